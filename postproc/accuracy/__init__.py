@@ -1,0 +1,1 @@
+"""Error: effects, models, fitting and solving."""

@@ -1,0 +1,66 @@
+"""One base exception; the leaves carry the place and the cure."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+
+class PostprocError(Exception):
+    """Something the user must change before the work can be done (exit code 2)."""
+
+
+class FileError(PostprocError):
+    """A file that cannot be used, with the place and the cure.
+
+    Attributes:
+        path: The file as the user named it (``-`` for standard input).
+        line: 1-based line, or None where no line is to blame.
+        place: A place inside a structured file, for instance ``$.tool.xyz_mm``.
+        problem: What is wrong.
+        cure: What the user can do about it.
+    """
+
+    def __init__(
+        self,
+        path: str | Path,
+        problem: str,
+        cure: str = "",
+        *,
+        line: int | None = None,
+        place: str = "",
+    ) -> None:
+        self.path, self.line, self.place = str(path), line, place
+        self.problem, self.cure = problem, cure
+        where = f"{path}:{line}" if line is not None else str(path)
+        text = f"{where}: {problem}"
+        text += f" @ {place}" if place else ""
+        text += f". {cure}" if cure else ""
+        super().__init__(text)
+
+
+class ProgramError(FileError):
+    """A robot program or variable file that cannot be read or must be refused."""
+
+
+class CellError(FileError):
+    """A cell file with a wrong key, unit or value."""
+
+
+class ArmError(FileError):
+    """An arm file with a wrong key, unit or value."""
+
+
+class MeasurementError(FileError):
+    """A measurement file that cannot be read or cannot determine what is asked."""
+
+
+class ModelError(FileError):
+    """A model file that cannot be read or does not fit the arm or the tool."""
+
+
+class OutputError(FileError):
+    """A place that cannot be written to."""
+
+
+class PlanError(PostprocError):
+    """A motion that cannot be planned: no time law, no inverse kinematics."""

@@ -1,0 +1,1 @@
+"""Robot program text: parsing, control flow, and rewriting without loss."""

@@ -1,0 +1,165 @@
+"""Visits: every arrival at a target, and the literals that hold the numbers."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from enum import IntEnum
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Bools = NDArray[np.bool_]
+
+START = -1  # predecessor: wherever the arm stands when the program starts
+ELSEWHERE = -2  # predecessor: a place that the program text does not tell
+
+
+class Motion(IntEnum):
+    """The trajectory word of a move."""
+
+    JOINT = 0
+    LINEAR = 1
+    CIRCULAR = 2
+
+
+class Target(IntEnum):
+    """What the six numbers of a visit mean."""
+
+    POSE = 0  # x, y, z [mm], a, e, r [deg] of the tool in the user frame
+    JOINTS = 1  # controller joint angles [deg]
+    HOME = 2  # $HOME: the numbers are in the cell file
+    CALIBRATION = 3  # $CAL_SYS
+    RELATIVE_TOOL = 4  # x, y, z [mm] from where the arm is, in the tool frame
+    RELATIVE_BASE = 5  # .. in the base frame
+    RELATIVE_UFRAME = 6  # .. in the user frame
+    AWAY = 7  # x: distance [mm] back along the tool's approach vector
+    NEAR = 8  # numbers of the pose as POSE, `distance_mm` short of it along approach
+    ABOUT = 9  # x, y, z: axis, a: angle [deg], e: frame (4, 5 or 6 as above)
+    BY = 10  # joint increments [deg]
+    UNKNOWN = 99  # the arm moves, the program text does not tell where to
+
+
+@dataclass(frozen=True)
+class Literals:
+    """m places in the text that hold the numbers of a target.
+
+    Attributes:
+        file: Index into `Visits.files`, (m,).
+        line: 1-based line of the first number, (m,).
+        start, end: Byte offsets of each number in its file, (m, 6); -1 where the
+            component is not written as a number.
+        joints: True where the numbers are joint angles, (m,).
+        name: Variable or array element, or "" for an inline literal; m strings.
+        shared: True where another program may read it too (exported), (m,).
+        taught: True where the point was taught with the robot, (m,).
+    """
+
+    file: Ints
+    line: Ints
+    start: Ints
+    end: Ints
+    joints: Bools
+    name: tuple[str, ...]
+    shared: Bools
+    taught: Bools
+
+    def __len__(self) -> int:
+        """Return the number of literals."""
+        return len(self.file)
+
+
+@dataclass(frozen=True)
+class Visits:
+    """n arrivals in program order (structure of arrays).
+
+    A CIRCULAR move makes two visits: its VIA point (`via` True), then its end, whose
+    predecessor is the VIA visit. Moves that hold no target are visits too, because they
+    turn the joints; their `literal` is -1.
+
+    Attributes:
+        files: Names of the files; index 0 is the program itself.
+        file, line: Where the move statement stands, (n,), line 1-based.
+        motion: `Motion`, (n,).
+        target: `Target`, (n,).
+        via: True at the VIA point of an arc, (n,).
+        values: The six numbers, (n, 6), NaN where not known.
+        distance_mm: For NEAR, (n,).
+        aux: Auxiliary axis values, (n, k), NaN where there is none.
+        config: Index into `configs`, (n,).
+        configs: Configuration strings verbatim; "" where none was written.
+        config_given: True where a configuration string was written, (n,).
+        literal: Index into `literals`, (n,), -1 where no number may be edited.
+        name: Index into `names`, (n,); names[0] is "" (inline literal).
+        tool, base, uframe: Index into `frames`, (n,), -1 where not known.
+        frames: Position records (k, 6) [mm, deg].
+        frame_taught: True where the text marks the frame as taught, (k,).
+        tool_remote: $TOOL_RMT is TRUE: the arm holds the part, (n,).
+        nearest_turn: $JNT_MTURN is FALSE, (n,).
+        fly: True for MOVEFLY, (n,).
+        fly_dist_mm: $FLY_DIST, (n,), NaN where unset or negative (off).
+        fly_per: $FLY_PER [%], (n,), NaN where unset.
+        fly_cart: $FLY_TYPE is FLY_CART, (n,).
+        lin_spd: $LIN_SPD [m/s], (n,), NaN where unset.
+        rot_spd: $ROT_SPD [rad/s], (n,), NaN where unset.
+        override: Product of the speed overrides that hold, (n,) in (0, 1].
+        wrist_joint: $ORNT_TYPE is WRIST_JNT, (n,).
+        reason: Index into `reasons`, (n,); 0 means that the visit may be compensated.
+        reasons: Why a visit is display only; reasons[0] is "".
+        pred_start: Offsets into `pred`, (n + 1,).
+        pred: Predecessor visits; START or ELSEWHERE where it is no visit.
+        measure_id: Ids of `-- MEASURE <id>` comments, n strings or "" where none.
+        literals: The places in the text.
+    """
+
+    files: tuple[str, ...]
+    file: Ints
+    line: Ints
+    motion: Ints
+    target: Ints
+    via: Bools
+    values: Floats
+    distance_mm: Floats
+    aux: Floats
+    config: Ints
+    configs: tuple[str, ...]
+    config_given: Bools
+    literal: Ints
+    name: Ints
+    names: tuple[str, ...]
+    tool: Ints
+    base: Ints
+    uframe: Ints
+    frames: Floats
+    frame_taught: Bools
+    tool_remote: Bools
+    nearest_turn: Bools
+    fly: Bools
+    fly_dist_mm: Floats
+    fly_per: Floats
+    fly_cart: Bools
+    lin_spd: Floats
+    rot_spd: Floats
+    override: Floats
+    wrist_joint: Bools
+    reason: Ints
+    reasons: tuple[str, ...]
+    pred_start: Ints
+    pred: Ints
+    measure_id: tuple[str, ...]
+    literals: Literals
+
+    def __post_init__(self) -> None:
+        for f in fields(self):
+            value = getattr(self, f.name)
+            if isinstance(value, np.ndarray):
+                value.setflags(write=False)
+
+    def __len__(self) -> int:
+        """Return the number of visits."""
+        return len(self.line)
+
+    def predecessors(self, visit: int) -> Ints:
+        """Return the possible predecessors of a visit."""
+        return self.pred[self.pred_start[visit] : self.pred_start[visit + 1]]

@@ -1,0 +1,1 @@
+"""Time: how the controller moves from one target to the next."""

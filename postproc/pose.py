@@ -1,0 +1,87 @@
+"""Rigid transforms and the Euler ZYZ poses of robot programs.
+
+A *pose* is an array (..., 4, 4) with lengths in metres. A *position record* is what
+a program or a cell file holds: (..., 6) with x, y, z [mm] and a, e, r [deg] so that
+R = Rz(a) Ry(e) Rz(r). This module imports nothing of the project: the language needs
+it to compose frames, the robot to place them.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+Array = NDArray[np.float64]
+
+MM = 1e-3  # [m]
+
+
+def _axis_rotation(angle: Array, axis: int) -> Array:
+    """Rotate about coordinate axis 1 (y) or 2 (z): (..., ) [rad] -> (..., 3, 3)."""
+    c, s = np.cos(angle), np.sin(angle)
+    R = np.zeros((*np.shape(angle), 3, 3))
+    i, j = (0, 1) if axis == 2 else (2, 0)
+    R[..., axis, axis] = 1.0
+    R[..., i, i] = R[..., j, j] = c
+    R[..., i, j], R[..., j, i] = -s, s
+    return R
+
+
+def rotation_from_zyz(zyz_deg: Array) -> Array:
+    """Convert Euler ZYZ angles (..., 3) [deg] to rotations (..., 3, 3).
+
+    >>> np.round(rotation_from_zyz(np.array([90.0, 0.0, 0.0])) @ [1, 0, 0], 12).tolist()
+    [0.0, 1.0, 0.0]
+    """
+    a, e, r = np.moveaxis(np.deg2rad(np.asarray(zyz_deg, dtype=float)), -1, 0)
+    R: Array = _axis_rotation(a, 2) @ _axis_rotation(e, 1) @ _axis_rotation(r, 2)
+    return R
+
+
+def zyz_from_rotation(R: Array) -> Array:
+    """Convert rotations (..., 3, 3) to Euler ZYZ angles (..., 3) [deg].
+
+    e lies in [0, 180]; where it is 0 or 180 the split is free and a = 0.
+    """
+    sin_e = np.hypot(R[..., 0, 2], R[..., 1, 2])
+    e = np.arctan2(sin_e, R[..., 2, 2])
+    degenerate = sin_e < 1e-9
+    a = np.where(degenerate, 0.0, np.arctan2(R[..., 1, 2], R[..., 0, 2]))
+    upright = np.sign(R[..., 2, 2]) * np.arctan2(R[..., 1, 0], R[..., 1, 1])
+    r = np.where(degenerate, upright, np.arctan2(R[..., 2, 1], -R[..., 2, 0]))
+    zyz: Array = np.rad2deg(np.stack([a, e, r], axis=-1))
+    return zyz
+
+
+def pose_from_record(record: Array) -> Array:
+    """Convert position records (..., 6) [mm, deg] to poses (..., 4, 4) [m]."""
+    record = np.asarray(record, dtype=float)
+    T = np.zeros((*record.shape[:-1], 4, 4))
+    T[..., :3, :3] = rotation_from_zyz(record[..., 3:])
+    T[..., :3, 3] = record[..., :3] * MM
+    T[..., 3, 3] = 1.0
+    return T
+
+
+def record_from_pose(T: Array) -> Array:
+    """Convert poses (..., 4, 4) [m] to position records (..., 6) [mm, deg]."""
+    angles = zyz_from_rotation(T[..., :3, :3])
+    record: Array = np.concatenate([T[..., :3, 3] / MM, angles], axis=-1)
+    return record
+
+
+def inverse(T: Array) -> Array:
+    """Invert poses (..., 4, 4)."""
+    out = np.zeros_like(T)
+    Rt = np.swapaxes(T[..., :3, :3], -1, -2)
+    out[..., :3, :3] = Rt
+    out[..., :3, 3] = -(Rt @ T[..., :3, 3, None])[..., 0]
+    out[..., 3, 3] = 1.0
+    return out
+
+
+def rotation_vector(R: Array) -> Array:
+    """Return the rotation vectors (..., 3) [rad] of rotations (..., 3, 3)."""
+    flat = Rotation.from_matrix(R.reshape(-1, 3, 3)).as_rotvec()
+    return np.asarray(flat, dtype=float).reshape(*R.shape[:-2], 3)

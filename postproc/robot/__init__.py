@@ -1,0 +1,1 @@
+"""The arm: kinematics, cell, states and arrival direction."""

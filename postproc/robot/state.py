@@ -1,0 +1,106 @@
+"""What the arm is doing at the moment it arrives at a target."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class States:
+    """States of the arm at n visits, in visit order (structure of arrays).
+
+    NaN in an optional covariate means that it is not known. SI units.
+
+    Attributes:
+        q: Commanded joint angles as the controller shows them, (n, 6) [rad].
+        direction: Arrival direction of every joint, (n, 6) in [-1, 1]; 0 is unknown.
+        tool: TCP in the flange frame, (n, 3) [m].
+        tool_id: Which tool or probe point, (n,) integers from 0.
+        travel: Travel of every joint since its last reversal, (n, 6) [rad].
+        speed: TCP speed on arrival, (n,) [m/s].
+        time: Time since the first visit, (n,) [s].
+        temperature: Arm or ambient temperature, (n,) [deg C].
+        payload: Payload mass, (n,) [kg].
+        payload_com: Payload centre of mass in the flange frame, (n, 3) [m].
+        order: Position in the visit order, (n,).
+    """
+
+    q: Array
+    direction: Array
+    tool: Array
+    tool_id: NDArray[np.int64]
+    travel: Array
+    speed: Array
+    time: Array
+    temperature: Array
+    payload: Array
+    payload_com: Array
+    order: Array
+
+    def __post_init__(self) -> None:
+        for f in fields(self):
+            getattr(self, f.name).setflags(write=False)
+
+    def __len__(self) -> int:
+        """Return the number of visits."""
+        return len(self.q)
+
+    def __getitem__(
+        self, rows: NDArray[np.int64] | NDArray[np.bool_] | slice
+    ) -> States:
+        """Return the states of the given rows."""
+        return replace(
+            self, **{f.name: getattr(self, f.name)[rows] for f in fields(self)}
+        )
+
+    def with_(self, **changes: NDArray[np.generic]) -> States:
+        """Return a copy with some arrays replaced."""
+        return replace(self, **changes)  # type: ignore[arg-type]
+
+
+def make_states(
+    q: Array,
+    direction: Array | None = None,
+    tool: Array | None = None,
+    **covariates: NDArray[np.generic] | float,
+) -> States:
+    """Build states from joint angles, with unknown covariates as NaN.
+
+    Args:
+        q: Joint angles, (n, 6) [rad].
+        direction: (n, 6), default 0 (unknown).
+        tool: TCP in the flange frame, (3,) or (n, 3) [m], default the flange.
+        covariates: Any other field of `States`, as an array or one value for all.
+
+    Raises:
+        TypeError: A covariate that `States` does not have.
+    """
+    q = np.array(q, dtype=float)
+    n = len(q)
+    shapes: dict[str, tuple[int, ...]] = {
+        "travel": (n, 6), "speed": (n,), "time": (n,), "temperature": (n,),
+        "payload": (n,), "payload_com": (n, 3),
+    }  # fmt: skip
+    values: dict[str, NDArray[np.generic]] = {
+        name: np.array(
+            np.broadcast_to(covariates.pop(name, np.nan), shape), dtype=float
+        )
+        for name, shape in shapes.items()
+    }
+    tool_id = covariates.pop("tool_id", 0)
+    order = covariates.pop("order", np.arange(n))
+    if covariates:
+        raise TypeError(f"states have no {', '.join(covariates)}")
+    return States(
+        q=q,
+        direction=np.zeros((n, 6)) if direction is None else np.array(direction, float),
+        tool=np.array(np.broadcast_to(np.zeros(3) if tool is None else tool, (n, 3))),
+        tool_id=np.array(np.broadcast_to(tool_id, (n,)), dtype=np.int64),
+        order=np.array(np.broadcast_to(order, (n,)), dtype=float),
+        **values,  # type: ignore[arg-type]
+    )
