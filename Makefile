@@ -1,0 +1,44 @@
+# make demo    survey, fit, compensate and check the sample programs on a virtual arm
+# make test    all tests
+# make lint    ruff and mypy
+# make bench   how long the stages take on this machine
+# Each target first creates the environment .venv when it is missing or out of date.
+
+VENV ?= .venv
+PYTHON_BIN := $(VENV)/bin/python
+STAMP := $(VENV)/.installed
+
+# Small matrices: two processes gain more than two threads inside one.
+export OMP_NUM_THREADS ?= 1
+export OPENBLAS_NUM_THREADS ?= 1
+
+.PHONY: help demo test lint format bench clean
+.DELETE_ON_ERROR:
+
+help:
+	@sed -n 's/^# //p' Makefile
+
+$(STAMP): pyproject.toml .ci/venv
+	@bash .ci/venv $(VENV)
+	@touch $@
+
+demo: $(STAMP)
+	@PATH="$(abspath $(VENV))/bin:$$PATH" bash programs/demo.sh
+
+test: $(STAMP)
+	@$(PYTHON_BIN) -m pytest -n 2
+
+lint: $(STAMP)
+	@$(VENV)/bin/ruff check .
+	@$(VENV)/bin/ruff format --check .
+	@$(VENV)/bin/mypy
+
+format: $(STAMP)
+	@$(VENV)/bin/ruff check --fix .
+	@$(VENV)/bin/ruff format .
+
+bench: $(STAMP)
+	@PATH="$(abspath $(VENV))/bin:$$PATH" bash programs/bench.sh
+
+clean:
+	rm -rf $(VENV) demo build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis
