@@ -1,0 +1,78 @@
+"""Closed-form inverse kinematics of an ortho-parallel arm with a spherical wrist.
+
+The only module that imports py-opw-kinematics (Brandstoetter, Angerer, Hofbaur: An
+analytical solution of the inverse kinematics problem of industrial serial manipulators
+with an ortho-parallel basis and a spherical wrist, 2014).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import py_opw_kinematics as opw
+from numpy.typing import NDArray
+from scipy.spatial.transform import RigidTransform
+
+from postproc.pose import MM
+from postproc.robot.arm_file import OpwSection
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Branches:
+    """All closed-form solutions of n flange poses, in stable slots 4 W + 2 S + E.
+
+    W: axis 5 negative; S: wrist centre behind axis 1; E: the other elbow.
+
+    Attributes:
+        q: (n, 8, 6) [rad], NaN where a branch does not exist. Axes lie in the arm's
+            range where a turn of 360 deg can bring them there, else in (-pi, pi].
+    """
+
+    q: Array
+
+
+def wrap(angle: Array) -> Array:
+    """Wrap angles into [-pi, pi)."""
+    wrapped: Array = np.mod(angle + np.pi, 2 * np.pi) - np.pi
+    return wrapped
+
+
+class Inverse:
+    """The inverse kinematics of one arm."""
+
+    def __init__(
+        self, parameters: OpwSection, mix: Array, lower: Array, upper: Array
+    ) -> None:
+        """Build it from the arm file's section, angle mixing and joint limits [rad]."""
+        p = parameters
+        model = opw.KinematicModel(
+            a1=p.a1_mm, a2=p.a2_mm, b=p.b_mm,
+            c1=p.c1_mm, c2=p.c2_mm, c3=p.c3_mm, c4=p.c4_mm,
+            offsets=tuple(np.deg2rad(p.offsets_deg)), flip_axes=tuple(p.flip_axes),
+        )  # fmt: skip
+        self._robot = opw.Robot(model, degrees=False)
+        self._unmix = np.linalg.inv(mix)
+        self._lower, self._upper = lower, upper
+
+    def branches(self, flange: Array) -> Branches:
+        """Solve for all branches of flange poses (n, 4, 4) [m]."""
+        n = len(flange)
+        if n == 0:
+            return Branches(np.empty((0, 8, 6)))
+        poses = np.array(flange)
+        poses[:, :3, 3] /= MM
+        reached = self._robot.reach(RigidTransform.from_matrix(poses), threads=1)
+        q = np.asarray(reached.joints, dtype=float).reshape(n, 8, 6)
+        return Branches(self._into_range(q @ self._unmix.T))
+
+    def _into_range(self, q: Array) -> Array:
+        """Shift angles by whole turns into the joint range where that is possible."""
+        turn = 2 * np.pi
+        q = np.pi - np.mod(np.pi - q, turn)
+        up = (q < self._lower) & (q + turn <= self._upper)
+        down = (q > self._upper) & (q - turn >= self._lower)
+        shifted: Array = q + turn * up - turn * down
+        return shifted
