@@ -48,7 +48,7 @@ def zyz_from_rotation(R: Array) -> Array:
     e = np.arctan2(sin_e, R[..., 2, 2])
     degenerate = sin_e < 1e-9
     a = np.where(degenerate, 0.0, np.arctan2(R[..., 1, 2], R[..., 0, 2]))
-    upright = np.sign(R[..., 2, 2]) * np.arctan2(R[..., 1, 0], R[..., 1, 1])
+    upright = np.arctan2(R[..., 1, 0], R[..., 1, 1])
     r = np.where(degenerate, upright, np.arctan2(R[..., 2, 1], -R[..., 2, 0]))
     zyz: Array = np.rad2deg(np.stack([a, e, r], axis=-1))
     return zyz

@@ -1,0 +1,240 @@
+"""The cell file: the robot's surroundings as the program finds them at its start."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field, NonNegativeFloat, PositiveFloat, model_validator
+
+from postproc.exceptions import CellError
+from postproc.pose import MM, pose_from_record
+from postproc.robot.arm import Arm, load_arm
+from postproc.robot.schema import Sextuple, Strict, Triple, read_toml
+
+Array = NDArray[np.float64]
+Source = Literal["cad", "tracker", "taught"]
+Effect = Literal["still", "moves", "sets-frames"]
+
+NO_ANGLES = [0.0, 0.0, 0.0]
+LONGEST_MM = 50_000.0  # no frame is farther away: a longer one has a wrong unit
+
+
+class FrameSection(Strict):
+    """A frame: where it is, and where that is known from."""
+
+    xyz_mm: Triple
+    euler_zyz_deg: Triple = NO_ANGLES
+    source: Source = "cad"
+
+    @model_validator(mode="before")
+    @classmethod
+    def _from_list(cls, value: object) -> object:
+        """Accept the six numbers of a POS as well as the two named triples."""
+        if isinstance(value, list) and len(value) == 6:
+            return {"xyz_mm": value[:3], "euler_zyz_deg": value[3:]}
+        return value
+
+    @model_validator(mode="after")
+    def _plausible(self) -> FrameSection:
+        if max(abs(v) for v in self.xyz_mm) > LONGEST_MM:
+            raise ValueError(f"xyz_mm is beyond {LONGEST_MM:g} mm: is it in mm?")
+        if max(abs(v) for v in self.euler_zyz_deg) > 360.0:
+            raise ValueError("euler_zyz_deg is beyond 360 deg")
+        return self
+
+    def record(self) -> tuple[float, ...]:
+        """Return x, y, z [mm], a, e, r [deg]."""
+        return (*self.xyz_mm, *self.euler_zyz_deg)
+
+
+class RobotSection(Strict):
+    """Which arm, and what its controller does."""
+
+    arm: str
+    absolute_accuracy: bool = False
+
+
+class HomeSection(Strict):
+    """Where $HOME is."""
+
+    joints_deg: Sextuple
+
+
+class PayloadSection(Strict):
+    """What the arm carries, tool included."""
+
+    mass_kg: NonNegativeFloat
+    com_mm: Triple = NO_ANGLES
+
+
+class EnvironmentSection(Strict):
+    """The state that compensation is made for."""
+
+    temperature_c: Annotated[float, Field(ge=-30.0, le=80.0)]
+
+
+class TrackerSection(Strict):
+    """Where the laser tracker stands, in the arm's base frame."""
+
+    xyz_mm: Triple
+
+
+class LimitSection(Strict):
+    """When a correction is not trusted."""
+
+    correction_mm: PositiveFloat = 5.0
+    agree_mm: PositiveFloat = 0.02
+    step_mm: PositiveFloat = 0.5
+    wrist_deg: PositiveFloat = 3.0
+
+
+class FrameTableEntry(Strict):
+    """The frames that one call of a frame routine sets."""
+
+    tool: FrameSection | None = None
+    base: FrameSection | None = None
+    uframe: FrameSection | None = None
+
+
+class FramesSection(Strict):
+    """Tables of routines that set frames, by routine name and arguments."""
+
+    routines: dict[str, dict[str, FrameTableEntry]] = Field(default_factory=dict)
+
+
+class CellFile(Strict):
+    """A whole cell file."""
+
+    robot: RobotSection
+    tool: FrameSection | None = None
+    base: FrameSection | None = None
+    uframe: FrameSection | None = None
+    home: HomeSection | None = None
+    payload: PayloadSection | None = None
+    environment: EnvironmentSection | None = None
+    tracker: TrackerSection | None = None
+    aux: dict[str, Literal["gun", "track", "positioner"]] = Field(default_factory=dict)
+    limits: LimitSection = LimitSection()
+    routines: dict[str, Effect] = Field(default_factory=dict)
+    frames: FramesSection = FramesSection()
+    taught: list[str] = Field(default_factory=list)
+
+
+@dataclass(frozen=True)
+class Frame:
+    """A frame of the cell: its pose (4, 4) [m], its record [mm, deg] and its source."""
+
+    pose: Array
+    record: tuple[float, ...]
+    source: Source
+
+
+@dataclass(frozen=True)
+class Cell:
+    """The robot's surroundings, in SI units; the file's own sections stay in `file`.
+
+    Attributes:
+        path: Where the cell was read from.
+        arm: The arm.
+        tool: TCP in the flange frame at program start.
+        base: The arm's base in the world at program start.
+        uframe: The user frame in the world at program start.
+        home: $HOME, (6,) [rad], or None.
+        payload_mass: [kg], NaN where not declared.
+        payload_com: Centre of mass in the flange frame, (3,) [m].
+        temperature: [deg C], NaN where not declared.
+        tracker: Tracker position in the base frame, (3,) [m], or None.
+        aux: Kind of every declared auxiliary axis.
+        limits: Guards, in the units of their names.
+        routines: What outside routines do, by lower-case name.
+        frame_tables: Frames set by routines, by lower-case name, then arguments.
+        taught: Lower-case names of points that were taught with the robot.
+    """
+
+    path: Path
+    file: CellFile
+    arm: Arm
+    tool: Frame
+    base: Frame
+    uframe: Frame
+    home: Array | None
+    payload_mass: float
+    payload_com: Array
+    temperature: float
+    tracker: Array | None
+    aux: Mapping[int, str]
+    limits: LimitSection
+    routines: Mapping[str, Effect]
+    frame_tables: Mapping[str, Mapping[str, FrameTableEntry]]
+    taught: frozenset[str]
+
+
+def _frame(section: FrameSection | None) -> Frame:
+    """Convert a frame section; a missing one is the identity."""
+    if section is None:
+        return Frame(np.eye(4), (0.0,) * 6, "cad")
+    record = section.record()
+    return Frame(pose_from_record(np.array(record)), record, section.source)
+
+
+def load_cell(path: str | Path) -> Cell:
+    """Read a cell file.
+
+    Raises:
+        CellError: The file cannot be read, or a key, unit or value is wrong; the
+            message names the place and the cure.
+        ArmError: The arm it names cannot be loaded.
+    """
+    path = Path(path)
+    file = read_toml(path, CellFile, CellError)
+    arm = load_arm(file.robot.arm, beside=path.parent)
+    payload, tracker = file.payload, file.tracker
+    return Cell(
+        path=path,
+        file=file,
+        arm=arm,
+        tool=_frame(file.tool),
+        base=_frame(file.base),
+        uframe=_frame(file.uframe),
+        home=_home(file, arm, path),
+        payload_mass=np.nan if payload is None else payload.mass_kg,
+        payload_com=np.array(NO_ANGLES if payload is None else payload.com_mm) * MM,
+        temperature=file.environment.temperature_c if file.environment else np.nan,
+        tracker=None if tracker is None else np.array(tracker.xyz_mm) * MM,
+        aux=_aux(file, path),
+        limits=file.limits,
+        routines={name.lower(): what for name, what in file.routines.items()},
+        frame_tables={k.lower(): v for k, v in file.frames.routines.items()},
+        taught=frozenset(name.lower() for name in file.taught),
+    )
+
+
+def _home(file: CellFile, arm: Arm, path: Path) -> Array | None:
+    """Convert and check $HOME."""
+    if file.home is None:
+        return None
+    home: Array = np.deg2rad(file.home.joints_deg)
+    if not arm.within_limits(home[None])[0]:
+        j = int(np.argmax((home < arm.lower) | (home > arm.upper)))
+        raise CellError(
+            path,
+            f"{file.home.joints_deg[j]:g} deg is outside the range of axis {j + 1}",
+            "Correct the angle or the arm file",
+            place=f"$.home.joints_deg[{j + 1}]",
+        )
+    return home
+
+
+def _aux(file: CellFile, path: Path) -> dict[int, str]:
+    """Convert the keys of [aux] to axis numbers."""
+    for key in file.aux:
+        if not key.isdigit() or int(key) < 1:
+            raise CellError(
+                path, "not an axis number", 'Write 1 = "gun"', place=f"$.aux.{key}"
+            )
+    return {int(key): str(kind) for key, kind in file.aux.items()}

@@ -1,0 +1,193 @@
+"""The NJ 220-2.7 against its published numbers, and derivatives by differences."""
+
+import numpy as np
+import pytest
+
+from postproc.exceptions import ArmError
+from postproc.pose import record_from_pose
+from postproc.robot.arm import GRAVITY, load_arm
+
+TOOL = np.array([0.08, -0.04, 0.15])
+
+
+@pytest.fixture(scope="module")
+def arm():
+    return load_arm("nj220-2.7")
+
+
+@pytest.fixture(scope="module")
+def q(arm):
+    rng = np.random.default_rng(1)
+    low = np.maximum(arm.lower, -np.pi) + 0.05
+    high = np.minimum(arm.upper, np.pi) - 0.05
+    low[2] = np.deg2rad(-250)
+    return rng.uniform(low, high, (500, 6))
+
+
+@pytest.mark.parametrize(
+    ("joints", "xyz", "zyz"),
+    [
+        ((0, 0, -90, 0, 0, 0), (1755.3, 0, 2255), None),
+        ((0, 0, -90, 0, 90, 0), (1525.3, 0, 2025), (0, 180, 0)),
+        (
+            (20, 10, -100, 40, 50, -60),
+            (1690.056, -735.651, 1659.802),
+            (-70.680, 140.469, -11.619),
+        ),
+    ],
+)
+def test_published_poses(arm, joints, xyz, zyz):
+    record = record_from_pose(arm.flange(np.deg2rad([joints])))[0]
+    np.testing.assert_allclose(record[:3], xyz, atol=6e-4)
+    if zyz is not None:
+        np.testing.assert_allclose(record[3:], zyz, atol=6e-4)
+
+
+def test_points_along_x_at_zero(arm):
+    flange = arm.flange(np.deg2rad([[0, 0, -90, 0, 0, 0]]))[0]
+    np.testing.assert_allclose(flange[:3, 2], [1, 0, 0], atol=1e-12)
+
+
+def test_link_frames_are_the_dh_product(arm, q):
+    dh, theta = arm.dh, arm.dh.angles(q[:20])
+    T = np.tile(np.eye(4), (20, 1, 1))
+    frames = arm.link_frames(q[:20])
+    for i in range(6):
+        c, s = np.cos(theta[:, i]), np.sin(theta[:, i])
+        ca, sa = np.cos(dh.alpha[i]), np.sin(dh.alpha[i])
+        A = np.zeros((20, 4, 4))
+        A[:, 0] = np.stack([c, -s * ca, s * sa, dh.a[i] * c], 1)
+        A[:, 1] = np.stack([s, c * ca, -c * sa, dh.a[i] * s], 1)
+        A[:, 2] = [0, sa, ca, dh.d[i]]
+        A[:, 3, 3] = 1
+        T = T @ A
+        np.testing.assert_allclose(frames[:, i + 1], T, atol=1e-12)
+    np.testing.assert_allclose(arm.flange(q[:20]), T, atol=1e-12)
+
+
+def test_jacobian_is_the_derivative(arm, q):
+    q = q[:50]
+    J = arm.jacobian(q, TOOL)
+    step = 1e-6
+    for j in range(6):
+        dq = np.zeros(6)
+        dq[j] = step
+        ahead, behind = arm.flange(q + dq), arm.flange(q - dq)
+        point = ((ahead - behind) @ [*TOOL, 1.0])[:, :3] / (2 * step)
+        np.testing.assert_allclose(J[:, :3, j], point, atol=1e-8)
+        spin = (ahead - behind)[:, :3, :3] / (2 * step)
+        spin = spin @ np.swapaxes(arm.flange(q)[:, :3, :3], 1, 2)
+        omega = np.stack([spin[:, 2, 1], spin[:, 0, 2], spin[:, 1, 0]], 1)
+        np.testing.assert_allclose(J[:, 3:, j], omega, atol=1e-8)
+
+
+def test_joint_axes_span_the_jacobian(arm, q):
+    axes, points = arm.joint_axes(q[:50])
+    tcp = (arm.flange(q[:50]) @ [*TOOL, 1.0])[:, :3]
+    linear = np.cross(axes, tcp[:, None] - points)
+    J = arm.jacobian(q[:50], TOOL)
+    np.testing.assert_allclose(np.swapaxes(linear, 1, 2), J[:, :3], atol=1e-12)
+
+
+def _potential_energy(arm, q, payload, com):
+    frames = arm.link_frames(q)
+    energy = payload * GRAVITY * (frames[:, 6] @ [*com, 1.0])[:, 2]
+    links = arm.file.links
+    for i in range(6):
+        centre = frames[:, i + 1] @ [*(np.array(links.com_mm[i]) * 1e-3), 1.0]
+        energy += links.mass_kg[i] * GRAVITY * centre[:, 2]
+    return energy
+
+
+def test_gravity_torque_is_the_energy_gradient(arm, q):
+    q, com = q[:30], np.array([0.1, 0.0, 0.2])
+    torque = arm.gravity_torque(q, 60.0, com)
+    step = 1e-5
+    for j in range(6):
+        dq = np.zeros(6)
+        dq[j] = step
+        ahead = _potential_energy(arm, q + dq, 60.0, com)
+        behind = _potential_energy(arm, q - dq, 60.0, com)
+        slope = (ahead - behind) / (2 * step)
+        np.testing.assert_allclose(torque[:, j], -slope, atol=1e-5)
+
+
+def test_gravity_basis_spans_the_torque(arm, q):
+    links = arm.file.links
+    lumped = [
+        value
+        for mass, com in zip(links.mass_kg, links.com_mm, strict=True)
+        for value in (mass, *(mass * np.array(com) * 1e-3))
+    ]
+    torque = arm.gravity_basis(q[:50]) @ lumped
+    np.testing.assert_allclose(torque, arm.gravity_torque(q[:50]), atol=1e-9)
+
+
+def test_every_branch_leads_back(arm, q):
+    flange = arm.flange(q)
+    branches = arm.inverse(flange).q
+    exists = ~np.isnan(branches).any(-1)
+    assert exists.any(1).all()
+    again = arm.flange(branches[exists])
+    wanted = np.repeat(flange[:, None], 8, 1)[exists]
+    np.testing.assert_allclose(again, wanted, atol=1e-9)
+
+
+def test_branch_flags(arm):
+    q = np.deg2rad([[10, 5, -90, 20, 40, 30], [10, 5, -90, 20, -40, 30]])
+    np.testing.assert_array_equal(arm.branch(q), [0, 4])
+    over = np.deg2rad([[0, -60, 0, 20, 40, 30]])
+    assert arm.branch(over)[0] & 1  # elbow: axis 3 outside (-192.53, -12.53) deg
+
+
+def test_nearest_keeps_branch_and_turn(arm, q):
+    turned = q + np.deg2rad([0, 0, 0, 360, 0, -720])
+    found = arm.nearest(arm.flange(q), turned + 1e-3, arm.branch(q))
+    np.testing.assert_allclose(found, turned, atol=1e-8)
+
+
+def test_axis_3_comes_back_in_range(arm):
+    q = np.deg2rad([[0.0, 0, -200, 10, 50, 0]])
+    slots = arm.inverse(arm.flange(q)).q[0]
+    assert np.abs(slots - q).max(1)[~np.isnan(slots).any(1)].min() < 1e-9
+
+
+def _write_arm(tmp_path, arm, old, new):
+    from postproc.robot.arm_file import ARMS
+
+    text = (ARMS / "nj220-2.7.toml").read_text()
+    assert old in text
+    path = tmp_path / "arm.toml"
+    path.write_text(text.replace(old, new))
+    return path
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("lower_deg = [-180.0", "lower_deg = [190.0", r"lower_deg\[1\] must be less"),
+        ("sense = [-1", "sense = [-2", "sense must be"),
+        ("c2_mm = 1175.0", "c2_mm = 1200.0", r"\$\.opw"),
+        ("a_mm =", "a_m =", "unknown key|required key"),
+        ("repeatability_mm = 0.075", "repeatability_mm = nan", "repeatability_mm"),
+    ],
+)
+def test_wrong_arm_file_names_the_place(tmp_path, arm, old, new, said):
+    with pytest.raises(ArmError, match=said):
+        load_arm(_write_arm(tmp_path, arm, old, new))
+
+
+def test_unknown_arm_lists_the_shipped_ones():
+    with pytest.raises(ArmError, match=r"nj220-2\.7"):
+        load_arm("kr-1000")
+
+
+def test_axis_3_measured_from_axis_2(tmp_path, arm):
+    linked = load_arm(
+        _write_arm(tmp_path, arm, "axis3_adds_axis2 = false", "axis3_adds_axis2 = true")
+    )
+    q = np.deg2rad([[10, 20, -100, 30, 40, 50]])
+    same = q - np.deg2rad([[0, 0, 20, 0, 0, 0]])
+    np.testing.assert_allclose(linked.flange(same), arm.flange(q), atol=1e-12)
+    found = linked.nearest(linked.flange(same), same)
+    np.testing.assert_allclose(found, same, atol=1e-9)

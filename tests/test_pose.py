@@ -1,0 +1,50 @@
+"""ZYZ poses as group axioms."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
+
+from postproc.pose import (
+    inverse,
+    pose_from_record,
+    record_from_pose,
+    rotation_vector,
+)
+
+angle = st.floats(-180, 180)
+record = st.tuples(*[st.floats(-3000, 3000)] * 3, angle, angle, angle).map(np.array)
+
+
+@given(record)
+def test_rotation_is_intrinsic_zyz(r):
+    expected = Rotation.from_euler("ZYZ", r[3:], degrees=True).as_matrix()
+    np.testing.assert_allclose(pose_from_record(r)[:3, :3], expected, atol=1e-12)
+
+
+@given(record)
+def test_record_and_back(r):
+    T = pose_from_record(r)
+    np.testing.assert_allclose(pose_from_record(record_from_pose(T)), T, atol=1e-8)
+
+
+@given(record, record)
+def test_inverse_of_a_product(r, s):
+    A, B = pose_from_record(r), pose_from_record(s)
+    np.testing.assert_allclose(inverse(A @ B), inverse(B) @ inverse(A), atol=1e-9)
+    np.testing.assert_allclose(A @ inverse(A), np.eye(4), atol=1e-9)
+
+
+@pytest.mark.parametrize("e", [0.0, 180.0])
+def test_degenerate_split_puts_a_to_zero(e):
+    T = pose_from_record(np.array([1, 2, 3, 25, e, 40]))
+    r = record_from_pose(T)
+    assert r[3] == 0.0 and r[4] == e
+    np.testing.assert_allclose(pose_from_record(r), T, atol=1e-9)
+
+
+def test_rotation_vector_of_many():
+    R = Rotation.random(12, random_state=0)
+    found = rotation_vector(R.as_matrix().reshape(3, 4, 3, 3))
+    np.testing.assert_allclose(found.reshape(-1, 3), R.as_rotvec(), atol=1e-12)
