@@ -1,0 +1,77 @@
+"""Writing files so that nothing is ever half written."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from collections.abc import Mapping
+from pathlib import Path
+
+from postproc.exceptions import OutputError
+
+
+def write_all(files: Mapping[Path, bytes]) -> None:
+    """Write several files, each to a temporary name, synced, then renamed.
+
+    No file appears under its name before all of them are safely on the disk. They are
+    renamed in the order given: name the one that users wait for last.
+
+    Raises:
+        OutputError: A folder is missing or cannot be written to, or the disk is full;
+            no file has been changed then.
+    """
+    ready: list[tuple[str, Path]] = []
+    try:
+        for path, data in files.items():
+            ready.append((_write_temporary(path, data), path))
+        for temporary, path in ready:
+            os.replace(temporary, path)
+        for folder in {path.parent for path in files}:
+            _sync_folder(folder)
+    except OSError as exc:
+        cure = "Give an existing folder with room that may be written to"
+        raise OutputError(exc.filename or "output", _reason(exc), cure) from None
+    finally:
+        for temporary, _ in ready:
+            Path(temporary).unlink(missing_ok=True)
+
+
+def _write_temporary(path: Path, data: bytes) -> str:
+    """Write and sync a temporary file in the folder of the final one."""
+    mode = path.stat().st_mode & 0o777 if path.exists() else 0o666 & ~_umask()
+    handle, name = tempfile.mkstemp(prefix=f".{path.name}.", dir=path.parent)
+    try:
+        with os.fdopen(handle, "wb") as out:
+            out.write(data)
+            out.flush()
+            os.fsync(out.fileno())
+        os.chmod(name, mode)
+    except BaseException:
+        Path(name).unlink(missing_ok=True)
+        raise
+    return name
+
+
+def _umask() -> int:
+    """Read the process's file mode mask."""
+    mask = os.umask(0)
+    os.umask(mask)
+    return mask
+
+
+def _sync_folder(folder: Path) -> None:
+    """Make renames in a folder durable."""
+    handle = os.open(folder, os.O_RDONLY)
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)
+
+
+def _reason(exc: OSError) -> str:
+    """Say in plain words why writing failed."""
+    if isinstance(exc, FileNotFoundError):
+        return "the folder does not exist"
+    if isinstance(exc, PermissionError) or exc.errno == 30:  # EROFS
+        return "the folder is read-only"
+    return f"cannot be written ({exc.strerror})"
