@@ -84,6 +84,12 @@ class TrackerSection(Strict):
     xyz_mm: Triple
 
 
+class SurveySection(Strict):
+    """Where the survey's probe points (SMR nests) sit, in the flange frame."""
+
+    points_mm: Annotated[list[Triple], Field(min_length=1)]
+
+
 class LimitSection(Strict):
     """When a correction is not trusted."""
 
@@ -118,6 +124,7 @@ class CellFile(Strict):
     payload: PayloadSection | None = None
     environment: EnvironmentSection | None = None
     tracker: TrackerSection | None = None
+    survey: SurveySection | None = None
     aux: dict[str, Literal["gun", "track", "positioner"]] = Field(default_factory=dict)
     limits: LimitSection = LimitSection()
     routines: dict[str, Effect] = Field(default_factory=dict)
@@ -149,6 +156,8 @@ class Cell:
         payload_com: Centre of mass in the flange frame, (3,) [m].
         temperature: [deg C], NaN where not declared.
         tracker: Tracker position in the base frame, (3,) [m], or None.
+        probes: Probe points of a survey in the flange frame, (k, 3) [m]; the tool's TCP
+            where the cell lists none. Row i belongs to tool_id i + 1.
         aux: Kind of every declared auxiliary axis.
         limits: Guards, in the units of their names.
         routines: What outside routines do, by lower-case name.
@@ -167,6 +176,7 @@ class Cell:
     payload_com: Array
     temperature: float
     tracker: Array | None
+    probes: Array
     aux: Mapping[int, str]
     limits: LimitSection
     routines: Mapping[str, Effect]
@@ -206,6 +216,7 @@ def load_cell(path: str | Path) -> Cell:
         payload_com=np.array(NO_ANGLES if payload is None else payload.com_mm) * MM,
         temperature=file.environment.temperature_c if file.environment else np.nan,
         tracker=None if tracker is None else np.array(tracker.xyz_mm) * MM,
+        probes=_probes(file),
         aux=_aux(file, path),
         limits=file.limits,
         routines={name.lower(): what for name, what in file.routines.items()},
@@ -228,6 +239,13 @@ def _home(file: CellFile, arm: Arm, path: Path) -> Array | None:
             place=f"$.home.joints_deg[{j + 1}]",
         )
     return home
+
+
+def _probes(file: CellFile) -> Array:
+    """Convert the survey's probe points; the default is the tool's TCP."""
+    if file.survey is not None:
+        return np.array(file.survey.points_mm) * MM
+    return _frame(file.tool).pose[None, :3, 3]
 
 
 def _aux(file: CellFile, path: Path) -> dict[int, str]:
