@@ -1,0 +1,91 @@
+"""When a correction is not trusted."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from postproc.pose import MM
+from postproc.reasons import Reasons
+from postproc.robot.arm import Arm
+from postproc.robot.cell import LimitSection
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Bools = NDArray[np.bool_]
+
+SOLVED = 1e-6  # [m] model against wanted pose
+
+
+def guard_solutions(
+    reasons: Reasons, arm: Arm, limits: LimitSection, q: Array, solved: Array
+) -> None:
+    """Mark corrected commands that the arm cannot or should not be given.
+
+    Args:
+        reasons: Collects the first reason of every visit.
+        arm: The arm.
+        limits: The cell's guards.
+        q: Joint angles of the original command, (n, 6) [rad].
+        solved: Joint angles of the corrected command, (n, 6) [rad], NaN where the
+            corrected pose has no solution.
+    """
+    with np.errstate(invalid="ignore"):
+        lost: Bools = np.isnan(solved).any(axis=1) & ~np.isnan(q).any(axis=1)
+        reasons.mark(lost, "the corrected pose is out of reach on its branch")
+        over = ~arm.within_limits(solved) & ~np.isnan(solved).any(axis=1)
+        reasons.mark(over, "the corrected pose is beyond a joint limit")
+        wrist = np.abs(q[:, 4]) < np.deg2rad(limits.wrist_deg)
+        wrist |= np.abs(solved[:, 4]) < np.deg2rad(limits.wrist_deg)
+        text = f"within {limits.wrist_deg:g} deg of the wrist singularity"
+        reasons.mark(wrist, text)
+        flipped = np.sign(q[:, 4]) != np.sign(solved[:, 4])
+        reasons.mark(flipped & ~lost, "the correction would flip the wrist")
+
+
+def guard_size(
+    reasons: Reasons, limits: LimitSection, correction: Array, residual: Array
+) -> None:
+    """Mark corrections that are too large or did not converge.
+
+    Args:
+        reasons: Collects the first reason of every visit.
+        limits: The cell's guards.
+        correction: Change of the commanded TCP, (n, 3) [m].
+        residual: Predicted landing against the wanted position, (n,) [m].
+    """
+    with np.errstate(invalid="ignore"):
+        size = np.linalg.norm(correction, axis=1) / MM
+        text = f"the correction exceeds correction_mm = {limits.correction_mm:g}"
+        reasons.mark(size > limits.correction_mm, text)
+        reasons.mark(~(residual <= SOLVED), "the correction did not converge to 1 um")
+
+
+def guard_steps(
+    reasons: Reasons,
+    limits: LimitSection,
+    correction: Array,
+    direction: Array,
+    before: Ints,
+) -> None:
+    """Mark jumps of the correction between neighbours of a fly run.
+
+    A step is allowed where a joint really turns.
+
+    Args:
+        reasons: Collects the first reason of every visit.
+        limits: The cell's guards.
+        correction: Change of the commanded TCP, (n, 3) [m].
+        direction: Arrival direction, (n, 6).
+        before: The visit before within the same fly run, (n,), -1 where there is none.
+    """
+    inside = before >= 0
+    last = np.where(inside, before, 0)
+    with np.errstate(invalid="ignore"):
+        step = np.linalg.norm(correction - correction[last], axis=1) / MM
+        same_side = (direction == direction[last]).all(axis=1)
+        jump = inside & same_side & (step > limits.step_mm)
+    text = (
+        f"the correction steps by more than step_mm = {limits.step_mm:g} in a fly run"
+    )
+    reasons.mark(jump, text)

@@ -1,0 +1,64 @@
+"""One literal, several arrivals: do their corrections agree?"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Bools = NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class Agreement:
+    """What the arrivals at m literals have in common.
+
+    Attributes:
+        literal: The literals that are visited, (m,), ascending.
+        group: Index into `literal` of every visit, (n,), -1 where it has none.
+        usable: Every arrival can be corrected, (m,).
+        spread_mm: Largest distance between two arrivals' corrections, (m,) [mm],
+            bounded from above by the diagonal of their bounding box.
+        values: The mean of the arrivals' corrected numbers, (m, 6).
+        arrivals: Number of arrivals, (m,).
+    """
+
+    literal: Ints
+    group: Ints
+    usable: Bools
+    spread_mm: Array
+    values: Array
+    arrivals: Ints
+
+
+def agree(
+    literal: Ints, usable: Bools, corrected: Array, correction_mm: Array
+) -> Agreement:
+    """Compare the corrections of all arrivals at every literal.
+
+    Args:
+        literal: Literal of every visit, (n,), -1 where it has none.
+        usable: The visit can be corrected, (n,).
+        corrected: Numbers that this visit would write, (n, 6) in the file's units.
+        correction_mm: What must agree: the change of the target in its own frame,
+            (n, 3) [mm].
+    """
+    rows = np.flatnonzero(literal >= 0)
+    names, inverse, count = np.unique(
+        literal[rows], return_inverse=True, return_counts=True
+    )
+    group = np.full(len(literal), -1, dtype=np.int64)
+    group[rows] = inverse
+    m = len(names)
+    all_usable = np.ones(m, dtype=bool)
+    np.logical_and.at(all_usable, inverse, usable[rows])
+    low, high = np.full((m, 3), np.inf), np.full((m, 3), -np.inf)
+    np.minimum.at(low, inverse, correction_mm[rows])
+    np.maximum.at(high, inverse, correction_mm[rows])
+    total = np.zeros((m, 6))
+    np.add.at(total, inverse, corrected[rows])
+    spread = np.linalg.norm(high - low, axis=1)
+    return Agreement(names, group, all_usable, spread, total / count[:, None], count)

@@ -1,0 +1,210 @@
+"""What came of a program: every visit with its status, and the exit code."""
+
+from __future__ import annotations
+
+import io
+import json
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+from enum import IntEnum
+from typing import TextIO
+
+import numpy as np
+from numpy.typing import NDArray
+
+from postproc.language.diagnostic import Diagnostic
+from postproc.language.visits import Motion, Visits
+from postproc.pose import MM
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+DONE, NOT_ALL, FAILED = 0, 1, 2  # exit codes
+
+
+class Status(IntEnum):
+    """How a visit came out."""
+
+    SAFE = 0  # corrected; every arrival at the literal agrees
+    UNSAFE = 1  # arrivals at one literal disagree: left alone
+    DISPLAY = 2  # the value is known only at run time
+    GUARDED = 3  # the correction is not trusted: left alone
+    UNCHANGED = 4  # nothing to correct, or not to be corrected
+
+
+@dataclass(frozen=True)
+class ErrorStatistics:
+    """Pose accuracy over a set of visits: distances between two points [mm]."""
+
+    mean_mm: float
+    std_mm: float
+    p95_mm: float
+    max_mm: float
+    n: int
+
+    @classmethod
+    def of(cls, error: Array) -> ErrorStatistics:
+        """Summarise error vectors (n, 3) [m]; NaN figures where there are none."""
+        size = np.linalg.norm(error, axis=1) / MM
+        if len(size) == 0:
+            return cls(np.nan, np.nan, np.nan, np.nan, 0)
+        p95 = float(np.percentile(size, 95))
+        return cls(
+            float(size.mean()), float(size.std()), p95, float(size.max()), len(size)
+        )
+
+
+@dataclass(frozen=True)
+class Decisions:
+    """What was decided for n visits (structure of arrays).
+
+    Attributes:
+        status: `Status`, (n,).
+        why: Index into `reasons`, (n,).
+        reasons: Texts; reasons[0] is "".
+        q: Commanded joint angles of the original program, (n, 6) [rad].
+        direction: Arrival direction, (n, 6).
+        corrected: The six numbers in the file after correction, (n, 6).
+        correction: Change of the commanded TCP, base frame, (n, 3) [m].
+        std_error: Standard error of the model there, per axis, (n, 3) [m].
+    """
+
+    status: Ints
+    why: Ints
+    reasons: tuple[str, ...]
+    q: Array
+    direction: Array
+    corrected: Array
+    correction: Array
+    std_error: Array
+
+    def count(self, status: Status) -> int:
+        """Count the visits of one status."""
+        return int((self.status == status).sum())
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """A compensated program and how it came about.
+
+    Attributes:
+        program: Name of the program.
+        model: Id of the model.
+        outputs: New bytes by file name, the program itself first; a file whose values
+            did not change is absent.
+        sidecar: The record that `restore` needs, as JSON text.
+        visits: What was found in the program.
+        decisions: What was decided for every visit.
+        before, after: Predicted error on the visits that could be compensated.
+        diagnostics: What else was found, in order of line.
+        stages: Seconds spent in every stage.
+    """
+
+    program: str
+    model: str
+    outputs: Mapping[str, bytes]
+    sidecar: str
+    visits: Visits
+    decisions: Decisions
+    before: ErrorStatistics
+    after: ErrorStatistics
+    diagnostics: tuple[Diagnostic, ...]
+    stages: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def exit_code(self) -> int:
+        """Return 1 where a target could have been compensated and was not."""
+        left = (Status.UNSAFE, Status.DISPLAY, Status.GUARDED)
+        return NOT_ALL if np.isin(self.decisions.status, left).any() else DONE
+
+    def summary(self) -> str:
+        """Say in one line what came of the program."""
+        d = self.decisions
+        counts = ", ".join(
+            f"{d.count(s)} {s.name.lower()}" for s in Status if d.count(s)
+        )
+        line = f"{self.program}: {len(d.status)} visits ({counts or 'no targets'})"
+        if self.before.n:
+            line += (
+                f"; predicted error mean {self.before.mean_mm:.3f} -> "
+                f"{self.after.mean_mm:.3f} mm, max {self.before.max_mm:.3f} -> "
+                f"{self.after.max_mm:.3f} mm"
+            )
+        return line
+
+    def left_alone(self) -> list[str]:
+        """List every visit that kept its value although it holds a target."""
+        d, v = self.decisions, self.visits
+        rows = np.flatnonzero(
+            np.isin(d.status, (Status.UNSAFE, Status.DISPLAY, Status.GUARDED))
+        )
+        return [
+            f"{v.files[v.file[i]]}:{v.line[i]}: {Status(d.status[i]).name.lower()}: "
+            f"{d.reasons[d.why[i]]}"
+            for i in rows
+        ]
+
+    def to_json(self) -> str:
+        """Return the whole report as JSON text."""
+        text = io.StringIO()
+        write_report(self, text)
+        return text.getvalue()
+
+
+def write_report(outcome: Outcome, out: TextIO) -> None:
+    """Write the report as JSON, one visit at a time, so that memory stays flat."""
+    head = {"program": outcome.program, "model": outcome.model}
+    out.write(json.dumps(head)[:-1] + ', "targets": [')
+    for i in range(len(outcome.visits)):
+        out.write(("," if i else "") + "\n" + json.dumps(target_row(outcome, i)))
+    tail = {
+        "predicted": {"before": asdict(outcome.before), "after": asdict(outcome.after)},
+        "diagnostics": [asdict(d) for d in outcome.diagnostics],
+        "stages_s": dict(outcome.stages),
+    }
+    text = json.dumps(_finite(tail))
+    out.write("],\n" + text[1:] + "\n")
+
+
+def target_row(outcome: Outcome, i: int) -> dict[str, object]:
+    """Describe visit i in the keys of the report."""
+    v, d = outcome.visits, outcome.decisions
+    literal = int(v.literal[i])
+    where = None
+    original: list[float | None] = []
+    corrected: list[float | None] = []
+    if literal >= 0:
+        where = {
+            "file": v.files[v.literals.file[literal]],
+            "line": int(v.literals.line[literal]),
+        }
+        original, corrected = _numbers(v.values[i]), _numbers(d.corrected[i])
+    return {
+        "line": int(v.line[i]),
+        "file": v.files[v.file[i]],
+        "literal": where,
+        "name": v.names[v.name[i]] or None,
+        "move": "VIA" if v.via[i] else Motion(v.motion[i]).name,
+        "q_deg": _numbers(np.rad2deg(d.q[i]), 5),
+        "lambda": [int(s) for s in d.direction[i]],
+        "status": Status(d.status[i]).name.lower(),
+        "why": d.reasons[d.why[i]],
+        "original": original,
+        "corrected": corrected,
+        "correction_mm": _numbers(d.correction[i] / MM, 5),
+        "std_error_mm": _numbers(d.std_error[i] / MM, 5),
+    }
+
+
+def _numbers(values: Array, digits: int = 9) -> list[float | None]:
+    """Round for a person; a number that is not known becomes null."""
+    return [round(float(v), digits) if np.isfinite(v) else None for v in values]
+
+
+def _finite(value: object) -> object:
+    """Replace NaN, which JSON does not have, by null."""
+    if isinstance(value, dict):
+        return {k: _finite(v) for k, v in value.items()}
+    if isinstance(value, list):
+        return [_finite(v) for v in value]
+    return None if isinstance(value, float) and not np.isfinite(value) else value
