@@ -1,0 +1,145 @@
+"""From which side every joint arrives: one play operator along the geometric path.
+
+The play has the width W = 4 * play on the drive side (joint angles through the arm's
+coupling matrix). With z its state and s = (q - z) / (W / 2), a joint arrives in
+direction +1 where s >= 1/2, -1 where s <= -1/2, else 0. So a jitter of less than one
+play flips nothing, between one and three plays after a reversal the side is not known,
+and a joint at rest keeps its side. What is not known is an interval of z: all of
+[q - W/2, q + W/2] before the first move, the hull over several predecessors; the side
+is known where the whole interval agrees.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import dataclass
+
+import numpy as np
+
+from postproc.robot.arm import Arm
+from postproc.robot.chains import Chains, Edges, cut
+from postproc.robot.play import Array, Clamps, Ints, identity, passing, prefix
+from postproc.robot.travel import travel_since_reversal
+
+WIDTH_IN_PLAYS = 4.0
+
+
+@dataclass(frozen=True)
+class Arrivals:
+    """How every joint arrives at n visits.
+
+    Attributes:
+        direction: lambda, (n, 6): +1 moving in positive controller direction, -1, or 0
+            where not known.
+        travel: Travel since the last reversal, (n, 6) [rad]; where the last reversal is
+            not known, the travel since then that is sure. NaN where q is not known.
+    """
+
+    direction: Array
+    travel: Array
+
+
+def chain(n: int) -> tuple[Ints, Ints]:
+    """Return `Edges.first` and `Edges.source` of n visits, one after the other."""
+    return np.arange(n + 1), np.arange(n) - 1
+
+
+def arrivals_of_rows(arm: Arm, q: Array) -> Arrivals:
+    """Infer arrivals at rows reached one after the other by straight JOINT moves.
+
+    Args:
+        arm: The arm.
+        q: Joint angles in the order of the visits, (n, 6) [rad].
+    """
+    first, source = chain(len(q))
+    return arrivals(arm, q, Edges(first, source, q, first))
+
+
+def directions_of_rows(arm: Arm, q: Array) -> Array:
+    """Return the directions of `arrivals_of_rows`, (n, 6)."""
+    return arrivals_of_rows(arm, q).direction
+
+
+def arrivals(arm: Arm, q: Array, edges: Edges) -> Arrivals:
+    """Run the play operator over a graph of visits.
+
+    Args:
+        arm: The arm; its play and coupling are used.
+        q: Joint angles at the visits, (n, 6) [rad], NaN where not known.
+        edges: The geometric paths between them.
+    """
+    if len(q) == 0:
+        return Arrivals(np.empty((0, 6)), np.empty((0, 6)))
+    chains = cut(q, arm.coupling, edges)
+    half = WIDTH_IN_PLAYS / 2 * arm.play
+    z = _states(chains, half)
+    forward = chains.angles - z.hi >= half / 2
+    backward = chains.angles - z.lo <= -half / 2
+    direction = forward.astype(float) - backward.astype(float)
+    return Arrivals(direction, travel_since_reversal(chains, arm.play))
+
+
+def _states(chains: Chains, half: Array) -> Clamps:
+    """Find what is known of the play's state at every visit, as intervals (n, 6).
+
+    The intervals at the heads only grow and their ends come from a finite set, so that
+    the work list runs dry.
+    """
+    since_head = _since_head(chains, half)
+    known: list[Clamps | None] = [None] * len(chains.heads)
+    followers = chains.followers()
+    waiting = deque(range(len(known)))
+    while waiting:
+        c = waiting.popleft()
+        new, old = _at_head(chains, c, half, known, since_head), known[c]
+        if new is None or (old is not None and _same(old, new)):
+            continue
+        known[c] = new
+        waiting.extend(f for f in followers[c] if f not in waiting)
+    out = passing(chains.angles, half)
+    for c, at_head in enumerate(known):
+        if at_head is not None:
+            rows = slice(int(chains.heads[c]), int(chains.ends[c]))
+            arrived = at_head.then(since_head[rows])
+            out.lo[rows], out.hi[rows] = arrived.lo, arrived.hi
+    return out
+
+
+def _since_head(chains: Chains, half: Array) -> Clamps:
+    """Compose the clamps from each visit's chain head (not included) to the visit."""
+    out = identity(chains.angles.shape)
+    for c, head in enumerate(chains.heads):
+        if chains.ends[c] > head + 1:
+            samples, visits = chains.body(c)
+            steps = prefix(passing(samples, half))[visits]
+            out.lo[head + 1 : chains.ends[c]] = steps.lo
+            out.hi[head + 1 : chains.ends[c]] = steps.hi
+    return out
+
+
+def _at_head(
+    chains: Chains,
+    c: int,
+    half: Array,
+    known: list[Clamps | None],
+    since_head: Clamps,
+) -> Clamps | None:
+    """Take the hull of what arrives at a head; None while nothing is known to."""
+    head = int(chains.heads[c])
+    found: list[Clamps] = []
+    for edge in chains.edges_to(head):
+        source = int(chains.source[edge])
+        if source < 0:
+            return passing(chains.angles[head], half)
+        before = known[chains.chain_of[source]]
+        if before is not None:
+            steps = prefix(passing(chains.samples_of(edge), half))
+            found.append(before.then(since_head[source]).then(steps[-1]))
+    if not found:
+        return None
+    low = np.min([f.lo for f in found], axis=0)
+    return Clamps(low, np.max([f.hi for f in found], axis=0))
+
+
+def _same(a: Clamps, b: Clamps) -> bool:
+    return np.array_equal(a.lo, b.lo) and np.array_equal(a.hi, b.hi)

@@ -1,0 +1,187 @@
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from postproc.robot.arm import Arm, load_arm
+from postproc.robot.chains import Edges
+from postproc.robot.direction import (
+    WIDTH_IN_PLAYS,
+    Arrivals,
+    arrivals,
+    arrivals_of_rows,
+    chain,
+    directions_of_rows,
+)
+from postproc.robot.play import Clamps, passing, prefix, with_turning_values
+
+
+@pytest.fixture(scope="module")
+def arm() -> Arm:
+    return load_arm("nj220-2.7")
+
+
+def sequential(q: np.ndarray, z: np.ndarray, half: float) -> np.ndarray:
+    """Run the play operator by its definition, one angle after the other."""
+    states = []
+    for angle in q:
+        z = np.minimum(np.maximum(z, angle - half), angle + half)
+        states.append(z)
+    return np.array(states)
+
+
+def one_joint(arm: Arm, plays: list[float], joint: int = 0) -> Arrivals:
+    """Visit angles of one joint, given in plays of that joint."""
+    q = np.zeros((len(plays), 6))
+    q[:, joint] = np.array(plays) * arm.play[joint]
+    return arrivals_of_rows(arm, q)
+
+
+angles = st.floats(-3.0, 3.0, allow_nan=False)
+
+
+@given(arrays(float, st.tuples(st.integers(1, 70), st.just(2)), elements=angles))
+@settings(max_examples=60, deadline=None)
+def test_composed_clamps_are_the_sequential_operator(q: np.ndarray) -> None:
+    half = 0.4
+    composed = prefix(passing(q, np.array(half)))
+    for z0 in (q[0] - half, q[0], q[0] + half):
+        np.testing.assert_array_equal(composed(z0), sequential(q, z0, half))
+
+
+@given(arrays(float, (3, 2, 4), elements=angles), arrays(float, 4, elements=angles))
+@settings(max_examples=60, deadline=None)
+def test_clamps_are_a_monoid(bounds: np.ndarray, z: np.ndarray) -> None:
+    a, b, c = (Clamps(*np.sort(pair, axis=0)) for pair in bounds)
+    np.testing.assert_array_equal(a.then(b)(z), b(a(z)))
+    left, right = a.then(b).then(c), a.then(b.then(c))
+    np.testing.assert_array_equal(left.lo, right.lo)
+    np.testing.assert_array_equal(left.hi, right.hi)
+
+
+def test_before_the_first_move_nothing_is_known(arm: Arm) -> None:
+    assert (one_joint(arm, [5.0]).direction == 0).all()
+
+
+def test_side_of_a_joint_that_moves_and_rests(arm: Arm) -> None:
+    side = one_joint(arm, [0, 10, 10, 3, 3, -20]).direction[:, 0]
+    assert side.tolist() == [0, 1, 1, -1, -1, -1]
+
+
+def test_a_joint_that_never_moved_is_unknown(arm: Arm) -> None:
+    assert (one_joint(arm, [0, 10, 0]).direction[:, 1:] == 0).all()
+
+
+@pytest.mark.parametrize(
+    ("back", "side"), [(0.9, 1), (1.1, 0), (2.9, 0), (3.1, -1), (30.0, -1)]
+)
+def test_a_return_counts_after_one_and_three_plays(
+    arm: Arm, back: float, side: int
+) -> None:
+    assert one_joint(arm, [0, 50, 50 - back]).direction[-1, 0] == side
+
+
+def test_the_drive_decides_where_wrist_gears_are_coupled(arm: Arm) -> None:
+    coupling = np.eye(6)
+    coupling[5, 4] = -2.0
+    coupled = replace(arm, coupling=coupling)
+    q = np.zeros((3, 6))
+    q[:, 4], q[:, 5] = [0.0, 0.1, 0.4], [0.0, -0.1, 0.1]
+    assert directions_of_rows(arm, q)[2, 5] == 1
+    assert directions_of_rows(coupled, q)[2, 5] == -1
+
+
+def test_a_turn_between_the_last_two_samples_is_not_missed(arm: Arm) -> None:
+    # The joint turns at u = 0.97, samples stand at 0.25 .. 1: each above the last.
+    u = np.linspace(0, 1, 5)[1:]
+    path = np.zeros((5, 6))
+    path[1:, 0] = 2.0 * (u - u**2 / (2 * 0.97))
+    path[0, 0] = 0.0
+    q = path[[0, 4]]
+    edges = Edges(np.array([0, 1, 2]), np.array([-1, 0]), path, np.array([0, 1, 5]))
+    assert (np.diff(path[:, 0]) > 0).all()
+    assert 0.97 - path[-1, 0] > 3 * arm.play[0]
+    assert arrivals(arm, q, edges).direction[1, 0] == -1
+
+
+def test_turning_values_are_exact_for_parabolas() -> None:
+    rng = np.random.default_rng(0)
+    vertex, height = rng.uniform(-0.99, 0.99, 6), rng.normal(size=6)
+    t = np.array([-1.0, 0.0, 1.0])[:, None]
+    y = height + 1.7 * (t - vertex) ** 2
+    out = with_turning_values(y[[0, 0, 1]], y, np.array([False, True, False]))
+    found = np.where(vertex < 0, out[1, 0], out[1, 2])
+    np.testing.assert_allclose(found, height, atol=1e-12)
+
+
+def test_predecessors_that_agree_and_that_do_not(arm: Arm) -> None:
+    # Visits 1 and 2 follow 0; visit 3 follows both.
+    q = np.zeros((4, 6))
+    q[:, 0] = [0.0, 0.1, 0.2, 0.5]
+    q[:, 1] = [0.0, 0.1, -0.1, 0.0]
+    first = np.array([0, 1, 2, 3, 5])
+    source = np.array([-1, 0, 0, 1, 2])
+    edges = Edges(first, source, q[[0, 1, 2, 3, 3]], np.arange(6))
+    found = arrivals(arm, q, edges)
+    assert found.direction[3, :2].tolist() == [1, 0]
+    np.testing.assert_allclose(found.travel[3, :2], [0.5, 0.0])
+
+
+def test_a_loop_is_known_where_every_round_agrees(arm: Arm) -> None:
+    # 0 -> 1 -> 2 -> 1 ..: visit 1 is reached from both sides, visit 2 from one.
+    q = np.zeros((3, 6))
+    q[:, 0] = [0.0, 0.1, 0.2]
+    first, source = np.array([0, 1, 3, 4]), np.array([-1, 0, 2, 1])
+    edges = Edges(first, source, q[[0, 1, 1, 2]], np.arange(5))
+    assert arrivals(arm, q, edges).direction[:, 0].tolist() == [0, 0, 1]
+
+
+def test_a_loop_without_entry_is_unknown(arm: Arm) -> None:
+    q = np.zeros((2, 6))
+    q[:, 0] = [0.0, 0.1]
+    edges = Edges(np.array([0, 1, 2]), np.array([1, 0]), q, np.arange(3))
+    assert (arrivals(arm, q, edges).direction == 0).all()
+
+
+def test_unknown_joint_angles_forget_the_past(arm: Arm) -> None:
+    q = np.zeros((4, 6))
+    q[:, 0] = [0.0, 0.1, np.nan, 0.3]
+    found = arrivals_of_rows(arm, q)
+    assert found.direction[:, 0].tolist() == [0, 1, 0, 0]
+    assert np.isnan(found.travel[2, 0])
+
+
+@given(st.lists(st.integers(-40, 40), min_size=1, max_size=60))
+@settings(max_examples=60, deadline=None)
+def test_rows_match_the_definition(plays: list[int]) -> None:
+    arm = load_arm("nj220-2.7")
+    q = np.array(plays, dtype=float) * 0.37 * arm.play[0]
+    half = WIDTH_IN_PLAYS / 2 * arm.play[0]
+    low = (q - sequential(q, q[0] + half, half)) / half
+    high = (q - sequential(q, q[0] - half, half)) / half
+    expected = (low >= 0.5 - 1e-9) * 1.0 - (high <= -0.5 + 1e-9) * 1.0
+    found = one_joint(arm, (q / arm.play[0]).tolist()).direction[:, 0]
+    near = (np.abs(np.abs(low) - 0.5) < 1e-6) | (np.abs(np.abs(high) - 0.5) < 1e-6)
+    np.testing.assert_array_equal(found[~near], expected[~near])
+
+
+def test_travel_counts_from_the_extreme_value_and_ignores_jitter(arm: Arm) -> None:
+    plays = [0.0, 100, 99.5, 200, 150, 150.6, 120, 400]
+    travel = one_joint(arm, plays).travel[:, 0] / arm.play[0]
+    expected = [0, 100, 99.5, 200, 50, 49.4, 80, 280]
+    np.testing.assert_allclose(travel, expected, atol=1e-9)
+
+
+def test_long_chains_are_no_chains_of_python_calls(arm: Arm) -> None:
+    q = np.cumsum(np.random.default_rng(1).normal(size=(20_000, 6)) * 0.01, axis=0)
+    first, source = chain(len(q))
+    found = arrivals(arm, q, Edges(first, source, q, first)).direction
+    half = WIDTH_IN_PLAYS / 2 * arm.play
+    z = sequential(q, q[0] - half, half)
+    np.testing.assert_array_equal(found[500:], np.sign(q - z)[500:] * (
+        np.abs(q - z) >= half / 2)[500:])  # fmt: skip
