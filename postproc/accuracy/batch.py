@@ -1,0 +1,103 @@
+"""Kinematics and torque of one batch of states, computed once for all effects."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from postproc.accuracy.chain import NOMINAL, Deviation, Walk, walk
+from postproc.robot.arm import Arm
+from postproc.robot.state import States
+
+Array = NDArray[np.float64]
+
+
+@dataclass(eq=False)
+class Loads:
+    """Torques about the joints: they depend on the nominal arm only."""
+
+    arm: Arm
+    states: States
+
+    @cached_property
+    def gravity(self) -> Array:
+        """Torque of the arm's own links, (n, 6) [N m]."""
+        return self.arm.gravity_torque(self.states.q)
+
+    @cached_property
+    def payload(self) -> Array:
+        """Torque of the payload, (n, 6) [N m]; 0 where it is not known.
+
+        Where no centre of mass is known, the mass is taken to sit at the TCP.
+        """
+        s = self.states
+        mass = np.nan_to_num(s.payload)
+        if not mass.any():
+            return np.zeros((len(s), 6))
+        com = np.where(np.isnan(s.payload_com), s.tool, s.payload_com)
+        loaded = self.arm.gravity_torque(s.q, mass, com)
+        torque: Array = loaded - self.gravity
+        return torque
+
+    @cached_property
+    def basis(self) -> Array:
+        """Torque per unit of every lumped mass parameter, (n, 6, k)."""
+        return self.arm.gravity_basis(self.states.q)
+
+
+@dataclass(eq=False)
+class Batch:
+    """States of an arm, with what effects need of its kinematics.
+
+    Attributes:
+        arm: The nominal arm.
+        states: n states.
+        deviation: Placement errors that the kinematics are taken at.
+        shift: Joint errors that the kinematics are taken at, (n, 6) [rad].
+    """
+
+    arm: Arm
+    states: States
+    deviation: Deviation = NOMINAL
+    shift: Array | None = None
+    loads: Loads = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.loads = Loads(self.arm, self.states)
+
+    def __len__(self) -> int:
+        """Return the number of states."""
+        return len(self.states)
+
+    def moved(self, deviation: Deviation, shift: Array | None) -> Batch:
+        """Return the same states with the kinematics taken at a deviated arm."""
+        batch = Batch(self.arm, self.states, deviation, shift)
+        batch.loads = self.loads
+        return batch
+
+    @cached_property
+    def walk(self) -> Walk:
+        """Axes, points and TCP along the (deviated) chain."""
+        q = self.states.q if self.shift is None else self.states.q + self.shift
+        return walk(self.arm.dh, q, self.states.tool, self.deviation)
+
+    @cached_property
+    def jacobian(self) -> Array:
+        """Derivative of the TCP by the controller's joint angles, (n, 3, 6) [m/rad]."""
+        w = self.walk
+        turned = np.cross(w.turn, w.tcp[:, None, :] - w.pivot)
+        return self._to_controller(turned)
+
+    @cached_property
+    def angular(self) -> Array:
+        """Angular velocity of the tool by joint angle, (n, 3, 6)."""
+        return self._to_controller(self.walk.turn)
+
+    def _to_controller(self, per_axis: Array) -> Array:
+        """Convert derivatives (n, 6, 3) by geometric angles to the controller's."""
+        dh = self.arm.dh
+        out: Array = (np.swapaxes(per_axis, 1, 2) * dh.sense) @ dh.mix
+        return out

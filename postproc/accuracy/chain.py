@@ -1,0 +1,110 @@
+"""A Denavit-Hartenberg chain with deviations, for many poses at once.
+
+The arm's own kinematics are nominal. A calibrated chain differs in every placement, and
+its derivatives are wanted at the deviated place: both fall out of one walk along the
+chain that keeps the axes and points of every elementary motion.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from postproc.robot.arm import DH
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Deviation:
+    """What a real chain's placements differ by from the nominal ones.
+
+    Attributes:
+        base: Shift x, y, z [m] of the base, then rotations about x, y, z [rad], (6,).
+        link: Per joint a [m], d [m], alpha, theta, beta [rad], (6, 5); beta is Hayati's
+            rotation about the y axis of the link frame, after alpha.
+        tool: Shift of the TCP in the flange frame [m], (3,).
+    """
+
+    base: Array
+    link: Array
+    tool: Array
+
+
+NOMINAL = Deviation(np.zeros(6), np.zeros((6, 5)), np.zeros(3))
+
+
+@dataclass(frozen=True)
+class Walk:
+    """Axes and points met along the chain, base frame; n poses.
+
+    Attributes:
+        turn, pivot: Axis z of every joint and a point on it, (n, 6, 3).
+        link, corner: Axis x of a and alpha and a point on it, (n, 6, 3).
+        bend: Axis y of beta, through `corner`, (n, 6, 3).
+        base_axes: Axes of the three base rotations, (3, 3), through `base_point`.
+        flange: Rotation of the flange, (n, 3, 3).
+        tcp: Tool centre point, (n, 3) [m].
+    """
+
+    turn: Array
+    pivot: Array
+    link: Array
+    corner: Array
+    bend: Array
+    base_axes: Array
+    base_point: Array
+    flange: Array
+    tcp: Array
+
+
+def _turned(a: Array, b: Array, cos: Array | float, sin: Array | float) -> tuple:  # type: ignore[type-arg]
+    """Turn the orthogonal axes a towards b by an angle, about a x b."""
+    return cos * a + sin * b, cos * b - sin * a
+
+
+def _base(deviation: Deviation) -> tuple[Array, Array]:
+    """Give the base's axes as columns, and the axes of its three rotations as rows."""
+    axes, about = np.eye(3), np.eye(3)
+    for k in range(3):
+        i, j = (k + 1) % 3, (k + 2) % 3
+        angle = deviation.base[3 + k]
+        about[k] = axes[:, k]
+        axes[:, i], axes[:, j] = _turned(
+            axes[:, i].copy(), axes[:, j].copy(), np.cos(angle), np.sin(angle)
+        )
+    return axes, about
+
+
+def walk(dh: DH, q: Array, tool: Array, deviation: Deviation = NOMINAL) -> Walk:
+    """Walk along the chain from the base to the tool centre point.
+
+    Args:
+        dh: Nominal parameters.
+        q: Joint angles, (n, 6) [rad].
+        tool: TCP in the flange frame, (n, 3) [m].
+        deviation: Deviations of the placements.
+    """
+    n = len(q)
+    theta = dh.angles(q) + deviation.link[:, 3]
+    axes, about = _base(deviation)
+    x, y, z = (np.tile(axes[:, k], (n, 1)) for k in range(3))
+    p = np.tile(deviation.base[:3], (n, 1))
+    turn, pivot, link, corner, bend = (np.empty((n, 6, 3)) for _ in range(5))
+    for i in range(6):
+        da, dd, dalpha, _, beta = deviation.link[i]
+        alpha = dh.alpha[i] + dalpha
+        turn[:, i], pivot[:, i] = z, p
+        c, s = np.cos(theta[:, i, None]), np.sin(theta[:, i, None])
+        x, y = _turned(x, y, c, s)
+        p = p + (dh.d[i] + dd) * z + (dh.a[i] + da) * x
+        y, z = _turned(y, z, np.cos(alpha), np.sin(alpha))
+        link[:, i], corner[:, i], bend[:, i] = x, p, y
+        if beta != 0.0:
+            z, x = _turned(z, x, np.cos(beta), np.sin(beta))
+    flange = np.stack([x, y, z], axis=-1)
+    tcp = p + np.einsum("nij,nj->ni", flange, tool + deviation.tool)
+    point = np.array(deviation.base[:3])
+    return Walk(turn, pivot, link, corner, bend, about, point, flange, tcp)

@@ -1,0 +1,114 @@
+"""The sum of effects: one vector of parameters, exact where geometry enters exactly."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from postproc.accuracy.batch import Batch
+from postproc.accuracy.chain import NOMINAL, Deviation
+from postproc.accuracy.effect import Effect, JointEffect, Parameter
+from postproc.accuracy.geometry import Geometry
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Combination:
+    """Effects whose errors add up; their parameters are laid end to end.
+
+    Geometry and joint errors go through the full kinematics together, so their
+    products are right; other effects are added to the position.
+    """
+
+    effects: tuple[Effect, ...]
+
+    @cached_property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """All parameters, in column order."""
+        return tuple(p for e in self.effects for p in e.parameters())
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        """Names ``effect.parameter`` of all parameters."""
+        return tuple(
+            f"{e.name}.{p.name}" for e in self.effects for p in e.parameters()
+        )
+
+    @cached_property
+    def groups(self) -> tuple[str, ...]:
+        """Names ``effect.group`` of the prior group of every parameter."""
+        return tuple(
+            f"{e.name}.{p.group}" for e in self.effects for p in e.parameters()
+        )
+
+    @cached_property
+    def scales(self) -> Array:
+        """Prior scales before the data rescale them, (p,)."""
+        return np.array([p.scale for p in self.parameters], dtype=float)
+
+    @cached_property
+    def slices(self) -> tuple[slice, ...]:
+        """Columns of every effect."""
+        ends = np.cumsum([0, *(len(e.parameters()) for e in self.effects)])
+        return tuple(slice(int(a), int(b)) for a, b in zip(ends, ends[1:], strict=False))
+
+    def where(self, *origins: str) -> NDArray[np.bool_]:
+        """Tell which parameters belong to effects of the given origins, (p,)."""
+        return np.array(
+            [e.origin in origins for e in self.effects for _ in e.parameters()],
+            dtype=bool,
+        )
+
+    def shift(self, batch: Batch, p: Array) -> Array:
+        """Sum the joint errors of all joint effects, (n, 6) [rad]."""
+        total = np.zeros((len(batch), 6))
+        for effect, part in zip(self.effects, self.slices, strict=True):
+            if isinstance(effect, JointEffect):
+                total += effect.angles(batch, p[part])
+        return total
+
+    def deviation(self, p: Array) -> Deviation:
+        """Read the geometry's parameters as deviations of the chain."""
+        for effect, part in zip(self.effects, self.slices, strict=True):
+            if isinstance(effect, Geometry):
+                return effect.deviation(p[part])
+        return NOMINAL
+
+    def at(self, batch: Batch, p: Array) -> Batch:
+        """Return the batch with its kinematics taken at parameters p."""
+        return batch.moved(self.deviation(p), self.shift(batch, p))
+
+    def error(self, batch: Batch, p: Array) -> Array:
+        """Sum the errors: actual minus nominal TCP position, (n, 3) [m].
+
+        Args:
+            batch: States with nominal kinematics.
+            p: All parameters, (p,).
+        """
+        error: Array = self.at(batch, p).walk.tcp - batch.walk.tcp
+        for effect, part in zip(self.effects, self.slices, strict=True):
+            if not isinstance(effect, Geometry | JointEffect):
+                error = error + effect.displacement(batch, p[part])
+        return error
+
+    def columns(self, batch: Batch) -> Array:
+        """Differentiate the error at the batch's kinematics, (n, 3, p)."""
+        if not self.effects:
+            return np.zeros((len(batch), 3, 0))
+        return np.concatenate([e.columns(batch) for e in self.effects], axis=2)
+
+    def direction_slopes(self, batch: Batch, p: Array) -> Array:
+        """Give each joint's position error per unit of direction, (n, 3, 6) [m]."""
+        ones = batch.states.with_(direction=np.ones_like(batch.states.q))
+        forward = Batch(batch.arm, ones, batch.deviation, batch.shift)
+        forward.loads = batch.loads
+        angles = np.zeros((len(batch), 6))
+        for effect, part in zip(self.effects, self.slices, strict=True):
+            if isinstance(effect, JointEffect) and effect.direct:
+                angles += effect.angles(forward, p[part])
+        slopes: Array = batch.jacobian * angles[:, None, :]
+        return slopes

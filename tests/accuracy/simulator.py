@@ -1,0 +1,103 @@
+"""A small arm with errors of its own, to check the fits against.
+
+Its chain multiplies 4 x 4 matrices in a loop and shares no code with the package.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from postproc.robot.arm import Arm, load_arm
+from postproc.robot.state import States, make_states
+
+NJ = load_arm("nj220-2.7")
+TOOL = np.array([0.08, -0.04, 0.15])
+PLATE = np.array([[0.08, -0.04, 0.15], [-0.06, 0.10, 0.20], [0.05, 0.09, 0.32]])
+LOW = np.deg2rad([-90.0, -45, -170, -150, -110, -150])
+HIGH = np.deg2rad([90.0, 60, -40, 150, 110, 150])
+
+
+def rot(axis: int, angle: float) -> np.ndarray:
+    T = np.eye(4)
+    vector = np.zeros(3)
+    vector[axis] = angle
+    T[:3, :3] = Rotation.from_rotvec(vector).as_matrix()
+    return T
+
+
+def move(x: float, y: float, z: float) -> np.ndarray:
+    T = np.eye(4)
+    T[:3, 3] = x, y, z
+    return T
+
+
+@dataclass
+class Simulated:
+    """True errors of one arm; lengths in m, angles in rad."""
+
+    link: np.ndarray = field(default_factory=lambda: np.zeros((6, 6)))
+    base: np.ndarray = field(default_factory=lambda: np.zeros(6))
+    tool: np.ndarray = field(default_factory=lambda: np.zeros(3))
+    backlash: np.ndarray = field(default_factory=lambda: np.zeros((6, 3)))
+    tracker: float = 2.5e-5
+    joint: float = 4e-6
+    arm: Arm = NJ
+
+    def joint_error(self, q: np.ndarray, side: np.ndarray) -> np.ndarray:
+        b0, s, c = self.backlash.T
+        return side * (b0 + s * np.sin(q) + c * np.cos(q))
+
+    def tcp(self, q: np.ndarray, side: np.ndarray, tool: np.ndarray) -> np.ndarray:
+        """True TCP positions, one pose after the other."""
+        dh = self.arm.dh
+        actual = q + self.joint_error(q, side)
+        out = np.empty((len(q), 3))
+        for k in range(len(q)):
+            x, y, z, a, b, c = self.base
+            T = move(x, y, z) @ rot(0, a) @ rot(1, b) @ rot(2, c)
+            theta = dh.offset + dh.sense * (dh.mix @ actual[k])
+            for j in range(6):
+                T = T @ rot(2, theta[j]) @ move(dh.a[j], 0, dh.d[j])
+                T = T @ rot(0, dh.alpha[j])
+                x, y, z, a, b, c = self.link[j]
+                T = T @ move(x, y, z) @ rot(0, a) @ rot(1, b) @ rot(2, c)
+            out[k] = (T @ np.append(tool[k] + self.tool, 1.0))[:3]
+        return out
+
+    def measure(
+        self, states: States, rng: np.random.Generator
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Noisy measurement and the noise-free truth of every state."""
+        truth = self.tcp(states.q, states.direction, states.tool)
+        shaken = states.q + self.joint * rng.standard_normal(states.q.shape)
+        noisy = self.tcp(shaken, states.direction, states.tool)
+        noisy = noisy + self.tracker * rng.standard_normal(noisy.shape)
+        return noisy, truth
+
+
+def random_arm(rng: np.random.Generator, tool: bool = True) -> Simulated:
+    """Draw geometry (1 mm, 1 mrad), tool and angle-dependent backlash errors."""
+    link = np.zeros((6, 6))
+    link[:, :3] = 5e-4 * rng.standard_normal((6, 3))
+    link[:, 3:] = 5e-4 * rng.standard_normal((6, 3))
+    backlash = np.zeros((6, 3))
+    backlash[:, 0] = rng.uniform(5e-5, 2e-4, 6) * rng.choice([-1, 1], 6)
+    backlash[:, 1:] = 5e-5 * rng.standard_normal((6, 2))
+    return Simulated(
+        link=link,
+        tool=5e-4 * rng.standard_normal(3) if tool else np.zeros(3),
+        backlash=backlash,
+    )
+
+
+def random_states(
+    n: int, rng: np.random.Generator, tools: np.ndarray = TOOL[None]
+) -> States:
+    """Draw poses with known random directions; tools take turns."""
+    q = rng.uniform(LOW, HIGH, (n, 6))
+    which = np.arange(n) % len(tools)
+    side = rng.choice([-1.0, 1.0], (n, 6))
+    return make_states(q, side, tools[which], tool_id=which)
