@@ -1,0 +1,135 @@
+"""What the virtual arm knows about itself each time it arrives somewhere."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields, replace
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from postproc.virtual.rotation import pose
+
+Array = NDArray[np.float64]
+
+LONG_TRAVEL = 1.0  # [rad] travel since a reversal that nobody recorded
+REST_TEMPERATURE = 20.0  # [deg C] where the arm has its nominal lengths (ISO 1)
+USUAL_SPEED = 0.1  # [m/s]
+
+
+@dataclass(frozen=True)
+class Arrivals:
+    """n arrivals in the order they happen (structure of arrays, SI units).
+
+    Attributes:
+        q: Commanded joint angles as the controller shows them, (n, 6) [rad].
+        side: Where each gear lies in its gap, (n, 6), +1 driven forward, -1 backward.
+        travel: Way of each joint since its last reversal, (n, 6) [rad].
+        loop: Way between its last two reversals, (n, 6) [rad].
+        speed: Speed of the TCP on the way there, (n,) [m/s].
+        time: (n,) [s].
+        temperature: Of the arm, (n,) [deg C].
+        payload: (n,) [kg].
+        payload_com: In the flange frame, (n, 3) [m].
+        order: Place in the sequence of measured visits, (n,).
+        tool: The nominal tool, flange to TCP, (n, 4, 4) [m].
+    """
+
+    q: Array
+    side: Array
+    travel: Array
+    loop: Array
+    speed: Array
+    time: Array
+    temperature: Array
+    payload: Array
+    payload_com: Array
+    order: Array
+    tool: Array
+
+    def __post_init__(self) -> None:
+        for f in fields(self):
+            getattr(self, f.name).setflags(write=False)
+
+    def __len__(self) -> int:
+        """Return the number of arrivals."""
+        return len(self.q)
+
+    def __getitem__(
+        self, rows: NDArray[np.int64] | NDArray[np.bool_] | slice
+    ) -> Arrivals:
+        """Return some of the arrivals."""
+        return replace(
+            self, **{f.name: getattr(self, f.name)[rows] for f in fields(self)}
+        )
+
+
+_DEFAULTS: dict[str, tuple[float, tuple[int, ...]]] = {
+    "side": (0.0, (6,)),
+    "travel": (LONG_TRAVEL, (6,)),
+    "loop": (LONG_TRAVEL, (6,)),
+    "speed": (USUAL_SPEED, ()),
+    "time": (0.0, ()),
+    "temperature": (REST_TEMPERATURE, ()),
+    "payload": (0.0, ()),
+    "payload_com": (0.0, (3,)),
+}
+
+
+def make_arrivals(
+    q: Array,
+    side: Array | float = 0.0,
+    tool: Array | None = None,
+    **covariates: Array | float,
+) -> Arrivals:
+    """Build arrivals from joint angles; what is not given or NaN takes a default.
+
+    Args:
+        q: Joint angles, (n, 6) [rad].
+        side: Arrival directions, (n, 6) or one value.
+        tool: TCP (3,) or (n, 3), or tool pose (4, 4) or (n, 4, 4) [m]; default flange.
+        covariates: Any other field of `Arrivals`.
+
+    Raises:
+        TypeError: A covariate that `Arrivals` does not have.
+    """
+    q = np.array(q, dtype=float).reshape(-1, 6)
+    n = len(q)
+    given: dict[str, Array | float] = {"side": side, **covariates}
+    order = np.array(np.broadcast_to(given.pop("order", np.arange(n)), n), dtype=float)
+    if unknown := sorted(set(given) - set(_DEFAULTS)):
+        raise TypeError(f"arrivals have no {', '.join(unknown)}")
+    values = {}
+    for name, (default, shape) in _DEFAULTS.items():
+        value = np.broadcast_to(given.get(name, default), (n, *shape)).astype(float)
+        values[name] = np.where(np.isnan(value), default, value)
+    return Arrivals(q=q, order=order, tool=_tool_poses(tool, n), **values)
+
+
+def _tool_poses(tool: Array | None, n: int) -> Array:
+    tool = np.zeros(3) if tool is None else np.asarray(tool, dtype=float)
+    if tool.shape[-2:] != (4, 4):
+        tool = pose(np.eye(3), tool)
+    return np.array(np.broadcast_to(tool, (n, 4, 4)))
+
+
+class StatesLike(Protocol):
+    """The fields of the model's states that mean something to a real arm."""
+
+    q: Array
+    direction: Array
+    tool: Array
+    travel: Array
+    speed: Array
+    time: Array
+    temperature: Array
+    payload: Array
+    payload_com: Array
+    order: Array
+
+
+def arrivals_of_states(states: StatesLike) -> Arrivals:
+    """Translate the model's states; what they do not know takes a default."""
+    names = "travel speed time temperature payload payload_com order".split()
+    covariates = {name: getattr(states, name) for name in names}
+    return make_arrivals(states.q, states.direction, states.tool, **covariates)

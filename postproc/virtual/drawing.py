@@ -1,0 +1,169 @@
+"""Draw a virtual arm from a seed."""
+
+from __future__ import annotations
+
+import zlib
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from postproc.exceptions import PostprocError
+from postproc.virtual.arm import VirtualArm
+from postproc.virtual.arrivals import Arrivals
+from postproc.virtual.as_built import AsBuilt, draw_as_built, draw_body
+from postproc.virtual.catalogue import (
+    AS_BUILT,
+    DEFAULT,
+    KINDS,
+    Planted,
+    parse_effects,
+)
+from postproc.virtual.direction_laws import backlash
+from postproc.virtual.gears import Gears
+from postproc.virtual.gravity import Body
+from postproc.virtual.kinematics import NJ220, Chain
+from postproc.virtual.law import Draw, Law
+from postproc.virtual.reference import MEASURED_EVERY, reference_arrivals
+
+Array = NDArray[np.float64]
+
+TRACKER_NOISE = (0.01e-3, 5e-6)  # [m], [m/m] per axis
+SMALL = 1e-6  # a size at which every law is linear
+REPEATS_WITHIN = (0.02e-3, 0.05e-3)  # [m] rms of the TCP over the reference campaign
+
+
+def stream(seed: int, name: str) -> np.random.Generator:
+    """Return the random numbers of one part, every part having its own."""
+    return np.random.default_rng([seed, zlib.crc32(name.encode())])
+
+
+def virtual_arm(
+    seed: int,
+    effects: str | Sequence[str | Planted] = DEFAULT,
+    *,
+    chain: Chain = NJ220,
+    coupling: Array | None = None,
+    rows: int = 400,
+    tool: Array | None = None,
+) -> VirtualArm:
+    """Draw an arm.
+
+    Args:
+        seed: Same seed, same arm; adding an effect leaves the others as they were.
+        effects: Names of `catalogue.NAMES`, with joints and sizes if wanted.
+        chain: The nominal arm.
+        coupling: Motor angles = coupling @ joint angles, (6, 6); default identity.
+        rows: Length of the campaign that steps, drifts and warm-ups are drawn for.
+        tool: TCP (3,) or pose (4, 4) [m] that sizes in mm refer to; default a probe
+            that stands off in all three axes.
+
+    Raises:
+        PostprocError: An effect that does not exist.
+    """
+    planted = parse_effects(effects)
+    names = {item.name for item in planted}
+    perfect = _perfect(chain, coupling)
+    body = draw_body(stream(seed, "body"), chain)
+    planter = _Planter(seed, body, reference_arrivals(rows, tool), perfect)
+    laws = {item: planter.law(item) for item in planted if item.name not in AS_BUILT}
+    gaps = [law for law in laws.values() if law.effect == "backlash"]
+    half_gap = _half_gap(gaps[0] if gaps else planter.law(Planted("backlash")))
+    rng = stream(seed, "arm")
+    return replace(
+        perfect,
+        seed=seed,
+        as_built=draw_as_built(
+            stream(seed, "as built"), chain, "geometry" in names, "tool" in names
+        ),
+        laws=tuple(laws.values()),
+        gears=replace(perfect.gears, gap=half_gap),
+        joint_noise=planter.joint_noise(rng),
+        tracker_noise=TRACKER_NOISE,
+        warming=(rng.uniform(3.0, 10.0), rng.uniform(1200.0, 3600.0)),
+    )
+
+
+def _perfect(chain: Chain, coupling: Array | None) -> VirtualArm:
+    """Return an arm that is exactly its drawing."""
+    return VirtualArm(
+        seed=0,
+        nominal=chain,
+        as_built=AsBuilt(chain, np.zeros(6), np.zeros(6)),
+        laws=(),
+        gears=Gears(np.full(6, 1e-4), np.eye(6) if coupling is None else coupling),
+        joint_noise=np.zeros(6),
+        tracker_noise=(0.0, 0.0),
+        warming=(0.0, 1.0),
+    )
+
+
+def _half_gap(law: Law) -> Array:
+    """Return the half gaps (6,) [rad] of the gears of a backlash law."""
+    return law.scale * np.array([-law.parameters[f"b_{j}"] for j in range(1, 7)])
+
+
+@dataclass(frozen=True)
+class _Planter:
+    """Draws the laws of one arm and gives them their sizes.
+
+    Attributes:
+        seed: Of the arm.
+        body: Weights of the arm.
+        reference: The campaign that sizes refer to.
+        perfect: An arm without any error, to measure one law at a time.
+    """
+
+    seed: int
+    body: Body
+    reference: Arrivals
+    perfect: VirtualArm
+
+    def law(self, item: Planted) -> Law:
+        """Draw one law and scale it to the size asked for or drawn."""
+        rng = stream(self.seed, item.name)
+        rows = len(self.reference)
+        draw = Draw(rng, self.body, item.joint, rows, rows * MEASURED_EVERY)
+        if item.name == "backlash":
+            law = backlash(draw)
+            return self.sized(law, item.peak_mm or self.peak_mm(law))
+        kind = KINDS[item.name]
+        law = kind.draw(draw).scaled(SMALL, 0.0)
+        usual = np.exp(rng.uniform(np.log(kind.low_mm), np.log(kind.high_mm)))
+        return self.sized(law, item.peak_mm or float(usual))
+
+    def sized(self, law: Law, peak_mm: float) -> Law:
+        """Scale a law to a peak displacement.
+
+        Raises:
+            PostprocError: The law moves nothing at this tool.
+        """
+        for _ in range(2):  # a turn's displacement is not quite linear in it
+            peak = self.peak_mm(law)
+            if peak < 1e-9:
+                raise PostprocError(
+                    f"effect '{law.effect}' on joint {law.joints} does not move this "
+                    "TCP. Choose another joint or a tool that stands off the axis"
+                )
+            law = law.scaled(peak_mm / peak, peak_mm)
+        return law
+
+    def peak_mm(self, law: Law) -> float:
+        """Return the largest displacement of the TCP over the reference [mm]."""
+        arm = replace(self.perfect, laws=(law,))
+        moved = arm.seen(self.reference, arm.tcp(self.reference))
+        away = moved - arm.nominal_tcp(self.reference)
+        return float(np.linalg.norm(away, axis=1).max() * 1e3)
+
+    def joint_noise(self, rng: np.random.Generator) -> Array:
+        """Draw joint repeatabilities (6,) [rad] that make a usual one at the TCP."""
+        noise = SMALL * rng.uniform(0.5, 1.5, 6)
+        wanted = rng.uniform(*REPEATS_WITHIN)
+        square = np.zeros(len(self.reference))
+        centre = self.perfect.nominal_tcp(self.reference)
+        for j in range(6):
+            only = noise * (np.arange(6) == j)
+            away = self.perfect.tcp(self.reference, only) - centre
+            square += np.sum(away**2, axis=1)
+        return np.asarray(noise * wanted / np.sqrt(square.mean()))

@@ -1,0 +1,57 @@
+"""The reference campaign: what sizes in millimetres refer to."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from postproc.virtual.arrivals import Arrivals, make_arrivals
+
+Array = NDArray[np.float64]
+
+# Angles between which each joint works in a usual campaign, (6, 2) [rad].
+WORKING_RANGE = np.radians(
+    [[-75, 75], [-40, 60], [-150, -40], [-160, 160], [-100, 100], [-160, 160]]
+)
+PROBE = np.array([0.1, 0.05, 0.2])  # [m] off the flange axis, so that joint 6 shows
+MEASURED_EVERY = 14.0  # [s] a tracker campaign's usual pace
+APPROACH = np.radians([0.5, 30.0])  # ways since the last reversal
+SPEEDS = np.array([0.05, 0.15, 0.4])  # [m/s]
+PAYLOADS = np.array([0.0, 40.0, 120.0])  # [kg]
+PAYLOAD_COM = np.array([0.0, 0.0, 0.2])  # [m]
+
+
+def working_angles(rng: np.random.Generator, n: int) -> Array:
+    """Draw joint sets (n, 6) [rad] by Latin hypercube over the working range."""
+    strata = rng.permuted(np.tile(np.arange(n), (6, 1)), axis=1).T
+    unit = (strata + rng.random((n, 6))) / n
+    low, high = WORKING_RANGE.T
+    return np.asarray(low + unit * (high - low))
+
+
+def log_uniform(rng: np.random.Generator, ends: Array, shape: tuple[int, ...]) -> Array:
+    """Draw numbers between two ends, evenly in their logarithm."""
+    return np.asarray(np.exp(rng.uniform(np.log(ends[0]), np.log(ends[1]), size=shape)))
+
+
+def reference_arrivals(rows: int, tool: Array | None = None) -> Arrivals:
+    """Return one campaign, always the same, in which every covariate varies.
+
+    Args:
+        rows: Number of arrivals, and so the length of the campaign.
+        tool: TCP (3,) or pose (4, 4) [m].
+    """
+    rng = np.random.default_rng(220)
+    duration = rows * MEASURED_EVERY
+    return make_arrivals(
+        working_angles(rng, rows),
+        rng.choice([-1.0, 1.0], (rows, 6)),
+        PROBE if tool is None else tool,
+        travel=log_uniform(rng, APPROACH, (rows, 6)),
+        loop=log_uniform(rng, APPROACH, (rows, 6)),
+        speed=rng.choice(SPEEDS, rows),
+        time=np.linspace(0.0, duration, rows),
+        temperature=22.0 + 8.0 * np.linspace(0.0, 1.0, rows),
+        payload=rng.choice(PAYLOADS, rows),
+        payload_com=PAYLOAD_COM,
+    )
