@@ -1,4 +1,4 @@
-"""What is installed is complete: grammars and arms, from an editable install and a wheel."""
+"""An editable install and a wheel are complete: grammars, arms, licence."""
 
 from __future__ import annotations
 
@@ -93,4 +93,6 @@ def test_every_version_is_the_same() -> None:
 
     changes = (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
     assert f"## [{postproc.__version__}]" in changes or "## [Unreleased]" in changes
-    assert f'version = "{postproc.__version__}"' in (ROOT / "pyproject.toml").read_text()
+    assert (
+        f'version = "{postproc.__version__}"' in (ROOT / "pyproject.toml").read_text()
+    )
