@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,9 +35,7 @@ class Combination:
     @cached_property
     def names(self) -> tuple[str, ...]:
         """Names ``effect.parameter`` of all parameters."""
-        return tuple(
-            f"{e.name}.{p.name}" for e in self.effects for p in e.parameters()
-        )
+        return tuple(f"{e.name}.{p.name}" for e in self.effects for p in e.parameters())
 
     @cached_property
     def groups(self) -> tuple[str, ...]:
@@ -54,7 +53,7 @@ class Combination:
     def slices(self) -> tuple[slice, ...]:
         """Columns of every effect."""
         ends = np.cumsum([0, *(len(e.parameters()) for e in self.effects)])
-        return tuple(slice(int(a), int(b)) for a, b in zip(ends, ends[1:], strict=False))
+        return tuple(slice(int(a), int(b)) for a, b in pairwise(ends))
 
     def where(self, *origins: str) -> NDArray[np.bool_]:
         """Tell which parameters belong to effects of the given origins, (p,)."""

@@ -228,5 +228,7 @@ def _with_unknown_sides(state: Fit, values: Array) -> Whitener:
 def _settled(before: Fit, after: Fit) -> bool:
     """Tell whether a pass changed nothing that matters."""
     moved = np.abs(after.residual - before.residual).max(initial=0.0)
-    ratio = after.whitener.variance(after.noise) / before.whitener.variance(before.noise)
+    ratio = after.whitener.variance(after.noise) / before.whitener.variance(
+        before.noise
+    )
     return bool(moved < SETTLED and np.abs(np.log(ratio)).max() < SETTLED_NOISE)

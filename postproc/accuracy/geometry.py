@@ -49,10 +49,7 @@ class Geometry(Effect):
     def _links(self) -> list[tuple[int, int]]:
         """List (joint, kind) of the link parameters."""
         return [
-            (j, k)
-            for j in range(6)
-            for k in range(5)
-            if k < 4 or (j + 1) in self.beta
+            (j, k) for j in range(6) for k in range(5) if k < 4 or (j + 1) in self.beta
         ]
 
     def parameters(self) -> tuple[Parameter, ...]:

@@ -39,7 +39,8 @@ class Noise:
 
     def tracker_std(self, position: Array) -> Array:
         """Standard deviation per axis of the tracker at positions (n, 3), (n,) [m]."""
-        return self.tracker * tracker_shape(position, self.origin)
+        std: Array = self.tracker * tracker_shape(position, self.origin)
+        return std
 
     def arrival_variance(self, jacobian: Array) -> Array:
         """Variance per axis that repeatability gives, (n, 3) [m^2]."""
@@ -47,14 +48,12 @@ class Noise:
         return variance
 
 
-def tracker_shape(
-    position: Array, origin: tuple[float, float, float] | None
-) -> Array:
+def tracker_shape(position: Array, origin: tuple[float, float, float] | None) -> Array:
     """Data-sheet standard deviation of a tracker at positions (n, 3), (n,) [m]."""
     if origin is None:
         return np.full(len(position), TRACKER_FIXED)
     reach = np.linalg.norm(position - np.array(origin), axis=1)
-    return TRACKER_FIXED + TRACKER_RANGE * reach
+    return np.asarray(TRACKER_FIXED + TRACKER_RANGE * reach)
 
 
 @dataclass(frozen=True)
@@ -105,8 +104,8 @@ class Whitener:
     def rotate(self, rows: Array) -> Array:
         """Rotate (n, 3) or (n, 3, p) into the eigenbasis."""
         if rows.ndim == 2:
-            return np.einsum("nij,nj->ni", self.turn, rows)
-        return self.turn @ rows
+            return np.asarray(np.einsum("nij,nj->ni", self.turn, rows))
+        return np.asarray(self.turn @ rows)
 
     def variance(self, noise: Noise) -> Array:
         """Variance of every rotated component, (n, 3) [m^2]."""
@@ -137,12 +136,8 @@ class Whitener:
             grad = np.array([(slope * t2 * T).sum(), (slope * r2 * R).sum()])
             return float(0.5 * (w * (np.log(v) + S / v)).sum()), grad
 
-        bounds = [
-            (np.log(SMALLEST / s), np.log(LARGEST / s)) for s in (t0, r0)
-        ]
-        begin = np.clip(
-            np.log([start.tracker, start.joint]), *np.array(bounds).T
-        )
+        bounds = [(np.log(SMALLEST / s), np.log(LARGEST / s)) for s in (t0, r0)]
+        begin = np.clip(np.log([start.tracker, start.joint]), *np.array(bounds).T)
         best = minimize(cost, begin, jac=True, method="L-BFGS-B", bounds=bounds)
         t, r = np.exp(best.x)
         return Noise(float(t), float(r), self.origin)

@@ -42,9 +42,7 @@ def student_weights(distance: Array) -> Array:
     return weight
 
 
-def judge(
-    distance: Array, residual: Array, q: Array, jacobian: Array
-) -> RowWeights:
+def judge(distance: Array, residual: Array, q: Array, jacobian: Array) -> RowWeights:
     """Weigh the rows of a survey.
 
     Args:
@@ -70,7 +68,8 @@ def judge(
 def _together(rows: NDArray[np.int64], residual: Array, q: Array) -> NDArray[np.bool_]:
     """Tell whether the nearest rows in joint space share a row's residual."""
     spread = np.maximum(q.std(axis=0), 1e-9)
-    nearest = cKDTree(q / spread).query(q[rows] / spread, k=NEIGHBOURS + 1)[1][:, 1:]
+    found = cKDTree(q / spread).query(q[rows] / spread, k=NEIGHBOURS + 1)
+    nearest = np.asarray(found[1])[:, 1:]
     own = residual[rows]
     along = np.einsum("rkj,rj->rk", residual[nearest], own)
     agrees: NDArray[np.bool_] = np.median(along, axis=1) > AGREES * (own**2).sum(axis=1)
@@ -87,7 +86,9 @@ def _same_joint(
     """
     square = np.maximum((jacobian**2).sum(axis=1), 1e-12)
     angle = np.einsum("nij,ni->nj", jacobian, residual) / square
-    explained = angle**2 * square / np.maximum((residual**2).sum(axis=1), 1e-300)[:, None]
+    explained = (
+        angle**2 * square / np.maximum((residual**2).sum(axis=1), 1e-300)[:, None]
+    )
     agrees = np.zeros(len(rows), dtype=bool)
     for j in range(q.shape[1]):
         order = np.argsort(q[:, j], kind="stable")

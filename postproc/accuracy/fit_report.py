@@ -1,0 +1,161 @@
+"""What a fit found, for people."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from postproc.accuracy.fit import Fit
+from postproc.accuracy.measurement import DroppedRow, Measurements
+from postproc.accuracy.observability import Unseen, observe
+from postproc.pose import MM
+
+Array = NDArray[np.float64]
+
+CORRELATED = 0.9
+SHOWN_UNITS = {"m": ("mm", 1e3), "rad": ("mrad", 1e3), "rad/(N m)": ("urad/(N m)", 1e6)}
+
+
+@dataclass(frozen=True)
+class ParameterRow:
+    """One line of the parameter table, in the unit that people use.
+
+    Attributes:
+        share: Part of the squared error that it explains; shares add up.
+        determined: 0 (at its prior) .. 1 (by the data alone).
+    """
+
+    name: str
+    value: float
+    std_error: float
+    unit: str
+    share: float
+    determined: float
+
+
+@dataclass(frozen=True)
+class Spread:
+    """Lengths of n error vectors [mm]."""
+
+    mean_mm: float
+    std_mm: float
+    p95_mm: float
+    max_mm: float
+    n: int
+
+    @classmethod
+    def of(cls, error: Array) -> Spread:
+        """Summarise errors (n, 3) [m]."""
+        e = np.linalg.norm(error, axis=1) / MM
+        if len(e) == 0:
+            return cls(np.nan, np.nan, np.nan, np.nan, 0)
+        p95 = float(np.percentile(e, 95))
+        return cls(float(e.mean()), float(e.std()), p95, float(e.max()), len(e))
+
+
+@dataclass(frozen=True)
+class FitReport:
+    """Everything worth telling about a fit.
+
+    Attributes:
+        parameters: The table.
+        shares: Part of the squared error explained, by effect.
+        correlated: Pairs of parameters with their correlation, above 0.9.
+        dropped: Rows left out or down-weighted, and why.
+        spared: Ids of rows that stand out, as their neighbours do: kept.
+        unseen: Directions that the rows do not determine.
+        before, after: Measured errors, and what the fit leaves of them.
+        tracker_mm: Estimated standard deviation of the tracker, typical, per axis.
+        repeatability_mm: Estimated scatter of arrivals, typical, per axis.
+        effective: Effective number of parameters.
+        warnings: What else to know.
+    """
+
+    parameters: tuple[ParameterRow, ...]
+    shares: dict[str, float]
+    correlated: tuple[tuple[str, str, float], ...]
+    dropped: tuple[DroppedRow, ...]
+    spared: tuple[str, ...]
+    unseen: tuple[Unseen, ...]
+    before: Spread
+    after: Spread
+    tracker_mm: float
+    repeatability_mm: float
+    effective: float
+    warnings: tuple[str, ...]
+
+
+def report_fit(fit: Fit, survey: Measurements) -> FitReport:
+    """Put a fit into words and numbers."""
+    used = fit.rows.weight > 0
+    shares = _shares(fit)
+    effects = {
+        effect.name: float(shares[part].sum())
+        for effect, part in zip(
+            fit.combination.effects, fit.combination.slices, strict=True
+        )
+    }
+    X = fit.whiten(fit.columns) * fit.combination.scales
+    arrival = np.sqrt(fit.noise.arrival_variance(fit.batch.jacobian).mean())
+    tracker = fit.noise.tracker_std(survey.position).mean()
+    return FitReport(
+        parameters=_table(fit, shares),
+        shares=effects,
+        correlated=_correlated(fit),
+        dropped=survey.dropped + _weighed_down(fit, survey),
+        spared=tuple(survey.ids[i] for i in np.flatnonzero(fit.rows.spared)),
+        unseen=observe(X, fit.combination.names, floor=1.0).unseen,
+        before=Spread.of(fit.error[used]),
+        after=Spread.of(fit.residual[used]),
+        tracker_mm=float(tracker / MM),
+        repeatability_mm=float(arrival / MM),
+        effective=fit.effective,
+        warnings=survey.warnings,
+    )
+
+
+def _shares(fit: Fit) -> Array:
+    """Part of the squared error that each parameter explains, (p,)."""
+    total = float((fit.error**2).sum())
+    along = np.einsum("nip,ni->p", fit.columns, fit.error)
+    shares: Array = along * fit.values / max(total, 1e-300)
+    return shares
+
+
+def _table(fit: Fit, shares: Array) -> tuple[ParameterRow, ...]:
+    """Make the parameter table."""
+    rows = []
+    for k, (name, p) in enumerate(
+        zip(fit.combination.names, fit.combination.parameters, strict=True)
+    ):
+        unit, factor = SHOWN_UNITS.get(p.unit, (p.unit, 1.0))
+        known = 1.0 - (fit.std[k] / fit.prior_std[k]) ** 2
+        rows.append(
+            ParameterRow(
+                name, float(fit.values[k] * factor), float(fit.std[k] * factor), unit,
+                float(shares[k]), float(np.clip(known, 0.0, 1.0)),
+            )
+        )  # fmt: skip
+    return tuple(rows)
+
+
+def _correlated(fit: Fit) -> tuple[tuple[str, str, float], ...]:
+    """List pairs of parameters that the data cannot tell apart well."""
+    C = fit.covariance / np.outer(fit.std, fit.std)
+    pairs = np.argwhere(np.triu(np.abs(C) > CORRELATED, 1))
+    names = fit.combination.names
+    return tuple((names[i], names[j], float(C[i, j])) for i, j in pairs)
+
+
+def _weighed_down(fit: Fit, survey: Measurements) -> tuple[DroppedRow, ...]:
+    """List the rows that count less than fully, and why."""
+    out = []
+    for i in np.flatnonzero(fit.rows.weight < 1.0):
+        w, d = fit.rows.weight[i], fit.rows.distance[i]
+        size = np.linalg.norm(fit.residual[i]) / MM
+        what = "dropped" if w == 0 else f"weight {w:.2f}"
+        why = f"{what}: off by {size:.3f} mm, {d:.1f} sigma; its neighbours disagree"
+        out.append(DroppedRow(survey.ids[i], int(survey.line[i]), why))
+    return tuple(out)

@@ -1,0 +1,73 @@
+"""Effects by name."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+from postproc.accuracy.backlash import Backlash
+from postproc.accuracy.backlash_profile import BacklashProfile
+from postproc.accuracy.effect import Effect
+from postproc.accuracy.geometry import Geometry
+from postproc.exceptions import PostprocError
+from postproc.robot.arm import Arm
+from postproc.robot.state import States
+
+EFFECTS: dict[str, type[Effect]] = {
+    kind.name: kind for kind in (Geometry, Backlash, BacklashProfile)
+}
+
+BASE_EFFECTS = ("geometry", "backlash", "backlash_profile")
+
+
+def propose(names: Iterable[str], arm: Arm, states: States) -> tuple[Effect, ...]:
+    """Make effects by name, with the settings that fit an arm and a survey.
+
+    Raises:
+        PostprocError: There is no effect of that name, or the survey does not record
+            what it needs.
+    """
+    chosen = tuple(dict.fromkeys(name.strip() for name in names))
+    for name in chosen:
+        if name not in EFFECTS:
+            known = ", ".join(EFFECTS)
+            raise PostprocError(f"there is no effect {name!r}. Known effects: {known}")
+        _check_needs(EFFECTS[name], states)
+    return tuple(EFFECTS[name].propose(arm, states) for name in chosen)
+
+
+def _check_needs(kind: type[Effect], states: States) -> None:
+    """Refuse an effect whose covariate was not recorded.
+
+    Raises:
+        PostprocError: Naming the effect and the column.
+    """
+    for need in kind.needs:
+        values = getattr(states, need)
+        if len(states) and all(math.isnan(v) for v in values.reshape(-1)):
+            raise PostprocError(
+                f"effect {kind.name} needs the {need} of every row, which the file "
+                f"does not have. Add the column or leave the effect out"
+            )
+
+
+def restore(name: str, settings: Mapping[str, Any]) -> Effect:
+    """Make an effect from the settings of a model file.
+
+    Raises:
+        ValueError: Unknown effect or settings that do not fit it.
+    """
+    if name not in EFFECTS:
+        raise ValueError(f"unknown effect {name!r}")
+    try:
+        return EFFECTS[name](**{k: _frozen(v) for k, v in settings.items()})
+    except TypeError:
+        raise ValueError(f"settings do not fit effect {name!r}") from None
+
+
+def _frozen(value: Any) -> Any:
+    """Turn lists into tuples, at all depths."""
+    if isinstance(value, list):
+        return tuple(_frozen(v) for v in value)
+    return value

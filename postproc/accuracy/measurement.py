@@ -1,0 +1,266 @@
+"""Measurements of where the tool really landed."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from postproc.accuracy.table import Table, read_table
+from postproc.exceptions import MeasurementError
+from postproc.pose import MM
+from postproc.robot.arm import Arm
+from postproc.robot.direction import arrivals_of_rows
+from postproc.robot.state import States, make_states
+
+Array = NDArray[np.float64]
+Bools = NDArray[np.bool_]
+
+JOINTS = tuple(f"q{j}_deg" for j in range(1, 7))
+SIDES = tuple(f"lambda{j}" for j in range(1, 7))
+TRAVELS = tuple(f"travel{j}_deg" for j in range(1, 7))
+POSITION = ("x_mm", "y_mm", "z_mm")
+TOOL = ("tool_x_mm", "tool_y_mm", "tool_z_mm")
+COVARIATES = {  # column: field of States, SI units per unit of the column
+    "time_s": ("time", 1.0),
+    "temperature_c": ("temperature", 1.0),
+    "payload_kg": ("payload", 1.0),
+    "speed_mm_s": ("speed", MM),
+}
+NOWHERE = 1e-6  # [m] a position this close to zero is a lost beam
+
+
+@dataclass(frozen=True)
+class DroppedRow:
+    """A row that was not used, and why."""
+
+    id: str
+    line: int
+    why: str
+
+
+@dataclass(frozen=True, eq=False)
+class Measurements:
+    """Measured positions with the states they were taken in, in visit order.
+
+    Attributes:
+        path: The file (the first of several).
+        states: n states.
+        position: Measured TCP, (n, 3) [m], NaN where the file has no positions.
+        ids: Row ids.
+        line: 1-based line of every row, (n,).
+        inferred: True where the direction was inferred from the row order, (n,).
+        sha256: Hash of the file(s).
+        dropped: Rows left out.
+        warnings: What a reader of the fit should know.
+        rotation: Measured tool or probe orientation, (n, 3, 3), or None.
+    """
+
+    path: Path
+    states: States
+    position: Array
+    ids: tuple[str, ...]
+    line: NDArray[np.int64]
+    inferred: Bools
+    sha256: str
+    dropped: tuple[DroppedRow, ...] = ()
+    warnings: tuple[str, ...] = ()
+    rotation: Array | None = field(default=None, repr=False)
+
+    def __len__(self) -> int:
+        """Return the number of rows."""
+        return len(self.states)
+
+    def with_states(self, states: States) -> Measurements:
+        """Return a copy with other states of the same rows."""
+        return replace(self, states=states)
+
+    def __getitem__(self, rows: NDArray[np.int64] | Bools) -> Measurements:
+        """Return some of the rows."""
+        index = np.arange(len(self))[rows]
+        return replace(
+            self,
+            states=self.states[index],
+            position=self.position[index],
+            ids=tuple(self.ids[i] for i in index),
+            line=self.line[index],
+            inferred=self.inferred[index],
+            rotation=None if self.rotation is None else self.rotation[index],
+        )
+
+
+def read_measurements(
+    path: str | Path,
+    arm: Arm,
+    tools: Array | Mapping[int, Array],
+    *,
+    positions: bool = True,
+) -> Measurements:
+    """Read a measurement file.
+
+    Args:
+        path: CSV with the columns of the documentation; rows in visit order.
+        arm: The arm, for directions that must be inferred.
+        tools: Probe points in the flange frame, (k, 3) [m] or by `tool_id`. Columns
+            tool_x_mm, tool_y_mm, tool_z_mm override them.
+        positions: Whether the file must have measured positions.
+
+    Raises:
+        MeasurementError: Naming file, line, problem and cure.
+    """
+    table = read_table(path)
+    return from_table(table, arm, tools, positions=positions)
+
+
+def from_table(
+    table: Table,
+    arm: Arm,
+    tools: Array | Mapping[int, Array],
+    *,
+    positions: bool = True,
+) -> Measurements:
+    """Interpret a table with the columns of the documentation."""
+    table.require("id", *JOINTS, *(POSITION if positions else ()))
+    ids = _unique_ids(table)
+    q = np.deg2rad(table.block(JOINTS))
+    side, travel, inferred, warnings = _directions(table, arm, q)
+    covariates = {
+        name: scale * table.numbers(column, empty=True)
+        for column, (name, scale) in COVARIATES.items()
+        if table.has(column)
+    }
+    tool, tool_id = _tools(table, tools)
+    states = make_states(q, side, tool, tool_id=tool_id, travel=travel, **covariates)
+    read = table.has(*POSITION)
+    position = table.block(POSITION) * MM if read else np.full((len(q), 3), np.nan)
+    found = Measurements(
+        table.path, states, position, ids, table.line, inferred, table.sha256,
+        warnings=warnings,
+    )  # fmt: skip
+    return drop_lost_beams(found)
+
+
+def drop_lost_beams(measured: Measurements) -> Measurements:
+    """Leave out rows whose position is zero: the tracker had lost the beam."""
+    lost: Bools = np.asarray((np.abs(measured.position) < NOWHERE).all(axis=1))
+    gone = tuple(
+        DroppedRow(
+            measured.ids[i], int(measured.line[i]), "position 0, 0, 0: beam lost"
+        )
+        for i in np.flatnonzero(lost)
+    )
+    return replace(measured[~lost], dropped=measured.dropped + gone)
+
+
+def _unique_ids(table: Table) -> tuple[str, ...]:
+    """Read the ids and refuse duplicates.
+
+    Raises:
+        MeasurementError: An id appears twice.
+    """
+    ids = table.text("id")
+    first: dict[str, int] = {}
+    for i, name in enumerate(ids):
+        if name in first:
+            raise MeasurementError(
+                table.path,
+                f"id {name!r} appears twice (first in line {table.line[first[name]]})",
+                "Give every row its own id",
+                line=int(table.line[i]),
+            )
+        first[name] = i
+    return tuple(ids)
+
+
+def _directions(
+    table: Table, arm: Arm, q: Array
+) -> tuple[Array, Array, Bools, tuple[str, ...]]:
+    """Read the arrival directions and travels, or infer them from the row order."""
+    arrived = arrivals_of_rows(arm, q)
+    travel = arrived.travel
+    if table.has(*TRAVELS):
+        travel = np.deg2rad(table.block(TRAVELS))
+    if not table.has(*SIDES):
+        warnings = (
+            f"{table.path}: no lambda columns; directions inferred from the order of "
+            "the rows, as JOINT moves. Wrong if the rows were sorted",
+        )
+        return arrived.direction, travel, np.ones(len(q), dtype=bool), warnings
+    side = table.block(SIDES)
+    wrong = ~np.isin(side, (-1.0, 0.0, 1.0)).all(axis=1)
+    if wrong.any():
+        line = int(table.line[np.argmax(wrong)])
+        cure = "lambda is 1 (positive direction), -1, or 0 where not known"
+        raise MeasurementError(table.path, "wrong lambda", cure, line=line)
+    return side, travel, np.zeros(len(q), dtype=bool), ()
+
+
+def _tools(
+    table: Table, tools: Array | Mapping[int, Array]
+) -> tuple[Array, NDArray[np.int64]]:
+    """Look up every row's tool.
+
+    Raises:
+        MeasurementError: A tool_id that no probe point is known for.
+    """
+    n = len(table)
+    known = (
+        tools if isinstance(tools, Mapping) else dict(enumerate(np.atleast_2d(tools)))
+    )
+    numbers = table.numbers("tool_id") if table.has("tool_id") else np.zeros(n)
+    tool_id = np.asarray(np.round(numbers), dtype=np.int64)
+    if table.has(*TOOL):
+        return table.block(TOOL) * MM, tool_id
+    if min(tool_id, default=0) > 0 and 0 in known and max(tool_id) == len(known):
+        tool_id = tool_id - 1  # numbered from 1
+    for i, one in enumerate(tool_id):
+        if int(one) not in known:
+            raise MeasurementError(
+                table.path,
+                f"tool_id {int(numbers[i])} is not one of the cell's probe points",
+                "Add the point to the cell file, or columns tool_x_mm, tool_y_mm, "
+                "tool_z_mm",
+                line=int(table.line[i]),
+            )
+    return np.stack([np.asarray(known[int(one)], float) for one in tool_id]), tool_id
+
+
+def concatenate(parts: Sequence[Measurements]) -> Measurements:
+    """Put several files one after the other.
+
+    Raises:
+        MeasurementError: An id appears in two files.
+    """
+    first = parts[0]
+    if len(parts) == 1:
+        return first
+    seen: dict[str, Path] = {}
+    for part in parts:
+        for name, line in zip(part.ids, part.line, strict=True):
+            if name in seen and seen[name] != part.path:
+                cure = "Give every row its own id"
+                problem = f"id {name!r} is also in {seen[name]}"
+                raise MeasurementError(part.path, problem, cure, line=int(line))
+            seen[name] = part.path
+    joined = {
+        name: np.concatenate([getattr(p.states, name) for p in parts])
+        for name in first.states.__dataclass_fields__
+        if name != "order"
+    }
+    order = np.arange(sum(map(len, parts)), dtype=float)
+    rotations = [p.rotation for p in parts if p.rotation is not None]
+    return Measurements(
+        path=first.path,
+        states=States(order=order, **joined),
+        position=np.concatenate([p.position for p in parts]),
+        ids=tuple(i for p in parts for i in p.ids),
+        line=np.concatenate([p.line for p in parts]),
+        inferred=np.concatenate([p.inferred for p in parts]),
+        sha256="+".join(p.sha256 for p in parts),
+        dropped=tuple(d for p in parts for d in p.dropped),
+        warnings=tuple(w for p in parts for w in p.warnings),
+        rotation=np.concatenate(rotations) if len(rotations) == len(parts) else None,
+    )

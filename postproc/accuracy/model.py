@@ -1,0 +1,259 @@
+"""A fitted model: what the arm does wrong, and how well that is known."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from postproc.accuracy.batch import Batch
+from postproc.accuracy.combination import Combination
+from postproc.accuracy.library import restore
+from postproc.accuracy.noise import Noise
+from postproc.accuracy.prediction import Prediction
+from postproc.accuracy.ranges import Ranges
+from postproc.accuracy.schema import FORMAT, Method, content_id, read_model_file
+from postproc.exceptions import ModelError
+from postproc.robot.arm import Arm
+from postproc.robot.state import States
+
+Array = NDArray[np.float64]
+
+CHUNK = 5000  # states evaluated together: the columns stay in the cache
+COMPENSATED = ("arm", "state")
+
+
+@dataclass(frozen=True, eq=False)
+class Model:
+    """Effects with their parameters, their covariance and where they hold.
+
+    Attributes:
+        method: How it was made.
+        arm_name, arm_id: The arm it was made for.
+        effects: All fitted effects, those of the set-up included.
+        values: Parameters, (p,) [SI].
+        covariance: Of the parameters, (p, p); empty where the method has none.
+        prior_std: Prior standard deviations, (p,).
+        spread: Further standard error per axis, of methods without a covariance [m].
+        noise: Tracker and repeatability.
+        ranges: What the survey covered.
+        rows: Number of rows fitted.
+        data_sha256: Hash of the measurement files.
+        parent: Id of the model that this one extends.
+        statistics: Figures of the fit, units in their names.
+        history: What was added to the ancestors, oldest first.
+    """
+
+    method: Method
+    arm_name: str
+    arm_id: str
+    effects: Combination
+    values: Array
+    covariance: Array
+    prior_std: Array
+    noise: Noise
+    ranges: Ranges
+    rows: int
+    data_sha256: str
+    spread: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    parent: str | None = None
+    statistics: dict[str, float] = field(default_factory=dict)
+    history: tuple[dict[str, Any], ...] = ()
+
+    @property
+    def id(self) -> str:
+        """Hash of the content."""
+        return str(self.to_dict()["id"])
+
+    @property
+    def needs(self) -> frozenset[str]:
+        """Covariates that the compensated effects cannot do without."""
+        used = [e for e in self.effects.effects if e.origin in COMPENSATED]
+        return frozenset(need for e in used for need in e.needs)
+
+    def compensable(self) -> tuple[Combination, Array, Array]:
+        """Return the effects that may be compensated, their values and covariance."""
+        keep = self.effects.where(*COMPENSATED)
+        part = tuple(e for e in self.effects.effects if e.origin in COMPENSATED)
+        covariance = self.covariance
+        if len(covariance):
+            covariance = covariance[np.ix_(keep, keep)]
+        return Combination(part), self.values[keep], covariance
+
+    def error(self, arm: Arm, states: States) -> Array:
+        """Predict the error without its uncertainty, (n, 3) [m]."""
+        effects, values, _ = self.compensable()
+        parts = [
+            effects.error(Batch(arm, states[rows]), values)
+            for rows in _chunks(len(states))
+        ]
+        return np.concatenate([np.zeros((0, 3)), *parts])
+
+    def measured_error(self, arm: Arm, states: States) -> Array:
+        """Predict what the survey's set-up would measure, (n, 3) [m]."""
+        return self.effects.error(Batch(arm, states), self.values)
+
+    def predict(self, arm: Arm, states: States) -> Prediction:
+        """Predict the error that may be compensated, and how sure it is.
+
+        Where a direction is not known (0), the error is that of the middle of the gap,
+        and half the gap enters both standard deviations.
+        """
+        effects, values, covariance = self.compensable()
+        error, model = np.empty((len(states), 3)), np.empty((len(states), 3))
+        arrival = np.empty((len(states), 3))
+        for rows in _chunks(len(states)):
+            batch = Batch(arm, states[rows])
+            at = effects.at(batch, values)
+            error[rows] = effects.error(batch, values)
+            variance = _side_variance(effects, at, values)
+            variance = variance + np.square(self.spread)
+            if len(covariance):
+                X = effects.columns(at)
+                variance += np.einsum("nip,nip->ni", X @ covariance, X)
+            model[rows] = variance
+            arrival[rows] = variance + self.noise.arrival_variance(at.jacobian)
+        model, arrival = np.sqrt(np.maximum(model, 0)), np.sqrt(np.maximum(arrival, 0))
+        outside = self.ranges.outside(states, self.needs)
+        worst = self.statistics.get("worst_std_mm", np.inf) * 1e-3
+        unsure = (model > 3 * worst).any(axis=1) & (states.direction != 0).all(axis=1)
+        if unsure.any():
+            outside["standard error above three times the survey's worst"] = unsure
+        return Prediction(error, model, arrival, outside)
+
+    def measured_std(self, arm: Arm, states: States) -> Array:
+        """Standard deviation of one measured row, tracker included, (n, 3) [m]."""
+        arrival = self.predict(arm, states).std_arrival
+        tcp = Batch(arm, states).walk.tcp
+        tracker = self.noise.tracker_std(tcp)[:, None]
+        return np.asarray(np.hypot(arrival, tracker))
+
+    def check_arm(self, arm: Arm, path: str | Path = "model") -> None:
+        """Refuse an arm that the model was not made for.
+
+        Raises:
+            ModelError: The kinematics differ.
+        """
+        if arm.id != self.arm_id:
+            raise ModelError(
+                path,
+                f"was made for arm {self.arm_name} ({self.arm_id}), not for "
+                f"{arm.name} ({arm.id})",
+                "Use the model of this arm, or fit one",
+                place="$.arm",
+            )
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the content of the model file."""
+        upper = np.triu_indices(len(self.covariance))
+        std = np.sqrt(np.diag(self.covariance)) if len(self.covariance) else None
+        data: dict[str, Any] = {
+            "format": FORMAT,
+            "parent": self.parent,
+            "method": self.method,
+            "arm": {"name": self.arm_name, "id": self.arm_id},
+            "data_sha256": self.data_sha256,
+            "rows": self.rows,
+            "effects": [
+                {"name": e.name, "settings": e.settings()} for e in self.effects.effects
+            ],
+            "parameters": [
+                {
+                    "name": name,
+                    "unit": p.unit,
+                    "value": float(self.values[k]),
+                    "std_error": 0.0 if std is None else float(std[k]),
+                    "prior_std": float(self.prior_std[k]),
+                }
+                for k, (name, p) in enumerate(
+                    zip(self.effects.names, self.effects.parameters, strict=True)
+                )
+            ],
+            "covariance": self.covariance[upper].tolist() if std is not None else [],
+            "spread": list(self.spread),
+            "noise": asdict(self.noise),
+            "ranges": asdict(self.ranges),
+            "statistics": self.statistics,
+            "history": list(self.history),
+        }
+        data = json.loads(json.dumps(data))
+        return {"id": content_id(data), **data}
+
+    def save(self, path: str | Path) -> None:
+        """Write the model file.
+
+        Raises:
+            ModelError: The place cannot be written to.
+        """
+        text = json.dumps(self.to_dict(), indent=1) + "\n"
+        try:
+            Path(path).write_text(text, encoding="utf-8")
+        except OSError as exc:
+            problem = f"cannot be written ({exc.strerror})"
+            raise ModelError(path, problem, "Choose another place") from None
+
+
+def load_model(path: str | Path) -> Model:
+    """Read a model file.
+
+    Raises:
+        ModelError: It cannot be read or does not hold together.
+    """
+    file = read_model_file(Path(path))
+    cure = "Make the model again with postproc fit"
+    try:
+        effects = Combination(tuple(restore(e.name, e.settings) for e in file.effects))
+        names = effects.names
+    except (ValueError, TypeError) as exc:
+        raise ModelError(path, str(exc), cure, place="$.effects") from None
+    count = len(names)
+    if tuple(p.name for p in file.parameters) != names:
+        problem = "parameters do not match the effects"
+        raise ModelError(path, problem, cure, place="$.parameters")
+    if len(file.covariance) not in (0, count * (count + 1) // 2):
+        problem = "covariance does not match the parameters"
+        raise ModelError(path, problem, cure, place="$.covariance")
+    return Model(
+        method=file.method,
+        arm_name=file.arm.name,
+        arm_id=file.arm.id,
+        effects=effects,
+        values=np.array([p.value for p in file.parameters]),
+        covariance=_square(np.array(file.covariance), count),
+        prior_std=np.array([p.prior_std for p in file.parameters]),
+        noise=Noise(**file.noise.model_dump()),
+        ranges=Ranges(**file.ranges.model_dump()),
+        rows=file.rows,
+        data_sha256=file.data_sha256,
+        spread=file.spread,
+        parent=file.parent,
+        statistics=file.statistics,
+        history=file.history,
+    )
+
+
+def _square(packed: Array, count: int) -> Array:
+    """Unpack an upper triangle, row by row."""
+    if len(packed) == 0:
+        return np.zeros((0, 0))
+    full = np.zeros((count, count))
+    full[np.triu_indices(count)] = packed
+    return np.asarray(full + np.triu(full, 1).T)
+
+
+def _chunks(n: int) -> list[slice]:
+    """Cut n states into pieces."""
+    return [slice(i, min(i + CHUNK, n)) for i in range(0, n, CHUNK)]
+
+
+def _side_variance(effects: Combination, at: Batch, values: Array) -> Array:
+    """Variance that unknown directions give, (n, 3) [m^2]."""
+    unknown = (at.states.direction == 0).astype(float)
+    if not unknown.any():
+        return np.zeros((len(at), 3))
+    slopes = effects.direction_slopes(at, values)
+    return np.asarray(np.einsum("nij,nj->ni", slopes**2, unknown))

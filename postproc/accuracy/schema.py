@@ -1,0 +1,129 @@
+"""The model file: JSON, checked when it is read."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from pathlib import Path
+from typing import Any, Literal
+
+import pydantic
+from pydantic import BaseModel, ConfigDict, Field, NonNegativeFloat, PositiveInt
+
+from postproc.exceptions import ModelError
+
+FORMAT = 1
+MAX_BYTES = 200_000_000
+
+Method = Literal["full", "eja-elm", "elm", "interpolation", "kinematic-elm", "kriging"]
+
+
+class Section(BaseModel):
+    """A part of the file: unknown keys and non-finite numbers are errors."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+class ArmSection(Section):
+    """The arm that the model was made for."""
+
+    name: str
+    id: str
+
+
+class EffectSection(Section):
+    """An effect and its settings."""
+
+    name: str
+    settings: dict[str, Any]
+
+
+class ParameterSection(Section):
+    """One parameter, SI units."""
+
+    name: str
+    unit: str
+    value: float
+    std_error: NonNegativeFloat
+    prior_std: NonNegativeFloat
+
+
+class NoiseSection(Section):
+    """The noise components of `postproc.accuracy.noise.Noise`."""
+
+    tracker: NonNegativeFloat
+    joint: NonNegativeFloat
+    origin: tuple[float, float, float] | None
+
+
+class RangesSection(Section):
+    """The ranges of `postproc.accuracy.ranges.Ranges`."""
+
+    lower: tuple[float, ...] = Field(min_length=6, max_length=6)
+    upper: tuple[float, ...] = Field(min_length=6, max_length=6)
+    tools: tuple[tuple[float, float, float], ...]
+    payload: tuple[float, float] | None
+    temperature: tuple[float, float] | None
+    speed: tuple[float, float] | None
+
+
+class ModelFile(Section):
+    """A whole model file."""
+
+    format: Literal[1]
+    id: str
+    parent: str | None
+    method: Method
+    arm: ArmSection
+    data_sha256: str
+    rows: PositiveInt
+    effects: tuple[EffectSection, ...]
+    parameters: tuple[ParameterSection, ...]
+    covariance: tuple[float, ...]
+    spread: tuple[float, float, float]
+    noise: NoiseSection
+    ranges: RangesSection
+    statistics: dict[str, float]
+    history: tuple[dict[str, Any], ...]
+
+
+def content_id(data: dict[str, Any]) -> str:
+    """Hash everything but the id."""
+    rest = {k: v for k, v in data.items() if k != "id"}
+    text = json.dumps(rest, sort_keys=True, separators=(",", ":"))
+    return hashlib.sha256(text.encode()).hexdigest()[:16]
+
+
+def read_model_file(path: Path) -> ModelFile:
+    """Read and check a model file.
+
+    Raises:
+        ModelError: Naming the file, the place and the cure.
+    """
+    try:
+        raw = path.read_bytes()
+    except OSError as exc:
+        cure = "Make a model with postproc fit"
+        raise ModelError(path, f"cannot be read ({exc.strerror})", cure) from None
+    if len(raw) > MAX_BYTES:
+        raise ModelError(path, "is too large for a model", "Check the path")
+    try:
+        data = json.loads(raw)
+    except (UnicodeDecodeError, json.JSONDecodeError, RecursionError):
+        cure = "Make it again with postproc fit"
+        raise ModelError(path, "is not valid JSON", cure) from None
+    try:
+        file = ModelFile.model_validate(data)
+    except pydantic.ValidationError as exc:
+        first = exc.errors()[0]
+        place = "$" + "".join(f".{key}" for key in first["loc"])
+        cure = "Make the model again with postproc fit"
+        raise ModelError(path, first["msg"], cure, place=place) from None
+    if content_id(data) != file.id:
+        raise ModelError(
+            path,
+            "has been changed since it was made: its id does not match its content",
+            "Make the model again with postproc fit",
+            place="$.id",
+        )
+    return file

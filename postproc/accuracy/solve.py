@@ -1,0 +1,95 @@
+"""Which command lands on the wanted pose."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from postproc.accuracy.model import Model
+from postproc.pose import inverse, rotation_vector
+from postproc.robot.arm import Arm
+from postproc.robot.state import States
+
+Array = NDArray[np.float64]
+
+CLOSE = 2e-7  # [m] where iterating stops
+MOST = 5  # iterations
+
+
+@dataclass(frozen=True)
+class Solution:
+    """Corrected commands of n targets.
+
+    Attributes:
+        q: Joint angles of the command, (n, 6) [rad], NaN where it cannot be reached.
+        command: TCP pose to command, base frame, (n, 4, 4).
+        residual: Distance of the predicted landing from the wanted place, (n,) [m].
+        iterations: How many were needed.
+    """
+
+    q: Array
+    command: Array
+    residual: Array
+    iterations: int
+
+
+def solve(
+    model: Model, arm: Arm, wanted: Array, tool: Array, states: States
+) -> Solution:
+    """Find the command whose predicted landing is the wanted place.
+
+    The position is corrected, the orientation stays as wanted, and so does the branch.
+
+    Args:
+        model: Predicts the error of a command.
+        arm: The arm.
+        wanted: TCP poses in the arm's base frame, (n, 4, 4).
+        tool: Tool in the flange frame, (4, 4) or (n, 4, 4).
+        states: The nominal states at the targets: angles, direction, loads.
+    """
+    n = len(wanted)
+    tool = np.broadcast_to(tool, (n, 4, 4))
+    states = states.with_(tool=np.ascontiguousarray(tool[:, :3, 3]))
+    from_tcp = inverse(np.ascontiguousarray(tool))
+    command, q = np.array(wanted), np.array(states.q)
+    place = wanted[:, :3, 3]
+    branch = arm.branch(states.q) if arm.has_inverse else None
+    landing = place + model.error(arm, states)
+    iterations = 0
+    while iterations < MOST and _worst(landing, place) > CLOSE:
+        command[:, :3, 3] += place - landing
+        q = _nearest(arm, command @ from_tcp, q, branch)
+        landing = command[:, :3, 3] + model.error(arm, states.with_(q=np.array(q)))
+        iterations += 1
+    return Solution(q, command, _distance(landing, place), iterations)
+
+
+def _distance(a: Array, b: Array) -> Array:
+    """Distance between points (n, 3), (n,) [m]."""
+    gap: Array = np.linalg.norm(a - b, axis=1)
+    return gap
+
+
+def _worst(a: Array, b: Array) -> float:
+    """Largest distance between points, those without a solution left out [m]."""
+    return float(np.fmax.reduce(_distance(a, b), initial=0.0))
+
+
+def _nearest(
+    arm: Arm, flange: Array, near: Array, branch: NDArray[np.int64] | None
+) -> Array:
+    """Solve for the joint angles next to given ones, in closed form or by Newton."""
+    if branch is not None:
+        return arm.nearest(flange, near, branch)
+    q = np.array(near)
+    for _ in range(4):
+        at = arm.flange(q)
+        turned = flange[:, :3, :3] @ np.swapaxes(at[:, :3, :3], 1, 2)
+        gap = np.concatenate(
+            [flange[:, :3, 3] - at[:, :3, 3], rotation_vector(turned)], axis=1
+        )
+        J = arm.jacobian(q, np.zeros(3))
+        q = q + np.linalg.solve(J + 1e-12 * np.eye(6), gap[:, :, None])[:, :, 0]
+    return q
