@@ -28,6 +28,7 @@ class Chain:
         mass: Link masses, (6,) [kg].
         centre: Centres of mass in the D-H link frames, (6, 3) [m].
         speed: Highest joint speeds, (6,) [rad/s].
+        lower, upper: Joint range, (6,) [rad].
     """
 
     a: Array
@@ -40,6 +41,8 @@ class Chain:
     mass: Array
     centre: Array
     speed: Array
+    lower: Array
+    upper: Array
 
     def dh_angles(self, q: Array) -> Array:
         """Convert controller angles (n, 6) to D-H angles (n, 6) [rad]."""
@@ -104,6 +107,8 @@ def _nj220() -> Chain:
             [0.0, -308.0, -26.0], [0.0, -15.0, 94.0], [0.0, -1.0, -16.0],
         ]) * 1e-3,
         speed=degrees([100.0, 90.0, 110.0, 130.0, 130.0, 195.0]),
+        lower=degrees([-180.0, -75.0, -256.0, -2700.0, -125.0, -2700.0]),
+        upper=degrees([180.0, 95.0, 10.0, 2700.0, 125.0, 2700.0]),
     )  # fmt: skip
 
 

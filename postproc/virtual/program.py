@@ -1,0 +1,162 @@
+"""Run a program on the virtual arm."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from postproc.exceptions import PlanError
+from postproc.language.visits import START, Motion, Visits
+from postproc.virtual.arm import VirtualArm
+from postproc.virtual.arrivals import USUAL_SPEED, Arrivals, make_arrivals
+from postproc.virtual.drawing import stream
+from postproc.virtual.gears import GearState, at_start, move
+from postproc.virtual.moves import Way, frames_at, way_to
+from postproc.virtual.rotation import pose_of_record
+from postproc.virtual.setup import Setup
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+SETTLE = 0.3  # [s] to start and stop a move
+# Where the arm stands when the cell names no home: its upright pose, wrist bent.
+UPRIGHT = np.radians([0.0, 0.0, -90.0, 0.0, 90.0, 0.0])
+
+
+@dataclass(frozen=True)
+class Run:
+    """What happened when a program ran.
+
+    Attributes:
+        visit: Index of every reached visit, (k,), in the order of the program.
+        arrivals: How the arm got there, k of them.
+        tool_id: Number of the tool among those of the program, (k,) from 0.
+        why: For each visit of the program, why it was not reached, or "".
+    """
+
+    visit: Ints
+    arrivals: Arrivals
+    tool_id: Ints
+    why: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class _Place:
+    """The arm after one visit; `way` is empty where the visit was not reached."""
+
+    joints: Array
+    gears: GearState
+    before: Array
+    speed: float = USUAL_SPEED
+    lasted: float = 0.0
+    why: str = ""
+
+
+def run_program(arm: VirtualArm, setup: Setup, visits: Visits) -> Run:
+    """Run every visit of a program once.
+
+    Where a visit has several possible predecessors, the arm comes from the first of
+    them that was run: one of the histories that really happen. Where it comes from an
+    unknown place, it starts at home with its gears as the seed drew them.
+
+    Args:
+        arm: Whose gears and clock.
+        setup: Its cell.
+        visits: The program.
+    """
+    poses = pose_of_record(visits.frames) if len(visits.frames) else np.eye(4)[None]
+    start = _start(arm, setup)
+    places: list[_Place] = []
+    for i in range(len(visits)):
+        came_from = _predecessor(visits, i)
+        place = start if came_from < 0 else places[came_from]
+        if came_from < 0 and setup.home is None:
+            place = _first_place(arm, setup, visits, i, poses, start)
+        places.append(_go(arm, setup, visits, i, poses, place))
+    return _collect(arm, setup, visits, poses, places)
+
+
+def _predecessor(visits: Visits, i: int) -> int:
+    """Return the visit that the arm comes from, or START."""
+    known = [int(p) for p in visits.predecessors(i) if 0 <= p < i]
+    return known[0] if known else START
+
+
+def _start(arm: VirtualArm, setup: Setup) -> _Place:
+    """Return the arm before the program starts."""
+    joints = UPRIGHT if setup.home is None else setup.home
+    side = stream(arm.seed, "start").choice([-1.0, 1.0], 6)
+    return _Place(joints, at_start(arm.gears, joints, side), joints)
+
+
+def _go(
+    arm: VirtualArm, setup: Setup, visits: Visits, i: int, poses: Array, place: _Place
+) -> _Place:
+    """Run one move; an arm that cannot go stays where it is."""
+    try:
+        frames = frames_at(visits, i, poses)
+        way = way_to(setup, visits, i, frames, place.joints, place.before)
+    except PlanError as error:
+        return replace(place, why=str(error), lasted=0.0)
+    lasted = _duration(setup, visits, i, way)
+    return _Place(
+        joints=way.joints[-1],
+        gears=move(arm.gears, place.gears, way.joints),
+        before=place.joints,
+        speed=max(way.length / lasted, 1e-6),
+        lasted=lasted + SETTLE,
+    )
+
+
+def _first_place(
+    arm: VirtualArm, setup: Setup, visits: Visits, i: int, poses: Array, start: _Place
+) -> _Place:
+    """Return the arm standing at the first target, for a cell without a home."""
+    try:
+        frames = frames_at(visits, i, poses)
+        one = replace(visits, motion=np.full_like(visits.motion, Motion.JOINT))
+        way = way_to(setup, one, i, frames, start.joints, start.joints)
+    except PlanError:
+        return start
+    joints = way.joints[-1]
+    gears = at_start(arm.gears, joints, start.gears.side)
+    return _Place(joints, gears, joints)
+
+
+def _duration(setup: Setup, visits: Visits, i: int, way: Way) -> float:
+    """Return how long a move takes, without ramps [s]."""
+    override = float(np.nan_to_num(visits.override[i], nan=1.0)) or 1.0
+    speed = setup.chain.speed * override
+    most = np.abs(np.diff(way.joints, axis=0)).sum(axis=0) / speed
+    lasted = float(most.max())
+    if visits.motion[i] != Motion.JOINT:
+        programmed = float(np.nan_to_num(visits.lin_spd[i], nan=USUAL_SPEED))
+        lasted = max(lasted, way.length / max(programmed * override, 1e-6))
+    return max(lasted, 1e-3)
+
+
+def _collect(
+    arm: VirtualArm, setup: Setup, visits: Visits, poses: Array, places: list[_Place]
+) -> Run:
+    """Gather the reached visits."""
+    reached = [i for i, p in enumerate(places) if not p.why]
+    visit = np.array(reached, dtype=np.int64)
+    kept = [places[i] for i in reached]
+    time = np.cumsum([p.lasted for p in places])[visit] if reached else np.zeros(0)
+    tools = list(dict.fromkeys(visits.tool[visit].tolist()))
+    tool_id = np.array([tools.index(t) for t in visits.tool[visit]], dtype=np.int64)
+    arrivals = make_arrivals(
+        np.array([p.joints for p in kept]).reshape(-1, 6),
+        np.array([p.gears.side for p in kept]).reshape(-1, 6),
+        poses[visits.tool[visit]],
+        travel=np.array([p.gears.travel for p in kept]).reshape(-1, 6),
+        loop=np.array([p.gears.loop for p in kept]).reshape(-1, 6),
+        speed=np.array([p.speed for p in kept]),
+        time=time,
+        temperature=arm.temperature(time, setup.temperature),
+        payload=setup.payload,
+        payload_com=setup.payload_com,
+    )
+    return Run(visit, arrivals, tool_id, tuple(p.why for p in places))

@@ -1,0 +1,56 @@
+"""The place where the virtual arm works, as plain values."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from postproc.virtual.kinematics import NJ220, Chain
+
+Array = NDArray[np.float64]
+
+# Where a tracker stands when nobody says so: to the right in front of the arm.
+USUAL_TRACKER = np.array([4.0, -3.0, 1.5])  # [m] in the arm base frame
+
+
+def _identity() -> Array:
+    return np.eye(4)
+
+
+@dataclass(frozen=True)
+class Setup:
+    """What the cell tells: SI units, poses in the frames of the controller.
+
+    Attributes:
+        chain: The nominal arm.
+        coupling: Motor angles = coupling @ joint angles, (6, 6).
+        tool: Flange to TCP, (4, 4) [m].
+        base: World to arm base, (4, 4).
+        uframe: World to user frame, (4, 4).
+        tools: Tools that `tool_id` columns count, (k, 4, 4); empty: always `tool`.
+        home: $HOME and where programs start, (6,) [rad], or None.
+        payload: [kg].
+        payload_com: In the flange frame, (3,) [m].
+        temperature: At the start, [deg C].
+        tracker: Where the tracker stands, (3,) [m] in the arm base frame.
+    """
+
+    chain: Chain = NJ220
+    coupling: Array = field(default_factory=lambda: np.eye(6))
+    tool: Array = field(default_factory=_identity)
+    base: Array = field(default_factory=_identity)
+    uframe: Array = field(default_factory=_identity)
+    tools: Array = field(default_factory=lambda: np.zeros((0, 4, 4)))
+    home: Array | None = None
+    payload: float = 0.0
+    payload_com: Array = field(default_factory=lambda: np.zeros(3))
+    temperature: float = 22.0
+    tracker: Array = field(default_factory=lambda: USUAL_TRACKER.copy())
+
+    def tool_of(self, tool_id: NDArray[np.int64]) -> Array:
+        """Return the tool poses (n, 4, 4) of tool numbers (n,) from 0."""
+        if len(self.tools):
+            return np.asarray(self.tools[tool_id])
+        return np.broadcast_to(self.tool, (len(tool_id), 4, 4))

@@ -1,0 +1,74 @@
+"""Write a simulated campaign as a measurement file."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from postproc.exceptions import OutputError
+from postproc.virtual.measure import Campaign
+
+Array = NDArray[np.float64]
+
+
+def write_measurements(
+    campaign: Campaign, path: str | Path, *, direction: bool = True
+) -> None:
+    """Write a measurement file.
+
+    Args:
+        campaign: What was measured.
+        path: The CSV file.
+        direction: Whether the arrival directions and travels are written too.
+
+    Raises:
+        OutputError: The file cannot be written.
+    """
+    header, table = _table(campaign, direction)
+    try:
+        with Path(path).open("w", newline="", encoding="utf-8") as file:
+            writer = csv.writer(file, lineterminator="\n")
+            writer.writerow(header)
+            writer.writerows(table)
+    except OSError as error:
+        raise OutputError(path, f"cannot be written: {error.strerror}") from error
+
+
+def _table(campaign: Campaign, direction: bool) -> tuple[list[str], list[list[str]]]:
+    """Return the header and the rows as text."""
+    a, joints = campaign.arrivals, range(1, 7)
+    columns: list[tuple[str, Sequence[object]]] = [("id", campaign.ids)]
+    columns += _columns([f"q{j}_deg" for j in joints], np.degrees(a.q), 5)
+    if direction:
+        columns += _columns([f"lambda{j}" for j in joints], _signs(a.side), 0)
+    columns += _columns(["x_mm", "y_mm", "z_mm"], campaign.measured * 1e3, 4)
+    columns += _columns(["time_s"], a.time[:, None], 1)
+    columns += _columns(["temperature_c"], a.temperature[:, None], 2)
+    columns += _columns(["payload_kg"], a.payload[:, None], 1)
+    columns += _columns(["speed_mm_s"], a.speed[:, None] * 1e3, 1)
+    columns.append(("tool_id", [str(t) for t in campaign.tool_id]))
+    if direction:
+        names = [f"travel{j}_deg" for j in joints]
+        columns += _columns(names, np.degrees(a.travel), 3)
+    header = [name for name, _ in columns]
+    table = [
+        [str(cell) for cell in row]
+        for row in zip(*(c for _, c in columns), strict=True)
+    ]
+    return header, table
+
+
+def _columns(
+    names: Sequence[str], values: Array, digits: int
+) -> list[tuple[str, Sequence[object]]]:
+    texts = [[f"{v:.{digits}f}" for v in column] for column in values.T]
+    return list(zip(names, texts, strict=True))
+
+
+def _signs(side: Array) -> Array:
+    """Return the directions that sides in the gap amount to: 0 in its middle half."""
+    return np.asarray(np.where(np.abs(side) > 0.5, np.sign(side), 0.0)) + 0.0
