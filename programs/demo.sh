@@ -1,0 +1,45 @@
+#!/usr/bin/env bash
+# From a survey to compensated programs, on a virtual arm with errors of its own.
+# Needs `postproc` on the PATH (make demo sees to that); writes into demo/.
+set -euo pipefail
+cd "$(dirname "${BASH_SOURCE[0]}")/.."
+
+cell=programs/cell.toml
+seed=${SEED:-1} # which virtual arm: another seed, other errors
+jobs="drilling handling"
+mkdir -p demo
+exec 3>&1 # commands are shown here also where their output goes to a file
+
+# Show a command, run it; exit code 1 is a result (targets left, files differ), 2 not.
+run() {
+    printf '\n$ %s\n' "$*" >&3
+    "$@" || [ $? -eq 1 ]
+}
+
+title() { printf '\n== %s\n' "$*"; }
+
+title "A survey program: 300 poses, each approached from both sides"
+run postproc survey --cell $cell --poses 300 -o demo/survey.pdl
+
+title "The (virtual) arm runs it, the tracker reads"
+run postproc simulate demo/survey.pdl --cell $cell --seed "$seed" -o demo/survey.csv
+
+title "A model of the arm's error, fitted to the readings"
+run postproc fit demo/survey.csv --cell $cell -o demo/model.json
+
+for job in $jobs; do
+    title "$job.pdl: every target moved against the predicted error"
+    run postproc compensate programs/$job.pdl --cell $cell --model demo/model.json \
+        -o demo/$job.pdl --report demo/$job.json
+    run postproc diff programs/$job.pdl demo/$job.pdl >demo/$job.diff
+    head -n 14 demo/$job.diff
+    echo "  ... all of it in demo/$job.diff"
+done
+
+title "What the tool really misses by: programs as written, and compensated"
+for job in $jobs; do
+    run postproc simulate programs/$job.pdl --cell $cell --seed "$seed" \
+        --wanted programs/$job.pdl --json demo/$job.before.json
+    run postproc simulate demo/$job.pdl --cell $cell --seed "$seed" \
+        --wanted programs/$job.pdl --json demo/$job.after.json
+done
