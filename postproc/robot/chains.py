@@ -95,6 +95,7 @@ def cut(q: Array, coupling: Array, edges: Edges) -> Chains:
     """
     n, unknown = len(q), np.asarray(np.isnan(q).any(axis=1))
     source = np.array(edges.source)
+    source[unknown[np.repeat(np.arange(n), np.diff(edges.first))]] = -1
     source[source >= 0] = np.where(
         unknown[source[source >= 0]], -1, source[source >= 0]
     )

@@ -1,0 +1,161 @@
+"""One arrival: from known joint angles over one edge to a target."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from postproc.motion.branches import (
+    LOST,
+    follow,
+    nearest_slot,
+    nearest_turns,
+    on_written_turns,
+)
+from postproc.motion.path import lines
+from postproc.motion.reasons import (
+    CODE,
+    NO_BRANCH,
+    NO_CIRCLE,
+    NO_START,
+    OTHER_BRANCH,
+    OUT_OF_REACH,
+    PATH_JUMP,
+    PATH_REACH,
+)
+from postproc.motion.targets import Kind, Move
+from postproc.motion.workspace import Workspace
+from postproc.motion.wrist import wrist_interpolated
+from postproc.robot.arm import Arm
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Arrival:
+    """Where one edge leads to.
+
+    Attributes:
+        q: (6,) [rad], NaN where not known.
+        flange: (4, 4) [m].
+        slot: Branch, -1 where unknown.
+        path: Joint angles along the edge, the target included, (k, 6); empty where the
+            path is not known.
+        reason: Index into `REASONS`.
+    """
+
+    q: Array
+    flange: Array
+    slot: int
+    path: Array
+    reason: int
+
+
+NO_PATH = np.empty((0, 6))
+
+
+def arrive(work: Workspace, v: int, edge: int) -> Arrival:
+    """Go over an edge whose source has known joint angles."""
+    targets, source = work.targets, int(work.source[edge])
+    kind, near = targets.kind[v], work.q[source]
+    if kind == Kind.JOINT_STEP:
+        q = near + targets.joints[v]
+        return Arrival(q, work.arm.flange(q[None])[0], -1, q[None], 0)
+    flange = work.flange[v]
+    if np.isnan(flange).any():
+        flange = work.after_step(v, work.flange[source])
+    if kind == Kind.JOINTS:
+        end = Arrival(work.q[v], flange, -1, work.q[v][None], 0)
+    else:
+        end = choose(work, v, flange, near)
+    if targets.move[v] == Move.JOINT:
+        return end
+    if work.samples.broken[edge]:
+        return Arrival(end.q, flange, end.slot, NO_PATH, CODE[NO_CIRCLE])
+    arc_unknown = targets.move[v] == Move.CIRCULAR and not work.samples.ready[edge]
+    if arc_unknown or np.isnan(targets.tool[v]).any():
+        return Arrival(end.q, flange, end.slot, NO_PATH, end.reason)
+    if targets.wrist_joint[v]:
+        path = wrist_interpolated(
+            work.arm, near, end.q, targets.tool[v], work.samples.count(edge)
+        )
+        reason = end.reason if len(path) else end.reason or CODE[PATH_REACH]
+        return Arrival(end.q, flange, end.slot, path, reason)
+    return _along_line(work, v, edge, flange, end)
+
+
+def choose(work: Workspace, v: int, flange: Array, near: Array | None) -> Arrival:
+    """Choose a solution by configuration string, else the nearest one.
+
+    Args:
+        work: The workspace.
+        v: The target.
+        flange: Its flange pose, (4, 4) [m].
+        near: Joint angles before, (6,) [rad], or None where they are not known.
+    """
+    arm, targets = work.arm, work.targets
+    unknown = np.full(6, np.nan)
+    if np.isnan(flange).any():
+        return Arrival(unknown, flange, -1, NO_PATH, CODE[OUT_OF_REACH])
+    row = work.solved[v]
+    branches = work.branches[row] if row >= 0 else arm.inverse(flange[None]).q[0]
+    if np.isnan(branches).any(axis=1).all():
+        return Arrival(unknown, flange, -1, NO_PATH, CODE[OUT_OF_REACH])
+    slot = int(targets.slot[v])
+    if slot < 0 and near is None:
+        return Arrival(unknown, flange, -1, NO_PATH, CODE[NO_START])
+    if slot < 0 and near is not None:
+        slot = nearest_slot(branches, near)
+    q = branches[slot]
+    if np.isnan(q).any():
+        return Arrival(unknown, flange, slot, NO_PATH, CODE[NO_BRANCH])
+    if near is None or (targets.slot[v] >= 0 and not targets.nearest_turn[v]):
+        q = on_written_turns(q[None], targets.turns[v][None])[0]
+    else:
+        q = _nearest_allowed(arm, q, near)
+    return Arrival(q, flange, slot, q[None], 0)
+
+
+def _nearest_allowed(arm: Arm, q: Array, near: Array) -> Array:
+    """Take the nearest turn of every axis that has it in its range."""
+    turned = nearest_turns(q, near)
+    return np.where((turned >= arm.lower) & (turned <= arm.upper), turned, q)
+
+
+def _along_line(
+    work: Workspace, v: int, edge: int, flange: Array, end: Arrival
+) -> Arrival:
+    """Follow a Cartesian path; where that fails, keep the end and say why."""
+    near = work.q[work.source[edge]]
+    joints = work.targets.kind[v] == Kind.JOINTS
+    branches = _branches(work, v, edge, flange)
+    if joints:
+        branches = branches[:-1]
+    done = follow(near, branches)
+    if len(done.q) < len(branches):
+        lost = OUT_OF_REACH if len(end.path) == 0 else PATH_REACH
+        reason = CODE[PATH_JUMP if done.reached else lost]
+        return Arrival(end.q, flange, end.slot, NO_PATH, reason)
+    if not joints:
+        return Arrival(done.q[-1], flange, int(done.slot[-1]), done.q, 0)
+    last = done.q[-1] if len(done.q) else near
+    if np.abs(last - end.q).max() > LOST:
+        return Arrival(end.q, flange, -1, NO_PATH, CODE[OTHER_BRANCH])
+    return Arrival(end.q, flange, -1, np.vstack([done.q, end.q]), 0)
+
+
+def _branches(work: Workspace, v: int, edge: int, flange: Array) -> Array:
+    """All solutions along an edge, the target included, (k, 8, 6) [rad]."""
+    if work.samples.ready[edge]:
+        ready: Array = work.branches[work.row[work.span(edge)]]
+        return ready
+    tool = work.targets.tool[v]
+    begin = (work.flange[work.source[edge]] @ tool)[None]
+    line = lines(begin, (flange @ tool)[None])
+    k = work.samples.count(edge)
+    u = np.arange(1, k + 1) / k
+    tcp = line.poses(np.zeros(k, dtype=np.int64), u)
+    solved: Array = work.arm.inverse(tcp @ work.tool_inverse[v]).q
+    return solved

@@ -1,0 +1,96 @@
+"""Which of the eight solutions, on which turn: from the string, or by continuity."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+FULL = 2 * np.pi
+SUSPICIOUS = 0.3  # [rad] a step between samples that another branch might shorten
+LOST = 1.2  # [rad] a step between samples that no arm makes
+TURN_AXES = ((3, 0), (5, 1), (2, 2))  # (axis, which of T1, T2, T3)
+
+
+def on_written_turns(q: Array, turns: Array) -> Array:
+    """Put solutions on the turns of their configuration strings.
+
+    T1 counts the turns of axis 4, T2 of axis 6, T3 of axis 3: floor((q + 180) / 360).
+    A missing T1 or T2 is 0; without T3 axis 3 stays where its range allows it.
+
+    Args:
+        q: Joint angles, (n, 6) [rad].
+        turns: T1, T2, T3, (n, 3), NaN where not written.
+    """
+    out = np.array(q)
+    for axis, which in TURN_AXES:
+        turn = turns[:, which]
+        rest = np.mod(q[:, axis] + np.pi, FULL) - np.pi
+        moved = rest + FULL * np.nan_to_num(turn)
+        keep = np.isnan(turn) if axis == 2 else np.zeros(len(q), dtype=bool)
+        out[:, axis] = np.where(keep, q[:, axis], moved)
+    return out
+
+
+def nearest_turns(q: Array, near: Array) -> Array:
+    """Put joint angles (.., 6) [rad] on the turns nearest to others."""
+    turned: Array = q - FULL * np.round((q - near) / FULL)
+    return turned
+
+
+def nearest_slot(branches: Array, near: Array) -> int:
+    """Name the branch (8, 6) nearest to joint angles (6,) [rad]; -1 without any."""
+    gap = np.abs(nearest_turns(branches, near) - near).max(axis=1)
+    return -1 if np.isnan(gap).all() else int(np.nanargmin(gap))
+
+
+@dataclass(frozen=True)
+class Followed:
+    """A path in joint space.
+
+    Attributes:
+        q: Joint angles, (k, 6) [rad], for the k samples that could be followed.
+        slot: Their branches, (k,).
+        reached: The first sample that could not be followed had a solution; it was a
+            jump.
+    """
+
+    q: Array
+    slot: Ints
+    reached: bool
+
+
+def follow(begin: Array, branches: Array) -> Followed:
+    """Follow the branch and the turns that continue a motion.
+
+    Args:
+        begin: Joint angles before the first sample, (6,) [rad].
+        branches: All solutions at the samples, (s, 8, 6) [rad], NaN where none.
+
+    Returns:
+        The whole path, or its beginning up to where it cannot be followed.
+    """
+    s = len(branches)
+    q, slots = np.empty((s, 6)), np.empty(s, dtype=np.int64)
+    done, last = 0, begin
+    while done < s:
+        slot = nearest_slot(branches[done], last)
+        if slot < 0:
+            return Followed(q[:done], slots[:done], False)
+        path = np.unwrap(np.vstack([last, branches[done:, slot]]), axis=0)
+        step = np.abs(np.diff(path, axis=0)).max(axis=1)
+        if step[0] > LOST:
+            return Followed(q[:done], slots[:done], True)
+        # The first step is the shortest there is; go on to the next suspicious one.
+        good = ~(step > SUSPICIOUS) & ~np.isnan(step)
+        good[0] = True
+        count = s - done if good.all() else int(np.argmin(good))
+        q[done : done + count] = path[1 : count + 1]
+        slots[done : done + count] = slot
+        done += count
+        last = q[done - 1]
+    return Followed(q, slots, True)

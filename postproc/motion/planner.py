@@ -1,0 +1,112 @@
+"""From targets to the state of the arm at every arrival."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+
+import numpy as np
+from numpy.typing import NDArray
+
+from postproc.motion.clock import tell_time
+from postproc.motion.reasons import CODE, NO_TIME, REASONS, WRIST
+from postproc.motion.targets import Targets
+from postproc.motion.trace import Trace, trace
+from postproc.robot.arm import Arm
+from postproc.robot.direction import arrivals
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Bools = NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class Plan:
+    """n arrivals in program order (structure of arrays), SI units, base frame.
+
+    Attributes:
+        q: Joint angles, (n, 6) [rad], NaN where not known.
+        tcp: Wanted TCP pose, (n, 4, 4) [m], NaN where not known.
+        tool: TCP in the flange frame, (n, 4, 4) [m].
+        direction: Side every joint arrives from, (n, 6): +1, -1, or 0 where not known.
+        travel: Travel since the last reversal, (n, 6) [rad].
+        speed: TCP speed at the target, (n,) [m/s]; 0 where the arm stops.
+        time: Time since the first move along the first predecessors, (n,) [s].
+        slot: Branch 4 W + 2 S + E, (n,), -1 where it was not looked up.
+        reason: Index into `reasons`, (n,); 0 where the arrival may be compensated.
+        reasons: Why not; reasons[0] is "".
+        overruled: Continuity took another branch or turn than the string says, (n,).
+    """
+
+    q: Array
+    tcp: Array
+    tool: Array
+    direction: Array
+    travel: Array
+    speed: Array
+    time: Array
+    slot: Ints
+    reason: Ints
+    reasons: tuple[str, ...]
+    overruled: Bools
+
+    def __post_init__(self) -> None:
+        for f in fields(self):
+            value = getattr(self, f.name)
+            if isinstance(value, np.ndarray):
+                value.setflags(write=False)
+
+    def __len__(self) -> int:
+        """Return the number of arrivals."""
+        return len(self.q)
+
+    def gravity_torque(self, arm: Arm, payload: float, payload_com: Array) -> Array:
+        """Torque that gravity exerts about every joint, (n, 6) [N m].
+
+        Args:
+            arm: The arm.
+            payload: Payload mass [kg].
+            payload_com: Its centre of mass in the flange frame, (3,) [m].
+        """
+        return arm.gravity_torque(self.q, payload, payload_com)
+
+
+def plan(arm: Arm, targets: Targets, wrist: float) -> Plan:
+    """Plan every move the way the controller moves.
+
+    Args:
+        arm: The arm.
+        targets: The moves.
+        wrist: Axis 5 nearer to zero than this is the wrist singularity [rad].
+
+    Raises:
+        PlanError: The arm has no closed-form inverse kinematics.
+    """
+    traced = trace(arm, targets)
+    arrived = arrivals(arm, traced.q, traced.edges)
+    clock = tell_time(arm, targets, traced)
+    reason = np.where(
+        (traced.reason == 0) & clock.failed, CODE[NO_TIME], _guard(traced, wrist)
+    )
+    return Plan(
+        traced.q, traced.flange @ targets.tool, targets.tool, arrived.direction,
+        arrived.travel, clock.speed, clock.time, traced.slot, reason, REASONS,
+        traced.overruled,
+    )  # fmt: skip
+
+
+def directions(arm: Arm, targets: Targets) -> tuple[Array, Array]:
+    """Find joint angles and directions only, without a time law.
+
+    For targets that a correction has moved: compare with the directions of the plan.
+
+    Returns:
+        Joint angles (n, 6) [rad] and directions (n, 6).
+    """
+    traced = trace(arm, targets)
+    return traced.q, arrivals(arm, traced.q, traced.edges).direction
+
+
+def _guard(traced: Trace, wrist: float) -> Ints:
+    """Add the wrist singularity to the reasons."""
+    near = np.abs(traced.q[:, 4]) < wrist
+    return np.where((traced.reason == 0) & near, CODE[WRIST], traced.reason)

@@ -1,0 +1,24 @@
+"""Why a planned move must not be compensated."""
+
+from __future__ import annotations
+
+REACHED = ""
+NO_TARGET = "where this move goes is not known"
+OUT_OF_REACH = "out of reach"
+NO_BRANCH = "no solution for the configuration string"
+NO_START = "the branch is not known: no configuration string and an unknown start"
+PATH_REACH = "the path to it leaves the reach"
+PATH_JUMP = "the path to it passes through a singularity"
+NO_CIRCLE = "the three points of the arc lie on one line"
+AMBIGUOUS = "its predecessors lead to different joint angles"
+OTHER_BRANCH = "the path to it arrives on another branch or turn than its joint angles"
+LIMITS = tuple(f"axis {j} beyond its limit" for j in range(1, 7))
+PATH_LIMITS = tuple(f"axis {j} beyond its limit on the way to it" for j in range(1, 7))
+WRIST = "at the wrist singularity"
+NO_TIME = "no time law for this run"
+
+REASONS = (
+    REACHED, NO_TARGET, OUT_OF_REACH, NO_BRANCH, NO_START, PATH_REACH, PATH_JUMP,
+    NO_CIRCLE, AMBIGUOUS, OTHER_BRANCH, *LIMITS, *PATH_LIMITS, WRIST, NO_TIME,
+)  # fmt: skip
+CODE = {reason: code for code, reason in enumerate(REASONS)}

@@ -1,0 +1,122 @@
+"""What a plan is made from: where every move goes, in the arm's base frame."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields, replace
+from enum import IntEnum
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Bools = NDArray[np.bool_]
+
+
+class Move(IntEnum):
+    """How the arm moves between two targets."""
+
+    JOINT = 0
+    LINEAR = 1
+    CIRCULAR = 2
+
+
+class Kind(IntEnum):
+    """What a target tells."""
+
+    POSE = 0  # the TCP's pose in the base frame
+    JOINTS = 1  # the joint angles
+    TOOL_STEP = 2  # `tcp` is a motion in the tool frame of where the arm is
+    BASE_STEP = 3  # `tcp` is a turn and a shift of the TCP along the base frame's axes
+    JOINT_STEP = 4  # `joints` are added to where the arm is
+    UNKNOWN = 5  # the arm goes where nobody knows
+
+
+@dataclass(frozen=True)
+class Targets:
+    """n moves in program order (structure of arrays), SI units.
+
+    A CIRCULAR move makes two: the point on the way (`via`), then the end.
+
+    Attributes:
+        move: `Move`, (n,).
+        kind: `Kind`, (n,).
+        via: True at the point on the way of an arc, (n,).
+        tcp: Wanted TCP pose in the base frame, or a step, (n, 4, 4); else NaN.
+        joints: Controller joint angles, or a step, (n, 6) [rad]; else NaN.
+        tool: TCP in the flange frame, (n, 4, 4); NaN where not known.
+        slot: Branch 4 W + 2 S + E of the configuration string, (n,); -1 without one.
+        turns: Turns T1, T2, T3 of axes 4, 6 and 3 in the string, (n, 3); NaN where not
+            written.
+        nearest_turn: The turn nearest to where the arm is, whatever the string says.
+        fly: The arm does not stop here, (n,).
+        linear_speed: Programmed TCP speed [m/s], (n,); NaN where not known.
+        rotary_speed: Programmed speed of reorientation [rad/s], (n,); NaN likewise.
+        override: Product of the speed overrides, (n,) in (0, 1].
+        wrist_joint: The wrist axes are interpolated instead of the orientation, (n,).
+        pred_start: Predecessors of move v are pred[pred_start[v] : pred_start[v + 1]].
+        pred: Predecessors; negative for a place that is not known.
+    """
+
+    move: Ints
+    kind: Ints
+    via: Bools
+    tcp: Array
+    joints: Array
+    tool: Array
+    slot: Ints
+    turns: Array
+    nearest_turn: Bools
+    fly: Bools
+    linear_speed: Array
+    rotary_speed: Array
+    override: Array
+    wrist_joint: Bools
+    pred_start: Ints
+    pred: Ints
+
+    def __post_init__(self) -> None:
+        for f in fields(self):
+            getattr(self, f.name).setflags(write=False)
+
+    def __len__(self) -> int:
+        """Return the number of moves."""
+        return len(self.move)
+
+    def moved_to(self, tcp: Array, joints: Array) -> Targets:
+        """Return a copy with other wanted poses and joint angles."""
+        return replace(self, tcp=tcp, joints=joints)
+
+
+def make_targets(
+    kind: Ints, tcp: Array | None = None, joints: Array | None = None, **given: object
+) -> Targets:
+    """Build targets reached one after the other; what is not given takes a default.
+
+    The defaults are JOINT moves that stop, without a tool, without a configuration
+    string, at an unknown programmed speed and full override, from an unknown place.
+
+    Raises:
+        TypeError: A field that `Targets` does not have.
+    """
+    kind = np.asarray(kind, dtype=np.int64)
+    n = len(kind)
+    values: dict[str, object] = {
+        "move": np.zeros(n, dtype=np.int64),
+        "via": np.zeros(n, dtype=bool),
+        "tcp": np.full((n, 4, 4), np.nan) if tcp is None else tcp,
+        "joints": np.full((n, 6), np.nan) if joints is None else joints,
+        "tool": np.tile(np.eye(4), (n, 1, 1)),
+        "slot": np.full(n, -1),
+        "turns": np.full((n, 3), np.nan),
+        "nearest_turn": np.zeros(n, dtype=bool),
+        "fly": np.zeros(n, dtype=bool),
+        "linear_speed": np.full(n, np.nan),
+        "rotary_speed": np.full(n, np.nan),
+        "override": np.ones(n),
+        "wrist_joint": np.zeros(n, dtype=bool),
+        "pred_start": np.arange(n + 1),
+        "pred": np.arange(n) - 1,
+    }
+    values.update(given)
+    return Targets(kind=kind, **{k: np.asarray(v) for k, v in values.items()})
