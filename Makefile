@@ -38,7 +38,7 @@ format: $(STAMP)
 	@$(VENV)/bin/ruff format .
 
 bench: $(STAMP)
-	@PATH="$(abspath $(VENV))/bin:$$PATH" bash programs/bench.sh
+	@PATH="$(abspath $(VENV))/bin:$$PATH" python programs/bench.py
 
 clean:
 	rm -rf $(VENV) demo build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis
