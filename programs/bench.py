@@ -1,7 +1,7 @@
 """How long compensation takes on this machine, stage by stage.
 
-Run by ``make bench`` with ``postproc`` on the PATH. Uses the model of ``make demo``, and
-makes one when there is none. Prints one line a program, seconds in every stage.
+Run by ``make bench`` with ``postproc`` on the PATH. Uses the model of ``make demo``,
+and makes one when there is none. Prints a line a program, seconds in every stage.
 """
 
 from __future__ import annotations
