@@ -84,8 +84,19 @@ class Targets:
         return len(self.move)
 
     def moved_to(self, tcp: Array, joints: Array) -> Targets:
-        """Return a copy with other wanted poses and joint angles."""
-        return replace(self, tcp=tcp, joints=joints)
+        """Return a copy whose targets lie elsewhere; steps stay what they are.
+
+        Args:
+            tcp: TCP poses in the base frame, (n, 4, 4) [m]; used for `Kind.POSE`.
+            joints: Joint angles, (n, 6) [rad]; used for `Kind.JOINTS`.
+        """
+        pose = (self.kind == Kind.POSE)[:, None, None]
+        angles = (self.kind == Kind.JOINTS)[:, None]
+        return replace(
+            self,
+            tcp=np.where(pose, tcp, self.tcp),
+            joints=np.where(angles, joints, self.joints),
+        )
 
 
 def make_targets(

@@ -1,0 +1,211 @@
+"""From what a program says to where the TCP goes: visits to targets of the planner.
+
+World . BASE . FK(q) . TOOL = UFRAME . P, so that the TCP in the arm's base frame is
+inverse(BASE) . UFRAME . P.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from postproc.language.visits import Target, Visits
+from postproc.motion.targets import Kind, Targets
+from postproc.pose import MM, inverse, pose_from_record
+from postproc.reasons import Reasons
+from postproc.robot.cell import Cell
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Bools = NDArray[np.bool_]
+
+FLAG = re.compile(r"([SEW])|T([123])\s*:\s*([+-]?\d+)", re.IGNORECASE)
+JOINTS = (Target.JOINTS, Target.HOME, Target.CALIBRATION)
+STEPS_IN = {
+    Target.RELATIVE_TOOL: "tool",
+    Target.RELATIVE_BASE: "base",
+    Target.RELATIVE_UFRAME: "uframe",
+}
+
+
+@dataclass(frozen=True)
+class Frames:
+    """The frames that hold at each of n visits, (n, 4, 4) [m], NaN where not known."""
+
+    tool: Array
+    base_inverse: Array
+    uframe: Array
+
+
+def targets_from_visits(visits: Visits, cell: Cell) -> tuple[Targets, Reasons]:
+    """Express all visits in the arm's base frame.
+
+    Args:
+        visits: What the program says.
+        cell: $HOME and the kinds of auxiliary axes.
+
+    Returns:
+        The targets, and why visits must not be compensated as far as frames, tools,
+        values and auxiliary axes tell.
+    """
+    frames, reasons = _frames(visits), Reasons(len(visits))
+    values = _values(visits, cell)
+    kind, tcp, joints = _places(visits, frames, values)
+    poses = np.isin(visits.target, (Target.POSE, Target.NEAR))
+    outside = _auxiliary(visits, cell, reasons)
+    _explain(visits, frames, values, poses, reasons)
+    lost = (outside | visits.tool_remote) & (kind != Kind.JOINTS)
+    lost |= np.isnan(tcp).any(axis=(1, 2)) & np.isin(
+        kind, (Kind.POSE, Kind.TOOL_STEP, Kind.BASE_STEP)
+    )
+    lost |= np.isnan(joints).any(axis=1) & np.isin(kind, (Kind.JOINTS, Kind.JOINT_STEP))
+    slot, turns = configurations(visits.configs)
+    targets = Targets(
+        move=visits.motion,
+        kind=np.where(lost, Kind.UNKNOWN, kind),
+        via=visits.via,
+        tcp=tcp,
+        joints=joints,
+        tool=frames.tool,
+        slot=np.where(visits.config_given & poses, slot[visits.config], -1),
+        turns=turns[visits.config],
+        nearest_turn=visits.nearest_turn,
+        fly=visits.fly,
+        linear_speed=visits.lin_spd,
+        rotary_speed=visits.rot_spd,
+        override=visits.override,
+        wrist_joint=visits.wrist_joint,
+        pred_start=visits.pred_start,
+        pred=visits.pred,
+    )
+    return targets, reasons
+
+
+def configurations(configs: tuple[str, ...]) -> tuple[Ints, Array]:
+    """Read configuration strings.
+
+    Returns:
+        Slots 4 W + 2 S + E, (k,), and turns T1, T2, T3, (k, 3), NaN where not written.
+
+    >>> slot, turns = configurations(("S W T1:0 T2:-1",))
+    >>> int(slot[0]), turns[0].tolist()
+    (6, [0.0, -1.0, nan])
+    """
+    slots = np.zeros(len(configs), dtype=np.int64)
+    turns = np.full((len(configs), 3), np.nan)
+    for k, text in enumerate(configs):
+        for flag, axis, turn in FLAG.findall(text):
+            if flag:
+                slots[k] |= {"W": 4, "S": 2, "E": 1}[flag.upper()]
+            else:
+                turns[k, int(axis) - 1] = int(turn)
+    return slots, turns
+
+
+def _frames(visits: Visits) -> Frames:
+    """Look up the frames of every visit."""
+    unknown = np.full((1, 4, 4), np.nan)
+    poses = np.concatenate([pose_from_record(visits.frames.reshape(-1, 6)), unknown])
+    return Frames(poses[visits.tool], inverse(poses)[visits.base], poses[visits.uframe])
+
+
+def _values(visits: Visits, cell: Cell) -> Array:
+    """Fill in $HOME where the program does not tell it."""
+    values = np.array(visits.values)
+    home = (visits.target == Target.HOME) & np.isnan(values).any(axis=1)
+    if cell.home is not None:
+        values[home] = np.rad2deg(cell.home)
+    return values
+
+
+def _places(visits: Visits, frames: Frames, values: Array) -> tuple[Ints, Array, Array]:
+    """Turn numbers into kinds, TCP poses (n, 4, 4) [m] and joints (n, 6) [rad]."""
+    n, target = len(visits), visits.target
+    kind = np.full(n, int(Kind.UNKNOWN))
+    tcp, joints = np.full((n, 4, 4), np.nan), np.full((n, 6), np.nan)
+    in_joints = np.isin(target, JOINTS)
+    kind[in_joints], kind[target == Target.BY] = Kind.JOINTS, Kind.JOINT_STEP
+    in_joints |= target == Target.BY
+    joints[in_joints] = np.deg2rad(values[in_joints])
+    poses = np.isin(target, (Target.POSE, Target.NEAR))
+    kind[poses] = Kind.POSE
+    user = frames.base_inverse[poses] @ frames.uframe[poses]
+    tcp[poses] = user @ pose_from_record(values[poses])
+    near = target == Target.NEAR
+    tcp[near] = tcp[near] @ _along_approach(-visits.distance_mm[near])
+    away = target == Target.AWAY
+    kind[away], tcp[away] = Kind.TOOL_STEP, _along_approach(-values[away, 0])
+    steps = np.isin(target, (*STEPS_IN, Target.ABOUT))
+    for v in np.flatnonzero(steps).tolist():
+        kind[v], tcp[v] = _step(target[v], values[v], frames, v)
+    return kind, tcp, joints
+
+
+def _along_approach(distance_mm: Array) -> Array:
+    """Shifts (m, 4, 4) [m] along the tool's z axis."""
+    T = np.tile(np.eye(4), (len(distance_mm), 1, 1))
+    T[:, 2, 3] = distance_mm * MM
+    return T
+
+
+def _step(target: int, value: Array, frames: Frames, v: int) -> tuple[Kind, Array]:
+    """Turn one RELATIVE or ABOUT into a step of the tool or along the base axes."""
+    about = target == Target.ABOUT
+    frame = STEPS_IN.get(Target(int(value[4])) if about else Target(int(target)), "")
+    axes = np.eye(3)
+    if frame == "uframe":
+        axes = (frames.base_inverse[v] @ frames.uframe[v])[:3, :3]
+    step = np.eye(4)
+    vector = axes @ value[:3]
+    if np.isnan(vector).any() or (about and not np.linalg.norm(vector) > 0):
+        return Kind.UNKNOWN, np.full((4, 4), np.nan)
+    if about:
+        turn = np.deg2rad(value[3]) * vector / np.linalg.norm(vector)
+        step[:3, :3] = Rotation.from_rotvec(turn).as_matrix()
+    else:
+        step[:3, 3] = vector * MM
+    return (Kind.TOOL_STEP if frame == "tool" else Kind.BASE_STEP), step
+
+
+def _auxiliary(visits: Visits, cell: Cell, reasons: Reasons) -> Bools:
+    """Tell which visits depend on axes that may move the arm or the part, (n,)."""
+    outside = np.zeros(len(visits), dtype=bool)
+    for column in range(visits.aux.shape[1] if visits.aux.ndim == 2 else 0):
+        axis = column + 1
+        given, use = ~np.isnan(visits.aux[:, column]), cell.aux.get(axis)
+        if use == "gun" or not given.any():
+            continue
+        outside |= given
+        if use is None:
+            reasons.mark(
+                given,
+                f"auxiliary axis {axis} is not declared in the cell: add [aux] "
+                f'{axis} = "gun", "track" or "positioner"',
+            )
+        else:
+            reasons.mark(given, f"auxiliary axis {axis} is a {use}: not modelled")
+    return outside
+
+
+def _explain(
+    visits: Visits, frames: Frames, values: Array, poses: Bools, reasons: Reasons
+) -> None:
+    """Say why visits are not compensated."""
+    reasons.mark(visits.tool_remote, "$TOOL_RMT: the arm holds the part")
+    reasons.mark(
+        np.isnan(values).any(axis=1) & (poses | np.isin(visits.target, JOINTS)),
+        "a value is not known",
+    )
+    for name, where, who in (
+        ("$TOOL", frames.tool, np.ones(len(visits), dtype=bool)),
+        ("$BASE", frames.base_inverse, poses),
+        ("$UFRAME", frames.uframe, poses),
+    ):
+        reasons.mark(
+            np.isnan(where).any(axis=(1, 2)) & who,
+            f"{name} is not known at this move: add it to the cell file",
+        )
