@@ -1,0 +1,78 @@
+"""The gap in the gears by its definition: a flank that is pushed along."""
+
+import numpy as np
+import pytest
+
+from postproc.virtual.gears import Gears, at_start, move, turning_points
+
+GAP = 1e-4
+GEARS = Gears(np.full(6, GAP), np.eye(6))
+
+
+def at_zero(side: float = 1.0):
+    return at_start(GEARS, np.zeros(6), np.full(6, side))
+
+
+def link_by_definition(path: np.ndarray, first_side: float) -> np.ndarray:
+    """Push a link with two flanks: it stays inside motor +- GAP."""
+    link = path[0] - first_side * GAP
+    for motor in path[1:]:
+        link = min(max(link, motor - GAP), motor + GAP)
+    return (path[-1] - link) / GAP
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_side_is_that_of_a_pushed_link(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    steps = rng.normal(size=(60, 6)) * np.array([0.3, 0.6, 1.0, 2.0, 5.0, 20.0]) * GAP
+    path = np.vstack([np.zeros(6), np.cumsum(steps, axis=0)])
+    state = move(GEARS, at_zero(), path[1:])
+    wanted = [link_by_definition(path[:, j], 1.0) for j in range(6)]
+    np.testing.assert_allclose(state.side, wanted, atol=1e-9)
+
+
+def test_a_joint_that_stands_keeps_its_side() -> None:
+    state = move(GEARS, at_zero(-1.0), np.array([[0.5, 0, 0, 0, 0, 0]]))
+    np.testing.assert_array_equal(state.side, [1, -1, -1, -1, -1, -1])
+
+
+def test_a_short_way_back_leaves_the_flank_only_half_way() -> None:
+    state = move(GEARS, at_zero(), np.full((1, 6), -0.5 * GAP))
+    np.testing.assert_allclose(state.side, 0.5)
+    assert (state.heading == 1).all()
+    state = move(GEARS, state, np.full((1, 6), -3 * GAP))
+    np.testing.assert_allclose(state.side, -1.0)
+    assert (state.heading == -1).all()
+
+
+def test_travel_and_loop_count_from_the_turns() -> None:
+    stops = np.outer([0.0, 0.3, 0.1, 0.25], np.ones(6))
+    state = at_start(GEARS, stops[0], np.ones(6))
+    state = move(GEARS, state, stops[1:])
+    np.testing.assert_allclose(state.travel, 0.15)
+    np.testing.assert_allclose(state.loop, 0.2)
+
+
+def test_a_path_in_pieces_is_the_path() -> None:
+    path = np.cumsum(np.random.default_rng(3).normal(size=(40, 6)) * GAP, axis=0)
+    whole, piece = move(GEARS, at_zero(), path), at_zero()
+    for point in path:
+        piece = move(GEARS, piece, point[None])
+    np.testing.assert_allclose(whole.side, piece.side, atol=1e-9)
+    np.testing.assert_allclose(whole.travel, piece.travel, atol=1e-12)
+
+
+def test_only_turning_points_and_the_end_are_kept() -> None:
+    path = np.zeros((5, 6))
+    path[:, 0] = [0.0, 1.0, 2.0, 1.5, 1.0]
+    path[:, 1] = [0.0, 1e-15, 0.0, 1e-15, 0.0]
+    np.testing.assert_array_equal(turning_points(path)[:, 0], [2.0, 1.0])
+
+
+def test_the_motor_of_a_coupled_wrist_turns_when_its_joint_does_not() -> None:
+    coupling = np.eye(6)
+    coupling[5, 4] = -1.0
+    gears = Gears(np.full(6, GAP), coupling)
+    state = at_start(gears, np.zeros(6), np.ones(6))
+    state = move(gears, state, np.array([[0, 0, 0, 0, 0.2, 0.0]]))
+    assert state.side[5] == -1.0
