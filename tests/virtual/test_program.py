@@ -5,7 +5,6 @@ import pytest
 
 from postproc.language.visits import ELSEWHERE, START, Motion, Target
 from postproc.virtual import Setup, run_program, virtual_arm
-from postproc.virtual.inverse import nearest_turns
 from postproc.virtual.kinematics import NJ220
 from postproc.virtual.rotation import pose_of_record, undo
 from tests.virtual.builders import Program
@@ -53,7 +52,6 @@ def test_direction_of_joint_moves_comes_from_the_joints() -> None:
     np.testing.assert_array_equal(run.arrivals.side[2, [0, 2, 4, 5]], [-1, 1, 1, 1])
     np.testing.assert_array_equal(run.arrivals.side[:, 1], run.arrivals.side[0, 1])
     np.testing.assert_allclose(np.degrees(run.arrivals.travel[2, 0]), 5.0, atol=1e-9)
-    np.testing.assert_allclose(np.degrees(run.arrivals.travel[2, 5]), 2.0, atol=60)
 
 
 def test_a_joint_that_turns_back_inside_a_straight_move_arrives_backwards() -> None:
@@ -146,9 +144,6 @@ def test_time_speed_and_tools_are_kept() -> None:
     assert run.arrivals.speed[2] == pytest.approx(0.05)
     assert run.arrivals.time[1] - run.arrivals.time[0] == pytest.approx(2.3)
     np.testing.assert_allclose(run.arrivals.tool[2, :3, 3], [0, 0, 0.1])
-    assert (
-        np.abs(nearest_turns(run.arrivals.q, HOME) - run.arrivals.q).max() < 2 * np.pi
-    )
 
 
 def test_an_empty_program_runs() -> None:
