@@ -19,6 +19,7 @@ Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 
+SIMILAR = 0.1  # neighbouring bounds nearer than this share belong to one speed
 SHORTEST = 1e-9  # [s at full joint speed] below this two samples are one
 
 
@@ -108,11 +109,21 @@ def _run(
     if moved.sum() < 2:
         return np.zeros(end - first), np.zeros((end - first, 6))
     limit = limit[moved[1:]]
-    at_points = np.minimum(np.append(limit, np.inf), np.append(np.inf, limit))
     override = float(targets.override[first:end].min())
     s = np.cumsum(np.where(moved, ds, 0.0))[moved]
-    law = toppra.run(arm, q[moved], s, at_points, override)
+    law = toppra.run(arm, q[moved], s, _at_points(limit), override)
     return np.diff(law.time[at], prepend=0.0), law.velocity[at]
+
+
+def _at_points(limit: Array) -> Array:
+    """Bounds at k + 1 waypoints from the bounds of the k intervals between them.
+
+    The mean where they are nearly equal (one speed on a curved path), else the lower.
+    """
+    before, after = np.append(limit[0], limit), np.append(limit, limit[-1])
+    lower, upper = np.minimum(before, after), np.maximum(before, after)
+    similar = upper < (1 + SIMILAR) * lower
+    return np.where(similar, (lower + upper) / 2, lower)
 
 
 def _speeds(arm: Arm, targets: Targets, traced: Trace, velocity: Array) -> Array:

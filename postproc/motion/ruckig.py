@@ -65,7 +65,10 @@ class JointMoves:
         given.max_acceleration = (arm.acceleration * override**2).tolist()
         given.max_jerk = (arm.jerk * override**3).tolist()
         trajectory = ruckig.Trajectory(6)
-        result = self._otg.calculate(given, trajectory)
+        try:
+            result = self._otg.calculate(given, trajectory)
+        except ruckig.RuckigError as error:
+            raise PlanError(f"no time law for a JOINT move: {error}") from error
         if result not in (ruckig.Result.Working, ruckig.Result.Finished):
             raise PlanError(f"no time law for a JOINT move: {result}")
         return JointMove(float(trajectory.duration), trajectory)

@@ -130,4 +130,4 @@ def make_targets(
         "pred": np.arange(n) - 1,
     }
     values.update(given)
-    return Targets(kind=kind, **{k: np.asarray(v) for k, v in values.items()})
+    return Targets(kind=kind, **{k: np.array(v) for k, v in values.items()})

@@ -16,6 +16,7 @@ from postproc.motion.reasons import (
     NO_BRANCH,
     NO_TARGET,
     OUT_OF_REACH,
+    PATH_JUMP,
     PATH_LIMITS,
 )
 from postproc.motion.targets import Kind, Move, Targets
@@ -201,6 +202,7 @@ def _finished(work: Workspace) -> Trace:
     work.source[edge_of[holes]] = -1
     work.path[holes] = work.q[samples.visit[edge_of[holes]]]
     _limits(work, edge_of)
+    _flips(work)
     written = (t.slot >= 0) & (t.move != Move.JOINT) & (work.slot >= 0)
     turned = np.abs(on_written_turns(work.q, t.turns) - work.q) > OTHER_TURN
     other = (work.slot != t.slot) | (turned.any(axis=1) & ~t.nearest_turn)
@@ -209,6 +211,15 @@ def _finished(work: Workspace) -> Trace:
         work.q, work.flange, work.slot, edges, samples.length, samples.turning,
         work.reason, np.asarray(written & other),
     )  # fmt: skip
+
+
+def _flips(work: Workspace) -> None:
+    """Note Cartesian paths that change the branch: only a singularity lets them."""
+    source, visit = work.source, work.samples.visit
+    flipped = work.samples.cartesian & (source >= 0) & (work.slot[visit] >= 0)
+    flipped &= (work.slot[source] >= 0) & (work.slot[source] != work.slot[visit])
+    rows = visit[flipped & (work.targets.kind[visit] != Kind.JOINTS)]
+    work.reason[rows] = np.where(work.reason[rows], work.reason[rows], CODE[PATH_JUMP])
 
 
 def _limits(work: Workspace, edge_of: Ints) -> None:

@@ -45,6 +45,7 @@ class Workspace:
         self._settle_steps()
         self.samples = sample(targets, self.flange)
         self.source = np.array(self.samples.source)
+        self._name_branches()
         self.path = np.full((int(self.samples.start[-1]), 6), np.nan)
         self._solve()
 
@@ -82,6 +83,13 @@ class Workspace:
             tcp[:3, 3] += step[:3, 3]
         moved: Array = tcp @ self.tool_inverse[v]
         return moved
+
+    def _name_branches(self) -> None:
+        """Look up the branch of joint targets that Cartesian paths start from."""
+        starts = self.source[self.samples.cartesian & (self.source >= 0)]
+        starts = np.unique(starts)
+        starts = starts[~np.isnan(self.q[starts]).any(axis=1)]
+        self.slot[starts] = self.arm.branch(self.q[starts])
 
     def _solve(self) -> None:
         """Solve for all known poses, then all inner samples, in one batch."""
