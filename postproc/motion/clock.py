@@ -123,7 +123,7 @@ def _at_points(limit: Array) -> Array:
     before, after = np.append(limit[0], limit), np.append(limit, limit[-1])
     lower, upper = np.minimum(before, after), np.maximum(before, after)
     similar = upper < (1 + SIMILAR) * lower
-    return np.where(similar, (lower + upper) / 2, lower)
+    return np.asarray(np.where(similar, (lower + upper) / 2, lower))
 
 
 def _speeds(arm: Arm, targets: Targets, traced: Trace, velocity: Array) -> Array:
