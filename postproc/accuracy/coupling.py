@@ -1,0 +1,42 @@
+"""Coupling: a joint is dragged along by another one."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from postproc.accuracy.batch import Batch
+from postproc.accuracy.effect import JointEffect, Parameter
+
+Array = NDArray[np.float64]
+
+SCALE = 5e-5  # [rad/rad]
+
+
+@dataclass(frozen=True)
+class Coupling(JointEffect):
+    """Error of one joint c * theta of another, as through a hollow wrist's gears.
+
+    Attributes:
+        pairs: (receiving joint, driving joint) of every coupling.
+    """
+
+    name: ClassVar[str] = "coupling"
+
+    pairs: tuple[tuple[int, int], ...] = ((3, 2), (5, 4), (6, 4), (6, 5))
+
+    def parameters(self) -> tuple[Parameter, ...]:
+        """Name one factor per pair: c<receiving>_<driving>."""
+        return tuple(
+            Parameter(f"c{j}_{k}", "rad/rad", SCALE, f"{j} by {k}", j)
+            for j, k in self.pairs
+        )
+
+    def basis(self, batch: Batch) -> Array:
+        """Evaluate the driving angles, (n, p)."""
+        driving = np.array([k - 1 for _, k in self.pairs], dtype=int)
+        theta: Array = batch.states.q[:, driving]
+        return theta

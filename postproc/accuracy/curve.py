@@ -1,0 +1,98 @@
+"""Curve: a free smooth function of any covariates, in any one direction."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import product
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from postproc.accuracy.batch import Batch
+from postproc.accuracy.covariate import covariate
+from postproc.accuracy.effect import Effect, Origin, Parameter, fade
+
+Array = NDArray[np.float64]
+
+TURN, SHIFT = 1e-4, 1e-4  # [rad], [m]
+TERMS_ALONE, TERMS_OF_TWO = 8, 3
+
+
+@dataclass(frozen=True)
+class Curve(Effect):
+    """Error along one direction, a smoothing spline of one or two covariates.
+
+    The spline is written in its own modes: cosines over the covariate's range, whose
+    prior falls with the square of their number, as a penalty on curvature makes it.
+    Of two covariates only what is no sum of two curves belongs to it.
+
+    Attributes:
+        direction: "joint 3" turns joint 3; "base x" and "tool x" shift the TCP along
+            an axis.
+        source: Names of one or two covariates.
+        lower, upper: Their ranges; outside, the curve fades to zero.
+        signed: Whether it is multiplied by the joint's arrival direction.
+    """
+
+    name: ClassVar[str] = "curve"
+    origin: ClassVar[Origin] = "arm"
+
+    direction: str = "joint 1"
+    source: tuple[str, ...] = ("joint 1",)
+    lower: tuple[float, ...] = (-np.pi,)
+    upper: tuple[float, ...] = (np.pi,)
+    signed: bool = False
+
+    def _orders(self) -> list[tuple[int, ...]]:
+        """List the orders of every mode's cosines."""
+        if len(self.source) == 1:
+            return [(k,) for k in range(1, TERMS_ALONE + 1)]
+        ends = range(1, TERMS_OF_TWO + 1)
+        return list(product(ends, ends))
+
+    def parameters(self) -> tuple[Parameter, ...]:
+        """Name the modes by the orders of their cosines."""
+        kind, _, which = self.direction.partition(" ")
+        turns = kind == "joint"
+        scale, unit = (TURN, "rad") if turns else (SHIFT, "m")
+        what = f"{self.direction} by {' x '.join(self.source)}"
+        what += " signed" if self.signed else ""
+        return tuple(
+            Parameter(
+                f"{what} {'.'.join(map(str, k))}", unit,
+                scale / sum(i * i for i in k), what, int(which) if turns else None,
+            )
+            for k in self._orders()
+        )  # fmt: skip
+
+    def shape(self, batch: Batch) -> Array:
+        """Evaluate the modes without their direction in space, (n, p)."""
+        value, inside = np.ones((len(batch), len(self._orders()))), np.ones(len(batch))
+        order = np.array(self._orders())
+        for k, name in enumerate(self.source):
+            low, high = self.lower[k], self.upper[k]
+            x = covariate(batch, name)
+            inside *= np.nan_to_num(fade(x, np.array(low), np.array(high)))
+            u = np.clip((np.nan_to_num(x) - low) / max(high - low, 1e-12), 0, 1)
+            value *= np.cos(np.pi * u[:, None] * order[:, k])
+        return np.asarray(value * inside[:, None])
+
+    def columns(self, batch: Batch) -> Array:
+        """Differentiate the TCP position, (n, 3, p)."""
+        axis = self._axis(batch)
+        if self.signed:
+            joint = int(self.direction.split()[1]) - 1
+            axis = axis * batch.states.direction[:, joint : joint + 1]
+        columns: Array = axis[:, :, None] * self.shape(batch)[:, None, :]
+        return columns
+
+    def _axis(self, batch: Batch) -> Array:
+        """Return the direction's displacement per unit, (n, 3)."""
+        kind, _, which = self.direction.partition(" ")
+        if kind == "joint":
+            return np.asarray(batch.jacobian[:, :, int(which) - 1])
+        k = "xyz".index(which)
+        if kind == "tool":
+            return np.asarray(batch.walk.flange[:, :, k])
+        return np.tile(np.eye(3)[k], (len(batch), 1))

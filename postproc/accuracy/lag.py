@@ -1,0 +1,42 @@
+"""Lag: a joint trails its command in proportion to the speed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from postproc.accuracy.batch import Batch
+from postproc.accuracy.effect import JointEffect, Parameter
+
+Array = NDArray[np.float64]
+
+SCALE = 2e-4  # [rad s/m]
+
+
+@dataclass(frozen=True)
+class Lag(JointEffect):
+    """Joint error lambda * k * speed of the TCP on arrival; 0 where it is not known.
+
+    Attributes:
+        joints: Joints that lag.
+    """
+
+    name: ClassVar[str] = "lag"
+    direct: ClassVar[bool] = True
+    needs: ClassVar[tuple[str, ...]] = ("speed",)
+
+    joints: tuple[int, ...] = (1, 2, 3, 4, 5, 6)
+
+    def parameters(self) -> tuple[Parameter, ...]:
+        """Name one k per joint."""
+        return tuple(
+            Parameter(f"k{j}", "rad s/m", SCALE, f"{j}", j) for j in self.joints
+        )
+
+    def basis(self, batch: Batch) -> Array:
+        """Evaluate lambda * speed [m/s], (n, p)."""
+        speed = np.nan_to_num(batch.states.speed)[:, None]
+        return np.asarray(batch.states.direction[:, self.acts_on()] * speed)

@@ -1,0 +1,40 @@
+"""Scale: an encoder or a gear ratio that is slightly wrong."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from postproc.accuracy.batch import Batch
+from postproc.accuracy.effect import JointEffect, Parameter
+
+Array = NDArray[np.float64]
+
+SCALE = 5e-5  # [rad/rad]
+
+
+@dataclass(frozen=True)
+class Scale(JointEffect):
+    """Joint error gain * theta.
+
+    Attributes:
+        joints: Joints with a gain.
+    """
+
+    name: ClassVar[str] = "scale"
+
+    joints: tuple[int, ...] = (1, 2, 3, 4, 5, 6)
+
+    def parameters(self) -> tuple[Parameter, ...]:
+        """Name one gain per joint."""
+        return tuple(
+            Parameter(f"gain{j}", "rad/rad", SCALE, f"{j}", j) for j in self.joints
+        )
+
+    def basis(self, batch: Batch) -> Array:
+        """Evaluate theta, (n, p)."""
+        theta: Array = batch.states.q[:, self.acts_on()]
+        return theta

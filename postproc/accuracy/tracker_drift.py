@@ -1,0 +1,67 @@
+"""Tracker drift: the tracker's stand moves slowly while it measures."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar, Literal, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from postproc.accuracy.base_shift import AXES, rigid_columns
+from postproc.accuracy.batch import Batch
+from postproc.accuracy.effect import Effect, Origin, Parameter
+from postproc.robot.arm import Arm
+from postproc.robot.state import States
+
+Array = NDArray[np.float64]
+
+SHIFT, TURN = 3e-5, 1e-5  # [m], [rad]
+TERMS = 3
+
+
+@dataclass(frozen=True)
+class TrackerDrift(Effect):
+    """A slow rigid motion of the tracker's frame, 0 when it was registered.
+
+    Motion is a polynomial in the share u of the campaign that has passed, u and
+    u (1 - u) and so on, later terms expected to be smaller.
+
+    Attributes:
+        duration: Length of the campaign, [s] or rows.
+        clock: "time", or "order" where no time was recorded.
+    """
+
+    name: ClassVar[str] = "tracker_drift"
+    origin: ClassVar[Origin] = "setup"
+
+    duration: float = 1.0
+    clock: Literal["time", "order"] = "time"
+
+    @classmethod
+    def propose(cls, arm: Arm, states: States) -> Self:
+        """Take the recorded time, or else the visit order."""
+        clock: Literal["time", "order"] = (
+            "order" if np.isnan(states.time).any() else "time"
+        )
+        return cls(max(float(getattr(states, clock).max(initial=1.0)), 1.0), clock)
+
+    def parameters(self) -> tuple[Parameter, ...]:
+        """Name shift and turn of every term."""
+        out = []
+        for term in range(TERMS):
+            part = 0.5**term
+            for a in AXES:
+                out.append(Parameter(f"{a}_{term + 1}", "m", SHIFT * part, "drift"))
+            for a in AXES:
+                out.append(Parameter(f"r{a}_{term + 1}", "rad", TURN * part, "drift"))
+        return tuple(out)
+
+    def columns(self, batch: Batch) -> Array:
+        """Differentiate the TCP position, (n, 3, p)."""
+        u = getattr(batch.states, self.clock) / self.duration
+        u = np.clip(np.nan_to_num(u), 0.0, 1.0)
+        bow = 4.0 * u * (1.0 - u)
+        terms = (u, bow, bow * (1.0 - 2.0 * u) * 1.5)
+        moved = rigid_columns(batch)
+        return np.concatenate([moved * t[:, None, None] for t in terms], axis=2)
