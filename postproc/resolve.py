@@ -59,9 +59,8 @@ def targets_from_visits(visits: Visits, cell: Cell) -> tuple[Targets, Reasons]:
     outside = _auxiliary(visits, cell, reasons)
     _explain(visits, frames, values, poses, reasons)
     lost = (outside | visits.tool_remote) & (kind != Kind.JOINTS)
-    lost |= np.isnan(tcp).any(axis=(1, 2)) & np.isin(
-        kind, (Kind.POSE, Kind.TOOL_STEP, Kind.BASE_STEP)
-    )
+    placed = np.isin(kind, (Kind.POSE, Kind.TOOL_STEP, Kind.BASE_STEP))
+    lost |= placed & np.isnan(tcp + frames.tool).any(axis=(1, 2))
     lost |= np.isnan(joints).any(axis=1) & np.isin(kind, (Kind.JOINTS, Kind.JOINT_STEP))
     slot, turns = configurations(visits.configs)
     targets = Targets(

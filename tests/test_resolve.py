@@ -1,0 +1,160 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from postproc.language.visits import Literals, Target, Visits
+from postproc.motion.targets import Kind
+from postproc.pose import inverse, pose_from_record
+from postproc.resolve import configurations, targets_from_visits
+from postproc.robot.cell import Cell, load_cell
+
+FRAMES = np.array(
+    [
+        [10.0, 20.0, 250.0, 30.0, 40.0, 50.0],
+        [100.0, -50.0, 500.0, 90.0, 0.0, 0.0],
+        [1200.0, 300.0, 700.0, 10.0, 20.0, 30.0],
+    ]
+)
+NO_INTS, NO_BOOLS = np.empty(0, dtype=np.int64), np.empty(0, dtype=bool)
+NO_LITERALS = Literals(
+    NO_INTS, NO_INTS, np.empty((0, 6), np.int64), np.empty((0, 6), np.int64), NO_BOOLS,
+    (), NO_BOOLS, NO_BOOLS,
+)  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def cell(tmp_path_factory: pytest.TempPathFactory) -> Cell:
+    path: Path = tmp_path_factory.mktemp("cell") / "cell.toml"
+    path.write_text(
+        '[robot]\narm = "nj220-2.7"\n[home]\njoints_deg = [0, 0, -90, 0, 45, 0]\n'
+        '[aux]\n1 = "gun"\n2 = "track"\n'
+    )
+    return load_cell(path)
+
+
+def visits(target: list[int], values: list[list[float]], **more: object) -> Visits:
+    """One visit after the other, tool 0, base 1, user frame 2."""
+    n = len(target)
+    zeros, no = np.zeros(n, dtype=np.int64), np.zeros(n, dtype=bool)
+    nan = np.full(n, np.nan)
+    given: dict[str, object] = {
+        "files": ("job.pdl",), "file": zeros, "line": np.arange(n) + 1,
+        "motion": zeros, "target": np.array(target), "via": no,
+        "values": np.array(values, dtype=float), "distance_mm": nan,
+        "aux": np.empty((n, 0)), "config": zeros, "configs": ("S T1:1",),
+        "config_given": ~no, "literal": zeros - 1, "name": zeros, "names": ("",),
+        "tool": zeros, "base": zeros + 1, "uframe": zeros + 2, "frames": FRAMES,
+        "frame_taught": np.zeros(3, dtype=bool), "tool_remote": no,
+        "nearest_turn": no, "fly": no, "fly_dist_mm": nan, "fly_per": nan,
+        "fly_cart": no, "lin_spd": nan, "rot_spd": nan, "override": np.ones(n),
+        "wrist_joint": no, "reason": zeros, "reasons": ("",),
+        "pred_start": np.arange(n + 1), "pred": np.arange(n) - 1,
+        "measure_id": ("",) * n, "literals": NO_LITERALS,
+    }  # fmt: skip
+    return Visits(**(given | more))  # type: ignore[arg-type]
+
+
+POSE = [100.0, 200.0, 300.0, 10.0, 80.0, -20.0]
+
+
+def test_world_base_flange_tool_is_uframe_pose(cell: Cell) -> None:
+    targets, reasons = targets_from_visits(visits([Target.POSE], [POSE]), cell)
+    tool, base, uframe = pose_from_record(FRAMES)
+    expected = uframe @ pose_from_record(np.array(POSE))
+    np.testing.assert_allclose(base @ targets.tcp[0], expected, atol=1e-12)
+    np.testing.assert_allclose(targets.tool[0], tool)
+    assert targets.slot[0] == 2 and targets.turns[0, 0] == 1
+    assert reasons.none.all()
+
+
+def test_joints_and_home(cell: Cell) -> None:
+    nothing = [np.nan] * 6
+    given = visits(
+        [Target.JOINTS, Target.HOME, Target.CALIBRATION, Target.BY],
+        [[10, 20, -90, 0, 30, 0], nothing, nothing, [1, 0, 0, 0, 0, -5]],
+    )
+    targets, reasons = targets_from_visits(given, cell)
+    kinds = [Kind.JOINTS, Kind.JOINTS, Kind.UNKNOWN, Kind.JOINT_STEP]
+    assert targets.kind.tolist() == kinds
+    np.testing.assert_allclose(targets.joints[1], cell.home)
+    np.testing.assert_allclose(np.rad2deg(targets.joints[3]), [1, 0, 0, 0, 0, -5])
+    assert reasons[2] == "a value is not known"
+    assert (targets.slot == -1).all()
+
+
+def test_steps_along_the_frames(cell: Cell) -> None:
+    nan = np.nan
+    given = visits(
+        [Target.RELATIVE_TOOL, Target.RELATIVE_BASE, Target.RELATIVE_UFRAME,
+         Target.AWAY, Target.ABOUT],
+        [[1, 2, 3, nan, nan, nan], [1, 2, 3, nan, nan, nan], [1, 2, 3, nan, nan, nan],
+         [50, nan, nan, nan, nan, nan], [0, 0, 2, 30, 6, nan]],
+    )  # fmt: skip
+    targets, _ = targets_from_visits(given, cell)
+    tool, base = Kind.TOOL_STEP, Kind.BASE_STEP
+    assert targets.kind.tolist() == [tool, base, base, tool, base]
+    _, base_pose, uframe = pose_from_record(FRAMES)
+    R = (inverse(base_pose) @ uframe)[:3, :3]
+    shifts = targets.tcp[:4, :3, 3] * 1000
+    np.testing.assert_allclose(shifts[0], [1, 2, 3], atol=1e-12)
+    np.testing.assert_allclose(shifts[1], [1, 2, 3], atol=1e-12)
+    np.testing.assert_allclose(shifts[2], R @ [1, 2, 3], atol=1e-12)
+    np.testing.assert_allclose(shifts[3], [0, 0, -50], atol=1e-12)
+    turn = Rotation.from_matrix(targets.tcp[4, :3, :3]).as_rotvec()
+    np.testing.assert_allclose(turn, np.deg2rad(30) * R[:, 2], atol=1e-12)
+
+
+def test_near_stops_short_along_the_approach(cell: Cell) -> None:
+    given = visits([Target.POSE, Target.NEAR], [POSE, POSE],
+                   distance_mm=np.array([np.nan, 40.0]))  # fmt: skip
+    targets, _ = targets_from_visits(given, cell)
+    at, short = targets.tcp
+    np.testing.assert_allclose(short[:3, :3], at[:3, :3])
+    np.testing.assert_allclose(at[:3, 3] - short[:3, 3], 0.04 * at[:3, 2], atol=1e-12)
+
+
+@pytest.mark.parametrize("frame", ["tool", "base", "uframe"])
+def test_an_unknown_frame_is_a_reason_and_no_guess(cell: Cell, frame: str) -> None:
+    given = visits([Target.POSE, Target.JOINTS], [POSE, [0, 0, -90, 0, 30, 0]],
+                   **{frame: np.array([-1, -1])})  # fmt: skip
+    targets, reasons = targets_from_visits(given, cell)
+    assert targets.kind.tolist() == [Kind.UNKNOWN, Kind.JOINTS]
+    assert f"${frame.upper()} is not known" in reasons[0]
+    assert (reasons[1] != "") == (frame == "tool")
+
+
+def test_auxiliary_axes(cell: Cell) -> None:
+    nan = np.nan
+    aux = np.array([[90, nan, nan], [nan, 100, nan], [nan, nan, 5], [nan, nan, nan]])
+    targets, reasons = targets_from_visits(
+        visits([Target.POSE] * 4, [POSE] * 4, aux=aux), cell
+    )
+    assert targets.kind.tolist() == [Kind.POSE, Kind.UNKNOWN, Kind.UNKNOWN, Kind.POSE]
+    assert "track" in reasons[1] and "[aux]" in reasons[2]
+    assert reasons[0] == reasons[3] == ""
+
+
+def test_a_remote_tool_is_not_guessed(cell: Cell) -> None:
+    given = visits([Target.POSE], [POSE], tool_remote=np.array([True]))
+    targets, reasons = targets_from_visits(given, cell)
+    assert targets.kind[0] == Kind.UNKNOWN and "$TOOL_RMT" in reasons[0]
+
+
+def test_a_value_known_at_run_time_only(cell: Cell) -> None:
+    given = visits([Target.POSE, Target.UNKNOWN], [[*POSE[:5], np.nan], [np.nan] * 6])
+    targets, reasons = targets_from_visits(given, cell)
+    assert targets.kind.tolist() == [Kind.UNKNOWN] * 2
+    assert reasons[0] == "a value is not known"
+
+
+def test_configuration_strings() -> None:
+    texts = ("", " ", "W", "S E W T1:1 T2:-1", "W T1:0 T2:0 T3:0", "e t1 : -2")
+    slots, turns = configurations(texts)
+    assert slots.tolist() == [0, 0, 4, 7, 4, 1]
+    np.testing.assert_array_equal(turns[3], [1, -1, np.nan])
+    np.testing.assert_array_equal(turns[4], [0, 0, 0])
+    np.testing.assert_array_equal(turns[5], [-2, np.nan, np.nan])
