@@ -7,10 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from postproc.accuracy.batch import Batch
 from postproc.accuracy.fit import Fit
 from postproc.accuracy.measurement import DroppedRow, Measurements
+from postproc.accuracy.model import Model
 from postproc.accuracy.observability import Unseen, observe
 from postproc.pose import MM
+from postproc.robot.arm import Arm
 
 Array = NDArray[np.float64]
 
@@ -112,6 +115,26 @@ def report_fit(fit: Fit, survey: Measurements) -> FitReport:
         tracker_mm=float(tracker / MM),
         repeatability_mm=float(arrival / MM),
         effective=fit.effective,
+        warnings=survey.warnings,
+    )
+
+
+def report_method(model: Model, survey: Measurements, arm: Arm) -> FitReport:
+    """Report a method that has no named parameters."""
+    error = survey.position - Batch(arm, survey.states).walk.tcp
+    left = error - model.measured_error(arm, survey.states)
+    return FitReport(
+        parameters=(),
+        shares={},
+        correlated=(),
+        dropped=survey.dropped,
+        spared=(),
+        unseen=(),
+        before=Spread.of(error),
+        after=Spread.of(left),
+        tracker_mm=0.0,
+        repeatability_mm=0.0,
+        effective=float(len(model.values)),
         warnings=survey.warnings,
     )
 

@@ -8,14 +8,22 @@ from typing import Any
 
 from postproc.accuracy.backlash import Backlash
 from postproc.accuracy.backlash_profile import BacklashProfile
+from postproc.accuracy.catalogue import FURTHER
 from postproc.accuracy.effect import Effect
+from postproc.accuracy.elm import Elm
+from postproc.accuracy.elm_map import ElmMap
 from postproc.accuracy.geometry import Geometry
+from postproc.accuracy.interpolation import Interpolation
+from postproc.accuracy.kriging import Kriging
 from postproc.exceptions import PostprocError
 from postproc.robot.arm import Arm
 from postproc.robot.state import States
 
 EFFECTS: dict[str, type[Effect]] = {
-    kind.name: kind for kind in (Geometry, Backlash, BacklashProfile)
+    kind.name: kind for kind in (Geometry, Backlash, BacklashProfile, Elm, *FURTHER)
+}
+MAPS: dict[str, type[Effect]] = {  # what other methods are made of
+    kind.name: kind for kind in (ElmMap, Interpolation, Kriging)
 }
 
 BASE_EFFECTS = ("geometry", "backlash", "backlash_profile")
@@ -58,16 +66,19 @@ def restore(name: str, settings: Mapping[str, Any]) -> Effect:
     Raises:
         ValueError: Unknown effect or settings that do not fit it.
     """
-    if name not in EFFECTS:
+    kind = {**EFFECTS, **MAPS}.get(name)
+    if kind is None:
         raise ValueError(f"unknown effect {name!r}")
     try:
-        return EFFECTS[name](**{k: _frozen(v) for k, v in settings.items()})
+        return kind(**{k: _frozen(v) for k, v in settings.items()})
     except TypeError:
         raise ValueError(f"settings do not fit effect {name!r}") from None
 
 
 def _frozen(value: Any) -> Any:
     """Turn lists into tuples, at all depths."""
+    if isinstance(value, Mapping):
+        return {k: _frozen(v) for k, v in value.items()}
     if isinstance(value, list):
         return tuple(_frozen(v) for v in value)
     return value

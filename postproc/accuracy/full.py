@@ -1,0 +1,69 @@
+"""The product's own method: a survey becomes a fit of named effects, and a model."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from postproc.accuracy.batch import Batch
+from postproc.accuracy.fit import Fit, fit_effects
+from postproc.accuracy.library import propose
+from postproc.accuracy.measurement import Measurements
+from postproc.accuracy.model import Model
+from postproc.accuracy.ranges import Ranges
+from postproc.pose import MM
+from postproc.robot.arm import Arm
+
+Array = NDArray[np.float64]
+
+
+def fit_survey(
+    survey: Measurements, arm: Arm, effects: Sequence[str], tracker: Array | None
+) -> Fit:
+    """Fit effects by name to a survey in the base frame.
+
+    Args:
+        survey: The measurements.
+        arm: The arm.
+        effects: Names of effects.
+        tracker: Tracker position in the base frame, (3,) [m], or None.
+
+    Raises:
+        PostprocError: An unknown effect, or one whose covariate was not recorded.
+    """
+    chosen = propose(effects, arm, survey.states)
+    origin = None if tracker is None else (tracker[0], tracker[1], tracker[2])
+    return fit_effects(Batch(arm, survey.states), survey.position, chosen, origin)
+
+
+def model_of(fitted: Fit, survey: Measurements) -> Model:
+    """Keep what a fit found as a model."""
+    used = fitted.rows.weight > 0
+    left = np.linalg.norm(fitted.residual[used], axis=1) / MM
+    X = fitted.columns
+    known = np.sqrt(np.einsum("nip,nip->ni", X @ fitted.covariance, X))
+    arm = fitted.batch.arm
+    statistics = {
+        "residual_mean_mm": float(left.mean()),
+        "residual_max_mm": float(left.max()),
+        "worst_std_mm": float(known.max(initial=0.0) / MM),
+        "effective_parameters": fitted.effective,
+        "log_evidence": fitted.log_evidence,
+        "rows_dropped": float((~used).sum() + len(survey.dropped)),
+    }
+    return Model(
+        method="full",
+        arm_name=arm.name,
+        arm_id=arm.id,
+        effects=fitted.combination,
+        values=fitted.values,
+        covariance=fitted.covariance,
+        prior_std=fitted.prior_std,
+        noise=fitted.noise,
+        ranges=Ranges.of(survey.states[used]),
+        rows=int(used.sum()),
+        data_sha256=survey.sha256,
+        statistics=statistics,
+    )
