@@ -12,6 +12,7 @@ from postproc.virtual.kinematics import NJ220, Chain
 from postproc.virtual.landing import Landing, land
 from postproc.virtual.measure import (
     Campaign,
+    campaign_length,
     in_tracker_frame,
     measure_program,
     measure_rows,
@@ -36,6 +37,7 @@ __all__ = [
     "Setup",
     "VirtualArm",
     "arrivals_of_states",
+    "campaign_length",
     "follow_rows",
     "in_tracker_frame",
     "land",

@@ -25,7 +25,7 @@ from postproc.virtual.gears import Gears
 from postproc.virtual.gravity import Body
 from postproc.virtual.kinematics import NJ220, Chain
 from postproc.virtual.law import Draw, Law
-from postproc.virtual.reference import MEASURED_EVERY, reference_arrivals
+from postproc.virtual.reference import reference_arrivals
 
 Array = NDArray[np.float64]
 
@@ -55,7 +55,8 @@ def virtual_arm(
         effects: Names of `catalogue.NAMES`, with joints and sizes if wanted.
         chain: The nominal arm.
         coupling: Motor angles = coupling @ joint angles, (6, 6); default identity.
-        rows: Length of the campaign that steps, drifts and warm-ups are drawn for.
+        rows: Length of the campaign in which base or tool shift at some row; nothing
+            else depends on it.
         tool: TCP (3,) or pose (4, 4) [m] that sizes in mm refer to; default a probe
             that stands off in all three axes.
 
@@ -66,7 +67,7 @@ def virtual_arm(
     names = {item.name for item in planted}
     perfect = _perfect(chain, coupling)
     body = draw_body(stream(seed, "body"), chain)
-    planter = _Planter(seed, body, reference_arrivals(rows, tool), perfect)
+    planter = _Planter(seed, body, rows, reference_arrivals(rows, tool), perfect)
     laws = {item: planter.law(item) for item in planted if item.name not in AS_BUILT}
     gaps = [law for law in laws.values() if law.effect == "backlash"]
     half_gap = _half_gap(gaps[0] if gaps else planter.law(Planted("backlash")))
@@ -111,20 +112,21 @@ class _Planter:
     Attributes:
         seed: Of the arm.
         body: Weights of the arm.
+        rows: Length of the campaign.
         reference: The campaign that sizes refer to.
         perfect: An arm without any error, to measure one law at a time.
     """
 
     seed: int
     body: Body
+    rows: int
     reference: Arrivals
     perfect: VirtualArm
 
     def law(self, item: Planted) -> Law:
         """Draw one law and scale it to the size asked for or drawn."""
         rng = stream(self.seed, item.name)
-        rows = len(self.reference)
-        draw = Draw(rng, self.body, item.joint, rows, rows * MEASURED_EVERY)
+        draw = Draw(rng, self.body, item.joint, self.rows)
         if item.name == "backlash":
             law = backlash(draw)
             return self.sized(law, item.peak_mm or self.peak_mm(law))

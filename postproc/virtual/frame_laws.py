@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from postproc.virtual.arrivals import REST_TEMPERATURE, Arrivals
 from postproc.virtual.law import Draw, Law, Where
+from postproc.virtual.reference import DURATION
 
 Array = NDArray[np.float64]
 
@@ -27,7 +28,7 @@ def thermal(draw: Draw) -> Law:
 def warmup(draw: Draw) -> Law:
     """Motors heat the links from inside, unseen by any thermometer."""
     expansion = STEEL * draw.rng.uniform(0.8, 1.6, 6)
-    constant = draw.duration * draw.rng.uniform(0.15, 0.5)
+    constant = DURATION * draw.rng.uniform(0.15, 0.5)
 
     def shape(arrivals: Arrivals) -> Array:
         return np.outer(1 - np.exp(-arrivals.time / constant), expansion)
@@ -46,7 +47,7 @@ def tool_shift(draw: Draw) -> Law:
 
 
 def _step(draw: Draw, name: str, where: Where) -> Law:
-    row = int(draw.rng.integers(draw.rows // 5 + 1, max(draw.rows * 4 // 5, 1) + 1))
+    row = int(np.ceil(draw.rows * draw.rng.uniform(0.2, 0.8)))
     shift = draw.rng.normal(size=3)
     turn = draw.rng.normal(size=3) * 0.3  # [rad / m]: a third of a mrad for a mm
     twist = np.concatenate([shift, turn])
@@ -63,7 +64,7 @@ def tracker_drift(draw: Draw) -> Law:
     phase = draw.phase()
 
     def shape(arrivals: Arrivals) -> Array:
-        progress = arrivals.time / draw.duration
+        progress = arrivals.time / DURATION
         swing = np.sin(np.pi * progress + phase) - np.sin(phase)
         return np.outer(progress, ends[0]) + 0.5 * np.outer(swing, ends[1])
 

@@ -67,15 +67,13 @@ class Draw:
         rng: Random numbers of this law alone.
         body: The weights of this arm (not the nominal ones).
         joint: The joint asked for, from 1, or 0: draw one.
-        rows: How many arrivals the campaign has, for laws that start at one of them.
-        duration: How long the campaign lasts [s].
+        rows: How many rows the campaign has, for laws that start at one of them.
     """
 
     rng: np.random.Generator
     body: Body
     joint: int
     rows: int
-    duration: float
 
     def pick(self, joints: Sequence[int]) -> int:
         """Return the joint asked for, or one of the given joints."""

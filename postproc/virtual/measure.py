@@ -45,6 +45,11 @@ class Campaign:
         return len(self.ids)
 
 
+def campaign_length(visits: Visits) -> int:
+    """Return how many visits of a program a tracker measures."""
+    return sum(map(bool, visits.measure_id)) or len(visits)
+
+
 def measure_program(arm: VirtualArm, setup: Setup, visits: Visits) -> Campaign:
     """Run a program and measure it.
 
@@ -81,7 +86,7 @@ def measure_rows(arm: VirtualArm, setup: Setup, rows: Rows) -> Campaign:
         rows.side,
         way,
         travel=rows.travel,
-        tool=setup.tool_of(rows.tool_id),
+        tool=_tools(setup, rows),
         speed=rows.speed,
         time=time,
         temperature=np.where(known, rows.temperature, warm),
@@ -89,6 +94,13 @@ def measure_rows(arm: VirtualArm, setup: Setup, rows: Rows) -> Campaign:
         payload_com=setup.payload_com,
     )
     return _read(arm, setup, rows.ids, arrivals, rows.tool_id)
+
+
+def _tools(setup: Setup, rows: Rows) -> Array:
+    """Return the rows' own tools (n, 3), or those of the cell (n, 4, 4)."""
+    if np.isnan(rows.tool).any():
+        return setup.tool_of(rows.tool_id)
+    return rows.tool
 
 
 def in_tracker_frame(campaign: Campaign, arm: VirtualArm, setup: Setup) -> Campaign:

@@ -32,7 +32,8 @@ class Run:
     Attributes:
         visit: Index of every reached visit, (k,), in the order of the program.
         arrivals: How the arm got there, k of them.
-        tool_id: Number of the tool among those of the program, (k,) from 0.
+        tool_id: Number of the tool, (k,) from 0: that of the cell's probe points where
+            all tools are probe points, else their order in the program.
         why: For each visit of the program, why it was not reached, or "".
     """
 
@@ -145,8 +146,8 @@ def _collect(
     visit = np.array(reached, dtype=np.int64)
     kept = [places[i] for i in reached]
     time = np.cumsum([p.lasted for p in places])[visit] if reached else np.zeros(0)
-    tools = list(dict.fromkeys(visits.tool[visit].tolist()))
-    tool_id = np.array([tools.index(t) for t in visits.tool[visit]], dtype=np.int64)
+    number = _tool_numbers(setup, visits.tool[visit].tolist(), poses)
+    tool_id = np.array([number[t] for t in visits.tool[visit].tolist()], dtype=np.int64)
     arrivals = make_arrivals(
         np.array([p.joints for p in kept]).reshape(-1, 6),
         np.array([p.gears.side for p in kept]).reshape(-1, 6),
@@ -160,3 +161,12 @@ def _collect(
         payload_com=setup.payload_com,
     )
     return Run(visit, arrivals, tool_id, tuple(p.why for p in places))
+
+
+def _tool_numbers(setup: Setup, used: list[int], poses: Array) -> dict[int, int]:
+    """Number the frames that serve as tools."""
+    frames = list(dict.fromkeys(used))
+    probes = [setup.number_of(poses[frame]) for frame in frames]
+    if min(probes, default=-1) < 0:
+        probes = list(range(len(frames)))
+    return dict(zip(frames, probes, strict=True))

@@ -15,6 +15,8 @@ WORKING_RANGE = np.radians(
 )
 PROBE = np.array([0.1, 0.05, 0.2])  # [m] off the flange axis, so that joint 6 shows
 MEASURED_EVERY = 14.0  # [s] a tracker campaign's usual pace
+ROWS = 400  # and length
+DURATION = ROWS * MEASURED_EVERY  # [s]
 APPROACH = np.radians([0.5, 30.0])  # ways since the last reversal
 SPEEDS = np.array([0.05, 0.15, 0.4])  # [m/s]
 PAYLOADS = np.array([0.0, 40.0, 120.0])  # [kg]
@@ -38,20 +40,21 @@ def reference_arrivals(rows: int, tool: Array | None = None) -> Arrivals:
     """Return one campaign, always the same, in which every covariate varies.
 
     Args:
-        rows: Number of arrivals, and so the length of the campaign.
+        rows: How many rows its order counts to; nothing else depends on it, so that
+            an arm stays the same arm in a short and in a long campaign.
         tool: TCP (3,) or pose (4, 4) [m].
     """
     rng = np.random.default_rng(220)
-    duration = rows * MEASURED_EVERY
     return make_arrivals(
-        working_angles(rng, rows),
-        rng.choice([-1.0, 1.0], (rows, 6)),
+        working_angles(rng, ROWS),
+        rng.choice([-1.0, 1.0], (ROWS, 6)),
         PROBE if tool is None else tool,
-        travel=log_uniform(rng, APPROACH, (rows, 6)),
-        loop=log_uniform(rng, APPROACH, (rows, 6)),
-        speed=rng.choice(SPEEDS, rows),
-        time=np.linspace(0.0, duration, rows),
-        temperature=22.0 + 8.0 * np.linspace(0.0, 1.0, rows),
-        payload=rng.choice(PAYLOADS, rows),
+        travel=log_uniform(rng, APPROACH, (ROWS, 6)),
+        loop=log_uniform(rng, APPROACH, (ROWS, 6)),
+        speed=rng.choice(SPEEDS, ROWS),
+        time=np.linspace(0.0, DURATION, ROWS),
+        temperature=22.0 + 8.0 * np.linspace(0.0, 1.0, ROWS),
+        payload=rng.choice(PAYLOADS, ROWS),
         payload_com=PAYLOAD_COM,
+        order=np.linspace(0.0, rows - 1.0, ROWS),
     )

@@ -15,6 +15,9 @@ Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 
+TOOL = ("tool_x_mm", "tool_y_mm", "tool_z_mm")
+
+
 @dataclass(frozen=True)
 class Rows:
     """n joint targets in visit order, SI units, NaN where a column is missing.
@@ -29,6 +32,7 @@ class Rows:
         payload: (n,) [kg].
         speed: (n,) [m/s].
         tool_id: (n,) from 0.
+        tool: TCP in the flange frame, (n, 3) [m], where the file has it itself.
     """
 
     ids: tuple[str, ...]
@@ -40,6 +44,7 @@ class Rows:
     payload: Array
     speed: Array
     tool_id: Ints
+    tool: Array
 
 
 def read_rows(path: str | Path) -> Rows:
@@ -72,6 +77,7 @@ def read_rows(path: str | Path) -> Rows:
         payload=table.block(["payload_kg"])[:, 0],
         speed=table.block(["speed_mm_s"])[:, 0] * 1e-3,
         tool_id=np.nan_to_num(table.block(["tool_id"])[:, 0]).astype(np.int64),
+        tool=table.block(list(TOOL)) * 1e-3,
     )
 
 

@@ -7,12 +7,14 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from postproc.exceptions import PostprocError
 from postproc.virtual.kinematics import NJ220, Chain
 
 Array = NDArray[np.float64]
 
 # Where a tracker stands when nobody says so: to the right in front of the arm.
 USUAL_TRACKER = np.array([4.0, -3.0, 1.5])  # [m] in the arm base frame
+SAME_POINT = 1e-6  # [m]
 
 
 def _identity() -> Array:
@@ -50,7 +52,27 @@ class Setup:
     tracker: Array = field(default_factory=lambda: USUAL_TRACKER.copy())
 
     def tool_of(self, tool_id: NDArray[np.int64]) -> Array:
-        """Return the tool poses (n, 4, 4) of tool numbers (n,) from 0."""
-        if len(self.tools):
-            return np.asarray(self.tools[tool_id])
-        return np.broadcast_to(self.tool, (len(tool_id), 4, 4))
+        """Return the tool poses (n, 4, 4) of tool numbers (n,) from 0.
+
+        Numbers that count from 1 to the number of tools are understood too.
+
+        Raises:
+            PostprocError: A number that belongs to no tool.
+        """
+        if not len(self.tools):
+            return np.broadcast_to(self.tool, (len(tool_id), 4, 4))
+        lowest, highest = (int(f(tool_id)) for f in (np.min, np.max))
+        if lowest > 0 and highest == len(self.tools):
+            tool_id, lowest, highest = tool_id - 1, lowest - 1, highest - 1
+        if lowest < 0 or highest >= len(self.tools):
+            raise PostprocError(
+                f"the rows name tools {lowest} to {highest}, the cell has "
+                f"{len(self.tools)} probe points. Add them to [survey] points_mm"
+            )
+        return np.asarray(self.tools[tool_id])
+
+    def number_of(self, tool: Array) -> int:
+        """Return the number from 0 of the probe point at a tool's TCP, or -1."""
+        away = np.linalg.norm(self.tools[:, :3, 3] - tool[:3, 3], axis=1)
+        same = np.flatnonzero(away < SAME_POINT)
+        return int(same[0]) if len(same) else -1

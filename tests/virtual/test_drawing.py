@@ -98,3 +98,14 @@ def test_the_arm_warms_up_towards_a_limit() -> None:
     T = arm.temperature(np.array([0.0, 600.0, 3600.0, 1e6]), 22.0)
     assert T[0] == 22.0 and (np.diff(T) > 0).all()
     np.testing.assert_allclose(T[3], 22.0 + arm.warming[0])
+
+
+def test_an_arm_is_the_same_in_a_short_and_in_a_long_campaign() -> None:
+    short, long = (virtual_arm(3, "all", rows=n) for n in (120, 900))
+    a = sample_survey(short, 20)
+    for one, two in zip(short.laws, long.laws, strict=True):
+        if "row" in one.parameters:
+            assert one.parameters["row"] < 100 < two.parameters["row"]
+        else:
+            np.testing.assert_array_equal(one(a), two(a))
+    np.testing.assert_array_equal(short.joint_noise, long.joint_noise)

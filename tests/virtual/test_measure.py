@@ -7,9 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from postproc.exceptions import MeasurementError, OutputError
+from postproc.exceptions import MeasurementError, OutputError, PostprocError
 from postproc.virtual import (
     Setup,
+    campaign_length,
     in_tracker_frame,
     measure_program,
     measure_rows,
@@ -143,3 +144,38 @@ def test_the_tracker_frame_is_rigid() -> None:
         )
     span = np.linalg.norm(campaign.measured - SETUP.tracker, axis=1)
     np.testing.assert_allclose(np.linalg.norm(moved.measured, axis=1), span)
+
+
+def test_tools_of_rows_are_the_files_own_or_the_cells(tmp_path: Path) -> None:
+    header = f"{HEADER},tool_id"
+    cell = replace(SETUP, tools=TOOLS)
+    from_one = f"{header}\n1,0,0,-90,0,30,0,1\n2,0,0,-90,0,30,0,2\n"
+    rows = read_rows(write(tmp_path / "a.csv", from_one))
+    found = measure_rows(ARM, cell, rows).arrivals.tool
+    np.testing.assert_array_equal(found, TOOLS)
+    own = f"{header},tool_x_mm,tool_y_mm,tool_z_mm\n1,0,0,-90,0,30,0,9,1,2,3\n"
+    rows = read_rows(write(tmp_path / "b.csv", own))
+    found = measure_rows(ARM, cell, rows).arrivals.tool[0, :3, 3]
+    np.testing.assert_allclose(found, [1e-3, 2e-3, 3e-3])
+    unknown = f"{header}\n1,0,0,-90,0,30,0,4\n"
+    with pytest.raises(PostprocError, match="2 probe points"):
+        measure_rows(ARM, cell, read_rows(write(tmp_path / "c.csv", unknown)))
+
+
+def test_tools_of_programs_take_the_numbers_of_the_probe_points() -> None:
+    second = Program(frames=[[0, 100, 200, 0, 0, 0], [0] * 6])
+    second.joints(0, 0, -90, 0, 40, 0, base=1, uframe=1)
+    cell = replace(SETUP, tools=TOOLS)
+    np.testing.assert_array_equal(
+        measure_program(ARM, cell, second.visits()).tool_id, [1]
+    )
+    other = Program(frames=[[0, 0, 300, 0, 0, 0], [0] * 6])
+    other.joints(0, 0, -90, 0, 40, 0, base=1, uframe=1)
+    np.testing.assert_array_equal(
+        measure_program(ARM, cell, other.visits()).tool_id, [0]
+    )
+
+
+def test_the_length_of_a_campaign_is_its_measured_visits() -> None:
+    assert campaign_length(program().visits()) == 3
+    assert campaign_length(Program().joints(0, 0, 0, 0, 0, 0).visits()) == 1
