@@ -139,7 +139,10 @@ def _along_line(
         reason = CODE[PATH_JUMP if done.reached else lost]
         return Arrival(end.q, flange, end.slot, NO_PATH, reason)
     if not joints:
-        return Arrival(done.q[-1], flange, int(done.slot[-1]), done.q, 0)
+        before = work.branch_at(int(work.source[edge]))
+        single = (done.slot == (done.slot[0] if before < 0 else before)).all()
+        reason = 0 if single else CODE[PATH_JUMP]
+        return Arrival(done.q[-1], flange, int(done.slot[-1]), done.q, reason)
     last = done.q[-1] if len(done.q) else near
     if np.abs(last - end.q).max() > LOST:
         return Arrival(end.q, flange, -1, NO_PATH, CODE[OTHER_BRANCH])

@@ -29,13 +29,14 @@ class Clock:
 
     Attributes:
         time: Since the first move, along the first predecessors, (n,) [s].
-        speed: TCP speed at the target, (n,) [m/s], NaN where not known.
-        failed: No time law was found, (n,).
+        speed: TCP speed at the target, (n,) [m/s], 0 where the arm stops.
+        untimed: No time law was found; time and speed are as if the arm kept to the
+            programmed speed or to full joint speed, (n,).
     """
 
     time: Array
     speed: Array
-    failed: Bools
+    untimed: Bools
 
 
 def tell_time(arm: Arm, targets: Targets, traced: Trace) -> Clock:
@@ -43,25 +44,22 @@ def tell_time(arm: Arm, targets: Targets, traced: Trace) -> Clock:
     n = len(targets)
     edge, source = main_edges(targets, traced)
     duration, velocity = np.zeros(n), np.zeros((n, 6))
-    failed = np.zeros(n, dtype=bool)
+    untimed = np.zeros(n, dtype=bool)
     first, end = runs(targets, source)
     lone = (end - first == 1) & (targets.move[first] == Move.JOINT)
     joint_moves = JointMoves(arm)
     for v in first[lone].tolist():
         begin, override = traced.q[source[v]], float(targets.override[v])
-        try:
-            move = joint_moves.move(begin, traced.q[v], override)
-            duration[v] = move.duration
-        except PlanError:
-            failed[v] = True
+        duration[v] = joint_moves.move(begin, traced.q[v], override).duration
     points = waypoints(arm, targets, traced, edge, source, first[~lone], end[~lone])
     for a, b in zip(first[~lone].tolist(), end[~lone].tolist(), strict=True):
         try:
             duration[a:b], velocity[a:b] = _run(arm, targets, points, a, b)
         except PlanError:
-            failed[a:b], velocity[a:b] = True, np.nan
+            duration[a:b], velocity[a:b] = _estimate(points, a, b)
+            untimed[a:b] = True
     speed = _speeds(arm, targets, traced, velocity)
-    return Clock(_times(targets, duration), speed, failed)
+    return Clock(_times(targets, duration), speed, untimed)
 
 
 def main_edges(targets: Targets, traced: Trace) -> tuple[Ints, Ints]:
@@ -99,7 +97,7 @@ def _run(
     """Time one run: durations (m,) [s] and joint velocities (m, 6) at its targets.
 
     Raises:
-        PlanError: No time law was found.
+        PlanError: toppra finds no time law.
     """
     rows = slice(int(points.start[first]), int(points.start[end]))
     q, ds = points.q[rows], points.ds[rows]
@@ -113,6 +111,19 @@ def _run(
     s = np.cumsum(np.where(moved, ds, 0.0))[moved]
     law = toppra.run(arm, q[moved], s, _at_points(limit), override)
     return np.diff(law.time[at], prepend=0.0), law.velocity[at]
+
+
+def _estimate(points: Waypoints, first: int, end: int) -> tuple[Array, Array]:
+    """Guess what `_run` would find, from programmed speeds and full joint speed."""
+    visit = np.arange(first, end)
+    last = points.start[visit + 1] - 1
+    dt = np.maximum(points.ds, points.least)
+    dt[points.start[first]] = 0.0
+    total = np.cumsum(dt[points.start[first] : points.start[end]])
+    moving = np.maximum(dt[last], SHORTEST)[:, None]
+    velocity = (points.q[last] - points.q[last - 1]) / moving
+    velocity[-1] = 0.0
+    return np.diff(total[last - points.start[first]], prepend=0.0), velocity
 
 
 def _at_points(limit: Array) -> Array:
@@ -129,7 +140,6 @@ def _at_points(limit: Array) -> Array:
 def _speeds(arm: Arm, targets: Targets, traced: Trace, velocity: Array) -> Array:
     """TCP speeds (n,) [m/s] from joint velocities (n, 6) [rad/s]."""
     speed = np.zeros(len(targets))
-    speed[np.isnan(velocity[:, 0])] = np.nan
     rows = np.flatnonzero(np.abs(velocity).max(axis=1) > 0)
     J = arm.jacobian(traced.q[rows], targets.tool[rows, :3, 3])[:, :3]
     moving = np.einsum("nij,nj->ni", J, velocity[rows])

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from postproc.motion.clock import tell_time
-from postproc.motion.reasons import CODE, NO_TIME, REASONS, WRIST
+from postproc.motion.reasons import CODE, REASONS, WRIST
 from postproc.motion.targets import Targets
 from postproc.motion.trace import Trace, trace
 from postproc.robot.arm import Arm
@@ -35,6 +35,7 @@ class Plan:
         reason: Index into `reasons`, (n,); 0 where the arrival may be compensated.
         reasons: Why not; reasons[0] is "".
         overruled: Continuity took another branch or turn than the string says, (n,).
+        untimed: Time and speed are estimates: no time law was found, (n,).
     """
 
     q: Array
@@ -48,6 +49,7 @@ class Plan:
     reason: Ints
     reasons: tuple[str, ...]
     overruled: Bools
+    untimed: Bools
 
     def __post_init__(self) -> None:
         for f in fields(self):
@@ -84,13 +86,11 @@ def plan(arm: Arm, targets: Targets, wrist: float) -> Plan:
     traced = trace(arm, targets)
     arrived = arrivals(arm, traced.q, traced.edges)
     clock = tell_time(arm, targets, traced)
-    reason = np.where(
-        (traced.reason == 0) & clock.failed, CODE[NO_TIME], _guard(traced, wrist)
-    )
     return Plan(
         traced.q, traced.flange @ targets.tool, targets.tool, arrived.direction,
-        arrived.travel, clock.speed, clock.time, traced.slot, reason, REASONS,
-        traced.overruled,
+        arrived.travel, clock.speed, clock.time, traced.slot, _guard(traced, wrist),
+        REASONS,
+        traced.overruled, clock.untimed,
     )  # fmt: skip
 
 

@@ -15,10 +15,9 @@ OTHER_BRANCH = "the path to it arrives on another branch or turn than its joint 
 LIMITS = tuple(f"axis {j} beyond its limit" for j in range(1, 7))
 PATH_LIMITS = tuple(f"axis {j} beyond its limit on the way to it" for j in range(1, 7))
 WRIST = "at the wrist singularity"
-NO_TIME = "no time law for this run"
 
 REASONS = (
     REACHED, NO_TARGET, OUT_OF_REACH, NO_BRANCH, NO_START, PATH_REACH, PATH_JUMP,
-    NO_CIRCLE, AMBIGUOUS, OTHER_BRANCH, *LIMITS, *PATH_LIMITS, WRIST, NO_TIME,
+    NO_CIRCLE, AMBIGUOUS, OTHER_BRANCH, *LIMITS, *PATH_LIMITS, WRIST,
 )  # fmt: skip
 CODE = {reason: code for code, reason in enumerate(REASONS)}

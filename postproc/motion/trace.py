@@ -132,6 +132,10 @@ def _stretch(work: Workspace, v: int, count: int) -> int:
     work.q[v : v + reached] = done.q[at]
     work.slot[v : v + reached] = done.slot[at]
     work.path[span.start : span.start + len(done.q)] = done.q
+    before = np.append(work.branch_at(v - 1), done.slot[:-1])
+    flips = np.flatnonzero((before >= 0) & (before != done.slot))
+    flipped = np.searchsorted(ends, flips, side="right")
+    work.reason[v + flipped[flipped < reached]] = CODE[PATH_JUMP]
     return reached
 
 
@@ -202,7 +206,6 @@ def _finished(work: Workspace) -> Trace:
     work.source[edge_of[holes]] = -1
     work.path[holes] = work.q[samples.visit[edge_of[holes]]]
     _limits(work, edge_of)
-    _flips(work)
     written = (t.slot >= 0) & (t.move != Move.JOINT) & (work.slot >= 0)
     turned = np.abs(on_written_turns(work.q, t.turns) - work.q) > OTHER_TURN
     other = (work.slot != t.slot) | (turned.any(axis=1) & ~t.nearest_turn)
@@ -211,15 +214,6 @@ def _finished(work: Workspace) -> Trace:
         work.q, work.flange, work.slot, edges, samples.length, samples.turning,
         work.reason, np.asarray(written & other),
     )  # fmt: skip
-
-
-def _flips(work: Workspace) -> None:
-    """Note Cartesian paths that change the branch: only a singularity lets them."""
-    source, visit = work.source, work.samples.visit
-    flipped = work.samples.cartesian & (source >= 0) & (work.slot[visit] >= 0)
-    flipped &= (work.slot[source] >= 0) & (work.slot[source] != work.slot[visit])
-    rows = visit[flipped & (work.targets.kind[visit] != Kind.JOINTS)]
-    work.reason[rows] = np.where(work.reason[rows], work.reason[rows], CODE[PATH_JUMP])
 
 
 def _limits(work: Workspace, edge_of: Ints) -> None:

@@ -13,6 +13,7 @@ from postproc.robot.arm import Arm
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
+STRAIGHT = 1e-3  # [rad] at axis 5, below this the two wrist branches are one
 SAME_POSE = 1e-7  # [m] and sines; poses that several predecessors agree on
 
 
@@ -45,7 +46,6 @@ class Workspace:
         self._settle_steps()
         self.samples = sample(targets, self.flange)
         self.source = np.array(self.samples.source)
-        self._name_branches()
         self.path = np.full((int(self.samples.start[-1]), 6), np.nan)
         self._solve()
 
@@ -84,13 +84,6 @@ class Workspace:
         moved: Array = tcp @ self.tool_inverse[v]
         return moved
 
-    def _name_branches(self) -> None:
-        """Look up the branch of joint targets that Cartesian paths start from."""
-        starts = self.source[self.samples.cartesian & (self.source >= 0)]
-        starts = np.unique(starts)
-        starts = starts[~np.isnan(self.q[starts]).any(axis=1)]
-        self.slot[starts] = self.arm.branch(self.q[starts])
-
     def _solve(self) -> None:
         """Solve for all known poses, then all inner samples, in one batch."""
         n, kind, samples = len(self.q), self.targets.kind, self.samples
@@ -107,6 +100,11 @@ class Workspace:
     def is_known(self, v: int) -> bool:
         """Tell whether the joint angles at a target are known already."""
         return v >= 0 and not np.isnan(self.q[v, 0])
+
+    def branch_at(self, v: int) -> int:
+        """Return the branch at a target, -1 where it is not known or not one alone."""
+        straight = abs(self.q[v, 4]) < STRAIGHT
+        return -1 if straight else int(self.slot[v])
 
     def span(self, edge: int) -> slice:
         """Return the samples of an edge."""

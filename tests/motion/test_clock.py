@@ -3,6 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from postproc.exceptions import PlanError
 from postproc.motion.planner import Plan, plan
 from postproc.motion.ruckig import JointMoves
 from postproc.motion.targets import Kind, make_targets
@@ -103,6 +104,22 @@ def test_a_target_reached_twice_in_a_row_takes_no_time(
     )  # fmt: skip
     assert found.time[:3].tolist() == [0, 0, 0] and found.time[3] > 0
     assert (found.reason == 0).all()
+
+
+def test_without_a_time_law_there_is_an_estimate(
+    arm: Arm, tool: np.ndarray, home: np.ndarray, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    timed = milling(arm, tool, home, 0.1)
+
+    def fail(*_: object) -> None:
+        raise PlanError("none")
+
+    monkeypatch.setattr("postproc.motion.toppra.run", fail)
+    found = milling(arm, tool, home, 0.1)
+    assert found.untimed[1:].all() and not timed.untimed.any()
+    np.testing.assert_allclose(found.time, timed.time, atol=0.2)
+    np.testing.assert_allclose(found.speed[10:-10], 0.1, rtol=0.01)
+    assert found.speed[-1] == 0 and (found.reason == 0).all()
 
 
 @pytest.mark.parametrize("deg", [2.9, 3.1])
