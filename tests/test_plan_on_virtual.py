@@ -1,0 +1,92 @@
+"""The planner against the virtual arm's own controller and gears."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from postproc.language.visits import Motion, Target, Visits
+from postproc.motion.planner import plan
+from postproc.pose import pose_from_record, record_from_pose
+from postproc.resolve import targets_from_visits
+from postproc.robot.cell import Cell, load_cell
+from postproc.virtual.drawing import virtual_arm
+from postproc.virtual.program import run_program
+from postproc.virtual.setup import Setup
+from tests.made_visits import FRAMES, visits
+
+HOME_DEG = [0.0, 0.0, -90.0, 0.0, 45.0, 0.0]
+HOLES = 25
+
+
+@pytest.fixture(scope="module")
+def cell(tmp_path_factory: pytest.TempPathFactory) -> Cell:
+    path: Path = tmp_path_factory.mktemp("cell") / "cell.toml"
+    path.write_text(
+        f'[robot]\narm = "nj220-2.7"\n[home]\njoints_deg = {HOME_DEG}\n',
+    )
+    return load_cell(path)
+
+
+def program(cell: Cell, rng: np.random.Generator) -> Visits:
+    """Holes drilled along lines, arcs between, JOINT moves to the next one."""
+    tool, base, uframe = pose_from_record(FRAMES)
+    to_user = np.linalg.inv(uframe) @ base
+    target, values, motion, via, branch = (
+        [int(Target.HOME)],
+        [[np.nan] * 6],
+        [0],
+        [0],
+        [0],
+    )
+    for _ in range(HOLES):
+        q = np.deg2rad(
+            rng.uniform([-40, -20, -110, -80, 25, -80], [40, 20, -80, 80, 70, 80])
+        )
+        if rng.uniform() < 0.3:
+            q[4] *= -1
+        hole = (cell.arm.flange(q[None]) @ tool)[0]
+        back, aside, over = hole.copy(), hole.copy(), hole.copy()
+        back[:3, 3] -= 0.15 * hole[:3, 2]
+        aside[:3, 3] += 0.1 * hole[:3, 0]
+        over[:3, 3] += 0.1 * hole[:3, 1] + 0.1 * hole[:3, 0]
+        for T, kind, on_way in (
+            (back, Motion.JOINT, 0), (hole, Motion.LINEAR, 0), (back, Motion.LINEAR, 0),
+            (hole, Motion.LINEAR, 0), (aside, Motion.CIRCULAR, 1),
+            (over, Motion.CIRCULAR, 0),
+        ):  # fmt: skip
+            target.append(int(Target.POSE))
+            values.append(record_from_pose(to_user @ T).tolist())
+            motion.append(int(kind))
+            via.append(on_way)
+            branch.append(int(q[4] < 0))
+    return visits(
+        target, values, motion=np.array(motion), via=np.array(via, dtype=bool),
+        config=np.array(branch), configs=("T1:0 T2:0", "W"),
+        lin_spd=np.full(len(target), 0.1),
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_joint_angles_and_directions_agree(cell: Cell, seed: int) -> None:
+    made = program(cell, np.random.default_rng(seed))
+    targets, _ = targets_from_visits(made, cell)
+    planned = plan(cell.arm, targets, np.deg2rad(cell.limits.wrist_deg))
+    setup = Setup(home=cell.home)
+    ran = run_program(virtual_arm(seed, effects="backlash"), setup, made)
+    assert len(ran.visit) > 0.9 * len(made)
+    same = ran.visit[planned.reason[ran.visit] == 0]
+    assert len(same) > 0.8 * len(made)
+    row = np.searchsorted(ran.visit, same)
+    np.testing.assert_allclose(planned.q[same], ran.arrivals.q[row], atol=1e-7)
+    direction, side = planned.direction[same], ran.arrivals.side[row]
+    assert (direction[3:] != 0).mean() > 0.98
+    # A gear between its flanges has just turned by less than one play.
+    sure = (direction != 0) & (np.abs(side) == 1)
+    assert sure[3:].mean() > 0.96
+    np.testing.assert_array_equal(direction[sure], side[sure])
+    recent = sure & (planned.travel[same] < 0.5)
+    travel, really = planned.travel[same][recent], ran.arrivals.travel[row][recent]
+    assert np.abs(travel - really).max() <= cell.arm.play.max()
