@@ -13,6 +13,7 @@ from postproc.virtual.controller import flange_of, joints_along, joints_of_pose
 from postproc.virtual.path import arc, straight
 from postproc.virtual.rotation import exponential, pose, pose_of_record, undo
 from postproc.virtual.setup import Setup
+from postproc.virtual.wrist import joints_with_wrist
 
 Array = NDArray[np.float64]
 
@@ -90,7 +91,11 @@ def way_to(
         samples = _arc_piece(setup, visits, i, frames, (began, start, end))
     else:
         samples = straight(start, end)
-    joints = joints_along(chain, samples @ undo(frames.tool), here)
+    if visits.wrist_joint[i]:
+        goal = _goal_joints(setup, visits, i, frames, here)
+        joints = joints_with_wrist(chain, samples[:, :3, 3], frames.tool, here, goal)
+    else:
+        joints = joints_along(chain, samples @ undo(frames.tool), here)
     return Way(np.vstack([here, joints]), np.vstack([start[:3, 3], samples[:, :3, 3]]))
 
 

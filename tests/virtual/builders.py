@@ -31,6 +31,7 @@ class Program:
             "speed": 0.1,
             "nearest": False,
             "distance": np.nan,
+            "wrist": False,
         }
         assert set(more) <= set(row)
         self.rows.append({**row, **more})
@@ -65,7 +66,7 @@ class Program:
             tool_remote=no.copy(), nearest_turn=column("nearest", bool),
             fly=no.copy(), fly_dist_mm=nan.copy(), fly_per=nan.copy(),
             fly_cart=no.copy(), lin_spd=column("speed", float), rot_spd=nan.copy(),
-            override=np.ones(n), wrist_joint=no.copy(), reason=nothing.copy(),
+            override=np.ones(n), wrist_joint=column("wrist", bool), reason=nothing.copy(),
             reasons=("",),
             pred_start=np.cumsum([0] + [len(p) for p in preds]),
             pred=np.array([p for each in preds for p in each], dtype=np.int64),
