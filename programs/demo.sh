@@ -38,8 +38,24 @@ done
 
 title "What the tool really misses by: programs as written, and compensated"
 for job in $jobs; do
-    run postproc simulate programs/$job.pdl --cell $cell --seed "$seed" \
-        --wanted programs/$job.pdl --json demo/$job.before.json
-    run postproc simulate demo/$job.pdl --cell $cell --seed "$seed" \
-        --wanted programs/$job.pdl --json demo/$job.after.json
+    for state in written compensated; do
+        program=programs/$job.pdl
+        [ $state = written ] || program=demo/$job.pdl
+        run postproc simulate "$program" --cell $cell --seed "$seed" \
+            --wanted programs/$job.pdl --json demo/$job.$state.json
+    done
 done
+
+title "True error of the tool, mm"
+python - $jobs <<'TABLE'
+import json
+import sys
+
+print(f"{'program':12}{'':14}{'mean':>8}{'95 %':>8}{'max':>8}{'targets':>9}")
+for job in sys.argv[1:]:
+    for state in ("written", "compensated"):
+        with open(f"demo/{job}.{state}.json", encoding="utf-8") as file:
+            e = json.load(file)["true_error"]
+        figures = f"{e['mean_mm']:8.3f}{e['p95_mm']:8.3f}{e['max_mm']:8.3f}"
+        print(f"{job:12}{state:14}{figures}{e['n']:9d}")
+TABLE
