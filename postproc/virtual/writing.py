@@ -51,8 +51,6 @@ def _table(campaign: Campaign, direction: bool) -> tuple[list[str], list[list[st
     columns += _columns(["payload_kg"], a.payload[:, None], 1)
     columns += _columns(["speed_mm_s"], a.speed[:, None] * 1e3, 1)
     columns.append(("tool_id", [str(t) for t in campaign.tool_id]))
-    names = ["tool_x_mm", "tool_y_mm", "tool_z_mm"]
-    columns += _columns(names, a.tool[:, :3, 3] * 1e3, 4)
     tcp = ["tool_x_mm", "tool_y_mm", "tool_z_mm"]
     columns += _columns(tcp, a.tool[:, :3, 3] * 1e3, 4)
     if direction:

@@ -39,7 +39,8 @@ def test_a_line_out_of_reach_is_refused() -> None:
 def test_programs_may_ask_for_it() -> None:
     # Through the wrist singularity, which a steady turn of the tool does not survive.
     home = np.radians([0.0, 10.0, -100.0, 0.0, 30.0, 0.0])
-    goal = np.degrees(np.array([*home[:4], -home[4], home[5]]) + [0.05, 0, 0, 0, 0, 0])
+    goal = np.degrees(home) * [1, 1, 1, 1, -1, 1]
+    goal[0] += 3.0
     program = Program().joints(*np.degrees(home))
     program.joints(*goal, motion=Motion.LINEAR, wrist=True)
     run = run_program(virtual_arm(1), Setup(home=home), program.visits())
