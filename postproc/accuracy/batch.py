@@ -43,6 +43,12 @@ class Loads:
         return torque
 
     @cached_property
+    def total(self) -> Array:
+        """Torque of links and payload, (n, 6) [N m]."""
+        total: Array = self.gravity + self.payload
+        return total
+
+    @cached_property
     def basis(self) -> Array:
         """Torque per unit of every lumped mass parameter, (n, 6, k)."""
         return self.arm.gravity_basis(self.states.q)
@@ -75,6 +81,13 @@ class Batch:
     def moved(self, deviation: Deviation, shift: Array | None) -> Batch:
         """Return the same states with the kinematics taken at a deviated arm."""
         batch = Batch(self.arm, self.states, deviation, shift)
+        batch.loads = self.loads
+        return batch
+
+    def arriving(self, direction: Array) -> Batch:
+        """Return the same poses reached from other sides, (n, 6)."""
+        states = self.states.with_(direction=direction)
+        batch = Batch(self.arm, states, self.deviation, self.shift)
         batch.loads = self.loads
         return batch
 

@@ -102,12 +102,8 @@ class Combination:
 
     def direction_slopes(self, batch: Batch, p: Array) -> Array:
         """Give each joint's position error per unit of direction, (n, 3, 6) [m]."""
-        ones = batch.states.with_(direction=np.ones_like(batch.states.q))
-        forward = Batch(batch.arm, ones, batch.deviation, batch.shift)
-        forward.loads = batch.loads
-        angles = np.zeros((len(batch), 6))
-        for effect, part in zip(self.effects, self.slices, strict=True):
-            if isinstance(effect, JointEffect) and effect.direct:
-                angles += effect.angles(forward, p[part])
-        slopes: Array = batch.jacobian * angles[:, None, :]
+        ones = np.ones_like(batch.states.q)
+        forward = self.shift(batch.arriving(ones), p)
+        backward = self.shift(batch.arriving(-ones), p)
+        slopes: Array = batch.jacobian * ((forward - backward) / 2)[:, None, :]
         return slopes

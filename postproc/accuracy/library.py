@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Mapping
 from typing import Any
+
+import numpy as np
 
 from postproc.accuracy.backlash import Backlash
 from postproc.accuracy.backlash_profile import BacklashProfile
@@ -15,16 +16,22 @@ from postproc.accuracy.elm_map import ElmMap
 from postproc.accuracy.geometry import Geometry
 from postproc.accuracy.interpolation import Interpolation
 from postproc.accuracy.kriging import Kriging
+from postproc.accuracy.probe import Probe
 from postproc.exceptions import PostprocError
 from postproc.robot.arm import Arm
 from postproc.robot.state import States
 
-EFFECTS: dict[str, type[Effect]] = {
-    kind.name: kind for kind in (Geometry, Backlash, BacklashProfile, Elm, *FURTHER)
-}
-MAPS: dict[str, type[Effect]] = {  # what other methods are made of
-    kind.name: kind for kind in (ElmMap, Interpolation, Kriging)
-}
+KINDS: tuple[type[Effect], ...] = (
+    Geometry,
+    Backlash,
+    BacklashProfile,
+    *FURTHER,
+    Probe,
+    Elm,
+)
+OTHERS: tuple[type[Effect], ...] = (ElmMap, Interpolation, Kriging)
+EFFECTS: dict[str, type[Effect]] = {kind.name: kind for kind in KINDS}
+MAPS: dict[str, type[Effect]] = {kind.name: kind for kind in OTHERS}
 
 BASE_EFFECTS = ("geometry", "backlash", "backlash_profile")
 
@@ -52,8 +59,7 @@ def _check_needs(kind: type[Effect], states: States) -> None:
         PostprocError: Naming the effect and the column.
     """
     for need in kind.needs:
-        values = getattr(states, need)
-        if len(states) and all(math.isnan(v) for v in values.reshape(-1)):
+        if len(states) and np.isnan(getattr(states, need)).all():
             raise PostprocError(
                 f"effect {kind.name} needs the {need} of every row, which the file "
                 f"does not have. Add the column or leave the effect out"

@@ -6,10 +6,12 @@ Its chain multiplies 4 x 4 matrices in a loop and shares no code with the packag
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from pathlib import Path
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from postproc.accuracy.measurement import Measurements
 from postproc.robot.arm import Arm, load_arm
 from postproc.robot.state import States, make_states
 
@@ -39,6 +41,8 @@ class Simulated:
     """True errors of one arm; lengths in m, angles in rad."""
 
     link: np.ndarray = field(default_factory=lambda: np.zeros((6, 6)))
+    dh_d: np.ndarray = field(default_factory=lambda: np.zeros(6))
+    dh_theta: np.ndarray = field(default_factory=lambda: np.zeros(6))
     base: np.ndarray = field(default_factory=lambda: np.zeros(6))
     tool: np.ndarray = field(default_factory=lambda: np.zeros(3))
     backlash: np.ndarray = field(default_factory=lambda: np.zeros((6, 3)))
@@ -60,7 +64,8 @@ class Simulated:
             T = move(x, y, z) @ rot(0, a) @ rot(1, b) @ rot(2, c)
             theta = dh.offset + dh.sense * (dh.mix @ actual[k])
             for j in range(6):
-                T = T @ rot(2, theta[j]) @ move(dh.a[j], 0, dh.d[j])
+                T = T @ rot(2, theta[j] + self.dh_theta[j])
+                T = T @ move(dh.a[j], 0, dh.d[j] + self.dh_d[j])
                 T = T @ rot(0, dh.alpha[j])
                 x, y, z, a, b, c = self.link[j]
                 T = T @ move(x, y, z) @ rot(0, a) @ rot(1, b) @ rot(2, c)
@@ -101,3 +106,29 @@ def random_states(
     which = np.arange(n) % len(tools)
     side = rng.choice([-1.0, 1.0], (n, 6))
     return make_states(q, side, tools[which], tool_id=which)
+
+
+def survey_of(states: States, position: np.ndarray) -> Measurements:
+    """Wrap states and positions as a survey."""
+    n = len(states)
+    return Measurements(
+        path=Path("survey.csv"),
+        states=states,
+        position=position,
+        ids=tuple(str(k + 1) for k in range(n)),
+        line=np.arange(n) + 2,
+        inferred=np.zeros(n, dtype=bool),
+        sha256="0" * 64,
+    )
+
+
+def covariates(states: States, rng: np.random.Generator) -> States:
+    """Fill in what effects may depend on."""
+    n = len(states)
+    return states.with_(
+        travel=rng.uniform(0.0, 0.3, (n, 6)),
+        speed=rng.uniform(0.05, 0.4, n),
+        time=np.cumsum(rng.uniform(5.0, 15.0, n)),
+        temperature=np.linspace(20.0, 30.0, n),
+        payload=rng.choice([40.0, 120.0], n),
+    )

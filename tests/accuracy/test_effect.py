@@ -1,0 +1,109 @@
+"""Every effect by its definition: columns are derivatives of the displacement."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+from postproc.accuracy.batch import Batch
+from postproc.accuracy.combination import Combination
+from postproc.accuracy.effect import Effect, fade
+from postproc.accuracy.library import EFFECTS, propose, restore
+from postproc.exceptions import PostprocError
+from postproc.pose import rotation_vector
+from tests.accuracy.simulator import NJ, PLATE, covariates, random_states
+
+RNG = np.random.default_rng(5)
+STATES = covariates(random_states(40, RNG, PLATE), RNG)
+
+
+def variants() -> list[Effect]:
+    out = list(propose(EFFECTS, NJ, STATES))
+    out.append(EFFECTS["thermal"](form="time", time_constant=100.0))
+    out.append(EFFECTS["load_backlash"](form="gravity_side"))
+    out.append(EFFECTS["tool_shift"](row=20.0, turns=True))
+    out.append(EFFECTS["base_shift"](row=20.0))
+    out.append(EFFECTS["backlash_profile"](constant=True))
+    out += [
+        EFFECTS["curve"](direction=d, source=s, lower=(low,), upper=(high,))
+        for d, s, low, high in (
+            ("base z", ("time",), 0.0, 400.0),
+            ("tool x", ("order",), 0.0, 40.0),
+            ("joint 2", ("torque 2",), -4e3, 4e3),
+        )
+    ]
+    return out
+
+
+@pytest.mark.parametrize("effect", variants(), ids=lambda e: e.name)
+def test_columns_are_finite_differences_of_the_error(effect: Effect) -> None:
+    one = Combination((effect,))
+    batch = Batch(NJ, STATES)
+    rng = np.random.default_rng(1)
+    at = rng.standard_normal(len(one.scales)) * one.scales
+    columns = one.columns(one.at(batch, at))
+    assert columns.shape == (len(STATES), 3, len(one.parameters))
+    for k, scale in enumerate(one.scales):
+        step = np.zeros(len(at))
+        step[k] = 1e-2 * scale
+        slope = one.error(batch, at + step) - one.error(batch, at - step)
+        slope /= 2 * step[k]
+        error = np.abs(slope - columns[:, :, k]).max() * scale
+        assert error < 2e-8, one.names[k]  # [m] at one prior scale
+
+
+@pytest.mark.parametrize(
+    "effect",
+    [e for e in variants() if e.rotation_columns(Batch(NJ, STATES)) is not None],
+    ids=lambda e: e.name,
+)
+def test_rotation_columns_turn_the_flange(effect: Effect) -> None:
+    one, batch = Combination((effect,)), Batch(NJ, STATES)
+    columns = effect.rotation_columns(batch)
+    before = batch.walk.flange
+    for k, scale in enumerate(one.scales):
+        step = np.zeros(len(one.scales))
+        step[k] = 1e-2 * scale
+        after = one.at(batch, step).walk.flange
+        turned = rotation_vector(after @ np.swapaxes(before, 1, 2)) / step[k]
+        assert np.abs(turned - columns[:, :, k]).max() * scale < 1e-7
+
+
+@pytest.mark.parametrize("effect", variants(), ids=lambda e: e.name)
+def test_settings_survive_a_model_file(effect: Effect) -> None:
+    plain = json.loads(json.dumps(effect.settings(), allow_nan=False))
+    again = restore(effect.name, plain)
+    assert again == effect
+    assert again.parameters() == effect.parameters()
+    names = [p.name for p in effect.parameters()]
+    assert len(set(names)) == len(names)
+
+
+def test_origins_say_what_may_be_compensated() -> None:
+    origin = {e.name: e.origin for e in variants() if e.name != "curve"}
+    assert {n for n, o in origin.items() if o == "setup"} == {
+        "base_shift", "tool_shift", "tracker_drift", "probe",
+    }  # fmt: skip
+    assert {n for n, o in origin.items() if o == "state"} == {"payload", "thermal"}
+
+
+def test_an_effect_without_its_covariate_is_refused() -> None:
+    bare = random_states(10, RNG)
+    with pytest.raises(PostprocError, match="payload needs the payload"):
+        propose(["payload"], NJ, bare)
+    with pytest.raises(PostprocError, match="no effect 'gravity'"):
+        propose(["gravity"], NJ, bare)
+
+
+def test_free_forms_fade_outside_the_survey() -> None:
+    low, high = STATES.q.min(axis=0), STATES.q.max(axis=0)
+    far = STATES.with_(q=np.where(STATES.q > 0, high + 1.0, low - 1.0))
+    for name in ("elm", "joint_map"):
+        effect = propose([name], NJ, STATES)[0]
+        assert np.abs(effect.columns(Batch(NJ, STATES))).max() > 0
+        assert np.abs(effect.columns(Batch(NJ, far))).max() < 1e-6
+    x = np.linspace(-1, 2, 301)
+    f = fade(x, np.array(0.0), np.array(1.0))
+    assert (np.diff(f[x >= 0.5]) <= 0).all() and (f[(x >= 0) & (x <= 1)] == 1).all()
