@@ -98,6 +98,9 @@ class Outcome:
         before, after: Predicted error on the visits that could be compensated.
         diagnostics: What else was found, in order of line.
         stages: Seconds spent in every stage.
+        position: Where the program wants the TCP at every visit, base frame, (n, 3)
+            [m], NaN where it is not known; empty where nobody asked.
+        sources: The bytes of the source files by name, for showing lines.
     """
 
     program: str
@@ -110,6 +113,8 @@ class Outcome:
     after: ErrorStatistics
     diagnostics: tuple[Diagnostic, ...]
     stages: Mapping[str, float] = field(default_factory=dict)
+    position: Array = field(default_factory=lambda: np.empty((0, 3)))
+    sources: Mapping[str, bytes] = field(default_factory=dict)
 
     @property
     def exit_code(self) -> int:
@@ -169,7 +174,7 @@ def write_report(outcome: Outcome, out: TextIO) -> None:
 def target_row(outcome: Outcome, i: int) -> dict[str, object]:
     """Describe visit i in the keys of the report."""
     v, d = outcome.visits, outcome.decisions
-    literal = int(v.literal[i])
+    literal, known = int(v.literal[i]), len(outcome.position) > 0
     where = None
     original: list[float | None] = []
     corrected: list[float | None] = []
@@ -191,6 +196,7 @@ def target_row(outcome: Outcome, i: int) -> dict[str, object]:
         "why": d.reasons[d.why[i]],
         "original": original,
         "corrected": corrected,
+        "position_mm": _numbers(outcome.position[i] / MM, 4) if known else [],
         "correction_mm": _numbers(d.correction[i] / MM, 5),
         "std_error_mm": _numbers(d.std_error[i] / MM, 5),
     }
