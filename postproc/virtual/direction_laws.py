@@ -46,7 +46,10 @@ def load_backlash(draw: Draw) -> Law:
 
 
 def gravity_side(draw: Draw) -> Law:
-    """A gear whose load picks the flank, whatever the direction: tanh(torque / t0)."""
+    """A gear whose load picks the flank, whatever the direction: tanh(torque / t0).
+
+    Its name for an engineer is that of the other load-dependent backlash.
+    """
     joint = draw.pick([2, 3, 5])
     threshold = draw.rng.uniform(0.1, 0.5)  # of what the joint usually carries
     usual = np.array([1.0, 5.0, 1.5, 0.1, 0.1, 0.01])[joint - 1]  # [kN m]
@@ -56,7 +59,7 @@ def gravity_side(draw: Draw) -> Law:
         return on_joint(joint, np.tanh(load / (threshold * usual)))
 
     parameters = {"t0": threshold * usual * KILO}
-    return Law("gravity_side", Where.JOINTS, (joint,), 0, parameters, shape)
+    return Law("load_backlash", Where.JOINTS, (joint,), 0, parameters, shape)
 
 
 def windup(draw: Draw) -> Law:

@@ -60,7 +60,8 @@ def run_program(arm: VirtualArm, setup: Setup, visits: Visits) -> Run:
 
     Where a visit has several possible predecessors, the arm comes from the first of
     them that was run: one of the histories that really happen. Where it comes from an
-    unknown place, it starts at home with its gears as the seed drew them.
+    unknown place, it starts at home with its gears as the seed drew them. A fly point
+    is passed exactly, not rounded, so that the path's own rounding is no arm error.
 
     Args:
         arm: Whose gears and clock.
