@@ -55,13 +55,18 @@ def solve(
     from_tcp = inverse(np.ascontiguousarray(tool))
     command, q = np.array(wanted), np.array(states.q)
     place = wanted[:, :3, 3]
-    branch = arm.branch(states.q) if arm.has_inverse else None
+    branch = arm.branch(np.nan_to_num(q)) if arm.has_inverse else None
     landing = place + model.error(arm, states)
     iterations = 0
-    while iterations < MOST and _worst(landing, place) > CLOSE:
-        command[:, :3, 3] += place - landing
-        q = _nearest(arm, command @ from_tcp, q, branch)
-        landing = command[:, :3, 3] + model.error(arm, states.with_(q=np.array(q)))
+    while iterations < MOST:
+        far = np.flatnonzero(_distance(landing, place) > CLOSE)  # NaN is not far
+        if len(far) == 0:
+            break
+        command[far, :3, 3] += (place - landing)[far]
+        own = None if branch is None else branch[far]
+        q[far] = _nearest(arm, command[far] @ from_tcp[far], q[far], own)
+        moved = states[far].with_(q=np.array(q[far]))
+        landing[far] = command[far, :3, 3] + model.error(arm, moved)
         iterations += 1
     return Solution(q, command, _distance(landing, place), iterations)
 
@@ -70,11 +75,6 @@ def _distance(a: Array, b: Array) -> Array:
     """Distance between points (n, 3), (n,) [m]."""
     gap: Array = np.linalg.norm(a - b, axis=1)
     return gap
-
-
-def _worst(a: Array, b: Array) -> float:
-    """Largest distance between points, those without a solution left out [m]."""
-    return float(np.fmax.reduce(_distance(a, b), initial=0.0))
 
 
 def _nearest(
