@@ -7,14 +7,18 @@ cd "$(dirname "${BASH_SOURCE[0]}")/.."
 cell=programs/cell.toml
 seed=${SEED:-1} # which virtual arm: another seed, other errors
 jobs="drilling handling"
-mkdir -p demo
+rm -rf demo
+mkdir demo
 exec 3>&1 # commands are shown here also where their output goes to a file
 
-# Show a command, run it; exit code 1 is a result (targets left, files differ), 2 not.
+# Show a command and run it.
 run() {
     printf '\n$ %s\n' "$*" >&3
-    "$@" || [ $? -eq 1 ]
+    "$@"
 }
+
+# The same, where exit code 1 is a result: targets were left, files differ.
+run_or_1() { run "$@" || [ $? -eq 1 ]; }
 
 title() { printf '\n== %s\n' "$*"; }
 
@@ -29,9 +33,9 @@ run postproc fit demo/survey.csv --cell $cell -o demo/model.json
 
 for job in $jobs; do
     title "$job.pdl: every target moved against the predicted error"
-    run postproc compensate programs/$job.pdl --cell $cell --model demo/model.json \
+    run_or_1 postproc compensate programs/$job.pdl --cell $cell --model demo/model.json \
         -o demo/$job.pdl --report demo/$job.json
-    run postproc diff programs/$job.pdl demo/$job.pdl >demo/$job.diff
+    run_or_1 postproc diff programs/$job.pdl demo/$job.pdl >demo/$job.diff
     head -n 14 demo/$job.diff
     echo "  ... all of it in demo/$job.diff"
 done
