@@ -19,8 +19,7 @@ Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 
-SIMILAR = 0.1  # neighbouring bounds nearer than this share belong to one speed
-SHORTEST = 1e-9  # [s at full joint speed] below this two samples are one
+BATCH = 20_000  # waypoints solved at a time, if one run does not need more
 
 
 @dataclass(frozen=True)
@@ -41,24 +40,26 @@ class Clock:
 
 def tell_time(arm: Arm, targets: Targets, traced: Trace) -> Clock:
     """Time all moves: JOINT moves between stops with ruckig, other runs with toppra."""
-    n = len(targets)
     edge, source = main_edges(targets, traced)
-    duration, velocity = np.zeros(n), np.zeros((n, 6))
-    untimed = np.zeros(n, dtype=bool)
     first, end = runs(targets, source)
     lone = (end - first == 1) & (targets.move[first] == Move.JOINT)
-    joint_moves = JointMoves(arm)
+    points = waypoints(arm, targets, traced, edge, source, first[~lone], end[~lone])
+    since, velocity, failed = _run_times(arm, points)
+    inside = points.at >= 0
+    at = points.at[inside]
+    duration, joint_velocity = np.zeros(len(targets)), np.zeros((len(targets), 6))
+    duration[inside] = since[at]
+    goes_on = np.flatnonzero(inside)
+    goes_on = goes_on[~np.isin(goes_on, first)]
+    duration[goes_on] -= since[points.at[goes_on - 1]]
+    joint_velocity[inside] = velocity[at]
+    untimed = np.zeros(len(targets), dtype=bool)
+    untimed[inside] = failed[at]
+    moves = JointMoves(arm)
     for v in first[lone].tolist():
         begin, override = traced.q[source[v]], float(targets.override[v])
-        duration[v] = joint_moves.move(begin, traced.q[v], override).duration
-    points = waypoints(arm, targets, traced, edge, source, first[~lone], end[~lone])
-    for a, b in zip(first[~lone].tolist(), end[~lone].tolist(), strict=True):
-        try:
-            duration[a:b], velocity[a:b] = _run(arm, targets, points, a, b)
-        except PlanError:
-            duration[a:b], velocity[a:b] = _estimate(points, a, b)
-            untimed[a:b] = True
-    speed = _speeds(arm, targets, traced, velocity)
+        duration[v] = moves.move(begin, traced.q[v], override).duration
+    speed = _speeds(arm, targets, traced, joint_velocity)
     return Clock(_times(targets, duration), speed, untimed)
 
 
@@ -91,50 +92,48 @@ def runs(targets: Targets, source: Ints) -> tuple[Ints, Ints]:
     return first[timed], end[timed]
 
 
-def _run(
-    arm: Arm, targets: Targets, points: Waypoints, first: int, end: int
-) -> tuple[Array, Array]:
-    """Time one run: durations (m,) [s] and joint velocities (m, 6) at its targets.
+def _run_times(arm: Arm, points: Waypoints) -> tuple[Array, Array, Bools]:
+    """Time all waypoints.
 
-    Raises:
-        PlanError: toppra finds no time law.
+    Returns:
+        Times since their run began, (k,) [s], joint velocities, (k, 6) [rad/s], and
+        where no time law was found, (k,).
     """
-    rows = slice(int(points.start[first]), int(points.start[end]))
-    q, ds = points.q[rows], points.ds[rows]
-    limit = ds[1:] / np.maximum(points.least[rows][1:], np.finfo(float).tiny)
-    moved = np.append(True, ds[1:] > SHORTEST)
-    at = np.cumsum(moved)[points.start[first + 1 : end + 1] - 1 - rows.start] - 1
-    if moved.sum() < 2:
-        return np.zeros(end - first), np.zeros((end - first, 6))
-    limit = limit[moved[1:]]
-    override = float(targets.override[first:end].min())
-    s = np.cumsum(np.where(moved, ds, 0.0))[moved]
-    law = toppra.run(arm, q[moved], s, _at_points(limit), override)
-    return np.diff(law.time[at], prepend=0.0), law.velocity[at]
+    k = len(points.ds)
+    since, velocity = np.zeros(k), np.zeros((k, 6))
+    failed = np.zeros(k, dtype=bool)
+    if k == 0:
+        return since, velocity, failed
+    begins = np.flatnonzero(points.begins)
+    limit, s = points.limit(), np.cumsum(points.ds)
+    batch = begins // BATCH
+    firsts = np.flatnonzero(np.diff(batch, prepend=-1))
+    todo = list(zip(firsts.tolist(), [*firsts[1:].tolist(), len(begins)], strict=True))
+    bounds = np.append(begins, k)
+    while todo:
+        a, b = todo.pop()
+        rows = slice(int(bounds[a]), int(bounds[b]))
+        try:
+            law = toppra.time_laws(
+                arm, points.q[rows], s[rows], limit[rows], points.begins[rows]
+            )
+            since[rows] = law.time / points.override[rows]
+            velocity[rows] = law.velocity * points.override[rows, None]
+        except PlanError:
+            if b - a > 1:
+                todo += [(a, (a + b) // 2), ((a + b) // 2, b)]
+                continue
+            since[rows], velocity[rows] = _estimate(points, rows)
+            failed[rows] = True
+    return since, velocity, failed
 
 
-def _estimate(points: Waypoints, first: int, end: int) -> tuple[Array, Array]:
-    """Guess what `_run` would find, from programmed speeds and full joint speed."""
-    visit = np.arange(first, end)
-    last = points.start[visit + 1] - 1
-    dt = np.maximum(points.ds, points.least)
-    dt[points.start[first]] = 0.0
-    total = np.cumsum(dt[points.start[first] : points.start[end]])
-    moving = np.maximum(dt[last], SHORTEST)[:, None]
-    velocity = (points.q[last] - points.q[last - 1]) / moving
-    velocity[-1] = 0.0
-    return np.diff(total[last - points.start[first]], prepend=0.0), velocity
-
-
-def _at_points(limit: Array) -> Array:
-    """Bounds at k + 1 waypoints from the bounds of the k intervals between them.
-
-    The mean where they are nearly equal (one speed on a curved path), else the lower.
-    """
-    before, after = np.append(limit[0], limit), np.append(limit, limit[-1])
-    lower, upper = np.minimum(before, after), np.maximum(before, after)
-    similar = upper < (1 + SIMILAR) * lower
-    return np.asarray(np.where(similar, (lower + upper) / 2, lower))
+def _estimate(points: Waypoints, rows: slice) -> tuple[Array, Array]:
+    """Guess the times of one run from programmed speeds and full joint speed."""
+    dt = np.maximum(points.ds[rows] / points.override[rows], points.least[rows])
+    velocity = np.zeros((len(dt), 6))
+    velocity[1:-1] = (np.diff(points.q[rows], axis=0) / dt[1:, None])[:-1]
+    return np.cumsum(dt), velocity
 
 
 def _speeds(arm: Arm, targets: Targets, traced: Trace, velocity: Array) -> Array:

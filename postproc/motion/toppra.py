@@ -15,13 +15,80 @@ import toppra
 import toppra.algorithm
 import toppra.constraint
 from numpy.typing import NDArray
+from scipy.interpolate import CubicHermiteSpline
 
 from postproc.exceptions import PlanError
+from postproc.motion.spline import derivatives
 from postproc.robot.arm import Arm
 
 Array = NDArray[np.float64]
+Bools = NDArray[np.bool_]
+
+GAP = 0.01  # path length put between two runs, where the arm stands
+FASTEST = 1e4  # bound of ds/dt where the joints give none
 
 logging.getLogger("toppra").setLevel(logging.CRITICAL)
+
+
+@dataclass(frozen=True)
+class Runs:
+    """Time laws of runs from stop to stop, at their k waypoints.
+
+    Attributes:
+        s: Path positions, (k,).
+        q: Joint angles, (k, 6) [rad].
+        slope: dq/ds, (k, 6).
+        rate: ds/dt, (k,), 0 at both ends of each run.
+        time: Time since the run began, (k,) [s].
+    """
+
+    s: Array
+    q: Array
+    slope: Array
+    rate: Array
+    time: Array
+
+    @property
+    def velocity(self) -> Array:
+        """Joint velocities at the waypoints, (k, 6) [rad/s]."""
+        return self.slope * self.rate[:, None]
+
+    def at(self, time: Array) -> tuple[Array, Array, Array]:
+        """Follow the first and only run.
+
+        Returns:
+            Joint angles, velocities and accelerations, (m, 6) each, at times (m,).
+        """
+        i = np.searchsorted(self.time, time, side="right") - 1
+        i = np.clip(i, 0, len(self.s) - 2)
+        squares = self.rate**2
+        push = (squares[i + 1] - squares[i]) / (2 * (self.s[i + 1] - self.s[i]))
+        dt = time - self.time[i]
+        s = self.s[i] + dt * self.rate[i] + push * dt**2 / 2
+        rate = (self.rate[i] + push * dt)[:, None]
+        path = CubicHermiteSpline(self.s, self.q, self.slope)
+        first, second = path(s, 1), path(s, 2)
+        return path(s), first * rate, second * rate**2 + first * push[:, None]
+
+
+class _Path(toppra.interpolator.AbstractGeometricPath):  # type: ignore[misc]
+    """A path that is only asked for its derivatives at all the gridpoints."""
+
+    def __init__(self, s: Array, q: Array, first: Array, second: Array) -> None:
+        self._s, self._orders = s, (q, first, second)
+
+    def __call__(self, positions: Array, order: int = 0) -> Array:
+        if np.ndim(positions) == 0:
+            return self._orders[order][np.searchsorted(self._s, positions)]
+        return self._orders[order]
+
+    @property
+    def dof(self) -> int:
+        return 6
+
+    @property
+    def path_interval(self) -> Array:
+        return self._s[[0, -1]]
 
 
 class _PathSpeed(toppra.constraint.LinearConstraint):  # type: ignore[misc]
@@ -35,72 +102,51 @@ class _PathSpeed(toppra.constraint.LinearConstraint):  # type: ignore[misc]
     def compute_constraint_params(
         self, path: Any, gridpoints: Array
     ) -> tuple[Any, ...]:
+        """Return no linear constraint, only bounds of the squared velocity."""
         bound = np.column_stack([np.zeros_like(self._square), self._square])
         return None, None, None, None, None, None, bound
 
 
-@dataclass(frozen=True, eq=False)
-class Run:
-    """The time law of one run between two stops.
+def time_laws(arm: Arm, q: Array, s: Array, limit: Array, begins: Bools) -> Runs:
+    """Find the fastest time laws along paths, from stop to stop.
 
-    Attributes:
-        s: Path positions of the gridpoints, (k,).
-        rate: ds/dt at the gridpoints, (k,).
-        time: Time at the gridpoints, (k,) [s].
-    """
-
-    s: Array
-    rate: Array
-    time: Array
-    _path: Any
-
-    @property
-    def velocity(self) -> Array:
-        """Joint velocities at the gridpoints, (k, 6) [rad/s]."""
-        velocity: Array = self._path(self.s, 1) * self.rate[:, None]
-        return velocity
-
-    def at(self, time: Array) -> tuple[Array, Array, Array]:
-        """Return joint angles, velocities and accelerations, (m, 6), at times (m,)."""
-        i = np.clip(
-            np.searchsorted(self.time, time, side="right") - 1, 0, len(self.s) - 2
-        )
-        squares = self.rate**2
-        push = (squares[i + 1] - squares[i]) / (2 * (self.s[i + 1] - self.s[i]))
-        dt = time - self.time[i]
-        s = self.s[i] + dt * self.rate[i] + push * dt**2 / 2
-        rate = (self.rate[i] + push * dt)[:, None]
-        d1, d2 = self._path(s, 1), self._path(s, 2)
-        return self._path(s), d1 * rate, d2 * rate**2 + d1 * push[:, None]
-
-
-def run(arm: Arm, q: Array, s: Array, limit: Array, override: float) -> Run:
-    """Find the fastest time law along a path, from stop to stop.
+    All runs are solved as one path on which the arm must stand at the seams.
 
     Args:
         arm: Its joint velocity and acceleration limits hold.
         q: Joint angles at the waypoints, each one a gridpoint, (k, 6) [rad].
-        s: Path positions of the waypoints, increasing, (k,).
+        s: Path positions of the waypoints, increasing within a run, (k,).
         limit: Bound of ds/dt at the waypoints, (k,), inf where there is none.
-        override: Share of the arm's joint velocity, its square of the acceleration.
+        begins: True at the first waypoint of each run, (k,).
 
     Raises:
-        PlanError: toppra finds no time law.
+        PlanError: toppra finds no time law for one of the runs.
     """
-    path = toppra.SplineInterpolator(s, q)
-    bounds = [
-        toppra.constraint.JointVelocityConstraint(arm.velocity * override),
-        toppra.constraint.JointAccelerationConstraint(arm.acceleration * override**2),
-        _PathSpeed(np.minimum(limit, 1e4)),
-    ]
+    first, second = derivatives(s, q, begins)
+    step = np.diff(s, prepend=s[0])
+    step[begins] = GAP
+    along = np.cumsum(step)
+    ends = np.append(begins[1:], True)
+    with np.errstate(divide="ignore"):
+        joints = (arm.velocity / np.abs(first)).min(axis=1)
+    bound = np.minimum(np.minimum(limit, joints), FASTEST)
     solver = toppra.algorithm.TOPPRA(
-        bounds, path, gridpoints=s, solver_wrapper="seidel"
+        [
+            toppra.constraint.JointAccelerationConstraint(arm.acceleration),
+            _PathSpeed(np.where(begins | ends, 0.0, bound)),
+        ],
+        _Path(along, q, first, second),
+        gridpoints=along,
+        solver_wrapper="seidel",
     )
     _, rate, _ = solver.compute_parameterization(0.0, 0.0)
     if rate is None or np.isnan(rate).any():
         raise PlanError("no time law for this path within the joint limits")
-    between = rate[1:] + rate[:-1]
+    between = (rate[1:] + rate[:-1])[~begins[1:]]
     if (between <= 0).any():
-        raise PlanError("the path stops inside a run")
-    time = np.concatenate([[0.0], np.cumsum(2 * np.diff(s) / between)])
-    return Run(s, rate, time, path)
+        raise PlanError("the arm would stand still inside a run")
+    lasts = np.zeros(len(s))
+    lasts[~begins] = 2 * step[~begins] / between
+    total = np.cumsum(lasts)
+    since = total - total[np.maximum.accumulate(np.where(begins, np.arange(len(s)), 0))]
+    return Runs(s, q, first, rate, since)

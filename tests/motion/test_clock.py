@@ -106,6 +106,19 @@ def test_a_target_reached_twice_in_a_row_takes_no_time(
     assert (found.reason == 0).all()
 
 
+def test_one_short_move_that_flies_to_nowhere_has_a_time(
+    arm: Arm, home: np.ndarray
+) -> None:
+    tcp = np.tile(arm.flange(home[None])[0], (2, 1, 1))
+    tcp[1, 0, 3] += 0.002
+    targets = make_targets(
+        np.zeros(2, int), tcp, move=np.array([0, 1]), fly=np.array([False, True]),
+        slot=np.zeros(2, dtype=int),
+    )  # fmt: skip
+    found = plan(arm, targets, WRIST)
+    assert 0 < found.time[1] < 0.5 and not found.untimed.any()
+
+
 def test_without_a_time_law_there_is_an_estimate(
     arm: Arm, tool: np.ndarray, home: np.ndarray, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -114,7 +127,7 @@ def test_without_a_time_law_there_is_an_estimate(
     def fail(*_: object) -> None:
         raise PlanError("none")
 
-    monkeypatch.setattr("postproc.motion.toppra.run", fail)
+    monkeypatch.setattr("postproc.motion.toppra.time_laws", fail)
     found = milling(arm, tool, home, 0.1)
     assert found.untimed[1:].all() and not timed.untimed.any()
     np.testing.assert_allclose(found.time, timed.time, atol=0.2)
