@@ -25,6 +25,7 @@ Array = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 
 GAP = 0.01  # path length put between two runs, where the arm stands
+CREEP = 1e-4  # ds/dt that counts as standing: an exact zero leaves the solver no room
 FASTEST = 1e4  # bound of ds/dt where the joints give none
 
 logging.getLogger("toppra").setLevel(logging.CRITICAL)
@@ -133,7 +134,7 @@ def time_laws(arm: Arm, q: Array, s: Array, limit: Array, begins: Bools) -> Runs
     solver = toppra.algorithm.TOPPRA(
         [
             toppra.constraint.JointAccelerationConstraint(arm.acceleration),
-            _PathSpeed(np.where(begins | ends, 0.0, bound)),
+            _PathSpeed(np.where(begins | ends, CREEP, bound)),
         ],
         _Path(along, q, first, second),
         gridpoints=along,
@@ -142,6 +143,7 @@ def time_laws(arm: Arm, q: Array, s: Array, limit: Array, begins: Bools) -> Runs
     _, rate, _ = solver.compute_parameterization(0.0, 0.0)
     if rate is None or np.isnan(rate).any():
         raise PlanError("no time law for this path within the joint limits")
+    rate = np.where(begins | ends, 0.0, rate)
     between = (rate[1:] + rate[:-1])[~begins[1:]]
     if (between <= 0).any():
         raise PlanError("the arm would stand still inside a run")
