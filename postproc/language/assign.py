@@ -1,0 +1,114 @@
+"""Assignments: what a variable, a component or a setting holds afterwards."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from postproc.language import pdl2 as ast
+from postproc.language.evaluate import Target
+from postproc.language.machine import Here
+from postproc.language.values import COMPONENTS, Nothing, Position, Value
+from postproc.language.world import World
+
+_FRAMES = ("tool", "base", "uframe")
+
+
+def assign(here: Here, statement: ast.Assign, taught: bool) -> None:
+    """Let an assignment have its effect; `taught` marks the literal in it."""
+    value = here.value(statement.value)
+    literal = statement.operator == ":="
+    if not literal:
+        sign = statement.operator[0]
+        value = here.value(ast.Binary(sign, statement.target, statement.value))
+    if taught and isinstance(value, Position):
+        value = replace(value, taught=True)
+    if statement.target.name.startswith("$"):
+        _setting(here, statement.target, value)
+        return
+    target = here.locate(statement.target)
+    if not target.exact:
+        for key in target.keys:
+            here.store.forget(key, "an element known only at run time is assigned")
+        return
+    slot = -1
+    if literal and isinstance(statement.value, ast.Number):
+        slot = here.global_slot(statement.value.slot)
+    held = _new_value(here, statement, target, value, slot)
+    if isinstance(held, Position):
+        held = _owned(here, statement.target.name, target.key, held)
+    if isinstance(held, Nothing) and target.component == ():
+        here.store.forget(target.key, held.why)
+    else:
+        here.store.write(target.key, held)
+
+
+def _setting(here: Here, reference: ast.Reference, value: Value) -> None:
+    """Change a frame or motion variable of our arm."""
+    name = here.setting_name(reference)
+    if name is None:
+        if reference.name[1:] in _FRAMES:
+            why = f"a part of {reference.name.upper()} is assigned"
+            here.store.set(**{reference.name[1:]: Nothing(why)})
+        elif reference.name == "$arm_data" and _whose(here, reference) is None:
+            field = str(reference.steps[-1]).lstrip("$")
+            here.store.set(**{field: Nothing("it is set for an arm known at run time")})
+        return
+    if f"${name}" in here.volatile:
+        value = Nothing("a condition handler changes it")
+    here.store.set(**{name: value})
+
+
+def _whose(here: Here, reference: ast.Reference) -> int | None:
+    """Return the arm that ``$ARM_DATA[n]`` names, None where it is not known."""
+    first = reference.steps[0] if reference.steps else None
+    if isinstance(first, ast.Index) and not isinstance(first.subscripts[0], tuple):
+        return here.integer(first.subscripts[0])
+    return 0
+
+
+def _new_value(
+    here: Here, statement: ast.Assign, target: Target, value: Value, slot: int
+) -> Value:
+    if target.component == ():
+        return value
+    held = here.store.read(target.key)
+    if not isinstance(held, Position):
+        held = _blank(here, statement.target.name, held)
+    number = value if isinstance(value, float) else None
+    match target.component:
+        case ("pos", _):
+            if not isinstance(value, Position):
+                why = value.why if isinstance(value, Nothing) else "it is no position"
+                return Nothing(why)
+            return replace(value, aux=held.aux, taught=value.taught or held.taught)
+        case ("aux", axis):
+            return held.with_aux(axis, number)
+        case ("joint", axis) if 1 <= axis <= 6:
+            return held.with_component(axis - 1, number, slot)
+        case ("joint", axis):
+            return held.with_aux(axis - 6, number)
+        case (str(name), _):
+            return held.with_component(COMPONENTS[name], number, slot)
+    return Nothing("a part of it known only at run time is assigned")
+
+
+def _blank(here: Here, name: str, held: Value) -> Position:
+    """Return a position of which nothing is known yet."""
+    type_ = here.world.type_of(here.place, name)
+    joints = type_ is not None and type_.name == "jointpos"
+    never = isinstance(held, Nothing) and held.why.startswith("it has no value")
+    return Position(joints, aux=() if never else None)
+
+
+def _owned(here: Here, name: str, key: str, value: Position) -> Position:
+    """Say which variable a literal is the value of."""
+    declared = here.world.declared(here.place, name)
+    shared = value.shared or bool(declared and declared.exported)
+    taught = value.taught or bool(declared and declared.taught)
+    owner = value.name or here.world.written(key)
+    return replace(value, name=owner, shared=shared, taught=taught)
+
+
+def initial_key(world: World, name: str) -> str:
+    """Return the name without indices and fields, in lower case."""
+    return name.lower().split("[")[0].split(".")[0]

@@ -1,0 +1,187 @@
+"""Calls: routines of the job are run, others are taken at their word."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from postproc.language import pdl2 as ast
+from postproc.language.effects import (
+    CHANGING,
+    PURE,
+    body_effects,
+    changed_arguments,
+    invocations,
+)
+from postproc.language.machine import Here, Machine, forget, forget_names
+from postproc.language.values import Alias, Nothing, Position
+from postproc.language.visits import ELSEWHERE
+from postproc.language.world import Place, Record
+
+_HANDS_OVER = ("sensor_", "c5gopen", "c4gopen", "open_controller", "opencontrol")
+_FRAMES = ("tool", "base", "uframe")
+
+
+def call_statement(machine: Machine, here: Here, call: ast.Call) -> bool:
+    """Run a call; tell whether control went into a routine of the job."""
+    inside = _program(here, call.name) if call.program else None
+    if not call.program:
+        inside = here.world.find_routine(here.place.program, call.name)
+    if inside is None:
+        outside(here, call.name, call.arguments)
+        return False
+    if inside.body in machine.calls_in(here.context):
+        _refuse_recursion(here, inside)
+        return False
+    _bind(here, inside, call.arguments)
+    machine.call(here, inside)
+    return True
+
+
+def _program(here: Here, name: str) -> Place | None:
+    program = here.world.others.get(name)
+    if program is None or program.main is None:
+        return None
+    return Place(program, program.main)
+
+
+def calls_in_expressions(here: Here, statement: ast.Statement) -> None:
+    """Let the function calls inside of a statement have their effects."""
+    for call in invocations(statement):
+        if call.name in PURE:
+            continue
+        inside = here.world.find_routine(here.place.program, call.name)
+        if inside is None:
+            outside(here, call.name, call.arguments)
+        else:
+            _summarised(here, inside, call.arguments)
+
+
+def _summarised(
+    here: Here, inside: Place, arguments: tuple[ast.Expression | None, ...]
+) -> None:
+    """Take a function's effects from its text instead of running it."""
+    name = inside.body.name
+    effects = body_effects(inside.program, inside.body)
+    within = replace_place(here, inside)
+    forget_names(within, effects.assigned, f"{name} may change it")
+    for argument in changed_arguments(arguments):
+        forget(here, argument, f"{name} may change it")
+    if effects.moves:
+        here.store.last = frozenset({ELSEWHERE})
+        here.world.report_once(
+            here.place.program,
+            here.row,
+            "call-not-followed",
+            name,
+            f"{name} may move the arm where it is called in an expression: the next "
+            "move is taken to come from an unknown place; call it as a statement",
+        )
+
+
+def replace_place(here: Here, place: Place) -> Here:
+    """Return the same point as seen from another body."""
+    return replace(here, place=place)
+
+
+def _refuse_recursion(here: Here, inside: Place) -> None:
+    name = inside.body.name or inside.program.name
+    here.world.report_once(
+        here.place.program,
+        here.row,
+        "recursion",
+        name,
+        f"{name} calls itself: what it does is not followed; moves after it are taken "
+        "to come from an unknown place",
+    )
+    effects = body_effects(inside.program, inside.body)
+    forget_names(replace_place(here, inside), effects.assigned, f"{name} may change it")
+    here.store.last = frozenset({ELSEWHERE})
+
+
+def _bind(
+    here: Here, inside: Place, arguments: tuple[ast.Expression | None, ...]
+) -> None:
+    """Give the parameters their values; variables go by reference."""
+    prefix = f"{inside.program.name}:{inside.body.name}/"
+    for at, parameter in enumerate(inside.body.parameters):
+        argument = arguments[at] if at < len(arguments) else None
+        key = prefix + parameter.name
+        if isinstance(argument, ast.Reference) and not argument.name.startswith("$"):
+            target = here.locate(argument)
+            if target.component == ():
+                here.store.write(key, Alias(target.keys, target.exact))
+                continue
+            for aliased in target.keys:
+                here.store.forget(aliased, f"{inside.body.name} may change it")
+        if argument is None:
+            here.store.write(key, Nothing("the argument is not given"))
+            continue
+        value = here.value(argument)
+        if isinstance(value, Position) and not value.name:
+            value = replace(value, name=f"{inside.body.name}.{parameter.name}")
+        here.store.write(key, value)
+
+
+def outside(
+    here: Here, name: str, arguments: tuple[ast.Expression | None, ...]
+) -> None:
+    """Take in what a routine that the job does not hold is said, or assumed, to do."""
+    start = here.world.start
+    for argument in changed_arguments(arguments):
+        forget(here, argument, f"{name} may change it (arguments go by reference)")
+    if name in CHANGING or name in PURE:
+        return
+    said = start.routines.get(name)
+    if name in start.frame_tables:
+        _frames_from_table(here, name, arguments)
+    elif name.startswith(_HANDS_OVER):
+        here.store.last = frozenset({ELSEWHERE})
+        _say(here, "position-unknown", name, "hands the arm over to a sensor or an "
+             "outside stream: the next move comes from an unknown place")  # fmt: skip
+    elif said is None:
+        _say(here, "assumed-still", name, "is not in the files at hand: assumed "
+             "neither to move the arm nor to set frames; if it does, say so under "
+             f"[routines] or [frames.routines.{name}] in the cell file")  # fmt: skip
+    if said == "moves":
+        here.store.last = frozenset({ELSEWHERE})
+    elif said == "sets-frames" and name not in start.frame_tables:
+        _unknown_frames(here, f"{name} sets it; give its table under "
+                        f"[frames.routines.{name}] in the cell file")  # fmt: skip
+
+
+def _say(here: Here, code: str, name: str, text: str) -> None:
+    here.world.report_once(here.place.program, here.row, code, name, f"{name} {text}")
+
+
+def _unknown_frames(here: Here, why: str) -> None:
+    here.store.set(**{frame: Nothing(why) for frame in _FRAMES})
+
+
+def _frames_from_table(
+    here: Here, name: str, arguments: tuple[ast.Expression | None, ...]
+) -> None:
+    table = here.world.start.frame_tables[name]
+    values = [here.value(a) for a in arguments]
+    key = ",".join(
+        f"{v:g}" if isinstance(v, float) else str(v)
+        for v in values
+        if isinstance(v, float | str) and not isinstance(v, bool)
+    )
+    rows = {k.replace(" ", ""): v for k, v in table.items()}
+    if len(key.split(",")) != max(len(values), 1) or key not in rows:
+        _unknown_frames(
+            here,
+            f'{name}({key}) sets it and the cell file has no "{key}" under '
+            f"[frames.routines.{name}]",
+        )
+        return
+    for frame, record in rows[key].items():
+        here.store.set(**{frame: frame_value(record, f"{name}({key}) sets it")})
+
+
+def frame_value(record: Record, why: str) -> Position | Nothing:
+    """Return a frame of the cell file as a value."""
+    if record is None:
+        return Nothing(why)
+    numbers = tuple(float(n) for n in record)
+    return Position(False, numbers, derived="it stands in the cell file")

@@ -1,0 +1,136 @@
+"""What a statement or a routine may do, read off its text."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+
+from postproc.language import pdl2 as ast
+from postproc.language.structure import Body, Program
+
+PURE = frozenset(
+    "pos vec jnt pos_shift pos_inv pos_frame pos_mir pos_xtrt jntp_to_pos arm_pos "
+    "arm_jntp arm_xtnd pos_comp_idl pos_idl_comp abs sqrt sin cos tan asin acos atan2 "
+    "ln exp round trunc ord chr str_len str_loc str_sub str_coding clock date "
+    "var_uninit bit_test array_dim1 array_dim2 path_len sys_call dv_cntrl".split()
+)
+"""Built-in functions: they change no argument and move nothing."""
+
+CHANGING = frozenset(
+    "pos_to_jntp pos_set_loc pos_set_rpy pos_set_norm pos_set_ornt pos_set_appr "
+    "pos_set_cnfg pos_get_loc pos_get_rpy pos_get_norm pos_get_ornt pos_get_appr "
+    "pos_get_cnfg str_cat str_ins str_del str_ovs str_xtrt bit_set bit_clear "
+    "bit_assign node_app node_del node_ins err_trap_on err_trap_off".split()
+)
+"""Built-in routines: they may change their arguments, nothing else."""
+
+
+@dataclass(frozen=True)
+class Effects:
+    """What running a routine, and all it calls in its file, may do.
+
+    Attributes:
+        moves: It holds a move, or text that is not understood.
+        assigned: Names of variables and settings (with ``$``) it may change.
+        calls: Names it calls that its file does not hold.
+    """
+
+    moves: bool
+    assigned: frozenset[str]
+    calls: frozenset[str]
+
+
+def invocations(node: object) -> Iterator[ast.Invoke]:
+    """Yield the function calls in a statement or expression, inner ones first."""
+    if isinstance(node, tuple):
+        for part in node:
+            yield from invocations(part)
+    elif isinstance(node, ast.Statement | ast.Expression | ast.Index):
+        for name in node.__slots__:
+            yield from invocations(getattr(node, name))
+        if isinstance(node, ast.Invoke):
+            yield node
+
+
+def changed_arguments(
+    arguments: tuple[ast.Expression | None, ...],
+) -> list[ast.Reference]:
+    """Return the arguments that go by reference: variables by themselves."""
+    return [a for a in arguments if isinstance(a, ast.Reference)]
+
+
+def body_effects(program: Program, body: Body) -> Effects:
+    """Return what a body may do, with all routines of its file that it reaches."""
+    return rows_effects(program, body.first, body.last)
+
+
+def rows_effects(program: Program, first: int, last: int) -> Effects:
+    """Return what the statements of rows first to last - 1 may do."""
+    own, names = _reach(program, _shapes(program, first, last))
+    return Effects(
+        any(e.moves for e in own),
+        frozenset().union(*(e.assigned for e in own)),
+        frozenset(n for n in names if n not in program.routines),
+    )
+
+
+def _shapes(program: Program, first: int, last: int) -> tuple[int, ...]:
+    return tuple(np.unique(program.lines.shape[first:last]).tolist())
+
+
+def _reach(
+    program: Program, shapes: tuple[int, ...]
+) -> tuple[list[Effects], frozenset[str]]:
+    found = [_direct(program.statements[s]) for s in shapes]
+    waiting = [n for e in found for n in e.calls]
+    done: set[str] = set()
+    while waiting:
+        name = waiting.pop()
+        if name in done:
+            continue
+        done.add(name)
+        body = program.routines.get(name)
+        if body is not None:
+            for shape in _shapes(program, body.first, body.last):
+                effects = _direct(program.statements[shape])
+                found.append(effects)
+                waiting += effects.calls
+    return found, frozenset(done)
+
+
+@lru_cache(maxsize=8192)
+def _direct(statement: ast.Statement) -> Effects:
+    assigned: set[str] = set()
+    calls = {i.name for i in invocations(statement)}
+    moves = False
+    match statement:
+        case ast.Label(_, then) | ast.Case(_, then) | ast.Else(then) | ast.When(then):
+            if then is not None:
+                inner = _direct(then)
+                moves, assigned = inner.moves, set(inner.assigned)
+                calls |= inner.calls
+        case ast.Move() | ast.Unknown():
+            moves = True
+        case ast.Assign(target):
+            assigned.add(_assigned_name(target))
+        case ast.For(name):
+            assigned.add(name)
+        case ast.Transfer(word, operands) if word != "WRITE":
+            assigned |= {_assigned_name(o) for o in changed_arguments(operands)}
+        case ast.Call(name, arguments):
+            calls.add(name)
+            assigned |= {_assigned_name(a) for a in changed_arguments(arguments)}
+    for call in invocations(statement):
+        if call.name not in PURE:
+            changed = changed_arguments(call.arguments)
+            assigned |= {_assigned_name(a) for a in changed}
+    return Effects(moves, frozenset(assigned), frozenset(calls - PURE - CHANGING))
+
+
+def _assigned_name(reference: ast.Reference) -> str:
+    if reference.name == "$arm_data" and len(reference.steps) == 2:
+        return f"${str(reference.steps[1]).lstrip('$')}"
+    return reference.name

@@ -1,0 +1,339 @@
+"""Evaluate expressions as far as the program text tells."""
+
+from __future__ import annotations
+
+import math
+import operator
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+from postproc.language import pdl2 as ast
+from postproc.language.store import Store
+from postproc.language.values import (
+    COMPONENTS,
+    Alias,
+    Nothing,
+    Position,
+    Value,
+    Vector,
+    composed,
+    inverted,
+    shifted,
+)
+from postproc.language.world import Place, World
+
+_TRUTH = {"true": True, "on": True, "false": False, "off": False}
+_WORDS = frozenset(
+    "joint linear circular seg_via fly_norm fly_cart fly_pass nosettle coarse fine "
+    "jnt_coarse jnt_fine rs_world rs_traj eul_world rpy_world wrist_jnt".split()
+)
+_RUN_TIME = Nothing("it is known only at run time")
+_POSITION_TYPES = frozenset({"position", "xtndpos", "jointpos", "vector"})
+_FIELDS = frozenset({*COMPONENTS, "pos", "aux"})
+
+_FUNCTIONS = frozenset("abs sqrt sin cos tan round trunc".split())
+_ARITHMETIC: dict[str, Callable[[float, float], float]] = {
+    "+": operator.add,
+    "-": operator.sub,
+    "*": operator.mul,
+    "/": operator.truediv,
+    "DIV": lambda a, b: float(math.trunc(a / b)),
+    "MOD": math.fmod,
+}
+_COMPARE: dict[str, Callable[[float, float], bool]] = {
+    "=": operator.eq,
+    "<>": operator.ne,
+    "<": operator.lt,
+    "<=": operator.le,
+    ">": operator.gt,
+    ">=": operator.ge,
+}
+
+
+@dataclass(frozen=True)
+class Target:
+    """Where a reference leads: a key and the component of the value there.
+
+    Attributes:
+        keys: Keys it may mean.
+        exact: It means the one key, not some element of it.
+        component: Component of a position: x .. r, pos, ``aux`` and joint indices as
+            (``aux``, i) and (``joint``, i); () for the whole value, None if unknown.
+    """
+
+    keys: frozenset[str]
+    exact: bool
+    component: tuple[str, int] | tuple[()] | None = ()
+
+    @property
+    def key(self) -> str:
+        """Return the one key."""
+        return next(iter(self.keys))
+
+
+@dataclass
+class Point:
+    """A place in the execution: where, and what is known there."""
+
+    world: World
+    place: Place
+    row: int
+    store: Store
+    volatile: frozenset[str] = frozenset()
+
+    # ---- numbers and places ---------------------------------------------------------
+    def number(self, slot: int) -> float:
+        """Return the value of a number of this line."""
+        lines = self.place.program.lines
+        return float(lines.value[lines.first[self.row] + slot])
+
+    def global_slot(self, slot: int) -> int:
+        """Return the job-wide index of a number of this line."""
+        lines = self.place.program.lines
+        base = self.world.slot_base[lines.source.name]
+        return int(base + lines.first[self.row] + slot)
+
+    def integer(self, expression: ast.Expression) -> int | None:
+        """Return a whole number, None where it is not known."""
+        value = self.value(expression)
+        if isinstance(value, float) and value.is_integer():
+            return int(value)
+        return None
+
+    def locate(self, reference: ast.Reference) -> Target:
+        """Find what a reference means, as far as its indices are known."""
+        root = self.world.root(self.place, reference.name)
+        held = self.store.values.get(root)
+        keys, exact = frozenset({root}), True
+        if isinstance(held, Alias):
+            keys, exact = held.keys, held.exact
+        type_ = self.world.type_of(self.place, reference.name)
+        plain = type_ is not None and type_.name in _POSITION_TYPES and not type_.path
+        array = type_ is not None and type_.array
+        for at, step in enumerate(reference.steps):
+            rest = reference.steps[at:]
+            if (plain and not array) or (
+                not plain and at > 0 and isinstance(step, str) and step in _FIELDS
+            ):
+                return Target(keys, exact, self._component(rest))
+            if isinstance(step, str):
+                keys = frozenset(f"{key}.{step}" for key in keys)
+                continue
+            array = False
+            if type_ is None and not isinstance(step, str) and self._is_joints(keys):
+                return Target(keys, exact, self._component(rest))
+            index = [
+                None if isinstance(s, tuple) else self.integer(s)
+                for s in step.subscripts
+            ]
+            if None in index:
+                return Target(keys, False)
+            text = ",".join(map(str, index))
+            keys = frozenset(f"{key}[{text}]" for key in keys)
+        return Target(keys, exact and len(keys) == 1)
+
+    def _is_joints(self, keys: frozenset[str]) -> bool:
+        held = self.store.read(next(iter(keys)))
+        return isinstance(held, Position) and held.joints
+
+    def _component(self, steps: tuple[str | ast.Index, ...]) -> tuple[str, int] | None:
+        match steps:
+            case (str(name),) if name in COMPONENTS:
+                return (name, 0)
+            case ("pos",):
+                return ("pos", 0)
+            case ("pos", str(name)) if name in COMPONENTS:
+                return (name, 0)
+            case ("aux", ast.Index((index,))) if not isinstance(index, tuple):
+                axis = self.integer(index)
+                return None if axis is None else ("aux", axis)
+            case (ast.Index((index,)),) if not isinstance(index, tuple):
+                axis = self.integer(index)
+                return None if axis is None else ("joint", axis)
+        return None
+
+    # ---- reading --------------------------------------------------------------------
+    def value(self, expression: ast.Expression | None) -> Value:
+        """Return what an expression is worth."""
+        match expression:
+            case ast.Number(slot):
+                number = self.number(slot)
+                return (
+                    Nothing("the number cannot be read") if number != number else number
+                )
+            case ast.Text(text):
+                return text
+            case ast.Reference():
+                return self.read(expression)
+            case ast.Unary(sign, operand):
+                return _unary(sign, self.value(operand))
+            case ast.Binary(sign, left, right):
+                return _binary(sign, self.value(left), self.value(right))
+            case ast.Aggregate(items):
+                return self._joints(items)
+            case ast.Invoke(name, arguments):
+                return self._invoke(name, arguments)
+        return _RUN_TIME
+
+    def read(self, reference: ast.Reference) -> Value:
+        """Return what a variable holds."""
+        name = reference.name
+        if name.startswith("$"):
+            return self._system(reference)
+        if not reference.steps and self.world.type_of(self.place, name) is None:
+            if name in _TRUTH:
+                return _TRUTH[name]
+            if name in _WORDS:
+                return name
+        target = self.locate(reference)
+        if not target.exact:
+            return Nothing("its index is known only at run time")
+        if name in self.volatile:
+            return Nothing("a condition handler changes it")
+        held = self.store.read(target.key)
+        return held if target.component == () else _part(held, target.component)
+
+    def _system(self, reference: ast.Reference) -> Value:
+        name = self.setting_name(reference)
+        if name is None or f"${name}" in self.volatile:
+            return _RUN_TIME
+        return self.store.settings.get(name, _RUN_TIME)
+
+    def setting_name(self, reference: ast.Reference) -> str | None:
+        """Return the name of our arm's setting, None for another arm's or none."""
+        match reference:
+            case ast.Reference("$arm_data", (ast.Index((index,)), str(name))):
+                if (
+                    not isinstance(index, tuple)
+                    and self.integer(index) == self.world.arm
+                ):
+                    return name.lstrip("$")
+                return None
+            case ast.Reference(name, ()):
+                return name.lstrip("$")
+        return None
+
+    def _joints(self, items: tuple[ast.Expression, ...]) -> Value:
+        if len(items) < 6:
+            return Nothing("it has fewer than six joint values")
+        numbers, slots = self._components(items[:6])
+        aux = tuple((i, self.real(item)) for i, item in enumerate(items[6:], start=1))
+        return Position(True, numbers, slots, aux=aux)
+
+    def _components(
+        self, items: tuple[ast.Expression | None, ...]
+    ) -> tuple[tuple[float | None, ...], tuple[int, ...]]:
+        numbers = tuple(self.real(item) for item in items)
+        slots = tuple(
+            self.global_slot(item.slot) if isinstance(item, ast.Number) else -1
+            for item in items
+        )
+        return numbers, slots
+
+    def real(self, expression: ast.Expression | None) -> float | None:
+        """Return a real number, None where it is not known."""
+        value = self.value(expression)
+        return value if isinstance(value, float) and math.isfinite(value) else None
+
+    def _invoke(self, name: str, arguments: tuple[ast.Expression | None, ...]) -> Value:
+        if name == "pos":
+            return self._position(arguments)
+        values = [self.value(a) for a in arguments]
+        match name, values:
+            case "vec", [_, _, _]:
+                x, y, z = (self.real(a) for a in arguments)
+                return Vector((x, y, z))
+            case "pos_shift", [Position() as p, Vector() as by]:
+                return shifted(p, by)
+            case "pos_inv", [Position() as p]:
+                return inverted(p)
+            case (
+                ("abs" | "sqrt" | "sin" | "cos" | "tan" | "round" | "trunc"),
+                [float(x)],
+            ):
+                return _function(name, x)
+        return Nothing(f"it comes from {name.upper()}, known only at run time")
+
+    def _position(self, arguments: tuple[ast.Expression | None, ...]) -> Value:
+        config = None
+        if len(arguments) == 7:
+            text = self.value(arguments[6])
+            if not isinstance(text, str):
+                return Nothing("its configuration is known only at run time")
+            config = text
+        elif len(arguments) == 1 and self.real(arguments[0]) == 0.0:
+            return Position(
+                numbers=(0.0,) * 6, derived="its numbers are not written one by one"
+            )
+        elif len(arguments) != 6:
+            return Nothing("POS has not six numbers")
+        numbers, slots = self._components(arguments[:6])
+        return Position(False, numbers, slots, config)
+
+
+def _part(held: Value, component: tuple[str, int] | tuple[()] | None) -> Value:
+    if not isinstance(held, Position | Vector):
+        return held if isinstance(held, Nothing) else _RUN_TIME
+    number: float | None = None
+    match component:
+        case ("pos", _) if isinstance(held, Position):
+            return replace(held, aux=())
+        case ("aux", axis) if isinstance(held, Position) and held.aux is not None:
+            number = dict(held.aux).get(axis)
+        case ("joint", axis) if 1 <= axis <= len(held.numbers):
+            number = held.numbers[axis - 1]
+        case (str(name), _) if COMPONENTS.get(name, 9) < len(held.numbers):
+            number = held.numbers[COMPONENTS[name]]
+    return _RUN_TIME if number is None else number
+
+
+def _unary(sign: str, value: Value) -> Value:
+    if sign == "NOT" and isinstance(value, bool):
+        return not value
+    if isinstance(value, float):
+        return -value if sign == "-" else value
+    if isinstance(value, Vector) and sign == "-" and None not in value.numbers:
+        x, y, z = (-n for n in value.numbers if n is not None)
+        return Vector((x, y, z))
+    return value if isinstance(value, Nothing) else _RUN_TIME
+
+
+def _binary(sign: str, a: Value, b: Value) -> Value:
+    if sign in ("AND", "OR"):
+        decisive = sign == "OR"
+        if a is decisive or b is decisive:
+            return decisive
+        if isinstance(a, bool) and isinstance(b, bool):
+            return not decisive
+    if isinstance(a, Position) and isinstance(b, Position) and sign == ":":
+        return composed(a, b)
+    if isinstance(a, Vector) and isinstance(b, Vector) and sign in "+-":
+        return _add(a, b, sign)
+    if sign in _COMPARE and type(a) is type(b) and isinstance(a, float | str | bool):
+        return _COMPARE[sign](a, b)  # type: ignore[arg-type]
+    if isinstance(a, float) and isinstance(b, float) and sign in _ARITHMETIC:
+        try:
+            return _ARITHMETIC[sign](a, b)
+        except (ArithmeticError, ValueError):
+            return Nothing("the arithmetic has no result")
+    return next((v for v in (a, b) if isinstance(v, Nothing)), _RUN_TIME)
+
+
+def _add(a: Vector, b: Vector, sign: str) -> Value:
+    if None in a.numbers or None in b.numbers:
+        return _RUN_TIME
+    x, y, z = (
+        _ARITHMETIC[sign](m, n)  # type: ignore[arg-type]
+        for m, n in zip(a.numbers, b.numbers, strict=True)
+    )
+    return Vector((x, y, z))
+
+
+def _function(name: str, x: float) -> Value:
+    if name in ("sin", "cos", "tan"):
+        return float(getattr(math, name)(math.radians(x)))
+    if name == "sqrt":
+        return math.sqrt(x) if x >= 0 else Nothing("the root of a negative number")
+    if name == "round":
+        return float(math.floor(x + 0.5))
+    return abs(x) if name == "abs" else float(math.trunc(x))

@@ -1,0 +1,212 @@
+"""Run a program over what is known: every way it may take, with a list of work.
+
+A *configuration* is a place in the program with the calls and the rounds of constant
+FOR loops that led there. Each has one store, in which all ways that lead there are
+merged; a configuration is run again when its store has changed, until nothing changes.
+Work is done in program order, so that most configurations are run once.
+"""
+
+from __future__ import annotations
+
+import heapq
+from dataclasses import dataclass, field
+
+from postproc.language import pdl2 as ast
+from postproc.language.arrivals import Arrival, Run
+from postproc.language.evaluate import Point
+from postproc.language.store import Store
+from postproc.language.structure import Body, Program
+from postproc.language.values import Nothing
+from postproc.language.visits import ELSEWHERE
+from postproc.language.world import Place, World
+
+Context = tuple[tuple[int, int], ...]
+"""Calls (row, CALLED) and loop rounds (row, round), outermost first."""
+
+CALLED, HANDLED, HERE = -1, -3, -2
+MAX_ROWS = 400_000  # rows of unrolled loops and of calls, each time they are run
+MAX_STEPS = 2_000_000  # times a configuration is run again, all in all
+
+Key = tuple[Context, int, int]
+
+
+@dataclass
+class Here(Point):
+    """A point of the execution with the way that led to it."""
+
+    context: Context = ()
+    reason: str = ""  # why nothing here may be compensated
+
+
+@dataclass
+class Machine:
+    """The work in hand and what came out of it.
+
+    Attributes:
+        world: The files of the job.
+        arrivals: Visits and runs of visits, by place; the last analysis of a place
+            holds.
+        ids: First visit id of each.
+        places: Program and body of each context.
+        entries: The store of each configuration.
+        ranges: (first, step, rounds) of constant loops, by context and row.
+        widened: Loops that are not unrolled.
+        interrupted: A condition handler may move the arm at any time.
+        exhausted: The program is too complex to be followed to the end.
+    """
+
+    world: World
+    arrivals: dict[Key, Arrival | Run] = field(default_factory=dict)
+    ids: dict[Key, int] = field(default_factory=dict)
+    places: dict[Context, Place] = field(default_factory=dict)
+    entries: dict[tuple[Context, int], Store] = field(default_factory=dict)
+    ranges: dict[tuple[Context, int], tuple[float, float, int]] = field(
+        default_factory=dict
+    )
+    widened: set[tuple[Context, int]] = field(default_factory=set)
+    volatile: frozenset[str] = frozenset()
+    interrupted: bool = False
+    exhausted: bool = False
+    rows: int = 0
+    _heap: list[tuple[Context, tuple[Context, int]]] = field(default_factory=list)
+    _queued: set[tuple[Context, int]] = field(default_factory=set)
+    _offsets: dict[int, int] = field(default_factory=dict)
+    next_id: int = 0
+
+    def __post_init__(self) -> None:
+        offset = 0
+        for program in self.world.programs():
+            self._offsets[id(program)] = offset
+            offset += len(program.lines) + 1
+
+    # ---- places ---------------------------------------------------------------------
+    def position(self, program: Program, row: int) -> int:
+        """Return the job-wide index of a row."""
+        return self._offsets[id(program)] + row
+
+    def enter(self, context: Context, place: Place) -> None:
+        """Say where a context is."""
+        self.places[context] = place
+
+    def visit_id(self, key: Key, count: int = 1) -> int:
+        """Return the first id of the visits of a place."""
+        if key not in self.ids:
+            self.ids[key] = self.next_id
+            self.next_id += count
+        return self.ids[key]
+
+    def record(self, here: Here, sub: int, arrival: Arrival | Run) -> int:
+        """Keep a visit; return its (first) id."""
+        key = (here.context, self.position(here.place.program, here.row), sub)
+        self.arrivals[key] = arrival
+        count = arrival.last - arrival.first if isinstance(arrival, Run) else 1
+        return self.visit_id(key, count)
+
+    def predecessors(self, here: Here) -> frozenset[int]:
+        """Return where the arm may come from."""
+        last = here.store.last
+        return last | {ELSEWHERE} if self.interrupted else last
+
+    # ---- work -----------------------------------------------------------------------
+    def push(self, context: Context, row: int, store: Store) -> None:
+        """A way leads to a row with what is known there."""
+        context = self._inside(context, row)
+        config = (context, row)
+        known = self.entries.get(config)
+        if known is None:
+            self.entries[config] = store.copy()
+        elif not known.merge(store):
+            return
+        if config not in self._queued:
+            self._queued.add(config)
+            at = self.position(self.places[context].program, row)
+            heapq.heappush(self._heap, ((*context, (at, HERE)), config))
+
+    def _inside(self, context: Context, row: int) -> Context:
+        """Drop the rounds of loops that a jump to a row leaves."""
+        place = self.places[context]
+        while context and context[-1][1] >= 0:
+            start = context[-1][0] - self._offsets[id(place.program)]
+            if start < row <= place.body.blocks.end[start]:
+                break
+            context = context[:-1]
+        return context
+
+    def next(self) -> Here | None:
+        """Take the first piece of work, None when all is done."""
+        if not self._heap:
+            return None
+        _, config = heapq.heappop(self._heap)
+        self._queued.discard(config)
+        context, row = config
+        self.rows += 1
+        if self.rows > MAX_STEPS:
+            self.exhausted = True
+            return None
+        store = self.entries[config].copy()
+        return Here(
+            self.world, self.places[context], row, store, self.volatile, context
+        )
+
+    # ---- calls ----------------------------------------------------------------------
+    def calls_in(self, context: Context) -> list[Body]:
+        """Return the bodies that are running."""
+        return [
+            self.places[context[:i]].body
+            for i in range(len(context) + 1)
+            if i == 0 or context[i - 1][1] < 0
+        ]
+
+    def leave(self, here: Here, by_return: bool = False) -> None:
+        """The body ends: go back to the caller, or into the next cycle."""
+        context = here.context
+        while context and context[-1][1] >= 0:
+            context = context[:-1]
+        blocks = here.place.body.blocks
+        if not by_return and blocks.cycle >= 0 and not here.place.body.name:
+            self.push(context, blocks.cycle, here.store)
+        elif context and context[-1][1] == CALLED:
+            _forget_locals(here)
+            caller = self.places[context[:-1]]
+            row = context[-1][0] - self._offsets[id(caller.program)]
+            self.push(context[:-1], row + 1, here.store)
+
+    def call(self, here: Here, place: Place) -> None:
+        """Go into a routine; it comes back to the row after this one."""
+        at = self.position(here.place.program, here.row)
+        context = (*here.context, (at, CALLED))
+        self.enter(context, place)
+        self.rows += 1
+        self.push(context, place.body.first + 1, here.store)
+
+
+def _forget_locals(here: Here) -> None:
+    body = here.place.body
+    if body.variables or body.parameters:
+        prefix = f"{here.place.program.name}:{body.name}/"
+        values = here.store.values
+        for key in [k for k in values if k.startswith(prefix)]:
+            del values[key]
+
+
+def forget_names(here: Here, names: frozenset[str], why: str) -> None:
+    """Forget variables and settings (with ``$``) by name."""
+    for name in names:
+        if name.startswith("$"):
+            here.store.set(**{name[1:]: Nothing(why)})
+        elif name:
+            forget(here, ast.Reference(name), why)
+
+
+def forget(here: Here, reference: ast.Reference, why: str) -> None:
+    """Forget what a variable holds, unless it is a constant."""
+    declared = here.world.declared(here.place, reference.name)
+    if declared is not None and declared.constant:
+        return
+    if reference.name.startswith("$"):
+        name = here.setting_name(reference)
+        if name in here.store.settings:
+            here.store.set(**{str(name): Nothing(why)})
+        return
+    for key in here.locate(reference).keys:
+        here.store.forget(key, why)

@@ -1,0 +1,275 @@
+"""What each statement does to the store, and which way the program goes on."""
+
+from __future__ import annotations
+
+import re
+
+from postproc.language import pdl2 as ast
+from postproc.language.arrivals import Arrival
+from postproc.language.assign import assign
+from postproc.language.blocks import recovered
+from postproc.language.calls import call_statement, calls_in_expressions
+from postproc.language.effects import changed_arguments, rows_effects
+from postproc.language.machine import (
+    MAX_ROWS,
+    Here,
+    Machine,
+    forget,
+    forget_names,
+)
+from postproc.language.moves import move
+from postproc.language.values import Nothing, Value
+from postproc.language.visits import ELSEWHERE, Motion, Target
+
+_WORD = re.compile(r"\$?[A-Za-z_]\w*")
+_CANNOT_MOVE = re.compile(
+    r"(?:IF|ELSE|ENDIF|SELECT|CASE|ENDSELECT|FOR|ENDFOR|WHILE|ENDWHILE|REPEAT|UNTIL|"
+    r"WAIT|SIGNAL|DELAY|PULSE|WRITE|READ|ENCODE|DECODE|OPEN|CLOSE|ENABLE|DISABLE|"
+    r"\$?\w+(?:\[[^\]]*\]|\.\$?\w+)*\s*:=)",
+    re.I,
+)
+_MOVES = re.compile(r".*\b(?:MOVE|MOVEFLY|SYNCMOVE|SYNCMOVEFLY)\b", re.I)
+
+
+def step(machine: Machine, here: Here, statement: ast.Statement) -> bool:
+    """Run one statement; tell whether the next row follows."""
+    statement = recovered(statement)
+    if not isinstance(statement, ast.Label | ast.Else | ast.When):
+        calls_in_expressions(here, statement)
+    match statement:
+        case ast.Move():
+            move(machine, here, statement)
+        case ast.Assign():
+            line = int(here.place.program.lines.line[here.row])
+            taught = (
+                line in here.world.taught_lines[here.place.program.lines.source.name]
+            )
+            assign(here, statement, taught)
+        case ast.Call():
+            return not call_statement(machine, here, statement)
+        case ast.Label(_, then) | ast.Case(_, then) | ast.Else(then) | ast.When(then):
+            return then is None or step(machine, here, then)
+        case ast.Transfer(word, operands) if word != "WRITE":
+            for operand in changed_arguments(operands):
+                forget(here, operand, f"{word} changes it")
+        case ast.Unknown():
+            _unknown(machine, here, statement)
+        case _:
+            return _control(machine, here, statement)
+    return True
+
+
+def _control(machine: Machine, here: Here, statement: ast.Statement) -> bool:
+    blocks, row = here.place.body.blocks, here.row
+    match statement:
+        case ast.If(condition):
+            inner = blocks.inner[row]
+            otherwise = inner[0] if inner else blocks.end[row]
+            return _branch(machine, here, condition, row + 1, otherwise)
+        case ast.While(condition):
+            return _branch(machine, here, condition, row + 1, blocks.end[row] + 1)
+        case ast.Until(condition):
+            return _branch(machine, here, condition, row + 1, blocks.opener[row])
+        case ast.EndWhile():
+            machine.push(here.context, blocks.opener[row], here.store)
+        case ast.Select(value):
+            _select(machine, here, here.value(value))
+        case ast.For():
+            _for(machine, here, statement)
+        case ast.EndFor():
+            _end_for(machine, here)
+        case ast.Goto(label):
+            machine.push(here.context, blocks.labels[label], here.store)
+        case ast.ExitCycle() if blocks.cycle >= 0:
+            machine.push(here.context, blocks.cycle, here.store)
+        case ast.Return():
+            machine.leave(here, by_return=True)
+        case ast.Condition():
+            machine.push(here.context, blocks.end[row] + 1, here.store)
+        case ast.EndCondition():
+            pass
+        case _:
+            return True
+    return False
+
+
+def _branch(
+    machine: Machine,
+    here: Here,
+    condition: ast.Expression | None,
+    then: int,
+    otherwise: int,
+) -> bool:
+    """Go both ways, or the one that is known."""
+    truth = here.value(condition) if condition is not None else None
+    if truth is not True:
+        machine.push(here.context, otherwise, here.store)
+    if truth is not False:
+        machine.push(here.context, then, here.store)
+    return False
+
+
+def _select(machine: Machine, here: Here, value: Value) -> None:
+    """Go to every CASE that may be meant."""
+    blocks = here.place.body.blocks
+    for row in blocks.inner[here.row]:
+        statement = here.place.program.statement(row)
+        if isinstance(statement, ast.Case):
+            fits = _fits(here, row, statement, value)
+            if fits is not False:
+                machine.push(here.context, row, here.store)
+            if fits is True:
+                return
+        else:
+            machine.push(here.context, row, here.store)
+            return
+    machine.push(here.context, blocks.end[here.row], here.store)
+
+
+def _fits(here: Here, row: int, case: ast.Case, value: Value) -> bool | None:
+    """Tell whether a CASE means a value, None where it is not known."""
+    at = Here(here.world, here.place, row, here.store, here.volatile, here.context)
+    found: bool | None = not case.choices and None
+    for choice in case.choices:
+        low, high = choice if isinstance(choice, tuple) else (choice, choice)
+        a, b = at.value(low), at.value(high)
+        known = type(a) is type(value) and type(b) is type(value)
+        if not known or not isinstance(value, float | str):
+            found = None
+        elif a <= value <= b:  # type: ignore[operator]
+            return True
+    return found
+
+
+def _for(machine: Machine, here: Here, statement: ast.For) -> None:
+    row, end = here.row, here.place.body.blocks.end[here.row]
+    start, stop = here.value(statement.start), here.value(statement.stop)
+    by = here.value(statement.step) if statement.step is not None else 1.0
+    rounds = None
+    if isinstance(start, float) and isinstance(stop, float) and isinstance(by, float):
+        by = -by if statement.down and by > 0 else by
+        if by:
+            rounds = max(int((stop - start) / by + 1e-9) + 1, 0)
+            rounds = 0 if (stop - start) / by < 0 else rounds
+    if rounds == 0:
+        machine.push(here.context, end + 1, here.store)
+        return
+    loop = (here.context, row)
+    if rounds is not None and _unrolled(machine, here, statement, rounds, end):
+        plan = (float(start), float(by), rounds)  # type: ignore[arg-type]
+        if machine.ranges.setdefault(loop, plan) == plan:
+            _round(machine, here, here.context, row, 0)
+            return
+    machine.widened.add(loop)
+    forget(here, ast.Reference(statement.name), "it counts a loop")
+    if rounds is None:
+        machine.push(here.context, end + 1, here.store)
+    machine.push(here.context, row + 1, here.store)
+
+
+def _unrolled(
+    machine: Machine, here: Here, statement: ast.For, rounds: int, end: int
+) -> bool:
+    """Tell whether a loop is followed round by round."""
+    loop = (here.context, here.row)
+    if loop in machine.widened:
+        return False
+    if loop in machine.ranges:
+        return True
+    program = here.place.program
+    if statement.name in rows_effects(program, here.row + 1, end).assigned:
+        return False
+    machine.rows += rounds * (end - here.row)
+    if machine.rows <= MAX_ROWS:
+        return True
+    machine.rows -= rounds * (end - here.row)
+    here.world.report_once(
+        program,
+        here.row,
+        "loop-not-unrolled",
+        str(here.row),
+        f"the loop runs {rounds} times: too often to be followed round by round; "
+        "targets that depend on its counter are not compensated",
+    )
+    return False
+
+
+def _round(
+    machine: Machine,
+    here: Here,
+    context: tuple[tuple[int, int], ...],
+    row: int,
+    number: int,
+) -> None:
+    """Start a round of a constant loop."""
+    first, by, _ = machine.ranges[(context, row)]
+    program = here.place.program
+    statement = recovered(program.statement(row))
+    if isinstance(statement, ast.Label) and statement.then is not None:
+        statement = statement.then
+    inner = (*context, (machine.position(program, row), number))
+    machine.enter(inner, here.place)
+    if isinstance(statement, ast.For):
+        key = here.locate(ast.Reference(statement.name)).key
+        here.store.write(key, first + number * by)
+    machine.push(inner, row + 1, here.store)
+
+
+def _end_for(machine: Machine, here: Here) -> None:
+    row = here.place.body.blocks.opener[here.row]
+    at = machine.position(here.place.program, row)
+    statement = recovered(here.place.program.statement(row))
+    if isinstance(statement, ast.Label) and statement.then is not None:
+        statement = statement.then
+    name = statement.name if isinstance(statement, ast.For) else ""
+    last = here.context[-1] if here.context else None
+    if last is not None and last[0] == at and last[1] >= 0:
+        outer = here.context[:-1]
+        if last[1] + 1 < machine.ranges[(outer, row)][2]:
+            _round(machine, here, outer, row, last[1] + 1)
+            return
+    else:
+        forget(here, ast.Reference(name), "it counts a loop")
+        machine.push(here.context, row + 1, here.store)
+    forget(here, ast.Reference(name), "it counted a loop that has ended")
+    machine.push(here.context, here.row + 1, here.store)
+
+
+def _unknown(machine: Machine, here: Here, statement: ast.Unknown) -> None:
+    """Forget all that unknown text could influence."""
+    line = int(here.place.program.lines.line[here.row])
+    why = f"line {line}, which is not understood, may change it"
+    names = frozenset(word.lower() for word in _WORD.findall(statement.text))
+    forget_names(here, names, why)
+    if _MOVES.match(statement.text):
+        arrival = Arrival(
+            here.place,
+            here.row,
+            machine.predecessors(here),
+            here.store.settings,
+            Motion.JOINT,
+            Target.UNKNOWN,
+            reason="the move statement is not understood",
+        )
+        here.store.last = frozenset({machine.record(here, 1, arrival), ELSEWHERE})
+    elif not _CANNOT_MOVE.match(statement.text):
+        here.store.last |= {ELSEWHERE}
+
+
+def run_broken(machine: Machine, here: Here) -> None:
+    """List the moves of a body whose blocks do not close; follow none of them."""
+    body = here.place.body
+    program = here.place.program
+    why = f"the block structure is broken (line {body.blocks.broken})"
+    here.reason = why
+    for row in range(body.first + 1, body.last):
+        statement = program.statement(row)
+        if isinstance(statement, ast.Move):
+            here.row = row
+            here.store.last = frozenset({ELSEWHERE})
+            move(machine, here, statement)
+    effects = rows_effects(program, body.first, body.last)
+    forget_names(here, effects.assigned, why)
+    here.store.set(tool=Nothing(why), base=Nothing(why), uframe=Nothing(why))
+    here.store.last = frozenset({ELSEWHERE})
+    machine.leave(here)

@@ -1,0 +1,103 @@
+"""The abstract store: what variables hold, and where the arm came from."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+
+from postproc.language.values import Alias, Nothing, Value, join
+
+Settings = Mapping[str, Value]
+
+_NEVER_SET = Nothing("it has no value in the program or its variable file")
+
+
+@dataclass
+class Store:
+    """What is known at one point of a program.
+
+    Keys are ``program/name`` or ``program:routine/name``, followed by constant indices
+    and record fields: ``job/tab[3].place``. Only what the program has assigned is kept;
+    the rest is what it was when the program started.
+
+    Attributes:
+        values: Assigned values. A Nothing at ``job/tab`` hides its elements.
+        settings: Frames and motion variables; replaced, never changed.
+        last: Visits the arm may come from.
+    """
+
+    initial: Callable[[str], Value | None]
+    values: dict[str, Value] = field(default_factory=dict)
+    settings: Settings = field(default_factory=dict)
+    last: frozenset[int] = frozenset()
+
+    def copy(self) -> Store:
+        """Return a store that can change on its own."""
+        return Store(self.initial, dict(self.values), self.settings, self.last)
+
+    def read(self, key: str) -> Value:
+        """Return what a key holds."""
+        found = self.values.get(key)
+        if found is not None:
+            return found
+        hidden = self._hidden(key)
+        if hidden is not None:
+            return hidden
+        initial = self.initial(key)
+        return _NEVER_SET if initial is None else initial
+
+    def _hidden(self, key: str) -> Value | None:
+        """Return the unknown array or record that an element belongs to."""
+        at = len(key)
+        while (at := max(key.rfind("[", 0, at), key.rfind(".", 0, at))) > 0:
+            found = self.values.get(key[:at])
+            if isinstance(found, Nothing):
+                return found
+        return None
+
+    def write(self, key: str, value: Value) -> None:
+        """Let a key hold a value."""
+        self.values[key] = value
+
+    def forget(self, key: str, why: str) -> None:
+        """What a variable and all its elements hold is no longer known."""
+        inside = (f"{key}[", f"{key}.")
+        for other in [k for k in self.values if k.startswith(inside)]:
+            del self.values[other]
+        self.values[key] = Nothing(why)
+
+    def forget_alias(self, alias: Alias, why: str) -> None:
+        """Forget whatever a parameter may stand for."""
+        for key in alias.keys:
+            self.forget(key, why)
+
+    def set(self, **settings: Value) -> None:
+        """Change frames or motion variables (names without ``$``)."""
+        self.settings = {**self.settings, **settings}
+
+    def merge(self, other: Store) -> bool:
+        """Take in what may hold too; tell whether anything changed."""
+        changed = False
+        if not other.last <= self.last:
+            self.last |= other.last
+            changed = True
+        if other.settings is not self.settings and other.settings != self.settings:
+            merged = _merge_settings(self.settings, other.settings)
+            changed |= merged != self.settings
+            self.settings = merged
+        for key in self.values.keys() | other.values.keys():
+            mine = self.values.get(key)
+            theirs = other.values.get(key)
+            if mine is theirs and mine is not None:
+                continue
+            before = self.read(key) if mine is None else mine
+            after = join(before, other.read(key) if theirs is None else theirs)
+            if mine is None or after is not mine:
+                changed |= after != before
+                self.values[key] = after
+        return changed
+
+
+def _merge_settings(a: Settings, b: Settings) -> Settings:
+    unset = Nothing("it is set on one way only")
+    return {name: join(a.get(name, unset), b.get(name, unset)) for name in {**a, **b}}

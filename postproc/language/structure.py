@@ -1,0 +1,257 @@
+"""Programs from lines: declarations, routines, blocks, and where each jump leads."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from postproc.language import pdl2 as ast
+from postproc.language.blocks import Blocks, build_blocks
+from postproc.language.diagnostic import Diagnostic
+from postproc.language.lines import Lines, read_lines
+from postproc.language.parser import parse_line
+from postproc.language.source import Source
+
+_PLAIN = (ast.Move, ast.Assign, ast.Call, ast.Transfer, ast.Still)
+
+
+@dataclass(frozen=True)
+class Variable:
+    """A declared variable or constant.
+
+    Attributes:
+        name: As it is written.
+        row: Logical line of its declaration.
+        type: Its type, None for a constant.
+        initial: Its initial value or None.
+        exported: The program it is exported from, or "".
+        constant: Declared in a CONST section.
+        taught: Marked ``-- TAUGHT``.
+    """
+
+    name: str
+    row: int
+    type: ast.Type | None = None
+    initial: ast.Expression | None = None
+    exported: str = ""
+    constant: bool = False
+    taught: bool = False
+
+
+@dataclass(frozen=True)
+class Body:
+    """A routine or the main part of a program.
+
+    Attributes:
+        name: Routine name in lower case, "" for the main part.
+        first, last: Rows of its BEGIN and of its END.
+        parameters: Formal parameters.
+        variables: Its own variables, by lower-case name; the main part has none.
+        blocks: Where its jumps lead.
+    """
+
+    name: str
+    first: int
+    last: int
+    parameters: tuple[ast.Parameter, ...]
+    variables: Mapping[str, Variable]
+    blocks: Blocks
+
+
+@dataclass(frozen=True)
+class Program:
+    """A parsed program file.
+
+    Attributes:
+        name: Program name in lower case.
+        lines: Its logical lines.
+        statements: What each shape says; parallel to `lines.shapes`.
+        main: Its main part, None where it has none.
+        routines: Routines with a body, by lower-case name.
+        outside: Routines exported from other programs: name to program.
+        variables: Declared variables, by lower-case name.
+        imports: Files named by IMPORT.
+        arm: ``PROG_ARM``, 0 where it is not said.
+        diagnostics: What was found while reading.
+    """
+
+    name: str
+    lines: Lines
+    statements: tuple[ast.Statement, ...]
+    main: Body | None
+    routines: Mapping[str, Body]
+    outside: Mapping[str, str]
+    variables: Mapping[str, Variable]
+    imports: tuple[str, ...]
+    arm: int
+    diagnostics: tuple[Diagnostic, ...]
+
+    def statement(self, row: int) -> ast.Statement:
+        """Return what a logical line says."""
+        return self.statements[int(self.lines.shape[row])]
+
+
+@dataclass
+class _Scope:
+    """What is being read: a program's or a routine's declarations."""
+
+    routine: ast.Routine | None = None
+    begin: int = -1
+    variables: dict[str, Variable] = field(default_factory=dict)
+
+
+@dataclass
+class _Reader:
+    """Collects the parts of a program, one structural line after the other."""
+
+    lines: Lines
+    statements: tuple[ast.Statement, ...]
+    taught: frozenset[int]
+    name: str = ""
+    arm: int = 0
+    main: Body | None = None
+    routines: dict[str, Body] = field(default_factory=dict)
+    outside: dict[str, str] = field(default_factory=dict)
+    imports: list[str] = field(default_factory=list)
+    diagnostics: list[Diagnostic] = field(default_factory=list)
+    scopes: list[_Scope] = field(default_factory=lambda: [_Scope()])
+    structure: bool = False  # between RECORD and ENDRECORD
+
+    def report(self, row: int, code: str, message: str) -> None:
+        name = self.lines.source.name
+        line = int(self.lines.line[row])
+        self.diagnostics.append(Diagnostic(name, line, code, message))
+
+    def take(self, row: int, statement: ast.Statement) -> None:
+        scope = self.scopes[-1]
+        match statement:
+            case ast.Section(then) if then is not None:
+                self.take(row, then)
+            case ast.Program(name, slot):
+                self.name = name
+                if slot >= 0:
+                    self.arm = int(self.lines.value[self.lines.first[row] + slot])
+            case ast.Import(file):
+                self.imports.append(file)
+            case ast.Structure() | ast.EndStructure():
+                self.structure = isinstance(statement, ast.Structure)
+            case ast.Declare() | ast.Constant() if scope.begin < 0:
+                self._declare(row, statement)
+            case ast.Routine(name, _, exported):
+                if exported and exported != self.name:
+                    self.outside[name] = exported
+                else:
+                    self.scopes.append(_Scope(statement))
+            case ast.Begin():
+                if scope.begin < 0:
+                    scope.begin = row
+            case ast.End() if scope.begin >= 0:
+                self.close(row)
+            case _:
+                pass
+
+    def _declare(self, row: int, statement: ast.Declare | ast.Constant) -> None:
+        if self.structure:
+            return
+        variables = self.scopes[-1].variables
+        taught = int(self.lines.line[row]) in self.taught
+        if isinstance(statement, ast.Constant):
+            variables[statement.name] = Variable(
+                statement.name, row, initial=statement.value, constant=True
+            )
+            return
+        for name in statement.names:
+            variables[name.lower()] = Variable(
+                name,
+                row,
+                statement.type,
+                statement.initial,
+                statement.exported,
+                "const" in statement.attributes,
+                taught,
+            )
+
+    def close(self, last: int) -> None:
+        """End the innermost routine, or the program."""
+        scope = self.scopes[-1]
+        routine = scope.routine
+        blocks, problems = build_blocks(
+            self.lines, self.statements, scope.begin + 1, last
+        )
+        for row, message in problems:
+            self.report(row, "block-structure", message)
+        name = routine.name if routine else ""
+        parameters = routine.parameters if routine else ()
+        own = scope.variables if routine else {}
+        body = Body(name, scope.begin, last, parameters, own, blocks)
+        if routine:
+            self.routines[name] = body
+            self.scopes.pop()
+        else:
+            self.main = body
+            self.scopes[-1] = _Scope(variables=scope.variables)
+
+
+def parse(source: Source) -> Program:
+    """Parse a PDL2 program: every distinct shape of line once.
+
+    Lines that the grammar does not know are kept and listed.
+
+    Raises:
+        ProgramError: A string does not end on its line.
+    """
+    lines = read_lines(source)
+    parsed: dict[int, ast.Statement] = {
+        shape: parse_line(lines.shapes[shape])
+        for shape in np.unique(lines.shape).tolist()
+    }
+    statements = tuple(parsed.get(i, ast.Statement()) for i in range(len(lines.shapes)))
+    taught = frozenset(line for line, _ in lines.marks("TAUGHT"))
+    reader = _Reader(lines, statements, taught)
+    structural = np.array([not isinstance(s, _PLAIN) for s in statements], dtype=bool)
+    for row in np.flatnonzero(structural[lines.shape]).tolist():
+        statement = statements[lines.shape[row]]
+        if isinstance(statement, ast.Unknown):
+            _report_unknown(reader, row)
+        reader.take(row, statement)
+    _close_open(reader)
+    return Program(
+        reader.name,
+        lines,
+        statements,
+        reader.main,
+        reader.routines,
+        reader.outside,
+        reader.scopes[0].variables,
+        tuple(reader.imports),
+        reader.arm,
+        tuple(reader.diagnostics),
+    )
+
+
+def _report_unknown(reader: _Reader, row: int) -> None:
+    line = int(reader.lines.line[row])
+    text = reader.lines.source.line_text(line).strip()
+    reader.report(
+        row,
+        "unknown-statement",
+        f"this statement is not understood and is kept as it is: {text[:60]!r}; "
+        "moves that it may influence are not compensated",
+    )
+
+
+def _close_open(reader: _Reader) -> None:
+    """Report what is missing at the end of the file and close what is open."""
+    while reader.scopes[-1].begin >= 0 or len(reader.scopes) > 1:
+        scope = reader.scopes[-1]
+        last = len(reader.lines) - 1
+        name = scope.routine.name if scope.routine else reader.name
+        reader.report(last, "end-missing", f"END {name} is missing at the end")
+        if scope.begin < 0:
+            reader.scopes.pop()
+        else:
+            reader.close(last + 1)
+    if reader.main is None and not reader.routines and len(reader.lines):
+        reader.report(0, "no-program", "the file holds no BEGIN .. END")

@@ -1,0 +1,180 @@
+"""What the analysis knows of a value: a number, a text, a position, or why nothing."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from postproc.pose import inverse, pose_from_record, record_from_pose
+
+Numbers = tuple[float | None, ...]
+
+COMPONENTS = {"x": 0, "y": 1, "z": 2, "a": 3, "e": 4, "r": 5}
+
+
+@dataclass(frozen=True, slots=True)
+class Nothing:
+    """A value that the program text does not tell, and why."""
+
+    why: str
+
+    def __eq__(self, other: object) -> bool:
+        """Unknown is unknown, whatever the reason."""
+        return isinstance(other, Nothing)
+
+    def __hash__(self) -> int:
+        """Hash like every other unknown."""
+        return hash(Nothing)
+
+
+@dataclass(frozen=True, slots=True)
+class Alias:
+    """A parameter stands for the caller's variables.
+
+    Attributes:
+        keys: Where they are stored; one key where it is known which.
+        exact: False where only the array or record is known.
+    """
+
+    keys: frozenset[str]
+    exact: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Vector:
+    """A VECTOR, [mm] where it is a place."""
+
+    numbers: tuple[float | None, float | None, float | None]
+
+
+@dataclass(frozen=True, slots=True)
+class Position:
+    """A POSITION, XTNDPOS or JOINTPOS.
+
+    Attributes:
+        joints: The numbers are joint angles [deg], not x, y, z [mm], a, e, r [deg].
+        numbers: Six numbers, None where unknown.
+        slots: Global index of the number that holds each component, -1 for none.
+        config: Configuration string, None where none was written.
+        aux: (axis, value) of auxiliary axes; None where they are not known.
+        name: Variable or array element, "" for an inline literal.
+        taught: Marked as taught with the robot.
+        shared: Another program may read it too.
+        derived: Why the numbers cannot be edited, "" where they can.
+    """
+
+    joints: bool = False
+    numbers: Numbers = (None,) * 6
+    slots: tuple[int, ...] = (-1,) * 6
+    config: str | None = None
+    aux: tuple[tuple[int, float | None], ...] | None = ()
+    name: str = ""
+    taught: bool = False
+    shared: bool = False
+    derived: str = ""
+
+    @property
+    def complete(self) -> bool:
+        """Tell whether all six numbers are known."""
+        return None not in self.numbers
+
+    @property
+    def editable(self) -> bool:
+        """Tell whether every number stands in a text by itself."""
+        return not self.derived and -1 not in self.slots
+
+    def with_component(self, at: int, value: float | None, slot: int) -> Position:
+        """Return a copy with one component replaced."""
+        numbers, slots = list(self.numbers), list(self.slots)
+        numbers[at], slots[at] = value, slot
+        return replace(self, numbers=tuple(numbers), slots=tuple(slots))
+
+    def with_aux(self, axis: int, value: float | None) -> Position:
+        """Return a copy with one auxiliary axis set."""
+        if self.aux is None:
+            return self
+        rest = tuple(entry for entry in self.aux if entry[0] != axis)
+        return replace(self, aux=tuple(sorted((*rest, (axis, value)))))
+
+
+Value = float | bool | str | Position | Vector | Alias | Nothing
+
+
+def join(a: Value, b: Value) -> Value:
+    """Return what holds when one of two values holds."""
+    if a is b or (type(a) is type(b) and a == b):
+        return a
+    if isinstance(a, Nothing):
+        return a
+    if isinstance(b, Nothing):
+        return b
+    if isinstance(a, Alias) and isinstance(b, Alias):
+        return Alias(a.keys | b.keys, False)
+    if isinstance(a, Position) and isinstance(b, Position):
+        return _join_positions(a, b)
+    return Nothing("it may hold different values here")
+
+
+def _join_positions(a: Position, b: Position) -> Value:
+    same = (a.joints, a.numbers, a.slots, a.config) == (
+        b.joints,
+        b.numbers,
+        b.slots,
+        b.config,
+    )
+    if not same:
+        return Nothing("it may hold different values here")
+    return replace(
+        a,
+        aux=a.aux if a.aux == b.aux else None,
+        name=a.name if a.name == b.name else min(a.name, b.name),
+        taught=a.taught or b.taught,
+        shared=a.shared or b.shared,
+        derived=a.derived or b.derived,
+    )
+
+
+def composed(a: Position, b: Position) -> Value:
+    """Return the composition a : b of two frames."""
+    if a.joints or b.joints or not (a.complete and b.complete):
+        return Nothing("a frame in `:` is not known")
+    pose = pose_from_record(_array(a)) @ pose_from_record(_array(b))
+    return _derived(pose, b.config, "it is composed of two frames (`:`)", b.aux)
+
+
+def inverted(a: Position) -> Value:
+    """Return the inverse frame (POS_INV)."""
+    if a.joints or not a.complete:
+        return Nothing("the argument of POS_INV is not known")
+    return _derived(inverse(pose_from_record(_array(a))), a.config, "it is POS_INV", ())
+
+
+def shifted(a: Position, by: Vector) -> Value:
+    """Return a position moved along its reference frame's axes (POS_SHIFT)."""
+    if a.joints or not a.complete or None in by.numbers:
+        return Nothing("an argument of POS_SHIFT is not known")
+    moved = tuple(
+        n + d  # type: ignore[operator]
+        for n, d in zip(a.numbers[:3], by.numbers, strict=True)
+    )
+    return replace(
+        a,
+        numbers=moved + a.numbers[3:],
+        slots=(-1,) * 3 + a.slots[3:],
+        derived="it is shifted by the program (POS_SHIFT)",
+    )
+
+
+def _array(position: Position) -> np.ndarray:
+    return np.array(position.numbers, dtype=float)
+
+
+def _derived(
+    pose: np.ndarray,
+    config: str | None,
+    why: str,
+    aux: tuple[tuple[int, float | None], ...] | None,
+) -> Position:
+    numbers = tuple(record_from_pose(pose).tolist())
+    return Position(False, numbers, config=config, aux=aux, derived=why)

@@ -1,0 +1,167 @@
+"""All files of one job: names, initial values, and the place of every number."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from postproc.language import pdl2 as ast
+from postproc.language.diagnostic import Diagnostic
+from postproc.language.lsv import Variables
+from postproc.language.structure import Body, Program, Variable
+from postproc.language.values import Value
+
+Record = tuple[float, ...] | None
+
+
+@dataclass(frozen=True)
+class Start:
+    """What the cell says about the moment at which the program starts.
+
+    Attributes:
+        tool, base, uframe: Position records (6,) [mm, deg], None where unknown.
+        routines: Outside routine to ``still``, ``moves`` or ``sets-frames``.
+        frame_tables: Outside routine to arguments (``"1,2"``) to the records of the
+            frames (``tool``, ``base``, ``uframe``) that it sets.
+        aux: Auxiliary axis to ``gun``, ``track`` or ``positioner``.
+        taught: Names of points that were taught with the robot.
+        arm: Number of our arm, 0 to take the program's ``PROG_ARM`` (else 1).
+    """
+
+    tool: Record = (0.0,) * 6
+    base: Record = (0.0,) * 6
+    uframe: Record = (0.0,) * 6
+    routines: Mapping[str, str] = field(default_factory=dict)
+    frame_tables: Mapping[str, Mapping[str, Mapping[str, Record]]] = field(
+        default_factory=dict
+    )
+    aux: Mapping[int, str] = field(default_factory=dict)
+    taught: frozenset[str] = frozenset()
+    arm: int = 0
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where a statement stands: its program and its body."""
+
+    program: Program
+    body: Body
+
+
+@dataclass
+class World:
+    """The programs of a job and what was found about them.
+
+    Attributes:
+        main: The program that is compensated.
+        others: Other programs, by lower-case program and file name.
+        start: What the cell says.
+        slot_base: First global number index of each file, by file name.
+        initial: What variables hold before the program assigns them, by key.
+        spelling: How variables are written, by key.
+        taught_lines: Lines marked ``-- TAUGHT``, by file name.
+        diagnostics: What was found; a message is kept once.
+    """
+
+    main: Program
+    others: Mapping[str, Program]
+    start: Start
+    variables: Variables | None
+    slot_base: dict[str, int] = field(default_factory=dict)
+    files: list[str] = field(default_factory=list)
+    initial: dict[str, Value] = field(default_factory=dict)
+    spelling: dict[str, str] = field(default_factory=dict)
+    diagnostics: dict[Diagnostic, None] = field(default_factory=dict)
+    taught_lines: dict[str, frozenset[int]] = field(default_factory=dict)
+    _said: set[tuple[str, str]] = field(default_factory=set)
+
+    def __post_init__(self) -> None:
+        base = 0
+        for program in self.programs():
+            self.slot_base[program.lines.source.name] = base
+            self.files.append(program.lines.source.name)
+            base += len(program.lines.start)
+            self.taught_lines[program.lines.source.name] = frozenset(
+                line for line, _ in program.lines.marks("TAUGHT")
+            )
+            self.diagnostics |= dict.fromkeys(program.diagnostics)
+        if self.variables is not None:
+            self.slot_base[self.variables.source.name] = base
+            self.files.append(self.variables.source.name)
+
+    @property
+    def arm(self) -> int:
+        """Return the number of our arm."""
+        return self.start.arm or self.main.arm or 1
+
+    def programs(self) -> list[Program]:
+        """Return the programs, the main one first, each once."""
+        found = {id(self.main): self.main}
+        for program in self.others.values():
+            found.setdefault(id(program), program)
+        return list(found.values())
+
+    def report(self, program: Program, row: int, code: str, message: str) -> None:
+        """Collect a finding at a logical line."""
+        lines = program.lines
+        line = int(lines.line[row]) if 0 <= row < len(lines) else 1
+        self.diagnostics[Diagnostic(lines.source.name, line, code, message)] = None
+
+    def report_once(
+        self, program: Program, row: int, code: str, what: str, message: str
+    ) -> None:
+        """Collect a finding about something the first time only."""
+        if (code, what) not in self._said:
+            self._said.add((code, what))
+            self.report(program, row, code, message)
+
+    def declared(self, place: Place, name: str) -> Variable | None:
+        """Return the declaration that a name means."""
+        return place.body.variables.get(name) or place.program.variables.get(name)
+
+    def root(self, place: Place, name: str) -> str:
+        """Return the key of a variable: its routine's own, or its program's."""
+        program, body = place.program, place.body
+        if name in body.variables or any(p.name == name for p in body.parameters):
+            return f"{program.name}:{body.name}/{name}"
+        declared = program.variables.get(name)
+        if declared is not None and declared.exported:
+            return f"{declared.exported}/{name}"
+        return f"{program.name}/{name}"
+
+    def written(self, key: str) -> str:
+        """Return how a variable or element is written."""
+        if key in self.spelling:
+            return self.spelling[key]
+        at = min((i for i in map(key.find, "[.") if i > 0), default=len(key))
+        root = self.spelling.get(key[:at], key[:at].split("/", 1)[-1])
+        return root + key[at:]
+
+    def type_of(self, place: Place, name: str) -> ast.Type | None:
+        """Return the declared type of a name."""
+        for parameter in place.body.parameters:
+            if parameter.name == name:
+                return parameter.type
+        declared = self.declared(place, name)
+        return declared.type if declared else None
+
+    def find_routine(self, program: Program, name: str) -> Place | None:
+        """Return the routine with a body that a name means, if the job holds it."""
+        if name in program.routines:
+            return Place(program, program.routines[name])
+        exporter = program.outside.get(name)
+        files = [exporter] if exporter else map(base_name, program.imports)
+        for file in files:
+            other = self.others.get(file)
+            if other is not None and name in other.routines:
+                return Place(other, other.routines[name])
+        return None
+
+
+def base_name(file: str) -> str:
+    r"""Return a file's name without folders and suffix, in lower case.
+
+    >>> base_name(r"UD:\\USR\\Page2.cod")
+    'page2'
+    """
+    return file.replace("\\", "/").rsplit("/", 1)[-1].rsplit(".", 1)[0].lower()
