@@ -1,0 +1,1 @@
+"""Tracing a residual to the effect that a model lacks."""

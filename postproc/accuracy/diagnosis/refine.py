@@ -1,0 +1,132 @@
+"""Finer settings around a candidate that a grid found."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from postproc.accuracy.base_shift import BaseShift
+from postproc.accuracy.batch import Batch
+from postproc.accuracy.counterbalance import Counterbalance
+from postproc.accuracy.diagnosis.named import LAST_FREE, STEPS
+from postproc.accuracy.diagnosis.projection import Projection, reduce_blocks
+from postproc.accuracy.diagnosis.score import Score, rank
+from postproc.accuracy.effect import Array, Effect
+from postproc.accuracy.joint_map import JointMap
+from postproc.accuracy.load_backlash import LoadBacklash
+from postproc.accuracy.thermal import Thermal
+from postproc.accuracy.tool_shift import ToolShift
+from postproc.accuracy.transmission import Transmission
+from postproc.accuracy.windup import Windup
+
+OFFSETS = np.linspace(-1.0, 1.0, 9)
+LEVELS = (1.0, 0.25)  # widths of the search, in steps of the grid
+
+
+def finer(effect: Effect, width: float, batch: Batch) -> list[Effect]:
+    """Vary the settings of an effect.
+
+    Args:
+        effect: The effect.
+        width: How far, in steps of the grid that it comes from.
+        batch: The states, for ranges.
+    """
+    for kind, vary in VARIATIONS.items():
+        if isinstance(effect, kind):
+            return [effect, *vary(effect, width * OFFSETS, batch)]
+    return [effect]
+
+
+def refine(projection: Projection, score: Score) -> Score:
+    """Improve the settings of a score's best candidate by its evidence."""
+    square = float(projection.rest @ projection.rest)
+    for width in LEVELS:
+        effects = finer(score.best.effect, width, projection.at)
+        if len(effects) == 1:
+            return score
+        tries = [replace(score.best, effect=e) for e in effects]
+        reduced = reduce_blocks(projection, tries, projection.rest[:, None])
+        found = rank(reduced, square, projection.rows)[0]
+        if found.best_evidence > score.best_evidence:
+            gained = found.best_evidence - score.best_evidence
+            score = replace(
+                found, evidence=max(score.evidence, score.evidence + 0.5 * gained)
+            )
+    return score
+
+
+def _waves(effect: Effect, offsets: Array, batch: Batch) -> list[Effect]:
+    assert isinstance(effect, Transmission)
+    ((joint, order),) = effect.waves
+    if order <= 2:
+        return []  # the orders of eccentricity are what they are
+    step = np.pi / max(float(np.ptp(batch.states.q[:, joint - 1])), 0.1)
+    tries = np.unique(np.clip(order + step * offsets, 2.5, LAST_FREE))
+    whole = np.round(order)
+    tries = np.append(tries, [whole] if abs(whole - order) < step else [])
+    return [Transmission(((joint, float(k)),)) for k in tries]
+
+
+def _rows(effect: Effect, offsets: Array, batch: Batch) -> list[Effect]:
+    assert isinstance(effect, BaseShift | ToolShift)
+    order = np.sort(batch.states.order)
+    half = max(len(order) / STEPS, 1.0)
+    near = np.searchsorted(order, effect.row) + np.round(half * offsets).astype(int)
+    rows = order[np.unique(np.clip(near, 1, len(order) - 1))]
+    return [replace(effect, row=float(r)) for r in rows]
+
+
+def _way(effect: Effect, offsets: Array, batch: Batch) -> list[Effect]:
+    assert isinstance(effect, Windup)
+    return [replace(effect, d0=float(effect.d0 * 2.0**x)) for x in offsets]
+
+
+def _threshold(effect: Effect, offsets: Array, batch: Batch) -> list[Effect]:
+    assert isinstance(effect, LoadBacklash)
+    if effect.form == "load":
+        return []
+    return [replace(effect, t0=float(effect.t0 * 3.0**x)) for x in offsets]
+
+
+def _time_constant(effect: Effect, offsets: Array, batch: Batch) -> list[Effect]:
+    assert isinstance(effect, Thermal)
+    if effect.form == "temperature":
+        return []
+    each = [float(effect.time_constant * 2.0**x) for x in offsets]
+    return [replace(effect, time_constant=c) for c in each]
+
+
+def _spring(effect: Effect, offsets: Array, batch: Batch) -> list[Effect]:
+    assert isinstance(effect, Counterbalance)
+    turned = [replace(effect, upright=float(effect.upright + 0.1 * x)) for x in offsets]
+    ratio = [replace(effect, ratio=float(effect.ratio * 1.5**x)) for x in offsets]
+    ratio = [e for e in ratio if 0.1 < e.ratio < 0.9]
+    loaded = [replace(effect, preload=float(effect.preload * 3.0**x)) for x in offsets]
+    return [*turned, *ratio, *loaded]
+
+
+def _bump(effect: Effect, offsets: Array, batch: Batch) -> list[Effect]:
+    assert isinstance(effect, JointMap)
+    if len(effect.bumps) > 1:
+        return []
+    ((joint, centre),) = effect.bumps
+    widths = [float(effect.width * 2.0**x) for x in (-0.5, -0.25, 0.0, 0.25, 0.5)]
+    return [
+        JointMap(((joint, float(centre + effect.width * x)),), w)
+        for x in offsets
+        for w in widths
+    ]
+
+
+VARIATIONS: dict[type[Effect], Callable[[Effect, Array, Batch], list[Effect]]] = {
+    Transmission: _waves,
+    BaseShift: _rows,
+    ToolShift: _rows,
+    Windup: _way,
+    LoadBacklash: _threshold,
+    Thermal: _time_constant,
+    Counterbalance: _spring,
+    JointMap: _bump,
+}

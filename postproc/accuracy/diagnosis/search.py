@@ -1,0 +1,196 @@
+"""The search: add the effect that is called for most, refit everything, look again."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+from postproc.accuracy.diagnosis.bootstrap import Null, bootstrap
+from postproc.accuracy.diagnosis.candidate import FREE, NAMED, Candidate
+from postproc.accuracy.diagnosis.curves import free_candidates
+from postproc.accuracy.diagnosis.folds import Gain, held_out_gain
+from postproc.accuracy.diagnosis.named import named_candidates
+from postproc.accuracy.diagnosis.projection import Projection, reduce_blocks
+from postproc.accuracy.diagnosis.refine import refine
+from postproc.accuracy.diagnosis.score import Score, rank
+from postproc.accuracy.effect import Effect
+from postproc.accuracy.fit import Fit, fit_effects
+
+MOST = 6  # additions
+LEVEL = 0.01  # probability of a false addition, whole library
+ALONE = 0.01  # level of the score test of the candidate itself
+CLEARLY = (8.0, 0.1)  # nats, and share of the name's evidence, that a free form
+#                       must be ahead by
+BETTER = 1.0  # nats that replace one family by another
+LOOKED_AT = 4  # families whose settings are refined before the best is taken
+
+Progress = Callable[[str], None]
+
+
+@dataclass(frozen=True)
+class Addition:
+    """An effect that was added.
+
+    Attributes:
+        score: Evidence when it was chosen, settings refined.
+        p_value: Probability that noise alone reaches the evidence anywhere.
+        gain: What it brings on held-out rows.
+    """
+
+    score: Score
+    p_value: float
+    gain: Gain
+
+    @property
+    def candidate(self) -> Candidate:
+        """The candidate."""
+        return self.score.best
+
+
+@dataclass(frozen=True, eq=False)
+class Search:
+    """What a search found.
+
+    Attributes:
+        base: Fit of the model that was given.
+        fit: Fit with all additions.
+        additions: In the order of addition; they are the last effects of `fit`.
+        null: Distribution of the largest evidence when there is nothing.
+        refused: The candidate that the search stopped at, if there was one.
+    """
+
+    base: Fit
+    fit: Fit
+    additions: tuple[Addition, ...]
+    null: Null
+    refused: Addition | None
+
+    def place(self, number: int) -> int:
+        """Return the place of an addition among the effects of the fit."""
+        count = len(self.fit.combination.effects)
+        return count - len(self.additions) + number
+
+
+def search(
+    base: Fit, seed: int, progress: Progress, null: Null | None = None
+) -> Search:
+    """Search for effects that a fit lacks.
+
+    Args:
+        base: The fit.
+        seed: Of the bootstrap.
+        progress: Told what is being done.
+        null: Distribution under the model, where it is known from a like search.
+    """
+    projection = Projection.of(base)
+    if null is None:
+        progress("threshold of the whole library")
+        null = bootstrap(projection, library(projection), seed)
+    found = Search(base, base, (), null, None)
+    while len(found.additions) < MOST:
+        progress(f"looking for effect {len(found.additions) + 1}")
+        grown = _grow(found)
+        if grown.refused is not None or grown.fit is found.fit:
+            return grown
+        found = _settle(grown)
+    return found
+
+
+def library(projection: Projection) -> list[Candidate]:
+    """List the candidates that the model does not hold yet."""
+    known = set(projection.names)
+    every = [*named_candidates(projection.at), *free_candidates(projection.at)]
+    return [
+        c
+        for c in every
+        if not any(f"{c.effect.name}.{p.name}" in known for p in c.effect.parameters())
+    ]
+
+
+def ranking(projection: Projection) -> list[Score]:
+    """Score the library, the settings of the leading families refined."""
+    square = float(projection.rest @ projection.rest)
+    reduced = reduce_blocks(projection, library(projection), projection.rest[:, None])
+    scores = rank(reduced, square, projection.rows)
+    leading: list[Score] = []
+    for tier in (NAMED, FREE):
+        leading += [s for s in scores if s.family.tier == tier][:LOOKED_AT]
+    refined = [refine(projection, s) for s in leading]
+    rest = [s for s in scores if s not in leading]
+    return sorted([*refined, *rest], key=lambda s: -s.evidence)
+
+
+def choose(scores: list[Score]) -> Score:
+    """Take the best name, unless a free form is clearly ahead of it."""
+    name = next(s for s in scores if s.family.tier == NAMED)
+    free = next((s for s in scores if s.family.tier == FREE), name)
+    ahead = max(CLEARLY[0], CLEARLY[1] * name.evidence)
+    return free if free.evidence > name.evidence + ahead else name
+
+
+def _grow(found: Search) -> Search:
+    """Add the best candidate, or say which one was refused."""
+    best = choose(ranking(Projection.of(found.fit)))
+    p_value = found.null.p_value(best.evidence)
+    if p_value > LEVEL or best.p_value > ALONE:
+        return replace(found, refused=None)
+    fit = extend(found.fit, best.best)
+    gain = held_out_gain(fit, len(fit.combination.effects) - 1, best.best)
+    added = Addition(best, p_value, gain)
+    if not gain.sure:
+        return replace(found, refused=added)
+    return replace(found, fit=fit, additions=(*found.additions, added))
+
+
+def extend(fit: Fit, candidate: Candidate, instead_of: int | None = None) -> Fit:
+    """Refit everything with a candidate added, or in the place of an effect."""
+    effects = list(fit.combination.effects)
+    if instead_of is None:
+        effects.append(candidate.effect)
+    else:
+        effects[instead_of] = candidate.effect
+    return refit(fit, effects)
+
+
+def _settle(found: Search) -> Search:
+    """Look at every addition again, now that the others are in."""
+    number = 0
+    while number < len(found.additions):
+        again = _again(found, number)
+        number += len(again.additions) == len(found.additions)
+        found = again
+    return found
+
+
+def _again(found: Search, number: int) -> Search:
+    """Keep an addition, replace it by what now fits better, or drop it."""
+    place = found.place(number)
+    old = found.additions[number].candidate
+    scores = ranking(Projection.of(found.fit, without=place))
+    best = choose(scores)
+    if found.null.p_value(best.evidence) > LEVEL:
+        return _drop(found, number)
+    present = next((s for s in scores if s.family == old.family), best)
+    if best.evidence < present.evidence + BETTER:
+        best = present
+    if best.best.effect == old.effect:
+        return found
+    fit = extend(found.fit, best.best, instead_of=place)
+    gain = held_out_gain(fit, place, best.best)
+    additions = list(found.additions)
+    additions[number] = Addition(best, found.null.p_value(best.evidence), gain)
+    return replace(found, fit=fit, additions=tuple(additions))
+
+
+def _drop(found: Search, number: int) -> Search:
+    """Take an addition out that the others have made superfluous."""
+    effects = list(found.fit.combination.effects)
+    del effects[found.place(number)]
+    additions = (*found.additions[:number], *found.additions[number + 1 :])
+    return replace(found, fit=refit(found.fit, effects), additions=additions)
+
+
+def refit(fit: Fit, effects: Sequence[Effect]) -> Fit:
+    """Fit other effects to the rows of a fit, beginning where it ended."""
+    position = fit.error + fit.batch.walk.tcp
+    return fit_effects(fit.batch, position, tuple(effects), fit.noise.origin, fit)
