@@ -23,9 +23,12 @@ from postproc.robot.arm import Arm
 
 Array = NDArray[np.float64]
 Bools = NDArray[np.bool_]
+Orders = tuple[Array, Array, Array]  # joint angles and their two derivatives, (k, 6)
 
 GAP = 0.01  # path length put between two runs, where the arm stands
 CREEP = 1e-4  # ds/dt that counts as standing: an exact zero leaves the solver no room
+WINDOW = 20_000  # gridpoints solved at a time
+TOUCHING = 0.9998  # of the bound; toppra itself stays a little below it
 FASTEST = 1e4  # bound of ds/dt where the joints give none
 
 logging.getLogger("toppra").setLevel(logging.CRITICAL)
@@ -126,23 +129,12 @@ def time_laws(arm: Arm, q: Array, s: Array, limit: Array, begins: Bools) -> Runs
     first, second = derivatives(s, q, begins)
     step = np.diff(s, prepend=s[0])
     step[begins] = GAP
-    along = np.cumsum(step)
     ends = np.append(begins[1:], True)
     with np.errstate(divide="ignore"):
         joints = (arm.velocity / np.abs(first)).min(axis=1)
     bound = np.minimum(np.minimum(limit, joints), FASTEST)
-    solver = toppra.algorithm.TOPPRA(
-        [
-            toppra.constraint.JointAccelerationConstraint(arm.acceleration),
-            _PathSpeed(np.where(begins | ends, CREEP, bound)),
-        ],
-        _Path(along, q, first, second),
-        gridpoints=along,
-        solver_wrapper="seidel",
-    )
-    _, rate, _ = solver.compute_parameterization(0.0, 0.0)
-    if rate is None or np.isnan(rate).any():
-        raise PlanError("no time law for this path within the joint limits")
+    bound[begins | ends] = CREEP
+    rate = _in_windows(arm, np.cumsum(step), (q, first, second), bound)
     rate = np.where(begins | ends, 0.0, rate)
     between = (rate[1:] + rate[:-1])[~begins[1:]]
     if (between <= 0).any():
@@ -152,3 +144,54 @@ def time_laws(arm: Arm, q: Array, s: Array, limit: Array, begins: Bools) -> Runs
     total = np.cumsum(lasts)
     since = total - total[np.maximum.accumulate(np.where(begins, np.arange(len(s)), 0))]
     return Runs(s, q, first, rate, since)
+
+
+def _in_windows(arm: Arm, along: Array, orders: Orders, bound: Array) -> Array:
+    """Solve a long path piece by piece, (k,).
+
+    A piece ends at rest, so that its velocities are nowhere above those of the whole
+    path, which are nowhere above the bound. Where the piece touches the bound all three
+    are equal: up to there it is the whole path's own law, and the next piece goes on
+    from there at that velocity.
+
+    Raises:
+        PlanError: toppra finds no time law.
+    """
+    rate, a, size = np.zeros(len(along)), 0, WINDOW
+    while True:
+        rows = slice(a, a + size)
+        part = _solve(arm, along[rows], orders, rows, bound[rows], float(rate[a]))
+        if a + size >= len(along):
+            rate[rows] = part
+            return rate
+        touching = np.flatnonzero(part >= TOUCHING * bound[rows])
+        if len(touching) == 0 or touching[-1] == 0:
+            size *= 2
+            continue
+        last = int(touching[-1])
+        rate[a : a + last + 1] = part[: last + 1]
+        a, size = a + last, WINDOW
+
+
+def _solve(
+    arm: Arm, along: Array, orders: Orders, rows: slice, bound: Array, begin: float
+) -> Array:
+    """Find the fastest ds/dt, (k,), from a given one to a standstill.
+
+    Raises:
+        PlanError: toppra finds no time law.
+    """
+    path = _Path(along, *(order[rows] for order in orders))
+    solver = toppra.algorithm.TOPPRA(
+        [
+            toppra.constraint.JointAccelerationConstraint(arm.acceleration),
+            _PathSpeed(bound),
+        ],
+        path,
+        gridpoints=along,
+        solver_wrapper="seidel",
+    )
+    _, rate, _ = solver.compute_parameterization(begin, 0.0)
+    if rate is None or np.isnan(rate).any():
+        raise PlanError("no time law for this path within the joint limits")
+    return np.asarray(rate, dtype=float)

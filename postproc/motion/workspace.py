@@ -14,6 +14,7 @@ Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 STRAIGHT = 1e-3  # [rad] at axis 5, below this the two wrist branches are one
+CHUNK = 50_000  # poses solved at a time; solving needs room for copies
 SAME_POSE = 1e-7  # [m] and sines; poses that several predecessors agree on
 
 
@@ -92,7 +93,10 @@ class Workspace:
         self.solved = np.full(n, -1)
         self.solved[poses] = np.arange(len(poses))
         everything = np.concatenate([self.flange[poses], samples.flange])
-        self.branches = self.arm.inverse(everything).q
+        self.branches = np.empty((len(everything), 8, 6))
+        for i in range(0, len(everything), CHUNK):
+            rows = slice(i, i + CHUNK)
+            self.branches[rows] = self.arm.inverse(everything[rows]).q
         self.row = np.full(int(samples.start[-1]), -1)
         self.row[samples.inner] = len(poses) + np.arange(len(samples.inner))
         self.row[samples.start[1:] - 1] = self.solved[samples.visit]

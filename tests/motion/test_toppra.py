@@ -68,6 +68,21 @@ def test_runs_together_are_as_alone(arm: Arm, home: np.ndarray) -> None:
         np.testing.assert_allclose(together.rate[rows], alone.rate, atol=1e-5)
 
 
+def test_windows_change_nothing_at_programmed_speeds(
+    arm: Arm, home: np.ndarray, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    s = np.linspace(0, 40, 3000)
+    phase = s[:, None] * np.arange(1, 7) / 5
+    q = home + 0.3 * np.sin(phase)
+    limit = np.where((s > 15) & (s < 16), 0.3, 0.9)
+    limit[s > 30] = 3.0  # beyond what the joints can do: no bound is touched
+    whole = one(arm, q, s, limit)
+    monkeypatch.setattr("postproc.motion.toppra.WINDOW", 400)
+    pieces = one(arm, q, s, limit)
+    np.testing.assert_allclose(pieces.rate, whole.rate, rtol=3e-4, atol=1e-5)
+    np.testing.assert_allclose(pieces.time, whole.time, rtol=3e-4)
+
+
 def test_failure_is_an_error_of_ours_and_silent(
     arm: Arm, home: np.ndarray, caplog: pytest.LogCaptureFixture
 ) -> None:
