@@ -88,14 +88,18 @@ def _states(chains: Chains, half: Array) -> Clamps:
     since_head = _since_head(chains, half)
     known: list[Clamps | None] = [None] * len(chains.heads)
     followers = chains.followers()
-    waiting = deque(range(len(known)))
+    waiting, queued = deque(range(len(known))), [True] * len(known)
     while waiting:
         c = waiting.popleft()
+        queued[c] = False
         new, old = _at_head(chains, c, half, known, since_head), known[c]
         if new is None or (old is not None and _same(old, new)):
             continue
         known[c] = new
-        waiting.extend(f for f in followers[c] if f not in waiting)
+        for follower in followers[c]:
+            if not queued[follower]:
+                queued[follower] = True
+                waiting.append(follower)
     out = passing(chains.angles, half)
     for c, at_head in enumerate(known):
         if at_head is not None:
