@@ -1,0 +1,70 @@
+"use strict";
+// The visits as typed columns.
+
+class Columns {
+  constructor(packed) {
+    this.files = packed.files;
+    this.names = packed.names;
+    this.reasons = packed.reasons;
+    this.moves = packed.moves;
+    this.statuses = packed.statuses;
+    Object.assign(this, packed.index);
+    this.length = this.visit.length;
+    this.direction = packed.direction;
+    this.numbers = {};
+    for (const [key, { step, width, values }] of Object.entries(packed.numbers)) {
+      const column = new Float64Array(values.length);
+      for (let i = 0; i < values.length; i++) {
+        column[i] = values[i] === null ? NaN : values[i] * step;
+      }
+      this.numbers[key] = { width, column };
+    }
+    this.size = this.lengths("correction_mm");
+    this.sigma = this.lengths("std_mm");
+    this.row = new Map(this.visit.map((v, i) => [v, i]));
+  }
+
+  // The numbers of one visit.
+  of(key, i) {
+    const { width, column } = this.numbers[key];
+    return column.subarray(i * width, (i + 1) * width);
+  }
+
+  lengths(key) {
+    const { column } = this.numbers[key];
+    const out = new Float64Array(this.length);
+    for (let i = 0; i < this.length; i++) {
+      out[i] = Math.hypot(column[3 * i], column[3 * i + 1], column[3 * i + 2]);
+    }
+    return out;
+  }
+
+  // -1, 0 or 1 of joint 0 to 5.
+  side(i, joint) {
+    return "-0+".indexOf(this.direction[6 * i + joint]) - 1;
+  }
+
+  arrows(i) {
+    let out = "";
+    for (let j = 0; j < 6; j++) out += Columns.ARROWS[this.side(i, j) + 1];
+    return out;
+  }
+
+  place(i) {
+    const file = this.file[i] > 0 || this.files.length > 2 ? `${this.files[this.file[i]]}:` : "";
+    return `${file}${this.line[i]}`;
+  }
+
+  status_of(i) {
+    return this.statuses[this.status[i]];
+  }
+}
+
+Columns.ARROWS = ["↓", "·", "↑"];
+Columns.STATUS = {
+  safe: { mark: "●", symbol: "circle", colour: Page.COLOURS.blue, told: "safe: corrected" },
+  unsafe: { mark: "■", symbol: "square", colour: Page.COLOURS.vermillion, told: "unsafe: arrivals disagree" },
+  guarded: { mark: "◆", symbol: "diamond", colour: Page.COLOURS.orange, told: "guarded: correction not trusted" },
+  display: { mark: "✚", symbol: "cross", colour: Page.COLOURS.purple, told: "display only: value known at run time" },
+  unchanged: { mark: "○", symbol: "circle-open", colour: Page.COLOURS.grey, told: "unchanged: nothing to correct" },
+};

@@ -1,0 +1,67 @@
+"use strict";
+// What every page needs: its data, elements made without markup, numbers told.
+
+const Page = {
+  // Read the data that stand in the page.
+  async data() {
+    const node = document.getElementById("data");
+    const text = node.type === "application/gzip"
+      ? await Page.inflate(node.textContent) : node.textContent;
+    node.textContent = "";
+    return JSON.parse(text);
+  },
+
+  async inflate(base64) {
+    const raw = atob(base64);
+    const bytes = new Uint8Array(raw.length);
+    for (let i = 0; i < raw.length; i++) bytes[i] = raw.charCodeAt(i);
+    const stream = new Blob([bytes]).stream();
+    return new Response(stream.pipeThrough(new DecompressionStream("gzip"))).text();
+  },
+
+  // Make an element; children are elements or texts, never markup.
+  element(tag, properties = {}, ...children) {
+    const node = document.createElement(tag);
+    for (const [key, value] of Object.entries(properties)) {
+      if (key in node) node[key] = value; else node.setAttribute(key, value);
+    }
+    node.append(...children);
+    return node;
+  },
+
+  number(value, digits) {
+    if (value === null || !Number.isFinite(value)) return "–";
+    return value.toFixed(digits).replace(/^-(?=[0.]*$)/, "").replace("-", "−");
+  },
+
+  // No button that would send the figure to a server.
+  config: {
+    displaylogo: false, responsive: true, showSendToCloud: false, plotlyServerURL: "",
+    typesetMath: false,
+    modeBarButtonsToRemove: ["select2d", "lasso2d", "zoomIn2d", "zoomOut2d", "autoScale2d", "resetCameraLastSave3d"],
+  },
+
+  layout(more) {
+    const font = { family: "system-ui, sans-serif", size: 12, color: "#222" };
+    return Object.assign({
+      font, paper_bgcolor: "#fff", plot_bgcolor: "#fff",
+      margin: { l: 60, r: 16, t: 30, b: 48 },
+    }, more);
+  },
+
+  // Draw, and say in words where a browser cannot.
+  draw(node, traces, layout) {
+    return Plotly.react(node, traces, Page.layout(layout), Page.config);
+  },
+
+  trouble(problem) {
+    const node = document.getElementById("trouble");
+    node.hidden = false;
+    node.textContent = `This page could not show everything: ${problem}`;
+  },
+};
+
+Page.COLOURS = {  // Okabe and Ito: told apart with any kind of colour vision
+  blue: "#0072b2", vermillion: "#d55e00", orange: "#e69f00", green: "#009e73",
+  purple: "#cc79a7", grey: "#767676", black: "#222222",
+};

@@ -1,0 +1,99 @@
+"use strict";
+// The program page: table, view, source and figures, each following the others.
+
+class ProgramPage {
+  constructor(data) {
+    const columns = new Columns(data.columns);
+    const listing = new Listing(data.listing);
+    this.columns = columns;
+    this.detail = new Detail(document.getElementById("detail"), columns, listing);
+    this.table = new Table(columns, listing, (rows) => this.filtered(rows), (i) => this.select(i, true));
+    const node = document.getElementById("view");
+    this.view = node && new View(node, columns, (i) => this.select(i, false));
+  }
+
+  // The table first; the view, which takes longer, when the table is on the screen.
+  async start(data) {
+    this.table.order();
+    this.table.turn(0);
+    performance.mark("table");
+    await new Promise((resolve) => setTimeout(resolve));
+    if (this.view) this.controls();
+    this.histogram(data.histogram);
+    this.predicted(data.predicted);
+    window.addEventListener("hashchange", () => this.follow());
+    window.addEventListener("beforeprint", () => this.table.turn(this.table.page));
+    const idle = window.requestIdleCallback || ((f) => setTimeout(f, 200));
+    idle(() => this.table.haystack());
+    if (this.view) await this.redraw();
+    performance.mark("view");
+    this.follow();
+  }
+
+  controls() {
+    const mode = document.getElementById("mode"), scale = document.getElementById("scale");
+    for (const s of View.SCALES) scale.append(Page.element("option", { value: s }, `× ${s}`));
+    scale.value = String(this.view.scale);
+    mode.addEventListener("change", () => { this.view.mode = mode.value; this.redraw(); });
+    scale.addEventListener("change", () => { this.view.scale = Number(scale.value); this.redraw(); });
+  }
+
+  redraw() {
+    return this.view.show(this.table.rows.slice().sort((a, b) => a - b));
+  }
+
+  // The table answers at once; the view follows when typing pauses.
+  filtered() {
+    if (!this.view) return;
+    clearTimeout(this.waiting);
+    this.waiting = setTimeout(() => this.redraw(), 250);
+  }
+
+  select(i, focus) {
+    this.table.select(i, focus);
+    this.detail.show(i);
+    if (this.view) this.view.select(i);
+    document.body.dataset.selected = this.columns.visit[i];
+  }
+
+  // A link to #target-12 selects visit 12.
+  follow() {
+    const found = /^#target-(\d+)$/.exec(location.hash);
+    const i = found ? this.columns.row.get(Number(found[1])) : undefined;
+    if (i === undefined) return;
+    this.select(i, false);
+    document.getElementById("bench").scrollIntoView();
+  }
+
+  histogram({ edges_mm: edges, counts }) {
+    const node = document.getElementById("histogram");
+    if (!counts.length) { node.replaceChildren("No target was corrected."); return; }
+    const x = counts.map((_, k) => (edges[k] + edges[k + 1]) / 2);
+    Page.draw(node, [{ type: "bar", x, y: counts, width: edges[1] - edges[0],
+      marker: { color: Page.COLOURS.blue, line: { color: "#fff", width: 1 } },
+      hovertemplate: "%{x:.3f} mm: %{y}<extra></extra>" }], {
+      bargap: 0, xaxis: { title: { text: "length of the correction [mm]" }, rangemode: "tozero" },
+      yaxis: { title: { text: "targets" } },
+    });
+  }
+
+  predicted({ before, after }) {
+    const node = document.getElementById("predicted");
+    if (!before.n) { node.remove(); return; }
+    const keys = ["mean_mm", "p95_mm", "max_mm"], names = ["mean", "95 %", "max"];
+    const bars = (from, name, colour, shape) => ({ type: "bar", orientation: "h", name, y: names, x: keys.map((k) => from[k]),
+      text: keys.map((k) => Page.number(from[k], 3)), textposition: "outside", cliponaxis: false,
+      marker: { color: colour, line: { color: colour, width: 1 }, pattern: { shape, fgcolor: colour, bgcolor: "#fff", solidity: 0.4 } } });
+    Page.draw(node, [bars(before, "before", Page.COLOURS.vermillion, "/"), bars(after, "after", Page.COLOURS.blue, "")], {
+      barmode: "group", legend: { x: 1, xanchor: "right", y: 0.1, traceorder: "normal" },
+      margin: { l: 48, r: 56, t: 28, b: 44 },
+      xaxis: { title: { text: "predicted error [mm]" }, rangemode: "tozero" }, yaxis: { autorange: "reversed", type: "category" },
+    });
+  }
+}
+
+Page.data()
+  .then((data) => { performance.mark("data"); return data; })
+  .then((data) => new ProgramPage(data).start(data))
+  .then(() => { document.body.dataset.ready = "yes"; })
+  .catch((problem) => Page.trouble(problem));

@@ -1,0 +1,115 @@
+"""One self-contained page: template, style, scripts and data in one text."""
+
+from __future__ import annotations
+
+import base64
+import gzip
+import hashlib
+import json
+from collections.abc import Mapping, Sequence
+from functools import cache
+from importlib.resources import files
+from typing import Any
+
+import jinja2
+import plotly.offline
+from markupsafe import Markup
+
+from postproc import __version__
+from postproc.html.text import visible
+
+PLAIN_BYTES = 3_000_000  # data up to this size stay readable in the file
+PLAIN, PACKED = "application/json", "application/gzip"
+
+# No plotly server, no fonts from elsewhere, no formula renderer: nothing to fetch.
+_SETTINGS = 'window.PlotlyConfig = {MathJaxConfig: "local"};'
+
+
+def render(
+    template: str,
+    title: str,
+    payload: Mapping[str, Any],
+    scripts: Sequence[str],
+    **context: object,
+) -> str:
+    """Make a page that opens from disk and asks the network for nothing.
+
+    Every text in `context` is escaped by the template; the payload reaches the scripts
+    as data. The page's own policy lets exactly its own scripts run, so text from a
+    program could not run even if an escape were missing.
+
+    Args:
+        template: Name in ``templates/``.
+        title: Of the page.
+        payload: What the scripts show; JSON values without NaN.
+        scripts: Names in ``assets/``, in order.
+        **context: What the template shows.
+    """
+    code = [_SETTINGS, plotly_js(), *(asset(name) for name in scripts)]
+    kind, data = embed(payload)
+    page = _environment().get_template(template)
+    return page.render(
+        title=title,
+        version=__version__,
+        style=Markup(asset("style.css")),  # noqa: S704: our own file
+        code=[Markup(text) for text in code],  # noqa: S704: our own files
+        policy=policy(code),
+        data=data,
+        data_kind=kind,
+        **context,
+    )
+
+
+def embed(payload: Mapping[str, Any]) -> tuple[str, Markup]:
+    """Write data so that it can stand inside a script element.
+
+    Returns:
+        The type of the element and its content: JSON without any ``<``, ``>`` or
+        ``&``, or, where that would be large, the same compressed, in base 64.
+    """
+    text = json.dumps(payload, separators=(",", ":"), allow_nan=False)
+    if len(text) > PLAIN_BYTES:
+        packed = gzip.compress(text.encode("ascii"), compresslevel=5, mtime=0)
+        return PACKED, Markup(base64.b64encode(packed).decode("ascii"))  # noqa: S704
+    for character in "<>&":
+        text = text.replace(character, f"\\u{ord(character):04x}")
+    return PLAIN, Markup(text)  # noqa: S704: nothing of HTML is left in it
+
+
+def policy(code: Sequence[str]) -> str:
+    """State what the page may do: run these scripts, draw, and nothing else."""
+    hashes = " ".join(f"'sha256-{_digest(text)}'" for text in code)
+    return (
+        f"default-src 'none'; script-src {hashes}; style-src 'unsafe-inline'; "
+        "img-src data: blob:; form-action 'none'; base-uri 'none'"
+    )
+
+
+def _digest(text: str) -> str:
+    """Hash a script as browsers do."""
+    return base64.b64encode(hashlib.sha256(text.encode()).digest()).decode("ascii")
+
+
+@cache
+def asset(name: str) -> str:
+    """Read a file of ``assets/``."""
+    return files("postproc.html").joinpath("assets", name).read_text(encoding="utf-8")
+
+
+@cache
+def plotly_js() -> str:
+    """Return the whole of plotly.js."""
+    return str(plotly.offline.get_plotlyjs())
+
+
+@cache
+def _environment() -> jinja2.Environment:
+    """Make the environment: everything is escaped, nothing undefined passes."""
+    return jinja2.Environment(
+        loader=jinja2.PackageLoader("postproc.html"),
+        autoescape=True,
+        undefined=jinja2.StrictUndefined,
+        finalize=lambda value: visible(value) if type(value) is str else value,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
