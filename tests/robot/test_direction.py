@@ -185,3 +185,64 @@ def test_long_chains_are_no_chains_of_python_calls(arm: Arm) -> None:
     z = sequential(q, q[0] - half, half)
     np.testing.assert_array_equal(found[500:], np.sign(q - z)[500:] * (
         np.abs(q - z) >= half / 2)[500:])  # fmt: skip
+
+
+def naive(q: np.ndarray, edges: Edges, half: float) -> np.ndarray:
+    """Propagate intervals edge by edge and sample by sample until nothing changes."""
+    n = len(q)
+    low, high = np.full(n, np.inf), np.full(n, -np.inf)
+    for _ in range(4 * n):
+        for v in range(n):
+            for e in range(edges.first[v], edges.first[v + 1]):
+                p = edges.source[e]
+                a, b = (-np.inf, np.inf) if p < 0 else (low[p], high[p])
+                if a > b:
+                    continue
+                for angle in edges.path[edges.start[e] : edges.start[e + 1], 0]:
+                    a, b = (np.clip(z, angle - half, angle + half) for z in (a, b))
+                low[v], high[v] = min(low[v], a), max(high[v], b)
+    known = low <= high
+    up = known & ((q[:, 0] - high) / half >= 0.5)
+    down = known & ((q[:, 0] - low) / half <= -0.5)
+    return up.astype(float) - down
+
+
+@given(st.data())
+@settings(max_examples=60, deadline=None)
+def test_graphs_match_a_naive_propagation(data: st.DataObject) -> None:
+    arm = load_arm("nj220-2.7")
+    n = data.draw(st.integers(1, 7))
+    angle = st.integers(-12, 12).map(lambda k: 0.93 * k * arm.play[0])
+    first, source, path, start = [0], [], [], [0]
+    q = np.zeros((n, 6))
+    q[:, 0] = [data.draw(angle) for _ in range(n)]
+    for v in range(n):
+        for p in data.draw(st.lists(st.integers(-1, n - 1), max_size=3, unique=True)):
+            source.append(p)
+            # Turning values between samples are tested elsewhere: only corners here.
+            path += [q[v]]
+            start.append(len(path))
+        first.append(len(source))
+    edges = Edges(np.array(first), np.array(source, dtype=int),
+                  np.array(path).reshape(-1, 6), np.array(start))  # fmt: skip
+    expected = naive(q, edges, WIDTH_IN_PLAYS / 2 * arm.play[0])
+    np.testing.assert_array_equal(arrivals(arm, q, edges).direction[:, 0], expected)
+
+
+@given(st.lists(st.integers(-30, 30), min_size=1, max_size=50))
+@settings(max_examples=60, deadline=None)
+def test_travel_matches_its_definition(steps: list[int]) -> None:
+    arm = load_arm("nj220-2.7")
+    play = arm.play[0]
+    q = np.cumsum(steps) * 0.31 * play
+    side, turn, extreme, expected = 0.0, q[0], q[0], []
+    for angle in q:
+        if side == 0 and abs(angle - extreme) > play / 2:
+            side, extreme = np.sign(angle - extreme), angle
+        elif side != 0 and side * (angle - extreme) > 0:
+            extreme = angle
+        elif side * (extreme - angle) > play:
+            side, turn, extreme = -side, extreme, angle
+        expected.append(abs(angle - turn))
+    found = one_joint(arm, (q / play).tolist()).travel[:, 0]
+    np.testing.assert_allclose(found, expected, atol=1e-12)
