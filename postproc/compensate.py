@@ -1,0 +1,230 @@
+"""The first sentence: a program goes in, the same program lands where it says."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass
+from itertools import count
+from time import perf_counter
+
+import numpy as np
+from numpy.typing import NDArray
+
+from postproc.accuracy.model import Model
+from postproc.exceptions import CellError, ProgramError
+from postproc.language.diagnostic import Diagnostic
+from postproc.language.source import Source
+from postproc.language.stamp import is_stamped
+from postproc.output import Output, write_numbers
+from postproc.planning import Planned, Reading, plan_visits, read_program, states_of
+from postproc.proposal import Proposal, propose
+from postproc.report import ErrorStatistics, Outcome
+from postproc.robot.cell import Cell
+from postproc.robot.state import States
+from postproc.verify import check_output
+
+Array = NDArray[np.float64]
+Bools = NDArray[np.bool_]
+
+FREE_ROUNDS = 2  # of correcting for changed directions, before targets are held
+
+
+@dataclass(frozen=True)
+class Options:
+    """What the user asked for.
+
+    Attributes:
+        clone: Give variables whose arrivals disagree a value for each.
+        shared: Edit variables that other programs may read too.
+        temperature: Arm temperature [deg C]; default: the cell's.
+    """
+
+    clone: bool = False
+    shared: bool = False
+    temperature: float | None = None
+
+
+class Clock:
+    """Seconds spent in every stage."""
+
+    def __init__(self) -> None:
+        """Start with no stage."""
+        self.stages: dict[str, float] = {}
+
+    @contextmanager
+    def __call__(self, stage: str) -> Iterator[None]:
+        """Add the time of a block to a stage."""
+        start = perf_counter()
+        yield
+        self.stages[stage] = self.stages.get(stage, 0.0) + perf_counter() - start
+
+
+@dataclass(frozen=True)
+class Corrected:
+    """A proposal, the files that hold it, and the plan of those files."""
+
+    proposal: Proposal
+    output: Output
+    planned: Planned
+
+
+def compensate(
+    source: bytes,
+    cell: Cell,
+    model: Model,
+    *,
+    name: str = "program.pdl",
+    variables: bytes | None = None,
+    options: Options = Options(),
+) -> Outcome:
+    """Move every target of a program against the error the arm would make there.
+
+    Args:
+        source: The program.
+        cell: The robot's surroundings.
+        model: The arm's error.
+        name: File name of the program; its variable file is ``name.lsv``.
+        variables: The variable file, where there is one.
+        options: What the user asked for.
+
+    Raises:
+        ProgramError: The source is no program text, or is compensated already.
+        CellError: The controller compensates on its own.
+        ModelError: The model was made for another arm.
+    """
+    clock = Clock()
+    files = name_files(name, source, variables)
+    refuse(files, cell, model)
+    with clock("parse"):
+        reading = read_program(files, cell)
+    with clock("plan"):
+        planned = plan_visits(reading.visits, cell)
+    states = states_of(planned.plan, cell, _temperature(cell, options))
+    corrected = settle(reading, planned, states, cell, model, options, clock)
+    with clock("report"):
+        return report(
+            name, reading, planned, states, corrected, cell, model, options, clock
+        )
+
+
+def name_files(name: str, source: bytes, variables: bytes | None) -> dict[str, bytes]:
+    """Name a program and its variable file, the program first."""
+    files = {name: source}
+    if variables is not None:
+        files[name.rpartition(".")[0] + ".lsv"] = variables
+    return files
+
+
+def refuse(files: Mapping[str, bytes], cell: Cell, model: Model) -> None:
+    """Refuse what must not be compensated at all.
+
+    Raises:
+        ProgramError: A file is stamped.
+        CellError: The controller's absolute accuracy is on.
+        ModelError: The model was made for another arm.
+    """
+    for name, data in files.items():
+        if is_stamped(Source(name, data)):
+            raise ProgramError(
+                name,
+                "is compensated already",
+                "Take the source, or give it back with postproc restore",
+                line=1,
+            )
+    if cell.file.robot.absolute_accuracy:
+        raise CellError(
+            cell.path,
+            "the controller compensates on its own: this would do it twice",
+            "Switch that option off on the controller, then here",
+            place="$.robot.absolute_accuracy",
+        )
+    model.check_arm(cell.arm)
+
+
+def settle(
+    reading: Reading,
+    planned: Planned,
+    states: States,
+    cell: Cell,
+    model: Model,
+    options: Options,
+    clock: Clock,
+) -> Corrected:
+    """Correct, write and plan again, until the directions are those corrected for.
+
+    The corrected program makes slightly other moves than the original. Where one of
+    them turns a joint the other way, the correction is computed anew for that side;
+    where that flips it back, the target is left alone.
+    """
+    direction = planned.plan.direction
+    held = np.zeros(len(states), dtype=bool)
+    for number in count():  # ends: from the third round on `held` grows
+        with clock("solve"):
+            aimed = states.with_(direction=np.array(direction))
+            proposal = propose(reading, planned, aimed, held, cell, model, options)
+        with clock("rewrite"):
+            output = write_numbers(reading, proposal.edited, proposal.values, model.id)
+        with clock("verify"):
+            again = read_program(output.files, cell)
+            check_output(reading, again, output, proposal.edited)
+            replanned = plan_visits(again.visits, cell)
+        found = replanned.plan.direction
+        changed = proposal.corrected & (found != direction).any(axis=1)
+        flipped = proposal.corrected & (found * direction < 0).any(axis=1)
+        if not (changed if number < FREE_ROUNDS else flipped).any():
+            return Corrected(proposal, output, replanned)
+        held = held | flipped if number >= FREE_ROUNDS else held
+        direction = np.where(changed[:, None], found, direction)
+    raise AssertionError("unreachable")
+
+
+def report(
+    name: str,
+    reading: Reading,
+    planned: Planned,
+    states: States,
+    corrected: Corrected,
+    cell: Cell,
+    model: Model,
+    options: Options,
+    clock: Clock,
+) -> Outcome:
+    """Say what came of every visit, and what error the model expects now."""
+    proposal, done = corrected.proposal, corrected.planned.plan
+    rows = proposal.corrected
+    wanted = planned.plan.tcp[rows, :3, 3]
+    new = states.with_(q=np.array(done.q), direction=np.array(done.direction))[rows]
+    before = model.error(cell.arm, states[rows])
+    after = done.tcp[rows, :3, 3] + model.error(cell.arm, new) - wanted
+    return Outcome(
+        program=name,
+        model=model.id,
+        outputs=corrected.output.changed,
+        sidecar=corrected.output.sidecar(model.id, asdict(options)),
+        visits=reading.visits,
+        decisions=proposal.decisions,
+        before=ErrorStatistics.of(before),
+        after=ErrorStatistics.of(after),
+        diagnostics=(*reading.diagnostics, *notes(name, cell)),
+        stages=clock.stages,
+        position=planned.plan.tcp[:, :3, 3],
+        sources={source.name: source.data for source in reading.sources},
+    )
+
+
+def notes(name: str, cell: Cell) -> tuple[Diagnostic, ...]:
+    """State the assumptions that every report must carry."""
+    return (
+        Diagnostic(
+            name,
+            1,
+            "absolute-accuracy",
+            f"the controller's own absolute accuracy is taken to be off ({cell.path})",
+        ),
+    )
+
+
+def _temperature(cell: Cell, options: Options) -> float:
+    """Choose the temperature to compensate for [deg C]."""
+    return cell.temperature if options.temperature is None else options.temperature

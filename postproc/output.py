@@ -1,0 +1,89 @@
+"""The files that a compensation writes, and the record that undoes them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from postproc import __version__
+from postproc.language.rewrite import edits as number_edits
+from postproc.language.source import Edit, Source, apply
+from postproc.language.stamp import stamp_line
+from postproc.planning import Reading
+from postproc.sidecar import FileRecord, Sidecar, block_checksums, sha256
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Output:
+    """What is to be written.
+
+    Attributes:
+        files: All files of the program by name, the program first.
+        records: How those that changed differ from their source.
+        edits: What was changed in every file, in the order of the files.
+    """
+
+    files: Mapping[str, bytes]
+    records: Mapping[str, FileRecord]
+    edits: tuple[tuple[Edit, ...], ...]
+
+    @property
+    def changed(self) -> dict[str, bytes]:
+        """Return the program, and the other files that changed."""
+        program = next(iter(self.files))
+        return {
+            name: data
+            for name, data in self.files.items()
+            if name == program or name in self.records
+        }
+
+    def sidecar(self, model: str, options: Mapping[str, object]) -> str:
+        """Return the record beside the program as JSON text."""
+        return Sidecar(__version__, model, self.records, options).to_json()
+
+
+def write_numbers(
+    reading: Reading, literals: Ints, values: Array, model: str
+) -> Output:
+    """Write new numbers into a program's files.
+
+    A file is stamped when it changes; the program also when nothing changes at all, so
+    that it shows that it was looked at.
+
+    Args:
+        reading: The program.
+        literals: Literals that get new numbers, (m,).
+        values: Their numbers, (m, 6) in the file's units.
+        model: Id of the model, for the stamp.
+    """
+    edits = number_edits(reading.visits.literals, reading.sources, literals, values)
+    nothing = not any(edits)
+    files, records = {}, {}
+    for number, (source, own) in enumerate(zip(reading.sources, edits, strict=True)):
+        files[source.name] = source.data
+        if own or (number == 0 and nothing):
+            stamp = stamp_line(__version__, model, source)
+            files[source.name] = stamp + apply(source.data, own)
+            records[source.name] = record(source, stamp, own, files[source.name])
+    return Output(files, records, edits)
+
+
+def record(
+    source: Source, stamp: bytes, edits: Sequence[Edit], output: bytes
+) -> FileRecord:
+    """Record how an output differs from its source, in the output's offsets."""
+    spans = [(0, len(stamp), "")]
+    shift = len(stamp)
+    for (start, end), new in sorted(edits):
+        begin = start + shift
+        original = source.data[start:end].decode("latin-1")
+        spans.append((begin, begin + len(new), original))
+        shift += len(new) - (end - start)
+    checksums = block_checksums(output)
+    return FileRecord(sha256(source.data), sha256(output), checksums, spans)

@@ -1,0 +1,133 @@
+"""From program text to planned states."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from postproc.language.diagnostic import Diagnostic
+from postproc.language.flow import Start, resolve
+from postproc.language.lsv import Variables
+from postproc.language.source import Source, source_from_bytes
+from postproc.language.structure import parse
+from postproc.language.visits import Visits
+from postproc.motion.planner import Plan, plan
+from postproc.motion.targets import Targets
+from postproc.reasons import Reasons
+from postproc.resolve import targets_from_visits
+from postproc.robot.cell import Cell
+from postproc.robot.state import States, make_states
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Reading:
+    """A program as the language understands it.
+
+    Attributes:
+        sources: Its files in the order of `Visits.files`.
+        visits: Every arrival at a target.
+        diagnostics: What else was found.
+    """
+
+    sources: tuple[Source, ...]
+    visits: Visits
+    diagnostics: tuple[Diagnostic, ...]
+
+
+@dataclass(frozen=True)
+class Planned:
+    """A program as the controller would run it.
+
+    Attributes:
+        targets: Where every move goes, in the arm's base frame.
+        plan: The state of the arm at every arrival.
+        reasons: Why visits must not be compensated.
+    """
+
+    targets: Targets
+    plan: Plan
+    reasons: Reasons
+
+
+def start_of(cell: Cell) -> Start:
+    """Tell the language what holds at program start."""
+    tables = {
+        routine: {
+            arguments: {
+                name: section.record()
+                for name in ("tool", "base", "uframe")
+                if (section := getattr(entry, name)) is not None
+            }
+            for arguments, entry in table.items()
+        }
+        for routine, table in cell.frame_tables.items()
+    }
+    return Start(
+        tool=cell.tool.record,
+        base=cell.base.record,
+        uframe=cell.uframe.record,
+        routines=dict(cell.routines),
+        frame_tables=tables,
+        aux=dict(cell.aux),
+        taught=cell.taught,
+    )
+
+
+def read_program(files: Mapping[str, bytes], cell: Cell) -> Reading:
+    """Parse a program and resolve its visits.
+
+    Args:
+        files: The program's bytes by name, first the program itself, then, where there
+            is one, its variable file.
+        cell: What holds at program start.
+
+    Raises:
+        ProgramError: A file is no program text.
+    """
+    sources = tuple(source_from_bytes(name, data) for name, data in files.items())
+    program = parse(sources[0])
+    variables: Variables | None = None
+    if len(sources) > 1:
+        from postproc.language.lsv import parse_variables
+
+        variables = parse_variables(sources[1])
+    resolved = resolve(program, start_of(cell), variables)
+    return Reading(sources, resolved.visits, resolved.diagnostics)
+
+
+def plan_visits(visits: Visits, cell: Cell) -> Planned:
+    """Plan every move of a program.
+
+    Raises:
+        PlanError: The arm has no inverse kinematics.
+    """
+    targets, reasons = targets_from_visits(visits, cell)
+    planned = plan(cell.arm, targets, np.deg2rad(cell.limits.wrist_deg))
+    reasons.adopt(planned.reason, planned.reasons)
+    return Planned(targets, planned, reasons)
+
+
+def states_of(planned: Plan, cell: Cell, temperature: float) -> States:
+    """Describe the planned arrivals in the terms of the accuracy model.
+
+    Args:
+        planned: The plan of n arrivals.
+        cell: Payload.
+        temperature: [deg C], NaN where not known.
+    """
+    return make_states(
+        planned.q,
+        planned.direction,
+        planned.tool[:, :3, 3],
+        travel=planned.travel,
+        speed=planned.speed,
+        time=planned.time,
+        temperature=temperature,
+        payload=cell.payload_mass,
+        payload_com=cell.payload_com,
+    )

@@ -1,0 +1,214 @@
+"""Which targets move, where to, and why the others do not."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from postproc.accuracy.guard import guard_size, guard_solutions, guard_steps
+from postproc.accuracy.model import Model
+from postproc.accuracy.prediction import Prediction
+from postproc.accuracy.solve import Solution, solve
+from postproc.language.visits import Target, Visits
+from postproc.planning import Planned, Reading
+from postproc.pose import MM, inverse, pose_from_record
+from postproc.reasons import Reasons
+from postproc.reconcile import Agreement, agree
+from postproc.report import Decisions, Status
+from postproc.robot.cell import Cell
+from postproc.robot.state import States
+
+if TYPE_CHECKING:
+    from postproc.compensate import Options
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Bools = NDArray[np.bool_]
+
+HELD = "its direction of arrival would change with the correction"
+
+
+@dataclass(frozen=True)
+class Proposal:
+    """Corrected numbers for the literals of a program.
+
+    Attributes:
+        edited: Literals that get new numbers, (m,).
+        values: Their numbers, (m, 6) in the file's units.
+        corrected: Visits whose target moves, (n,).
+        decisions: What was decided for every visit.
+    """
+
+    edited: Ints
+    values: Array
+    corrected: Bools
+    decisions: Decisions
+
+
+def propose(
+    reading: Reading,
+    planned: Planned,
+    states: States,
+    held: Bools,
+    cell: Cell,
+    model: Model,
+    options: Options,
+) -> Proposal:
+    """Solve every visit, guard it, and compare the arrivals at every literal.
+
+    Args:
+        reading: The program.
+        planned: Its plan.
+        states: Planned states with the directions to correct for.
+        held: Visits that must be left alone, (n,).
+        cell: Guards and frames.
+        model: The arm's error.
+        options: What the user asked for.
+    """
+    visits, plan = reading.visits, planned.plan
+    solution = solve_known(model, cell, planned, states)
+    prediction = model.predict(cell.arm, states)
+    correction = solution.command[:, :3, 3] - plan.tcp[:, :3, 3]
+    reasons = Reasons(len(visits))
+    display = mark_display(visits, planned, reasons)
+    unchanged = mark_unchanged(visits, reasons, options)
+    reasons.adopt(planned.reasons.index, planned.reasons.texts)
+    guard_outside(reasons, prediction)
+    guard_solutions(reasons, cell.arm, cell.limits, plan.q, solution.q)
+    guard_size(reasons, cell.limits, correction, solution.residual)
+    guard_steps(reasons, cell.limits, correction, states.direction, _run_mates(visits))
+    reasons.mark(held, HELD)
+    numbers = new_numbers(visits, solution)
+    agreement = agree(
+        visits.literal, reasons.none, numbers, change_mm(visits, numbers, correction)
+    )
+    chosen, unsafe = mark_disagreement(visits, agreement, cell, reasons)
+    status = np.where(reasons.none, Status.SAFE, Status.GUARDED)
+    for rows, value in (
+        (unsafe, Status.UNSAFE),
+        (display, Status.DISPLAY),
+        (unchanged, Status.UNCHANGED),
+    ):
+        status[rows] = value
+    corrected = status == Status.SAFE
+    values = np.array(visits.values)
+    values[corrected] = agreement.values[agreement.group[corrected]]
+    decisions = Decisions(
+        status=status.astype(np.int64),
+        why=reasons.index,
+        reasons=reasons.texts,
+        q=plan.q,
+        direction=states.direction,
+        corrected=values,
+        correction=np.where(corrected[:, None], correction, 0.0),
+        std_error=prediction.std_model,
+    )
+    return Proposal(
+        agreement.literal[chosen], agreement.values[chosen], corrected, decisions
+    )
+
+
+def solve_known(model: Model, cell: Cell, planned: Planned, states: States) -> Solution:
+    """Solve the visits whose joint angles and pose are known; NaN elsewhere."""
+    plan, n = planned.plan, len(states)
+    known = ~np.isnan(plan.q).any(axis=1) & ~np.isnan(plan.tcp).any(axis=(1, 2))
+    part = solve(model, cell.arm, plan.tcp[known], plan.tool[known], states[known])
+    q, command = np.full((n, 6), np.nan), np.full((n, 4, 4), np.nan)
+    residual = np.full(n, np.nan)
+    q[known], command[known], residual[known] = part.q, part.command, part.residual
+    return Solution(q, command, residual, part.iterations)
+
+
+def new_numbers(visits: Visits, solution: Solution) -> Array:
+    """Express commands in the numbers of the file, (n, 6).
+
+    A pose keeps its written orientation; P = inverse(UFRAME) . BASE . command.
+    """
+    numbers = np.array(visits.values)
+    joints = visits.target == Target.JOINTS
+    numbers[joints] = np.rad2deg(solution.q[joints])
+    poses = np.flatnonzero(visits.target == Target.POSE)
+    unknown = np.full((1, 4, 4), np.nan)
+    frames = np.concatenate([pose_from_record(visits.frames.reshape(-1, 6)), unknown])
+    placed = inverse(frames)[visits.uframe[poses]] @ frames[visits.base[poses]]
+    point = np.einsum("nij,nj->ni", placed, solution.command[poses, :, 3])
+    numbers[poses, :3] = point[:, :3] / MM
+    return numbers
+
+
+def change_mm(visits: Visits, numbers: Array, correction: Array) -> Array:
+    """Give the change that arrivals at one literal must agree on, (n, 3) [mm].
+
+    For a pose it is that of its numbers (the same literal may be reached in two user
+    frames), for joint angles that of the TCP.
+    """
+    poses = (visits.target == Target.POSE)[:, None]
+    moved = numbers[:, :3] - visits.values[:, :3]
+    return np.where(poses, moved, correction / MM)
+
+
+def mark_display(visits: Visits, planned: Planned, reasons: Reasons) -> Bools:
+    """Mark targets whose value is known only at run time, (n,)."""
+    holds = ~np.isin(visits.target, NO_TARGET)
+    display = holds & ((visits.reason > 0) | (visits.literal < 0))
+    reasons.adopt(np.where(holds, visits.reason, 0), visits.reasons)
+    reasons.mark(display, "its numbers are not written in the program")
+    return display
+
+
+NO_TARGET = tuple(
+    t for t in Target if t not in (Target.POSE, Target.JOINTS, Target.NEAR)
+)
+
+
+def mark_unchanged(visits: Visits, reasons: Reasons, options: Options) -> Bools:
+    """Mark moves without a target, taught points and shared variables, (n,)."""
+    empty = np.isin(visits.target, NO_TARGET)
+    reasons.mark(empty, "this move holds no target")
+    has = visits.literal >= 0
+    literal = np.where(has, visits.literal, 0)
+    if len(visits.literals) == 0:
+        return empty
+    taught = has & visits.literals.taught[literal]
+    reasons.mark(taught, "a taught point already contains the arm's error")
+    return np.asarray(empty | taught)
+
+
+def guard_outside(reasons: Reasons, prediction: Prediction) -> None:
+    """Mark visits outside of what was surveyed."""
+    for text, rows in prediction.outside.items():
+        reasons.mark(rows, text)
+
+
+def mark_disagreement(
+    visits: Visits, agreement: Agreement, cell: Cell, reasons: Reasons
+) -> tuple[Bools, Bools]:
+    """Mark the visits of literals whose arrivals disagree.
+
+    Returns:
+        The literals that agree, (m,), and the visits that would be corrected if the
+        others at their literal agreed, (n,).
+    """
+    limit = cell.limits.agree_mm
+    has = agreement.group >= 0
+    apart = ~(agreement.spread_mm <= limit)
+    together = agreement.usable & ~apart
+    if len(together) == 0:
+        return together, np.zeros(len(visits), dtype=bool)
+    at = np.where(has, agreement.group, 0)
+    unsafe = reasons.none & has & ~together[at]
+    text = f"its arrivals differ by more than agree_mm = {limit:g} (see --clone)"
+    reasons.mark(unsafe & agreement.usable[at], text)
+    reasons.mark(unsafe, "another arrival at the same point cannot be corrected")
+    return together, unsafe
+
+
+def _run_mates(visits: Visits) -> Ints:
+    """Give the visit before within the same fly run, (n,), -1 where there is none."""
+    single = np.diff(visits.pred_start) == 1
+    first = visits.pred[np.minimum(visits.pred_start[:-1], len(visits.pred) - 1)]
+    before = np.where(single & (first >= 0), first, -1)
+    return np.where((before >= 0) & visits.fly[before], before, -1)

@@ -1,0 +1,77 @@
+"""A cell, a virtual arm and a model fitted to it, for tests of whole jobs."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from postproc.calibrate import fit
+from postproc.robot.cell import load_cell
+from postproc.virtual import (
+    measure_rows,
+    read_rows,
+    sample_survey,
+    virtual_arm,
+    write_measurements,
+)
+
+ROOT = Path(__file__).parents[1]
+SEED = 4
+POSES = 300
+
+CELL = """
+[robot]
+arm = "nj220-2.7"
+[tool]
+xyz_mm = [80.0, -40.0, 150.0]
+[uframe]
+xyz_mm = [1600.0, -300.0, 900.0]
+[home]
+joints_deg = [0.0, 0.0, -90.0, 0.0, 60.0, 0.0]
+[tracker]
+xyz_mm = [4000.0, -3000.0, 1500.0]
+[survey]
+points_mm = [[80.0, -40.0, 150.0], [-120.0, 60.0, 180.0], [30.0, 130.0, 320.0]]
+[aux]
+1 = "gun"
+"""
+
+
+@pytest.fixture(scope="session")
+def job_folder(tmp_path_factory):
+    """A folder with cell.toml and model.json of virtual arm SEED."""
+    folder = tmp_path_factory.mktemp("job")
+    (folder / "cell.toml").write_text(CELL)
+    cell = load_cell(folder / "cell.toml")
+    rows = folder / "rows.csv"
+    targets = sample_survey(virtual_arm(SEED), POSES, seed=SEED)
+    with rows.open("w") as out:
+        names = [f"q{j}_deg" for j in range(1, 7)]
+        sides = [f"lambda{j}" for j in range(1, 7)]
+        out.write(",".join(["id", *names, *sides, "tool_id"]) + "\n")
+        for i, (q, side) in enumerate(zip(targets.q, targets.side, strict=True)):
+            cells = [*np.degrees(q), *np.sign(side), i % 3]
+            out.write(f"{i + 1}," + ",".join(f"{c:.5f}" for c in cells) + "\n")
+    from postproc.simulate import setup_of
+
+    arm = virtual_arm(SEED)
+    campaign = measure_rows(arm, setup_of(cell), read_rows(rows))
+    write_measurements(campaign, folder / "survey.csv")
+    fit([folder / "survey.csv"], cell).model.save(folder / "model.json")
+    return folder
+
+
+@pytest.fixture(scope="session")
+def job_cell(job_folder):
+    """The cell of the job folder."""
+    return load_cell(job_folder / "cell.toml")
+
+
+@pytest.fixture(scope="session")
+def job_model(job_folder):
+    """The model of the job folder."""
+    from postproc.accuracy.model import load_model
+
+    return load_model(job_folder / "model.json")
