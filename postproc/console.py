@@ -1,0 +1,65 @@
+"""Tables for a terminal; the only module that imports rich."""
+
+from __future__ import annotations
+
+import io
+import sys
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import Literal, TextIO
+
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+PLAIN_WIDTH = 200  # of a table that goes to a file or a pipe
+
+
+@dataclass(frozen=True)
+class Column:
+    """A column: its title, and on which side its cells stand."""
+
+    title: str
+    justify: Literal["left", "right"] = "right"
+    fold: bool = False
+
+
+def print_table(
+    columns: Sequence[Column],
+    rows: Iterable[Sequence[str]],
+    out: TextIO | None = None,
+) -> None:
+    """Print an aligned table, coloured only on a terminal.
+
+    Args:
+        columns: Its columns.
+        rows: The texts of its cells; they are printed as they are, never as markup.
+        out: Where to; default: stdout.
+    """
+    out = out or sys.stdout
+    table = Table(box=None, pad_edge=False, header_style="bold")
+    for c in columns:
+        overflow: Literal["fold", "ellipsis"] = "fold" if c.fold else "ellipsis"
+        table.add_column(
+            c.title, justify=c.justify, no_wrap=not c.fold, overflow=overflow
+        )
+    for row in rows:
+        table.add_row(*(Text(printable(cell)) for cell in row))
+    width = None if out.isatty() else PLAIN_WIDTH
+    Console(file=out, width=width, highlight=False).print(table)
+
+
+def table_text(columns: Sequence[Column], rows: Iterable[Sequence[str]]) -> str:
+    """Return a table as text."""
+    out = io.StringIO()
+    print_table(columns, rows, out)
+    return "\n".join(line.rstrip() for line in out.getvalue().splitlines())
+
+
+def printable(text: str) -> str:
+    r"""Escape control characters, so that a name cannot steer the terminal.
+
+    >>> printable("a\x1b[31m")
+    'a\\x1b[31m'
+    """
+    return "".join(c if c.isprintable() else repr(c)[1:-1] for c in text)

@@ -1,0 +1,157 @@
+"""Why every target moves: where it is reached from, and what that costs."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from postproc.accuracy.model import Model, load_model
+from postproc.compensate import Options, compensate, name_files
+from postproc.console import Column, print_table
+from postproc.jobs import find_variables, read_bytes
+from postproc.language.visits import ELSEWHERE, START, Visits
+from postproc.planning import Planned, plan_visits, read_program
+from postproc.pose import MM
+from postproc.report import Outcome, Status, target_row
+from postproc.robot.cell import Cell, load_cell
+
+ARROWS = {1: "+", -1: "-", 0: "?"}
+COLUMNS = (
+    Column("line"),
+    Column("target", "left"),
+    Column("from", "left"),
+    Column("q [deg]"),
+    Column("lambda"),
+    Column("correction [mm]"),
+    Column("+- [mm]"),
+    Column("status, why", "left", fold=True),
+)
+
+
+@dataclass(frozen=True)
+class Explanation:
+    """A planned program, and what its compensation would do.
+
+    Attributes:
+        visits: Every arrival at a target.
+        planned: How the arm gets there.
+        outcome: The compensation, or None without a model.
+    """
+
+    visits: Visits
+    planned: Planned
+    outcome: Outcome | None
+
+    def to_json(self, line: int | None = None) -> str:
+        """Return one object per visit as JSON text."""
+        rows = [self.row(i) for i in self._chosen(line)]
+        return json.dumps({"visits": rows}, indent=1) + "\n"
+
+    def row(self, i: int) -> dict[str, object]:
+        """Describe visit i."""
+        plan, v = self.planned.plan, self.visits
+        if self.outcome is not None:
+            row = target_row(self.outcome, i)
+        else:
+            row = {
+                "line": int(v.line[i]),
+                "name": v.names[v.name[i]] or None,
+                "q_deg": _known(np.rad2deg(plan.q[i])),
+                "lambda": [int(s) for s in plan.direction[i]],
+                "why": self.planned.reasons[i],
+            }
+        travel = _known(np.rad2deg(plan.travel[i]))
+        return {**row, "from": self._from(i), "travel_deg": travel}
+
+    def print(self, line: int | None = None) -> None:
+        """Print a table, one row per visit."""
+        print_table(COLUMNS, (self._cells(i) for i in self._chosen(line)))
+
+    def _cells(self, i: int) -> list[str]:
+        """Write visit i as the cells of a table row."""
+        plan, v = self.planned.plan, self.visits
+        name = v.names[v.name[i]] or ("VIA" if v.via[i] else "inline")
+        sides = "".join(ARROWS[int(s)] for s in self._direction(i))
+        angles = " ".join(f"{q:8.3f}" for q in np.rad2deg(plan.q[i]))
+        cells = [str(v.line[i]), name, self._from(i), angles, sides]
+        if self.outcome is None:
+            return [*cells, "", "", self.planned.reasons[i]]
+        d = self.outcome.decisions
+        moved = " ".join(f"{c:7.3f}" for c in d.correction[i] / MM)
+        sure = " ".join(f"{s:5.3f}" for s in d.std_error[i] / MM)
+        status = Status(d.status[i]).name.lower()
+        why = d.reasons[d.why[i]]
+        return [*cells, moved, sure, f"{status}: {why}" if why else status]
+
+    def _direction(self, i: int) -> np.ndarray:
+        """Return the direction that visit i is compensated for."""
+        if self.outcome is None:
+            return np.asarray(self.planned.plan.direction[i])
+        return np.asarray(self.outcome.decisions.direction[i])
+
+    def _from(self, i: int) -> str:
+        """Name the lines that visit i is reached from."""
+        names = {START: "start", ELSEWHERE: "unknown"}
+        lines = self.visits.line
+        before = self.visits.predecessors(i)
+        told = [names.get(int(p)) or f"line {lines[p]}" for p in before]
+        return ", ".join(dict.fromkeys(told))
+
+    def _chosen(self, line: int | None) -> list[int]:
+        """Choose the visits to show."""
+        rows = np.arange(len(self.visits))
+        return [int(i) for i in rows if line is None or self.visits.line[i] == line]
+
+
+def _known(values: np.ndarray) -> list[float | None]:
+    """Round; what is not known becomes None."""
+    return [round(float(v), 5) if np.isfinite(v) else None for v in values]
+
+
+def explain(
+    files: dict[str, bytes],
+    cell: Cell,
+    model: Model | None,
+    temperature: float | None = None,
+) -> Explanation:
+    """Plan a program and, with a model, compensate it.
+
+    Raises:
+        PostprocError: The program, the cell or the model cannot be used.
+    """
+    reading = read_program(files, cell)
+    planned = plan_visits(reading.visits, cell)
+    outcome = None
+    if model is not None:
+        (name, source), *rest = files.items()
+        outcome = compensate(
+            source,
+            cell,
+            model,
+            name=name,
+            variables=rest[0][1] if rest else None,
+            options=Options(temperature=temperature),
+        )
+    return Explanation(reading.visits, planned, outcome)
+
+
+def explain_file(
+    program: Path,
+    cell: Path,
+    model: Path | None,
+    lsv: Path | None,
+    temperature: float | None,
+) -> Explanation:
+    """Explain a program on disk.
+
+    Raises:
+        PostprocError: A file cannot be read or used.
+    """
+    values = lsv or find_variables(program)
+    variables = None if values is None else read_bytes(values)
+    files = name_files(program.name, read_bytes(program), variables)
+    fitted = None if model is None else load_model(model)
+    return explain(files, load_cell(cell), fitted, temperature)

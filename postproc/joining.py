@@ -1,0 +1,93 @@
+"""Measured points of a program: which visit each of them belongs to."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from postproc.accuracy.measurement import COVARIATES, POSITION, Measurements
+from postproc.accuracy.table import read_table
+from postproc.exceptions import MeasurementError
+from postproc.jobs import find_variables, read_bytes
+from postproc.planning import plan_visits, read_program, states_of
+from postproc.pose import MM
+from postproc.robot.cell import Cell
+
+
+def join_program(data: Path, program: Path, cell: Cell) -> Measurements:
+    """Give measured points the planned states of the visits they were taken at.
+
+    A row belongs to the visit with its id in a MEASURE comment, else to the only visit
+    of the variable with that name.
+
+    Args:
+        data: Columns id, x_mm, y_mm, z_mm and any recorded covariate.
+        program: The program that ran.
+        cell: Its cell.
+
+    Raises:
+        MeasurementError: An id that the program does not have, or has several times.
+        ProgramError: The program cannot be read.
+    """
+    table = read_table(data)
+    table.require("id", *POSITION)
+    files = {program.name: read_bytes(program)}
+    values = find_variables(program)
+    if values is not None:
+        files[values.name] = read_bytes(values)
+    visits = read_program(files, cell).visits
+    planned = plan_visits(visits, cell)
+    places = _places(visits.measure_id, [visits.names[k] for k in visits.name])
+    ids = table.text("id")
+    rows = np.array([_row(places, i, table.path, line) for i, line in zip(
+        ids, table.line.tolist(), strict=True)], dtype=np.int64)  # fmt: skip
+    order = np.argsort(rows, kind="stable")
+    states = states_of(planned.plan, cell, cell.temperature)[rows[order]]
+    recorded = {
+        name: scale * table.numbers(column, empty=True)[order]
+        for column, (name, scale) in COVARIATES.items()
+        if table.has(column)
+    }
+    lost = np.isnan(states.q).any(axis=1)
+    if lost.any():
+        first = int(np.flatnonzero(lost)[0])
+        raise MeasurementError(
+            data,
+            f"the program's visit {ids[order[first]]} cannot be planned: "
+            f"{planned.reasons[int(rows[order][first])]}",
+            "Mend the program or leave the row out",
+            line=int(table.line[order][first]),
+        )
+    return Measurements(
+        path=table.path,
+        states=states.with_(**recorded),
+        position=table.block(POSITION)[order] * MM,
+        ids=tuple(ids[k] for k in order),
+        line=table.line[order],
+        inferred=np.zeros(len(rows), dtype=bool),
+        sha256=table.sha256,
+    )
+
+
+def _places(measured: tuple[str, ...], names: list[str]) -> dict[str, list[int]]:
+    """List the visits of every id, and of every variable name."""
+    places: dict[str, list[int]] = {}
+    for visit, (mark, name) in enumerate(zip(measured, names, strict=True)):
+        for key in {mark.lower(), name.lower()} - {""}:
+            places.setdefault(key, []).append(visit)
+    return places
+
+
+def _row(places: dict[str, list[int]], key: str, path: Path, line: int) -> int:
+    """Find the visit of an id."""
+    found = places.get(key.lower(), [])
+    if len(found) == 1:
+        return found[0]
+    problem = "has no visit" if not found else f"has {len(found)} visits"
+    raise MeasurementError(
+        path,
+        f"id {key} {problem} in the program",
+        "Mark the move with a comment -- MEASURE <id>",
+        line=line,
+    )

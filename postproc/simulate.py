@@ -1,0 +1,147 @@
+"""Let the virtual arm run a program or a survey, and measure it."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import numpy as np
+
+from postproc.jobs import find_variables, read_bytes
+from postproc.language.visits import Visits
+from postproc.planning import read_program
+from postproc.report import ErrorStatistics
+from postproc.robot.cell import Cell, load_cell
+from postproc.virtual import (
+    DEFAULT,
+    Campaign,
+    Setup,
+    VirtualArm,
+    campaign_length,
+    land,
+    measure_program,
+    measure_rows,
+    parse_effects,
+    read_rows,
+    virtual_arm,
+    write_measurements,
+)
+
+
+@dataclass(frozen=True)
+class Simulation:
+    """What the virtual arm did.
+
+    Attributes:
+        name: The program or survey.
+        campaign: What the tracker read.
+        true_error: Where the tool landed against the wanted program, or None.
+    """
+
+    name: str
+    campaign: Campaign
+    true_error: ErrorStatistics | None
+
+    def write(self, path: Path) -> None:
+        """Write the readings as a measurement file.
+
+        Raises:
+            OutputError: The place cannot be written to.
+        """
+        write_measurements(self.campaign, path)
+
+    def to_json(self) -> str:
+        """Return the true error as JSON text."""
+        error = None if self.true_error is None else asdict(self.true_error)
+        return json.dumps({"program": self.name, "true_error": error}) + "\n"
+
+    def summary(self) -> str:
+        """Say in one line what was measured or missed."""
+        if self.true_error is None:
+            return f"{self.name}: {len(self.campaign)} measurements"
+        e = self.true_error
+        return (
+            f"{self.name}: true error mean {e.mean_mm:.4f} mm, std {e.std_mm:.4f}, "
+            f"95 % {e.p95_mm:.4f}, max {e.max_mm:.4f} over {e.n} visits"
+        )
+
+
+def setup_of(cell: Cell) -> Setup:
+    """Tell the virtual arm about its cell in plain values."""
+    probes = np.tile(np.eye(4), (len(cell.probes), 1, 1))
+    probes[:, :3, 3] = cell.probes
+    given = {} if cell.tracker is None else {"tracker": cell.tracker}
+    if np.isfinite(cell.temperature):
+        given["temperature"] = cell.temperature
+    return Setup(
+        coupling=cell.arm.coupling,
+        tool=cell.tool.pose,
+        base=cell.base.pose,
+        uframe=cell.uframe.pose,
+        tools=probes,
+        home=cell.home,
+        payload=float(np.nan_to_num(cell.payload_mass)),
+        payload_com=cell.payload_com,
+        **given,
+    )
+
+
+def simulate_file(
+    program: Path,
+    cell_path: Path,
+    seed: int = 1,
+    effects: str | None = None,
+    wanted: Path | None = None,
+) -> Simulation:
+    """Run a program or a survey on the virtual arm.
+
+    Args:
+        program: A program (.pdl) or joint targets (.csv).
+        cell_path: The cell.
+        seed: Which virtual arm.
+        effects: Effects beyond geometry, tool and backlash, comma separated.
+        wanted: The program that says where the tool should have landed.
+
+    Raises:
+        PostprocError: A file cannot be used, or an effect is not known.
+    """
+    cell = load_cell(cell_path)
+    setup = setup_of(cell)
+    names = (*DEFAULT, *parse_effects(effects or ""))
+    if program.suffix.lower() == ".csv":
+        rows = read_rows(program)
+        arm = virtual_arm(
+            seed, names, coupling=setup.coupling, rows=len(rows.ids), tool=setup.tool
+        )
+        return Simulation(program.name, measure_rows(arm, setup, rows), None)
+    visits = visits_of(program, cell)
+    arm = virtual_arm(
+        seed,
+        names,
+        coupling=setup.coupling,
+        rows=campaign_length(visits),
+        tool=setup.tool,
+    )
+    campaign = measure_program(arm, setup, visits)
+    error = None if wanted is None else true_error(arm, setup, visits, wanted, cell)
+    return Simulation(program.name, campaign, error)
+
+
+def visits_of(program: Path, cell: Cell) -> Visits:
+    """Read a program, with the variable file beside it."""
+    files = {program.name: read_bytes(program)}
+    values = find_variables(program)
+    if values is not None:
+        files[values.name] = read_bytes(values)
+    return read_program(files, cell).visits
+
+
+def true_error(
+    arm: VirtualArm, setup: Setup, executed: Visits, wanted: Path, cell: Cell
+) -> ErrorStatistics:
+    """Compare where the tool landed with where the wanted program says."""
+    original = visits_of(wanted, cell)
+    landing = land(arm, setup, original, executed)
+    targets = original.literal[landing.visit] >= 0
+    return ErrorStatistics.of(landing.error[targets])

@@ -1,0 +1,102 @@
+"""Write a survey as a robot program."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from postproc.accuracy.survey import design_survey
+from postproc.exceptions import PostprocError
+from postproc.files import write_all
+from postproc.pose import MM
+from postproc.robot.cell import Cell, load_cell
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+BACK = np.deg2rad(2.0)  # how far to the side every approach starts [rad]
+SETTLE_MS = 1500  # pause before the tracker reads
+
+
+def survey_program(cell: Cell, q: Array, side: Array, probe: Ints, name: str) -> str:
+    """Write a survey: every pose is reached twice, with all joints from the other side.
+
+    Args:
+        cell: The cell; its probe points become the program's tools.
+        q: Joint angles of the poses, (n, 6) [rad].
+        side: Arrival direction of every joint in the first approach, (n, 6), +1 or -1.
+        probe: Index of the probe point that is measured, (n,).
+        name: Program name.
+
+    Returns:
+        The program text. The measurement ids are the pose number with a or b.
+    """
+    count = f"{len(q)} poses, each from both sides: {2 * len(q)} measurements"
+    lines = [
+        f"-- Laser-tracker survey of {cell.arm.name}: {count}",
+        "-- After a MEASURE comment: read the tracker when the next move has settled.",
+        f"PROGRAM {name} EZ, HOLD",
+        "BEGIN",
+        "  $TERM_TYPE := FINE",
+    ]
+    mounted = -1
+    for i in np.argsort(probe, kind="stable"):
+        if probe[i] != mounted:
+            mounted = int(probe[i])
+            lines.append(f"  -- probe point {mounted + 1}")
+            xyz = ", ".join(f"{v:.3f}" for v in cell.probes[mounted] / MM)
+            lines.append(f"  $TOOL := POS({xyz}, 0, 0, 0, '')")
+        for letter, sign in (("a", 1.0), ("b", -1.0)):
+            lines.append(f"  MOVE JOINT TO {_joints(q[i] - sign * BACK * side[i])}")
+            lines.append(f"  -- MEASURE {i + 1}{letter}")
+            lines.append(f"  MOVE JOINT TO {_joints(q[i])}")
+            lines.append(f"  DELAY {SETTLE_MS}")
+    return "\n".join([*lines, f"END {name}", ""])
+
+
+def _joints(q: Array) -> str:
+    """Write joint angles [rad] as a joint target."""
+    return "{" + ", ".join(f"{v:.5f}" for v in np.rad2deg(q)) + "}"
+
+
+def write_survey(
+    cell_path: Path,
+    output: Path,
+    poses: int,
+    mode: str = "lhs",
+    tracker: str | None = None,
+    seed: int = 0,
+) -> str:
+    """Design a survey and write it as a program.
+
+    Returns:
+        What was written, with the observability of the design, in words.
+
+    Raises:
+        PostprocError: A wrong mode, tracker position or number of poses.
+        OutputError: The program cannot be written.
+    """
+    cell = load_cell(cell_path)
+    stand = cell.tracker if tracker is None else _position(tracker)
+    design = design_survey(cell.arm, cell.probes, poses, mode, stand, seed)
+    name = "".join(c if c.isalnum() else "_" for c in output.stem) or "survey"
+    text = survey_program(cell, design.q, design.side, design.probe, name)
+    write_all({output: text.encode("ascii")})
+    return f"{output}: {design.summary()}"
+
+
+def _position(text: str) -> Array:
+    """Read x,y,z [mm] as a position [m].
+
+    Raises:
+        PostprocError: It is not three numbers.
+    """
+    try:
+        x, y, z = (float(v) for v in text.split(","))
+    except ValueError:
+        raise PostprocError(
+            f"--tracker {text}: not a position. Write x,y,z in mm"
+        ) from None
+    return np.array([x, y, z]) * MM
