@@ -111,7 +111,7 @@ def test_joint_angles_and_directions_agree(
     np.testing.assert_allclose(planned.q[same], ran.arrivals.q[row], atol=1e-7)
     direction, side = planned.direction[same], ran.arrivals.side[row]
     assert (direction[3:] != 0).mean() > 0.98
-    # What has just turned by less than one play is jitter, though a small gap is crossed.
+    # A turn by less than one play is jitter, even where it crosses a small gap.
     sure = (direction != 0) & (ran.arrivals.travel[row] > cell.arm.play)
     sure &= np.abs(side) == 1
     assert sure[3:].mean() > 0.96
