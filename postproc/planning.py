@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from postproc.language.diagnostic import Diagnostic
 from postproc.language.flow import Start, resolve
-from postproc.language.lsv import Variables
+from postproc.language.lsv import Variables, read_variables
 from postproc.language.source import Source, source_from_bytes
 from postproc.language.structure import parse
 from postproc.language.visits import Visits
@@ -93,9 +93,7 @@ def read_program(files: Mapping[str, bytes], cell: Cell) -> Reading:
     program = parse(sources[0])
     variables: Variables | None = None
     if len(sources) > 1:
-        from postproc.language.lsv import parse_variables
-
-        variables = parse_variables(sources[1])
+        variables = read_variables(sources[1])
     resolved = resolve(program, start_of(cell), variables)
     return Reading(sources, resolved.visits, resolved.diagnostics)
 

@@ -114,7 +114,8 @@ def propose(
 def solve_known(model: Model, cell: Cell, planned: Planned, states: States) -> Solution:
     """Solve the visits whose joint angles and pose are known; NaN elsewhere."""
     plan, n = planned.plan, len(states)
-    known = ~np.isnan(plan.q).any(axis=1) & ~np.isnan(plan.tcp).any(axis=(1, 2))
+    lost = np.isnan(plan.q).any(axis=1) | np.isnan(plan.tcp).any(axis=(1, 2))
+    known = np.asarray(~lost)
     part = solve(model, cell.arm, plan.tcp[known], plan.tool[known], states[known])
     q, command = np.full((n, 6), np.nan), np.full((n, 4, 4), np.nan)
     residual = np.full(n, np.nan)

@@ -32,7 +32,7 @@ class Reasons:
     @property
     def none(self) -> Bools:
         """Tell which visits have no reason yet, (n,)."""
-        return self.index == 0
+        return np.asarray(self.index == 0)
 
     def mark(self, rows: Bools, text: str) -> None:
         """Give visits a reason, unless they have one already.

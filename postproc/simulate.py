@@ -16,6 +16,7 @@ from postproc.robot.cell import Cell, load_cell
 from postproc.virtual import (
     DEFAULT,
     Campaign,
+    Planted,
     Setup,
     VirtualArm,
     campaign_length,
@@ -71,9 +72,8 @@ def setup_of(cell: Cell) -> Setup:
     """Tell the virtual arm about its cell in plain values."""
     probes = np.tile(np.eye(4), (len(cell.probes), 1, 1))
     probes[:, :3, 3] = cell.probes
-    given = {} if cell.tracker is None else {"tracker": cell.tracker}
-    if np.isfinite(cell.temperature):
-        given["temperature"] = cell.temperature
+    usual = Setup()
+    warm = cell.temperature
     return Setup(
         coupling=cell.arm.coupling,
         tool=cell.tool.pose,
@@ -83,7 +83,8 @@ def setup_of(cell: Cell) -> Setup:
         home=cell.home,
         payload=float(np.nan_to_num(cell.payload_mass)),
         payload_com=cell.payload_com,
-        **given,
+        temperature=warm if np.isfinite(warm) else usual.temperature,
+        tracker=usual.tracker if cell.tracker is None else cell.tracker,
     )
 
 
@@ -108,7 +109,7 @@ def simulate_file(
     """
     cell = load_cell(cell_path)
     setup = setup_of(cell)
-    names = (*DEFAULT, *parse_effects(effects or ""))
+    names: list[str | Planted] = [*DEFAULT, *parse_effects(effects or "")]
     if program.suffix.lower() == ".csv":
         rows = read_rows(program)
         arm = virtual_arm(

@@ -31,7 +31,7 @@ def guard_solutions(
             corrected pose has no solution.
     """
     with np.errstate(invalid="ignore"):
-        lost: Bools = np.isnan(solved).any(axis=1) & ~np.isnan(q).any(axis=1)
+        lost = np.asarray(np.isnan(solved).any(axis=1) & ~np.isnan(q).any(axis=1))
         reasons.mark(lost, "the corrected pose is out of reach on its branch")
         over = ~arm.within_limits(solved) & ~np.isnan(solved).any(axis=1)
         reasons.mark(over, "the corrected pose is beyond a joint limit")
