@@ -107,7 +107,7 @@ def report_fit(fit: Fit, survey: Measurements) -> FitReport:
         parameters=_table(fit, shares),
         shares=effects,
         correlated=_correlated(fit),
-        dropped=survey.dropped + _weighed_down(fit, survey),
+        dropped=survey.dropped + weighed_down(fit, survey),
         spared=tuple(survey.ids[i] for i in np.flatnonzero(fit.rows.spared)),
         unseen=observe(X, fit.combination.names, floor=1.0).unseen,
         before=Spread.of(fit.error[used]),
@@ -172,7 +172,7 @@ def _correlated(fit: Fit) -> tuple[tuple[str, str, float], ...]:
     return tuple((names[i], names[j], float(C[i, j])) for i, j in pairs)
 
 
-def _weighed_down(fit: Fit, survey: Measurements) -> tuple[DroppedRow, ...]:
+def weighed_down(fit: Fit, survey: Measurements) -> tuple[DroppedRow, ...]:
     """List the rows that count less than fully, and why."""
     out = []
     for i in np.flatnonzero(fit.rows.weight < 1.0):

@@ -1,0 +1,213 @@
+"""Close the loop: what a model leaves of fresh measurements, and why."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+from postproc.accuracy.batch import Batch
+from postproc.accuracy.diagnosis.findings import describe
+from postproc.accuracy.diagnosis.floor import multi_directional, noise_floor
+from postproc.accuracy.diagnosis.groups import Standing, stand
+from postproc.accuracy.diagnosis.omnibus import Leftover, leftovers
+from postproc.accuracy.diagnosis.outer import HeldOut, hold_out
+from postproc.accuracy.diagnosis.planning import (
+    poses_that_separate,
+    poses_that_sharpen,
+)
+from postproc.accuracy.diagnosis.projection import Projection
+from postproc.accuracy.diagnosis.result import (
+    Diagnosis,
+    Finding,
+    Place,
+    Verdict,
+    statistics,
+)
+from postproc.accuracy.diagnosis.search import Progress, Search, ranking, search
+from postproc.accuracy.effect import Array
+from postproc.accuracy.fit import Fit, fit_effects
+from postproc.accuracy.fit_report import Spread, weighed_down
+from postproc.accuracy.full import model_of
+from postproc.accuracy.measurement import Measurements
+from postproc.accuracy.model import Model
+from postproc.exceptions import PostprocError
+from postproc.pose import MM
+from postproc.robot.arm import Arm
+
+REMAINS = 0.01  # level at which structure is called structure: nothing was added
+STILL_REMAINS = 0.001  # ... after something was
+PLACES = 5
+
+
+@dataclass(frozen=True, eq=False)
+class Extension:
+    """A diagnosis with the model that follows from it.
+
+    Attributes:
+        diagnosis: What was found.
+        model: The given model, refitted to the rows, with what was found.
+        search: The search, for plots and further tests.
+        held_out: Errors on held-out rows.
+    """
+
+    diagnosis: Diagnosis
+    model: Model
+    search: Search
+    held_out: HeldOut
+
+
+def silent(message: str) -> None:
+    """Tell nobody."""
+
+
+def diagnose(
+    survey: Measurements,
+    arm: Arm,
+    model: Model,
+    *,
+    tracker: Array | None = None,
+    seed: int = 0,
+    progress: Progress = silent,
+) -> Extension:
+    """Find what a model lacks, and add it.
+
+    All parameters of the given model are refitted to the rows, so a model of another
+    day or another set-up may be given.
+
+    Args:
+        survey: Fresh measurements in the base frame, or those of the model itself.
+        arm: The arm.
+        model: The model, made by the full method.
+        tracker: Tracker position in the base frame, (3,) [m], if known.
+        seed: Of the bootstrap, the folds and the poses proposed.
+        progress: Told what is being done.
+
+    Raises:
+        PostprocError: A model that cannot be refitted.
+        ModelError: A model of another arm.
+    """
+    base = _refit(survey, arm, model, tracker)
+    found = search(base, seed, progress)
+    progress("groups that cannot be told apart")
+    standings = [stand(found, k) for k in range(len(found.additions))]
+    progress("what is left")
+    left = leftovers(Projection.of(found.fit), seed)
+    given = None
+    if model.data_sha256 != survey.sha256:
+        given = survey.position - base.batch.walk.tcp
+        given = given - model.measured_error(arm, survey.states)
+    held_out = hold_out(base, found.null, seed, progress, given)
+    diagnosis = _conclude(survey, found, standings, left, held_out, tracker, seed)
+    return Extension(
+        diagnosis, _extended(model, survey, found, diagnosis), found, held_out
+    )
+
+
+def _refit(survey: Measurements, arm: Arm, model: Model, tracker: Array | None) -> Fit:
+    """Fit the given model's effects to the rows.
+
+    Raises:
+        PostprocError: The model was not made by the full method.
+    """
+    model.check_arm(arm)
+    if model.method != "full":
+        raise PostprocError(
+            f"a model of method {model.method} has no named effects to extend. "
+            "Fit one with --method full and diagnose that"
+        )
+    effects = model.effects.effects
+    if model.data_sha256 != survey.sha256:
+        effects = tuple(e for e in effects if e.origin != "setup")
+    origin = None if tracker is None else (tracker[0], tracker[1], tracker[2])
+    return fit_effects(Batch(arm, survey.states), survey.position, effects, origin)
+
+
+def _conclude(
+    survey: Measurements,
+    found: Search,
+    standings: list[Standing],
+    left: tuple[Leftover, ...],
+    held_out: HeldOut,
+    tracker: Array | None,
+    seed: int,
+) -> Diagnosis:
+    """Put everything together."""
+    findings = describe(found, standings)
+    floor = noise_floor(found.fit, tracker is not None)
+    batch = Batch(found.fit.batch.arm, found.fit.batch.states[held_out.rows])
+    before = multi_directional(batch, held_out.before)
+    after = multi_directional(batch, held_out.after)
+    why, poses = _next(found, standings, seed)
+    return Diagnosis(
+        verdict=_verdict(findings, left),
+        noise_floor_mm=floor.size / MM,
+        noise_floor_source=floor.source,
+        n_fit=held_out.fitted,
+        n_held_out=len(held_out.rows),
+        before=Spread.of(held_out.before),
+        after=Spread.of(held_out.after),
+        vap_mm=None if before is None or after is None else (before / MM, after / MM),
+        findings=findings,
+        leftovers=left,
+        places=_places(found),
+        next_measurements=poses,
+        why_next=why,
+        dropped=weighed_down(found.fit, survey),
+    )
+
+
+def _verdict(findings: tuple[Finding, ...], left: tuple[Leftover, ...]) -> Verdict:
+    """Decide between an effect, noise, and structure without a name."""
+    p_value = min((x.p_value for x in left), default=1.0)
+    if not findings:
+        return "unexplained" if p_value < REMAINS else "noise"
+    nameless = any(f.effect == "curve" for f in findings)
+    return "unexplained" if nameless or p_value < STILL_REMAINS else "effect"
+
+
+def _places(found: Search) -> tuple[Place, ...]:
+    """Say where what is left lives, from the candidates that come closest."""
+    out = []
+    for score in ranking(Projection.of(found.fit))[:PLACES]:
+        family = score.family
+        joint = f"joint {family.joint}"
+        direction = family.effect if family.joint is None else joint
+        driver = family.driver or score.best.source
+        if family.effect == "curve" and family.joint is None:
+            driver, _, direction = driver.partition(" along ")
+        p_value = found.null.p_value(score.evidence)
+        out.append(Place(direction, driver, score.evidence, p_value))
+    return tuple(out)
+
+
+def _next(found: Search, standings: list[Standing], seed: int) -> tuple[str, Array]:
+    """Propose poses that separate the closest rivals, or sharpen the model."""
+    for number, standing in enumerate(standings):
+        if standing.confusable:
+            rival = standing.confusable[0]
+            own = found.additions[number].candidate.family
+            poses = poses_that_separate(found.fit, found.place(number), rival, seed)
+            return f"tell {own} from {rival.family}", poses
+    return "sharpen what the model knows worst", poses_that_sharpen(found.fit, seed)
+
+
+def _extended(
+    model: Model, survey: Measurements, found: Search, diagnosis: Diagnosis
+) -> Model:
+    """Write the extended model with the record of how it came about."""
+    record: dict[str, Any] = {
+        "parent": model.id,
+        "data_sha256": survey.sha256,
+        "added": [
+            {"effect": f.effect, "joint": f.joint, "source": f.source,
+             "p_value": f.p_value, "share": f.share}
+            for f in diagnosis.findings
+        ],
+        "verdict": diagnosis.verdict,
+        "n_fit": diagnosis.n_fit,
+        "n_held_out": diagnosis.n_held_out,
+        "before": statistics(diagnosis.before),
+        "after": statistics(diagnosis.after),
+    }  # fmt: skip
+    fitted = model_of(found.fit, survey)
+    return replace(fitted, parent=model.id, history=(*model.history, record))

@@ -1,0 +1,100 @@
+"""The noise floor: how large the error of one measured row is at best."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from postproc.accuracy.batch import Batch
+from postproc.accuracy.effect import Array
+from postproc.accuracy.fit import Fit
+from postproc.accuracy.noise import Noise
+
+SAME_POSE = 1e-5  # [rad] joint angles that are one pose
+ENOUGH = 5  # repeats beyond the first that give an estimate
+LENGTH = float(np.sqrt(8 / (3 * np.pi)))  # mean length over its root mean square
+ISO_RP = 3.615  # RP of ISO 9283 over the standard deviation per axis, round scatter
+
+
+@dataclass(frozen=True)
+class NoiseFloor:
+    """Mean length of the error that measuring and arriving make by themselves [m]."""
+
+    size: float
+    source: str
+
+
+def noise_floor(fit: Fit, tracker_known: bool) -> NoiseFloor:
+    """Take the noise floor from repeats, else from data sheets, else from the fit.
+
+    Args:
+        fit: A fit of the rows.
+        tracker_known: Whether the cell says where the tracker stands.
+    """
+    same = repeats(fit.batch)
+    count = sum(len(rows) - 1 for rows in same)
+    if count >= ENOUGH:
+        square = sum(
+            float(((fit.error[r] - fit.error[r].mean(axis=0)) ** 2).sum()) for r in same
+        )
+        size = LENGTH * float(np.sqrt(square / count))
+        return NoiseFloor(size, f"repeated poses ({count} repeats)")
+    if tracker_known:
+        sheet = Noise(1.0, 0.0, fit.noise.origin)
+        tracker = sheet.tracker_std(fit.batch.walk.tcp + fit.error)
+        arrival = fit.batch.arm.repeatability / ISO_RP
+        size = LENGTH * float(np.sqrt(3 * (arrival**2 + (tracker**2).mean())))
+        return NoiseFloor(size, "tracker and repeatability of the data sheets")
+    variance = fit.whitener.variance(fit.noise).sum(axis=1).mean()
+    return NoiseFloor(LENGTH * float(np.sqrt(variance)), "estimated from the rows")
+
+
+def repeats(batch: Batch) -> list[NDArray[np.int64]]:
+    """Group the rows that went to one pose in the same way."""
+    s = batch.states
+    key = np.column_stack(
+        [np.round(s.q / SAME_POSE), s.direction, s.tool_id, np.nan_to_num(s.payload)]
+    )
+    _, label = np.unique(key, axis=0, return_inverse=True)
+    return _several(label)
+
+
+def sides(batch: Batch) -> list[list[NDArray[np.int64]]]:
+    """Group the rows of one pose by the side that they came from, if several."""
+    s = batch.states
+    pose = np.column_stack([np.round(s.q / SAME_POSE), s.tool_id])
+    _, label = np.unique(pose, axis=0, return_inverse=True)
+    out = []
+    for rows in _several(label):
+        _, side = np.unique(s.direction[rows], axis=0, return_inverse=True)
+        side = side.reshape(-1)
+        if side.max() > 0:
+            out.append([rows[side == k] for k in range(int(side.max()) + 1)])
+    return out
+
+
+def _several(label: NDArray[np.int64]) -> list[NDArray[np.int64]]:
+    """List the rows of every label that has more than one."""
+    label = label.reshape(-1)
+    order = np.argsort(label, kind="stable")
+    cuts = np.flatnonzero(np.diff(label[order])) + 1
+    return [rows for rows in np.split(order, cuts) if len(rows) > 1]
+
+
+def multi_directional(batch: Batch, error: Array) -> float | None:
+    """Compute vAP, the multi-directional pose accuracy variation of ISO 9283 [m].
+
+    At every pose that is visited from several sides: the largest distance between the
+    mean positions of two sides. Returns the mean over the poses, or None.
+    """
+    poses = sides(batch)
+    if not poses:
+        return None
+    apart = []
+    for pose in poses:
+        centres = np.array([error[rows].mean(axis=0) for rows in pose])
+        gaps = np.linalg.norm(centres[:, None] - centres[None], axis=2)
+        apart.append(float(gaps.max()))
+    return float(np.mean(apart))
