@@ -8,7 +8,6 @@ from postproc.language import pdl2 as ast
 from postproc.language.evaluate import Target
 from postproc.language.machine import Here
 from postproc.language.values import COMPONENTS, Nothing, Position, Value
-from postproc.language.world import World
 
 _FRAMES = ("tool", "base", "uframe")
 
@@ -107,8 +106,3 @@ def _owned(here: Here, name: str, key: str, value: Position) -> Position:
     taught = value.taught or bool(declared and declared.taught)
     owner = value.name or here.world.written(key)
     return replace(value, name=owner, shared=shared, taught=taught)
-
-
-def initial_key(world: World, name: str) -> str:
-    """Return the name without indices and fields, in lower case."""
-    return name.lower().split("[")[0].split(".")[0]

@@ -30,6 +30,8 @@ def call_statement(machine: Machine, here: Here, call: ast.Call) -> bool:
         outside(here, call.name, call.arguments)
         return False
     if inside.body in machine.calls_in(here.context):
+        running = machine.calls_in(here.context)
+        machine.recursive |= {id(b) for b in running[running.index(inside.body) :]}
         _refuse_recursion(here, inside)
         return False
     _bind(here, inside, call.arguments)

@@ -13,7 +13,8 @@ from postproc.language.literals import Numbering, find_literals
 from postproc.language.machine import HERE, Key, Machine
 from postproc.language.setting_columns import SettingColumns
 from postproc.language.structure import Program
-from postproc.language.visits import Motion, Target, Visits
+from postproc.language.visits import ELSEWHERE, Motion, Target, Visits
+from postproc.language.world import base_variable
 
 Ints = NDArray[np.int64]
 
@@ -85,6 +86,7 @@ class Collector:
         self._position(at, arrival)
         c.reason[at] = self.reasons(
             arrival.reason
+            or self._recursion(arrival)
             or self.settings.problem(c.setting[at], arrival.target)
             or self._aux_problem(arrival)
         )
@@ -105,9 +107,14 @@ class Collector:
         lines = world.taught_lines[arrival.place.program.lines.source.name]
         inline = not position.name and int(c.line[at]) in lines
         name = position.name.lower()
-        listed = not world.start.taught.isdisjoint({name, name.split("[")[0]})
+        listed = not world.start.taught.isdisjoint({name, base_variable(name)})
         c.taught[at] = position.taught or inline or listed
         c.shared[at] = position.shared
+
+    def _recursion(self, record: Arrival | Run) -> str:
+        if id(record.place.body) not in self.machine.recursive:
+            return ""
+        return "it stands in a routine that calls itself, which is not followed"
 
     def _aux_problem(self, arrival: Arrival) -> str:
         kinds = self.machine.world.start.aux
@@ -173,7 +180,9 @@ class Collector:
             c.config[mine] = self.configs(config.value)
             c.config_given[mine] = True
         setting = self.settings.index(run.settings)
-        reason = run.reason or self.settings.problem(setting, target)
+        reason = (
+            run.reason or self._recursion(run) or self.settings.problem(setting, target)
+        )
         c.reason[mine] = self.reasons(reason)
         wrong = mine[~np.isfinite(c.values[mine]).all(axis=1)]
         c.target[wrong] = Target.UNKNOWN
@@ -284,7 +293,10 @@ def _predecessors(
     counts = np.ones(n, dtype=np.int64)
     sets: list[tuple[int, list[int]]] = []
     for at, (_, record) in zip(offsets.tolist(), ordered, strict=False):
-        origins = sorted(int(visit[p]) if p >= 0 else p for p in record.predecessors)
+        found = {int(visit[p]) if p >= 0 else p for p in record.predecessors}
+        if id(record.place.body) in machine.recursive:
+            found.add(ELSEWHERE)
+        origins = sorted(found)
         counts[at] = len(origins)
         sets.append((at, origins))
     start = np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)

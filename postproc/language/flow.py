@@ -6,22 +6,26 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
+from numpy.typing import NDArray
 
 from postproc.language import pdl2 as ast
 from postproc.language.arrivals import Run
 from postproc.language.calls import frame_value
 from postproc.language.collect import collect
 from postproc.language.diagnostic import Diagnostic
-from postproc.language.effects import Effects, rows_effects
+from postproc.language.effects import rows_effects
 from postproc.language.initial import fill_initial
 from postproc.language.lsv import Variables
 from postproc.language.machine import HANDLED, Here, Machine
 from postproc.language.steps import run_broken, step
 from postproc.language.store import Store
-from postproc.language.structure import Body, Program
+from postproc.language.structure import Program
 from postproc.language.values import Nothing
 from postproc.language.visits import ELSEWHERE, START, Visits
 from postproc.language.world import Place, Start, World
+
+Bools = NDArray[np.bool_]
+Ints = NDArray[np.int64]
 
 __all__ = ["Resolved", "Start", "resolve"]
 
@@ -122,32 +126,44 @@ def _moving_handler(machine: Machine, place: Place, row: int, store: Store) -> N
 
 @dataclass
 class _Runs:
-    """Rows that are moves to inline literals, and where stretches of them end."""
+    """Where stretches of moves to inline literals end.
 
-    known: dict[int, tuple[np.ndarray, np.ndarray]] = field(default_factory=dict)
+    A move without a trajectory word belongs to a stretch only where `$MOVE_TYPE` is
+    known; that is the second part of the keys.
+    """
 
-    def end(self, program: Program, body: Body, row: int) -> int:
+    simple: dict[tuple[int, bool], tuple[Bools, Ints]] = field(default_factory=dict)
+    joins: dict[int, Ints] = field(default_factory=dict)
+
+    def end(self, here: Here) -> int:
         """Return the row after the stretch that a row is in, the row itself if none."""
-        simple, stops = self.known.get(id(body)) or self._find(program, body)
+        settled = here.store.settings.get("move_type") in ("joint", "linear")
+        program, body, row = here.place.program, here.place.body, here.row
+        key = (id(program), settled)
+        if key not in self.simple:
+            flags = [is_simple(s, settled) for s in program.statements]
+            simple = np.array(flags, dtype=bool)[program.lines.shape]
+            self.simple[key] = simple, np.flatnonzero(~simple)
+        simple, others = self.simple[key]
         if not simple[row]:
             return row
-        return int(stops[np.searchsorted(stops, row, side="right")])
-
-    def _find(self, program: Program, body: Body) -> tuple[np.ndarray, np.ndarray]:
-        flags = np.array([is_simple(s) for s in program.statements], dtype=bool)
-        simple = flags[program.lines.shape]
-        stops = np.concatenate(
-            [np.flatnonzero(~simple), [*body.blocks.joins, body.last]]
-        )
-        self.known[id(body)] = simple, np.unique(stops)
-        return self.known[id(body)]
+        if id(body) not in self.joins:
+            self.joins[id(body)] = np.array(sorted(body.blocks.joins), dtype=np.int64)
+        joins = self.joins[id(body)]
+        return min(body.last, _next(others, row), _next(joins, row))
 
 
-def is_simple(statement: ast.Statement) -> bool:
+def _next(rows: Ints, row: int) -> int:
+    """Return the first of some rows after a row, a large number if there is none."""
+    at = int(np.searchsorted(rows, row, side="right"))
+    return int(rows[at]) if at < len(rows) else 1 << 62
+
+
+def is_simple(statement: ast.Statement, settled: bool) -> bool:
     """Tell whether a line is a move to six written numbers and nothing else."""
     if not isinstance(statement, ast.Move) or statement.how != "TO":
         return False
-    plain = statement.trajectory in ("", "JOINT", "LINEAR")
+    plain = statement.trajectory in ("JOINT", "LINEAR", "" if settled else "JOINT")
     if not plain or statement.arm or statement.via or statement.til:
         return False
     if statement.settings or statement.conditions:
@@ -174,8 +190,8 @@ def _run(machine: Machine, here: Here, runs: _Runs) -> None:
         if not first and here.row in joins:
             machine.push(here.context, here.row, here.store)
             return
-        end = runs.end(program, body, here.row)
-        if end > here.row and not machine.interrupted and _settled(here):
+        end = here.row if machine.interrupted else runs.end(here)
+        if end > here.row:
             _straight(machine, here, end)
         else:
             statement = program.statement(here.row)
@@ -187,12 +203,6 @@ def _run(machine: Machine, here: Here, runs: _Runs) -> None:
             here.row += 1
         first = False
     machine.leave(here)
-
-
-def _settled(here: Here) -> bool:
-    """Tell whether a move without a trajectory word has a known one."""
-    said = here.store.settings.get("move_type")
-    return said in ("joint", "linear")
 
 
 def _straight(machine: Machine, here: Here, end: int) -> None:
@@ -208,8 +218,3 @@ def _straight(machine: Machine, here: Here, end: int) -> None:
     base = machine.record(here, 0, run)
     here.store.last = frozenset({base + end - here.row - 1})
     here.row = end
-
-
-def handler_effects(program: Program, body: Body) -> list[Effects]:
-    """Return what each condition handler of a body may do."""
-    return [rows_effects(program, a, b) for a, b in body.blocks.handlers]

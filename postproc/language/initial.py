@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 
+from postproc.language.diagnostic import Diagnostic
 from postproc.language.evaluate import Point
 from postproc.language.lsv import Entry, Variables
 from postproc.language.store import Store
 from postproc.language.structure import Body, Program
-from postproc.language.values import Nothing, Position, Value
-from postproc.language.world import Place, World
+from postproc.language.values import Nothing, Position, Value, Vector
+from postproc.language.world import Place, World, base_variable
 
+_WORD = re.compile(r"[A-Za-z_]\w*")
 _POSITIONS = ("POS", "XTND", "JNTP")
 
 
@@ -24,6 +27,42 @@ def fill_initial(world: World) -> None:
         place = Place(world.main, world.main.main)
         for entry in world.variables.entries.values():
             _entered(world, place, world.variables, entry)
+        _report_drift(world, place, world.variables)
+
+
+def _report_drift(world: World, place: Place, file: Variables) -> None:
+    """Say where a program and its variable file have drifted apart."""
+    for found in file.diagnostics:
+        world.diagnostics[found] = None
+    words = {
+        word.lower()
+        for mask in place.program.lines.shapes
+        for word in _WORD.findall(mask)
+    }
+    names = {base_variable(entry.name): entry.name for entry in file.entries.values()}
+    unused = [written for name, written in names.items() if name not in words]
+    undeclared = [
+        written
+        for name, written in names.items()
+        if name in words and world.declared(place, name) is None
+    ]
+    if names and len(unused) == len(names):
+        _say(world, file, "lsv-other-program", "none of its variables is used by "
+             f"{place.program.name}: is it the file of another program?")  # fmt: skip
+    elif unused:
+        _say(world, file, "lsv-unused", f"never used: {_some(unused)}")
+    if undeclared:
+        text = f"used by the program, but not declared there: {_some(undeclared)}"
+        _say(world, file, "lsv-undeclared", text)
+
+
+def _say(world: World, file: Variables, code: str, text: str) -> None:
+    world.diagnostics[Diagnostic(file.source.name, 1, code, text)] = None
+
+
+def _some(names: list[str]) -> str:
+    rest = f" and {len(names) - 10} more" if len(names) > 10 else ""
+    return ", ".join(names[:10]) + rest
 
 
 def _declared(world: World, program: Program, body: Body) -> None:
@@ -47,9 +86,9 @@ def _declared(world: World, program: Program, body: Body) -> None:
 
 def _entered(world: World, place: Place, file: Variables, entry: Entry) -> None:
     name = entry.name.lower()
-    at = min((i for i in map(name.find, "[.") if i > 0), default=len(name))
-    key = world.root(place, name[:at]) + name[at:]
-    declared = world.declared(place, name[:at])
+    root = base_variable(name)
+    key = world.root(place, root) + name[len(root) :]
+    declared = world.declared(place, root)
     base = world.slot_base[file.source.name]
     value: Value | None = entry.numbers[0] if entry.numbers else None
     if entry.kind in _POSITIONS:
@@ -63,6 +102,9 @@ def _entered(world: World, place: Place, file: Variables, entry: Entry) -> None:
             taught=bool(declared and declared.taught),
             shared=entry.shared or bool(declared and declared.exported),
         )
+    if entry.kind == "VEC":
+        x, y, z = entry.numbers[:3]
+        value = Vector((x, y, z))
     if entry.arm not in (0, world.arm):
         value = Nothing(f"its value is one of arm {entry.arm}")
     if isinstance(value, Position) and not value.complete:

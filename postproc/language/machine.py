@@ -51,6 +51,7 @@ class Machine:
         entries: The store of each configuration.
         ranges: (first, step, rounds) of constant loops, by context and row.
         widened: Loops that are not unrolled.
+        recursive: Bodies (by id) that call themselves, directly or not.
         interrupted: A condition handler may move the arm at any time.
         exhausted: The program is too complex to be followed to the end.
     """
@@ -65,6 +66,7 @@ class Machine:
     )
     widened: set[tuple[Context, int]] = field(default_factory=set)
     volatile: frozenset[str] = frozenset()
+    recursive: set[int] = field(default_factory=set)
     interrupted: bool = False
     exhausted: bool = False
     rows: int = 0
@@ -122,6 +124,15 @@ class Machine:
             at = self.position(self.places[context].program, row)
             heapq.heappush(self._heap, ((*context, (at, HERE)), config))
 
+    def go_on(self, context: Context, row: int, store: Store) -> None:
+        """Go on with a row as the one after the last: ELSE and CASE end a branch."""
+        place = self.places[context]
+        if row < place.body.last:
+            statement = place.program.statement(row)
+            if isinstance(statement, ast.Case | ast.Else):
+                row = place.body.blocks.end.get(row, row)
+        self.push(context, row, store)
+
     def _inside(self, context: Context, row: int) -> Context:
         """Drop the rounds of loops that a jump to a row leaves."""
         place = self.places[context]
@@ -169,7 +180,7 @@ class Machine:
             _forget_locals(here)
             caller = self.places[context[:-1]]
             row = context[-1][0] - self._offsets[id(caller.program)]
-            self.push(context[:-1], row + 1, here.store)
+            self.go_on(context[:-1], row + 1, here.store)
 
     def call(self, here: Here, place: Place) -> None:
         """Go into a routine; it comes back to the row after this one."""

@@ -203,7 +203,22 @@ def _absolute(here: Here, expression: ast.Expression) -> _Goal:
             target = Target.HOME if name == "home" else Target.CALIBRATION
             return _Goal(target, reason=_why(f"${name.upper()}"))
         return _from_value(held or Nothing(f"${name} is a system variable"), True)
+    if isinstance(expression, ast.Reference):
+        _check_declared(here, expression.name)
     return _from_value(here.value(expression), False)
+
+
+def _check_declared(here: Here, name: str) -> None:
+    if here.world.type_of(here.place, name) is None:
+        if here.world.declared(here.place, name) is not None:
+            return
+        here.world.report_once(
+            here.place.program,
+            here.row,
+            "undeclared-variable",
+            name,
+            f"{name} is used and not declared",
+        )
 
 
 def _from_value(value: Value, system: bool) -> _Goal:

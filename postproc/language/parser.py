@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from functools import cache, lru_cache
+from itertools import count
 from pathlib import Path
 
 import lark
 
 from postproc.language import pdl2 as ast
-from postproc.language.build import RULES, Mark
+from postproc.language.build import RULES, Mark, Rule
+from postproc.language.entered import VALUE_RULES, Entered
 
 _PACKAGE = Path(__file__).resolve().parent.parent
 _NUMBERED_NAME = re.compile(
@@ -17,6 +20,7 @@ _NUMBERED_NAME = re.compile(
     r"|(?<![\w$])(?P<name>[A-Za-z_]\w*\d\w*)(?!\w)(?!\s*::)"
 )
 _NAME_MARK = "\x01"
+_FAILED = object()
 
 
 def grammar(name: str) -> str:
@@ -53,6 +57,20 @@ def parse_line(mask: str) -> ast.Statement:
     Returns:
         Its statement, or `Unknown` where the grammar knows none.
     """
+    found = _parse("pdl2", mask, RULES)
+    if found is _FAILED:
+        return ast.Unknown(mask)
+    return found if isinstance(found, ast.Statement) else ast.Statement()
+
+
+def parse_value_line(mask: str) -> Entered | None:
+    """Parse the mask of one line of a variable file, None where it is none."""
+    found = _parse("lsv", mask, VALUE_RULES)
+    return found if isinstance(found, Entered) else None
+
+
+def _parse(name: str, mask: str, rules: Mapping[str, Rule]) -> object:
+    """Parse a mask and build what it says, _FAILED where the grammar has no rule."""
     names: list[str] = []
 
     def mark(found: re.Match[str]) -> str:
@@ -61,29 +79,31 @@ def parse_line(mask: str) -> ast.Statement:
         names.append(found["name"])
         return _NAME_MARK
 
-    tree = None
-    if _NAME_MARK not in mask:
-        tree = _tree(_NUMBERED_NAME.sub(mark, mask))
+    if _NAME_MARK in mask:
+        return _FAILED
+    tree = _tree(name, _NUMBERED_NAME.sub(mark, mask))
     if tree is None:
-        return ast.Unknown(mask)
+        return _FAILED
     try:
-        return _build(tree, names)
+        return _build(tree, names, rules)
     except RecursionError:  # hundreds of nested parentheses: no program has them
-        return ast.Unknown(mask)
+        return _FAILED
 
 
 @lru_cache(maxsize=8192)
-def _tree(form: str) -> lark.Tree[lark.Token] | None:
+def _tree(name: str, form: str) -> lark.Tree[lark.Token] | None:
     try:
-        return line_parser("pdl2", "line").parse(form)
+        return line_parser(name, "line").parse(form)
     except lark.exceptions.LarkError:
         return None
 
 
-def _build(tree: lark.Tree[lark.Token], names: list[str]) -> ast.Statement:
-    """Build the statement of a tree, stamping names and counting numbers."""
+def _build(
+    tree: lark.Tree[lark.Token], names: list[str], rules: Mapping[str, Rule]
+) -> object:
+    """Build what a tree says, stamping names and counting numbers."""
     waiting = iter(names)
-    slots = iter(range(len(names) + _count_numbers(tree)))
+    slots = count()
 
     def walk(node: lark.Tree[lark.Token] | lark.Token) -> object:
         if isinstance(node, lark.Token):
@@ -91,11 +111,6 @@ def _build(tree: lark.Tree[lark.Token], names: list[str]) -> ast.Statement:
                 return ast.Number(next(slots))
             text = next(waiting) if node == _NAME_MARK else str(node)
             return Mark(text, node.type)
-        return RULES[str(node.data)]([walk(child) for child in node.children])
+        return rules[str(node.data)]([walk(child) for child in node.children])
 
-    statement = walk(tree)
-    return statement if isinstance(statement, ast.Statement) else ast.Statement()
-
-
-def _count_numbers(tree: lark.Tree[lark.Token]) -> int:
-    return sum(1 for _ in tree.scan_values(lambda token: token.type == "NUMBER"))
+    return walk(tree)

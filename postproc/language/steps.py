@@ -65,7 +65,7 @@ def _control(machine: Machine, here: Here, statement: ast.Statement) -> bool:
         case ast.If(condition):
             inner = blocks.inner[row]
             otherwise = inner[0] if inner else blocks.end[row]
-            return _branch(machine, here, condition, row + 1, otherwise)
+            return _branch(machine, here, condition, row + 1, otherwise, True)
         case ast.While(condition):
             return _branch(machine, here, condition, row + 1, blocks.end[row] + 1)
         case ast.Until(condition):
@@ -85,7 +85,7 @@ def _control(machine: Machine, here: Here, statement: ast.Statement) -> bool:
         case ast.Return():
             machine.leave(here, by_return=True)
         case ast.Condition():
-            machine.push(here.context, blocks.end[row] + 1, here.store)
+            machine.go_on(here.context, blocks.end[row] + 1, here.store)
         case ast.EndCondition():
             pass
         case _:
@@ -99,13 +99,15 @@ def _branch(
     condition: ast.Expression | None,
     then: int,
     otherwise: int,
+    enters: bool = False,
 ) -> bool:
-    """Go both ways, or the one that is known."""
+    """Go both ways, or the one that is known; `otherwise` may enter an ELSE."""
     truth = here.value(condition) if condition is not None else None
     if truth is not True:
-        machine.push(here.context, otherwise, here.store)
+        go = machine.push if enters else machine.go_on
+        go(here.context, otherwise, here.store)
     if truth is not False:
-        machine.push(here.context, then, here.store)
+        machine.go_on(here.context, then, here.store)
     return False
 
 
@@ -152,7 +154,7 @@ def _for(machine: Machine, here: Here, statement: ast.For) -> None:
             rounds = max(int((stop - start) / by + 1e-9) + 1, 0)
             rounds = 0 if (stop - start) / by < 0 else rounds
     if rounds == 0:
-        machine.push(here.context, end + 1, here.store)
+        machine.go_on(here.context, end + 1, here.store)
         return
     loop = (here.context, row)
     if rounds is not None and _unrolled(machine, here, statement, rounds, end):
@@ -163,7 +165,7 @@ def _for(machine: Machine, here: Here, statement: ast.For) -> None:
     machine.widened.add(loop)
     forget(here, ast.Reference(statement.name), "it counts a loop")
     if rounds is None:
-        machine.push(here.context, end + 1, here.store)
+        machine.go_on(here.context, end + 1, here.store)
     machine.push(here.context, row + 1, here.store)
 
 
@@ -212,7 +214,7 @@ def _round(
     if isinstance(statement, ast.For):
         key = here.locate(ast.Reference(statement.name)).key
         here.store.write(key, first + number * by)
-    machine.push(inner, row + 1, here.store)
+    machine.go_on(inner, row + 1, here.store)
 
 
 def _end_for(machine: Machine, here: Here) -> None:
@@ -232,7 +234,7 @@ def _end_for(machine: Machine, here: Here) -> None:
         forget(here, ast.Reference(name), "it counts a loop")
         machine.push(here.context, row + 1, here.store)
     forget(here, ast.Reference(name), "it counted a loop that has ended")
-    machine.push(here.context, here.row + 1, here.store)
+    machine.go_on(here.context, here.row + 1, here.store)
 
 
 def _unknown(machine: Machine, here: Here, statement: ast.Unknown) -> None:

@@ -133,9 +133,9 @@ class World:
         """Return how a variable or element is written."""
         if key in self.spelling:
             return self.spelling[key]
-        at = min((i for i in map(key.find, "[.") if i > 0), default=len(key))
-        root = self.spelling.get(key[:at], key[:at].split("/", 1)[-1])
-        return root + key[at:]
+        root = base_variable(key)
+        written = self.spelling.get(root, root.split("/", 1)[-1])
+        return written + key[len(root) :]
 
     def type_of(self, place: Place, name: str) -> ast.Type | None:
         """Return the declared type of a name."""
@@ -156,6 +156,15 @@ class World:
             if other is not None and name in other.routines:
                 return Place(other, other.routines[name])
         return None
+
+
+def base_variable(name: str) -> str:
+    """Return a variable's name without indices and fields, in lower case.
+
+    >>> base_variable("Tab[3].place")
+    'tab'
+    """
+    return name.lower().split("[", 1)[0].split(".", 1)[0]
 
 
 def base_name(file: str) -> str:
