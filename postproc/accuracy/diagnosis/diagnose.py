@@ -23,6 +23,13 @@ from postproc.accuracy.diagnosis.result import (
     Verdict,
     statistics,
 )
+from postproc.accuracy.diagnosis.revision import (
+    Revision,
+    few,
+    fold_back,
+    only_arm,
+    revise,
+)
 from postproc.accuracy.diagnosis.search import Progress, Search, ranking, search
 from postproc.accuracy.effect import Array
 from postproc.accuracy.fit import Fit, fit_effects
@@ -37,6 +44,7 @@ from postproc.robot.arm import Arm
 REMAINS = 0.01  # level at which structure is called structure: nothing was added
 STILL_REMAINS = 0.001  # ... after something was
 PLACES = 5
+FEWEST = 12  # rows
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,7 +80,8 @@ def diagnose(
     """Find what a model lacks, and add it.
 
     All parameters of the given model are refitted to the rows, so a model of another
-    day or another set-up may be given.
+    day or another set-up may be given; where the rows are too few for that, its own
+    covariance says how far they may move.
 
     Args:
         survey: Fresh measurements in the base frame, or those of the model itself.
@@ -94,8 +103,7 @@ def diagnose(
     left = leftovers(Projection.of(found.fit), seed)
     given = None
     if model.data_sha256 != survey.sha256:
-        given = survey.position - base.batch.walk.tcp
-        given = given - model.measured_error(arm, survey.states)
+        given = survey.position - base.batch.walk.tcp - model.error(arm, survey.states)
     held_out = hold_out(base, found.null, seed, progress, given)
     diagnosis = _conclude(survey, found, standings, left, held_out, tracker, seed)
     return Extension(
@@ -104,10 +112,11 @@ def diagnose(
 
 
 def _refit(survey: Measurements, arm: Arm, model: Model, tracker: Array | None) -> Fit:
-    """Fit the given model's effects to the rows.
+    """Fit the given model's effects to the rows, or revise it where they are few.
 
     Raises:
-        PostprocError: The model was not made by the full method.
+        PostprocError: The model was not made by the full method, or there are hardly
+            any rows.
     """
     model.check_arm(arm)
     if model.method != "full":
@@ -115,11 +124,19 @@ def _refit(survey: Measurements, arm: Arm, model: Model, tracker: Array | None) 
             f"a model of method {model.method} has no named effects to extend. "
             "Fit one with --method full and diagnose that"
         )
+    if len(survey) < FEWEST:
+        raise PostprocError(
+            f"{survey.path} has {len(survey)} rows; tracing an effect takes at least "
+            f"{FEWEST}. Measure more points"
+        )
+    origin = None if tracker is None else (tracker[0], tracker[1], tracker[2])
+    batch = Batch(arm, survey.states)
     effects = model.effects.effects
     if model.data_sha256 != survey.sha256:
-        effects = tuple(e for e in effects if e.origin != "setup")
-    origin = None if tracker is None else (tracker[0], tracker[1], tracker[2])
-    return fit_effects(Batch(arm, survey.states), survey.position, effects, origin)
+        if few(survey, model):
+            return revise(survey, model, batch, origin)
+        effects = only_arm(model).effects.effects
+    return fit_effects(batch, survey.position, effects, origin)
 
 
 def _conclude(
@@ -209,5 +226,7 @@ def _extended(
         "before": statistics(diagnosis.before),
         "after": statistics(diagnosis.after),
     }  # fmt: skip
-    fitted = model_of(found.fit, survey)
+    fit = found.fit
+    revised = any(isinstance(e, Revision) for e in fit.combination.effects)
+    fitted = model_of(fold_back(fit) if revised else fit, survey)
     return replace(fitted, parent=model.id, history=(*model.history, record))

@@ -1,0 +1,226 @@
+"""Diagnosing files: what is read, written and told."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from postproc.accuracy.diagnosis.diagnose import Extension, diagnose, silent
+from postproc.accuracy.diagnosis.result import Diagnosis
+from postproc.accuracy.diagnosis.search import Progress
+from postproc.accuracy.fit_report import Spread
+from postproc.accuracy.measurement import Measurements, concatenate
+from postproc.accuracy.model import Model, load_model
+from postproc.accuracy.registration import register
+from postproc.calibrate import read_surveys
+from postproc.console import Column, table_text
+from postproc.joining import join_program
+from postproc.pose import inverse
+from postproc.robot.cell import Cell, load_cell
+
+Array = NDArray[np.float64]
+
+HISTORY = (
+    Column("model", "left"),
+    Column("verdict", "left"),
+    Column("added", "left", fold=True),
+    Column("before mm"),
+    Column("after mm"),
+    Column("rows"),
+    Column("data", "left"),
+)
+FINDINGS = (
+    Column("effect", "left"),
+    Column("joint"),
+    Column("by", "left"),
+    Column("p"),
+    Column("share"),
+    Column("peak mm"),
+    Column("or just as well", "left"),
+)
+
+
+def diagnose_files(
+    data: Sequence[Path],
+    cell_path: Path,
+    model_path: Path,
+    *,
+    output: Path | None = None,
+    program: Path | None = None,
+    measured_frame: str = "base",
+    seed: int = 0,
+    progress: Progress = silent,
+) -> Extension:
+    """Diagnose measurement files with a model, and write the extended model.
+
+    Args:
+        data: Measurement files.
+        cell_path: The cell.
+        model_path: The model that may lack something.
+        output: The extended model's file; default: beside the given one.
+        program: The program whose points were measured, compensated or not.
+        measured_frame: "base", "uframe" or "tracker": what positions are given in.
+        seed: Of the bootstrap.
+        progress: Told what is being done.
+
+    Raises:
+        PostprocError: A file cannot be used, or the model cannot be extended.
+    """
+    cell, model = load_cell(cell_path), load_model(model_path)
+    model.check_arm(cell.arm, model_path)
+    if program is None:
+        survey = read_surveys(data, cell)
+    else:
+        survey = concatenate([join_program(path, program, cell) for path in data])
+    survey = in_base_frame(survey, cell, model, measured_frame)
+    found = diagnose(
+        survey, cell.arm, model, tracker=cell.tracker, seed=seed, progress=progress
+    )
+    found.model.save(output or extended_path(model_path))
+    return found
+
+
+def extended_path(model_path: Path) -> Path:
+    """Name the extended model's file when nobody did."""
+    return model_path.with_name(f"{model_path.stem}.extended.json")
+
+
+def in_base_frame(
+    survey: Measurements, cell: Cell, model: Model, frame: str
+) -> Measurements:
+    """Convert positions to the arm's base frame.
+
+    Args:
+        survey: Measurements.
+        cell: Gives base and user frame.
+        model: Gives the arm's errors when the tracker must be registered first.
+        frame: "base", "uframe" or "tracker".
+    """
+    if frame == "base":
+        return survey
+    if frame == "uframe":
+        T = inverse(cell.base.pose) @ cell.uframe.pose
+        return replace(survey, position=survey.position @ T[:3, :3].T + T[:3, 3])
+    effects, values, _ = model.compensable()
+    placed = register(cell.arm, survey.states, survey.position, effects, values)
+    return replace(survey, position=placed.to_base(survey.position))
+
+
+def tell(found: Diagnosis) -> str:
+    """Write a diagnosis for a terminal."""
+    lines = [f"verdict: {found.verdict}"]
+    if found.findings:
+        lines.append(table_text(FINDINGS, (_row(found, k) for k in _numbers(found))))
+    lines += [_constants(found, k) for k in _numbers(found)]
+    lines += [
+        f"before {_spread(found.before)}",
+        f"after  {_spread(found.after)}",
+        f"on {found.n_held_out} rows that chose and fitted nothing; noise floor "
+        f"{found.noise_floor_mm:.4f} mm ({found.noise_floor_source})",
+    ]
+    if found.vap_mm is not None:
+        lines.append(f"vAP {found.vap_mm[0]:.4f} -> {found.vap_mm[1]:.4f} mm")
+    if found.verdict == "unexplained":
+        lines += _unexplained(found)
+    lines += [f"row {d.id} (line {d.line}): {d.why}" for d in found.dropped]
+    lines.append(f"measure next, to {found.why_next} (q1..q6 deg):")
+    lines += [
+        "  " + " ".join(f"{x:9.3f}" for x in np.degrees(q))
+        for q in found.next_measurements
+    ]
+    return "\n".join(lines)
+
+
+def _numbers(found: Diagnosis) -> range:
+    return range(len(found.findings))
+
+
+def _row(found: Diagnosis, number: int) -> tuple[str, ...]:
+    f = found.findings[number]
+    others = ", ".join(
+        effect + (f" {joint}" if joint else "") for effect, joint in f.confusable_with
+    )
+    return (
+        f.effect, str(f.joint or ""), f.source or "", f"{f.p_value:.1e}",
+        f"{f.share:.0%}", f"{f.peak_mm:.3f}", others,
+    )  # fmt: skip
+
+
+def _constants(found: Diagnosis, number: int) -> str:
+    """Write the parameters of a finding in one line, the clearest ones."""
+    f = found.findings[number]
+    clear = [
+        f"{name} = {value:.4g}" + (f" +- {error:.2g}" if error else "") + f" {unit}"
+        for name, (value, error, unit) in f.parameters.items()
+        if abs(value) > 2 * error
+    ]
+    return f"{f.effect}: " + (", ".join(clear[:8]) or "no parameter stands out")
+
+
+def _spread(spread: Spread) -> str:
+    return (
+        f"mean {spread.mean_mm:.4f} mm, std {spread.std_mm:.4f}, 95 % "
+        f"{spread.p95_mm:.4f}, max {spread.max_mm:.4f}"
+    )
+
+
+def _unexplained(found: Diagnosis) -> list[str]:
+    """Say what shows the structure, and where it lives."""
+    lines = [
+        f"still there: {x.what} (p = {x.p_value:.2g})" for x in found.leftovers[:2]
+    ]
+    lines += [
+        f"closest: {p.direction} by {p.driver} ({p.evidence:.1f} nats, "
+        f"p = {p.p_value:.2g})"
+        for p in found.places[:2]
+    ]
+    return lines
+
+
+def history_text(model_path: Path) -> str:
+    """Write the chain of models that led to a model, oldest first.
+
+    Raises:
+        ModelError: The file cannot be used.
+    """
+    model = load_model(model_path)
+    ids = [*(str(r.get("parent", "")) for r in model.history[1:]), model.id]
+    rows = []
+    if not model.history:
+        rows.append((model.id, "fitted", _named(model), "", "", str(model.rows), ""))
+    else:
+        first = str(model.history[0].get("parent", ""))
+        rows.append((first, "given", "", "", "", "", ""))
+    for made, record in zip(ids, model.history, strict=True):
+        added = "; ".join(_added(a) for a in record["added"]) or "nothing"
+        rows.append(
+            (
+                made, str(record["verdict"]), added,
+                f"{record['before']['mean_mm']:.4f}",
+                f"{record['after']['mean_mm']:.4f}",
+                str(record["n_held_out"]), str(record["data_sha256"])[:12],
+            )
+        )  # fmt: skip
+    return table_text(HISTORY, rows)
+
+
+def _named(model: Model) -> str:
+    return ", ".join(e.name for e in model.effects.effects)
+
+
+def _added(entry: dict[str, object]) -> str:
+    """Write one added effect of the history."""
+    where = f" of joint {entry['joint']}" if entry.get("joint") else ""
+    by = f" by {entry['source']}" if entry.get("source") else ""
+    return f"{entry['effect']}{where}{by}, p = {float(str(entry['p_value'])):.1e}"
+
+
+def history_json(model_path: Path) -> str:
+    """Return the chain as JSON."""
+    model = load_model(model_path)
+    return json.dumps({"id": model.id, "history": list(model.history)}, indent=1)
