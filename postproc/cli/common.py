@@ -1,0 +1,79 @@
+"""What all commands share: options, messages, and how errors end."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from postproc.exceptions import PostprocError
+
+app = typer.Typer(
+    no_args_is_help=True,
+    rich_markup_mode=None,
+    pretty_exceptions_enable=False,
+    help="Compensate robot programs with a model learned from laser-tracker data.",
+)
+
+CellOption = Annotated[Path, typer.Option("--cell", help="Cell file (TOML).")]
+ModelOption = Annotated[Path, typer.Option("--model", help="Model file (JSON).")]
+SeedOption = Annotated[int, typer.Option("--seed", help="Seed of every random draw.")]
+
+
+JsonOption = Annotated[
+    str | None, typer.Option("--json", help="Write JSON to a file, - for stdout.")
+]
+LsvOption = Annotated[
+    Path | None, typer.Option("--lsv", help="Variable file, default PROGRAM.lsv.")
+]
+HtmlOption = Annotated[
+    Path | None, typer.Option("--html", help="Write a report (HTML) here.")
+]
+TemperatureOption = Annotated[
+    float | None, typer.Option("--temperature", help="Arm temperature [deg C].")
+]
+
+
+def say(text: str) -> None:
+    """Print a message for a person, on stderr."""
+    typer.echo(text, err=True)
+
+
+@contextmanager
+def explained() -> Iterator[None]:
+    """Turn an error that the user can mend into a message and exit code 2."""
+    try:
+        yield
+    except PostprocError as exc:
+        say(f"postproc: {exc}")
+        raise typer.Exit(2) from None
+    except BrokenPipeError:
+        sys.stderr.close()
+        raise typer.Exit(2) from None
+
+
+def split_names(text: str) -> list[str]:
+    """Split a comma-separated list of names.
+
+    >>> split_names("geometry, backlash,")
+    ['geometry', 'backlash']
+    """
+    return [name.strip() for name in text.split(",") if name.strip()]
+
+
+def write_text(target: str, text: str) -> None:
+    """Write text to a file, or to stdout for ``-``.
+
+    Raises:
+        OutputError: The file cannot be written.
+    """
+    from postproc.files import write_all
+
+    if target == "-":
+        sys.stdout.write(text if text.endswith("\n") else text + "\n")
+    else:
+        write_all({Path(target): text.encode()})

@@ -1,0 +1,138 @@
+"""Commands on measurements and models: survey, simulate, fit, predict."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from postproc.cli.common import (
+    CellOption,
+    JsonOption,
+    ModelOption,
+    SeedOption,
+    app,
+    explained,
+    say,
+    split_names,
+    write_text,
+)
+
+
+class Method(StrEnum):
+    """How a model is made from measurements."""
+
+    FULL = "full"
+    EJA_ELM = "eja-elm"
+    ELM = "elm"
+    INTERPOLATION = "interpolation"
+    KINEMATIC_ELM = "kinematic-elm"
+    KRIGING = "kriging"
+
+
+class MeasuredFrame(StrEnum):
+    """The frame that positions were measured in."""
+
+    BASE = "base"
+    TRACKER = "tracker"
+
+
+@app.command()
+def survey(
+    cell: CellOption,
+    output: Annotated[Path, typer.Option("-o", "--output", help="SURVEY.pdl")],
+    poses: Annotated[int, typer.Option("--poses", help="Number of poses.")] = 300,
+    mode: Annotated[
+        str, typer.Option("--mode", help="lhs (Latin hypercube) or optimal.")
+    ] = "lhs",
+    tracker: Annotated[
+        str | None, typer.Option("--tracker", help="x,y,z [mm] in the base frame.")
+    ] = None,
+    seed: SeedOption = 0,
+) -> None:
+    """Write a measurement program; every pose is approached from both sides."""
+    from postproc.surveying import write_survey
+
+    with explained():
+        say(write_survey(cell, output, poses, mode, tracker, seed))
+
+
+@app.command()
+def simulate(
+    program: Annotated[Path, typer.Argument(help="PROGRAM.pdl or SURVEY.csv")],
+    cell: CellOption,
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", help="MEASURED.csv")
+    ] = None,
+    seed: SeedOption = 1,
+    effects: Annotated[
+        str | None, typer.Option("--effects", help="Further effects, comma separated.")
+    ] = None,
+    wanted: Annotated[
+        Path | None,
+        typer.Option("--wanted", help="Original program: print the true error."),
+    ] = None,
+    json: JsonOption = None,
+) -> None:
+    """Let the virtual arm run a program or a survey, and measure it."""
+    from postproc.simulate import simulate_file
+
+    with explained():
+        found = simulate_file(program, cell, seed, effects, wanted)
+        if output is not None:
+            found.write(output)
+        if json:
+            write_text(json, found.to_json())
+        say(found.summary())
+
+
+@app.command()
+def fit(
+    data: Annotated[list[Path], typer.Argument(help="Measurement files (CSV).")],
+    cell: CellOption,
+    output: Annotated[Path, typer.Option("-o", "--output", help="MODEL.json")],
+    method: Annotated[Method, typer.Option("--method")] = Method.FULL,
+    effects: Annotated[
+        str | None,
+        typer.Option("--effects", help="Effects of the full method, comma separated."),
+    ] = None,
+    frame: Annotated[MeasuredFrame, typer.Option("--frame")] = MeasuredFrame.BASE,
+    seed: SeedOption = 0,
+    program: Annotated[
+        Path | None,
+        typer.Option("--program", help="The survey program, for id, x, y, z files."),
+    ] = None,
+) -> None:
+    """Fit a model of the arm's error to laser-tracker measurements."""
+    from postproc import calibrating
+
+    names = None if effects is None else split_names(effects)
+    with explained():
+        found = calibrating.fit_files(
+            data,
+            cell,
+            output,
+            program,
+            method=method.value,
+            effects=names,
+            seed=seed,
+        )
+        say(found)
+
+
+@app.command()
+def predict(
+    states: Annotated[Path, typer.Argument(help="STATES.csv")],
+    cell: CellOption,
+    model: ModelOption,
+    output: Annotated[Path | None, typer.Option("-o", "--output")] = None,
+) -> None:
+    """Add the predicted error of every row; with positions, also the residual."""
+    from postproc import calibrating
+
+    with explained():
+        text, summary = calibrating.predict_file(states, cell, model)
+        write_text("-" if output is None else str(output), text)
+        say(summary)

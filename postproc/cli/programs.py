@@ -1,0 +1,138 @@
+"""Commands on programs: compensate, diff, restore, explain."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from postproc.cli.common import (
+    CellOption,
+    HtmlOption,
+    JsonOption,
+    LsvOption,
+    ModelOption,
+    TemperatureOption,
+    app,
+    explained,
+    say,
+    write_text,
+)
+from postproc.exceptions import PostprocError
+
+if TYPE_CHECKING:
+    from postproc.report import Outcome
+
+
+@app.command()
+def compensate(
+    program: Annotated[str, typer.Argument(help="PROGRAM.pdl, or - for stdin.")],
+    cell: CellOption,
+    model: ModelOption,
+    output: Annotated[
+        Path | None,
+        typer.Option(
+            "-o", "--output", help="Default: PROGRAM.compensated.pdl beside it."
+        ),
+    ] = None,
+    lsv: LsvOption = None,
+    report: Annotated[
+        Path | None, typer.Option("--report", help="Write the report (JSON) here.")
+    ] = None,
+    html: HtmlOption = None,
+    strict: Annotated[
+        bool, typer.Option("--strict", help="Fail, and write nothing, if any is left.")
+    ] = False,
+    clone: Annotated[
+        bool, typer.Option("--clone", help="Clone variables whose arrivals disagree.")
+    ] = False,
+    temperature: TemperatureOption = None,
+) -> None:
+    """Rewrite a program so that the tool lands where its targets say.
+
+    Example: postproc compensate job.pdl --cell cell.toml --model model.json
+    """
+    from postproc import jobs
+    from postproc.compensate import Options
+
+    options = Options(clone=clone, temperature=temperature)
+    with explained():
+        job = jobs.Job.open(program, cell, model, lsv)
+        outcome = job.run(options)
+        if strict and outcome.exit_code:
+            _print_outcome(outcome)
+            raise PostprocError(
+                "--strict: targets were left uncompensated (listed above), nothing is "
+                "written. Mend them, or run without --strict"
+            )
+        job.write(outcome, output, report, html)
+        _print_outcome(outcome)
+    raise typer.Exit(outcome.exit_code)
+
+
+def _print_outcome(outcome: Outcome) -> None:
+    """Print what a person needs to know, on stderr."""
+    for finding in outcome.diagnostics:
+        say(f"{finding.file}:{finding.line}: {finding.code}: {finding.message}")
+    for line in outcome.left_alone():
+        say(line)
+    say(outcome.summary())
+
+
+@app.command()
+def diff(
+    original: Path,
+    compensated: Path,
+    json: JsonOption = None,
+) -> None:
+    """Compare the targets of two programs: exit 0 same, 1 different, 2 trouble."""
+    from postproc import diff as differ
+
+    with explained():
+        found = differ.diff(original, compensated)
+        if json:
+            write_text(json, found.to_json())
+        if json != "-":
+            found.print()
+    raise typer.Exit(1 if found.rows else 0)
+
+
+@app.command()
+def restore(
+    compensated: Path,
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", help="Default: over the program.")
+    ] = None,
+) -> None:
+    """Give back the original program, byte for byte, from the sidecar record."""
+    from postproc.restore import restore_file
+
+    with explained():
+        for path in restore_file(compensated, output):
+            say(f"restored {path}")
+
+
+@app.command()
+def explain(
+    program: Path,
+    cell: CellOption,
+    model: Annotated[
+        Path | None, typer.Option("--model", help="Model file (JSON).")
+    ] = None,
+    lsv: LsvOption = None,
+    line: Annotated[
+        int | None, typer.Option("--line", help="Only the visits of this line.")
+    ] = None,
+    temperature: TemperatureOption = None,
+    json: JsonOption = None,
+) -> None:
+    """Show why every target moves: from where it is reached, and what that costs."""
+    from postproc.explain import explain_file
+
+    with explained():
+        found = explain_file(program, cell, model, lsv, temperature)
+        if json:
+            write_text(json, found.to_json(line))
+        if json != "-":
+            found.print(line)
