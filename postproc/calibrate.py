@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
+from postproc.accuracy.combination import Combination
 from postproc.accuracy.fit_report import FitReport, report_fit, report_method
 from postproc.accuracy.full import fit_survey, model_of
 from postproc.accuracy.library import BASE_EFFECTS
@@ -18,9 +21,15 @@ from postproc.accuracy.measurement import (
 )
 from postproc.accuracy.methods import fit_method
 from postproc.accuracy.model import Model
-from postproc.accuracy.plausibility import check_survey
+from postproc.accuracy.plausibility import check_registered, check_survey
+from postproc.accuracy.registration import Registration, register
 from postproc.accuracy.schema import Method
+from postproc.pose import MM
+from postproc.robot.arm import Arm
 from postproc.robot.cell import Cell
+
+Array = NDArray[np.float64]
+Frame = Literal["base", "tracker"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,15 +46,18 @@ def fit(
     *,
     method: Method = "full",
     effects: Sequence[str] = BASE_EFFECTS,
+    frame: Frame = "base",
     seed: int = 0,
 ) -> Calibration:
-    """Fit a model to measurement files in the base frame.
+    """Fit a model to measurement files.
 
     Args:
         files: Measurement files, in visit order.
         cell: The cell: arm, probe points, tracker.
         method: "full" or one of the source's methods.
         effects: Names of the effects that "full" fits.
+        frame: Frame of the measured positions. In the tracker's, the tracker's place
+            and the probe points are fitted too.
         seed: Of random layers, for methods that have one.
 
     Raises:
@@ -53,7 +65,9 @@ def fit(
         PostprocError: An unknown effect, or one whose covariate was not recorded.
     """
     survey = read_surveys(files, cell)
-    return fit_measurements(survey, cell, method=method, effects=effects, seed=seed)
+    return fit_measurements(
+        survey, cell, method=method, effects=effects, frame=frame, seed=seed
+    )
 
 
 def fit_measurements(
@@ -62,15 +76,48 @@ def fit_measurements(
     *,
     method: Method = "full",
     effects: Sequence[str] = BASE_EFFECTS,
+    frame: Frame = "base",
     seed: int = 0,
 ) -> Calibration:
-    """Fit a model to measurements in the base frame, see `fit`."""
+    """Fit a model to measurements, see `fit`."""
+    tracker = cell.tracker
+    if frame == "tracker":
+        survey, placed = into_base_frame(survey, cell.arm)
+        effects, tracker = (*effects, "registration"), placed.tracker
     check_survey(survey, cell.arm)
     if method != "full":
         model = fit_method(method, survey, cell.arm, seed)
         return Calibration(model, report_method(model, survey, cell.arm))
-    fitted = fit_survey(survey, cell.arm, effects, cell.tracker)
+    if len(np.unique(survey.states.tool_id)) > 1 and frame == "base":
+        effects = (*effects, "probe")
+    fitted = fit_survey(survey, cell.arm, effects, tracker)
     return Calibration(model_of(fitted, survey), report_fit(fitted, survey))
+
+
+def into_base_frame(
+    survey: Measurements, arm: Arm
+) -> tuple[Measurements, Registration]:
+    """Register a survey in the tracker's frame with the nominal arm.
+
+    Raises:
+        MeasurementError: The positions fit the arm in no frame.
+    """
+    nothing = Combination(())
+    found = register(arm, survey.states, survey.position, nothing, np.zeros(0))
+    check_registered(survey, arm, found.typical)
+    ids, which = np.unique(survey.states.tool_id, return_inverse=True)
+    xyz = ", ".join(f"{v / MM:.1f}" for v in found.tracker)
+    notes = [f"tracker at {xyz} mm in the base frame"]
+    for k, name in enumerate(ids):
+        xyz = ", ".join(f"{v / MM:.2f}" for v in found.probes[k])
+        notes.append(f"probe point {name} at {xyz} mm in the flange frame")
+    registered = replace(
+        survey,
+        states=survey.states.with_(tool=found.probes[which]),
+        position=found.to_base(survey.position),
+        warnings=(*survey.warnings, *notes),
+    )
+    return registered, found
 
 
 def read_surveys(files: Sequence[str | Path], cell: Cell) -> Measurements:

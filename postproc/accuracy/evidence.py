@@ -17,7 +17,7 @@ from scipy.optimize import minimize
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-LOG_BOUNDS = (-8.0, 4.0)  # of log s_g
+LOG_BOUNDS = (-8.0, 7.0)  # of log s_g
 LOG_SPREAD = 3.0  # hyperprior of log s_g: an order of magnitude is no surprise
 
 

@@ -31,7 +31,8 @@ class Geometry(Effect):
     Attributes:
         beta: Joints (1 to 6) that have a beta: those whose next axis is nearly
             parallel, and the last, so that the flange may turn about every axis.
-        base: Whether the base may be misplaced; a registration does that otherwise.
+        base: Whether the base may be misplaced. Where the base frame is only known
+            through the arm itself, base, d1 and theta1 are nothing by definition.
     """
 
     name: ClassVar[str] = "geometry"
@@ -49,7 +50,11 @@ class Geometry(Effect):
     def _links(self) -> list[tuple[int, int]]:
         """List (joint, kind) of the link parameters."""
         return [
-            (j, k) for j in range(6) for k in range(5) if k < 4 or (j + 1) in self.beta
+            (j, k)
+            for j in range(6)
+            for k in range(5)
+            if (k < 4 or (j + 1) in self.beta)
+            and (self.base or j > 0 or KINDS[k] not in ("d", "theta"))
         ]
 
     def parameters(self) -> tuple[Parameter, ...]:

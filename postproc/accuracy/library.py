@@ -15,8 +15,10 @@ from postproc.accuracy.elm import Elm
 from postproc.accuracy.elm_map import ElmMap
 from postproc.accuracy.geometry import Geometry
 from postproc.accuracy.interpolation import Interpolation
+from postproc.accuracy.joint_spline import JointSpline
 from postproc.accuracy.kriging import Kriging
 from postproc.accuracy.probe import Probe
+from postproc.accuracy.registration import Placement
 from postproc.exceptions import PostprocError
 from postproc.robot.arm import Arm
 from postproc.robot.state import States
@@ -27,6 +29,8 @@ KINDS: tuple[type[Effect], ...] = (
     BacklashProfile,
     *FURTHER,
     Probe,
+    Placement,
+    JointSpline,
     Elm,
 )
 OTHERS: tuple[type[Effect], ...] = (ElmMap, Interpolation, Kriging)

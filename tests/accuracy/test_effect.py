@@ -84,7 +84,7 @@ def test_settings_survive_a_model_file(effect: Effect) -> None:
 def test_origins_say_what_may_be_compensated() -> None:
     origin = {e.name: e.origin for e in variants() if e.name != "curve"}
     assert {n for n, o in origin.items() if o == "setup"} == {
-        "base_shift", "tool_shift", "tracker_drift", "probe",
+        "base_shift", "tool_shift", "tracker_drift", "probe", "registration",
     }  # fmt: skip
     assert {n for n, o in origin.items() if o == "state"} == {"payload", "thermal"}
 

@@ -1,0 +1,160 @@
+"""Where the tracker stands, and where the probe sits on the flange.
+
+P_base = T P_tracker. Both are found from the same rows as the model: first coarsely
+with the arm as far as it is known, then finely as effects of the set-up beside the
+arm's own.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from postproc.accuracy.batch import Batch
+from postproc.accuracy.combination import Combination
+from postproc.accuracy.effect import Effect, Origin, Parameter
+from postproc.robot.arm import Arm
+from postproc.robot.state import States
+
+Array = NDArray[np.float64]
+
+PASSES = 60
+SETTLED = 1e-9  # [m]
+ROBUST = 3.0  # residuals beyond this many typical ones count less
+SHIFT, TURN = 3e-3, 3e-3  # [m], [rad] how far off the coarse registration may be
+
+
+@dataclass(frozen=True)
+class Registration:
+    """A tracker's place and the probe points, as fitted.
+
+    Attributes:
+        base_from_tracker: Transform of tracker coordinates into the base frame, (4, 4).
+        probes: Probe points in the flange frame by `tool_id`, (k, 3) [m].
+        typical: Median distance that is left [m].
+    """
+
+    base_from_tracker: Array
+    probes: Array
+    typical: float
+
+    @property
+    def tracker(self) -> Array:
+        """Position of the tracker in the base frame, (3,) [m]."""
+        place: Array = self.base_from_tracker[:3, 3]
+        return place
+
+    def to_base(self, position: Array) -> Array:
+        """Convert positions (n, 3) [m] from the tracker's to the base frame."""
+        T = self.base_from_tracker
+        converted: Array = position @ T[:3, :3].T + T[:3, 3]
+        return converted
+
+
+def register(
+    arm: Arm,
+    states: States,
+    position: Array,
+    arm_effects: Combination,
+    values: Array,
+) -> Registration:
+    """Find the tracker and the probe points, the arm's own errors being known.
+
+    Gauss-Newton on six numbers for the tracker and three per probe point, robust
+    against rows that are no measurements.
+
+    Args:
+        arm: The arm.
+        states: States of the rows; their `tool` is where the search starts.
+        position: Measured positions in the tracker frame, (n, 3) [m].
+        arm_effects: Effects of the arm, or none.
+        values: Their parameters.
+    """
+    ids, which = np.unique(states.tool_id, return_inverse=True)
+    probes = np.stack([states.tool[which == k].mean(axis=0) for k in range(len(ids))])
+    batch = Batch(arm, states)
+    at = arm_effects.at(batch, values)
+    flange, R = at.walk.tcp, at.walk.flange
+    flange = flange - np.einsum("nij,nj->ni", R, states.tool + at.deviation.tool)
+    per_point = np.zeros((len(states), 3, len(ids), 3))
+    per_point[np.arange(len(states)), :, which] = R
+    columns = per_point.reshape(len(states), 3, -1)
+    weight = np.ones(len(states))
+    for _ in range(PASSES):
+        tcp = flange + np.einsum("nij,nj->ni", R, probes[which])
+        T = _procrustes(position, tcp, weight)
+        measured = position @ T[:3, :3].T + T[:3, 3]
+        gap = measured - tcp
+        weight = _robust(gap)
+        turned = np.swapaxes(np.cross(np.eye(3)[None], measured[:, None]), 1, 2)
+        eye = np.tile(np.eye(3), (len(states), 1, 1))
+        A = np.concatenate([columns, -eye, -turned], axis=2)
+        A = (A * np.sqrt(weight)[:, None, None]).reshape(-1, A.shape[2])
+        step = np.linalg.lstsq(A, (gap * np.sqrt(weight)[:, None]).reshape(-1))[0]
+        move = step[: 3 * len(ids)].reshape(-1, 3)
+        probes = probes + move
+        if np.abs(move).max() < SETTLED:
+            break
+    typical = float(np.median(np.linalg.norm(gap, axis=1)))
+    return Registration(T, probes, typical)
+
+
+def _procrustes(a: Array, b: Array, weight: Array) -> Array:
+    """Find the rigid transform (4, 4) that takes points a (n, 3) to b best."""
+    total = weight.sum()
+    ca, cb = weight @ a / total, weight @ b / total
+    turn, _ = Rotation.align_vectors(b - cb, a - ca, weights=weight)
+    T = np.eye(4)
+    T[:3, :3] = turn.as_matrix()
+    T[:3, 3] = cb - T[:3, :3] @ ca
+    return T
+
+
+def _robust(gap: Array) -> Array:
+    """Weigh rows by their distance over the typical one, (n,)."""
+    size = np.linalg.norm(gap, axis=1)
+    ratio = size / max(ROBUST * float(np.median(size)), 1e-12)
+    return np.asarray(1.0 / np.maximum(ratio, 1.0) ** 2)
+
+
+@dataclass(frozen=True)
+class Placement(Effect):
+    """What the coarse registration is still off by: tracker and probe points.
+
+    It belongs to the set-up: the base frame is only known through the arm itself.
+
+    Attributes:
+        tools: The `tool_id` of the probe points.
+    """
+
+    name: ClassVar[str] = "registration"
+    origin: ClassVar[Origin] = "setup"
+
+    tools: tuple[int, ...] = (0,)
+
+    @classmethod
+    def propose(cls, arm: Arm, states: States) -> Placement:
+        """List the survey's probe points."""
+        return cls(tuple(int(t) for t in np.unique(states.tool_id)))
+
+    def parameters(self) -> tuple[Parameter, ...]:
+        """Name shift and turn of the tracker, then the shift of every point."""
+        out = [Parameter(f"tracker_{a}", "m", SHIFT, "tracker") for a in "xyz"]
+        out += [Parameter(f"tracker_r{a}", "rad", TURN, "tracker") for a in "xyz"]
+        out += [
+            Parameter(f"probe{t}_{a}", "m", SHIFT, "probe")
+            for t in self.tools
+            for a in "xyz"
+        ]
+        return tuple(out)
+
+    def columns(self, batch: Batch) -> Array:
+        """Differentiate the measured position, (n, 3, 6 + 3 k)."""
+        w, s, n = batch.walk, batch.states, len(batch)
+        turned = np.swapaxes(np.cross(np.eye(3)[None], w.tcp[:, None]), 1, 2)
+        points = [w.flange * (s.tool_id == t)[:, None, None] for t in self.tools]
+        return np.concatenate([np.tile(np.eye(3), (n, 1, 1)), turned, *points], axis=2)
