@@ -22,7 +22,8 @@ UNARY_CONTEXT = "(,{[=<>*/:@#&+"
 
 _STRINGS = (r"'(?:\\.|[^'\\])*'", r"'[^']*'")
 _UNICODE = r'"(?:\\.|[^"\\])*"'
-_BLANK = r"[\x01-\x09\x0b\x0c\x0e-\x20\x7f]"
+BLANKS = "".join(chr(c) for c in (*range(1, 33), 127) if chr(c) not in "\r\n")
+_BLANK = f"[{re.escape(BLANKS)}]"
 
 
 def _tokens(string: str) -> re.Pattern[str]:
@@ -114,7 +115,7 @@ def number_value(text: str) -> float:
     >>> number_value("- 0x1F"), number_value("1.5e3")
     (-31.0, 1500.0)
     """
-    digits = text.lstrip("-+ \t")
+    digits = text.lstrip("-+" + BLANKS)
     try:
         base = {"x": 16, "o": 8, "b": 2}.get(digits[1:2].lower())
         value = float(int(digits, base)) if base else float(digits)

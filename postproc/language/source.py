@@ -53,7 +53,10 @@ class Source:
     def line_starts(self) -> NDArray[np.int64]:
         """Return the offsets at which lines start, (n,); CR, LF and CRLF end a line."""
         a = np.frombuffer(self.data, dtype=np.uint8)
-        ends = np.flatnonzero((a == 10) | ((a == 13) & (np.append(a[1:], 0) != 10)))
+        feeds, returns = np.flatnonzero(a == 10), np.flatnonzero(a == 13)
+        following = a[np.minimum(returns + 1, len(a) - 1)]
+        ends = np.concatenate([feeds, returns[following != 10]])
+        ends.sort()
         return np.concatenate([[0], ends[ends < len(a) - 1] + 1]).astype(np.int64)
 
     @cached_property
