@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -53,7 +54,12 @@ def propose(names: Iterable[str], arm: Arm, states: States) -> tuple[Effect, ...
             known = ", ".join(EFFECTS)
             raise PostprocError(f"there is no effect {name!r}. Known effects: {known}")
         _check_needs(EFFECTS[name], states)
-    return tuple(EFFECTS[name].propose(arm, states) for name in chosen)
+    effects = tuple(EFFECTS[name].propose(arm, states) for name in chosen)
+    if Placement.name not in chosen:
+        return effects
+    return tuple(
+        replace(e, base=False) if isinstance(e, Geometry) else e for e in effects
+    )
 
 
 def _check_needs(kind: type[Effect], states: States) -> None:
