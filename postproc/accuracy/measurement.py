@@ -9,7 +9,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from postproc.accuracy.table import Table, read_table
+from postproc.accuracy.formats import read_foreign
+from postproc.accuracy.table import Table
 from postproc.exceptions import MeasurementError
 from postproc.pose import MM
 from postproc.robot.arm import Arm
@@ -98,6 +99,7 @@ def read_measurements(
     tools: Array | Mapping[int, Array],
     *,
     positions: bool = True,
+    column_map: str | Path | None = None,
 ) -> Measurements:
     """Read a measurement file.
 
@@ -107,11 +109,12 @@ def read_measurements(
         tools: Probe points in the flange frame, (k, 3) [m] or by `tool_id`. Columns
             tool_x_mm, tool_y_mm, tool_z_mm override them.
         positions: Whether the file must have measured positions.
+        column_map: A column-map file, for files of other tools.
 
     Raises:
         MeasurementError: Naming file, line, problem and cure.
     """
-    table = read_table(path)
+    table = read_foreign(path, column_map)
     return from_table(table, arm, tools, positions=positions)
 
 

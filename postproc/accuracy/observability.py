@@ -25,7 +25,7 @@ class Unseen:
         return (
             f"{self.name} with {', '.join(self.partners)}"
             if self.partners
-            else (f"{self.name} (no effect on these rows)")
+            else (f"{self.name} (too small to see)")
         )
 
 
