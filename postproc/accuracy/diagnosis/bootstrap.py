@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from postproc.accuracy.diagnosis.candidate import Candidate
-from postproc.accuracy.diagnosis.projection import Projection, reduce_blocks
+from postproc.accuracy.diagnosis.library import Library
+from postproc.accuracy.diagnosis.projection import Projection
 from postproc.accuracy.diagnosis.score import family_maxima
 from postproc.accuracy.effect import Array
 
@@ -52,9 +51,7 @@ class Null:
         return start + scale * float(np.log(TAIL / level))
 
 
-def bootstrap(
-    projection: Projection, candidates: Sequence[Candidate], seed: int
-) -> Null:
+def bootstrap(projection: Projection, library: Library, seed: int) -> Null:
     """Draw from the current model and score the whole library against each draw.
 
     The filter turns draws from the model into plain noise, so no draw needs a fit.
@@ -62,6 +59,6 @@ def bootstrap(
     rng = np.random.default_rng(seed)
     used = np.repeat(projection.fit.rows.weight > 0, 3)
     rows = rng.standard_normal((len(projection.rest), DRAWS)) * used[:, None]
-    reduced = reduce_blocks(projection, candidates, rows)
+    reduced = library.reduce(projection, rows)
     square = (rows**2).sum(axis=0)
     return Null(np.sort(family_maxima(reduced, square, projection.rows)))

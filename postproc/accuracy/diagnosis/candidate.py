@@ -53,6 +53,17 @@ class Candidate:
     log_prior: float
 
     @property
+    def width(self) -> int:
+        """Number of columns."""
+        return len(self.effect.parameters())
+
+    @property
+    def names(self) -> frozenset[str]:
+        """Names of its parameters in a model."""
+        effect = self.effect
+        return frozenset(f"{effect.name}.{p.name}" for p in effect.parameters())
+
+    @property
     def in_time(self) -> bool:
         """Whether what drives it passes with time rather than from pose to pose."""
         return self.source in ("order", "time", "temperature")

@@ -6,9 +6,11 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from postproc.accuracy.batch import Batch
+from postproc.accuracy.diagnosis.bootstrap import bootstrap
 from postproc.accuracy.diagnosis.findings import describe
 from postproc.accuracy.diagnosis.floor import multi_directional, noise_floor
 from postproc.accuracy.diagnosis.groups import Standing, stand
+from postproc.accuracy.diagnosis.library import Library
 from postproc.accuracy.diagnosis.omnibus import Leftover, leftovers
 from postproc.accuracy.diagnosis.outer import HeldOut, hold_out
 from postproc.accuracy.diagnosis.planning import (
@@ -45,6 +47,36 @@ REMAINS = 0.01  # level at which structure is called structure: nothing was adde
 STILL_REMAINS = 0.001  # ... after something was
 PLACES = 5
 FEWEST = 12  # rows
+
+
+@dataclass(frozen=True, eq=False)
+class Trace:
+    """What all the rows say.
+
+    Attributes:
+        search: What was added.
+        standings: Every addition judged with all others in the model.
+        leftovers: What the final residual still shows.
+    """
+
+    search: Search
+    standings: tuple[Standing, ...]
+    leftovers: tuple[Leftover, ...]
+
+    @property
+    def findings(self) -> tuple[Finding, ...]:
+        """Describe the additions."""
+        return describe(self.search, self.standings)
+
+    @property
+    def verdict(self) -> Verdict:
+        """Decide between an effect, noise, and structure without a name."""
+        p_value = min((x.p_value for x in self.leftovers), default=1.0)
+        added = [a.candidate.family.effect for a in self.search.additions]
+        if not added:
+            return "unexplained" if p_value < REMAINS else "noise"
+        nameless = "curve" in added or p_value < STILL_REMAINS
+        return "unexplained" if nameless else "effect"
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,23 +127,32 @@ def diagnose(
         PostprocError: A model that cannot be refitted.
         ModelError: A model of another arm.
     """
-    base = _refit(survey, arm, model, tracker)
-    found = search(base, seed, progress)
-    progress("groups that cannot be told apart")
-    standings = [stand(found, k) for k in range(len(found.additions))]
-    progress("what is left")
-    left = leftovers(Projection.of(found.fit), seed)
+    base = refit(survey, arm, model, tracker)
+    traced = trace(base, seed, progress)
     given = None
     if model.data_sha256 != survey.sha256:
         given = survey.position - base.batch.walk.tcp - model.error(arm, survey.states)
-    held_out = hold_out(base, found.null, seed, progress, given)
-    diagnosis = _conclude(survey, found, standings, left, held_out, tracker, seed)
-    return Extension(
-        diagnosis, _extended(model, survey, found, diagnosis), found, held_out
-    )
+    held_out = hold_out(traced.search, seed, progress, given)
+    diagnosis = _conclude(survey, traced, held_out, tracker, seed)
+    extended = _extended(model, survey, traced.search, diagnosis)
+    return Extension(diagnosis, extended, traced.search, held_out)
 
 
-def _refit(survey: Measurements, arm: Arm, model: Model, tracker: Array | None) -> Fit:
+def trace(base: Fit, seed: int, progress: Progress = silent) -> Trace:
+    """Search a fit's rows for what it lacks, and judge what was found."""
+    progress("candidates")
+    library = Library.of(base)
+    progress("threshold of the whole library")
+    null = bootstrap(Projection.of(base), library, seed)
+    found = search(base, library, null, progress)
+    progress("groups that cannot be told apart")
+    standings = tuple(stand(found, k) for k in range(len(found.additions)))
+    progress("what is left")
+    left = leftovers(Projection.of(found.fit), seed)
+    return Trace(found, standings, left)
+
+
+def refit(survey: Measurements, arm: Arm, model: Model, tracker: Array | None) -> Fit:
     """Fit the given model's effects to the rows, or revise it where they are few.
 
     Raises:
@@ -141,22 +182,20 @@ def _refit(survey: Measurements, arm: Arm, model: Model, tracker: Array | None) 
 
 def _conclude(
     survey: Measurements,
-    found: Search,
-    standings: list[Standing],
-    left: tuple[Leftover, ...],
+    traced: Trace,
     held_out: HeldOut,
     tracker: Array | None,
     seed: int,
 ) -> Diagnosis:
     """Put everything together."""
-    findings = describe(found, standings)
+    found = traced.search
     floor = noise_floor(found.fit, tracker is not None)
     batch = Batch(found.fit.batch.arm, found.fit.batch.states[held_out.rows])
     before = multi_directional(batch, held_out.before)
     after = multi_directional(batch, held_out.after)
-    why, poses = _next(found, standings, seed)
+    why, poses = _next(traced, seed)
     return Diagnosis(
-        verdict=_verdict(findings, left),
+        verdict=traced.verdict,
         noise_floor_mm=floor.size / MM,
         noise_floor_source=floor.source,
         n_fit=held_out.fitted,
@@ -164,8 +203,8 @@ def _conclude(
         before=Spread.of(held_out.before),
         after=Spread.of(held_out.after),
         vap_mm=None if before is None or after is None else (before / MM, after / MM),
-        findings=findings,
-        leftovers=left,
+        findings=traced.findings,
+        leftovers=traced.leftovers,
         places=_places(found),
         next_measurements=poses,
         why_next=why,
@@ -173,19 +212,10 @@ def _conclude(
     )
 
 
-def _verdict(findings: tuple[Finding, ...], left: tuple[Leftover, ...]) -> Verdict:
-    """Decide between an effect, noise, and structure without a name."""
-    p_value = min((x.p_value for x in left), default=1.0)
-    if not findings:
-        return "unexplained" if p_value < REMAINS else "noise"
-    nameless = any(f.effect == "curve" for f in findings)
-    return "unexplained" if nameless or p_value < STILL_REMAINS else "effect"
-
-
 def _places(found: Search) -> tuple[Place, ...]:
     """Say where what is left lives, from the candidates that come closest."""
     out = []
-    for score in ranking(Projection.of(found.fit))[:PLACES]:
+    for score in ranking(Projection.of(found.fit), found.library)[:PLACES]:
         family = score.family
         joint = f"joint {family.joint}"
         direction = family.effect if family.joint is None else joint
@@ -197,9 +227,10 @@ def _places(found: Search) -> tuple[Place, ...]:
     return tuple(out)
 
 
-def _next(found: Search, standings: list[Standing], seed: int) -> tuple[str, Array]:
+def _next(traced: Trace, seed: int) -> tuple[str, Array]:
     """Propose poses that separate the closest rivals, or sharpen the model."""
-    for number, standing in enumerate(standings):
+    found = traced.search
+    for number, standing in enumerate(traced.standings):
         if standing.confusable:
             rival = standing.confusable[0]
             own = found.additions[number].candidate.family

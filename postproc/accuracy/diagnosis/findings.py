@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from postproc.accuracy.diagnosis.groups import Standing
@@ -12,7 +14,7 @@ from postproc.accuracy.fit_report import SHOWN_UNITS
 from postproc.pose import MM
 
 
-def describe(found: Search, standings: list[Standing]) -> tuple[Finding, ...]:
+def describe(found: Search, standings: Sequence[Standing]) -> tuple[Finding, ...]:
     """Describe every addition of a search."""
     shares = _shares(found)
     return tuple(

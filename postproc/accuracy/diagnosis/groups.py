@@ -31,7 +31,8 @@ class Standing:
 def stand(found: Search, number: int) -> Standing:
     """Judge one addition of a search against all that could take its place."""
     own = found.additions[number].candidate
-    scores = ranking(Projection.of(found.fit, without=found.place(number)))
+    projection = Projection.of(found.fit, without=found.place(number))
+    scores = ranking(projection, found.library)
     here = next((s for s in scores if s.family == own.family), None)
     if here is None:
         here = found.additions[number].score

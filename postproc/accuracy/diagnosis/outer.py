@@ -13,9 +13,8 @@ from numpy.typing import NDArray
 
 from postproc.accuracy.batch import Batch
 from postproc.accuracy.combination import Combination
-from postproc.accuracy.diagnosis.bootstrap import Null
 from postproc.accuracy.diagnosis.folds import deal
-from postproc.accuracy.diagnosis.search import Progress, search
+from postproc.accuracy.diagnosis.search import Progress, Search, search
 from postproc.accuracy.effect import Array
 from postproc.accuracy.fit import Fit, fit_effects
 
@@ -41,18 +40,18 @@ class HeldOut:
 
 
 def hold_out(
-    base: Fit, null: Null, seed: int, progress: Progress, given: Array | None = None
+    found: Search, seed: int, progress: Progress, given: Array | None = None
 ) -> HeldOut:
     """Repeat the search without each part of the rows.
 
     Args:
-        base: Fit of the given model's effects to all rows.
-        null: Null distribution of the library.
+        found: The search on all rows: its first fit, its library, its threshold.
         seed: Of the parts.
         progress: Told what is being done.
         given: Errors that the given model leaves as it is, (n, 3) [m], where it has
             not seen the rows; else its effects are refitted without each part.
     """
+    base = found.base
     used = base.rows.weight > 0
     part = deal(base.batch.states.order, PARTS, seed, RUN)
     count = PARTS if len(base.batch) < MANY else 1
@@ -62,7 +61,8 @@ def hold_out(
         out = np.flatnonzero((part == k) & used)
         inside = np.flatnonzero(part != k)
         less = _fit_of(base, inside)
-        more = search(less, seed, lambda _: None, null).fit
+        library = found.library.at_rows(inside)
+        more = search(less, library, found.null, lambda _: None).fit
         rows.append(out)
         before.append(
             left_by(less, base, out) if given is None else np.asarray(given[out])

@@ -52,10 +52,12 @@ def poses_that_sharpen(fit: Fit, seed: int) -> Array:
     at = fit.combination.at(batch, fit.values)
     X = fit.combination.columns(at)
     noise = float(fit.whitener.variance(fit.noise).mean())
-    C, chosen = np.array(fit.covariance), []
+    C = np.array(fit.covariance)
+    chosen: list[int] = []
     for _ in range(WANTED):
         spread = X @ C @ np.swapaxes(X, 1, 2)
         gain = np.linalg.slogdet(np.eye(3) + spread / noise)[1]
+        gain[chosen] = -np.inf
         best = int(np.argmax(gain))
         chosen.append(best)
         CX = C @ X[best].T

@@ -15,10 +15,8 @@ import numpy as np
 
 from postproc.accuracy.batch import Batch
 from postproc.accuracy.diagnosis.candidate import Candidate
-from postproc.accuracy.effect import Array, Effect
+from postproc.accuracy.effect import Array
 from postproc.accuracy.fit import Fit
-
-CHUNK = 5_000_000  # numbers of columns held at once
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,12 +72,6 @@ class Projection:
         )
         return left
 
-    def columns(self, effects: Sequence[Effect]) -> Array:
-        """Whiten, scale and filter the columns of effects, (3 n, sum of p)."""
-        raw = np.concatenate([e.columns(self.at) for e in effects], axis=2)
-        scale = np.array([p.scale for e in effects for p in e.parameters()])
-        return self.filter(self.fit.whiten(raw * scale))
-
 
 @dataclass(frozen=True, eq=False)
 class Blocks:
@@ -96,37 +88,28 @@ class Blocks:
     along: Array
 
 
-def reduce_blocks(
-    projection: Projection, candidates: Sequence[Candidate], rows: Array
-) -> tuple[Blocks, ...]:
-    """Reduce candidates against rows.
+def reduce_columns(
+    projection: Projection,
+    candidates: Sequence[Candidate],
+    columns: Array,
+    rows: Array,
+) -> Blocks:
+    """Reduce candidates of one width against rows.
 
     Args:
         projection: The model to take out.
-        candidates: Any number; reduced together with those of the same width.
+        candidates: c candidates.
+        columns: Their rotated, scaled columns, (3 n, c, k).
         rows: Filtered rows, (3 n, draws).
     """
-    widths: dict[int, list[Candidate]] = {}
-    for candidate in candidates:
-        widths.setdefault(len(candidate.effect.parameters()), []).append(candidate)
-    out = []
-    for width, alike in sorted(widths.items()):
-        step = max(1, CHUNK // (rows.shape[0] * width))
-        for first in range(0, len(alike), step):
-            out.append(_reduce(projection, alike[first : first + step], width, rows))
-    return tuple(out)
-
-
-def _reduce(
-    projection: Projection, alike: list[Candidate], width: int, rows: Array
-) -> Blocks:
-    """Reduce candidates of one width."""
-    B = projection.columns([c.effect for c in alike])
-    B = B.reshape(len(B), len(alike), width)
-    gram = np.einsum("rck,rcl->ckl", B, B, optimize=True) if width > 1 else None
-    along = (B.reshape(len(B), -1).T @ rows).reshape(len(alike), width, -1)
-    if gram is None:
-        return Blocks(tuple(alike), np.einsum("rck,rck->ck", B, B), along)
+    B = columns * projection.fit.row_scale.reshape(-1, 1, 1)
+    count, width = B.shape[1:]
+    B = projection.filter(B.reshape(len(B), -1))
+    along = (B.T @ rows).reshape(count, width, -1)
+    B = np.ascontiguousarray(B.T).reshape(count, width, -1)
+    gram = B @ np.swapaxes(B, 1, 2)
+    if width == 1:
+        return Blocks(tuple(candidates), gram[:, :, 0], along)
     gain, turn = np.linalg.eigh(gram)
-    along = np.einsum("ckl,ckd->cld", turn, along)
-    return Blocks(tuple(alike), np.maximum(gain, 0.0), along)
+    along = np.swapaxes(turn, 1, 2) @ along
+    return Blocks(tuple(candidates), np.maximum(gain, 0.0), along)

@@ -10,8 +10,9 @@ import numpy as np
 from postproc.accuracy.base_shift import BaseShift
 from postproc.accuracy.batch import Batch
 from postproc.accuracy.counterbalance import Counterbalance
+from postproc.accuracy.diagnosis.library import make_columns
 from postproc.accuracy.diagnosis.named import LAST_FREE, STEPS
-from postproc.accuracy.diagnosis.projection import Projection, reduce_blocks
+from postproc.accuracy.diagnosis.projection import Projection, reduce_columns
 from postproc.accuracy.diagnosis.score import Score, rank
 from postproc.accuracy.effect import Array, Effect
 from postproc.accuracy.joint_map import JointMap
@@ -47,8 +48,9 @@ def refine(projection: Projection, score: Score) -> Score:
         if len(effects) == 1:
             return score
         tries = [replace(score.best, effect=e) for e in effects]
-        reduced = reduce_blocks(projection, tries, projection.rest[:, None])
-        found = rank(reduced, square, projection.rows)[0]
+        columns = make_columns(tries, projection.at, projection.fit.whitener)
+        blocks = reduce_columns(projection, tries, columns, projection.rest[:, None])
+        found = rank((blocks,), square, projection.rows)[0]
         if found.best_evidence > score.best_evidence:
             gained = found.best_evidence - score.best_evidence
             score = replace(

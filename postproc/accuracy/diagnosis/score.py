@@ -16,7 +16,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import logsumexp
 from scipy.stats import f as fisher
 
 from postproc.accuracy.diagnosis.candidate import Candidate, Family
@@ -89,21 +88,36 @@ class Score:
     p_value: float
 
 
-def rank(reduced: tuple[Blocks, ...], square: float, rows: int) -> list[Score]:
-    """Score families against the first draw, the best first."""
+def rank(
+    reduced: tuple[Blocks, ...],
+    square: float,
+    rows: int,
+    without: frozenset[str] = frozenset(),
+) -> list[Score]:
+    """Score families against the first draw, the best first.
+
+    Args:
+        reduced: Reduced candidates.
+        square: |z|^2.
+        rows: Number of scalar rows.
+        without: Names of parameters whose candidates are left out.
+    """
     found: dict[Family, list[tuple[float, float, Candidate]]] = {}
     for blocks in reduced:
         first = Blocks(blocks.candidates, blocks.gain, blocks.along[:, :, :1])
         each = log_evidence(first, np.array([square]), rows)[:, 0]
         p = score_p_value(first, square, rows)
         for candidate, e, p_one in zip(blocks.candidates, each, p, strict=True):
+            if without and not without.isdisjoint(candidate.names):
+                continue
             found.setdefault(candidate.family, []).append((e, float(p_one), candidate))
     out = []
     for family, members in found.items():
         e = np.array([m[0] for m in members])
         log_prior = np.array([m[2].log_prior for m in members])
         top = members[int(np.argmax(e + log_prior))]
-        total = float(logsumexp(e + log_prior))
+        weighed = e + log_prior
+        total = float(weighed.max() + np.log(np.exp(weighed - weighed.max()).sum()))
         out.append(Score(family, total, top[2], float(top[0]), top[1]))
     return sorted(out, key=lambda s: -s.evidence)
 

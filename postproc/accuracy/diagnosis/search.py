@@ -5,12 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
-from postproc.accuracy.diagnosis.bootstrap import Null, bootstrap
+from postproc.accuracy.diagnosis.bootstrap import Null
 from postproc.accuracy.diagnosis.candidate import FREE, NAMED, Candidate
-from postproc.accuracy.diagnosis.curves import free_candidates
 from postproc.accuracy.diagnosis.folds import Gain, held_out_gain
-from postproc.accuracy.diagnosis.named import named_candidates
-from postproc.accuracy.diagnosis.projection import Projection, reduce_blocks
+from postproc.accuracy.diagnosis.library import Library
+from postproc.accuracy.diagnosis.projection import Projection
 from postproc.accuracy.diagnosis.refine import refine
 from postproc.accuracy.diagnosis.score import Score, rank
 from postproc.accuracy.effect import Effect
@@ -54,6 +53,7 @@ class Search:
     Attributes:
         base: Fit of the model that was given.
         fit: Fit with all additions.
+        library: All candidates.
         additions: In the order of addition; they are the last effects of `fit`.
         null: Distribution of the largest evidence when there is nothing.
         refused: The candidate that the search stopped at, if there was one.
@@ -61,6 +61,7 @@ class Search:
 
     base: Fit
     fit: Fit
+    library: Library
     additions: tuple[Addition, ...]
     null: Null
     refused: Addition | None
@@ -71,22 +72,16 @@ class Search:
         return count - len(self.additions) + number
 
 
-def search(
-    base: Fit, seed: int, progress: Progress, null: Null | None = None
-) -> Search:
+def search(base: Fit, library: Library, null: Null, progress: Progress) -> Search:
     """Search for effects that a fit lacks.
 
     Args:
         base: The fit.
-        seed: Of the bootstrap.
+        library: All candidates.
+        null: Distribution of the largest evidence under the fit.
         progress: Told what is being done.
-        null: Distribution under the model, where it is known from a like search.
     """
-    projection = Projection.of(base)
-    if null is None:
-        progress("threshold of the whole library")
-        null = bootstrap(projection, library(projection), seed)
-    found = Search(base, base, (), null, None)
+    found = Search(base, base, library, (), null, None)
     while len(found.additions) < MOST:
         progress(f"looking for effect {len(found.additions) + 1}")
         grown = _grow(found)
@@ -96,22 +91,12 @@ def search(
     return found
 
 
-def library(projection: Projection) -> list[Candidate]:
-    """List the candidates that the model does not hold yet."""
-    known = set(projection.names)
-    every = [*named_candidates(projection.at), *free_candidates(projection.at)]
-    return [
-        c
-        for c in every
-        if not any(f"{c.effect.name}.{p.name}" in known for p in c.effect.parameters())
-    ]
-
-
-def ranking(projection: Projection) -> list[Score]:
+def ranking(projection: Projection, library: Library) -> list[Score]:
     """Score the library, the settings of the leading families refined."""
     square = float(projection.rest @ projection.rest)
-    reduced = reduce_blocks(projection, library(projection), projection.rest[:, None])
-    scores = rank(reduced, square, projection.rows)
+    reduced = library.reduce(projection, projection.rest[:, None])
+    known = frozenset(projection.names)
+    scores = rank(reduced, square, projection.rows, without=known)
     leading: list[Score] = []
     for tier in (NAMED, FREE):
         leading += [s for s in scores if s.family.tier == tier][:LOOKED_AT]
@@ -130,7 +115,7 @@ def choose(scores: list[Score]) -> Score:
 
 def _grow(found: Search) -> Search:
     """Add the best candidate, or say which one was refused."""
-    best = choose(ranking(Projection.of(found.fit)))
+    best = choose(ranking(Projection.of(found.fit), found.library))
     p_value = found.null.p_value(best.evidence)
     if p_value > LEVEL or best.p_value > ALONE:
         return replace(found, refused=None)
@@ -166,7 +151,7 @@ def _again(found: Search, number: int) -> Search:
     """Keep an addition, replace it by what now fits better, or drop it."""
     place = found.place(number)
     old = found.additions[number].candidate
-    scores = ranking(Projection.of(found.fit, without=place))
+    scores = ranking(Projection.of(found.fit, without=place), found.library)
     best = choose(scores)
     if found.null.p_value(best.evidence) > LEVEL:
         return _drop(found, number)
