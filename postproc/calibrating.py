@@ -4,19 +4,23 @@ from __future__ import annotations
 
 import csv
 import io
+import json
 from collections.abc import Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from postproc.accuracy.comparison import Comparison, compare
 from postproc.accuracy.fit_report import FitReport, Spread
 from postproc.accuracy.measurement import concatenate, from_table
 from postproc.accuracy.model import Model, load_model
+from postproc.accuracy.plausibility import check_survey
 from postproc.accuracy.table import Table as Cells
 from postproc.accuracy.table import read_table
-from postproc.calibrate import fit, fit_measurements
+from postproc.calibrate import fit, fit_measurements, into_base_frame, read_surveys
 from postproc.console import Column, table_text
 from postproc.joining import join_program
 from postproc.pose import MM
@@ -32,6 +36,12 @@ COLUMNS = (
     Column("unit", "left"),
     Column("share"),
     Column("seen"),
+)
+COMPARED = (
+    Column("method", "left"),
+    Column("range mm"),
+    Column("mean mm"),
+    Column("std mm"),
 )
 PREDICTED = (
     *("dx_mm", "dy_mm", "dz_mm"),  # predicted error
@@ -114,6 +124,42 @@ def _tell(spread: Spread) -> str:
         f"mean {spread.mean_mm:.4f} mm, std {spread.std_mm:.4f}, "
         f"95 % {spread.p95_mm:.4f}, max {spread.max_mm:.4f} ({spread.n} rows)"
     )
+
+
+def compare_files(
+    data: Sequence[Path], cell_path: Path, frame: str, seed: int
+) -> Comparison:
+    """Fit and test every method on measurement files.
+
+    Raises:
+        PostprocError: A file cannot be used.
+    """
+    cell = load_cell(cell_path)
+    survey, tracker = read_surveys(data, cell), cell.tracker
+    if frame == "tracker":
+        survey, placed = into_base_frame(survey, cell.arm)
+        tracker = placed.tracker
+    check_survey(survey, cell.arm)
+    return compare(survey, cell.arm, tracker, seed)
+
+
+def comparison_json(found: Comparison) -> str:
+    """Return a comparison as JSON text."""
+    return json.dumps(asdict(found), indent=1) + "\n"
+
+
+def tell_comparison(found: Comparison) -> str:
+    """Write a comparison for a terminal."""
+    rows = (
+        (
+            r.method,
+            f"{r.min_mm:.4f} .. {r.max_mm:.4f}",
+            f"{r.mean_mm:.4f}",
+            f"{r.std_mm:.4f}",
+        )
+        for r in found.rows
+    )
+    return f"{table_text(COMPARED, rows)}\n{found.split}"
 
 
 def predict_file(path: Path, cell_path: Path, model_path: Path) -> tuple[str, str]:

@@ -1,4 +1,4 @@
-"""Commands on measurements and models: survey, simulate, fit, predict."""
+"""Commands that measure and model: survey, simulate, fit, predict, compare."""
 
 from __future__ import annotations
 
@@ -117,9 +117,10 @@ def fit(
             program,
             method=method.value,
             effects=names,
+            frame=frame.value,
             seed=seed,
         )
-        say(found)
+        typer.echo(found)
 
 
 @app.command()
@@ -136,3 +137,22 @@ def predict(
         text, summary = calibrating.predict_file(states, cell, model)
         write_text("-" if output is None else str(output), text)
         say(summary)
+
+
+@app.command()
+def compare(
+    data: Annotated[list[Path], typer.Argument(help="Measurement files (CSV).")],
+    cell: CellOption,
+    json: JsonOption = None,
+    frame: Annotated[MeasuredFrame, typer.Option("--frame")] = MeasuredFrame.BASE,
+    seed: SeedOption = 0,
+) -> None:
+    """Fit every method to the same rows, and test it on the same others."""
+    from postproc import calibrating
+
+    with explained():
+        found = calibrating.compare_files(data, cell, frame.value, seed)
+        if json:
+            write_text(json, calibrating.comparison_json(found))
+        if json != "-":
+            typer.echo(calibrating.tell_comparison(found))

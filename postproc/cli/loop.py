@@ -1,0 +1,96 @@
+"""Commands that close the loop: diagnose, history."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from postproc.cli.common import (
+    CellOption,
+    HtmlOption,
+    JsonOption,
+    ModelOption,
+    SeedOption,
+    app,
+    explained,
+    say,
+    write_text,
+)
+
+
+class PointFrame(StrEnum):
+    """The frame that points were measured in."""
+
+    BASE = "base"
+    UFRAME = "uframe"
+    TRACKER = "tracker"
+
+
+@app.command()
+def diagnose(
+    data: Annotated[list[Path], typer.Argument(help="Fresh measurements (CSV).")],
+    cell: CellOption,
+    model: ModelOption,
+    output: Annotated[
+        Path | None,
+        typer.Option("-o", "--output", help="Default: MODEL.extended.json beside it."),
+    ] = None,
+    json: JsonOption = None,
+    html: HtmlOption = None,
+    plot: Annotated[
+        Path | None, typer.Option("--plot", help="Plots (.png or .svg), by this name.")
+    ] = None,
+    program: Annotated[
+        Path | None,
+        typer.Option("--program", help="The program whose points were measured."),
+    ] = None,
+    frame: Annotated[
+        PointFrame, typer.Option("--measured-frame", "--frame")
+    ] = PointFrame.BASE,
+    seed: SeedOption = 0,
+) -> None:
+    """Find what the model lacks, trace it to an effect, and add that effect.
+
+    Example: postproc diagnose fresh.csv --cell cell.toml --model model.json
+    """
+    from postproc import diagnosing
+
+    with explained():
+        found = diagnosing.diagnose_files(
+            data,
+            cell,
+            model,
+            output=output,
+            program=program,
+            measured_frame=frame.value,
+            seed=seed,
+            progress=say,
+        )
+        if json:
+            write_text(json, found.diagnosis.to_json())
+        if html is not None:
+            from postproc.html import diagnosis_report
+
+            write_text(str(html), diagnosis_report(found.diagnosis.to_dict()))
+        if plot is not None:
+            from postproc.plots import plot_diagnosis
+
+            for path in plot_diagnosis(found, plot):
+                say(f"plot {path}")
+        if json != "-":
+            typer.echo(diagnosing.tell(found.diagnosis))
+
+
+@app.command()
+def history(model: Path, json: JsonOption = None) -> None:
+    """Print what was added to a model and its parents, with before and after."""
+    from postproc import diagnosing
+
+    with explained():
+        if json:
+            write_text(json, diagnosing.history_json(model))
+        if json != "-":
+            typer.echo(diagnosing.history_text(model))
