@@ -51,8 +51,8 @@ def number_text(value: float, old: str, least: int) -> str:
 def edits(
     literals: Literals,
     sources: Sequence[Source],
-    rows: Ints,
-    new_values: Floats,
+    rows: Ints | Sequence[int],
+    new_values: Floats | Sequence[Floats],
 ) -> tuple[tuple[Edit, ...], ...]:
     """Return the edits that give literals new values, file by file.
 
@@ -72,6 +72,7 @@ def edits(
     if not np.isfinite(new_values).all():
         raise ValueError("a new value of a target is not finite")
     found: list[list[Edit]] = [[] for _ in sources]
+    rows = np.asarray(rows, dtype=np.int64)
     files = literals.file[rows].tolist()
     starts, ends = literals.start[rows].tolist(), literals.end[rows].tolist()
     joints = literals.joints[rows].tolist()

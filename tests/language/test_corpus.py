@@ -1,0 +1,68 @@
+"""The chapters of the language: every case is a program and what it does."""
+
+from pathlib import Path
+
+import pytest
+
+from postproc.language.flow import Resolved, Start, resolve
+from postproc.language.rewrite import edits
+from postproc.language.source import apply, source_from_bytes
+from postproc.language.structure import parse
+from postproc.language.visits import ELSEWHERE, START, Motion, Target
+
+CORPUS = Path(__file__).parents[1] / "corpus"
+CELL = Start(
+    aux={1: "gun"},
+    frame_tables={"tf": {"1, 2": {"tool": (1.0, 2.0, 3.0, 0.0, 0.0, 0.0)}}},
+)
+
+
+def chapters() -> list[tuple[str, str, str]]:
+    found = []
+    for path in sorted(CORPUS.glob("*.txt")):
+        for case in path.read_text("utf-8").split("==== ")[1:]:
+            title, body = case.split("\n", 1)
+            program, _, expected = body.partition("----\n")
+            found.append((f"{path.stem}: {title}", program, expected))
+    return found
+
+
+def described(resolved: Resolved, text: str) -> str:
+    """Return one line for each visit, then one for each diagnostic."""
+    v = resolved.visits
+    out = []
+    for i in range(len(v)):
+        origins = {START: "start", ELSEWHERE: "?"}
+        before = [origins.get(p) or str(v.line[p]) for p in v.predecessors(i).tolist()]
+        word = Motion(v.motion[i]).name + (" VIA" if v.via[i] else "")
+        literal = "-"
+        if v.literal[i] >= 0:
+            row = v.literal[i]
+            places = zip(v.literals.start[row], v.literals.end[row], strict=True)
+            literal = ",".join(text[a:b] for a, b in places)
+            literal += " taught" * bool(v.literals.taught[row])
+        name = v.names[v.name[i]] or "-"
+        parts = [
+            f"{v.line[i]} {word} {Target(v.target[i]).name} {name}",
+            f"from {'|'.join(before)}",
+            f"numbers {literal}",
+        ]
+        parts += [f"measure {v.measure_id[i]}"] * bool(v.measure_id[i])
+        parts += [f"because {v.reasons[v.reason[i]]}"] * bool(v.reason[i])
+        out.append("; ".join(parts))
+    out += [f"! {d.line} {d.code}" for d in resolved.diagnostics]
+    return "\n".join(out) + "\n"
+
+
+@pytest.mark.parametrize(
+    ("title", "program", "expected"), chapters(), ids=[c[0] for c in chapters()]
+)
+@pytest.mark.parametrize("newline", ["\n", "\r\n"])
+def test_chapter(title: str, program: str, expected: str, newline: str) -> None:
+    text = program.replace("\n", newline)
+    source = source_from_bytes("case.pdl", text.encode("latin-1"))
+    resolved = resolve(parse(source), CELL)
+    assert described(resolved, source.text) == expected
+    visits = resolved.visits
+    same = edits(visits.literals, (source,), [], [])
+    assert apply(source.data, same[0]) == source.data

@@ -1,0 +1,110 @@
+"""The array passes agree with the definition in `lexis`, line by line."""
+
+import re
+
+import numpy as np
+import pytest
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
+
+from postproc.exceptions import ProgramError
+from postproc.language.lexis import mask_line, number_value
+from postproc.language.lines import read_lines
+from postproc.language.masking import mask_lines
+from postproc.language.source import Source, source_from_bytes
+
+PIECES = (
+    "1 0 9 . - , ( ) [ ] { } : = * ' \" \\ x e E $ -- .. TO 5.25 -0.5 0x3F 1..n "
+    "1234567890.123456789"
+).split()
+TEXT = st.lists(
+    st.sampled_from([*PIECES, " ", "\t", "\n", "\r\n", "\r", "\x1a", "\xe9"]),
+    min_size=1,
+    max_size=40,
+)
+
+
+@settings(max_examples=400, deadline=None)
+@given(TEXT)
+@example(["'", "\\", "'"])
+def test_arrays_agree_with_lines(parts: list[str]) -> None:
+    data = "".join(parts).encode("latin-1")
+    starts = Source("x", data).line_starts
+    masked = mask_lines(data, starts)
+    lines = re.split(rb"\r\n|\n|\r", data)
+    if not lines[-1] and len(lines) > 1:
+        lines.pop()
+    for row, line in enumerate(lines):
+        wanted = mask_line(line.decode("latin-1"))
+        at = int(starts[row])
+        mine = slice(masked.first[row], masked.first[row + 1])
+        assert masked.masks[row].decode("latin-1") == wanted.mask
+        assert (masked.start[mine] - at).tolist() == list(wanted.start)
+        assert (masked.end[mine] - at).tolist() == list(wanted.end)
+        assert masked.comment[row] == (
+            at + wanted.comment if wanted.comment >= 0 else -1
+        )
+        assert (row in masked.unterminated) == wanted.unterminated
+    texts = [data[a:b].decode("latin-1") for a, b in zip(masked.start, masked.end)]  # noqa: B905
+    assert np.array_equal(
+        masked.value, [number_value(t) for t in texts], equal_nan=True
+    )
+
+
+@given(st.floats(-1e6, 1e6), st.integers(0, 9))
+def test_values_are_read_as_python_reads_them(value: float, decimals: int) -> None:
+    text = f"{value:.{decimals}f}"
+    data = f"p := {text}\n".encode()
+    assert mask_lines(data, np.array([0])).value.tolist() == [float(text)]
+
+
+@pytest.mark.parametrize(
+    ("line", "numbers"),
+    [
+        ("x := -1.5 - 2 -3", ["-1.5", "2", "3"]),
+        ("POS(- 2, a-1, .5, 1e-3)", ["- 2", "1", ".5", "1e-3"]),
+        ("a1.x := $FMI[2] + 0x3F", ["2", "0x3F"]),
+        ("ALONG p[1..n]", ["1"]),
+        ("WRITE ('1 2 -- 3', x::4) -- 5", ["4"]),
+        ("s := 'it''s 1' + 2", ["2"]),
+        (r"OPEN FILE l ('UD:\', '3')", []),
+        ('s := "it\'s 1" -- 2', []),
+    ],
+)
+def test_what_a_number_is(line: str, numbers: list[str]) -> None:
+    masked = mask_line(line)
+    spans = zip(masked.start, masked.end, strict=True)
+    assert [line[a:b] for a, b in spans] == numbers
+
+
+def test_a_file_in_pieces_is_one_file() -> None:
+    line = b"  MOVE LINEAR TO POS(1.5, -2.25, 3, 4, 5, 6, '') -- 7\r\n"
+    count = 3 * (1 << 20) // len(line)
+    lines = read_lines(source_from_bytes("x", line * count))
+    assert len(lines) == count
+    assert len(lines.shapes) == 1
+    assert np.array_equal(np.diff(lines.first), np.full(count, 6))
+    assert lines.value[-5] == -2.25
+    assert lines.source.data[lines.start[-5] : lines.end[-5]] == b"-2.25"
+
+
+def test_statements_are_joined_up_to_endmove() -> None:
+    text = (
+        b"MOVE TO p ,\r\n -- note\r\n\r\n WITH CONDITION[3],\r\n WITH $LIN_SPD=0.5\r\n"
+        b" ENDMOVE\r\nMOVE TO q,\nMOVE TO r"
+    )
+    lines = read_lines(source_from_bytes("x", text))
+    assert lines.line.tolist() == [1, 7, 8]
+    assert lines.value.tolist() == [3.0, 0.5]
+    assert lines.text(0).endswith("ENDMOVE")
+
+
+def test_an_open_string_is_refused_with_its_line() -> None:
+    with pytest.raises(ProgramError, match=r"x:2: a string is not terminated"):
+        read_lines(source_from_bytes("x", b"BEGIN\n  WRITE ('hello, NL)\nEND"))
+
+
+def test_marks_are_comments_not_strings() -> None:
+    text = b"WRITE ('-- MEASURE no')\n-- MEASURE P1\nMOVE TO p --measure P2 -- x\n"
+    lines = read_lines(source_from_bytes("x", text))
+    assert list(lines.marks("MEASURE")) == [(2, "P1"), (3, "P2")]

@@ -1,0 +1,61 @@
+"""Only the numbers of targets change, and they keep their digits."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from postproc.language.flow import resolve
+from postproc.language.rewrite import compare, decimals_of, edits, number_text
+from postproc.language.source import Edit, Source, Span, apply, source_from_bytes
+from postproc.language.structure import parse
+
+PROGRAM = (
+    "PROGRAM a -- caf\xe9\r\n"
+    "BEGIN\r\n"
+    "\tMOVE LINEAR TO POS(1.5,- 2.25 , 3, -0.00000, 45.123456, 1e1, 'W T1:0')  \r\n"
+    "  MOVE JOINT TO {1, 2.5, 3, 4, 5, 6}"
+).encode("latin-1")
+
+
+def test_new_numbers_have_enough_digits_and_nothing_else_changes() -> None:
+    source = source_from_bytes("a.pdl", PROGRAM)
+    literals = resolve(parse(source)).visits.literals
+    new = np.array(
+        [[1.25, 2.5, 3.0001, -0.5, 45.1234561, 10.5], [1.000006, 2.5, -3, 4, 5, 6]]
+    )
+    (mine,) = edits(literals, (source,), np.array([0, 1]), new)
+    out = apply(source.data, mine)
+    assert out == PROGRAM.replace(b"1.5,- 2.25 ", b"1.250,2.500 ").replace(
+        b"-0.00000", b"-0.50000"
+    ).replace(b"1e1", b"10.5000").replace(b"{1, 2.5, 3,", b"{1.00001, 2.5, -3.00000,")
+    assert compare(source, Source("a.pdl", out), mine) == ()
+
+
+def test_compare_finds_what_was_not_meant() -> None:
+    source = source_from_bytes("a.pdl", PROGRAM)
+    at = PROGRAM.index(b"1.5")
+    meant = [Edit(Span(at, at + 3), b"1.7")]
+    good = Source("a", apply(PROGRAM, meant))
+    assert compare(source, good, meant) == ()
+    assert compare(source, Source("a", good.data.replace(b"45.1", b"45.2")), meant)
+    assert compare(source, Source("a", good.data.replace(b"\xe9", b"e")), meant)
+    assert compare(source, Source("a", good.data + b"\r\nx"), meant)
+    assert compare(source, Source("a", good.data.replace(b"1.7", b"1.8")), meant)
+    assert compare(source, source, meant)
+
+
+def test_a_value_that_is_none_is_refused() -> None:
+    source = source_from_bytes("a.pdl", PROGRAM)
+    literals = resolve(parse(source)).visits.literals
+    with pytest.raises(ValueError, match="not finite"):
+        edits(literals, (source,), np.array([0]), np.full((1, 6), np.nan))
+
+
+@given(st.floats(-1e4, 1e4), st.integers(0, 8), st.integers(3, 5))
+def test_digits_written(value: float, decimals: int, least: int) -> None:
+    old = f"{12.5:.{decimals}f}"
+    text = number_text(value, old, least)
+    assert decimals_of(text) == max(decimals, least)
+    assert abs(float(text) - value) <= 0.5 * 10.0 ** -max(decimals, least) + 1e-11
+    assert not text.startswith("-0.000") or float(text) != 0.0

@@ -1,0 +1,81 @@
+"""Bytes in, bytes out."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from postproc.exceptions import FileError, ProgramError
+from postproc.language.source import (
+    Edit,
+    Source,
+    Span,
+    apply,
+    read_source,
+    source_from_bytes,
+)
+
+TEXT = st.lists(st.sampled_from([b"a", b"\r", b"\n", b"\r\n", b"\xe9"]), max_size=30)
+
+
+@given(TEXT)
+def test_lines_partition_the_text(parts: list[bytes]) -> None:
+    data = b"".join(parts)
+    source = Source("x", data)
+    starts = source.line_starts
+    wanted = data.replace(b"\r\n", b"\n").replace(b"\r", b"\n").split(b"\n")
+    if len(wanted) > 1 and not wanted[-1]:
+        wanted.pop()
+    assert len(starts) == len(wanted)
+    for line, text in enumerate(wanted, start=1):
+        assert source.line_text(line) == text.decode("latin-1")
+        assert source.line_of(int(starts[line - 1])) == line
+
+
+@given(st.binary(max_size=60), st.data())
+def test_edits_change_their_spans_only(data: bytes, draw: st.DataObject) -> None:
+    places = draw.draw(st.lists(st.integers(0, len(data)), max_size=8))
+    places = sorted(places)[: len(places) // 2 * 2]
+    edits = [
+        Edit(Span(a, b), draw.draw(st.binary(max_size=5)))
+        for a, b in zip(places[0::2], places[1::2], strict=True)
+    ]
+    out = apply(data, edits)
+    assert len(out) == len(data) + sum(
+        len(e.new) - (e.span.end - e.span.start) for e in edits
+    )
+    back, shift = [], 0
+    for (start, end), new in edits:
+        back.append(
+            Edit(Span(start + shift, start + shift + len(new)), data[start:end])
+        )
+        shift += len(new) - (end - start)
+    assert apply(out, back) == data
+
+
+def test_overlapping_edits_are_refused() -> None:
+    with pytest.raises(ValueError, match="overlaps"):
+        apply(b"abcdef", [Edit(Span(0, 3), b""), Edit(Span(2, 4), b"")])
+
+
+@pytest.mark.parametrize("data", [b"", b" \r\n", b"\xef\xbb\xbf"])
+def test_empty_files_are_refused(data: bytes) -> None:
+    with pytest.raises(ProgramError, match="empty"):
+        source_from_bytes("x.pdl", data)
+
+
+def test_binary_files_are_refused_with_the_line() -> None:
+    with pytest.raises(ProgramError, match=r"x\.cod:2: .*binary.*\.pdl"):
+        source_from_bytes("x.cod", b"PROGRAM x\r\n\x00\x01")
+
+
+def test_missing_file() -> None:
+    with pytest.raises(FileError, match="cannot be read"):
+        read_source("/nowhere/at/all.pdl")
+
+
+def test_newline_is_that_of_the_first_line() -> None:
+    assert Source("x", b"a\nb\r\n").newline == b"\n"
+    assert Source("x", b"a\r\nb\n").newline == b"\r\n"
+    assert Source("x", b"a").newline == b"\r\n"
+    assert np.array_equal(Source("x", b"a").line_starts, [0])
