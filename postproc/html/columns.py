@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, fields, replace
-from typing import Self
+from dataclasses import dataclass, fields
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -67,11 +67,12 @@ class Columns:
 
     def __getitem__(self, rows: Ints) -> Self:
         """Take some of the visits."""
-        arrays = {f.name: getattr(self, f.name) for f in fields(self)}
-        return replace(
-            self,
-            **{k: v[rows] for k, v in arrays.items() if isinstance(v, np.ndarray)},
-        )
+        values = {f.name: getattr(self, f.name) for f in fields(self)}
+        taken: dict[str, Any] = {
+            name: value[rows] if isinstance(value, np.ndarray) else value
+            for name, value in values.items()
+        }
+        return type(self)(**taken)
 
     @property
     def size_mm(self) -> Array:

@@ -35,7 +35,7 @@ def listing(sources: Mapping[str, bytes], columns: Columns) -> Listing:
         last = len(source.line_starts)
         wanted = np.arange(1, last + 1) if total <= WHOLE else _used(columns, name)
         wanted = wanted[(wanted >= 1) & (wanted <= last)]
-        out[name] = {"line": stretches(wanted), "text": _texts(source, wanted)}
+        out[visible(name)] = {"line": stretches(wanted), "text": _texts(source, wanted)}
     return out
 
 

@@ -44,20 +44,26 @@ def render(
         payload: What the scripts show; JSON values without NaN.
         scripts: Names in ``assets/``, in order.
         **context: What the template shows.
+
+    Raises:
+        KeyError: The template needs something that the context lacks.
     """
     code = [_SETTINGS, plotly_js(), *(asset(name) for name in scripts)]
     kind, data = embed(payload)
     page = _environment().get_template(template)
-    return page.render(
-        title=title,
-        version=__version__,
-        style=Markup(asset("style.css")),  # noqa: S704: our own file
-        code=[Markup(text) for text in code],  # noqa: S704: our own files
-        policy=policy(code),
-        data=data,
-        data_kind=kind,
-        **context,
-    )
+    try:
+        return page.render(
+            title=title,
+            version=__version__,
+            style=Markup(asset("style.css")),  # our own file
+            code=[Markup(text) for text in code],  # our own files
+            policy=policy(code),
+            data=data,
+            data_kind=kind,
+            **context,
+        )
+    except jinja2.UndefinedError as exc:
+        raise KeyError(str(exc)) from None
 
 
 def embed(payload: Mapping[str, Any]) -> tuple[str, Markup]:
@@ -70,10 +76,10 @@ def embed(payload: Mapping[str, Any]) -> tuple[str, Markup]:
     text = json.dumps(payload, separators=(",", ":"), allow_nan=False)
     if len(text) > PLAIN_BYTES:
         packed = gzip.compress(text.encode("ascii"), compresslevel=5, mtime=0)
-        return PACKED, Markup(base64.b64encode(packed).decode("ascii"))  # noqa: S704
+        return PACKED, Markup(base64.b64encode(packed).decode("ascii"))
     for character in "<>&":
         text = text.replace(character, f"\\u{ord(character):04x}")
-    return PLAIN, Markup(text)  # noqa: S704: nothing of HTML is left in it
+    return PLAIN, Markup(text)  # nothing of HTML is left in it
 
 
 def policy(code: Sequence[str]) -> str:

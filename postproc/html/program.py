@@ -20,15 +20,14 @@ from postproc.html.summary import (
     left_alone,
     seconds,
     tell_counts,
+    uncertainty,
 )
 from postproc.report import Outcome, Status
 
 SCRIPTS = ("page.js", "columns.js", "view.js", "table.js", "source.js", "program.js")
 
 
-def program_report(
-    outcome: Outcome, sources: Mapping[str, bytes] | None = None
-) -> str:
+def program_report(outcome: Outcome, sources: Mapping[str, bytes] | None = None) -> str:
     """Make the page of an outcome.
 
     Args:
@@ -91,6 +90,7 @@ def _page(program: Program) -> str:
         corrected=int((columns.status == Status.SAFE).sum()),
         groups=left_alone(columns),
         predicted=finite(program.predicted),
+        sigma=uncertainty(columns),
         stages=seconds(program.stages),
         shown=len(carried),
         placed=bool(np.isfinite(columns.position_mm).all(axis=1).any()),

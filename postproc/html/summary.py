@@ -87,13 +87,23 @@ def histogram(columns: Columns) -> dict[str, Any]:
     return {"edges_mm": edges.round(6).tolist(), "counts": counts.tolist()}
 
 
+def uncertainty(columns: Columns) -> dict[str, float | None]:
+    """Summarise the standard errors at the corrected targets, over the axes [mm]."""
+    rows = columns.status == Status.SAFE
+    size = np.linalg.norm(columns.std_mm[rows], axis=1)
+    size = size[np.isfinite(size)]
+    if len(size) == 0:
+        return {"median": None, "max": None}
+    return {"median": float(np.median(size)), "max": float(size.max())}
+
+
 def seconds(stages: Mapping[str, float]) -> tuple[Stage, ...]:
     """List stages in their order, with shares."""
     total = sum(stages.values()) or 1.0
     return tuple(Stage(name, s, s / total) for name, s in stages.items())
 
 
-def finite(value: Any) -> Any:  # noqa: ANN401
+def finite(value: Any) -> Any:
     """Replace NaN, which JSON does not have, by None, all the way down."""
     if isinstance(value, Mapping):
         return {k: finite(v) for k, v in value.items()}

@@ -29,7 +29,7 @@ def program_text(n: int, extra: str = "") -> bytes:
         "-11.6190, '') ADVANCE\r\n"
         for x, y, z in p.tolist()
     )
-    return (head + "".join(moves) + "END panel\r\n").encode("latin-1")
+    return (head + "".join(moves) + "END panel\r\n").encode("latin-1", "replace")
 
 
 def path(n: int) -> np.ndarray:
@@ -136,7 +136,7 @@ def outcome_of(
         decisions=decisions,
         before=ErrorStatistics.of(decisions.correction[safe]),
         after=ErrorStatistics.of(left),
-        diagnostics=(Diagnostic(name, 1, "absolute-accuracy", f"taken to be off {extra}"),),
+        diagnostics=(Diagnostic(name, 1, "assumed", f"taken to be off {extra}"),),
         stages={"parse": 0.1, "plan": 0.5, "solve": 0.2},
         position=path(n) * 1e-3 + [1.6, -0.3, 0.9],
         sources={name: program_text(n, extra)} if sources is None else sources,

@@ -21,6 +21,7 @@ class Columns {
     }
     this.size = this.lengths("correction_mm");
     this.sigma = this.lengths("std_mm");
+    this.several = new Set(this.file).size > 1;
     this.row = new Map(this.visit.map((v, i) => [v, i]));
   }
 
@@ -51,8 +52,7 @@ class Columns {
   }
 
   place(i) {
-    const file = this.file[i] > 0 || this.files.length > 2 ? `${this.files[this.file[i]]}:` : "";
-    return `${file}${this.line[i]}`;
+    return (this.several ? `${this.files[this.file[i]]}:` : "") + this.line[i];
   }
 
   status_of(i) {

@@ -85,8 +85,8 @@ class ProgramPage {
       text: keys.map((k) => Page.number(from[k], 3)), textposition: "outside", cliponaxis: false,
       marker: { color: colour, line: { color: colour, width: 1 }, pattern: { shape, fgcolor: colour, bgcolor: "#fff", solidity: 0.4 } } });
     Page.draw(node, [bars(before, "before", Page.COLOURS.vermillion, "/"), bars(after, "after", Page.COLOURS.blue, "")], {
-      barmode: "group", legend: { x: 1, xanchor: "right", y: 0.1, traceorder: "normal" },
-      margin: { l: 48, r: 56, t: 28, b: 44 },
+      barmode: "group", legend: { orientation: "h", x: 0, y: 1.02, yanchor: "bottom", traceorder: "normal" },
+      margin: { l: 48, r: 56, t: 30, b: 44 },
       xaxis: { title: { text: "predicted error [mm]" }, rangemode: "tozero" }, yaxis: { autorange: "reversed", type: "category" },
     });
   }

@@ -14,7 +14,7 @@ class View {
     this.onPick = onPick;
   }
 
-  // A magnification that makes large errors about a twentieth of the path's size.
+  // A magnification that makes large errors about a twelfth of the path's size.
   suggest() {
     const { column } = this.columns.numbers.position_mm;
     const low = [Infinity, Infinity, Infinity], high = [-Infinity, -Infinity, -Infinity];
@@ -25,7 +25,7 @@ class View {
     const extent = Math.hypot(...high.map((v, k) => v - low[k]));
     const sizes = Array.from(this.columns.size).filter((v) => v > 0).sort((a, b) => a - b);
     if (!sizes.length || !(extent > 0)) return 100;
-    const wanted = 0.05 * extent / sizes[Math.floor(0.95 * (sizes.length - 1))];
+    const wanted = 0.08 * extent / sizes[Math.floor(0.95 * (sizes.length - 1))];
     return View.SCALES.reduce((best, s) => (s <= wanted ? s : best), 1);
   }
 
@@ -91,7 +91,7 @@ class View {
     return [
       { ...common, ...marks, mode: "markers", name: `${kind.name} (${rows.length})`, customdata: rows,
         hovertemplate: "%{text}<extra></extra>", text: rows.map((i) => this.told(i)),
-        marker: { size: this.crowded ? 2 : 3.2, color: kind.colour, symbol: kind.symbol } },
+        marker: { size: this.crowd, color: kind.colour, symbol: kind.symbol } },
       { ...common, ...lines, mode: "lines", showlegend: false, hoverinfo: "skip",
         line: { color: kind.colour, width: 4 } },
     ];
@@ -133,7 +133,7 @@ class View {
   // Draw the rows that the table lists.
   show(rows) {
     const thin = this.thin(rows);
-    this.crowded = thin.rows.length > View.CROWD;
+    this.crowd = thin.rows.length > 3000 ? 1.8 : thin.rows.length > 300 ? 2.2 : 3.4;
     const { kinds, of } = this.classes();
     const members = kinds.map(() => []);
     for (const i of thin.rows) members[of(i)].push(i);
@@ -144,7 +144,7 @@ class View {
     const done = Page.draw(this.node, traces, {
       margin: { l: 0, r: 0, t: 0, b: 0 }, uirevision: "keep", hovermode: "closest",
       legend: { x: 0, y: 1, bgcolor: "rgba(255,255,255,0.8)", itemsizing: "constant" },
-      scene: { aspectmode: "data", camera: { eye: { x: 1.5, y: -1.5, z: 1.0 } }, xaxis: axis("x"), yaxis: axis("y"), zaxis: axis("z") },
+      scene: { aspectmode: "data", camera: { eye: { x: 1.7, y: -1.7, z: 1.1 } }, xaxis: axis("x"), yaxis: axis("y"), zaxis: axis("z") },
     });
     this.note(thin);
     if (!this.listening) this.listen();
@@ -174,7 +174,6 @@ class View {
 }
 
 View.MOST = 12000;  // targets drawn at a time
-View.CROWD = 3000;  // from here on with small marks
 View.SCALES = [1, 2, 5, 10, 20, 50, 100, 200, 500, 1000, 2000, 5000];
 View.LEFT = new Set(["unsafe", "guarded", "display"]);
 View.SHADES = ["#fdc527", "#d9a528", "#8c6f63", "#4a4a8f", "#0d0887"];  // light to dark: told apart in grey too

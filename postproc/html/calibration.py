@@ -1,0 +1,174 @@
+"""The page of a model: what was fitted, how well, and what the rows could not see."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from postproc.html.figure import (
+    AFTER,
+    OTHER,
+    Figure,
+    along_axes,
+    distribution,
+    figure,
+    in_space,
+    points,
+    rounded,
+    thin,
+)
+from postproc.html.iso9283 import PoseFigures, pose_figures
+from postproc.html.page import render
+
+Array = NDArray[np.float64]
+
+SCRIPTS = ("page.js", "figures.js")
+SHOWN_UNITS = {"m": ("mm", 1e3), "rad": ("mrad", 1e3), "rad/(N m)": ("urad/(N m)", 1e6)}
+CORRELATED = 0.9
+UNSEEN = 0.1  # a parameter known less than this is at its prior
+MOST_PAIRS = 40
+
+
+def calibration_report(
+    model: Mapping[str, Any], fit: Mapping[str, Any] | None = None
+) -> str:
+    """Make the page of a model file.
+
+    Args:
+        model: The model file.
+        fit: The report of the fit with its rows, see `postproc.html.evidence`;
+            default: what stands under ``fit`` in the file, or nothing. Without it the
+            page has no residuals.
+
+    Raises:
+        KeyError, ValueError, TypeError: It is no model file.
+    """
+    told = dict(fit or model.get("fit") or {})
+    rows = _rows(told.get("rows"))
+    figures = {"coverage": coverage(model["ranges"], rows)}
+    figures |= residuals(rows) if rows else {}
+    parameters = told.get("parameters") or parameter_table(model["parameters"])
+    pairs = told.get("correlated") or correlated(model)
+    return render(
+        "calibration.html.j2",
+        f"Model {model['id']}",
+        {"figures": figures},
+        SCRIPTS,
+        model=model,
+        fit=told,
+        parameters=parameters,
+        unseen=told.get("unseen") or at_prior(parameters),
+        pairs=pairs[:MOST_PAIRS],
+        more_pairs=max(0, len(pairs) - MOST_PAIRS),
+        iso=_iso(rows),
+        has_rows=bool(rows),
+    )
+
+
+def _rows(rows: Mapping[str, Sequence[Any]] | None) -> dict[str, Array]:
+    """Take the rows as arrays."""
+    if not rows:
+        return {}
+    return {k: np.array(v, dtype=float) for k, v in rows.items() if k != "id"}
+
+
+def _iso(rows: Mapping[str, Array]) -> dict[str, PoseFigures]:
+    """Work out the figures of ISO 9283 before and after."""
+    if not rows:
+        return {}
+    q, side = rows["q_deg"], rows["lambda"].astype(int)
+    return {when: pose_figures(q, side, rows[f"{when}_mm"]) for when in WHEN}
+
+
+WHEN = ("before", "after")
+
+
+def residuals(rows: Mapping[str, Array]) -> dict[str, Figure]:
+    """Show measured errors and what the model leaves of them."""
+    errors = {when: rows[f"{when}_mm"] for when in WHEN}
+    size = {when: np.linalg.norm(e, axis=1) for when, e in errors.items()}
+    order = np.arange(1.0, len(size["before"]) + 1)
+    some = thin(len(order))
+    along = [points(when, order[some], s[some]) for when, s in size.items()]
+    return {
+        "histogram": distribution(size),
+        "axes": along_axes(errors),
+        "order": figure(along, "visit order", "error [mm]", yaxis={"type": "log"}),
+        "space": in_space(rows["position_mm"], errors),
+    }
+
+
+def coverage(ranges: Mapping[str, Any], rows: Mapping[str, Array]) -> Figure:
+    """Show which angles of every joint the survey covered."""
+    low, high = (np.rad2deg(np.array(ranges[k])) for k in ("lower", "upper"))
+    joints = [f"J{j}" for j in range(1, 7)]
+    bar = {
+        "type": "bar",
+        "orientation": "h",
+        "name": "range covered",
+        "y": joints,
+        "base": rounded(low, 2),
+        "x": rounded(high - low, 2),
+        "marker": {"color": "#dcdcdc", "line": {"color": OTHER, "width": 1}},
+        "hovertemplate": "%{base:.1f} deg and %{x:.1f} deg on<extra></extra>",
+    }
+    traces: list[Figure] = [bar]
+    if rows:
+        some = thin(len(rows["q_deg"]), 2000)
+        q = rows["q_deg"][some]
+        marker = {"symbol": "line-ns-open", "size": 9, "color": AFTER, "opacity": 0.5}
+        traces.append(
+            {
+                "type": "scatter",
+                "mode": "markers",
+                "name": "rows",
+                "x": rounded(q.T, 2),
+                "y": np.repeat(joints, len(q)).tolist(),
+                "marker": marker,
+            }
+        )
+    axis = {"autorange": "reversed", "type": "category"}
+    return figure(traces, "joint angle [deg]", "", yaxis=axis)
+
+
+def parameter_table(parameters: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
+    """Write the parameters of a model file in the units that people use."""
+    out = []
+    for p in parameters:
+        unit, factor = SHOWN_UNITS.get(p["unit"], (p["unit"], 1.0))
+        prior = p["prior_std"]
+        known = 1.0 - (p["std_error"] / prior) ** 2 if prior > 0 else 1.0
+        out.append(
+            {
+                "name": p["name"],
+                "value": p["value"] * factor,
+                "std_error": p["std_error"] * factor,
+                "unit": unit,
+                "share": None,
+                "determined": float(np.clip(known, 0.0, 1.0)),
+            }
+        )
+    return out
+
+
+def at_prior(parameters: Sequence[Mapping[str, Any]]) -> list[str]:
+    """Name the parameters that the rows say next to nothing about."""
+    return [str(p["name"]) for p in parameters if p["determined"] < UNSEEN]
+
+
+def correlated(model: Mapping[str, Any]) -> list[tuple[str, str, float]]:
+    """List pairs of parameters that the rows cannot tell apart well, worst first."""
+    names = [p["name"] for p in model["parameters"]]
+    packed = np.array(model["covariance"], dtype=float)
+    if len(packed) == 0:
+        return []
+    i, j = np.triu_indices(len(names))
+    std = np.sqrt(packed[i == j])
+    scale = std[i] * std[j]
+    r = np.divide(packed, scale, out=np.zeros_like(packed), where=scale > 0)
+    rows = np.flatnonzero((i < j) & (np.abs(r) > CORRELATED))
+    rows = rows[np.argsort(-np.abs(r[rows]), kind="stable")]
+    return [(names[i[k]], names[j[k]], float(r[k])) for k in rows]

@@ -1,0 +1,166 @@
+"""Figures as plain data, drawn by the page."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Figure = dict[str, Any]
+
+# Okabe and Ito: told apart with any kind of colour vision, and in grey by lightness.
+BEFORE, AFTER, OTHER = "#d55e00", "#0072b2", "#767676"
+BINS = 40
+MOST = 20_000  # points of a figure
+
+
+def figure(traces: Sequence[Figure], x: str, y: str, **layout: Any) -> Figure:
+    """Put traces on titled axes."""
+    axes = {"xaxis": {"title": {"text": x}}, "yaxis": {"title": {"text": y}}}
+    for key in ("xaxis", "yaxis"):
+        axes[key] = {**axes[key], **layout.pop(key, {})}
+    return {"traces": list(traces), "layout": {**axes, **layout}}
+
+
+def rounded(values: Array, digits: int = 5) -> list[float | None]:
+    """Round for the page; what is not known becomes None."""
+    flat = np.asarray(values, dtype=np.float64).ravel()
+    return [v if v == v else None for v in np.round(flat, digits).tolist()]
+
+
+def bars(name: str, x: Sequence[Any], y: Sequence[Any], **more: Any) -> Figure:
+    """Make bars; those of what was before are hatched, so that grey tells them too."""
+    before = name == "before"
+    colour = BEFORE if before else AFTER
+    pattern = {"shape": "/" if before else "", "fgcolor": colour, "bgcolor": "#fff"}
+    marker = {"color": colour, "line": {"color": colour, "width": 1}}
+    if before:
+        marker["pattern"] = {**pattern, "solidity": 0.35}
+    return {"type": "bar", "name": name, "x": x, "y": y, "marker": marker, **more}
+
+
+def points(name: str, x: Array, y: Array, **more: Any) -> Figure:
+    """Make points: open circles before, dots after."""
+    before = name == "before"
+    return {
+        "type": "scatter",
+        "mode": "markers",
+        "name": name,
+        "x": rounded(x),
+        "y": rounded(y),
+        "marker": {
+            "color": BEFORE if before else AFTER,
+            "symbol": "circle-open" if before else "circle",
+            "size": 6 if before else 5,
+            "opacity": 0.8,
+        },
+        **more,
+    }
+
+
+def distribution(errors: Mapping[str, Array]) -> Figure:
+    """Compare distributions of lengths, on a logarithmic scale: both remain visible."""
+    known = {k: v[np.isfinite(v) & (v > 0)] for k, v in errors.items()}
+    whole = np.concatenate([*known.values(), [1e-3]])
+    edges = np.geomspace(whole.min(), whole.max() * (1 + 1e-9) + 1e-9, BINS + 1)
+    traces = []
+    for name, v in known.items():
+        counts = np.histogram(v, bins=edges)[0]
+        line = {"shape": "hv", "color": colour_of(name), "width": 2}
+        if name == "before":
+            line["dash"] = "dash"
+        traces.append(
+            {
+                "type": "scatter",
+                "mode": "lines",
+                "name": name,
+                "x": rounded(edges, 6),
+                "y": [*counts.tolist(), 0],
+                "line": line,
+                "fill": "tozeroy",
+            }
+        )
+    return figure(traces, "error [mm]", "rows", xaxis={"type": "log"})
+
+
+def colour_of(name: str) -> str:
+    """Choose the colour of what was before or is after."""
+    return BEFORE if name == "before" else AFTER
+
+
+def along_axes(errors: Mapping[str, Array]) -> Figure:
+    """Show the spread of errors (n, 3) axis by axis, each set on its own scale."""
+    traces, layout = [], {"grid": {"rows": 1, "columns": 2, "pattern": "independent"}}
+    for k, (name, e) in enumerate(errors.items()):
+        least, low, mid, high, most = np.percentile(e, (2.5, 25, 50, 75, 97.5), axis=0)
+        number = str(k + 1) if k else ""
+        traces.append(
+            {
+                "type": "box",
+                "name": name,
+                "x": list("xyz"),
+                "q1": rounded(low),
+                "median": rounded(mid),
+                "q3": rounded(high),
+                "lowerfence": rounded(least),
+                "upperfence": rounded(most),
+                "marker": {"color": colour_of(name)},
+                "fillcolor": "#fff" if k == 0 else "#9cc8e4",
+                "xaxis": f"x{number}",
+                "yaxis": f"y{number}",
+            }
+        )
+        layout[f"xaxis{number}"] = {"title": {"text": f"axis, {name}"}}
+        layout[f"yaxis{number}"] = {"title": {"text": "" if k else "error [mm]"}}
+    return {"traces": traces, "layout": layout}
+
+
+def in_space(position_mm: Array, errors: Mapping[str, Array]) -> Figure:
+    """Show errors (n, 3) [mm] where they were measured, each set magnified."""
+    rows = thin(len(position_mm))
+    p = position_mm[rows]
+    extent = float(np.linalg.norm(np.ptp(p, axis=0))) or 1.0
+    traces = []
+    for name, e in errors.items():
+        usual = float(np.percentile(np.linalg.norm(e, axis=1), 95))
+        scale = magnification(0.06 * extent / max(usual, 1e-9))
+        ends = np.stack([p, p + scale * e[rows], np.full_like(p, np.nan)], axis=1)
+        x, y, z = (rounded(ends[:, :, k], 2) for k in range(3))
+        width = 2 if name == "before" else 5
+        traces.append(
+            {
+                "type": "scatter3d",
+                "mode": "lines",
+                "name": f"{name}, drawn {scale:g} times as long",
+                "x": x,
+                "y": y,
+                "z": z,
+                "hoverinfo": "skip",
+                "line": {"color": colour_of(name), "width": width},
+            }
+        )
+    axes = {f"{k}axis": {"title": {"text": f"{k} base [mm]"}} for k in "xyz"}
+    camera = {"eye": {"x": 1.5, "y": -1.5, "z": 1.0}}
+    scene = {"aspectmode": "data", "camera": camera, **axes}
+    margin = {"l": 0, "r": 0, "t": 0, "b": 0}
+    return {"traces": traces, "layout": {"scene": scene, "margin": margin}}
+
+
+def magnification(wanted: float) -> float:
+    """Round down to 1, 2 or 5 times a power of ten.
+
+    >>> magnification(370.0), magnification(0.3)
+    (200.0, 1.0)
+    """
+    if not wanted > 1.0:
+        return 1.0
+    power = 10.0 ** np.floor(np.log10(wanted))
+    return float(power * max(k for k in (1, 2, 5) if k * power <= wanted))
+
+
+def thin(n: int, most: int = MOST) -> NDArray[np.int64]:
+    """Choose at most so many of n rows, evenly."""
+    return np.arange(n) if n <= most else np.arange(most) * n // most
