@@ -78,7 +78,7 @@ class Generator:
         self.lines = ["PROGRAM job EZ", "VAR"]
         self.lines += [f"  {', '.join(POINTS)}, q : POSITION"]
         self.lines += [f"  {', '.join(JOINTS)} : JOINTPOS FOR ARM[1]"]
-        self.lines += [f"  {', '.join(COUNTS)}, i1, i2, i3 : INTEGER"]
+        self.lines += [f"  {', '.join(COUNTS)}, i1, i2, i3, k1, k2, k3 : INTEGER"]
         self.lines += [f"  {TABLE} : ARRAY[9] OF POSITION"]
         self.lines += ["ROUTINE ext(a : POSITION) EXPORTED FROM other"]
         for name in ("r1", "r2"):
@@ -260,7 +260,7 @@ class Generator:
         self.emit("ENDSELECT", "nop")
 
     def for_(self, depth: int) -> None:
-        name = f"i{depth + 1}"
+        name = f"{'ki'[self.in_main]}{depth + 1}"
         if name in self.in_loops:
             return
         first, last, by = self.rng.choice([(1, 3, 1), (1, 5, 2), (4, 2, -1), (3, 1, 1)])
