@@ -1,0 +1,135 @@
+"""Campaigns of a virtual arm with an effect that nobody declared, of a known size."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from postproc.accuracy.batch import Batch
+from postproc.accuracy.diagnosis.projection import Projection
+from postproc.accuracy.fit import Fit, fit_effects
+from postproc.accuracy.library import BASE_EFFECTS, propose
+from postproc.robot.arm import load_arm
+from postproc.robot.state import States, make_states
+from postproc.virtual import (
+    Arrivals,
+    Planted,
+    VirtualArm,
+    sample_survey,
+    stream,
+    virtual_arm,
+)
+
+ARM = load_arm("nj220-2.7")
+TRACKER = np.array([3.0, -2.0, 1.5])  # [m]
+PAYLOADS = np.array([0.0, 40.0, 120.0])  # [kg]
+BASE = ("geometry", "tool", "backlash")
+
+NAMED = (
+    "compliance", "payload", "counterbalance", "transmission", "transmission_free",
+    "scale", "coupling", "load_backlash", "gravity_side", "thermal", "warmup", "windup",
+    "lag", "base_shift", "tool_shift", "tracker_drift", "worn_spot",
+)  # fmt: skip
+NAMELESS = ("joint_product", "hysteresis")
+SIZES = (0.5, 1.0, 2.0, 3.0)  # rms after projection on the base model over the noise
+
+
+@dataclass(frozen=True)
+class Campaign:
+    """What an arm with undeclared effects was measured to do.
+
+    Attributes:
+        arm: The arm, its laws the truth.
+        planted: The undeclared effects.
+        arrivals, states: The survey, for the arm and for the model.
+        position: Measured, (n, 3) [m].
+        sizes: Size of every planted effect after projection, over the noise.
+    """
+
+    arm: VirtualArm
+    planted: tuple[Planted, ...]
+    arrivals: Arrivals
+    states: States
+    position: np.ndarray
+    sizes: tuple[float, ...]
+
+    def base_fit(self) -> Fit:
+        """Fit geometry and backlash: what a user declares."""
+        effects = propose(BASE_EFFECTS, ARM, self.states)
+        batch = Batch(ARM, self.states)
+        return fit_effects(batch, self.position, effects, tuple(TRACKER))
+
+
+def campaign(
+    seed: int, kinds: tuple[str, ...], size: float, rows: int = 400
+) -> Campaign:
+    """Measure an arm with undeclared effects.
+
+    Args:
+        seed: Draws the arm, its effects and the campaign.
+        kinds: Names of the undeclared effects.
+        size: rms of each after projection on the base model over the noise; 0 leaves
+            the usual size that was drawn.
+        rows: Number of rows.
+    """
+    clean = virtual_arm(seed, BASE, rows=rows)
+    arrivals = survey(clean, seed, rows)
+    planted = tuple(Planted(kind) for kind in kinds)
+    reached = tuple(_size(clean, seed, p, arrivals, rows) for p in planted)
+    if size > 0:
+        planted = tuple(
+            replace(p, peak_mm=float(_peak(seed, p, rows) * size / was))
+            for p, was in zip(planted, reached, strict=True)
+        )
+        reached = (size,) * len(kinds)
+    arm = virtual_arm(seed, (*map(Planted, BASE), *planted), rows=rows)
+    position = arm.measure(arrivals, TRACKER, stream(seed, "tracker"))
+    return Campaign(arm, planted, arrivals, states_of(arrivals), position, reached)
+
+
+def survey(arm: VirtualArm, seed: int, rows: int) -> Arrivals:
+    """Send an arm to random poses with three payloads."""
+    payload = stream(seed, "payload").choice(PAYLOADS, rows)
+    return sample_survey(arm, rows, seed=seed, payload=payload)
+
+
+def states_of(a: Arrivals) -> States:
+    """Translate arrivals into what a measurement file tells the model."""
+    return make_states(
+        a.q, np.sign(a.side), a.tool[:, :3, 3], travel=a.travel, speed=a.speed,
+        time=a.time, temperature=a.temperature, payload=a.payload,
+        payload_com=a.payload_com, order=a.order,
+    )  # fmt: skip
+
+
+def seen_error(arm: VirtualArm, arrivals: Arrivals) -> np.ndarray:
+    """What a perfect tracker on a stand that may move would read, less the nominal."""
+    return arm.seen(arrivals, arm.tcp(arrivals)) - arm.nominal_tcp(arrivals)
+
+
+def displacement(
+    clean: VirtualArm, seed: int, planted: Planted, arrivals: Arrivals, rows: int
+) -> np.ndarray:
+    """What one undeclared effect adds to the noise-free readings, (n, 3) [m]."""
+    arm = virtual_arm(seed, (*map(Planted, BASE), planted), rows=rows)
+    return seen_error(arm, arrivals) - seen_error(clean, arrivals)
+
+
+def _peak(seed: int, planted: Planted, rows: int) -> float:
+    """The peak size [mm] that a law was drawn with."""
+    arm = virtual_arm(seed, (*map(Planted, BASE), planted), rows=rows)
+    return arm.laws[-1].peak_mm
+
+
+def _size(
+    clean: VirtualArm, seed: int, planted: Planted, arrivals: Arrivals, rows: int
+) -> float:
+    """rms of an effect after projection on the base model, in units of the noise."""
+    position = clean.measure(arrivals, TRACKER, stream(seed, "tracker"))
+    effects = propose(BASE_EFFECTS, ARM, states_of(arrivals))
+    batch = Batch(ARM, states_of(arrivals))
+    fit = fit_effects(batch, position, effects, tuple(TRACKER))
+    added = fit.whiten(displacement(clean, seed, planted, arrivals, rows))
+    left = Projection.of(fit).filter(added[:, None])[:, 0]
+    return float(np.sqrt((left**2).mean()))

@@ -1,0 +1,252 @@
+"""Trace undeclared effects on virtual arms, and count how often the answer is right.
+
+    python -m tests.undeclared --seeds 60 --none 200 --jobs 2 -o docs/undeclared.md
+
+The data come from the virtual arm, which shares no code with the model. An effect is
+drawn by seed, the fitter is not told, and the truth is opened only to score. Results
+are kept line by line beside the table, so that an interrupted run goes on.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import time
+from collections.abc import Iterable, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from postproc.accuracy.batch import Batch
+from postproc.accuracy.combination import Combination
+from postproc.accuracy.diagnosis.diagnose import trace
+from postproc.accuracy.effect import Effect, Parameter
+from postproc.accuracy.fit import Fit, fit_effects
+from postproc.accuracy.library import BASE_EFFECTS, propose
+from postproc.virtual import Arrivals, VirtualArm, virtual_arm
+from tests.accuracy.planted import (
+    ARM,
+    BASE,
+    NAMED,
+    NAMELESS,
+    SIZES,
+    TRACKER,
+    Campaign,
+    campaign,
+    displacement,
+    states_of,
+    survey,
+)
+
+FIRST_SEED = 5000  # seeds below are for trying things out
+FRESH = 200  # poses at which the true error is checked
+CLEAR = 1e-3  # p-value of a finding that a reader takes for certain
+
+
+@dataclass(frozen=True)
+class Trial:
+    """One arm, diagnosed and scored.
+
+    Attributes:
+        kind: What was planted.
+        seed: Of everything.
+        size: rms after projection over the noise.
+        truth: (effect, joints, source joint) of every planted law.
+        verdict: What the tool said.
+        found: Effect, joint, source, p-value and group of every finding.
+        right: Whether every planted law is among the findings or their groups.
+        alone: Whether it is without its group, too.
+        true_mm: True mean error at fresh poses before, after, and of an informed fit.
+        seconds: Of the search.
+    """
+
+    kind: str
+    seed: int
+    size: float
+    truth: list[tuple[str, list[int], int]]
+    verdict: str
+    found: list[dict[str, object]]
+    right: bool
+    alone: bool
+    true_mm: tuple[float, float, float]
+    seconds: float
+
+
+@dataclass(frozen=True, eq=False)
+class Known(Effect):
+    """The planted effect itself, of unknown size: what an informed fit uses.
+
+    Attributes:
+        table: Displacement at every row, survey first, then fresh poses, (m, 3) [m].
+    """
+
+    name = "known"
+    table: np.ndarray
+
+    def parameters(self) -> tuple[Parameter, ...]:
+        return (Parameter("size", "1", 1.0, "size"),)
+
+    def columns(self, batch: Batch) -> np.ndarray:
+        return self.table[batch.states.order.astype(int)][:, :, None]
+
+
+def kinds_of(kind: str, seed: int) -> tuple[str, ...]:
+    """Names of the effects that a kind plants."""
+    if kind == "none":
+        return ()
+    if kind == "two":
+        rng = np.random.default_rng([seed, 2])
+        return tuple(map(str, rng.choice(NAMED, 2, replace=False)))
+    return (kind,)
+
+
+def run(kind: str, seed: int, size: float) -> Trial:
+    """Plant, measure, diagnose, score."""
+    planted = kinds_of(kind, seed)
+    c = campaign(seed, planted, size)
+    base = c.base_fit()
+    start = time.perf_counter()
+    traced = trace(base, seed=0)
+    seconds = time.perf_counter() - start
+    found: list[dict[str, object]] = [
+        {
+            "effect": f.effect,
+            "joint": f.joint,
+            "source": f.source,
+            "p": f.p_value,
+            "group": [list(x) for x in f.confusable_with],
+        }
+        for f in traced.findings
+    ]
+    laws = [law for law in c.arm.laws if law.effect != "backlash"]
+    truth = [(law.effect, list(law.joints), law.source) for law in laws]
+    hits = [_hit(law, found) for law in truth]
+    before, after = base, traced.search.fit
+    return Trial(
+        kind, seed, size, truth, traced.verdict, found,
+        all(h >= 1 for h in hits), all(h >= 2 for h in hits),
+        _true_errors(c, seed, before, after), seconds,
+    )  # fmt: skip
+
+
+def _hit(law: tuple[str, list[int], int], found: Sequence[dict[str, object]]) -> int:
+    """2 where a finding names the law, 1 where one of its group does, else 0.
+
+    A law without a name is hit by a curve on its joint.
+    """
+    effect, joints, _ = law
+    effect = effect or "curve"
+    best = 0
+    for f in found:
+        names = [[f["effect"], f["joint"]], *f["group"]]  # type: ignore[misc]
+        for k, (name, joint) in enumerate(names):
+            if name == effect and (joint in joints or (joint is None and not joints)):
+                best = max(best, 1 if k else 2)
+    return best
+
+
+def _true_errors(
+    c: Campaign, seed: int, before: Fit, after: Fit
+) -> tuple[float, float, float]:
+    """True mean errors [mm] that three fits leave at fresh poses."""
+    fresh = _fresh(c.arm, seed, len(c.states))
+    truth = c.arm.error(fresh)
+    informed = _informed(c, seed, fresh, truth)
+    out = []
+    for fit, origins in (
+        (before, ("arm", "state")),
+        (after, ("arm", "state")),
+        (informed, ("arm", "state", "setup")),
+    ):
+        keep = tuple(e for e in fit.combination.effects if e.origin in origins)
+        values = fit.values[fit.combination.where(*origins)]
+        batch = Batch(ARM, states_of(fresh))
+        left = truth - Combination(keep).error(batch, values)
+        out.append(float(np.linalg.norm(left, axis=1).mean() * 1e3))
+    return out[0], out[1], out[2]
+
+
+def _fresh(arm: VirtualArm, seed: int, rows: int) -> Arrivals:
+    """Other poses, visited after the survey."""
+    fresh = survey(arm, seed + 10**6, FRESH)
+    later = 14.0 * rows + fresh.time
+    return replace(
+        fresh,
+        order=fresh.order + rows,
+        time=later,
+        temperature=arm.temperature(later, 22.0),
+    )
+
+
+def _informed(c: Campaign, seed: int, fresh: Arrivals, truth: np.ndarray) -> Fit:
+    """Fit the base and exactly the planted effects, sizes unknown."""
+    rows = len(c.states)
+    clean = virtual_arm(seed, BASE, rows=rows)
+    effects: list[Effect] = list(propose(BASE_EFFECTS, ARM, c.states))
+    if c.planted:
+        seen = sum(displacement(clean, seed, p, c.arrivals, rows) for p in c.planted)
+        there = truth - clean.error(fresh)
+        effects.append(Known(np.concatenate([seen, there])))
+    batch = Batch(ARM, c.states)
+    return fit_effects(batch, c.position, tuple(effects), tuple(TRACKER))
+
+
+def jobs_of(seeds: int, none: int) -> list[tuple[str, int, float]]:
+    """List kind, seed and size of every trial."""
+    out = []
+    for kind in (*NAMED, *NAMELESS, "two"):
+        for k in range(seeds):
+            out.append((kind, FIRST_SEED + k, SIZES[k % len(SIZES)]))
+    out += [("none", FIRST_SEED + k, 0.0) for k in range(none)]
+    return out
+
+
+def _run(job: tuple[str, int, float]) -> str:
+    return json.dumps(asdict(run(*job)))
+
+
+def run_all(jobs: Iterable[tuple[str, int, float]], log: Path, workers: int) -> None:
+    """Run the trials that the log does not hold yet."""
+    done = {(t.kind, t.seed, t.size) for t in read_log(log)}
+    todo = [j for j in jobs if j not in done]
+    with log.open("a") as out, ProcessPoolExecutor(workers) as pool:
+        for k, line in enumerate(pool.map(_run, todo, chunksize=4)):
+            out.write(line + "\n")
+            out.flush()
+            if k % 20 == 0:
+                print(f"{k + 1} of {len(todo)}", flush=True)
+
+
+def read_log(log: Path) -> list[Trial]:
+    """Read the trials of a log."""
+    if not log.exists():
+        return []
+    lines = log.read_text().splitlines()
+    return [_trial(json.loads(line)) for line in lines]
+
+
+def _trial(data: dict[str, object]) -> Trial:
+    truth = [tuple(law) for law in data["truth"]]  # type: ignore[attr-defined]
+    return Trial(**{**data, "truth": truth, "true_mm": tuple(data["true_mm"])})  # type: ignore[arg-type]
+
+
+def main() -> None:
+    """Run and write the table."""
+    from tests.undeclared_table import write_table
+
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--seeds", type=int, default=60)
+    parser.add_argument("--none", type=int, default=200)
+    parser.add_argument("--jobs", type=int, default=2)
+    parser.add_argument("--log", type=Path, default=Path("build/undeclared.jsonl"))
+    parser.add_argument("-o", "--output", type=Path, default=Path("docs/undeclared.md"))
+    chosen = parser.parse_args()
+    chosen.log.parent.mkdir(parents=True, exist_ok=True)
+    run_all(jobs_of(chosen.seeds, chosen.none), chosen.log, chosen.jobs)
+    write_table(read_log(chosen.log), chosen.output)
+
+
+if __name__ == "__main__":
+    main()
