@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from itertools import count
@@ -27,7 +27,13 @@ from postproc.verify import check_output
 Array = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 
+Progress = Callable[[str], None]
+
 FREE_ROUNDS = 2  # of correcting for changed directions, before targets are held
+
+
+def silent(stage: str) -> None:
+    """Tell nobody."""
 
 
 @dataclass(frozen=True)
@@ -46,15 +52,17 @@ class Options:
 
 
 class Clock:
-    """Seconds spent in every stage."""
+    """Seconds spent in every stage; tells the stages to whom it may concern."""
 
-    def __init__(self) -> None:
+    def __init__(self, progress: Progress) -> None:
         """Start with no stage."""
         self.stages: dict[str, float] = {}
+        self._progress = progress
 
     @contextmanager
     def __call__(self, stage: str) -> Iterator[None]:
         """Add the time of a block to a stage."""
+        self._progress(stage)
         start = perf_counter()
         yield
         self.stages[stage] = self.stages.get(stage, 0.0) + perf_counter() - start
@@ -77,6 +85,7 @@ def compensate(
     name: str = "program.pdl",
     variables: bytes | None = None,
     options: Options = Options(),
+    progress: Progress = silent,
 ) -> Outcome:
     """Move every target of a program against the error the arm would make there.
 
@@ -87,13 +96,14 @@ def compensate(
         name: File name of the program; its variable file is ``name.lsv``.
         variables: The variable file, where there is one.
         options: What the user asked for.
+        progress: Told the name of every stage as it begins.
 
     Raises:
         ProgramError: The source is no program text, or is compensated already.
         CellError: The controller compensates on its own.
         ModelError: The model was made for another arm.
     """
-    clock = Clock()
+    clock = Clock(progress)
     files = name_files(name, source, variables)
     refuse(files, cell, model)
     with clock("parse"):

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import io
 import sys
-from collections.abc import Iterable, Sequence
+import threading
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Literal, TextIO
 
@@ -12,6 +14,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+PATIENCE = 2.0  # [s] before a person is shown what is being done
 PLAIN_WIDTH = 200  # of a table that goes to a file or a pipe
 
 
@@ -63,3 +66,28 @@ def printable(text: str) -> str:
     'a\\x1b[31m'
     """
     return "".join(c if c.isprintable() else repr(c)[1:-1] for c in text)
+
+
+@contextmanager
+def stages(out: TextIO | None = None) -> Iterator[Callable[[str], None]]:
+    """Show what is being done when it lasts, on a terminal only.
+
+    Args:
+        out: Where to; default: stderr.
+
+    Yields:
+        A function to be told the name of every stage.
+    """
+    out = out or sys.stderr
+    if not out.isatty():
+        yield lambda stage: None
+        return
+    status = Console(file=out).status("starting")
+    timer = threading.Timer(PATIENCE, status.start)
+    timer.daemon = True
+    timer.start()
+    try:
+        yield lambda stage: status.update(printable(stage))
+    finally:
+        timer.cancel()
+        status.stop()

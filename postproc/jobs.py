@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from postproc.accuracy.model import Model, load_model
-from postproc.compensate import Options, compensate
+from postproc.compensate import Options, Progress, compensate, silent
 from postproc.exceptions import OutputError, ProgramError
 from postproc.files import write_all
 from postproc.report import Outcome
@@ -64,7 +64,7 @@ class Job:
         values = None if lsv is None else (lsv, read_bytes(lsv))
         return cls(path, path.name, source, values, loaded, fitted)
 
-    def run(self, options: Options) -> Outcome:
+    def run(self, options: Options, progress: Progress = silent) -> Outcome:
         """Compensate the program."""
         variables = None if self.variables is None else self.variables[1]
         return compensate(
@@ -74,6 +74,7 @@ class Job:
             name=self.name,
             variables=variables,
             options=options,
+            progress=progress,
         )
 
     def write(

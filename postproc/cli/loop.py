@@ -57,18 +57,20 @@ def diagnose(
     Example: postproc diagnose fresh.csv --cell cell.toml --model model.json
     """
     from postproc import diagnosing
+    from postproc.console import stages
 
     with explained():
-        found = diagnosing.diagnose_files(
-            data,
-            cell,
-            model,
-            output=output,
-            program=program,
-            measured_frame=frame.value,
-            seed=seed,
-            progress=say,
-        )
+        with stages() as progress:
+            found = diagnosing.diagnose_files(
+                data,
+                cell,
+                model,
+                output=output,
+                program=program,
+                measured_frame=frame.value,
+                seed=seed,
+                progress=progress,
+            )
         if json:
             write_text(json, found.diagnosis.to_json())
         if html is not None:

@@ -55,11 +55,13 @@ def compensate(
     """
     from postproc import jobs
     from postproc.compensate import Options
+    from postproc.console import stages
 
     options = Options(clone=clone, temperature=temperature)
     with explained():
         job = jobs.Job.open(program, cell, model, lsv)
-        outcome = job.run(options)
+        with stages() as progress:
+            outcome = job.run(options, progress)
         if strict and outcome.exit_code:
             _print_outcome(outcome)
             raise PostprocError(
