@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
+from postproc.language.shelves import Shelves
 from postproc.language.values import Alias, Nothing, Value, join
 
 Settings = Mapping[str, Value]
@@ -24,16 +25,20 @@ class Store:
         values: Assigned values. A Nothing at ``job/tab`` hides its elements.
         settings: Frames and motion variables; replaced, never changed.
         last: Visits the arm may come from.
+        compound: Keys that ever had elements or fields; shared by all copies.
     """
 
     initial: Callable[[str], Value | None]
-    values: dict[str, Value] = field(default_factory=dict)
+    values: Shelves = field(default_factory=Shelves)
     settings: Settings = field(default_factory=dict)
     last: frozenset[int] = frozenset()
+    compound: set[str] = field(default_factory=set)
 
     def copy(self) -> Store:
         """Return a store that can change on its own."""
-        return Store(self.initial, dict(self.values), self.settings, self.last)
+        return Store(
+            self.initial, self.values.copy(), self.settings, self.last, self.compound
+        )
 
     def read(self, key: str) -> Value:
         """Return what a key holds."""
@@ -58,12 +63,16 @@ class Store:
     def write(self, key: str, value: Value) -> None:
         """Let a key hold a value."""
         self.values[key] = value
+        root = _root(key)
+        if len(root) < len(key):
+            self.compound.add(root)
 
     def forget(self, key: str, why: str) -> None:
         """What a variable and all its elements hold is no longer known."""
-        inside = (f"{key}[", f"{key}.")
-        for other in [k for k in self.values if k.startswith(inside)]:
-            del self.values[other]
+        if _root(key) in self.compound:
+            inside = (f"{key}[", f"{key}.")
+            for other in [k for k in self.values if k.startswith(inside)]:
+                del self.values[other]
         self.values[key] = Nothing(why)
 
     def forget_alias(self, alias: Alias, why: str) -> None:
@@ -85,17 +94,19 @@ class Store:
             merged = _merge_settings(self.settings, other.settings)
             changed |= merged != self.settings
             self.settings = merged
-        for key in self.values.keys() | other.values.keys():
+        for key in self.values.differing(other.values):
             mine = self.values.get(key)
             theirs = other.values.get(key)
-            if mine is theirs and mine is not None:
-                continue
             before = self.read(key) if mine is None else mine
             after = join(before, other.read(key) if theirs is None else theirs)
             if mine is None or after is not mine:
                 changed |= after != before
                 self.values[key] = after
         return changed
+
+
+def _root(key: str) -> str:
+    return key.partition("[")[0].partition(".")[0]
 
 
 def _merge_settings(a: Settings, b: Settings) -> Settings:

@@ -1,0 +1,63 @@
+"""A mapping that is cheap to copy and to compare: what copies share stays shared."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from postproc.language.values import Value
+
+_COUNT = 256
+
+
+class Shelves:
+    """Values by key on 256 shelves; a copy shares a shelf until one side writes to it.
+
+    An analysis keeps one copy for every place of a program, and merges copies that
+    differ in a few keys of thousands: both cost what differs, not what is held.
+    """
+
+    __slots__ = ("_mine", "_shelves")
+
+    def __init__(self) -> None:
+        self._shelves: list[dict[str, Value]] = [{}] * _COUNT
+        self._mine: set[int] = set()
+
+    def copy(self) -> Shelves:
+        """Return a mapping that can change on its own."""
+        other = Shelves.__new__(Shelves)
+        other._shelves = self._shelves.copy()
+        other._mine = set()
+        self._mine = set()
+        return other
+
+    def get(self, key: str) -> Value | None:
+        """Return what a key holds, None where it holds nothing."""
+        return self._shelves[hash(key) % _COUNT].get(key)
+
+    def __setitem__(self, key: str, value: Value) -> None:
+        """Let a key hold a value."""
+        self._own(hash(key) % _COUNT)[key] = value
+
+    def __delitem__(self, key: str) -> None:
+        """Let a key hold nothing."""
+        self._own(hash(key) % _COUNT).pop(key, None)
+
+    def _own(self, at: int) -> dict[str, Value]:
+        if at not in self._mine:
+            self._shelves[at] = self._shelves[at].copy()
+            self._mine.add(at)
+        return self._shelves[at]
+
+    def __iter__(self) -> Iterator[str]:
+        """Iterate over the keys."""
+        for shelf in self._shelves:
+            yield from shelf
+
+    def differing(self, other: Shelves) -> list[str]:
+        """Return the keys that may hold other values in another mapping."""
+        found: list[str] = []
+        for mine, theirs in zip(self._shelves, other._shelves, strict=True):
+            if mine is not theirs:
+                found += [k for k, v in mine.items() if theirs.get(k) is not v]
+                found += [k for k in theirs if k not in mine]
+        return found
