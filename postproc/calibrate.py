@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 from postproc.accuracy.combination import Combination
 from postproc.accuracy.fit_report import FitReport, report_fit, report_method
 from postproc.accuracy.full import fit_survey, model_of
-from postproc.accuracy.library import BASE_EFFECTS
 from postproc.accuracy.measurement import (
     Measurements,
     concatenate,
@@ -45,7 +44,7 @@ def fit(
     cell: Cell,
     *,
     method: Method = "full",
-    effects: Sequence[str] = BASE_EFFECTS,
+    effects: Sequence[str] | None = None,
     frame: Frame = "base",
     seed: int = 0,
 ) -> Calibration:
@@ -55,7 +54,8 @@ def fit(
         files: Measurement files, in visit order.
         cell: The cell: arm, probe points, tracker.
         method: "full" or one of the source's methods.
-        effects: Names of the effects that "full" fits.
+        effects: Names of the effects that "full" fits; None: geometry and backlash,
+            and whatever else the survey gives evidence for.
         frame: Frame of the measured positions. In the tracker's, the tracker's place
             and the probe points are fitted too.
         seed: Of random layers, for methods that have one.
@@ -75,23 +75,26 @@ def fit_measurements(
     cell: Cell,
     *,
     method: Method = "full",
-    effects: Sequence[str] = BASE_EFFECTS,
+    effects: Sequence[str] | None = None,
     frame: Frame = "base",
     seed: int = 0,
 ) -> Calibration:
     """Fit a model to measurements, see `fit`."""
-    tracker = cell.tracker
+    tracker, setup = cell.tracker, several_points(survey)
     if frame == "tracker":
         survey, placed = into_base_frame(survey, cell.arm)
-        effects, tracker = (*effects, "registration"), placed.tracker
+        tracker, setup = placed.tracker, ("registration",)
     check_survey(survey, cell.arm)
     if method != "full":
         model = fit_method(method, survey, cell.arm, seed)
         return Calibration(model, report_method(model, survey, cell.arm))
-    if len(np.unique(survey.states.tool_id)) > 1 and frame == "base":
-        effects = (*effects, "probe")
-    fitted = fit_survey(survey, cell.arm, effects, tracker)
+    fitted = fit_survey(survey, cell.arm, effects, tracker, setup)
     return Calibration(model_of(fitted, survey), report_fit(fitted, survey))
+
+
+def several_points(survey: Measurements) -> tuple[str, ...]:
+    """Name the effect of a probe plate's nests, where there are several."""
+    return ("probe",) if len(np.unique(survey.states.tool_id)) > 1 else ()
 
 
 def into_base_frame(

@@ -11,13 +11,14 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import cho_factor, cho_solve
+from scipy.linalg.lapack import dpotrf, dpotri
 from scipy.optimize import minimize
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 LOG_BOUNDS = (-8.0, 7.0)  # of log s_g
+STEPS = 60
 LOG_SPREAD = 3.0  # hyperprior of log s_g: an order of magnitude is no surprise
 
 
@@ -69,10 +70,10 @@ def posterior(normal: Normal, group: Ints, log_scale: Array) -> Posterior:
     """
     s = np.exp(log_scale)[group]
     B = np.eye(len(s)) + s[:, None] * normal.gram * s
-    factor = cho_factor(B, lower=True)
-    covariance = s[:, None] * cho_solve(factor, np.eye(len(s))) * s
+    factor, inverse = _factor(B)
+    covariance = s[:, None] * inverse * s
     mean = covariance @ normal.moment
-    log_det = 2.0 * float(np.log(np.diag(factor[0])).sum())
+    log_det = 2.0 * float(np.log(np.diag(factor)).sum())
     fit = normal.square - float(normal.moment @ mean)
     evidence = -0.5 * (
         normal.log_noise + log_det + fit + normal.rows * np.log(2 * np.pi)
@@ -81,13 +82,26 @@ def posterior(normal: Normal, group: Ints, log_scale: Array) -> Posterior:
     return Posterior(mean, covariance, log_scale, evidence, effective)
 
 
-def maximise(normal: Normal, group: Ints, start: Array) -> Posterior:
+def _factor(B: Array) -> tuple[Array, Array]:
+    """Return the Cholesky factor and the inverse of a positive definite matrix."""
+    factor, failed = dpotrf(B, lower=True)
+    inverse, _ = dpotri(factor, lower=True)
+    if failed:
+        raise np.linalg.LinAlgError("the normal equations are not positive definite")
+    lower = np.tril(inverse)
+    return factor, lower + np.tril(inverse, -1).T
+
+
+def maximise(
+    normal: Normal, group: Ints, start: Array, steps: int = STEPS
+) -> Posterior:
     """Choose the prior scales by marginal likelihood.
 
     Args:
         normal: Normal equations.
         group: Group of every parameter, (p,).
         start: Log prior scales to begin with, (g,).
+        steps: Most steps of the search.
     """
     count = len(start)
     if count == 0:
@@ -104,6 +118,6 @@ def maximise(normal: Normal, group: Ints, start: Array) -> Posterior:
 
     best = minimize(
         cost, start, jac=True, method="L-BFGS-B", bounds=[LOG_BOUNDS] * count,
-        options={"maxiter": 60, "ftol": 1e-10},
+        options={"maxiter": steps, "ftol": 1e-10},
     )  # fmt: skip
     return posterior(normal, group, np.asarray(best.x, dtype=float))

@@ -25,8 +25,8 @@ Array = NDArray[np.float64]
 
 PASSES = 30
 HEAVY_TAILED = 4  # first passes that a gross outlier must not lead astray
-SETTLED = 1e-8  # [m] change of any predicted error that ends the passes
-SETTLED_NOISE = 2e-3  # relative change of the noise that ends the passes
+SETTLED = 5e-8  # [m] change of any predicted error that ends the passes
+SETTLED_NOISE = 5e-3  # relative change of the noise that ends the passes
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,9 +128,10 @@ def fit_effects(
     """
     combination = Combination(effects)
     state = _begin(batch, position, combination, origin, start)
+    heavy = HEAVY_TAILED if start is None else 0
     for number in range(PASSES):
-        following = _pass(state, heavy=number < HEAVY_TAILED and start is None)
-        if _settled(state, following) and number > HEAVY_TAILED:
+        following = _pass(state, heavy=number < heavy)
+        if _settled(state, following) and number >= heavy:
             return following
         state = following
     return state

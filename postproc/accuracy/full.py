@@ -13,6 +13,7 @@ from postproc.accuracy.library import propose
 from postproc.accuracy.measurement import Measurements
 from postproc.accuracy.model import Model
 from postproc.accuracy.ranges import Ranges
+from postproc.accuracy.selection import fit_best
 from postproc.pose import MM
 from postproc.robot.arm import Arm
 
@@ -20,21 +21,28 @@ Array = NDArray[np.float64]
 
 
 def fit_survey(
-    survey: Measurements, arm: Arm, effects: Sequence[str], tracker: Array | None
+    survey: Measurements,
+    arm: Arm,
+    effects: Sequence[str] | None,
+    tracker: Array | None,
+    setup: tuple[str, ...] = (),
 ) -> Fit:
-    """Fit effects by name to a survey in the base frame.
+    """Fit effects to a survey in the base frame.
 
     Args:
         survey: The measurements.
         arm: The arm.
-        effects: Names of effects.
+        effects: Names of effects; None: those that the survey gives evidence for.
         tracker: Tracker position in the base frame, (3,) [m], or None.
+        setup: Names of effects of the set-up, fitted besides.
 
     Raises:
         PostprocError: An unknown effect, or one whose covariate was not recorded.
     """
-    chosen = propose(effects, arm, survey.states)
     origin = None if tracker is None else (tracker[0], tracker[1], tracker[2])
+    if effects is None:
+        return fit_best(arm, survey.states, survey.position, origin, setup)
+    chosen = propose((*effects, *setup), arm, survey.states)
     return fit_effects(Batch(arm, survey.states), survey.position, chosen, origin)
 
 
