@@ -13,9 +13,14 @@ from numpy.typing import NDArray
 
 from postproc.accuracy.model import Model
 from postproc.exceptions import CellError, ProgramError
-from postproc.language.diagnostic import Diagnostic
 from postproc.language.source import Source
 from postproc.language.stamp import is_stamped
+from postproc.notes import (
+    assumed_off,
+    overruled_strings,
+    unsure_sides,
+    untimed_runs,
+)
 from postproc.output import Output, write_numbers
 from postproc.planning import Planned, Reading, plan_visits, read_program, states_of
 from postproc.proposal import Proposal, propose
@@ -202,7 +207,7 @@ def report(
 ) -> Outcome:
     """Say what came of every visit, and what error the model expects now."""
     proposal, done = corrected.proposal, corrected.planned.plan
-    rows = proposal.corrected
+    d, rows, visits = proposal.decisions, proposal.corrected, reading.visits
     wanted = planned.plan.tcp[rows, :3, 3]
     new = states.with_(q=np.array(done.q), direction=np.array(done.direction))[rows]
     before = model.error(cell.arm, states[rows])
@@ -212,26 +217,20 @@ def report(
         model=model.id,
         outputs=corrected.output.changed,
         sidecar=corrected.output.sidecar(model.id, asdict(options)),
-        visits=reading.visits,
-        decisions=proposal.decisions,
+        visits=visits,
+        decisions=d,
         before=ErrorStatistics.of(before),
         after=ErrorStatistics.of(after),
-        diagnostics=(*reading.diagnostics, *notes(name, cell)),
+        diagnostics=(
+            *reading.diagnostics,
+            *overruled_strings(visits, planned.plan),
+            *untimed_runs(visits, planned.plan),
+            *unsure_sides(visits, rows, d.direction, d.std_error),
+            assumed_off(name, cell),
+        ),
         stages=clock.stages,
         position=planned.plan.tcp[:, :3, 3],
         sources={source.name: source.data for source in reading.sources},
-    )
-
-
-def notes(name: str, cell: Cell) -> tuple[Diagnostic, ...]:
-    """State the assumptions that every report must carry."""
-    return (
-        Diagnostic(
-            name,
-            1,
-            "absolute-accuracy",
-            f"the controller's own absolute accuracy is taken to be off ({cell.path})",
-        ),
     )
 
 

@@ -1,0 +1,94 @@
+"""What the user should know of a plan beyond what came of each target."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from postproc.language.diagnostic import Diagnostic
+from postproc.language.visits import Visits
+from postproc.motion.planner import Plan
+from postproc.pose import MM
+from postproc.robot.cell import Cell
+
+Array = NDArray[np.float64]
+Bools = NDArray[np.bool_]
+
+SINGLY = 20  # findings of one kind that are listed line by line
+
+
+def assumed_off(name: str, cell: Cell) -> Diagnostic:
+    """State that the controller is taken not to compensate on its own."""
+    text = f"the controller's own absolute accuracy is taken to be off ({cell.path})"
+    return Diagnostic(name, 1, "absolute-accuracy", text)
+
+
+def overruled_strings(visits: Visits, plan: Plan) -> list[Diagnostic]:
+    """List targets whose configuration string the path does not follow."""
+    text = (
+        "the path arrives on another branch or turn than the configuration string "
+        "says: the string is kept, the path decides"
+    )
+    return _each(visits, plan.overruled, "configuration-overruled", text)
+
+
+def untimed_runs(visits: Visits, plan: Plan) -> list[Diagnostic]:
+    """List targets in runs that no time law was found for."""
+    text = "no time law was found for this run: times and speeds are estimates"
+    return _each(visits, plan.untimed, "no-time-law", text)
+
+
+def _each(visits: Visits, rows: Bools, code: str, text: str) -> list[Diagnostic]:
+    """Make one diagnostic for each visit, or one for all where they are many."""
+    found = np.flatnonzero(rows)
+    if len(found) > SINGLY:
+        text, found = f"{len(found)} targets from here on: {text}", found[:1]
+    return [
+        Diagnostic(visits.files[visits.file[i]], int(visits.line[i]), code, text)
+        for i in found
+    ]
+
+
+def unsure_sides(
+    visits: Visits, corrected: Bools, direction: Array, std_error: Array
+) -> list[Diagnostic]:
+    """List the corrected targets that a joint reaches from a side that is not sure.
+
+    They are corrected for the middle of the backlash, so half of it may remain.
+
+    Args:
+        visits: Every arrival.
+        corrected: Visits whose target moves, (n,).
+        direction: Arrival direction that they are corrected for, (n, 6).
+        std_error: Standard error of the correction, (n, 3) [m].
+    """
+    rows = np.flatnonzero(corrected & (direction == 0).any(axis=1))
+    size = np.linalg.norm(std_error, axis=1) / MM
+    cure = "start the approach farther away, or from the side it moves to"
+    if len(rows) > SINGLY:
+        worst = rows[np.argsort(-size[rows])[:5]]
+        lines = ", ".join(str(line) for line in np.unique(visits.line[worst]))
+        text = (
+            f"{len(rows)} targets are reached soon after a joint turned, from a side "
+            f"that is not sure (up to +-{size[rows].max():.3f} mm, for instance lines "
+            f"{lines}): {cure}"
+        )
+        return [Diagnostic(visits.files[0], int(visits.line[rows[0]]), CODE, text)]
+    return [
+        Diagnostic(
+            visits.files[visits.file[i]],
+            int(visits.line[i]),
+            CODE,
+            f"reached soon after axis {_axes(direction[i])} turned, from a side that "
+            f"is not sure (+-{size[i]:.3f} mm): {cure}",
+        )
+        for i in rows
+    ]
+
+
+CODE = "side-not-sure"
+
+
+def _axes(direction: Array) -> str:
+    """Name the axes whose side is not known."""
+    return ", ".join(str(j + 1) for j in np.flatnonzero(direction == 0))
