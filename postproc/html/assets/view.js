@@ -151,12 +151,17 @@ class View {
     return done;
   }
 
+  // A click takes the target whose label is shown, a drag turns the view.
   listen() {
     this.listening = true;
-    this.node.on("plotly_click", (event) => {
-      const i = event.points[0].customdata;
-      if (Number.isInteger(i)) this.onPick(i);
-    });
+    let hovered = -1, from = null;
+    this.node.on("plotly_hover", ({ points }) => { hovered = points[0].customdata ?? -1; });
+    this.node.on("plotly_unhover", () => { hovered = -1; });
+    this.node.addEventListener("pointerdown", (e) => { from = [e.clientX, e.clientY]; }, true);
+    this.node.addEventListener("pointerup", (e) => {
+      const still = from && Math.hypot(e.clientX - from[0], e.clientY - from[1]) < 4;
+      if (still && hovered >= 0) this.onPick(hovered);
+    }, true);
   }
 
   note(thin) {
