@@ -23,7 +23,7 @@ from postproc.accuracy.transmission import Transmission
 from postproc.accuracy.windup import Windup
 
 OFFSETS = np.linspace(-1.0, 1.0, 9)
-LEVELS = (1.0, 0.25)  # widths of the search, in steps of the grid
+LEVELS = (1.0, 0.5, 0.25)  # widths of the search, in steps of the grid
 
 
 def finer(effect: Effect, width: float, batch: Batch) -> list[Effect]:
@@ -41,21 +41,28 @@ def finer(effect: Effect, width: float, batch: Batch) -> list[Effect]:
 
 
 def refine(projection: Projection, score: Score) -> Score:
-    """Improve the settings of a score's best candidate by its evidence."""
+    """Improve the settings of a score's best candidate by its evidence.
+
+    The evidence of the family becomes that of the finer points, averaged over the part
+    of the grid that they stand for: a sharp peak between two points of the grid counts,
+    but only as much of the prior as it covers.
+    """
     square = float(projection.rest @ projection.rest)
+    share = score.best.log_prior
     for width in LEVELS:
         effects = finer(score.best.effect, width, projection.at)
         if len(effects) == 1:
             return score
-        tries = [replace(score.best, effect=e) for e in effects]
+        tries = [replace(score.best, effect=e, log_prior=0.0) for e in effects]
         columns = make_columns(tries, projection.at, projection.fit.whitener)
         blocks = reduce_columns(projection, tries, columns, projection.rest[:, None])
         found = rank((blocks,), square, projection.rows)[0]
-        if found.best_evidence > score.best_evidence:
-            gained = found.best_evidence - score.best_evidence
-            score = replace(
-                found, evidence=max(score.evidence, score.evidence + 0.5 * gained)
-            )
+        covered = share + float(np.log(2.0 * width))
+        average = found.evidence - float(np.log(len(tries))) + covered
+        if found.best_evidence < score.best_evidence:
+            continue
+        best = replace(found.best, log_prior=share)
+        score = replace(found, best=best, evidence=max(score.evidence, average))
     return score
 
 
