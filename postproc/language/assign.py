@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 from postproc.language import pdl2 as ast
-from postproc.language.evaluate import Target
 from postproc.language.machine import Here
+from postproc.language.target import Target
 from postproc.language.values import COMPONENTS, Nothing, Position, Value
 
 _FRAMES = ("tool", "base", "uframe")

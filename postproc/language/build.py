@@ -10,21 +10,20 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from postproc.language import pdl2 as ast
+from postproc.language.parts import (
+    ArmPart,
+    BesidePart,
+    DestinationPart,
+    ExportedPart,
+    Mark,
+    NamesPart,
+    SettingPart,
+    SyncPart,
+    TilPart,
+)
 
 Children = Sequence[Any]
 Rule = Callable[[Children], Any]
-
-
-class Mark(str):
-    """A token: text with the name of its terminal."""
-
-    kind: str
-
-    def __new__(cls, text: str, kind: str) -> Mark:
-        """Remember the terminal beside the text."""
-        mark = super().__new__(cls, text)
-        mark.kind = kind
-        return mark
 
 
 def _name(mark: str) -> str:
@@ -44,42 +43,10 @@ def _unquoted(mark: str) -> str:
     return str(mark)[1:-1]
 
 
-class _Names(tuple[str, ...]):
-    """Declared names."""
-
-
-class _Exported(str):
-    """The program after EXPORTED FROM."""
-
-
-class _Arm(tuple[Any, ...]):
-    """The index of ARM[n]."""
-
-
-class _Setting(tuple[Any, ...]):
-    """One WITH item that sets a variable."""
-
-
-class _Beside(tuple[Any, ...]):
-    """One WITH item that names a condition handler."""
-
-
-class _Til:
-    """A TIL clause."""
-
-
-class _Sync:
-    """A SYNCMOVE clause."""
-
-
-class _Destination(tuple[Any, ...]):
-    """(how, operands, via, frame)."""
-
-
 def _declared(children: Children, first: int) -> tuple[str, tuple[str, ...]]:
     """Return the exporting program and the other attributes."""
     rest = children[first:]
-    exported = [str(c) for c in rest if isinstance(c, _Exported)]
+    exported = [str(c) for c in rest if isinstance(c, ExportedPart)]
     words = tuple(_name(c) for c in rest if type(c) is Mark)
     return (exported[0] if exported else ""), words
 
@@ -109,8 +76,8 @@ def _parameters(c: Children) -> list[ast.Parameter]:
 
 
 def _motion(c: Children) -> ast.Move:
-    arm = _of(c, _Arm)
-    how, where, via, frame = _of(c, _Destination)[0]
+    arm = _of(c, ArmPart)
+    how, where, via, frame = _of(c, DestinationPart)[0]
     trajectory = [str(m).upper() for m in c[1:] if type(m) is Mark]
     return ast.Move(
         fly=c[0].kind == "MOVEFLY",
@@ -120,14 +87,14 @@ def _motion(c: Children) -> ast.Move:
         where=where,
         via=via,
         frame=frame,
-        settings=tuple((s[0], s[1]) for s in _of(c, _Setting)),
-        conditions=tuple(b[0] for b in _of(c, _Beside)),
-        til=bool(_of(c, _Til)),
-        sync=bool(_of(c, _Sync)),
+        settings=tuple((s[0], s[1]) for s in _of(c, SettingPart)),
+        conditions=tuple(b[0] for b in _of(c, BesidePart)),
+        til=bool(_of(c, TilPart)),
+        sync=bool(_of(c, SyncPart)),
     )
 
 
-def _absolute(c: Children) -> _Destination:
+def _absolute(c: Children) -> DestinationPart:
     to: list[Any] = []
     via = None
     for word, place in zip(c[0::2], c[1::2], strict=True):
@@ -135,17 +102,17 @@ def _absolute(c: Children) -> _Destination:
             via = place
         else:
             to.append(place)
-    return _Destination(("TO", tuple(to), via, ""))
+    return DestinationPart(("TO", tuple(to), via, ""))
 
 
-def _destination(c: Children) -> _Destination:
+def _destination(c: Children) -> DestinationPart:
     frame = str(c[-1]).upper() if type(c[-1]) is Mark else ""
     where = tuple(x for x in c[1:] if type(x) is not Mark)
-    return _Destination((c[0].kind, where, None, frame))
+    return DestinationPart((c[0].kind, where, None, frame))
 
 
 def _clause(c: Children) -> Any:
-    return _Til() if c and isinstance(c[0], ast.Still) else None
+    return TilPart() if c and isinstance(c[0], ast.Still) else None
 
 
 def _reference(c: Children) -> ast.Reference:
@@ -162,9 +129,9 @@ def _for(c: Children) -> ast.For:
     return ast.For(_name(c[0]), c[1], c[3], step, c[2].kind == "DOWNTO")
 
 
-def _beside(c: Children) -> _Beside:
+def _beside(c: Children) -> BesidePart:
     inside = c[0] if len(c) == 1 else ast.Invoke(_name(c[0]), c[1])
-    return _Beside((inside,))
+    return BesidePart((inside,))
 
 
 def _io(c: Children) -> ast.Transfer:
@@ -197,8 +164,8 @@ RULES: dict[str, Rule] = {
     "structure": lambda c: ast.Structure(_name(c[0])),
     "node_fields": lambda c: ast.Statement(),
     "end_structure": lambda c: ast.EndStructure(),
-    "names": lambda c: _Names(str(n) for n in c),
-    "exported": lambda c: _Exported(_name(c[0])),
+    "names": lambda c: NamesPart(str(n) for n in c),
+    "exported": lambda c: ExportedPart(_name(c[0])),
     "attribute": lambda c: c[0],
     "simple_type": lambda c: ast.Type(_name(c[0])),
     "array_type": lambda c: ast.Type(c[-1].name, array=True),
@@ -226,13 +193,13 @@ RULES: dict[str, Rule] = {
     "when": lambda c: ast.When(_statement(c[1:])),
     "endcondition": lambda c: ast.EndCondition(),
     "motion": _motion,
-    "arm": lambda c: _Arm((c[0].subscripts[0],)),
+    "arm": lambda c: ArmPart((c[0].subscripts[0],)),
     "absolute": _absolute,
     "destination": _destination,
     "clause": _clause,
     "with": lambda c: c[0],
-    "sync": lambda c: _Sync(),
-    "item": _Setting,
+    "sync": lambda c: SyncPart(),
+    "item": SettingPart,
     "item_condition": _beside,
     "assign": lambda c: ast.Assign(c[0], str(c[1]), c[2]),
     "call": _call,

@@ -10,7 +10,6 @@ from postproc.language.effects import (
     PURE,
     body_effects,
     changed_arguments,
-    invocations,
 )
 from postproc.language.machine import Here, Machine, forget, forget_names
 from postproc.language.values import Alias, Nothing, Position
@@ -46,11 +45,11 @@ def _program(here: Here, name: str) -> Place | None:
     return Place(program, program.main)
 
 
-def calls_in_expressions(here: Here, statement: ast.Statement) -> None:
+def calls_in_expressions(
+    machine: Machine, here: Here, statement: ast.Statement
+) -> None:
     """Let the function calls inside of a statement have their effects."""
-    for call in invocations(statement):
-        if call.name in PURE:
-            continue
+    for call in machine.called(statement):
         inside = here.world.find_routine(here.place.program, call.name)
         if inside is None:
             outside(here, call.name, call.arguments)

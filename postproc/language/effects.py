@@ -9,7 +9,7 @@ from functools import lru_cache
 import numpy as np
 
 from postproc.language import pdl2 as ast
-from postproc.language.structure import Body, Program
+from postproc.language.program import Body, Program
 
 PURE = frozenset(
     "pos vec jnt pos_shift pos_inv pos_frame pos_mir pos_xtrt jntp_to_pos arm_pos "

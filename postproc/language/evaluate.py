@@ -3,12 +3,18 @@
 from __future__ import annotations
 
 import math
-import operator
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from postproc.language import pdl2 as ast
+from postproc.language.operators import (
+    RUN_TIME,
+    binary,
+    function,
+    part_of,
+    unary,
+)
 from postproc.language.store import Store
+from postproc.language.target import Target
 from postproc.language.values import (
     COMPONENTS,
     Alias,
@@ -16,7 +22,6 @@ from postproc.language.values import (
     Position,
     Value,
     Vector,
-    composed,
     inverted,
     shifted,
 )
@@ -27,48 +32,8 @@ _WORDS = frozenset(
     "joint linear circular seg_via fly_norm fly_cart fly_pass nosettle coarse fine "
     "jnt_coarse jnt_fine rs_world rs_traj eul_world rpy_world wrist_jnt".split()
 )
-_RUN_TIME = Nothing("it is known only at run time")
 _POSITION_TYPES = frozenset({"position", "xtndpos", "jointpos", "vector"})
 _FIELDS = frozenset({*COMPONENTS, "pos", "aux"})
-
-_FUNCTIONS = frozenset("abs sqrt sin cos tan round trunc".split())
-_ARITHMETIC: dict[str, Callable[[float, float], float]] = {
-    "+": operator.add,
-    "-": operator.sub,
-    "*": operator.mul,
-    "/": operator.truediv,
-    "DIV": lambda a, b: float(math.trunc(a / b)),
-    "MOD": math.fmod,
-}
-_COMPARE: dict[str, Callable[[float, float], bool]] = {
-    "=": operator.eq,
-    "<>": operator.ne,
-    "<": operator.lt,
-    "<=": operator.le,
-    ">": operator.gt,
-    ">=": operator.ge,
-}
-
-
-@dataclass(frozen=True)
-class Target:
-    """Where a reference leads: a key and the component of the value there.
-
-    Attributes:
-        keys: Keys it may mean.
-        exact: It means the one key, not some element of it.
-        component: Component of a position: x .. r, pos, ``aux`` and joint indices as
-            (``aux``, i) and (``joint``, i); () for the whole value, None if unknown.
-    """
-
-    keys: frozenset[str]
-    exact: bool
-    component: tuple[str, int] | tuple[()] | None = ()
-
-    @property
-    def key(self) -> str:
-        """Return the one key."""
-        return next(iter(self.keys))
 
 
 @dataclass
@@ -166,14 +131,14 @@ class Point:
             case ast.Reference():
                 return self.read(expression)
             case ast.Unary(sign, operand):
-                return _unary(sign, self.value(operand))
+                return unary(sign, self.value(operand))
             case ast.Binary(sign, left, right):
-                return _binary(sign, self.value(left), self.value(right))
+                return binary(sign, self.value(left), self.value(right))
             case ast.Aggregate(items):
                 return self._joints(items)
             case ast.Invoke(name, arguments):
                 return self._invoke(name, arguments)
-        return _RUN_TIME
+        return RUN_TIME
 
     def read(self, reference: ast.Reference) -> Value:
         """Return what a variable holds."""
@@ -191,13 +156,13 @@ class Point:
         if name in self.volatile:
             return Nothing("a condition handler changes it")
         held = self.store.read(target.key)
-        return held if target.component == () else _part(held, target.component)
+        return held if target.component == () else part_of(held, target.component)
 
     def _system(self, reference: ast.Reference) -> Value:
         name = self.setting_name(reference)
         if name is None or f"${name}" in self.volatile:
-            return _RUN_TIME
-        return self.store.settings.get(name, _RUN_TIME)
+            return RUN_TIME
+        return self.store.settings.get(name, RUN_TIME)
 
     def setting_name(self, reference: ast.Reference) -> str | None:
         """Return the name of our arm's setting, None for another arm's or none."""
@@ -251,7 +216,7 @@ class Point:
                 ("abs" | "sqrt" | "sin" | "cos" | "tan" | "round" | "trunc"),
                 [float(x)],
             ):
-                return _function(name, x)
+                return function(name, x)
         return Nothing(f"it comes from {name.upper()}, known only at run time")
 
     def _position(self, arguments: tuple[ast.Expression | None, ...]) -> Value:
@@ -269,71 +234,3 @@ class Point:
             return Nothing("POS has not six numbers")
         numbers, slots = self._components(arguments[:6])
         return Position(False, numbers, slots, config)
-
-
-def _part(held: Value, component: tuple[str, int] | tuple[()] | None) -> Value:
-    if not isinstance(held, Position | Vector):
-        return held if isinstance(held, Nothing) else _RUN_TIME
-    number: float | None = None
-    match component:
-        case ("pos", _) if isinstance(held, Position):
-            return replace(held, aux=())
-        case ("aux", axis) if isinstance(held, Position) and held.aux is not None:
-            number = dict(held.aux).get(axis)
-        case ("joint", axis) if 1 <= axis <= len(held.numbers):
-            number = held.numbers[axis - 1]
-        case (str(name), _) if COMPONENTS.get(name, 9) < len(held.numbers):
-            number = held.numbers[COMPONENTS[name]]
-    return _RUN_TIME if number is None else number
-
-
-def _unary(sign: str, value: Value) -> Value:
-    if sign == "NOT" and isinstance(value, bool):
-        return not value
-    if isinstance(value, float):
-        return -value if sign == "-" else value
-    if isinstance(value, Vector) and sign == "-" and None not in value.numbers:
-        x, y, z = (-n for n in value.numbers if n is not None)
-        return Vector((x, y, z))
-    return value if isinstance(value, Nothing) else _RUN_TIME
-
-
-def _binary(sign: str, a: Value, b: Value) -> Value:
-    if sign in ("AND", "OR"):
-        decisive = sign == "OR"
-        if a is decisive or b is decisive:
-            return decisive
-        if isinstance(a, bool) and isinstance(b, bool):
-            return not decisive
-    if isinstance(a, Position) and isinstance(b, Position) and sign == ":":
-        return composed(a, b)
-    if isinstance(a, Vector) and isinstance(b, Vector) and sign in "+-":
-        return _add(a, b, sign)
-    if sign in _COMPARE and type(a) is type(b) and isinstance(a, float | str | bool):
-        return _COMPARE[sign](a, b)  # type: ignore[arg-type]
-    if isinstance(a, float) and isinstance(b, float) and sign in _ARITHMETIC:
-        try:
-            return _ARITHMETIC[sign](a, b)
-        except (ArithmeticError, ValueError):
-            return Nothing("the arithmetic has no result")
-    return next((v for v in (a, b) if isinstance(v, Nothing)), _RUN_TIME)
-
-
-def _add(a: Vector, b: Vector, sign: str) -> Value:
-    if None in a.numbers or None in b.numbers:
-        return _RUN_TIME
-    x, y, z = (
-        _ARITHMETIC[sign](m, n)  # type: ignore[arg-type]
-        for m, n in zip(a.numbers, b.numbers, strict=True)
-    )
-    return Vector((x, y, z))
-
-
-def _function(name: str, x: float) -> Value:
-    if name in ("sin", "cos", "tan"):
-        return float(getattr(math, name)(math.radians(x)))
-    if name == "sqrt":
-        return math.sqrt(x) if x >= 0 else Nothing("the root of a negative number")
-    if name == "round":
-        return float(math.floor(x + 0.5))
-    return abs(x) if name == "abs" else float(math.trunc(x))

@@ -17,9 +17,9 @@ from postproc.language.effects import rows_effects
 from postproc.language.initial import fill_initial
 from postproc.language.lsv import Variables
 from postproc.language.machine import HANDLED, Here, Machine
+from postproc.language.program import Program
 from postproc.language.steps import run_broken, step
 from postproc.language.store import Store
-from postproc.language.structure import Program
 from postproc.language.values import Nothing
 from postproc.language.visits import ELSEWHERE, START, Visits
 from postproc.language.world import Place, Start, World

@@ -8,8 +8,8 @@ from dataclasses import replace
 from postproc.language.diagnostic import Diagnostic
 from postproc.language.evaluate import Point
 from postproc.language.lsv import Entry, Variables
+from postproc.language.program import Body, Program
 from postproc.language.store import Store
-from postproc.language.structure import Body, Program
 from postproc.language.values import Nothing, Position, Value, Vector
 from postproc.language.world import Place, World, base_variable
 

@@ -13,9 +13,10 @@ from dataclasses import dataclass, field
 
 from postproc.language import pdl2 as ast
 from postproc.language.arrivals import Arrival, Run
+from postproc.language.effects import PURE, invocations
 from postproc.language.evaluate import Point
+from postproc.language.program import Body, Program
 from postproc.language.store import Store
-from postproc.language.structure import Body, Program
 from postproc.language.values import Nothing
 from postproc.language.visits import ELSEWHERE
 from postproc.language.world import Place, World
@@ -72,6 +73,7 @@ class Machine:
     rows: int = 0
     _heap: list[tuple[Context, tuple[Context, int]]] = field(default_factory=list)
     _queued: set[tuple[Context, int]] = field(default_factory=set)
+    _called: dict[int, tuple[ast.Invoke, ...]] = field(default_factory=dict)
     _offsets: dict[int, int] = field(default_factory=dict)
     next_id: int = 0
 
@@ -158,6 +160,14 @@ class Machine:
         return Here(
             self.world, self.places[context], row, store, self.volatile, context
         )
+
+    def called(self, statement: ast.Statement) -> tuple[ast.Invoke, ...]:
+        """Return the calls in a statement's expressions that may have effects."""
+        known = self._called.get(id(statement))
+        if known is None:
+            found = (c for c in invocations(statement) if c.name not in PURE)
+            known = self._called[id(statement)] = tuple(found)
+        return known
 
     # ---- calls ----------------------------------------------------------------------
     def calls_in(self, context: Context) -> list[Body]:

@@ -11,8 +11,9 @@ from pathlib import Path
 import lark
 
 from postproc.language import pdl2 as ast
-from postproc.language.build import RULES, Mark, Rule
+from postproc.language.build import RULES, Rule
 from postproc.language.entered import VALUE_RULES, Entered
+from postproc.language.parts import Mark
 
 _PACKAGE = Path(__file__).resolve().parent.parent
 _NUMBERED_NAME = re.compile(

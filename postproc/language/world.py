@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from postproc.language import pdl2 as ast
 from postproc.language.diagnostic import Diagnostic
 from postproc.language.lsv import Variables
-from postproc.language.structure import Body, Program, Variable
+from postproc.language.program import Body, Program, Variable
 from postproc.language.values import Value
 
 Record = tuple[float, ...] | None

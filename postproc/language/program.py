@@ -1,0 +1,87 @@
+"""A parsed program: declarations, routines and where each jump leads."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from postproc.language import pdl2 as ast
+from postproc.language.blocks import Blocks
+from postproc.language.diagnostic import Diagnostic
+from postproc.language.lines import Lines
+
+
+@dataclass(frozen=True)
+class Variable:
+    """A declared variable or constant.
+
+    Attributes:
+        name: As it is written.
+        row: Logical line of its declaration.
+        type: Its type, None for a constant.
+        initial: Its initial value or None.
+        exported: The program it is exported from, or "".
+        constant: Declared in a CONST section.
+        taught: Marked ``-- TAUGHT``.
+    """
+
+    name: str
+    row: int
+    type: ast.Type | None = None
+    initial: ast.Expression | None = None
+    exported: str = ""
+    constant: bool = False
+    taught: bool = False
+
+
+@dataclass(frozen=True)
+class Body:
+    """A routine or the main part of a program.
+
+    Attributes:
+        name: Routine name in lower case, "" for the main part.
+        first, last: Rows of its BEGIN and of its END.
+        parameters: Formal parameters.
+        variables: Its own variables, by lower-case name; the main part has none.
+        blocks: Where its jumps lead.
+    """
+
+    name: str
+    first: int
+    last: int
+    parameters: tuple[ast.Parameter, ...]
+    variables: Mapping[str, Variable]
+    blocks: Blocks
+
+
+@dataclass(frozen=True)
+class Program:
+    """A parsed program file.
+
+    Attributes:
+        name: Program name in lower case.
+        lines: Its logical lines.
+        statements: What each shape says; parallel to `lines.shapes`.
+        main: Its main part, None where it has none.
+        routines: Routines with a body, by lower-case name.
+        outside: Routines exported from other programs: name to program.
+        variables: Declared variables, by lower-case name.
+        imports: Files named by IMPORT.
+        arm: ``PROG_ARM``, 0 where it is not said.
+        diagnostics: What was found while reading.
+    """
+
+    name: str
+    lines: Lines
+    statements: tuple[ast.Statement, ...]
+    main: Body | None
+    routines: Mapping[str, Body]
+    outside: Mapping[str, str]
+    variables: Mapping[str, Variable]
+    imports: tuple[str, ...]
+    arm: int
+    diagnostics: tuple[Diagnostic, ...]
+
+    def statement(self, row: int) -> ast.Statement:
+        """Return what a logical line says."""
+        return self.statements[int(self.lines.shape[row])]

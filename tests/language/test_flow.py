@@ -1,0 +1,190 @@
+"""What a program does, beyond the chapters of the corpus."""
+
+import numpy as np
+import pytest
+
+from postproc.language.flow import Resolved, Start, resolve
+from postproc.language.source import source_from_bytes
+from postproc.language.structure import Program, parse
+from postproc.language.visits import START
+
+
+def program(text: str, name: str = "job") -> Program:
+    return parse(source_from_bytes(f"{name}.pdl", text.encode("latin-1")))
+
+
+def body(text: str, start: Start | None = None, declared: str = "") -> Resolved:
+    return resolve(program(f"PROGRAM a\n{declared}\nBEGIN\n{text}\nEND a"), start)
+
+
+def reasons(found: Resolved) -> list[str]:
+    return [found.visits.reasons[i] for i in found.visits.reason]
+
+
+def test_pages_of_one_job_are_one_flow() -> None:
+    main = program(
+        "PROGRAM job\nIMPORT 'page1'\nIMPORT 'Page2.pdl'\n"
+        "ROUTINE r2 EXPORTED FROM page2\nBEGIN\n"
+        "MOVE JOINT TO {1,0,0,0,0,0}\nr1\nr2\nCALL page3\nEND job"
+    )
+    page = "PROGRAM {0}\n{1}\nBEGIN\nEND {0}"
+    routine = "ROUTINE {0}\nBEGIN\nMOVE JOINT TO {{{1},0,0,0,0,0}}\nEND {0}"
+    others = {
+        "page1": program(page.format("page1", routine.format("r1", 2)), "page1"),
+        "page2": program(page.format("page2", routine.format("r2", 3)), "page2"),
+        "page3": program(
+            "PROGRAM page3\nBEGIN\nMOVE JOINT TO {4,0,0,0,0,0}\nEND page3", "page3"
+        ),
+    }
+    found = resolve(main, others=others)
+    visits = found.visits
+    assert visits.values[:, 0].tolist() == [1, 2, 3, 4]
+    assert visits.pred.tolist() == [START, 0, 1, 2]
+    assert [visits.files[i] for i in visits.file] == [
+        "job.pdl",
+        "page1.pdl",
+        "page2.pdl",
+        "page3.pdl",
+    ]
+    assert visits.literals.file.tolist() == visits.file.tolist()
+    assert found.diagnostics == ()
+    assert main.imports == ("page1", "Page2.pdl")
+
+
+def test_a_shared_frame_of_another_program_reaches_its_routines() -> None:
+    main = program(
+        "PROGRAM job\nVAR f : POSITION\nROUTINE r EXPORTED FROM lib\nBEGIN\n"
+        "f := POS(1,2,3,0,0,0,'')\nr\nEND job"
+    )
+    lib = program(
+        "PROGRAM lib\nVAR f : POSITION EXPORTED FROM job\nROUTINE r\nBEGIN\n"
+        "$TOOL := f\nMOVE LINEAR TO POS(9,2,3,4,5,6,'')\nEND r\nBEGIN\nEND lib",
+        "lib",
+    )
+    visits = resolve(main, others={"lib": lib}).visits
+    assert visits.frames[visits.tool[0]].tolist() == [1, 2, 3, 0, 0, 0]
+
+
+def test_frames_that_the_cell_does_not_know() -> None:
+    found = body(
+        "MOVE LINEAR TO POS(1,2,3,4,5,6,'')\nMOVE JOINT TO {1,2,3,4,5,6}",
+        Start(uframe=None),
+    )
+    assert "$UFRAME" in reasons(found)[0]
+    assert found.visits.literal.tolist() == [0, 1]
+    assert reasons(found)[1] == ""
+    assert found.visits.uframe.tolist() == [-1, -1]
+
+
+def test_settings_become_columns() -> None:
+    found = body(
+        "$LIN_SPD := 0.25\n$ROT_SPD := 1\n$ARM_SPD_OVR := 50\n$PROG_SPD_OVR := 50\n"
+        "$FLY_TYPE := FLY_CART\n$FLY_DIST := 5\n$FLY_PER := 80\n$JNT_MTURN := FALSE\n"
+        "$ORNT_TYPE := WRIST_JNT\n$TOOL_RMT := TRUE\n"
+        "MOVEFLY LINEAR TO POS(1,2,3,4,5,6,'W') ADVANCE\n"
+        "$FLY_DIST := -1\n$TOOL_RMT := OFF\n"
+        "MOVE LINEAR TO POS(1,2,3,4,5,6) WITH $LIN_SPD = 0.1\n"
+        "MOVE LINEAR TO POS(1,2,3,4,5,6)"
+    )
+    v = found.visits
+    assert v.lin_spd.tolist() == [0.25, 0.1, 0.25]
+    assert v.override.tolist() == [0.25] * 3
+    assert v.fly.tolist() == [True, False, False]
+    assert v.fly_dist_mm[0] == 5
+    assert np.isnan(v.fly_dist_mm[1:]).all()
+    assert v.fly_per.tolist() == [80] * 3
+    assert v.fly_cart.all() and v.nearest_turn.all() and v.wrist_joint.all()
+    assert v.tool_remote.tolist() == [True, False, False]
+    assert v.config_given.tolist() == [True, False, False]
+    assert [v.configs[i] for i in v.config] == ["W", "", ""]
+
+
+def test_a_variable_used_twice_is_one_literal() -> None:
+    found = body(
+        "p := POS(1,2,3,4,5,6,'')\nMOVE LINEAR TO p\nMOVE JOINT TO {1,2,3,4,5,6}\n"
+        "MOVE LINEAR TO p"
+    )
+    assert found.visits.literal.tolist() == [0, 1, 0]
+    assert found.visits.literals.name == ("p", "")
+
+
+def test_exported_and_taught_points_are_marked() -> None:
+    declared = "VAR Px : POSITION EXPORTED FROM a\n  t : POSITION -- TAUGHT"
+    found = body(
+        "px := POS(1,2,3,4,5,6,'')\nt := POS(2,2,3,4,5,6,'')\n"
+        "q := POS(3,2,3,4,5,6,'')\n"
+        "MOVE LINEAR TO px\nMOVE LINEAR TO t\nMOVE LINEAR TO q",
+        Start(taught=frozenset({"q"})),
+        declared,
+    )
+    literals = found.visits.literals
+    assert literals.name == ("Px", "t", "q")
+    assert literals.shared.tolist() == [True, False, False]
+    assert literals.taught.tolist() == [False, True, True]
+
+
+def test_a_taught_frame_is_marked() -> None:
+    found = body(
+        "$UFRAME := POS(1,2,3,4,5,6,'') -- TAUGHT\nMOVE LINEAR TO POS(1,2,3,4,5,6,'')"
+    )
+    v = found.visits
+    assert v.frame_taught[v.uframe[0]]
+    assert not v.frame_taught[v.tool[0]]
+
+
+@pytest.mark.parametrize(
+    ("said", "origin"), [("still", 0), ("moves", -2), ("sets-frames", 0)]
+)
+def test_what_the_cell_says_of_outside_routines(said: str, origin: int) -> None:
+    text = "MOVE LINEAR TO POS(1,2,3,4,5,6,'')\next\nMOVE LINEAR TO POS(2,2,3,4,5,6,'')"
+    found = body(text, Start(routines={"ext": said}))
+    assert found.visits.predecessors(1).tolist() == [origin]
+    assert ("[frames.routines.ext]" in reasons(found)[1]) == (said == "sets-frames")
+    assert found.diagnostics == ()
+
+
+def test_each_assumption_is_listed_once() -> None:
+    found = body("ext(1)\next(2)\nx := ext(3)\nother")
+    lines = [(d.line, d.code) for d in found.diagnostics]
+    assert lines == [(4, "assumed-still"), (7, "assumed-still")]
+
+
+def test_a_loop_too_long_to_unroll_is_reported() -> None:
+    found = body("FOR i := 1 TO 1000000 DO\nMOVE LINEAR TO POS(1,2,3,4,5,6,'')\nENDFOR")
+    assert len(found.visits) == 1
+    assert sorted(found.visits.predecessors(0).tolist()) == [START, 0]
+    assert "loop-not-unrolled" in {d.code for d in found.diagnostics}
+
+
+def test_a_move_in_a_call_inside_of_an_expression_is_reported() -> None:
+    text = (
+        "PROGRAM a\nROUTINE f : INTEGER\nBEGIN\nMOVE JOINT TO {1,2,3,4,5,6}\n"
+        "RETURN (1)\nEND f\nBEGIN\nn := f()\nMOVE JOINT TO {1,2,3,4,5,6}\nEND a"
+    )
+    found = resolve(program(text))
+    assert found.visits.predecessors(0).tolist() == [-2]
+    assert {d.code for d in found.diagnostics} == {"call-not-followed"}
+
+
+def test_a_condition_handler_makes_what_it_changes_unknown() -> None:
+    found = body(
+        "p := POS(1,2,3,4,5,6,'')\nCONDITION[1] :\nWHEN $DIN[1] DO\n"
+        "p := POS(2,2,3,4,5,6,'')\nENDCONDITION\nMOVE LINEAR TO p"
+    )
+    assert "handler" in reasons(found)[0]
+
+
+def test_an_empty_program_has_no_visits() -> None:
+    found = body("-- nothing")
+    assert len(found.visits) == len(found.visits.literals) == 0
+    assert found.visits.frames.shape == (0, 6)
+
+
+def test_long_lines_and_many_variables() -> None:
+    names = [f"point_{i:04d}" for i in range(3000)]
+    declared = "VAR " + ", ".join(names[:30]) + " : POSITION"
+    text = [f"{n} := POS({i}, 2, 3, 4, 5, 6, '')" for i, n in enumerate(names)]
+    text += [f"MOVE LINEAR TO {n}{' ' * 430}-- note" for n in names]
+    found = body("\n".join(text), declared=declared)
+    assert len(found.visits.literals) == 3000
+    assert found.visits.values[:, 0].tolist() == list(range(3000))
