@@ -11,7 +11,7 @@ from postproc.accuracy.base_shift import BaseShift
 from postproc.accuracy.batch import Batch
 from postproc.accuracy.counterbalance import Counterbalance
 from postproc.accuracy.diagnosis.library import make_columns
-from postproc.accuracy.diagnosis.named import LAST_FREE, STEPS
+from postproc.accuracy.diagnosis.named import LAST_FREE, LONGEST_WINDUP, STEPS
 from postproc.accuracy.diagnosis.projection import Projection, reduce_columns
 from postproc.accuracy.diagnosis.score import Score, rank
 from postproc.accuracy.effect import Array, Effect
@@ -89,7 +89,8 @@ def _rows(effect: Effect, offsets: Array, batch: Batch) -> list[Effect]:
 
 def _way(effect: Effect, offsets: Array, batch: Batch) -> list[Effect]:
     assert isinstance(effect, Windup)
-    return [replace(effect, d0=float(effect.d0 * 2.0**x)) for x in offsets]
+    ways = np.unique(np.minimum(effect.d0 * 2.0**offsets, LONGEST_WINDUP))
+    return [replace(effect, d0=float(way)) for way in ways]
 
 
 def _threshold(effect: Effect, offsets: Array, batch: Batch) -> list[Effect]:
