@@ -69,11 +69,16 @@ class _Reader:
                 if exported and exported != self.name:
                     self.outside[name] = exported
                 else:
+                    self._before_next(row)
                     self.scopes.append(_Scope(statement))
             case ast.Begin():
-                if scope.begin < 0:
-                    scope.begin = row
-            case ast.End() if scope.begin >= 0:
+                if scope.begin >= 0:
+                    self._before_next(row)
+                if self.scopes[-1].begin < 0:
+                    self.scopes[-1].begin = row
+            case ast.End(name) if scope.begin >= 0:
+                if scope.routine and name == self.name != scope.routine.name:
+                    self._drop_declared()
                 self.close(row)
             case _:
                 pass
@@ -98,6 +103,24 @@ class _Reader:
                 "const" in statement.attributes,
                 taught,
             )
+
+    def _before_next(self, row: int) -> None:
+        """End or drop a routine because the next body or routine begins."""
+        scope = self.scopes[-1]
+        if scope.routine is None:
+            return
+        if scope.begin < 0:
+            self._drop_declared()
+        else:
+            name = scope.routine.name
+            self.report(row, "end-missing", f"END {name} is missing before this line")
+            self.close(row)
+
+    def _drop_declared(self) -> None:
+        """Take a routine that turns out to have no body of its own as declared."""
+        scope = self.scopes.pop()
+        self.scopes[-1].begin = scope.begin
+        self.scopes[-1].variables.update(scope.variables)
 
     def close(self, last: int) -> None:
         """End the innermost routine, or the program."""
