@@ -75,6 +75,10 @@ class Arm:
     gear_ratio: Array
     repeatability: float
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Travel between processes as the arm file: compiled parts cannot."""
+        return _build, (self.file,)
+
     @cached_property
     def _chain(self) -> Any:
         """Build the pinocchio model: joint i turns about z of D-H frame i - 1."""
