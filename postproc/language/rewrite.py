@@ -84,7 +84,11 @@ def edits(
             if start >= 0:
                 edit = _edit(text, start, end, value, few)
                 found[file] += [edit] if edit else []
-    return tuple(tuple(sorted(file)) for file in found)
+    return tuple(tuple(sorted(file, key=_place)) for file in found)
+
+
+def _place(edit: Edit) -> Span:
+    return edit.span
 
 
 def _edit(text: str, start: int, end: int, value: float, least: int) -> Edit | None:
@@ -137,7 +141,7 @@ def compare(before: Source, after: Source, allowed: Sequence[Edit]) -> tuple[str
 def _compare_kept(before: Source, after: Source, allowed: Sequence[Edit]) -> list[str]:
     """Check the bytes between the edits."""
     at = done = 0
-    for (start, end), new in sorted(allowed):
+    for (start, end), new in sorted(allowed, key=_place):
         length = start - done
         if before.data[done:start] != after.data[at : at + length]:
             line = before.line_of(done)

@@ -123,7 +123,7 @@ def apply(data: bytes, edits: Iterable[Edit]) -> bytes:
     """
     parts: list[bytes] = []
     done = 0
-    for (start, end), new in sorted(edits):
+    for (start, end), new in sorted(edits, key=lambda edit: edit.span):
         if not done <= start <= end <= len(data):
             raise ValueError(f"edit of bytes {start} to {end} overlaps or lies outside")
         parts += (data[done:start], new)
