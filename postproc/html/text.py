@@ -18,8 +18,8 @@ def visible(text: str) -> str:
 
     >>> visible("p\x1b[31m1")
     'p\\x1b[31m1'
-    >>> visible("a\u202eb\tc")
-    'a\\u202eb   c'
+    >>> visible("a\u202eb")
+    'a\\u202eb'
     """
     if text.isascii() and text.isprintable():
         return text
