@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from itertools import count
 from time import perf_counter
+from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +16,8 @@ from postproc.accuracy.model import Model
 from postproc.exceptions import CellError, ProgramError
 from postproc.language.source import Source
 from postproc.language.stamp import is_stamped
+from postproc.language.visits import Visits
+from postproc.motion.planner import directions
 from postproc.notes import (
     assumed_off,
     overruled_strings,
@@ -25,8 +28,10 @@ from postproc.output import Output, write_numbers
 from postproc.planning import Planned, Reading, plan_visits, read_program, states_of
 from postproc.proposal import Proposal, propose
 from postproc.report import ErrorStatistics, Outcome
+from postproc.resolve import targets_from_visits
 from postproc.robot.cell import Cell
 from postproc.robot.state import States
+from postproc.solved import solve_again, solve_visits
 from postproc.verify import check_output
 
 Array = NDArray[np.float64]
@@ -34,6 +39,7 @@ Bools = NDArray[np.bool_]
 
 Progress = Callable[[str], None]
 
+NO_PAGES: Mapping[str, bytes] = MappingProxyType({})
 FREE_ROUNDS = 2  # of correcting for changed directions, before targets are held
 
 
@@ -89,6 +95,7 @@ def compensate(
     *,
     name: str = "program.pdl",
     variables: bytes | None = None,
+    pages: Mapping[str, bytes] = NO_PAGES,
     options: Options = Options(),
     progress: Progress = silent,
 ) -> Outcome:
@@ -100,6 +107,8 @@ def compensate(
         model: The arm's error.
         name: File name of the program; its variable file is ``name.lsv``.
         variables: The variable file, where there is one.
+        pages: Programs that it imports and that nobody else uses, by file name; they
+            are followed and rewritten with it.
         options: What the user asked for.
         progress: Told the name of every stage as it begins.
 
@@ -109,7 +118,7 @@ def compensate(
         ModelError: The model was made for another arm.
     """
     clock = Clock(progress)
-    files = name_files(name, source, variables)
+    files = name_files(name, source, variables, pages)
     refuse(files, cell, model)
     with clock("parse"):
         reading = read_program(files, cell)
@@ -123,9 +132,14 @@ def compensate(
         )
 
 
-def name_files(name: str, source: bytes, variables: bytes | None) -> dict[str, bytes]:
-    """Name a program and its variable file, the program first."""
-    files = {name: source}
+def name_files(
+    name: str,
+    source: bytes,
+    variables: bytes | None,
+    pages: Mapping[str, bytes] = NO_PAGES,
+) -> dict[str, bytes]:
+    """Name a program, its pages and its variable file, the program first."""
+    files = {name: source, **pages}
     if variables is not None:
         files[name.rpartition(".")[0] + ".lsv"] = variables
     return files
@@ -172,26 +186,54 @@ def settle(
     them turns a joint the other way, the correction is computed anew for that side;
     where that flips it back, the target is left alone.
     """
-    direction = planned.plan.direction
     held = np.zeros(len(states), dtype=bool)
+    with clock("solve"):
+        solved = solve_visits(model, cell, planned, states)
     for number in count():  # ends: from the third round on `held` grows
-        with clock("solve"):
-            aimed = states.with_(direction=np.array(direction))
-            proposal = propose(reading, planned, aimed, held, cell, model, options)
-        with clock("rewrite"):
-            output = write_numbers(reading, proposal.edited, proposal.values, model.id)
-        with clock("verify"):
-            again = read_program(output.files, cell)
-            check_output(reading, again, output, proposal.edited)
-            replanned = plan_visits(again.visits, cell)
-        found = replanned.plan.direction
-        changed = proposal.corrected & (found != direction).any(axis=1)
-        flipped = proposal.corrected & (found * direction < 0).any(axis=1)
+        with clock("decide"):
+            proposal = propose(reading, planned, solved, held, cell, options)
+        with clock("plan again"):
+            found = directions_after(reading.visits, proposal, cell)
+        changed = proposal.corrected & (found != solved.direction).any(axis=1)
+        flipped = proposal.corrected & (found * solved.direction < 0).any(axis=1)
         if not (changed if number < FREE_ROUNDS else flipped).any():
-            return Corrected(proposal, output, replanned)
+            done = write_and_verify(reading, proposal, cell, model, clock)
+            found = done.planned.plan.direction
+            flipped = proposal.corrected & (found * solved.direction < 0).any(axis=1)
+            if not flipped.any():
+                return done
+            held = held | flipped
+            continue
         held = held | flipped if number >= FREE_ROUNDS else held
-        direction = np.where(changed[:, None], found, direction)
+        with clock("solve"):
+            aimed = states.with_(direction=found)
+            solved = solve_again(solved, changed, model, cell, planned, aimed)
     raise AssertionError("unreachable")
+
+
+def directions_after(visits: Visits, proposal: Proposal, cell: Cell) -> Array:
+    """Find the arrival directions of a program whose targets have moved, (n, 6)."""
+    moved = replace(visits, values=proposal.decisions.corrected)
+    targets, _ = targets_from_visits(moved, cell)
+    return np.array(directions(cell.arm, targets)[1])
+
+
+def write_and_verify(
+    reading: Reading, proposal: Proposal, cell: Cell, model: Model, clock: Clock
+) -> Corrected:
+    """Write the numbers, and read and plan what was written.
+
+    Raises:
+        VerificationError: The output is not what was meant.
+    """
+    with clock("rewrite"):
+        output = write_numbers(reading, proposal.edited, proposal.values, model.id)
+    with clock("verify"):
+        again = read_program(output.files, cell)
+        check_output(reading, again, output, proposal.edited)
+        replanned = plan_visits(again.visits, cell)
+    decisions = replace(proposal.decisions, corrected=np.array(again.visits.values))
+    return Corrected(replace(proposal, decisions=decisions), output, replanned)
 
 
 def report(

@@ -9,6 +9,8 @@ from pathlib import Path
 
 from postproc.exceptions import OutputError
 
+TEMPORARY = ".postproc-tmp"  # end of the names of files that are being written
+
 
 def write_all(files: Mapping[Path, bytes]) -> None:
     """Write several files, each to a temporary name, synced, then renamed.
@@ -39,7 +41,7 @@ def write_all(files: Mapping[Path, bytes]) -> None:
 def _write_temporary(path: Path, data: bytes) -> str:
     """Write and sync a temporary file in the folder of the final one."""
     mode = path.stat().st_mode & 0o777 if path.exists() else 0o666 & ~_umask()
-    handle, name = tempfile.mkstemp(prefix=f".{path.name}.", dir=path.parent)
+    handle, name = tempfile.mkstemp(TEMPORARY, f".{path.name[:100]}.", path.parent)
     try:
         with os.fdopen(handle, "wb") as out:
             out.write(data)

@@ -12,8 +12,9 @@ from postproc.language.diagnostic import Diagnostic
 from postproc.language.flow import Start, resolve
 from postproc.language.lsv import Variables, read_variables
 from postproc.language.source import Source, source_from_bytes
-from postproc.language.structure import parse
+from postproc.language.structure import Program, parse
 from postproc.language.visits import Visits
+from postproc.language.world import base_name
 from postproc.motion.planner import Plan, plan
 from postproc.motion.targets import Targets
 from postproc.reasons import Reasons
@@ -22,6 +23,8 @@ from postproc.robot.cell import Cell
 from postproc.robot.state import States, make_states
 
 Array = NDArray[np.float64]
+
+VARIABLES = ".lsv"  # suffix of variable files
 
 
 @dataclass(frozen=True)
@@ -82,8 +85,8 @@ def read_program(files: Mapping[str, bytes], cell: Cell) -> Reading:
     """Parse a program and resolve its visits.
 
     Args:
-        files: The program's bytes by name, first the program itself, then, where there
-            is one, its variable file.
+        files: Bytes by name: first the program itself, then the programs that it
+            imports, last, where there is one, its variable file.
         cell: What holds at program start.
 
     Raises:
@@ -91,10 +94,15 @@ def read_program(files: Mapping[str, bytes], cell: Cell) -> Reading:
     """
     sources = tuple(source_from_bytes(name, data) for name, data in files.items())
     program = parse(sources[0])
+    others: dict[str, Program] = {}
     variables: Variables | None = None
-    if len(sources) > 1:
-        variables = read_variables(sources[1])
-    resolved = resolve(program, start_of(cell), variables)
+    for source in sources[1:]:
+        if source.name.lower().endswith(VARIABLES):
+            variables = read_variables(source)
+        else:
+            page = parse(source)
+            others |= {page.name: page, base_name(source.name): page}
+    resolved = resolve(program, start_of(cell), variables, others)
     return Reading(sources, resolved.visits, resolved.diagnostics)
 
 
