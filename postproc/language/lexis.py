@@ -117,8 +117,10 @@ def number_value(text: str) -> float:
     """
     digits = text.lstrip("-+" + BLANKS)
     try:
+        if digits[0] != "0":
+            return -float(digits) if text[0] == "-" else float(digits)
         base = {"x": 16, "o": 8, "b": 2}.get(digits[1:2].lower())
         value = float(int(digits, base)) if base else float(digits)
-    except ValueError:
+    except (ValueError, IndexError):
         return float("nan")
     return -value if text.startswith("-") else value

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -10,8 +9,8 @@ from numpy.typing import NDArray
 
 from postproc.exceptions import ProgramError
 from postproc.language.lexis import number_value
-from postproc.language.lines import read_lines
-from postproc.language.source import Edit, Source, Span
+from postproc.language.lines import Lines, read_lines
+from postproc.language.source import Edit, Source, Span, apply
 from postproc.language.visits import Literals
 
 Ints = NDArray[np.int64]
@@ -28,6 +27,8 @@ def decimals_of(text: str) -> int:
     >>> decimals_of("-12.50"), decimals_of("7"), decimals_of("1.25e1")
     (2, 0, 1)
     """
+    if text.replace(".", "", 1).lstrip("-").isdecimal():
+        return len(text.partition(".")[2])
     mantissa, _, exponent = text.lower().partition("e")
     if "x" in mantissa:
         return 0
@@ -35,16 +36,15 @@ def decimals_of(text: str) -> int:
     return max(written - int(exponent or 0), 0)
 
 
-def number_text(value: float, old: str, least: int) -> str:
-    """Write a number with at least the decimals it had and at least `least`.
+def number_text(value: float, decimals: int, least: int) -> str:
+    """Write a number with the decimals it had and at least `least`.
 
     The sign stands directly before the digits; a zero carries none.
 
-    >>> number_text(12.34567, "12.3", 3), number_text(-0.00001, "- 0.5", 3)
-    ('12.346', '0.000')
+    >>> number_text(12.34567, 1, 3), number_text(-0.00001, 4, 3)
+    ('12.346', '0.0000')
     """
-    decimals = max(decimals_of(old), least)
-    text = f"{value:.{decimals}f}"
+    text = f"{value:.{max(decimals, least)}f}"
     return text.lstrip("-") if float(text) == 0.0 else text
 
 
@@ -71,36 +71,50 @@ def edits(
     new_values = np.asarray(new_values, dtype=float).reshape(-1, 6)
     if not np.isfinite(new_values).all():
         raise ValueError("a new value of a target is not finite")
-    found: list[list[Edit]] = [[] for _ in sources]
     rows = np.asarray(rows, dtype=np.int64)
-    files = literals.file[rows].tolist()
-    starts, ends = literals.start[rows].tolist(), literals.end[rows].tolist()
-    joints = literals.joints[rows].tolist()
-    for row, file in enumerate(files):
-        text = sources[file].text
-        least = _JOINT_DECIMALS if joints[row] else _POSE_DECIMALS
-        places = zip(starts[row], ends[row], new_values[row].tolist(), least)  # noqa: B905
-        for start, end, value, few in places:
-            if start >= 0:
-                edit = _edit(text, start, end, value, few)
-                found[file] += [edit] if edit else []
-    return tuple(tuple(sorted(file, key=_place)) for file in found)
+    found = []
+    for file, source in enumerate(sources):
+        mine = np.flatnonzero(literals.file[rows] == file)
+        start, end = literals.start[rows[mine]], literals.end[rows[mine]]
+        joints = literals.joints[rows[mine], None]
+        least = np.where(joints, _JOINT_DECIMALS, _POSE_DECIMALS)
+        written = start >= 0
+        found.append(
+            _edits_of(
+                source.text,
+                start[written].tolist(),
+                end[written].tolist(),
+                new_values[mine][written].tolist(),
+                least[written].tolist(),
+            )
+        )
+    return tuple(found)
+
+
+def _edits_of(
+    text: str,
+    starts: list[int],
+    ends: list[int],
+    values: list[float],
+    least: list[int],
+) -> tuple[Edit, ...]:
+    """Return the edits of one file's numbers, sorted."""
+    found = []
+    for start, end, value, few in zip(starts, ends, values, least, strict=True):
+        old = text[start:end]
+        decimals = decimals_of(old)
+        before = number_value(old)
+        if abs(value - before) <= 0.5 * 10.0 ** -max(decimals, few):
+            continue
+        new = number_text(value, decimals, few)
+        if float(new) != before:
+            found.append(Edit(Span(start, end), new.encode("ascii")))
+    found.sort(key=_place)
+    return tuple(found)
 
 
 def _place(edit: Edit) -> Span:
     return edit.span
-
-
-def _edit(text: str, start: int, end: int, value: float, least: int) -> Edit | None:
-    """Return the edit of one number, None where it keeps its digits."""
-    old = text[start:end]
-    decimals = max(decimals_of(old), least)
-    if abs(value - number_value(old)) <= 0.5 * 10.0**-decimals:
-        return None
-    new = number_text(value, old, least)
-    if math.isclose(number_value(old), float(new), rel_tol=0.0, abs_tol=1e-12):
-        return None
-    return Edit(Span(start, end), new.encode("ascii"))
 
 
 def compare(before: Source, after: Source, allowed: Sequence[Edit]) -> tuple[str, ...]:
@@ -117,39 +131,35 @@ def compare(before: Source, after: Source, allowed: Sequence[Edit]) -> tuple[str
     Returns:
         What is wrong, empty where all is well.
     """
+    if apply(before.data, allowed) != after.data:
+        return (_first_difference(before, after, allowed),)
     try:
         old, new = read_lines(before), read_lines(after)
     except ProgramError as problem:
         return (str(problem),)
-    if len(old) != len(new) or old.shapes != new.shapes:
-        return ("the rewritten text has other lines or shapes than the original",)
-    if (old.shape != new.shape).any() or len(old.start) != len(new.start):
-        return ("a line of the rewritten text has another shape",)
-    wanted = {edit.span.start: edit.new.decode("latin-1") for edit in allowed}
-    is_wanted = np.isin(old.start, np.array(sorted(wanted), dtype=np.int64))
-    problems = _compare_kept(before, after, allowed)
-    for at in np.flatnonzero(is_wanted).tolist():
-        got = after.text[new.start[at] : new.end[at]]
-        if got != wanted[int(old.start[at])]:
-            line = before.line_of(int(old.start[at]))
-            problems.append(f"line {line}: a number is {got}, not what was meant")
-    if int(is_wanted.sum()) != len(wanted):
-        problems.append("an edit does not stand on a number")
-    return tuple(problems)
+    if len(old) != len(new) or len(old.start) != len(new.start):
+        return ("the rewritten text has other lines or numbers than the original",)
+    if old.shapes != new.shapes or (old.shape != new.shape).any():
+        row = int(np.flatnonzero(old.shape != new.shape)[:1].sum())
+        return (f"line {old.line[row]}: the rewritten line has another shape",)
+    return _stray_edits(old, allowed)
 
 
-def _compare_kept(before: Source, after: Source, allowed: Sequence[Edit]) -> list[str]:
-    """Check the bytes between the edits."""
-    at = done = 0
-    for (start, end), new in sorted(allowed, key=_place):
-        length = start - done
-        if before.data[done:start] != after.data[at : at + length]:
-            line = before.line_of(done)
-            return [f"text after line {line} differs outside of the targets"]
-        at += length + len(new)
-        done = end
-    if before.data[done:] != after.data[at:]:
-        return [
-            f"text after line {before.line_of(done)} differs outside of the targets"
-        ]
-    return []
+def _stray_edits(old: Lines, allowed: Sequence[Edit]) -> tuple[str, ...]:
+    """Find edits that do not replace exactly one number."""
+    spans = np.array([e.span for e in allowed], dtype=np.int64).reshape(-1, 2)
+    at = np.minimum(np.searchsorted(old.start, spans[:, 0]), len(old.start) - 1)
+    whole = (old.start[at] == spans[:, 0]) & (old.end[at] == spans[:, 1])
+    if whole.all():
+        return ()
+    line = old.source.line_of(int(spans[~whole][0, 0]))
+    return (f"line {line}: an edit does not replace one whole number",)
+
+
+def _first_difference(before: Source, after: Source, allowed: Sequence[Edit]) -> str:
+    meant = apply(before.data, allowed)
+    length = min(len(meant), len(after.data))
+    pairs = zip(meant, after.data, strict=False)
+    at = next((i for i, (a, b) in enumerate(pairs) if a != b), length)
+    line = after.line_of(min(at, max(len(after.data) - 1, 0)))
+    return f"line {line}: the text is not what was meant"

@@ -54,8 +54,8 @@ def test_a_value_that_is_none_is_refused() -> None:
 
 @given(st.floats(-1e4, 1e4), st.integers(0, 8), st.integers(3, 5))
 def test_digits_written(value: float, decimals: int, least: int) -> None:
-    old = f"{12.5:.{decimals}f}"
-    text = number_text(value, old, least)
+    assert decimals_of(f"{12.5:.{decimals}f}") == decimals
+    text = number_text(value, decimals, least)
     assert decimals_of(text) == max(decimals, least)
     assert abs(float(text) - value) <= 0.5 * 10.0 ** -max(decimals, least) + 1e-11
     assert not text.startswith("-0.000") or float(text) != 0.0
