@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 
 from postproc.accuracy.batch import Batch
 from postproc.accuracy.full import fit_survey, model_of
-from postproc.accuracy.library import BASE_EFFECTS
 from postproc.accuracy.measurement import Measurements
 from postproc.accuracy.methods import fit_method
 from postproc.accuracy.schema import Method
@@ -99,7 +98,7 @@ def compare_on(
     rows = [_row("no compensation", error)]
     for method in ORDER:
         if method == "full":
-            model = model_of(fit_survey(train, arm, BASE_EFFECTS, tracker), train)
+            model = model_of(fit_survey(train, arm, None, tracker), train)
         else:
             model = fit_method(method, train, arm, seed)
         rows.append(_row(method, error - model.measured_error(arm, test.states)))

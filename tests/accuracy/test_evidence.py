@@ -1,0 +1,64 @@
+"""Empirical Bayes against brute force."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.optimize import approx_fprime
+from scipy.stats import multivariate_normal
+
+from postproc.accuracy.evidence import Normal, maximise, posterior
+
+
+def problem(seed: int = 0) -> tuple[np.ndarray, np.ndarray, np.ndarray, Normal]:
+    rng = np.random.default_rng(seed)
+    X = rng.standard_normal((40, 5))
+    group = np.array([0, 0, 0, 1, 1])
+    y = X @ np.array([2.0, -1.0, 1.5, 0.0, 0.0]) + rng.standard_normal(40)
+    return X, y, group, Normal(X.T @ X, X.T @ y, float(y @ y), 0.0, 40.0)
+
+
+def test_evidence_is_the_density_of_the_data() -> None:
+    X, y, group, normal = problem()
+    log_scale = np.array([0.3, -0.8])
+    s2 = np.exp(2 * log_scale)[group]
+    found = posterior(normal, group, log_scale)
+    covariance = np.eye(40) + X * s2 @ X.T
+    direct = multivariate_normal(np.zeros(40), covariance).logpdf(y)
+    assert found.log_evidence == pytest.approx(direct, rel=1e-10)
+    A = X.T @ X + np.diag(1 / s2)
+    np.testing.assert_allclose(found.covariance, np.linalg.inv(A), rtol=1e-8)
+    np.testing.assert_allclose(found.mean, np.linalg.solve(A, X.T @ y), rtol=1e-8)
+
+
+def test_the_scales_maximise_the_evidence() -> None:
+    _, _, group, normal = problem()
+    found = maximise(normal, group, np.zeros(2))
+
+    def cost(u: np.ndarray) -> float:
+        return (
+            0.5 * float((u**2).sum()) / 9.0 - posterior(normal, group, u).log_evidence
+        )
+
+    slope = approx_fprime(found.log_scale, cost, 1e-6)
+    inside = found.log_scale > -7.9
+    assert np.abs(slope[inside]).max() < 1e-3
+    assert found.log_scale[0] > -1.0 > found.log_scale[1]
+    assert 2.5 < found.effective < 4.0
+
+
+def test_a_group_without_effect_is_shut() -> None:
+    rng = np.random.default_rng(1)
+    X = rng.standard_normal((400, 40))
+    y = rng.standard_normal(400)
+    normal = Normal(X.T @ X, X.T @ y, float(y @ y), 0.0, 400.0)
+    found = maximise(normal, np.zeros(40, dtype=int), np.zeros(1))
+    assert found.effective < 8  # of 40
+
+
+def test_no_groups_no_search() -> None:
+    none = np.zeros(0)
+    found = maximise(
+        Normal(np.zeros((0, 0)), none, 3.0, 0.0, 4.0), none.astype(int), none
+    )
+    assert found.mean.shape == (0,) and found.effective == 0
