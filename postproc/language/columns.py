@@ -106,7 +106,8 @@ class Collector:
         lines = world.taught_lines[arrival.place.program.lines.source.name]
         inline = not position.name and int(c.line[at]) in lines
         name = position.name.lower()
-        listed = not world.start.taught.isdisjoint({name, base_variable(name)})
+        taught = world.start.taught
+        listed = name in taught or base_variable(name) in taught
         c.taught[at] = position.taught or inline or listed
         c.shared[at] = position.shared
 

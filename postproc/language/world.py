@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 
 from postproc.language import pdl2 as ast
@@ -36,8 +36,17 @@ class Start:
         default_factory=dict
     )
     aux: Mapping[int, str] = field(default_factory=dict)
-    taught: frozenset[str] = frozenset()
+    taught: Collection[str] = frozenset()
     arm: int = 0
+
+    def __post_init__(self) -> None:
+        """PDL2 does not tell cases apart: keep names in lower case."""
+        lower = {name.lower(): said for name, said in self.routines.items()}
+        object.__setattr__(self, "routines", lower)
+        tables = {name.lower(): table for name, table in self.frame_tables.items()}
+        object.__setattr__(self, "frame_tables", tables)
+        taught = frozenset(name.lower() for name in self.taught)
+        object.__setattr__(self, "taught", taught)
 
 
 @dataclass(frozen=True)

@@ -114,7 +114,7 @@ def test_exported_and_taught_points_are_marked() -> None:
         "px := POS(1,2,3,4,5,6,'')\nt := POS(2,2,3,4,5,6,'')\n"
         "q := POS(3,2,3,4,5,6,'')\n"
         "MOVE LINEAR TO px\nMOVE LINEAR TO t\nMOVE LINEAR TO q",
-        Start(taught=frozenset({"q"})),
+        Start(taught=["Q"]),
         declared,
     )
     literals = found.visits.literals
@@ -137,7 +137,7 @@ def test_a_taught_frame_is_marked() -> None:
 )
 def test_what_the_cell_says_of_outside_routines(said: str, origin: int) -> None:
     text = "MOVE LINEAR TO POS(1,2,3,4,5,6,'')\next\nMOVE LINEAR TO POS(2,2,3,4,5,6,'')"
-    found = body(text, Start(routines={"ext": said}))
+    found = body(text, Start(routines={"Ext": said}))
     assert found.visits.predecessors(1).tolist() == [origin]
     assert ("[frames.routines.ext]" in reasons(found)[1]) == (said == "sets-frames")
     assert found.diagnostics == ()
