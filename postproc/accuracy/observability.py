@@ -69,7 +69,6 @@ def observe(X: Array, names: tuple[str, ...], floor: float = 0.0) -> Observabili
             keep = order[np.abs(share[order]) > PARTNER]
             partners = tuple(names[pivot[i]] for i in keep)
             unseen.append(Unseen(names[pivot[rank + k]], partners))
-        unseen += [Unseen(names[pivot[k]], ()) for k in range(len(size), X.shape[1])]
     values = np.linalg.svd(R[:rank, :], compute_uv=False) if rank else np.ones(1)
     o1 = float(np.exp(np.log(values).mean()) / np.sqrt(len(X)))
     return Observability(rank, tuple(unseen), float(values[0] / values[-1]), o1)
