@@ -113,19 +113,19 @@ def program(browser: Any, folder: Path) -> Any:
     return browser
 
 
-@pytest.mark.parametrize(
-    ("name", "text"),
-    [
-        ("program", program_report(outcome_of(250, names=("", NASTY), extra=NASTY))),
-        ("empty", program_report(outcome_of(0))),
-        ("model", calibration_report(model_file(NASTY))),
-        ("fit", calibration_report(model_file(), fit_of())),
-        ("diagnosis", diagnosis_report(diagnosis())),
-        ("comparison", comparison_report(comparison())),
-    ],
-)
-def test_pages_open_quietly(browser: Any, folder: Path, name: str, text: str) -> None:
-    show(browser, folder, name, text)
+PAGES = {
+    "program": lambda: program_report(outcome_of(250, names=("", NASTY), extra=NASTY)),
+    "empty": lambda: program_report(outcome_of(0)),
+    "model": lambda: calibration_report(model_file(NASTY)),
+    "fit": lambda: calibration_report(model_file(), fit_of()),
+    "diagnosis": lambda: diagnosis_report(diagnosis()),
+    "comparison": lambda: comparison_report(comparison()),
+}
+
+
+@pytest.mark.parametrize("name", PAGES)
+def test_pages_open_quietly(browser: Any, folder: Path, name: str) -> None:
+    show(browser, folder, name, PAGES[name]())
     assert requests(browser) == []
     assert complaints(browser) == []
     assert not browser.find_elements("css selector", "[data-title*='Share']")
@@ -263,6 +263,19 @@ def test_classes_are_told_by_symbols_too(program: Any, mode: str) -> None:
 def test_the_page_prints(program: Any, folder: Path) -> None:
     pdf = base64.b64decode(program.execute_cdp_cmd("Page.printToPDF", {})["data"])
     assert pdf.startswith(b"%PDF") and len(pdf) > 20_000
+    marks = program.execute_script(
+        """
+        window.dispatchEvent(new Event("beforeprint"));
+        const copy = document.querySelector("#view canvas.printed");
+        const { width, height } = copy;
+        const { data } = copy.getContext("2d").getImageData(0, 0, width, height);
+        let blue = 0;
+        for (let k = 0; k < data.length; k += 4) blue += data[k + 2] > data[k] + 80;
+        window.dispatchEvent(new Event("afterprint"));
+        return [blue, document.querySelectorAll("canvas.printed").length];
+        """
+    )
+    assert marks[0] > 100 and marks[1] == 0  # targets are drawn in blue
     wanted = os.environ.get("SCREENSHOTS")
     if wanted:
         (Path(wanted) / "program.pdf").write_bytes(pdf)

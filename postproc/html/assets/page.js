@@ -54,6 +54,27 @@ const Page = {
     return Plotly.react(node, traces, Page.layout(layout), Page.config);
   },
 
+  // Printers do not see what WebGL drew: copy it into plain canvases for them.
+  copyForPrint() {
+    Page.forgetCopies();
+    for (const node of document.querySelectorAll(".js-plotly-plot")) {
+      const scene = node._fullLayout && node._fullLayout.scene && node._fullLayout.scene._scene;
+      if (!scene || !scene.glplot) continue;
+      scene.glplot.redraw();
+      const drawn = scene.glplot.canvas, copy = document.createElement("canvas");
+      copy.width = drawn.width;
+      copy.height = drawn.height;
+      copy.getContext("2d").drawImage(drawn, 0, 0);
+      copy.style.cssText = drawn.style.cssText;
+      copy.className = "printed";
+      drawn.after(copy);
+    }
+  },
+
+  forgetCopies() {
+    for (const copy of document.querySelectorAll("canvas.printed")) copy.remove();
+  },
+
   trouble(problem) {
     const node = document.getElementById("trouble");
     node.hidden = false;
@@ -65,3 +86,6 @@ Page.COLOURS = {  // Okabe and Ito: told apart with any kind of colour vision
   blue: "#0072b2", vermillion: "#d55e00", orange: "#e69f00", green: "#009e73",
   purple: "#cc79a7", grey: "#767676", black: "#222222",
 };
+
+window.addEventListener("beforeprint", Page.copyForPrint);
+window.addEventListener("afterprint", Page.forgetCopies);

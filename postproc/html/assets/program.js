@@ -22,7 +22,6 @@ class ProgramPage {
     this.histogram(data.histogram);
     this.predicted(data.predicted);
     window.addEventListener("hashchange", () => this.follow());
-    window.addEventListener("beforeprint", () => this.table.turn(this.table.page));
     const idle = window.requestIdleCallback || ((f) => setTimeout(f, 200));
     idle(() => this.table.haystack());
     if (this.view) await this.redraw();
