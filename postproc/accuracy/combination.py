@@ -58,7 +58,7 @@ class Combination:
     def where(self, *origins: str) -> NDArray[np.bool_]:
         """Tell which parameters belong to effects of the given origins, (p,)."""
         return np.array(
-            [e.origin in origins for e in self.effects for _ in e.parameters()],
+            [e.belongs_to() in origins for e in self.effects for _ in e.parameters()],
             dtype=bool,
         )
 

@@ -44,6 +44,18 @@ class Curve(Effect):
     upper: tuple[float, ...] = (np.pi,)
     signed: bool = False
 
+    def belongs_to(self) -> Origin:
+        """Follow the covariate: what only a survey has is never compensated."""
+        if any(name in ("time", "order") for name in self.source):
+            return "setup"
+        states = any(name in ("temperature", "payload") for name in self.source)
+        return "state" if states else "arm"
+
+    def requires(self) -> tuple[str, ...]:
+        """Need the covariates that a program does not tell."""
+        told = ("temperature", "payload", "speed")
+        return tuple(name for name in self.source if name in told)
+
     def _orders(self) -> list[tuple[int, ...]]:
         """List the orders of every mode's cosines."""
         if len(self.source) == 1:

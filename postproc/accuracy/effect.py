@@ -64,6 +64,14 @@ class Effect(ABC):
         """Make the effect with the settings that fit an arm and a survey."""
         return cls()
 
+    def belongs_to(self) -> Origin:
+        """Say what it is of, where that depends on the settings."""
+        return self.origin
+
+    def requires(self) -> tuple[str, ...]:
+        """List what it needs, where that depends on the settings."""
+        return self.needs
+
     @abstractmethod
     def parameters(self) -> tuple[Parameter, ...]:
         """Name the p parameters, in the order of the columns."""

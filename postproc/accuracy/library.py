@@ -53,8 +53,9 @@ def propose(names: Iterable[str], arm: Arm, states: States) -> tuple[Effect, ...
         if name not in EFFECTS:
             known = ", ".join(EFFECTS)
             raise PostprocError(f"there is no effect {name!r}. Known effects: {known}")
-        _check_needs(EFFECTS[name], states)
     effects = tuple(EFFECTS[name].propose(arm, states) for name in chosen)
+    for effect in effects:
+        _check_needs(effect, states)
     if Placement.name not in chosen:
         return effects
     return tuple(
@@ -62,13 +63,13 @@ def propose(names: Iterable[str], arm: Arm, states: States) -> tuple[Effect, ...
     )
 
 
-def _check_needs(kind: type[Effect], states: States) -> None:
+def _check_needs(kind: Effect, states: States) -> None:
     """Refuse an effect whose covariate was not recorded.
 
     Raises:
         PostprocError: Naming the effect and the column.
     """
-    for need in kind.needs:
+    for need in kind.requires():
         if len(states) and np.isnan(getattr(states, need)).all():
             raise PostprocError(
                 f"effect {kind.name} needs the {need} of every row, which the file "

@@ -72,13 +72,13 @@ class Model:
     @property
     def needs(self) -> frozenset[str]:
         """Covariates that the compensated effects cannot do without."""
-        used = [e for e in self.effects.effects if e.origin in COMPENSATED]
-        return frozenset(need for e in used for need in e.needs)
+        used = [e for e in self.effects.effects if e.belongs_to() in COMPENSATED]
+        return frozenset(need for e in used for need in e.requires())
 
     def compensable(self) -> tuple[Combination, Array, Array]:
         """Return the effects that may be compensated, their values and covariance."""
         keep = self.effects.where(*COMPENSATED)
-        part = tuple(e for e in self.effects.effects if e.origin in COMPENSATED)
+        part = tuple(e for e in self.effects.effects if e.belongs_to() in COMPENSATED)
         covariance = self.covariance
         if len(covariance):
             covariance = covariance[np.ix_(keep, keep)]

@@ -50,6 +50,10 @@ class Thermal(Effect):
         last = float(np.nanmax(states.time, initial=1.0))
         return cls(links, form="time", time_constant=last / 4)
 
+    def requires(self) -> tuple[str, ...]:
+        """Need the temperature; a warm-up of unknown time is over."""
+        return ("temperature",) if self.form == "temperature" else ()
+
     def parameters(self) -> tuple[Parameter, ...]:
         """Name the common growth and every link's deviation from it."""
         if self.form == "temperature":

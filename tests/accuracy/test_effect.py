@@ -82,11 +82,17 @@ def test_settings_survive_a_model_file(effect: Effect) -> None:
 
 
 def test_origins_say_what_may_be_compensated() -> None:
-    origin = {e.name: e.origin for e in variants() if e.name != "curve"}
+    origin = {e.name: e.belongs_to() for e in variants() if e.name != "curve"}
     assert {n for n, o in origin.items() if o == "setup"} == {
         "base_shift", "tool_shift", "tracker_drift", "probe", "registration",
     }  # fmt: skip
     assert {n for n, o in origin.items() if o == "state"} == {"payload", "thermal"}
+    curve = EFFECTS["curve"]
+    assert curve(source=("order",)).belongs_to() == "setup"
+    assert curve(source=("joint 3", "temperature")).belongs_to() == "state"
+    assert curve(source=("joint 3",)).belongs_to() == "arm"
+    assert EFFECTS["thermal"]().requires() == ("temperature",)
+    assert EFFECTS["thermal"](form="time").requires() == ()
 
 
 def test_an_effect_without_its_covariate_is_refused() -> None:
