@@ -11,6 +11,15 @@ from dataclasses import dataclass
 from typing import Literal, TextIO
 
 from rich.console import Console
+from rich.progress import (
+    BarColumn,
+    MofNCompleteColumn,
+    Progress,
+    ProgressColumn,
+    Task,
+    TextColumn,
+    TimeRemainingColumn,
+)
 from rich.table import Table
 from rich.text import Text
 
@@ -91,3 +100,40 @@ def stages(out: TextIO | None = None) -> Iterator[Callable[[str], None]]:
     finally:
         timer.cancel()
         status.stop()
+
+
+@contextmanager
+def progress_bar(
+    title: str, out: TextIO | None = None
+) -> Iterator[Callable[[int, int], None]]:
+    """Show how far a job is, its rate and the time it still takes, on a terminal only.
+
+    Args:
+        title: What is being done.
+        out: Where to; default: stderr.
+
+    Yields:
+        A function to be told how many are done, of how many.
+    """
+    out = out or sys.stderr
+    if not out.isatty():
+        yield lambda done, of: None
+        return
+    columns = (
+        TextColumn("{task.description}", markup=False),
+        BarColumn(),
+        MofNCompleteColumn(),
+        _Rate(),
+        TimeRemainingColumn(),
+    )
+    with Progress(*columns, console=Console(file=out), transient=True) as progress:
+        bar = progress.add_task(printable(title), total=None)
+        yield lambda done, of: progress.update(bar, completed=done, total=of)
+
+
+class _Rate(ProgressColumn):
+    """How many are done in a second."""
+
+    def render(self, task: Task) -> Text:
+        """Return the cell."""
+        return Text(f"{task.speed:.1f}/s" if task.speed else "")

@@ -62,5 +62,9 @@ class OutputError(FileError):
     """A place that cannot be written to."""
 
 
+class DiskFullError(OutputError):
+    """No room is left: nothing else can be written there either."""
+
+
 class PlanError(PostprocError):
     """A motion that cannot be planned: no time law, no inverse kinematics."""

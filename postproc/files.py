@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
+from typing import IO
 
-from postproc.exceptions import OutputError
+from postproc.exceptions import DiskFullError, OutputError
 
 TEMPORARY = ".postproc-tmp"  # end of the names of files that are being written
 
@@ -31,11 +34,37 @@ def write_all(files: Mapping[Path, bytes]) -> None:
         for folder in {path.parent for path in files}:
             _sync_folder(folder)
     except OSError as exc:
-        cure = "Give an existing folder with room that may be written to"
-        raise OutputError(exc.filename or "output", _reason(exc), cure) from None
+        raise disk_error(exc, exc.filename or next(iter(files))) from None
     finally:
         for temporary, _ in ready:
             Path(temporary).unlink(missing_ok=True)
+
+
+@contextmanager
+def replace_file(path: Path) -> Iterator[IO[bytes]]:
+    """Open a file for writing that takes its name when the block has ended well.
+
+    Raises:
+        OSError: It cannot be written; what was there is there still.
+    """
+    handle, name = tempfile.mkstemp(TEMPORARY, f".{path.name[:100]}.", path.parent)
+    try:
+        with os.fdopen(handle, "wb") as out:
+            yield out
+            out.flush()
+            os.fsync(out.fileno())
+        os.replace(name, path)
+        _sync_folder(path.parent)
+    finally:
+        Path(name).unlink(missing_ok=True)
+
+
+def disk_error(exc: OSError, path: str | Path) -> OutputError:
+    """Say in our terms why a file cannot be written."""
+    if exc.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG):
+        return DiskFullError(path, "no room is left there", "Make room, then go on")
+    cure = "Give an existing folder with room that may be written to"
+    return OutputError(path, _reason(exc), cure)
 
 
 def _write_temporary(path: Path, data: bytes) -> str:
@@ -74,6 +103,6 @@ def _reason(exc: OSError) -> str:
     """Say in plain words why writing failed."""
     if isinstance(exc, FileNotFoundError):
         return "the folder does not exist"
-    if isinstance(exc, PermissionError) or exc.errno == 30:  # EROFS
+    if isinstance(exc, PermissionError) or exc.errno == errno.EROFS:
         return "the folder is read-only"
     return f"cannot be written ({exc.strerror})"

@@ -7,10 +7,10 @@ from typing import Annotated
 import typer
 
 from postproc import __version__
-from postproc.cli import loop, models, programs
+from postproc.cli import loop, models, plant, programs
 from postproc.cli.common import app
 
-__all__ = ["app", "loop", "main", "models", "programs"]
+__all__ = ["app", "loop", "main", "models", "plant", "programs"]
 
 
 @app.callback(invoke_without_command=True)

@@ -1,0 +1,1 @@
+"""Many programs: worker processes of this machine, or a cluster."""

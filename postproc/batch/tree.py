@@ -1,0 +1,206 @@
+"""What a source tree holds: programs with all that belongs to them, and the rest."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections import defaultdict
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from postproc.batch.pages import group_pages, named_programs, read_head
+from postproc.batch.plan import Plan
+from postproc.batch.task import Unit
+from postproc.exceptions import OutputError, ProgramError
+from postproc.files import TEMPORARY
+from postproc.sidecar import SUFFIX
+
+PROGRAM, VARIABLES = ".pdl", ".lsv"
+
+_TARGETS = re.compile(
+    rb"^[ \t]*\w+[ \t]+A?(?:POS|XTND|JNTP|PATH)\b", re.IGNORECASE | re.MULTILINE
+)
+
+
+@dataclass(frozen=True)
+class Tree:
+    """A source tree, by paths below its root with ``/``.
+
+    Attributes:
+        root: Its folder.
+        units: Programs that are compensated together.
+        copies: Everything else, to be copied as it is.
+        refused: What will not be in the target tree, and why.
+        notes: What was not followed: path and reason.
+        size: Bytes of all files.
+    """
+
+    root: Path
+    units: tuple[Unit, ...]
+    copies: tuple[str, ...]
+    refused: Mapping[str, str]
+    notes: tuple[tuple[str, str], ...]
+    size: int
+
+
+def scan(root: Path, plan: Plan) -> Tree:
+    """List a source tree.
+
+    Raises:
+        ProgramError: It is no folder, or holds a folder that cannot be read.
+    """
+    if not root.is_dir():
+        raise ProgramError(root, "is no folder", "Give the folder of the programs")
+    folders: dict[str, list[str]] = defaultdict(list)
+    refused: dict[str, str] = {}
+    size = 0
+    for place, entry in _walk(root):
+        if entry.is_symlink() or not entry.is_file(follow_symlinks=False):
+            kind = "a symbolic link" if entry.is_symlink() else "no regular file"
+            refused[place] = f"is {kind}: it is not followed; put the file itself here"
+            continue
+        folders[place.rpartition("/")[0]].append(place)
+        size += entry.stat(follow_symlinks=False).st_size
+    found = [_sort(root, names, plan) for names in folders.values()]
+    return Tree(
+        root,
+        tuple(unit for part in found for unit in part.units),
+        tuple(copy for part in found for copy in part.copies),
+        refused | {k: v for part in found for k, v in part.refused.items()},
+        tuple(note for part in found for note in part.notes),
+        size,
+    )
+
+
+def _walk(root: Path) -> Iterator[tuple[str, os.DirEntry[str]]]:
+    """Yield all entries below a folder that are not folders, in order of their paths.
+
+    Raises:
+        ProgramError: A folder cannot be read.
+    """
+    waiting = [""]
+    while waiting:
+        folder = waiting.pop()
+        try:
+            with os.scandir(root / folder) as entries:
+                found = sorted(entries, key=lambda entry: entry.name)
+        except OSError as exc:
+            problem = f"cannot be read ({exc.strerror})"
+            raise ProgramError(root / folder, problem, "Check its rights") from None
+        for entry in found:
+            place = f"{folder}/{entry.name}".lstrip("/")
+            if entry.is_dir(follow_symlinks=False):
+                waiting.append(place)
+            elif not entry.name.endswith(TEMPORARY):
+                yield place, entry
+
+
+@dataclass
+class _Folder:
+    """What one folder holds, being sorted."""
+
+    units: list[Unit]
+    copies: list[str]
+    refused: dict[str, str]
+    notes: list[tuple[str, str]]
+
+
+def _sort(root: Path, places: Sequence[str], plan: Plan) -> _Folder:
+    """Sort the files of one folder into programs, what belongs to them, and others."""
+    part = _Folder([], [], {}, [])
+    programs = _by_base(places, PROGRAM, part)
+    variables = _by_base(places, VARIABLES, part)
+    records = {place + SUFFIX for place in programs.values()}
+    for place in places:
+        if place in records or place in part.refused:
+            continue  # a record of an earlier output would be taken for ours
+        if suffix_of(place) == VARIABLES and base_of(place) not in programs:
+            _lone_variables(root, place, part)
+        elif suffix_of(place) not in (PROGRAM, VARIABLES):
+            part.copies.append(place)
+    named = {}
+    for base, place in programs.items():
+        named[base], outside = named_programs(read_head(root / place))
+        part.notes += [(place, f"{n!r} leads out of the folder") for n in outside]
+    for main, pages in _joined(named, variables).items():
+        _add_unit(programs[main], [programs[p] for p in pages], variables, plan, part)
+    return part
+
+
+def _by_base(places: Sequence[str], suffix: str, part: _Folder) -> dict[str, str]:
+    """Index files of one kind by base name; refuse those that differ in case only."""
+    found: dict[str, str] = {}
+    for place in places:
+        if suffix_of(place) == suffix:
+            first = found.setdefault(base_of(place), place)
+            if first != place:
+                part.refused[place] = f"has the name of {first} but for upper case"
+    return found
+
+
+def _joined(
+    named: Mapping[str, Sequence[str]], variables: Mapping[str, str]
+) -> dict[str, tuple[str, ...]]:
+    """Join pages to their programs, but for pages that have variables of their own.
+
+    Only the main program's variable file is read with it.
+    """
+    keep = {
+        name: [o for o in others if o not in variables]
+        for name, others in named.items()
+    }
+    return group_pages(keep)
+
+
+def _add_unit(
+    program: str,
+    pages: Sequence[str],
+    variables: Mapping[str, str],
+    plan: Plan,
+    part: _Folder,
+) -> None:
+    """Add a program, or refuse it where no rule of the plan fits."""
+    setup = plan.setup_of(program)
+    values = variables.get(base_of(program))
+    if setup is not None:
+        part.units.append(Unit(program, tuple(pages), values, setup))
+        return
+    for place in (program, *pages, *([values] if values else [])):
+        part.refused[place] = "no rule of the plan fits: add one, or --cell and --model"
+
+
+def _lone_variables(root: Path, place: str, part: _Folder) -> None:
+    """Refuse a variable file that holds targets of a program which is not there."""
+    try:
+        data = (root / place).read_bytes()
+    except OSError as exc:
+        part.refused[place] = f"cannot be read ({exc.strerror})"
+        return
+    if _TARGETS.search(data):
+        part.refused[place] = "holds targets, and its program is not beside it"
+    else:
+        part.copies.append(place)
+
+
+def suffix_of(place: str) -> str:
+    """Return a path's suffix in lower case."""
+    return os.path.splitext(place)[1].lower()
+
+
+def base_of(place: str) -> str:
+    """Return a file's name without folder and suffix, in lower case."""
+    return os.path.splitext(place.rpartition("/")[2])[0].lower()
+
+
+def refuse_overlap(source: Path, target: Path) -> None:
+    """Refuse a target tree inside of the source tree, or around it.
+
+    Raises:
+        OutputError: They overlap.
+    """
+    a, b = source.resolve(), target.resolve()
+    if a == b or a in b.parents or b in a.parents:
+        raise OutputError(
+            target, "overlaps the source tree", "Give a folder beside it as DST"
+        )
