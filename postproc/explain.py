@@ -9,11 +9,17 @@ from pathlib import Path
 import numpy as np
 
 from postproc.accuracy.model import Model, load_model
-from postproc.compensate import Options, compensate, name_files
+from postproc.compensate import compensate, name_files
 from postproc.console import Column, print_table
 from postproc.jobs import find_variables, read_bytes
 from postproc.language.visits import ELSEWHERE, START, Visits
-from postproc.planning import Planned, plan_visits, read_program
+from postproc.options import Options
+from postproc.planning import (
+    Planned,
+    plan_visits,
+    read_program,
+    with_measured_play,
+)
 from postproc.pose import MM
 from postproc.report import Outcome, Status, target_row
 from postproc.robot.cell import Cell, load_cell
@@ -122,6 +128,8 @@ def explain(
     Raises:
         PostprocError: The program, the cell or the model cannot be used.
     """
+    if model is not None:
+        cell = with_measured_play(cell, model)
     reading = read_program(files, cell)
     planned = plan_visits(reading.visits, cell)
     outcome = None

@@ -7,9 +7,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from postproc.accuracy.model import Model, load_model
-from postproc.compensate import Options, Progress, compensate, silent
+from postproc.clock import Progress, silent
+from postproc.compensate import compensate
 from postproc.exceptions import OutputError, ProgramError
 from postproc.files import write_all
+from postproc.options import Options
 from postproc.report import Outcome
 from postproc.robot.cell import Cell, load_cell
 from postproc.sidecar import sidecar_path

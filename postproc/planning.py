@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from postproc.accuracy.lost_motion import measured_play
+from postproc.accuracy.model import Model
 from postproc.language.diagnostic import Diagnostic
 from postproc.language.flow import Start, resolve
 from postproc.language.lsv import Variables, read_variables
@@ -79,6 +81,12 @@ def start_of(cell: Cell) -> Start:
         aux=dict(cell.aux),
         taught=cell.taught,
     )
+
+
+def with_measured_play(cell: Cell, model: Model) -> Cell:
+    """Let directions be told by the gaps that the model found, not by a guess."""
+    arm = replace(cell.arm, play=measured_play(model, cell.arm))
+    return replace(cell, arm=arm)
 
 
 def read_program(files: Mapping[str, bytes], cell: Cell) -> Reading:

@@ -3,26 +3,20 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from postproc.accuracy.guard import guard_size, guard_solutions, guard_steps
-from postproc.accuracy.model import Model
-from postproc.accuracy.prediction import Prediction
-from postproc.accuracy.solve import Solution, solve
 from postproc.language.visits import Target, Visits
+from postproc.options import Options
 from postproc.planning import Planned, Reading
 from postproc.pose import MM, inverse, pose_from_record
 from postproc.reasons import Reasons
 from postproc.reconcile import Agreement, agree
 from postproc.report import Decisions, Status
 from postproc.robot.cell import Cell
-from postproc.robot.state import States
-
-if TYPE_CHECKING:
-    from postproc.compensate import Options
+from postproc.solved import Solved
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -51,37 +45,34 @@ class Proposal:
 def propose(
     reading: Reading,
     planned: Planned,
-    states: States,
+    solved: Solved,
     held: Bools,
     cell: Cell,
-    model: Model,
     options: Options,
 ) -> Proposal:
-    """Solve every visit, guard it, and compare the arrivals at every literal.
+    """Guard every solved visit, and compare the arrivals at every literal.
 
     Args:
         reading: The program.
         planned: Its plan.
-        states: Planned states with the directions to correct for.
+        solved: The corrected command of every visit.
         held: Visits that must be left alone, (n,).
         cell: Guards and frames.
-        model: The arm's error.
         options: What the user asked for.
     """
     visits, plan = reading.visits, planned.plan
-    solution = solve_known(model, cell, planned, states)
-    prediction = model.predict(cell.arm, states)
-    correction = solution.command[:, :3, 3] - plan.tcp[:, :3, 3]
+    correction = solved.command[:, :3, 3] - plan.tcp[:, :3, 3]
     reasons = Reasons(len(visits))
     display = mark_display(visits, planned, reasons)
     unchanged = mark_unchanged(visits, reasons, options)
     reasons.adopt(planned.reasons.index, planned.reasons.texts)
-    guard_outside(reasons, prediction)
-    guard_solutions(reasons, cell.arm, cell.limits, plan.q, solution.q)
-    guard_size(reasons, cell.limits, correction, solution.residual)
-    guard_steps(reasons, cell.limits, correction, states.direction, _run_mates(visits))
+    for text, outside in solved.outside.items():
+        reasons.mark(outside, text)
+    guard_solutions(reasons, cell.arm, cell.limits, plan.q, solved.q)
+    guard_size(reasons, cell.limits, correction, solved.residual)
+    guard_steps(reasons, cell.limits, correction, solved.direction, _run_mates(visits))
     reasons.mark(held, HELD)
-    numbers = new_numbers(visits, solution)
+    numbers = new_numbers(visits, solved)
     agreement = agree(
         visits.literal, reasons.none, numbers, change_mm(visits, numbers, correction)
     )
@@ -101,41 +92,29 @@ def propose(
         why=reasons.index,
         reasons=reasons.texts,
         q=plan.q,
-        direction=states.direction,
+        direction=solved.direction,
         corrected=values,
         correction=np.where(corrected[:, None], correction, 0.0),
-        std_error=prediction.std_model,
+        std_error=solved.std_error,
     )
     return Proposal(
         agreement.literal[chosen], agreement.values[chosen], corrected, decisions
     )
 
 
-def solve_known(model: Model, cell: Cell, planned: Planned, states: States) -> Solution:
-    """Solve the visits whose joint angles and pose are known; NaN elsewhere."""
-    plan, n = planned.plan, len(states)
-    lost = np.isnan(plan.q).any(axis=1) | np.isnan(plan.tcp).any(axis=(1, 2))
-    known = np.asarray(~lost)
-    part = solve(model, cell.arm, plan.tcp[known], plan.tool[known], states[known])
-    q, command = np.full((n, 6), np.nan), np.full((n, 4, 4), np.nan)
-    residual = np.full(n, np.nan)
-    q[known], command[known], residual[known] = part.q, part.command, part.residual
-    return Solution(q, command, residual, part.iterations)
-
-
-def new_numbers(visits: Visits, solution: Solution) -> Array:
+def new_numbers(visits: Visits, solved: Solved) -> Array:
     """Express commands in the numbers of the file, (n, 6).
 
     A pose keeps its written orientation; P = inverse(UFRAME) . BASE . command.
     """
     numbers = np.array(visits.values)
     joints = visits.target == Target.JOINTS
-    numbers[joints] = np.rad2deg(solution.q[joints])
+    numbers[joints] = np.rad2deg(solved.q[joints])
     poses = np.flatnonzero(visits.target == Target.POSE)
     unknown = np.full((1, 4, 4), np.nan)
     frames = np.concatenate([pose_from_record(visits.frames.reshape(-1, 6)), unknown])
     placed = inverse(frames)[visits.uframe[poses]] @ frames[visits.base[poses]]
-    point = np.einsum("nij,nj->ni", placed, solution.command[poses, :, 3])
+    point = np.einsum("nij,nj->ni", placed, solved.command[poses, :, 3])
     numbers[poses, :3] = point[:, :3] / MM
     return numbers
 
@@ -175,13 +154,10 @@ def mark_unchanged(visits: Visits, reasons: Reasons, options: Options) -> Bools:
         return empty
     taught = has & visits.literals.taught[literal]
     reasons.mark(taught, "a taught point already contains the arm's error")
+    if not options.shared:
+        shared = has & visits.literals.shared[literal]
+        reasons.mark(shared, "other programs may read this variable too (see --shared)")
     return np.asarray(empty | taught)
-
-
-def guard_outside(reasons: Reasons, prediction: Prediction) -> None:
-    """Mark visits outside of what was surveyed."""
-    for text, rows in prediction.outside.items():
-        reasons.mark(rows, text)
 
 
 def mark_disagreement(

@@ -54,8 +54,8 @@ def compensate(
     Example: postproc compensate job.pdl --cell cell.toml --model model.json
     """
     from postproc import jobs
-    from postproc.compensate import Options
     from postproc.console import stages
+    from postproc.options import Options
 
     options = Options(clone=clone, temperature=temperature)
     with explained():

@@ -1,0 +1,23 @@
+"""What the user asked for."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Options:
+    """What the user asked for.
+
+    Attributes:
+        clone: Give variables whose arrivals disagree a value for each.
+        shared: Edit variables that other programs may read too.
+        temperature: Arm temperature [deg C]; default: the cell's.
+    """
+
+    clone: bool = False
+    shared: bool = False
+    temperature: float | None = None
+
+
+AS_USUAL = Options()
