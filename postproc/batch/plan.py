@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from postproc.batch.setup import Setup, open_setup
-from postproc.compensate import Options
 from postproc.exceptions import CellError, PostprocError
+from postproc.options import Options
 from postproc.robot.schema import Strict, read_toml
 
 

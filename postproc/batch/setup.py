@@ -10,8 +10,8 @@ from pathlib import Path
 
 from postproc import __version__
 from postproc.accuracy.model import Model, load_model
-from postproc.compensate import Options
 from postproc.exceptions import CellError
+from postproc.options import Options
 from postproc.robot.cell import Cell, load_cell
 
 

@@ -60,8 +60,8 @@ def batch(
     with explained():
         from postproc.batch import run
         from postproc.batch.plan import make_plan
-        from postproc.compensate import Options
         from postproc.console import progress_bar
+        from postproc.options import Options
 
         made = make_plan(plan, cell, model, Options(clone, temperature=temperature))
         order = run.Order(source, target, made, log or run.default_log(target), resume)
