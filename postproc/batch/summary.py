@@ -36,7 +36,7 @@ class Summary:
         problems: Files that are absent from the target tree, and why.
         left: Programs with targets left alone, and how many.
         removed: Files of earlier runs that no source stands for any more.
-        notes: What was not followed: path and reason.
+        notes: What a person should know: path and text.
         stopped: The user stopped the run before its end.
     """
 
@@ -87,7 +87,7 @@ class Summary:
         return [
             *_some("absent", (f"{place}: {why}" for place, why in self.problems)),
             *_some("left alone", (f"{p}: {n} visits" for p, n in self.left)),
-            *_some("not followed", (f"{place}: {why}" for place, why in self.notes)),
+            *_some("note", (f"{place}: {why}" for place, why in self.notes)),
             *_some("removed, no source any more", self.removed),
         ]
 

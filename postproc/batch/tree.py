@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import re
 from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -14,13 +13,17 @@ from postproc.batch.plan import Plan
 from postproc.batch.task import Unit
 from postproc.exceptions import OutputError, ProgramError
 from postproc.files import TEMPORARY
+from postproc.kinds import (
+    COMPILED,
+    PROGRAM,
+    VARIABLES,
+    base_of,
+    holds_targets,
+    suffix_of,
+)
 from postproc.sidecar import SUFFIX
 
-PROGRAM, VARIABLES = ".pdl", ".lsv"
-
-_TARGETS = re.compile(
-    rb"^[ \t]*\w+[ \t]+A?(?:POS|XTND|JNTP|PATH)\b", re.IGNORECASE | re.MULTILINE
-)
+_STALE = "is compiled from the uncompensated program: translate it anew"
 
 
 @dataclass(frozen=True)
@@ -32,7 +35,7 @@ class Tree:
         units: Programs that are compensated together.
         copies: Everything else, to be copied as it is.
         refused: What will not be in the target tree, and why.
-        notes: What was not followed: path and reason.
+        notes: What a person should know: path and text.
         size: Bytes of all files.
     """
 
@@ -119,10 +122,14 @@ def _sort(root: Path, places: Sequence[str], plan: Plan) -> _Folder:
             _lone_variables(root, place, part)
         elif suffix_of(place) not in (PROGRAM, VARIABLES):
             part.copies.append(place)
+            if suffix_of(place) in COMPILED and base_of(place) in programs:
+                part.notes.append((place, _STALE))
     named = {}
     for base, place in programs.items():
         named[base], outside = named_programs(read_head(root / place))
-        part.notes += [(place, f"{n!r} leads out of the folder") for n in outside]
+        part.notes += [
+            (place, f"{n!r} is outside of its folder: not followed") for n in outside
+        ]
     for main, pages in _joined(named, variables).items():
         _add_unit(programs[main], [programs[p] for p in pages], variables, plan, part)
     return part
@@ -177,20 +184,10 @@ def _lone_variables(root: Path, place: str, part: _Folder) -> None:
     except OSError as exc:
         part.refused[place] = f"cannot be read ({exc.strerror})"
         return
-    if _TARGETS.search(data):
+    if holds_targets(data):
         part.refused[place] = "holds targets, and its program is not beside it"
     else:
         part.copies.append(place)
-
-
-def suffix_of(place: str) -> str:
-    """Return a path's suffix in lower case."""
-    return os.path.splitext(place)[1].lower()
-
-
-def base_of(place: str) -> str:
-    """Return a file's name without folder and suffix, in lower case."""
-    return os.path.splitext(place.rpartition("/")[2])[0].lower()
 
 
 def refuse_overlap(source: Path, target: Path) -> None:

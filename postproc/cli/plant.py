@@ -8,7 +8,15 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from postproc.cli.common import TemperatureOption, app, explained, say
+from postproc.cli.common import (
+    JsonOption,
+    TemperatureOption,
+    app,
+    explained,
+    say,
+    write_text,
+)
+from postproc.options import AS_USUAL
 
 if TYPE_CHECKING:
     from postproc.batch.run import Gather
@@ -95,3 +103,54 @@ def _print_summary(summary: Summary) -> None:
     print_table(columns, summary.rows())
     for line in summary.lists():
         say(printable(line))
+
+
+@app.command()
+def check(
+    folder: Annotated[Path, typer.Argument(metavar="DIR", help="Compensated tree.")],
+    model: Annotated[
+        Path | None, typer.Option("--model", help="The model that is current.")
+    ] = None,
+    plan: PlanFile = None,
+    source: Annotated[
+        Path | None, typer.Option("--source", help="The tree it was made from.")
+    ] = None,
+    json: JsonOption = None,
+) -> None:
+    """Tell whether a tree may be uploaded: exit 0 yes, 1 no, 2 trouble.
+
+    Every program must be compensated, with the current model, from the source as it is
+    now, and unchanged since.
+
+    Example: postproc check dst --model model.json --source src
+    """
+    from postproc.check import check as look
+    from postproc.console import printable
+
+    with explained():
+        found = look(folder, _current_model(model, plan), source)
+        if json:
+            write_text(json, found.to_json())
+        for finding in found.findings:
+            say(printable(f"{finding.place}: {finding.code}: {finding.message}"))
+        say(f"{folder}: {found.programs} programs, {len(found.findings)} findings")
+    raise typer.Exit(found.exit_code)
+
+
+def _current_model(
+    model: Path | None, plan: Path | None
+) -> Callable[[str], str | None]:
+    """Tell which model a program should have been made with."""
+    if plan is not None:
+        from postproc.batch.plan import make_plan
+
+        made = make_plan(plan, None, None, AS_USUAL)
+        ids = [setup.model.id for setup in made.setups]
+        which = made.setup_of
+        return lambda place: None if (i := which(place)) is None else ids[i]
+    if model is not None:
+        from postproc.accuracy.model import load_model
+
+        current = load_model(model).id
+        return lambda place: current
+    return lambda place: None

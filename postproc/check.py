@@ -1,0 +1,220 @@
+"""Before an upload: is all of a tree compensated, current, and as it was written?"""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+from postproc.exceptions import ProgramError
+from postproc.files import TEMPORARY
+from postproc.kinds import COMPILED, PROGRAM, VARIABLES, holds_targets, suffix_of
+from postproc.language.stamp import read_stamp
+from postproc.sidecar import FileRecord, Sidecar, read_sidecar, sha256, sidecar_path
+
+Current = Callable[[str], str | None]  # program -> id of the model it should have
+
+
+@dataclass(frozen=True, order=True)
+class Finding:
+    """Why a file must not be uploaded as it is.
+
+    Attributes:
+        place: Its path below the checked folder, with ``/``.
+        code: What kind of trouble it is.
+        message: The trouble, and what to do.
+    """
+
+    place: str
+    code: str
+    message: str
+
+
+@dataclass(frozen=True)
+class Checked:
+    """What a check has found.
+
+    Attributes:
+        programs: Number of programs looked at.
+        findings: Sorted by file.
+    """
+
+    programs: int
+    findings: tuple[Finding, ...]
+
+    @property
+    def exit_code(self) -> int:
+        """Return 0 where all may be uploaded, 1 where something must not."""
+        return 1 if self.findings else 0
+
+    def to_json(self) -> str:
+        """Return it as JSON text."""
+        rows = [asdict(finding) for finding in self.findings]
+        return json.dumps({"programs": self.programs, "findings": rows}) + "\n"
+
+
+def check(
+    folder: Path, current: Current = lambda place: None, source: Path | None = None
+) -> Checked:
+    """Check a tree of compensated programs.
+
+    Args:
+        folder: The tree.
+        current: Tells the model that a program should be made with, None: any.
+        source: The tree that it was made from.
+
+    Raises:
+        ProgramError: A folder or a file cannot be read.
+    """
+    for root in (folder, source):
+        if root is not None and not root.is_dir():
+            raise ProgramError(root, "is no folder", "Give a tree of programs")
+    places = list(_places(folder))
+    look = _Look(folder, source, current, {place.lower(): place for place in places})
+    findings = [f for place in places for f in look.at(place)]
+    if source is not None:
+        findings += _absent(source, set(places))
+    programs = sum(suffix_of(place) == PROGRAM for place in places)
+    return Checked(programs, tuple(sorted(findings)))
+
+
+def _places(root: Path) -> Iterator[str]:
+    """Yield the files of a tree, by their paths below it.
+
+    Raises:
+        ProgramError: A folder cannot be read.
+    """
+
+    def fail(exc: OSError) -> None:
+        problem = f"cannot be read ({exc.strerror})"
+        raise ProgramError(exc.filename, problem, "Check its rights") from None
+
+    for parent, _, names in os.walk(root, onerror=fail):
+        for name in sorted(names):
+            yield (Path(parent) / name).relative_to(root).as_posix()
+
+
+def _absent(source: Path, places: set[str]) -> list[Finding]:
+    """Find programs of which there is no output."""
+    return [
+        Finding(place, "absent", "is in the source tree only: it was not compensated")
+        for place in _places(source)
+        if suffix_of(place) == PROGRAM and place not in places
+    ]
+
+
+@dataclass(frozen=True)
+class _Look:
+    """A look at the files of a tree.
+
+    Attributes:
+        root: The tree.
+        source: The tree that it was made from, or None.
+        current: Tells the model that a program should be made with.
+        places: All files, by their paths in lower case.
+    """
+
+    root: Path
+    source: Path | None
+    current: Current
+    places: Mapping[str, str]
+
+    def at(self, place: str) -> Iterator[Finding]:
+        """Find what is wrong with a file."""
+        suffix = suffix_of(place)
+        if place.endswith(TEMPORARY):
+            yield Finding(place, "unfinished", "was left by a run that was killed")
+        elif suffix == PROGRAM:
+            yield from self._program(place)
+        elif suffix == VARIABLES and not self._beside(place, PROGRAM):
+            if holds_targets(_read(self.root / place)):
+                yield Finding(place, "uncompensated", "its program is not beside it")
+        elif suffix in COMPILED and self._beside(place, PROGRAM):
+            yield from self._compiled(place)
+
+    def _beside(self, place: str, suffix: str) -> str | None:
+        """Return the file of another kind with the same base name."""
+        return self.places.get(os.path.splitext(place)[0].lower() + suffix)
+
+    def _program(self, place: str) -> Iterator[Finding]:
+        """Check a program and the variable file that was written with it."""
+        data = _read(self.root / place)
+        stamp = read_stamp(data)
+        record_path = sidecar_path(self.root / place)
+        if not record_path.exists():
+            if stamp is None:
+                yield Finding(place, "uncompensated", "carries no stamp and no record")
+            else:
+                text = "its record is missing: it cannot be checked or restored"
+                yield Finding(place, "no-record", text)
+            return
+        try:
+            sidecar = read_sidecar(record_path)
+        except ProgramError as exc:
+            yield Finding(place, "no-record", str(exc))
+            return
+        yield from self._model(place, sidecar)
+        yield from self._content(place, data, sidecar)
+        if values := self._beside(place, VARIABLES):
+            yield from self._content(values, _read(self.root / values), sidecar)
+
+    def _model(self, place: str, sidecar: Sidecar) -> Iterator[Finding]:
+        """Check that a program was made with the model it should be made with."""
+        wanted = self.current(place)
+        if wanted is not None and sidecar.model != wanted:
+            text = f"was made with model {sidecar.model}, the current one is {wanted}"
+            yield Finding(place, "older-model", f"{text}: compensate it again")
+
+    def _content(self, place: str, data: bytes, sidecar: Sidecar) -> Iterator[Finding]:
+        """Check a file against its record, and the record against the source."""
+        record = sidecar.files.get(place.rpartition("/")[2])
+        stamp = read_stamp(data)
+        if record is None:
+            if stamp is not None:
+                text = "is stamped, and its record does not know it"
+                yield Finding(place, "no-record", text)
+            yield from self._source(place, sha256(data))
+            return
+        if sha256(data) != record.output_sha256:
+            yield Finding(place, "changed", "was changed after it was compensated")
+        elif stamp is None or not _agree(stamp.source, stamp.model, record, sidecar):
+            yield Finding(place, "no-record", "its stamp is not that of its record")
+        yield from self._source(place, record.source_sha256)
+
+    def _source(self, place: str, digest: str) -> Iterator[Finding]:
+        """Check that a file was made from what is in the source tree now."""
+        if self.source is None:
+            return
+        path = self.source / place
+        if not path.is_file():
+            yield Finding(place, "no-source", "is not in the source tree")
+        elif sha256(_read(path)) != digest:
+            text = "its source has changed since: compensate it again"
+            yield Finding(place, "source-changed", text)
+
+    def _compiled(self, place: str) -> Iterator[Finding]:
+        """Check that a compiled file is not that of the uncompensated program."""
+        if self.source is not None and (self.source / place).is_file():
+            if _read(self.source / place) == _read(self.root / place):
+                text = "is compiled from the uncompensated program: translate it anew"
+                yield Finding(place, "uncompensated", text)
+
+
+def _agree(source: str, model: str, record: FileRecord, sidecar: Sidecar) -> bool:
+    """Tell whether a stamp and a record say the same."""
+    return (source, model) == (record.source_sha256, sidecar.model)
+
+
+def _read(path: Path) -> bytes:
+    """Read a file.
+
+    Raises:
+        ProgramError: It cannot be read.
+    """
+    try:
+        return path.read_bytes()
+    except OSError as exc:
+        problem = f"cannot be read ({exc.strerror})"
+        raise ProgramError(path, problem, "Check its rights") from None
