@@ -16,7 +16,14 @@ from postproc.accuracy.library import restore
 from postproc.accuracy.noise import Noise
 from postproc.accuracy.prediction import Prediction
 from postproc.accuracy.ranges import Ranges
-from postproc.accuracy.schema import FORMAT, Method, content_id, read_model_file
+from postproc.accuracy.schema import (
+    FORMAT,
+    Method,
+    content_id,
+    packed,
+    read_model_file,
+    square_of,
+)
 from postproc.exceptions import ModelError
 from postproc.robot.arm import Arm
 from postproc.robot.state import States
@@ -149,7 +156,6 @@ class Model:
 
     def to_dict(self) -> dict[str, Any]:
         """Return the content of the model file."""
-        upper = np.triu_indices(len(self.covariance))
         std = np.sqrt(np.diag(self.covariance)) if len(self.covariance) else None
         data: dict[str, Any] = {
             "format": FORMAT,
@@ -173,7 +179,7 @@ class Model:
                     zip(self.effects.names, self.effects.parameters, strict=True)
                 )
             ],
-            "covariance": self.covariance[upper].tolist() if std is not None else [],
+            "covariance": packed(self.covariance),
             "spread": list(self.spread),
             "noise": asdict(self.noise),
             "ranges": asdict(self.ranges),
@@ -223,7 +229,7 @@ def load_model(path: str | Path) -> Model:
         arm_id=file.arm.id,
         effects=effects,
         values=np.array([p.value for p in file.parameters]),
-        covariance=_square(np.array(file.covariance), count),
+        covariance=square_of(np.array(file.covariance), count),
         prior_std=np.array([p.prior_std for p in file.parameters]),
         noise=Noise(**file.noise.model_dump()),
         ranges=Ranges(**file.ranges.model_dump()),
@@ -234,15 +240,6 @@ def load_model(path: str | Path) -> Model:
         statistics=file.statistics,
         history=file.history,
     )
-
-
-def _square(packed: Array, count: int) -> Array:
-    """Unpack an upper triangle, row by row."""
-    if len(packed) == 0:
-        return np.zeros((0, 0))
-    full = np.zeros((count, count))
-    full[np.triu_indices(count)] = packed
-    return np.asarray(full + np.triu(full, 1).T)
 
 
 def _chunks(n: int) -> list[slice]:

@@ -7,10 +7,14 @@ import json
 from pathlib import Path
 from typing import Any, Literal
 
+import numpy as np
 import pydantic
+from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, NonNegativeFloat, PositiveInt
 
 from postproc.exceptions import ModelError
+
+Array = NDArray[np.float64]
 
 FORMAT = 1
 MAX_BYTES = 200_000_000
@@ -127,3 +131,18 @@ def read_model_file(path: Path) -> ModelFile:
             place="$.id",
         )
     return file
+
+
+def packed(square: Array) -> list[float]:
+    """Pack a symmetric matrix as its upper triangle, row by row."""
+    upper: list[float] = square[np.triu_indices(len(square))].tolist()
+    return upper
+
+
+def square_of(values: Array, count: int) -> Array:
+    """Unpack an upper triangle, row by row."""
+    if len(values) == 0:
+        return np.zeros((0, 0))
+    full = np.zeros((count, count))
+    full[np.triu_indices(count)] = values
+    return np.asarray(full + np.triu(full, 1).T)

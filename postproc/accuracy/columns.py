@@ -1,0 +1,94 @@
+"""Single columns of a measurement file: ids, directions, probe points."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from postproc.accuracy.table import Table
+from postproc.exceptions import MeasurementError
+from postproc.pose import MM
+from postproc.robot.arm import Arm
+from postproc.robot.direction import arrivals_of_rows
+
+Array = NDArray[np.float64]
+Bools = NDArray[np.bool_]
+
+SIDES = tuple(f"lambda{j}" for j in range(1, 7))
+TRAVELS = tuple(f"travel{j}_deg" for j in range(1, 7))
+TOOL = ("tool_x_mm", "tool_y_mm", "tool_z_mm")
+
+
+def unique_ids(table: Table) -> tuple[str, ...]:
+    """Read the ids and refuse duplicates.
+
+    Raises:
+        MeasurementError: An id appears twice.
+    """
+    ids = table.text("id")
+    first: dict[str, int] = {}
+    for i, name in enumerate(ids):
+        if name in first:
+            raise MeasurementError(
+                table.path,
+                f"id {name!r} appears twice (first in line {table.line[first[name]]})",
+                "Give every row its own id",
+                line=int(table.line[i]),
+            )
+        first[name] = i
+    return tuple(ids)
+
+
+def read_directions(
+    table: Table, arm: Arm, q: Array
+) -> tuple[Array, Array, Bools, tuple[str, ...]]:
+    """Read the arrival directions and travels, or infer them from the row order."""
+    arrived = arrivals_of_rows(arm, q)
+    travel = arrived.travel
+    if table.has(*TRAVELS):
+        travel = np.deg2rad(table.block(TRAVELS))
+    if not table.has(*SIDES):
+        warnings = (
+            f"{table.path}: no lambda columns; directions inferred from the order of "
+            "the rows, as JOINT moves. Wrong if the rows were sorted",
+        )
+        return arrived.direction, travel, np.ones(len(q), dtype=bool), warnings
+    side = table.block(SIDES)
+    wrong = ~np.isin(side, (-1.0, 0.0, 1.0)).all(axis=1)
+    if wrong.any():
+        line = int(table.line[np.argmax(wrong)])
+        cure = "lambda is 1 (positive direction), -1, or 0 where not known"
+        raise MeasurementError(table.path, "wrong lambda", cure, line=line)
+    return side, travel, np.zeros(len(q), dtype=bool), ()
+
+
+def read_tools(
+    table: Table, tools: Array | Mapping[int, Array]
+) -> tuple[Array, NDArray[np.int64]]:
+    """Look up every row's tool.
+
+    Raises:
+        MeasurementError: A tool_id that no probe point is known for.
+    """
+    n = len(table)
+    known = (
+        tools if isinstance(tools, Mapping) else dict(enumerate(np.atleast_2d(tools)))
+    )
+    numbers = table.numbers("tool_id") if table.has("tool_id") else np.zeros(n)
+    tool_id = np.asarray(np.round(numbers), dtype=np.int64)
+    if table.has(*TOOL):
+        return table.block(TOOL) * MM, tool_id
+    if min(tool_id, default=0) > 0 and 0 in known and max(tool_id) == len(known):
+        tool_id = tool_id - 1  # numbered from 1
+    for i, one in enumerate(tool_id):
+        if int(one) not in known:
+            raise MeasurementError(
+                table.path,
+                f"tool_id {int(numbers[i])} is not one of the cell's probe points",
+                "Add the point to the cell file, or columns tool_x_mm, tool_y_mm, "
+                "tool_z_mm",
+                line=int(table.line[i]),
+            )
+    return np.stack([np.asarray(known[int(one)], float) for one in tool_id]), tool_id
