@@ -26,9 +26,10 @@ class LoadBacklash(JointEffect):
     Attributes:
         joints: Joints that have it.
         form: "load": lambda * b * |torque / t0|, with a column for a power other
-            than 1. "gravity_side": b * tanh(torque / t0), the flank that a preloaded
-            gear rests on whatever the direction, with a column for an offset of the
-            torque.
+            than 1. "signed": lambda * b * tanh(torque / t0), a gap that a load one
+            way opens and a load the other way closes. "gravity_side": b *
+            tanh(torque / t0), the flank that a preloaded gear rests on whatever the
+            direction. The last two have a column for an offset of the torque.
         t0: Torque [N m].
     """
 
@@ -36,7 +37,7 @@ class LoadBacklash(JointEffect):
     direct: ClassVar[bool] = True
 
     joints: tuple[int, ...] = (2, 3, 5)
-    form: Literal["load", "gravity_side"] = "load"
+    form: Literal["load", "signed", "gravity_side"] = "load"
     t0: float = 1000.0
 
     @classmethod
@@ -53,6 +54,7 @@ class LoadBacklash(JointEffect):
             group = f"{j} {self.form} {self.t0:.4g}"
             out.append(Parameter(f"b{j}_{self.form}", "rad", SCALE, group, j))
             name = f"b{j}_{second}"
+            name += "" if self.form == "load" else f"_{self.form}"
             out.append(Parameter(name, "rad", UNSURE * SCALE, group, j))
         return tuple(out)
 
@@ -66,6 +68,7 @@ class LoadBacklash(JointEffect):
             law = side * size
             second = law * np.log(np.maximum(size, 1e-6))
         else:
+            sign = side if self.form == "signed" else np.ones_like(side)
             law = np.tanh(torque)
-            second = 1.0 - law**2
+            law, second = sign * law, sign * (1.0 - law**2)
         return np.stack([law, second], axis=2).reshape(len(batch), -1)

@@ -14,10 +14,16 @@ from postproc.accuracy.effect import JointEffect, Origin, Parameter
 
 Array = NDArray[np.float64]
 
+UNSURE_LEVER = 0.5  # [m] along the links of an arm of this size
+
 
 @dataclass(frozen=True)
 class Payload(JointEffect):
-    """Joint error payload torque / stiffness; the centre of mass may be corrected.
+    """Joint error payload torque / stiffness, with levers that the data may correct.
+
+    A structure that bends under a load does not turn its joints quite as the torque
+    about them says, so levers along the joint's own link and the next one are columns
+    too, besides the payload's centre of mass.
 
     Attributes:
         joints: Joints that yield.
@@ -29,20 +35,32 @@ class Payload(JointEffect):
 
     joints: tuple[int, ...] = (2, 3, 5)
 
+    def _places(self, joint: int) -> list[tuple[str, int, float]]:
+        """List name, link and standard deviation [m] of a joint's levers."""
+        links = range(joint, min(joint + 2, 6))
+        own = [(f"lever{link}", link, UNSURE_LEVER) for link in links]
+        return [*own, ("com", 6, UNSURE_PAYLOAD)]
+
     def parameters(self) -> tuple[Parameter, ...]:
-        """Name softness, and softness times the shift of the centre of mass."""
+        """Name softness, and softness times the change of every lever."""
         out = []
         for j in self.joints:
             out.append(Parameter(f"k{j}", "rad/(N m)", SCALE, f"{j}", j))
-            wide = SCALE * UNSURE_PAYLOAD
-            out += [Parameter(f"k{j}_com_{a}", "rad/N", wide, f"{j}", j) for a in AXES]
+            out += [
+                Parameter(f"k{j}_{name}_{a}", "rad/N", SCALE * spread, f"{j}", j)
+                for name, _, spread in self._places(j)
+                for a in AXES
+            ]
         return tuple(out)
 
     def basis(self, batch: Batch) -> Array:
-        """Evaluate the payload's torque, and that per metre of its centre, (n, p)."""
-        unit = batch.loads.basis.reshape(len(batch), 6, 6, 4)[:, :, 5, 1:]
+        """Evaluate the payload's torque, and that per metre of every lever, (n, p)."""
+        unit = batch.loads.basis.reshape(len(batch), 6, 6, 4)
         mass = np.nan_to_num(batch.states.payload)[:, None]
         columns = []
         for j in self.joints:
-            columns += [batch.loads.payload[:, j - 1 : j], mass * unit[:, j - 1]]
+            columns.append(batch.loads.payload[:, j - 1 : j])
+            columns += [
+                mass * unit[:, j - 1, link - 1, 1:] for _, link, _ in self._places(j)
+            ]
         return np.concatenate(columns, axis=1)

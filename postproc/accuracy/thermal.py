@@ -17,8 +17,8 @@ Array = NDArray[np.float64]
 
 STEEL = 12e-6  # [1/K] linear expansion
 WARM_UP = 10.0  # [K] usual rise inside an arm that starts cold
-UNSURE = 0.4  # share by which links differ from the common growth
-SHORT = 1e-3  # [m] a link without length does not grow
+UNSURE = 0.7  # share by which a length differs from the common growth
+SHORT = 1e-3  # [m] what has no length does not grow
 
 
 @dataclass(frozen=True)
@@ -26,7 +26,7 @@ class Thermal(Effect):
     """Every link grows in proportion to its lengths, with the temperature or in time.
 
     Attributes:
-        links: Links that have a length.
+        lengths: Names a1 .. d6 of the D-H lengths that grow.
         form: "temperature": growth alpha * (T - reference). "time": growth
             g * (1 - exp(-t / time_constant)) - g, 0 when the arm is warm.
         reference: [deg C].
@@ -36,7 +36,7 @@ class Thermal(Effect):
     name: ClassVar[str] = "thermal"
     origin: ClassVar[Origin] = "state"
 
-    links: tuple[int, ...] = (1, 2, 3, 4, 6)
+    lengths: tuple[str, ...] = ("a1", "d1", "a2", "a3", "d4", "d6")
     form: Literal["temperature", "time"] = "temperature"
     reference: float = 20.0
     time_constant: float = 3600.0
@@ -44,25 +44,26 @@ class Thermal(Effect):
     @classmethod
     def propose(cls, arm: Arm, states: States) -> Self:
         """Grow with the recorded temperature, or else in time."""
-        links = links_with_length(arm)
+        lengths = growing(arm)
         if not np.isnan(states.temperature).all():
-            return cls(links, reference=float(np.nanmean(states.temperature)))
+            return cls(lengths, reference=float(np.nanmean(states.temperature)))
         last = float(np.nanmax(states.time, initial=1.0))
-        return cls(links, form="time", time_constant=last / 4)
+        return cls(lengths, form="time", time_constant=last / 4)
 
     def requires(self) -> tuple[str, ...]:
         """Need the temperature; a warm-up of unknown time is over."""
         return ("temperature",) if self.form == "temperature" else ()
 
     def parameters(self) -> tuple[Parameter, ...]:
-        """Name the common growth and every link's deviation from it."""
+        """Name the common growth and every length's deviation from it."""
         if self.form == "temperature":
             name, unit, scale = "alpha", "1/K", STEEL
         else:
             name, unit, scale = "growth", "m/m", STEEL * WARM_UP
         group = "expansion" if name == "alpha" else f"over {self.time_constant:.4g}"
         each = [
-            Parameter(f"{name}{k}", unit, UNSURE * scale, group) for k in self.links
+            Parameter(f"{name}_{length}", unit, UNSURE * scale, group)
+            for length in self.lengths
         ]
         return (Parameter(name, unit, scale, group), *each)
 
@@ -75,18 +76,22 @@ class Thermal(Effect):
 
     def columns(self, batch: Batch) -> Array:
         """Differentiate the TCP position, (n, 3, p)."""
-        w, dh = batch.walk, batch.arm.dh
-        lengths = [
-            dh.a[k - 1] * w.link[:, k - 1] + dh.d[k - 1] * w.turn[:, k - 1]
-            for k in self.links
-        ]
-        each = np.stack(lengths, axis=2)
-        all_links = each.sum(axis=2, keepdims=True)
+        each = np.stack([self._length(batch, name) for name in self.lengths], axis=2)
+        every = each.sum(axis=2, keepdims=True)
         warmth = self.warmth(batch)[:, None, None]
-        return np.concatenate([all_links, each], axis=2) * warmth
+        return np.concatenate([every, each], axis=2) * warmth
+
+    def _length(self, batch: Batch, name: str) -> Array:
+        """Differentiate the TCP position by the growth of one length, (n, 3) [m]."""
+        kind, joint = name[0], int(name[1]) - 1
+        if kind == "a":
+            return np.asarray(batch.arm.dh.a[joint] * batch.walk.link[:, joint])
+        return np.asarray(batch.arm.dh.d[joint] * batch.walk.turn[:, joint])
 
 
-def links_with_length(arm: Arm) -> tuple[int, ...]:
-    """List the links that can grow."""
-    size = np.hypot(arm.dh.a, arm.dh.d)
-    return tuple(int(k) + 1 for k in np.flatnonzero(size > SHORT))
+def growing(arm: Arm) -> tuple[str, ...]:
+    """Name the D-H lengths that are long enough to grow."""
+    sizes = {"a": np.abs(arm.dh.a), "d": np.abs(arm.dh.d)}
+    return tuple(
+        f"{kind}{j + 1}" for j in range(6) for kind in "ad" if sizes[kind][j] > SHORT
+    )

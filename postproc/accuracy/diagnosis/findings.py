@@ -80,9 +80,12 @@ def nonlinear(effect: Effect) -> dict[str, tuple[float, str]]:
     }
     if "waves" in settings:
         out["order"] = (float(settings["waves"][0][1]), "1/turn")
-    if "bumps" in settings and len(settings["bumps"]) == 1:
-        out["centre"] = (float(np.degrees(settings["bumps"][0][1])), "deg")
+    if "bumps" in settings:
+        places = np.degrees([centre for _, centre in settings["bumps"]])
+        out["centre"] = (float(places.mean()), "deg")
         out["width"] = (float(np.degrees(settings["width"])), "deg")
+        if len(places) > 1:
+            out["reach"] = (float(np.ptp(places)), "deg")
     if settings.get("form") == "temperature":
         out.pop("time_constant", None)
     return out

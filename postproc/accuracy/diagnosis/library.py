@@ -56,12 +56,9 @@ class Library:
         """List all candidates that a fit's rows can show."""
         at = fit.combination.at(fit.batch, fit.values)
         every = [*named_candidates(at), *free_candidates(at)]
-        widths: dict[int, list[Candidate]] = {}
-        for candidate in every:
-            widths.setdefault(candidate.width, []).append(candidate)
-        numbers = 3 * len(at) * sum(k * len(c) for k, c in widths.items())
+        numbers = 3 * len(at) * sum(c.width for c in every)
         shelves = []
-        for width, alike in sorted(widths.items()):
+        for width, alike in by_width(every):
             step = max(1, CHUNK // (3 * len(at) * width))
             for first in range(0, len(alike), step):
                 some = tuple(alike[first : first + step])
@@ -88,6 +85,27 @@ class Library:
             )
             for s in self.shelves
         )
+
+
+def by_width(candidates: Sequence[Candidate]) -> list[tuple[int, list[Candidate]]]:
+    """Group candidates by their number of columns."""
+    widths: dict[int, list[Candidate]] = {}
+    for candidate in candidates:
+        widths.setdefault(candidate.width, []).append(candidate)
+    return sorted(widths.items())
+
+
+def reduce_some(
+    projection: Projection, candidates: Sequence[Candidate], rows: Array
+) -> tuple[Blocks, ...]:
+    """Filter a few candidates of any widths and reduce them against rows."""
+    whitener = projection.fit.whitener
+    return tuple(
+        reduce_columns(
+            projection, alike, make_columns(alike, projection.at, whitener), rows
+        )
+        for _, alike in by_width(candidates)
+    )
 
 
 def make_columns(

@@ -16,7 +16,7 @@ from postproc.accuracy.lag import Lag
 from postproc.accuracy.load_backlash import LoadBacklash
 from postproc.accuracy.payload import Payload
 from postproc.accuracy.scale import Scale
-from postproc.accuracy.thermal import Thermal, links_with_length
+from postproc.accuracy.thermal import Thermal, growing
 from postproc.accuracy.tool_shift import ToolShift
 from postproc.accuracy.tracker_drift import TrackerDrift
 from postproc.accuracy.transmission import Transmission
@@ -32,6 +32,7 @@ WINDUPS = tuple(np.radians([0.5, 1.0, 2.0, 4.0, 7.0]))
 SPOTS = tuple(np.radians([3.0, 6.0, 12.0]))
 WARM_UPS = (0.1, 0.2, 0.4, 0.8)  # of the campaign's length
 FLANKS = (0.1, 0.3, 0.8)  # of the usual torque
+STRAIGHT = 3.0  # of it: the law is nearly proportional
 SPRINGS = tuple(
     (ratio, float(np.radians(upright)), preload)
     for ratio in (0.25, 0.4, 0.6)
@@ -89,6 +90,7 @@ def _loads(batch: Batch) -> list[Candidate]:
         t0 = max(float(typical[j - 1]), 1e-3)
         laws = [LoadBacklash((j,), "load", t0)]
         laws += [LoadBacklash((j,), "gravity_side", k * t0) for k in FLANKS]
+        laws += [LoadBacklash((j,), "signed", k * t0) for k in (*FLANKS, STRAIGHT)]
         out += _single("load_backlash", j, [(law, source) for law in laws])
     springs = [(Counterbalance(*spring), "joint 2") for spring in SPRINGS]
     return out + _single("counterbalance", 2, list(springs))
@@ -167,15 +169,15 @@ def _moments(batch: Batch) -> list[Candidate]:
 
 def _warmth(batch: Batch) -> list[Candidate]:
     """Growth with the recorded temperature, or along a warm-up."""
-    links = links_with_length(batch.arm)
+    lengths = growing(batch.arm)
     members: list[tuple[Effect, str]] = []
     if known(batch.states.temperature):
         middle = float(np.mean(batch.states.temperature))
-        members.append((Thermal(links, reference=middle), "temperature"))
+        members.append((Thermal(lengths, reference=middle), "temperature"))
     if known(batch.states.time):
         span = float(np.ptp(batch.states.time))
         members += [
-            (Thermal(links, form="time", time_constant=k * span), "time")
+            (Thermal(lengths, form="time", time_constant=k * span), "time")
             for k in WARM_UPS
         ]
     return _single("thermal", None, members) if members else []

@@ -10,12 +10,12 @@ import numpy as np
 from postproc.accuracy.base_shift import BaseShift
 from postproc.accuracy.batch import Batch
 from postproc.accuracy.counterbalance import Counterbalance
-from postproc.accuracy.diagnosis.library import make_columns
+from postproc.accuracy.diagnosis.library import reduce_some
 from postproc.accuracy.diagnosis.named import LAST_FREE, LONGEST_WINDUP, STEPS
-from postproc.accuracy.diagnosis.projection import Projection, reduce_columns
+from postproc.accuracy.diagnosis.projection import Projection
 from postproc.accuracy.diagnosis.score import Score, rank
 from postproc.accuracy.effect import Array, Effect
-from postproc.accuracy.joint_map import JointMap
+from postproc.accuracy.joint_map import SPACING, JointMap
 from postproc.accuracy.load_backlash import LoadBacklash
 from postproc.accuracy.thermal import Thermal
 from postproc.accuracy.tool_shift import ToolShift
@@ -54,9 +54,8 @@ def refine(projection: Projection, score: Score) -> Score:
         if len(effects) == 1:
             return score
         tries = [replace(score.best, effect=e, log_prior=0.0) for e in effects]
-        columns = make_columns(tries, projection.at, projection.fit.whitener)
-        blocks = reduce_columns(projection, tries, columns, projection.rest[:, None])
-        found = rank((blocks,), square, projection.rows)[0]
+        blocks = reduce_some(projection, tries, projection.rest[:, None])
+        found = rank(blocks, square, projection.rows)[0]
         covered = share + float(np.log(2.0 * width))
         average = found.evidence - float(np.log(len(tries))) + covered
         if found.best_evidence < score.best_evidence:
@@ -122,12 +121,21 @@ def _bump(effect: Effect, offsets: Array, batch: Batch) -> list[Effect]:
     if len(effect.bumps) > 1:
         return []
     ((joint, centre),) = effect.bumps
-    widths = [float(effect.width * 2.0**x) for x in (-0.5, -0.25, 0.0, 0.25, 0.5)]
-    return [
-        JointMap(((joint, float(centre + effect.width * x)),), w)
-        for x in offsets
-        for w in widths
+    each = effect.width * 2.0 ** np.array([-0.5, -0.25, 0.0, 0.25, 0.5])
+    moved = centre + effect.width * offsets
+    single: list[Effect] = [
+        JointMap(((joint, float(c)),), float(w)) for c in moved for w in each
     ]
+    narrow = [_local_map(joint, centre, effect.width, half) for half in (2, 4)]
+    return [*single, *narrow]
+
+
+def _local_map(joint: int, centre: float, width: float, half: int) -> JointMap:
+    """Give a spot a shape of its own: narrower bumps over the same place."""
+    reach = 2.0 * width
+    places = centre + reach * np.arange(-half, half + 1) / half
+    bumps = tuple((joint, float(c)) for c in places)
+    return JointMap(bumps, float(reach / half / SPACING))
 
 
 VARIATIONS: dict[type[Effect], Callable[[Effect, Array, Batch], list[Effect]]] = {
