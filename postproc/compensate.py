@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Mapping
 from dataclasses import asdict
-from types import MappingProxyType
+from types import MappingProxyType, ModuleType
 
 import numpy as np
 from numpy.typing import NDArray
@@ -167,3 +168,12 @@ def report(
 def _temperature(cell: Cell, options: Options) -> float:
     """Choose the temperature to compensate for [deg C]."""
     return cell.temperature if options.temperature is None else options.temperature
+
+
+class _Verb(ModuleType):
+    """This module, which can be called: `postproc.compensate` is module and verb."""
+
+    __call__ = staticmethod(compensate)
+
+
+sys.modules[__name__].__class__ = _Verb
