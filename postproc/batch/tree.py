@@ -32,7 +32,8 @@ class Tree:
 
     Attributes:
         root: Its folder.
-        units: Programs that are compensated together.
+        units: Programs that are compensated together, those of a setup behind each
+            other.
         copies: Everything else, to be copied as it is.
         refused: What will not be in the target tree, and why.
         notes: What a person should know: path and text.
@@ -57,22 +58,25 @@ def scan(root: Path, plan: Plan) -> Tree:
         raise ProgramError(root, "is no folder", "Give the folder of the programs")
     folders: dict[str, list[str]] = defaultdict(list)
     refused: dict[str, str] = {}
-    size = 0
+    sizes: dict[str, int] = {}
     for place, entry in _walk(root):
         if entry.is_symlink() or not entry.is_file(follow_symlinks=False):
             kind = "a symbolic link" if entry.is_symlink() else "no regular file"
             refused[place] = f"is {kind}: it is not followed; put the file itself here"
             continue
         folders[place.rpartition("/")[0]].append(place)
-        size += entry.stat(follow_symlinks=False).st_size
+        sizes[place] = entry.stat(follow_symlinks=False).st_size
     found = [_sort(root, names, plan) for names in folders.values()]
+    units = [unit for part in found for unit in part.units]
+    # The largest first: no worker is left alone with one at the end.
+    units.sort(key=lambda u: (u.setup, -sum(sizes[f] for f in u.files), u.program))
     return Tree(
         root,
-        tuple(unit for part in found for unit in part.units),
+        tuple(units),
         tuple(copy for part in found for copy in part.copies),
         refused | {k: v for part in found for k, v in part.refused.items()},
         tuple(note for part in found for note in part.notes),
-        size,
+        sum(sizes.values()),
     )
 
 

@@ -51,6 +51,9 @@ def explained() -> Iterator[None]:
     except PostprocError as exc:
         say(f"postproc: {exc}")
         raise typer.Exit(2) from None
+    except KeyboardInterrupt:
+        say("postproc: interrupted; nothing is half written. Run the command again")
+        raise typer.Exit(2) from None
     except BrokenPipeError:
         sys.stderr.close()
         raise typer.Exit(2) from None

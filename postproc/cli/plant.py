@@ -21,6 +21,7 @@ from postproc.options import AS_USUAL
 if TYPE_CHECKING:
     from postproc.batch.run import Gather
     from postproc.batch.summary import Summary
+    from postproc.check import Current
 
 CellFile = Annotated[
     Path | None, typer.Option("--cell", help="Cell of programs that no rule fits.")
@@ -137,9 +138,7 @@ def check(
     raise typer.Exit(found.exit_code)
 
 
-def _current_model(
-    model: Path | None, plan: Path | None
-) -> Callable[[str], str | None]:
+def _current_model(model: Path | None, plan: Path | None) -> Current:
     """Tell which model a program should have been made with."""
     if plan is not None:
         from postproc.batch.plan import make_plan
