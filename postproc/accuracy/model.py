@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import asdict, dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -71,7 +72,7 @@ class Model:
     statistics: dict[str, float] = field(default_factory=dict)
     history: tuple[dict[str, Any], ...] = ()
 
-    @property
+    @cached_property
     def id(self) -> str:
         """Hash of the content."""
         return str(self.to_dict()["id"])
