@@ -45,4 +45,4 @@ class Transmission(JointEffect):
         order = np.array([k for _, k in self.waves])
         angle = batch.states.q[:, joint] * order
         both = np.stack([np.sin(angle), np.cos(angle)], axis=2)
-        return both.reshape(len(batch), -1)
+        return both.reshape(len(batch), 2 * len(self.waves))

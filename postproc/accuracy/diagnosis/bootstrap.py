@@ -12,6 +12,7 @@ from postproc.accuracy.diagnosis.score import family_maxima
 from postproc.accuracy.effect import Array
 
 DRAWS = 300
+LEAST = 1e-300  # p-values below this are all the same to anybody
 TAIL = 0.2  # share of the draws that the tail is taken from
 
 
@@ -41,7 +42,7 @@ class Null:
         if evidence <= start:
             reached = (self.maxima >= evidence).sum()
             return float((reached + 1) / (len(self.maxima) + 1))
-        return float(TAIL * np.exp(-(evidence - start) / scale))
+        return max(float(TAIL * np.exp(-(evidence - start) / scale)), LEAST)
 
     def threshold(self, level: float) -> float:
         """Give the evidence that noise reaches with a probability [nats]."""

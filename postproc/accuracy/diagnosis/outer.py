@@ -60,6 +60,8 @@ def hold_out(
         progress(f"held-out rows, part {k + 1} of {count}")
         out = np.flatnonzero((part == k) & used)
         inside = np.flatnonzero(part != k)
+        if len(out) == 0:
+            continue
         less = _fit_of(base, inside)
         library = found.library.at_rows(inside)
         more = search(less, library, found.null, lambda _: None).fit

@@ -1,0 +1,127 @@
+"""Plots for papers and reports; the only module that imports matplotlib."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from postproc.accuracy.diagnosis.diagnose import Extension
+from postproc.accuracy.diagnosis.locate import Profile, periodogram, profile
+from postproc.accuracy.diagnosis.projection import Projection
+from postproc.exceptions import OutputError
+from postproc.pose import MM
+
+Array = NDArray[np.float64]
+
+BEFORE, AFTER = "#d55e00", "#0072b2"  # told apart by all kinds of colour vision
+BINS = 40
+SMOOTHED = 15  # rows of a running median
+
+
+def plot_diagnosis(found: Extension, path: Path) -> list[Path]:
+    """Draw the residual before and after, every finding, and the periodograms.
+
+    Args:
+        found: A diagnosis.
+        path: PNG or SVG; its stem begins the name of every plot.
+
+    Returns:
+        The files written.
+
+    Raises:
+        OutputError: They cannot be written.
+    """
+    figures = {"residual": histogram(found), "periodogram": periodograms(found)}
+    search = found.search
+    for number, addition in enumerate(search.additions):
+        shown = profile(search.fit, search.place(number), addition.candidate)
+        title = str(addition.candidate.family)
+        figures[f"finding{number + 1}"] = against_covariate(shown, title)
+    written = []
+    for name, figure in figures.items():
+        target = path.with_name(f"{path.stem}-{name}{path.suffix or '.png'}")
+        try:
+            figure.savefig(target, dpi=150)
+        except (OSError, ValueError) as exc:
+            cure = "Name a .png or .svg file in an existing folder"
+            raise OutputError(target, str(exc), cure) from None
+        written.append(target)
+    return written
+
+
+def histogram(found: Extension) -> Figure:
+    """Draw the lengths of held-out errors before and after."""
+    figure, axes = _figure("error on held-out rows [mm]", "rows")
+    lengths = [
+        np.linalg.norm(e, axis=1) / MM
+        for e in (found.held_out.before, found.held_out.after)
+    ]
+    bins = np.linspace(0.0, max(float(x.max()) for x in lengths), BINS)
+    for values, colour, hatch, label in zip(
+        lengths, (BEFORE, AFTER), ("//", ""), ("before", "after"), strict=True
+    ):
+        what = f"{label}, mean {values.mean():.3f} mm"
+        axes.hist(values, bins, alpha=0.6, color=colour, hatch=hatch, label=what)
+    floor = found.diagnosis.noise_floor_mm
+    axes.axvline(floor, color="black", linestyle=":", label=f"noise {floor:.3f} mm")
+    axes.legend()
+    return figure
+
+
+def against_covariate(shown: Profile, title: str) -> Figure:
+    """Draw a residual against the covariate that matters, before and after."""
+    figure, axes = _figure(f"{shown.label} [{shown.unit}]", shown.direction)
+    order = np.argsort(shown.values)
+    for values, colour, mark, label in (
+        (shown.before, BEFORE, "x", "without it"),
+        (shown.after, AFTER, "o", "with it"),
+    ):
+        axes.plot(shown.values, values, mark, color=colour, markersize=3, alpha=0.5)
+        smooth = _running_median(values[order])
+        axes.plot(shown.values[order], smooth, color=colour, label=label)
+    limit = 1.5 * float(np.percentile(np.abs(shown.before), 98))
+    axes.set_ylim(-limit, limit)
+    axes.set_title(title)
+    axes.legend()
+    return figure
+
+
+def periodograms(found: Extension) -> Figure:
+    """Draw, joint by joint, what waves of its angle explain before and after."""
+    figure = Figure(figsize=(8, 9), layout="constrained")
+    all_axes = figure.subplots(6, 1, sharex=True)
+    search = found.search
+    for fit, colour, style, label in (
+        (search.base, BEFORE, "-", "before"),
+        (search.fit, AFTER, "--", "after"),
+    ):
+        projection = Projection.of(fit)
+        for joint, axes in enumerate(all_axes, start=1):
+            p = periodogram(projection, joint)
+            axes.plot(p.orders, p.power, style, color=colour, label=label)
+            axes.set_ylabel(f"joint {joint}")
+    all_axes[0].legend()
+    all_axes[0].set_title("half of the chi-square that a wave explains")
+    all_axes[-1].set_xlabel("waves per turn of the joint")
+    return figure
+
+
+def _figure(x: str, y: str) -> tuple[Figure, Any]:
+    """Make a figure with one pair of axes."""
+    figure = Figure(figsize=(7, 4.5), layout="constrained")
+    axes = figure.subplots()
+    axes.set_xlabel(x)
+    axes.set_ylabel(y)
+    return figure, axes
+
+
+def _running_median(values: Array) -> Array:
+    """Smooth values in their order, (n,)."""
+    half = SMOOTHED // 2
+    padded = np.pad(values, half, mode="edge")
+    windows = np.lib.stride_tricks.sliding_window_view(padded, 2 * half + 1)
+    return np.asarray(np.median(windows, axis=1))
