@@ -33,10 +33,11 @@ Frame = Literal["base", "tracker"]
 
 @dataclass(frozen=True, eq=False)
 class Calibration:
-    """A model, and what the fit found."""
+    """A model, what the fit found, and the rows in the base frame."""
 
     model: Model
     report: FitReport
+    survey: Measurements
 
 
 def fit(
@@ -87,9 +88,9 @@ def fit_measurements(
     check_survey(survey, cell.arm)
     if method != "full":
         model = fit_method(method, survey, cell.arm, seed)
-        return Calibration(model, report_method(model, survey, cell.arm))
+        return Calibration(model, report_method(model, survey, cell.arm), survey)
     fitted = fit_survey(survey, cell.arm, effects, tracker, setup)
-    return Calibration(model_of(fitted, survey), report_fit(fitted, survey))
+    return Calibration(model_of(fitted, survey), report_fit(fitted, survey), survey)
 
 
 def several_points(survey: Measurements) -> tuple[str, ...]:

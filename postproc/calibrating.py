@@ -20,8 +20,15 @@ from postproc.accuracy.model import Model, load_model
 from postproc.accuracy.plausibility import check_survey
 from postproc.accuracy.table import Table as Cells
 from postproc.accuracy.table import read_table
-from postproc.calibrate import fit, fit_measurements, into_base_frame, read_surveys
+from postproc.calibrate import (
+    Calibration,
+    fit,
+    fit_measurements,
+    into_base_frame,
+    read_surveys,
+)
 from postproc.console import Column, table_text
+from postproc.files import write_all
 from postproc.joining import join_program
 from postproc.pose import MM
 from postproc.robot.cell import Cell, load_cell
@@ -57,6 +64,7 @@ def fit_files(
     cell_path: Path,
     output: Path,
     program: Path | None = None,
+    html: Path | None = None,
     **how: Any,
 ) -> str:
     """Fit measurement files and write the model.
@@ -66,6 +74,7 @@ def fit_files(
         cell_path: The cell.
         output: The model file to write.
         program: The survey program, for files that hold ids and positions only.
+        html: A page about the fit to write.
         how: Arguments of `postproc.calibrate.fit`; None stands for the default.
 
     Returns:
@@ -82,7 +91,23 @@ def fit_files(
         survey = concatenate([join_program(path, program, cell) for path in data])
         found = fit_measurements(survey, cell, **chosen)
     found.model.save(output)
+    if html is not None:
+        write_page(html, found, cell)
     return tell_fit(found.report) + f"\nmodel {found.model.id} written to {output}"
+
+
+def write_page(path: Path, found: Calibration, cell: Cell) -> None:
+    """Write a page about a fit.
+
+    Raises:
+        OutputError: The place cannot be written to.
+    """
+    from postproc.html import calibration_report
+    from postproc.html.evidence import fit_evidence
+
+    rows = fit_evidence(found.report, found.model, found.survey, cell.arm)
+    page = calibration_report(found.model.to_dict(), rows)
+    write_all({path: page.encode()})
 
 
 def tell_fit(report: FitReport) -> str:

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import os
+import signal
+import sys
 from typing import Annotated
 
 import typer
 
 from postproc import __version__
 from postproc.cli import loop, models, plant, programs
-from postproc.cli.common import app
+from postproc.cli.common import app, say
 
 __all__ = ["app", "loop", "main", "models", "plant", "programs"]
 
@@ -25,5 +28,16 @@ def _main(
 
 
 def main() -> None:
-    """Run the command line."""
-    app()
+    """Run the command line; a defect of ours ends with 2, like all that failed."""
+    # SIGTERM ends a command as Ctrl-C does: what was begun is cleaned up.
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    try:
+        app()
+    except Exception as exc:
+        if os.environ.get("POSTPROC_DEBUG"):
+            raise
+        say(
+            f"postproc: internal error: {type(exc).__name__}: {exc}. Nothing more was "
+            "written. Set POSTPROC_DEBUG=1 for the trace, and please report it"
+        )
+        sys.exit(2)

@@ -1,4 +1,4 @@
-"""Commands that close the loop: diagnose, history."""
+"""Commands that close the loop and show it: diagnose, history, report."""
 
 from __future__ import annotations
 
@@ -96,3 +96,21 @@ def history(model: Path, json: JsonOption = None) -> None:
             write_text(json, diagnosing.history_json(model))
         if json != "-":
             typer.echo(diagnosing.history_text(model))
+
+
+@app.command()
+def report(
+    source: Annotated[
+        Path, typer.Argument(help="A report, model, diagnosis or comparison (JSON).")
+    ],
+    output: Annotated[Path, typer.Option("-o", "--output", help="REPORT.html")],
+) -> None:
+    """Make one self-contained page (HTML) of a report, model or diagnosis.
+
+    Example: postproc report diagnosis.json -o diagnosis.html
+    """
+    from postproc.html import report_file
+
+    with explained():
+        report_file(source, output)
+        say(f"{output}")

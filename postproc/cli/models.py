@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
@@ -10,6 +11,7 @@ import typer
 
 from postproc.cli.common import (
     CellOption,
+    HtmlOption,
     JsonOption,
     ModelOption,
     SeedOption,
@@ -104,6 +106,7 @@ def fit(
         Path | None,
         typer.Option("--program", help="The survey program, for id, x, y, z files."),
     ] = None,
+    html: HtmlOption = None,
 ) -> None:
     """Fit a model of the arm's error to laser-tracker measurements."""
     from postproc import calibrating
@@ -115,6 +118,7 @@ def fit(
             cell,
             output,
             program,
+            html,
             method=method.value,
             effects=names,
             frame=frame.value,
@@ -144,6 +148,7 @@ def compare(
     data: Annotated[list[Path], typer.Argument(help="Measurement files (CSV).")],
     cell: CellOption,
     json: JsonOption = None,
+    html: HtmlOption = None,
     frame: Annotated[MeasuredFrame, typer.Option("--frame")] = MeasuredFrame.BASE,
     seed: SeedOption = 0,
 ) -> None:
@@ -154,5 +159,9 @@ def compare(
         found = calibrating.compare_files(data, cell, frame.value, seed)
         if json:
             write_text(json, calibrating.comparison_json(found))
+        if html is not None:
+            from postproc.html import comparison_report
+
+            write_text(str(html), comparison_report(asdict(found)))
         if json != "-":
             typer.echo(calibrating.tell_comparison(found))
