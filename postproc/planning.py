@@ -129,6 +129,9 @@ def plan_visits(visits: Visits, cell: Cell) -> Planned:
 def states_of(planned: Plan, cell: Cell, temperature: float) -> States:
     """Describe the planned arrivals in the terms of the accuracy model.
 
+    The time within a program says nothing about how warm the arm is, so it stays
+    unknown; the temperature that is declared does.
+
     Args:
         planned: The plan of n arrivals.
         cell: Payload.
@@ -140,7 +143,6 @@ def states_of(planned: Plan, cell: Cell, temperature: float) -> States:
         planned.tool[:, :3, 3],
         travel=planned.travel,
         speed=planned.speed,
-        time=planned.time,
         temperature=temperature,
         payload=cell.payload_mass,
         payload_com=cell.payload_com,
