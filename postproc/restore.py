@@ -82,8 +82,10 @@ def restore_file(compensated: Path, output: Path | None = None) -> list[Path]:
     restored: dict[Path, bytes] = {}
     for name, file in record.files.items():
         source = compensated.with_name(Path(name).name)
-        place = target.with_name(target.stem + source.suffix)
-        place = target if source == compensated else place
+        place = source
+        if output is not None:
+            place = target.with_name(target.stem + source.suffix)
+            place = target if source == compensated else place
         try:
             restored[place] = restore(source.read_bytes(), file, str(source))
         except OSError as exc:
