@@ -2,6 +2,8 @@
 # make test    all tests
 # make lint    ruff and mypy
 # make bench   how long the stages take on this machine
+# make reproduce   the published method and ours, simulated: docs/reproduction.md
+# make accuracy    held-out errors, coverage, real and blind data: docs/accuracy.md
 # Each target first creates the environment .venv when it is missing or out of date.
 
 VENV ?= .venv
@@ -12,7 +14,7 @@ STAMP := $(VENV)/.installed
 export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
 
-.PHONY: help demo test lint format bench clean
+.PHONY: help demo test lint format bench reproduce accuracy clean
 .DELETE_ON_ERROR:
 
 help:
@@ -39,6 +41,12 @@ format: $(STAMP)
 
 bench: $(STAMP)
 	@PATH="$(abspath $(VENV))/bin:$$PATH" python programs/bench.py
+
+reproduce: $(STAMP)
+	@cd docs/studies && $(abspath $(PYTHON_BIN)) reproduction.py --seeds 20 --arms 10
+
+accuracy: $(STAMP)
+	@PYTHONPATH=. $(PYTHON_BIN) docs/studies/accuracy.py --seeds 20
 
 clean:
 	rm -rf $(VENV) demo build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis

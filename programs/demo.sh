@@ -6,7 +6,7 @@ cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
 cell=programs/cell.toml
 seed=${SEED:-1} # which virtual arm: another seed, other errors
-jobs="drilling handling"
+jobs="drilling handling spot milling"
 rm -rf demo
 mkdir demo
 exec 3>&1 # commands are shown here also where their output goes to a file
