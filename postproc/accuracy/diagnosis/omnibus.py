@@ -1,7 +1,7 @@
 """Whether anything is left: tests that ask for no particular effect.
 
-Three questions, each against its own distribution under plain noise: do poses that are
-alike in two joint angles err alike (random smooth maps of pairs of joints, at two
+Three questions, each against rows whose signs or places are drawn anew: do poses that
+are alike in two joint angles err alike (random smooth maps of pairs of joints, at two
 length scales); do rows that follow each other err alike (serial correlation); does the
 scatter of a joint change with the way since its last reversal, which no mean shows.
 """
@@ -31,7 +31,7 @@ class Leftover:
     Attributes:
         what: What it shows, in words.
         statistic: Standardised: 0 on average and of unit scale under noise.
-        p_value: Against plain noise filtered like the residual, all questions counted.
+        p_value: Against the same rows without order, all questions counted.
     """
 
     what: str
@@ -42,13 +42,12 @@ class Leftover:
 def leftovers(projection: Projection, seed: int) -> tuple[Leftover, ...]:
     """Ask all questions of a filtered residual, the most telling first."""
     rng = np.random.default_rng(seed)
-    rows = rng.standard_normal((len(projection.rest), DRAWS))
-    rows[np.repeat(projection.fit.rows.weight <= 0, 3)] = 0.0
-    both = np.column_stack([projection.rest, rows])
+    rest = projection.rest.reshape(-1, 3) * (projection.fit.rows.weight > 0)[:, None]
+    flipped, shuffled = _draws(rest, rng)
     found: list[tuple[str, Array]] = [
-        *_maps(projection, both, rng),
-        *_serial(projection, both),
-        *_scatter(projection, both),
+        *_maps(projection, flipped, rng),
+        *_serial(projection, flipped),
+        *_scatter(projection, shuffled),
     ]
     spread = np.array([_standardised(values) for _, values in found])
     worst = spread[:, 1:].max(axis=0)
@@ -59,6 +58,24 @@ def leftovers(projection: Projection, seed: int) -> tuple[Leftover, ...]:
             Leftover(what, float(values[0]), min(reached, _tail(worst, values[0])))
         )
     return tuple(sorted(out, key=lambda x: x.p_value))
+
+
+def _draws(rest: Array, rng: np.random.Generator) -> tuple[Array, Array]:
+    """Make draws of plain noise from the rows themselves, the rows as they are first.
+
+    Rows (n, 3) with signs drawn anew keep how large and how round the scatter of every
+    row is, which a model of the noise need not know; rows dealt anew to the poses keep
+    it on the whole.
+
+    Returns:
+        Flipped and shuffled rows, (3 n, 1 + DRAWS) each.
+    """
+    n = len(rest)
+    signs = rng.choice([-1.0, 1.0], (n, DRAWS))
+    flipped = (rest[:, :, None] * signs[:, None, :]).reshape(3 * n, DRAWS)
+    dealt = np.stack([rest[rng.permutation(n)].reshape(-1) for _ in range(DRAWS)])
+    first = rest.reshape(-1)
+    return np.column_stack([first, flipped]), np.column_stack([first, dealt.T])
 
 
 def _standardised(values: Array) -> Array:

@@ -23,7 +23,8 @@ from postproc.accuracy.transmission import Transmission
 from postproc.accuracy.windup import Windup
 
 OFFSETS = np.linspace(-1.0, 1.0, 9)
-LEVELS = (1.0, 0.5, 0.25)  # widths of the search, in steps of the grid
+LEVELS = tuple(0.5**k for k in range(9))  # widths tried, in steps of the grid
+SETTLED = 0.3  # nats: finer settings no longer matter
 
 
 def finer(effect: Effect, width: float, batch: Batch) -> list[Effect]:
@@ -56,12 +57,14 @@ def refine(projection: Projection, score: Score) -> Score:
         tries = [replace(score.best, effect=e, log_prior=0.0) for e in effects]
         blocks = reduce_some(projection, tries, projection.rest[:, None])
         found = rank(blocks, square, projection.rows)[0]
-        covered = share + float(np.log(2.0 * width))
-        average = found.evidence - float(np.log(len(tries))) + covered
-        if found.best_evidence < score.best_evidence:
-            continue
-        best = replace(found.best, log_prior=share)
-        score = replace(found, best=best, evidence=max(score.evidence, average))
+        gained = found.best_evidence - score.best_evidence
+        if gained > 0.0:
+            covered = share + float(np.log(2.0 * width / len(tries)))
+            best = replace(found.best, log_prior=share)
+            evidence = max(score.evidence, found.evidence + covered)
+            score = replace(found, best=best, evidence=evidence)
+        if gained < SETTLED and width < 1.0:
+            break
     return score
 
 
