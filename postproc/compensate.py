@@ -140,7 +140,7 @@ def report(
     proposal, done = corrected.proposal, corrected.planned.plan
     d, rows, visits = proposal.decisions, proposal.corrected, reading.visits
     wanted = planned.plan.tcp[rows, :3, 3]
-    new = states.with_(q=np.array(done.q), direction=np.array(done.direction))[rows]
+    new = states.with_(q=np.array(done.q), direction=np.array(done.side))[rows]
     before = model.error(cell.arm, states[rows])
     after = done.tcp[rows, :3, 3] + model.error(cell.arm, new) - wanted
     return Outcome(
@@ -156,7 +156,7 @@ def report(
             *reading.diagnostics,
             *overruled_strings(visits, planned.plan),
             *untimed_runs(visits, planned.plan),
-            *unsure_sides(visits, rows, d.direction, d.std_error),
+            *unsure_sides(visits, rows, d.side, d.std_error),
             assumed_off(name, cell),
         ),
         stages=clock.stages,

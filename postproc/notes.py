@@ -14,6 +14,7 @@ from postproc.robot.cell import Cell
 Array = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 
+SURE = 0.9  # part of its play from its middle at which a joint rests on a flank
 SINGLY = 20  # findings of one kind that are listed line by line
 
 
@@ -50,19 +51,20 @@ def _each(visits: Visits, rows: Bools, code: str, text: str) -> list[Diagnostic]
 
 
 def unsure_sides(
-    visits: Visits, corrected: Bools, direction: Array, std_error: Array
+    visits: Visits, corrected: Bools, side: Array, std_error: Array
 ) -> list[Diagnostic]:
     """List the corrected targets that a joint reaches from a side that is not sure.
 
-    They are corrected for the middle of the backlash, so half of it may remain.
+    They are corrected for where the joint should lie within its play, or for its
+    middle where that is not known: up to half of the backlash may remain.
 
     Args:
         visits: Every arrival.
         corrected: Visits whose target moves, (n,).
-        direction: Arrival direction that they are corrected for, (n, 6).
+        side: Where every joint lies in its play, (n, 6) from -1 to 1.
         std_error: Standard error of the correction, (n, 3) [m].
     """
-    rows = np.flatnonzero(corrected & (direction == 0).any(axis=1))
+    rows = np.flatnonzero(corrected & (np.abs(side) < SURE).any(axis=1))
     size = np.linalg.norm(std_error, axis=1) / MM
     cure = "start the approach farther away, or from the side it moves to"
     if len(rows) > SINGLY:
@@ -79,7 +81,7 @@ def unsure_sides(
             visits.files[visits.file[i]],
             int(visits.line[i]),
             CODE,
-            f"reached soon after axis {_axes(direction[i])} turned, from a side that "
+            f"reached soon after axis {_axes(side[i])} turned, from a side that "
             f"is not sure (+-{size[i]:.3f} mm): {cure}",
         )
         for i in rows
@@ -89,6 +91,6 @@ def unsure_sides(
 CODE = "side-not-sure"
 
 
-def _axes(direction: Array) -> str:
+def _axes(side: Array) -> str:
     """Name the axes whose side is not known."""
-    return ", ".join(str(j + 1) for j in np.flatnonzero(direction == 0))
+    return ", ".join(str(j + 1) for j in np.flatnonzero(np.abs(side) < SURE))

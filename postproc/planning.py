@@ -139,7 +139,7 @@ def states_of(planned: Plan, cell: Cell, temperature: float) -> States:
     """
     return make_states(
         planned.q,
-        planned.direction,
+        planned.side,
         planned.tool[:, :3, 3],
         travel=planned.travel,
         speed=planned.speed,

@@ -22,6 +22,7 @@ Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 
+KNOWN = 0.5  # part of its play that a joint must have left behind to be on a side
 HELD = "its direction of arrival would change with the correction"
 
 
@@ -60,7 +61,7 @@ def propose(
         cell: Guards and frames.
         options: What the user asked for.
     """
-    visits, plan = reading.visits, planned.plan
+    visits, plan, side = reading.visits, planned.plan, solved.direction
     correction = solved.command[:, :3, 3] - plan.tcp[:, :3, 3]
     reasons = Reasons(len(visits))
     display = mark_display(visits, planned, reasons)
@@ -70,7 +71,7 @@ def propose(
         reasons.mark(outside, text)
     guard_solutions(reasons, cell.arm, cell.limits, plan.q, solved.q)
     guard_size(reasons, cell.limits, correction, solved.residual)
-    guard_steps(reasons, cell.limits, correction, solved.direction, _run_mates(visits))
+    guard_steps(reasons, cell.limits, correction, side, _run_mates(visits))
     reasons.mark(held, HELD)
     numbers = new_numbers(visits, solved)
     agreement = agree(
@@ -92,7 +93,8 @@ def propose(
         why=reasons.index,
         reasons=reasons.texts,
         q=plan.q,
-        direction=solved.direction,
+        direction=np.where(np.abs(side) < KNOWN, 0.0, np.sign(side)),
+        side=side,
         corrected=values,
         correction=np.where(corrected[:, None], correction, 0.0),
         std_error=solved.std_error,

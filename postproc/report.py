@@ -63,7 +63,8 @@ class Decisions:
         why: Index into `reasons`, (n,).
         reasons: Texts; reasons[0] is "".
         q: Commanded joint angles of the original program, (n, 6) [rad].
-        direction: Arrival direction, (n, 6).
+        direction: Arrival direction, (n, 6): +1, -1, or 0 where not known.
+        side: Where every joint lies in its play, (n, 6) from -1 to 1.
         corrected: The six numbers in the file after correction, (n, 6).
         correction: Change of the commanded TCP, base frame, (n, 3) [m].
         std_error: Standard error of the model there, per axis, (n, 3) [m].
@@ -74,6 +75,7 @@ class Decisions:
     reasons: tuple[str, ...]
     q: Array
     direction: Array
+    side: Array
     corrected: Array
     correction: Array
     std_error: Array
@@ -192,6 +194,7 @@ def target_row(outcome: Outcome, i: int) -> dict[str, object]:
         "move": "VIA" if v.via[i] else Motion(v.motion[i]).name,
         "q_deg": _numbers(np.rad2deg(d.q[i]), 5),
         "lambda": [int(s) for s in d.direction[i]],
+        "side": [round(float(s), 3) for s in d.side[i]],
         "status": Status(d.status[i]).name.lower(),
         "why": d.reasons[d.why[i]],
         "original": original,

@@ -1,4 +1,4 @@
-"""Correct, write and plan again, until the directions are those corrected for."""
+"""Correct, write and plan again, until the sides are those corrected for."""
 
 from __future__ import annotations
 
@@ -24,7 +24,9 @@ from postproc.verify import check_output
 
 Array = NDArray[np.float64]
 
-FREE_ROUNDS = 2  # of correcting for changed directions, before targets are held
+ROUNDS = 10  # of correcting for changed sides, before targets are held
+SAME = 0.05  # sides closer than this are the same
+OTHER = 1.0  # sides farther apart than this are different ones
 
 
 @dataclass(frozen=True)
@@ -45,42 +47,46 @@ def settle(
     options: Options,
     clock: Clock,
 ) -> Corrected:
-    """Correct, write and plan again, until the directions are those corrected for.
+    """Correct, write and plan again, until the sides are those corrected for.
 
-    The corrected program makes slightly other moves than the original. Where one of
-    them turns a joint the other way, the correction is computed anew for that side;
-    where that flips it back, the target is left alone.
+    The corrected program makes slightly other moves than the original, so a joint may
+    come from the other side, or lie elsewhere in its play: the correction is computed
+    anew for that. A correction of a joint is as large as its play, so from the second
+    round on half a step is taken. A target whose joints still change sides at the end
+    is left alone.
     """
     held = np.zeros(len(states), dtype=bool)
     with clock("solve"):
         solved = solve_visits(model, cell, planned, states)
-    for number in count():  # ends: from the third round on `held` grows
+    for number in count():  # ends: from round ROUNDS on, `held` grows
         with clock("decide"):
             proposal = propose(reading, planned, solved, held, cell, options)
         with clock("plan again"):
-            found = directions_after(reading.visits, proposal, cell)
-        changed = proposal.corrected & (found != solved.direction).any(axis=1)
-        flipped = proposal.corrected & (found * solved.direction < 0).any(axis=1)
-        if not (changed if number < FREE_ROUNDS else flipped).any():
+            found = sides_after(reading.visits, proposal, cell)
+        off = np.abs(found - solved.direction).max(axis=1, initial=0.0)
+        moved = proposal.corrected & (off > (SAME if number < ROUNDS else OTHER))
+        if not moved.any():
             done = write_and_verify(reading, proposal, cell, model, clock)
-            found = done.planned.plan.direction
-            flipped = proposal.corrected & (found * solved.direction < 0).any(axis=1)
+            off = np.abs(done.planned.plan.side - solved.direction)
+            flipped = proposal.corrected & (off > OTHER).any(axis=1)
             if not flipped.any():
                 return done
             held = held | flipped
             continue
-        held = held | flipped if number >= FREE_ROUNDS else held
+        held = held | moved if number >= ROUNDS else held
+        step = 1.0 if number == 0 else 0.5
         with clock("solve"):
-            aimed = states.with_(direction=found)
-            solved = solve_again(solved, changed, model, cell, planned, aimed)
+            aim = solved.direction + step * (found - solved.direction)
+            aimed = states.with_(direction=aim)
+            solved = solve_again(solved, moved, model, cell, planned, aimed)
     raise AssertionError("unreachable")
 
 
-def directions_after(visits: Visits, proposal: Proposal, cell: Cell) -> Array:
-    """Find the arrival directions of a program whose targets have moved, (n, 6)."""
+def sides_after(visits: Visits, proposal: Proposal, cell: Cell) -> Array:
+    """Find where joints lie in their play once the targets have moved, (n, 6)."""
     moved = replace(visits, values=proposal.decisions.corrected)
     targets, _ = targets_from_visits(moved, cell)
-    return np.array(directions(cell.arm, targets)[1])
+    return np.array(directions(cell.arm, targets)[1].side)
 
 
 def write_and_verify(

@@ -14,6 +14,7 @@ Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 
+TURNED = 0.5  # change of a side by which a joint has turned
 SOLVED = 1e-6  # [m] model against wanted pose
 
 
@@ -83,7 +84,7 @@ def guard_steps(
     last = np.where(inside, before, 0)
     with np.errstate(invalid="ignore"):
         step = np.linalg.norm(correction - correction[last], axis=1) / MM
-        same_side = (direction == direction[last]).all(axis=1)
+        same_side = (np.abs(direction - direction[last]) < TURNED).all(axis=1)
         jump = inside & same_side & (step > limits.step_mm)
     text = (
         f"the correction steps by more than step_mm = {limits.step_mm:g} in a fly run"

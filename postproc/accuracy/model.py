@@ -128,7 +128,8 @@ class Model:
         model, arrival = np.sqrt(np.maximum(model, 0)), np.sqrt(np.maximum(arrival, 0))
         outside = self.ranges.outside(states, self.needs)
         worst = self.statistics.get("worst_std_mm", np.inf) * 1e-3
-        unsure = (model > 3 * worst).any(axis=1) & (states.direction != 0).all(axis=1)
+        on_flank = (np.abs(states.direction) == 1).all(axis=1)
+        unsure = (model > 3 * worst).any(axis=1) & on_flank
         if unsure.any():
             outside["standard error above three times the survey's worst"] = unsure
         return Prediction(error, model, arrival, outside)
@@ -250,7 +251,7 @@ def _chunks(n: int) -> list[slice]:
 
 def _side_variance(effects: Combination, at: Batch, values: Array) -> Array:
     """Variance that unknown directions give, (n, 3) [m^2]."""
-    unknown = (at.states.direction == 0).astype(float)
+    unknown = 1.0 - np.clip(at.states.direction, -1.0, 1.0) ** 2
     if not unknown.any():
         return np.zeros((len(at), 3))
     slopes = effects.direction_slopes(at, values)

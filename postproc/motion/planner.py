@@ -12,7 +12,7 @@ from postproc.motion.reasons import CODE, REASONS, WRIST
 from postproc.motion.targets import Targets
 from postproc.motion.trace import Trace, trace
 from postproc.robot.arm import Arm
-from postproc.robot.direction import arrivals
+from postproc.robot.direction import Arrivals, arrivals
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -28,6 +28,7 @@ class Plan:
         tcp: Wanted TCP pose, (n, 4, 4) [m], NaN where not known.
         tool: TCP in the flange frame, (n, 4, 4) [m].
         direction: Side every joint arrives from, (n, 6): +1, -1, or 0 where not known.
+        side: Where every joint lies in its play, (n, 6) from -1 to 1; 0: not known.
         travel: Travel since the last reversal, (n, 6) [rad].
         speed: TCP speed at the target, (n,) [m/s]; 0 where the arm stops.
         time: Time since the first move along the first predecessors, (n,) [s].
@@ -42,6 +43,7 @@ class Plan:
     tcp: Array
     tool: Array
     direction: Array
+    side: Array
     travel: Array
     speed: Array
     time: Array
@@ -88,22 +90,21 @@ def plan(arm: Arm, targets: Targets, wrist: float) -> Plan:
     clock = tell_time(arm, targets, traced)
     return Plan(
         traced.q, traced.flange @ targets.tool, targets.tool, arrived.direction,
-        arrived.travel, clock.speed, clock.time, traced.slot, _guard(traced, wrist),
-        REASONS,
-        traced.overruled, clock.untimed,
+        arrived.side, arrived.travel, clock.speed, clock.time, traced.slot,
+        _guard(traced, wrist), REASONS, traced.overruled, clock.untimed,
     )  # fmt: skip
 
 
-def directions(arm: Arm, targets: Targets) -> tuple[Array, Array]:
+def directions(arm: Arm, targets: Targets) -> tuple[Array, Arrivals]:
     """Find joint angles and directions only, without a time law.
 
     For targets that a correction has moved: compare with the directions of the plan.
 
     Returns:
-        Joint angles (n, 6) [rad] and directions (n, 6).
+        Joint angles (n, 6) [rad], and how every joint arrives.
     """
     traced = trace(arm, targets)
-    return traced.q, arrivals(arm, traced.q, traced.edges).direction
+    return traced.q, arrivals(arm, traced.q, traced.edges)
 
 
 def _guard(traced: Trace, wrist: float) -> Ints:

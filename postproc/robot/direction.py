@@ -22,6 +22,7 @@ from postproc.robot.play import Array, Clamps, Ints, identity, passing, prefix
 from postproc.robot.travel import travel_since_reversal
 
 WIDTH_IN_PLAYS = 4.0
+ON_FLANK = 0.999  # of half the width: as good as resting on the flank
 
 
 @dataclass(frozen=True)
@@ -31,11 +32,14 @@ class Arrivals:
     Attributes:
         direction: lambda, (n, 6): +1 moving in positive controller direction, -1, or 0
             where not known.
+        side: Where the joint lies in its play, (n, 6) from -1 to 1: s of above, the
+            middle of what is known; 0 where nothing is.
         travel: Travel since the last reversal, (n, 6) [rad]; where the last reversal is
             not known, the travel since then that is sure. NaN where q is not known.
     """
 
     direction: Array
+    side: Array
     travel: Array
 
 
@@ -69,14 +73,24 @@ def arrivals(arm: Arm, q: Array, edges: Edges) -> Arrivals:
         edges: The geometric paths between them.
     """
     if len(q) == 0:
-        return Arrivals(np.empty((0, 6)), np.empty((0, 6)))
+        return Arrivals(np.empty((0, 6)), np.empty((0, 6)), np.empty((0, 6)))
     chains = cut(q, arm.coupling, edges)
     half = WIDTH_IN_PLAYS / 2 * arm.play
     z = _states(chains, half)
     forward = chains.angles - z.hi >= half / 2
     backward = chains.angles - z.lo <= -half / 2
     direction = forward.astype(float) - backward.astype(float)
-    return Arrivals(direction, travel_since_reversal(chains, arm.play))
+    travel = travel_since_reversal(chains, arm.play)
+    return Arrivals(direction, _side(chains.angles, z, half), travel)
+
+
+def _side(angles: Array, z: Clamps, half: Array) -> Array:
+    """Place every joint in its play, (n, 6)."""
+    s = np.clip((angles - (z.lo + z.hi) / 2) / half, -1.0, 1.0)
+    on_flank = np.abs(s) > ON_FLANK
+    known = (z.hi - z.lo < half / 2) | on_flank
+    side: Array = np.nan_to_num(np.where(known, s, 0.0))
+    return np.where(on_flank, np.sign(side), side)
 
 
 def _states(chains: Chains, half: Array) -> Clamps:

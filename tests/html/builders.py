@@ -111,7 +111,7 @@ def decisions_of(visits: Visits, seed: int) -> Decisions:
     corrected[:, :3] += correction * 1e3
     q = rng.uniform(-1.5, 1.5, (n, 6))
     std = np.full((n, 3), 1.2e-5)
-    return Decisions(status, why, REASONS, q, side, corrected, correction, std)
+    return Decisions(status, why, REASONS, q, side, side, corrected, correction, std)
 
 
 def outcome_of(

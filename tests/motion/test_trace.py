@@ -101,7 +101,8 @@ def test_joint_4_turns_back_before_the_end_of_a_straight_line(
     arm: Arm, tool: np.ndarray
 ) -> None:
     home, end = turning_line(arm, tool)
-    q, side = directions(arm, lines_from(arm, tool, home, [end]))
+    q, arrived = directions(arm, lines_from(arm, tool, home, [end]))
+    side = arrived.direction
     assert side[1, 3] == -np.sign(q[1, 3] - q[0, 3]) != 0
 
 
@@ -283,7 +284,7 @@ def test_after_an_unknown_move_a_joint_target_is_known_again(
     found = trace(arm, targets)
     assert reason(found, 1) == NO_TARGET and np.isnan(found.q[1]).all()
     np.testing.assert_array_equal(found.q[2], home)
-    assert (directions(arm, targets)[1] == 0).all()
+    assert (directions(arm, targets)[1].direction == 0).all()
 
 
 def test_predecessors_that_lead_to_different_turns(arm: Arm, home: np.ndarray) -> None:
