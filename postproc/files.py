@@ -5,7 +5,7 @@ from __future__ import annotations
 import errno
 import os
 import tempfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import IO
@@ -13,6 +13,48 @@ from typing import IO
 from postproc.exceptions import DiskFullError, OutputError
 
 TEMPORARY = ".postproc-tmp"  # end of the names of files that are being written
+STREAM = "-"  # stands for standard input or output
+
+
+def check_places(outputs: Iterable[Path | None], inputs: Iterable[Path | None]) -> None:
+    """Refuse, before any work is done, places that must or can not be written to.
+
+    Args:
+        outputs: Files to be written; None and "-" stand for no file.
+        inputs: Files that are read, likewise.
+
+    Raises:
+        OutputError: An output is an input, another output or a folder, or lies in a
+            folder that does not exist.
+    """
+    read = [p for p in inputs if p is not None and str(p) != STREAM and p.exists()]
+    taken: set[Path] = set()
+    for place in outputs:
+        if place is None or str(place) == STREAM:
+            continue
+        if any(place.exists() and place.samefile(source) for source in read):
+            cure = "Give another output with -o; inputs are never overwritten"
+            raise OutputError(place, "is an input", cure)
+        if place.resolve() in taken:
+            raise OutputError(place, "is named twice", "Give each output its own name")
+        taken.add(place.resolve())
+        _check_folder(place)
+
+
+def _check_folder(place: Path) -> None:
+    """Refuse a place that is a folder, or that lies in none.
+
+    Raises:
+        OutputError: It does.
+    """
+    if place.is_dir():
+        raise OutputError(place, "is a folder", "Name the file to write in it")
+    if not place.parent.exists():
+        cure = f"Make the folder {place.parent} first, or give another place"
+        raise OutputError(place, "the folder does not exist", cure)
+    if not place.parent.is_dir():
+        cure = f"{place.parent} is a file: give a folder"
+        raise OutputError(place, "there is no such folder", cure)
 
 
 def write_all(files: Mapping[Path, bytes]) -> None:
@@ -25,7 +67,10 @@ def write_all(files: Mapping[Path, bytes]) -> None:
         OutputError: A folder is missing or cannot be written to, or the disk is full;
             no file has been changed then.
     """
+    for path in files:
+        _check_folder(path)
     ready: list[tuple[str, Path]] = []
+    path = Path()
     try:
         for path, data in files.items():
             ready.append((_write_temporary(path, data), path))
@@ -34,7 +79,7 @@ def write_all(files: Mapping[Path, bytes]) -> None:
         for folder in {path.parent for path in files}:
             _sync_folder(folder)
     except OSError as exc:
-        raise disk_error(exc, exc.filename or next(iter(files))) from None
+        raise disk_error(exc, path) from None
     finally:
         for temporary, _ in ready:
             Path(temporary).unlink(missing_ok=True)

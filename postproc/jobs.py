@@ -9,14 +9,13 @@ from pathlib import Path
 from postproc.accuracy.model import Model, load_model
 from postproc.clock import Progress, silent
 from postproc.compensate import compensate
-from postproc.exceptions import OutputError, ProgramError
-from postproc.files import write_all
+from postproc.exceptions import ProgramError
+from postproc.files import STREAM, check_places, write_all
 from postproc.options import Options
+from postproc.planning import VARIABLES
 from postproc.report import Outcome
 from postproc.robot.cell import Cell, load_cell
-from postproc.sidecar import sidecar_path
-
-STDIN = "-"
+from postproc.sidecar import rename_files, sidecar_path
 
 
 @dataclass(frozen=True)
@@ -30,6 +29,7 @@ class Job:
         variables: Path and bytes of its variable file, or None.
         cell: The cell.
         model: The model.
+        inputs: Every file that was read.
     """
 
     path: Path | None
@@ -38,6 +38,7 @@ class Job:
     variables: tuple[Path, bytes] | None
     cell: Cell
     model: Model
+    inputs: tuple[Path, ...]
 
     @classmethod
     def open(
@@ -56,15 +57,17 @@ class Job:
         """
         loaded = load_cell(cell)
         fitted = load_model(model)
-        if program == STDIN:
-            given = None if lsv is None else (lsv, read_bytes(lsv))
+        fitted.check_arm(loaded.arm, model)
+        path = None if program == STREAM else Path(program)
+        if path is None:
             name = "stdin.pdl" if lsv is None else lsv.with_suffix(".pdl").name
-            return cls(None, name, sys.stdin.buffer.read(), given, loaded, fitted)
-        path = Path(program)
-        source = read_bytes(path)
-        lsv = lsv or find_variables(path)
+            source = sys.stdin.buffer.read()
+        else:
+            name, source = path.name, read_bytes(path)
+            lsv = lsv or find_variables(path)
         values = None if lsv is None else (lsv, read_bytes(lsv))
-        return cls(path, path.name, source, values, loaded, fitted)
+        inputs = tuple(p for p in (path, lsv, cell, model) if p is not None)
+        return cls(path, name, source, values, loaded, fitted, inputs)
 
     def run(self, options: Options, progress: Progress = silent) -> Outcome:
         """Compensate the program."""
@@ -85,12 +88,19 @@ class Job:
         output: Path | None = None,
         report: Path | None = None,
         html: Path | None = None,
-    ) -> None:
+    ) -> list[Path]:
         """Write the program, its variable file, the record and the reports.
+
+        A program from standard input goes to standard output unless it is told where
+        to; values that change go to a file in any case.
+
+        Returns:
+            The files written.
 
         Raises:
             OutputError: The output is the input, or cannot be written.
         """
+        check_places([output, report, html], self.inputs)
         files: dict[Path, bytes] = {}
         if report is not None:
             files[report] = outcome.to_json().encode()
@@ -98,32 +108,43 @@ class Job:
             from postproc.html import program_report
 
             files[html] = program_report(outcome).encode()
-        program = outcome.outputs[self.name]
-        values = next((v for k, v in outcome.outputs.items() if k != self.name), None)
-        if self.path is None and output is None:
-            write_all(files)
-            sys.stdout.buffer.write(program)
-            sys.stdout.buffer.flush()
-            return
-        target = output or default_output(self.path or Path(self.name))
-        files[sidecar_path(target)] = outcome.sidecar.encode()
-        if values is not None:
-            files[target.with_suffix(".lsv")] = values
-        files[target] = program
-        self._refuse_overwriting(list(files))
+        piped = self.path is None and output is None
+        files |= self._results(outcome, output or default_output(self._beside()), piped)
+        check_places(files, self.inputs)
         write_all(files)
+        if piped:
+            sys.stdout.buffer.write(outcome.outputs[self.name])
+            sys.stdout.buffer.flush()
+        return list(files)
 
-    def _refuse_overwriting(self, outputs: list[Path]) -> None:
-        """Refuse an output that is one of the inputs."""
-        values = None if self.variables is None else self.variables[0]
-        for source in (self.path, values, self.cell.path):
-            for place in outputs:
-                if source is not None and place.exists() and place.samefile(source):
-                    raise OutputError(
-                        place,
-                        "is an input",
-                        "Give another output with -o; inputs are never overwritten",
-                    )
+    def _beside(self) -> Path:
+        """Name the file that outputs lie beside, unless the user says where."""
+        if self.path is None and self.variables is not None:
+            return self.variables[0].with_name(self.name)
+        return self.path or Path(self.name)
+
+    def _results(
+        self, outcome: Outcome, target: Path, piped: bool
+    ) -> dict[Path, bytes]:
+        """Name what a compensation gives, the file that users wait for last.
+
+        Args:
+            outcome: The compensation.
+            target: Where the program goes.
+            piped: The program goes elsewhere; only values get a file.
+        """
+        values = target.with_suffix(VARIABLES)
+        places = {
+            name: target if name == self.name else values
+            for name in reversed(list(outcome.outputs))
+            if not (piped and name == self.name)
+        }
+        if not places:
+            return {}
+        names = {name: place.name for name, place in places.items()}
+        record = rename_files(outcome.sidecar, names).encode()
+        files = {place: outcome.outputs[name] for name, place in places.items()}
+        return {sidecar_path(values if piped else target): record, **files}
 
 
 def default_output(program: Path) -> Path:

@@ -72,6 +72,19 @@ class Sidecar:
         )
 
 
+def rename_files(record: str, names: Mapping[str, str]) -> str:
+    """Let a record speak of its files by other names.
+
+    Args:
+        record: JSON text of a record.
+        names: New names by old ones; files that have none are left out.
+    """
+    data = json.loads(record)
+    files = data["files"].items()
+    data["files"] = {names[name]: file for name, file in files if name in names}
+    return json.dumps(data) + "\n"
+
+
 def read_sidecar(path: Path) -> Sidecar:
     """Read a record.
 

@@ -68,6 +68,11 @@ def split_names(text: str) -> list[str]:
     return [name.strip() for name in text.split(",") if name.strip()]
 
 
+def as_path(target: str | None) -> Path | None:
+    """Name the file of an option that may be - for stdout."""
+    return None if target is None else Path(target)
+
+
 def write_text(target: str, text: str) -> None:
     """Write text to a file, or to stdout for ``-``.
 

@@ -15,10 +15,12 @@ from postproc.cli.common import (
     ModelOption,
     SeedOption,
     app,
+    as_path,
     explained,
     say,
     write_text,
 )
+from postproc.files import check_places
 
 
 class PointFrame(StrEnum):
@@ -60,6 +62,7 @@ def diagnose(
     from postproc.console import stages
 
     with explained():
+        check_places([output, as_path(json), html, plot], [*data, cell, model, program])
         with stages() as progress:
             found = diagnosing.diagnose_files(
                 data,
@@ -92,6 +95,7 @@ def history(model: Path, json: JsonOption = None) -> None:
     from postproc import diagnosing
 
     with explained():
+        check_places([as_path(json)], [model])
         if json:
             write_text(json, diagnosing.history_json(model))
         if json != "-":
@@ -112,5 +116,6 @@ def report(
     from postproc.html import report_file
 
     with explained():
+        check_places([output], [source])
         report_file(source, output)
         say(f"{output}")

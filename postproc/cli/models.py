@@ -16,11 +16,13 @@ from postproc.cli.common import (
     ModelOption,
     SeedOption,
     app,
+    as_path,
     explained,
     say,
     split_names,
     write_text,
 )
+from postproc.files import check_places
 
 
 class Method(StrEnum):
@@ -58,6 +60,7 @@ def survey(
     from postproc.surveying import write_survey
 
     with explained():
+        check_places([output], [cell])
         say(write_survey(cell, output, poses, mode, tracker, seed))
 
 
@@ -82,6 +85,7 @@ def simulate(
     from postproc.simulate import simulate_file
 
     with explained():
+        check_places([output, as_path(json)], [program, cell, wanted])
         found = simulate_file(program, cell, seed, effects, wanted)
         if output is not None:
             found.write(output)
@@ -113,6 +117,7 @@ def fit(
 
     names = None if effects is None else split_names(effects)
     with explained():
+        check_places([output, html], [*data, cell, program])
         found = calibrating.fit_files(
             data,
             cell,
@@ -138,6 +143,7 @@ def predict(
     from postproc import calibrating
 
     with explained():
+        check_places([output], [states, cell, model])
         text, summary = calibrating.predict_file(states, cell, model)
         write_text("-" if output is None else str(output), text)
         say(summary)
@@ -156,6 +162,7 @@ def compare(
     from postproc import calibrating
 
     with explained():
+        check_places([as_path(json), html], [*data, cell])
         found = calibrating.compare_files(data, cell, frame.value, seed)
         if json:
             write_text(json, calibrating.comparison_json(found))

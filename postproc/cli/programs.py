@@ -15,11 +15,13 @@ from postproc.cli.common import (
     ModelOption,
     TemperatureOption,
     app,
+    as_path,
     explained,
     say,
     write_text,
 )
 from postproc.exceptions import PostprocError
+from postproc.files import STREAM, check_places
 
 if TYPE_CHECKING:
     from postproc.report import Outcome
@@ -59,6 +61,8 @@ def compensate(
 
     options = Options(clone=clone, temperature=temperature)
     with explained():
+        given = None if program == STREAM else Path(program)
+        check_places([output, report, html], [given, lsv, cell, model])
         job = jobs.Job.open(program, cell, model, lsv)
         with stages() as progress:
             outcome = job.run(options, progress)
@@ -68,8 +72,10 @@ def compensate(
                 "--strict: targets were left uncompensated (listed above), nothing is "
                 "written. Mend them, or run without --strict"
             )
-        job.write(outcome, output, report, html)
+        written = job.write(outcome, output, report, html)
         _print_outcome(outcome)
+        for path in written:
+            say(f"written {path}")
     raise typer.Exit(outcome.exit_code)
 
 
@@ -92,6 +98,7 @@ def diff(
     from postproc import diff as differ
 
     with explained():
+        check_places([as_path(json)], [original, compensated])
         found = differ.diff(original, compensated)
         if json:
             write_text(json, found.to_json())
@@ -133,6 +140,7 @@ def explain(
     from postproc.explain import explain_file
 
     with explained():
+        check_places([as_path(json)], [program, cell, model, lsv])
         found = explain_file(program, cell, model, lsv, temperature)
         if json:
             write_text(json, found.to_json(line))
