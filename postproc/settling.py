@@ -24,8 +24,10 @@ from postproc.verify import check_output
 
 Array = NDArray[np.float64]
 
-ROUNDS = 10  # of correcting for changed sides, before targets are held
-SAME = 0.05  # sides closer than this are the same
+ROUNDS = 8  # of correcting for changed sides, before targets are held
+SAME = 0.01  # sides closer than this are the same
+LEAST_SHIFT = 1e-3  # change of an aim that tells how the arrival follows it
+FOLLOWS = 0.75  # gain above which the arrival runs away with the aim
 OTHER = 1.0  # sides farther apart than this are different ones
 
 
@@ -36,6 +38,38 @@ class Corrected:
     proposal: Proposal
     output: Output
     planned: Planned
+
+
+class SideSearch:
+    """Search, joint by joint, for the side at which aim and arrival agree.
+
+    A correction of a joint is as large as its play, so aiming where it was found last
+    may swing or creep. Secant steps settle that; where the arrival follows the aim so
+    closely that there is nothing to settle on, the joint is taken to its flank.
+    """
+
+    def __init__(self) -> None:
+        """Start without a history."""
+        self._aim: Array | None = None
+        self._found: Array | None = None
+
+    def next_aim(self, aim: Array, found: Array) -> Array:
+        """Give the sides to aim for next, (n, 6).
+
+        Args:
+            aim: Sides that the targets are corrected for, (n, 6).
+            found: Sides that joints then arrive at, (n, 6).
+        """
+        step = found - aim
+        if self._aim is not None and self._found is not None:
+            shift = aim - self._aim
+            known = np.abs(shift) > LEAST_SHIFT
+            gain = (found - self._found) / np.where(known, shift, np.inf)
+            follows = gain > FOLLOWS
+            step = step / np.where(follows, 1.0, 1.0 - gain)
+            step = np.where(follows, 2.0 * np.sign(step), step)
+        self._aim, self._found = np.array(aim), np.array(found)
+        return np.clip(aim + step, -1.0, 1.0)
 
 
 def settle(
@@ -51,11 +85,9 @@ def settle(
 
     The corrected program makes slightly other moves than the original, so a joint may
     come from the other side, or lie elsewhere in its play: the correction is computed
-    anew for that. A correction of a joint is as large as its play, so from the second
-    round on half a step is taken. A target whose joints still change sides at the end
-    is left alone.
+    anew for that. A target whose joints still change sides at the end is left alone.
     """
-    held = np.zeros(len(states), dtype=bool)
+    held, search = np.zeros(len(states), dtype=bool), SideSearch()
     with clock("solve"):
         solved = solve_visits(model, cell, planned, states)
     for number in count():  # ends: from round ROUNDS on, `held` grows
@@ -74,10 +106,8 @@ def settle(
             held = held | flipped
             continue
         held = held | moved if number >= ROUNDS else held
-        step = 1.0 if number == 0 else 0.5
         with clock("solve"):
-            aim = solved.direction + step * (found - solved.direction)
-            aimed = states.with_(direction=aim)
+            aimed = states.with_(direction=search.next_aim(solved.direction, found))
             solved = solve_again(solved, moved, model, cell, planned, aimed)
     raise AssertionError("unreachable")
 
