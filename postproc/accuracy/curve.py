@@ -25,7 +25,8 @@ class Curve(Effect):
 
     The spline is written in its own modes: cosines over the covariate's range, whose
     prior falls with the square of their number, as a penalty on curvature makes it.
-    Of two covariates only what is no sum of two curves belongs to it.
+    Of two covariates only what is no sum of two curves belongs to it, unless it is
+    whole.
 
     Attributes:
         direction: "joint 3" turns joint 3; "base x" and "tool x" shift the TCP along
@@ -33,6 +34,7 @@ class Curve(Effect):
         source: Names of one or two covariates.
         lower, upper: Their ranges; outside, the curve fades to zero.
         signed: Whether it is multiplied by the joint's arrival direction.
+        whole: Whether functions of each of two covariates alone belong to it.
     """
 
     name: ClassVar[str] = "curve"
@@ -43,6 +45,7 @@ class Curve(Effect):
     lower: tuple[float, ...] = (-np.pi,)
     upper: tuple[float, ...] = (np.pi,)
     signed: bool = False
+    whole: bool = False
 
     def belongs_to(self) -> Origin:
         """Follow the covariate: what only a survey has is never compensated."""
@@ -60,8 +63,8 @@ class Curve(Effect):
         """List the orders of every mode's cosines."""
         if len(self.source) == 1:
             return [(k,) for k in range(1, TERMS_ALONE + 1)]
-        ends = range(1, TERMS_OF_TWO + 1)
-        return list(product(ends, ends))
+        ends = range(0 if self.whole else 1, TERMS_OF_TWO + 1)
+        return [k for k in product(ends, ends) if any(k)]
 
     def parameters(self) -> tuple[Parameter, ...]:
         """Name the modes by the orders of their cosines."""

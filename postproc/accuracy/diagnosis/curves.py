@@ -35,6 +35,7 @@ def free_candidates(batch: Batch) -> list[Candidate]:
         with_side += [f"torque {k}" for k in loaded if k == j]
         if known(covariate(batch, f"travel {j}")):
             with_side.append(f"travel {j}")
+            out.append(_memory(batch, j))
         with_side += [f"joint {k}" for k in JOINTS if k != j]
         out += [_curve(batch, f"joint {j}", (name,), True) for name in with_side]
         pairs = combinations([f"joint {k}" for k in JOINTS], 2)
@@ -43,6 +44,12 @@ def free_candidates(batch: Batch) -> list[Candidate]:
         names = [*passing, *(f"joint {k}" for k in JOINTS)]
         out += [_curve(batch, axis, (name,)) for name in names]
     return out
+
+
+def _memory(batch: Batch, joint: int) -> Candidate:
+    """Whatever depends on the last two reversals of a joint."""
+    source = (f"travel {joint}", f"loop {joint}")
+    return _curve(batch, f"joint {joint}", source, signed=True, whole=True)
 
 
 def _maps(batch: Batch, joint: int) -> list[Candidate]:
@@ -56,13 +63,17 @@ def _maps(batch: Batch, joint: int) -> list[Candidate]:
 
 
 def _curve(
-    batch: Batch, direction: str, source: tuple[str, ...], signed: bool = False
+    batch: Batch,
+    direction: str,
+    source: tuple[str, ...],
+    signed: bool = False,
+    whole: bool = False,
 ) -> Candidate:
     """Make the curve of some covariates in one direction."""
     values = [covariate(batch, name) for name in source]
-    lower = tuple(float(np.min(v)) for v in values)
-    upper = tuple(float(np.max(v)) for v in values)
-    effect = Curve(direction, source, lower, upper, signed)
+    lower = tuple(float(np.nanmin(v)) for v in values)
+    upper = tuple(float(np.nanmax(v)) for v in values)
+    effect = Curve(direction, source, lower, upper, signed, whole)
     kind, _, which = direction.partition(" ")
     joint = int(which) if kind == "joint" else None
     driver = " x ".join(source)
