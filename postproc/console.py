@@ -53,7 +53,7 @@ def print_table(
     for c in columns:
         overflow: Literal["fold", "ellipsis"] = "fold" if c.fold else "ellipsis"
         table.add_column(
-            c.title, justify=c.justify, no_wrap=not c.fold, overflow=overflow
+            Text(c.title), justify=c.justify, no_wrap=not c.fold, overflow=overflow
         )
     for row in rows:
         table.add_row(*(Text(printable(cell)) for cell in row))

@@ -11,6 +11,7 @@ import numpy as np
 from postproc.accuracy.model import Model, load_model
 from postproc.compensate import compensate, name_files
 from postproc.console import Column, print_table
+from postproc.exceptions import ProgramError
 from postproc.jobs import find_variables, read_bytes
 from postproc.language.visits import ELSEWHERE, START, Visits
 from postproc.options import Options
@@ -52,7 +53,11 @@ class Explanation:
     outcome: Outcome | None
 
     def to_json(self, line: int | None = None) -> str:
-        """Return one object per visit as JSON text."""
+        """Return one object per visit as JSON text.
+
+        Raises:
+            ProgramError: There is no target on the line asked for.
+        """
         rows = [self.row(i) for i in self._chosen(line)]
         return json.dumps({"visits": rows}, indent=1) + "\n"
 
@@ -73,7 +78,11 @@ class Explanation:
         return {**row, "from": self._from(i), "travel_deg": travel}
 
     def print(self, line: int | None = None) -> None:
-        """Print a table, one row per visit."""
+        """Print a table, one row per visit.
+
+        Raises:
+            ProgramError: There is no target on the line asked for.
+        """
         print_table(COLUMNS, (self._cells(i) for i in self._chosen(line)))
 
     def _cells(self, i: int) -> list[str]:
@@ -107,9 +116,25 @@ class Explanation:
         return ", ".join(dict.fromkeys(told))
 
     def _chosen(self, line: int | None) -> list[int]:
-        """Choose the visits to show."""
-        rows = np.arange(len(self.visits))
-        return [int(i) for i in rows if line is None or self.visits.line[i] == line]
+        """Choose the visits to show: those whose move or literal is on a line."""
+        v = self.visits
+        if line is None:
+            return list(range(len(v)))
+        found = v.line == line
+        if len(v.literals):
+            found = found | (
+                (v.literal >= 0)
+                & (v.literals.line[v.literal] == line)
+                & (v.literals.file[v.literal] == 0)
+            )
+        if not found.any():
+            raise ProgramError(
+                v.files[0],
+                "no target is reached or written here",
+                "Take a line that holds a move or the numbers of its target",
+                line=line,
+            )
+        return np.flatnonzero(found).tolist()
 
 
 def _known(values: np.ndarray) -> list[float | None]:

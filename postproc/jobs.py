@@ -102,7 +102,7 @@ class Job:
         """
         check_places([output, report, html], self.inputs)
         files: dict[Path, bytes] = {}
-        if report is not None:
+        if report is not None and report != Path(STREAM):
             files[report] = outcome.to_json().encode()
         if html is not None:
             from postproc.html import program_report

@@ -40,7 +40,8 @@ def compensate(
     ] = None,
     lsv: LsvOption = None,
     report: Annotated[
-        Path | None, typer.Option("--report", help="Write the report (JSON) here.")
+        Path | None,
+        typer.Option("--report", help="Write the report (JSON), - for stdout."),
     ] = None,
     html: HtmlOption = None,
     strict: Annotated[
@@ -48,6 +49,10 @@ def compensate(
     ] = False,
     clone: Annotated[
         bool, typer.Option("--clone", help="Clone variables whose arrivals disagree.")
+    ] = False,
+    shared: Annotated[
+        bool,
+        typer.Option("--shared", help="Edit variables that other programs may read."),
     ] = False,
     temperature: TemperatureOption = None,
 ) -> None:
@@ -59,9 +64,11 @@ def compensate(
     from postproc.console import stages
     from postproc.options import Options
 
-    options = Options(clone=clone, temperature=temperature)
     with explained():
+        options = Options(clone, shared, temperature)
         given = None if program == STREAM else Path(program)
+        if report == Path(STREAM) and given is None and output is None:
+            raise PostprocError("--report -: stdout holds the program. Name a file")
         check_places([output, report, html], [given, lsv, cell, model])
         job = jobs.Job.open(program, cell, model, lsv)
         with stages() as progress:
@@ -74,6 +81,8 @@ def compensate(
             )
         written = job.write(outcome, output, report, html)
         _print_outcome(outcome)
+        if report == Path(STREAM):
+            write_text(STREAM, outcome.to_json())
         for path in written:
             say(f"written {path}")
     raise typer.Exit(outcome.exit_code)
@@ -81,11 +90,14 @@ def compensate(
 
 def _print_outcome(outcome: Outcome) -> None:
     """Print what a person needs to know, on stderr."""
+    from postproc.console import printable
+
     for finding in outcome.diagnostics:
-        say(f"{finding.file}:{finding.line}: {finding.code}: {finding.message}")
+        place = f"{finding.file}:{finding.line}"
+        say(printable(f"{place}: {finding.code}: {finding.message}"))
     for line in outcome.left_alone():
-        say(line)
-    say(outcome.summary())
+        say(printable(line))
+    say(printable(outcome.summary()))
 
 
 @app.command()

@@ -59,7 +59,10 @@ def _explain(
     error: type[FileError],
 ) -> FileError:
     """Turn the first validation error into a message with place and cure."""
-    first = exc.errors()[0]
+    found = exc.errors()
+    # A key with another unit is unknown, and the right one missing: tell the former.
+    unknown = [e for e in found if e["type"] == "extra_forbidden"]
+    first = (unknown or found)[0]
     place = "$" + "".join(
         f"[{k + 1}]" if isinstance(k, int) else f".{k}" for k in first["loc"]
     )

@@ -142,8 +142,7 @@ def test_the_wrist_singularity_is_a_reason(
     q = home.copy()
     q[4] = np.deg2rad(deg)
     found = plan(arm, make_targets(np.array([Kind.JOINTS]), joints=q[None]), WRIST)
-    expected = "at the wrist singularity" if deg < 3 else ""
-    assert found.reasons[found.reason[0]] == expected
+    assert ("wrist singularity" in found.reasons[found.reason[0]]) == (deg < 3)
 
 
 def test_no_targets_are_no_trouble(arm: Arm) -> None:
