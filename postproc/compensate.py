@@ -17,6 +17,7 @@ from postproc.language.source import Source
 from postproc.language.stamp import is_stamped
 from postproc.notes import (
     assumed_off,
+    listing_cost,
     overruled_strings,
     unsure_sides,
     untimed_runs,
@@ -157,6 +158,7 @@ def report(
             *overruled_strings(visits, planned.plan),
             *untimed_runs(visits, planned.plan),
             *unsure_sides(visits, rows, d.side, d.std_error),
+            *listing_cost(visits, rows, planned.plan, cell.arm),
             assumed_off(name, cell),
         ),
         stages=clock.stages,

@@ -6,15 +6,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from postproc.language.diagnostic import Diagnostic
-from postproc.language.visits import Visits
+from postproc.language.visits import Target, Visits
 from postproc.motion.planner import Plan
 from postproc.pose import MM
+from postproc.robot.arm import Arm
 from postproc.robot.cell import Cell
 
 Array = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 
 SURE = 0.9  # part of its play from its middle at which a joint rests on a flank
+LISTED = 0.01  # [mm] and [deg], the last decimal of the controller's own listing
 SINGLY = 20  # findings of one kind that are listed line by line
 
 
@@ -37,6 +39,48 @@ def untimed_runs(visits: Visits, plan: Plan) -> list[Diagnostic]:
     """List targets in runs that no time law was found for."""
     text = "no time law was found for this run: times and speeds are estimates"
     return _each(visits, plan.untimed, "no-time-law", text)
+
+
+def listing_cost(
+    visits: Visits, corrected: Bools, plan: Plan, arm: Arm
+) -> list[Diagnostic]:
+    """Say what is lost when the controller lists corrected values with its 2 decimals.
+
+    Args:
+        visits: Every arrival.
+        corrected: Visits whose target moves, (n,).
+        plan: Where they are.
+        arm: How far a joint angle moves the TCP.
+    """
+    if len(visits.literals) == 0:
+        return []
+    files = np.array([name.lower().endswith(".lsv") for name in visits.files])
+    rows = corrected & files[visits.literals.file[visits.literal]]
+    found = []
+    poses = rows & (visits.target != Target.JOINTS)
+    if poses.any():
+        lever = np.linalg.norm(plan.tool[poses, :3, 3], axis=1).max() / MM
+        lost = np.sqrt(3) * LISTED / 2
+        found.append(
+            f"up to {lost:.4f} mm of position and, in orientation, {LISTED / 2:g} deg "
+            f"an angle: {np.deg2rad(LISTED / 2) * lever:.3f} mm over the tool's length"
+        )
+    joints = rows & (visits.target == Target.JOINTS)
+    if joints.any():
+        J = arm.jacobian(plan.q[joints], plan.tool[joints, :3, 3])[:, :3]
+        lost = np.linalg.norm(J, axis=1).sum(axis=1).max() * np.deg2rad(LISTED / 2)
+        found.append(f"up to {lost / MM:.3f} mm at joint targets")
+    first = np.flatnonzero(rows)[:1]
+    return [
+        Diagnostic(
+            visits.files[visits.literals.file[visits.literal[v]]],
+            int(visits.literals.line[visits.literal[v]]),
+            "listing-digits",
+            f"a listing by the controller has 2 decimals (0.01 mm, 0.01 deg): to list "
+            f"these values and load them again costs {'; '.join(found)}",
+        )
+        for v in first
+    ]
 
 
 def _each(visits: Visits, rows: Bools, code: str, text: str) -> list[Diagnostic]:

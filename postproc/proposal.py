@@ -179,7 +179,10 @@ def mark_disagreement(
         return together, np.zeros(len(visits), dtype=bool)
     at = np.where(has, agreement.group, 0)
     unsafe = reasons.none & has & ~together[at]
-    text = f"its arrivals differ by more than agree_mm = {limit:g} (see --clone)"
+    text = (
+        f"its arrivals differ by more than agree_mm = {limit:g}: give each move a "
+        "point of its own"
+    )
     reasons.mark(unsafe & agreement.usable[at], text)
     reasons.mark(unsafe, "another arrival at the same point cannot be corrected")
     return together, unsafe
