@@ -1,6 +1,7 @@
 # make demo    survey, fit, compensate and check the sample programs on a virtual arm
 # make test    all tests
 # make lint    ruff and mypy
+# make chaos   kill 200 batches of 300 files at random moments and resume them
 # make bench   how long the stages take on this machine
 # make reproduce   the published method and ours, simulated: docs/reproduction.md
 # make accuracy    held-out errors, coverage, real and blind data: docs/accuracy.md
@@ -14,7 +15,7 @@ STAMP := $(VENV)/.installed
 export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
 
-.PHONY: help demo test lint format bench reproduce accuracy clean
+.PHONY: help demo test lint format bench reproduce accuracy chaos clean
 .DELETE_ON_ERROR:
 
 help:
@@ -47,6 +48,9 @@ reproduce: $(STAMP)
 
 accuracy: $(STAMP)
 	@PYTHONPATH=. $(PYTHON_BIN) docs/studies/accuracy.py --seeds 20
+
+chaos: $(STAMP)
+	@$(PYTHON_BIN) -m tests.chaos --runs $(or $(RUNS),200) --files $(or $(FILES),300)
 
 clean:
 	rm -rf $(VENV) demo build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis

@@ -42,7 +42,11 @@ points_mm = [[80.0, -40.0, 150.0], [-120.0, 60.0, 180.0], [30.0, 130.0, 320.0]]
 @pytest.fixture(scope="session")
 def job_folder(tmp_path_factory):
     """A folder with cell.toml and model.json of virtual arm SEED."""
-    folder = tmp_path_factory.mktemp("job")
+    return make_job(tmp_path_factory.mktemp("job"))
+
+
+def make_job(folder: Path) -> Path:
+    """Write a cell, a survey of virtual arm SEED, and the model fitted to it."""
     (folder / "cell.toml").write_text(CELL)
     cell = load_cell(folder / "cell.toml")
     rows = folder / "rows.csv"

@@ -1,0 +1,100 @@
+"""Runs that end early: killed, interrupted, out of room. Nothing is ever lost."""
+
+from __future__ import annotations
+
+import os
+import resource
+import signal
+import subprocess
+import time
+
+import pytest
+
+from postproc.batch.run import default_log
+from postproc.files import TEMPORARY
+from tests.chaos import Plant, build, chaos, descendants, gone
+from tests.plant import contents, grow
+
+
+@pytest.fixture
+def plant(tmp_path, job_folder):
+    cell, model = job_folder / "cell.toml", job_folder / "model.json"
+    return Plant(tmp_path, cell, model, 2)
+
+
+def started(plant, *more, **how):
+    """Start a batch and wait until it has written something."""
+    target = plant.root / "dst"
+    command = plant.command(target, *more)
+    process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True, **how)
+    end = time.monotonic() + 60.0
+    while process.poll() is None and time.monotonic() < end:
+        if target.exists() and any(target.rglob("*.pdl")):
+            break
+        time.sleep(0.01)
+    return process
+
+
+def test_killed_runs_resume_to_the_same_tree(plant):
+    build(plant.source, 16)
+    chaos(plant, 2, seed=2)
+
+
+def test_an_interrupted_run_stops_in_order_and_can_go_on(plant):
+    grow(plant.source, 60, 1)
+    process = started(plant)
+    workers = list(descendants(process.pid))
+    process.send_signal(signal.SIGTERM)
+    _, said = process.communicate(timeout=60)
+    there = contents(plant.root / "dst")
+    assert process.returncode == 2
+    assert "--resume" in said and "Traceback" not in said
+    assert not [p for p in there if p.endswith(TEMPORARY)]
+    assert 0 < len([p for p in there if p.endswith(".pdl")]) < 60
+    gone(workers)
+    assert plant.run(plant.root / "dst", "--resume") == 0
+    assert len([p for p in contents(plant.root / "dst") if p.endswith(".pdl")]) == 60
+
+
+def test_a_full_disk_stops_the_run_and_loses_nothing(plant):
+    grow(plant.source, 3, 1)
+    (plant.source / "zz.bin").write_bytes(bytes(3_000_000))
+    target = plant.root / "dst"
+    small = (1_000_000, 1_000_000)
+    done = subprocess.run(
+        plant.command(target),
+        capture_output=True,
+        text=True,
+        timeout=60,
+        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, small),
+    )
+    assert done.returncode == 2
+    assert "no room is left" in done.stderr and "Traceback" not in done.stderr
+    assert "zz.bin" not in contents(target)
+    assert not [p for p in contents(target) if p.endswith(TEMPORARY)]
+    assert plant.run(target, "--resume") == 0
+    assert len(contents(target)) == 3 * 2 + 1 + 1
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="root may write to any folder")
+def test_a_read_only_target_is_said(plant):
+    grow(plant.source, 1, 1)
+    plant.root.chmod(0o500)
+    done = subprocess.run(
+        plant.command(plant.root / "dst"), capture_output=True, text=True, timeout=60
+    )
+    plant.root.chmod(0o700)
+    assert done.returncode == 2
+    assert "read-only" in done.stderr and "Traceback" not in done.stderr
+
+
+def test_a_place_that_cannot_be_written_fails_alone(plant):
+    grow(plant.source, 12, 1)
+    target = plant.root / "dst"
+    target.mkdir()
+    (target / "line001").write_bytes(b"a file where a folder is to be")
+    assert plant.run(target) == 2
+    there = contents(target)
+    assert there["line001"] == contents(target)["line001"]
+    assert sum(p.endswith(".pdl") for p in there) == 10
+    assert "line001/job00010.pdl" in default_log(target).read_text()

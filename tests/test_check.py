@@ -1,0 +1,133 @@
+"""Before an upload: what check finds, and what it lets pass."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+from postproc.batch.plan import make_plan
+from postproc.batch.run import Order, batch, default_log
+from postproc.check import check
+from postproc.exceptions import ProgramError
+from postproc.files import TEMPORARY
+from postproc.options import AS_USUAL
+from tests.inline import InlineCrew
+from tests.plant import grow, program
+
+SUFFIX = ".postproc.json"
+VALUES = (
+    b"p1 POS Priv\r\n X: 100.00 Y: 50.00 Z: 300.00 A: 0.000 E: 180.000 R: 0.000\r\n"
+    b" CNFG: ''\r\n"
+)
+SPOT = b"PROGRAM s\r\nVAR p1: POSITION\r\nBEGIN\r\nMOVE LINEAR TO p1\r\nEND s\r\n"
+
+
+@pytest.fixture
+def trees(tmp_path, job_folder):
+    """A source tree, its compensated tree, and the id of the model."""
+    source = grow(tmp_path / "src", 2, 1)
+    (source / "spot.pdl").write_bytes(SPOT)
+    (source / "spot.lsv").write_bytes(VALUES)
+    (source / "spot.cod").write_bytes(b"compiled")
+    plan = make_plan(
+        None, job_folder / "cell.toml", job_folder / "model.json", AS_USUAL
+    )
+    target = tmp_path / "dst"
+    order = Order(source, target, plan, default_log(target), False)
+    assert batch(order, lambda plan: InlineCrew(plan.setups)).exit_code == 0
+    (target / "spot.cod").unlink()
+    return source, target, plan.setups[0].model.id
+
+
+def codes(checked):
+    return {(f.place, f.code) for f in checked.findings}
+
+
+def test_a_fresh_tree_may_be_uploaded(trees):
+    source, target, model = trees
+    found = check(target, lambda place: model, source)
+    assert found.findings == ()
+    assert (found.programs, found.exit_code) == (3, 0)
+
+
+def test_uncompensated_programs_and_values_are_found(trees):
+    _, target, _ = trees
+    (target / "raw.pdl").write_bytes(program("raw", 1, 1))
+    (target / "raw2.lsv").write_bytes(VALUES)
+    (target / "numbers.lsv").write_bytes(b"n INT Priv\r\n 3\r\n")
+    found = check(target)
+    assert codes(found) == {
+        ("raw.pdl", "uncompensated"),
+        ("raw2.lsv", "uncompensated"),
+    }
+    assert found.exit_code == 1
+
+
+def test_an_older_model_is_listed(trees):
+    _, target, _ = trees
+    found = check(target, lambda place: "newer" if "spot" in place else None)
+    assert codes(found) == {("spot.pdl", "older-model")}
+
+
+@pytest.mark.parametrize("name", ["line000/job00000.pdl", "spot.lsv"])
+def test_a_changed_output_is_found(trees, name):
+    _, target, _ = trees
+    (target / name).write_bytes((target / name).read_bytes() + b"-- touched\r\n")
+    assert codes(check(target)) == {(name, "changed")}
+
+
+@pytest.mark.parametrize("name", ["line000/job00000.pdl", "spot.pdl", "spot.lsv"])
+def test_a_changed_source_is_found(trees, name):
+    source, target, _ = trees
+    (source / name).write_bytes((source / name).read_bytes() + b"-- touched\r\n")
+    assert codes(check(target, source=source)) == {(name, "source-changed")}
+
+
+def test_an_unstamped_program_is_compared_with_the_source(trees):
+    # Only its values were edited: the record says nothing of the program itself.
+    source, target, _ = trees
+    (target / "spot.pdl").write_bytes(SPOT.replace(b"p1\r\nEND", b"p1\r\n\r\nEND"))
+    assert codes(check(target, source=source)) == {("spot.pdl", "source-changed")}
+
+
+def test_a_record_that_is_missing_or_broken_or_of_another_file(trees):
+    _, target, _ = trees
+    record = target / f"line000/job00000.pdl{SUFFIX}"
+    text = record.read_bytes()
+    record.unlink()
+    assert codes(check(target)) == {("line000/job00000.pdl", "no-record")}
+    record.write_bytes(b"{}")
+    assert codes(check(target)) == {("line000/job00000.pdl", "no-record")}
+    record.write_bytes(text.replace(b"job00000", b"job00001"))
+    assert codes(check(target)) == {("line000/job00000.pdl", "no-record")}
+
+
+def test_what_was_not_compensated_is_missed(trees):
+    source, target, _ = trees
+    (source / "new.pdl").write_bytes(program("new", 1, 1))
+    assert codes(check(target, source=source)) == {("new.pdl", "absent")}
+
+
+def test_the_compiled_form_of_the_source_is_found(trees):
+    source, target, _ = trees
+    (target / "spot.cod").write_bytes(b"compiled")
+    assert codes(check(target, source=source)) == {("spot.cod", "uncompensated")}
+    (target / "spot.cod").write_bytes(b"compiled anew")
+    assert check(target, source=source).exit_code == 0
+
+
+def test_what_a_killed_run_has_left_is_found(trees):
+    _, target, _ = trees
+    (target / f".job.pdl.x{TEMPORARY}").write_bytes(b"")
+    assert {code for _, code in codes(check(target))} == {"unfinished"}
+
+
+def test_json_and_trouble(trees, tmp_path):
+    _, target, _ = trees
+    (target / "raw.pdl").write_bytes(b"x")
+    data = json.loads(check(target).to_json())
+    assert data["programs"] == 4
+    assert data["findings"][0]["code"] == "uncompensated"
+    with pytest.raises(ProgramError, match="is no folder"):
+        check(tmp_path / "none")
