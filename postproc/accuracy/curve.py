@@ -8,6 +8,7 @@ from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import eval_legendre
 
 from postproc.accuracy.batch import Batch
 from postproc.accuracy.covariate import covariate
@@ -16,15 +17,15 @@ from postproc.accuracy.effect import Effect, Origin, Parameter, fade
 Array = NDArray[np.float64]
 
 TURN, SHIFT = 1e-4, 1e-4  # [rad], [m]
-TERMS_ALONE, TERMS_OF_TWO = 8, 3
+TERMS_ALONE, TERMS_OF_TWO, TERMS_OF_WHOLE = 8, 3, 5
 
 
 @dataclass(frozen=True)
 class Curve(Effect):
-    """Error along one direction, a smoothing spline of one or two covariates.
+    """Error along one direction, a penalised curve of one or two covariates.
 
-    The spline is written in its own modes: cosines over the covariate's range, whose
-    prior falls with the square of their number, as a penalty on curvature makes it.
+    The curve is a sum of Legendre polynomials over the covariate's range, whose prior
+    falls with the square of their degree, as a penalty on curvature makes it.
     Of two covariates only what is no sum of two curves belongs to it, unless it is
     whole.
 
@@ -60,14 +61,16 @@ class Curve(Effect):
         return tuple(name for name in self.source if name in told)
 
     def _orders(self) -> list[tuple[int, ...]]:
-        """List the orders of every mode's cosines."""
+        """List the degrees of every term."""
         if len(self.source) == 1:
             return [(k,) for k in range(1, TERMS_ALONE + 1)]
-        ends = range(0 if self.whole else 1, TERMS_OF_TWO + 1)
-        return [k for k in product(ends, ends) if any(k)]
+        if not self.whole:
+            return list(product(range(1, TERMS_OF_TWO + 1), repeat=2))
+        pairs = product(range(TERMS_OF_WHOLE + 1), repeat=2)
+        return [k for k in pairs if 0 < sum(k) <= TERMS_OF_WHOLE]
 
     def parameters(self) -> tuple[Parameter, ...]:
-        """Name the modes by the orders of their cosines."""
+        """Name the terms by their degrees."""
         kind, _, which = self.direction.partition(" ")
         turns = kind == "joint"
         scale, unit = (TURN, "rad") if turns else (SHIFT, "m")
@@ -82,7 +85,7 @@ class Curve(Effect):
         )  # fmt: skip
 
     def shape(self, batch: Batch) -> Array:
-        """Evaluate the modes without their direction in space, (n, p)."""
+        """Evaluate the terms without their direction in space, (n, p)."""
         value, inside = np.ones((len(batch), len(self._orders()))), np.ones(len(batch))
         order = np.array(self._orders())
         for k, name in enumerate(self.source):
@@ -90,7 +93,7 @@ class Curve(Effect):
             x = covariate(batch, name)
             inside *= np.nan_to_num(fade(x, np.array(low), np.array(high)))
             u = np.clip((np.nan_to_num(x) - low) / max(high - low, 1e-12), 0, 1)
-            value *= np.cos(np.pi * u[:, None] * order[:, k])
+            value *= eval_legendre(order[:, k], 2.0 * u[:, None] - 1.0)
         return np.asarray(value * inside[:, None])
 
     def columns(self, batch: Batch) -> Array:

@@ -22,6 +22,7 @@ from postproc.accuracy.tool_shift import ToolShift
 from postproc.accuracy.transmission import Transmission
 from postproc.accuracy.windup import Windup
 
+HARDLY = 2.0  # nats
 OFFSETS = np.linspace(-1.0, 1.0, 9)
 LEVELS = tuple(0.5**k for k in range(9))  # widths tried, in steps of the grid
 SETTLED = 0.3  # nats: finer settings no longer matter
@@ -65,7 +66,22 @@ def refine(projection: Projection, score: Score) -> Score:
             score = replace(found, best=best, evidence=evidence)
         if gained < SETTLED and width < 1.0:
             break
-    return score
+    return _plainer(projection, score)
+
+
+def _plainer(projection: Projection, score: Score) -> Score:
+    """Take a whole order of a gear where it does hardly worse than a broken one."""
+    effect = score.best.effect
+    if not isinstance(effect, Transmission):
+        return score
+    ((joint, order),) = effect.waves
+    whole = replace(score.best, effect=Transmission(((joint, float(round(order))),)))
+    square = float(projection.rest @ projection.rest)
+    blocks = reduce_some(projection, [whole], projection.rest[:, None])
+    found = rank(blocks, square, projection.rows)[0]
+    if found.best_evidence < score.best_evidence - HARDLY:
+        return score
+    return replace(found, evidence=score.evidence)
 
 
 def _waves(effect: Effect, offsets: Array, batch: Batch) -> list[Effect]:
@@ -75,8 +91,6 @@ def _waves(effect: Effect, offsets: Array, batch: Batch) -> list[Effect]:
         return []  # the orders of eccentricity are what they are
     step = np.pi / max(float(np.ptp(batch.states.q[:, joint - 1])), 0.1)
     tries = np.unique(np.clip(order + step * offsets, 2.5, LAST_FREE))
-    whole = np.round(order)
-    tries = np.append(tries, [whole] if abs(whole - order) < step else [])
     return [Transmission(((joint, float(k)),)) for k in tries]
 
 
