@@ -18,6 +18,7 @@ from postproc.language.stamp import is_stamped
 from postproc.notes import (
     assumed_off,
     listing_cost,
+    missing_file,
     overruled_strings,
     unsure_sides,
     untimed_runs,
@@ -155,6 +156,7 @@ def report(
         after=ErrorStatistics.of(after),
         diagnostics=(
             *reading.diagnostics,
+            *missing_file(visits),
             *overruled_strings(visits, planned.plan),
             *untimed_runs(visits, planned.plan),
             *unsure_sides(visits, rows, d.side, d.std_error),

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from postproc.language.diagnostic import Diagnostic
-from postproc.language.visits import Target, Visits
+from postproc.language.visits import NO_VALUE, Target, Visits
 from postproc.motion.planner import Plan
 from postproc.pose import MM
 from postproc.robot.arm import Arm
@@ -17,6 +17,7 @@ Bools = NDArray[np.bool_]
 
 SURE = 0.9  # part of its play from its middle at which a joint rests on a flank
 LISTED = 0.01  # [mm] and [deg], the last decimal of the controller's own listing
+VARIABLES = ".lsv"  # suffix of variable files
 SINGLY = 20  # findings of one kind that are listed line by line
 
 
@@ -24,6 +25,22 @@ def assumed_off(name: str, cell: Cell) -> Diagnostic:
     """State that the controller is taken not to compensate on its own."""
     text = f"the controller's own absolute accuracy is taken to be off ({cell.path})"
     return Diagnostic(name, 1, "absolute-accuracy", text)
+
+
+def missing_file(visits: Visits) -> list[Diagnostic]:
+    """Tell that a program came without the variable file that holds its targets."""
+    name = visits.files[0].rpartition(".")[0] + VARIABLES
+    if any(file.lower().endswith(VARIABLES) for file in visits.files):
+        return []
+    lost = np.array([text.endswith(NO_VALUE) for text in visits.reasons])[visits.reason]
+    text = (
+        f"{lost.sum()} targets have no value, and there is no {name}: put it beside "
+        "the program, or give it with --lsv"
+    )
+    first = visits.line[np.flatnonzero(lost)[:1]].tolist()
+    return [
+        Diagnostic(visits.files[0], line, "no-variable-file", text) for line in first
+    ]
 
 
 def overruled_strings(visits: Visits, plan: Plan) -> list[Diagnostic]:
@@ -54,7 +71,7 @@ def listing_cost(
     """
     if len(visits.literals) == 0:
         return []
-    files = np.array([name.lower().endswith(".lsv") for name in visits.files])
+    files = np.array([name.lower().endswith(VARIABLES) for name in visits.files])
     rows = corrected & files[visits.literals.file[visits.literal]]
     found = []
     poses = rows & (visits.target != Target.JOINTS)

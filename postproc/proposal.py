@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from postproc.accuracy.guard import guard_size, guard_solutions, guard_steps
-from postproc.language.visits import Target, Visits
+from postproc.language.visits import NO_TARGET, Target, Visits
 from postproc.options import Options
 from postproc.planning import Planned, Reading
 from postproc.pose import MM, inverse, pose_from_record
@@ -134,21 +134,25 @@ def change_mm(visits: Visits, numbers: Array, correction: Array) -> Array:
 
 def mark_display(visits: Visits, planned: Planned, reasons: Reasons) -> Bools:
     """Mark targets whose value is known only at run time, (n,)."""
-    holds = ~np.isin(visits.target, NO_TARGET)
+    holds = ~without_target(visits)
     display = holds & ((visits.reason > 0) | (visits.literal < 0))
-    reasons.adopt(np.where(holds, visits.reason, 0), visits.reasons)
+    reasons.adopt(visits.reason, visits.reasons)
     reasons.mark(display, "its numbers are not written in the program")
     return display
 
 
-NO_TARGET = tuple(
-    t for t in Target if t not in (Target.POSE, Target.JOINTS, Target.NEAR)
-)
+def without_target(visits: Visits) -> Bools:
+    """Tell which moves go where no target of theirs says, (n,): $HOME, RELATIVE, .."""
+    none = np.array([text.startswith(NO_TARGET) for text in visits.reasons])
+    named = np.isin(
+        visits.target, (Target.POSE, Target.JOINTS, Target.NEAR, Target.UNKNOWN)
+    )
+    return np.asarray(~named | none[visits.reason])
 
 
 def mark_unchanged(visits: Visits, reasons: Reasons, options: Options) -> Bools:
     """Mark moves without a target, taught points and shared variables, (n,)."""
-    empty = np.isin(visits.target, NO_TARGET)
+    empty = without_target(visits)
     reasons.mark(empty, "this move holds no target")
     has = visits.literal >= 0
     literal = np.where(has, visits.literal, 0)

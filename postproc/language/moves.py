@@ -9,7 +9,7 @@ from postproc.language.arrivals import Arrival
 from postproc.language.machine import Here, Machine
 from postproc.language.store import Settings
 from postproc.language.values import Nothing, Position, Value, Vector
-from postproc.language.visits import ELSEWHERE, Motion, Target
+from postproc.language.visits import ELSEWHERE, NO_TARGET, Motion, Target
 
 _FRAME = {
     "TOOL": Target.RELATIVE_TOOL,
@@ -169,7 +169,7 @@ def _goal(here: Here, statement: ast.Move) -> _Goal:
 
 
 def _why(word: str) -> str:
-    return f"the move holds no target of its own ({word})"
+    return f"{NO_TARGET} ({word})"
 
 
 def _no_target(target: Target, numbers: tuple[float | None, ...], word: str) -> _Goal:

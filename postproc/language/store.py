@@ -7,10 +7,11 @@ from dataclasses import dataclass, field
 
 from postproc.language.shelves import Shelves
 from postproc.language.values import Alias, Nothing, Value, join
+from postproc.language.visits import NO_VALUE
 
 Settings = Mapping[str, Value]
 
-_NEVER_SET = Nothing("it has no value in the program or its variable file")
+_NEVER_SET = Nothing(NO_VALUE)
 
 
 @dataclass

@@ -13,6 +13,8 @@ Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 
 START = -1  # predecessor: wherever the arm stands when the program starts
+NO_VALUE = "it has no value in the program or its variable file"  # ends a reason
+NO_TARGET = "the move holds no target of its own"  # begins such a visit's reason
 ELSEWHERE = -2  # predecessor: a place that the program text does not tell
 
 
