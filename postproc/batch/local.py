@@ -17,6 +17,14 @@ from postproc.batch.setup import Setup
 from postproc.batch.task import Result
 from postproc.batch.work import run_tasks
 
+# Numerical libraries and their pools: processes use the cores, not threads.
+POOLS = (
+    "OMP_NUM_THREADS",
+    "OPENBLAS_NUM_THREADS",
+    "MKL_NUM_THREADS",
+    "RAYON_NUM_THREADS",
+)
+
 _setups: Sequence[Setup] = ()
 
 
@@ -36,8 +44,8 @@ class LocalCrew:
             setups: What units mean by their `setup`.
             jobs: Number of processes.
         """
-        for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
-            os.environ.setdefault(name, "1")  # processes use the cores, not threads
+        for name in POOLS:
+            os.environ.setdefault(name, "1")
         self._setups, self._jobs = tuple(setups), jobs
         self._context = multiprocessing.get_context("forkserver")
         self._context.set_forkserver_preload([run_tasks.__module__])
