@@ -14,7 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from postproc.accuracy.comparison import Comparison, compare
-from postproc.accuracy.fit_report import FitReport, Spread
+from postproc.accuracy.error_statistics import ErrorStatistics
+from postproc.accuracy.fit_report import FitReport
 from postproc.accuracy.measurement import concatenate, from_table
 from postproc.accuracy.model import Model, load_model
 from postproc.accuracy.plausibility import check_survey
@@ -143,7 +144,7 @@ def tell_fit(report: FitReport) -> str:
     return "\n".join(lines)
 
 
-def _tell(spread: Spread) -> str:
+def _tell(spread: ErrorStatistics) -> str:
     """Write error statistics in one line."""
     return (
         f"mean {spread.mean_mm:.4f} mm, std {spread.std_mm:.4f}, "
@@ -213,7 +214,7 @@ def predict_table(table: Cells, cell: Cell, model: Model) -> tuple[str, str]:
         left = measured.position - nominal_tcp(cell, measured.states) - predicted.error
         parts.append(left)
         header += RESIDUAL
-        summary += f"\nresidual {_tell(Spread.of(left))}"
+        summary += f"\nresidual {_tell(ErrorStatistics.of(left))}"
     numbers = np.concatenate(parts, axis=1) / MM
     row_of = {int(line): i for i, line in enumerate(measured.line)}
     out = io.StringIO()

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from postproc.accuracy.diagnosis.diagnose import Extension, diagnose, silent
 from postproc.accuracy.diagnosis.result import Diagnosis
 from postproc.accuracy.diagnosis.search import Progress
-from postproc.accuracy.fit_report import Spread
+from postproc.accuracy.error_statistics import ErrorStatistics
 from postproc.accuracy.measurement import Measurements, concatenate
 from postproc.accuracy.model import Model, load_model
 from postproc.accuracy.registration import register
@@ -162,7 +162,7 @@ def _constants(found: Diagnosis, number: int) -> str:
     return f"{f.effect}: " + (", ".join(clear[:8]) or "no parameter stands out")
 
 
-def _spread(spread: Spread) -> str:
+def _spread(spread: ErrorStatistics) -> str:
     return (
         f"mean {spread.mean_mm:.4f} mm, std {spread.std_mm:.4f}, 95 % "
         f"{spread.p95_mm:.4f}, max {spread.max_mm:.4f}"

@@ -12,6 +12,7 @@ from typing import TextIO
 import numpy as np
 from numpy.typing import NDArray
 
+from postproc.accuracy.error_statistics import ErrorStatistics
 from postproc.language.diagnostic import Diagnostic
 from postproc.language.visits import Motion, Visits
 from postproc.pose import MM
@@ -30,28 +31,6 @@ class Status(IntEnum):
     DISPLAY = 2  # the value is known only at run time
     GUARDED = 3  # the correction is not trusted: left alone
     UNCHANGED = 4  # nothing to correct, or not to be corrected
-
-
-@dataclass(frozen=True)
-class ErrorStatistics:
-    """Pose accuracy over a set of visits: distances between two points [mm]."""
-
-    mean_mm: float
-    std_mm: float
-    p95_mm: float
-    max_mm: float
-    n: int
-
-    @classmethod
-    def of(cls, error: Array) -> ErrorStatistics:
-        """Summarise error vectors (n, 3) [m]; NaN figures where there are none."""
-        size = np.linalg.norm(error, axis=1) / MM
-        if len(size) == 0:
-            return cls(np.nan, np.nan, np.nan, np.nan, 0)
-        p95 = float(np.percentile(size, 95))
-        return cls(
-            float(size.mean()), float(size.std()), p95, float(size.max()), len(size)
-        )
 
 
 @dataclass(frozen=True)

@@ -8,10 +8,10 @@ from pathlib import Path
 
 import numpy as np
 
+from postproc.accuracy.error_statistics import ErrorStatistics
 from postproc.jobs import find_variables, read_bytes
 from postproc.language.visits import Visits
 from postproc.planning import read_program
-from postproc.report import ErrorStatistics
 from postproc.robot.cell import Cell, load_cell
 from postproc.virtual import (
     DEFAULT,

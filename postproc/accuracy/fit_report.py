@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from postproc.accuracy.batch import Batch
+from postproc.accuracy.error_statistics import ErrorStatistics
 from postproc.accuracy.fit import Fit
 from postproc.accuracy.measurement import DroppedRow, Measurements
 from postproc.accuracy.model import Model
@@ -39,26 +40,6 @@ class ParameterRow:
 
 
 @dataclass(frozen=True)
-class Spread:
-    """Lengths of n error vectors [mm]."""
-
-    mean_mm: float
-    std_mm: float
-    p95_mm: float
-    max_mm: float
-    n: int
-
-    @classmethod
-    def of(cls, error: Array) -> Spread:
-        """Summarise errors (n, 3) [m]."""
-        e = np.linalg.norm(error, axis=1) / MM
-        if len(e) == 0:
-            return cls(np.nan, np.nan, np.nan, np.nan, 0)
-        p95 = float(np.percentile(e, 95))
-        return cls(float(e.mean()), float(e.std()), p95, float(e.max()), len(e))
-
-
-@dataclass(frozen=True)
 class FitReport:
     """Everything worth telling about a fit.
 
@@ -82,8 +63,8 @@ class FitReport:
     dropped: tuple[DroppedRow, ...]
     spared: tuple[str, ...]
     unseen: tuple[Unseen, ...]
-    before: Spread
-    after: Spread
+    before: ErrorStatistics
+    after: ErrorStatistics
     tracker_mm: float
     repeatability_mm: float
     effective: float
@@ -110,8 +91,8 @@ def report_fit(fit: Fit, survey: Measurements) -> FitReport:
         dropped=survey.dropped + weighed_down(fit, survey),
         spared=tuple(survey.ids[i] for i in np.flatnonzero(fit.rows.spared)),
         unseen=observe(X, fit.combination.names, floor=1.0).unseen,
-        before=Spread.of(fit.error[used]),
-        after=Spread.of(fit.residual[used]),
+        before=ErrorStatistics.of(fit.error[used]),
+        after=ErrorStatistics.of(fit.residual[used]),
         tracker_mm=float(tracker / MM),
         repeatability_mm=float(arrival / MM),
         effective=fit.effective,
@@ -130,8 +111,8 @@ def report_method(model: Model, survey: Measurements, arm: Arm) -> FitReport:
         dropped=survey.dropped,
         spared=(),
         unseen=(),
-        before=Spread.of(error),
-        after=Spread.of(left),
+        before=ErrorStatistics.of(error),
+        after=ErrorStatistics.of(left),
         tracker_mm=0.0,
         repeatability_mm=0.0,
         effective=float(len(model.values)),

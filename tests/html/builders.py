@@ -6,9 +6,10 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from postproc.accuracy.error_statistics import ErrorStatistics
 from postproc.language.diagnostic import Diagnostic
 from postproc.language.visits import Literals, Visits
-from postproc.report import Decisions, ErrorStatistics, Outcome, Status
+from postproc.report import Decisions, Outcome, Status
 
 REASONS = (
     "",

@@ -34,8 +34,9 @@ from postproc.accuracy.diagnosis.revision import (
 )
 from postproc.accuracy.diagnosis.search import Progress, Search, ranking, search
 from postproc.accuracy.effect import Array
+from postproc.accuracy.error_statistics import ErrorStatistics
 from postproc.accuracy.fit import Fit, fit_effects
-from postproc.accuracy.fit_report import Spread, weighed_down
+from postproc.accuracy.fit_report import weighed_down
 from postproc.accuracy.full import model_of
 from postproc.accuracy.measurement import Measurements
 from postproc.accuracy.model import Model
@@ -200,8 +201,8 @@ def _conclude(
         noise_floor_source=floor.source,
         n_fit=held_out.fitted,
         n_held_out=len(held_out.rows),
-        before=Spread.of(held_out.before),
-        after=Spread.of(held_out.after),
+        before=ErrorStatistics.of(held_out.before),
+        after=ErrorStatistics.of(held_out.after),
         vap_mm=None if before is None or after is None else (before / MM, after / MM),
         findings=traced.findings,
         leftovers=traced.leftovers,

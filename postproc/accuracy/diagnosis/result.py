@@ -8,7 +8,7 @@ from typing import Any, Literal
 
 from postproc.accuracy.diagnosis.omnibus import Leftover
 from postproc.accuracy.effect import Array
-from postproc.accuracy.fit_report import Spread
+from postproc.accuracy.error_statistics import ErrorStatistics
 from postproc.accuracy.measurement import DroppedRow
 
 Verdict = Literal["effect", "noise", "unexplained"]
@@ -105,8 +105,8 @@ class Diagnosis:
     noise_floor_source: str
     n_fit: int
     n_held_out: int
-    before: Spread
-    after: Spread
+    before: ErrorStatistics
+    after: ErrorStatistics
     vap_mm: tuple[float, float] | None
     findings: tuple[Finding, ...]
     leftovers: tuple[Leftover, ...]
@@ -155,7 +155,7 @@ class Diagnosis:
         return json.dumps(self.to_dict(), indent=1) + "\n"
 
 
-def statistics(spread: Spread) -> dict[str, float]:
+def statistics(spread: ErrorStatistics) -> dict[str, float]:
     """Return mean, standard deviation, 95th percentile and maximum [mm]."""
     return {
         "mean_mm": spread.mean_mm,

@@ -1,0 +1,34 @@
+"""Pose accuracy over many poses, in one line of figures."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from postproc.pose import MM
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class ErrorStatistics:
+    """Pose accuracy over a set of visits: distances between two points [mm]."""
+
+    mean_mm: float
+    std_mm: float
+    p95_mm: float
+    max_mm: float
+    n: int
+
+    @classmethod
+    def of(cls, error: Array) -> ErrorStatistics:
+        """Summarise error vectors (n, 3) [m]; NaN figures where there are none."""
+        size = np.linalg.norm(error, axis=1) / MM
+        if len(size) == 0:
+            return cls(np.nan, np.nan, np.nan, np.nan, 0)
+        p95 = float(np.percentile(size, 95))
+        return cls(
+            float(size.mean()), float(size.std()), p95, float(size.max()), len(size)
+        )
