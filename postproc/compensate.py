@@ -10,6 +10,7 @@ from types import MappingProxyType, ModuleType
 import numpy as np
 from numpy.typing import NDArray
 
+from postproc.accuracy.error_statistics import ErrorStatistics
 from postproc.accuracy.model import Model
 from postproc.clock import Clock, Progress, silent
 from postproc.exceptions import CellError, ProgramError
@@ -32,7 +33,7 @@ from postproc.planning import (
     states_of,
     with_measured_play,
 )
-from postproc.report import ErrorStatistics, Outcome
+from postproc.report import Outcome
 from postproc.robot.cell import Cell
 from postproc.robot.state import States
 from postproc.settling import Corrected, settle
