@@ -17,7 +17,7 @@ from postproc.accuracy.error_statistics import ErrorStatistics
 from postproc.accuracy.measurement import Measurements, concatenate
 from postproc.accuracy.model import Model, load_model
 from postproc.accuracy.registration import register
-from postproc.calibrate import read_surveys
+from postproc.calibrate import read_surveys, several_points
 from postproc.console import Column, table_text
 from postproc.joining import join_program
 from postproc.pose import inverse
@@ -77,10 +77,16 @@ def diagnose_files(
         survey = read_surveys(data, cell)
     else:
         survey = concatenate([join_program(path, program, cell) for path in data])
-    survey = in_base_frame(survey, cell, model, measured_frame)
+    tracker, setup = cell.tracker, several_points(survey)
+    if measured_frame == "uframe":
+        survey = from_user_frame(survey, cell)
+    elif measured_frame == "tracker":
+        survey, tracker = from_tracker_frame(survey, cell, model)
+        setup = ("registration",)
     found = diagnose(
-        survey, cell.arm, model, tracker=cell.tracker, seed=seed, progress=progress
-    )
+        survey, cell.arm, model, tracker=tracker, setup=setup, seed=seed,
+        progress=progress,
+    )  # fmt: skip
     found.model.save(output or extended_path(model_path))
     return found
 
@@ -90,25 +96,31 @@ def extended_path(model_path: Path) -> Path:
     return model_path.with_name(f"{model_path.stem}.extended.json")
 
 
-def in_base_frame(
-    survey: Measurements, cell: Cell, model: Model, frame: str
-) -> Measurements:
-    """Convert positions to the arm's base frame.
+def from_user_frame(survey: Measurements, cell: Cell) -> Measurements:
+    """Convert positions from the cell's user frame to the arm's base frame."""
+    T = inverse(cell.base.pose) @ cell.uframe.pose
+    return replace(survey, position=survey.position @ T[:3, :3].T + T[:3, 3])
 
-    Args:
-        survey: Measurements.
-        cell: Gives base and user frame.
-        model: Gives the arm's errors when the tracker must be registered first.
-        frame: "base", "uframe" or "tracker".
+
+def from_tracker_frame(
+    survey: Measurements, cell: Cell, model: Model
+) -> tuple[Measurements, Array]:
+    """Convert positions from the tracker's frame, found with the model's help.
+
+    A model that was fitted in the tracker's frame has probe points of its own, which
+    are then found again; else those of the cell hold.
+
+    Returns:
+        The measurements in the base frame, and where the tracker stands, (3,) [m].
     """
-    if frame == "base":
-        return survey
-    if frame == "uframe":
-        T = inverse(cell.base.pose) @ cell.uframe.pose
-        return replace(survey, position=survey.position @ T[:3, :3].T + T[:3, 3])
     effects, values, _ = model.compensable()
     placed = register(cell.arm, survey.states, survey.position, effects, values)
-    return replace(survey, position=placed.to_base(survey.position))
+    states = survey.states
+    if any(e.name == "registration" for e in model.effects.effects):
+        _, which = np.unique(states.tool_id, return_inverse=True)
+        states = states.with_(tool=placed.probes[which])
+    position = placed.to_base(survey.position)
+    return replace(survey, states=states, position=position), placed.tracker
 
 
 def tell(found: Diagnosis) -> str:

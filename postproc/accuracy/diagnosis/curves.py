@@ -14,7 +14,8 @@ from postproc.accuracy.diagnosis.named import JOINTS, carrying, known
 from postproc.accuracy.effect import Effect
 from postproc.accuracy.joint_map import JointMap
 
-KNOTS = (12, 24)  # bumps of a joint's map
+KNOTS = (12, 24, 48)  # bumps of a joint's map
+ROWS_PER_KNOT = 12
 PASSING = ("speed", "payload", "temperature", "time", "order")
 FRAMES = tuple(f"{frame} {axis}" for frame in ("base", "tool") for axis in "xyz")
 
@@ -58,6 +59,7 @@ def _maps(batch: Batch, joint: int) -> list[Candidate]:
     members: list[tuple[Effect, str]] = [
         (JointMap.over(joint, float(q.min()), float(q.max()), k), f"joint {joint}")
         for k in KNOTS
+        if k == KNOTS[0] or ROWS_PER_KNOT * k <= len(q)
     ]
     return shared(members, Family("joint_map", joint, None, FREE))
 

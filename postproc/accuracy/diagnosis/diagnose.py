@@ -38,6 +38,7 @@ from postproc.accuracy.error_statistics import ErrorStatistics
 from postproc.accuracy.fit import Fit, fit_effects
 from postproc.accuracy.fit_report import weighed_down
 from postproc.accuracy.full import model_of
+from postproc.accuracy.library import propose
 from postproc.accuracy.measurement import Measurements
 from postproc.accuracy.model import Model
 from postproc.exceptions import PostprocError
@@ -107,6 +108,7 @@ def diagnose(
     model: Model,
     *,
     tracker: Array | None = None,
+    setup: tuple[str, ...] = (),
     seed: int = 0,
     progress: Progress = silent,
 ) -> Extension:
@@ -121,6 +123,7 @@ def diagnose(
         arm: The arm.
         model: The model, made by the full method.
         tracker: Tracker position in the base frame, (3,) [m], if known.
+        setup: Names of effects of these measurements' set-up, fitted besides.
         seed: Of the bootstrap, the folds and the poses proposed.
         progress: Told what is being done.
 
@@ -128,7 +131,7 @@ def diagnose(
         PostprocError: A model that cannot be refitted.
         ModelError: A model of another arm.
     """
-    base = refit(survey, arm, model, tracker)
+    base = refit(survey, arm, model, tracker, setup)
     traced = trace(base, seed, progress)
     given = None
     if model.data_sha256 != survey.sha256:
@@ -153,7 +156,13 @@ def trace(base: Fit, seed: int, progress: Progress = silent) -> Trace:
     return Trace(found, standings, left)
 
 
-def refit(survey: Measurements, arm: Arm, model: Model, tracker: Array | None) -> Fit:
+def refit(
+    survey: Measurements,
+    arm: Arm,
+    model: Model,
+    tracker: Array | None,
+    setup: tuple[str, ...] = (),
+) -> Fit:
     """Fit the given model's effects to the rows, or revise it where they are few.
 
     Raises:
@@ -175,10 +184,12 @@ def refit(survey: Measurements, arm: Arm, model: Model, tracker: Array | None) -
     batch = Batch(arm, survey.states)
     effects = model.effects.effects
     if model.data_sha256 != survey.sha256:
-        if few(survey, model):
-            return revise(survey, model, batch, origin)
         effects = only_arm(model).effects.effects
-    return fit_effects(batch, survey.position, effects, origin)
+    missing = [name for name in setup if name not in {e.name for e in effects}]
+    placed = propose(missing, arm, survey.states)
+    if model.data_sha256 != survey.sha256 and few(survey, model):
+        return revise(survey, model, batch, origin, placed)
+    return fit_effects(batch, survey.position, (*effects, *placed), origin)
 
 
 def _conclude(

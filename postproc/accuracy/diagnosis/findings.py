@@ -14,6 +14,9 @@ from postproc.accuracy.fit_report import SHOWN_UNITS
 from postproc.pose import MM
 
 
+SPOT = 9  # bumps: more are a map of the whole joint, with no one place
+
+
 def describe(found: Search, standings: Sequence[Standing]) -> tuple[Finding, ...]:
     """Describe every addition of a search."""
     shares = _shares(found)
@@ -80,7 +83,7 @@ def nonlinear(effect: Effect) -> dict[str, tuple[float, str]]:
     }
     if "waves" in settings:
         out["order"] = (float(settings["waves"][0][1]), "1/turn")
-    if "bumps" in settings:
+    if 0 < len(settings.get("bumps", ())) <= SPOT:
         places = np.degrees([centre for _, centre in settings["bumps"]])
         out["centre"] = (float(places.mean()), "deg")
         out["width"] = (float(np.degrees(settings["width"])), "deg")

@@ -80,11 +80,17 @@ def few(survey: Measurements, model: Model) -> bool:
     return len(survey) < ROWS_PER_PARAMETER * len(model.values)
 
 
-def revise(survey: Measurements, model: Model, batch: Batch, origin: Any) -> Fit:
-    """Fit what a model leaves of a few rows, its own uncertainty as the only effect."""
+def revise(
+    survey: Measurements,
+    model: Model,
+    batch: Batch,
+    origin: tuple[float, float, float] | None,
+    setup: tuple[Effect, ...] = (),
+) -> Fit:
+    """Fit what a model leaves of a few rows, with its own uncertainty as an effect."""
     known = only_arm(model)
     left = survey.position - known.effects.error(batch, known.values)
-    return fit_effects(batch, left, (Revision.of(known),), origin)
+    return fit_effects(batch, left, (Revision.of(known), *setup), origin)
 
 
 def fold_back(fit: Fit) -> Fit:

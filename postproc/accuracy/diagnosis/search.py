@@ -18,7 +18,7 @@ from postproc.accuracy.diagnosis.score import Score, rank
 from postproc.accuracy.effect import Effect, JointEffect
 from postproc.accuracy.fit import Fit, fit_effects
 
-MOST = 6  # additions
+MOST = 10  # additions
 LEVEL = 0.01  # probability of a false addition, whole library
 ALONE = 0.01  # level of the score test of the candidate itself
 CLEARLY = (8.0, 0.1)  # nats, and share of the name's evidence, that a free form
