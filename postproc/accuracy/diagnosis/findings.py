@@ -13,7 +13,6 @@ from postproc.accuracy.effect import Array, Effect
 from postproc.accuracy.fit_report import SHOWN_UNITS
 from postproc.pose import MM
 
-
 SPOT = 9  # bumps: more are a map of the whole joint, with no one place
 
 
