@@ -92,7 +92,16 @@ def test_same_bytes_as_here_although_a_worker_is_killed(
     assert there.rows() == local.rows()
 
 
-def test_nobody_answers(job_folder, monkeypatch):
+@pytest.mark.parametrize(
+    ("address", "why"),
+    [("tcp://127.0.0.1:9", "workers answers"), ("tls://127.0.0.1:9", "--tls")],
+)
+def test_nobody_answers(address, why, monkeypatch):
     monkeypatch.setattr("postproc.batch.cluster.CONNECT", 0.2)
-    with pytest.raises(PostprocError, match="no scheduler with workers answers"):
-        ClusterCrew((), "tcp://127.0.0.1:9")
+    with pytest.raises(PostprocError, match=why):
+        ClusterCrew((), address)
+
+
+def test_certificates_that_are_not_there(tmp_path):
+    with pytest.raises(PostprocError, match="No such file"):
+        ClusterCrew((), "tls://127.0.0.1:9", tmp_path)

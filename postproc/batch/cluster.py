@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from importlib.util import find_spec
 from pathlib import Path
 from time import monotonic
+from typing import Any
 
 from postproc import __version__
 from postproc.batch.crew import Working
@@ -47,27 +48,15 @@ class ClusterCrew:
         """
         if find_spec("distributed") is None:
             raise PostprocError("--scheduler needs: pip install 'postproc[cluster]'")
-        from distributed import Client, KilledWorker
-        from distributed.security import Security
+        from distributed import KilledWorker
 
         self.losses = (KilledWorker,)
-        security = Security()
-        if tls is not None:
-            security = Security(
-                tls_ca_file=str(tls / "ca.pem"),
-                tls_client_cert=str(tls / "cert.pem"),
-                tls_client_key=str(tls / "key.pem"),
-                require_encryption=True,
-            )
         try:
-            self._client = Client(
-                address, timeout=CONNECT, security=security, set_as_default=False
-            )
-            self._client.wait_for_workers(1, timeout=CONNECT)
+            self._client = _connect(address, tls)
         except (OSError, ValueError, RuntimeError) as exc:
             raise PostprocError(
                 f"{address}: no scheduler with workers answers ({exc}). Start them "
-                "with: dask scheduler; dask worker " + address
+                f"with: dask scheduler; dask worker {address}"
             ) from None
         self._pool = self._client.get_executor(pure=False)
         # As results of tasks, they are made again when the worker that has them is
@@ -98,6 +87,39 @@ class ClusterCrew:
         """Take back what is not done, and leave the cluster as it was."""
         self._pool.shutdown(wait=False)
         self._client.close(timeout=CONNECT)
+
+
+def _connect(address: str, tls: Path | None) -> Any:
+    """Connect to a scheduler, and wait for its first worker.
+
+    Raises:
+        OSError, ValueError, RuntimeError: Nobody answers, or a certificate is missing.
+    """
+    from distributed import Client
+    from distributed.security import Security
+
+    class OwnClient(Client):  # type: ignore[misc]
+        """A client that only we close: one that never connected hangs over it."""
+
+        def __del__(self) -> None:
+            """Leave it."""
+
+    security = Security()
+    if tls is not None:
+        security = Security(
+            tls_ca_file=str(tls / "ca.pem"),
+            tls_client_cert=str(tls / "cert.pem"),
+            tls_client_key=str(tls / "key.pem"),
+            require_encryption=True,
+        )
+    context = security.get_connection_args("client").get("ssl_context")
+    if address.startswith("tls:") and context is None:
+        raise ValueError("tls:// needs certificates: give their folder with --tls")
+    client = OwnClient(
+        address, timeout=CONNECT, security=security, set_as_default=False
+    )
+    client.wait_for_workers(1, timeout=CONNECT)
+    return client
 
 
 def _keep(setup: Setup) -> Setup:
