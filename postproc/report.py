@@ -148,7 +148,7 @@ def write_report(outcome: Outcome, out: TextIO) -> None:
         "diagnostics": [asdict(d) for d in outcome.diagnostics],
         "stages_s": dict(outcome.stages),
     }
-    text = json.dumps(_finite(tail))
+    text = json.dumps(finite(tail))
     out.write("],\n" + text[1:] + "\n")
 
 
@@ -189,10 +189,10 @@ def _numbers(values: Array, digits: int = 9) -> list[float | None]:
     return [round(float(v), digits) if np.isfinite(v) else None for v in values]
 
 
-def _finite(value: object) -> object:
+def finite(value: object) -> object:
     """Replace NaN, which JSON does not have, by null."""
     if isinstance(value, dict):
-        return {k: _finite(v) for k, v in value.items()}
+        return {k: finite(v) for k, v in value.items()}
     if isinstance(value, list):
-        return [_finite(v) for v in value]
+        return [finite(v) for v in value]
     return None if isinstance(value, float) and not np.isfinite(value) else value

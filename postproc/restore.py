@@ -80,17 +80,27 @@ def restore_file(compensated: Path, output: Path | None = None) -> list[Path]:
     record = read_sidecar(sidecar_path(compensated))
     target = output or compensated
     restored: dict[Path, bytes] = {}
+    if output is not None and compensated.name not in record.files:
+        restored[output] = read_bytes(compensated)  # only its values were changed
     for name, file in record.files.items():
         source = compensated.with_name(Path(name).name)
         place = source
         if output is not None:
             place = target.with_name(target.stem + source.suffix)
             place = target if source == compensated else place
-        try:
-            restored[place] = restore(source.read_bytes(), file, str(source))
-        except OSError as exc:
-            raise ProgramError(
-                source, f"cannot be read ({exc.strerror})", "Put it beside the program"
-            ) from None
+        restored[place] = restore(read_bytes(source), file, str(source))
     write_all(restored)
     return list(restored)
+
+
+def read_bytes(path: Path) -> bytes:
+    """Read a file that a record speaks of.
+
+    Raises:
+        ProgramError: It cannot be read.
+    """
+    try:
+        return path.read_bytes()
+    except OSError as exc:
+        problem = f"cannot be read ({exc.strerror})"
+        raise ProgramError(path, problem, "Put it beside its record") from None

@@ -12,6 +12,7 @@ from postproc.accuracy.error_statistics import ErrorStatistics
 from postproc.jobs import find_variables, read_bytes
 from postproc.language.visits import Visits
 from postproc.planning import read_program
+from postproc.report import finite
 from postproc.robot.cell import Cell, load_cell
 from postproc.virtual import (
     DEFAULT,
@@ -55,13 +56,15 @@ class Simulation:
     def to_json(self) -> str:
         """Return the true error as JSON text."""
         error = None if self.true_error is None else asdict(self.true_error)
-        return json.dumps({"program": self.name, "true_error": error}) + "\n"
+        return json.dumps(finite({"program": self.name, "true_error": error})) + "\n"
 
     def summary(self) -> str:
         """Say in one line what was measured or missed."""
         if self.true_error is None:
             return f"{self.name}: {len(self.campaign)} measurements"
         e = self.true_error
+        if e.n == 0:
+            return f"{self.name}: no target of it is known, so no error either"
         return (
             f"{self.name}: true error mean {e.mean_mm:.4f} mm, std {e.std_mm:.4f}, "
             f"95 % {e.p95_mm:.4f}, max {e.max_mm:.4f} over {e.n} visits"

@@ -69,7 +69,7 @@ def main_edges(targets: Targets, traced: Trace) -> tuple[Ints, Ints]:
     edge, source = np.full(n, -1), np.full(n, -1)
     visit = np.repeat(np.arange(n), np.diff(targets.pred_start))
     known = ~np.isnan(traced.q[:, 0])
-    usable = (edges.source >= 0) & known[edges.source] & known[visit]
+    usable = (edges.source >= 0) & known[np.maximum(edges.source, 0)] & known[visit]
     rows = np.flatnonzero(usable)[::-1]
     edge[visit[rows]], source[visit[rows]] = rows, edges.source[rows]
     return edge, source

@@ -62,11 +62,12 @@ def sample(targets: Targets, flange: Array) -> Samples:
     """
     visit = np.repeat(np.arange(len(targets)), np.diff(targets.pred_start))
     source = np.array(targets.pred)
+    at = np.maximum(source, 0)  # no visit: looked up, and never used
     cartesian = targets.move[visit] != Move.JOINT
     known = ~np.isnan(flange[:, 0, 0])
     tool_known = ~np.isnan(targets.tool[:, 0, 0])
     ready = cartesian & (source >= 0) & known[visit] & tool_known[visit]
-    ready &= known[source] & ~targets.wrist_joint[visit]
+    ready &= known[at] & ~targets.wrist_joint[visit]
     straight = np.flatnonzero(ready & (targets.move[visit] == Move.LINEAR))
     begin = flange[source[straight]] @ targets.tool[visit[straight]]
     end = flange[visit[straight]] @ targets.tool[visit[straight]]
@@ -77,7 +78,7 @@ def sample(targets: Targets, flange: Array) -> Samples:
     ready = np.zeros(len(visit), dtype=bool)
     ready[edge] = segments.valid
     passing = targets.fly | targets.via
-    free = passing[visit] | ((source >= 0) & passing[source])
+    free = passing[visit] | ((source >= 0) & passing[at])
     count = np.where(cartesian & (source >= 0) & ~ready & ~broken, BLIND, 1)
     count[edge] = segments.intervals(np.where(free[edge], 1, LEAST))
     count[broken] = 1
@@ -129,9 +130,9 @@ def _arcs(
     via = flange[visit[first]] @ targets.tool[visit[first]]
     end = flange[visit[first] + 1] @ targets.tool[visit[first]]
     to, after = arcs(begin, via, end)
-    row = np.full(n, -1)
+    row, at = np.full(n, -1), np.maximum(source, 0)
     row[visit[first][::-1]] = np.arange(len(first))[::-1]
-    second = np.flatnonzero(arc & ~targets.via[visit] & (row[source] >= 0))
+    second = np.flatnonzero(arc & ~targets.via[visit] & (row[at] >= 0))
     second = second[source[second] == visit[second] - 1]
     used = row[source[second]]
     picked = Segments(

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from postproc.motion.planner import directions
+from postproc.motion.planner import directions, plan
 from postproc.motion.reasons import (
     AMBIGUOUS,
     LIMITS,
@@ -377,3 +377,22 @@ def test_windows_change_nothing(
     np.testing.assert_array_equal(whole.q, cut.q)
     np.testing.assert_array_equal(whole.edges.path, cut.edges.path)
     np.testing.assert_array_equal(whole.reason, cut.reason)
+
+
+@pytest.mark.parametrize("move", [Move.JOINT, Move.LINEAR])
+@pytest.mark.parametrize("before", [-1, -2])
+def test_a_lone_move_from_anywhere(
+    arm: Arm, tool: np.ndarray, home: np.ndarray, move: Move, before: int
+) -> None:
+    targets = make_targets(
+        np.array([Kind.POSE]),
+        move=np.array([move]),
+        tcp=(arm.flange(home[None])[0] @ tool)[None],
+        tool=tool[None],
+        slot=np.array([0]),
+        pred_start=np.array([0, 1]),
+        pred=np.array([before]),
+    )
+    found = plan(arm, targets, np.deg2rad(3.0))
+    np.testing.assert_allclose(found.q[0, :3], home[:3], atol=1e-9)
+    assert (found.direction == 0).all()
