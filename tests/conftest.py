@@ -63,7 +63,10 @@ def make_job(folder: Path) -> Path:
     arm = virtual_arm(SEED)
     campaign = measure_rows(arm, setup_of(cell), read_rows(rows))
     write_measurements(campaign, folder / "survey.csv")
-    fit([folder / "survey.csv"], cell).model.save(folder / "model.json")
+    effects = ("geometry", "backlash")  # all that this arm has: a search takes long
+    fit([folder / "survey.csv"], cell, effects=effects).model.save(
+        folder / "model.json"
+    )
     return folder
 
 
@@ -79,3 +82,11 @@ def job_model(job_folder):
     from postproc.accuracy.model import load_model
 
     return load_model(job_folder / "model.json")
+
+
+@pytest.fixture
+def desk(job_folder, tmp_path):
+    """An empty folder to work in, with the cell and the model of the job folder."""
+    from tests.written import Desk
+
+    return Desk(tmp_path, job_folder / "cell.toml", job_folder / "model.json")

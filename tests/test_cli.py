@@ -1,0 +1,265 @@
+"""Every command: exit codes, what goes to which stream, which files appear."""
+
+from __future__ import annotations
+
+import json
+import re
+
+import pytest
+
+from postproc import __version__
+from postproc.cli import app
+from postproc.language.source import source_from_bytes
+from tests.written import FIRST, LISTED, NEXT, POSE, cli, entry, program
+
+COMMANDS = (
+    "compensate", "diff", "restore", "explain", "survey", "simulate", "fit", "predict",
+    "diagnose", "compare", "batch", "check", "report", "history",
+)  # fmt: skip
+UNREACHED = "MOVE LINEAR TO POS(9000.0, 0.0, 0.0, 0.0, 175.0, 0.0, '')"
+STAMP = rb"-- postproc \S+ model=[0-9a-f]{16} source=[0-9a-f]{64}"
+
+
+def test_every_command_of_the_interface_is_there():
+    names = {c.name or c.callback.__name__ for c in app.registered_commands}
+    assert set(COMMANDS) <= names
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_every_command_explains_itself(command):
+    found = cli(command, "--help")
+    assert found.exit_code == 0 and "Usage:" in found.stdout
+
+
+def test_version():
+    assert cli("--version").stdout == f"postproc {__version__}\n"
+
+
+def test_unknown_command_and_missing_option_end_with_2():
+    assert cli("compensat").exit_code == 2
+    found = cli("compensate", "job.pdl")
+    assert found.exit_code == 2 and "--cell" in found.stderr
+
+
+def test_default_output_lies_beside_the_program_and_is_restorable(desk):
+    source = desk.put("job.pdl", program(FIRST, POSE, NEXT))
+    found = desk.compensate(source)
+    assert found.exit_code == 0 and found.stdout == ""
+    out = desk.folder / "job.compensated.pdl"
+    assert desk.names() == {"job.pdl", out.name, out.name + ".postproc.json"}
+    assert source.read_bytes() == program(FIRST, POSE, NEXT)
+    assert cli("restore", out).exit_code == 0
+    assert out.read_bytes() == source.read_bytes()
+
+
+def test_stamp_is_one_line_in_the_files_own_ending(desk):
+    for name, ending in (("crlf.pdl", b"\r\n"), ("lf.pdl", b"\n")):
+        source = desk.put(name, program(FIRST, POSE).replace(b"\r\n", ending))
+        out = desk.folder / "out.pdl"
+        desk.compensate(source, "-o", out)
+        first, rest = out.read_bytes().split(ending, 1)
+        assert re.fullmatch(STAMP, first)
+        assert rest.count(b"\n") == source.read_bytes().count(b"\n")
+        assert rest.split(ending)[:4] == source.read_bytes().split(ending)[:4]
+
+
+def test_stdin_to_stdout_is_byte_clean_and_equals_the_file_form(desk):
+    source = desk.put("job.pdl", program(FIRST, POSE, NEXT))
+    desk.compensate(source, "-o", desk.folder / "out.pdl")
+    found = desk.compensate("-", stdin=source.read_bytes())
+    assert found.exit_code == 0
+    assert found.stdout_bytes == (desk.folder / "out.pdl").read_bytes()
+    assert "stdin.pdl: 3 visits" in found.stderr
+    assert desk.names() == {"job.pdl", "out.pdl", "out.pdl.postproc.json"}
+
+
+def test_stdin_that_fails_writes_nothing_to_stdout(desk):
+    for data, options in ((b"", ()), (program(FIRST, UNREACHED), ("--strict",))):
+        found = desk.compensate("-", *options, stdin=data)
+        assert found.exit_code == 2
+        assert found.stdout_bytes == b"" and found.stderr
+
+
+def test_stdin_to_a_named_output(desk):
+    out = desk.folder / "out.pdl"
+    found = desk.compensate("-", "-o", out, stdin=program(FIRST, POSE))
+    assert found.exit_code == 0 and found.stdout_bytes == b""
+    assert cli("restore", out).exit_code == 0
+    assert out.read_bytes() == program(FIRST, POSE)
+
+
+def test_a_target_left_alone_is_exit_1_and_listed(desk):
+    source = desk.put("job.pdl", program(FIRST, UNREACHED, POSE))
+    found = desk.compensate(source, "-o", desk.folder / "out.pdl")
+    assert found.exit_code == 1
+    assert re.search(r"job\.pdl:6: guarded: out of reach: check", found.stderr)
+    assert UNREACHED.encode() in (desk.folder / "out.pdl").read_bytes()
+
+
+def test_strict_turns_1_into_2_and_writes_nothing(desk):
+    source = desk.put("job.pdl", program(FIRST, UNREACHED))
+    out = desk.folder / "out.pdl"
+    found = desk.compensate(
+        source, "-o", out, "--strict", "--report", desk.folder / "r"
+    )
+    assert found.exit_code == 2
+    assert "job.pdl:6" in found.stderr and "--strict" in found.stderr
+    assert desk.names() == {"job.pdl"}
+    done = desk.put("fine.pdl", program(FIRST, POSE))
+    assert desk.compensate(done, "-o", out, "--strict").exit_code == 0
+
+
+def test_report_has_one_row_a_visit_in_program_order(desk):
+    lines = (
+        FIRST,
+        "p := POS(120.0, 200.0, 150.0, 0.0, 175.0, 0.0, '')",
+        "MOVE LINEAR TO p",
+        "MOVE CIRCULAR TO POS(200.0, 200.0, 150.0, 0.0, 175.0, 0.0, '') "
+        "VIA POS(160.0, 240.0, 150.0, 0.0, 175.0, 0.0, '')",
+        "MOVE TO $HOME",
+        "MOVE LINEAR TO p",
+    )
+    report = desk.report(desk.put("job.pdl", program(*lines)))
+    rows = report["targets"]
+    assert [r["line"] for r in rows] == [5, 7, 8, 8, 9, 10]
+    assert [r["move"] for r in rows] == [
+        "JOINT", "LINEAR", "VIA", "CIRCULAR", "JOINT", "LINEAR",
+    ]  # fmt: skip
+    assert rows[1]["literal"] == {"file": "job.pdl", "line": 6}
+    assert rows[1]["name"].lower() == "p" and rows[0]["name"] is None
+    assert rows[4]["status"] == "unchanged" and rows[4]["literal"] is None
+    assert {r["status"] for r in rows} <= {
+        "safe", "unsafe", "display", "guarded", "unchanged",
+    }  # fmt: skip
+    for row in rows:
+        assert len(row["q_deg"]) == len(row["lambda"]) == 6
+        assert set(row["lambda"]) <= {-1, 0, 1}
+        assert len(row["correction_mm"]) == len(row["std_error_mm"]) == 3
+
+
+def test_report_numbers_are_those_in_the_files(desk):
+    source = desk.put("job.pdl", program(FIRST, POSE, NEXT))
+    out = desk.folder / "out.pdl"
+    report = desk.report(source, "-o", out)
+    lines = out.read_bytes().decode("latin-1").split("\r\n")
+    for row in report["targets"]:
+        written = lines[row["literal"]["line"]].split("--")[0]  # the stamp comes first
+        numbers = [float(n) for n in re.findall(r"-?\d+\.\d+", written)]
+        assert numbers[:6] == pytest.approx(row["corrected"], abs=1e-9)
+        moved = [b - a for a, b in zip(row["original"], row["corrected"], strict=True)]
+        if row["move"] == "LINEAR":  # the user frame of this cell is not turned
+            assert moved[:3] == pytest.approx(row["correction_mm"], abs=6e-4)
+            assert moved[3:] == [0.0, 0.0, 0.0]
+
+
+def test_report_to_stdout_only_where_the_program_is_not(desk):
+    source = desk.put("job.pdl", program(FIRST, POSE))
+    found = desk.compensate(source, "--report", "-")
+    assert json.loads(found.stdout)["program"] == "job.pdl"
+    piped = desk.compensate("-", "--report", "-", stdin=source.read_bytes())
+    assert piped.exit_code == 2 and "stdout holds the program" in piped.stderr
+
+
+def test_same_input_same_bytes(desk):
+    source = desk.put("job.pdl", program(FIRST, POSE, NEXT))
+    for name in ("a", "b"):
+        (desk.folder / name).mkdir()
+        desk.compensate(source, "-o", desk.folder / name / "job.pdl")
+    for name in ("job.pdl", "job.pdl.postproc.json"):
+        a, b = (desk.folder / x / name for x in "ab")
+        assert a.read_bytes() == b.read_bytes()
+
+
+def test_values_are_written_and_the_program_stays_byte_identical(desk):
+    source = desk.put(
+        "job.pdl",
+        program("MOVE JOINT TO $HOME", "MOVE JOINT TO A_1", "MOVE LINEAR TO b",
+                declared="a_1, b : XTNDPOS"),
+    )  # fmt: skip
+    values = desk.put("JOB.LSV", LISTED + entry("a_1") + entry("B", 130.0))
+    (desk.folder / "out").mkdir()
+    out = desk.folder / "out" / "job.pdl"
+    found = desk.compensate(source, "-o", out)
+    assert found.exit_code == 0, found.stderr
+    assert out.read_bytes() == source.read_bytes()
+    assert re.match(STAMP + b"\r\n", out.with_suffix(".lsv").read_bytes())
+    assert "2 decimals" in found.stderr
+    again = cli("restore", out, "-o", desk.folder / "back.pdl")
+    assert again.exit_code == 0, again.stderr
+    assert (desk.folder / "back.pdl").read_bytes() == source.read_bytes()
+    assert (desk.folder / "back.lsv").read_bytes() == values.read_bytes()
+    assert desk.compensate(out, "-o", desk.folder / "again.pdl").exit_code == 2
+
+
+def test_values_of_a_piped_program_get_a_file_of_their_own(desk):
+    source = program(FIRST, "MOVE LINEAR TO a", declared="a : XTNDPOS")
+    values = desk.put("job.lsv", LISTED + entry("a"))
+    found = desk.compensate("-", "--lsv", values, stdin=source)
+    assert found.exit_code == 0
+    out = desk.folder / "job.compensated.lsv"
+    assert out.read_bytes().startswith(b"-- postproc")
+    assert cli("restore", out).exit_code == 0
+    assert out.read_bytes() == values.read_bytes()
+
+
+def test_restore_refuses_what_was_edited_since_and_says_where(desk):
+    source = desk.put("job.pdl", program(FIRST, POSE))
+    out = desk.folder / "out.pdl"
+    desk.compensate(source, "-o", out)
+    edited = out.read_bytes().replace(b"VAR", b"VAr")
+    out.write_bytes(edited)
+    found = cli("restore", out)
+    assert found.exit_code == 2 and "out.pdl:1: was changed" in found.stderr
+    assert out.read_bytes() == edited
+
+
+def test_restore_without_a_record(desk):
+    found = cli("restore", desk.put("job.pdl", program(FIRST)))
+    assert found.exit_code == 2 and "record" in found.stderr
+
+
+def test_cloning_is_refused_rather_than_not_done(desk):
+    found = desk.compensate(desk.put("job.pdl", program(FIRST)), "--clone")
+    assert found.exit_code == 2 and "--clone" in found.stderr
+    assert desk.names() == {"job.pdl"}
+
+
+def test_temperature_outside_the_survey_is_guarded(desk):
+    found = desk.compensate(
+        desk.put("job.pdl", program(FIRST)), "--temperature", "75", "-o",
+        desk.folder / "o.pdl",
+    )  # fmt: skip
+    warm = re.search(r"job\.pdl:5: guarded: .*temperature", found.stderr)
+    assert found.exit_code == 1 and warm or found.exit_code == 0
+
+
+def test_survey_simulate_fit_predict(desk, tmp_path):
+    survey, rows = tmp_path / "s.pdl", tmp_path / "s.csv"
+    cell = ("--cell", desk.cell)
+    assert cli("survey", *cell, "--poses", "40", "-o", survey).exit_code == 0
+    source_from_bytes("s.pdl", survey.read_bytes())
+    assert cli("simulate", survey, *cell, "--seed", "2", "-o", rows).exit_code == 0
+    assert len(rows.read_text().splitlines()) == 1 + 2 * 40
+    found = cli("fit", rows, *cell, "-o", tmp_path / "m.json", "--effects",
+                "geometry,backlash")  # fmt: skip
+    assert found.exit_code == 0 and "geometry.a2" in found.stdout
+    predicted = cli("predict", rows, *cell, "--model", tmp_path / "m.json")
+    assert predicted.exit_code == 0
+    header, first = predicted.stdout.splitlines()[:2]
+    assert {"dx_mm", "sy_mm", "rz_mm"} <= set(header.split(","))
+    assert first.split(",")[0] == rows.read_text().splitlines()[1].split(",")[0]
+    assert "residual mean" in predicted.stderr
+
+
+def test_simulate_tells_the_true_error_as_json(desk):
+    source = desk.put("job.pdl", program(FIRST, POSE))
+    found = cli("simulate", source, "--cell", desk.cell, "--wanted", source,
+                "--json", "-")  # fmt: skip
+    error = json.loads(found.stdout)["true_error"]
+    assert found.exit_code == 0 and error["n"] == 2 and error["mean_mm"] > 0.2
+
+
+def test_messages_show_control_characters_escaped(desk):
+    source = program("glob \x1b[31m red", POSE)
+    found = desk.compensate(desk.put("job.pdl", source), "-o", desk.folder / "o.pdl")
+    assert "\x1b" not in found.stderr and "\\x1b" in found.stderr
