@@ -1,0 +1,445 @@
+"""Bad input: exit 2 or a listed target; file, line, cure; nothing half written."""
+
+from __future__ import annotations
+
+import csv
+import errno
+import json
+import os
+import re
+
+import pytest
+
+from tests.written import FIRST, LISTED, NEXT, POSE, cli, entry, program
+
+LOOSE = "MOVE JOINT TO POS(100.0, 200.0, 150.0, 0.0, 175.0, 0.0, 'S E W')"
+
+
+def refused(found, said):
+    """Check that a command ended with 2 and one message, and printed no result."""
+    assert found.exit_code == 2, found.stderr
+    assert re.search(said, found.stderr), found.stderr
+    assert "Traceback" not in found.stderr and found.stdout == ""
+
+
+@pytest.mark.parametrize(
+    ("data", "said"),
+    [
+        (b"", r"job\.pdl: the file is empty\. Give"),
+        (b" \r\n\r\n", r"job\.pdl: the file is empty"),
+        (bytes(range(256)) * 9, r"job\.pdl:1: the file is binary .*compiled"),
+        ("PROGRAM x\nBEGIN\nEND x".encode("utf-16"), r"job\.pdl:1: .*8-bit"),
+        (
+            program(FIRST, "s := 'abc", POSE),
+            r"job\.pdl:6: a string is not .*Close",
+        ),
+        (program("MOVE LINEAR TO POS(1, 2, 3, 4, 5, 6, '"), r"job\.pdl:5: a string"),
+    ],
+    ids=["empty", "blank", "binary", "utf-16", "string", "configuration"],
+)
+def test_a_file_that_is_no_program_text(desk, data, said):
+    refused(desk.compensate(desk.put("job.pdl", data)), said)
+    assert desk.names() == {"job.pdl"}
+    refused(desk.compensate("-", stdin=data), said.replace("job", "stdin"))
+
+
+@pytest.mark.parametrize(
+    ("place", "said"),
+    [
+        ("none.pdl", r"none\.pdl: cannot be read \(No such file.* Check"),
+        (".", "direct"),
+    ],
+)
+def test_a_program_that_cannot_be_read(desk, place, said):
+    refused(desk.compensate(desk.folder / place), said)
+
+
+def test_an_unknown_statement_is_kept_and_reported(desk):
+    source = desk.put("job.pdl", program(FIRST, "frobnicate  the 3,gripper ;", POSE))
+    out = desk.folder / "out.pdl"
+    found = desk.compensate(source, "-o", out)
+    assert re.search(r"job\.pdl:6: unknown-statement: .*frobnicate", found.stderr)
+    assert b"  frobnicate  the 3,gripper ;\r\n" in out.read_bytes()
+    assert b"frobnicate" in out.read_bytes() and POSE.encode() not in out.read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("line", "said"),
+    [
+        (
+            "MOVE LINEAR TO POS(9000.0, 0.0, 0.0, 0.0, 175.0, 0.0, '')",
+            "out of reach: ",
+        ),
+        (
+            "MOVE JOINT TO {5.0, 10.0, -95.0, 20.0, 125.5, 30.0}",
+            "axis 5 beyond its l",
+        ),
+        (
+            "MOVE JOINT TO {5.0, 10.0, -95.0, 20.0, 0.5, 30.0}",
+            "wrist singularity",
+        ),
+        (LOOSE, "axis [23] beyond its limit|no solution for the config"),
+    ],
+    ids=["reach", "limit", "wrist", "configuration"],
+)
+def test_a_target_that_must_not_move_keeps_its_value_and_is_listed(desk, line, said):
+    out = desk.folder / "out.pdl"
+    found = desk.compensate(desk.put("job.pdl", program(FIRST, line, POSE)), "-o", out)
+    assert found.exit_code == 1
+    assert re.search(rf"job\.pdl:6: guarded: .*({said})", found.stderr), found.stderr
+    assert line.encode() in out.read_bytes()
+
+
+def test_a_target_so_near_its_limit_that_the_correction_passes_it(desk, job_cell):
+    top = float(job_cell.arm.upper[4] * 57.29577951308232)
+    edge = "MOVE JOINT TO {5.0, 10.0, -95.0, 20.0, %.5f, 30.0}"
+    lines = [edge % (top - 1e-5), edge % -(top - 1e-5)]
+    report = desk.report(desk.put("job.pdl", program(FIRST, *lines)))
+    for row in report["targets"][1:]:
+        assert abs(row["corrected"][4]) <= top
+        if row["status"] != "safe":
+            assert row["corrected"] == row["original"]
+            assert "axis 5" in row["why"] or "survey" in row["why"]
+
+
+def test_an_unknown_frame_at_a_move_is_named_with_the_cure(desk):
+    lines = (
+        FIRST,
+        "$UFRAME := vision(3)",
+        POSE,
+        "$UFRAME := POS(1600,-300,900,0,0,0,'')",
+    )
+    found = desk.compensate(desk.put("job.pdl", program(*lines, NEXT)))
+    assert found.exit_code == 1
+    assert re.search(
+        r"job\.pdl:7: (display|guarded): \$UFRAME is not known", found.stderr
+    )
+    assert "[frames.routines.vision]" in found.stderr
+    assert not re.search(r"job\.pdl:9: (display|guarded)", found.stderr)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("xyz_mm = [80", "xyz_m = [80", r"unknown key @ \$\.tool\.xyz_m\. .*xyz_mm"),
+        ("joints_deg", "joints_rad", r"unknown key @ \$\.home\.joints_rad\. .*_deg"),
+        (
+            "[80.0, -40.0, 150.0]\n[u",
+            "[80.0, -40.0]\n[u",
+            r"3 items.* @ \$\.tool\.x",
+        ),
+        ("[home]", "[hone]", r"unknown key @ \$\.hone"),
+        ('"gun"', '"pistol"', r"'gun', 'track' or 'positioner'.* @ \$\.aux\.1"),
+        ("150.0]\n[u", "nan]\n[u", r"finite number @ \$\.tool\.xyz_mm\[3\]"),
+        ('"nj220-2.7"', '"nj999"', "no such arm. Shipped arms: nj220-2.7"),
+        ("[robot]", "[robot", r"not valid TOML.*line 2"),
+        ("[tool]", "absolute_accuracy = true\n[tool]", r"twice @ .*Switch"),
+    ],
+    ids=["unit", "unit2", "short", "key", "aux", "nan", "arm", "syntax", "twice"],
+)
+def test_a_wrong_cell_file(desk, old, new, said):
+    text = desk.cell.read_text()
+    assert old in text
+    cell = desk.put("cell.toml", text.replace(old, new, 1))
+    source = desk.put("job.pdl", program(FIRST))
+    found = cli("compensate", source, "--cell", cell, "--model", desk.model)
+    refused(found, said)
+    assert "cell.toml" in found.stderr or "nj999" in found.stderr
+    assert desk.names() == {"job.pdl", "cell.toml"}
+
+
+def test_a_model_of_another_arm(desk):
+    other = desk.put("ur10.toml", '[robot]\narm = "ur10"\n')
+    source = desk.put("job.pdl", program(FIRST))
+    found = cli("compensate", source, "--cell", other, "--model", desk.model)
+    refused(found, r"model\.json: was made for arm nj220-2\.7 .*not for ur10.* fit one")
+
+
+@pytest.mark.parametrize("data", [b"", b"{}", b"[1]", b"\x00\x01", b'{"format": 1'])
+def test_a_model_file_that_is_none(desk, data):
+    source, model = desk.put("job.pdl", program(FIRST)), desk.put("m.json", data)
+    found = cli("compensate", source, "--cell", desk.cell, "--model", model)
+    refused(found, r"m\.json: .*postproc fit")
+
+
+def rows_of(folder):
+    with (folder / "survey.csv").open(newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def written(path, rows):
+    with path.open("w", newline="") as file:
+        out = csv.DictWriter(file, list(rows[0]))
+        out.writeheader()
+        out.writerows(rows)
+    return path
+
+
+def test_a_model_for_one_point_is_not_used_for_another_tool(desk, job_folder):
+    rows = [r for r in rows_of(job_folder) if r["tool_id"] == "1"]
+    data, model = written(desk.folder / "one.csv", rows), desk.folder / "one.json"
+    cell = ("--cell", desk.cell)
+    assert cli("fit", data, *cell, "-o", model, "--effects", "geometry").exit_code == 0
+    found = cli("compensate", desk.put("job.pdl", program(FIRST, POSE)), *cell,
+                "--model", model)  # fmt: skip
+    assert found.exit_code == 1
+    assert (
+        len(re.findall(r"job\.pdl:\d: guarded: tool not surveyed", found.stderr)) == 2
+    )
+
+
+def spoilt(rows, name):
+    """Spoil a survey in one way."""
+    first = rows[0]
+    match name:
+        case "few":
+            return rows[:5]
+        case "one pose":
+            return [dict(first, id=str(i)) for i in range(60)]
+        case "one joint":
+            still = {f"q{j}_deg": first[f"q{j}_deg"] for j in range(2, 7)}
+            return [{**row, **still} for row in rows]
+        case "all zero":
+            return [dict(r, x_mm="0", y_mm="0", z_mm="0") for r in rows]
+        case "nan":
+            return [*rows[:3], dict(rows[3], y_mm="NaN"), *rows[4:]]
+        case "empty cell":
+            return [*rows[:3], dict(rows[3], q2_deg=""), *rows[4:]]
+        case "twice":
+            return [*rows[:3], dict(rows[3], id=rows[1]["id"]), *rows[4:]]
+        case "metres":
+            mm = ("x_mm", "y_mm", "z_mm")
+            return [{**r, **{k: str(float(r[k]) / 1e3) for k in mm}} for r in rows]
+        case "no column":
+            return [{k: v for k, v in r.items() if k != "q4_deg"} for r in rows]
+    raise AssertionError(name)
+
+
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [
+        ("few", r"5 rows .* determine .* of .* directions.* Measure more"),
+        ("one pose", r"at 1 poses determine .*Measure more poses"),
+        ("one joint", r"determine .* directions of the geometry.*all joints moving"),
+        ("all zero", r"0 rows .*determine"),
+        ("nan", r"bad\.csv:5: 'NaN' in column y_mm is not a number\. Correct"),
+        ("empty cell", r"bad\.csv:5: .*q2_deg"),
+        ("twice", r"bad\.csv:5: id '2' appears twice \(first in line 3\)\. Give"),
+        ("metres", r"bad\.csv: .*look like metres: write millimetres"),
+        ("no column", r"bad\.csv:1: column q4_deg is missing\. The header has"),
+    ],
+)
+def test_a_survey_that_cannot_be_used(desk, job_folder, name, said):
+    data = written(desk.folder / "bad.csv", spoilt(rows_of(job_folder), name))
+    found = cli("fit", data, "--cell", desk.cell, "-o", desk.folder / "m.json")
+    refused(found, said)
+    assert desk.names() == {"bad.csv"}
+
+
+@pytest.mark.parametrize("data", [b"", b"id,q1_deg\n", bytes(range(256)) * 9])
+def test_a_survey_file_that_is_none(desk, data):
+    survey = desk.put("bad.csv", data)
+    found = cli("fit", survey, "--cell", desk.cell, "-o", desk.folder / "m.json")
+    refused(found, r"bad\.csv(:1)?: .*[.] [A-Z]")
+    assert desk.names() == {"bad.csv"}
+
+
+def test_broken_beams_are_left_out_and_listed(desk, job_folder):
+    rows = rows_of(job_folder)
+    for k in (4, 70):
+        rows[k].update(x_mm="0", y_mm="0", z_mm="0")
+    data = written(desk.folder / "zeros.csv", rows)
+    found = cli("fit", data, "--cell", desk.cell, "-o", desk.folder / "m.json",
+                "--effects", "geometry,backlash")  # fmt: skip
+    assert found.exit_code == 0, found.stderr
+    for k in (4, 70):
+        assert re.search(rf"row {rows[k]['id']} \(line {k + 2}\): ", found.stdout)
+    left = json.loads((desk.folder / "m.json").read_bytes())
+    assert left["rows"] == len(rows) - 2
+
+
+def test_no_output_is_an_input(desk):
+    source = desk.put("job.pdl", program(FIRST))
+    own = desk.folder / "own.json"
+    own.write_bytes(desk.model.read_bytes())
+    before = source.read_bytes(), own.read_bytes(), desk.cell.read_bytes()
+    for place in (source, desk.folder / ".." / desk.folder.name / "job.pdl", own,
+                  desk.cell):  # fmt: skip
+        for option in ("-o", "--report", "--html"):
+            found = cli("compensate", source, "--cell", desk.cell, "--model", own,
+                        option, place)  # fmt: skip
+            refused(found, "is an input. Give another output")
+    assert (source.read_bytes(), own.read_bytes(), desk.cell.read_bytes()) == before
+    assert desk.names() == {"job.pdl", "own.json"}
+
+
+@pytest.mark.parametrize("command", ["survey", "simulate", "fit", "predict"])
+def test_no_other_command_overwrites_its_input(desk, job_folder, command):
+    data = desk.put("s.csv", (job_folder / "survey.csv").read_bytes())
+    cell = desk.put("cell.toml", desk.cell.read_bytes())
+    given = {
+        "survey": (cell, ()), "simulate": (data, (data,)), "fit": (data, (data,)),
+        "predict": (data, (data, "--model", desk.model)),
+    }  # fmt: skip
+    place, arguments = given[command]
+    kept = place.read_bytes()
+    refused(cli(command, *arguments, "--cell", cell, "-o", place), "is an input")
+    assert place.read_bytes() == kept
+
+
+def test_output_places_that_cannot_be(desk):
+    source = desk.put("job.pdl", program(FIRST))
+    for place, said in (
+        ("none/out.pdl", "the folder does not exist. Make the folder"),
+        ("job.pdl/out.pdl", "job.pdl is a file: give a folder"),
+        (".", "is a folder. Name the file"),
+    ):
+        refused(desk.compensate(source, "-o", desk.folder / place), said)
+        found = desk.compensate(source, "--report", desk.folder / place)
+        refused(found, said)
+    twice = desk.folder / "x"
+    refused(desk.compensate(source, "-o", twice, "--report", twice), "named twice")
+    assert desk.names() == {"job.pdl"}
+
+
+@pytest.mark.parametrize(
+    ("code", "said"),
+    [
+        (errno.EACCES, r"out\.pdl.*: the folder is read-only\. Give"),
+        (errno.EROFS, r"out\.pdl.*: the folder is read-only\. Give"),
+        (errno.ENOSPC, r"out\.pdl.*: no room is left there\. Make room"),
+    ],
+)
+def test_a_folder_that_refuses_leaves_nothing(desk, monkeypatch, code, said):
+    source = desk.put("job.pdl", program(FIRST))
+
+    def refuse(*_: object, **__: object):
+        raise OSError(code, os.strerror(code), "somewhere")
+
+    monkeypatch.setattr("tempfile.mkstemp", refuse)
+    refused(desk.compensate(source, "-o", desk.folder / "out.pdl"), said)
+    assert desk.names() == {"job.pdl"}
+
+
+def test_a_stamped_program(desk):
+    out = desk.folder / "out.pdl"
+    desk.compensate(desk.put("job.pdl", program(FIRST)), "-o", out)
+    again = desk.folder / "again.pdl"
+    said = r":1: is compensated already\. .*postproc restore"
+    refused(desk.compensate(out, "-o", again), "out.pdl" + said)
+    refused(desk.compensate("-", stdin=out.read_bytes()), "stdin.pdl" + said)
+    assert not again.exists()
+
+
+MOVES = ("MOVE LINEAR TO a", "MOVE LINEAR TO b")
+
+
+@pytest.fixture
+def listed(desk):
+    """Compensate a program of two listed targets with a variable file."""
+
+    def run(values, *lines):
+        made = program(FIRST, *(lines or MOVES), declared="a, b : XTNDPOS")
+        source = desk.put("job.pdl", made)
+        if values is not None:
+            desk.put("job.lsv", values)
+        report = desk.folder / "r.json"
+        found = desk.compensate(source, "--report", report)
+        rows = json.loads(report.read_bytes())["targets"] if report.exists() else []
+        return found, [row["status"] for row in rows][1:]
+
+    return run
+
+
+BOTH = LISTED + entry("a") + entry("b", 130.0)
+
+
+@pytest.mark.parametrize(
+    ("values", "status", "said"),
+    [
+        (None, ["display"] * 2, r"job\.pdl:6: no-variable-file: .*no job\.lsv: put"),
+        (
+            LISTED + entry("y") + entry("z"),
+            ["display"] * 2,
+            "of another program",
+        ),
+        (BOTH[:-70], ["safe", "display"], r"job\.lsv:5: lsv-incomplete: b has . of 6"),
+        (
+            BOTH + entry("A", 110.0),
+            ["display", "safe"],
+            "job.lsv:8: .*A has two ",
+        ),
+        (LISTED + entry("a", arm=2) + entry("b"), ["display", "safe"], "one of arm 2"),
+        (
+            BOTH.replace("130.00", "*******"),
+            ["safe", "display"],
+            "b is not init",
+        ),
+        (
+            BOTH.replace("1: 90", "1: 90 2: 5", 1),
+            ["display", "safe"],
+            r"axis 2 .*\[aux",
+        ),
+        (LISTED + entry("c") + BOTH, ["safe"] * 2, "job.lsv:1: .*never used: c"),
+    ],
+    ids=["missing", "other", "cut", "twice", "arm", "uninitialised", "aux", "unused"],
+)
+def test_a_variable_file_that_does_not_fit(listed, values, status, said):
+    found, statuses = listed(values)
+    assert statuses == status
+    assert found.exit_code == (0 if set(status) == {"safe"} else 1)
+    assert re.search(said, found.stderr), found.stderr
+
+
+@pytest.mark.parametrize(("data", "said"), [(b"", "empty"), (b"\0\1" * 50, "binary")])
+def test_a_variable_file_that_is_none(listed, data, said):
+    refused(listed(data)[0], rf"job\.lsv(:1)?: the file is {said}")
+
+
+def test_a_stamped_variable_file(listed, desk):
+    listed(BOTH)
+    stamped = (desk.folder / "job.compensated.lsv").read_bytes()
+    refused(listed(stamped)[0], r"job\.lsv:1: is compensated already")
+
+
+def test_undeclared_variables_are_reported_and_corrected(desk):
+    source = desk.put("job.pdl", program(FIRST, *MOVES))
+    desk.put("job.lsv", BOTH)
+    found = desk.compensate(source)
+    assert found.exit_code == 0
+    assert "not declared" in found.stderr
+
+
+def pos(x, y, e=175.0):
+    return f"POS({x:.1f}, {y:.1f}, 150.0, 0.0, {e:.1f}, 0.0, '')"
+
+
+def test_an_arc_through_three_points_on_a_line(desk):
+    arcs = (
+        f"MOVE LINEAR TO {pos(100, 200)}",
+        f"MOVE CIRCULAR TO {pos(200, 200)} VIA {pos(150, 200)}",
+        f"MOVE CIRCULAR TO {pos(300, 200)} VIA {pos(250, 250)}",
+    )
+    report = desk.report(desk.put("job.pdl", program(FIRST, *arcs)))
+    status = [row["status"] for row in report["targets"]]
+    assert status == ["safe", "safe", "guarded", "guarded", "safe", "safe"]
+    assert "on one line" in report["targets"][2]["why"]
+
+
+def test_a_fly_run_through_the_wrist_singularity(desk):
+    flown = [
+        f"MOVEFLY JOINT TO {{5.0, 10.0, -95.0, 20.0, {e:.1f}, 30.0}} ADVANCE"
+        for e in (30.0, 1.0, -30.0)
+    ]
+    report = desk.report(desk.put("job.pdl", program(FIRST, *flown, POSE)))
+    rows = report["targets"]
+    assert [r["status"] for r in rows[1:4]] == ["safe", "guarded", "safe"]
+    assert "wrist" in rows[2]["why"] and rows[2]["corrected"] == rows[2]["original"]
+
+
+@pytest.mark.parametrize("distance", ["-1.0", "0.0", "5.0"])
+def test_fly_distances_are_legal_whatever_their_sign(desk, distance):
+    flown = [f"MOVEFLY LINEAR TO {pos(100 + 20 * k, 200)} ADVANCE" for k in range(6)]
+    setting = ("$FLY_TYPE := FLY_CART", f"$FLY_DIST := {distance}")
+    report = desk.report(desk.put("job.pdl", program(FIRST, *setting, *flown, POSE)))
+    assert {row["status"] for row in report["targets"]} == {"safe"}
