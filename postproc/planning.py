@@ -13,6 +13,7 @@ from postproc.accuracy.model import Model
 from postproc.language.diagnostic import Diagnostic
 from postproc.language.flow import Start, resolve
 from postproc.language.lsv import Variables, read_variables
+from postproc.language.reached import never_reached
 from postproc.language.source import Source, source_from_bytes
 from postproc.language.structure import Program, parse
 from postproc.language.visits import Visits
@@ -111,7 +112,9 @@ def read_program(files: Mapping[str, bytes], cell: Cell) -> Reading:
             page = parse(source)
             others |= {page.name: page, base_name(source.name): page}
     resolved = resolve(program, start_of(cell), variables, others)
-    return Reading(sources, resolved.visits, resolved.diagnostics)
+    programs = list({id(p): p for p in (program, *others.values())}.values())
+    missed = never_reached(programs, resolved.visits)
+    return Reading(sources, resolved.visits, (*resolved.diagnostics, *missed))
 
 
 def plan_visits(visits: Visits, cell: Cell) -> Planned:

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from postproc.accuracy.error_statistics import ErrorStatistics
 from postproc.language.diagnostic import Diagnostic
+from postproc.language.reached import NEVER_REACHED
 from postproc.language.visits import Motion, Visits
 from postproc.pose import MM
 
@@ -101,7 +102,8 @@ class Outcome:
     def exit_code(self) -> int:
         """Return 1 where a target could have been compensated and was not."""
         left = (Status.UNSAFE, Status.DISPLAY, Status.GUARDED)
-        return NOT_ALL if np.isin(self.decisions.status, left).any() else DONE
+        missed = any(d.code == NEVER_REACHED for d in self.diagnostics)
+        return NOT_ALL if missed or np.isin(self.decisions.status, left).any() else DONE
 
     def summary(self) -> str:
         """Say in one line what came of the program."""

@@ -312,3 +312,12 @@ class _KillingSetup:
         if frame.f_locals["unit"].program == "killer.pdl":
             os.kill(os.getpid(), signal.SIGKILL)
         raise PostprocError("reached")
+
+
+def test_a_library_that_nobody_calls_is_not_passed_off_as_compensated(tmp_path, run):
+    source = pages(tmp_path / "src", 1, 1)
+    text = (source / "main.pdl").read_bytes()
+    (source / "other.pdl").write_bytes(text.replace(b"main", b"other"))
+    summary = run()
+    assert summary.exit_code == 1
+    assert ("page1.pdl", 0) in summary.left
