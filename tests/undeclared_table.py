@@ -1,0 +1,222 @@
+"""Write docs/undeclared.md and its plot from the scored trials."""
+
+from __future__ import annotations
+
+from collections import Counter, defaultdict
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from tests.accuracy.planted import NAMED, NAMELESS, SIZES
+
+if TYPE_CHECKING:
+    from tests.undeclared import Trial
+
+CLEAR = 1e-3  # p-value of a finding that a reader takes for certain
+WITHIN = 1.5  # times the informed fit's error
+
+INTRODUCTION = """# Tracing effects that nobody declared
+
+Written by `make undeclared`. Each trial draws a virtual arm with geometry, tool and
+backlash errors and one undeclared effect (or two, or none) by seed, surveys it with 400
+rows, fits geometry and backlash, and diagnoses what is left. The virtual arm shares no
+code with the model, and its link masses, load laws and shapes are not the model's
+nominal ones. Size is the effect's rms after projection on the base model, over the
+noise. An answer is right when it names the effect and its joint, alone or in the group
+that it says it cannot tell apart; an effect without a name is answered rightly by a
+`curve` on its joint or by the verdict `unexplained`.
+
+"""
+
+
+def write_table(trials: Sequence[Trial], output: Path) -> None:
+    """Write the page, and the plot beside it."""
+    by_kind: dict[str, list[Trial]] = defaultdict(list)
+    for t in trials:
+        by_kind[t.kind].append(t)
+    kinds = [k for k in (*NAMED, *NAMELESS, "two") if k in by_kind]
+    planted = [t for t in trials if t.kind != "none"]
+    lines = [
+        *INTRODUCTION.splitlines(),
+        *_summary(trials),
+        "",
+        *_by_size(planted),
+        "",
+        f"![rate against size]({plot(planted, output.with_suffix('.png')).name})",
+        "",
+        "## By kind",
+        "",
+        *_by_kind(kinds, by_kind),
+        "",
+        "## What was said first",
+        "",
+        *_confusion(kinds, by_kind),
+        "",
+        "## Every answer that was not right",
+        "",
+        *_wrong(trials),
+    ]
+    output.parent.mkdir(parents=True, exist_ok=True)
+    output.write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
+def ok(t: Trial) -> bool:
+    """Tell whether an answer is right."""
+    if t.kind == "none":
+        return t.verdict == "noise"
+    return t.right or (t.kind in NAMELESS and t.verdict == "unexplained")
+
+
+def groups(trials: Iterable[Trial]) -> list[int]:
+    """List the sizes of all groups."""
+    return [1 + len(f["group"]) for t in trials for f in t.found]  # type: ignore[arg-type]
+
+
+def misnamed(t: Trial) -> bool:
+    """Tell whether something without a name was given one with confidence."""
+    return t.kind in NAMELESS and any(
+        f["effect"] != "curve" and float(str(f["p"])) < CLEAR and t.verdict == "effect"
+        for f in t.found
+    )
+
+
+def close(t: Trial) -> bool:
+    """Tell whether the extension comes close to an informed fit."""
+    return t.true_mm[1] <= WITHIN * t.true_mm[2]
+
+
+def _rate(hits: Sequence[bool]) -> str:
+    return f"{sum(hits)} / {len(hits)}" if hits else "-"
+
+
+def _summary(trials: Sequence[Trial]) -> list[str]:
+    none = [t for t in trials if t.kind == "none"]
+    named = [t for t in trials if t.kind in NAMED]
+    nameless = [t for t in trials if t.kind in NAMELESS]
+    two = [t for t in trials if t.kind == "two"]
+    planted = [*named, *nameless, *two]
+    large = [t for t in named if t.size >= 1]
+    small = [t for t in named if t.size < 1]
+    sizes = groups(named) or [1]
+    return [
+        f"- named effects at 1 to 3 times the noise: {_rate([ok(t) for t in large])}",
+        f"- named effects at half the noise: {_rate([ok(t) for t in small])}",
+        f"- two at once, both right: {_rate([ok(t) for t in two])}",
+        f"- without a name: {_rate([ok(t) for t in nameless])}; given a name with "
+        f"confidence: {_rate([misnamed(t) for t in nameless])}",
+        f"- nothing planted, verdict `noise`: {_rate([ok(t) for t in none])}; effects "
+        f"added: {_rate([bool(t.found) for t in none])}",
+        f"- groups: median {np.median(sizes):.0f}, largest {max(sizes)}",
+        f"- true error at fresh poses within {WITHIN} times an informed fit's: "
+        f"{_rate([close(t) for t in planted])}",
+        f"- time of a search: median {np.median([t.seconds for t in trials]):.1f} s",
+    ]
+
+
+def _by_size(planted: Sequence[Trial]) -> list[str]:
+    lines = [
+        "| size | named, right | two, right | no name, right "
+        "| true error before | after | informed |",
+        "|---|---|---|---|---|---|---|",
+    ]
+    for size in SIZES:
+        some = [t for t in planted if t.size == size]
+        cells = [
+            _rate([ok(t) for t in some if t.kind in NAMED]),
+            _rate([ok(t) for t in some if t.kind == "two"]),
+            _rate([ok(t) for t in some if t.kind in NAMELESS]),
+        ]
+        errors = np.mean([t.true_mm for t in some], axis=0) if some else np.zeros(3)
+        cells += [f"{e:.4f} mm" for e in errors]
+        lines.append(f"| {size:g} | " + " | ".join(cells) + " |")
+    return lines
+
+
+def _by_kind(kinds: list[str], by_kind: dict[str, list[Trial]]) -> list[str]:
+    sizes = " | ".join(f"size {s:g}" for s in SIZES)
+    lines = [
+        f"| planted | right | {sizes} | without its group | more than planted "
+        f"| within {WITHIN} of informed |",
+        "|---" * (len(SIZES) + 5) + "|",
+    ]
+    for kind in kinds:
+        some = by_kind[kind]
+        cells = [_rate([ok(t) for t in some])]
+        cells += [_rate([ok(t) for t in some if t.size == s]) for s in SIZES]
+        cells.append(_rate([t.alone for t in some]))
+        cells.append(_rate([len(t.found) > laws(t) for t in some]))
+        cells.append(_rate([close(t) for t in some]))
+        lines.append(f"| {kind} | " + " | ".join(cells) + " |")
+    return lines
+
+
+def laws(t: Trial) -> int:
+    """Count what was planted; compliance of two joints counts twice."""
+    return sum(max(1, len(joints)) for _, joints, _ in t.truth)
+
+
+def _confusion(kinds: list[str], by_kind: dict[str, list[Trial]]) -> list[str]:
+    singles = [k for k in (*kinds, "none") if k != "two" and k in by_kind]
+    said = {k: Counter(_first(t) for t in by_kind[k]) for k in singles}
+    names = sorted({name for counts in said.values() for name in counts})
+    lines = [
+        "| planted | " + " | ".join(names) + " |",
+        "|---" * (len(names) + 1) + "|",
+    ]
+    for kind in singles:
+        cells = [str(said[kind][name] or "") for name in names]
+        lines.append(f"| {kind} | " + " | ".join(cells) + " |")
+    return lines
+
+
+def _first(t: Trial) -> str:
+    """Name what was found first: effect, and whether the joint is right."""
+    if not t.found:
+        return t.verdict
+    effect, joint = t.found[0]["effect"], t.found[0]["joint"]
+    right = any(joint in joints or not joints for _, joints, _ in t.truth)
+    return f"{effect}" if right else f"{effect}, wrong joint"
+
+
+def _wrong(trials: Sequence[Trial]) -> list[str]:
+    lines = []
+    for t in trials:
+        if ok(t):
+            continue
+        truth = ", ".join(f"{e or 'no name'} {j}" for e, j, _ in t.truth) or "nothing"
+        found = ", ".join(
+            f"{f['effect']} {f['joint']} (p = {float(str(f['p'])):.0e})"
+            for f in t.found
+        )
+        lines.append(
+            f"- {t.kind}, seed {t.seed}, size {t.size:g}: {truth}; said {t.verdict}, "
+            f"{found or 'nothing'}"
+        )
+    return lines or ["none"]
+
+
+def plot(planted: Sequence[Trial], path: Path) -> Path:
+    """Draw the rate of right answers against size."""
+    figure = Figure(figsize=(6, 4), layout="constrained")
+    axes = figure.subplots()
+    for label, kinds, mark in (
+        ("named", NAMED, "o-"),
+        ("two at once", ("two",), "s--"),
+        ("no name", NAMELESS, "^:"),
+    ):
+        rates = [
+            [ok(t) for t in planted if t.kind in kinds and t.size == s] for s in SIZES
+        ]
+        axes.plot(
+            SIZES, [np.mean(r) if r else np.nan for r in rates], mark, label=label
+        )
+    axes.set_xlabel("rms after projection on the base model, over the noise")
+    axes.set_ylabel("right answers")
+    axes.set_ylim(0, 1.02)
+    axes.legend(loc="lower right")
+    path.parent.mkdir(parents=True, exist_ok=True)
+    figure.savefig(path, dpi=120)
+    return path
