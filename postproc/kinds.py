@@ -6,6 +6,7 @@ import os
 import re
 
 PROGRAM, VARIABLES, COMPILED = ".pdl", ".lsv", (".cod", ".var")
+LARGEST = 500_000_000  # bytes of a program or variable file; a longer one is neither
 
 _TARGETS = re.compile(
     rb"^[ \t]*\w+[ \t]+A?(?:POS|XTND|JNTP|PATH)\b", re.IGNORECASE | re.MULTILINE

@@ -321,3 +321,21 @@ def test_a_library_that_nobody_calls_is_not_passed_off_as_compensated(tmp_path, 
     summary = run()
     assert summary.exit_code == 1
     assert ("page1.pdl", 0) in summary.left
+
+
+def test_a_file_that_is_too_long_is_not_read(tmp_path, run, monkeypatch):
+    source = grow(tmp_path / "src", 1, 1)
+    monkeypatch.setattr("postproc.batch.tree.LARGEST", 2000)
+    (source / "huge.pdl").write_bytes(program("huge", 100, 1))
+    assert [place for place, _ in run().problems] == ["huge.pdl"]
+
+
+def test_names_cannot_steer_the_terminal_or_the_log(tmp_path, run):
+    source = tmp_path / "src"
+    source.mkdir()
+    (source / "a\x1b[31m\n.pdl").write_bytes(b"PROGRAM x\0")
+    summary = run()
+    text = default_log(tmp_path / "dst").read_bytes()
+    assert b"\x1b" not in text
+    assert text.count(b"\n") == 2
+    assert summary.problems[0][0] == "a\x1b[31m\n.pdl"

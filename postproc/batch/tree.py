@@ -15,6 +15,7 @@ from postproc.exceptions import OutputError, ProgramError
 from postproc.files import TEMPORARY
 from postproc.kinds import (
     COMPILED,
+    LARGEST,
     PROGRAM,
     VARIABLES,
     base_of,
@@ -64,8 +65,12 @@ def scan(root: Path, plan: Plan) -> Tree:
             kind = "a symbolic link" if entry.is_symlink() else "no regular file"
             refused[place] = f"is {kind}: it is not followed; put the file itself here"
             continue
+        size = entry.stat(follow_symlinks=False).st_size
+        if size > LARGEST and suffix_of(place) in (PROGRAM, VARIABLES):
+            refused[place] = f"is longer than {LARGEST} bytes: is it a program?"
+            continue
         folders[place.rpartition("/")[0]].append(place)
-        sizes[place] = entry.stat(follow_symlinks=False).st_size
+        sizes[place] = size
     found = [_sort(root, names, plan) for names in folders.values()]
     units = [unit for part in found for unit in part.units]
     # The largest first: no worker is left alone with one at the end.

@@ -17,7 +17,6 @@ from postproc.report import Outcome
 from postproc.sidecar import SUFFIX
 
 LISTED = 50  # findings of a program that the log lists; the rest is counted
-LARGEST = 500_000_000  # bytes of a file: a longer one is no program
 
 
 def run_tasks(tasks: Sequence[Task], setup: Setup, version: str) -> list[Result]:
@@ -59,9 +58,6 @@ def _compensated(task: Task, setup: Setup) -> Result:
     """Compensate, and name everything that belongs into the target tree."""
     unit = task.unit
     sources = dict(zip(unit.files, task.sources, strict=True))
-    for place, data in sources.items():
-        if len(data) > LARGEST:
-            return failed(unit, f"{place} is longer than {LARGEST} bytes")
     outcome = compensate(
         task.sources[0],
         setup.cell,
