@@ -3,6 +3,7 @@
 # make lint    ruff and mypy
 # make chaos   kill 200 batches of 300 files at random moments and resume them
 # make bench   how long the stages take on this machine
+# make evidence    coverage of the intervals, and what direction is worth
 # make reproduce   the published method and ours, simulated: docs/reproduction.md
 # make accuracy    held-out errors, coverage, real and blind data: docs/accuracy.md
 # Each target first creates the environment .venv when it is missing or out of date.
@@ -15,7 +16,7 @@ STAMP := $(VENV)/.installed
 export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
 
-.PHONY: help demo test lint format bench reproduce accuracy chaos clean
+.PHONY: help demo test lint format bench evidence reproduce accuracy chaos clean
 .DELETE_ON_ERROR:
 
 help:
@@ -42,6 +43,9 @@ format: $(STAMP)
 
 bench: $(STAMP)
 	@PATH="$(abspath $(VENV))/bin:$$PATH" python programs/bench.py
+
+evidence: $(STAMP)
+	@$(PYTHON_BIN) -m tests.evidence
 
 reproduce: $(STAMP)
 	@cd docs/studies && $(abspath $(PYTHON_BIN)) reproduction.py --seeds 20 --arms 10

@@ -1,0 +1,111 @@
+"""Claims of the README, measured at full size: python -m tests.evidence."""
+
+from __future__ import annotations
+
+import sys
+import tempfile
+from pathlib import Path
+
+import numpy as np
+
+from postproc.accuracy.full import fit_survey, model_of
+from postproc.accuracy.library import BASE_EFFECTS
+from postproc.accuracy.measurement import Measurements
+from postproc.calibrate import fit
+from postproc.compensate import compensate
+from postproc.planning import read_program
+from postproc.robot.arm import load_arm
+from postproc.robot.cell import load_cell
+from postproc.robot.state import States, make_states
+from postproc.simulate import setup_of, simulate_file, visits_of
+from postproc.surveying import write_survey
+from postproc.virtual import (
+    Arrivals,
+    campaign_length,
+    land,
+    sample_survey,
+    stream,
+    virtual_arm,
+)
+
+ROOT = Path(__file__).parents[1]
+CELL = ROOT / "programs" / "cell.toml"
+TRACKER = np.array([3.15, -2.48, 1.12])  # [m]
+ARMS, ROWS, HELD_OUT = range(1001, 1051), 300, 200
+
+
+def states_of(a: Arrivals) -> States:
+    """Describe what the virtual arm did as the model sees it."""
+    known = {
+        name: getattr(a, name)
+        for name in ("travel", "speed", "temperature", "payload", "payload_com")
+    }
+    return make_states(a.q, np.sign(a.side), a.tool[:, :3, 3], **known)
+
+
+def coverage() -> str:
+    """Pool, over arms, the coordinates of true errors inside the 95 % intervals."""
+    arm, inside = load_arm("nj220-2.7"), []
+    for seed in ARMS:
+        made = virtual_arm(seed)
+        rows = sample_survey(made, ROWS, seed=seed)
+        survey = Measurements(
+            path=Path("survey"),
+            states=states_of(rows),
+            position=made.measure(rows, TRACKER, stream(seed, "tracker")),
+            ids=tuple(map(str, range(ROWS))),
+            line=np.arange(ROWS),
+            inferred=np.zeros(ROWS, dtype=bool),
+            sha256="0" * 64,
+        )
+        model = model_of(fit_survey(survey, arm, BASE_EFFECTS, TRACKER), survey)
+        others = sample_survey(made, HELD_OUT, seed=seed + 5000)
+        told = model.predict(arm, states_of(others))
+        off = np.abs(made.error(others) - told.error) / told.std_model
+        inside.append((off < 1.96).mean())
+    return (
+        f"coverage: {np.mean(inside):.1%} of {len(inside) * HELD_OUT * 3} coordinates "
+        f"of true errors on {len(inside)} arms (per arm {min(inside):.1%} to "
+        f"{max(inside):.1%})"
+    )
+
+
+def direction(seed: int = 41) -> str:
+    """Compare fits with and without direction, and the published ones."""
+    said = [f"drilling job, virtual arm {seed}, true error mean / max mm:"]
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        write_survey(CELL, folder / "survey.pdl", 300)
+        simulate_file(folder / "survey.pdl", CELL, seed).write(folder / "survey.csv")
+        for title, how in (
+            ("with direction", {"effects": BASE_EFFECTS}),
+            ("without direction", {"effects": ("geometry",)}),
+            ("eja-elm", {"method": "eja-elm"}),
+            ("elm", {"method": "elm"}),
+        ):
+            error = _drilled(folder / "survey.csv", seed, how)
+            said.append(f"  {title}: {error.mean():.4f} / {error.max():.4f}")
+    return "\n".join(said)
+
+
+def _drilled(survey: Path, seed: int, how: dict[str, object]) -> np.ndarray:
+    """Return the true errors [mm] of the compensated drilling job."""
+    cell = load_cell(CELL)
+    model = fit([survey], cell, **how).model  # type: ignore[arg-type]
+    source = ROOT / "programs" / "drilling.pdl"
+    done = compensate(source.read_bytes(), cell, model, name=source.name)
+    original = visits_of(source, cell)
+    executed = read_program(done.outputs, cell).visits
+    setup = setup_of(cell)
+    rows = campaign_length(original)
+    arm = virtual_arm(seed, coupling=setup.coupling, rows=rows, tool=setup.tool)
+    landing = land(arm, setup, original, executed)
+    targets = original.literal[landing.visit] >= 0
+    return np.linalg.norm(landing.error[targets], axis=1) * 1e3
+
+
+CLAIMS = {claim.__name__: claim for claim in (coverage, direction)}
+
+if __name__ == "__main__":
+    for chosen in sys.argv[1:] or CLAIMS:
+        print(CLAIMS[chosen](), flush=True)
