@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -201,24 +202,25 @@ def history_text(model_path: Path) -> str:
         ModelError: The file cannot be used.
     """
     model = load_model(model_path)
-    ids = [*(str(r.get("parent", "")) for r in model.history[1:]), model.id]
-    rows = []
     if not model.history:
-        rows.append((model.id, "fitted", _named(model), "", "", str(model.rows), ""))
-    else:
-        first = str(model.history[0].get("parent", ""))
-        rows.append((first, "given", "", "", "", "", ""))
-    for made, record in zip(ids, model.history, strict=True):
-        added = "; ".join(_added(a) for a in record["added"]) or "nothing"
-        rows.append(
-            (
-                made, str(record["verdict"]), added,
-                f"{record['before']['mean_mm']:.4f}",
-                f"{record['after']['mean_mm']:.4f}",
-                str(record["n_held_out"]), str(record["data_sha256"])[:12],
-            )
-        )  # fmt: skip
-    return table_text(HISTORY, rows)
+        row = (model.id, "fitted", _named(model), "", "", str(model.rows), "")
+        return table_text(HISTORY, [row])
+    first = str(model.history[0].get("parent", ""))
+    made = [*(str(r.get("parent", "")) for r in model.history[1:]), model.id]
+    steps = [
+        _step(name, record) for name, record in zip(made, model.history, strict=True)
+    ]
+    return table_text(HISTORY, [(first, "given", "", "", "", "", ""), *steps])
+
+
+def _step(name: str, record: Mapping[str, Any]) -> tuple[str, ...]:
+    """Write one step of the history: the model that was made, and from what."""
+    return (
+        name, str(record["verdict"]),
+        "; ".join(_added(a) for a in record["added"]) or "nothing",
+        f"{record['before']['mean_mm']:.4f}", f"{record['after']['mean_mm']:.4f}",
+        str(record["n_held_out"]), str(record["data_sha256"])[:12],
+    )  # fmt: skip
 
 
 def _named(model: Model) -> str:
