@@ -1,0 +1,64 @@
+"""Tables: units survive, markup is text, control characters are shown."""
+
+from __future__ import annotations
+
+import io
+
+from postproc.console import (
+    Column,
+    print_table,
+    printable,
+    progress_bar,
+    stages,
+    table_text,
+)
+
+
+class Screen(io.StringIO):
+    def isatty(self):
+        return True
+
+
+def test_cells_and_titles_are_never_markup():
+    text = table_text(
+        [Column("x [mm]"), Column("name", "left")], [["1.0", "[red]a[/]"]]
+    )
+    head, row = text.splitlines()
+    assert head.split() == ["x", "[mm]", "name"] and row.split() == ["1.0", "[red]a[/]"]
+
+
+def test_columns_are_aligned_as_asked():
+    rows = [["1", "a"], ["100", "bbb"]]
+    lines = table_text([Column("n"), Column("name", "left")], rows).splitlines()
+    assert [
+        line.index(end) for line, end in zip(lines[1:], ("a", "b"), strict=True)
+    ] == [lines[0].index("name")] * 2
+    assert lines[1].startswith("  1") and lines[2].startswith("100")
+
+
+def test_control_characters_cannot_steer_the_terminal():
+    out = Screen()
+    print_table([Column("name")], [["\x1b[2Jgone\r"]], out)
+    assert "\x1b[2J" not in out.getvalue() and "\\x1b[2Jgone\\r" in out.getvalue()
+    assert printable("Br\xfccke 'a'\t") == "Br\xfccke 'a'\\t"
+
+
+def test_long_tables_are_not_cut_in_a_pipe():
+    rows = [[str(i), "x" * 40, "y" * 40, "z" * 40] for i in range(300)]
+    text = table_text([Column(c) for c in "abcd"], rows)
+    assert len(text.splitlines()) == 301 and "\u2026" not in text
+
+
+def test_nothing_of_progress_reaches_a_pipe():
+    pipe = io.StringIO()
+    with stages(pipe) as told, progress_bar("work", pipe) as done:
+        told("parse")
+        done(1, 2)
+    assert pipe.getvalue() == ""
+
+
+def test_progress_shows_on_a_terminal():
+    screen = Screen()
+    with progress_bar("copying [all]", screen) as done:
+        done(3, 4)
+    assert "copying [all]" in screen.getvalue()

@@ -1,0 +1,103 @@
+"""The virtual arm runs programs and surveys, and measures them."""
+
+from __future__ import annotations
+
+import csv
+import json
+
+import numpy as np
+import pytest
+
+from postproc.robot.cell import load_cell
+from postproc.simulate import setup_of, simulate_file
+from postproc.virtual import land, virtual_arm
+from tests.conftest import SEED
+from tests.written import FIRST, NEXT, POSE, cli, program
+
+
+def rows_of(path):
+    with path.open(newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def positions(path):
+    return np.array([[float(r[k]) for k in ("x_mm", "y_mm", "z_mm")]
+                     for r in rows_of(path)])  # fmt: skip
+
+
+def test_measured_visits_carry_their_ids(desk):
+    marked = ("-- MEASURE hole_1", POSE, NEXT, "-- MEASURE hole_2", FIRST)
+    source, out = desk.put("job.pdl", program(FIRST, *marked)), desk.folder / "m.csv"
+    found = cli("simulate", source, "--cell", desk.cell, "-o", out)
+    assert found.exit_code == 0
+    assert [r["id"] for r in rows_of(out)] == ["hole_1", "hole_2"]
+
+
+def test_a_seed_is_an_arm(desk):
+    source = desk.put("job.pdl", program(FIRST, POSE))
+    made = []
+    for name, seed in (("a", 3), ("b", 3), ("c", 4)):
+        path = desk.folder / name
+        simulate_file(source, desk.cell, seed).write(path)
+        made.append(positions(path))
+    np.testing.assert_array_equal(made[0], made[1])
+    assert (np.linalg.norm(made[0] - made[2], axis=1) > 0.1).all()
+
+
+def test_readings_are_the_landing_with_a_trackers_noise(desk, job_cell):
+    source, out = desk.put("job.pdl", program(*[FIRST, POSE, NEXT] * 20)), None
+    out = desk.folder / "m.csv"
+    found = simulate_file(source, desk.cell, SEED, wanted=source)
+    found.write(out)
+    from postproc.simulate import visits_of
+
+    landed = land(
+        virtual_arm(SEED, tool=job_cell.tool.pose),
+        setup_of(job_cell),
+        visits_of(source, job_cell),
+    ).landed
+    noise = positions(out) - landed * 1e3
+    assert 0.005 < noise.std() < 0.06 and abs(noise.mean()) < 0.02
+
+
+def test_a_compensated_program_misses_less(desk):
+    source = desk.put("job.pdl", program(FIRST, POSE, NEXT, POSE, NEXT))
+    out = desk.folder / "out.pdl"
+    desk.compensate(source, "-o", out)
+    errors = [
+        json.loads(
+            cli("simulate", p, "--cell", desk.cell, "--seed", SEED, "--wanted", source,
+                "--json", "-").stdout
+        )["true_error"]
+        for p in (source, out)
+    ]  # fmt: skip
+    assert errors[0]["n"] == errors[1]["n"] == 5
+    assert errors[1]["mean_mm"] < 0.2 * errors[0]["mean_mm"]
+
+
+def test_another_program_cannot_be_the_wanted_one(desk):
+    source, other = (desk.put(n, program(*lines)) for n, lines in (
+        ("a.pdl", (FIRST, POSE)), ("b.pdl", (FIRST,))))  # fmt: skip
+    found = cli("simulate", source, "--cell", desk.cell, "--wanted", other)
+    assert found.exit_code == 2 and "two versions of one program" in found.stderr
+
+
+@pytest.mark.parametrize("effects", ["nonsense", "compliance@9"])
+def test_unknown_effects_are_refused(desk, effects):
+    source = desk.put("job.pdl", program(FIRST))
+    found = cli("simulate", source, "--cell", desk.cell, "--effects", effects)
+    assert found.exit_code == 2 and found.stderr.startswith("postproc: ")
+
+
+def test_no_known_target_is_told_and_is_valid_json(desk):
+    source = desk.put("job.pdl", program("MOVE LINEAR TO p"))
+    found = cli("simulate", source, "--cell", desk.cell, "--wanted", source, "--json",
+                "-")  # fmt: skip
+    assert found.exit_code == 0
+    assert json.loads(found.stdout)["true_error"]["mean_mm"] is None
+
+
+def test_the_cell_gives_the_probe_points(desk):
+    cell = load_cell(desk.cell)
+    tools = setup_of(cell).tools
+    np.testing.assert_allclose(tools[:, :3, 3], cell.probes)

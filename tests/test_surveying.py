@@ -1,0 +1,78 @@
+"""The survey program: every pose from both sides, its readings joined by their ids."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+import pytest
+
+from postproc.planning import plan_visits, read_program
+from postproc.surveying import BACK, write_survey
+from tests.written import cli
+
+POSES = 24
+
+
+@pytest.fixture(scope="module")
+def survey(job_folder, tmp_path_factory):
+    path = tmp_path_factory.mktemp("survey") / "s.pdl"
+    told = write_survey(job_folder / "cell.toml", path, POSES)
+    assert told.startswith(f"{path}: {POSES} poses")
+    return path
+
+
+@pytest.fixture(scope="module")
+def visits(survey, job_cell):
+    return read_program({survey.name: survey.read_bytes()}, job_cell).visits
+
+
+def test_every_pose_is_measured_twice_under_its_own_id(visits):
+    ids = [name for name in visits.measure_id if name]
+    assert len(ids) == len(set(ids)) == 2 * POSES
+    assert set(ids) == {f"{k + 1}{side}" for k in range(POSES) for side in "ab"}
+
+
+def test_both_arrivals_at_a_pose_come_from_opposite_sides(visits, job_cell):
+    planned = plan_visits(visits, job_cell)
+    at = {name: i for i, name in enumerate(visits.measure_id) if name}
+    for k in range(POSES):
+        a, b = at[f"{k + 1}a"], at[f"{k + 1}b"]
+        np.testing.assert_array_equal(visits.values[a], visits.values[b])
+        sides = planned.plan.direction[[a, b]]
+        assert (np.abs(sides) == 1).all() and (sides[0] == -sides[1]).all()
+        way = np.abs(visits.values[a] - visits.values[a - 1])
+        np.testing.assert_allclose(way, np.rad2deg(BACK), atol=2e-5)
+    assert not np.isnan(planned.plan.q).any()
+    told = {planned.reasons[i] for i in range(len(visits))} - {""}
+    assert all("wrist singularity" in text for text in told)  # harmless to measure at
+
+
+def test_every_probe_point_is_used_and_mounted_once(survey, visits, job_cell):
+    mounted = re.findall(r"\$TOOL := POS\(([^)]*), 0, 0, 0, ''\)", survey.read_text())
+    xyz = np.array([[float(v) for v in text.split(",")] for text in mounted])
+    np.testing.assert_allclose(xyz, job_cell.probes * 1e3, atol=1e-3)
+    used = [visits.tool[i] for i, name in enumerate(visits.measure_id) if name]
+    assert (np.bincount(used)[np.unique(used)] == 2 * POSES / len(xyz)).all()
+
+
+def test_same_seed_same_survey(job_folder, survey, tmp_path):
+    again, other = tmp_path / "s.pdl", tmp_path / "other" / "s.pdl"
+    other.parent.mkdir()
+    write_survey(job_folder / "cell.toml", again, POSES)
+    write_survey(job_folder / "cell.toml", other, POSES, seed=1)
+    assert again.read_bytes() == survey.read_bytes() != other.read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (("--poses", "0"), "0 poses are no survey"),
+        (("--mode", "both"), "no survey mode 'both'. Use lhs or optimal"),
+        (("--tracker", "1,2"), "--tracker 1,2: not a position. Write x,y,z in mm"),
+    ],
+)
+def test_wrong_options(desk, options, said):
+    found = cli("survey", "--cell", desk.cell, "-o", desk.folder / "s.pdl", *options)
+    assert found.exit_code == 2 and said in found.stderr
+    assert desk.names() == set()
