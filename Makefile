@@ -6,6 +6,8 @@
 # make evidence    coverage of the intervals, and what direction is worth
 # make reproduce   the published method and ours, simulated: docs/reproduction.md
 # make accuracy    held-out errors, coverage, real and blind data: docs/accuracy.md
+# make undeclared  undeclared effects traced on virtual arms, 1,400 of them: docs/undeclared.md
+# make blind       effects traced in the blind campaigns and on a real arm: docs/blind.md
 # Each target first creates the environment .venv when it is missing or out of date.
 
 VENV ?= .venv
@@ -16,7 +18,7 @@ STAMP := $(VENV)/.installed
 export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
 
-.PHONY: help demo test lint format bench evidence reproduce accuracy chaos clean
+.PHONY: help demo test lint format bench evidence reproduce accuracy undeclared blind chaos clean
 .DELETE_ON_ERROR:
 
 help:
@@ -52,6 +54,12 @@ reproduce: $(STAMP)
 
 accuracy: $(STAMP)
 	@PYTHONPATH=. $(PYTHON_BIN) docs/studies/accuracy.py --seeds 20
+
+undeclared: $(STAMP)
+	@$(PYTHON_BIN) -m tests.undeclared --seeds $(or $(SEEDS),60) --none $(or $(NONE),200)
+
+blind: $(STAMP)
+	@PYTHONPATH=. $(PYTHON_BIN) docs/studies/diagnosed.py
 
 chaos: $(STAMP)
 	@$(PYTHON_BIN) -m tests.chaos --runs $(or $(RUNS),200) --files $(or $(FILES),300)
