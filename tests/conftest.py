@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from postproc.accuracy.library import BASE_EFFECTS
 from postproc.calibrate import fit
 from postproc.robot.cell import load_cell
 from postproc.virtual import (
@@ -63,7 +64,7 @@ def make_job(folder: Path) -> Path:
     arm = virtual_arm(SEED)
     campaign = measure_rows(arm, setup_of(cell), read_rows(rows))
     write_measurements(campaign, folder / "survey.csv")
-    effects = ("geometry", "backlash")  # all that this arm has: a search takes long
+    effects = BASE_EFFECTS  # all that this arm has: a search takes long
     fit([folder / "survey.csv"], cell, effects=effects).model.save(
         folder / "model.json"
     )
