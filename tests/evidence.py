@@ -11,13 +11,19 @@ import numpy as np
 from postproc.accuracy.full import fit_survey, model_of
 from postproc.accuracy.library import BASE_EFFECTS
 from postproc.accuracy.measurement import Measurements
+from postproc.accuracy.model import Model
 from postproc.calibrate import fit
 from postproc.compensate import compensate
-from postproc.planning import read_program
+from postproc.language.visits import Target
+from postproc.planning import plan_visits, read_program, with_measured_play
+from postproc.planning import states_of as planned_states
+from postproc.proposal import new_numbers
+from postproc.report import Status
 from postproc.robot.arm import load_arm
-from postproc.robot.cell import load_cell
+from postproc.robot.cell import Cell, load_cell
 from postproc.robot.state import States, make_states
 from postproc.simulate import setup_of, simulate_file, visits_of
+from postproc.solved import solve_visits
 from postproc.surveying import write_survey
 from postproc.virtual import (
     Arrivals,
@@ -74,18 +80,23 @@ def direction(seed: int = 41) -> str:
     """Compare fits with and without direction, and the published ones."""
     said = [f"drilling job, virtual arm {seed}, true error mean / max mm:"]
     with tempfile.TemporaryDirectory() as name:
-        folder = Path(name)
-        write_survey(CELL, folder / "survey.pdl", 300)
-        simulate_file(folder / "survey.pdl", CELL, seed).write(folder / "survey.csv")
+        survey = _surveyed(Path(name), seed)
         for title, how in (
             ("with direction", {"effects": BASE_EFFECTS}),
             ("without direction", {"effects": ("geometry",)}),
             ("eja-elm", {"method": "eja-elm"}),
             ("elm", {"method": "elm"}),
         ):
-            error = _drilled(folder / "survey.csv", seed, how)
+            error = _drilled(survey, seed, how)
             said.append(f"  {title}: {error.mean():.4f} / {error.max():.4f}")
     return "\n".join(said)
+
+
+def _surveyed(folder: Path, seed: int) -> Path:
+    """Let a virtual arm run a survey of 300 poses; return the readings."""
+    write_survey(CELL, folder / "survey.pdl", ROWS)
+    simulate_file(folder / "survey.pdl", CELL, seed).write(folder / "survey.csv")
+    return folder / "survey.csv"
 
 
 def _drilled(survey: Path, seed: int, how: dict[str, object]) -> np.ndarray:
@@ -104,7 +115,34 @@ def _drilled(survey: Path, seed: int, how: dict[str, object]) -> np.ndarray:
     return np.linalg.norm(landing.error[targets], axis=1) * 1e3
 
 
-CLAIMS = {claim.__name__: claim for claim in (coverage, direction)}
+def digits(seed: int = 41) -> str:
+    """Tell what solving leaves and digits add on the drilling job's POS literals."""
+    with tempfile.TemporaryDirectory() as name:
+        model = fit([_surveyed(Path(name), seed)], load_cell(CELL)).model
+    left, added = solved_and_written(load_cell(CELL), model)
+    return (
+        f"digits: solving leaves {left.max():.3f} um at most, the digits written add "
+        f"{added.max():.3f} um at most, over {len(left)} POS literals"
+    )
+
+
+def solved_and_written(cell: Cell, model: Model) -> tuple[np.ndarray, np.ndarray]:
+    """Return residuals of solving and shifts by rounding [um], (n,) each."""
+    source = ROOT / "programs" / "drilling.pdl"
+    done = compensate(source.read_bytes(), cell, model, name=source.name)
+    cell = with_measured_play(cell, model)
+    reading = read_program({source.name: source.read_bytes()}, cell)
+    planned = plan_visits(reading.visits, cell)
+    at = planned_states(planned.plan, cell, cell.temperature)
+    at = at.with_(direction=done.decisions.side)
+    exact = solve_visits(model, cell, planned, at)
+    rows = (done.decisions.status == Status.SAFE) & (done.visits.target == Target.POSE)
+    shift = done.decisions.corrected - new_numbers(reading.visits, exact)
+    added = np.linalg.norm(shift[rows, :3], axis=1) * 1e3
+    return exact.residual[rows] * 1e6, added
+
+
+CLAIMS = {claim.__name__: claim for claim in (coverage, direction, digits)}
 
 if __name__ == "__main__":
     for chosen in sys.argv[1:] or CLAIMS:
