@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import pytest
+from typer.testing import CliRunner
 
+from postproc.accuracy.model import load_model
 from postproc.batch.plan import make_plan
 from postproc.batch.run import Order, batch, default_log
 from postproc.check import check
+from postproc.cli import app
 from postproc.exceptions import ProgramError
 from postproc.files import TEMPORARY
 from postproc.options import AS_USUAL
@@ -131,3 +135,30 @@ def test_json_and_trouble(trees, tmp_path):
     assert data["findings"][0]["code"] == "uncompensated"
     with pytest.raises(ProgramError, match="is no folder"):
         check(tmp_path / "none")
+
+
+def test_the_command_says_it_by_its_exit_code(trees, job_folder, tmp_path):
+    source, target, _ = trees
+    call = ["check", str(target), "--model", str(job_folder / "model.json")]
+    runner = CliRunner()
+    assert runner.invoke(app, [*call, "--source", str(source)]).exit_code == 0
+    (target / "raw.pdl").write_bytes(b"x")
+    found = runner.invoke(app, [*call, "--json", "-"])
+    assert found.exit_code == 1
+    assert json.loads(found.stdout)["findings"][0]["place"] == "raw.pdl"
+    assert runner.invoke(app, ["check", str(tmp_path / "none")]).exit_code == 2
+
+
+def test_the_command_takes_each_program_s_model_from_the_plan(trees, job_folder):
+    _, target, _ = trees
+    plan = job_folder / "check.toml"
+    rule = '[[rule]]\npattern = "{}"\ncell = "cell.toml"\nmodel = "{}"\n'
+    loaded = load_model(job_folder / "model.json")
+    replace(loaded, rows=loaded.rows + 1).save(job_folder / "other.json")
+    plan.write_text(
+        rule.format("line000/**", "model.json") + rule.format("**", "other.json")
+    )
+    found = CliRunner().invoke(app, ["check", str(target), "--plan", str(plan)])
+    assert found.exit_code == 1
+    assert found.stderr.count("older-model") == 1
+    assert "spot.pdl: older-model" in found.stderr
