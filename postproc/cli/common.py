@@ -68,6 +68,16 @@ def split_names(text: str) -> list[str]:
     return [name.strip() for name in text.split(",") if name.strip()]
 
 
+@contextmanager
+def busy(doing: str) -> Iterator[None]:
+    """Show on a terminal what is being done, where it lasts."""
+    from postproc.console import stages
+
+    with stages() as told:
+        told(doing)
+        yield
+
+
 def as_path(target: str | None) -> Path | None:
     """Name the file of an option that may be - for stdout."""
     return None if target is None else Path(target)

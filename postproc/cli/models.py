@@ -17,6 +17,7 @@ from postproc.cli.common import (
     SeedOption,
     app,
     as_path,
+    busy,
     explained,
     say,
     split_names,
@@ -61,7 +62,9 @@ def survey(
 
     with explained():
         check_places([output], [cell])
-        say(write_survey(cell, output, poses, mode, tracker, seed))
+        with busy("choose poses"):
+            told = write_survey(cell, output, poses, mode, tracker, seed)
+        say(told)
 
 
 @app.command()
@@ -86,7 +89,8 @@ def simulate(
 
     with explained():
         check_places([output, as_path(json)], [program, cell, wanted])
-        found = simulate_file(program, cell, seed, effects, wanted)
+        with busy("run on the virtual arm"):
+            found = simulate_file(program, cell, seed, effects, wanted)
         if output is not None:
             found.write(output)
         if json:
@@ -118,17 +122,18 @@ def fit(
     names = None if effects is None else split_names(effects)
     with explained():
         check_places([output, html], [*data, cell, program])
-        found = calibrating.fit_files(
-            data,
-            cell,
-            output,
-            program,
-            html,
-            method=method.value,
-            effects=names,
-            frame=frame.value,
-            seed=seed,
-        )
+        with busy("fit"):
+            found = calibrating.fit_files(
+                data,
+                cell,
+                output,
+                program,
+                html,
+                method=method.value,
+                effects=names,
+                frame=frame.value,
+                seed=seed,
+            )
         typer.echo(found)
 
 
@@ -144,7 +149,8 @@ def predict(
 
     with explained():
         check_places([output], [states, cell, model])
-        text, summary = calibrating.predict_file(states, cell, model)
+        with busy("predict"):
+            text, summary = calibrating.predict_file(states, cell, model)
         write_text("-" if output is None else str(output), text)
         say(summary)
 
@@ -163,7 +169,8 @@ def compare(
 
     with explained():
         check_places([as_path(json), html], [*data, cell])
-        found = calibrating.compare_files(data, cell, frame.value, seed)
+        with busy("fit every method"):
+            found = calibrating.compare_files(data, cell, frame.value, seed)
         if json:
             write_text(json, calibrating.comparison_json(found))
         if html is not None:

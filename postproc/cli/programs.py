@@ -16,6 +16,7 @@ from postproc.cli.common import (
     TemperatureOption,
     app,
     as_path,
+    busy,
     explained,
     say,
     write_text,
@@ -111,7 +112,8 @@ def diff(
 
     with explained():
         check_places([as_path(json)], [original, compensated])
-        found = differ.diff(original, compensated)
+        with busy("compare"):
+            found = differ.diff(original, compensated)
         if json:
             write_text(json, found.to_json())
         if json != "-":
@@ -153,7 +155,8 @@ def explain(
 
     with explained():
         check_places([as_path(json)], [program, cell, model, lsv])
-        found = explain_file(program, cell, model, lsv, temperature)
+        with busy("plan"):
+            found = explain_file(program, cell, model, lsv, temperature)
         if json:
             write_text(json, found.to_json(line))
         if json != "-":
