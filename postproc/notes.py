@@ -142,14 +142,20 @@ def unsure_sides(
             visits.files[visits.file[i]],
             int(visits.line[i]),
             CODE,
-            f"reached soon after axis {_axes(side[i])} turned, from a side that "
-            f"is not sure (+-{size[i]:.3f} mm): {cure}",
+            f"{_how(side[i])}, from a side that is not sure (+-{size[i]:.3f} mm): {cure}",
         )
         for i in rows
     ]
 
 
 CODE = "side-not-sure"
+
+
+def _how(side: Array) -> str:
+    """Say why the side is not sure."""
+    if not side.any():
+        return "reached from a place that the program does not tell"
+    return f"reached soon after axis {_axes(side)} turned"
 
 
 def _axes(side: Array) -> str:
