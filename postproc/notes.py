@@ -142,7 +142,8 @@ def unsure_sides(
             visits.files[visits.file[i]],
             int(visits.line[i]),
             CODE,
-            f"{_how(side[i])}, from a side that is not sure (+-{size[i]:.3f} mm): {cure}",
+            f"{_how(side[i])}, from a side that is not sure "
+            f"(+-{size[i]:.3f} mm): {cure}",
         )
         for i in rows
     ]
