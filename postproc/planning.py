@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from postproc.accuracy.lost_motion import measured_play
 from postproc.accuracy.model import Model
+from postproc.exceptions import ProgramError
 from postproc.language.diagnostic import Diagnostic
 from postproc.language.flow import Start, resolve
 from postproc.language.lsv import Variables, read_variables
@@ -103,6 +104,9 @@ def read_program(files: Mapping[str, bytes], cell: Cell) -> Reading:
     """
     sources = tuple(source_from_bytes(name, data) for name, data in files.items())
     program = parse(sources[0])
+    if program.main is None and not program.routines:
+        problem, cure = "the file holds no BEGIN .. END", "Give a PDL2 program"
+        raise ProgramError(sources[0].name, problem, cure)
     others: dict[str, Program] = {}
     variables: Variables | None = None
     for source in sources[1:]:

@@ -27,6 +27,7 @@ def refused(found, said):
     [
         (b"", r"job\.pdl: the file is empty\. Give"),
         (b" \r\n\r\n", r"job\.pdl: the file is empty"),
+        (b"id;x_mm;y_mm\n1;2;3\n", r"job\.pdl: the file holds no BEGIN .* Give"),
         (bytes(range(256)) * 9, r"job\.pdl:1: the file is binary .*compiled"),
         ("PROGRAM x\nBEGIN\nEND x".encode("utf-16"), r"job\.pdl:1: .*8-bit"),
         (
@@ -35,7 +36,7 @@ def refused(found, said):
         ),
         (program("MOVE LINEAR TO POS(1, 2, 3, 4, 5, 6, '"), r"job\.pdl:5: a string"),
     ],
-    ids=["empty", "blank", "binary", "utf-16", "string", "configuration"],
+    ids=["empty", "blank", "table", "binary", "utf-16", "string", "configuration"],
 )
 def test_a_file_that_is_no_program_text(desk, data, said):
     refused(desk.compensate(desk.put("job.pdl", data)), said)
