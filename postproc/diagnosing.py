@@ -11,9 +11,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from postproc.accuracy.diagnosis.diagnose import Extension, diagnose, silent
+from postproc.accuracy.diagnosis.diagnose import Extension, diagnose
 from postproc.accuracy.diagnosis.result import Diagnosis
 from postproc.accuracy.diagnosis.search import Progress
+from postproc.accuracy.diagnosis.tracing import silent
 from postproc.accuracy.error_statistics import ErrorStatistics
 from postproc.accuracy.measurement import Measurements, concatenate
 from postproc.accuracy.model import Model, load_model

@@ -21,7 +21,7 @@ import numpy as np
 
 from postproc.accuracy.batch import Batch
 from postproc.accuracy.combination import Combination
-from postproc.accuracy.diagnosis.diagnose import trace
+from postproc.accuracy.diagnosis.tracing import trace
 from postproc.accuracy.effect import Effect, Parameter
 from postproc.accuracy.fit import Fit, fit_effects
 from postproc.accuracy.library import BASE_EFFECTS, propose

@@ -9,7 +9,7 @@ from postproc.accuracy.batch import Batch
 
 Array = NDArray[np.float64]
 
-JOINT_KINDS = ("joint", "travel", "loop", "torque")
+JOINT_KINDS = ("joint", "lambda", "before", "travel", "loop", "torque")
 SHORTEST = 1e-4  # [rad] of a way whose logarithm is taken
 PLAIN = ("speed", "payload", "temperature", "time", "order")
 
@@ -17,7 +17,8 @@ PLAIN = ("speed", "payload", "temperature", "time", "order")
 def covariate(batch: Batch, name: str) -> Array:
     """Look up a covariate by its name, (n,), NaN where it is not known.
 
-    Names are ``joint 5`` (its angle [rad]), ``travel 5`` (since its last reversal
+    Names are ``joint 5`` (its angle [rad]), ``lambda 5`` (its direction), ``before 5``
+    (its direction at the visit before), ``travel 5`` (since its last reversal
     [log rad]), ``loop 5`` (between its last two reversals [log rad]), ``torque 5`` (of
     gravity about it [N m]), ``speed``, ``payload``, ``temperature``, ``time`` and
     ``order`` (SI units).
@@ -34,6 +35,10 @@ def covariate(batch: Batch, name: str) -> Array:
             return np.asarray(batch.states.q[:, j])
         if kind == "travel":
             return np.log(np.maximum(batch.states.travel[:, j], SHORTEST))
+        if kind == "lambda":
+            return np.asarray(batch.states.direction[:, j])
+        if kind == "before":
+            return sides_before(batch, j)
         if kind == "loop":
             return np.log(np.maximum(loops(batch, j), SHORTEST))
         return np.asarray((batch.loads.gravity + batch.loads.payload)[:, j])
@@ -44,8 +49,8 @@ def unit(name: str) -> str:
     """Name the unit of a covariate in SI."""
     kind = name.partition(" ")[0]
     return {
-        "joint": "rad", "travel": "log rad", "loop": "log rad", "torque": "N m",
-        "speed": "m/s",
+        "joint": "rad", "lambda": "1", "before": "1", "travel": "log rad",
+        "loop": "log rad", "torque": "N m", "speed": "m/s",
         "payload": "kg", "temperature": "deg C", "time": "s", "order": "rows",
     }[kind]  # fmt: skip
 
@@ -71,4 +76,16 @@ def loops(batch: Batch, joint: int) -> Array:
     begun = np.maximum.accumulate(np.where(still, 0, np.arange(len(q))))
     out = np.empty(len(q))
     out[order] = loop[begun]
+    return out
+
+
+def sides_before(batch: Batch, joint: int) -> Array:
+    """Return the direction of a joint (from 0) at the visit before, NaN if missing."""
+    s = batch.states
+    order = np.argsort(s.order, kind="stable")
+    before = np.full(len(order), np.nan)
+    follows = np.diff(s.order[order]) == 1
+    before[1:] = np.where(follows, s.direction[order, joint][:-1], np.nan)
+    out = np.empty(len(order))
+    out[order] = before
     return out

@@ -28,9 +28,10 @@ class Thermal(Effect):
     Attributes:
         lengths: Names a1 .. d6 of the D-H lengths that grow.
         form: "temperature": growth alpha * (T - reference). "time": growth
-            g * (1 - exp(-t / time_constant)) - g, 0 when the arm is warm.
+            g * (1 - exp(-(t - start) / time_constant)) - g, 0 when the arm is warm.
         reference: [deg C].
         time_constant: [s].
+        start: When the arm was cold [s].
     """
 
     name: ClassVar[str] = "thermal"
@@ -40,6 +41,7 @@ class Thermal(Effect):
     form: Literal["temperature", "time"] = "temperature"
     reference: float = 20.0
     time_constant: float = 3600.0
+    start: float = 0.0
 
     @classmethod
     def propose(cls, arm: Arm, states: States) -> Self:
@@ -47,8 +49,13 @@ class Thermal(Effect):
         lengths = growing(arm)
         if not np.isnan(states.temperature).all():
             return cls(lengths, reference=float(np.nanmean(states.temperature)))
-        last = float(np.nanmax(states.time, initial=1.0))
-        return cls(lengths, form="time", time_constant=last / 4)
+        time = states.time[~np.isnan(states.time)]
+        if len(time) == 0:
+            return cls(lengths, form="time")
+        span = max(float(np.ptp(time)), 1.0)
+        return cls(
+            lengths, form="time", time_constant=span / 4, start=float(time.min())
+        )
 
     def requires(self) -> tuple[str, ...]:
         """Need the temperature; a warm-up of unknown time is over."""
@@ -71,7 +78,8 @@ class Thermal(Effect):
         """Return temperature above the reference [K], or share of the warm-up, (n,)."""
         if self.form == "temperature":
             return np.nan_to_num(batch.states.temperature - self.reference)
-        warm = -np.exp(-np.maximum(batch.states.time, 0.0) / self.time_constant)
+        since = np.maximum(batch.states.time - self.start, 0.0)
+        warm = -np.exp(-since / self.time_constant)
         return np.nan_to_num(warm)
 
     def columns(self, batch: Batch) -> Array:

@@ -28,6 +28,7 @@ class TrackerDrift(Effect):
     u (1 - u) and so on, later terms expected to be smaller.
 
     Attributes:
+        start: When the tracker was registered, [s] or rows.
         duration: Length of the campaign, [s] or rows.
         clock: "time", or "order" where no time was recorded.
     """
@@ -35,6 +36,7 @@ class TrackerDrift(Effect):
     name: ClassVar[str] = "tracker_drift"
     origin: ClassVar[Origin] = "setup"
 
+    start: float = 0.0
     duration: float = 1.0
     clock: Literal["time", "order"] = "time"
 
@@ -44,7 +46,10 @@ class TrackerDrift(Effect):
         clock: Literal["time", "order"] = (
             "order" if np.isnan(states.time).any() else "time"
         )
-        return cls(max(float(getattr(states, clock).max(initial=1.0)), 1.0), clock)
+        passed = getattr(states, clock)
+        if len(passed) == 0:
+            return cls()
+        return cls(float(passed.min()), max(float(np.ptp(passed)), 1e-9), clock)
 
     def parameters(self) -> tuple[Parameter, ...]:
         """Name shift and turn of every term."""
@@ -59,7 +64,7 @@ class TrackerDrift(Effect):
 
     def columns(self, batch: Batch) -> Array:
         """Differentiate the TCP position, (n, 3, p)."""
-        u = getattr(batch.states, self.clock) / self.duration
+        u = (getattr(batch.states, self.clock) - self.start) / self.duration
         u = np.clip(np.nan_to_num(u), 0.0, 1.0)
         bow = 4.0 * u * (1.0 - u)
         terms = (u, bow, bow * (1.0 - 2.0 * u) * 1.5)

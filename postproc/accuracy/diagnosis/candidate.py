@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -52,12 +53,12 @@ class Candidate:
     source: str
     log_prior: float
 
-    @property
+    @cached_property
     def width(self) -> int:
         """Number of columns."""
         return len(self.effect.parameters())
 
-    @property
+    @cached_property
     def names(self) -> frozenset[str]:
         """Names of its parameters in a model."""
         effect = self.effect

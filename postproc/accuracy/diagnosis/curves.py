@@ -39,6 +39,9 @@ def free_candidates(batch: Batch) -> list[Candidate]:
             out.append(_memory(batch, j))
         with_side += [f"joint {k}" for k in JOINTS if k != j]
         out += [_curve(batch, f"joint {j}", (name,), True) for name in with_side]
+        if np.ptp(batch.states.direction[:, j - 1]) > 0:
+            name = (f"before {j}",)
+            out += [_curve(batch, f"joint {j}", name, side) for side in (False, True)]
         pairs = combinations([f"joint {k}" for k in JOINTS], 2)
         out += [_curve(batch, f"joint {j}", pair) for pair in pairs]
     for axis in FRAMES:

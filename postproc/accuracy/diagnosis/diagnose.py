@@ -6,79 +6,36 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from postproc.accuracy.batch import Batch
-from postproc.accuracy.diagnosis.bootstrap import bootstrap
-from postproc.accuracy.diagnosis.findings import describe
+from postproc.accuracy.diagnosis.choice import ranking
 from postproc.accuracy.diagnosis.floor import multi_directional, noise_floor
-from postproc.accuracy.diagnosis.groups import Standing, stand
-from postproc.accuracy.diagnosis.library import Library
-from postproc.accuracy.diagnosis.omnibus import Leftover, leftovers
 from postproc.accuracy.diagnosis.outer import HeldOut, hold_out
 from postproc.accuracy.diagnosis.planning import (
     poses_that_separate,
     poses_that_sharpen,
 )
 from postproc.accuracy.diagnosis.projection import Projection
+from postproc.accuracy.diagnosis.refitting import refit
 from postproc.accuracy.diagnosis.result import (
     Diagnosis,
-    Finding,
     Place,
-    Verdict,
     statistics,
 )
 from postproc.accuracy.diagnosis.revision import (
     Revision,
-    few,
     fold_back,
-    only_arm,
-    revise,
 )
-from postproc.accuracy.diagnosis.search import Progress, Search, ranking, search
+from postproc.accuracy.diagnosis.search import Progress, Search
+from postproc.accuracy.diagnosis.tracing import Trace, silent, trace
 from postproc.accuracy.effect import Array
 from postproc.accuracy.error_statistics import ErrorStatistics
-from postproc.accuracy.fit import Fit, fit_effects
 from postproc.accuracy.fit_report import weighed_down
 from postproc.accuracy.full import model_of
-from postproc.accuracy.library import propose
 from postproc.accuracy.measurement import Measurements
 from postproc.accuracy.model import Model
-from postproc.exceptions import PostprocError
 from postproc.pose import MM
 from postproc.robot.arm import Arm
 
-REMAINS = 0.01  # level at which structure is called structure: nothing was added
-STILL_REMAINS = 0.001  # ... after something was
 PLACES = 5
-FEWEST = 12  # rows
-
-
-@dataclass(frozen=True, eq=False)
-class Trace:
-    """What all the rows say.
-
-    Attributes:
-        search: What was added.
-        standings: Every addition judged with all others in the model.
-        leftovers: What the final residual still shows.
-    """
-
-    search: Search
-    standings: tuple[Standing, ...]
-    leftovers: tuple[Leftover, ...]
-
-    @property
-    def findings(self) -> tuple[Finding, ...]:
-        """Describe the additions."""
-        return describe(self.search, self.standings)
-
-    @property
-    def verdict(self) -> Verdict:
-        """Decide between an effect, noise, and structure without a name."""
-        p_value = min((x.p_value for x in self.leftovers), default=1.0)
-        added = [a.candidate.family.effect for a in self.search.additions]
-        if not added:
-            return "unexplained" if p_value < REMAINS else "noise"
-        nameless = "curve" in added or p_value < STILL_REMAINS
-        return "unexplained" if nameless else "effect"
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,10 +53,6 @@ class Extension:
     model: Model
     search: Search
     held_out: HeldOut
-
-
-def silent(message: str) -> None:
-    """Tell nobody."""
 
 
 def diagnose(
@@ -140,56 +93,6 @@ def diagnose(
     diagnosis = _conclude(survey, traced, held_out, tracker, seed)
     extended = _extended(model, survey, traced.search, diagnosis)
     return Extension(diagnosis, extended, traced.search, held_out)
-
-
-def trace(base: Fit, seed: int, progress: Progress = silent) -> Trace:
-    """Search a fit's rows for what it lacks, and judge what was found."""
-    progress("candidates")
-    library = Library.of(base)
-    progress("threshold of the whole library")
-    null = bootstrap(Projection.of(base), library, seed)
-    found = search(base, library, null, progress)
-    progress("groups that cannot be told apart")
-    standings = tuple(stand(found, k) for k in range(len(found.additions)))
-    progress("what is left")
-    left = leftovers(Projection.of(found.fit), seed)
-    return Trace(found, standings, left)
-
-
-def refit(
-    survey: Measurements,
-    arm: Arm,
-    model: Model,
-    tracker: Array | None,
-    setup: tuple[str, ...] = (),
-) -> Fit:
-    """Fit the given model's effects to the rows, or revise it where they are few.
-
-    Raises:
-        PostprocError: The model was not made by the full method, or there are hardly
-            any rows.
-    """
-    model.check_arm(arm)
-    if model.method != "full":
-        raise PostprocError(
-            f"a model of method {model.method} has no named effects to extend. "
-            "Fit one with --method full and diagnose that"
-        )
-    if len(survey) < FEWEST:
-        raise PostprocError(
-            f"{survey.path} has {len(survey)} rows; tracing an effect takes at least "
-            f"{FEWEST}. Measure more points"
-        )
-    origin = None if tracker is None else (tracker[0], tracker[1], tracker[2])
-    batch = Batch(arm, survey.states)
-    effects = model.effects.effects
-    if model.data_sha256 != survey.sha256:
-        effects = only_arm(model).effects.effects
-    missing = [name for name in setup if name not in {e.name for e in effects}]
-    placed = propose(missing, arm, survey.states)
-    if model.data_sha256 != survey.sha256 and few(survey, model):
-        return revise(survey, model, batch, origin, placed)
-    return fit_effects(batch, survey.position, (*effects, *placed), origin)
 
 
 def _conclude(

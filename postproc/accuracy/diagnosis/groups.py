@@ -5,9 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from postproc.accuracy.diagnosis.candidate import FREE
+from postproc.accuracy.diagnosis.choice import ranking
 from postproc.accuracy.diagnosis.projection import Projection
 from postproc.accuracy.diagnosis.score import Score
-from postproc.accuracy.diagnosis.search import Search, ranking
+from postproc.accuracy.diagnosis.search import Search
 
 NEAR = 3.0  # nats: odds of 20 to 1
 MOST_OTHERS = 2

@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
+from postproc.accuracy.backlash import Backlash
+from postproc.accuracy.backlash_profile import BacklashProfile
 from postproc.accuracy.base_shift import BaseShift
 from postproc.accuracy.batch import Batch
 from postproc.accuracy.compliance import Compliance
@@ -26,6 +30,7 @@ JOINTS = (1, 2, 3, 4, 5, 6)
 CARRYING = 0.02  # of the largest torque: a joint that carries less cannot yield
 FIRST_FREE, LAST_FREE = 3.0, 60.0  # orders of a gear's teeth
 STEPS = 48  # moments at which a step is tried
+PAIRS = (*Coupling().pairs, (2, 3), (4, 5), (4, 6), (5, 6))  # receiving, driving
 EDGE = 10  # rows before and after a step that must show it
 LONGEST_WINDUP = float(np.radians(8.0))  # what fades more slowly is no wind-up
 WINDUPS = tuple(np.radians([0.5, 1.0, 2.0, 4.0, 7.0]))
@@ -116,7 +121,7 @@ def _angles(batch: Batch) -> list[Candidate]:
             share = half - float(np.log(len(members)))
             out += [Candidate(family, e, source, share) for e in members]
         out += _single("scale", j, [(Scale((j,)), source)])
-    for pair in Coupling().pairs:
+    for pair in PAIRS:
         driver = f"joint {pair[1]}"
         family = Family("coupling", pair[0], driver, NAMED)
         out += shared([(Coupling((pair,)), driver)], family)
@@ -124,10 +129,14 @@ def _angles(batch: Batch) -> list[Candidate]:
 
 
 def _directions(batch: Batch) -> list[Candidate]:
-    """Wind-up and lag: odd in the direction."""
+    """Backlash, wind-up and lag: odd in the direction."""
     out = []
+    profile = BacklashProfile.propose(batch.arm, batch.states)
     moves = known(batch.states.speed)
     for j in JOINTS:
+        out += _single("backlash", j, [(Backlash((j,)), f"lambda {j}")])
+        varying = replace(profile, joints=(j,))
+        out += _single("backlash_profile", j, [(varying, f"joint {j}")])
         if known(batch.states.travel[:, j - 1]):
             members = [(Windup((j,), float(d0)), f"travel {j}") for d0 in WINDUPS]
             out += _single("windup", j, list(members))
@@ -176,8 +185,6 @@ def _warmth(batch: Batch) -> list[Candidate]:
         members.append((Thermal(lengths, reference=middle), "temperature"))
     if known(batch.states.time):
         span = float(np.ptp(batch.states.time))
-        members += [
-            (Thermal(lengths, form="time", time_constant=k * span), "time")
-            for k in WARM_UPS
-        ]
+        cold = Thermal(lengths, form="time", start=float(batch.states.time.min()))
+        members += [(replace(cold, time_constant=k * span), "time") for k in WARM_UPS]
     return _single("thermal", None, members) if members else []

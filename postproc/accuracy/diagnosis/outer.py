@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 from postproc.accuracy.batch import Batch
 from postproc.accuracy.combination import Combination
 from postproc.accuracy.diagnosis.folds import deal
-from postproc.accuracy.diagnosis.search import Progress, Search, search
+from postproc.accuracy.diagnosis.search import Progress, Search
+from postproc.accuracy.diagnosis.withdrawal import investigate
 from postproc.accuracy.effect import Array
 from postproc.accuracy.fit import Fit, fit_effects
 
@@ -64,7 +65,7 @@ def hold_out(
             continue
         less = _fit_of(base, inside)
         library = found.library.at_rows(inside)
-        more = search(less, library, found.null, lambda _: None).fit
+        more = investigate(less, library, found.null, lambda _: None).fit
         rows.append(out)
         before.append(
             left_by(less, base, out) if given is None else np.asarray(given[out])

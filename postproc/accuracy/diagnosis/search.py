@@ -5,28 +5,21 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
-import numpy as np
-from scipy.stats import norm
-
 from postproc.accuracy.diagnosis.bootstrap import Null
-from postproc.accuracy.diagnosis.candidate import FREE, NAMED, Candidate
+from postproc.accuracy.diagnosis.candidate import Candidate
+from postproc.accuracy.diagnosis.choice import choose, ranking
 from postproc.accuracy.diagnosis.folds import Gain, held_out_gain
 from postproc.accuracy.diagnosis.library import Library
 from postproc.accuracy.diagnosis.projection import Projection
-from postproc.accuracy.diagnosis.refine import refine
-from postproc.accuracy.diagnosis.score import Score, rank
-from postproc.accuracy.effect import Effect, JointEffect
+from postproc.accuracy.diagnosis.score import Score
+from postproc.accuracy.effect import Effect
 from postproc.accuracy.fit import Fit, fit_effects
 
-MOST = 10  # additions
+MOST = 12  # additions
 LEVEL = 0.01  # probability of a false addition, whole library
 ALONE = 0.01  # level of the score test of the candidate itself
-CLEARLY = (8.0, 0.1)  # nats, and share of the name's evidence, that a free form
-#                       must be ahead by
 BETTER = 1.0  # nats that replace one family by another
-UNSTEADY = 1e-3  # level at which scatter that follows a law takes its name away
-STANDS_IN = 0.5  # share of the name's evidence that a free form must have
-LOOKED_AT = 4  # families whose settings are refined before the best is taken
+RECENT = 2  # additions looked at again after each further one
 
 Progress = Callable[[str], None]
 
@@ -87,35 +80,14 @@ def search(base: Fit, library: Library, null: Null, progress: Progress) -> Searc
         progress: Told what is being done.
     """
     found = Search(base, base, library, (), null, None)
-    while len(found.additions) < MOST:
-        progress(f"looking for effect {len(found.additions) + 1}")
+    for number in range(MOST):
+        progress(f"looking for effect {number + 1}")
         grown = _grow(found)
-        if grown.refused is not None or grown.fit is found.fit:
-            return withdraw(grown)
-        found = _settle(grown)
-    return withdraw(found)
-
-
-def ranking(projection: Projection, library: Library) -> list[Score]:
-    """Score the library, the settings of the leading families refined."""
-    square = float(projection.rest @ projection.rest)
-    reduced = library.reduce(projection, projection.rest[:, None])
-    known = frozenset(projection.names)
-    scores = rank(reduced, square, projection.rows, without=known)
-    leading: list[Score] = []
-    for tier in (NAMED, FREE):
-        leading += [s for s in scores if s.family.tier == tier][:LOOKED_AT]
-    refined = [refine(projection, s) for s in leading]
-    rest = [s for s in scores if s not in leading]
-    return sorted([*refined, *rest], key=lambda s: -s.evidence)
-
-
-def choose(scores: list[Score]) -> Score:
-    """Take the best name, unless a free form is clearly ahead of it."""
-    name = next(s for s in scores if s.family.tier == NAMED)
-    free = next((s for s in scores if s.family.tier == FREE), name)
-    ahead = max(CLEARLY[0], CLEARLY[1] * name.evidence)
-    return free if free.evidence > name.evidence + ahead else name
+        if grown.fit is found.fit:
+            found = grown
+            break
+        found = _settle(grown, len(grown.additions) - RECENT)
+    return _settle(found, 0) if len(found.additions) > RECENT else found
 
 
 def _grow(found: Search) -> Search:
@@ -142,9 +114,9 @@ def extend(fit: Fit, candidate: Candidate, instead_of: int | None = None) -> Fit
     return refit(fit, effects)
 
 
-def _settle(found: Search) -> Search:
-    """Look at every addition again, now that the others are in."""
-    number = 0
+def _settle(found: Search, first: int) -> Search:
+    """Look again at additions from some number on, now that the others are in."""
+    number = max(first, 0)
     while number < len(found.additions):
         again = _again(found, number)
         number += len(again.additions) == len(found.additions)
@@ -165,10 +137,10 @@ def _again(found: Search, number: int) -> Search:
         best = present
     if best.best.effect == old.effect:
         return found
-    return _instead(found, number, best)
+    return put_instead(found, number, best)
 
 
-def _instead(found: Search, number: int, best: Score) -> Search:
+def put_instead(found: Search, number: int, best: Score) -> Search:
     """Put another candidate in the place of an addition."""
     place = found.place(number)
     fit = extend(found.fit, best.best, instead_of=place)
@@ -176,50 +148,6 @@ def _instead(found: Search, number: int, best: Score) -> Search:
     additions = list(found.additions)
     additions[number] = Addition(best, found.null.p_value(best.evidence), gain)
     return replace(found, fit=fit, additions=tuple(additions))
-
-
-def withdraw(found: Search) -> Search:
-    """Take names back whose law does not hold: the scatter follows the law's size.
-
-    Rows at which a law is large then err more than others, which its mean cannot show:
-    something that no covariate tells drives it too. A free form takes its place.
-    """
-    for number, addition in enumerate(found.additions):
-        place, family = found.place(number), addition.candidate.family
-        effect = found.fit.combination.effects[place]
-        if family.tier == FREE or not isinstance(effect, JointEffect):
-            continue
-        without = Projection.of(found.fit, without=place)
-        if incomplete(without, effect, place) > UNSTEADY:
-            continue
-        scores = ranking(without, found.library)
-        free = [s for s in scores if s.family.tier == FREE]
-        same = [s for s in free if s.family.joint == family.joint]
-        if same and same[0].evidence > STANDS_IN * addition.score.evidence:
-            found = _instead(found, number, same[0])
-    return found
-
-
-def incomplete(projection: Projection, effect: JointEffect, place: int) -> float:
-    """Test whether the scatter of a joint follows the size of a law; the p-value.
-
-    Args:
-        projection: The fit with the law left out: what only the law can explain counts.
-        effect: The law.
-        place: Its place in the fit.
-    """
-    fit = projection.fit
-    part = fit.combination.slices[place]
-    moved = fit.whiten(fit.columns[:, :, part] @ fit.values[part])
-    own = projection.filter(moved[:, None]).reshape(-1, 3)
-    axis = fit.whiten(fit.batch.jacobian[:, :, int(effect.acts_on()[0])])
-    axis = axis.reshape(-1, 3)
-    axis /= np.maximum(np.linalg.norm(axis, axis=1, keepdims=True), 1e-12)
-    square = np.einsum("nk,nk->n", axis, fit.whiten(fit.residual).reshape(-1, 3)) ** 2
-    size = (own**2).sum(axis=1)
-    size, square = size - size.mean(), square - square.mean()
-    spread = float(np.sqrt((size**2).sum() * (square**2).mean()))
-    return float(norm.sf(float(size @ square) / max(spread, 1e-300)))
 
 
 def _drop(found: Search, number: int) -> Search:
