@@ -134,8 +134,8 @@ def tell(found: Diagnosis) -> str:
     lines += [
         f"before {_spread(found.before)}",
         f"after  {_spread(found.after)}",
-        f"on {found.n_held_out} rows that chose and fitted nothing; noise floor "
-        f"{found.noise_floor_mm:.4f} mm ({found.noise_floor_source})",
+        f"on {found.n_held_out} rows, each left out of the search that predicts it; "
+        f"noise floor {found.noise_floor_mm:.4f} mm ({found.noise_floor_source})",
     ]
     if found.vap_mm is not None:
         lines.append(f"vAP {found.vap_mm[0]:.4f} -> {found.vap_mm[1]:.4f} mm")
