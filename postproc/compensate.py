@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from postproc.accuracy.error_statistics import ErrorStatistics
 from postproc.accuracy.model import Model
+from postproc.arrivals import tell_arrivals
 from postproc.clock import Clock, Progress, silent
 from postproc.exceptions import CellError, ProgramError
 from postproc.language.source import Source
@@ -142,6 +143,7 @@ def report(
     """Say what came of every visit, and what error the model expects now."""
     proposal, done = corrected.proposal, corrected.planned.plan
     d, rows, visits = proposal.decisions, proposal.corrected, reading.visits
+    output = corrected.output
     wanted = planned.plan.tcp[rows, :3, 3]
     new = states.with_(q=np.array(done.q), direction=np.array(done.side))[rows]
     before = model.error(cell.arm, states[rows])
@@ -149,8 +151,10 @@ def report(
     return Outcome(
         program=name,
         model=model.id,
-        outputs=corrected.output.changed,
-        sidecar=corrected.output.sidecar(model.id, asdict(options)),
+        outputs=output.changed,
+        sidecar=output.sidecar(
+            model.id, asdict(options), tell_arrivals(visits, d, tuple(output.records))
+        ),
         visits=visits,
         decisions=d,
         before=ErrorStatistics.of(before),

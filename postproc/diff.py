@@ -3,88 +3,51 @@
 from __future__ import annotations
 
 import json
-import re
-from dataclasses import asdict, dataclass
-from difflib import SequenceMatcher
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
 
-from postproc.console import Column, print_table
-from postproc.exceptions import ProgramError
-from postproc.language.lexis import MaskedLine, mask_line, number_value
-from postproc.language.stamp import read_stamp
-
-DECIMALS = 4  # shown of a number
-COLUMNS = (
-    Column("file", "left"),
-    Column("line"),
-    Column("target", "left"),
-    Column("original", fold=True),
-    Column("compensated", fold=True),
-    Column("change [mm]"),
-)
-VARIABLES = ".lsv"
-
-
-@dataclass(frozen=True)
-class Row:
-    """One line that differs.
-
-    Attributes:
-        file: Name of the original file.
-        line: 1-based line in the original; 0 for a line that it does not have.
-        target: What the numbers belong to: a variable, or the statement's first word.
-        original, compensated: The numbers on the line; empty where the text differs.
-        change_mm: Length of the change of the first three of six numbers or more, for
-            a position; None for joint angles and text.
-        text: The line's two texts where more than numbers differ, else "".
-    """
-
-    file: str
-    line: int
-    target: str
-    original: tuple[float, ...]
-    compensated: tuple[float, ...]
-    change_mm: float | None
-    text: str = ""
-
-    def cells(self) -> list[str]:
-        """Write the row for a table."""
-        size = "" if self.change_mm is None else f"{self.change_mm:.3f}"
-        head = [self.file, str(self.line or ""), self.target]
-        if self.text:
-            return [*head, self.text, "", size]
-        moved = [i for i, old in enumerate(self.original) if old != self.compensated[i]]
-        pairs = [
-            ", ".join(f"{values[i]:.{DECIMALS}f}" for i in moved)
-            for values in (self.original, self.compensated)
-        ]
-        return [*head, *pairs, size]
+from postproc.arrivals import LEFT_ALONE, Arrivals, read_arrivals
+from postproc.compared import VARIABLES, Compared, Row, compare_files
+from postproc.report import Status
 
 
 @dataclass(frozen=True)
 class Difference:
-    """All rows in which two programs (and their variable files) differ."""
+    """All rows in which two programs (and their variable files) differ.
+
+    Attributes:
+        rows: Lines that differ.
+        stamped: The second program carries a stamp.
+        left: Lines of targets that were left alone on purpose, where a record tells.
+        counts: Visits by status, likewise; else empty.
+    """
 
     rows: tuple[Row, ...]
     stamped: bool
+    left: tuple[Row, ...] = ()
+    counts: Mapping[str, int] = field(default_factory=dict)
 
     def to_json(self) -> str:
         """Return the rows as JSON text."""
-        rows = [asdict(row) for row in self.rows]
-        return json.dumps({"stamped": self.stamped, "rows": rows}, indent=1) + "\n"
-
-    def print(self) -> None:
-        """Print one row per line that differs, then a summary."""
-        if self.rows:
-            print_table(COLUMNS, (row.cells() for row in self.rows))
-        print(self.summary())
+        told = {
+            "stamped": self.stamped,
+            "counts": dict(self.counts),
+            "rows": [vars(row) for row in self.rows],
+            "left": [vars(row) for row in self.left],
+        }
+        return json.dumps(told, indent=1) + "\n"
 
     def summary(self) -> str:
-        """Say in one line what differs."""
-        if not self.rows:
-            return "the targets are the same"
+        """Say in one line what differs, and what came of the targets."""
+        said = self._said() if self.rows else "the targets are the same"
+        counts = ", ".join(f"{n} {status}" for status, n in self.counts.items() if n)
+        return f"{said}; visits: {counts}" if counts else said
+
+    def _said(self) -> str:
+        """Count the rows and their sizes."""
         sizes = [r.change_mm for r in self.rows if r.change_mm is not None]
         texts = sum(bool(r.text) for r in self.rows)
         said = f"{len(self.rows) - texts} lines with other numbers"
@@ -99,92 +62,53 @@ def diff(original: Path, compensated: Path) -> Difference:
     Raises:
         ProgramError: A file cannot be read.
     """
-    rows, stamped = _diff_files(original, compensated)
+    files = [compare_files(original, compensated)]
     values = original.with_suffix(VARIABLES), compensated.with_suffix(VARIABLES)
     if original.suffix.lower() != VARIABLES and all(v.is_file() for v in values):
-        rows += _diff_files(*values)[0]
-    return Difference(tuple(rows), stamped)
+        files.append(compare_files(*values))
+    told = read_arrivals(compensated, [(f.original, f.compensated) for f in files])
+    rows = [row for f in files for row in _marked(f.rows, told.get(f.original.name))]
+    left = [row for f in files for row in _left(f, told.get(f.original.name))]
+    return Difference(tuple(rows), files[0].stamped, tuple(left), _counts(told))
 
 
-def _read_lines(path: Path) -> tuple[list[str], bool]:
-    """Read a file's lines without their endings; the stamp line is dropped."""
-    try:
-        data = path.read_bytes()
-    except OSError as exc:
-        problem = f"cannot be read ({exc.strerror})"
-        raise ProgramError(path, problem, "Check the path") from None
-    lines = re.split(r"\r\n|\n|\r", data.decode("latin-1"))
-    stamped = read_stamp(data) is not None
-    return lines[stamped:], stamped
+def _marked(rows: Sequence[Row], told: Arrivals | None) -> Iterator[Row]:
+    """Add to every row what the record says of its line."""
+    if told is None:
+        yield from rows
+        return
+    found = told.find([row.line for row in rows]).tolist()
+    for row, k in zip(rows, found, strict=True):
+        yield row if k < 0 else _with(row, told, k)
 
 
-def _diff_files(original: Path, compensated: Path) -> tuple[list[Row], bool]:
-    """Compare two files line by line."""
-    before, _ = _read_lines(original)
-    after, stamped = _read_lines(compensated)
-    if len(before) == len(after):
-        pairs = zip(range(1, len(before) + 1), before, after, strict=True)
-        found = [_compare(original.name, *p) for p in pairs if p[1] != p[2]]
-    else:
-        found = _align(original.name, before, after)
-    name = ""
-    rows = []
-    for row in found:
-        if original.suffix.lower() == VARIABLES:
-            name = _entry_name(before, row.line)
-        rows.append(row if not name else Row(**{**asdict(row), "target": name}))
-    return rows, stamped
+def _with(row: Row, told: Arrivals, k: int) -> Row:
+    """Add the k-th entry of a record to a row."""
+    return replace(
+        row,
+        status=Status(told.status[k]).name.lower(),
+        why=told.reasons[told.why[k]],
+        direction=tuple(told.direction[k].tolist()),
+        correction_mm=float(told.correction_mm[k]),
+    )
 
 
-def _compare(file: str, line: int, before: str, after: str) -> Row:
-    """Describe how two lines differ."""
-    a, b = mask_line(before), mask_line(after)
-    same_text = a.mask == b.mask and _comment(before, a) == _comment(after, b)
-    old = tuple(number_value(before[s:e]) for s, e in zip(a.start, a.end, strict=True))
-    new = tuple(number_value(after[s:e]) for s, e in zip(b.start, b.end, strict=True))
-    if not same_text or a.unterminated or old == new:
-        return Row(file, line, "", (), (), None, f"{before} -> {after}")
-    joints = "{" in before
-    moved = np.linalg.norm(np.subtract(new[:3], old[:3])) if len(old) >= 3 else None
-    change = None if joints or moved is None else float(moved)
-    return Row(file, line, _target(before), old, new, change)
+def _left(file: Compared, told: Arrivals | None) -> Iterator[Row]:
+    """List the targets that were left alone."""
+    if told is None:
+        return
+    differ = {row.line for row in file.rows}
+    for k in np.flatnonzero(np.isin(told.status, LEFT_ALONE)).tolist():
+        line = int(told.line[k])
+        if line not in differ:
+            bare = Row(file.original.name, line, file.target(line), (), (), None)
+            yield _with(bare, told, k)
 
 
-def _comment(line: str, masked: MaskedLine) -> str:
-    """Return the comment of a line."""
-    return line[masked.comment :] if masked.comment >= 0 else ""
-
-
-def _target(line: str) -> str:
-    """Name what a line's numbers belong to."""
-    assigned = re.match(r"\s*([A-Za-z_$][\w$.\[\]]*)\s*(?::=|:)", line)
-    if assigned:
-        return assigned.group(1)
-    words = re.findall(r"[A-Za-z_]+", line)
-    return " ".join(words[:2]) if words else ""
-
-
-def _entry_name(lines: list[str], line: int) -> str:
-    """Find the variable that a line of a variable file belongs to."""
-    for text in reversed(lines[: max(line, 1)]):
-        found = re.match(r"([A-Za-z_]\w*(?:\[[\d, ]+\])?)\s+[A-Z]{3,4}\b", text)
-        if found:
-            return found.group(1)
-    return ""
-
-
-def _align(file: str, before: list[str], after: list[str]) -> list[Row]:
-    """Compare files of different length: match lines by their shape."""
-    shapes = [mask_line(t).mask for t in before], [mask_line(t).mask for t in after]
-    rows: list[Row] = []
-    matcher = SequenceMatcher(None, *shapes, autojunk=False)
-    for kind, a0, a1, b0, b1 in matcher.get_opcodes():
-        if kind == "equal":
-            lines = zip(range(a0 + 1, a1 + 1), before[a0:a1], after[b0:b1], strict=True)
-            rows += [_compare(file, *p) for p in lines if p[1] != p[2]]
-            continue
-        gone = [
-            Row(file, k + 1, "", (), (), None, f"- {before[k]}") for k in range(a0, a1)
-        ]
-        rows += gone + [Row(file, 0, "", (), (), None, f"+ {t}") for t in after[b0:b1]]
-    return rows
+def _counts(told: Mapping[str, Arrivals]) -> dict[str, int]:
+    """Add up the visits of every status."""
+    return {
+        s.name.lower(): sum(a.counts[s.name.lower()] for a in told.values())
+        for s in Status
+        if told
+    }

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,9 +43,24 @@ class Output:
             if name == program or name in self.records
         }
 
-    def sidecar(self, model: str, options: Mapping[str, object]) -> str:
-        """Return the record beside the program as JSON text."""
-        return Sidecar(__version__, model, self.records, options).to_json()
+    def sidecar(
+        self,
+        model: str,
+        options: Mapping[str, object],
+        arrivals: Mapping[str, Mapping[str, object]],
+    ) -> str:
+        """Return the record beside the program as JSON text.
+
+        Args:
+            model: Id of the model.
+            options: What the user asked for.
+            arrivals: What came of the targets in every file.
+        """
+        records = {
+            name: replace(record, targets=arrivals[name])
+            for name, record in self.records.items()
+        }
+        return Sidecar(__version__, model, records, options).to_json()
 
 
 def write_numbers(

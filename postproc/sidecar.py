@@ -6,7 +6,7 @@ import hashlib
 import json
 import zlib
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -46,12 +46,15 @@ class FileRecord:
         checksums: CRC-32 of every `BLOCK` lines of the output.
         edits: Start and end in the output, and the original bytes (as Latin-1 text),
             ascending. The stamp is the first of them.
+        targets: What came of the targets in it, see `postproc.arrivals`; empty in
+            records of older versions.
     """
 
     source_sha256: str
     output_sha256: str
     checksums: Sequence[int]
     edits: Sequence[tuple[int, int, str]]
+    targets: Mapping[str, Any] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -66,7 +69,7 @@ class Sidecar:
     def to_json(self) -> str:
         """Return the record as JSON text."""
         head = {"postproc": self.version, "model": self.model}
-        files = {name: asdict(record) for name, record in self.files.items()}
+        files = {name: vars(record) for name, record in self.files.items()}
         return (
             json.dumps({**head, "options": dict(self.options), "files": files}) + "\n"
         )
@@ -100,6 +103,7 @@ def read_sidecar(path: Path) -> Sidecar:
                 str(r["output_sha256"]),
                 [int(c) for c in r["checksums"]],
                 [(int(a), int(b), str(text)) for a, b, text in r["edits"]],
+                dict(r.get("targets", {})),
             )
             for name, r in data["files"].items()
         }

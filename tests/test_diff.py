@@ -49,8 +49,60 @@ def test_the_table_shows_units_lines_and_a_summary(desk):
     out = desk.folder / "out.pdl"
     desk.compensate(source, "-o", out)
     found = cli("diff", source, out)
-    assert "change [mm]" in found.stdout and "\x1b" not in found.stdout
+    assert "|c| mm" in found.stdout and "\x1b" not in found.stdout
     assert "2 lines with other numbers, change mean" in found.stdout
+    assert found.stdout.rstrip().endswith("visits: 2 safe")
+    (desk.folder / "out.pdl.postproc.json").unlink()
+    bare = cli("diff", source, out).stdout  # nobody tells what came of the targets
+    assert "change mm" in bare and "safe" not in bare and "J1-6" not in bare
+
+
+FAR = "MOVE LINEAR TO POS(9000.0, 0.0, 0.0, 0.0, 175.0, 0.0, '')"
+
+
+def test_directions_and_statuses_are_those_of_the_report(desk):
+    source = desk.put("job.pdl", program(FIRST, POSE, FAR, NEXT))
+    out = desk.folder / "out.pdl"
+    report = desk.report(source, "-o", out)["targets"]
+    found = json.loads(cli("diff", source, out, "--json", "-").stdout)
+    told = {row["line"]: row for row in (*found["rows"], *found["left"])}
+    assert sorted(told) == [5, 6, 7, 8] and [r["line"] for r in found["left"]] == [7]
+    for row in report:
+        mine = told[row["line"]]
+        assert mine["direction"] == row["lambda"]
+        assert (mine["status"], mine["why"]) == (row["status"], row["why"])
+        size = sum(c * c for c in row["correction_mm"]) ** 0.5
+        assert mine["correction_mm"] == pytest.approx(size, abs=1e-4)
+    assert found["counts"]["safe"] == 3 and found["counts"]["guarded"] == 1
+
+
+def test_what_was_left_alone_is_listed_with_its_reason(desk):
+    source = desk.put("job.pdl", program(FIRST, FAR))
+    out = desk.folder / "out.pdl"
+    desk.compensate(source, "-o", out)
+    listed = cli("diff", source, out).stdout.partition("left as they were:")[2]
+    assert "6  MOVE LINEAR" in listed and "guarded: out of reach" in listed
+
+
+def test_a_record_of_other_bytes_is_not_believed(desk):
+    source = desk.put("job.pdl", program(FIRST, POSE))
+    out = desk.folder / "out.pdl"
+    desk.compensate(source, "-o", out)
+    out.write_bytes(out.read_bytes().replace(b"END job", b"END job --"))
+    assert not diff(source, out).counts
+
+
+def test_a_damaged_record_is_not_believed(desk):
+    source = desk.put("job.pdl", program(FIRST, POSE))
+    out = desk.folder / "out.pdl"
+    desk.compensate(source, "-o", out)
+    record = desk.folder / "out.pdl.postproc.json"
+    data = json.loads(record.read_text())
+    data["files"]["job.pdl" if "job.pdl" in data["files"] else "out.pdl"]["targets"] = {
+        "line": "x"
+    }
+    record.write_text(json.dumps(data))
+    assert not diff(source, out).counts and diff(source, out).rows
 
 
 def test_variable_files_beside_are_compared_by_entry(desk):

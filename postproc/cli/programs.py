@@ -109,6 +109,7 @@ def diff(
 ) -> None:
     """Compare the targets of two programs: exit 0 same, 1 different, 2 trouble."""
     from postproc import diff as differ
+    from postproc.diff_listing import print_difference
 
     with explained():
         check_places([as_path(json)], [original, compensated])
@@ -117,7 +118,7 @@ def diff(
         if json:
             write_text(json, found.to_json())
         if json != "-":
-            found.print()
+            print_difference(found)
     raise typer.Exit(1 if found.rows else 0)
 
 
