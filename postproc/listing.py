@@ -82,29 +82,37 @@ class _Layout:
     def __init__(self, columns: Sequence[Column], colours: Colours) -> None:
         self._left = [c.justify == "left" for c in columns]
         self._colours = [colours.get(c.title) for c in columns]
+        self._plain = not any(self._colours)
         self._widths = [0] * len(columns)
-        self._sum = 0
+        self.widen([""] * len(columns))
 
     def widen(self, row: Sequence[str]) -> None:
         """Make room for a row."""
         lengths = [len(cell) for cell in row[:-1]]
         self._widths = [*map(max, self._widths, lengths), 0]  # the last is not padded
-        self._sum = sum(self._widths)
+        signs = ["-" if left else "" for left in self._left]
+        fields = zip(signs, self._widths, strict=True)
+        self._fields = [f"%{sign}{width}s" for sign, width in fields]
+        self._template = GAP.join(self._fields)
+        self._length = len(self._template % (("",) * len(row)))
 
     def line(self, row: Sequence[str]) -> str:
         """Write a row."""
-        if not "".join(row).isprintable():
+        line = self._template % tuple(row)
+        if not line.isprintable():
             row = [printable(cell) for cell in row]
-        fit = zip(row, self._widths, self._left, strict=True)
-        padded = [t.ljust(w) if left else t.rjust(w) for t, w, left in fit]
-        if sum(map(len, padded)) - len(row[-1]) > self._sum:  # a cell sticks out
+            line = self._template % tuple(row)
+        if len(line) - len(row[-1]) > self._length:  # a cell sticks out
             self.widen(row)
-        if any(self._colours):
-            padded = [
-                paint(p, colour(t)) if colour else p
-                for p, t, colour in zip(padded, row, self._colours, strict=True)
-            ]
-        return GAP.join(padded).rstrip()
+        return line.rstrip() if self._plain else self._coloured(row)
+
+    def _coloured(self, row: Sequence[str]) -> str:
+        """Write a row with its colours."""
+        parts = zip(self._fields, row, self._colours, strict=True)
+        return GAP.join(
+            paint(field % cell, colour(cell)) if colour else field % cell
+            for field, cell, colour in parts
+        ).rstrip()
 
 
 def _write(out: TextIO, lines: Iterator[str]) -> None:
