@@ -20,6 +20,7 @@ from postproc.exceptions import ArmError, PlanError
 from postproc.pose import MM
 from postproc.robot.arm_file import ArmFile, arm_path, read_arm_file
 from postproc.robot.inverse import Branches, Inverse, wrap
+from postproc.robot.recall import Recall
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -113,6 +114,11 @@ class Arm:
         opw = self.file.opw
         limits = (self.lower, self.upper)
         return None if opw is None else Inverse(opw, self.dh.mix, *limits)
+
+    @cached_property
+    def inverse_of_path(self) -> Recall:
+        """`inverse` that recalls the last path: flange poses (n, 4, 4) -> (n, 8, 6)."""
+        return Recall(lambda poses: self.inverse(poses).q)
 
     @property
     def has_inverse(self) -> bool:

@@ -71,8 +71,10 @@ class Inverse:
     def _into_range(self, q: Array) -> Array:
         """Shift angles by whole turns into the joint range where that is possible."""
         turn = 2 * np.pi
-        q = np.pi - np.mod(np.pi - q, turn)
-        up = (q < self._lower) & (q + turn <= self._upper)
-        down = (q > self._upper) & (q - turn >= self._lower)
-        shifted: Array = q + turn * up - turn * down
-        return shifted
+        below = np.pi - q
+        around = (below < 0) | (below >= turn)
+        below[around] = np.mod(below[around], turn)
+        q = np.pi - below
+        q[(q < self._lower) & (q + turn <= self._upper)] += turn
+        q[(q > self._upper) & (q - turn >= self._lower)] -= turn
+        return q
