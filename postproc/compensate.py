@@ -141,7 +141,7 @@ def report(
     clock: Clock,
 ) -> Outcome:
     """Say what came of every visit, and what error the model expects now."""
-    proposal, done = corrected.proposal, corrected.planned.plan
+    proposal, done = corrected.proposal, corrected.reached
     d, rows, visits = proposal.decisions, proposal.corrected, reading.visits
     output = corrected.output
     wanted = planned.plan.tcp[rows, :3, 3]

@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 from postproc.accuracy.model import Model
 from postproc.clock import Clock
 from postproc.language.visits import Visits
-from postproc.motion.planner import directions
+from postproc.motion.planner import Reached, reach
 from postproc.options import Options
 from postproc.output import Output, write_numbers
-from postproc.planning import Planned, Reading, plan_visits, read_program
+from postproc.planning import Planned, Reading, read_program
 from postproc.proposal import Proposal, propose
 from postproc.resolve import targets_from_visits
 from postproc.robot.cell import Cell
@@ -33,11 +33,11 @@ OTHER = 1.0  # sides farther apart than this are different ones
 
 @dataclass(frozen=True)
 class Corrected:
-    """A proposal, the files that hold it, and the plan of those files."""
+    """A proposal, the files that hold it, and where those files lead."""
 
     proposal: Proposal
     output: Output
-    planned: Planned
+    reached: Reached
 
 
 class SideSearch:
@@ -99,7 +99,7 @@ def settle(
         moved = proposal.corrected & (off > (SAME if number < ROUNDS else OTHER))
         if not moved.any():
             done = write_and_verify(reading, proposal, cell, model, clock)
-            off = np.abs(done.planned.plan.side - solved.direction)
+            off = np.abs(done.reached.side - solved.direction)
             flipped = proposal.corrected & (off > OTHER).any(axis=1)
             if not flipped.any():
                 return done
@@ -115,8 +115,13 @@ def settle(
 def sides_after(visits: Visits, proposal: Proposal, cell: Cell) -> Array:
     """Find where joints lie in their play once the targets have moved, (n, 6)."""
     moved = replace(visits, values=proposal.decisions.corrected)
-    targets, _ = targets_from_visits(moved, cell)
-    return np.array(directions(cell.arm, targets)[1].side)
+    return np.array(where(moved, cell).side)
+
+
+def where(visits: Visits, cell: Cell) -> Reached:
+    """Find where the targets of visits lead the arm."""
+    targets, _ = targets_from_visits(visits, cell)
+    return reach(cell.arm, targets)
 
 
 def write_and_verify(
@@ -132,6 +137,6 @@ def write_and_verify(
     with clock("verify"):
         again = read_program(output.files, cell)
         check_output(reading, again, output, proposal.edited)
-        replanned = plan_visits(again.visits, cell)
+        reached = where(again.visits, cell)
     decisions = replace(proposal.decisions, corrected=np.array(again.visits.values))
-    return Corrected(replace(proposal, decisions=decisions), output, replanned)
+    return Corrected(replace(proposal, decisions=decisions), output, reached)

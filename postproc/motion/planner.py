@@ -12,7 +12,7 @@ from postproc.motion.reasons import CODE, REASONS, WRIST
 from postproc.motion.targets import Targets
 from postproc.motion.trace import Trace, trace
 from postproc.robot.arm import Arm
-from postproc.robot.direction import Arrivals, arrivals
+from postproc.robot.direction import arrivals, sides
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -95,16 +95,29 @@ def plan(arm: Arm, targets: Targets, wrist: float) -> Plan:
     )  # fmt: skip
 
 
-def directions(arm: Arm, targets: Targets) -> tuple[Array, Arrivals]:
-    """Find joint angles and directions only, without a time law.
+@dataclass(frozen=True)
+class Reached:
+    """Where n arrivals end up, without a time law.
 
-    For targets that a correction has moved: compare with the directions of the plan.
+    Attributes:
+        q: Joint angles, (n, 6) [rad], NaN where not known.
+        tcp: TCP pose, (n, 4, 4) [m], base frame, NaN where not known.
+        side: Where every joint lies in its play, (n, 6) from -1 to 1; 0: not known.
+    """
 
-    Returns:
-        Joint angles (n, 6) [rad], and how every joint arrives.
+    q: Array
+    tcp: Array
+    side: Array
+
+
+def reach(arm: Arm, targets: Targets) -> Reached:
+    """Find joint angles and sides only.
+
+    For targets that a correction has moved: their speeds are those of the plan.
     """
     traced = trace(arm, targets)
-    return traced.q, arrivals(arm, traced.q, traced.edges)
+    tcp = traced.flange @ targets.tool
+    return Reached(traced.q, tcp, sides(arm, traced.q, traced.edges))
 
 
 def _guard(traced: Trace, wrist: float) -> Ints:

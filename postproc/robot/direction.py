@@ -75,13 +75,26 @@ def arrivals(arm: Arm, q: Array, edges: Edges) -> Arrivals:
     if len(q) == 0:
         return Arrivals(np.empty((0, 6)), np.empty((0, 6)), np.empty((0, 6)))
     chains = cut(q, arm.coupling, edges)
-    half = WIDTH_IN_PLAYS / 2 * arm.play
+    half = _half_width(arm)
     z = _states(chains, half)
     forward = chains.angles - z.hi >= half / 2
     backward = chains.angles - z.lo <= -half / 2
     direction = forward.astype(float) - backward.astype(float)
     travel = travel_since_reversal(chains, arm.play)
     return Arrivals(direction, _side(chains.angles, z, half), travel)
+
+
+def sides(arm: Arm, q: Array, edges: Edges) -> Array:
+    """Return the sides of `arrivals` alone, (n, 6)."""
+    if len(q) == 0:
+        return np.empty((0, 6))
+    chains, half = cut(q, arm.coupling, edges), _half_width(arm)
+    return _side(chains.angles, _states(chains, half), half)
+
+
+def _half_width(arm: Arm) -> Array:
+    """Return half the width of every joint's play on the drive side, (6,) [rad]."""
+    return np.asarray(WIDTH_IN_PLAYS / 2 * arm.play)
 
 
 def _side(angles: Array, z: Clamps, half: Array) -> Array:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from postproc.motion.planner import directions, plan
+from postproc.motion.planner import plan, reach
 from postproc.motion.reasons import (
     AMBIGUOUS,
     LIMITS,
@@ -101,8 +101,8 @@ def test_joint_4_turns_back_before_the_end_of_a_straight_line(
     arm: Arm, tool: np.ndarray
 ) -> None:
     home, end = turning_line(arm, tool)
-    q, arrived = directions(arm, lines_from(arm, tool, home, [end]))
-    side = arrived.direction
+    found = reach(arm, lines_from(arm, tool, home, [end]))
+    q, side = found.q, np.sign(found.side)
     assert side[1, 3] == -np.sign(q[1, 3] - q[0, 3]) != 0
 
 
@@ -284,7 +284,7 @@ def test_after_an_unknown_move_a_joint_target_is_known_again(
     found = trace(arm, targets)
     assert reason(found, 1) == NO_TARGET and np.isnan(found.q[1]).all()
     np.testing.assert_array_equal(found.q[2], home)
-    assert (directions(arm, targets)[1].direction == 0).all()
+    assert (reach(arm, targets).side == 0).all()
 
 
 def test_predecessors_that_lead_to_different_turns(arm: Arm, home: np.ndarray) -> None:
