@@ -88,7 +88,11 @@ class Combination:
             batch: States with nominal kinematics.
             p: All parameters, (p,).
         """
-        error: Array = self.at(batch, p).walk.tcp - batch.walk.tcp
+        return self.error_at(self.at(batch, p), batch, p)
+
+    def error_at(self, at: Batch, batch: Batch, p: Array) -> Array:
+        """Sum the errors where the kinematics at parameters p are known already."""
+        error: Array = at.walk.tcp - batch.walk.tcp
         for effect, part in zip(self.effects, self.slices, strict=True):
             if not isinstance(effect, Geometry | JointEffect):
                 error = error + effect.displacement(batch, p[part])

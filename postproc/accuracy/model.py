@@ -85,6 +85,11 @@ class Model:
 
     def compensable(self) -> tuple[Combination, Array, Array]:
         """Return the effects that may be compensated, their values and covariance."""
+        return self._compensable
+
+    @cached_property
+    def _compensable(self) -> tuple[Combination, Array, Array]:
+        """Choose them once: a program asks some twenty times."""
         keep = self.effects.where(*COMPENSATED)
         part = tuple(e for e in self.effects.effects if e.belongs_to() in COMPENSATED)
         covariance = self.covariance
@@ -117,7 +122,7 @@ class Model:
         for rows in _chunks(len(states)):
             batch = Batch(arm, states[rows])
             at = effects.at(batch, values)
-            error[rows] = effects.error(batch, values)
+            error[rows] = effects.error_at(at, batch, values)
             variance = _side_variance(effects, at, values)
             variance = variance + np.square(self.spread)
             if len(covariance):

@@ -61,12 +61,17 @@ def prefix(steps: Clamps) -> Clamps:
     pad.lo[:n], pad.hi[:n] = steps.lo, steps.hi
     lo, hi = pad.lo.reshape(blocks, length, k), pad.hi.reshape(blocks, length, k)
     for i in range(1, length):
-        done = Clamps(lo[:, i - 1], hi[:, i - 1]).then(Clamps(lo[:, i], hi[:, i]))
-        lo[:, i], hi[:, i] = done.lo, done.hi
+        _compose(lo[:, i - 1], hi[:, i - 1], lo[:, i], hi[:, i])
     for b in range(1, blocks):
-        done = Clamps(lo[b - 1, -1], hi[b - 1, -1]).then(Clamps(lo[b], hi[b]))
-        lo[b], hi[b] = done.lo, done.hi
+        _compose(lo[b - 1, -1], hi[b - 1, -1], lo[b], hi[b])
     return Clamps(lo.reshape(-1, k)[:n], hi.reshape(-1, k)[:n])
+
+
+def _compose(lo0: Array, hi0: Array, lo: Array, hi: Array) -> None:
+    """Put earlier clamps in front of later ones, in place: `Clamps.then`."""
+    low = np.minimum(np.maximum(lo0, lo), hi)
+    np.minimum(np.maximum(hi0, lo), hi, out=hi)
+    lo[...] = low
 
 
 def with_turning_values(before: Array, path: Array, inside: Array) -> Array:
