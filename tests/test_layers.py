@@ -20,8 +20,9 @@ ALLOWED: dict[str, set[str]] = {
     "language": set(),
     "robot": set(),
     "motion": {"robot"},
-    "accuracy": {"robot"},
-    "virtual": {"language"},
+    "files": set(),
+    "accuracy": {"robot", "files"},
+    "virtual": {"language", "files"},
 }
 
 # Foreign libraries that every module may use.

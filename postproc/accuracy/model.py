@@ -26,6 +26,7 @@ from postproc.accuracy.schema import (
     square_of,
 )
 from postproc.exceptions import ModelError
+from postproc.files import write_all
 from postproc.robot.arm import Arm
 from postproc.robot.state import States
 
@@ -197,17 +198,13 @@ class Model:
         return {"id": content_id(data), **data}
 
     def save(self, path: str | Path) -> None:
-        """Write the model file.
+        """Write the model file, whole or not at all.
 
         Raises:
-            ModelError: The place cannot be written to.
+            OutputError: The place cannot be written to.
         """
         text = json.dumps(self.to_dict(), indent=1) + "\n"
-        try:
-            Path(path).write_text(text, encoding="utf-8")
-        except OSError as exc:
-            problem = f"cannot be written ({exc.strerror})"
-            raise ModelError(path, problem, "Choose another place") from None
+        write_all({Path(path): text.encode()})
 
 
 def load_model(path: str | Path) -> Model:

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import csv
+import io
 from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from postproc.exceptions import OutputError
+from postproc.files import write_all
 from postproc.virtual.measure import Campaign
 
 Array = NDArray[np.float64]
@@ -18,7 +19,7 @@ Array = NDArray[np.float64]
 def write_measurements(
     campaign: Campaign, path: str | Path, *, direction: bool = True
 ) -> None:
-    """Write a measurement file.
+    """Write a measurement file, whole or not at all.
 
     Args:
         campaign: What was measured.
@@ -29,13 +30,11 @@ def write_measurements(
         OutputError: The file cannot be written.
     """
     header, table = _table(campaign, direction)
-    try:
-        with Path(path).open("w", newline="", encoding="utf-8") as file:
-            writer = csv.writer(file, lineterminator="\n")
-            writer.writerow(header)
-            writer.writerows(table)
-    except OSError as error:
-        raise OutputError(path, f"cannot be written: {error.strerror}") from error
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(header)
+    writer.writerows(table)
+    write_all({Path(path): text.getvalue().encode()})
 
 
 def _table(campaign: Campaign, direction: bool) -> tuple[list[str], list[list[str]]]:

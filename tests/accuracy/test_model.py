@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import errno
 import json
+import os
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -15,7 +17,7 @@ from postproc.accuracy.fit import fit_effects
 from postproc.accuracy.full import fit_survey, model_of
 from postproc.accuracy.library import BASE_EFFECTS, EFFECTS, propose
 from postproc.accuracy.model import Model, load_model
-from postproc.exceptions import ModelError
+from postproc.exceptions import ModelError, OutputError
 from postproc.robot.state import make_states
 from tests.accuracy.simulator import (
     NJ,
@@ -48,6 +50,25 @@ def test_a_model_file_gives_back_the_model(tmp_path: Path) -> None:
     a, b = saved.predict(NJ, states), loaded.predict(NJ, states)
     np.testing.assert_array_equal(a.error, b.error)
     np.testing.assert_allclose(a.std_arrival, b.std_arrival, rtol=1e-9)
+
+
+def test_a_model_file_is_written_whole_or_not_at_all(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "m.json"
+    path.write_text("what was there")
+
+    def full(*_: object) -> None:
+        raise OSError(errno.ENOSPC, "no space")
+
+    with monkeypatch.context() as patched:
+        patched.setattr(os, "fsync", full)
+        with pytest.raises(OutputError, match=r"m\.json: no room is left"):
+            model().save(path)
+    assert path.read_text() == "what was there"
+    assert [p.name for p in tmp_path.iterdir()] == ["m.json"]
+    model().save(path)
+    assert load_model(path).id == model().id
 
 
 def test_files_that_do_not_hold_together_are_refused(tmp_path: Path) -> None:
