@@ -20,7 +20,11 @@ from postproc.accuracy.measurement import (
 )
 from postproc.accuracy.methods import fit_method
 from postproc.accuracy.model import Model
-from postproc.accuracy.plausibility import check_registered, check_survey
+from postproc.accuracy.plausibility import (
+    check_orientations,
+    check_registered,
+    check_survey,
+)
 from postproc.accuracy.registration import Registration, register
 from postproc.accuracy.schema import Method
 from postproc.pose import MM
@@ -86,6 +90,7 @@ def fit_measurements(
         survey, placed = into_base_frame(survey, cell.arm)
         tracker, setup = placed.tracker, ("registration",)
     check_survey(survey, cell.arm)
+    survey = check_orientations(survey, cell.arm)
     if method != "full":
         model = fit_method(method, survey, cell.arm, seed)
         return Calibration(model, report_method(model, survey, cell.arm), survey)
@@ -115,10 +120,14 @@ def into_base_frame(
     for k, name in enumerate(ids):
         xyz = ", ".join(f"{v / MM:.2f}" for v in found.probes[k])
         notes.append(f"probe point {name} at {xyz} mm in the flange frame")
+    turned = None
+    if survey.rotation is not None:
+        turned = found.base_from_tracker[:3, :3] @ survey.rotation
     registered = replace(
         survey,
         states=survey.states.with_(tool=found.probes[which]),
         position=found.to_base(survey.position),
+        rotation=turned,
         warnings=(*survey.warnings, *notes),
     )
     return registered, found
@@ -127,7 +136,7 @@ def into_base_frame(
 def read_surveys(files: Sequence[str | Path], cell: Cell) -> Measurements:
     """Read measurement files as one survey, with what the cell knows of the load."""
     parts = [read_measurements(path, cell.arm, cell.probes) for path in files]
-    survey = concatenate(parts)
+    survey = replace(concatenate(parts), mounting=cell.mounting)
     if cell.file.payload is None:
         return survey
     com = np.tile(cell.payload_com, (len(survey), 1))

@@ -139,6 +139,8 @@ def tell_fit(report: FitReport) -> str:
         f"tracker {report.tracker_mm:.4f} mm, repeatability "
         f"{report.repeatability_mm:.4f} mm per axis (estimated)"
     )
+    if report.orientation_mrad is not None:
+        lines.append(f"orientation {report.orientation_mrad:.4f} mrad (estimated)")
     lines.append(f"measured error  {_tell(report.before)}")
     lines.append(f"left by the fit {_tell(report.after)}")
     return "\n".join(lines)

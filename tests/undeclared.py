@@ -23,7 +23,8 @@ from postproc.accuracy.batch import Batch
 from postproc.accuracy.combination import Combination
 from postproc.accuracy.diagnosis.tracing import trace
 from postproc.accuracy.effect import Effect, Parameter
-from postproc.accuracy.fit import Fit, fit_effects
+from postproc.accuracy.fit import fit_effects
+from postproc.accuracy.fitted import Fit
 from postproc.accuracy.library import BASE_EFFECTS, propose
 from postproc.virtual import Arrivals, VirtualArm, virtual_arm
 from tests.accuracy.planted import (

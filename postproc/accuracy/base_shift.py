@@ -25,6 +25,12 @@ def rigid_columns(batch: Batch) -> Array:
     return np.stack(moved, axis=2)
 
 
+def rigid_rotations(batch: Batch) -> Array:
+    """Differentiate the tool's rotation by the same six motions, (n, 3, 6)."""
+    turned = np.concatenate([np.zeros((3, 3)), np.eye(3)], axis=1)
+    return np.tile(turned, (len(batch), 1, 1))
+
+
 @dataclass(frozen=True)
 class BaseShift(Effect):
     """A step of the base frame: a shift and a turn at one row.
@@ -52,3 +58,8 @@ class BaseShift(Effect):
         """Differentiate the TCP position, (n, 3, 6)."""
         before = (batch.states.order < self.row)[:, None, None]
         return np.where(before, -rigid_columns(batch), 0.0)
+
+    def rotation_columns(self, batch: Batch) -> Array:
+        """Differentiate the tool's rotation, (n, 3, 6)."""
+        before = (batch.states.order < self.row)[:, None, None]
+        return np.where(before, -rigid_rotations(batch), 0.0)

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 from postproc.accuracy.table import Table
 from postproc.exceptions import MeasurementError
@@ -18,6 +19,7 @@ Bools = NDArray[np.bool_]
 
 SIDES = tuple(f"lambda{j}" for j in range(1, 7))
 TRAVELS = tuple(f"travel{j}_deg" for j in range(1, 7))
+ROTATION = ("rx_deg", "ry_deg", "rz_deg")
 TOOL = ("tool_x_mm", "tool_y_mm", "tool_z_mm")
 
 
@@ -92,3 +94,11 @@ def read_tools(
                 line=int(table.line[i]),
             )
     return np.stack([np.asarray(known[int(one)], float) for one in tool_id]), tool_id
+
+
+def read_rotation(table: Table) -> Array | None:
+    """Read measured orientations, (n, 3, 3): R = Rx Ry Rz (intrinsic x, y', z'')."""
+    if not table.has(*ROTATION):
+        return None
+    angles = table.block(ROTATION)
+    return np.asarray(Rotation.from_euler("XYZ", angles, degrees=True).as_matrix())

@@ -13,6 +13,7 @@ from postproc.accuracy.batch import Batch
 from postproc.accuracy.chain import NOMINAL, Deviation
 from postproc.accuracy.effect import Effect, JointEffect, Parameter
 from postproc.accuracy.geometry import Geometry
+from postproc.pose import rotation_vector
 
 Array = NDArray[np.float64]
 
@@ -103,6 +104,25 @@ class Combination:
         if not self.effects:
             return np.zeros((len(batch), 3, 0))
         return np.concatenate([e.columns(batch) for e in self.effects], axis=2)
+
+    def turn(self, batch: Batch, p: Array) -> Array:
+        """Turn the tool: its rotation from nominal to actual, (n, 3) [rad]."""
+        at = self.at(batch, p).walk.flange
+        turn = rotation_vector(at @ np.swapaxes(batch.walk.flange, 1, 2))
+        for effect, part in zip(self.effects, self.slices, strict=True):
+            columns = effect.rotation_columns(batch)
+            if columns is not None and not isinstance(effect, Geometry | JointEffect):
+                turn = turn + columns @ p[part]
+        return turn
+
+    def rotation_columns(self, batch: Batch) -> Array:
+        """Differentiate the tool's rotation at the batch's kinematics, (n, 3, p)."""
+        out = np.zeros((len(batch), 3, len(self.parameters)))
+        for effect, part in zip(self.effects, self.slices, strict=True):
+            columns = effect.rotation_columns(batch)
+            if columns is not None:
+                out[:, :, part] = columns
+        return out
 
     def direction_slopes(self, batch: Batch, p: Array) -> Array:
         """Give each joint's position error per unit of direction, (n, 3, 6) [m]."""

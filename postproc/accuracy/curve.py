@@ -98,7 +98,17 @@ class Curve(Effect):
 
     def columns(self, batch: Batch) -> Array:
         """Differentiate the TCP position, (n, 3, p)."""
-        axis = self._axis(batch)
+        return self._along(batch, self._axis(batch))
+
+    def rotation_columns(self, batch: Batch) -> Array | None:
+        """Differentiate the tool's rotation, (n, 3, p)."""
+        kind, _, which = self.direction.partition(" ")
+        if kind != "joint":
+            return None
+        return self._along(batch, batch.angular[:, :, int(which) - 1])
+
+    def _along(self, batch: Batch, axis: Array) -> Array:
+        """Multiply a direction per unit (n, 3) by the terms, (n, 3, p)."""
         if self.signed:
             joint = int(self.direction.split()[1]) - 1
             axis = axis * batch.states.direction[:, joint : joint + 1]

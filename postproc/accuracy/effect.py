@@ -81,7 +81,7 @@ class Effect(ABC):
         """Differentiate the TCP position: (n, 3, p) [m per unit], base frame."""
 
     def rotation_columns(self, batch: Batch) -> Array | None:
-        """Differentiate the tool's rotation: (n, 3, p) [rad per unit], if known."""
+        """Differentiate the tool's rotation: (n, 3, p) [rad per unit], None if 0."""
         return None
 
     def displacement(self, batch: Batch, p: Array) -> Array:

@@ -19,6 +19,7 @@ Ints = NDArray[np.int64]
 
 LOG_BOUNDS = (-8.0, 7.0)  # of log s_g
 STEPS = 60
+FEWEST = 4.0  # degrees of freedom that a prior scale is credited with at least
 LOG_SPREAD = 3.0  # hyperprior of log s_g: an order of magnitude is no surprise
 
 
@@ -39,6 +40,14 @@ class Normal:
     square: float
     log_noise: float
     rows: float
+
+    def __add__(self, other: Normal) -> Normal:
+        """Put the rows of another set of measurements beside these."""
+        return Normal(
+            self.gram + other.gram, self.moment + other.moment,
+            self.square + other.square, self.log_noise + other.log_noise,
+            self.rows + other.rows,
+        )  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -121,3 +130,21 @@ def maximise(
         options={"maxiter": steps, "ftol": 1e-10},
     )  # fmt: skip
     return posterior(normal, group, np.asarray(best.x, dtype=float))
+
+
+def widened(normal: Normal, group: Ints, at: Posterior) -> Array:
+    """Covariance at prior scales that are known no better than the data tell them.
+
+    A scale that g well-determined parameters have told leaves a Student t with g
+    degrees of freedom for the others of its group (MacKay, 1992, section 2: the error
+    bar of a log variance is sqrt(2 / g)); its variance is g / (g - 2) times the normal
+    one's. Directions that the data determine are not affected.
+
+    Returns:
+        (p, p), in units of the prior scales.
+    """
+    known = 1.0 - np.diag(at.covariance) / np.exp(2.0 * at.log_scale)[group]
+    told = np.bincount(group, known, minlength=len(at.log_scale))
+    freedom = np.maximum(told, FEWEST)
+    wide = at.log_scale + 0.5 * np.log(freedom / (freedom - 2.0))
+    return posterior(normal, group, wide).covariance

@@ -7,19 +7,19 @@ two components of the noise and re-weighs the rows; passes repeat until nothing 
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from functools import cached_property
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import qr
 
 from postproc.accuracy.batch import Batch
 from postproc.accuracy.combination import Combination
 from postproc.accuracy.effect import Effect
-from postproc.accuracy.evidence import Normal, Posterior, maximise
+from postproc.accuracy.evidence import maximise
+from postproc.accuracy.fitted import Fit
 from postproc.accuracy.noise import Noise, Whitener
 from postproc.accuracy.outliers import RowWeights, judge, student_weights
+from postproc.accuracy.turns import Turns
 
 Array = NDArray[np.float64]
 
@@ -29,95 +29,15 @@ SETTLED = 5e-8  # [m] change of any predicted error that ends the passes
 SETTLED_NOISE = 5e-3  # relative change of the noise that ends the passes
 
 
-@dataclass(frozen=True, eq=False)
-class Fit:
-    """Fitted effects, with all that tests of further effects need.
-
-    Attributes:
-        batch: The survey's states, nominal kinematics.
-        combination: The effects.
-        error: Measured minus nominal position, (n, 3) [m].
-        values: Parameters, (p,) [SI].
-        covariance: Of the parameters, (p, p).
-        log_scale: Log factor that the data put on each group's prior scale, (g,).
-        groups: Names of the prior groups, in the order of `log_scale`.
-        noise: Estimated noise components.
-        rows: Weight of every row.
-        residual: Error that the effects leave, (n, 3) [m].
-        columns: Derivatives at the solution, (n, 3, p).
-        whitener: Rotations and variances of the rows.
-        log_evidence: Log marginal likelihood of the whitened rows.
-        effective: Effective number of parameters.
-    """
-
-    batch: Batch
-    combination: Combination
-    error: Array
-    values: Array
-    covariance: Array
-    log_scale: Array
-    groups: tuple[str, ...]
-    noise: Noise
-    rows: RowWeights
-    residual: Array
-    columns: Array
-    whitener: Whitener
-    log_evidence: float
-    effective: float
-
-    @property
-    def std(self) -> Array:
-        """Standard errors of the parameters, (p,)."""
-        return np.sqrt(np.diag(self.covariance))
-
-    @property
-    def prior_std(self) -> Array:
-        """Prior standard deviations that the data chose, (p,)."""
-        index = np.array([self.groups.index(g) for g in self.combination.groups], int)
-        std: Array = self.combination.scales * np.exp(self.log_scale)[index]
-        return std
-
-    @cached_property
-    def row_scale(self) -> Array:
-        """What whitening multiplies the rotated components with, (n, 3) [1/m]."""
-        v = self.whitener.variance(self.noise)
-        scale: Array = np.sqrt(self.rows.weight[:, None] / v)
-        return scale
-
-    def whiten(self, rows: Array) -> Array:
-        """Whiten (n, 3) or (n, 3, k): the noise of the result has unit variance.
-
-        Returns:
-            (3 n,) or (3 n, k).
-        """
-        turned = self.whitener.rotate(rows)
-        if rows.ndim == 2:
-            return (turned * self.row_scale).reshape(-1)
-        return (turned * self.row_scale[:, :, None]).reshape(-1, rows.shape[2])
-
-    @cached_property
-    def basis(self) -> Array:
-        """Orthonormal basis of the whitened columns, (3 n, rank)."""
-        X = self.whiten(self.columns) * self.prior_std
-        Q, R, _ = qr(X, mode="economic", pivoting=True)
-        size = np.abs(np.diag(R))
-        known = size > max(1e-9 * float(size.max(initial=0.0)), 1e-3)
-        return np.asarray(Q[:, : int(known.sum())])
-
-    def project_out(self, whitened: Array) -> Array:
-        """Remove from whitened rows what the fitted effects can take up."""
-        left: Array = whitened - self.basis @ (self.basis.T @ whitened)
-        return left
-
-
 def fit_effects(
     batch: Batch,
     position: Array,
     effects: tuple[Effect, ...],
     origin: tuple[float, float, float] | None = None,
     start: Fit | None = None,
+    turns: Turns | None = None,
 ) -> Fit:
-    """Fit effects to measured positions.
+    """Fit effects to measured positions, and to orientations where there are any.
 
     Args:
         batch: States of the survey.
@@ -125,9 +45,12 @@ def fit_effects(
         effects: What may cause the errors.
         origin: Tracker position in the base frame, where it is known.
         start: A fit of some of these effects to the same rows, to begin with.
+        turns: Measured orientations of the same rows; those of `start` if None.
     """
     combination = Combination(effects)
     state = _begin(batch, position, combination, origin, start)
+    if turns is not None:
+        state = replace(state, turns=turns)
     heavy = HEAVY_TAILED if start is None else 0
     for number in range(PASSES):
         following = _pass(state, heavy=number < heavy)
@@ -159,21 +82,19 @@ def _begin(
         log_scale = np.array([scale.get(g, 0.0) for g in groups])
     whitener = Whitener.build(batch, position, origin)
     ones = RowWeights(np.ones(n), np.zeros(n), np.zeros(n, dtype=bool))
+    turns = None if start is None else start.turns
     return Fit(
         batch, combination, error, values, np.eye(p), log_scale, groups, noise,
         ones if start is None else start.rows, error, np.zeros((n, 3, p)), whitener,
-        -np.inf, 0.0,
+        -np.inf, 0.0, turns,
     )  # fmt: skip
 
 
 def _pass(state: Fit, heavy: bool) -> Fit:
     """Do one pass: linearise, solve, estimate the noise, weigh the rows."""
+    state = _linearised(state)
     c, batch = state.combination, state.batch
-    at = c.at(batch, state.values)
-    columns = c.columns(at)
-    target = state.error - c.error(batch, state.values) + columns @ state.values
-    state = replace(state, columns=columns)
-    solved = _solve(state, target)
+    solved = maximise(state.normal(), state.group, state.log_scale)
     values = c.scales * solved.mean
     covariance = solved.covariance * np.outer(c.scales, c.scales)
     residual = state.error - c.error(batch, values)
@@ -186,27 +107,26 @@ def _pass(state: Fit, heavy: bool) -> Fit:
     else:
         rows = judge(distance, residual, batch.states.q, batch.jacobian)
     noise = state.whitener.estimate(turned**2 + spread, rows.weight, state.noise)
+    turns = state.turns
+    if turns is not None:
+        turns = turns.left(c, batch, values).judged(covariance, rows.weight, heavy)
     return replace(
         state, values=values, covariance=covariance, log_scale=solved.log_scale,
-        noise=noise, rows=rows, residual=residual,
+        noise=noise, rows=rows, residual=residual, turns=turns,
         whitener=_with_unknown_sides(state, values),
         log_evidence=solved.log_evidence, effective=solved.effective,
     )  # fmt: skip
 
 
-def _solve(state: Fit, target: Array) -> Posterior:
-    """Solve the linear regression of the present pass."""
-    X = state.whiten(state.columns) * state.combination.scales
-    y = state.whiten(target)
-    v = state.whitener.variance(state.noise)
-    used = state.rows.weight > 0
-    normal = Normal(
-        X.T @ X, X.T @ y, float(y @ y),
-        float(np.log(v[used]).sum()), 3.0 * float(used.sum()),
-    )  # fmt: skip
-    index = {g: i for i, g in enumerate(state.groups)}
-    group = np.array([index[g] for g in state.combination.groups], dtype=int)
-    return maximise(normal, group, state.log_scale)
+def _linearised(state: Fit) -> Fit:
+    """Take columns and residuals at the present values."""
+    c, batch = state.combination, state.batch
+    at = c.at(batch, state.values)
+    residual = state.error - c.error(batch, state.values)
+    turns = state.turns
+    if turns is not None:
+        turns = turns.left(c, batch, state.values).linearised(c, at)
+    return replace(state, columns=c.columns(at), residual=residual, turns=turns)
 
 
 def _spread(state: Fit, covariance: Array) -> Array:
@@ -232,4 +152,8 @@ def _settled(before: Fit, after: Fit) -> bool:
     ratio = after.whitener.variance(after.noise) / before.whitener.variance(
         before.noise
     )
-    return bool(moved < SETTLED and np.abs(np.log(ratio)).max() < SETTLED_NOISE)
+    quiet = np.abs(np.log(ratio)).max() < SETTLED_NOISE
+    if before.turns is not None and after.turns is not None:
+        change = np.log(after.turns.std / before.turns.std)
+        quiet = quiet and abs(change) < SETTLED_NOISE
+    return bool(moved < SETTLED and quiet)

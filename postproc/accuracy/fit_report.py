@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,7 +10,7 @@ from numpy.typing import NDArray
 
 from postproc.accuracy.batch import Batch
 from postproc.accuracy.error_statistics import ErrorStatistics
-from postproc.accuracy.fit import Fit
+from postproc.accuracy.fitted import Fit
 from postproc.accuracy.measurement import DroppedRow, Measurements
 from postproc.accuracy.model import Model
 from postproc.accuracy.observability import Unseen, observe
@@ -55,6 +56,7 @@ class FitReport:
         repeatability_mm: Estimated scatter of arrivals, typical, per axis.
         effective: Effective number of parameters.
         warnings: What else to know.
+        orientation_mrad: Estimated scatter of orientations about each axis, or None.
     """
 
     parameters: tuple[ParameterRow, ...]
@@ -69,6 +71,7 @@ class FitReport:
     repeatability_mm: float
     effective: float
     warnings: tuple[str, ...]
+    orientation_mrad: float | None = None
 
 
 def report_fit(fit: Fit, survey: Measurements) -> FitReport:
@@ -81,7 +84,7 @@ def report_fit(fit: Fit, survey: Measurements) -> FitReport:
             fit.combination.effects, fit.combination.slices, strict=True
         )
     }
-    X = fit.whiten(fit.columns) * fit.combination.scales
+    X = fit.stacked() * fit.combination.scales
     arrival = np.sqrt(fit.noise.arrival_variance(fit.batch.jacobian).mean())
     tracker = fit.noise.tracker_std(survey.position).mean()
     return FitReport(
@@ -97,6 +100,7 @@ def report_fit(fit: Fit, survey: Measurements) -> FitReport:
         repeatability_mm=float(arrival / MM),
         effective=fit.effective,
         warnings=survey.warnings,
+        orientation_mrad=None if fit.turns is None else fit.turns.std * 1e3,
     )
 
 
@@ -130,7 +134,7 @@ def _shares(fit: Fit) -> Array:
 
 def _table(fit: Fit, shares: Array) -> tuple[ParameterRow, ...]:
     """Make the parameter table."""
-    rows = []
+    rows, std = [], np.sqrt(np.diag(fit.stated))
     for k, (name, p) in enumerate(
         zip(fit.combination.names, fit.combination.parameters, strict=True)
     ):
@@ -138,7 +142,7 @@ def _table(fit: Fit, shares: Array) -> tuple[ParameterRow, ...]:
         known = 1.0 - (fit.std[k] / fit.prior_std[k]) ** 2
         rows.append(
             ParameterRow(
-                name, float(fit.values[k] * factor), float(fit.std[k] * factor), unit,
+                name, float(fit.values[k] * factor), float(std[k] * factor), unit,
                 float(shares[k]), float(np.clip(known, 0.0, 1.0)),
             )
         )  # fmt: skip
@@ -162,4 +166,17 @@ def weighed_down(fit: Fit, survey: Measurements) -> tuple[DroppedRow, ...]:
         what = "dropped" if w == 0 else f"weight {w:.2f}"
         why = f"{what}: off by {size:.3f} mm, {d:.1f} sigma; its neighbours disagree"
         out.append(DroppedRow(survey.ids[i], int(survey.line[i]), why))
-    return tuple(out)
+    return (*out, *_turned_down(fit, survey))
+
+
+def _turned_down(fit: Fit, survey: Measurements) -> Iterator[DroppedRow]:
+    """List the rows whose position counts more than their orientation."""
+    if fit.turns is None:
+        return
+    size = np.linalg.norm(fit.turns.residual, axis=1)
+    for i in np.flatnonzero((fit.turns.weight < 1.0) & (fit.rows.weight > 0)):
+        w = fit.turns.weight[i]
+        what = "orientation " + ("dropped" if w == 0 else f"weight {w:.2f}")
+        sigma = size[i] / fit.turns.std
+        why = f"{what}: off by {size[i] * 1e3:.2f} mrad, {sigma:.1f} sigma"
+        yield DroppedRow(survey.ids[i], int(survey.line[i]), why)

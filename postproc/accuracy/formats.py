@@ -60,6 +60,7 @@ IPA = Format(  # Fraunhofer IPA, UR10 series: joints in rad, T-Mac positions in 
     {
         **{f"q{j + 1}_deg": (name, DEGREES) for j, name in enumerate(UR_JOINTS)},
         **{f"{a}_mm": (f"measurement_{a}", 1.0) for a in "xyz"},
+        **{f"r{a}_deg": (f"measurement_r{a}", 1.0) for a in "xyz"},
         "temperature_c": ("measurement_temperature", 1.0),
     }
 )

@@ -8,12 +8,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from postproc.accuracy.batch import Batch
-from postproc.accuracy.fit import Fit, fit_effects
+from postproc.accuracy.fit import fit_effects
+from postproc.accuracy.fitted import Fit
 from postproc.accuracy.library import propose
 from postproc.accuracy.measurement import Measurements
 from postproc.accuracy.model import Model
+from postproc.accuracy.probe_turn import ProbeMount, ProbeTurn
 from postproc.accuracy.ranges import Ranges
 from postproc.accuracy.selection import fit_best
+from postproc.accuracy.turns import Turns
 from postproc.pose import MM
 from postproc.robot.arm import Arm
 
@@ -40,10 +43,16 @@ def fit_survey(
         PostprocError: An unknown effect, or one whose covariate was not recorded.
     """
     origin = None if tracker is None else (tracker[0], tracker[1], tracker[2])
+    states, position, batch = survey.states, survey.position, Batch(arm, survey.states)
+    turns = None
+    if survey.rotation is not None:
+        turns = Turns.of(batch, survey.rotation, survey.mounting)
+        probe = ProbeMount if survey.mounting is None else ProbeTurn
+        setup = (*setup, probe.name)
     if effects is None:
-        return fit_best(arm, survey.states, survey.position, origin, setup)
-    chosen = propose((*effects, *setup), arm, survey.states)
-    return fit_effects(Batch(arm, survey.states), survey.position, chosen, origin)
+        return fit_best(arm, states, position, origin, setup, turns)
+    chosen = propose((*effects, *setup), arm, states)
+    return fit_effects(batch, position, chosen, origin, turns=turns)
 
 
 def model_of(fitted: Fit, survey: Measurements) -> Model:
@@ -51,7 +60,8 @@ def model_of(fitted: Fit, survey: Measurements) -> Model:
     used = fitted.rows.weight > 0
     left = np.linalg.norm(fitted.residual[used], axis=1) / MM
     X = fitted.columns
-    known = np.sqrt(np.einsum("nip,nip->ni", X @ fitted.covariance, X))
+    covariance = fitted.stated
+    known = np.sqrt(np.einsum("nip,nip->ni", X @ covariance, X))
     arm = fitted.batch.arm
     statistics = {
         "residual_mean_mm": float(left.mean()),
@@ -61,16 +71,19 @@ def model_of(fitted: Fit, survey: Measurements) -> Model:
         "log_evidence": fitted.log_evidence,
         "rows_dropped": float((~used).sum() + len(survey.dropped)),
     }
+    oriented = fitted.turns is not None and survey.mounting is not None
+    if fitted.turns is not None:
+        statistics["orientation_std_mrad"] = fitted.turns.std * 1e3
     return Model(
         method="full",
         arm_name=arm.name,
         arm_id=arm.id,
         effects=fitted.combination,
         values=fitted.values,
-        covariance=fitted.covariance,
+        covariance=covariance,
         prior_std=fitted.prior_std,
         noise=fitted.noise,
-        ranges=Ranges.of(survey.states[used]),
+        ranges=Ranges.of(survey.states[used], oriented),
         rows=int(used.sum()),
         data_sha256=survey.sha256,
         statistics=statistics,

@@ -9,7 +9,12 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from postproc.accuracy.columns import read_directions, read_tools, unique_ids
+from postproc.accuracy.columns import (
+    read_directions,
+    read_rotation,
+    read_tools,
+    unique_ids,
+)
 from postproc.accuracy.formats import read_foreign
 from postproc.accuracy.table import Table
 from postproc.exceptions import MeasurementError
@@ -54,7 +59,10 @@ class Measurements:
         sha256: Hash of the file(s).
         dropped: Rows left out.
         warnings: What a reader of the fit should know.
-        rotation: Measured tool or probe orientation, (n, 3, 3), or None.
+        rotation: Measured orientation of the tool or 6D probe, (n, 3, 3), or None; in
+            the frame of the positions.
+        mounting: Orientation of the tool or probe in the flange frame, (3, 3), or None
+            where it is not known.
     """
 
     path: Path
@@ -67,6 +75,7 @@ class Measurements:
     dropped: tuple[DroppedRow, ...] = ()
     warnings: tuple[str, ...] = ()
     rotation: Array | None = field(default=None, repr=False)
+    mounting: Array | None = field(default=None, repr=False)
 
     def __len__(self) -> int:
         """Return the number of rows."""
@@ -138,7 +147,7 @@ def from_table(
     position = table.block(POSITION) * MM if read else np.full((len(q), 3), np.nan)
     found = Measurements(
         table.path, states, position, ids, table.line, inferred, table.sha256,
-        warnings=warnings,
+        warnings=warnings, rotation=read_rotation(table),
     )  # fmt: skip
     return drop_lost_beams(found)
 

@@ -42,6 +42,11 @@ def student_weights(distance: Array) -> Array:
     return weight
 
 
+def limit_of(n: int) -> float:
+    """Distance in standard deviations from which one of n rows stands out."""
+    return float(np.sqrt(chi2.isf(FALSE_ALARMS / max(n, 1), 3)))
+
+
 def judge(distance: Array, residual: Array, q: Array, jacobian: Array) -> RowWeights:
     """Weigh the rows of a survey.
 
@@ -52,7 +57,7 @@ def judge(distance: Array, residual: Array, q: Array, jacobian: Array) -> RowWei
         jacobian: Position Jacobian, (n, 3, 6) [m/rad].
     """
     n = len(q)
-    limit = float(np.sqrt(chi2.isf(FALSE_ALARMS / max(n, 1), 3)))
+    limit = limit_of(n)
     stands_out = distance > limit
     spared = np.zeros(n, dtype=bool)
     if stands_out.any() and n > 2 * NEIGHBOURS:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
@@ -14,6 +15,7 @@ from postproc.accuracy.geometry import Geometry
 from postproc.accuracy.measurement import Measurements
 from postproc.accuracy.observability import observe
 from postproc.accuracy.registration import register
+from postproc.accuracy.turns import Turns
 from postproc.exceptions import MeasurementError
 from postproc.pose import MM
 from postproc.robot.arm import Arm
@@ -28,6 +30,7 @@ MANY = 0.1  # share of such rows from which the file is at fault, not the rows
 TRIED = 60  # rows that a guess is tried on
 PROBES = 400  # random poses that show what could be determined at best
 ENOUGH = 0.75  # share of the determinable directions that a survey must show
+TURNED = np.deg2rad(1.0)  # no flange that works is off by more
 NOTHING = Combination(())
 
 
@@ -148,3 +151,30 @@ def _rank(arm: Arm, states: States) -> int:
     scales = np.array([p.scale for p in geometry.parameters()])
     X = geometry.columns(Batch(arm, states)).reshape(-1, len(names)) * scales
     return observe(X, names).rank
+
+
+def check_orientations(survey: Measurements, arm: Arm) -> Measurements:
+    """Check measured orientations, base frame; what cannot be used is left out.
+
+    Raises:
+        MeasurementError: The declared mounting of the probe is not the measured one.
+    """
+    if survey.rotation is None or len(survey) == 0:
+        return survey
+    batch = Batch(arm, survey.states)
+    apart = Turns.of(batch, survey.rotation, None).typical
+    if apart > TURNED:
+        text = (
+            f"the measured orientations scatter by {np.rad2deg(apart):.1f} deg about "
+            "the arm's: they are not R = Rx Ry Rz of a probe on the flange, and are "
+            "not used"
+        )
+        warnings = (*survey.warnings, text)
+        return replace(survey, rotation=None, warnings=warnings)
+    if survey.mounting is not None:
+        apart = Turns.of(batch, survey.rotation, survey.mounting).typical
+        if apart > TURNED:
+            problem = f"the probe is mounted {np.rad2deg(apart):.1f} deg off"
+            cure = "Correct [survey] euler_zyz_deg in the cell file, or leave it out"
+            raise MeasurementError(survey.path, problem, cure)
+    return survey

@@ -30,6 +30,7 @@ class Ranges:
         payload: [kg], or None where it was not recorded.
         temperature: [deg C], or None.
         speed: [m/s], or None.
+        oriented: Whether orientations were measured with a probe of known mounting.
     """
 
     lower: tuple[float, ...]
@@ -38,9 +39,10 @@ class Ranges:
     payload: Interval | None
     temperature: Interval | None
     speed: Interval | None
+    oriented: bool = False
 
     @classmethod
-    def of(cls, states: States) -> Ranges:
+    def of(cls, states: States, oriented: bool = False) -> Ranges:
         """Take the ranges of a survey."""
         tools = np.unique(np.round(states.tool, 9), axis=0)
         return cls(
@@ -50,6 +52,7 @@ class Ranges:
             payload=_interval(states.payload),
             temperature=_interval(states.temperature),
             speed=_interval(states.speed),
+            oriented=oriented,
         )
 
     def outside(self, states: States, needs: frozenset[str]) -> dict[str, Bools]:
@@ -101,7 +104,9 @@ class Ranges:
 
     @property
     def see_all_rotations(self) -> bool:
-        """Whether the probe points span a plane, so that flange rotations show."""
+        """Whether flange rotations show: points that span a plane, or orientations."""
+        if self.oriented:
+            return True
         points = np.array(self.tools).reshape(-1, 3)
         spread = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
         return len(spread) > 1 and bool(spread[1] > 0.02)  # [m]

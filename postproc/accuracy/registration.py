@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from postproc.accuracy.base_shift import rigid_columns, rigid_rotations
 from postproc.accuracy.batch import Batch
 from postproc.accuracy.combination import Combination
 from postproc.accuracy.effect import Effect, Origin, Parameter
@@ -154,7 +155,11 @@ class Placement(Effect):
 
     def columns(self, batch: Batch) -> Array:
         """Differentiate the measured position, (n, 3, 6 + 3 k)."""
-        w, s, n = batch.walk, batch.states, len(batch)
-        turned = np.swapaxes(np.cross(np.eye(3)[None], w.tcp[:, None]), 1, 2)
-        points = [w.flange * (s.tool_id == t)[:, None, None] for t in self.tools]
-        return np.concatenate([np.tile(np.eye(3), (n, 1, 1)), turned, *points], axis=2)
+        flange, which = batch.walk.flange, batch.states.tool_id
+        points = [flange * (which == t)[:, None, None] for t in self.tools]
+        return np.concatenate([rigid_columns(batch), *points], axis=2)
+
+    def rotation_columns(self, batch: Batch) -> Array:
+        """Differentiate the measured orientation, (n, 3, 6 + 3 k)."""
+        still = np.zeros((len(batch), 3, 3 * len(self.tools)))
+        return np.concatenate([rigid_rotations(batch), still], axis=2)

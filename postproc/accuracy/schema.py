@@ -69,6 +69,7 @@ class RangesSection(Section):
     payload: tuple[float, float] | None
     temperature: tuple[float, float] | None
     speed: tuple[float, float] | None
+    oriented: bool = False
 
 
 class ModelFile(Section):

@@ -14,8 +14,10 @@ from numpy.typing import NDArray
 from postproc.accuracy.batch import Batch
 from postproc.accuracy.effect import Effect
 from postproc.accuracy.evidence import LOG_SPREAD, Normal, maximise
-from postproc.accuracy.fit import Fit, fit_effects
+from postproc.accuracy.fit import fit_effects
+from postproc.accuracy.fitted import Fit
 from postproc.accuracy.library import BASE_EFFECTS, propose
+from postproc.accuracy.turns import Turns
 from postproc.robot.arm import Arm
 from postproc.robot.state import States
 
@@ -56,6 +58,7 @@ def fit_best(
     position: Array,
     origin: tuple[float, float, float] | None,
     setup: tuple[str, ...] = (),
+    turns: Turns | None = None,
 ) -> Fit:
     """Fit the base effects and all others that a survey gives evidence for.
 
@@ -65,17 +68,18 @@ def fit_best(
         position: Measured positions in the base frame, (n, 3) [m].
         origin: Tracker position, where it is known.
         setup: Effects of the set-up that are always fitted.
+        turns: Measured orientations, where the survey has them.
     """
     batch = Batch(arm, states)
     base = propose((*BASE_EFFECTS, *setup), arm, states)
     free = ("joint_spline",) if len(states) >= LONG else ("joint_map", "elm")
     kept = base
-    fitted: Fit | None = fit_effects(batch, position, base, origin)
+    fitted = fit_effects(batch, position, base, origin, turns=turns)
     for names in (candidates(states), *((name,) for name in free)):
         tried = (*kept, *propose(names, arm, states))
         fitted = fit_effects(batch, position, tried, origin, fitted)
         kept = keep_needed(fitted, always=base)
-    if fitted is None or kept != fitted.combination.effects:
+    if kept != fitted.combination.effects:
         fitted = fit_effects(batch, position, kept, origin, fitted)
     return fitted
 
@@ -88,7 +92,7 @@ def keep_needed(fitted: Fit, always: tuple[Effect, ...]) -> tuple[Effect, ...]:
         always: Effects that are not in question.
     """
     kept = list(fitted.combination.effects)
-    normal, group = _normal(fitted)
+    normal, group = fitted.normal(), fitted.group
     present = np.ones(len(fitted.values), dtype=bool)
     now = _evidence(fitted, normal, group, present)
     while True:
@@ -117,15 +121,6 @@ def _in_question(
             columns = np.zeros(len(fitted.values), dtype=bool)
             columns[part] = True
             yield effect, columns
-
-
-def _normal(fitted: Fit) -> tuple[Normal, NDArray[np.int64]]:
-    """Whitened normal equations at the solution, and the group of every column."""
-    X = fitted.whiten(fitted.columns) * fitted.combination.scales
-    y = fitted.whiten(fitted.residual + fitted.columns @ fitted.values)
-    index = {g: i for i, g in enumerate(fitted.groups)}
-    group = np.array([index[g] for g in fitted.combination.groups], dtype=np.int64)
-    return Normal(X.T @ X, X.T @ y, float(y @ y), 0.0, 0.0), group
 
 
 def _evidence(

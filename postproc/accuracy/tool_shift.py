@@ -48,3 +48,11 @@ class ToolShift(Effect):
             arms = np.cross(np.eye(3)[None], batch.states.tool[:, None, :])
             axes = np.concatenate([axes, axes @ np.swapaxes(arms, 1, 2)], axis=2)
         return np.where(before[:, None, None], -axes, 0.0)
+
+    def rotation_columns(self, batch: Batch) -> Array | None:
+        """Differentiate the tool's rotation, (n, 3, p)."""
+        if not self.turns:
+            return None
+        axes, before = batch.walk.flange, (batch.states.order < self.row)
+        axes = np.concatenate([np.zeros_like(axes), axes], axis=2)
+        return np.where(before[:, None, None], -axes, 0.0)

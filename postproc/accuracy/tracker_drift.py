@@ -8,7 +8,7 @@ from typing import ClassVar, Literal, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from postproc.accuracy.base_shift import AXES, rigid_columns
+from postproc.accuracy.base_shift import AXES, rigid_columns, rigid_rotations
 from postproc.accuracy.batch import Batch
 from postproc.accuracy.effect import Effect, Origin, Parameter
 from postproc.robot.arm import Arm
@@ -64,9 +64,16 @@ class TrackerDrift(Effect):
 
     def columns(self, batch: Batch) -> Array:
         """Differentiate the TCP position, (n, 3, p)."""
+        return self._in_time(batch, rigid_columns(batch))
+
+    def rotation_columns(self, batch: Batch) -> Array:
+        """Differentiate the tool's rotation, (n, 3, p)."""
+        return self._in_time(batch, rigid_rotations(batch))
+
+    def _in_time(self, batch: Batch, moved: Array) -> Array:
+        """Multiply six motions (n, 3, 6) by every term, (n, 3, p)."""
         u = (getattr(batch.states, self.clock) - self.start) / self.duration
         u = np.clip(np.nan_to_num(u), 0.0, 1.0)
         bow = 4.0 * u * (1.0 - u)
         terms = (u, bow, bow * (1.0 - 2.0 * u) * 1.5)
-        moved = rigid_columns(batch)
         return np.concatenate([moved * t[:, None, None] for t in terms], axis=2)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from pydantic import Field, NonNegativeFloat, PositiveFloat, model_validator
 
 from postproc.exceptions import CellError
-from postproc.pose import MM, pose_from_record
+from postproc.pose import MM, pose_from_record, rotation_from_zyz
 from postproc.robot.arm import Arm, load_arm
 from postproc.robot.schema import Sextuple, Strict, Triple, read_toml
 
@@ -85,9 +85,14 @@ class TrackerSection(Strict):
 
 
 class SurveySection(Strict):
-    """Where the survey's probe points (SMR nests) sit, in the flange frame."""
+    """Where the survey's probe points (SMR nests) sit, in the flange frame.
+
+    A 6D probe also has an orientation there; without it, the flange's own orientation
+    cannot be told from the probe's.
+    """
 
     points_mm: Annotated[list[Triple], Field(min_length=1)]
+    euler_zyz_deg: Triple | None = None
 
 
 class LimitSection(Strict):
@@ -158,6 +163,7 @@ class Cell:
         tracker: Tracker position in the base frame, (3,) [m], or None.
         probes: Probe points of a survey in the flange frame, (k, 3) [m]; the tool's TCP
             where the cell lists none. Row i belongs to tool_id i + 1.
+        mounting: Orientation of a 6D probe in the flange frame, (3, 3), or None.
         aux: Kind of every declared auxiliary axis.
         limits: Guards, in the units of their names.
         routines: What outside routines do, by lower-case name.
@@ -177,6 +183,7 @@ class Cell:
     temperature: float
     tracker: Array | None
     probes: Array
+    mounting: Array | None
     aux: Mapping[int, str]
     limits: LimitSection
     routines: Mapping[str, Effect]
@@ -217,6 +224,7 @@ def load_cell(path: str | Path) -> Cell:
         temperature=file.environment.temperature_c if file.environment else np.nan,
         tracker=None if tracker is None else np.array(tracker.xyz_mm) * MM,
         probes=_probes(file),
+        mounting=_mounting(file),
         aux=_aux(file, path),
         limits=file.limits,
         routines={name.lower(): what for name, what in file.routines.items()},
@@ -246,6 +254,13 @@ def _probes(file: CellFile) -> Array:
     if file.survey is not None:
         return np.array(file.survey.points_mm) * MM
     return _frame(file.tool).pose[None, :3, 3]
+
+
+def _mounting(file: CellFile) -> Array | None:
+    """Convert the orientation of a 6D probe."""
+    if file.survey is None or file.survey.euler_zyz_deg is None:
+        return None
+    return rotation_from_zyz(np.array(file.survey.euler_zyz_deg))
 
 
 def _aux(file: CellFile, path: Path) -> dict[int, str]:

@@ -8,7 +8,8 @@ import numpy as np
 
 from postproc.accuracy.batch import Batch
 from postproc.accuracy.diagnosis.projection import Projection
-from postproc.accuracy.fit import Fit, fit_effects
+from postproc.accuracy.fit import fit_effects
+from postproc.accuracy.fitted import Fit
 from postproc.accuracy.library import BASE_EFFECTS, propose
 from postproc.robot.arm import load_arm
 from postproc.robot.state import States, make_states

@@ -55,10 +55,15 @@ class Simulated:
         return side * (b0 + s * np.sin(q) + c * np.cos(q))
 
     def tcp(self, q: np.ndarray, side: np.ndarray, tool: np.ndarray) -> np.ndarray:
-        """True TCP positions, one pose after the other."""
+        """True TCP positions."""
+        out: np.ndarray = self.pose(q, side, tool)[:, :3, 3]
+        return out
+
+    def pose(self, q: np.ndarray, side: np.ndarray, tool: np.ndarray) -> np.ndarray:
+        """True TCP poses (n, 4, 4), one after the other; the tool is not turned."""
         dh = self.arm.dh
         actual = q + self.joint_error(q, side)
-        out = np.empty((len(q), 3))
+        out = np.empty((len(q), 4, 4))
         for k in range(len(q)):
             x, y, z, a, b, c = self.base
             T = move(x, y, z) @ rot(0, a) @ rot(1, b) @ rot(2, c)
@@ -69,7 +74,7 @@ class Simulated:
                 T = T @ rot(0, dh.alpha[j])
                 x, y, z, a, b, c = self.link[j]
                 T = T @ move(x, y, z) @ rot(0, a) @ rot(1, b) @ rot(2, c)
-            out[k] = (T @ np.append(tool[k] + self.tool, 1.0))[:3]
+            out[k] = T @ move(*(tool[k] + self.tool))
         return out
 
     def measure(

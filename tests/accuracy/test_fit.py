@@ -10,7 +10,7 @@ from scipy.linalg import qr
 
 from postproc.accuracy.batch import Batch
 from postproc.accuracy.combination import Combination
-from postproc.accuracy.fit import Fit
+from postproc.accuracy.fitted import Fit
 from postproc.accuracy.full import fit_survey
 from postproc.accuracy.geometry import Geometry
 from postproc.accuracy.library import BASE_EFFECTS

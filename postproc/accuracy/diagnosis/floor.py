@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from postproc.accuracy.batch import Batch
 from postproc.accuracy.effect import Array
-from postproc.accuracy.fit import Fit
+from postproc.accuracy.fitted import Fit
 from postproc.accuracy.noise import Noise
 
 SAME_POSE = 1e-5  # [rad] joint angles that are one pose

@@ -16,7 +16,7 @@ from scipy.linalg import cho_factor, cho_solve
 
 from postproc.accuracy.diagnosis.candidate import Candidate
 from postproc.accuracy.effect import Array
-from postproc.accuracy.fit import Fit
+from postproc.accuracy.fitted import Fit
 
 FOLDS = 10
 RUN = 4  # rows of a run

@@ -14,7 +14,7 @@ from postproc.accuracy.diagnosis.curves import free_candidates
 from postproc.accuracy.diagnosis.named import named_candidates
 from postproc.accuracy.diagnosis.projection import Blocks, Projection, reduce_columns
 from postproc.accuracy.effect import Array
-from postproc.accuracy.fit import Fit
+from postproc.accuracy.fitted import Fit
 from postproc.accuracy.noise import Whitener
 
 KEPT = 60_000_000  # numbers of columns that are kept rather than made again

@@ -11,7 +11,7 @@ from postproc.accuracy.covariate import covariate, unit
 from postproc.accuracy.diagnosis.candidate import Candidate
 from postproc.accuracy.diagnosis.projection import Projection
 from postproc.accuracy.effect import Array, Effect
-from postproc.accuracy.fit import Fit
+from postproc.accuracy.fitted import Fit
 from postproc.pose import MM
 
 LARGEST_ORDER = 60

@@ -17,7 +17,8 @@ from postproc.accuracy.diagnosis.folds import deal
 from postproc.accuracy.diagnosis.search import Progress, Search
 from postproc.accuracy.diagnosis.withdrawal import investigate
 from postproc.accuracy.effect import Array
-from postproc.accuracy.fit import Fit, fit_effects
+from postproc.accuracy.fit import fit_effects
+from postproc.accuracy.fitted import Fit
 
 PARTS = 5
 RUN = 8  # consecutive rows that are held out together

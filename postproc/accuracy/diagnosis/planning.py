@@ -8,7 +8,7 @@ from postproc.accuracy.batch import Batch
 from postproc.accuracy.diagnosis.score import Score
 from postproc.accuracy.diagnosis.search import extend
 from postproc.accuracy.effect import Array
-from postproc.accuracy.fit import Fit
+from postproc.accuracy.fitted import Fit
 from postproc.robot.state import make_states
 
 TRIED = 400  # random poses

@@ -16,7 +16,7 @@ import numpy as np
 from postproc.accuracy.batch import Batch
 from postproc.accuracy.diagnosis.candidate import Candidate
 from postproc.accuracy.effect import Array
-from postproc.accuracy.fit import Fit
+from postproc.accuracy.fitted import Fit
 
 
 @dataclass(frozen=True, eq=False)

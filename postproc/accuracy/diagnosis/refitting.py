@@ -5,7 +5,8 @@ from __future__ import annotations
 from postproc.accuracy.batch import Batch
 from postproc.accuracy.diagnosis.revision import few, only_arm, revise
 from postproc.accuracy.effect import Array
-from postproc.accuracy.fit import Fit, fit_effects
+from postproc.accuracy.fit import fit_effects
+from postproc.accuracy.fitted import Fit
 from postproc.accuracy.library import propose
 from postproc.accuracy.measurement import Measurements
 from postproc.accuracy.model import Model

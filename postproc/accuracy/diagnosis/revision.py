@@ -15,7 +15,8 @@ import numpy as np
 from postproc.accuracy.batch import Batch
 from postproc.accuracy.combination import Combination
 from postproc.accuracy.effect import Array, Effect, Parameter
-from postproc.accuracy.fit import Fit, fit_effects
+from postproc.accuracy.fit import fit_effects
+from postproc.accuracy.fitted import Fit
 from postproc.accuracy.measurement import Measurements
 from postproc.accuracy.model import Model
 

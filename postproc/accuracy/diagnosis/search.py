@@ -13,7 +13,8 @@ from postproc.accuracy.diagnosis.library import Library
 from postproc.accuracy.diagnosis.projection import Projection
 from postproc.accuracy.diagnosis.score import Score
 from postproc.accuracy.effect import Effect
-from postproc.accuracy.fit import Fit, fit_effects
+from postproc.accuracy.fit import fit_effects
+from postproc.accuracy.fitted import Fit
 
 MOST = 12  # additions
 LEVEL = 0.01  # probability of a false addition, whole library

@@ -13,7 +13,7 @@ from postproc.accuracy.diagnosis.projection import Projection
 from postproc.accuracy.diagnosis.result import Finding, Verdict
 from postproc.accuracy.diagnosis.search import Progress, Search
 from postproc.accuracy.diagnosis.withdrawal import investigate
-from postproc.accuracy.fit import Fit
+from postproc.accuracy.fitted import Fit
 
 REMAINS = 0.01  # level at which structure is called structure: nothing was added
 STILL_REMAINS = 0.001  # ... after something was
