@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from postproc.accuracy.guard import guard_size, guard_solutions, guard_steps
+from postproc.followers import carry_along, worsened
 from postproc.language.visits import NO_TARGET, Target, Visits
 from postproc.options import Options
 from postproc.planning import Planned, Reading
@@ -74,10 +76,11 @@ def propose(
     guard_steps(reasons, cell.limits, correction, side, _run_mates(visits))
     reasons.mark(held, HELD)
     numbers = new_numbers(visits, solved)
-    agreement = agree(
-        visits.literal, reasons.none, numbers, change_mm(visits, numbers, correction)
-    )
-    chosen, unsafe = mark_disagreement(visits, agreement, cell, reasons)
+    change = change_mm(visits, numbers, correction)
+    agreement = agree(visits.literal, reasons.none, numbers, change)
+    trusted = ~np.any([held, *solved.outside.values()], axis=0)
+    stay = must_stay(visits, agreement, change, trusted, cell)
+    chosen, unsafe = mark_disagreement(visits, agreement, stay, cell, reasons)
     status = np.where(reasons.none, Status.SAFE, Status.GUARDED)
     for rows, value in (
         (unsafe, Status.UNSAFE),
@@ -88,6 +91,7 @@ def propose(
     corrected = status == Status.SAFE
     values = np.array(visits.values)
     values[corrected] = agreement.values[agreement.group[corrected]]
+    carry_along(visits, agreement, chosen, values)
     decisions = Decisions(
         status=status.astype(np.int64),
         why=reasons.index,
@@ -113,12 +117,17 @@ def new_numbers(visits: Visits, solved: Solved) -> Array:
     joints = visits.target == Target.JOINTS
     numbers[joints] = np.rad2deg(solved.q[joints])
     poses = np.flatnonzero(visits.target == Target.POSE)
-    unknown = np.full((1, 4, 4), np.nan)
-    frames = np.concatenate([pose_from_record(visits.frames.reshape(-1, 6)), unknown])
-    placed = inverse(frames)[visits.uframe[poses]] @ frames[visits.base[poses]]
+    placed = base_in_uframe(visits, poses)
     point = np.einsum("nij,nj->ni", placed, solved.command[poses, :, 3])
     numbers[poses, :3] = point[:, :3] / MM
     return numbers
+
+
+def base_in_uframe(visits: Visits, rows: Ints) -> Array:
+    """Return the pose of the arm's base in the user frame, (k, 4, 4) [m]."""
+    unknown = np.full((1, 4, 4), np.nan)
+    frames = np.concatenate([pose_from_record(visits.frames.reshape(-1, 6)), unknown])
+    return np.asarray(inverse(frames)[visits.uframe[rows]] @ frames[visits.base[rows]])
 
 
 def change_mm(visits: Visits, numbers: Array, correction: Array) -> Array:
@@ -129,7 +138,27 @@ def change_mm(visits: Visits, numbers: Array, correction: Array) -> Array:
     """
     poses = (visits.target == Target.POSE)[:, None]
     moved = numbers[:, :3] - visits.values[:, :3]
-    return np.where(poses, moved, correction / MM)
+    near = np.flatnonzero(visits.target == Target.NEAR)
+    axes = base_in_uframe(visits, near)[:, :3, :3]
+    change = np.where(poses, moved, correction / MM)
+    change[near] = np.einsum("nij,nj->ni", axes, correction[near]) / MM
+    return change
+
+
+def must_stay(
+    visits: Visits, agreement: Agreement, change: Array, trusted: Bools, cell: Cell
+) -> dict[str, Bools]:
+    """Find literals that must keep their values for what else depends on them.
+
+    Returns:
+        The reasons, and which of the m literals of the agreement have each, (m,).
+    """
+    pinned = np.array([visits.literals.pinned[row] for row in agreement.literal], str)
+    hurt = worsened(visits, agreement, change, trusted, cell.limits.agree_mm)
+    found = {f"{why}: give the move a point of its own": pinned == why
+             for why in sorted({*pinned.tolist()} - {""})}  # fmt: skip
+    text = "a target computed from it would land farther off: give each its own point"
+    return found | {text: hurt}
 
 
 def mark_display(visits: Visits, planned: Planned, reasons: Reasons) -> Bools:
@@ -167,9 +196,13 @@ def mark_unchanged(visits: Visits, reasons: Reasons, options: Options) -> Bools:
 
 
 def mark_disagreement(
-    visits: Visits, agreement: Agreement, cell: Cell, reasons: Reasons
+    visits: Visits,
+    agreement: Agreement,
+    stay: Mapping[str, Bools],
+    cell: Cell,
+    reasons: Reasons,
 ) -> tuple[Bools, Bools]:
-    """Mark the visits of literals whose arrivals disagree.
+    """Mark the visits of literals whose arrivals disagree, or that must stay.
 
     Returns:
         The literals that agree, (m,), and the visits that would be corrected if the
@@ -178,7 +211,8 @@ def mark_disagreement(
     limit = cell.limits.agree_mm
     has = agreement.group >= 0
     apart = ~(agreement.spread_mm <= limit)
-    together = agreement.usable & ~apart
+    stays = np.any([apart, *stay.values()], axis=0)
+    together = agreement.usable & ~stays
     if len(together) == 0:
         return together, np.zeros(len(visits), dtype=bool)
     at = np.where(has, agreement.group, 0)
@@ -187,7 +221,9 @@ def mark_disagreement(
         f"its arrivals differ by more than agree_mm = {limit:g}: give each move a "
         "point of its own"
     )
-    reasons.mark(unsafe & agreement.usable[at], text)
+    reasons.mark(unsafe & agreement.usable[at] & apart[at], text)
+    for why, literals in stay.items():
+        reasons.mark(unsafe & literals[at], why)
     reasons.mark(unsafe, "another arrival at the same point cannot be corrected")
     return together, unsafe
 

@@ -23,6 +23,7 @@ class Agreement:
         spread_mm: Largest distance between two arrivals' corrections, (m,) [mm],
             bounded from above by the diagonal of their bounding box.
         values: The mean of the arrivals' corrected numbers, (m, 6).
+        change_mm: The mean of what must agree, (m, 3) [mm].
         arrivals: Number of arrivals, (m,).
     """
 
@@ -31,6 +32,7 @@ class Agreement:
     usable: Bools
     spread_mm: Array
     values: Array
+    change_mm: Array
     arrivals: Ints
 
 
@@ -58,7 +60,9 @@ def agree(
     low, high = np.full((m, 3), np.inf), np.full((m, 3), -np.inf)
     np.minimum.at(low, inverse, correction_mm[rows])
     np.maximum.at(high, inverse, correction_mm[rows])
-    total = np.zeros((m, 6))
+    total, moved = np.zeros((m, 6)), np.zeros((m, 3))
     np.add.at(total, inverse, corrected[rows])
+    np.add.at(moved, inverse, correction_mm[rows])
     spread = np.linalg.norm(high - low, axis=1)
-    return Agreement(names, group, all_usable, spread, total / count[:, None], count)
+    mean, change = total / count[:, None], moved / count[:, None]
+    return Agreement(names, group, all_usable, spread, mean, change, count)

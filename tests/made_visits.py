@@ -16,7 +16,7 @@ FRAMES = np.array(
 NO_INTS, NO_BOOLS = np.empty(0, dtype=np.int64), np.empty(0, dtype=bool)
 NO_LITERALS = Literals(
     NO_INTS, NO_INTS, np.empty((0, 6), np.int64), np.empty((0, 6), np.int64), NO_BOOLS,
-    (), NO_BOOLS, NO_BOOLS,
+    (), NO_BOOLS, NO_BOOLS, (),
 )  # fmt: skip
 
 
@@ -30,7 +30,8 @@ def visits(target: list[int], values: list[list[float]], **more: object) -> Visi
         "motion": zeros, "target": np.array(target), "via": no,
         "values": np.array(values, dtype=float), "distance_mm": nan,
         "aux": np.empty((n, 0)), "config": zeros, "configs": ("S T1:1",),
-        "config_given": ~no, "literal": zeros - 1, "name": zeros, "names": ("",),
+        "config_given": ~no, "literal": zeros - 1,
+        "follows": zeros - 1, "name": zeros, "names": ("",),
         "tool": zeros, "base": zeros + 1, "uframe": zeros + 2, "frames": FRAMES,
         "frame_taught": np.zeros(3, dtype=bool), "tool_remote": no,
         "nearest_turn": no, "fly": no, "fly_dist_mm": nan, "fly_per": nan,

@@ -5,20 +5,23 @@ from __future__ import annotations
 from dataclasses import replace
 
 from postproc.language import pdl2 as ast
+from postproc.language.evaluate import component_index
 from postproc.language.machine import Here
 from postproc.language.target import Target
-from postproc.language.values import COMPONENTS, Nothing, Position, Value
+from postproc.language.values import Nothing, Position, Value, Written
 
 _FRAMES = ("tool", "base", "uframe")
 
 
 def assign(here: Here, statement: ast.Assign, taught: bool) -> None:
     """Let an assignment have its effect; `taught` marks the literal in it."""
-    value = here.value(statement.value)
-    literal = statement.operator == ":="
-    if not literal:
-        sign = statement.operator[0]
-        value = here.value(ast.Binary(sign, statement.target, statement.value))
+    new = statement.value
+    if statement.operator != ":=":
+        new = ast.Binary(statement.operator[0], statement.target, statement.value)
+    if _assigns_component(here, statement.target):
+        _assign_component(here, statement.target, here.written(new))
+        return
+    value = here.value(new)
     if taught and isinstance(value, Position):
         value = replace(value, taught=True)
     if statement.target.name.startswith("$"):
@@ -29,16 +32,31 @@ def assign(here: Here, statement: ast.Assign, taught: bool) -> None:
         for key in target.keys:
             here.store.forget(key, "an element known only at run time is assigned")
         return
-    slot = -1
-    if literal and isinstance(statement.value, ast.Number):
-        slot = here.global_slot(statement.value.slot)
-    held = _new_value(here, statement, target, value, slot)
+    held = _new_value(here, statement, target, value)
     if isinstance(held, Position):
         held = _owned(here, statement.target.name, target.key, held)
     if isinstance(held, Nothing) and target.component == ():
         here.store.forget(target.key, held.why)
     else:
         here.store.write(target.key, held)
+
+
+def _assigns_component(here: Here, reference: ast.Reference) -> bool:
+    """Tell whether a reference means one of a position's six numbers."""
+    if reference.name.startswith("$"):
+        return False
+    target = here.locate(reference)
+    return target.exact and component_index(target) >= 0
+
+
+def _assign_component(here: Here, reference: ast.Reference, new: Written) -> None:
+    """Replace one of the six numbers of a position."""
+    target = here.locate(reference)
+    held = here.store.read(target.key)
+    if not isinstance(held, Position):
+        held = _blank(here, reference.name, held)
+    held = held.with_component(component_index(target), new)
+    here.store.write(target.key, _owned(here, reference.name, target.key, held))
 
 
 def _setting(here: Here, reference: ast.Reference, value: Value) -> None:
@@ -52,6 +70,7 @@ def _setting(here: Here, reference: ast.Reference, value: Value) -> None:
             field = str(reference.steps[-1]).lstrip("$")
             here.store.set(**{field: Nothing("it is set for an arm known at run time")})
         return
+    here.world.pin(value, f"${name.upper()} is set to it")
     if f"${name}" in here.volatile:
         value = Nothing("a condition handler changes it")
     here.store.set(**{name: value})
@@ -66,7 +85,7 @@ def _whose(here: Here, reference: ast.Reference) -> int | None:
 
 
 def _new_value(
-    here: Here, statement: ast.Assign, target: Target, value: Value, slot: int
+    here: Here, statement: ast.Assign, target: Target, value: Value
 ) -> Value:
     if target.component == ():
         return value
@@ -82,12 +101,8 @@ def _new_value(
             return replace(value, aux=held.aux, taught=value.taught or held.taught)
         case ("aux", axis):
             return held.with_aux(axis, number)
-        case ("joint", axis) if 1 <= axis <= 6:
-            return held.with_component(axis - 1, number, slot)
         case ("joint", axis):
             return held.with_aux(axis - 6, number)
-        case (str(name), _):
-            return held.with_component(COMPONENTS[name], number, slot)
     return Nothing("a part of it known only at run time is assigned")
 
 

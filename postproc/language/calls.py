@@ -11,7 +11,13 @@ from postproc.language.effects import (
     body_effects,
     changed_arguments,
 )
-from postproc.language.machine import Here, Machine, forget, forget_names
+from postproc.language.machine import (
+    Here,
+    Machine,
+    forget,
+    forget_names,
+    pin_names,
+)
 from postproc.language.values import Alias, Nothing, Position
 from postproc.language.visits import ELSEWHERE
 from postproc.language.world import Place, Record
@@ -49,7 +55,7 @@ def calls_in_expressions(
     machine: Machine, here: Here, statement: ast.Statement
 ) -> None:
     """Let the function calls inside of a statement have their effects."""
-    for call in machine.called(statement):
+    for call in machine.called(here.place, statement):
         inside = here.world.find_routine(here.place.program, call.name)
         if inside is None:
             outside(here, call.name, call.arguments)
@@ -64,6 +70,7 @@ def _summarised(
     name = inside.body.name
     effects = body_effects(inside.program, inside.body)
     within = replace_place(here, inside)
+    pin_names(within, effects.read, f"{name} may compute with it")
     forget_names(within, effects.assigned, f"{name} may change it")
     for argument in changed_arguments(arguments):
         forget(here, argument, f"{name} may change it")
@@ -95,7 +102,9 @@ def _refuse_recursion(here: Here, inside: Place) -> None:
         "to come from an unknown place",
     )
     effects = body_effects(inside.program, inside.body)
-    forget_names(replace_place(here, inside), effects.assigned, f"{name} may change it")
+    within = replace_place(here, inside)
+    pin_names(within, effects.read, f"{name} may compute with it")
+    forget_names(within, effects.assigned, f"{name} may change it")
     here.store.last = frozenset({ELSEWHERE})
 
 
@@ -128,6 +137,9 @@ def outside(
 ) -> None:
     """Take in what a routine that the job does not hold is said, or assumed, to do."""
     start = here.world.start
+    if name in CHANGING or name in PURE:
+        for given in arguments:
+            here.world.pin(here.value(given), f"{name.upper()} computes with it")
     for argument in changed_arguments(arguments):
         forget(here, argument, f"{name} may change it (arguments go by reference)")
     if name in CHANGING or name in PURE:

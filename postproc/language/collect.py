@@ -10,6 +10,7 @@ from postproc.language.columns import Collector, Columns
 from postproc.language.literals import Numbering, find_literals
 from postproc.language.machine import HERE, Key, Machine
 from postproc.language.setting_columns import SettingColumns
+from postproc.language.uses import find_uses
 from postproc.language.visits import ELSEWHERE, Visits
 
 Ints = NDArray[np.int64]
@@ -32,6 +33,7 @@ def collect(machine: Machine) -> Visits:
     if machine.exhausted:
         c.reason[:] = collector.reasons("the program is too complex to be followed")
     literals, literal = find_literals(c, Numbering.of(world), collector.names)
+    literals, follows = find_uses(literals, c.slots, c.bases, literal, world.pinned)
     overlapping = (literal < 0) & (c.slots[:, 0] >= 0) & (c.reason == 0)
     if overlapping.any():
         why = "a number of the target belongs to another target too"
@@ -51,6 +53,7 @@ def collect(machine: Machine) -> Visits:
         configs=collector.configs.texts(),
         config_given=c.config_given,
         literal=literal,
+        follows=follows,
         name=c.name,
         names=collector.names.texts(),
         fly=c.fly,

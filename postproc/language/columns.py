@@ -52,6 +52,7 @@ class Columns:
         self.reason = np.zeros(n, dtype=np.int64)
         self.setting = np.zeros(n, dtype=np.int64)
         self.slots = np.full((n, 6), -1, dtype=np.int64)
+        self.bases = np.full((n, 6), -1, dtype=np.int64)
         self.taught = np.zeros(n, dtype=bool)
         self.shared = np.zeros(n, dtype=bool)
         self.measure_id = [""] * n
@@ -103,6 +104,10 @@ class Collector:
                 c.aux[at, axis - 1] = value
         if position.editable and arrival.target in (Target.POSE, Target.JOINTS):
             c.slots[at] = position.slots
+        elif -1 not in position.slots and arrival.target in (Target.POSE, Target.NEAR):
+            c.bases[at] = position.slots
+        else:
+            world.pin(position, "a target is computed from a part of it")
         lines = world.taught_lines[arrival.place.program.lines.source.name]
         inline = not position.name and int(c.line[at]) in lines
         name = position.name.lower()

@@ -35,24 +35,34 @@ class Effects:
     Attributes:
         moves: It holds a move, or text that is not understood.
         assigned: Names of variables and settings (with ``$``) it may change.
+        read: Names of variables and settings that occur in it.
         calls: Names it calls that its file does not hold.
     """
 
     moves: bool
     assigned: frozenset[str]
+    read: frozenset[str]
     calls: frozenset[str]
 
 
 def invocations(node: object) -> Iterator[ast.Invoke]:
     """Yield the function calls in a statement or expression, inner ones first."""
+    return (part for part in _parts(node) if isinstance(part, ast.Invoke))
+
+
+def references(node: object) -> Iterator[ast.Reference]:
+    """Yield the variables in a statement or expression."""
+    return (part for part in _parts(node) if isinstance(part, ast.Reference))
+
+
+def _parts(node: object) -> Iterator[object]:
     if isinstance(node, tuple):
         for part in node:
-            yield from invocations(part)
+            yield from _parts(part)
     elif isinstance(node, ast.Statement | ast.Expression | ast.Index):
         for name in node.__slots__:
-            yield from invocations(getattr(node, name))
-        if isinstance(node, ast.Invoke):
-            yield node
+            yield from _parts(getattr(node, name))
+        yield node
 
 
 def changed_arguments(
@@ -73,6 +83,7 @@ def rows_effects(program: Program, first: int, last: int) -> Effects:
     return Effects(
         any(e.moves for e in own),
         frozenset().union(*(e.assigned for e in own)),
+        frozenset().union(*(e.read for e in own)),
         frozenset(n for n in names if n not in program.routines),
     )
 
@@ -85,7 +96,7 @@ def _reach(
     program: Program, shapes: tuple[int, ...]
 ) -> tuple[list[Effects], frozenset[str]]:
     found = [_direct(program.statements[s]) for s in shapes]
-    waiting = [n for e in found for n in e.calls]
+    waiting = [n for e in found for n in e.calls | e.read]
     done: set[str] = set()
     while waiting:
         name = waiting.pop()
@@ -97,8 +108,9 @@ def _reach(
             for shape in _shapes(program, body.first, body.last):
                 effects = _direct(program.statements[shape])
                 found.append(effects)
-                waiting += effects.calls
-    return found, frozenset(done)
+                waiting += effects.calls | effects.read
+    named = frozenset().union(*(e.calls for e in found))
+    return found, frozenset(done) & named
 
 
 @lru_cache(maxsize=8192)
@@ -127,7 +139,9 @@ def _direct(statement: ast.Statement) -> Effects:
         if call.name not in PURE:
             changed = changed_arguments(call.arguments)
             assigned |= {_assigned_name(a) for a in changed}
-    return Effects(moves, frozenset(assigned), frozenset(calls - PURE - CHANGING))
+    read = frozenset(reference.name for reference in references(statement))
+    called = frozenset(calls - PURE - CHANGING)
+    return Effects(moves, frozenset(assigned), read, called)
 
 
 def _assigned_name(reference: ast.Reference) -> str:

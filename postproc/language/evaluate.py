@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from postproc.language import pdl2 as ast
 from postproc.language.operators import (
@@ -22,6 +22,7 @@ from postproc.language.values import (
     Position,
     Value,
     Vector,
+    Written,
     inverted,
     shifted,
 )
@@ -133,7 +134,7 @@ class Point:
             case ast.Unary(sign, operand):
                 return unary(sign, self.value(operand))
             case ast.Binary(sign, left, right):
-                return binary(sign, self.value(left), self.value(right))
+                return self._binary(sign, self.value(left), self.value(right))
             case ast.Aggregate(items):
                 return self._joints(items)
             case ast.Invoke(name, arguments):
@@ -150,13 +151,20 @@ class Point:
                 return _TRUTH[name]
             if name in _WORDS:
                 return name
+        if self.world.is_function(self.place, name):
+            return Nothing(f"it comes from {name.upper()}, known only at run time")
         target = self.locate(reference)
         if not target.exact:
             return Nothing("its index is known only at run time")
         if name in self.volatile:
             return Nothing("a condition handler changes it")
         held = self.store.read(target.key)
-        return held if target.component == () else part_of(held, target.component)
+        if target.component == ():
+            return held
+        at = component_index(target)
+        if at >= 0:
+            self.world.pin(held, "the program computes with a part of it", (at,))
+        return part_of(held, target.component)
 
     def _system(self, reference: ast.Reference) -> Value:
         name = self.setting_name(reference)
@@ -178,22 +186,51 @@ class Point:
                 return name.lstrip("$")
         return None
 
+    def _binary(self, sign: str, left: Value, right: Value) -> Value:
+        if sign == ":":
+            for frame in (left, right):
+                self.world.pin(frame, "the program composes it with a frame (`:`)")
+        return binary(sign, left, right)
+
     def _joints(self, items: tuple[ast.Expression, ...]) -> Value:
         if len(items) < 6:
             return Nothing("it has fewer than six joint values")
-        numbers, slots = self._components(items[:6])
         aux = tuple((i, self.real(item)) for i, item in enumerate(items[6:], start=1))
-        return Position(True, numbers, slots, aux=aux)
+        return replace(self._components(items[:6]), joints=True, aux=aux)
 
-    def _components(
-        self, items: tuple[ast.Expression | None, ...]
-    ) -> tuple[tuple[float | None, ...], tuple[int, ...]]:
-        numbers = tuple(self.real(item) for item in items)
-        slots = tuple(
-            self.global_slot(item.slot) if isinstance(item, ast.Number) else -1
-            for item in items
+    def _components(self, items: tuple[ast.Expression | None, ...]) -> Position:
+        parts = [self.written(item) for item in items]
+        return Position(
+            numbers=tuple(part.number for part in parts),
+            slots=tuple(part.slot for part in parts),
+            along=frozenset(at for at, part in enumerate(parts) if part.along),
         )
-        return numbers, slots
+
+    def written(self, expression: ast.Expression | None) -> Written:
+        """Return a number, and where in the text it is written or comes from."""
+        match expression:
+            case ast.Number(slot):
+                return Written(self.real(expression), self.global_slot(slot))
+            case ast.Reference():
+                return self._part(expression) or Written(self.real(expression))
+            case ast.Binary("+" | "-" as sign, ast.Reference() as left, right):
+                part = self._part(left)
+                if part is not None:
+                    return _moved(part, self.real(right), sign)
+        return Written(self.real(expression))
+
+    def _part(self, reference: ast.Reference) -> Written | None:
+        """Return a component that stands in the text, None for anything else."""
+        if reference.name.startswith("$") or reference.name in self.volatile:
+            return None
+        target = self.locate(reference)
+        at = component_index(target)
+        if at < 0 or not target.exact:
+            return None
+        held = self.store.read(target.key)
+        if not isinstance(held, Position) or held.slots[at] < 0:
+            return None
+        return Written(held.numbers[at], held.slots[at], along=True)
 
     def real(self, expression: ast.Expression | None) -> float | None:
         """Return a real number, None where it is not known."""
@@ -204,6 +241,9 @@ class Point:
         if name == "pos":
             return self._position(arguments)
         values = [self.value(a) for a in arguments]
+        if name not in ("vec", "pos_shift"):
+            for value in values:
+                self.world.pin(value, f"{name.upper()} computes with it")
         match name, values:
             case "vec", [_, _, _]:
                 x, y, z = (self.real(a) for a in arguments)
@@ -232,5 +272,20 @@ class Point:
             )
         elif len(arguments) != 6:
             return Nothing("POS has not six numbers")
-        numbers, slots = self._components(arguments[:6])
-        return Position(False, numbers, slots, config)
+        return replace(self._components(arguments[:6]), config=config)
+
+
+def component_index(target: Target) -> int:
+    """Return which of the six numbers a reference means, -1 for anything else."""
+    match target.component:
+        case ("joint", axis) if 1 <= axis <= 6:
+            return axis - 1
+        case (str(name), _) if name in COMPONENTS:
+            return COMPONENTS[name]
+    return -1
+
+
+def _moved(part: Written, by: float | None, sign: str) -> Written:
+    if part.number is None or by is None:
+        return replace(part, number=None)
+    return replace(part, number=part.number + (by if sign == "+" else -by))

@@ -113,6 +113,7 @@ def _literals(
         name=tuple(texts[i] for i in columns.name[visit].tolist()),
         shared=_any(columns.shared, literal, len(slots)),
         taught=_any(columns.taught, literal, len(slots)),
+        pinned=("",) * len(slots),
     )
 
 

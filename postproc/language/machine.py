@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 
 from postproc.language import pdl2 as ast
 from postproc.language.arrivals import Arrival, Run
-from postproc.language.effects import PURE, invocations
+from postproc.language.effects import PURE, invocations, references
 from postproc.language.evaluate import Point
 from postproc.language.program import Body, Program
 from postproc.language.store import Store
@@ -161,11 +161,17 @@ class Machine:
             self.world, self.places[context], row, store, self.volatile, context
         )
 
-    def called(self, statement: ast.Statement) -> tuple[ast.Invoke, ...]:
-        """Return the calls in a statement's expressions that may have effects."""
+    def called(self, place: Place, statement: ast.Statement) -> tuple[ast.Invoke, ...]:
+        """Return the calls in a statement's expressions that may have effects.
+
+        A function without arguments is called by its name alone.
+        """
         known = self._called.get(id(statement))
         if known is None:
-            found = (c for c in invocations(statement) if c.name not in PURE)
+            found = [c for c in invocations(statement) if c.name not in PURE]
+            names = {r.name for r in references(statement) if not r.steps}
+            alone = [n for n in names if self.world.is_function(place, n)]
+            found += [ast.Invoke(name, ()) for name in sorted(alone)]
             known = self._called[id(statement)] = tuple(found)
         return known
 
@@ -217,6 +223,18 @@ def forget_names(here: Here, names: frozenset[str], why: str) -> None:
             here.store.set(**{name[1:]: Nothing(why)})
         elif name:
             forget(here, ast.Reference(name), why)
+
+
+def pin_names(here: Here, names: frozenset[str], why: str) -> None:
+    """Keep the numbers of variables that something not followed may depend on."""
+    for name in sorted(names):
+        if not name.startswith("$"):
+            for key in here.locate(ast.Reference(name)).keys:
+                inside = (f"{key}[", f"{key}.")
+                held = [k for k in here.store.values if k.startswith(inside)]
+                first = [k for k in here.world.initial if k.startswith(inside)]
+                for part in (key, *held, *first):
+                    here.world.pin(here.store.read(part), why)
 
 
 def forget(here: Here, reference: ast.Reference, why: str) -> None:

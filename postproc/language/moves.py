@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from postproc.language import pdl2 as ast
 from postproc.language.arrivals import Arrival
@@ -117,6 +117,7 @@ def _with(here: Here, statement: ast.Move) -> Settings:
         name = here.setting_name(reference)
         if name is not None:
             changes[name] = here.value(expression)
+            here.world.pin(changes[name], f"${name.upper()} is set to it")
     return {**here.store.settings, **changes} if changes else here.store.settings
 
 
@@ -157,12 +158,13 @@ def _goal(here: Here, statement: ast.Move) -> _Goal:
             goal = _absolute(here, where[0])
             distance = here.real(where[1])
             if goal.target is Target.POSE and distance is not None:
-                reason = _why("NEAR")
-                return _Goal(Target.NEAR, goal.numbers, None, distance, reason)
+                near = goal.position and replace(goal.position, name="", derived="NEAR")
+                return _Goal(Target.NEAR, goal.numbers, near, distance, _why("NEAR"))
         case "ABOUT":
             return _about(here, where, statement.frame)
         case "BY":
             by = here.value(where[0])
+            here.world.pin(by, "MOVE BY goes on by it")
             if isinstance(by, Position) and by.joints:
                 return _no_target(Target.BY, by.numbers, "BY")
     return _Goal(Target.UNKNOWN, reason=_why(statement.how))

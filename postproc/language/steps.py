@@ -16,6 +16,7 @@ from postproc.language.machine import (
     Machine,
     forget,
     forget_names,
+    pin_names,
 )
 from postproc.language.moves import move
 from postproc.language.values import Nothing, Value
@@ -177,6 +178,7 @@ def run_broken(machine: Machine, here: Here) -> None:
             here.store.last = frozenset({ELSEWHERE})
             move(machine, here, statement)
     effects = rows_effects(program, body.first, body.last)
+    pin_names(here, effects.read, f"{why}: it may be used in a computation")
     forget_names(here, effects.assigned, why)
     here.store.set(tool=Nothing(why), base=Nothing(why), uframe=Nothing(why))
     here.store.last = frozenset({ELSEWHERE})

@@ -49,19 +49,36 @@ class Vector:
 
 
 @dataclass(frozen=True, slots=True)
+class Written:
+    """A number and where it stands.
+
+    Attributes:
+        number: Its value, None where unknown.
+        slot: Global index of the number in the text, -1 for none.
+        along: It is that number plus a constant.
+    """
+
+    number: float | None
+    slot: int = -1
+    along: bool = False
+
+
+@dataclass(frozen=True, slots=True)
 class Position:
     """A POSITION, XTNDPOS or JOINTPOS.
 
     Attributes:
         joints: The numbers are joint angles [deg], not x, y, z [mm], a, e, r [deg].
         numbers: Six numbers, None where unknown.
-        slots: Global index of the number that holds each component, -1 for none.
+        slots: Global index of the number that holds each component, or that it moves
+            along with; -1 for none.
         config: Configuration string, None where none was written.
         aux: (axis, value) of auxiliary axes; None where they are not known.
         name: Variable or array element, "" for an inline literal.
         taught: Marked as taught with the robot.
         shared: Another program may read it too.
         derived: Why the numbers cannot be edited, "" where they can.
+        along: Components that are the number of their slot plus a constant.
     """
 
     joints: bool = False
@@ -73,6 +90,7 @@ class Position:
     taught: bool = False
     shared: bool = False
     derived: str = ""
+    along: frozenset[int] = frozenset()
 
     @property
     def complete(self) -> bool:
@@ -82,13 +100,14 @@ class Position:
     @property
     def editable(self) -> bool:
         """Tell whether every number stands in a text by itself."""
-        return not self.derived and -1 not in self.slots
+        return not (self.derived or self.along) and -1 not in self.slots
 
-    def with_component(self, at: int, value: float | None, slot: int) -> Position:
+    def with_component(self, at: int, new: Written) -> Position:
         """Return a copy with one component replaced."""
         numbers, slots = list(self.numbers), list(self.slots)
-        numbers[at], slots[at] = value, slot
-        return replace(self, numbers=tuple(numbers), slots=tuple(slots))
+        numbers[at], slots[at] = new.number, new.slot
+        along = self.along | {at} if new.along else self.along - {at}
+        return replace(self, numbers=tuple(numbers), slots=tuple(slots), along=along)
 
     def with_aux(self, axis: int, value: float | None) -> Position:
         """Return a copy with one auxiliary axis set."""
@@ -117,10 +136,11 @@ def join(a: Value, b: Value) -> Value:
 
 
 def _join_positions(a: Position, b: Position) -> Value:
-    same = (a.joints, a.numbers, a.slots, a.config) == (
+    same = (a.joints, a.numbers, a.slots, a.along, a.config) == (
         b.joints,
         b.numbers,
         b.slots,
+        b.along,
         b.config,
     )
     if not same:
@@ -161,7 +181,7 @@ def shifted(a: Position, by: Vector) -> Value:
     return replace(
         a,
         numbers=moved + a.numbers[3:],
-        slots=(-1,) * 3 + a.slots[3:],
+        along=a.along | {0, 1, 2},
         derived="it is shifted by the program (POS_SHIFT)",
     )
 

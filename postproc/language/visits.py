@@ -56,6 +56,8 @@ class Literals:
         name: Variable or array element, or "" for an inline literal; m strings.
         shared: True where another program may read it too (exported), (m,).
         taught: True where the point was taught with the robot, (m,).
+        pinned: What else depends on the numbers, so that they must stay as they are, or
+            ""; m strings.
     """
 
     file: Ints
@@ -66,6 +68,7 @@ class Literals:
     name: tuple[str, ...]
     shared: Bools
     taught: Bools
+    pinned: tuple[str, ...]
 
     def __len__(self) -> int:
         """Return the number of literals."""
@@ -93,6 +96,8 @@ class Visits:
         configs: Configuration strings verbatim; "" where none was written.
         config_given: True where a configuration string was written, (n,).
         literal: Index into `literals`, (n,), -1 where no number may be edited.
+        follows: Literal that a computed target moves along with (its numbers are those
+            of the literal plus constants), (n,), -1 where there is none.
         name: Index into `names`, (n,); names[0] is "" (inline literal).
         tool, base, uframe: Index into `frames`, (n,), -1 where not known.
         frames: Position records (k, 6) [mm, deg].
@@ -128,6 +133,7 @@ class Visits:
     configs: tuple[str, ...]
     config_given: Bools
     literal: Ints
+    follows: Ints
     name: Ints
     names: tuple[str, ...]
     tool: Ints

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, field
 
 from postproc.language import pdl2 as ast
 from postproc.language.diagnostic import Diagnostic
 from postproc.language.lsv import Variables
 from postproc.language.program import Body, Program, Variable
-from postproc.language.values import Value
+from postproc.language.values import Position, Value
 
 Record = tuple[float, ...] | None
 
@@ -70,6 +70,8 @@ class World:
         spelling: How variables are written, by key.
         taught_lines: Lines marked ``-- TAUGHT``, by file name.
         diagnostics: What was found; a message is kept once.
+        pinned: Numbers (by their index in the job) that say more than where a move
+            goes, and what else they are used for: they must stay as they are.
     """
 
     main: Program
@@ -81,6 +83,7 @@ class World:
     initial: dict[str, Value] = field(default_factory=dict)
     spelling: dict[str, str] = field(default_factory=dict)
     diagnostics: dict[Diagnostic, None] = field(default_factory=dict)
+    pinned: dict[int, str] = field(default_factory=dict)
     taught_lines: dict[str, frozenset[int]] = field(default_factory=dict)
     _said: set[tuple[str, str]] = field(default_factory=set)
 
@@ -124,6 +127,13 @@ class World:
             self._said.add((code, what))
             self.report(program, row, code, message)
 
+    def pin(self, value: Value, why: str, components: Iterable[int] = range(6)) -> None:
+        """Keep the numbers of a position because something else depends on them."""
+        if isinstance(value, Position):
+            for at in components:
+                if value.slots[at] >= 0:
+                    self.pinned.setdefault(value.slots[at], why)
+
     def declared(self, place: Place, name: str) -> Variable | None:
         """Return the declaration that a name means."""
         return place.body.variables.get(name) or place.program.variables.get(name)
@@ -153,6 +163,12 @@ class World:
                 return parameter.type
         declared = self.declared(place, name)
         return declared.type if declared else None
+
+    def is_function(self, place: Place, name: str) -> bool:
+        """Tell whether a name by itself calls a routine."""
+        program = place.program
+        known = name in program.routines or name in program.outside
+        return known and self.type_of(place, name) is None
 
     def find_routine(self, program: Program, name: str) -> Place | None:
         """Return the routine with a body that a name means, if the job holds it."""

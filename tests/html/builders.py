@@ -50,7 +50,15 @@ def visits_of(n: int, name: str, names: tuple[str, ...]) -> Visits:
     start = np.zeros((n, 6), dtype=np.int64)
     name_of = index % len(names)
     literals = Literals(
-        index * 0, line, start, start + 5, no, tuple(names[k] for k in name_of), no, no
+        index * 0,
+        line,
+        start,
+        start + 5,
+        no,
+        tuple(names[k] for k in name_of),
+        no,
+        no,
+        ("",) * n,
     )
     return Visits(
         files=(name,),
@@ -66,6 +74,7 @@ def visits_of(n: int, name: str, names: tuple[str, ...]) -> Visits:
         configs=("",),
         config_given=no,
         literal=index,
+        follows=index * 0 - 1,
         name=name_of,
         names=names,
         tool=index * 0,

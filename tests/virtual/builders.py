@@ -59,7 +59,7 @@ class Program:
             config=np.array([configs.index(r["config"] or "") for r in self.rows]),
             configs=tuple(configs),
             config_given=np.array([r["config"] is not None for r in self.rows]),
-            literal=nothing - 1, name=nothing.copy(), names=("",),
+            literal=nothing - 1, follows=nothing - 1, name=nothing.copy(), names=("",),
             tool=column("tool", np.int64), base=column("base", np.int64),
             uframe=column("uframe", np.int64), frames=np.array(self.frames, float),
             frame_taught=np.zeros(len(self.frames), dtype=bool),
@@ -78,4 +78,4 @@ class Program:
 def _no_literals() -> Literals:
     ints, bools = np.zeros(0, dtype=np.int64), np.zeros(0, dtype=bool)
     spans = np.zeros((0, 6), dtype=np.int64)
-    return Literals(ints, ints, spans, spans, bools, (), bools, bools)
+    return Literals(ints, ints, spans, spans, bools, (), bools, bools, ())

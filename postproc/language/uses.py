@@ -1,0 +1,55 @@
+"""What else depends on the numbers of a target than the moves that go to it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from postproc.language.visits import Literals
+
+Ints = NDArray[np.int64]
+
+_IN_PART = "a target is computed from a part of it"
+
+
+def find_uses(
+    literals: Literals,
+    slots: Ints,
+    bases: Ints,
+    literal: Ints,
+    pinned: Mapping[int, str],
+) -> tuple[Literals, Ints]:
+    """Find which literals computed targets move along with, and which must stay.
+
+    Args:
+        literals: m literals.
+        slots: Numbers of every visit's literal, (n, 6), -1 where it has none.
+        bases: Numbers that a computed target is made of, (n, 6), -1 likewise.
+        literal: Literal of every visit, (n,), -1 where it has none.
+        pinned: Numbers that must stay, and why.
+
+    Returns:
+        The literals with what pins them, and for every visit the literal that it moves
+        along with, (n,), -1 where there is none.
+    """
+    direct = np.flatnonzero(literal >= 0)
+    numbers = np.full((len(literals), 6), -1, dtype=np.int64)
+    numbers[literal[direct]] = slots[direct]
+    computed = np.flatnonzero(bases[:, 0] >= 0)
+    most = max([-1, *pinned, bases.max(initial=-1), numbers.max(initial=-1)])
+    owner = np.full(int(most) + 2, -1, dtype=np.int64)  # the last is that of slot -1
+    owner[numbers] = np.arange(len(literals))[:, None]
+    owner[-1] = -1
+    stay = {int(owner[slot]): why for slot, why in pinned.items() if owner[slot] >= 0}
+    follows = np.full(len(literal), -1, dtype=np.int64)
+    for visit in computed.tolist():
+        rows = owner[bases[visit]]
+        if rows[0] >= 0 and (numbers[rows[0]] == bases[visit]).all():
+            follows[visit] = rows[0]
+        else:
+            stay |= {row: _IN_PART for row in rows.tolist() if 0 <= row not in stay}
+    why = tuple(stay.get(row, "") for row in range(len(literals)))
+    return replace(literals, pinned=why) if stay else literals, follows
