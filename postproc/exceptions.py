@@ -15,6 +15,7 @@ class FileError(PostprocError):
     Attributes:
         path: The file as the user named it (``-`` for standard input).
         line: 1-based line, or None where no line is to blame.
+        column: 1-based column in that line, or None where it is not known.
         place: A place inside a structured file, for instance ``$.tool.xyz_mm``.
         problem: What is wrong.
         cure: What the user can do about it.
@@ -27,9 +28,11 @@ class FileError(PostprocError):
         cure: str = "",
         *,
         line: int | None = None,
+        column: int | None = None,
         place: str = "",
     ) -> None:
-        self.path, self.line, self.place = str(path), line, place
+        self.path, self.line, self.column = str(path), line, column
+        self.place = place
         self.problem, self.cure = problem, cure
         where = f"{path}:{line}" if line is not None else str(path)
         text = f"{where}: {problem}"

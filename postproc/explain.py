@@ -10,10 +10,11 @@ import numpy as np
 
 from postproc.accuracy.model import Model, load_model
 from postproc.compensate import compensate, name_files
-from postproc.console import Column, print_table
+from postproc.console import Column, printable
 from postproc.exceptions import ProgramError
 from postproc.jobs import find_variables, read_bytes
 from postproc.language.visits import ELSEWHERE, START, Visits
+from postproc.listing import arrows, print_listing, status_colour
 from postproc.options import Options
 from postproc.planning import (
     Planned,
@@ -25,17 +26,18 @@ from postproc.pose import MM
 from postproc.report import Outcome, Status, target_row
 from postproc.robot.cell import Cell, load_cell
 
-ARROWS = {1: "+", -1: "-", 0: "?"}
+STATUS = "status, why"
 COLUMNS = (
     Column("line"),
     Column("target", "left"),
     Column("from", "left"),
     Column("q [deg]"),
-    Column("lambda"),
-    Column("correction [mm]"),
-    Column("+- [mm]"),
-    Column("status, why", "left", fold=True),
+    Column("J1-6", "left"),
+    Column("correction x, y, z [mm]"),
+    Column("+- x, y, z [mm]"),
+    Column(STATUS, "left"),
 )
+PLANNED = (*COLUMNS[:5], Column(STATUS, "left"))  # without a model
 
 
 @dataclass(frozen=True)
@@ -78,22 +80,34 @@ class Explanation:
         return {**row, "from": self._from(i), "travel_deg": travel}
 
     def print(self, line: int | None = None) -> None:
-        """Print a table, one row per visit.
+        """Print a table, one row per visit, and how many came out how.
 
         Raises:
             ProgramError: There is no target on the line asked for.
         """
-        print_table(COLUMNS, (self._cells(i) for i in self._chosen(line)))
+        rows = self._chosen(line)
+        cells = (self._cells(i) for i in rows)
+        columns = PLANNED if self.outcome is None else COLUMNS
+        print_listing(columns, cells, {STATUS: status_colour})
+        if line is None:
+            print(self.summary())
+
+    def summary(self) -> str:
+        """Say in one line what came of the program."""
+        if self.outcome is not None:
+            return printable(self.outcome.summary())
+        known = np.isfinite(self.planned.plan.q).all(axis=1)
+        return f"{len(self.visits)} visits, {int((~known).sum())} of them not planned"
 
     def _cells(self, i: int) -> list[str]:
         """Write visit i as the cells of a table row."""
         plan, v = self.planned.plan, self.visits
         name = v.names[v.name[i]] or ("VIA" if v.via[i] else "inline")
-        sides = "".join(ARROWS[int(s)] for s in self._direction(i))
+        sides = arrows(self._direction(i))
         angles = " ".join(f"{q:8.3f}" for q in np.rad2deg(plan.q[i]))
         cells = [str(v.line[i]), name, self._from(i), angles, sides]
         if self.outcome is None:
-            return [*cells, "", "", self.planned.reasons[i]]
+            return [*cells, self.planned.reasons[i]]
         d = self.outcome.decisions
         moved = " ".join(f"{c:7.3f}" for c in d.correction[i] / MM)
         sure = " ".join(f"{s:5.3f}" for s in d.std_error[i] / MM)

@@ -6,9 +6,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from matplotlib import rc_context
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from postproc.accuracy.comparison import Comparison
 from postproc.accuracy.diagnosis.diagnose import Extension
 from postproc.accuracy.diagnosis.locate import Profile, periodogram, profile
 from postproc.accuracy.diagnosis.projection import Projection
@@ -18,6 +20,7 @@ from postproc.pose import MM
 Array = NDArray[np.float64]
 
 BEFORE, AFTER = "#d55e00", "#0072b2"  # told apart by all kinds of colour vision
+SPAN = "#767676"
 BINS = 40
 SMOOTHED = 15  # rows of a running median
 
@@ -44,13 +47,49 @@ def plot_diagnosis(found: Extension, path: Path) -> list[Path]:
     written = []
     for name, figure in figures.items():
         target = path.with_name(f"{path.stem}-{name}{path.suffix or '.png'}")
-        try:
-            figure.savefig(target, dpi=150)
-        except (OSError, ValueError) as exc:
-            cure = "Name a .png or .svg file in an existing folder"
-            raise OutputError(target, str(exc), cure) from None
-        written.append(target)
+        written.append(save(figure, target))
     return written
+
+
+def plot_comparison(found: Comparison, path: Path) -> Path:
+    """Draw the errors that every method leaves on rows it has not seen.
+
+    Args:
+        found: A comparison.
+        path: PNG or SVG.
+
+    Raises:
+        OutputError: It cannot be written.
+    """
+    figure, axes = _figure("error on held-out rows [mm]", "")
+    rows = sorted(found.rows, key=lambda row: row.mean_mm)
+    for place, row in enumerate(rows):
+        axes.plot([row.min_mm, row.max_mm], [place] * 2, "|-", color=SPAN)
+        spread = {"xerr": row.std_mm, "fmt": "D", "color": AFTER, "capsize": 3}
+        axes.errorbar(row.mean_mm, place, **spread)
+        told = f"{row.mean_mm:.3f}"
+        axes.annotate(told, (row.mean_mm, place), (0, 7), textcoords="offset points")
+    axes.set_yticks(range(len(rows)), [row.method for row in rows])
+    axes.set_ylim(-0.6, len(rows) - 0.2)
+    axes.set_xlim(left=0.0)
+    axes.set_title("mean (diamond) ± standard deviation, smallest to largest (line)")
+    return save(figure, path)
+
+
+def save(figure: Figure, path: Path) -> Path:
+    """Write a figure as the suffix says; the same figure gives the same bytes.
+
+    Raises:
+        OutputError: It cannot be written.
+    """
+    dated = {"Date": None} if path.suffix.lower() == ".svg" else None
+    try:
+        with rc_context({"svg.hashsalt": "postproc"}):
+            figure.savefig(path, dpi=150, metadata=dated)
+    except (OSError, ValueError) as exc:
+        cure = "Name a .png or .svg file in an existing folder"
+        raise OutputError(path, str(exc), cure) from None
+    return path
 
 
 def histogram(found: Extension) -> Figure:

@@ -120,16 +120,19 @@ class Outcome:
             )
         return line
 
+    def left_rows(self) -> list[int]:
+        """Return the visits that kept their value although they hold a target."""
+        left = (Status.UNSAFE, Status.DISPLAY, Status.GUARDED)
+        rows: list[int] = np.flatnonzero(np.isin(self.decisions.status, left)).tolist()
+        return rows
+
     def left_alone(self) -> list[str]:
         """List every visit that kept its value although it holds a target."""
         d, v = self.decisions, self.visits
-        rows = np.flatnonzero(
-            np.isin(d.status, (Status.UNSAFE, Status.DISPLAY, Status.GUARDED))
-        )
         return [
             f"{v.files[v.file[i]]}:{v.line[i]}: {Status(d.status[i]).name.lower()}: "
             f"{d.reasons[d.why[i]]}"
-            for i in rows
+            for i in self.left_rows()
         ]
 
     def to_json(self) -> str:

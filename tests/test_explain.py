@@ -63,7 +63,7 @@ def test_the_table(desk):
     assert plain.exit_code == 0
     assert "q [deg]" in plain.stdout and "safe" not in plain.stdout
     full = cli("explain", source, *cell, "--model", desk.model, "--line", 6)
-    assert "correction [mm]" in full.stdout
+    assert "correction x, y, z [mm]" in full.stdout
     assert full.stdout.splitlines()[1].split()[:4] == ["6", "inline", "line", "5"]
     assert full.stdout.rstrip().endswith("safe")
 

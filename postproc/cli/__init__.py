@@ -12,8 +12,14 @@ import typer
 from postproc import __version__
 from postproc.cli import loop, models, plant, programs
 from postproc.cli.common import app, say
+from postproc.cli.examples import epilog
+
+NAME = "__name__"  # a command is called like its function
 
 __all__ = ["app", "loop", "main", "models", "plant", "programs"]
+
+for _command in app.registered_commands:
+    _command.epilog = epilog(str(_command.name or getattr(_command.callback, NAME)))
 
 
 @app.callback(invoke_without_command=True)

@@ -10,7 +10,7 @@ from typing import Annotated
 
 import typer
 
-from postproc.exceptions import PostprocError
+from postproc.exceptions import FileError, PostprocError
 
 app = typer.Typer(
     no_args_is_help=True,
@@ -44,12 +44,21 @@ def say(text: str) -> None:
 
 
 @contextmanager
-def explained() -> Iterator[None]:
-    """Turn an error that the user can mend into a message and exit code 2."""
+def explained(*files: Path | None) -> Iterator[None]:
+    """Turn an error that the user can mend into a message and exit code 2.
+
+    Args:
+        *files: Programs that an error may name by their bare names.
+    """
     try:
         yield
     except PostprocError as exc:
         say(f"postproc: {exc}")
+        if isinstance(exc, FileError):
+            from postproc.pointing import point_at
+
+            if shown := point_at(exc, files):
+                say(shown)
         raise typer.Exit(2) from None
     except KeyboardInterrupt:
         say("postproc: interrupted; nothing is half written. Run the command again")

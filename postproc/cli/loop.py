@@ -54,10 +54,7 @@ def diagnose(
     ] = PointFrame.BASE,
     seed: SeedOption = 0,
 ) -> None:
-    """Find what the model lacks, trace it to an effect, and add that effect.
-
-    Example: postproc diagnose fresh.csv --cell cell.toml --model model.json
-    """
+    """Find what the model lacks, trace it to an effect, and add that effect."""
     from postproc import diagnosing
     from postproc.console import stages
 
@@ -109,10 +106,7 @@ def report(
     ],
     output: Annotated[Path, typer.Option("-o", "--output", help="REPORT.html")],
 ) -> None:
-    """Make one self-contained page (HTML) of a report, model or diagnosis.
-
-    Example: postproc report diagnosis.json -o diagnosis.html
-    """
+    """Make one self-contained page (HTML) of a report, model or diagnosis."""
     from postproc.html import report_file
 
     with explained():

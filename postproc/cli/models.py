@@ -161,6 +161,9 @@ def compare(
     cell: CellOption,
     json: JsonOption = None,
     html: HtmlOption = None,
+    plot: Annotated[
+        Path | None, typer.Option("--plot", help="Plot (.png or .svg).")
+    ] = None,
     frame: Annotated[MeasuredFrame, typer.Option("--frame")] = MeasuredFrame.BASE,
     seed: SeedOption = 0,
 ) -> None:
@@ -168,7 +171,7 @@ def compare(
     from postproc import calibrating
 
     with explained():
-        check_places([as_path(json), html], [*data, cell])
+        check_places([as_path(json), html, plot], [*data, cell])
         with busy("fit every method"):
             found = calibrating.compare_files(data, cell, frame.value, seed)
         if json:
@@ -177,5 +180,9 @@ def compare(
             from postproc.html import comparison_report
 
             write_text(str(html), comparison_report(asdict(found)))
+        if plot is not None:
+            from postproc.plots import plot_comparison
+
+            say(f"plot {plot_comparison(found, plot)}")
         if json != "-":
             typer.echo(calibrating.tell_comparison(found))

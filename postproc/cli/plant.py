@@ -62,10 +62,7 @@ def batch(
     ] = False,
     temperature: TemperatureOption = None,
 ) -> None:
-    """Compensate a tree of programs; what could not be compensated is not in DST.
-
-    Example: postproc batch src dst --cell cell.toml --model model.json --resume
-    """
+    """Compensate a tree of programs; what could not be compensated is not in DST."""
     with explained():
         from postproc.batch import run
         from postproc.batch.plan import make_plan
@@ -122,8 +119,6 @@ def check(
 
     Every program must be compensated, with the current model, from the source as it is
     now, and unchanged since.
-
-    Example: postproc check dst --model model.json --source src
     """
     from postproc.check import check as look
     from postproc.console import printable

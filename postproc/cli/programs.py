@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import zip_longest
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -26,6 +27,8 @@ from postproc.files import STREAM, check_places
 
 if TYPE_CHECKING:
     from postproc.report import Outcome
+
+SHOWN = 20  # targets left alone whose source lines are shown
 
 
 @app.command()
@@ -57,17 +60,14 @@ def compensate(
     ] = False,
     temperature: TemperatureOption = None,
 ) -> None:
-    """Rewrite a program so that the tool lands where its targets say.
-
-    Example: postproc compensate job.pdl --cell cell.toml --model model.json
-    """
+    """Rewrite a program so that the tool lands where its targets say."""
     from postproc import jobs
     from postproc.console import stages
     from postproc.options import Options
 
-    with explained():
+    given = None if program == STREAM else Path(program)
+    with explained(given, lsv):
         options = Options(clone, shared, temperature)
-        given = None if program == STREAM else Path(program)
         if report == Path(STREAM) and given is None and output is None:
             raise PostprocError("--report -: stdout holds the program. Name a file")
         check_places([output, report, html], [given, lsv, cell, model])
@@ -92,12 +92,16 @@ def compensate(
 def _print_outcome(outcome: Outcome) -> None:
     """Print what a person needs to know, on stderr."""
     from postproc.console import printable
+    from postproc.pointing import point_at_visits
 
     for finding in outcome.diagnostics:
         place = f"{finding.file}:{finding.line}"
         say(printable(f"{place}: {finding.code}: {finding.message}"))
-    for line in outcome.left_alone():
+    excerpts = point_at_visits(outcome, outcome.left_rows()[:SHOWN])
+    for line, source in zip_longest(outcome.left_alone(), excerpts, fillvalue=""):
         say(printable(line))
+        if source:
+            say(source)
     say(printable(outcome.summary()))
 
 
@@ -154,7 +158,7 @@ def explain(
     """Show why every target moves: from where it is reached, and what that costs."""
     from postproc.explain import explain_file
 
-    with explained():
+    with explained(program, lsv):
         check_places([as_path(json)], [program, cell, model, lsv])
         with busy("plan"):
             found = explain_file(program, cell, model, lsv, temperature)

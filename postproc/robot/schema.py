@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import tomllib
 from pathlib import Path
 from typing import Annotated, TypeVar
@@ -45,11 +46,20 @@ def read_toml(path: Path, schema: type[Schema], error: type[FileError]) -> Schem
     except UnicodeDecodeError:
         raise error(path, "is not UTF-8 text", "Save it as UTF-8") from None
     except tomllib.TOMLDecodeError as exc:
-        raise error(path, f"is not valid TOML: {exc}", "Mend the syntax") from None
+        raise _syntax(path, str(exc), error) from None
     try:
         return schema.model_validate(data)
     except pydantic.ValidationError as exc:
         raise _explain(path, exc, schema, error) from None
+
+
+def _syntax(path: Path, message: str, error: type[FileError]) -> FileError:
+    """Take the place out of the message of the TOML reader."""
+    text, _, place = message.partition(" (at line ")
+    numbers = [int(n) for n in re.findall(r"\d+", place)]
+    line, column = numbers if len(numbers) == 2 else (None, None)
+    problem, cure = f"is not valid TOML: {text}", "Mend the syntax"
+    return error(path, problem, cure, line=line, column=column)
 
 
 def _explain(
