@@ -25,6 +25,7 @@ from postproc.accuracy.plausibility import (
     check_registered,
     check_survey,
 )
+from postproc.accuracy.reading import DETECT, Reading
 from postproc.accuracy.registration import Registration, register
 from postproc.accuracy.schema import Method
 from postproc.pose import MM
@@ -52,6 +53,7 @@ def fit(
     effects: Sequence[str] | None = None,
     frame: Frame = "base",
     seed: int = 0,
+    reading: Reading = DETECT,
 ) -> Calibration:
     """Fit a model to measurement files.
 
@@ -64,12 +66,13 @@ def fit(
         frame: Frame of the measured positions. In the tracker's, the tracker's place
             and the probe points are fitted too.
         seed: Of random layers, for methods that have one.
+        reading: What the user knows of the files.
 
     Raises:
         MeasurementError: A file that cannot be read or cannot determine the geometry.
         PostprocError: An unknown effect, or one whose covariate was not recorded.
     """
-    survey = read_surveys(files, cell)
+    survey = read_surveys(files, cell, reading)
     return fit_measurements(
         survey, cell, method=method, effects=effects, frame=frame, seed=seed
     )
@@ -133,9 +136,14 @@ def into_base_frame(
     return registered, found
 
 
-def read_surveys(files: Sequence[str | Path], cell: Cell) -> Measurements:
+def read_surveys(
+    files: Sequence[str | Path], cell: Cell, reading: Reading = DETECT
+) -> Measurements:
     """Read measurement files as one survey, with what the cell knows of the load."""
-    parts = [read_measurements(path, cell.arm, cell.probes) for path in files]
+    parts = [
+        read_measurements(path, cell.arm, cell.probes, reading=reading)
+        for path in files
+    ]
     survey = replace(concatenate(parts), mounting=cell.mounting)
     if cell.file.payload is None:
         return survey

@@ -19,6 +19,7 @@ from postproc.accuracy.fit_report import FitReport
 from postproc.accuracy.measurement import concatenate, from_table
 from postproc.accuracy.model import Model, load_model
 from postproc.accuracy.plausibility import check_survey
+from postproc.accuracy.reading import DETECT, Reading
 from postproc.accuracy.table import Table as Cells
 from postproc.accuracy.table import read_table
 from postproc.calibrate import (
@@ -66,6 +67,7 @@ def fit_files(
     output: Path,
     program: Path | None = None,
     html: Path | None = None,
+    reading: Reading = DETECT,
     **how: Any,
 ) -> str:
     """Fit measurement files and write the model.
@@ -76,6 +78,7 @@ def fit_files(
         output: The model file to write.
         program: The survey program, for files that hold ids and positions only.
         html: A page about the fit to write.
+        reading: What the user knows of the measurement files.
         how: Arguments of `postproc.calibrate.fit`; None stands for the default.
 
     Returns:
@@ -87,9 +90,10 @@ def fit_files(
     cell = load_cell(cell_path)
     chosen = {name: value for name, value in how.items() if value is not None}
     if program is None:
-        found = fit(data, cell, **chosen)
+        found = fit(data, cell, reading=reading, **chosen)
     else:
-        survey = concatenate([join_program(path, program, cell) for path in data])
+        parts = [join_program(path, program, cell, reading) for path in data]
+        survey = concatenate(parts)
         found = fit_measurements(survey, cell, **chosen)
     found.model.save(output)
     if html is not None:
@@ -155,7 +159,11 @@ def _tell(spread: ErrorStatistics) -> str:
 
 
 def compare_files(
-    data: Sequence[Path], cell_path: Path, frame: str, seed: int
+    data: Sequence[Path],
+    cell_path: Path,
+    frame: str,
+    seed: int,
+    reading: Reading = DETECT,
 ) -> Comparison:
     """Fit and test every method on measurement files.
 
@@ -163,7 +171,7 @@ def compare_files(
         PostprocError: A file cannot be used.
     """
     cell = load_cell(cell_path)
-    survey, tracker = read_surveys(data, cell), cell.tracker
+    survey, tracker = read_surveys(data, cell, reading), cell.tracker
     if frame == "tracker":
         survey, placed = into_base_frame(survey, cell.arm)
         tracker = placed.tracker

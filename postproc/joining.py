@@ -7,7 +7,8 @@ from pathlib import Path
 import numpy as np
 
 from postproc.accuracy.measurement import COVARIATES, POSITION, Measurements
-from postproc.accuracy.table import read_table
+from postproc.accuracy.points import read_points
+from postproc.accuracy.reading import DETECT, Reading
 from postproc.exceptions import MeasurementError
 from postproc.jobs import find_variables, read_bytes
 from postproc.planning import plan_visits, read_program, states_of
@@ -15,23 +16,26 @@ from postproc.pose import MM
 from postproc.robot.cell import Cell
 
 
-def join_program(data: Path, program: Path, cell: Cell) -> Measurements:
+def join_program(
+    data: Path, program: Path, cell: Cell, reading: Reading = DETECT
+) -> Measurements:
     """Give measured points the planned states of the visits they were taken at.
 
     A row belongs to the visit with its id in a MEASURE comment, else to the only visit
     of the variable with that name.
 
     Args:
-        data: Columns id, x_mm, y_mm, z_mm and any recorded covariate.
+        data: Columns id, x_mm, y_mm, z_mm and any recorded covariate, or a list of
+            points as SpatialAnalyzer and Leica software write it.
         program: The program that ran.
         cell: Its cell.
+        reading: What the user knows of the file.
 
     Raises:
         MeasurementError: An id that the program does not have, or has several times.
         ProgramError: The program cannot be read.
     """
-    table = read_table(data)
-    table.require("id", *POSITION)
+    table = read_points(data, reading)
     files = {program.name: read_bytes(program)}
     values = find_variables(program)
     if values is not None:

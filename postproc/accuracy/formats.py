@@ -23,7 +23,9 @@ from typing import Any
 
 import numpy as np
 
-from postproc.accuracy.table import Table, read_table
+from postproc.accuracy.reading import DETECT, Reading
+from postproc.accuracy.robodk import from_robodk, is_robodk
+from postproc.accuracy.table import Table, read_headed, read_table
 from postproc.exceptions import MeasurementError
 
 DEGREES = float(np.rad2deg(1.0))  # per radian
@@ -67,26 +69,26 @@ IPA = Format(  # Fraunhofer IPA, UR10 series: joints in rad, T-Mac positions in 
 KNOWN = (IPA,)
 
 
-def read_foreign(path: str | Path, column_map: str | Path | None = None) -> Table:
+def read_foreign(path: str | Path, reading: Reading = DETECT) -> Table:
     """Read a measurement file in our columns, whatever tool wrote it.
 
     Args:
         path: The file.
-        column_map: A column-map file, for formats that are not detected.
+        reading: What the user knows of it.
 
     Raises:
-        MeasurementError: The file or the map cannot be used.
+        MeasurementError: The file or the column map cannot be used.
     """
-    if column_map is not None:
-        form = read_column_map(column_map)
-        table = read_table(path, **form.reading)  # type: ignore[arg-type]
+    if reading.columns is not None:
+        form = read_column_map(reading.columns)
+        table = read_table(path, **{**form.reading, **reading.given})  # type: ignore[arg-type]
         table.require(*(name for name, _ in form.columns.values()))
         return translate(table, form)
-    table = read_table(path)
+    table = read_headed(path, **reading.given)
     for form in KNOWN:
         if form.fits(table):
             return translate(table, form)
-    return table
+    return from_robodk(table) if is_robodk(table) else table
 
 
 def translate(table: Table, form: Format) -> Table:
@@ -94,7 +96,7 @@ def translate(table: Table, form: Format) -> Table:
     cells = []
     for column, (source, factor) in form.columns.items():
         if column == "id":
-            cells.append(table.text(source))
+            cells.append([text.strip("'\" ") for text in table.text(source)])
         else:
             values = table.numbers(source) * factor
             cells.append([repr(float(v)) for v in values])

@@ -16,6 +16,7 @@ from postproc.accuracy.columns import (
     unique_ids,
 )
 from postproc.accuracy.formats import read_foreign
+from postproc.accuracy.reading import DETECT, Reading
 from postproc.accuracy.table import Table
 from postproc.exceptions import MeasurementError
 from postproc.pose import MM
@@ -105,7 +106,7 @@ def read_measurements(
     tools: Array | Mapping[int, Array],
     *,
     positions: bool = True,
-    column_map: str | Path | None = None,
+    reading: Reading = DETECT,
 ) -> Measurements:
     """Read a measurement file.
 
@@ -115,12 +116,12 @@ def read_measurements(
         tools: Probe points in the flange frame, (k, 3) [m] or by `tool_id`. Columns
             tool_x_mm, tool_y_mm, tool_z_mm override them.
         positions: Whether the file must have measured positions.
-        column_map: A column-map file, for files of other tools.
+        reading: What the user knows of the file.
 
     Raises:
         MeasurementError: Naming file, line, problem and cure.
     """
-    table = read_foreign(path, column_map)
+    table = read_foreign(path, reading)
     return from_table(table, arm, tools, positions=positions)
 
 

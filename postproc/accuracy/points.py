@@ -8,61 +8,33 @@ joined with the program that was measured.
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
-from numpy.typing import NDArray
-
-from postproc.accuracy.table import Table, read_table
+from postproc.accuracy.formats import Format, translate
+from postproc.accuracy.reading import DETECT, Reading
+from postproc.accuracy.table import NUMBER, Table, read_headed
 from postproc.exceptions import MeasurementError
-from postproc.pose import MM
-
-Array = NDArray[np.float64]
 
 NAMES = ("id", "name", "point", "point name", "point id", "target")
 AXIS = {a: re.compile(rf"^{a}(\s*[\[(]?\s*mm\s*[\])]?|_mm)?$", re.I) for a in "xyz"}
-NUMBER = re.compile(r"^\s*[-+]?\d+([.,]\d+)?([eE][-+]?\d+)?\s*$")
+POSITION = ("x_mm", "y_mm", "z_mm")
 
 
-@dataclass(frozen=True, eq=False)
-class Points:
-    """Measured points by name.
+def read_points(path: str | Path, reading: Reading = DETECT) -> Table:
+    """Read names and positions as columns id, x_mm, y_mm, z_mm.
 
-    Attributes:
-        ids: Their names.
-        position: (n, 3) [m].
-        line: 1-based lines, (n,).
-        sha256: Hash of the file.
-    """
-
-    ids: tuple[str, ...]
-    position: Array
-    line: NDArray[np.int64]
-    sha256: str
-
-
-def read_points(path: str | Path, mm_per_unit: float = 1.0) -> Points:
-    """Read names and positions.
-
-    Args:
-        path: The file.
-        mm_per_unit: Unit of the coordinates, for files that do not say it.
+    A file that has these columns keeps its others, too.
 
     Raises:
         MeasurementError: No names or coordinates are found.
     """
-    table = read_table(path, comment="//", header=_has_header(path))
+    table = read_headed(path, comment="//", **reading.given)
+    if table.has("id", *POSITION):
+        return table
     name, axes = _columns(table)
-    position = np.stack([table.numbers(axis) for axis in axes], axis=1)
-    ids = tuple(text.strip("'\" ") for text in table.text(name))
-    return Points(ids, position * mm_per_unit * MM, table.line, table.sha256)
-
-
-def _has_header(path: str | Path) -> bool:
-    """Tell whether the first line that is no comment holds names, not numbers."""
-    first = read_table(path, comment="//", header=False).cells[0]
-    return sum(bool(NUMBER.match(str(cell))) for cell in first) < 3
+    scaled = {ours: (axis, reading.mm_per_unit)
+              for ours, axis in zip(POSITION, axes, strict=True)}  # fmt: skip
+    return translate(table, Format({"id": (name, 1.0), **scaled}))
 
 
 def _columns(table: Table) -> tuple[str, tuple[str, str, str]]:

@@ -10,6 +10,7 @@ import io
 import re
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -20,6 +21,8 @@ from postproc.exceptions import MeasurementError
 Array = NDArray[np.float64]
 
 MAX_BYTES = 500_000_000
+NUMBER = re.compile(r"^\s*[-+]?\d+([.,]\d+)?([eE][-+]?\d+)?\s*$")
+FEW_NUMBERS = 3  # a first line with as many numbers is no header
 DECIMAL_COMMA = re.compile(r"^\s*[-+]?\d*,\d+([eE][-+]?\d+)?\s*$")
 
 
@@ -156,6 +159,19 @@ def read_table(
     sign = decimal or _decimal(body, split)
     digest = hashlib.sha256(raw).hexdigest()
     return Table(path, tuple(names), body, line, sign, digest)
+
+
+def read_headed(path: str | Path, **options: Any) -> Table:
+    """Read a table that may have no header; its columns are then 1, 2, ..
+
+    Raises:
+        MeasurementError: See `read_table`.
+    """
+    table = read_table(path, header=False, **options)
+    numbers = sum(bool(NUMBER.match(str(cell))) for cell in table.cells[0])
+    if numbers >= FEW_NUMBERS and len(table.cells):
+        return table
+    return read_table(path, **options)
 
 
 def _read(path: Path) -> bytes:

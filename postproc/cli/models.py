@@ -44,6 +44,22 @@ class MeasuredFrame(StrEnum):
     TRACKER = "tracker"
 
 
+ColumnsOption = Annotated[
+    Path | None,
+    typer.Option("--columns", help="Column map (TOML) for files of other tools."),
+]
+DelimiterOption = Annotated[
+    str | None, typer.Option("--delimiter", help="Or tab, space, comma, semicolon.")
+]
+DecimalOption = Annotated[str | None, typer.Option("--decimal", help=". or ,")]
+EncodingOption = Annotated[
+    str | None, typer.Option("--encoding", help="utf-8, latin-1, utf-16, ..")
+]
+UnitOption = Annotated[
+    str, typer.Option("--unit", help="Of points without a unit: mm, m or inch.")
+]
+
+
 @app.command()
 def survey(
     cell: CellOption,
@@ -115,13 +131,20 @@ def fit(
         typer.Option("--program", help="The survey program, for id, x, y, z files."),
     ] = None,
     html: HtmlOption = None,
+    columns: ColumnsOption = None,
+    delimiter: DelimiterOption = None,
+    decimal: DecimalOption = None,
+    encoding: EncodingOption = None,
+    unit: UnitOption = "mm",
 ) -> None:
     """Fit a model of the arm's error to laser-tracker measurements."""
     from postproc import calibrating
+    from postproc.accuracy.reading import Reading
 
     names = None if effects is None else split_names(effects)
     with explained():
-        check_places([output, html], [*data, cell, program])
+        check_places([output, html], [*data, cell, program, columns])
+        reading = Reading(columns, delimiter, decimal, encoding, unit)
         with busy("fit"):
             found = calibrating.fit_files(
                 data,
@@ -129,6 +152,7 @@ def fit(
                 output,
                 program,
                 html,
+                reading,
                 method=method.value,
                 effects=names,
                 frame=frame.value,
@@ -166,14 +190,20 @@ def compare(
     ] = None,
     frame: Annotated[MeasuredFrame, typer.Option("--frame")] = MeasuredFrame.BASE,
     seed: SeedOption = 0,
+    columns: ColumnsOption = None,
+    delimiter: DelimiterOption = None,
+    decimal: DecimalOption = None,
+    encoding: EncodingOption = None,
 ) -> None:
     """Fit every method to the same rows, and test it on the same others."""
     from postproc import calibrating
+    from postproc.accuracy.reading import Reading
 
     with explained():
-        check_places([as_path(json), html, plot], [*data, cell])
+        check_places([as_path(json), html, plot], [*data, cell, columns])
+        reading = Reading(columns, delimiter, decimal, encoding)
         with busy("fit every method"):
-            found = calibrating.compare_files(data, cell, frame.value, seed)
+            found = calibrating.compare_files(data, cell, frame.value, seed, reading)
         if json:
             write_text(json, calibrating.comparison_json(found))
         if html is not None:

@@ -14,6 +14,7 @@ from postproc.accuracy.full import fit_survey, model_of
 from postproc.accuracy.library import BASE_EFFECTS
 from postproc.accuracy.measurement import read_measurements
 from postproc.accuracy.points import read_points
+from postproc.accuracy.reading import Reading
 from postproc.accuracy.registration import register
 from postproc.calibrate import into_base_frame
 from postproc.exceptions import MeasurementError
@@ -84,14 +85,17 @@ def test_other_tools_files_are_read(tmp_path: Path) -> None:
     sa = tmp_path / "sa.txt"
     sa.write_text("// SpatialAnalyzer\n// Group: A\np1, 1.0, 2.0, 3.0\np2, 4, 5, 6\n")
     points = read_points(sa)
-    assert points.ids == ("p1", "p2") and points.line.tolist() == [3, 4]
-    np.testing.assert_allclose(points.position[1], [4e-3, 5e-3, 6e-3])
+    assert points.text("id") == ["p1", "p2"] and points.line.tolist() == [3, 4]
+    xyz = ("x_mm", "y_mm", "z_mm")
+    assert points.block(xyz)[1].tolist() == [4.0, 5.0, 6.0]
+    inches = read_points(sa, Reading(unit="inch"))
+    assert inches.block(xyz)[0].tolist() == [25.4, 50.8, pytest.approx(76.2)]
     leica = tmp_path / "leica.txt"
     text = "Point Id;X [mm];Y [mm];Z [mm];Time\n'a1';1,5;2;3;'12:30'\n"
     leica.write_bytes(text.replace("Time", "Zeit für").encode("latin-1"))
     points = read_points(leica)
-    assert points.ids == ("a1",)
-    np.testing.assert_allclose(points.position[0], [1.5e-3, 2e-3, 3e-3])
+    assert points.text("id") == ["a1"]
+    assert points.block(xyz)[0].tolist() == [1.5, 2.0, 3.0]
     (tmp_path / "bad.csv").write_text("a;b\n1;2\n")
     with pytest.raises(MeasurementError, match="no columns for a name"):
         read_points(tmp_path / "bad.csv")
@@ -107,7 +111,7 @@ def test_a_column_map_reads_the_rest(tmp_path: Path) -> None:
     )
     data = tmp_path / "d.txt"
     data.write_text("name|A1|A2|A3|A4|A5|A6|x|y|z\np|1|2|3|4|5|6|0.1|0.2|0.3\n")
-    found = read_measurements(data, NJ, PLATE[:1], column_map=form)
+    found = read_measurements(data, NJ, PLATE[:1], reading=Reading(form))
     np.testing.assert_allclose(found.position[0], [0.1, 0.2, 0.3])
     assert found.ids == ("p",)
     form.write_text("[columns]\nx_mm = 3\n")
