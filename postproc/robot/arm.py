@@ -234,21 +234,43 @@ class Arm:
         flat: Array = -GRAVITY * basis.reshape(len(q), 6, 24)
         return flat
 
+    @property
+    def _solver(self) -> Inverse:
+        """The closed-form inverse kinematics.
+
+        Raises:
+            PlanError: The arm file has none.
+        """
+        if self._inverse is None:
+            raise PlanError(f"arm {self.name} has no closed-form inverse kinematics")
+        return self._inverse
+
     def inverse(self, flange: Array) -> Branches:
         """Solve the inverse kinematics of flange poses (n, 4, 4) [m].
 
         Raises:
             PlanError: The arm file has no closed-form inverse kinematics.
         """
-        if self._inverse is None:
-            raise PlanError(f"arm {self.name} has no closed-form inverse kinematics")
-        return self._inverse.branches(flange)
+        return self._solver.branches(flange)
+
+    def on_branch(self, flange: Array, slot: Ints) -> Array:
+        """Solve for one branch of flange poses (n, 4, 4) [m], on any turn.
+
+        Args:
+            flange: Flange poses.
+            slot: Slots 4 W + 2 S + E, (n,).
+
+        Returns:
+            (n, 6) [rad], NaN where the branch does not exist.
+
+        Raises:
+            PlanError: The arm file has no closed-form inverse kinematics.
+        """
+        return self._solver.branch(flange, slot)
 
     def branch(self, q: Array) -> Ints:
         """Name the branch (slot 4 W + 2 S + E) of joint angles (n, 6) [rad]."""
-        slots = self.inverse(self.flange(q)).q
-        gap = np.abs(wrap(slots - q[:, None, :])).max(-1)
-        return np.asarray(np.argmin(np.where(np.isnan(gap), np.inf, gap), axis=1))
+        return self._solver.slot(q)
 
     def nearest(self, flange: Array, near: Array, branch: Ints | None = None) -> Array:
         """Solve for the joint angles nearest to given ones.
@@ -261,12 +283,14 @@ class Arm:
         Returns:
             (n, 6) [rad] on the turn nearest to `near`, NaN where no solution exists.
         """
+        if branch is not None:
+            one: Array = near + wrap(self.on_branch(flange, branch) - near)
+            return one
         slots = self.inverse(flange).q
         slots = near[:, None, :] + wrap(slots - near[:, None, :])
-        if branch is None:
-            gap = np.abs(slots - near[:, None, :]).max(-1)
-            branch = np.argmin(np.where(np.isnan(gap), np.inf, gap), axis=1)
-        q: Array = slots[np.arange(len(slots)), branch]
+        gap = np.abs(slots - near[:, None, :]).max(-1)
+        best = np.argmin(np.where(np.isnan(gap), np.inf, gap), axis=1)
+        q: Array = slots[np.arange(len(slots)), best]
         return q
 
     def within_limits(self, q: Array) -> NDArray[np.bool_]:

@@ -16,8 +16,10 @@ from scipy.spatial.transform import RigidTransform
 
 from postproc.pose import MM
 from postproc.robot.arm_file import OpwSection
+from postproc.robot.closed_form import ClosedForm
 
 Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
 
 
 @dataclass(frozen=True)
@@ -54,7 +56,8 @@ class Inverse:
             offsets=tuple(np.deg2rad(p.offsets_deg)), flip_axes=tuple(p.flip_axes),
         )  # fmt: skip
         self._robot = opw.Robot(model, degrees=False)
-        self._unmix = np.linalg.inv(mix)
+        self._closed = ClosedForm(parameters)
+        self._mix, self._unmix = mix, np.linalg.inv(mix)
         self._lower, self._upper = lower, upper
 
     def branches(self, flange: Array) -> Branches:
@@ -67,6 +70,19 @@ class Inverse:
         reached = self._robot.reach(RigidTransform.from_matrix(poses), threads=1)
         q = np.asarray(reached.joints, dtype=float).reshape(n, 8, 6)
         return Branches(self._into_range(q @ self._unmix.T))
+
+    def branch(self, flange: Array, slot: Ints) -> Array:
+        """Solve for one branch each of flange poses (n, 4, 4) [m], on any turn.
+
+        Returns:
+            (n, 6) [rad], NaN where the branch does not exist.
+        """
+        q: Array = self._closed.branch(flange, slot) @ self._unmix.T
+        return q
+
+    def slot(self, q: Array) -> Ints:
+        """Name the branch (slot 4 W + 2 S + E) of joint angles (n, 6) [rad]."""
+        return self._closed.slot(q @ self._mix.T)
 
     def _into_range(self, q: Array) -> Array:
         """Shift angles by whole turns into the joint range where that is possible."""
