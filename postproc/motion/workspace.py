@@ -96,7 +96,7 @@ class Workspace:
         self.branches = np.empty((len(everything), 8, 6))
         for i in range(0, len(everything), CHUNK):
             rows = slice(i, i + CHUNK)
-            self.branches[rows] = self.arm.inverse_of_path(everything[rows])
+            self.branches[rows] = self.arm.inverse(everything[rows]).q
         self.row = np.full(int(samples.start[-1]), -1)
         self.row[samples.inner] = len(poses) + np.arange(len(samples.inner))
         self.row[samples.start[1:] - 1] = self.solved[samples.visit]

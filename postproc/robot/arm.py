@@ -1,6 +1,6 @@
 """The arm: forward kinematics, Jacobians, gravity torque, inverse kinematics.
 
-Pinocchio does the chain and the torque; no other module imports it. Angles are the
+Pinocchio does the torque; no other module imports it. Angles are the
 controller's joint angles [rad], lengths metres, the frame the arm's base frame.
 """
 
@@ -20,7 +20,6 @@ from postproc.exceptions import ArmError, PlanError
 from postproc.pose import MM
 from postproc.robot.arm_file import ArmFile, arm_path, read_arm_file
 from postproc.robot.inverse import Branches, Inverse, wrap
-from postproc.robot.recall import Recall
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -43,6 +42,29 @@ class DH:
         """Convert controller angles (n, 6) to D-H angles (n, 6) [rad]."""
         theta: Array = self.offset + self.sense * (q @ self.mix.T)
         return theta
+
+    def placed(self, frame: Array, joint: int, theta: Array) -> Array:
+        """Place the next link frame.
+
+        Args:
+            frame: Link frames i, (n, 4, 4) [m].
+            joint: i, from 0.
+            theta: D-H angles of the joint, (n,) [rad].
+
+        Returns:
+            Link frames i + 1, (n, 4, 4): turn and shift along z, then along x.
+        """
+        x, y, z = frame[:, :3, 0], frame[:, :3, 1], frame[:, :3, 2]
+        c, s = np.cos(theta)[:, None], np.sin(theta)[:, None]
+        ca, sa = np.cos(self.alpha[joint]), np.sin(self.alpha[joint])
+        across, out = c * y - s * x, np.empty_like(frame)
+        out[:, :3, 0] = c * x + s * y
+        out[:, :3, 1] = ca * across + sa * z
+        out[:, :3, 2] = ca * z - sa * across
+        out[:, :3, 3] = frame[:, :3, 3] + self.d[joint] * z
+        out[:, :3, 3] += self.a[joint] * out[:, :3, 0]
+        out[:, 3] = 0.0, 0.0, 0.0, 1.0
+        return out
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,26 +121,11 @@ class Arm:
         return model
 
     @cached_property
-    def _link_from_joint(self) -> Array:
-        """D-H frame i seen from pinocchio joint frame i, (6, 4, 4)."""
-        ca, sa = np.cos(self.dh.alpha), np.sin(self.dh.alpha)
-        T = np.tile(np.eye(4), (6, 1, 1))
-        T[:, 1, 1] = T[:, 2, 2] = ca
-        T[:, 2, 1], T[:, 1, 2] = sa, -sa
-        T[:, 0, 3], T[:, 2, 3] = self.dh.a, self.dh.d
-        return T
-
-    @cached_property
     def _inverse(self) -> Inverse | None:
         """Build the closed-form inverse kinematics, or None where there is none."""
         opw = self.file.opw
         limits = (self.lower, self.upper)
         return None if opw is None else Inverse(opw, self.dh.mix, *limits)
-
-    @cached_property
-    def inverse_of_path(self) -> Recall:
-        """`inverse` that recalls the last path: flange poses (n, 4, 4) -> (n, 8, 6)."""
-        return Recall(lambda poses: self.inverse(poses).q)
 
     @property
     def has_inverse(self) -> bool:
@@ -127,15 +134,12 @@ class Arm:
 
     def link_frames(self, q: Array) -> Array:
         """Place the D-H frames 0 (base) to 6 (flange): (n, 6) -> (n, 7, 4, 4)."""
-        theta = self.dh.angles(q)
-        model = self._chain
-        data = model.createData()
-        frames = np.tile(np.eye(4), (len(q), 7, 1, 1))
-        for k, angles in enumerate(theta):
-            pin.forwardKinematics(model, data, angles)
-            for i in range(6):
-                frames[k, i + 1] = data.oMi[i + 1].homogeneous
-        frames[:, 1:] = frames[:, 1:] @ self._link_from_joint
+        frames = np.empty((len(q), 7, 4, 4))
+        frames[:, 0] = np.eye(4)
+        theta, T = self.dh.angles(q), frames[:, 0]
+        for i in range(6):
+            T = self.dh.placed(T, i, theta[:, i])
+            frames[:, i + 1] = T
         return frames
 
     def flange(self, q: Array) -> Array:
@@ -153,15 +157,13 @@ class Arm:
             lies in the base origin: rows 0-2 its velocity, rows 3-5 the angular
             velocity, per unit of controller joint velocity.
         """
-        theta = self.dh.angles(q)
-        model = self._chain
-        data = model.createData()
-        flange, screws = np.empty((len(q), 4, 4)), np.empty((len(q), 6, 6))
-        for k, angles in enumerate(theta):
-            screws[k] = pin.computeJointJacobians(model, data, angles)
-            flange[k] = data.oMi[6].homogeneous
-        flange = flange @ self._link_from_joint[5]
-        return flange, (screws * self.dh.sense) @ self.dh.mix
+        theta, screws = self.dh.angles(q), np.empty((len(q), 6, 6))
+        T = np.tile(np.eye(4), (len(q), 1, 1))
+        for i in range(6):
+            point, axis = T[:, :3, 3], T[:, :3, 2]
+            screws[:, :3, i], screws[:, 3:, i] = np.cross(point, axis), axis
+            T = self.dh.placed(T, i, theta[:, i])
+        return T, (screws * self.dh.sense) @ self.dh.mix
 
     def joint_axes(self, q: Array) -> tuple[Array, Array]:
         """Give every joint's rotation axis and a point on it.

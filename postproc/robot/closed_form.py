@@ -1,8 +1,9 @@
-"""One branch of the inverse kinematics at a time, for very many poses.
+"""The closed-form inverse kinematics of an ortho-parallel arm, for very many poses.
 
-The formulas are those of py-opw-kinematics (Brandstoetter, Angerer, Hofbaur 2014, see
-`inverse`), which solves for all eight branches and needs several times as long for it.
-Paths and corrections stay on one branch that is known beforehand.
+Brandstoetter, Angerer, Hofbaur: An analytical solution of the inverse kinematics
+problem of industrial serial manipulators with an ortho-parallel basis and a spherical
+wrist (2014). Written over arrays, and for one branch alone where that is known: a
+correction stays on its branch.
 """
 
 from __future__ import annotations
@@ -15,30 +16,54 @@ from postproc.robot.arm_file import OpwSection
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
+Bools = NDArray[np.bool_]
 
 CHUNK = 8192  # poses solved at a time: what they need stays in the cache
 WRIST, SHOULDER, ELBOW = 4, 2, 1  # bits of a slot
 
 
 class ClosedForm:
-    """The closed form of one arm, in its geometric joint angles."""
+    """The closed form of one arm, in its geometric joint angles.
+
+    Branches are named by slots 4 W + 2 S + E. W: axis 5 negative; S: wrist centre
+    behind axis 1; E: the other elbow.
+    """
 
     def __init__(self, parameters: OpwSection) -> None:
         """Take the arm file's section."""
         p = parameters
         self._a1, self._b, self._c1 = p.a1_mm * MM, p.b_mm * MM, p.c1_mm * MM
-        self._c2, self._c4 = p.c2_mm * MM, p.c4_mm * MM
+        self._upper, self._c4 = p.c2_mm * MM, p.c4_mm * MM
         self._forearm = float(np.hypot(p.a2_mm, p.c3_mm)) * MM
         self._bent = float(np.arctan2(p.a2_mm, p.c3_mm))
         self._offset = np.deg2rad(p.offsets_deg)
         self._sign = np.where(p.flip_axes, -1.0, 1.0)
+
+    def branches(self, flange: Array) -> Array:
+        """Solve for all branches of every pose.
+
+        Args:
+            flange: Flange poses, (n, 4, 4) [m].
+
+        Returns:
+            Geometric joint angles on no particular turn, (n, 8, 6) [rad], NaN where a
+            branch does not exist.
+        """
+        out = np.empty((len(flange), 8, 6))
+        for a in range(0, len(flange), CHUNK):
+            rows = slice(a, a + CHUNK)
+            for slot in range(4):
+                one = self._angles(flange[rows], slot)
+                out[rows, slot] = self._to_joints(one)
+                out[rows, slot + WRIST] = self._to_joints(_wrist_flipped(one))
+        return out
 
     def branch(self, flange: Array, slot: Ints) -> Array:
         """Solve for one branch of every pose.
 
         Args:
             flange: Flange poses, (n, 4, 4) [m].
-            slot: Slots 4 W + 2 S + E, (n,).
+            slot: Branches, (n,).
 
         Returns:
             Geometric joint angles on no particular turn, (n, 6) [rad], NaN where the
@@ -47,26 +72,33 @@ class ClosedForm:
         out = np.empty((len(flange), 6))
         for a in range(0, len(flange), CHUNK):
             rows = slice(a, a + CHUNK)
-            out[rows] = self._branch(flange[rows], slot[rows])
+            one = self._angles(flange[rows], slot[rows])
+            flipped = ((slot[rows] & WRIST) > 0)[:, None]
+            out[rows] = self._to_joints(np.where(flipped, _wrist_flipped(one), one))
         return out
 
     def slot(self, theta: Array) -> Ints:
         """Name the branch of geometric joint angles (n, 6) [rad], (n,)."""
         t = theta * self._sign - self._offset
-        upper = self._c2 * np.sin(t[:, 1])
-        lower = self._forearm * np.sin(t[:, 1] + t[:, 2] + self._bent)
-        behind = self._a1 + upper + lower < 0
-        other = np.sin(t[:, 2] + self._bent) < 0
-        negative = np.sin(t[:, 4]) < 0
-        slots: Ints = WRIST * negative + SHOULDER * behind + ELBOW * other
+        elbow = t[:, 2] + self._bent
+        ahead = self._upper * np.sin(t[:, 1]) + self._forearm * np.sin(t[:, 1] + elbow)
+        slots: Ints = (
+            WRIST * (np.sin(t[:, 4]) < 0)
+            + SHOULDER * (self._a1 + ahead < 0)
+            + ELBOW * (np.sin(elbow) < 0)
+        )
         return slots
 
-    def _branch(self, flange: Array, slot: Ints) -> Array:
-        """Solve for one branch of some poses."""
-        behind = (slot & SHOULDER) > 0
-        elbow = np.where((slot & ELBOW) > 0, -1.0, 1.0)
-        wrist = np.where((slot & WRIST) > 0, -1.0, 1.0)
-        R, c2, c3 = flange[:, :3, :3], self._c2, self._forearm
+    def _to_joints(self, angles: Array) -> Array:
+        """Convert the formulas' angles (n, 6) to the arm's geometric ones."""
+        joints: Array = (angles + self._offset) * self._sign
+        return joints
+
+    def _angles(self, flange: Array, slot: Ints | int) -> Array:
+        """Solve for the branches with a positive axis 5, (n, 6) [rad]."""
+        behind = (np.asarray(slot) & SHOULDER) > 0
+        side = np.where((np.asarray(slot) & ELBOW) > 0, -1.0, 1.0)
+        R, upper, forearm = flange[:, :3, :3], self._upper, self._forearm
         centre = flange[:, :3, 3] - self._c4 * R[:, :, 2]
         cx, cy, z = centre[:, 0], centre[:, 1], centre[:, 2] - self._c1
         with np.errstate(invalid="ignore", divide="ignore"):
@@ -75,20 +107,29 @@ class ClosedForm:
             t1 = np.arctan2(cy, cx) + np.where(behind, aside - np.pi, -aside)
             x = np.where(behind, -reach, reach) - self._a1
             far = x**2 + z**2
-            lean = np.arccos((far + c2**2 - c3**2) / (2 * np.sqrt(far) * c2))
-            t2 = np.arctan2(x, z) - elbow * lean
-            fold = np.arccos((far - c2**2 - c3**2) / (2 * c2 * c3))
-            t3 = elbow * fold - self._bent
+            gap = far - forearm**2 + upper**2
+            lean = np.arccos(gap / (2 * np.sqrt(far) * upper))
+            t2 = np.arctan2(x, z) - side * lean
+            fold = np.arccos((far - upper**2 - forearm**2) / (2 * upper * forearm))
+            t3 = side * fold - self._bent
         s1, c1 = np.sin(t1)[:, None], np.cos(t1)[:, None]
         s23, c23 = np.sin(t2 + t3)[:, None], np.cos(t2 + t3)[:, None]
-        ahead = c1 * R[:, 0] + s1 * R[:, 1]  # rows of the flange seen from axis 1
-        across = c1 * R[:, 1] - s1 * R[:, 0]
-        out = ahead * c23 - R[:, 2] * s23  # .. and seen from the forearm
-        along = ahead * s23 + R[:, 2] * c23
-        t4 = np.arctan2(wrist * across[:, 2], wrist * out[:, 2])
-        t5 = wrist * np.arctan2(np.hypot(across[:, 2], out[:, 2]), along[:, 2])
-        t6 = np.arctan2(wrist * along[:, 1], -wrist * along[:, 0])
+        # The flange's axes ahead of and across axis 1, out of and along the forearm.
+        ahead, across = c1 * R[:, 0] + s1 * R[:, 1], c1 * R[:, 1] - s1 * R[:, 0]
+        out, along = ahead * c23 - R[:, 2] * s23, ahead[:, 2] * s23[:, 0]
+        along += R[:, 2, 2] * c23[:, 0]
+        t4 = np.arctan2(across[:, 2], out[:, 2])
+        t5 = np.arctan2(np.hypot(across[:, 2], out[:, 2]), along)
+        # Axis 5 seen from the flange; a straight wrist has it too.
+        bend = np.cos(t4)[:, None] * across - np.sin(t4)[:, None] * out
+        t6 = np.arctan2(bend[:, 0], bend[:, 1])
         angles = np.stack([t1, t2, t3, t4, t5, t6], axis=1)
         angles[np.isnan(angles).any(axis=1)] = np.nan
-        solved: Array = (angles + self._offset) * self._sign
-        return solved
+        return angles
+
+
+def _wrist_flipped(angles: Array) -> Array:
+    """Turn the wrist (n, 6) [rad] to its other solution."""
+    flipped: Array = angles + np.array([0.0, 0.0, 0.0, np.pi, 0.0, np.pi])
+    flipped[:, 4] *= -1
+    return flipped

@@ -1,20 +1,12 @@
-"""Closed-form inverse kinematics of an ortho-parallel arm with a spherical wrist.
-
-The only module that imports py-opw-kinematics (Brandstoetter, Angerer, Hofbaur: An
-analytical solution of the inverse kinematics problem of industrial serial manipulators
-with an ortho-parallel basis and a spherical wrist, 2014).
-"""
+"""Inverse kinematics of an arm: all branches or one, on turns within its range."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 import numpy as np
-import py_opw_kinematics as opw
 from numpy.typing import NDArray
-from scipy.spatial.transform import RigidTransform
 
-from postproc.pose import MM
 from postproc.robot.arm_file import OpwSection
 from postproc.robot.closed_form import ClosedForm
 
@@ -25,8 +17,6 @@ Ints = NDArray[np.int64]
 @dataclass(frozen=True)
 class Branches:
     """All closed-form solutions of n flange poses, in stable slots 4 W + 2 S + E.
-
-    W: axis 5 negative; S: wrist centre behind axis 1; E: the other elbow.
 
     Attributes:
         q: (n, 8, 6) [rad], NaN where a branch does not exist. Axes lie in the arm's
@@ -49,27 +39,14 @@ class Inverse:
         self, parameters: OpwSection, mix: Array, lower: Array, upper: Array
     ) -> None:
         """Build it from the arm file's section, angle mixing and joint limits [rad]."""
-        p = parameters
-        model = opw.KinematicModel(
-            a1=p.a1_mm, a2=p.a2_mm, b=p.b_mm,
-            c1=p.c1_mm, c2=p.c2_mm, c3=p.c3_mm, c4=p.c4_mm,
-            offsets=tuple(np.deg2rad(p.offsets_deg)), flip_axes=tuple(p.flip_axes),
-        )  # fmt: skip
-        self._robot = opw.Robot(model, degrees=False)
         self._closed = ClosedForm(parameters)
         self._mix, self._unmix = mix, np.linalg.inv(mix)
         self._lower, self._upper = lower, upper
 
     def branches(self, flange: Array) -> Branches:
         """Solve for all branches of flange poses (n, 4, 4) [m]."""
-        n = len(flange)
-        if n == 0:
-            return Branches(np.empty((0, 8, 6)))
-        poses = np.array(flange)
-        poses[:, :3, 3] /= MM
-        reached = self._robot.reach(RigidTransform.from_matrix(poses), threads=1)
-        q = np.asarray(reached.joints, dtype=float).reshape(n, 8, 6)
-        return Branches(self._into_range(q @ self._unmix.T))
+        q = self._closed.branches(flange) @ self._unmix.T
+        return Branches(self._into_range(q))
 
     def branch(self, flange: Array, slot: Ints) -> Array:
         """Solve for one branch each of flange poses (n, 4, 4) [m], on any turn.

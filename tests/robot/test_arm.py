@@ -1,6 +1,7 @@
 """The NJ 220-2.7 against its published numbers, and derivatives by differences."""
 
 import numpy as np
+import pinocchio as pin
 import pytest
 
 from postproc.exceptions import ArmError
@@ -191,3 +192,19 @@ def test_axis_3_measured_from_axis_2(tmp_path, arm):
     np.testing.assert_allclose(linked.flange(same), arm.flange(q), atol=1e-12)
     found = linked.nearest(linked.flange(same), same)
     np.testing.assert_allclose(found, same, atol=1e-9)
+
+
+def test_kinematics_are_those_of_pinocchio(arm, q):
+    model, theta = arm._chain, arm.dh.angles(q)
+    data = model.createData()
+    flange, screws = arm.kinematics(q)
+    frames = arm.link_frames(q)
+    for k in range(len(q)):
+        J = pin.computeJointJacobians(model, data, theta[k])
+        np.testing.assert_allclose(
+            screws[k], (J * arm.dh.sense) @ arm.dh.mix, atol=1e-12
+        )
+        for i in range(1, 6):  # pinocchio's joint frame i turns about D-H axis i
+            axis = data.oMi[i + 1].rotation[:, 2]
+            np.testing.assert_allclose(frames[k, i, :3, 2], axis, atol=1e-12)
+    np.testing.assert_array_equal(flange, frames[:, 6])
