@@ -2,6 +2,7 @@
 # make test    all tests
 # make lint    ruff and mypy
 # make chaos   kill 200 batches of 300 files at random moments and resume them
+# make fuzz    20,000 damaged programs: refused, or rewritten byte for byte
 # make bench   how long the stages take on this machine
 # make evidence    coverage of the intervals, and what direction is worth
 # make reproduce   the published method and ours, simulated: docs/reproduction.md
@@ -18,7 +19,7 @@ STAMP := $(VENV)/.installed
 export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
 
-.PHONY: help demo test lint format bench evidence reproduce accuracy undeclared blind chaos clean
+.PHONY: help demo test lint format bench evidence reproduce accuracy undeclared blind chaos fuzz clean
 .DELETE_ON_ERROR:
 
 help:
@@ -63,6 +64,9 @@ blind: $(STAMP)
 
 chaos: $(STAMP)
 	@$(PYTHON_BIN) -m tests.chaos --runs $(or $(RUNS),200) --files $(or $(FILES),300)
+
+fuzz: $(STAMP)
+	@$(PYTHON_BIN) -m tests.fuzz --count $(or $(COUNT),20000)
 
 clean:
 	rm -rf $(VENV) demo build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis

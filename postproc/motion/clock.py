@@ -58,7 +58,11 @@ def tell_time(arm: Arm, targets: Targets, traced: Trace) -> Clock:
     moves = JointMoves(arm)
     for v in first[lone].tolist():
         begin, override = traced.q[source[v]], float(targets.override[v])
-        duration[v] = moves.move(begin, traced.q[v], override).duration
+        try:
+            duration[v] = moves.move(begin, traced.q[v], override).duration
+        except PlanError:
+            full = np.abs(traced.q[v] - begin) / arm.velocity
+            duration[v], untimed[v] = full.max() / override, True
     speed = _speeds(arm, targets, traced, joint_velocity)
     return Clock(_times(targets, duration), speed, untimed)
 

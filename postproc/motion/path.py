@@ -65,8 +65,8 @@ class Segments:
         """Choose how many intervals to cut each path into, at least those given."""
         steps = np.maximum(self.length / STEP, self.turning / TURN)
         steps = np.nan_to_num(steps, nan=0.0)
-        wanted = np.ceil(steps - 1e-9).astype(np.int64)
-        return np.asarray(np.clip(wanted, least, MOST))
+        wanted = np.clip(np.ceil(steps - 1e-9), least, MOST)
+        return np.asarray(wanted, dtype=np.int64)
 
     def poses(self, path: Ints, u: Array) -> Array:
         """Place the TCP on paths `path` (s,) at fractions u (s,): (s, 4, 4)."""

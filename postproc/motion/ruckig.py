@@ -67,7 +67,7 @@ class JointMoves:
         trajectory = ruckig.Trajectory(6)
         try:
             result = self._otg.calculate(given, trajectory)
-        except ruckig.RuckigError as error:
+        except (ruckig.RuckigError, ValueError) as error:  # ValueError: its own result
             raise PlanError(f"no time law for a JOINT move: {error}") from error
         if result not in (ruckig.Result.Working, ruckig.Result.Finished):
             raise PlanError(f"no time law for a JOINT move: {result}")

@@ -1,0 +1,99 @@
+"""Damage programs, many thousand of them, and see what becomes of them.
+
+python -m tests.fuzz --count 20000 --seed 0        (or: make fuzz)
+
+Every damaged program is read and rewritten with other numbers in all of its targets;
+every tenth is compensated and restored. The same numbers give the same programs.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import tempfile
+import time
+import traceback
+from collections import Counter
+from concurrent.futures import ProcessPoolExecutor
+from pathlib import Path
+
+from postproc.accuracy.model import Model, load_model
+from postproc.robot.cell import Cell, load_cell
+from tests.conftest import make_job
+from tests.fuzz.case import HangError, compensated, rewrite
+from tests.fuzz.originals import damaged
+
+WHOLE = 10  # every so many are compensated, not only rewritten
+_SETUP: list[tuple[Cell, Model]] = []
+
+
+def begin(folder: str) -> None:
+    """Load the cell and the model, and warm the parser up, once in each process."""
+    cell = load_cell(Path(folder) / "cell.toml")
+    _SETUP.append((cell, load_model(Path(folder) / "model.json")))
+    files = {"job.pdl": b"PROGRAM a\nBEGIN\nEND a", "job.lsv": b"n INT Priv 1"}
+    compensated(files, *_SETUP[0])
+
+
+def attempt(seed: int, number: int) -> tuple[int, str, str, float]:
+    """Damage one program; return its number, what came of it, why, and the time [s]."""
+    cell, model = _SETUP[0]
+    files = damaged(seed, number)
+    begun = time.process_time()
+    said = ""
+    try:
+        kind = rewrite(files, cell)
+        if number % WHOLE == 0:
+            kind = compensated(files, cell, model)
+    except HangError as hang:
+        kind, said = "hang", f"{hang}: {where()}"
+    except Exception:  # whatever it is, it is what we are looking for
+        kind, said = "failed", traceback.format_exc()
+    return number, kind, said, time.process_time() - begun
+
+
+def where() -> str:
+    """Name the innermost lines of ours that were running."""
+    frames = traceback.extract_tb(sys.exc_info()[2])
+    return " < ".join(f"{Path(f.filename).name}:{f.lineno}" for f in frames[-2:-6:-1])
+
+
+def keep(folder: Path, seed: int, number: int) -> None:
+    """Write the files of a case for a closer look."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for name, data in damaged(seed, number).items():
+        (folder / f"{seed}-{number}{Path(name).suffix}").write_bytes(data)
+
+
+def main() -> int:
+    """Run the cases; exit 1 where one fails or hangs."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--count", type=int, default=20_000)
+    parser.add_argument("--first", type=int, default=0)
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--jobs", type=int, default=2)
+    parser.add_argument("--keep", type=Path, help="write failing programs there")
+    given = parser.parse_args()
+    counted: Counter[str] = Counter()
+    slowest = 0.0
+    with tempfile.TemporaryDirectory() as name:
+        folder = str(make_job(Path(name)))
+        with ProcessPoolExecutor(given.jobs, None, begin, (folder,)) as pool:
+            numbers = range(given.first, given.first + given.count)
+            seeds = [given.seed] * len(numbers)
+            for number, kind, said, took in pool.map(
+                attempt, seeds, numbers, chunksize=50
+            ):
+                counted[kind] += 1
+                slowest = max(slowest, took)
+                if said:
+                    print(f"{given.seed}:{number}: {kind}: {said}", flush=True)
+                    if given.keep:
+                        keep(given.keep, given.seed, number)
+    said = ", ".join(f"{n} {kind}" for kind, n in sorted(counted.items()))
+    print(f"{given.count} damaged programs: {said}; slowest {slowest:.2f} s")
+    return 1 if counted["failed"] or counted["hang"] else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
