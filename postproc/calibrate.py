@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from postproc.accuracy.combination import Combination
 from postproc.accuracy.fit_report import FitReport, report_fit, report_method
+from postproc.accuracy.fitted import Fit
 from postproc.accuracy.full import fit_survey, model_of
 from postproc.accuracy.measurement import (
     Measurements,
@@ -28,6 +29,7 @@ from postproc.accuracy.plausibility import (
 from postproc.accuracy.reading import DETECT, Reading
 from postproc.accuracy.registration import Registration, register
 from postproc.accuracy.schema import Method
+from postproc.accuracy.tool_groups import find_groups
 from postproc.pose import MM
 from postproc.robot.arm import Arm
 from postproc.robot.cell import Cell
@@ -98,7 +100,26 @@ def fit_measurements(
         model = fit_method(method, survey, cell.arm, seed)
         return Calibration(model, report_method(model, survey, cell.arm), survey)
     fitted = fit_survey(survey, cell.arm, effects, tracker, setup)
+    survey = replace(survey, warnings=(*survey.warnings, *moved_tools(fitted, survey)))
     return Calibration(model_of(fitted, survey), report_fit(fitted, survey), survey)
+
+
+def moved_tools(fitted: Fit, survey: Measurements) -> tuple[str, ...]:
+    """Tell of rows that look as if the tool, or the nest, had moved between them."""
+    found = find_groups(fitted.residual, fitted.batch.walk.flange)
+    if found is None:
+        return ()
+    far = f"{found.describe()} in the flange frame"
+    if len(found.changes) == 1:
+        row = survey.ids[int(found.changes[0])]
+        return (
+            f"the tool or its nest has moved by {far} at row {row}: run postproc "
+            "diagnose, which fits it as tool_shift and does not compensate it",
+        )
+    return (
+        f"the rows look like several tools, the others at {far} from the first: if "
+        "they are, add tool_id; if not, run postproc diagnose",
+    )
 
 
 def several_points(survey: Measurements) -> tuple[str, ...]:
@@ -116,7 +137,6 @@ def into_base_frame(
     """
     nothing = Combination(())
     found = register(arm, survey.states, survey.position, nothing, np.zeros(0))
-    check_registered(survey, arm, found.typical)
     ids, which = np.unique(survey.states.tool_id, return_inverse=True)
     xyz = ", ".join(f"{v / MM:.1f}" for v in found.tracker)
     notes = [f"tracker at {xyz} mm in the base frame"]
@@ -133,6 +153,7 @@ def into_base_frame(
         rotation=turned,
         warnings=(*survey.warnings, *notes),
     )
+    check_registered(survey, registered, arm, found.typical)
     return registered, found
 
 

@@ -20,6 +20,8 @@ Bools = NDArray[np.bool_]
 SIDES = tuple(f"lambda{j}" for j in range(1, 7))
 TRAVELS = tuple(f"travel{j}_deg" for j in range(1, 7))
 ROTATION = ("rx_deg", "ry_deg", "rz_deg")
+JOINTS = tuple(f"q{j}_deg" for j in range(1, 7))
+MANY = 20  # rows that are in order of a column by no accident
 TOOL = ("tool_x_mm", "tool_y_mm", "tool_z_mm")
 
 
@@ -54,7 +56,7 @@ def read_directions(
     if not table.has(*SIDES):
         warnings = (
             f"{table.path}: no lambda columns; directions inferred from the order of "
-            "the rows, as JOINT moves. Wrong if the rows were sorted",
+            f"the rows, as JOINT moves. {_sorted(table)}",
         )
         return arrived.direction, travel, np.ones(len(q), dtype=bool), warnings
     side = table.block(SIDES)
@@ -102,3 +104,15 @@ def read_rotation(table: Table) -> Array | None:
         return None
     angles = table.block(ROTATION)
     return np.asarray(Rotation.from_euler("XYZ", angles, degrees=True).as_matrix())
+
+
+def _sorted(table: Table) -> str:
+    """Say whether the rows still are in the order in which they were measured."""
+    for name in (*JOINTS, "x_mm", "y_mm", "z_mm"):
+        step = np.diff(table.numbers(name)) if table.has(name) else np.zeros(0)
+        if len(step) > MANY and ((step >= 0).all() or (step <= 0).all()):
+            return (
+                f"The rows are sorted by {name}: the order of visits is lost, and "
+                "backlash with it. Use the file as it was measured"
+            )
+    return "Wrong if the rows were sorted"

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from postproc.accuracy.columns import (
+    JOINTS,
     read_directions,
     read_rotation,
     read_tools,
@@ -26,7 +27,6 @@ from postproc.robot.state import States, make_states
 Array = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 
-JOINTS = tuple(f"q{j}_deg" for j in range(1, 7))
 POSITION = ("x_mm", "y_mm", "z_mm")
 COVARIATES = {  # column: field of States, SI units per unit of the column
     "time_s": ("time", 1.0),

@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import replace
-from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
 
 from postproc.accuracy.batch import Batch
-from postproc.accuracy.combination import Combination
 from postproc.accuracy.geometry import Geometry
 from postproc.accuracy.measurement import Measurements
+from postproc.accuracy.mistakes import CLOSE, likely_cure
 from postproc.accuracy.observability import observe
-from postproc.accuracy.registration import register
+from postproc.accuracy.tool_groups import find_groups
 from postproc.accuracy.turns import Turns
 from postproc.exceptions import MeasurementError
 from postproc.pose import MM
@@ -24,23 +22,25 @@ from postproc.robot.state import States, make_states
 Array = NDArray[np.float64]
 
 FAR = 0.05  # [m] no arm that works is off by more
-CLOSE = 0.01  # [m] a mended survey agrees at least so well
 APART = 10.0  # rows this many times farther off than the typical one are another kind
 MANY = 0.1  # share of such rows from which the file is at fault, not the rows
-TRIED = 60  # rows that a guess is tried on
 PROBES = 400  # random poses that show what could be determined at best
 ENOUGH = 0.75  # share of the determinable directions that a survey must show
 TURNED = np.deg2rad(1.0)  # no flange that works is off by more
-NOTHING = Combination(())
+OTHER_UNIT = 50.0  # no arm's positions differ so much in size
+SOME = 0.02  # share of rows in another unit that is no accident
+TOOL_APART = 1e-3  # [m] tools that differ by less are told by the fit, not refused
 
 
 def check_survey(survey: Measurements, arm: Arm) -> None:
-    """Check units, frame and number of rows of a survey in the base frame.
+    """Check units, frame, tools and number of rows of a survey in the base frame.
 
     Raises:
         MeasurementError: With the likely reason and the cure.
     """
     check_rows(survey, arm)
+    check_units(survey)
+    check_tools(survey, arm)
     gap = survey.position - Batch(arm, survey.states).walk.tcp
     size = np.linalg.norm(gap, axis=1)
     typical = float(np.median(size))
@@ -58,11 +58,60 @@ def check_survey(survey: Measurements, arm: Arm) -> None:
         raise MeasurementError(survey.path, problem, cure, line=line)
 
 
-def check_registered(survey: Measurements, arm: Arm, typical: float) -> None:
+def check_units(survey: Measurements) -> None:
+    """Refuse rows in metres among rows in millimetres.
+
+    Raises:
+        MeasurementError: Naming the first such row.
+    """
+    size = np.linalg.norm(survey.position, axis=1)
+    typical = float(np.median(size))
+    other = (size * OTHER_UNIT < typical) | (size > OTHER_UNIT * typical)
+    if other.mean() > SOME:
+        metres = size < np.sqrt(float(size.max()) * float(size.min()))
+        line = int(survey.line[np.argmax(metres)])
+        problem = f"{int(metres.sum())} of {len(survey)} rows look like metres"
+        cure = "The others are in millimetres: write all of them so"
+        raise MeasurementError(survey.path, problem, cure, line=line)
+
+
+def check_tools(survey: Measurements, arm: Arm) -> None:
+    """Refuse rows of several tools that have no tool_id of their own.
+
+    Raises:
+        MeasurementError: Saying how the tools lie to each other, and a row of each.
+    """
+    batch = Batch(arm, survey.states)
+    left = survey.position - batch.walk.tcp
+    X = Geometry.propose(arm, survey.states).columns(batch)
+    X = X.reshape(-1, X.shape[2])
+    scale = np.maximum(np.linalg.norm(X, axis=0), 1e-300)
+    fitted = np.linalg.lstsq(X / scale, left.reshape(-1), rcond=1e-6)[0]
+    left = left - (X / scale @ fitted).reshape(-1, 3)
+    for tool in np.unique(survey.states.tool_id):
+        rows = np.flatnonzero(survey.states.tool_id == tool)
+        found = find_groups(left[rows], batch.walk.flange[rows])
+        if found is not None and found.apart > TOOL_APART:
+            first = sorted(rows[np.argmax(found.which == k)] for k in found.kinds)
+            raise MeasurementError(
+                survey.path,
+                f"the rows were measured with {len(first)} tools (first seen in rows "
+                f"{', '.join(survey.ids[i] for i in first)}); from the first one the "
+                f"others are at {found.describe()} in the flange frame",
+                "Add a column tool_id and the points to [survey] in the cell file, or "
+                "columns tool_x_mm, tool_y_mm, tool_z_mm, or split the file",
+                line=int(survey.line[first[1]]),
+            )
+
+
+def check_registered(
+    survey: Measurements, registered: Measurements, arm: Arm, typical: float
+) -> None:
     """Check a survey in the tracker's frame by what its registration leaves.
 
     Args:
         survey: The measurements, tracker frame.
+        registered: The same in the base frame, as far as they could be placed.
         arm: The arm.
         typical: Median distance that the registration leaves [m].
 
@@ -70,50 +119,11 @@ def check_registered(survey: Measurements, arm: Arm, typical: float) -> None:
         MeasurementError: With the likely reason and the cure.
     """
     check_rows(survey, arm)
+    check_units(survey)
     if typical > CLOSE:
+        check_tools(registered, arm)
         problem = f"the registration leaves {typical / MM:.0f} mm"
         raise MeasurementError(survey.path, problem, likely_cure(survey, arm))
-
-
-def likely_cure(survey: Measurements, arm: Arm) -> str:
-    """Name the mistake that would explain the positions, if one does."""
-    few = survey[np.unique(np.linspace(0, len(survey) - 1, TRIED).astype(np.int64))]
-    for cure, states, position in _guesses(few.states, few.position):
-        if register(arm, states, position, NOTHING, np.zeros(0)).typical < CLOSE:
-            return cure
-    return "Check units, joint order and signs, the tool and the frame (--frame)"
-
-
-def _guesses(states: States, position: Array) -> Iterator[tuple[str, States, Array]]:
-    """List mistakes that people make, most frequent first, each undone."""
-    q = states.q
-
-    def turned(angles: Array) -> States:
-        return states.with_(q=angles)
-
-    yield (
-        "The positions look like the tracker's frame: use --frame tracker",
-        states,
-        (position),
-    )
-    yield "The positions look like metres: write millimetres", states, position / MM
-    yield (
-        "The joint angles look like radians: write degrees",
-        turned(np.rad2deg(q)),
-        (position),
-    )
-    for j in range(6):
-        sign = np.where(np.arange(6) == j, -1.0, 1.0)
-        yield (
-            f"Joint {j + 1} looks like it has the other sign",
-            turned(q * sign),
-            (position),
-        )
-    for i, j in combinations(range(6), 2):
-        order = np.arange(6)
-        order[[i, j]] = j, i
-        cure = f"Joints {i + 1} and {j + 1} look swapped: correct the columns"
-        yield cure, turned(q[:, order]), position
 
 
 def check_rows(survey: Measurements, arm: Arm) -> None:

@@ -13,12 +13,12 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from postproc.accuracy.columns import JOINTS
 from postproc.accuracy.table import Table
 
 Array = NDArray[np.float64]
 
 WIDTH = 18
-JOINTS = tuple(f"q{j}_deg" for j in range(1, 7))
 MEASURED = ("x_mm", "y_mm", "z_mm")
 TURNS = ("rx_deg", "ry_deg", "rz_deg")
 TCP = ("tool_x_mm", "tool_y_mm", "tool_z_mm")
