@@ -169,7 +169,7 @@ def report(
             assumed_off(name, cell),
         ),
         stages=clock.stages,
-        position=planned.plan.tcp[:, :3, 3],
+        position=planned.plan.tcp[:, :3, 3] - planned.plan.aside,
         sources={source.name: source.data for source in reading.sources},
     )
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from postproc.accuracy.guard import guard_size, guard_solutions, guard_steps
 from postproc.followers import carry_along, worsened
 from postproc.language.visits import NO_TARGET, Target, Visits
+from postproc.motion.planner import Plan
 from postproc.options import Options
 from postproc.planning import Planned, Reading
 from postproc.pose import MM, inverse, pose_from_record
@@ -49,6 +50,7 @@ def propose(
     reading: Reading,
     planned: Planned,
     solved: Solved,
+    aside: Array,
     held: Bools,
     cell: Cell,
     options: Options,
@@ -59,6 +61,7 @@ def propose(
         reading: The program.
         planned: Its plan.
         solved: The corrected command of every visit.
+        aside: From targets to where the corrected path passes them, (n, 3) [m].
         held: Visits that must be left alone, (n,).
         cell: Guards and frames.
         options: What the user asked for.
@@ -75,7 +78,7 @@ def propose(
     guard_size(reasons, cell.limits, correction, solved.residual)
     guard_steps(reasons, cell.limits, correction, side, _run_mates(visits))
     reasons.mark(held, HELD)
-    numbers = new_numbers(visits, solved)
+    numbers = new_numbers(visits, plan, solved, aside)
     change = change_mm(visits, numbers, correction)
     agreement = agree(visits.literal, reasons.none, numbers, change)
     trusted = ~np.any([held, *solved.outside.values()], axis=0)
@@ -108,17 +111,20 @@ def propose(
     )
 
 
-def new_numbers(visits: Visits, solved: Solved) -> Array:
+def new_numbers(visits: Visits, plan: Plan, solved: Solved, aside: Array) -> Array:
     """Express commands in the numbers of the file, (n, 6).
 
-    A pose keeps its written orientation; P = inverse(UFRAME) . BASE . command.
+    A pose keeps its written orientation; P = inverse(UFRAME) . BASE . command. A fly
+    point is moved so that the path passes it where it should.
     """
     numbers = np.array(visits.values)
     joints = visits.target == Target.JOINTS
-    numbers[joints] = np.rad2deg(solved.q[joints])
+    numbers[joints] += np.rad2deg(solved.q[joints] - plan.q[joints])
     poses = np.flatnonzero(visits.target == Target.POSE)
     placed = base_in_uframe(visits, poses)
-    point = np.einsum("nij,nj->ni", placed, solved.command[poses, :, 3])
+    command = np.array(solved.command[poses, :, 3])
+    command[:, :3] -= aside[poses]
+    point = np.einsum("nij,nj->ni", placed, command)
     numbers[poses, :3] = point[:, :3] / MM
     return numbers
 

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from postproc.flying import rounding_of
 from postproc.language.visits import Target, Visits
 from postproc.motion.targets import Kind, Targets
 from postproc.pose import MM, inverse, pose_from_record
@@ -63,6 +64,7 @@ def targets_from_visits(visits: Visits, cell: Cell) -> tuple[Targets, Reasons]:
     lost |= placed & np.isnan(tcp + frames.tool).any(axis=(1, 2))
     lost |= np.isnan(joints).any(axis=1) & np.isin(kind, (Kind.JOINTS, Kind.JOINT_STEP))
     slot, turns = configurations(visits.configs)
+    rounding, distance, overlap = rounding_of(visits)
     targets = Targets(
         move=visits.motion,
         kind=np.where(lost, Kind.UNKNOWN, kind),
@@ -74,6 +76,9 @@ def targets_from_visits(visits: Visits, cell: Cell) -> tuple[Targets, Reasons]:
         turns=turns[visits.config],
         nearest_turn=visits.nearest_turn,
         fly=visits.fly,
+        rounding=rounding,
+        fly_distance=distance,
+        overlap=overlap,
         linear_speed=visits.lin_spd,
         rotary_speed=visits.rot_spd,
         override=visits.override,

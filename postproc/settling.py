@@ -29,6 +29,8 @@ SAME = 0.01  # sides closer than this are the same
 LEAST_SHIFT = 1e-3  # change of an aim that tells how the arrival follows it
 FOLLOWS = 0.75  # gain above which the arrival runs away with the aim
 OTHER = 1.0  # sides farther apart than this are different ones
+CLOSE = 5e-6  # [m] how well rounded fly points are hit
+CORNERS = 3  # rounds for that
 
 
 @dataclass(frozen=True)
@@ -86,18 +88,24 @@ def settle(
     The corrected program makes slightly other moves than the original, so a joint may
     come from the other side, or lie elsewhere in its play: the correction is computed
     anew for that. A target whose joints still change sides at the end is left alone.
+    A rounded fly point also moves with its neighbours' corrections, which its own makes
+    up for.
     """
     held, search = np.zeros(len(states), dtype=bool), SideSearch()
     with clock("solve"):
         solved = solve_visits(model, cell, planned, states)
+    aside = np.array(planned.plan.aside)
     for number in count():  # ends: from round ROUNDS on, `held` grows
         with clock("decide"):
-            proposal = propose(reading, planned, solved, held, cell, options)
+            proposal = propose(reading, planned, solved, aside, held, cell, options)
         with clock("plan again"):
-            found = sides_after(reading.visits, proposal, cell)
+            after = reached_after(reading.visits, proposal, cell)
+        found, missed = after.side, np.linalg.norm(after.aside - aside, axis=1)
+        rounds_on = number < CORNERS and (missed[proposal.corrected] > CLOSE).any()
+        aside = np.array(after.aside) if rounds_on else aside
         off = np.abs(found - solved.direction).max(axis=1, initial=0.0)
         moved = proposal.corrected & (off > (SAME if number < ROUNDS else OTHER))
-        if not moved.any():
+        if not moved.any() and not rounds_on:
             done = write_and_verify(reading, proposal, cell, model, clock)
             off = np.abs(done.reached.side - solved.direction)
             flipped = proposal.corrected & (off > OTHER).any(axis=1)
@@ -112,10 +120,10 @@ def settle(
     raise AssertionError("unreachable")
 
 
-def sides_after(visits: Visits, proposal: Proposal, cell: Cell) -> Array:
-    """Find where joints lie in their play once the targets have moved, (n, 6)."""
+def reached_after(visits: Visits, proposal: Proposal, cell: Cell) -> Reached:
+    """Find where targets lead the arm once they have moved."""
     moved = replace(visits, values=proposal.decisions.corrected)
-    return np.array(where(moved, cell).side)
+    return where(moved, cell)
 
 
 def where(visits: Visits, cell: Cell) -> Reached:

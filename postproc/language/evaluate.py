@@ -30,8 +30,9 @@ from postproc.language.world import Place, World
 
 _TRUTH = {"true": True, "on": True, "false": False, "off": False}
 _WORDS = frozenset(
-    "joint linear circular seg_via fly_norm fly_cart fly_pass nosettle coarse fine "
-    "jnt_coarse jnt_fine rs_world rs_traj eul_world rpy_world wrist_jnt".split()
+    "joint linear circular seg_via fly_norm fly_cart fly_auto fly_pass fly_tol "
+    "fly_from nosettle coarse fine jnt_coarse jnt_fine rs_world rs_traj eul_world "
+    "rpy_world wrist_jnt".split()
 )
 _POSITION_TYPES = frozenset({"position", "xtndpos", "jointpos", "vector"})
 _FIELDS = frozenset({*COMPONENTS, "pos", "aux"})

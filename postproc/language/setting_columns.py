@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from enum import IntEnum
 from typing import Any
 
 import numpy as np
@@ -9,7 +10,7 @@ from numpy.typing import NDArray
 
 from postproc.language.store import Settings
 from postproc.language.values import Nothing, Position
-from postproc.language.visits import Target
+from postproc.language.visits import FlyTrajectory, FlyType, Target
 
 Ints = NDArray[np.int64]
 _FRAMES = ("tool", "base", "uframe")
@@ -67,14 +68,14 @@ class SettingColumns:
 
 
 def _row(settings: Settings, frame: Any) -> dict[str, Any]:
-    distance = _number(settings, "fly_dist")
     return {
         **{name: frame(settings.get(name)) for name in _FRAMES},
         "tool_remote": settings.get("tool_rmt") is True,
         "nearest_turn": settings.get("jnt_mturn") is False,
-        "fly_dist_mm": distance if distance >= 0 else np.nan,
+        "fly_dist_mm": _number(settings, "fly_dist"),
         "fly_per": _number(settings, "fly_per"),
-        "fly_cart": settings.get("fly_type") == "fly_cart",
+        "fly_type": _word(settings, "fly_type", FlyType),
+        "fly_traj": _word(settings, "fly_traj", FlyTrajectory),
         "lin_spd": _number(settings, "lin_spd"),
         "rot_spd": _number(settings, "rot_spd"),
         "override": _override(settings),
@@ -85,6 +86,12 @@ def _row(settings: Settings, frame: Any) -> dict[str, Any]:
 def _number(settings: Settings, name: str) -> float:
     value = settings.get(name)
     return value if isinstance(value, float) else np.nan
+
+
+def _word(settings: Settings, name: str, words: type[IntEnum]) -> int:
+    """Return the number of a predefined word, 0 where it is not set or not known."""
+    said = str(settings.get(name)).upper()
+    return int(words[said]) if said in words.__members__ else 0
 
 
 def _override(settings: Settings) -> float:

@@ -43,6 +43,24 @@ class Target(IntEnum):
     UNKNOWN = 99  # the arm moves, the program text does not tell where to
 
 
+class FlyType(IntEnum):
+    """$FLY_TYPE."""
+
+    UNSET = 0
+    FLY_NORM = 1
+    FLY_CART = 2
+
+
+class FlyTrajectory(IntEnum):
+    """$FLY_TRAJ."""
+
+    UNSET = 0
+    FLY_AUTO = 1
+    FLY_PASS = 2
+    FLY_TOL = 3
+    FLY_FROM = 4
+
+
 @dataclass(frozen=True)
 class Literals:
     """m places in the text that hold the numbers of a target.
@@ -105,9 +123,9 @@ class Visits:
         tool_remote: $TOOL_RMT is TRUE: the arm holds the part, (n,).
         nearest_turn: $JNT_MTURN is FALSE, (n,).
         fly: True for MOVEFLY, (n,).
-        fly_dist_mm: $FLY_DIST, (n,), NaN where unset or negative (off).
+        fly_dist_mm: $FLY_DIST, (n,), NaN where unset; negative: off.
         fly_per: $FLY_PER [%], (n,), NaN where unset.
-        fly_cart: $FLY_TYPE is FLY_CART, (n,).
+        fly_type, fly_traj: `FlyType` and `FlyTrajectory`, (n,).
         lin_spd: $LIN_SPD [m/s], (n,), NaN where unset.
         rot_spd: $ROT_SPD [rad/s], (n,), NaN where unset.
         override: Product of the speed overrides that hold, (n,) in (0, 1].
@@ -146,7 +164,8 @@ class Visits:
     fly: Bools
     fly_dist_mm: Floats
     fly_per: Floats
-    fly_cart: Bools
+    fly_type: Ints
+    fly_traj: Ints
     lin_spd: Floats
     rot_spd: Floats
     override: Floats

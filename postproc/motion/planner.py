@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from postproc.motion.clock import tell_time
 from postproc.motion.reasons import CODE, REASONS, WRIST
+from postproc.motion.rounding import rounded
 from postproc.motion.targets import Targets
 from postproc.motion.trace import Trace, trace
 from postproc.robot.arm import Arm
@@ -24,8 +25,10 @@ class Plan:
     """n arrivals in program order (structure of arrays), SI units, base frame.
 
     Attributes:
-        q: Joint angles, (n, 6) [rad], NaN where not known.
-        tcp: Wanted TCP pose, (n, 4, 4) [m], NaN where not known.
+        q: Joint angles, (n, 6) [rad], NaN where not known; at a rounded fly point those
+            of the point of the path that lies nearest to the target.
+        tcp: Wanted TCP pose there, (n, 4, 4) [m], NaN where not known.
+        aside: From the target to that place, (n, 3) [m]; 0 but at rounded fly points.
         tool: TCP in the flange frame, (n, 4, 4) [m].
         direction: Side every joint arrives from, (n, 6): +1, -1, or 0 where not known.
         side: Where every joint lies in its play, (n, 6) from -1 to 1; 0: not known.
@@ -41,6 +44,7 @@ class Plan:
 
     q: Array
     tcp: Array
+    aside: Array
     tool: Array
     direction: Array
     side: Array
@@ -85,11 +89,13 @@ def plan(arm: Arm, targets: Targets, wrist: float) -> Plan:
     Raises:
         PlanError: The arm has no closed-form inverse kinematics.
     """
-    traced = trace(arm, targets)
+    exact = trace(arm, targets)
+    traced = rounded(arm, targets, exact)
     arrived = arrivals(arm, traced.q, traced.edges)
     clock = tell_time(arm, targets, traced)
+    tcp = traced.flange @ targets.tool
     return Plan(
-        traced.q, traced.flange @ targets.tool, targets.tool, arrived.direction,
+        traced.q, tcp, _aside(exact, traced, targets), targets.tool, arrived.direction,
         arrived.side, arrived.travel, clock.speed, clock.time, traced.slot,
         _guard(traced, wrist), REASONS, traced.overruled, clock.untimed,
     )  # fmt: skip
@@ -100,13 +106,15 @@ class Reached:
     """Where n arrivals end up, without a time law.
 
     Attributes:
-        q: Joint angles, (n, 6) [rad], NaN where not known.
-        tcp: TCP pose, (n, 4, 4) [m], base frame, NaN where not known.
+        q: Joint angles, (n, 6) [rad], NaN where not known; as in `Plan`.
+        tcp: TCP pose, (n, 4, 4) [m], base frame, NaN where not known; as in `Plan`.
+        aside: From the target to that place, (n, 3) [m].
         side: Where every joint lies in its play, (n, 6) from -1 to 1; 0: not known.
     """
 
     q: Array
     tcp: Array
+    aside: Array
     side: Array
 
 
@@ -115,9 +123,16 @@ def reach(arm: Arm, targets: Targets) -> Reached:
 
     For targets that a correction has moved: their speeds are those of the plan.
     """
-    traced = trace(arm, targets)
-    tcp = traced.flange @ targets.tool
-    return Reached(traced.q, tcp, sides(arm, traced.q, traced.edges))
+    exact = trace(arm, targets)
+    traced = rounded(arm, targets, exact)
+    tcp, aside = traced.flange @ targets.tool, _aside(exact, traced, targets)
+    return Reached(traced.q, tcp, aside, sides(arm, traced.q, traced.edges))
+
+
+def _aside(exact: Trace, traced: Trace, targets: Targets) -> Array:
+    """Measure from targets to where the path passes them, (n, 3) [m]."""
+    moved = (traced.flange - exact.flange) @ targets.tool
+    return np.array(moved[:, :3, 3])
 
 
 def _guard(traced: Trace, wrist: float) -> Ints:

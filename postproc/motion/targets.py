@@ -21,6 +21,15 @@ class Move(IntEnum):
     CIRCULAR = 2
 
 
+class Fly(IntEnum):
+    """How a fly point is rounded."""
+
+    OVERLAP = 0  # two moves overlap in time ($FLY_TYPE FLY_NORM)
+    FROM = 1  # the zone begins at a distance (FLY_CART with FLY_FROM or nothing said)
+    WITHIN = 2  # the path passes within a distance (FLY_TOL)
+    EXACT = 3  # the path passes through the point (FLY_PASS, negative $FLY_DIST)
+
+
 class Kind(IntEnum):
     """What a target tells."""
 
@@ -50,6 +59,9 @@ class Targets:
             written.
         nearest_turn: The turn nearest to where the arm is, whatever the string says.
         fly: The arm does not stop here, (n,).
+        rounding: `Fly`, (n,), for Cartesian moves; other corners overlap or are exact.
+        fly_distance: Of FROM and WITHIN, (n,) [m].
+        overlap: Part of the braking time that the next move overlaps, (n,), 0 to 1.
         linear_speed: Programmed TCP speed [m/s], (n,); NaN where not known.
         rotary_speed: Programmed speed of reorientation [rad/s], (n,); NaN likewise.
         override: Product of the speed overrides, (n,) in (0, 1].
@@ -68,6 +80,9 @@ class Targets:
     turns: Array
     nearest_turn: Bools
     fly: Bools
+    rounding: Ints
+    fly_distance: Array
+    overlap: Array
     linear_speed: Array
     rotary_speed: Array
     override: Array
@@ -105,7 +120,8 @@ def make_targets(
     """Build targets reached one after the other; what is not given takes a default.
 
     The defaults are JOINT moves that stop, without a tool, without a configuration
-    string, at an unknown programmed speed and full override, from an unknown place.
+    string, at an unknown programmed speed and full override, from an unknown place; fly
+    points are passed exactly.
 
     Raises:
         TypeError: A field that `Targets` does not have.
@@ -122,6 +138,9 @@ def make_targets(
         "turns": np.full((n, 3), np.nan),
         "nearest_turn": np.zeros(n, dtype=bool),
         "fly": np.zeros(n, dtype=bool),
+        "rounding": np.full(n, int(Fly.EXACT)),
+        "fly_distance": np.zeros(n),
+        "overlap": np.zeros(n),
         "linear_speed": np.full(n, np.nan),
         "rotary_speed": np.full(n, np.nan),
         "override": np.ones(n),

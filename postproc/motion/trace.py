@@ -46,6 +46,7 @@ class Trace:
         reason: Index into `REASONS`, (n,).
         length, turning: TCP path length [m] and reorientation [rad] of each edge, (e,);
             0 for JOINT moves and where they are not known.
+        share: Part of its edge's way that leads to each sample of the edges, (s,).
         overruled: Continuity took another branch or turn than the string says, (n,).
     """
 
@@ -55,6 +56,7 @@ class Trace:
     edges: Edges
     length: Array
     turning: Array
+    share: Array
     reason: Ints
     overruled: Bools
 
@@ -210,8 +212,9 @@ def _finished(work: Workspace) -> Trace:
     turned = np.abs(on_written_turns(work.q, t.turns) - work.q) > OTHER_TURN
     other = (work.slot != t.slot) | (turned.any(axis=1) & ~t.nearest_turn)
     edges = Edges(t.pred_start, work.source, work.path, samples.start)
+    share = 1.0 / np.diff(samples.start)[edge_of]
     return Trace(
-        work.q, work.flange, work.slot, edges, samples.length, samples.turning,
+        work.q, work.flange, work.slot, edges, samples.length, samples.turning, share,
         work.reason, np.asarray(written & other),
     )  # fmt: skip
 

@@ -89,7 +89,7 @@ def waypoints(
     # A run needs a waypoint between its stops.
     alone = np.zeros(n, dtype=bool)
     alone[first] = end - first == 1
-    straight = (targets.move == Move.JOINT) | (alone & (sampled == 1))
+    straight = (sampled == 1) & ((targets.move == Move.JOINT) | alone)
     intervals = np.where(straight, JOINT_INTERVALS, sampled)
     count = np.where(run_of >= 0, intervals + begins, 0)
     start = np.concatenate([[0], np.cumsum(count)])
@@ -98,12 +98,13 @@ def waypoints(
     u = (nth / intervals[visit])[:, None]
     q = (1 - u) * traced.q[source[visit]] + u * traced.q[visit]
     curved = ~straight[visit] & (nth > 0)
-    q[curved] = edges.path[edges.start[edge[visit[curved]]] + nth[curved] - 1]
+    sample = edges.start[edge[visit[curved]]] + nth[curved] - 1
+    q[curved] = edges.path[sample]
+    share = 1.0 / intervals[visit]
+    share[curved] = traced.share[sample]
     step = np.diff(q, axis=0, prepend=q[:1]) / arm.velocity
     ds = np.where(nth > 0, np.linalg.norm(step, axis=1), 0.0)
-    least = np.where(
-        nth > 0, (_programmed(targets, traced, edge) / intervals)[visit], 0
-    )
+    least = np.where(nth > 0, _programmed(targets, traced, edge)[visit] * share, 0)
     override = np.ones(len(first))
     inside = np.flatnonzero(run_of >= 0)
     np.minimum.at(override, run_of[inside], targets.override[inside])

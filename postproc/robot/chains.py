@@ -6,7 +6,7 @@ visits after it whose only predecessor is the one before them.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -20,16 +20,18 @@ class Edges:
     Attributes:
         first: Edges first[v] .. first[v + 1] - 1 lead to visit v, (n + 1,).
         source: Visit an edge comes from, (e,); negative where that is not known.
-        path: Equidistant samples of all edges, without the predecessor itself, with the
-            visit as the last one, (s, 6) joint angles [rad].
+        path: Samples of all edges, without the predecessor itself, with the visit as
+            the last one, (s, 6) joint angles [rad]; equidistant but for `uneven`.
         start: Samples start[i] .. start[i + 1] - 1 are those of edge i, (e + 1,); an
             edge from an unknown place may have none.
+        uneven: Samples whose neighbours are not equally far along the path, any number.
     """
 
     first: Ints
     source: Ints
     path: Array
     start: Ints
+    uneven: Ints = field(default_factory=lambda: np.empty(0, dtype=np.int64))
 
 
 @dataclass(frozen=True)
@@ -101,7 +103,7 @@ def cut(q: Array, coupling: Array, edges: Edges) -> Chains:
     )
     angles, values, start = q @ coupling.T, edges.path @ coupling.T, edges.start
     if len(values) > len(source):
-        values, start = _refined(angles, source, values, start)
+        values, start = _refined(angles, source, values, edges)
     follows = np.zeros(n, dtype=bool)
     single = np.flatnonzero((np.diff(edges.first) == 1) & ~unknown)
     follows[single] = source[edges.first[single]] == single - 1
@@ -114,9 +116,10 @@ def cut(q: Array, coupling: Array, edges: Edges) -> Chains:
 
 
 def _refined(
-    angles: Array, source: Ints, values: Array, start: Ints
+    angles: Array, source: Ints, values: Array, edges: Edges
 ) -> tuple[Array, Ints]:
     """Insert turning values inside every edge from a known place."""
+    start = edges.start
     filled = np.flatnonzero(np.diff(start) > 0)
     begins, lasts = start[filled], start[filled + 1] - 1
     before = np.vstack([values[:1], values[:-1]])
@@ -124,6 +127,6 @@ def _refined(
         source[filled, None] >= 0, angles[source[filled]], values[begins]
     )
     inside = np.ones(len(values), dtype=bool)
-    inside[lasts] = False
+    inside[lasts] = inside[edges.uneven] = False
     inside[begins[source[filled] < 0]] = False
     return with_turning_values(before, values, inside).reshape(-1, 6), start * 3

@@ -7,13 +7,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from postproc.exceptions import PlanError
-from postproc.language.visits import START, Motion, Visits
+from postproc.language.visits import Motion, Visits
 from postproc.virtual.arm import VirtualArm
 from postproc.virtual.arrivals import USUAL_SPEED, Arrivals, make_arrivals
 from postproc.virtual.drawing import stream
+from postproc.virtual.drive import Drive, plan_drives
 from postproc.virtual.gears import GearState, at_start, move
-from postproc.virtual.moves import Way, frames_at, way_to
+from postproc.virtual.moves import Way
 from postproc.virtual.rotation import pose_of_record
 from postproc.virtual.setup import Setup
 
@@ -45,11 +45,10 @@ class Run:
 
 @dataclass(frozen=True)
 class _Place:
-    """The arm after one visit; `way` is empty where the visit was not reached."""
+    """The arm after one visit; `why` says why it was not reached."""
 
     joints: Array
     gears: GearState
-    before: Array
     speed: float = USUAL_SPEED
     lasted: float = 0.0
     why: str = ""
@@ -60,8 +59,8 @@ def run_program(arm: VirtualArm, setup: Setup, visits: Visits) -> Run:
 
     Where a visit has several possible predecessors, the arm comes from the first of
     them that was run: one of the histories that really happen. Where it comes from an
-    unknown place, it starts at home with its gears as the seed drew them. A fly point
-    is passed exactly, not rounded, so that the path's own rounding is no arm error.
+    unknown place, it starts at home with its gears as the seed drew them. Fly points
+    are rounded; the arrival there is where the TCP passes closest.
 
     Args:
         arm: Whose gears and clock.
@@ -70,61 +69,37 @@ def run_program(arm: VirtualArm, setup: Setup, visits: Visits) -> Run:
     """
     poses = pose_of_record(visits.frames) if len(visits.frames) else np.eye(4)[None]
     start = _start(arm, setup)
+    drives = plan_drives(setup, visits, poses, start.joints)
     places: list[_Place] = []
-    for i in range(len(visits)):
-        came_from = _predecessor(visits, i)
-        place = start if came_from < 0 else places[came_from]
-        if came_from < 0 and setup.home is None:
-            place = _first_place(arm, setup, visits, i, poses, start)
-        places.append(_go(arm, setup, visits, i, poses, place))
+    for i, drive in enumerate(drives):
+        place = start if drive.came_from < 0 else places[drive.came_from]
+        if drive.stands_there:
+            gears = at_start(arm.gears, drive.begin, start.gears.side)
+            place = _Place(drive.begin, gears)
+        places.append(_go(arm, setup, visits, i, drive, place))
     return _collect(arm, setup, visits, poses, places)
-
-
-def _predecessor(visits: Visits, i: int) -> int:
-    """Return the visit that the arm comes from, or START."""
-    known = [int(p) for p in visits.predecessors(i) if 0 <= p < i]
-    return known[0] if known else START
 
 
 def _start(arm: VirtualArm, setup: Setup) -> _Place:
     """Return the arm before the program starts."""
     joints = UPRIGHT if setup.home is None else setup.home
     side = stream(arm.seed, "start").choice([-1.0, 1.0], 6)
-    return _Place(joints, at_start(arm.gears, joints, side), joints)
+    return _Place(joints, at_start(arm.gears, joints, side))
 
 
 def _go(
-    arm: VirtualArm, setup: Setup, visits: Visits, i: int, poses: Array, place: _Place
+    arm: VirtualArm, setup: Setup, visits: Visits, i: int, drive: Drive, place: _Place
 ) -> _Place:
     """Run one move; an arm that cannot go stays where it is."""
-    try:
-        frames = frames_at(visits, i, poses)
-        way = way_to(setup, visits, i, frames, place.joints, place.before)
-    except PlanError as error:
-        return replace(place, why=str(error), lasted=0.0)
-    lasted = _duration(setup, visits, i, way)
+    if drive.why:
+        return replace(place, why=drive.why, lasted=0.0)
+    lasted = _duration(setup, visits, i, drive.way)
     return _Place(
-        joints=way.joints[-1],
-        gears=move(arm.gears, place.gears, way.joints),
-        before=place.joints,
-        speed=max(way.length / lasted, 1e-6),
+        joints=drive.path[-1],
+        gears=move(arm.gears, place.gears, drive.path),
+        speed=max(drive.way.length / lasted, 1e-6),
         lasted=lasted + SETTLE,
     )
-
-
-def _first_place(
-    arm: VirtualArm, setup: Setup, visits: Visits, i: int, poses: Array, start: _Place
-) -> _Place:
-    """Return the arm standing at the first target, for a cell without a home."""
-    try:
-        frames = frames_at(visits, i, poses)
-        one = replace(visits, motion=np.full_like(visits.motion, Motion.JOINT))
-        way = way_to(setup, one, i, frames, start.joints, start.joints)
-    except PlanError:
-        return start
-    joints = way.joints[-1]
-    gears = at_start(arm.gears, joints, start.gears.side)
-    return _Place(joints, gears, joints)
 
 
 def _duration(setup: Setup, visits: Visits, i: int, way: Way) -> float:

@@ -1,12 +1,11 @@
 """What a program does, beyond the chapters of the corpus."""
 
-import numpy as np
 import pytest
 
 from postproc.language.flow import Resolved, Start, resolve
 from postproc.language.source import source_from_bytes
 from postproc.language.structure import Program, parse
-from postproc.language.visits import START
+from postproc.language.visits import START, FlyTrajectory, FlyType
 
 
 def program(text: str, name: str = "job") -> Program:
@@ -80,6 +79,7 @@ def test_settings_become_columns() -> None:
     found = body(
         "$LIN_SPD := 0.25\n$ROT_SPD := 1\n$ARM_SPD_OVR := 50\n$PROG_SPD_OVR := 50\n"
         "$FLY_TYPE := FLY_CART\n$FLY_DIST := 5\n$FLY_PER := 80\n$JNT_MTURN := FALSE\n"
+        "$FLY_TRAJ := FLY_TOL\n"
         "$ORNT_TYPE := WRIST_JNT\n$TOOL_RMT := TRUE\n"
         "MOVEFLY LINEAR TO POS(1,2,3,4,5,6,'W') ADVANCE\n"
         "$FLY_DIST := -1\n$TOOL_RMT := OFF\n"
@@ -90,10 +90,11 @@ def test_settings_become_columns() -> None:
     assert v.lin_spd.tolist() == [0.25, 0.1, 0.25]
     assert v.override.tolist() == [0.25] * 3
     assert v.fly.tolist() == [True, False, False]
-    assert v.fly_dist_mm[0] == 5
-    assert np.isnan(v.fly_dist_mm[1:]).all()
+    assert v.fly_dist_mm.tolist() == [5, -1, -1]
     assert v.fly_per.tolist() == [80] * 3
-    assert v.fly_cart.all() and v.nearest_turn.all() and v.wrist_joint.all()
+    assert (v.fly_type == FlyType.FLY_CART).all()
+    assert (v.fly_traj == FlyTrajectory.FLY_TOL).all()
+    assert v.nearest_turn.all() and v.wrist_joint.all()
     assert v.tool_remote.tolist() == [True, False, False]
     assert v.config_given.tolist() == [True, False, False]
     assert [v.configs[i] for i in v.config] == ["W", "", ""]

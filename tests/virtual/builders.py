@@ -32,6 +32,11 @@ class Program:
             "nearest": False,
             "distance": np.nan,
             "wrist": False,
+            "fly": False,
+            "fly_dist": np.nan,
+            "fly_per": np.nan,
+            "fly_type": 0,
+            "fly_traj": 0,
         }
         assert set(more) <= set(row)
         self.rows.append({**row, **more})
@@ -64,8 +69,10 @@ class Program:
             uframe=column("uframe", np.int64), frames=np.array(self.frames, float),
             frame_taught=np.zeros(len(self.frames), dtype=bool),
             tool_remote=no.copy(), nearest_turn=column("nearest", bool),
-            fly=no.copy(), fly_dist_mm=nan.copy(), fly_per=nan.copy(),
-            fly_cart=no.copy(), lin_spd=column("speed", float), rot_spd=nan.copy(),
+            fly=column("fly", bool), fly_dist_mm=column("fly_dist", float),
+            fly_per=column("fly_per", float), fly_type=column("fly_type", np.int64),
+            fly_traj=column("fly_traj", np.int64), lin_spd=column("speed", float),
+            rot_spd=nan.copy(),
             override=np.ones(n), wrist_joint=column("wrist", bool),
             reason=nothing.copy(), reasons=("",),
             pred_start=np.cumsum([0] + [len(p) for p in preds]),

@@ -1,0 +1,129 @@
+"""Paths whose fly points are rounded: new samples, and where each point is passed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from postproc.motion.corner import Corners, corners, on_corner
+from postproc.motion.paths import along
+from postproc.motion.targets import Targets
+from postproc.motion.trace import Trace
+from postproc.robot.arm import Arm
+from postproc.robot.chains import Edges
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Bools = NDArray[np.bool_]
+
+SAMPLES = 4  # on each side of the nearest point of a corner that is not flat
+EMPTY = 1e-9  # part of a move between two zones that is nothing
+
+
+@dataclass(frozen=True)
+class _Pieces:
+    """What e edges are made of: the end of a corner, a middle, the begin of a corner.
+
+    Attributes:
+        corner: Corner at both ends, (2, e), -1 where there is none.
+        begin, end: Where the middle begins and ends, (e,) in u.
+        count: Samples of the three pieces, (3, e).
+    """
+
+    corner: Ints
+    begin: Array
+    end: Array
+    count: Ints
+
+
+def rounded(arm: Arm, targets: Targets, traced: Trace) -> Trace:
+    """Round the fly points of a trace.
+
+    Its joint angles and flange poses at rounded points become those of the point of the
+    path that lies nearest to the target; that is also where an edge ends and the next
+    one begins. Edges without a corner stay as they are.
+    """
+    found = corners(arm, targets, traced)
+    visit = found.zones.visit
+    if len(visit) == 0:
+        return traced
+    q, flange = np.array(traced.q), np.array(traced.flange)
+    q[visit], flange[visit] = found.q, arm.flange(found.q)
+    edges, share = _resampled(traced, found)
+    return replace(traced, q=q, flange=flange, edges=edges, share=share)
+
+
+def _pieces(traced: Trace, found: Corners) -> _Pieces:
+    """Cut the edges at the ends of the zones."""
+    e, zones = len(traced.edges.source), found.zones
+    rows = np.arange(len(zones.visit))
+    corner = np.full((2, e), -1)
+    corner[0, zones.out], corner[1, zones.into] = rows, rows
+    begin, end = np.zeros(e), np.ones(e)
+    begin[zones.out], end[zones.into] = zones.behind, 1 - zones.before
+    flat = found.flat
+    count = np.zeros((3, e), dtype=np.int64)
+    count[0, zones.out] = np.where(flat, 0, SAMPLES)
+    count[2, zones.into] = np.where(flat, 1, SAMPLES)
+    before = np.diff(traced.edges.start)
+    inner = np.ceil(before * (end - begin) - EMPTY).astype(np.int64)
+    count[1] = np.where(end - begin > EMPTY, np.minimum(inner, before), 0)
+    return _Pieces(corner, begin, end, count)
+
+
+def _resampled(traced: Trace, found: Corners) -> tuple[Edges, Array]:
+    """Sample all edges anew; return them and their samples' share of the way."""
+    pieces, old = _pieces(traced, found), traced.edges
+    touched = np.asarray((pieces.corner >= 0).any(axis=0))
+    start = np.concatenate([[0], np.cumsum(pieces.count.sum(axis=0))])
+    edge = np.repeat(np.arange(len(old.source)), np.diff(start))
+    nth = np.arange(len(edge)) - start[edge] + 1
+    path, share = np.empty((len(edge), 6)), np.empty(len(edge))
+    kept = ~touched[edge]
+    same = old.start[edge[kept]] + nth[kept] - 1
+    path[kept], share[kept] = old.path[same], traced.share[same]
+    split = np.cumsum(pieces.count, axis=0)[:, edge]
+    end_of_zone = ~kept & (nth <= split[0])
+    middle = ~kept & (nth > split[0]) & (nth <= split[1])
+    begin_of_zone = ~kept & (nth > split[1])
+    rows = np.flatnonzero(middle)
+    at, part = edge[rows], (nth - split[0])[rows]
+    long = (pieces.end - pieces.begin)[at] / pieces.count[1, at]
+    path[rows] = along(traced, at, pieces.begin[at] + part * long)
+    share[rows] = long
+    for side, chosen in ((0, end_of_zone), (1, begin_of_zone)):
+        rows = np.flatnonzero(chosen)
+        corner = pieces.corner[side, edge[rows]]
+        part = nth[rows] - (0 if side == 0 else split[1][rows])
+        s, step = _places(found, corner, part, pieces.count[2 * side, edge[rows]], side)
+        path[rows] = on_corner(traced, found.zones, corner, s)
+        size = (found.zones.behind, found.zones.before)[side][corner]
+        share[rows] = 2 * size * step
+    return replace(
+        old, path=path, start=start, uneven=_uneven(pieces, touched, start)
+    ), share
+
+
+def _places(
+    found: Corners, corner: Ints, part: Ints, count: Ints, side: int
+) -> tuple[Array, Array]:
+    """Give s of samples behind (side 0) or before the nearest point, and its step."""
+    nearest = found.nearest[corner]
+    step = (1 - nearest if side == 0 else nearest) / count
+    return (nearest if side == 0 else 0.0) + part * step, step
+
+
+def _uneven(pieces: _Pieces, touched: Bools, start: Ints) -> Ints:
+    """List the samples whose neighbours are not equally far along the path.
+
+    The last one of a piece, and the first one where its piece does not begin at a
+    sample because the corner before is flat.
+    """
+    first, middle, _ = pieces.count
+    flat = (pieces.corner[0] >= 0) & (first == 0)
+    ends = [start[:-1] + first, start[:-1] + first + middle]
+    joints = [ends[0][touched & (first > 0)], ends[1][touched & (middle > 0)]]
+    after = start[:-1][touched & flat] + 1
+    return np.unique(np.concatenate([*(j - 1 for j in joints), after - 1]))
