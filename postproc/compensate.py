@@ -14,6 +14,7 @@ from postproc.accuracy.error_statistics import ErrorStatistics
 from postproc.accuracy.model import Model
 from postproc.arrivals import tell_arrivals
 from postproc.clock import Clock, Progress, silent
+from postproc.cloning import give_own_points
 from postproc.exceptions import CellError, ProgramError
 from postproc.language.source import Source
 from postproc.language.stamp import is_stamped
@@ -84,6 +85,11 @@ def compensate(
         planned = plan_visits(reading.visits, cell)
     states = states_of(planned.plan, cell, _temperature(cell, options))
     corrected = settle(reading, planned, states, cell, model, options, clock)
+    if options.clone:
+        with clock("clone"):
+            reading = give_own_points(reading, corrected.proposal, cell)
+        if reading.cloned:
+            corrected = settle(reading, planned, states, cell, model, options, clock)
     with clock("report"):
         return report(
             name, reading, planned, states, corrected, cell, model, options, clock
@@ -170,7 +176,7 @@ def report(
         ),
         stages=clock.stages,
         position=planned.plan.tcp[:, :3, 3] - planned.plan.aside,
-        sources={source.name: source.data for source in reading.sources},
+        sources={source.name: source.data for source, _ in reading.originals},
     )
 
 

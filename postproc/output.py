@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from postproc import __version__
 from postproc.language.rewrite import edits as number_edits
-from postproc.language.source import Edit, Source, apply
+from postproc.language.source import Edit, Source, apply, compose
 from postproc.language.stamp import stamp_line
 from postproc.planning import Reading
 from postproc.sidecar import FileRecord, Sidecar, block_checksums, sha256
@@ -26,7 +26,7 @@ class Output:
     Attributes:
         files: All files of the program by name, the program first.
         records: How those that changed differ from their source.
-        edits: What was changed in every file, in the order of the files.
+        edits: Numbers that were changed in every file, in the order of the files.
     """
 
     files: Mapping[str, bytes]
@@ -78,9 +78,10 @@ def write_numbers(
         model: Id of the model, for the stamp.
     """
     edits = number_edits(reading.visits.literals, reading.sources, literals, values)
-    nothing = not any(edits)
+    nothing = not any(edits) and not any(reading.cloned)
     files, records = {}, {}
-    for number, (source, own) in enumerate(zip(reading.sources, edits, strict=True)):
+    for number, (source, cloned) in enumerate(reading.originals):
+        own = compose(cloned, edits[number]) if cloned else edits[number]
         files[source.name] = source.data
         if own or (number == 0 and nothing):
             stamp = stamp_line(__version__, model, source)

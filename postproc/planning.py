@@ -15,7 +15,7 @@ from postproc.language.diagnostic import Diagnostic
 from postproc.language.flow import Start, resolve
 from postproc.language.lsv import Variables, read_variables
 from postproc.language.reached import never_reached
-from postproc.language.source import Source, source_from_bytes
+from postproc.language.source import Edit, Source, source_from_bytes
 from postproc.language.structure import Program, parse
 from postproc.language.visits import Visits
 from postproc.language.world import base_name
@@ -39,11 +39,23 @@ class Reading:
         sources: Its files in the order of `Visits.files`.
         visits: Every arrival at a target.
         diagnostics: What else was found.
+        cloned: Edits, file by file, that gave `sources` clones of variables; empty
+            where there are none. Lines of visits are those before these edits.
+        given: The files as they were before that; empty where nothing was cloned.
     """
 
     sources: tuple[Source, ...]
     visits: Visits
     diagnostics: tuple[Diagnostic, ...]
+    cloned: tuple[tuple[Edit, ...], ...] = ()
+    given: tuple[Source, ...] = ()
+
+    @property
+    def originals(self) -> tuple[tuple[Source, tuple[Edit, ...]], ...]:
+        """Return every file as it was given, with the edits that led to `sources`."""
+        if not self.given:
+            return tuple((source, ()) for source in self.sources)
+        return tuple(zip(self.given, self.cloned, strict=True))
 
 
 @dataclass(frozen=True)

@@ -38,12 +38,19 @@ class Proposal:
         values: Their numbers, (m, 6) in the file's units.
         corrected: Visits whose target moves, (n,).
         decisions: What was decided for every visit.
+        usable: Visits that could be corrected if they had their points alone, (n,).
+        change_mm: What they would be corrected by, as arrivals at one point compare
+            it, (n, 3) [mm].
+        fixed: Literals that must keep their values for what else depends on them, (k,).
     """
 
     edited: Ints
     values: Array
     corrected: Bools
     decisions: Decisions
+    usable: Bools
+    change_mm: Array
+    fixed: Ints
 
 
 def propose(
@@ -82,6 +89,7 @@ def propose(
     change = change_mm(visits, numbers, correction)
     agreement = agree(visits.literal, reasons.none, numbers, change)
     trusted = ~np.any([held, *solved.outside.values()], axis=0)
+    usable = reasons.none
     stay = must_stay(visits, agreement, change, trusted, cell)
     chosen, unsafe = mark_disagreement(visits, agreement, stay, cell, reasons)
     status = np.where(reasons.none, Status.SAFE, Status.GUARDED)
@@ -107,7 +115,13 @@ def propose(
         std_error=solved.std_error,
     )
     return Proposal(
-        agreement.literal[chosen], agreement.values[chosen], corrected, decisions
+        agreement.literal[chosen],
+        agreement.values[chosen],
+        corrected,
+        decisions,
+        usable,
+        change,
+        agreement.literal[np.any([*stay.values()], axis=0)],
     )
 
 
@@ -161,9 +175,9 @@ def must_stay(
     """
     pinned = np.array([visits.literals.pinned[row] for row in agreement.literal], str)
     hurt = worsened(visits, agreement, change, trusted, cell.limits.agree_mm)
-    found = {f"{why}: give the move a point of its own": pinned == why
+    found = {f"{why}: give the move a point of its own (see --clone)": pinned == why
              for why in sorted({*pinned.tolist()} - {""})}  # fmt: skip
-    text = "a target computed from it would land farther off: give each its own point"
+    text = "a target computed from it would land farther off (see --clone)"
     return found | {text: hurt}
 
 
@@ -225,7 +239,7 @@ def mark_disagreement(
     unsafe = reasons.none & has & ~together[at]
     text = (
         f"its arrivals differ by more than agree_mm = {limit:g}: give each move a "
-        "point of its own"
+        "point of its own (see --clone)"
     )
     reasons.mark(unsafe & agreement.usable[at] & apart[at], text)
     for why, literals in stay.items():

@@ -218,10 +218,30 @@ def test_restore_without_a_record(desk):
     assert found.exit_code == 2 and "record" in found.stderr
 
 
-def test_cloning_is_refused_rather_than_not_done(desk):
-    found = desk.compensate(desk.put("job.pdl", program(FIRST)), "--clone")
-    assert found.exit_code == 2 and "--clone" in found.stderr
-    assert desk.names() == {"job.pdl"}
+def test_clones_are_written_checked_compared_and_restored(desk):
+    to_p = "MOVE JOINT TO p"
+    low = "MOVE JOINT TO {-12.0, -8.0, -140.0, -40.0, 20.0, -60.0}"
+    lines = ("p := POS(100.0, 200.0, 150.0, 0.0, 175.0, 0.0, '')", FIRST, to_p)
+    source = program(*lines, low, to_p)
+    given = desk.put("job.pdl", source)
+    (desk.folder / "new").mkdir()
+    out = desk.folder / "new" / "job.pdl"
+    found = desk.compensate(given, "--clone", "-o", out)
+    assert found.exit_code == 0 and "job.pdl:3: cloned: p:" in found.stderr
+    assert b"  p__2 : POSITION\r\n" in out.read_bytes()
+    report = desk.folder / "r.json"
+    desk.compensate(given, "--clone", "-o", out, "--report", report)
+    row = json.loads(report.read_bytes())["targets"][3]
+    assert row["name"] == "p__2" and row["status"] == "safe"
+    assert (row["line"], row["literal"]["line"]) == (9, 5)
+    checked = cli("check", desk.folder / "new")
+    assert checked.exit_code == 0, checked.stdout
+    compared = cli("diff", given, out)
+    assert compared.exit_code == 1 and "p__2" in compared.stdout
+    again = desk.compensate(out, "--clone")
+    assert again.exit_code == 2 and "compensated already" in again.stderr
+    assert cli("restore", out).exit_code == 0
+    assert out.read_bytes() == source
 
 
 def test_temperature_outside_the_survey_is_guarded(desk):

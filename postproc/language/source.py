@@ -130,3 +130,50 @@ def apply(data: bytes, edits: Iterable[Edit]) -> bytes:
         done = end
     parts.append(data[done:])
     return b"".join(parts)
+
+
+def compose(first: Iterable[Edit], second: Iterable[Edit]) -> list[Edit]:
+    """Make one list of edits of two that follow each other.
+
+    Args:
+        first: Edits of a text.
+        second: Edits of what comes out, each inside or outside of a new piece.
+
+    Raises:
+        ValueError: An edit of the second list reaches over the border of a new piece.
+
+    >>> data, first = b"p := 1", [Edit(Span(6, 6), b" q := 1")]
+    >>> second = [Edit(Span(5, 6), b"2.0"), Edit(Span(12, 13), b"3.0")]
+    >>> apply(data, compose(first, second))
+    b'p := 2.0 q := 3.0'
+    """
+    later = sorted(second, key=lambda edit: edit.span)
+    found: list[Edit] = []
+    at, shift = 0, 0  # of `later`; from the first text to what comes out
+    for (start, end), new in sorted(first, key=lambda edit: edit.span):
+        begin = start + shift
+        at += _take_over(later, at, begin, shift, found)
+        inside = []
+        while at < len(later) and later[at].span.start < begin + len(new):
+            (a, b), text = later[at]
+            if a < begin or b > begin + len(new):
+                raise ValueError("an edit reaches over the border of another")
+            inside.append(Edit(Span(a - begin, b - begin), text))
+            at += 1
+        found.append(Edit(Span(start, end), apply(new, inside)))
+        shift += len(new) - (end - start)
+    _take_over(later, at, None, shift, found)
+    return found
+
+
+def _take_over(
+    edits: list[Edit], at: int, until: int | None, shift: int, found: list[Edit]
+) -> int:
+    """Take over the edits that end before an offset; return how many."""
+    count = 0
+    for (start, end), new in edits[at:]:
+        if until is not None and end > until:
+            break
+        found.append(Edit(Span(start - shift, end - shift), new))
+        count += 1
+    return count

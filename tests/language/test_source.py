@@ -11,6 +11,7 @@ from postproc.language.source import (
     Source,
     Span,
     apply,
+    compose,
     read_source,
     source_from_bytes,
 )
@@ -79,3 +80,31 @@ def test_newline_is_that_of_the_first_line() -> None:
     assert Source("x", b"a\r\nb\n").newline == b"\r\n"
     assert Source("x", b"a").newline == b"\r\n"
     assert np.array_equal(Source("x", b"a").line_starts, [0])
+
+
+@given(st.binary(max_size=20), st.data())
+def test_two_rounds_of_edits_make_one(data: bytes, draw: st.DataObject) -> None:
+    def edits(size: int, borders: list[int]) -> list[Edit]:
+        points = draw.draw(st.lists(st.integers(0, size), max_size=8))
+        points = sorted(points)[: len(points) // 2 * 2]
+        pairs = zip(points[0::2], points[1::2], strict=True)
+        new = st.binary(max_size=4)
+        return [
+            Edit(Span(a, b), draw.draw(new))
+            for a, b in pairs
+            if a < b and not any(a < border < b for border in borders)
+        ]
+
+    first = edits(len(data), [])
+    borders, shift = [], 0
+    for (start, end), new in first:
+        borders += [start + shift, start + shift + len(new)]
+        shift += len(new) - (end - start)
+    middle = apply(data, first)
+    second = edits(len(middle), borders)
+    assert apply(data, compose(first, second)) == apply(middle, second)
+
+
+def test_an_edit_over_the_border_of_another_is_refused() -> None:
+    with pytest.raises(ValueError, match="border"):
+        compose([Edit(Span(2, 2), b"xy")], [Edit(Span(1, 3), b"")])
