@@ -68,7 +68,7 @@ def test_same_seed_same_survey(job_folder, survey, tmp_path):
     ("options", "said"),
     [
         (("--poses", "0"), "0 poses are no survey"),
-        (("--mode", "both"), "no survey mode 'both'. Use lhs or optimal"),
+        (("--mode", "both"), "no survey mode 'both'. Use lhs, optimal, d-optimal"),
         (("--tracker", "1,2"), "--tracker 1,2: not a position. Write x,y,z in mm"),
     ],
 )

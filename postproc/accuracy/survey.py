@@ -10,6 +10,7 @@ from scipy.stats import qmc
 
 from postproc.accuracy.batch import Batch
 from postproc.accuracy.combination import Combination
+from postproc.accuracy.exchange import choose, gain_d, gain_i
 from postproc.accuracy.library import BASE_EFFECTS, propose
 from postproc.accuracy.observability import Observability, observe
 from postproc.accuracy.reachability import joint_box, usable
@@ -20,8 +21,8 @@ from postproc.robot.state import States, make_states
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
+MODES = ("lhs", "optimal", "d-optimal")
 POOL = 6  # candidate poses per wanted pose in an optimal design
-SWAPS = 2  # passes of exchange
 TYPICAL_NOISE = 3e-5  # [m] tracker and repeatability of one coordinate
 ATTEMPTS = 12  # times the number of drawn poses doubles before giving up
 
@@ -35,7 +36,7 @@ class Design:
         side: Arrival directions of the first approach, (n, 6), +1 or -1; the second
             approach comes from the other side of every joint.
         probe: Index of the probe point, (n,).
-        mode: "lhs" or "optimal".
+        mode: One of MODES.
         observability: What the design shows of the base model.
     """
 
@@ -69,23 +70,26 @@ def design_survey(
         arm: The arm.
         probes: Probe points in the flange frame, (k, 3) [m]; poses take turns.
         poses: Number of poses.
-        mode: "lhs" (Latin hypercube) or "optimal" (D-optimal exchange).
+        mode: "lhs" (Latin hypercube); "optimal": the predicted errors are known best,
+            on average over the workspace (Bayesian I-optimal exchange); "d-optimal":
+            the parameters are.
         tracker: Tracker position in the base frame, (3,) [m], or None.
         seed: Of the random draws.
 
     Raises:
         PostprocError: A wrong mode or number, or too few poses can be measured.
     """
-    if mode not in ("lhs", "optimal"):
-        raise PostprocError(f"there is no survey mode {mode!r}. Use lhs or optimal")
+    if mode not in MODES:
+        raise PostprocError(f"no survey mode {mode!r}. Use {', '.join(MODES)}")
     if poses < 1:
         raise PostprocError(f"{poses} poses are no survey. Ask for 1 or more")
     rng = np.random.default_rng(seed)
-    wanted = poses * (POOL if mode == "optimal" else 1)
+    wanted = poses * (1 if mode == "lhs" else POOL)
     pool = _candidates(arm, np.atleast_2d(probes), wanted, tracker, rng)
-    if mode == "optimal":
-        pool = pool[_optimal(arm, pool, poses)]
     X, names = _whitened(arm, pool)
+    if mode != "lhs":
+        kept = choose(X, poses, gain_i(X) if mode == "optimal" else gain_d)
+        pool, X = pool[kept], X[kept]
     seen = observe(X.reshape(-1, X.shape[2]), names, floor=1.0)
     return Design(pool.q, pool.direction, pool.tool_id, mode, seen)
 
@@ -134,46 +138,3 @@ def _whitened(arm: Arm, states: States) -> tuple[Array, tuple[str, ...]]:
     both = [base.columns(Batch(arm, s)) for s in (states, back)]
     X = np.concatenate(both, axis=1) * base.scales / TYPICAL_NOISE
     return X, base.names
-
-
-def _optimal(arm: Arm, pool: States, poses: int) -> Ints:
-    """Choose poses by D-optimality: greedily, then by exchange."""
-    X, _ = _whitened(arm, pool)
-    inverse = np.eye(X.shape[2])
-    chosen: list[int] = []
-    free = np.ones(len(pool), dtype=bool)
-    for _ in range(poses):
-        best = _best(X, inverse, free)
-        inverse = _updated(inverse, X[best], +1.0)
-        chosen.append(best)
-        free[best] = False
-    for _ in range(SWAPS):
-        before = sorted(chosen)
-        for place, one in enumerate(list(chosen)):
-            inverse = _updated(inverse, X[one], -1.0)
-            free[one] = True
-            best = _best(X, inverse, free)
-            inverse = _updated(inverse, X[best], +1.0)
-            chosen[place], free[best] = best, False
-        if sorted(chosen) == before:
-            break
-    return np.array(sorted(chosen), dtype=np.int64)
-
-
-def _best(X: Array, inverse: Array, free: NDArray[np.bool_]) -> int:
-    """Find the free pose that adds most to the determinant of the information."""
-    part = X[free]
-    flat = part.reshape(-1, X.shape[2])
-    spread = (flat @ inverse).reshape(part.shape)
-    gain = np.linalg.slogdet(
-        np.eye(X.shape[1]) + spread @ np.swapaxes(part, 1, 2)
-    ).logabsdet
-    return int(np.flatnonzero(free)[np.argmax(gain)])
-
-
-def _updated(inverse: Array, rows: Array, sign: float) -> Array:
-    """Add (+1) or remove (-1) rows of an inverse information matrix (Woodbury)."""
-    spread = inverse @ rows.T
-    middle = np.linalg.inv(sign * np.eye(len(rows)) + rows @ spread)
-    updated: Array = inverse - spread @ middle @ spread.T
-    return updated

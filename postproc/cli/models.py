@@ -66,7 +66,7 @@ def survey(
     output: Annotated[Path, typer.Option("-o", "--output", help="SURVEY.pdl")],
     poses: Annotated[int, typer.Option("--poses", help="Number of poses.")] = 300,
     mode: Annotated[
-        str, typer.Option("--mode", help="lhs (Latin hypercube) or optimal.")
+        str, typer.Option("--mode", help="lhs, optimal (of predictions) or d-optimal.")
     ] = "lhs",
     tracker: Annotated[
         str | None, typer.Option("--tracker", help="x,y,z [mm] in the base frame.")

@@ -1,0 +1,103 @@
+"""Payload and temperature: compensated as declared, refused where not surveyed."""
+
+from __future__ import annotations
+
+import json
+import re
+
+import numpy as np
+import pytest
+
+from tests.conftest import CELL
+from tests.written import FIRST, POSE, cli, program
+
+EFFECTS = "payload,thermal"
+
+
+@pytest.fixture(scope="module")
+def campaign(tmp_path_factory):
+    """A survey at two payloads along a warm-up, and the model fitted to it."""
+    folder = tmp_path_factory.mktemp("state")
+    (folder / "cell.toml").write_text(CELL)
+    (folder / "loaded.toml").write_text(declared(60, 26))
+    rng, n = np.random.default_rng(0), 260
+    low, high = [-90, -45, -170, -150, -110, -150], [90, 60, -40, 150, 110, 150]
+    joints = ",".join(f"q{j}_deg" for j in range(1, 7))
+    sides = ",".join(f"lambda{j}" for j in range(1, 7))
+    lines = [f"id,{joints},{sides},payload_kg,temperature_c,tool_id"]
+    for k in range(n):
+        q = ",".join(f"{v:.4f}" for v in rng.uniform(low, high))
+        side = ",".join(str(s) for s in rng.choice([-1, 1], 6))
+        state = f"{120 * (k // 26 % 2)},{20 + 12 * (1 - np.exp(-3 * k / n)):.2f}"
+        lines.append(f"{k + 1},{q},{side},{state},{k % 3}")
+    (folder / "rows.csv").write_text("\n".join(lines) + "\n")
+    cell = ("--cell", folder / "loaded.toml")
+    assert run("simulate", folder / "rows.csv", *cell, "--seed", 3, "--effects",
+               EFFECTS, "-o", folder / "s.csv") == 0  # fmt: skip
+    assert run("fit", folder / "s.csv", *cell, "-o", folder / "m.json", "--effects",
+               f"geometry,backlash,backlash_profile,{EFFECTS}") == 0  # fmt: skip
+    (folder / "job.pdl").write_bytes(program(FIRST, POSE))
+    return folder
+
+
+def run(*arguments):
+    found = cli(*arguments)
+    assert found.exit_code in (0, 1), found.stderr
+    return found.exit_code
+
+
+def declared(payload=None, temperature=None):
+    """Write a cell that declares a payload and a temperature."""
+    text = CELL
+    if payload is not None:
+        text += f"[payload]\nmass_kg = {payload}\ncom_mm = [0.0, 0.0, 150.0]\n"
+    if temperature is not None:
+        text += f"[environment]\ntemperature_c = {temperature}\n"
+    return text
+
+
+def compensate(folder, payload, temperature):
+    """Compensate the job in a declared state; the report's rows."""
+    cell, report = folder / "now.toml", folder / "r.json"
+    cell.write_text(declared(payload, temperature))
+    run("compensate", folder / "job.pdl", "--cell", cell, "--model",
+        folder / "m.json", "-o", folder / "out.pdl", "--report", report)  # fmt: skip
+    return json.loads(report.read_bytes())["targets"]
+
+
+@pytest.mark.parametrize(("payload", "temperature"), [(0, 21), (120, 31), (60, 26)])
+def test_a_job_is_compensated_for_the_state_that_the_cell_declares(
+    campaign, payload, temperature
+):
+    rows = compensate(campaign, payload, temperature)
+    assert [row["status"] for row in rows] == ["safe", "safe"]
+    found = cli("simulate", campaign / "out.pdl", "--cell", campaign / "now.toml",
+                "--wanted", campaign / "job.pdl", "--seed", 3, "--effects", EFFECTS,
+                "--json", "-")  # fmt: skip
+    error = json.loads(found.stdout)["true_error"]
+    # Where the arm was before its first move is not known: its backlash stays.
+    later = (error["mean_mm"] * error["n"] - error["max_mm"]) / (error["n"] - 1)
+    assert later < 0.03
+
+
+def test_another_state_is_another_correction(campaign):
+    empty, full = (compensate(campaign, p, 26) for p in (0, 120))
+    cold, warm = (compensate(campaign, 60, t) for t in (21, 31))
+    for a, b in ((empty, full), (cold, warm)):
+        moved = np.subtract(a[1]["correction_mm"], b[1]["correction_mm"])
+        assert np.linalg.norm(moved) > 0.05
+
+
+@pytest.mark.parametrize(
+    ("payload", "temperature", "why"),
+    [
+        (200, 26, r"payload outside the surveyed 0 to 120 kg"),
+        (60, 45, r"temperature outside the surveyed 20.* to 3\d.* deg C"),
+        (None, 26, r"payload is not known, and the model needs it"),
+        (60, None, r"temperature is not known, and the model needs it"),
+    ],
+)
+def test_a_state_that_was_not_surveyed_is_refused(campaign, payload, temperature, why):
+    for row in compensate(campaign, payload, temperature):
+        assert row["status"] == "guarded" and re.search(why, row["why"]), row
+        assert row["corrected"] == row["original"]
