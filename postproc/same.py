@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import fields, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,11 +14,10 @@ from postproc.planning import Reading
 
 Ints = NDArray[np.int64]
 
-_EQUAL = (
-    "files file motion target via values distance_mm aux config_given frames "
-    "frame_taught tool base uframe tool_remote nearest_turn fly fly_dist_mm fly_per "
-    "fly_cart lin_spd rot_spd override wrist_joint pred_start pred measure_id"
-).split()
+_APART = frozenset(
+    "line config configs literal literals follows name names reason reasons".split()
+)
+"""Columns that are numbered anew, or speak of lines: they are compared by meaning."""
 
 
 def same_moves(
@@ -44,7 +43,8 @@ def same_moves(
         differ.
     """
     v, w = before.visits, after.visits
-    if len(v) != len(w) or any(_differ(getattr(v, n), getattr(w, n)) for n in _EQUAL):
+    columns = [f.name for f in fields(Visits) if f.name not in _APART]
+    if len(v) != len(w) or any(_differ(getattr(v, n), getattr(w, n)) for n in columns):
         return None
     if _configs(v) != _configs(w) or ((v.reason > 0) != (w.reason > 0)).any():
         return None
