@@ -20,6 +20,7 @@ from postproc.language.source import Source
 from postproc.language.stamp import is_stamped
 from postproc.notes import (
     assumed_off,
+    followed_pages,
     listing_cost,
     missing_file,
     overruled_strings,
@@ -167,6 +168,7 @@ def report(
         after=ErrorStatistics.of(after),
         diagnostics=(
             *reading.diagnostics,
+            *followed_pages(visits),
             *missing_file(visits),
             *overruled_strings(visits, planned.plan),
             *untimed_runs(visits, planned.plan),

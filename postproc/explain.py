@@ -9,10 +9,11 @@ from pathlib import Path
 import numpy as np
 
 from postproc.accuracy.model import Model, load_model
-from postproc.compensate import compensate, name_files
+from postproc.compensate import compensate
 from postproc.console import Column, printable
 from postproc.exceptions import ProgramError
-from postproc.jobs import find_variables, read_bytes
+from postproc.jobs import read_files
+from postproc.kinds import VARIABLES, suffix_of
 from postproc.language.visits import ELSEWHERE, START, Visits
 from postproc.listing import arrows, print_listing, status_colour
 from postproc.options import Options
@@ -105,7 +106,7 @@ class Explanation:
         name = v.names[v.name[i]] or ("VIA" if v.via[i] else "inline")
         sides = arrows(self._direction(i))
         angles = " ".join(f"{q:8.3f}" for q in np.rad2deg(plan.q[i]))
-        cells = [str(v.line[i]), name, self._from(i), angles, sides]
+        cells = [self._line(i), name, self._from(i), angles, sides]
         if self.outcome is None:
             return [*cells, self.planned.reasons[i]]
         d = self.outcome.decisions
@@ -124,10 +125,14 @@ class Explanation:
     def _from(self, i: int) -> str:
         """Name the lines that visit i is reached from."""
         names = {START: "start", ELSEWHERE: "unknown"}
-        lines = self.visits.line
         before = self.visits.predecessors(i)
-        told = [names.get(int(p)) or f"line {lines[p]}" for p in before]
+        told = [names.get(int(p)) or self._line(int(p), "line ") for p in before]
         return ", ".join(dict.fromkeys(told))
+
+    def _line(self, i: int, word: str = "") -> str:
+        """Name the line of visit i; that of a page with the page's name."""
+        v = self.visits
+        return f"{f'{v.files[v.file[i]]}:' if v.file[i] else word}{v.line[i]}"
 
     def _chosen(self, line: int | None) -> list[int]:
         """Choose the visits to show: those whose move or literal is on a line."""
@@ -174,12 +179,14 @@ def explain(
     outcome = None
     if model is not None:
         (name, source), *rest = files.items()
+        values = {n: data for n, data in rest if suffix_of(n) == VARIABLES}
         outcome = compensate(
             source,
             cell,
             model,
             name=name,
-            variables=rest[0][1] if rest else None,
+            variables=next(iter(values.values()), None),
+            pages={n: data for n, data in rest if n not in values},
             options=Options(temperature=temperature),
         )
     return Explanation(reading.visits, planned, outcome)
@@ -197,8 +204,6 @@ def explain_file(
     Raises:
         PostprocError: A file cannot be read or used.
     """
-    values = lsv or find_variables(program)
-    variables = None if values is None else read_bytes(values)
-    files = name_files(program.name, read_bytes(program), variables)
+    files = read_files(program, lsv)
     fitted = None if model is None else load_model(model)
     return explain(files, load_cell(cell), fitted, temperature)

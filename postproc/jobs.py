@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import sys
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from postproc.accuracy.model import Model, load_model
 from postproc.clock import Progress, silent
-from postproc.compensate import compensate
+from postproc.compensate import compensate, name_files
 from postproc.exceptions import ProgramError
 from postproc.files import STREAM, check_places, write_all
+from postproc.language.diagnostic import Diagnostic
 from postproc.options import Options
+from postproc.page_files import Pages, find_pages
 from postproc.planning import VARIABLES
 from postproc.report import Outcome
 from postproc.robot.cell import Cell, load_cell
@@ -27,6 +30,8 @@ class Job:
         name: The program's file name.
         source: Its bytes.
         variables: Path and bytes of its variable file, or None.
+        pages: Paths and bytes of its pages.
+        notes: What it names and is not followed.
         cell: The cell.
         model: The model.
         inputs: Every file that was read.
@@ -36,6 +41,8 @@ class Job:
     name: str
     source: bytes
     variables: tuple[Path, bytes] | None
+    pages: tuple[tuple[Path, bytes], ...]
+    notes: tuple[str, ...]
     cell: Cell
     model: Model
     inputs: tuple[Path, ...]
@@ -66,21 +73,29 @@ class Job:
             name, source = path.name, read_bytes(path)
             lsv = lsv or find_variables(path)
         values = None if lsv is None else (lsv, read_bytes(lsv))
-        inputs = tuple(p for p in (path, lsv, cell, model) if p is not None)
-        return cls(path, name, source, values, loaded, fitted, inputs)
+        found = Pages() if path is None else find_pages(path)
+        pages = tuple((page, read_bytes(page)) for page in found.paths)
+        given = (path, lsv, cell, model, *found.paths)
+        inputs = tuple(p for p in given if p is not None)
+        return cls(
+            path, name, source, values, pages, found.notes, loaded, fitted, inputs
+        )
 
     def run(self, options: Options, progress: Progress = silent) -> Outcome:
         """Compensate the program."""
         variables = None if self.variables is None else self.variables[1]
-        return compensate(
+        outcome = compensate(
             self.source,
             self.cell,
             self.model,
             name=self.name,
             variables=variables,
+            pages={page.name: data for page, data in self.pages},
             options=options,
             progress=progress,
         )
+        left = (Diagnostic(self.name, 1, "not-followed", text) for text in self.notes)
+        return replace(outcome, diagnostics=(*outcome.diagnostics, *left))
 
     def write(
         self,
@@ -134,17 +149,37 @@ class Job:
             piped: The program goes elsewhere; only values get a file.
         """
         values = target.with_suffix(VARIABLES)
-        places = {
+        files: dict[Path, bytes] = {}
+        for page, _ in reversed(self.pages):
+            if page.name in outcome.outputs:
+                place = _page_place(page, target)
+                files |= _with_record(outcome, {page.name: place}, place)
+        own = {
             name: target if name == self.name else values
             for name in reversed(list(outcome.outputs))
-            if not (piped and name == self.name)
+            if name not in {page.name for page, _ in self.pages}
+            and not (piped and name == self.name)
         }
-        if not places:
-            return {}
-        names = {name: place.name for name, place in places.items()}
-        record = rename_files(outcome.sidecar, names).encode()
-        files = {place: outcome.outputs[name] for name, place in places.items()}
-        return {sidecar_path(values if piped else target): record, **files}
+        return files | _with_record(outcome, own, values if piped else target)
+
+
+def _with_record(
+    outcome: Outcome, places: Mapping[str, Path], main: Path
+) -> dict[Path, bytes]:
+    """Name the files of one program, behind the record that undoes them."""
+    if not places:
+        return {}
+    names = {name: place.name for name, place in places.items()}
+    record = rename_files(outcome.sidecar, names).encode()
+    files = {place: outcome.outputs[name] for name, place in places.items()}
+    return {sidecar_path(main): record, **files}
+
+
+def _page_place(page: Path, target: Path) -> Path:
+    """Name the output of a page: beside that of its program."""
+    if target.parent.resolve() == page.parent.resolve():
+        return default_output(page)
+    return target.with_name(page.name)
 
 
 def default_output(program: Path) -> Path:
@@ -163,6 +198,21 @@ def find_variables(program: Path) -> Path | None:
     wanted = f"{program.stem}.lsv".lower()
     found = [p for p in program.parent.iterdir() if p.name.lower() == wanted]
     return min(found, default=None)
+
+
+def read_files(program: Path, lsv: Path | None = None) -> dict[str, bytes]:
+    """Read a program with its pages and its variable file, the program first.
+
+    Raises:
+        ProgramError: A file cannot be read.
+    """
+    values = lsv or find_variables(program)
+    return name_files(
+        program.name,
+        read_bytes(program),
+        None if values is None else read_bytes(values),
+        {path.name: read_bytes(path) for path in find_pages(program).paths},
+    )
 
 
 def read_bytes(path: Path) -> bytes:

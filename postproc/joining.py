@@ -10,7 +10,7 @@ from postproc.accuracy.measurement import COVARIATES, POSITION, Measurements
 from postproc.accuracy.points import read_points
 from postproc.accuracy.reading import DETECT, Reading
 from postproc.exceptions import MeasurementError
-from postproc.jobs import find_variables, read_bytes
+from postproc.jobs import read_files
 from postproc.planning import plan_visits, read_program, states_of
 from postproc.pose import MM
 from postproc.robot.cell import Cell
@@ -36,11 +36,7 @@ def join_program(
         ProgramError: The program cannot be read.
     """
     table = read_points(data, reading)
-    files = {program.name: read_bytes(program)}
-    values = find_variables(program)
-    if values is not None:
-        files[values.name] = read_bytes(values)
-    visits = read_program(files, cell).visits
+    visits = read_program(read_files(program), cell).visits
     planned = plan_visits(visits, cell)
     places = _places(visits.measure_id, [visits.names[k] for k in visits.name])
     ids = table.text("id")

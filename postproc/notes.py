@@ -27,6 +27,16 @@ def assumed_off(name: str, cell: Cell) -> Diagnostic:
     return Diagnostic(name, 1, "absolute-accuracy", text)
 
 
+def followed_pages(visits: Visits) -> list[Diagnostic]:
+    """List the files that are one job with the program."""
+    text = "is followed, and rewritten, as a page of this program"
+    return [
+        Diagnostic(visits.files[0], 1, "page", f"{name} {text}")
+        for name in visits.files[1:]
+        if not name.lower().endswith(VARIABLES)
+    ]
+
+
 def missing_file(visits: Visits) -> list[Diagnostic]:
     """Tell that a program came without the variable file that holds its targets."""
     name = visits.files[0].rpartition(".")[0] + VARIABLES

@@ -128,6 +128,9 @@ def read_program(files: Mapping[str, bytes], cell: Cell) -> Reading:
             page = parse(source)
             others |= {page.name: page, base_name(source.name): page}
     resolved = resolve(program, start_of(cell), variables, others)
+    for name in {source.name for source in sources} - {*resolved.visits.files}:
+        problem, cure = "its program has the name of another file", "Rename one"
+        raise ProgramError(name, problem, cure)
     programs = list({id(p): p for p in (program, *others.values())}.values())
     missed = never_reached(programs, resolved.visits)
     return Reading(sources, resolved.visits, (*resolved.diagnostics, *missed))

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from postproc.accuracy.error_statistics import ErrorStatistics
-from postproc.jobs import find_variables, read_bytes
+from postproc.jobs import read_files
 from postproc.language.visits import Visits
 from postproc.planning import read_program
 from postproc.report import finite
@@ -133,12 +133,8 @@ def simulate_file(
 
 
 def visits_of(program: Path, cell: Cell) -> Visits:
-    """Read a program, with the variable file beside it."""
-    files = {program.name: read_bytes(program)}
-    values = find_variables(program)
-    if values is not None:
-        files[values.name] = read_bytes(values)
-    return read_program(files, cell).visits
+    """Read a program, with its pages and the variable file beside it."""
+    return read_program(read_files(program), cell).visits
 
 
 def true_error(

@@ -1,0 +1,91 @@
+"""Programs with pages on the command line: one flow, as in a batch."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+from postproc.page_files import find_pages
+from tests.plant import contents, pages
+from tests.written import cli
+
+
+def names(program: Path) -> list[str]:
+    return [path.name for path in find_pages(program).paths]
+
+
+def test_pages_are_compensated_as_in_a_batch(desk):
+    source = pages(desk.folder / "src", 2, 3)
+    out = desk.folder / "one"
+    out.mkdir()
+    found = desk.compensate(source / "main.pdl", "-o", out / "main.pdl")
+    assert found.exit_code == 0, found.stderr
+    assert "page1.pdl is followed" in found.stderr
+    many = desk.folder / "many"
+    given = ("--cell", desk.cell, "--model", desk.model)
+    assert cli("batch", source, many, *given, "--jobs", 1).exit_code == 0
+    one, all_ = contents(out), contents(many)
+    assert {k: v for k, v in one.items() if k.endswith(".pdl")} == {
+        k: v for k, v in all_.items() if k.endswith(".pdl")
+    }
+    assert cli("check", out, "--source", source).exit_code == 0
+    for name in ("main", "page1", "page2"):
+        assert cli("restore", out / f"{name}.pdl").exit_code == 0
+        restored = (out / f"{name}.pdl").read_bytes()
+        assert restored == (source / f"{name}.pdl").read_bytes()
+
+
+def test_pages_beside_their_sources_get_names_of_their_own(desk):
+    source = pages(desk.folder / "src", 2, 3)
+    for _ in range(2):  # what the first run has written does not count
+        before = (source / "page1.pdl").read_bytes()
+        assert desk.compensate(source / "main.pdl").exit_code == 0
+        assert (source / "page1.pdl").read_bytes() == before
+    assert (source / "page1.compensated.pdl").exists()
+    assert names(source / "main.pdl") == ["page1.pdl", "page2.pdl"]
+
+
+def test_explain_and_simulate_follow_pages(desk):
+    source = pages(desk.folder / "src", 2, 3)
+    found = cli("explain", source / "main.pdl", "--cell", desk.cell, "--model",
+                desk.model, "--json", "-")  # fmt: skip
+    rows = json.loads(found.stdout)["visits"]
+    assert len(rows) == 7 and rows[4]["from"] == "page1.pdl:7"
+    measured = desk.folder / "m.csv"
+    given = ("--cell", desk.cell, "-o", measured)
+    assert cli("simulate", source / "main.pdl", *given).exit_code == 0
+    assert len(measured.read_text().splitlines()) == 8
+
+
+def test_what_is_not_followed_is_said(tmp_path):
+    def put(name: str, *lines: str) -> Path:
+        path = tmp_path / f"{name}.pdl"
+        path.write_text("\n".join([f"PROGRAM {name}", *lines, "BEGIN", f"END {name}"]))
+        return path
+
+    main = put("main", "IMPORT 'own'", "IMPORT 'shared'", "IMPORT '../far'",
+               "IMPORT 'valued'", "IMPORT 'gone'")  # fmt: skip
+    put("own", "IMPORT 'inner'", "IMPORT 'main'")
+    put("inner")
+    put("shared")
+    put("other", "IMPORT 'shared'")
+    put("valued")
+    (tmp_path / "valued.lsv").write_text("p POS Priv\n X: 1 Y: 2 Z: 3\n")
+    (tmp_path.parent / "far.pdl").write_text("PROGRAM far\nBEGIN\nEND far")
+    (tmp_path / "linked.pdl").symlink_to(tmp_path.parent / "far.pdl")
+    found = find_pages(main)
+    assert [path.name for path in found.paths] == ["own.pdl", "inner.pdl"]
+    assert found.notes == (
+        "'../far' leads out of the folder: not followed",
+        "shared.pdl is not followed: main.pdl and other.pdl name it",
+        "valued.pdl is not followed: it has a variable file of its own",
+    )
+    assert names(put("plain")) == []
+
+
+def test_programs_under_the_names_of_other_files_are_refused(desk):
+    main = desk.put("main.pdl", "PROGRAM main\nIMPORT 'a'\nIMPORT 'b'\nBEGIN\nEND main")
+    desk.put("a.pdl", "PROGRAM b\nBEGIN\nEND b")
+    desk.put("b.pdl", "PROGRAM a\nBEGIN\nEND a")
+    found = desk.compensate(main)
+    assert found.exit_code == 2 and "a.pdl: its program has the name" in found.stderr
