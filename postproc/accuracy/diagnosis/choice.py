@@ -33,9 +33,13 @@ def choose(scores: list[Score]) -> Score:
     """Take the best name, unless a free form is clearly ahead of it."""
     name = next(s for s in scores if s.family.tier == NAMED)
     free = next((s for s in scores if s.family.tier == FREE), name)
-    ahead = max(CLEARLY[0], CLEARLY[1] * name.evidence)
-    best = free if free.evidence > name.evidence + ahead else name
-    return _forerunner(best, scores)
+    lead = free.evidence - name.evidence
+    return _forerunner(free if lead > ahead(name.evidence) else name, scores)
+
+
+def ahead(evidence: float) -> float:
+    """Return by how much a free form must be ahead of so much evidence [nats]."""
+    return max(CLEARLY[0], CLEARLY[1] * evidence)
 
 
 def _forerunner(best: Score, scores: list[Score]) -> Score:

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from postproc.accuracy.batch import Batch
+from postproc.accuracy.diagnosis.extending import extend
 from postproc.accuracy.diagnosis.score import Score
-from postproc.accuracy.diagnosis.search import extend
 from postproc.accuracy.effect import Array
 from postproc.accuracy.fitted import Fit
 from postproc.robot.state import make_states

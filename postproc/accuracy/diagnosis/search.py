@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from postproc.accuracy.diagnosis.bootstrap import Null
-from postproc.accuracy.diagnosis.candidate import Candidate
+from postproc.accuracy.diagnosis.candidate import FREE, NAMED, Candidate
 from postproc.accuracy.diagnosis.choice import choose, ranking
+from postproc.accuracy.diagnosis.extending import extend, without
 from postproc.accuracy.diagnosis.folds import Gain, held_out_gain
 from postproc.accuracy.diagnosis.library import Library
+from postproc.accuracy.diagnosis.names_first import names_instead
 from postproc.accuracy.diagnosis.projection import Projection
 from postproc.accuracy.diagnosis.score import Score
-from postproc.accuracy.effect import Effect
-from postproc.accuracy.fit import fit_effects
 from postproc.accuracy.fitted import Fit
 
 MOST = 12  # additions
@@ -93,7 +93,7 @@ def search(base: Fit, library: Library, null: Null, progress: Progress) -> Searc
 
 def _grow(found: Search) -> Search:
     """Add the best candidate, or say which one was refused."""
-    best = choose(ranking(Projection.of(found.fit), found.library))
+    best = _best(found, ranking(Projection.of(found.fit), found.library))
     p_value = found.null.p_value(best.evidence)
     if p_value > LEVEL or best.p_value > ALONE:
         return replace(found, refused=None)
@@ -105,14 +105,14 @@ def _grow(found: Search) -> Search:
     return replace(found, fit=fit, additions=(*found.additions, added))
 
 
-def extend(fit: Fit, candidate: Candidate, instead_of: int | None = None) -> Fit:
-    """Refit everything with a candidate added, or in the place of an effect."""
-    effects = list(fit.combination.effects)
-    if instead_of is None:
-        effects.append(candidate.effect)
-    else:
-        effects[instead_of] = candidate.effect
-    return refit(fit, effects)
+def _best(found: Search, scores: list[Score]) -> Score:
+    """Choose among scores under the fit of a search, names before free forms."""
+    best = choose(scores)
+    if best.family.tier == NAMED:
+        return best
+    rivals = [best, *(s for s in scores if s != best)]
+    name = names_instead(found.fit, found.library, found.null, LEVEL, rivals)
+    return name or best
 
 
 def _settle(found: Search, first: int) -> Search:
@@ -133,33 +133,46 @@ def _again(found: Search, number: int) -> Search:
     best = choose(scores)
     if found.null.p_value(best.evidence) > LEVEL:
         return _drop(found, number)
+    if best.family.tier == FREE and old.family.tier == NAMED:
+        best = _best(_drop(found, number), scores)
     present = next((s for s in scores if s.family == old.family), best)
     if best.evidence < present.evidence + BETTER:
         best = present
-    if best.best.effect == old.effect:
-        return found
-    return put_instead(found, number, best)
+    other = found
+    if best.best.effect != old.effect:
+        other = put_instead(found, number, best)
+    return _confirmed(found, number) if other is found else other
 
 
 def put_instead(found: Search, number: int, best: Score) -> Search:
-    """Put another candidate in the place of an addition."""
+    """Put another candidate in the place of an addition, if it predicts held-out rows.
+
+    Returns:
+        The search as it was where the candidate's gain is not sure.
+    """
     place = found.place(number)
     fit = extend(found.fit, best.best, instead_of=place)
     gain = held_out_gain(fit, place, best.best)
+    if not gain.sure:
+        return found
     additions = list(found.additions)
     additions[number] = Addition(best, found.null.p_value(best.evidence), gain)
     return replace(found, fit=fit, additions=tuple(additions))
 
 
+def _confirmed(found: Search, number: int) -> Search:
+    """Keep an addition if it still predicts held-out rows with all others in."""
+    addition = found.additions[number]
+    gain = held_out_gain(found.fit, found.place(number), addition.candidate)
+    if not gain.sure:
+        return _drop(found, number)
+    additions = list(found.additions)
+    additions[number] = replace(addition, gain=gain)
+    return replace(found, additions=tuple(additions))
+
+
 def _drop(found: Search, number: int) -> Search:
-    """Take an addition out that the others have made superfluous."""
-    effects = list(found.fit.combination.effects)
-    del effects[found.place(number)]
+    """Take an addition out that is not called for any more."""
+    fit = without(found.fit, found.place(number))
     additions = (*found.additions[:number], *found.additions[number + 1 :])
-    return replace(found, fit=refit(found.fit, effects), additions=additions)
-
-
-def refit(fit: Fit, effects: Sequence[Effect]) -> Fit:
-    """Fit other effects to the rows of a fit, beginning where it ended."""
-    position = fit.error + fit.batch.walk.tcp
-    return fit_effects(fit.batch, position, tuple(effects), fit.noise.origin, fit)
+    return replace(found, fit=fit, additions=additions)
