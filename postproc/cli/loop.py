@@ -56,6 +56,7 @@ def diagnose(
 ) -> None:
     """Find what the model lacks, trace it to an effect, and add that effect."""
     from postproc import diagnosing
+    from postproc.accuracy.diagnosis.evidence import dumped, evidence_of
     from postproc.console import stages
 
     with explained():
@@ -72,11 +73,11 @@ def diagnose(
                 progress=progress,
             )
         if json:
-            write_text(json, found.diagnosis.to_json())
+            write_text(json, dumped(evidence_of(found)))
         if html is not None:
             from postproc.html import diagnosis_report
 
-            write_text(str(html), diagnosis_report(found.diagnosis.to_dict()))
+            write_text(str(html), diagnosis_report(evidence_of(found)))
         if plot is not None:
             from postproc.plots import plot_diagnosis
 

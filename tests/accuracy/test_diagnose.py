@@ -13,6 +13,7 @@ from postproc.accuracy.batch import Batch
 from postproc.accuracy.covariate import covariate, loops, unit
 from postproc.accuracy.curve import Curve
 from postproc.accuracy.diagnosis.diagnose import Extension, diagnose
+from postproc.accuracy.diagnosis.evidence import dumped, evidence_of
 from postproc.accuracy.diagnosis.floor import (
     multi_directional,
     noise_floor,
@@ -21,12 +22,14 @@ from postproc.accuracy.diagnosis.floor import (
 )
 from postproc.accuracy.diagnosis.locate import periodogram, profile
 from postproc.accuracy.diagnosis.omnibus import leftovers
+from postproc.accuracy.diagnosis.planning import poses_that_sharpen
 from postproc.accuracy.diagnosis.projection import Projection
 from postproc.accuracy.full import fit_survey, model_of
 from postproc.accuracy.library import BASE_EFFECTS
 from postproc.accuracy.measurement import Measurements
 from postproc.accuracy.model import Model, load_model
 from postproc.exceptions import ModelError, PostprocError
+from postproc.html import diagnosis_report
 from postproc.robot.arm import load_arm
 from postproc.robot.state import States, make_states
 from postproc.virtual import Planted, stream, virtual_arm
@@ -59,7 +62,7 @@ def found(planted: tuple[Measurements, Model]) -> Extension:
 
 
 def test_report_has_the_keys_that_other_tools_read(found: Extension) -> None:
-    report = json.loads(found.diagnosis.to_json())
+    report = json.loads(dumped(evidence_of(found)))
     assert report["verdict"] == "effect"
     statistics = {"mean_mm", "std_mm", "p95_mm", "max_mm"}
     assert set(report["before"]) == set(report["after"]) == statistics
@@ -77,6 +80,35 @@ def test_report_has_the_keys_that_other_tools_read(found: Extension) -> None:
     assert all(set(g) == {"effect", "joint"} for g in effect["confusable_with"])
     assert all(len(q) == 6 for q in report["next_measurements"])
     assert report["noise_floor_source"].startswith("tracker")
+
+
+def test_report_holds_the_evidence_that_its_page_shows(found: Extension) -> None:
+    report = json.loads(dumped(evidence_of(found)))
+    (effect,) = report["effects"]
+    seen = effect["evidence"]
+    assert seen["covariate"] == effect["source"]
+    assert seen["unit"] == "deg"
+    assert len(seen["x"]) == len(seen["before_mm"]) == len(seen["after_mm"]) == 400
+    before, after = np.array(seen["before_mm"]), np.array(seen["after_mm"])
+    assert np.hypot.reduce(before) > 1.2 * np.hypot.reduce(after)
+    best = report["candidates"][0]
+    assert (best["effect"], best["joint"]) == ("transmission", effect["joint"])
+    p = [c["p_value"] for c in report["candidates"]]
+    assert p == sorted(p)
+    size = np.linalg.norm(report["rows"]["after_mm"], axis=1)
+    assert size.mean() == pytest.approx(report["after"]["mean_mm"], abs=1e-4)
+    assert report["history"][-1]["added"][0]["effect"] == "transmission"
+    page = diagnosis_report(report)
+    for shown in ("evidence-0", "candidates", "histogram"):
+        assert f'"{shown}"' in page
+
+
+def test_measuring_next_names_what_it_sharpens(found: Extension) -> None:
+    fit = found.search.fit
+    name, poses = poses_that_sharpen(fit, seed=0)
+    assert name in fit.combination.names
+    assert name in found.diagnosis.why_next
+    assert np.array_equal(poses, found.diagnosis.next_measurements)
 
 
 def test_held_out_errors_fall_to_the_noise(found: Extension) -> None:

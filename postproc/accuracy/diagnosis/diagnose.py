@@ -151,7 +151,10 @@ def _next(traced: Trace, seed: int) -> tuple[str, Array]:
             own = found.additions[number].candidate.family
             poses = poses_that_separate(found.fit, found.place(number), rival, seed)
             return f"tell {own} from {rival.family}", poses
-    return "sharpen what the model knows worst", poses_that_sharpen(found.fit, seed)
+    name, poses = poses_that_sharpen(found.fit, seed)
+    if name.startswith(Revision.name):
+        name = "the given model"
+    return f"sharpen {name}, known worst for what it moves", poses
 
 
 def _extended(

@@ -27,6 +27,7 @@ class Profile:
         values: (n,).
         direction: What the residual is read as, with its unit.
         before, after: Residual without and with the effect, (n,).
+        lever: Millimetres of the TCP per unit of that residual, (n,).
     """
 
     label: str
@@ -35,6 +36,7 @@ class Profile:
     direction: str
     before: Array
     after: Array
+    lever: Array
 
 
 def profile(fit: Fit, place: int, candidate: Candidate) -> Profile:
@@ -70,7 +72,8 @@ def profile(fit: Fit, place: int, candidate: Candidate) -> Profile:
         values, what = np.degrees(values), "deg"
     if what == "log rad":
         values, what = np.degrees(np.exp(values)), "deg"
-    return Profile(name, what, values, direction, seen[0], seen[1])
+    lever = np.sqrt(weight) / (scale * MM)
+    return Profile(name, what, values, direction, seen[0], seen[1], lever)
 
 
 def odd(effect: Effect, batch: Batch) -> bool:

@@ -39,20 +39,22 @@ def poses_that_separate(fit: Fit, place: int, rival: Score, seed: int) -> Array:
     return _spread_out(batch.states.q, np.linalg.norm(apart, axis=1))
 
 
-def poses_that_sharpen(fit: Fit, seed: int) -> Array:
+def poses_that_sharpen(fit: Fit, seed: int) -> tuple[str, Array]:
     """Choose poses that lower the model's uncertainty most, one after the other.
 
     Each step takes the pose whose predicted error is known worst against the noise,
     which is the step of a D-optimal design, and updates the covariance.
 
     Returns:
+        The parameter that is known better then by most of the TCP's way, and the poses,
         (WANTED, 6) [rad].
     """
     batch = _tries(fit, seed)
     at = fit.combination.at(batch, fit.values)
     X = fit.combination.columns(at)
     noise = float(fit.whitener.variance(fit.noise).mean())
-    C = np.array(fit.covariance)
+    before = np.array(fit.covariance)
+    C = before
     chosen: list[int] = []
     for _ in range(WANTED):
         spread = X @ C @ np.swapaxes(X, 1, 2)
@@ -62,7 +64,10 @@ def poses_that_sharpen(fit: Fit, seed: int) -> Array:
         chosen.append(best)
         CX = C @ X[best].T
         C = C - CX @ np.linalg.solve(noise * np.eye(3) + X[best] @ CX, CX.T)
-    return np.asarray(batch.states.q[chosen])
+    fall = np.sqrt(np.diag(before)) - np.sqrt(np.maximum(np.diag(C), 0.0))
+    moved = np.sqrt((X**2).sum(axis=1).mean(axis=0))
+    name = fit.combination.names[int(np.argmax(fall * moved))]
+    return name, np.asarray(batch.states.q[chosen])
 
 
 def _tries(fit: Fit, seed: int) -> Batch:

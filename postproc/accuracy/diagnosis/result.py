@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -149,10 +148,6 @@ class Diagnosis:
                 {"id": d.id, "line": d.line, "why": d.why} for d in self.dropped
             ],
         }
-
-    def to_json(self) -> str:
-        """Return the JSON report."""
-        return json.dumps(self.to_dict(), indent=1) + "\n"
 
 
 def statistics(spread: ErrorStatistics) -> dict[str, float]:
