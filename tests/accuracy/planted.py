@@ -21,6 +21,7 @@ from postproc.virtual import (
     stream,
     virtual_arm,
 )
+from postproc.virtual.law import Law
 
 ARM = load_arm("nj220-2.7")
 TRACKER = np.array([3.0, -2.0, 1.5])  # [m]
@@ -117,6 +118,39 @@ def displacement(
     return seen_error(arm, arrivals) - seen_error(clean, arrivals)
 
 
+def part_sizes(c: Campaign) -> dict[int, float]:
+    """Sizes of the parts of a law of several joints, by joint, over the noise.
+
+    Each is the rms of one joint's part after projection on the base model and on the
+    other parts: what nothing else can absorb.
+    """
+    many = [law for law in c.arm.laws[1:] if len(law.joints) > 1]
+    if not many:
+        return {}
+    (law,) = many
+    none = replace(c.arm, laws=tuple(x for x in c.arm.laws if x is not law))
+    clean = _clean_fit(none, c.arm.seed, c.arrivals)
+    filtered = Projection.of(clean)
+    start = seen_error(none, c.arrivals)
+    parts = []
+    for joint in law.joints:
+        alone = replace(none, laws=(*none.laws, _only(law, joint)))
+        moved = seen_error(alone, c.arrivals) - start
+        parts.append(filtered.filter(clean.whiten(moved)[:, None])[:, 0])
+    sizes = {}
+    for k, joint in enumerate(law.joints):
+        others = np.column_stack([p for i, p in enumerate(parts) if i != k])
+        left = parts[k] - others @ np.linalg.lstsq(others, parts[k])[0]
+        sizes[joint] = float(np.sqrt((left**2).mean()))
+    return sizes
+
+
+def _only(law: Law, joint: int) -> Law:
+    """Keep what a law does to one joint."""
+    mask = np.arange(1, 7) == joint
+    return replace(law, joints=(joint,), shape=lambda a: law.shape(a) * mask)
+
+
 def _peak(seed: int, planted: Planted, rows: int) -> float:
     """The peak size [mm] that a law was drawn with."""
     arm = virtual_arm(seed, (*map(Planted, BASE), planted), rows=rows)
@@ -127,10 +161,15 @@ def _size(
     clean: VirtualArm, seed: int, planted: Planted, arrivals: Arrivals, rows: int
 ) -> float:
     """rms of an effect after projection on the base model, in units of the noise."""
-    position = clean.measure(arrivals, TRACKER, stream(seed, "tracker"))
-    effects = propose(BASE_EFFECTS, ARM, states_of(arrivals))
-    batch = Batch(ARM, states_of(arrivals))
-    fit = fit_effects(batch, position, effects, tuple(TRACKER))
+    fit = _clean_fit(clean, seed, arrivals)
     added = fit.whiten(displacement(clean, seed, planted, arrivals, rows))
     left = Projection.of(fit).filter(added[:, None])[:, 0]
     return float(np.sqrt((left**2).mean()))
+
+
+def _clean_fit(clean: VirtualArm, seed: int, arrivals: Arrivals) -> Fit:
+    """Fit the base model to the arm without undeclared effects."""
+    position = clean.measure(arrivals, TRACKER, stream(seed, "tracker"))
+    effects = propose(BASE_EFFECTS, ARM, states_of(arrivals))
+    batch = Batch(ARM, states_of(arrivals))
+    return fit_effects(batch, position, effects, tuple(TRACKER))
