@@ -12,7 +12,7 @@ from postproc.accuracy.fit import fit_effects
 from postproc.accuracy.fitted import Fit
 from postproc.accuracy.library import propose
 from postproc.accuracy.measurement import Measurements
-from postproc.accuracy.model import Model
+from postproc.accuracy.model import COMPENSATED, Model
 from postproc.accuracy.probe_turn import ProbeMount, ProbeTurn
 from postproc.accuracy.ranges import Ranges
 from postproc.accuracy.selection import fit_best
@@ -59,9 +59,10 @@ def model_of(fitted: Fit, survey: Measurements) -> Model:
     """Keep what a fit found as a model."""
     used = fitted.rows.weight > 0
     left = np.linalg.norm(fitted.residual[used], axis=1) / MM
-    X = fitted.columns
     covariance = fitted.stated
-    known = np.sqrt(np.einsum("nip,nip->ni", X @ covariance, X))
+    told = fitted.combination.where(*COMPENSATED)
+    X = fitted.columns[:, :, told]  # of predictions: the set-up is no part of them
+    known = np.sqrt(np.einsum("nip,nip->ni", X @ covariance[np.ix_(told, told)], X))
     arm = fitted.batch.arm
     statistics = {
         "residual_mean_mm": float(left.mean()),
