@@ -15,6 +15,7 @@ from scipy.spatial.transform import Rotation
 Array = NDArray[np.float64]
 
 MM = 1e-3  # [m]
+SAME_ROTATION = 1e-10  # elements of a matrix that differ less are the same
 
 
 def _axis_rotation(angle: Array, axis: int) -> Array:
@@ -52,6 +53,24 @@ def zyz_from_rotation(R: Array) -> Array:
     r = np.where(degenerate, upright, np.arctan2(R[..., 2, 1], -R[..., 2, 0]))
     zyz: Array = np.rad2deg(np.stack([a, e, r], axis=-1))
     return zyz
+
+
+def angles_near(zyz_deg: Array, R: Array) -> Array:
+    """Convert rotations (n, 3, 3) to the Euler ZYZ angles next to given ones, (n, 3).
+
+    (a, e, r) and (a + 180, -e, r + 180) are one rotation, and full turns change none;
+    angles that already say what the rotation is are given back as they are.
+    """
+    zyz_deg = np.asarray(zyz_deg, dtype=float)
+    out = np.array(zyz_deg)
+    changed = np.abs(rotation_from_zyz(zyz_deg) - R).max(axis=(1, 2)) > SAME_ROTATION
+    new = zyz_from_rotation(R[changed])
+    other = new * [1.0, -1.0, 1.0] + [180.0, 0.0, 180.0]
+    both = np.stack([new, other])
+    both += 360.0 * np.round((zyz_deg[changed] - both) / 360.0)
+    nearer = np.abs(both - zyz_deg[changed]).sum(axis=2).argmin(axis=0)
+    out[changed] = both[nearer, np.arange(len(new))]
+    return out
 
 
 def pose_from_record(record: Array) -> Array:

@@ -8,23 +8,24 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from postproc.accuracy.guard import guard_size, guard_solutions, guard_steps
+from postproc.accuracy.guard import guard_size, guard_solutions, guard_steps, guard_turn
 from postproc.followers import carry_along, worsened
 from postproc.language.visits import NO_TARGET, Target, Visits
-from postproc.motion.planner import Plan
 from postproc.options import Options
 from postproc.planning import Planned, Reading
-from postproc.pose import MM, inverse, pose_from_record
 from postproc.reasons import Reasons
 from postproc.reconcile import Agreement, agree
 from postproc.report import Decisions, Status
 from postproc.robot.cell import Cell
 from postproc.solved import Solved
+from postproc.written import change_mm, new_numbers, turns, turns_in_file
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 
+LEVER_MM = 100.0  # from the TCP, by which turns count where arrivals must agree
+NONE = np.empty((0, 3))
 KNOWN = 0.5  # part of its play that a joint must have left behind to be on a side
 HELD = "its direction of arrival would change with the correction"
 
@@ -82,12 +83,15 @@ def propose(
     for text, outside in solved.outside.items():
         reasons.mark(outside, text)
     guard_solutions(reasons, cell.arm, cell.limits, plan.q, solved.q)
+    turn = turns(plan, solved)
+    guard_turn(reasons, cell.limits, turn)
     guard_size(reasons, cell.limits, correction, solved.residual)
     guard_steps(reasons, cell.limits, correction, side, _run_mates(visits))
     reasons.mark(held, HELD)
     numbers = new_numbers(visits, plan, solved, aside)
     change = change_mm(visits, numbers, correction)
-    agreement = agree(visits.literal, reasons.none, numbers, change)
+    both = np.concatenate([change, turns_in_file(visits, turn) * LEVER_MM], axis=1)
+    agreement = agree(visits.literal, reasons.none, numbers, both)
     trusted = ~np.any([held, *solved.outside.values()], axis=0)
     usable = reasons.none
     stay = must_stay(visits, agreement, change, trusted, cell)
@@ -113,6 +117,7 @@ def propose(
         corrected=values,
         correction=np.where(corrected[:, None], correction, 0.0),
         std_error=solved.std_error,
+        turn=np.where(corrected[:, None], turn, 0.0) if options.orientation else NONE,
     )
     return Proposal(
         agreement.literal[chosen],
@@ -123,46 +128,6 @@ def propose(
         change,
         agreement.literal[np.any([*stay.values()], axis=0)],
     )
-
-
-def new_numbers(visits: Visits, plan: Plan, solved: Solved, aside: Array) -> Array:
-    """Express commands in the numbers of the file, (n, 6).
-
-    A pose keeps its written orientation; P = inverse(UFRAME) . BASE . command. A fly
-    point is moved so that the path passes it where it should.
-    """
-    numbers = np.array(visits.values)
-    joints = visits.target == Target.JOINTS
-    numbers[joints] += np.rad2deg(solved.q[joints] - plan.q[joints])
-    poses = np.flatnonzero(visits.target == Target.POSE)
-    placed = base_in_uframe(visits, poses)
-    command = np.array(solved.command[poses, :, 3])
-    command[:, :3] -= aside[poses]
-    point = np.einsum("nij,nj->ni", placed, command)
-    numbers[poses, :3] = point[:, :3] / MM
-    return numbers
-
-
-def base_in_uframe(visits: Visits, rows: Ints) -> Array:
-    """Return the pose of the arm's base in the user frame, (k, 4, 4) [m]."""
-    unknown = np.full((1, 4, 4), np.nan)
-    frames = np.concatenate([pose_from_record(visits.frames.reshape(-1, 6)), unknown])
-    return np.asarray(inverse(frames)[visits.uframe[rows]] @ frames[visits.base[rows]])
-
-
-def change_mm(visits: Visits, numbers: Array, correction: Array) -> Array:
-    """Give the change that arrivals at one literal must agree on, (n, 3) [mm].
-
-    For a pose it is that of its numbers (the same literal may be reached in two user
-    frames), for joint angles that of the TCP.
-    """
-    poses = (visits.target == Target.POSE)[:, None]
-    moved = numbers[:, :3] - visits.values[:, :3]
-    near = np.flatnonzero(visits.target == Target.NEAR)
-    axes = base_in_uframe(visits, near)[:, :3, :3]
-    change = np.where(poses, moved, correction / MM)
-    change[near] = np.einsum("nij,nj->ni", axes, correction[near]) / MM
-    return change
 
 
 def must_stay(

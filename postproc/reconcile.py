@@ -46,7 +46,7 @@ def agree(
         usable: The visit can be corrected, (n,).
         corrected: Numbers that this visit would write, (n, 6) in the file's units.
         correction_mm: What must agree: the change of the target in its own frame,
-            (n, 3) [mm].
+            (n, k) [mm], of which the first three are that of its place.
     """
     rows = np.flatnonzero(literal >= 0)
     names, inverse, count = np.unique(
@@ -57,12 +57,13 @@ def agree(
     m = len(names)
     all_usable = np.ones(m, dtype=bool)
     np.logical_and.at(all_usable, inverse, usable[rows])
-    low, high = np.full((m, 3), np.inf), np.full((m, 3), -np.inf)
+    width = (m, correction_mm.shape[1])
+    low, high = np.full(width, np.inf), np.full(width, -np.inf)
     np.minimum.at(low, inverse, correction_mm[rows])
     np.maximum.at(high, inverse, correction_mm[rows])
     total, moved = np.zeros((m, 6)), np.zeros((m, 3))
     np.add.at(total, inverse, corrected[rows])
-    np.add.at(moved, inverse, correction_mm[rows])
+    np.add.at(moved, inverse, correction_mm[rows, :3])
     spread = np.linalg.norm(high - low, axis=1)
     mean, change = total / count[:, None], moved / count[:, None]
     return Agreement(names, group, all_usable, spread, mean, change, count)

@@ -48,6 +48,8 @@ class Decisions:
         corrected: The six numbers in the file after correction, (n, 6).
         correction: Change of the commanded TCP, base frame, (n, 3) [m].
         std_error: Standard error of the model there, per axis, (n, 3) [m].
+        turn: Rotation of the commanded tool, base frame, (n, 3) [rad]; empty where
+            nobody asked.
     """
 
     status: Ints
@@ -59,6 +61,7 @@ class Decisions:
     corrected: Array
     correction: Array
     std_error: Array
+    turn: Array = field(default_factory=lambda: np.empty((0, 3)))
 
     def count(self, status: Status) -> int:
         """Count the visits of one status."""
@@ -170,6 +173,9 @@ def target_row(outcome: Outcome, i: int) -> dict[str, object]:
             "line": int(v.literals.line[literal]),
         }
         original, corrected = _numbers(v.values[i]), _numbers(d.corrected[i])
+    turned = {}
+    if len(d.turn):
+        turned["correction_deg"] = _numbers(np.rad2deg(d.turn[i]), 6)
     return {
         "line": int(v.line[i]),
         "file": v.files[v.file[i]],
@@ -185,6 +191,7 @@ def target_row(outcome: Outcome, i: int) -> dict[str, object]:
         "corrected": corrected,
         "position_mm": _numbers(outcome.position[i] / MM, 4) if known else [],
         "correction_mm": _numbers(d.correction[i] / MM, 5),
+        **turned,
         "std_error_mm": _numbers(d.std_error[i] / MM, 5),
     }
 

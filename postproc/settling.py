@@ -93,7 +93,7 @@ def settle(
     """
     held, search = np.zeros(len(states), dtype=bool), SideSearch()
     with clock("solve"):
-        solved = solve_visits(model, cell, planned, states)
+        solved = solve_visits(model, cell, planned, states, options.orientation)
     aside = np.array(planned.plan.aside)
     for number in count():  # ends: from round ROUNDS on, `held` grows
         with clock("decide"):
@@ -116,7 +116,9 @@ def settle(
         held = held | moved if number >= ROUNDS else held
         with clock("solve"):
             aimed = states.with_(direction=search.next_aim(solved.direction, found))
-            solved = solve_again(solved, moved, model, cell, planned, aimed)
+            solved = solve_again(
+                solved, moved, model, cell, planned, aimed, options.orientation
+            )
     raise AssertionError("unreachable")
 
 

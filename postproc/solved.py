@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from postproc.accuracy.model import Model
+from postproc.accuracy.orientation import UNSURE, refuse_unknown_rotations, unsure_turn
 from postproc.accuracy.solve import solve
 from postproc.planning import Planned
 from postproc.robot.cell import Cell
@@ -38,7 +39,13 @@ class Solved:
     outside: dict[str, Bools]
 
 
-def solve_visits(model: Model, cell: Cell, planned: Planned, states: States) -> Solved:
+def solve_visits(
+    model: Model,
+    cell: Cell,
+    planned: Planned,
+    states: States,
+    orientation: bool = False,
+) -> Solved:
     """Solve every visit whose pose and joint angles are known.
 
     Args:
@@ -46,7 +53,13 @@ def solve_visits(model: Model, cell: Cell, planned: Planned, states: States) -> 
         cell: The arm.
         planned: The program's plan.
         states: Planned states, with the directions to correct for.
+        orientation: Correct the orientation as well as the position.
+
+    Raises:
+        ModelError: The orientation is asked for, and the model does not know it.
     """
+    if orientation:
+        refuse_unknown_rotations(model)
     n = len(states)
     empty = Solved(
         direction=np.array(states.direction),
@@ -56,7 +69,8 @@ def solve_visits(model: Model, cell: Cell, planned: Planned, states: States) -> 
         std_error=np.full((n, 3), np.nan),
         outside={},
     )
-    return solve_again(empty, np.ones(n, dtype=bool), model, cell, planned, states)
+    everything = np.ones(n, dtype=bool)
+    return solve_again(empty, everything, model, cell, planned, states, orientation)
 
 
 def solve_again(
@@ -66,6 +80,7 @@ def solve_again(
     cell: Cell,
     planned: Planned,
     states: States,
+    orientation: bool = False,
 ) -> Solved:
     """Solve some visits anew, for the directions of `states`; keep the others.
 
@@ -76,12 +91,14 @@ def solve_again(
         cell: The arm.
         planned: The program's plan.
         states: Planned states, with the directions to correct for.
+        orientation: Correct the orientation as well as the position.
     """
     plan = planned.plan
     lost = np.isnan(plan.q).any(axis=1) | np.isnan(plan.tcp).any(axis=(1, 2))
     known = np.asarray(rows & ~lost)
-    part = solve(model, cell.arm, plan.tcp[known], plan.tool[known], states[known])
-    predicted = model.predict(cell.arm, states[known])
+    here = states[known]
+    part = solve(model, cell.arm, plan.tcp[known], plan.tool[known], here, orientation)
+    predicted = model.predict(cell.arm, here)
     out = Solved(
         direction=np.where(rows[:, None], states.direction, solved.direction),
         q=np.array(solved.q),
@@ -95,4 +112,8 @@ def solve_again(
     for text, mask in predicted.outside.items():
         merged = out.outside.setdefault(text, np.zeros(len(states), dtype=bool))
         merged[known] = mask
+    if orientation:
+        unsure = unsure_turn(model, cell.arm, here)
+        merged = out.outside.setdefault(UNSURE, np.zeros(len(states), dtype=bool))
+        merged[known] = unsure
     return out

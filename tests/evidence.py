@@ -17,7 +17,6 @@ from postproc.compensate import compensate
 from postproc.language.visits import Target
 from postproc.planning import plan_visits, read_program, with_measured_play
 from postproc.planning import states_of as planned_states
-from postproc.proposal import new_numbers
 from postproc.report import Status
 from postproc.robot.arm import load_arm
 from postproc.robot.cell import Cell, load_cell
@@ -33,6 +32,7 @@ from postproc.virtual import (
     stream,
     virtual_arm,
 )
+from postproc.written import new_numbers
 
 ROOT = Path(__file__).parents[1]
 CELL = ROOT / "programs" / "cell.toml"
@@ -137,7 +137,9 @@ def solved_and_written(cell: Cell, model: Model) -> tuple[np.ndarray, np.ndarray
     at = at.with_(direction=done.decisions.side)
     exact = solve_visits(model, cell, planned, at)
     rows = (done.decisions.status == Status.SAFE) & (done.visits.target == Target.POSE)
-    shift = done.decisions.corrected - new_numbers(reading.visits, exact)
+    shift = done.decisions.corrected - new_numbers(
+        reading.visits, planned.plan, exact, planned.plan.aside
+    )
     added = np.linalg.norm(shift[rows, :3], axis=1) * 1e3
     return exact.residual[rows] * 1e6, added
 

@@ -62,6 +62,20 @@ def guard_size(
         reasons.mark(~(residual <= SOLVED), "the correction did not converge to 1 um")
 
 
+def guard_turn(reasons: Reasons, limits: LimitSection, turn: Array) -> None:
+    """Mark corrections that turn the tool too far.
+
+    Args:
+        reasons: Collects the first reason of every visit.
+        limits: The cell's guards.
+        turn: Rotation of the commanded tool, (n, 3) [rad].
+    """
+    with np.errstate(invalid="ignore"):
+        angle = np.rad2deg(np.linalg.norm(turn, axis=1))
+        text = f"the correction exceeds correction_deg = {limits.correction_deg:g}"
+        reasons.mark(angle > limits.correction_deg, text)
+
+
 def guard_steps(
     reasons: Reasons,
     limits: LimitSection,

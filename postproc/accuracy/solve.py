@@ -6,8 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 from postproc.accuracy.model import Model
+from postproc.accuracy.orientation import turn
 from postproc.pose import inverse, rotation_vector
 from postproc.robot.arm import Arm
 from postproc.robot.state import States
@@ -15,6 +17,7 @@ from postproc.robot.state import States
 Array = NDArray[np.float64]
 
 CLOSE = 2e-7  # [m] where iterating stops
+CLOSE_TURN = 2e-7  # [rad] likewise
 MOST = 5  # iterations
 
 
@@ -36,11 +39,17 @@ class Solution:
 
 
 def solve(
-    model: Model, arm: Arm, wanted: Array, tool: Array, states: States
+    model: Model,
+    arm: Arm,
+    wanted: Array,
+    tool: Array,
+    states: States,
+    orientation: bool = False,
 ) -> Solution:
     """Find the command whose predicted landing is the wanted place.
 
-    The position is corrected, the orientation stays as wanted, and so does the branch.
+    The branch stays as it is, and so does the commanded orientation unless it is to be
+    corrected too.
 
     Args:
         model: Predicts the error of a command.
@@ -48,6 +57,7 @@ def solve(
         wanted: TCP poses in the arm's base frame, (n, 4, 4).
         tool: Tool in the flange frame, (4, 4) or (n, 4, 4).
         states: The nominal states at the targets: angles, direction, loads.
+        orientation: Correct the orientation as well as the position.
     """
     n = len(wanted)
     tool = np.broadcast_to(tool, (n, 4, 4))
@@ -57,16 +67,25 @@ def solve(
     place = wanted[:, :3, 3]
     branch = arm.branch(np.nan_to_num(q)) if arm.has_inverse else None
     landing = place + model.error(arm, states)
+    turned, allowed = np.zeros((n, 3)), np.zeros((n, 3))  # [rad] found and allowed for
+    if orientation:
+        turned = turn(model, arm, states)
     iterations = 0
     while iterations < MOST:
-        far = np.flatnonzero(_distance(landing, place) > CLOSE)  # NaN is not far
+        off = _distance(landing, place) > CLOSE  # NaN is not far
+        far = np.flatnonzero(off | (_distance(turned, allowed) > CLOSE_TURN))
         if len(far) == 0:
             break
         command[far, :3, 3] += (place - landing)[far]
+        if orientation:
+            command[far, :3, :3] = _turned(wanted[far, :3, :3], -turned[far])
+            allowed[far] = turned[far]
         own = None if branch is None else branch[far]
         q[far] = _nearest(arm, command[far] @ from_tcp[far], q[far], own)
         moved = states[far].with_(q=np.array(q[far]))
         landing[far] = command[far, :3, 3] + model.error(arm, moved)
+        if orientation:
+            turned[far] = turn(model, arm, moved)
         iterations += 1
     return Solution(q, command, _distance(landing, place), iterations)
 
@@ -75,6 +94,11 @@ def _distance(a: Array, b: Array) -> Array:
     """Distance between points (n, 3), (n,) [m]."""
     gap: Array = np.linalg.norm(a - b, axis=1)
     return gap
+
+
+def _turned(rotation: Array, by: Array) -> Array:
+    """Turn rotations (n, 3, 3) by rotation vectors (n, 3) [rad] in the base frame."""
+    return np.asarray(Rotation.from_rotvec(by).as_matrix() @ rotation)
 
 
 def _nearest(

@@ -58,6 +58,12 @@ def compensate(
         bool,
         typer.Option("--shared", help="Edit variables that other programs may read."),
     ] = False,
+    orientation: Annotated[
+        bool,
+        typer.Option(
+            "--orientation", help="Correct orientations too, not only places."
+        ),
+    ] = False,
     temperature: TemperatureOption = None,
 ) -> None:
     """Rewrite a program so that the tool lands where its targets say."""
@@ -67,7 +73,7 @@ def compensate(
 
     given = None if program == STREAM else Path(program)
     with explained(given, lsv):
-        options = Options(clone, shared, temperature)
+        options = Options(clone, shared, temperature, orientation)
         if report == Path(STREAM) and given is None and output is None:
             raise PostprocError("--report -: stdout holds the program. Name a file")
         check_places([output, report, html], [given, lsv, cell, model])

@@ -99,6 +99,7 @@ class LimitSection(Strict):
     """When a correction is not trusted."""
 
     correction_mm: PositiveFloat = 5.0
+    correction_deg: PositiveFloat = 1.0
     agree_mm: PositiveFloat = 0.02
     step_mm: PositiveFloat = 0.5
     wrist_deg: PositiveFloat = 3.0

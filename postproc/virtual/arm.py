@@ -41,13 +41,25 @@ class VirtualArm:
     tracker_noise: tuple[float, float]
     warming: tuple[float, float]
 
+    def nominal_pose(self, arrivals: Arrivals) -> Array:
+        """Return where the drawing puts the tool, (n, 4, 4)."""
+        return np.asarray(self.nominal.flange(arrivals.q) @ arrivals.tool)
+
     def nominal_tcp(self, arrivals: Arrivals) -> Array:
         """Return where the drawing puts the TCP, (n, 3)."""
-        poses = self.nominal.flange(arrivals.q) @ arrivals.tool
-        return np.asarray(poses[:, :3, 3])
+        return np.asarray(self.nominal_pose(arrivals)[:, :3, 3])
 
     def tcp(self, arrivals: Arrivals, joint_noise: Array | float = 0.0) -> Array:
         """Return where the TCP really is, (n, 3), without noise unless some is given.
+
+        Args:
+            arrivals: Commanded joints and all they depend on.
+            joint_noise: Added to the joints, (n, 6) [rad].
+        """
+        return np.asarray(self.pose(arrivals, joint_noise)[:, :3, 3])
+
+    def pose(self, arrivals: Arrivals, joint_noise: Array | float = 0.0) -> Array:
+        """Return where the tool really is, (n, 4, 4).
 
         Args:
             arrivals: Commanded joints and all they depend on.
@@ -58,8 +70,9 @@ class VirtualArm:
         base = self.as_built.base + total(self.laws, Where.BASE, arrivals)
         mount = self.as_built.mount + total(self.laws, Where.TOOL, arrivals)
         flange = self.as_built.chain.bent(growth).flange(angles)
-        poses = small_motion(base) @ flange @ small_motion(mount) @ arrivals.tool
-        return np.asarray(poses[:, :3, 3])
+        return np.asarray(
+            small_motion(base) @ flange @ small_motion(mount) @ arrivals.tool
+        )
 
     def error(self, arrivals: Arrivals) -> Array:
         """Return the true error, actual minus nominal TCP, (n, 3), without noise."""

@@ -1,0 +1,85 @@
+"""Commands in the numbers of the file, and how far those change."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from postproc.language.visits import Target, Visits
+from postproc.motion.planner import Plan
+from postproc.pose import (
+    MM,
+    angles_near,
+    inverse,
+    pose_from_record,
+    rotation_from_zyz,
+    rotation_vector,
+)
+from postproc.solved import Solved
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+
+def new_numbers(visits: Visits, plan: Plan, solved: Solved, aside: Array) -> Array:
+    """Express commands in the numbers of the file, (n, 6).
+
+    P = inverse(UFRAME) . BASE . command. A fly point is moved so that the path passes
+    it where it should. An orientation that does not change keeps its written angles.
+    """
+    numbers = np.array(visits.values)
+    joints = visits.target == Target.JOINTS
+    numbers[joints] += np.rad2deg(solved.q[joints] - plan.q[joints])
+    poses = np.flatnonzero(visits.target == Target.POSE)
+    placed = base_in_uframe(visits, poses)
+    command = np.array(solved.command[poses, :, 3])
+    command[:, :3] -= aside[poses]
+    point = np.einsum("nij,nj->ni", placed, command)
+    numbers[poses, :3] = point[:, :3] / MM
+    turn = turns_in_file(visits, turns(plan, solved))[poses]
+    turned = np.any(turn != 0, axis=1) & ~np.isnan(turn[:, 0])
+    rows, by = poses[turned], Rotation.from_rotvec(turn[turned]).as_matrix()
+    written = numbers[rows, 3:]
+    numbers[rows, 3:] = angles_near(written, by @ rotation_from_zyz(written))
+    return numbers
+
+
+def turns(plan: Plan, solved: Solved) -> Array:
+    """Return the rotation of the commands against the targets, (n, 3) [rad]."""
+    new, old = solved.command[:, :3, :3], plan.tcp[:, :3, :3]
+    apart = np.abs(new - old).max(axis=(1, 2))
+    out = np.where(np.isnan(apart)[:, None], np.nan, np.zeros(3))
+    rows = np.flatnonzero(apart > 0)
+    out[rows] = rotation_vector(new[rows] @ np.swapaxes(old[rows], 1, 2))
+    return out
+
+
+def base_in_uframe(visits: Visits, rows: Ints) -> Array:
+    """Return the pose of the arm's base in the user frame, (k, 4, 4) [m]."""
+    unknown = np.full((1, 4, 4), np.nan)
+    frames = np.concatenate([pose_from_record(visits.frames.reshape(-1, 6)), unknown])
+    return np.asarray(inverse(frames)[visits.uframe[rows]] @ frames[visits.base[rows]])
+
+
+def turns_in_file(visits: Visits, turn: Array) -> Array:
+    """Give the rotations in the frame that the numbers are in, (n, 3) [rad]."""
+    out, poses = np.array(turn), np.flatnonzero(visits.target == Target.POSE)
+    axes = base_in_uframe(visits, poses)[:, :3, :3]
+    out[poses] = np.einsum("nij,nj->ni", axes, turn[poses])
+    return out
+
+
+def change_mm(visits: Visits, numbers: Array, correction: Array) -> Array:
+    """Give the change that arrivals at one literal must agree on, (n, 3) [mm].
+
+    For a pose it is that of its numbers (the same literal may be reached in two user
+    frames), for joint angles that of the TCP.
+    """
+    poses = (visits.target == Target.POSE)[:, None]
+    moved = numbers[:, :3] - visits.values[:, :3]
+    near = np.flatnonzero(visits.target == Target.NEAR)
+    axes = base_in_uframe(visits, near)[:, :3, :3]
+    change = np.where(poses, moved, correction / MM)
+    change[near] = np.einsum("nij,nj->ni", axes, correction[near]) / MM
+    return change
