@@ -9,6 +9,7 @@
 # make accuracy    held-out errors, coverage, real and blind data: docs/accuracy.md
 # make undeclared  undeclared effects traced on virtual arms, 1,400 of them: docs/undeclared.md
 # make blind       effects traced in the blind campaigns and on a real arm: docs/blind.md
+# make docs     run every command of the documentation, check links, write build/docs
 # Each target first creates the environment .venv when it is missing or out of date.
 
 VENV ?= .venv
@@ -19,7 +20,7 @@ STAMP := $(VENV)/.installed
 export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
 
-.PHONY: help demo test lint format bench evidence reproduce accuracy undeclared blind chaos fuzz clean
+.PHONY: help demo test lint format bench evidence reproduce accuracy undeclared blind chaos fuzz docs clean
 .DELETE_ON_ERROR:
 
 help:
@@ -67,6 +68,9 @@ chaos: $(STAMP)
 
 fuzz: $(STAMP)
 	@$(PYTHON_BIN) -m tests.fuzz --count $(or $(COUNT),20000)
+
+docs: $(STAMP)
+	@PATH="$(abspath $(VENV))/bin:$$PATH" python docs/tools/build.py $(UPDATE)
 
 clean:
 	rm -rf $(VENV) demo build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis

@@ -105,13 +105,13 @@ class Explanation:
         plan, v = self.planned.plan, self.visits
         name = v.names[v.name[i]] or ("VIA" if v.via[i] else "inline")
         sides = arrows(self._direction(i))
-        angles = " ".join(f"{q:8.3f}" for q in np.rad2deg(plan.q[i]))
+        angles = " ".join(_told(q, 8, 3) for q in np.rad2deg(plan.q[i]))
         cells = [self._line(i), name, self._from(i), angles, sides]
         if self.outcome is None:
             return [*cells, self.planned.reasons[i]]
         d = self.outcome.decisions
-        moved = " ".join(f"{c:7.3f}" for c in d.correction[i] / MM)
-        sure = " ".join(f"{s:5.3f}" for s in d.std_error[i] / MM)
+        moved = " ".join(_told(c, 7, 3) for c in d.correction[i] / MM)
+        sure = " ".join(_told(s, 5, 3) for s in d.std_error[i] / MM)
         status = Status(d.status[i]).name.lower()
         why = d.reasons[d.why[i]]
         return [*cells, moved, sure, f"{status}: {why}" if why else status]
@@ -154,6 +154,11 @@ class Explanation:
                 line=line,
             )
         return np.flatnonzero(found).tolist()
+
+
+def _told(value: float, width: int, digits: int) -> str:
+    """Write a number; a dash where it is not known."""
+    return f"{value:{width}.{digits}f}" if np.isfinite(value) else "-".rjust(width)
 
 
 def _known(values: np.ndarray) -> list[float | None]:

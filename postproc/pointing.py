@@ -135,7 +135,7 @@ def _plain(name: str) -> str:
 
 def _read(path: str, files: Iterable[Path | None]) -> str | None:
     """Read the file that a message names, None where it cannot be had."""
-    places = [Path(path), *(f for f in files if f is not None and f.name == path)]
+    places = [*(f for f in files if f is not None and f.name == path), Path(path)]
     for place in places:
         try:
             if place.is_file() and place.stat().st_size <= MOST_BYTES:
