@@ -28,6 +28,7 @@ from postproc.report import Outcome, Status, target_row
 from postproc.robot.cell import Cell, load_cell
 
 STATUS = "status, why"
+FEW = 3  # places of origin that a row names
 COLUMNS = (
     Column("line"),
     Column("target", "left"),
@@ -106,7 +107,7 @@ class Explanation:
         name = v.names[v.name[i]] or ("VIA" if v.via[i] else "inline")
         sides = arrows(self._direction(i))
         angles = " ".join(_told(q, 8, 3) for q in np.rad2deg(plan.q[i]))
-        cells = [self._line(i), name, self._from(i), angles, sides]
+        cells = [self._line(i), name, _few(self._from(i)), angles, sides]
         if self.outcome is None:
             return [*cells, self.planned.reasons[i]]
         d = self.outcome.decisions
@@ -154,6 +155,18 @@ class Explanation:
                 line=line,
             )
         return np.flatnonzero(found).tolist()
+
+
+def _few(places: str) -> str:
+    """Shorten a list of places that a visit is reached from.
+
+    >>> _few("line 3, line 5, line 7, line 9")
+    'line 3, line 5 and 2 more'
+    """
+    listed = places.split(", ")
+    if len(listed) <= FEW:
+        return places
+    return f"{', '.join(listed[: FEW - 1])} and {len(listed) - FEW + 1} more"
 
 
 def _told(value: float, width: int, digits: int) -> str:
