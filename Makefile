@@ -3,6 +3,7 @@
 # make lint    ruff and mypy
 # make chaos   kill 200 batches of 300 files at random moments and resume them
 # make fuzz    20,000 damaged programs: refused, or rewritten byte for byte
+# make plant-bench   10,000 files, a second run, memory, workers, a cluster: docs/plant.md
 # make bench   how long the stages take on this machine
 # make evidence    coverage of the intervals, and what direction is worth
 # make reproduce   the published method and ours, simulated: docs/reproduction.md
@@ -21,6 +22,7 @@ export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
 
 .PHONY: help demo test lint format bench evidence reproduce accuracy undeclared blind chaos fuzz docs clean
+.PHONY: plant-bench
 .DELETE_ON_ERROR:
 
 help:
@@ -71,6 +73,9 @@ fuzz: $(STAMP)
 
 docs: $(STAMP)
 	@PATH="$(abspath $(VENV))/bin:$$PATH" python docs/tools/build.py $(UPDATE)
+
+plant-bench: $(STAMP)
+	@$(PYTHON_BIN) -m tests.plant_bench --files $(or $(FILES),10000)
 
 clean:
 	rm -rf $(VENV) demo build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis

@@ -23,7 +23,7 @@ from postproc.files import TEMPORARY
 from tests.conftest import make_job
 from tests.plant import contents, grow, pages, program
 
-ORPHANED = 10.0  # [s] after which no worker of a killed run may be left
+ORPHANED = 60.0  # [s] after which no worker of a killed run is left, however busy
 
 
 @dataclass(frozen=True)

@@ -4,9 +4,6 @@ from __future__ import annotations
 
 import os
 import signal
-import socket
-import subprocess
-import sys
 
 import pytest
 
@@ -15,34 +12,18 @@ from postproc.batch.plan import make_plan
 from postproc.batch.run import Order, batch, default_log
 from postproc.exceptions import PostprocError
 from postproc.options import AS_USUAL
+from tests.dask_cluster import Cluster
 from tests.inline import InlineCrew
 from tests.plant import contents, grow, pages
 
 pytest.importorskip("distributed")
 
-DASK = [sys.executable, "-m", "distributed.cli.dask_scheduler"]
-WORKER = [sys.executable, "-m", "distributed.cli.dask_worker"]
-
 
 @pytest.fixture
 def cluster(tmp_path):
-    """A scheduler's address and two single-thread workers without a nanny."""
-    with socket.socket() as free:
-        free.bind(("127.0.0.1", 0))
-        port = free.getsockname()[1]
-    address = f"tcp://127.0.0.1:{port}"
-    quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
-    here = ["--host", "127.0.0.1", "--port", str(port), "--no-dashboard"]
-    processes = [subprocess.Popen([*DASK, *here], **quiet)]
-    options = ["--nthreads", "1", "--no-nanny", "--no-dashboard"]
-    for _ in range(2):
-        place = ["--local-directory", str(tmp_path / "scratch")]
-        command = [*WORKER, address, *options, *place]
-        processes.append(subprocess.Popen(command, **quiet))
-    yield address, processes[1:]
-    for process in reversed(processes):
-        process.kill()
-        process.wait()
+    """A scheduler and two workers."""
+    with Cluster(tmp_path / "scratch", workers=2) as running:
+        yield running
 
 
 def test_same_bytes_as_here_although_a_worker_is_killed(
@@ -50,7 +31,6 @@ def test_same_bytes_as_here_although_a_worker_is_killed(
 ):
     monkeypatch.setattr("postproc.batch.pace.FIRST", 1)  # many chunks
     monkeypatch.setattr("postproc.batch.pace.LASTING", 0.05)
-    address, workers = cluster
     source = grow(tmp_path / "src", 24, 2)
     pages(source / "pages", 2, 2)
     (source / "bad.pdl").write_bytes(b"\0")
@@ -80,12 +60,12 @@ def test_same_bytes_as_here_although_a_worker_is_killed(
     crews = []
 
     def gather(plan):
-        crews.append(Wounded(plan.setups, address))
+        crews.append(Wounded(plan.setups, cluster.address))
         return crews[0]
 
     local = batch(order("local"), lambda plan: InlineCrew(plan.setups))
     there = batch(order("cluster"), gather)
-    killed = [worker for worker in workers if worker.pid == crews[0].killed]
+    killed = [worker for worker in cluster.workers if worker.pid == crews[0].killed]
     assert [worker.wait(10) for worker in killed] == [-signal.SIGKILL]
     assert contents(tmp_path / "cluster") == contents(tmp_path / "local")
     assert there.exit_code == local.exit_code == 2
