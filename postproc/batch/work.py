@@ -8,11 +8,14 @@ from dataclasses import asdict
 from time import perf_counter
 from typing import Any
 
+import numpy as np
+
 from postproc import __version__
 from postproc.batch.setup import Setup
 from postproc.batch.task import Result, Task, Unit, failed
 from postproc.compensate import compensate
 from postproc.exceptions import PostprocError
+from postproc.pose import MM
 from postproc.report import Outcome
 from postproc.sidecar import SUFFIX
 
@@ -112,9 +115,17 @@ def facts_of(outcome: Outcome) -> dict[str, Any]:
         "left": len(left),
         "left_alone": left[:LISTED],
         "findings": findings[:LISTED],
+        "largest_mm": _largest(outcome),
         "before_mm": _figures(asdict(outcome.before)),
         "after_mm": _figures(asdict(outcome.after)),
     }
+
+
+def _largest(outcome: Outcome) -> float | None:
+    """Return the largest correction [mm], None where nothing was corrected."""
+    lengths = np.linalg.norm(outcome.decisions.correction, axis=1) / MM
+    known = lengths[np.isfinite(lengths)]
+    return round(float(known.max()), 5) if len(known) else None
 
 
 def _figures(statistics: Mapping[str, float]) -> dict[str, float | None]:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from postproc.cli.common import (
+    HtmlOption,
     JsonOption,
     TemperatureOption,
     app,
@@ -16,6 +17,7 @@ from postproc.cli.common import (
     say,
     write_text,
 )
+from postproc.files import check_places
 from postproc.options import AS_USUAL
 
 if TYPE_CHECKING:
@@ -57,6 +59,7 @@ def batch(
     log: Annotated[
         Path | None, typer.Option("--log", help="Log; default: DST.batch.jsonl.")
     ] = None,
+    html: HtmlOption = None,
     clone: Annotated[
         bool, typer.Option("--clone", help="Clone variables whose arrivals disagree.")
     ] = False,
@@ -70,11 +73,14 @@ def batch(
         from postproc.options import Options
 
         made = make_plan(plan, cell, model, Options(clone, temperature=temperature))
+        check_places([html], [cell, model, plan])
         order = run.Order(source, target, made, log or run.default_log(target), resume)
         with progress_bar(f"{source} -> {target}") as told:
             summary = run.batch(order, _workers(jobs, scheduler, tls), told)
         _print_summary(summary)
         say(f"log: {order.log}")
+        if html is not None:
+            _write_page(html, f"{source} -> {target}", order.log)
         if summary.stopped:
             say("stopped; nothing is half written. Go on: same command with --resume")
     raise typer.Exit(summary.exit_code)
@@ -101,6 +107,17 @@ def _print_summary(summary: Summary) -> None:
     print_table(columns, summary.rows())
     for line in summary.lists():
         say(printable(line))
+
+
+def _write_page(html: Path, title: str, log: Path) -> None:
+    """Write the page of a batch from its log, which holds what earlier runs did too."""
+    from postproc.batch.journal import read_entries
+    from postproc.html import batch_report
+
+    entries = read_entries(log).values()
+    found = ((entry.place, entry.status, entry.facts) for entry in entries)
+    write_text(str(html), batch_report(title, found))
+    say(f"written {html}")
 
 
 @app.command()
