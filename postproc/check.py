@@ -8,11 +8,15 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
+from postproc.arrivals import LEFT_ALONE
 from postproc.exceptions import ProgramError
 from postproc.files import TEMPORARY
 from postproc.kinds import COMPILED, PROGRAM, VARIABLES, holds_targets, suffix_of
 from postproc.language.stamp import read_stamp
 from postproc.sidecar import FileRecord, Sidecar, read_sidecar, sha256, sidecar_path
+
+LEFT = "left-alone"  # code of targets that kept their value
+NAMED = 5  # lines of such targets that a message names
 
 Current = Callable[[str], str | None]  # program -> id of the model it should have
 
@@ -48,6 +52,11 @@ class Checked:
     def exit_code(self) -> int:
         """Return 0 where all may be uploaded, 1 where something must not."""
         return 1 if self.findings else 0
+
+    def accepting_left(self) -> Checked:
+        """Return it without targets left alone: somebody has looked at them."""
+        kept = tuple(f for f in self.findings if f.code != LEFT)
+        return Checked(self.programs, kept)
 
     def to_json(self) -> str:
         """Return it as JSON text."""
@@ -181,6 +190,7 @@ class _Look:
             yield Finding(place, "changed", "was changed after it was compensated")
         elif stamp is None or not _agree(stamp.source, stamp.model, record, sidecar):
             yield Finding(place, "no-record", "its stamp is not that of its record")
+        yield from _left_alone(place, record)
         yield from self._source(place, record.source_sha256)
 
     def _source(self, place: str, digest: str) -> Iterator[Finding]:
@@ -200,6 +210,19 @@ class _Look:
             if _read(self.source / place) == _read(self.root / place):
                 text = "is compiled from the uncompensated program: translate it anew"
                 yield Finding(place, "uncompensated", text)
+
+
+def _left_alone(place: str, record: FileRecord) -> Iterator[Finding]:
+    """Find targets that could have been compensated and kept their value."""
+    told = record.targets
+    codes = "".join(str(int(status)) for status in LEFT_ALONE)
+    pairs = zip(str(told.get("status", "")), told.get("line", ()), strict=False)
+    lines = [str(line) for status, line in pairs if status in codes]
+    if lines:
+        more = " .." if len(lines) > NAMED else ""
+        text = f"{len(lines)} visits were left alone, lines {', '.join(lines[:NAMED])}"
+        cure = "look at them, then pass --accept-left"
+        yield Finding(place, LEFT, f"{text}{more} of the source: {cure}")
 
 
 def _agree(source: str, model: str, record: FileRecord, sidecar: Sidecar) -> bool:

@@ -16,6 +16,7 @@ from postproc.cli import app
 from postproc.exceptions import ProgramError
 from postproc.files import TEMPORARY
 from postproc.options import AS_USUAL
+from postproc.report import Status
 from tests.inline import InlineCrew
 from tests.plant import grow, program
 
@@ -72,6 +73,22 @@ def test_an_older_model_is_listed(trees):
     _, target, _ = trees
     found = check(target, lambda place: "newer" if "spot" in place else None)
     assert codes(found) == {("spot.pdl", "older-model")}
+
+
+def test_targets_left_alone_are_found_and_may_be_accepted(trees):
+    _, target, _ = trees
+    path = target / ("spot.pdl" + SUFFIX)
+    record = json.loads(path.read_text())
+    told = record["files"]["spot.lsv"]["targets"]
+    told["status"] = str(int(Status.GUARDED)) * len(told["line"])
+    path.write_text(json.dumps(record))
+    found = check(target)
+    assert codes(found) == {("spot.lsv", "left-alone")}
+    assert "1 visits were left alone, lines 2 of" in found.findings[0].message
+    assert found.exit_code == 1 and found.accepting_left().exit_code == 0
+    command = ["check", str(target)]
+    assert CliRunner().invoke(app, command).exit_code == 1
+    assert CliRunner().invoke(app, [*command, "--accept-left"]).exit_code == 0
 
 
 @pytest.mark.parametrize("name", ["line000/job00000.pdl", "spot.lsv"])
