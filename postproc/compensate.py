@@ -159,7 +159,7 @@ def report(
         program=name,
         model=model.id,
         outputs=output.changed,
-        sidecar=output.sidecar(
+        record=output.sidecar(
             model.id, asdict(options), tell_arrivals(visits, d, tuple(output.records))
         ),
         visits=visits,

@@ -24,7 +24,8 @@ from postproc.planning import (
     with_measured_play,
 )
 from postproc.pose import MM
-from postproc.report import Outcome, Status, target_row
+from postproc.report import Outcome, Status
+from postproc.report_json import target_row
 from postproc.robot.cell import Cell, load_cell
 
 STATUS = "status, why"

@@ -13,6 +13,7 @@ from typing import IO
 from postproc.exceptions import DiskFullError, OutputError
 
 TEMPORARY = ".postproc-tmp"  # end of the names of files that are being written
+Content = bytes | Iterable[bytes]  # of a file, whole or in pieces
 STREAM = "-"  # stands for standard input or output
 
 
@@ -57,7 +58,7 @@ def _check_folder(place: Path) -> None:
         raise OutputError(place, "there is no such folder", cure)
 
 
-def write_all(files: Mapping[Path, bytes]) -> None:
+def write_all(files: Mapping[Path, Content]) -> None:
     """Write several files, each to a temporary name, synced, then renamed.
 
     No file appears under its name before all of them are safely on the disk. They are
@@ -112,13 +113,13 @@ def disk_error(exc: OSError, path: str | Path) -> OutputError:
     return OutputError(path, _reason(exc), cure)
 
 
-def _write_temporary(path: Path, data: bytes) -> str:
+def _write_temporary(path: Path, data: Content) -> str:
     """Write and sync a temporary file in the folder of the final one."""
     mode = path.stat().st_mode & 0o777 if path.exists() else 0o666 & ~_umask()
     handle, name = tempfile.mkstemp(TEMPORARY, f".{path.name[:100]}.", path.parent)
     try:
         with os.fdopen(handle, "wb") as out:
-            out.write(data)
+            out.writelines([data] if isinstance(data, bytes) else data)
             out.flush()
             os.fsync(out.fileno())
         os.chmod(name, mode)

@@ -11,14 +11,15 @@ from postproc.accuracy.model import Model, load_model
 from postproc.clock import Progress, silent
 from postproc.compensate import compensate, name_files
 from postproc.exceptions import ProgramError
-from postproc.files import STREAM, check_places, write_all
+from postproc.files import STREAM, Content, check_places, write_all
 from postproc.language.diagnostic import Diagnostic
 from postproc.options import Options
 from postproc.page_files import Pages, find_pages
 from postproc.planning import VARIABLES
 from postproc.report import Outcome
+from postproc.report_json import report_pieces
 from postproc.robot.cell import Cell, load_cell
-from postproc.sidecar import rename_files, sidecar_path
+from postproc.sidecar import sidecar_path
 
 
 @dataclass(frozen=True)
@@ -116,9 +117,9 @@ class Job:
             OutputError: The output is the input, or cannot be written.
         """
         check_places([output, report, html], self.inputs)
-        files: dict[Path, bytes] = {}
+        files: dict[Path, Content] = {}
         if report is not None and report != Path(STREAM):
-            files[report] = outcome.to_json().encode()
+            files[report] = map(str.encode, report_pieces(outcome))
         if html is not None:
             from postproc.html import program_report
 
@@ -140,7 +141,7 @@ class Job:
 
     def _results(
         self, outcome: Outcome, target: Path, piped: bool
-    ) -> dict[Path, bytes]:
+    ) -> dict[Path, Content]:
         """Name what a compensation gives, the file that users wait for last.
 
         Args:
@@ -149,7 +150,7 @@ class Job:
             piped: The program goes elsewhere; only values get a file.
         """
         values = target.with_suffix(VARIABLES)
-        files: dict[Path, bytes] = {}
+        files: dict[Path, Content] = {}
         for page, _ in reversed(self.pages):
             if page.name in outcome.outputs:
                 place = _page_place(page, target)
@@ -165,12 +166,12 @@ class Job:
 
 def _with_record(
     outcome: Outcome, places: Mapping[str, Path], main: Path
-) -> dict[Path, bytes]:
+) -> dict[Path, Content]:
     """Name the files of one program, behind the record that undoes them."""
     if not places:
         return {}
     names = {name: place.name for name, place in places.items()}
-    record = rename_files(outcome.sidecar, names).encode()
+    record = map(str.encode, outcome.record.renamed(names).to_json())
     files = {place: outcome.outputs[name] for name, place in places.items()}
     return {sidecar_path(main): record, **files}
 

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from postproc import __version__
+from postproc.language.edits import Edit, Replacements, Span
 from postproc.language.rewrite import edits as number_edits
-from postproc.language.source import Edit, Source, apply, compose
+from postproc.language.source import Source, apply, compose
 from postproc.language.stamp import stamp_line
 from postproc.planning import Reading
 from postproc.sidecar import FileRecord, Sidecar, block_checksums, sha256
@@ -31,7 +32,7 @@ class Output:
 
     files: Mapping[str, bytes]
     records: Mapping[str, FileRecord]
-    edits: tuple[tuple[Edit, ...], ...]
+    edits: tuple[Replacements, ...]
 
     @property
     def changed(self) -> dict[str, bytes]:
@@ -48,8 +49,8 @@ class Output:
         model: str,
         options: Mapping[str, object],
         arrivals: Mapping[str, Mapping[str, object]],
-    ) -> str:
-        """Return the record beside the program as JSON text.
+    ) -> Sidecar:
+        """Return the record beside the program.
 
         Args:
             model: Id of the model.
@@ -60,7 +61,7 @@ class Output:
             name: replace(record, targets=arrivals[name])
             for name, record in self.records.items()
         }
-        return Sidecar(__version__, model, records, options).to_json()
+        return Sidecar(__version__, model, records, options)
 
 
 def write_numbers(
@@ -81,7 +82,9 @@ def write_numbers(
     nothing = not any(edits) and not any(reading.cloned)
     files, records = {}, {}
     for number, (source, cloned) in enumerate(reading.originals):
-        own = compose(cloned, edits[number]) if cloned else edits[number]
+        own = edits[number]
+        if cloned:
+            own = Replacements.of(compose(cloned, own))
         files[source.name] = source.data
         if own or (number == 0 and nothing):
             stamp = stamp_line(__version__, model, source)
@@ -91,15 +94,10 @@ def write_numbers(
 
 
 def record(
-    source: Source, stamp: bytes, edits: Sequence[Edit], output: bytes
+    source: Source, stamp: bytes, edits: Replacements, output: bytes
 ) -> FileRecord:
     """Record how an output differs from its source, in the output's offsets."""
-    spans = [(0, len(stamp), "")]
-    shift = len(stamp)
-    for (start, end), new in sorted(edits):
-        begin = start + shift
-        original = source.data[start:end].decode("latin-1")
-        spans.append((begin, begin + len(new), original))
-        shift += len(new) - (end - start)
+    stamped = Replacements.of([Edit(Span(0, len(stamp)), b"")])
+    undone = Replacements.joined([stamped, edits.undone(source.data, len(stamp))])
     checksums = block_checksums(output)
-    return FileRecord(sha256(source.data), sha256(output), checksums, spans)
+    return FileRecord(sha256(source.data), sha256(output), checksums, undone)

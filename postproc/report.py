@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-import io
-import json
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from enum import IntEnum
-from typing import TextIO
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,8 +12,8 @@ from numpy.typing import NDArray
 from postproc.accuracy.error_statistics import ErrorStatistics
 from postproc.language.diagnostic import Diagnostic
 from postproc.language.reached import NEVER_REACHED
-from postproc.language.visits import Motion, Visits
-from postproc.pose import MM
+from postproc.language.visits import Visits
+from postproc.sidecar import Sidecar
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -77,7 +74,7 @@ class Outcome:
         model: Id of the model.
         outputs: New bytes by file name, the program itself first; a file whose values
             did not change is absent.
-        sidecar: The record that `restore` needs, as JSON text.
+        record: What `restore` needs.
         visits: What was found in the program.
         decisions: What was decided for every visit.
         before, after: Predicted error on the visits that could be compensated.
@@ -91,7 +88,7 @@ class Outcome:
     program: str
     model: str
     outputs: Mapping[str, bytes]
-    sidecar: str
+    record: Sidecar
     visits: Visits
     decisions: Decisions
     before: ErrorStatistics
@@ -100,6 +97,11 @@ class Outcome:
     stages: Mapping[str, float] = field(default_factory=dict)
     position: Array = field(default_factory=lambda: np.empty((0, 3)))
     sources: Mapping[str, bytes] = field(default_factory=dict)
+
+    @property
+    def sidecar(self) -> str:
+        """The record that `restore` needs, as JSON text."""
+        return "".join(self.record.to_json())
 
     @property
     def exit_code(self) -> int:
@@ -140,71 +142,6 @@ class Outcome:
 
     def to_json(self) -> str:
         """Return the whole report as JSON text."""
-        text = io.StringIO()
-        write_report(self, text)
-        return text.getvalue()
+        from postproc.report_json import report_pieces
 
-
-def write_report(outcome: Outcome, out: TextIO) -> None:
-    """Write the report as JSON, one visit at a time, so that memory stays flat."""
-    head = {"program": outcome.program, "model": outcome.model}
-    out.write(json.dumps(head)[:-1] + ', "targets": [')
-    for i in range(len(outcome.visits)):
-        out.write(("," if i else "") + "\n" + json.dumps(target_row(outcome, i)))
-    tail = {
-        "predicted": {"before": asdict(outcome.before), "after": asdict(outcome.after)},
-        "diagnostics": [asdict(d) for d in outcome.diagnostics],
-        "stages_s": dict(outcome.stages),
-    }
-    text = json.dumps(finite(tail))
-    out.write("],\n" + text[1:] + "\n")
-
-
-def target_row(outcome: Outcome, i: int) -> dict[str, object]:
-    """Describe visit i in the keys of the report."""
-    v, d = outcome.visits, outcome.decisions
-    literal, known = int(v.literal[i]), len(outcome.position) > 0
-    where = None
-    original: list[float | None] = []
-    corrected: list[float | None] = []
-    if literal >= 0:
-        where = {
-            "file": v.files[v.literals.file[literal]],
-            "line": int(v.literals.line[literal]),
-        }
-        original, corrected = _numbers(v.values[i]), _numbers(d.corrected[i])
-    turned = {}
-    if len(d.turn):
-        turned["correction_deg"] = _numbers(np.rad2deg(d.turn[i]), 6)
-    return {
-        "line": int(v.line[i]),
-        "file": v.files[v.file[i]],
-        "literal": where,
-        "name": v.names[v.name[i]] or None,
-        "move": "VIA" if v.via[i] else Motion(v.motion[i]).name,
-        "q_deg": _numbers(np.rad2deg(d.q[i]), 5),
-        "lambda": [int(s) for s in d.direction[i]],
-        "side": [round(float(s), 3) for s in d.side[i]],
-        "status": Status(d.status[i]).name.lower(),
-        "why": d.reasons[d.why[i]],
-        "original": original,
-        "corrected": corrected,
-        "position_mm": _numbers(outcome.position[i] / MM, 4) if known else [],
-        "correction_mm": _numbers(d.correction[i] / MM, 5),
-        **turned,
-        "std_error_mm": _numbers(d.std_error[i] / MM, 5),
-    }
-
-
-def _numbers(values: Array, digits: int = 9) -> list[float | None]:
-    """Round for a person; a number that is not known becomes null."""
-    return [round(float(v), digits) if np.isfinite(v) else None for v in values]
-
-
-def finite(value: object) -> object:
-    """Replace NaN, which JSON does not have, by null."""
-    if isinstance(value, dict):
-        return {k: finite(v) for k, v in value.items()}
-    if isinstance(value, list):
-        return [finite(v) for v in value]
-    return None if isinstance(value, float) and not np.isfinite(value) else value
+        return "".join(report_pieces(self))

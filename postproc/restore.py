@@ -6,6 +6,7 @@ from pathlib import Path
 
 from postproc.exceptions import ProgramError
 from postproc.files import write_all
+from postproc.language.source import apply
 from postproc.sidecar import (
     BLOCK,
     FileRecord,
@@ -35,11 +36,7 @@ def restore(data: bytes, record: FileRecord, name: str) -> bytes:
             "Undo that change, or take the source from your archive",
             line=_first_changed_line(data, record),
         )
-    parts, end = [], 0
-    for start, stop, original in record.edits:
-        parts += [data[end:start], original.encode("latin-1")]
-        end = stop
-    source = b"".join([*parts, data[end:]])
+    source = apply(data, record.edits)
     if sha256(source) != record.source_sha256:
         raise ProgramError(
             name, "the record does not give its source back", "It belongs elsewhere"

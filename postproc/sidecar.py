@@ -5,12 +5,15 @@ from __future__ import annotations
 import hashlib
 import json
 import zlib
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
+
+import numpy as np
 
 from postproc.exceptions import ProgramError
+from postproc.language.edits import Replacements
 
 SUFFIX = ".postproc.json"
 BLOCK = 50  # lines per checksum: how closely a later edit can be located
@@ -44,8 +47,8 @@ class FileRecord:
     Attributes:
         source_sha256, output_sha256: Hashes of the bytes.
         checksums: CRC-32 of every `BLOCK` lines of the output.
-        edits: Start and end in the output, and the original bytes (as Latin-1 text),
-            ascending. The stamp is the first of them.
+        edits: What the output's bytes were before, ascending: in a file start, end and
+            the original as Latin-1 text. The stamp is the first of them.
         targets: What came of the targets in it, see `postproc.arrivals`; empty in
             records of older versions.
     """
@@ -53,8 +56,41 @@ class FileRecord:
     source_sha256: str
     output_sha256: str
     checksums: Sequence[int]
-    edits: Sequence[tuple[int, int, str]]
+    edits: Replacements
     targets: Mapping[str, Any] = field(default_factory=dict)
+
+    @classmethod
+    def read(cls, told: Mapping[str, Any]) -> Self:
+        """Take what a record's file says of one output file.
+
+        Raises:
+            KeyError, ValueError, TypeError: It is something else.
+        """
+        rows = told["edits"]
+        return cls(
+            str(told["source_sha256"]),
+            str(told["output_sha256"]),
+            [int(c) for c in told["checksums"]],
+            Replacements(
+                np.array([int(start) for start, _, _ in rows], dtype=np.int64),
+                np.array([int(end) for _, end, _ in rows], dtype=np.int64),
+                np.array([str(text).encode("latin-1") for *_, text in rows], "S"),
+            ),
+            dict(told.get("targets", {})),
+        )
+
+    def to_json(self) -> Iterator[str]:
+        """Write the record piece by piece: it is as long as the program."""
+        told = {name: value for name, value in vars(self).items() if name != "edits"}
+        targets = told.pop("targets")
+        yield json.dumps(told)[:-1] + ', "edits": ['
+        comma = ""
+        for some in self.edits.pieces():
+            texts = [text.decode("latin-1") for text in some.new.tolist()]
+            rows = zip(some.start.tolist(), some.end.tolist(), texts, strict=True)
+            yield comma + json.dumps(list(rows))[1:-1]
+            comma = ", "
+        yield '], "targets": ' + json.dumps(targets) + "}"
 
 
 @dataclass(frozen=True)
@@ -66,26 +102,23 @@ class Sidecar:
     files: Mapping[str, FileRecord]
     options: Mapping[str, Any] = field(default_factory=dict)
 
-    def to_json(self) -> str:
-        """Return the record as JSON text."""
+    def to_json(self) -> Iterator[str]:
+        """Write the record as JSON text, piece by piece."""
         head = {"postproc": self.version, "model": self.model}
-        files = {name: vars(record) for name, record in self.files.items()}
-        return (
-            json.dumps({**head, "options": dict(self.options), "files": files}) + "\n"
-        )
+        yield json.dumps({**head, "options": dict(self.options)})[:-1] + ', "files": {'
+        for number, (name, record) in enumerate(self.files.items()):
+            yield (", " if number else "") + json.dumps(name) + ": "
+            yield from record.to_json()
+        yield "}}\n"
 
+    def renamed(self, names: Mapping[str, str]) -> Sidecar:
+        """Let the record speak of its files by other names.
 
-def rename_files(record: str, names: Mapping[str, str]) -> str:
-    """Let a record speak of its files by other names.
-
-    Args:
-        record: JSON text of a record.
-        names: New names by old ones; files that have none are left out.
-    """
-    data = json.loads(record)
-    files = data["files"].items()
-    data["files"] = {names[name]: file for name, file in files if name in names}
-    return json.dumps(data) + "\n"
+        Args:
+            names: New names by old ones; files that have none are left out.
+        """
+        files = {names[name]: r for name, r in self.files.items() if name in names}
+        return replace(self, files=files)
 
 
 def read_sidecar(path: Path) -> Sidecar:
@@ -97,16 +130,7 @@ def read_sidecar(path: Path) -> Sidecar:
     cure = "Restore needs the record that was written beside the program"
     try:
         data = json.loads(path.read_bytes())
-        files = {
-            name: FileRecord(
-                str(r["source_sha256"]),
-                str(r["output_sha256"]),
-                [int(c) for c in r["checksums"]],
-                [(int(a), int(b), str(text)) for a, b, text in r["edits"]],
-                dict(r.get("targets", {})),
-            )
-            for name, r in data["files"].items()
-        }
+        files = {name: FileRecord.read(told) for name, told in data["files"].items()}
         version, model = str(data["postproc"]), str(data["model"])
         return Sidecar(version, model, files, data.get("options", {}))
     except OSError as exc:

@@ -12,7 +12,7 @@ from postproc.accuracy.error_statistics import ErrorStatistics
 from postproc.jobs import read_files
 from postproc.language.visits import Visits
 from postproc.planning import read_program
-from postproc.report import finite
+from postproc.report_json import finite
 from postproc.robot.cell import Cell, load_cell
 from postproc.virtual import (
     DEFAULT,

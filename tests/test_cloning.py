@@ -55,7 +55,7 @@ def given_back(outcome) -> dict[str, bytes]:
     """Undo every file of an outcome."""
     records = json.loads(outcome.sidecar)["files"]
     return {
-        name: restore(data, FileRecord(**records[name]), name)
+        name: restore(data, FileRecord.read(records[name]), name)
         for name, data in outcome.outputs.items()
         if name in records
     }

@@ -104,7 +104,7 @@ def test_restore_gives_the_source_back(run):
     outcome = run(JOINTS, POSE)
     record = json.loads(outcome.sidecar)["files"]["job.pdl"]
     record["edits"] = [tuple(e) for e in record["edits"]]
-    again = restore(outcome.outputs["job.pdl"], FileRecord(**record), "job.pdl")
+    again = restore(outcome.outputs["job.pdl"], FileRecord.read(record), "job.pdl")
     assert again == program(JOINTS, POSE)
 
 

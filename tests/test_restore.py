@@ -3,6 +3,7 @@
 import pytest
 
 from postproc.exceptions import ProgramError
+from postproc.language.edits import Edit, Replacements, Span
 from postproc.restore import restore, restore_file
 from postproc.sidecar import (
     FileRecord,
@@ -15,7 +16,7 @@ from postproc.sidecar import (
 
 SOURCE = b"PROGRAM x\r\nMOVE TO {1.0, \xe4 2}\r\nEND x"
 OUTPUT = b"-- stamp\r\nPROGRAM x\r\nMOVE TO {1.25, \xe4 2}\r\nEND x"
-EDITS = [(0, 10, ""), (30, 34, "1.0")]
+EDITS = Replacements.of([Edit(Span(0, 10), b""), Edit(Span(30, 34), b"1.0")])
 
 
 @pytest.fixture
@@ -34,7 +35,9 @@ def test_refuses_what_was_edited_since_and_says_where(record):
 
 def test_locates_a_late_change():
     text = b"".join(b"line %d\n" % i for i in range(200))
-    record = FileRecord(sha256(text), sha256(text), block_checksums(text), [])
+    record = FileRecord(
+        sha256(text), sha256(text), block_checksums(text), Replacements.of([])
+    )
     with pytest.raises(ProgramError, match="lines 151 and 200"):
         restore(text.replace(b"line 170", b"line 17x"), record, "x.pdl")
 
@@ -49,8 +52,9 @@ def test_round_trip_through_files(tmp_path, record):
     program = tmp_path / "job.pdl"
     program.write_bytes(OUTPUT)
     side = Sidecar("0", "m", {"job.pdl": record}, {"clone": False})
-    sidecar_path(program).write_text(side.to_json())
-    assert read_sidecar(sidecar_path(program)).files["job.pdl"].edits == EDITS
+    sidecar_path(program).write_text("".join(side.to_json()))
+    read = read_sidecar(sidecar_path(program)).files["job.pdl"].edits
+    assert list(read) == list(EDITS)
     assert restore_file(program, tmp_path / "back.pdl") == [tmp_path / "back.pdl"]
     assert (tmp_path / "back.pdl").read_bytes() == SOURCE
     assert program.read_bytes() == OUTPUT

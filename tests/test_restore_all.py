@@ -28,7 +28,7 @@ def assert_restored(source, cell, model, variables=None):
     assert set(records) <= set(outcome.outputs)
     for name, data in outcome.outputs.items():
         if name in records:
-            record = FileRecord(**records[name])
+            record = FileRecord.read(records[name])
             assert restore(data, record, name) == sources[name]
         else:
             assert data == sources[name]

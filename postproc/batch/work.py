@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from time import perf_counter
@@ -86,16 +85,14 @@ def _outputs(
         stem = _file_name(unit.program).rpartition(".")[0]
         place_of[f"{stem}.lsv"] = unit.variables
     new = {place_of[name]: data for name, data in outcome.outputs.items()}
-    record = json.loads(outcome.sidecar)
-    records = {place_of[name]: r for name, r in record.pop("files").items()}
     outputs: dict[str, bytes] = {}
     for place in reversed(unit.programs):
         belongs = [place]
         if place == unit.program and unit.variables is not None:
             belongs.insert(0, unit.variables)
-        own = {_file_name(b): records[b] for b in belongs if b in records}
-        text = json.dumps({**record, "files": own}) + "\n"
-        outputs[place + SUFFIX] = text.encode()
+        own = {n: _file_name(b) for n, b in place_of.items() if b in belongs}
+        record = outcome.record.renamed(own)
+        outputs[place + SUFFIX] = "".join(record.to_json()).encode()
         outputs |= {b: new.get(b, sources[b]) for b in belongs}
     return outputs
 

@@ -8,15 +8,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from postproc.exceptions import ProgramError
+from postproc.language import digits
+from postproc.language.edits import Replacements
 from postproc.language.lexis import number_value
 from postproc.language.lines import Lines, read_lines
-from postproc.language.source import Edit, Source, Span, apply
+from postproc.language.source import Source, apply
 from postproc.language.visits import Literals
 
 Ints = NDArray[np.int64]
 Floats = NDArray[np.float64]
 
 MM_DECIMALS, DEGREE_DECIMALS, JOINT_DECIMALS = 3, 4, 5
+_PIECE = 100_000  # numbers rewritten at a time
 _POSE_DECIMALS = (MM_DECIMALS,) * 3 + (DEGREE_DECIMALS,) * 3
 _JOINT_DECIMALS = (JOINT_DECIMALS,) * 6
 
@@ -53,7 +56,7 @@ def edits(
     sources: Sequence[Source],
     rows: Ints | Sequence[int],
     new_values: Floats | Sequence[Floats],
-) -> tuple[tuple[Edit, ...], ...]:
+) -> tuple[Replacements, ...]:
     """Return the edits that give literals new values, file by file.
 
     A number is edited only where it changes by more than half of its last digit as it
@@ -79,45 +82,47 @@ def edits(
         joints = literals.joints[rows[mine], None]
         least = np.where(joints, _JOINT_DECIMALS, _POSE_DECIMALS)
         written = start >= 0
-        found.append(
-            _edits_of(
-                source.text,
-                start[written].tolist(),
-                end[written].tolist(),
-                new_values[mine][written].tolist(),
-                least[written].tolist(),
-            )
-        )
+        order = np.argsort(start[written], kind="stable")
+        start, end = start[written][order], end[written][order]
+        values, least = new_values[mine][written][order], least[written][order]
+        pieces = [
+            _edits_of(source, start[some], end[some], values[some], least[some])
+            for some in (slice(a, a + _PIECE) for a in range(0, len(start), _PIECE))
+        ]
+        found.append(Replacements.joined(pieces))
     return tuple(found)
 
 
 def _edits_of(
-    text: str,
-    starts: list[int],
-    ends: list[int],
-    values: list[float],
-    least: list[int],
-) -> tuple[Edit, ...]:
-    """Return the edits of one file's numbers, sorted."""
-    found = []
-    for start, end, value, few in zip(starts, ends, values, least, strict=True):
-        old = text[start:end]
-        decimals = decimals_of(old)
-        before = number_value(old)
-        if abs(value - before) <= 0.5 * 10.0 ** -max(decimals, few):
-            continue
-        new = number_text(value, decimals, few)
-        if float(new) != before:
-            found.append(Edit(Span(start, end), new.encode("ascii")))
-    found.sort(key=_place)
-    return tuple(found)
+    source: Source, start: Ints, end: Ints, values: Floats, least: Ints
+) -> Replacements:
+    """Return the edits of one file's numbers, which are in ascending order."""
+    old, plain = digits.cut(source.data, start, end)
+    had, before = np.zeros(len(old), dtype=np.int64), np.empty(len(old))
+    had[plain], before[plain] = digits.decimals(old[plain]), old[plain].astype(float)
+    for row in np.flatnonzero(~plain).tolist():
+        text = source.text[start[row] : end[row]]
+        had[row], before[row] = decimals_of(text), number_value(text)
+    moved = ~(np.abs(values - before) <= 0.5 * 10.0 ** -np.maximum(had, least))
+    rows = np.flatnonzero(moved)
+    new = _texts(values[rows], had[rows], least[rows])
+    other = new.astype(float) != before[rows]
+    return Replacements(start[rows[other]], end[rows[other]], new[other])
 
 
-def _place(edit: Edit) -> Span:
-    return edit.span
+def _texts(values: Floats, decimals: Ints, least: Ints) -> NDArray[np.bytes_]:
+    """Write numbers with the decimals they had and at least `least`, (m,)."""
+    new, sure = digits.fixed(values, np.maximum(decimals, least))
+    rest = np.flatnonzero(~sure)
+    triples = zip(values[rest], decimals[rest], least[rest], strict=True)
+    texts = [number_text(v, d, few).encode("ascii") for v, d, few in triples]
+    widest = max([new.dtype.itemsize, *map(len, texts)])
+    new = new.astype(f"S{widest}")
+    new[rest] = texts
+    return new
 
 
-def compare(before: Source, after: Source, allowed: Sequence[Edit]) -> tuple[str, ...]:
+def compare(before: Source, after: Source, allowed: Replacements) -> tuple[str, ...]:
     """Check that a text differs from its origin only by the edits meant.
 
     Both texts are read anew: every line must have the shape it had, and every number
@@ -145,18 +150,17 @@ def compare(before: Source, after: Source, allowed: Sequence[Edit]) -> tuple[str
     return _stray_edits(old, allowed)
 
 
-def _stray_edits(old: Lines, allowed: Sequence[Edit]) -> tuple[str, ...]:
+def _stray_edits(old: Lines, allowed: Replacements) -> tuple[str, ...]:
     """Find edits that do not replace exactly one number."""
-    spans = np.array([e.span for e in allowed], dtype=np.int64).reshape(-1, 2)
-    at = np.minimum(np.searchsorted(old.start, spans[:, 0]), len(old.start) - 1)
-    whole = (old.start[at] == spans[:, 0]) & (old.end[at] == spans[:, 1])
+    at = np.minimum(np.searchsorted(old.start, allowed.start), len(old.start) - 1)
+    whole = (old.start[at] == allowed.start) & (old.end[at] == allowed.end)
     if whole.all():
         return ()
-    line = old.source.line_of(int(spans[~whole][0, 0]))
+    line = old.source.line_of(int(allowed.start[~whole][0]))
     return (f"line {line}: an edit does not replace one whole number",)
 
 
-def _first_difference(before: Source, after: Source, allowed: Sequence[Edit]) -> str:
+def _first_difference(before: Source, after: Source, allowed: Replacements) -> str:
     meant = apply(before.data, allowed)
     length = min(len(meant), len(after.data))
     pairs = zip(meant, after.data, strict=False)

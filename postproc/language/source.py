@@ -7,29 +7,25 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from postproc.exceptions import FileError, ProgramError
+from postproc.language.edits import Edit, Replacements, Span
+
+__all__ = [
+    "Edit",
+    "Source",
+    "Span",
+    "apply",
+    "compose",
+    "read_source",
+    "source_from_bytes",
+]
 
 _LINE_END = re.compile(rb"\r\n|\n|\r")
 _UTF8_MARK = b"\xef\xbb\xbf"
-
-
-class Span(NamedTuple):
-    """Bytes `start` up to, but not including, `end` of a file."""
-
-    start: int
-    end: int
-
-
-class Edit(NamedTuple):
-    """Replace the bytes of `span` by `new`."""
-
-    span: Span
-    new: bytes
 
 
 @dataclass(frozen=True)
@@ -121,6 +117,8 @@ def apply(data: bytes, edits: Iterable[Edit]) -> bytes:
     >>> apply(b"MOVE TO {1.0}", [Edit(Span(9, 12), b"1.00025")])
     b'MOVE TO {1.00025}'
     """
+    if isinstance(edits, Replacements):
+        return edits.apply(data)
     parts: list[bytes] = []
     done = 0
     for (start, end), new in sorted(edits, key=lambda edit: edit.span):

@@ -108,7 +108,7 @@ def records_of(sidecar: str) -> dict[str, FileRecord]:
     import json
 
     files = json.loads(sidecar)["files"]
-    return {name: FileRecord(**record) for name, record in files.items()}
+    return {name: FileRecord.read(record) for name, record in files.items()}
 
 
 def check_bytes(

@@ -10,6 +10,7 @@ from postproc.accuracy.error_statistics import ErrorStatistics
 from postproc.language.diagnostic import Diagnostic
 from postproc.language.visits import Literals, Visits
 from postproc.report import Decisions, Outcome, Status
+from postproc.sidecar import Sidecar
 
 REASONS = (
     "",
@@ -142,7 +143,7 @@ def outcome_of(
         program=name,
         model="0123456789abcdef",
         outputs={},
-        sidecar="{}",
+        record=Sidecar("0", "model", {}),
         visits=visits,
         decisions=decisions,
         before=ErrorStatistics.of(decisions.correction[safe]),

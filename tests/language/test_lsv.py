@@ -95,7 +95,7 @@ def test_edits_fall_into_the_variable_file() -> None:
     program = source_from_bytes("job.pdl", PDL)
     new = v.values[:1] + np.array([0.5, 0, 0, 0, 0, 0])
     pdl, lsv = edits(v.literals, (program, variables.source), v.literal[:1], new)
-    assert pdl == ()
+    assert not pdl
     assert apply(LSV, lsv) == LSV.replace(b"1093.44", b"1093.940")
 
 

@@ -5,6 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from postproc.language.edits import Replacements
 from postproc.language.flow import resolve
 from postproc.language.rewrite import compare, decimals_of, edits, number_text
 from postproc.language.source import Edit, Source, Span, apply, source_from_bytes
@@ -35,7 +36,7 @@ def test_new_numbers_have_enough_digits_and_nothing_else_changes() -> None:
 def test_compare_finds_what_was_not_meant() -> None:
     source = source_from_bytes("a.pdl", PROGRAM)
     at = PROGRAM.index(b"1.5")
-    meant = [Edit(Span(at, at + 3), b"1.7")]
+    meant = Replacements.of([Edit(Span(at, at + 3), b"1.7")])
     good = Source("a", apply(PROGRAM, meant))
     assert compare(source, good, meant) == ()
     assert compare(source, Source("a", good.data.replace(b"45.1", b"45.2")), meant)

@@ -1,0 +1,130 @@
+"""What is to be changed in a text: single edits, or a million of them as arrays."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple, overload
+
+import numpy as np
+from numpy.typing import NDArray
+
+Ints = NDArray[np.int64]
+
+AT_ONCE = 50_000  # edits that are Python objects at the same time
+
+
+class Span(NamedTuple):
+    """Bytes `start` up to, but not including, `end` of a file."""
+
+    start: int
+    end: int
+
+
+class Edit(NamedTuple):
+    """Replace the bytes of `span` by `new`."""
+
+    span: Span
+    new: bytes
+
+
+@dataclass(frozen=True, eq=False)
+class Replacements(Sequence[Edit]):
+    """Edits in ascending order that do not overlap (structure of arrays).
+
+    Attributes:
+        start, end: Offsets of the bytes to replace, (m,).
+        new: What replaces them, (m,) strings of bytes.
+    """
+
+    start: Ints
+    end: Ints
+    new: NDArray[np.bytes_]
+
+    def __post_init__(self) -> None:
+        """Refuse what is not in order.
+
+        Raises:
+            ValueError: Edits overlap or are not sorted.
+        """
+        if (self.start > self.end).any() or (self.start[1:] < self.end[:-1]).any():
+            raise ValueError("edits overlap or are not in ascending order")
+
+    @classmethod
+    def joined(cls, parts: Sequence[Replacements]) -> Replacements:
+        """Put edits one after the other."""
+        none = np.empty(0, dtype=np.int64)
+        return cls(
+            np.concatenate([none, *(p.start for p in parts)]),
+            np.concatenate([none, *(p.end for p in parts)]),
+            np.concatenate([np.empty(0, dtype="S1"), *(p.new for p in parts)]),
+        )
+
+    @classmethod
+    def of(cls, edits: Iterable[Edit]) -> Replacements:
+        """Take single edits."""
+        found = sorted(edits, key=lambda edit: edit.span)
+        spans = np.array([e.span for e in found], dtype=np.int64).reshape(-1, 2)
+        return cls(spans[:, 0], spans[:, 1], np.array([e.new for e in found], "S"))
+
+    def __len__(self) -> int:
+        """Return the number of edits."""
+        return len(self.start)
+
+    @overload
+    def __getitem__(self, row: int) -> Edit: ...
+    @overload
+    def __getitem__(self, row: slice) -> Replacements: ...
+    def __getitem__(self, row: int | slice) -> Edit | Replacements:
+        """Return one edit or some."""
+        if isinstance(row, slice):
+            return Replacements(self.start[row], self.end[row], self.new[row])
+        span = Span(int(self.start[row]), int(self.end[row]))
+        return Edit(span, bytes(self.new[row]))
+
+    def __iter__(self) -> Iterator[Edit]:
+        """Go through the edits."""
+        for some in self.pieces():
+            spans = map(Span, some.start.tolist(), some.end.tolist())
+            yield from map(Edit, spans, some.new.tolist())
+
+    def pieces(self) -> Iterator[Replacements]:
+        """Cut into pieces that may become Python objects."""
+        return (self[a : a + AT_ONCE] for a in range(0, len(self), AT_ONCE))
+
+    def apply(self, data: bytes) -> bytes:
+        """Apply to a text.
+
+        Raises:
+            ValueError: An edit lies outside.
+        """
+        if len(self) and not (self.start[0] >= 0 and self.end[-1] <= len(data)):
+            raise ValueError("an edit lies outside")
+        out, done = [], 0
+        for some in self.pieces():
+            kept = [done, *some.end[:-1].tolist()]
+            parts: list[bytes] = []
+            for start, end, new in zip(
+                kept, some.start.tolist(), some.new.tolist(), strict=True
+            ):
+                parts += (data[start:end], new)
+            out.append(b"".join(parts))
+            done = int(some.end[-1])
+        return b"".join([*out, data[done:]])
+
+    def undone(self, data: bytes, after: int = 0) -> Replacements:
+        """Return the edits of the result that give the text back.
+
+        Args:
+            data: The text.
+            after: Bytes that stand before the result.
+        """
+        length = np.char.str_len(self.new).astype(np.int64)
+        growth = length - (self.end - self.start)
+        start = self.start + after + np.cumsum(growth) - growth
+        old = [
+            np.array([data[a:b] for a, b in zip(s.start, s.end, strict=True)], "S")
+            for s in self.pieces()
+        ]
+        originals = np.concatenate([np.empty(0, dtype="S1"), *old])
+        return Replacements(start, start + length, originals)
