@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +14,7 @@ from postproc.calibrate import fit
 from postproc.exceptions import MeasurementError, PostprocError
 from postproc.robot.cell import Cell, load_cell
 from tests.accuracy.simulator import NJ, PLATE, TOOL, random_arm, random_states
+from tests.written import cli
 
 
 def write(path: Path, n: int = 200, seed: int = 0, points: int = 1) -> Path:
@@ -104,3 +106,28 @@ def test_what_cannot_be_fitted_is_refused(tmp_path: Path) -> None:
     few.write_text("\n".join(path.read_text().splitlines()[:7]) + "\n")
     with pytest.raises(MeasurementError, match="determine"):
         fit([few], cell(tmp_path))
+
+
+def test_fit_prints_what_an_engineer_reads(tmp_path: Path) -> None:
+    data = write(tmp_path / "s.csv")
+    cell(tmp_path)
+    found = cli(
+        "fit", data, "--cell", tmp_path / "cell.toml", "-o", tmp_path / "m.json",
+        "--effects", ",".join(BASE_EFFECTS),
+    )  # fmt: skip
+    assert found.exit_code == 0, found.stderr
+    lines = found.stdout.splitlines()
+    assert lines[0].split() == ["parameter", "value", "std", "error", "unit", "share",
+                                "seen"]  # fmt: skip
+    row = next(line.split() for line in lines if line.startswith("geometry.a2 "))
+    assert row[3] == "mm" and row[4].endswith("%") and 0 < float(row[2]) < 0.02
+    shares = [float(x) for x in re.findall(r"^\w+: (-?[\d.]+)% of", found.stdout, re.M)]
+    assert len(shares) == 3 and sum(shares) == pytest.approx(100.0, abs=1.0)
+    pairs = re.findall(r"^correlated ([+-][\d.]+): \S+ and \S+$", found.stdout, re.M)
+    assert pairs and all(abs(float(value)) > 0.9 for value in pairs)
+    assert "row 8 (line 9): position 0, 0, 0: beam lost" in lines
+    assert re.search(
+        r"row 10 \(line 11\): dropped: off by [\d.]+ mm, [\d.]+ sigma; its neighbours "
+        "disagree",
+        found.stdout,
+    )

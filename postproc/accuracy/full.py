@@ -13,7 +13,7 @@ from postproc.accuracy.fitted import Fit
 from postproc.accuracy.library import propose
 from postproc.accuracy.measurement import Measurements
 from postproc.accuracy.model import COMPENSATED, Model
-from postproc.accuracy.probe_turn import ProbeMount, ProbeTurn
+from postproc.accuracy.probe_turn import ProbeTurn
 from postproc.accuracy.ranges import Ranges
 from postproc.accuracy.selection import fit_best
 from postproc.accuracy.turns import Turns
@@ -45,10 +45,9 @@ def fit_survey(
     origin = None if tracker is None else (tracker[0], tracker[1], tracker[2])
     states, position, batch = survey.states, survey.position, Batch(arm, survey.states)
     turns = None
-    if survey.rotation is not None:
+    if survey.rotation is not None and survey.mounting is not None:
         turns = Turns.of(batch, survey.rotation, survey.mounting)
-        probe = ProbeMount if survey.mounting is None else ProbeTurn
-        setup = (*setup, probe.name)
+        setup = (*setup, ProbeTurn.name)
     if effects is None:
         return fit_best(arm, states, position, origin, setup, turns)
     chosen = propose((*effects, *setup), arm, states)
@@ -72,7 +71,6 @@ def model_of(fitted: Fit, survey: Measurements) -> Model:
         "log_evidence": fitted.log_evidence,
         "rows_dropped": float((~used).sum() + len(survey.dropped)),
     }
-    oriented = fitted.turns is not None and survey.mounting is not None
     if fitted.turns is not None:
         statistics["orientation_std_mrad"] = fitted.turns.std * 1e3
     return Model(
@@ -84,7 +82,7 @@ def model_of(fitted: Fit, survey: Measurements) -> Model:
         covariance=covariance,
         prior_std=fitted.prior_std,
         noise=fitted.noise,
-        ranges=Ranges.of(survey.states[used], oriented),
+        ranges=Ranges.of(survey.states[used], fitted.turns is not None),
         rows=int(used.sum()),
         data_sha256=survey.sha256,
         statistics=statistics,

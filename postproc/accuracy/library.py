@@ -19,7 +19,7 @@ from postproc.accuracy.interpolation import Interpolation
 from postproc.accuracy.joint_spline import JointSpline
 from postproc.accuracy.kriging import Kriging
 from postproc.accuracy.probe import Probe
-from postproc.accuracy.probe_turn import ProbeMount, ProbeTurn
+from postproc.accuracy.probe_turn import ProbeTurn
 from postproc.accuracy.registration import Placement
 from postproc.exceptions import PostprocError
 from postproc.robot.arm import Arm
@@ -32,7 +32,6 @@ KINDS: tuple[type[Effect], ...] = (
     *FURTHER,
     Probe,
     ProbeTurn,
-    ProbeMount,
     Placement,
     JointSpline,
     Elm,

@@ -166,6 +166,9 @@ def _rank(arm: Arm, states: States) -> int:
 def check_orientations(survey: Measurements, arm: Arm) -> Measurements:
     """Check measured orientations, base frame; what cannot be used is left out.
 
+    Without the probe's mounting they tell nothing of the flange that one point does
+    not, so that only their own errors would enter.
+
     Raises:
         MeasurementError: The declared mounting of the probe is not the measured one.
     """
@@ -174,17 +177,21 @@ def check_orientations(survey: Measurements, arm: Arm) -> Measurements:
     batch = Batch(arm, survey.states)
     apart = Turns.of(batch, survey.rotation, None).typical
     if apart > TURNED:
-        text = (
-            f"the measured orientations scatter by {np.rad2deg(apart):.1f} deg about "
-            "the arm's: they are not R = Rx Ry Rz of a probe on the flange, and are "
-            "not used"
+        why = (
+            f"they scatter by {np.rad2deg(apart):.1f} deg about the arm's: not "
+            "R = Rx Ry Rz of a probe on the flange"
         )
-        warnings = (*survey.warnings, text)
-        return replace(survey, rotation=None, warnings=warnings)
-    if survey.mounting is not None:
+    elif survey.mounting is None:
+        why = (
+            "the cell does not say how the probe is mounted: write euler_zyz_deg in "
+            "[survey]"
+        )
+    else:
         apart = Turns.of(batch, survey.rotation, survey.mounting).typical
         if apart > TURNED:
             problem = f"the probe is mounted {np.rad2deg(apart):.1f} deg off"
             cure = "Correct [survey] euler_zyz_deg in the cell file, or leave it out"
             raise MeasurementError(survey.path, problem, cure)
-    return survey
+        return survey
+    told = f"measured orientations are not used: {why}"
+    return replace(survey, rotation=None, warnings=(*survey.warnings, told))

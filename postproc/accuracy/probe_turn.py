@@ -15,6 +15,8 @@ from postproc.robot.state import States
 
 Array = NDArray[np.float64]
 
+SCALE = 1e-4  # [rad] of a mounting that was measured
+
 
 @dataclass(frozen=True)
 class ProbeTurn(Effect):
@@ -29,8 +31,6 @@ class ProbeTurn(Effect):
 
     name: ClassVar[str] = "probe_turn"
     origin: ClassVar[Origin] = "setup"
-    scale: ClassVar[float] = 1e-4  # [rad] of a mounting that was measured
-
     tools: tuple[int, ...] = (0,)
 
     @classmethod
@@ -41,7 +41,7 @@ class ProbeTurn(Effect):
     def parameters(self) -> tuple[Parameter, ...]:
         """Name three turns per point."""
         return tuple(
-            Parameter(f"r{a}_{t}", "rad", self.scale, "mounting")
+            Parameter(f"r{a}_{t}", "rad", SCALE, "mounting")
             for t in self.tools
             for a in "xyz"
         )
@@ -55,11 +55,3 @@ class ProbeTurn(Effect):
         R = batch.walk.flange
         parts = [R * (batch.states.tool_id == t)[:, None, None] for t in self.tools]
         return np.concatenate(parts, axis=2)
-
-
-@dataclass(frozen=True)
-class ProbeMount(ProbeTurn):
-    """Turn of a 6D probe whose mounting nobody has declared."""
-
-    name: ClassVar[str] = "probe_mount"
-    scale: ClassVar[float] = 1e-2  # [rad] after a first estimate from the survey

@@ -81,8 +81,10 @@ def longer_states():  # type: ignore[no-untyped-def]
 
 def test_an_undeclared_mounting_leaves_the_flange_unseen_and_says_so() -> None:
     arm, survey = oriented(0)
-    model = fitted(replace(survey, mounting=None))
-    assert "probe_mount" in {e.name for e in model.effects.effects}
+    unknown = check_orientations(replace(survey, mounting=None), NJ)
+    assert unknown.rotation is None
+    assert "write euler_zyz_deg in [survey]" in unknown.warnings[-1]
+    model = fitted(unknown)
     assert any("not surveyed" in w for w in model.predict(NJ, longer_states()).outside)
     assert rms([gap(arm, model, 0.0)[0]]) < 2e-5
 
@@ -124,7 +126,7 @@ def test_orientations_that_do_not_belong_to_the_arm() -> None:
     assert checked.rotation is survey.rotation
     turned = replace(survey, rotation=np.swapaxes(survey.rotation, 1, 2))
     checked = check_orientations(turned, NJ)
-    assert checked.rotation is None and "are not used" in checked.warnings[-1]
+    assert checked.rotation is None and "they scatter by" in checked.warnings[-1]
     with pytest.raises(MeasurementError, match=r"mounted .* deg off.*euler_zyz_deg"):
         check_orientations(replace(survey, mounting=np.eye(3)), NJ)
 
