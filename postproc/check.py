@@ -11,6 +11,7 @@ from pathlib import Path
 from postproc.arrivals import LEFT_ALONE
 from postproc.exceptions import ProgramError
 from postproc.files import TEMPORARY
+from postproc.inputs import read_input
 from postproc.kinds import COMPILED, PROGRAM, VARIABLES, holds_targets, suffix_of
 from postproc.language.stamp import read_stamp
 from postproc.sidecar import FileRecord, Sidecar, read_sidecar, sha256, sidecar_path
@@ -138,7 +139,7 @@ class _Look:
         elif suffix == PROGRAM:
             yield from self._program(place)
         elif suffix == VARIABLES and not self._beside(place, PROGRAM):
-            if holds_targets(_read(self.root / place)):
+            if holds_targets(read_input(self.root / place)):
                 yield Finding(place, "uncompensated", "its program is not beside it")
         elif suffix in COMPILED and self._beside(place, PROGRAM):
             yield from self._compiled(place)
@@ -149,7 +150,7 @@ class _Look:
 
     def _program(self, place: str) -> Iterator[Finding]:
         """Check a program and the variable file that was written with it."""
-        data = _read(self.root / place)
+        data = read_input(self.root / place)
         stamp = read_stamp(data)
         record_path = sidecar_path(self.root / place)
         if not record_path.exists():
@@ -167,7 +168,7 @@ class _Look:
         yield from self._model(place, sidecar)
         yield from self._content(place, data, sidecar)
         if values := self._beside(place, VARIABLES):
-            yield from self._content(values, _read(self.root / values), sidecar)
+            yield from self._content(values, read_input(self.root / values), sidecar)
 
     def _model(self, place: str, sidecar: Sidecar) -> Iterator[Finding]:
         """Check that a program was made with the model it should be made with."""
@@ -200,14 +201,14 @@ class _Look:
         path = self.source / place
         if not path.is_file():
             yield Finding(place, "no-source", "is not in the source tree")
-        elif sha256(_read(path)) != digest:
+        elif sha256(read_input(path)) != digest:
             text = "its source has changed since: compensate it again"
             yield Finding(place, "source-changed", text)
 
     def _compiled(self, place: str) -> Iterator[Finding]:
         """Check that a compiled file is not that of the uncompensated program."""
         if self.source is not None and (self.source / place).is_file():
-            if _read(self.source / place) == _read(self.root / place):
+            if read_input(self.source / place) == read_input(self.root / place):
                 text = "is compiled from the uncompensated program: translate it anew"
                 yield Finding(place, "uncompensated", text)
 
@@ -228,16 +229,3 @@ def _left_alone(place: str, record: FileRecord) -> Iterator[Finding]:
 def _agree(source: str, model: str, record: FileRecord, sidecar: Sidecar) -> bool:
     """Tell whether a stamp and a record say the same."""
     return (source, model) == (record.source_sha256, sidecar.model)
-
-
-def _read(path: Path) -> bytes:
-    """Read a file.
-
-    Raises:
-        ProgramError: It cannot be read.
-    """
-    try:
-        return path.read_bytes()
-    except OSError as exc:
-        problem = f"cannot be read ({exc.strerror})"
-        raise ProgramError(path, problem, "Check its rights") from None

@@ -23,6 +23,8 @@ from rich.progress import (
 from rich.table import Table
 from rich.text import Text
 
+from postproc.printable import printable
+
 PATIENCE = 2.0  # [s] before a person is shown what is being done
 PLAIN_WIDTH = 200  # of a table that goes to a file or a pipe
 
@@ -66,15 +68,6 @@ def table_text(columns: Sequence[Column], rows: Iterable[Sequence[str]]) -> str:
     out = io.StringIO()
     print_table(columns, rows, out)
     return "\n".join(line.rstrip() for line in out.getvalue().splitlines())
-
-
-def printable(text: str) -> str:
-    r"""Escape control characters, so that a name cannot steer the terminal.
-
-    >>> printable("a\x1b[31m")
-    'a\\x1b[31m'
-    """
-    return "".join(c if c.isprintable() else repr(c)[1:-1] for c in text)
 
 
 @contextmanager

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from postproc.printable import printable
+
 
 class PostprocError(Exception):
     """Something the user must change before the work can be done (exit code 2)."""
@@ -34,7 +36,8 @@ class FileError(PostprocError):
         self.path, self.line, self.column = str(path), line, column
         self.place = place
         self.problem, self.cure = problem, cure
-        where = f"{path}:{line}" if line is not None else str(path)
+        shown = printable(str(path))  # a line break in a name would forge a message
+        where = f"{shown}:{line}" if line is not None else shown
         text = f"{where}: {problem}"
         text += f" @ {place}" if place else ""
         text += f". {cure}" if cure else ""

@@ -10,7 +10,7 @@ import numpy as np
 
 from postproc.accuracy.model import Model, load_model
 from postproc.compensate import compensate
-from postproc.console import Column, printable
+from postproc.console import Column
 from postproc.exceptions import ProgramError
 from postproc.jobs import read_files
 from postproc.kinds import VARIABLES, suffix_of
@@ -24,6 +24,7 @@ from postproc.planning import (
     with_measured_play,
 )
 from postproc.pose import MM
+from postproc.printable import printable
 from postproc.report import Outcome, Status
 from postproc.report_json import target_row
 from postproc.robot.cell import Cell, load_cell

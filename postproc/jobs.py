@@ -10,8 +10,8 @@ from pathlib import Path
 from postproc.accuracy.model import Model, load_model
 from postproc.clock import Progress, silent
 from postproc.compensate import compensate, name_files
-from postproc.exceptions import ProgramError
 from postproc.files import STREAM, Content, check_places, write_all
+from postproc.inputs import read_input, read_stream
 from postproc.language.diagnostic import Diagnostic
 from postproc.options import Options
 from postproc.page_files import Pages, find_pages
@@ -69,13 +69,13 @@ class Job:
         path = None if program == STREAM else Path(program)
         if path is None:
             name = "stdin.pdl" if lsv is None else lsv.with_suffix(".pdl").name
-            source = sys.stdin.buffer.read()
+            source = read_stream(sys.stdin.buffer, STREAM)
         else:
-            name, source = path.name, read_bytes(path)
+            name, source = path.name, read_input(path)
             lsv = lsv or find_variables(path)
-        values = None if lsv is None else (lsv, read_bytes(lsv))
+        values = None if lsv is None else (lsv, read_input(lsv))
         found = Pages() if path is None else find_pages(path)
-        pages = tuple((page, read_bytes(page)) for page in found.paths)
+        pages = tuple((page, read_input(page)) for page in found.paths)
         given = (path, lsv, cell, model, *found.paths)
         inputs = tuple(p for p in given if p is not None)
         return cls(
@@ -210,20 +210,7 @@ def read_files(program: Path, lsv: Path | None = None) -> dict[str, bytes]:
     values = lsv or find_variables(program)
     return name_files(
         program.name,
-        read_bytes(program),
-        None if values is None else read_bytes(values),
-        {path.name: read_bytes(path) for path in find_pages(program).paths},
+        read_input(program),
+        None if values is None else read_input(values),
+        {path.name: read_input(path) for path in find_pages(program).paths},
     )
-
-
-def read_bytes(path: Path) -> bytes:
-    """Read a file.
-
-    Raises:
-        ProgramError: It cannot be read.
-    """
-    try:
-        return path.read_bytes()
-    except OSError as exc:
-        problem = f"cannot be read ({exc.strerror})"
-        raise ProgramError(path, problem, "Check the path") from None

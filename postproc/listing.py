@@ -8,7 +8,8 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from itertools import chain, islice
 from typing import TextIO
 
-from postproc.console import Column, printable
+from postproc.console import Column
+from postproc.printable import printable
 
 MEASURED = 1000  # rows that the widths of the columns are taken from
 BATCH = 500  # lines that are written at a time

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from postproc.exceptions import ProgramError
 from postproc.files import write_all
+from postproc.inputs import read_input
 from postproc.language.source import apply
 from postproc.sidecar import (
     BLOCK,
@@ -15,6 +16,8 @@ from postproc.sidecar import (
     sha256,
     sidecar_path,
 )
+
+BESIDE = "Put it beside its record"
 
 
 def restore(data: bytes, record: FileRecord, name: str) -> bytes:
@@ -78,26 +81,15 @@ def restore_file(compensated: Path, output: Path | None = None) -> list[Path]:
     target = output or compensated
     restored: dict[Path, bytes] = {}
     if output is not None and compensated.name not in record.files:
-        restored[output] = read_bytes(compensated)  # only its values were changed
+        restored[output] = read_input(
+            compensated, BESIDE
+        )  # only its values were changed
     for name, file in record.files.items():
         source = compensated.with_name(Path(name).name)
         place = source
         if output is not None:
             place = target.with_name(target.stem + source.suffix)
             place = target if source == compensated else place
-        restored[place] = restore(read_bytes(source), file, str(source))
+        restored[place] = restore(read_input(source, BESIDE), file, str(source))
     write_all(restored)
     return list(restored)
-
-
-def read_bytes(path: Path) -> bytes:
-    """Read a file that a record speaks of.
-
-    Raises:
-        ProgramError: It cannot be read.
-    """
-    try:
-        return path.read_bytes()
-    except OSError as exc:
-        problem = f"cannot be read ({exc.strerror})"
-        raise ProgramError(path, problem, "Put it beside its record") from None

@@ -13,6 +13,7 @@ from typing import Any, Self
 import numpy as np
 
 from postproc.exceptions import ProgramError
+from postproc.inputs import read_input
 from postproc.language.edits import Replacements
 
 SUFFIX = ".postproc.json"
@@ -129,11 +130,9 @@ def read_sidecar(path: Path) -> Sidecar:
     """
     cure = "Restore needs the record that was written beside the program"
     try:
-        data = json.loads(path.read_bytes())
+        data = json.loads(read_input(path, cure))
         files = {name: FileRecord.read(told) for name, told in data["files"].items()}
         version, model = str(data["postproc"]), str(data["model"])
         return Sidecar(version, model, files, data.get("options", {}))
-    except OSError as exc:
-        raise ProgramError(path, f"cannot be read ({exc.strerror})", cure) from None
-    except (ValueError, KeyError, TypeError, AttributeError):
+    except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
         raise ProgramError(path, "is not a record of postproc", cure) from None

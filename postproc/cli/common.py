@@ -11,6 +11,7 @@ from typing import Annotated
 import typer
 
 from postproc.exceptions import FileError, PostprocError
+from postproc.printable import printable
 
 app = typer.Typer(
     no_args_is_help=True,
@@ -39,8 +40,8 @@ TemperatureOption = Annotated[
 
 
 def say(text: str) -> None:
-    """Print a message for a person, on stderr."""
-    typer.echo(text, err=True)
+    """Print a message for a person, on stderr; no name in it steers the terminal."""
+    typer.echo("\n".join(map(printable, text.split("\n"))), err=True)
 
 
 @contextmanager

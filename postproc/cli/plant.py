@@ -101,12 +101,12 @@ def _workers(jobs: int, scheduler: str | None, tls: Path | None) -> Gather:
 def _print_summary(summary: Summary) -> None:
     """Print the table, and what a person must look at."""
     from postproc.batch.summary import TITLES
-    from postproc.console import Column, print_table, printable
+    from postproc.console import Column, print_table
 
     columns = [Column(t, "left" if t == TITLES[0] else "right") for t in TITLES]
     print_table(columns, summary.rows())
     for line in summary.lists():
-        say(printable(line))
+        say(line)
 
 
 def _write_page(html: Path, title: str, log: Path) -> None:
@@ -141,7 +141,6 @@ def check(
     from the source as it is now, and unchanged since.
     """
     from postproc.check import check as look
-    from postproc.console import printable
 
     with explained():
         found = look(folder, _current_model(model, plan), source)
@@ -150,7 +149,7 @@ def check(
         if json:
             write_text(json, found.to_json())
         for finding in found.findings:
-            say(printable(f"{finding.place}: {finding.code}: {finding.message}"))
+            say(f"{finding.place}: {finding.code}: {finding.message}")
         say(f"{folder}: {found.programs} programs, {len(found.findings)} findings")
     raise typer.Exit(found.exit_code)
 

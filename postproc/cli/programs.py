@@ -97,18 +97,17 @@ def compensate(
 
 def _print_outcome(outcome: Outcome) -> None:
     """Print what a person needs to know, on stderr."""
-    from postproc.console import printable
     from postproc.pointing import point_at_visits
 
     for finding in outcome.diagnostics:
         place = f"{finding.file}:{finding.line}"
-        say(printable(f"{place}: {finding.code}: {finding.message}"))
+        say(f"{place}: {finding.code}: {finding.message}")
     excerpts = point_at_visits(outcome, outcome.left_rows()[:SHOWN])
     for line, source in zip_longest(outcome.left_alone(), excerpts, fillvalue=""):
-        say(printable(line))
+        say(line)
         if source:
             say(source)
-    say(printable(outcome.summary()))
+    say(outcome.summary())
 
 
 @app.command()
