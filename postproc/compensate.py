@@ -40,6 +40,7 @@ from postproc.report import Outcome
 from postproc.robot.cell import Cell
 from postproc.robot.state import States
 from postproc.settling import Corrected, settle
+from postproc.taught import correct_taught
 
 Array = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -84,6 +85,7 @@ def compensate(
         reading = read_program(files, cell)
     with clock("plan"):
         planned = plan_visits(reading.visits, cell)
+        planned = correct_taught(planned, reading.visits, cell, model)
     states = states_of(planned.plan, cell, _temperature(cell, options))
     corrected = settle(reading, planned, states, cell, model, options, clock)
     if options.clone:
@@ -151,9 +153,9 @@ def report(
     proposal, done = corrected.proposal, corrected.reached
     d, rows, visits = proposal.decisions, proposal.corrected, reading.visits
     output = corrected.output
-    wanted = planned.plan.tcp[rows, :3, 3]
+    wanted = planned.wanted[rows, :3, 3]
     new = states.with_(q=np.array(done.q), direction=np.array(done.side))[rows]
-    before = model.error(cell.arm, states[rows])
+    before = model.error(cell.arm, states[rows]) - planned.shift[rows]
     after = done.tcp[rows, :3, 3] + model.error(cell.arm, new) - wanted
     return Outcome(
         program=name,
@@ -177,7 +179,7 @@ def report(
             assumed_off(name, cell),
         ),
         stages=clock.stages,
-        position=planned.plan.tcp[:, :3, 3] - planned.plan.aside,
+        position=planned.wanted[:, :3, 3] - planned.plan.aside,
         sources={source.name: source.data for source, _ in reading.originals},
     )
 

@@ -60,5 +60,8 @@ def carry_along(
         values: Numbers of every visit, (n, 6).
     """
     rows, at = followers(visits, agreement)
-    moved = chosen[at]
-    values[rows[moved], :3] += agreement.change_mm[at[moved]]
+    rows, at = rows[chosen[at]], at[chosen[at]]
+    direct = np.flatnonzero(visits.literal >= 0)
+    written = np.zeros((len(visits.literals), 6))
+    written[visits.literal[direct]] = visits.values[direct]
+    values[rows] += agreement.values[at] - written[agreement.literal[at]]

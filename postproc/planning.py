@@ -66,11 +66,21 @@ class Planned:
         targets: Where every move goes, in the arm's base frame.
         plan: The state of the arm at every arrival.
         reasons: Why visits must not be compensated.
+        shift: From where the controller takes every target to be to where it is, as
+            far as a frame was taught with the arm's error in it, (n, 3) [m].
     """
 
     targets: Targets
     plan: Plan
     reasons: Reasons
+    shift: Array
+
+    @property
+    def wanted(self) -> Array:
+        """Return the TCP poses that should be reached, (n, 4, 4) [m]."""
+        poses = np.array(self.plan.tcp)
+        poses[:, :3, 3] += self.shift
+        return poses
 
 
 def start_of(cell: Cell) -> Start:
@@ -145,7 +155,7 @@ def plan_visits(visits: Visits, cell: Cell) -> Planned:
     targets, reasons = targets_from_visits(visits, cell)
     planned = plan(cell.arm, targets, np.deg2rad(cell.limits.wrist_deg))
     reasons.adopt(planned.reason, planned.reasons)
-    return Planned(targets, planned, reasons)
+    return Planned(targets, planned, reasons, np.zeros((len(visits), 3)))
 
 
 def states_of(planned: Plan, cell: Cell, temperature: float) -> States:

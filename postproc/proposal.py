@@ -41,7 +41,7 @@ class Proposal:
         decisions: What was decided for every visit.
         usable: Visits that could be corrected if they had their points alone, (n,).
         change_mm: What they would be corrected by, as arrivals at one point compare
-            it, (n, 3) [mm].
+            it, (n, k) [mm].
         fixed: Literals that must keep their values for what else depends on them, (k,).
     """
 
@@ -125,7 +125,7 @@ def propose(
         corrected,
         decisions,
         usable,
-        change,
+        both,
         agreement.literal[np.any([*stay.values()], axis=0)],
     )
 

@@ -34,7 +34,7 @@ class Arrivals:
     Attributes:
         stop: Where.
         variable: What it can be separated from by another name, "" for nothing.
-        changes: The changes that the arrivals need, (k, 3) [mm], by literal.
+        changes: The changes that the arrivals need, one row each [mm], by literal.
         usable: Every arrival can be corrected.
     """
 

@@ -21,6 +21,7 @@ Source = Literal["cad", "tracker", "taught"]
 Effect = Literal["still", "moves", "sets-frames"]
 
 NO_ANGLES = [0.0, 0.0, 0.0]
+TAUGHT_POINTS = ("the origin", "a point on +x", "a point at +y")
 LONGEST_MM = 50_000.0  # no frame is farther away: a longer one has a wrong unit
 
 
@@ -30,6 +31,7 @@ class FrameSection(Strict):
     xyz_mm: Triple
     euler_zyz_deg: Triple = NO_ANGLES
     source: Source = "cad"
+    taught_deg: list[Sextuple] | None = None
 
     @model_validator(mode="before")
     @classmethod
@@ -45,6 +47,11 @@ class FrameSection(Strict):
             raise ValueError(f"xyz_mm is beyond {LONGEST_MM:g} mm: is it in mm?")
         if max(abs(v) for v in self.euler_zyz_deg) > 360.0:
             raise ValueError("euler_zyz_deg is beyond 360 deg")
+        if self.taught_deg is not None:
+            if self.source != "taught":
+                raise ValueError('taught_deg needs source = "taught"')
+            if len(self.taught_deg) != len(TAUGHT_POINTS):
+                raise ValueError(f"taught_deg needs {', '.join(TAUGHT_POINTS)}")
         return self
 
     def record(self) -> tuple[float, ...]:
@@ -170,6 +177,8 @@ class Cell:
         routines: What outside routines do, by lower-case name.
         frame_tables: Frames set by routines, by lower-case name, then arguments.
         taught: Lower-case names of points that were taught with the robot.
+        taught_frames: Records of the frames that were taught with the robot, with the
+            joint angles of their three points, (3, 6) [rad], or None.
     """
 
     path: Path
@@ -190,6 +199,7 @@ class Cell:
     routines: Mapping[str, Effect]
     frame_tables: Mapping[str, Mapping[str, FrameTableEntry]]
     taught: frozenset[str]
+    taught_frames: Mapping[tuple[float, ...], Array | None]
 
 
 def _frame(section: FrameSection | None) -> Frame:
@@ -231,7 +241,21 @@ def load_cell(path: str | Path) -> Cell:
         routines={name.lower(): what for name, what in file.routines.items()},
         frame_tables={k.lower(): v for k, v in file.frames.routines.items()},
         taught=frozenset(name.lower() for name in file.taught),
+        taught_frames=_taught_frames(file),
     )
+
+
+def _taught_frames(file: CellFile) -> dict[tuple[float, ...], Array | None]:
+    """Collect the taught frames of the cell and of its tables."""
+    tables = file.frames.routines.values()
+    frames = [file.tool, file.base, file.uframe]
+    for entry in (entry for table in tables for entry in table.values()):
+        frames += [entry.tool, entry.base, entry.uframe]
+    return {
+        frame.record(): np.deg2rad(frame.taught_deg) if frame.taught_deg else None
+        for frame in frames
+        if frame is not None and frame.source == "taught"
+    }
 
 
 def _home(file: CellFile, arm: Arm, path: Path) -> Array | None:

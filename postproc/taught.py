@@ -1,0 +1,130 @@
+"""Frames that were taught with the arm contain its error: where they really are.
+
+Whoever teaches a frame drives the tool to three points of the part. The controller
+takes them to be where its nominal arm says; the tool really was where the arm lands.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from postproc.accuracy.model import Model
+from postproc.exceptions import CellError
+from postproc.language.visits import Target, Visits
+from postproc.planning import Planned
+from postproc.pose import MM, inverse, pose_from_record
+from postproc.robot.cell import Cell
+from postproc.robot.state import make_states
+
+Array = NDArray[np.float64]
+
+APART_MM, APART_DEG = 1.0, 0.1  # a frame of three points may differ by rounding only
+_NO_POINTS = (
+    "its user frame was taught with the arm and contains its error: give taught_deg in "
+    "the cell file (the joint angles of its three points), or measure the frame"
+)
+_OUTSIDE = "the points of its taught user frame lie outside of what was surveyed"
+_OTHER = "its {} was taught with the arm and contains its error: measure it"
+
+
+def correct_taught(
+    planned: Planned, visits: Visits, cell: Cell, model: Model
+) -> Planned:
+    """Find where targets in taught frames really are; say which cannot be known.
+
+    Args:
+        planned: The program's plan, in the controller's frames.
+        visits: The program.
+        cell: Says which frames were taught, and at which joint angles.
+        model: The arm's error, in the state of the cell.
+
+    Raises:
+        CellError: The points of a frame do not give that frame.
+    """
+    records = [tuple(frame) for frame in visits.frames.tolist()]
+    listed = np.array([record in cell.taught_frames for record in records], dtype=bool)
+    taught = np.flatnonzero(listed | visits.frame_taught)
+    if len(taught) == 0:
+        return planned
+    poses = np.isin(visits.target, (Target.POSE, Target.NEAR))
+    shift = np.array(planned.shift)
+    for frame in taught.tolist():
+        for column, name in ((visits.tool, "tool"), (visits.base, "base")):
+            planned.reasons.mark(column == frame, _OTHER.format(name))
+        rows = poses & (visits.uframe == frame)
+        joints = cell.taught_frames.get(records[frame])
+        if joints is None:
+            planned.reasons.mark(rows, _NO_POINTS)
+            continue
+        moved, inside = moved_frame(joints, records[frame], cell, model)
+        if not inside:
+            planned.reasons.mark(rows, _OUTSIDE)
+        base = cell.base.pose
+        away = inverse(base[None])[0] @ moved @ base
+        tcp = planned.plan.tcp[rows]
+        shift[rows] = (away @ tcp - tcp)[:, :3, 3]
+    return replace(planned, shift=shift)
+
+
+def moved_frame(
+    joints: Array, record: tuple[float, ...], cell: Cell, model: Model
+) -> tuple[Array, bool]:
+    """Find how a taught frame differs from the one that its points really span.
+
+    Args:
+        joints: Joint angles at its three points, (3, 6) [rad].
+        record: The frame as the controller has it [mm, deg].
+        cell: Tool and base with which it was taught.
+        model: The arm's error.
+
+    Returns:
+        The motion from the frame of the controller to the real one, in the world,
+        (4, 4) [m], and whether the points lie inside of what was surveyed.
+
+    Raises:
+        CellError: The points do not give the frame.
+    """
+    arm, base = cell.arm, cell.base.pose
+    nominal = (arm.flange(joints) @ cell.tool.pose)[:, :3, 3]
+    states = make_states(
+        joints,
+        tool=cell.tool.pose[:3, 3],
+        temperature=cell.temperature,
+        payload=cell.payload_mass,
+        payload_com=cell.payload_com,
+    )
+    predicted = model.predict(arm, states)
+    spanned = base @ frame_of_points(nominal)
+    _check(spanned, pose_from_record(np.array([record]))[0], cell)
+    really = base @ frame_of_points(nominal + predicted.error)
+    inside = not any(mask.any() for mask in predicted.outside.values())
+    return np.asarray(really @ inverse(spanned[None])[0]), inside
+
+
+def frame_of_points(points: Array) -> Array:
+    """Return the frame (4, 4) with its origin, a point on +x and one at +y, (3, 3)."""
+    x = points[1] - points[0]
+    z = np.cross(x, points[2] - points[0])
+    pose = np.eye(4)
+    pose[:3, 0], pose[:3, 2] = x / np.linalg.norm(x), z / np.linalg.norm(z)
+    pose[:3, 1] = np.cross(pose[:3, 2], pose[:3, 0])
+    pose[:3, 3] = points[0]
+    return pose
+
+
+def _check(spanned: Array, frame: Array, cell: Cell) -> None:
+    """Refuse joint angles that do not give the frame."""
+    away = np.linalg.norm(spanned[:3, 3] - frame[:3, 3]) / MM
+    cosine = (np.trace(spanned[:3, :3].T @ frame[:3, :3]) - 1.0) / 2.0
+    turned = np.rad2deg(np.arccos(np.clip(cosine, -1.0, 1.0)))
+    if not (away <= APART_MM and turned <= APART_DEG):
+        raise CellError(
+            cell.path,
+            f"the points of taught_deg give another frame, {away:.2f} mm and "
+            f"{turned:.2f} deg from the one that is written",
+            "Give origin, a point on +x and one at +y, taught with [tool] and [base]",
+            place="$.uframe.taught_deg",
+        )
