@@ -8,6 +8,7 @@ from typing import Any
 from postproc.accuracy.batch import Batch
 from postproc.accuracy.diagnosis.choice import ranking
 from postproc.accuracy.diagnosis.floor import multi_directional, noise_floor
+from postproc.accuracy.diagnosis.groups import NEAR
 from postproc.accuracy.diagnosis.outer import HeldOut, hold_out
 from postproc.accuracy.diagnosis.planning import (
     poses_that_separate,
@@ -149,8 +150,13 @@ def _next(traced: Trace, seed: int) -> tuple[str, Array]:
         if standing.confusable:
             rival = standing.confusable[0]
             own = found.additions[number].candidate.family
-            poses = poses_that_separate(found.fit, found.place(number), rival, seed)
-            return f"tell {own} from {rival.family}", poses
+            nats, poses = poses_that_separate(
+                found.fit, found.place(number), rival, seed
+            )
+            worth = (
+                f"a round is worth about {nats:.1f} nats, {NEAR:.0f} tell them apart"
+            )
+            return f"tell {own} from {rival.family} ({worth})", poses
     name, poses = poses_that_sharpen(found.fit, seed)
     if name.startswith(Revision.name):
         name = "the given model"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from postproc.accuracy.batch import Batch
 from postproc.accuracy.diagnosis.extending import extend
@@ -16,27 +17,48 @@ WANTED = 8
 APART = 0.15  # of the joint ranges: poses that differ by less are one
 
 
-def poses_that_separate(fit: Fit, place: int, rival: Score, seed: int) -> Array:
+def poses_that_separate(
+    fit: Fit, place: int, rival: Score, seed: int, wanted: int = WANTED
+) -> tuple[float, Array]:
     """Choose poses at which two explanations of the same rows differ most.
 
-    Both are fitted to the rows there are; where their predictions then differ, one more
-    measurement tells them apart.
+    Both are fitted to the rows there are. If the first is right, one more visit speaks
+    against the other by d^T S^-1 d / 2 nats, d the difference of their predictions and
+    S the noise with the other's own uncertainty: what it could still take up by moving
+    its parameters is no difference. It is moved so after every pose, before the next is
+    chosen (a design after Box and Hill, Technometrics 9, 1967).
 
     Args:
         fit: The fit with one explanation.
         place: Place of that effect in the fit.
         rival: The other explanation.
         seed: Of the random poses.
+        wanted: Number of poses.
 
     Returns:
-        (WANTED, 6) [rad].
+        What one visit to each of them is expected to be worth [nats], and the poses,
+        (wanted, 6) [rad].
     """
     other = extend(fit, rival.best, instead_of=place)
     batch = _tries(fit, seed)
+    X, C = _uncertainty(other, batch)
     apart = fit.combination.error(batch, fit.values) - other.combination.error(
         batch, other.values
     )
-    return _spread_out(batch.states.q, np.linalg.norm(apart, axis=1))
+    noise = float(fit.whitener.variance(fit.noise).mean()) * np.eye(3)
+    total, chosen = 0.0, list[int]()
+    for _ in range(wanted):
+        S = noise + X @ C @ np.swapaxes(X, 1, 2)
+        solved = np.linalg.solve(S, apart[:, :, None])[:, :, 0]
+        worth = 0.5 * (apart * solved).sum(axis=1)
+        worth[_close(batch.states.q, chosen)] = -np.inf
+        best = int(np.argmax(worth))
+        chosen.append(best)
+        total += float(worth[best])
+        taken = C @ X[best].T
+        apart = apart - X @ (taken @ solved[best])
+        C = C - taken @ np.linalg.solve(S[best], taken.T)
+    return total, np.asarray(batch.states.q[chosen])
 
 
 def poses_that_sharpen(fit: Fit, seed: int) -> tuple[str, Array]:
@@ -50,10 +72,8 @@ def poses_that_sharpen(fit: Fit, seed: int) -> tuple[str, Array]:
         (WANTED, 6) [rad].
     """
     batch = _tries(fit, seed)
-    at = fit.combination.at(batch, fit.values)
-    X = fit.combination.columns(at)
+    X, before = _uncertainty(fit, batch)
     noise = float(fit.whitener.variance(fit.noise).mean())
-    before = np.array(fit.covariance)
     C = before
     chosen: list[int] = []
     for _ in range(WANTED):
@@ -87,13 +107,15 @@ def _tries(fit: Fit, seed: int) -> Batch:
     return Batch(arm, states)
 
 
-def _spread_out(q: Array, value: Array) -> Array:
-    """Take the poses of highest value that are not close to one already taken."""
+def _uncertainty(fit: Fit, batch: Batch) -> tuple[Array, Array]:
+    """Return columns at other states, (n, 3, p), and the parameters' covariance."""
+    at = fit.combination.at(batch, fit.values)
+    return fit.combination.columns(at), np.array(fit.covariance)
+
+
+def _close(q: Array, chosen: list[int]) -> NDArray[np.bool_]:
+    """Mark the poses (n, 6) that are close to one already taken, (n,)."""
     unit = q / np.maximum(np.ptp(q, axis=0), 1e-9)
-    chosen: list[int] = []
-    for k in np.argsort(-value):
-        if all(np.abs(unit[k] - unit[c]).max() > APART for c in chosen):
-            chosen.append(int(k))
-        if len(chosen) == WANTED:
-            break
-    return np.asarray(q[chosen])
+    gaps = np.abs(unit[:, None] - unit[None, chosen]).max(axis=2)
+    close: NDArray[np.bool_] = (gaps <= APART).any(axis=1)
+    return close
