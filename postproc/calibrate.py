@@ -21,11 +21,8 @@ from postproc.accuracy.measurement import (
 )
 from postproc.accuracy.methods import fit_method
 from postproc.accuracy.model import Model
-from postproc.accuracy.plausibility import (
-    check_orientations,
-    check_registered,
-    check_survey,
-)
+from postproc.accuracy.mounting import check_orientations
+from postproc.accuracy.plausibility import check_registered, check_survey
 from postproc.accuracy.reading import DETECT, Reading
 from postproc.accuracy.registration import Registration, register
 from postproc.accuracy.schema import Method

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -13,7 +11,6 @@ from postproc.accuracy.measurement import Measurements
 from postproc.accuracy.mistakes import CLOSE, likely_cure
 from postproc.accuracy.observability import observe
 from postproc.accuracy.tool_groups import find_groups
-from postproc.accuracy.turns import Turns
 from postproc.exceptions import MeasurementError
 from postproc.pose import MM
 from postproc.robot.arm import Arm
@@ -26,7 +23,6 @@ APART = 10.0  # rows this many times farther off than the typical one are anothe
 MANY = 0.1  # share of such rows from which the file is at fault, not the rows
 PROBES = 400  # random poses that show what could be determined at best
 ENOUGH = 0.75  # share of the determinable directions that a survey must show
-TURNED = np.deg2rad(1.0)  # no flange that works is off by more
 OTHER_UNIT = 50.0  # no arm's positions differ so much in size
 SOME = 0.02  # share of rows in another unit that is no accident
 TOOL_APART = 1e-3  # [m] tools that differ by less are told by the fit, not refused
@@ -161,37 +157,3 @@ def _rank(arm: Arm, states: States) -> int:
     scales = np.array([p.scale for p in geometry.parameters()])
     X = geometry.columns(Batch(arm, states)).reshape(-1, len(names)) * scales
     return observe(X, names).rank
-
-
-def check_orientations(survey: Measurements, arm: Arm) -> Measurements:
-    """Check measured orientations, base frame; what cannot be used is left out.
-
-    Without the probe's mounting they tell nothing of the flange that one point does
-    not, so that only their own errors would enter.
-
-    Raises:
-        MeasurementError: The declared mounting of the probe is not the measured one.
-    """
-    if survey.rotation is None or len(survey) == 0:
-        return survey
-    batch = Batch(arm, survey.states)
-    apart = Turns.of(batch, survey.rotation, None).typical
-    if apart > TURNED:
-        why = (
-            f"they scatter by {np.rad2deg(apart):.1f} deg about the arm's: not "
-            "R = Rx Ry Rz of a probe on the flange"
-        )
-    elif survey.mounting is None:
-        why = (
-            "the cell does not say how the probe is mounted: write euler_zyz_deg in "
-            "[survey]"
-        )
-    else:
-        apart = Turns.of(batch, survey.rotation, survey.mounting).typical
-        if apart > TURNED:
-            problem = f"the probe is mounted {np.rad2deg(apart):.1f} deg off"
-            cure = "Correct [survey] euler_zyz_deg in the cell file, or leave it out"
-            raise MeasurementError(survey.path, problem, cure)
-        return survey
-    told = f"measured orientations are not used: {why}"
-    return replace(survey, rotation=None, warnings=(*survey.warnings, told))

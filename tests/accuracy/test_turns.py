@@ -14,7 +14,7 @@ from postproc.accuracy.full import fit_survey, model_of
 from postproc.accuracy.library import BASE_EFFECTS
 from postproc.accuracy.measurement import Measurements, read_measurements
 from postproc.accuracy.model import Model
-from postproc.accuracy.plausibility import check_orientations
+from postproc.accuracy.mounting import check_orientations
 from postproc.calibrate import into_base_frame
 from postproc.exceptions import MeasurementError
 from tests.accuracy.simulator import (
