@@ -84,7 +84,7 @@ def compensate(
     with clock("parse"):
         reading = read_program(files, cell)
     with clock("plan"):
-        planned = plan_visits(reading.visits, cell)
+        planned = plan_visits(reading.visits, cell, timed="speed" in model.needs)
         planned = correct_taught(planned, reading.visits, cell, model)
     states = states_of(planned.plan, cell, _temperature(cell, options))
     corrected = settle(reading, planned, states, cell, model, options, clock)

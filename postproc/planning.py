@@ -146,14 +146,14 @@ def read_program(files: Mapping[str, bytes], cell: Cell) -> Reading:
     return Reading(sources, resolved.visits, (*resolved.diagnostics, *missed))
 
 
-def plan_visits(visits: Visits, cell: Cell) -> Planned:
-    """Plan every move of a program.
+def plan_visits(visits: Visits, cell: Cell, timed: bool = True) -> Planned:
+    """Plan every move of a program, with the time that it takes or without.
 
     Raises:
         PlanError: The arm has no inverse kinematics.
     """
     targets, reasons = targets_from_visits(visits, cell)
-    planned = plan(cell.arm, targets, np.deg2rad(cell.limits.wrist_deg))
+    planned = plan(cell.arm, targets, np.deg2rad(cell.limits.wrist_deg), timed)
     reasons.adopt(planned.reason, planned.reasons)
     return Planned(targets, planned, reasons, np.zeros((len(visits), 3)))
 

@@ -38,6 +38,12 @@ class Clock:
     untimed: Bools
 
 
+def no_time(n: int) -> Clock:
+    """Leave the times of n arrivals unknown."""
+    unknown = np.full(n, np.nan)
+    return Clock(unknown, unknown, np.zeros(n, dtype=bool))
+
+
 def tell_time(arm: Arm, targets: Targets, traced: Trace) -> Clock:
     """Time all moves: JOINT moves between stops with ruckig, other runs with toppra."""
     edge, source = main_edges(targets, traced)

@@ -7,7 +7,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import NDArray
 
-from postproc.motion.clock import tell_time
+from postproc.motion.clock import no_time, tell_time
 from postproc.motion.reasons import CODE, REASONS, WRIST
 from postproc.motion.rounding import rounded
 from postproc.motion.targets import Targets
@@ -33,7 +33,8 @@ class Plan:
         direction: Side every joint arrives from, (n, 6): +1, -1, or 0 where not known.
         side: Where every joint lies in its play, (n, 6) from -1 to 1; 0: not known.
         travel: Travel since the last reversal, (n, 6) [rad].
-        speed: TCP speed at the target, (n,) [m/s]; 0 where the arm stops.
+        speed: TCP speed at the target, (n,) [m/s]; 0 where the arm stops, NaN where
+            nobody asked.
         time: Time since the first move along the first predecessors, (n,) [s].
         slot: Branch 4 W + 2 S + E, (n,), -1 where it was not looked up.
         reason: Index into `reasons`, (n,); 0 where the arrival may be compensated.
@@ -78,13 +79,14 @@ class Plan:
         return arm.gravity_torque(self.q, payload, payload_com)
 
 
-def plan(arm: Arm, targets: Targets, wrist: float) -> Plan:
+def plan(arm: Arm, targets: Targets, wrist: float, timed: bool = True) -> Plan:
     """Plan every move the way the controller moves.
 
     Args:
         arm: The arm.
         targets: The moves.
         wrist: Axis 5 nearer to zero than this is the wrist singularity [rad].
+        timed: Find out how fast the arm passes; else speed and time stay unknown.
 
     Raises:
         PlanError: The arm has no closed-form inverse kinematics.
@@ -92,7 +94,7 @@ def plan(arm: Arm, targets: Targets, wrist: float) -> Plan:
     exact = trace(arm, targets)
     traced = rounded(arm, targets, exact)
     arrived = arrivals(arm, traced.q, traced.edges)
-    clock = tell_time(arm, targets, traced)
+    clock = tell_time(arm, targets, traced) if timed else no_time(len(targets))
     tcp = traced.flange @ targets.tool
     return Plan(
         traced.q, tcp, _aside(exact, traced, targets), targets.tool, arrived.direction,

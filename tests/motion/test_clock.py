@@ -147,3 +147,15 @@ def test_the_wrist_singularity_is_a_reason(
 
 def test_no_targets_are_no_trouble(arm: Arm) -> None:
     assert len(plan(arm, make_targets(np.empty(0, int)), WRIST)) == 0
+
+
+def test_a_plan_without_times_is_the_same_path(arm: Arm, home: np.ndarray) -> None:
+    tcp = np.tile(arm.flange(home[None])[0], (30, 1, 1))
+    tcp[:, 0, 3] += 0.002 * np.arange(30)
+    targets = make_targets(
+        np.zeros(30, int), tcp, move=np.arange(30).clip(max=1), slot=np.zeros(30, int)
+    )
+    timed, untimed = plan(arm, targets, WRIST), plan(arm, targets, WRIST, timed=False)
+    for name in ("q", "tcp", "side", "travel", "reason"):
+        np.testing.assert_array_equal(getattr(timed, name), getattr(untimed, name))
+    assert np.isfinite(timed.speed).all() and np.isnan(untimed.speed).all()
