@@ -3,7 +3,12 @@ from __future__ import annotations
 import numpy as np
 
 from postproc.accuracy.batch import Batch
+from postproc.accuracy.diagnosis.tracing import trace
+from postproc.accuracy.fit import fit_effects
+from postproc.accuracy.library import BASE_EFFECTS, propose
 from postproc.accuracy.outliers import judge, student_weights
+from postproc.virtual import Planted, stream, virtual_arm
+from tests.accuracy.planted import ARM, BASE, TRACKER, states_of, survey
 from tests.accuracy.simulator import NJ, random_states
 
 STATES = random_states(300, np.random.default_rng(0))
@@ -47,3 +52,26 @@ def test_rows_at_one_angle_of_a_joint_are_spared() -> None:
 def test_heavy_tails_fall_with_the_distance() -> None:
     w = student_weights(np.array([0.0, 1.0, 5.0, 100.0]))
     assert (np.diff(w) < 0).all() and w[-1] < 1e-3
+
+
+def test_a_worn_spot_survives_beside_a_broken_beam() -> None:
+    """Both are some thirty sigma; only the row without neighbours is dropped."""
+    spot = Planted("worn_spot", 2, peak_mm=1.5)
+    arm = virtual_arm(370, (*map(Planted, BASE), spot))
+    arrivals = survey(arm, 370, 300)
+    position = arm.measure(arrivals, TRACKER, stream(370, "tracker"))
+    law = arm.laws[-1]
+    away = np.abs(arrivals.q[:, 1] - law.parameters["centre"])
+    worn = away < law.parameters["width"]
+    broken = np.flatnonzero(away > 5 * law.parameters["width"])[:3]
+    position[broken] += np.array([1e-3, -1e-3, 1e-3])
+    states = states_of(arrivals)
+    base = fit_effects(
+        Batch(ARM, states), position, propose(BASE_EFFECTS, ARM, states), tuple(TRACKER)
+    )
+    found = trace(base, seed=0).search
+    assert found.additions[0].candidate.family.effect == "joint_map"
+    assert found.additions[0].candidate.family.joint == 2
+    weight = found.fit.rows.weight
+    assert (weight[broken] < 0.2).all()
+    assert (weight[worn] == 1).mean() > 0.95
