@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from postproc.accuracy.diagnosis.diagnose import Extension, diagnose
 from postproc.accuracy.diagnosis.result import Diagnosis
 from postproc.accuracy.diagnosis.search import Progress
-from postproc.accuracy.diagnosis.tracing import silent
+from postproc.accuracy.diagnosis.tracing import REMAINS, silent
 from postproc.accuracy.error_statistics import ErrorStatistics
 from postproc.accuracy.measurement import Measurements, concatenate
 from postproc.accuracy.model import Model, load_model
@@ -185,15 +185,22 @@ def _spread(spread: ErrorStatistics) -> str:
 
 def _unexplained(found: Diagnosis) -> list[str]:
     """Say what shows the structure, and where it lives."""
+    curves = [f for f in found.findings if f.effect == "curve"]
     lines = [
-        f"still there: {x.what} (p = {x.p_value:.2g})" for x in found.leftovers[:2]
+        f"no effect with a name follows {f.source}"
+        + (f" at joint {f.joint}" if f.joint else "")
+        + f": a curve takes up {f.share:.0%} (p = {f.p_value:.2g})"
+        for f in curves
     ]
-    lines += [
+    shown = [x for x in found.leftovers if x.p_value < REMAINS]
+    lines += [f"still there: {x.what} (p = {x.p_value:.2g})" for x in shown[:2]]
+    if not shown:
+        return lines
+    return lines + [
         f"closest: {p.direction} by {p.driver} ({p.evidence:.1f} nats, "
         f"p = {p.p_value:.2g})"
         for p in found.places[:2]
     ]
-    return lines
 
 
 def history_text(model_path: Path) -> str:

@@ -28,8 +28,10 @@ from postproc.accuracy.full import fit_survey, model_of
 from postproc.accuracy.library import BASE_EFFECTS
 from postproc.accuracy.measurement import Measurements
 from postproc.accuracy.model import Model, load_model
+from postproc.diagnosing import tell
 from postproc.exceptions import ModelError, PostprocError
 from postproc.html import diagnosis_report
+from postproc.plots import plot_diagnosis
 from postproc.robot.arm import load_arm
 from postproc.robot.state import States, make_states
 from postproc.virtual import Planted, stream, virtual_arm
@@ -286,3 +288,20 @@ def test_whole_curves_have_functions_of_each_covariate_alone() -> None:
     assert "1.1" in names
     assert "0.1" not in names
     assert "0.1" in [p.name.split()[-1] for p in whole.parameters()]
+
+
+def test_what_has_no_name_is_told_by_where_it_lives(tmp_path: Path) -> None:
+    c = campaign(341, ("joint_product",), 1.5, rows=200)
+    rows = measurements(c.states, c.position, "nameless")
+    found = diagnose(rows, ARM, base_model(rows), tracker=TRACKER)
+    assert found.diagnosis.verdict == "unexplained"
+    (curve,) = found.diagnosis.findings
+    law = c.arm.laws[-1]
+    pair = sorted(int(law.parameters[k]) for k in ("first", "second"))
+    assert (curve.effect, curve.joint) == ("curve", 3)
+    assert curve.source == f"joint {pair[0]} x joint {pair[1]}"
+    told = tell(found.diagnosis)
+    assert f"no effect with a name follows {curve.source} at joint 3" in told
+    assert "still there" not in told
+    names = [p.name for p in plot_diagnosis(found, tmp_path / "n.svg")]
+    assert "n-finding1.svg" in names
