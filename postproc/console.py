@@ -124,6 +124,28 @@ def progress_bar(
         yield lambda done, of: progress.update(bar, completed=done, total=of)
 
 
+@contextmanager
+def stage_bar(out: TextIO | None = None) -> Iterator[Callable[[str, float], None]]:
+    """Show the stage of a job and how far all of it is, on a terminal only.
+
+    Args:
+        out: Where to; default: stderr.
+
+    Yields:
+        A function to be told the name of every stage, and the share that is done.
+    """
+    out = out or sys.stderr
+    if not out.isatty():
+        yield lambda stage, share: None
+        return
+    columns = (BarColumn(), TextColumn("{task.description}", markup=False))
+    with Progress(*columns, console=Console(file=out), transient=True) as progress:
+        bar = progress.add_task("starting", total=1.0)
+        yield lambda stage, share: progress.update(
+            bar, description=printable(stage), completed=share
+        )
+
+
 class _Rate(ProgressColumn):
     """How many are done in a second."""
 

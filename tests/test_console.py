@@ -9,6 +9,7 @@ from postproc.console import (
     print_table,
     printable,
     progress_bar,
+    stage_bar,
     stages,
     table_text,
 )
@@ -54,6 +55,8 @@ def test_nothing_of_progress_reaches_a_pipe():
     with stages(pipe) as told, progress_bar("work", pipe) as done:
         told("parse")
         done(1, 2)
+    with stage_bar(pipe) as share_of:
+        share_of("parse", 0.5)
     assert pipe.getvalue() == ""
 
 
@@ -62,3 +65,11 @@ def test_progress_shows_on_a_terminal():
     with progress_bar("copying [all]", screen) as done:
         done(3, 4)
     assert "copying [all]" in screen.getvalue()
+
+
+def test_stages_show_with_how_far_the_job_is():
+    screen = Screen()
+    with stage_bar(screen) as told:
+        told("look for effect [2]", 0.25)
+    assert "look for effect [2]" in screen.getvalue()
+    assert "\u2501" in screen.getvalue()

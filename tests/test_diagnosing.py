@@ -80,12 +80,13 @@ def job(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_files_in_model_and_words_out(job: Path, tmp_path: Path) -> None:
     for name in ("cell.toml", "rows.csv", "model.json"):
         shutil.copy(job / name, tmp_path)
-    told: list[str] = []
+    told: list[float] = []
     found = diagnose_files(
         [tmp_path / "rows.csv"], tmp_path / "cell.toml", tmp_path / "model.json",
-        progress=told.append,
+        progress=lambda stage, share: told.append(share),
     )  # fmt: skip
-    assert told
+    assert told == sorted(told)
+    assert 0 <= told[0] < told[-1] < 1
     written = extended_path(tmp_path / "model.json")
     better = load_model(written)
     assert better.id == found.model.id

@@ -57,11 +57,11 @@ def diagnose(
     """Find what the model lacks, trace it to an effect, and add that effect."""
     from postproc import diagnosing
     from postproc.accuracy.diagnosis.evidence import dumped, evidence_of
-    from postproc.console import stages
+    from postproc.console import stage_bar
 
     with explained():
         check_places([output, as_path(json), html, plot], [*data, cell, model, program])
-        with stages() as progress:
+        with stage_bar() as progress:
             found = diagnosing.diagnose_files(
                 data,
                 cell,

@@ -59,14 +59,14 @@ def hold_out(
     count = PARTS if len(base.batch) < MANY else 1
     rows, before, after, fitted = [], [], [], 0
     for k in range(count):
-        progress(f"held-out rows, part {k + 1} of {count}")
+        progress(f"held-out rows, part {k + 1} of {count}", 0.6 + 0.4 * k / count)
         out = np.flatnonzero((part == k) & used)
         inside = np.flatnonzero(part != k)
         if len(out) == 0:
             continue
         less = _fit_of(base, inside)
         library = found.library.at_rows(inside)
-        more = investigate(less, library, found.null, lambda _: None).fit
+        more = investigate(less, library, found.null, lambda *_: None).fit
         rows.append(out)
         before.append(
             left_by(less, base, out) if given is None else np.asarray(given[out])

@@ -22,7 +22,7 @@ ALONE = 0.01  # level of the score test of the candidate itself
 BETTER = 1.0  # nats that replace one family by another
 RECENT = 2  # additions looked at again after each further one
 
-Progress = Callable[[str], None]
+Progress = Callable[[str, float], None]  # what is done, and how far everything is
 
 
 @dataclass(frozen=True)
@@ -82,7 +82,7 @@ def search(base: Fit, library: Library, null: Null, progress: Progress) -> Searc
     """
     found = Search(base, base, library, (), null, None)
     for number in range(MOST):
-        progress(f"looking for effect {number + 1}")
+        progress(f"looking for effect {number + 1}", 0.1 + 0.4 * number / MOST)
         grown = _grow(found)
         if grown.fit is found.fit:
             found = grown

@@ -19,7 +19,7 @@ REMAINS = 0.01  # level at which structure is called structure: nothing was adde
 STILL_REMAINS = 0.001  # ... after something was
 
 
-def silent(message: str) -> None:
+def silent(stage: str, share: float) -> None:
     """Tell nobody."""
 
 
@@ -55,13 +55,13 @@ class Trace:
 
 def trace(base: Fit, seed: int, progress: Progress = silent) -> Trace:
     """Search a fit's rows for what it lacks, and judge what was found."""
-    progress("candidates")
+    progress("candidates", 0.0)
     library = Library.of(base)
-    progress("threshold of the whole library")
+    progress("threshold of the whole library", 0.05)
     null = bootstrap(Projection.of(base), library, seed)
     found = investigate(base, library, null, progress)
-    progress("groups that cannot be told apart")
+    progress("groups that cannot be told apart", 0.5)
     standings = tuple(stand(found, k) for k in range(len(found.additions)))
-    progress("what is left")
+    progress("what is left", 0.55)
     left = leftovers(Projection.of(found.fit), seed)
     return Trace(found, standings, left)
