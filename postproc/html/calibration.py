@@ -16,10 +16,12 @@ from postproc.html.figure import (
     distribution,
     figure,
     in_space,
+    log_axis,
     points,
     rounded,
     thin,
 )
+from postproc.html.history import steps
 from postproc.html.iso9283 import PoseFigures, pose_figures
 from postproc.html.page import render
 
@@ -65,6 +67,7 @@ def calibration_report(
         more_pairs=max(0, len(pairs) - MOST_PAIRS),
         iso=_iso(rows),
         has_rows=bool(rows),
+        history=steps(model.get("history")),
     )
 
 
@@ -93,10 +96,13 @@ def residuals(rows: Mapping[str, Array]) -> dict[str, Figure]:
     order = np.arange(1.0, len(size["before"]) + 1)
     some = thin(len(order))
     along = [points(when, order[some], s[some]) for when, s in size.items()]
+    whole = np.concatenate([*size.values()])
+    whole = whole[whole > 0]
+    axis = log_axis(float(whole.min()), float(whole.max())) if len(whole) else {}
     return {
         "histogram": distribution(size),
         "axes": along_axes(errors),
-        "order": figure(along, "visit order", "error [mm]", yaxis={"type": "log"}),
+        "order": figure(along, "visit order", "error [mm]", yaxis=axis),
         "space": in_space(rows["position_mm"], errors),
     }
 

@@ -18,6 +18,7 @@ from postproc.html.figure import (
     rounded,
     thin,
 )
+from postproc.html.history import name_of, steps
 from postproc.html.page import render
 
 SCRIPTS = ("page.js", "figures.js")
@@ -44,7 +45,7 @@ def diagnosis_report(diagnosis: Mapping[str, Any]) -> str:
         KeyError, ValueError, TypeError: It is no such report.
     """
     effects = list(diagnosis["effects"])
-    candidates = list(diagnosis.get("candidates") or ())
+    candidates = distinct(diagnosis.get("candidates") or ())
     figures: dict[str, Figure] = {"summary": before_after(diagnosis)}
     for k, effect in enumerate(effects):
         if effect.get("evidence"):
@@ -65,20 +66,16 @@ def diagnosis_report(diagnosis: Mapping[str, Any]) -> str:
         alike=[[name_of(c) for c in e.get("confusable_with", ())] for e in effects],
         candidates=[{**c, "name": name_of(c)} for c in candidates[:MOST_CANDIDATES]],
         figures=figures,
+        history=steps(diagnosis.get("history")),
     )
 
 
-def name_of(effect: Mapping[str, Any]) -> str:
-    """Name an effect with its joint and what drives it.
-
-    >>> name_of({"effect": "coupling", "joint": 6, "source": "joint 5"})
-    'coupling of joint 6 by joint 5'
-    """
-    joint, source = effect.get("joint"), effect.get("source")
-    name = str(effect["effect"])
-    name += "" if joint is None else f" of joint {joint}"
-    own = source is None or source == f"joint {joint}"
-    return name if own else f"{name} by {source}"
+def distinct(candidates: Sequence[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
+    """Keep the best of the candidates of one name, which differ in settings only."""
+    best: dict[str, Mapping[str, Any]] = {}
+    for candidate in sorted(candidates, key=lambda c: float(c["p_value"])):
+        best.setdefault(name_of(candidate), candidate)
+    return list(best.values())
 
 
 def _sizes(rows: Mapping[str, Any]) -> dict[str, Any]:

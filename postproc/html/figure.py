@@ -15,6 +15,7 @@ Figure = dict[str, Any]
 BEFORE, AFTER, OTHER = "#d55e00", "#0072b2", "#767676"
 BINS = 40
 MOST = 20_000  # points of a figure
+CROWDED = 3  # decades from which a logarithmic axis labels powers of ten only
 
 
 def figure(traces: Sequence[Figure], x: str, y: str, **layout: Any) -> Figure:
@@ -83,7 +84,20 @@ def distribution(errors: Mapping[str, Array]) -> Figure:
                 "fill": "tozeroy",
             }
         )
-    return figure(traces, "error [mm]", "rows", xaxis={"type": "log"})
+    axis = log_axis(float(edges[0]), float(edges[-1]))
+    return figure(traces, "error [mm]", "rows", xaxis=axis)
+
+
+def log_axis(low: float, high: float) -> Figure:
+    """Make a logarithmic axis whose ticks are whole numbers of a power of ten.
+
+    >>> log_axis(0.02, 0.3)["tickvals"]
+    [0.01, 0.02, 0.05, 0.1, 0.2, 0.5]
+    """
+    first, last = int(np.floor(np.log10(low))), int(np.floor(np.log10(high)))
+    steps = (1, 2, 5) if last - first < CROWDED else (1,)
+    ticks = [float(f"{k}e{p}") for p in range(first, last + 1) for k in steps]
+    return {"type": "log", "tickvals": ticks, "ticktext": [f"{t:g}" for t in ticks]}
 
 
 def colour_of(name: str) -> str:
@@ -143,7 +157,7 @@ def in_space(position_mm: Array, errors: Mapping[str, Array]) -> Figure:
             }
         )
     axes = {f"{k}axis": {"title": {"text": f"{k} base [mm]"}} for k in "xyz"}
-    camera = {"eye": {"x": 1.5, "y": -1.5, "z": 1.0}}
+    camera = {"eye": {"x": 1.5, "y": -1.5, "z": 1.0}, "center": {"z": -0.15}}
     scene = {"aspectmode": "data", "camera": camera, **axes}
     margin = {"l": 0, "r": 0, "t": 0, "b": 0}
     return {"traces": traces, "layout": {"scene": scene, "margin": margin}}

@@ -9,9 +9,11 @@ import base64
 import os
 import time
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from postproc.html import (
@@ -104,6 +106,14 @@ def type_search(browser: Any, text: str) -> None:
     field = browser.find_element("css selector", "#search")
     field.clear()
     field.send_keys(text)
+
+
+def keep(name: str, data: bytes) -> None:
+    """Keep a file beside the pictures, if somebody wants them."""
+    wanted = os.environ.get("SCREENSHOTS")
+    if wanted:
+        Path(wanted).mkdir(parents=True, exist_ok=True)
+        (Path(wanted) / name).write_bytes(data)
 
 
 @pytest.fixture
@@ -276,9 +286,47 @@ def test_the_page_prints(program: Any, folder: Path) -> None:
         """
     )
     assert marks[0] > 100 and marks[1] == 0  # targets are drawn in blue
-    wanted = os.environ.get("SCREENSHOTS")
-    if wanted:
-        (Path(wanted) / "program.pdf").write_bytes(pdf)
+    keep("program.pdf", pdf)
+
+
+def test_wide_figures_fit_on_a_sheet_and_come_back(browser: Any, folder: Path) -> None:
+    show(browser, folder, "diagnosis", diagnosis_report(diagnosis()))
+    told = """
+        window.dispatchEvent(new Event(arguments[0]));
+        return [...document.querySelectorAll(".js-plotly-plot .main-svg")]
+          .map((svg) => svg.getBoundingClientRect().width);
+    """
+    on_screen = browser.execute_script(told, "nothing")
+    assert max(browser.execute_script(told, "beforeprint")) <= 701 < max(on_screen)
+    browser.execute_script(told, "afterprint")
+    until(
+        browser,
+        "return Math.max(...[...document.querySelectorAll('.main-svg')]"
+        ".map((svg) => svg.getBoundingClientRect().width)) > 701",
+    )
+    pdf = base64.b64decode(browser.execute_cdp_cmd("Page.printToPDF", {})["data"])
+    keep("diagnosis.pdf", pdf)
+
+
+def test_a_target_far_away_does_not_spoil_the_view(browser: Any, folder: Path) -> None:
+    outcome = outcome_of(60)
+    far = np.array(outcome.position)
+    far[7] = [0.0, 90.0, 0.0]
+    page = program_report(replace(outcome, position=far))
+    show(browser, folder, "far", page)
+    aspect = browser.execute_script(
+        "const s = document.getElementById('view')._fullLayout.scene;"
+        "return [s.aspectmode, s.aspectratio.x, s.aspectratio.y, s.aspectratio.z]"
+    )
+    assert aspect[0] == "manual" and max(aspect[1:]) == pytest.approx(1.5)
+    assert min(aspect[1:]) > 0.1
+
+
+def test_words_are_explained_on_every_page(browser: Any, folder: Path) -> None:
+    for name in ("program", "fit", "diagnosis"):
+        show(browser, folder, name, PAGES[name]())
+        words = browser.find_elements("css selector", ".words dt")
+        assert len(words) > 5 and all(word.text for word in words)
 
 
 def test_100_000_targets_are_usable(browser: Any, folder: Path) -> None:

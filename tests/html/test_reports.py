@@ -15,8 +15,9 @@ from postproc.html import (
     report_file,
 )
 from postproc.html.calibration import correlated
-from postproc.html.diagnosis import running_mean
+from postproc.html.diagnosis import distinct, running_mean
 from postproc.html.figure import distribution, in_space, magnification
+from postproc.html.history import steps
 from postproc.html.iso9283 import pose_figures
 from tests.html.builders import outcome_of, program_text
 from tests.html.test_program import NASTY, Elements
@@ -197,6 +198,25 @@ def test_evidence_is_told_in_words_too() -> None:
     assert "transmission of joint 3<" in text
     assert "joint_map of joint 3" in text
     assert "nothing is missing" in diagnosis_report(noise())
+
+
+def test_candidates_of_one_name_are_told_once() -> None:
+    wave = {"effect": "transmission", "joint": 3, "source": "joint 3"}
+    given = [{**wave, "p_value": p} for p in (0.5, 1e-9)]
+    lag = {"effect": "lag", "joint": 1, "source": "speed", "p_value": 0.1}
+    assert [c["p_value"] for c in distinct([*given, lag])] == [1e-9, 0.1]
+
+
+def test_the_history_is_told_in_rows() -> None:
+    added = {"effect": "coupling", "joint": 6, "source": "joint 5", "p_value": 0.0}
+    told = {"parent": "abc", "verdict": "effect", "added": [added], "n_held_out": 80,
+            "before": {"mean_mm": 0.4}, "after": {"mean_mm": 0.1}}  # fmt: skip
+    (row,) = steps([told])
+    assert row["added"] == ["coupling of joint 6 by joint 5"]
+    assert (row["before"], row["after"], row["rows"]) == (0.4, 0.1, 80)
+    page = calibration_report(model_file() | {"history": [told, {}]})
+    assert "coupling of joint 6 by joint 5" in page and "{'mean_mm" not in page
+    assert steps(None) == []
 
 
 def test_running_means_follow_a_line() -> None:

@@ -71,6 +71,22 @@ const Page = {
     }
   },
 
+  // Figures wider than a sheet are drawn anew in its width, views in space made smaller.
+  fitForPrint() {
+    for (const node of document.querySelectorAll(".js-plotly-plot")) {
+      if (node.clientWidth <= Page.SHEET) continue;
+      if (node.querySelector("canvas")) node.style.zoom = String(Page.SHEET / node.clientWidth);
+      else Plotly.relayout(node, { autosize: false, width: Page.SHEET });
+    }
+  },
+
+  forgetFit() {
+    for (const node of document.querySelectorAll(".js-plotly-plot")) {
+      node.style.zoom = "";
+      if (node.layout.width) Plotly.relayout(node, { autosize: true, width: null });
+    }
+  },
+
   forgetCopies() {
     for (const copy of document.querySelectorAll("canvas.printed")) copy.remove();
   },
@@ -87,5 +103,7 @@ Page.COLOURS = {  // Okabe and Ito: told apart with any kind of colour vision
   purple: "#cc79a7", grey: "#767676", black: "#222222",
 };
 
-window.addEventListener("beforeprint", Page.copyForPrint);
-window.addEventListener("afterprint", Page.forgetCopies);
+Page.SHEET = 700;  // px that the width of a sheet holds
+
+window.addEventListener("beforeprint", () => { Page.copyForPrint(); Page.fitForPrint(); });
+window.addEventListener("afterprint", () => { Page.forgetCopies(); Page.forgetFit(); });

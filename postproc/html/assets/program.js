@@ -81,7 +81,7 @@ class ProgramPage {
     if (!before.n) { node.remove(); return; }
     const keys = ["mean_mm", "p95_mm", "max_mm"], names = ["mean", "95 %", "max"];
     const bars = (from, name, colour, shape) => ({ type: "bar", orientation: "h", name, y: names, x: keys.map((k) => from[k]),
-      text: keys.map((k) => Page.number(from[k], 3)), textposition: "outside", cliponaxis: false,
+      text: keys.map((k) => Page.number(from[k], from[k] < 0.01 ? 4 : 3)), textposition: "outside", cliponaxis: false,
       marker: { color: colour, line: { color: colour, width: 1 }, pattern: { shape, fgcolor: colour, bgcolor: "#fff", solidity: 0.4 } } });
     Page.draw(node, [bars(before, "before", Page.COLOURS.vermillion, "/"), bars(after, "after", Page.COLOURS.blue, "")], {
       barmode: "group", legend: { orientation: "h", x: 0, y: 1.02, yanchor: "bottom", traceorder: "normal" },

@@ -14,19 +14,32 @@ class View {
     this.onPick = onPick;
   }
 
-  // A magnification that makes large errors about a twelfth of the path's size.
-  suggest() {
+  // How far the targets reach along x, y and z [mm].
+  spans() {
     const { column } = this.columns.numbers.position_mm;
     const low = [Infinity, Infinity, Infinity], high = [-Infinity, -Infinity, -Infinity];
     for (let k = 0; k < column.length; k++) {
       if (column[k] < low[k % 3]) low[k % 3] = column[k];
       if (column[k] > high[k % 3]) high[k % 3] = column[k];
     }
-    const extent = Math.hypot(...high.map((v, k) => v - low[k]));
+    return high.map((v, k) => Math.max(v - low[k], 0));
+  }
+
+  // True proportions that fit into the frame however long and thin the path is.
+  aspect() {
+    const spans = this.spans(), most = Math.max(...spans);
+    const [x, y, z] = spans.map((v) => 1.5 * Math.max(most > 0 ? v / most : 1, View.THIN));
+    return { x, y, z };
+  }
+
+  // A magnification that makes large errors about a twelfth of the path's size.
+  suggest() {
+    const extent = Math.hypot(...this.spans());
     const sizes = Array.from(this.columns.size).filter((v) => v > 0).sort((a, b) => a - b);
     if (!sizes.length || !(extent > 0)) return 100;
     const wanted = 0.08 * extent / sizes[Math.floor(0.95 * (sizes.length - 1))];
-    return View.SCALES.reduce((best, s) => (s <= wanted ? s : best), 1);
+    const off = (s) => Math.abs(Math.log(s / wanted));
+    return View.SCALES.reduce((best, s) => (off(s) < off(best) ? s : best), 1);
   }
 
   // The rows that are drawn: all, or those left alone and every k-th of the others.
@@ -133,18 +146,19 @@ class View {
   // Draw the rows that the table lists.
   show(rows) {
     const thin = this.thin(rows);
-    this.crowd = thin.rows.length > 3000 ? 1.8 : thin.rows.length > 300 ? 2.2 : 3.4;
+    this.crowd = thin.rows.length > 3000 ? 1.8 : thin.rows.length > 300 ? 2 : 3.4;
     const { kinds, of } = this.classes();
     const members = kinds.map(() => []);
     for (const i of thin.rows) members[of(i)].push(i);
     const traces = [this.path(), this.mark()];
     kinds.forEach((kind, k) => { if (members[k].length) traces.push(...this.traces(kind, members[k])); });
-    const axis = (name) => ({ title: { text: `${name} base [mm]` }, backgroundcolor: "#fff",
+    const aspect = this.aspect();
+    const axis = (name) => ({ title: { text: `${name} base [mm]` }, nticks: Math.max(3, Math.round(5 * aspect[name])), backgroundcolor: "#fff",
       gridcolor: "#ddd", zerolinecolor: "#bbb", showspikes: false });
     const done = Page.draw(this.node, traces, {
       margin: { l: 0, r: 0, t: 0, b: 0 }, uirevision: "keep", hovermode: "closest",
       legend: { x: 0, y: 1, bgcolor: "rgba(255,255,255,0.8)", itemsizing: "constant" },
-      scene: { aspectmode: "data", camera: { eye: { x: 1.7, y: -1.7, z: 1.1 } }, xaxis: axis("x"), yaxis: axis("y"), zaxis: axis("z") },
+      scene: { aspectmode: "manual", aspectratio: aspect, camera: { eye: { x: 1.55, y: -1.55, z: 1.0 }, center: { x: 0, y: 0, z: -0.16 } }, xaxis: axis("x"), yaxis: axis("y"), zaxis: axis("z") },
     });
     this.note(thin);
     if (!this.listening) this.listen();
@@ -178,6 +192,7 @@ class View {
   }
 }
 
+View.THIN = 0.12;  // least proportion of an axis
 View.MOST = 12000;  // targets drawn at a time
 View.SCALES = [1, 2, 5, 10, 20, 50, 100, 200, 500, 1000, 2000, 5000];
 View.LEFT = new Set(["unsafe", "guarded", "display"]);

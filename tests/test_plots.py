@@ -1,0 +1,35 @@
+"""Plots for papers: the same comparison gives the same file."""
+
+from __future__ import annotations
+
+import pytest
+
+from postproc.accuracy.comparison import Comparison, MethodRow
+from postproc.exceptions import OutputError
+from postproc.plots import plot_comparison
+
+
+def comparison():
+    rows = (
+        MethodRow("full", 0.01, 0.2, 0.05, 0.02, 100),
+        MethodRow("elm", 0.2, 4.0, 1.4, 0.6, 100),
+    )
+    return Comparison(rows, "200 rows to fit, 100 to test")
+
+
+@pytest.mark.parametrize("suffix", [".svg", ".png"])
+def test_a_comparison_becomes_a_picture(suffix, tmp_path):
+    first, second = (
+        plot_comparison(comparison(), tmp_path / f"{name}{suffix}").read_bytes()
+        for name in ("a", "b")
+    )
+    assert first == second
+    begins = b"\x89PNG" if suffix == ".png" else b"<?xml"
+    assert first.startswith(begins)
+    assert b"<dc:date>" not in first
+
+
+def test_other_formats_and_missing_folders_are_refused(tmp_path):
+    for place in (tmp_path / "a.xyz", tmp_path / "none" / "a.png"):
+        with pytest.raises(OutputError, match="png or .svg"):
+            plot_comparison(comparison(), place)
