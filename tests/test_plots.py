@@ -31,5 +31,5 @@ def test_a_comparison_becomes_a_picture(suffix, tmp_path):
 
 def test_other_formats_and_missing_folders_are_refused(tmp_path):
     for place in (tmp_path / "a.xyz", tmp_path / "none" / "a.png"):
-        with pytest.raises(OutputError, match="png or .svg"):
+        with pytest.raises(OutputError, match=r"\.png or \.svg"):
             plot_comparison(comparison(), place)

@@ -215,7 +215,7 @@ def test_the_history_is_told_in_rows() -> None:
     assert row["added"] == ["coupling of joint 6 by joint 5"]
     assert (row["before"], row["after"], row["rows"]) == (0.4, 0.1, 80)
     page = calibration_report(model_file() | {"history": [told, {}]})
-    assert "coupling of joint 6 by joint 5" in page and "{'mean_mm" not in page
+    assert "coupling of joint 6 by joint 5" in page and "&#39;mean_mm" not in page
     assert steps(None) == []
 
 
