@@ -27,7 +27,7 @@ from tests.plant import contents, grow
 from tests.plant_watch import Cost, watched
 
 TARGETS = 100
-ROUNDS = 3  # of runs that are compared with each other
+ROUNDS = 2  # of runs that are compared with each other
 STEPS = 40_000_000  # of the plain loop: some seconds
 PAGE = ROOT / "docs" / "plant.md"
 
@@ -175,24 +175,27 @@ def main() -> None:
     """Run from the command line."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--files", type=int, default=10_000)
-    parser.add_argument("--compared", type=int, default=300, help="files of the ratios")
+    parser.add_argument("--compared", type=int, default=400, help="files of the ratios")
     parser.add_argument("--page", type=Path, default=PAGE)
     args = parser.parse_args()
     found = Findings()
     found.add("before the start", load())
     with tempfile.TemporaryDirectory(prefix="postproc-plant-") as folder:
         root = make_job(Path(folder))
-        for name, files in (("compared", args.compared), ("many", args.files)):
-            plant = Plant(root / name, root / "cell.toml", root / "model.json", 2)
-            grow(plant.source, files, TARGETS)
-            if name == "many":
-                many_files(plant, files, found)
-            else:
-                workers(plant, found)
-                cluster(plant, found)
-    args.page.write_text(
-        page(found, f"--files {args.files} --compared {args.compared}")
-    )
+        many, few = (
+            Plant(root / name, root / "cell.toml", root / "model.json", 2)
+            for name in ("many", "few")
+        )
+        grow(many.source, args.files, TARGETS)
+        grow(few.source, args.compared, TARGETS)
+        for part in (
+            lambda: many_files(many, args.files, found),
+            lambda: workers(few, found),
+            lambda: cluster(few, found),
+        ):
+            part()
+            command = f"--files {args.files} --compared {args.compared}"
+            args.page.write_text(page(found, command))
 
 
 if __name__ == "__main__":

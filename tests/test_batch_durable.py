@@ -10,7 +10,9 @@ import time
 
 import pytest
 
+from postproc.batch.guard import locked
 from postproc.batch.run import default_log
+from postproc.exceptions import OutputError
 from postproc.files import TEMPORARY
 from tests.chaos import Plant, build, chaos, descendants, gone
 from tests.plant import contents, grow
@@ -86,6 +88,12 @@ def test_a_read_only_target_is_said(plant):
     plant.root.chmod(0o700)
     assert done.returncode == 2
     assert "read-only" in done.stderr and "Traceback" not in done.stderr
+
+
+def test_a_read_only_target_is_told_before_any_work(tmp_path, monkeypatch):
+    monkeypatch.setattr(os, "access", lambda place, mode: mode != os.W_OK)
+    with pytest.raises(OutputError, match="read-only"), locked(tmp_path / "dst"):
+        raise AssertionError("held")
 
 
 def test_a_place_that_cannot_be_written_fails_alone(plant):

@@ -26,13 +26,17 @@ def locked(folder: Path) -> Iterator[None]:
     this process, however that ends.
 
     Raises:
-        OutputError: Another run holds it, or it cannot be created.
+        OutputError: Another run holds it, or it cannot be created or written to.
     """
     try:
         folder.mkdir(parents=True, exist_ok=True)
         handle = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
     except OSError as exc:
         raise disk_error(exc, folder) from None
+    if not os.access(folder, os.W_OK):
+        os.close(handle)
+        cure = "Give a folder that may be written to"
+        raise OutputError(folder, "the folder is read-only", cure)
     try:
         fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except OSError:

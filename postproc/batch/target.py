@@ -50,7 +50,8 @@ class Target:
                 shutil.copyfileobj(data, out, 1 << 20)
             shutil.copystat(source, self.root / place)
         except OSError as exc:
-            raise disk_error(exc, exc.filename or place) from None
+            read = exc.filename == str(source)
+            raise disk_error(exc, source if read else self.root / place) from None
         return {place: file_hash(self.root / place)}
 
     def holds(self, outputs: Mapping[str, str]) -> bool:
