@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from postproc.accuracy.model import Model
 from postproc.clock import Clock
 from postproc.language.visits import Visits
-from postproc.motion.planner import Reached, reach
+from postproc.motion.planner import Plan, Reached, reach
 from postproc.options import Options
 from postproc.output import Output, write_numbers
 from postproc.planning import Planned, Reading, read_program
@@ -19,18 +19,18 @@ from postproc.proposal import Proposal, propose
 from postproc.resolve import targets_from_visits
 from postproc.robot.cell import Cell
 from postproc.robot.state import States
-from postproc.solved import solve_again, solve_visits
+from postproc.side_search import SideSearch
+from postproc.solved import Solved, solve_again, solve_visits
 from postproc.verify import check_output
 
 Array = NDArray[np.float64]
+Bools = NDArray[np.bool_]
 
-ROUNDS = 8  # of correcting for changed sides, before targets are held
+ROUNDS = 8  # of correcting for changed sides, before targets are settled for
 SAME = 0.01  # sides closer than this are the same
-LEAST_SHIFT = 1e-3  # change of an aim that tells how the arrival follows it
-FOLLOWS = 0.75  # gain above which the arrival runs away with the aim
 OTHER = 1.0  # sides farther apart than this are different ones
 CLOSE = 5e-6  # [m] how well rounded fly points are hit
-CORNERS = 3  # rounds for that
+CORNERS = 3  # rounds for what is curved there
 
 
 @dataclass(frozen=True)
@@ -40,38 +40,6 @@ class Corrected:
     proposal: Proposal
     output: Output
     reached: Reached
-
-
-class SideSearch:
-    """Search, joint by joint, for the side at which aim and arrival agree.
-
-    A correction of a joint is as large as its play, so aiming where it was found last
-    may swing or creep. Secant steps settle that; where the arrival follows the aim so
-    closely that there is nothing to settle on, the joint is taken to its flank.
-    """
-
-    def __init__(self) -> None:
-        """Start without a history."""
-        self._aim: Array | None = None
-        self._found: Array | None = None
-
-    def next_aim(self, aim: Array, found: Array) -> Array:
-        """Give the sides to aim for next, (n, 6).
-
-        Args:
-            aim: Sides that the targets are corrected for, (n, 6).
-            found: Sides that joints then arrive at, (n, 6).
-        """
-        step = found - aim
-        if self._aim is not None and self._found is not None:
-            shift = aim - self._aim
-            known = np.abs(shift) > LEAST_SHIFT
-            gain = (found - self._found) / np.where(known, shift, np.inf)
-            follows = gain > FOLLOWS
-            step = step / np.where(follows, 1.0, 1.0 - gain)
-            step = np.where(follows, 2.0 * np.sign(step), step)
-        self._aim, self._found = np.array(aim), np.array(found)
-        return np.clip(aim + step, -1.0, 1.0)
 
 
 def settle(
@@ -87,39 +55,55 @@ def settle(
 
     The corrected program makes slightly other moves than the original, so a joint may
     come from the other side, or lie elsewhere in its play: the correction is computed
-    anew for that. A target whose joints still change sides at the end is left alone.
+    anew for that. Where joints still change sides at the end, the target is corrected
+    for the middle between both, and listed: to leave it alone would bend a fly run by
+    the whole correction, and move its neighbours' sides with it.
+
     A rounded fly point also moves with its neighbours' corrections, which its own makes
     up for.
     """
     held, search = np.zeros(len(states), dtype=bool), SideSearch()
     with clock("solve"):
         solved = solve_visits(model, cell, planned, states, options.orientation)
-    aside = np.array(planned.plan.aside)
-    for number in count():  # ends: from round ROUNDS on, `held` grows
+    bent = np.zeros_like(planned.plan.aside)
+    settled_for = np.zeros(len(states), dtype=bool)
+    for number in count():  # ends: from round ROUNDS on, `settled_for` or `held` grows
         with clock("decide"):
+            aside = aside_after(planned.plan, solved, held) + bent
             proposal = propose(reading, planned, solved, aside, held, cell, options)
         with clock("plan again"):
             after = reached_after(reading.visits, proposal, cell)
-        found, missed = after.side, np.linalg.norm(after.aside - aside, axis=1)
-        rounds_on = number < CORNERS and (missed[proposal.corrected] > CLOSE).any()
-        aside = np.array(after.aside) if rounds_on else aside
+        found, missed = after.side, np.zeros_like(bent)
+        sharp = planned.plan.pull.visit
+        missed[sharp] = (after.aside - aside)[sharp]
+        missed[~proposal.corrected] = 0.0
+        rounds_on = number < CORNERS and np.abs(missed).max(initial=0.0) > CLOSE
+        bent = bent + missed if rounds_on else bent
         off = np.abs(found - solved.direction).max(axis=1, initial=0.0)
-        moved = proposal.corrected & (off > (SAME if number < ROUNDS else OTHER))
+        moved = proposal.corrected & ~settled_for
+        moved = moved & (off > (SAME if number < ROUNDS else OTHER))
         if not moved.any() and not rounds_on:
             done = write_and_verify(reading, proposal, cell, model, clock)
             off = np.abs(done.reached.side - solved.direction)
-            flipped = proposal.corrected & (off > OTHER).any(axis=1)
+            flipped = proposal.corrected & ~settled_for & (off > OTHER).any(axis=1)
             if not flipped.any():
                 return done
             held = held | flipped
             continue
-        held = held | moved if number >= ROUNDS else held
+        settled_for = settled_for | moved if number >= ROUNDS else settled_for
         with clock("solve"):
             aimed = states.with_(direction=search.next_aim(solved.direction, found))
             solved = solve_again(
                 solved, moved, model, cell, planned, aimed, options.orientation
             )
     raise AssertionError("unreachable")
+
+
+def aside_after(plan: Plan, solved: Solved, held: Bools) -> Array:
+    """Foretell where the path passes its fly points once targets have moved, (n, 3)."""
+    wanted = np.nan_to_num(solved.command[:, :3, 3] - plan.tcp[:, :3, 3])
+    wanted[held] = 0.0
+    return plan.aside + plan.pull.on(plan.pull.to_move(wanted))
 
 
 def reached_after(visits: Visits, proposal: Proposal, cell: Cell) -> Reached:

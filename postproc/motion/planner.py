@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from postproc.motion.clock import no_time, tell_time
+from postproc.motion.pull import Pull
 from postproc.motion.reasons import CODE, REASONS, WRIST
 from postproc.motion.rounding import rounded
 from postproc.motion.targets import Targets
@@ -41,6 +42,7 @@ class Plan:
         reasons: Why not; reasons[0] is "".
         overruled: Continuity took another branch or turn than the string says, (n,).
         untimed: Time and speed are estimates: no time law was found, (n,).
+        pull: How rounded fly points move with their neighbours.
     """
 
     q: Array
@@ -57,6 +59,7 @@ class Plan:
     reasons: tuple[str, ...]
     overruled: Bools
     untimed: Bools
+    pull: Pull
 
     def __post_init__(self) -> None:
         for f in fields(self):
@@ -100,6 +103,7 @@ def plan(arm: Arm, targets: Targets, wrist: float, timed: bool = True) -> Plan:
         traced.q, tcp, _aside(exact, traced, targets), targets.tool, arrived.direction,
         arrived.side, arrived.travel, clock.speed, clock.time, traced.slot,
         _guard(traced, wrist), REASONS, traced.overruled, clock.untimed,
+        traced.pull,
     )  # fmt: skip
 
 

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from postproc.motion.corner import Corners, corners, on_corner
 from postproc.motion.paths import along
+from postproc.motion.pull import Pull
 from postproc.motion.targets import Targets
 from postproc.motion.trace import Trace
 from postproc.robot.arm import Arm
@@ -52,7 +53,22 @@ def rounded(arm: Arm, targets: Targets, traced: Trace) -> Trace:
     q, flange = np.array(traced.q), np.array(traced.flange)
     q[visit], flange[visit] = found.q, arm.flange(found.q)
     edges, share = _resampled(traced, found)
-    return replace(traced, q=q, flange=flange, edges=edges, share=share)
+    pull = _pull(targets, traced, found)
+    return replace(traced, q=q, flange=flange, edges=edges, share=share, pull=pull)
+
+
+def _pull(targets: Targets, traced: Trace, found: Corners) -> Pull:
+    """Tell how sharp corners move with the targets next to them.
+
+    On a flat one the corrections of neighbours are alike but where a joint turns, and
+    to sharpen that step would make the joint turn elsewhere.
+    """
+    to = np.repeat(np.arange(len(targets)), np.diff(targets.pred_start))
+    zones, s = found.zones[~found.flat], found.nearest[~found.flat]
+    return Pull(
+        zones.visit, traced.edges.source[zones.into], to[zones.out],
+        zones.before * (1 - s) ** 2, zones.behind * s**2,
+    )  # fmt: skip
 
 
 def _pieces(traced: Trace, found: Corners) -> _Pieces:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
 from postproc.motion.arrive import Arrival, arrive, choose
 from postproc.motion.branches import follow, on_written_turns
+from postproc.motion.pull import Pull
 from postproc.motion.reasons import (
     AMBIGUOUS,
     CODE,
@@ -48,6 +49,7 @@ class Trace:
             0 for JOINT moves and where they are not known.
         share: Part of its edge's way that leads to each sample of the edges, (s,).
         overruled: Continuity took another branch or turn than the string says, (n,).
+        pull: How rounded fly points move with their neighbours.
     """
 
     q: Array
@@ -59,6 +61,7 @@ class Trace:
     share: Array
     reason: Ints
     overruled: Bools
+    pull: Pull = field(default_factory=Pull)
 
 
 def trace(arm: Arm, targets: Targets) -> Trace:

@@ -1,0 +1,61 @@
+"""How the path at a sharp fly point moves with the points next to it.
+
+The corner superposes two moves, so that the place where the path passes a point moves
+by the share 1 - v - w of what the point moves, and by the shares v and w of what the
+points before and behind it move; see `corner`. Exact for straight moves of the TCP.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+ROUNDS = 12  # of Jacobi's method; v + w is 1/4 at most, each gains a factor of two
+
+
+def _no_points() -> Ints:
+    return np.empty(0, dtype=np.int64)
+
+
+def _no_shares() -> Array:
+    return np.empty(0)
+
+
+@dataclass(frozen=True)
+class Pull:
+    """c rounded fly points where the path really bends.
+
+    Attributes:
+        visit: The point, (c,).
+        before, behind: The targets next to it, (c,).
+        v, w: Their shares, (c,).
+    """
+
+    visit: Ints = field(default_factory=_no_points)
+    before: Ints = field(default_factory=_no_points)
+    behind: Ints = field(default_factory=_no_points)
+    v: Array = field(default_factory=_no_shares)
+    w: Array = field(default_factory=_no_shares)
+
+    def on(self, moved: Array) -> Array:
+        """Tell how much farther than their targets points move, (n, 3).
+
+        Args:
+            moved: What all n targets move by, (n, 3).
+        """
+        out, here = np.zeros_like(moved), moved[self.visit]
+        out[self.visit] = self.v[:, None] * (moved[self.before] - here)
+        out[self.visit] += self.w[:, None] * (moved[self.behind] - here)
+        return out
+
+    def to_move(self, wanted: Array) -> Array:
+        """Move targets so that the path moves as wanted where it passes, (n, 3)."""
+        moved = np.array(wanted)
+        for _ in range(ROUNDS if len(self.visit) else 0):
+            moved = wanted - self.on(moved)
+        return moved
