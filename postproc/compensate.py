@@ -16,6 +16,7 @@ from postproc.arrivals import tell_arrivals
 from postproc.clock import Clock, Progress, silent
 from postproc.cloning import give_own_points
 from postproc.exceptions import CellError, ProgramError
+from postproc.flying import rounded_points
 from postproc.language.source import Source
 from postproc.language.stamp import is_stamped
 from postproc.notes import (
@@ -174,6 +175,7 @@ def report(
             *missing_file(visits),
             *overruled_strings(visits, planned.plan),
             *untimed_runs(visits, planned.plan),
+            *rounded_points(visits, planned.plan),
             *unsure_sides(visits, rows, d.side, d.std_error),
             *listing_cost(visits, rows, planned.plan, cell.arm),
             assumed_off(name, cell),

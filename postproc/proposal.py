@@ -86,7 +86,7 @@ def propose(
     turn = turns(plan, solved)
     guard_turn(reasons, cell.limits, turn)
     guard_size(reasons, cell.limits, correction, solved.residual)
-    guard_steps(reasons, cell.limits, correction, side, _run_mates(visits))
+    guard_steps(reasons, cell.limits, correction, side, visits.run_mates)
     reasons.mark(held, HELD)
     numbers = new_numbers(visits, plan, solved, aside)
     change = change_mm(visits, numbers, correction)
@@ -211,11 +211,3 @@ def mark_disagreement(
         reasons.mark(unsafe & literals[at], why)
     reasons.mark(unsafe, "another arrival at the same point cannot be corrected")
     return together, unsafe
-
-
-def _run_mates(visits: Visits) -> Ints:
-    """Give the visit before within the same fly run, (n,), -1 where there is none."""
-    single = np.diff(visits.pred_start) == 1
-    first = visits.pred[np.minimum(visits.pred_start[:-1], len(visits.pred) - 1)]
-    before = np.where(single & (first >= 0), first, -1)
-    return np.where((before >= 0) & visits.fly[before], before, -1)

@@ -75,8 +75,19 @@ def _columns(outcome: Outcome, rows: Ints) -> dict[str, list[str]]:
         else ["[]"] * len(rows),
         "correction_mm": _rounded(d.correction[rows] / MM, 5),
         **degrees,
+        "step_mm": _steps(outcome, rows),
         "std_error_mm": _rounded(d.std_error[rows] / MM, 5),
     }
+
+
+def _steps(outcome: Outcome, rows: Ints) -> list[str]:
+    """Write how far the correction moves from the fly point before, null without."""
+    before, correction = outcome.visits.run_mates[rows], outcome.decisions.correction
+    step = np.linalg.norm(correction[rows] - correction[before], axis=1) / MM
+    return [
+        "null" if mate < 0 else f"{size:.5f}"
+        for mate, size in zip(before.tolist(), step.tolist(), strict=True)
+    ]
 
 
 def _named(texts: Sequence[str | None], index: Ints) -> list[str]:

@@ -46,9 +46,9 @@ def job_folder(tmp_path_factory):
     return make_job(tmp_path_factory.mktemp("job"))
 
 
-def make_job(folder: Path) -> Path:
+def make_job(folder: Path, text: str = CELL) -> Path:
     """Write a cell, a survey of virtual arm SEED, and the model fitted to it."""
-    (folder / "cell.toml").write_text(CELL)
+    (folder / "cell.toml").write_text(text)
     cell = load_cell(folder / "cell.toml")
     rows = folder / "rows.csv"
     targets = sample_survey(virtual_arm(SEED), POSES, seed=SEED)

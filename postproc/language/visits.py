@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, fields
 from enum import IntEnum
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -190,3 +191,13 @@ class Visits:
     def predecessors(self, visit: int) -> Ints:
         """Return the possible predecessors of a visit."""
         return self.pred[self.pred_start[visit] : self.pred_start[visit + 1]]
+
+    @cached_property
+    def run_mates(self) -> Ints:
+        """The visit before in the same fly run, (n,), -1 where there is none."""
+        if len(self) == 0:
+            return np.empty(0, dtype=np.int64)
+        single = np.diff(self.pred_start) == 1
+        first = self.pred[np.minimum(self.pred_start[:-1], len(self.pred) - 1)]
+        before = np.where(single & (first >= 0), first, -1)
+        return np.where((before >= 0) & self.fly[before], before, -1)

@@ -1,0 +1,50 @@
+"""What $FLY_TYPE, $FLY_TRAJ, $FLY_DIST and $FLY_PER make of a fly point."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from postproc.flying import rounding_of
+from postproc.language.visits import FlyTrajectory, FlyType
+from postproc.motion.pull import Pull
+from postproc.motion.targets import Fly
+from tests.made_visits import visits
+
+NAN = float("nan")
+NORM, CART = FlyType.FLY_NORM, FlyType.FLY_CART
+
+
+@pytest.mark.parametrize(
+    ("type_", "trajectory", "distance", "percent", "expected"),
+    [
+        (CART, FlyTrajectory.FLY_FROM, 3.0, NAN, (Fly.FROM, 3e-3, 1.0)),
+        (CART, FlyTrajectory.UNSET, NAN, NAN, (Fly.FROM, 5e-3, 1.0)),
+        (CART, FlyTrajectory.FLY_TOL, 2.0, NAN, (Fly.WITHIN, 2e-3, 1.0)),
+        (CART, FlyTrajectory.FLY_PASS, 2.0, NAN, (Fly.EXACT, 2e-3, 1.0)),
+        (CART, FlyTrajectory.UNSET, -1.0, NAN, (Fly.EXACT, 0.0, 1.0)),
+        (NORM, FlyTrajectory.UNSET, NAN, 70.0, (Fly.OVERLAP, 5e-3, 0.7)),
+        (FlyType.UNSET, FlyTrajectory.UNSET, NAN, NAN, (Fly.OVERLAP, 5e-3, 1.0)),
+        (NORM, FlyTrajectory.UNSET, -1.0, 70.0, (Fly.EXACT, 0.0, 0.7)),
+    ],
+)
+def test_settings(type_, trajectory, distance, percent, expected) -> None:
+    one = visits(
+        [0], [[0.0] * 6], fly=np.array([True]), fly_dist_mm=np.array([distance]),
+        fly_per=np.array([percent]), fly_type=np.array([int(type_)]),
+        fly_traj=np.array([int(trajectory)]),
+    )  # fmt: skip
+    rounding, metres, overlap = rounding_of(one)
+    assert (rounding[0], metres[0], overlap[0]) == pytest.approx(expected)
+
+
+def test_targets_make_up_for_what_their_neighbours_pull() -> None:
+    rng = np.random.default_rng(3)
+    n = 40
+    middle = np.arange(1, n - 1)
+    v, w = rng.uniform(0, 0.125, (2, n - 2))
+    pull = Pull(middle, middle - 1, middle + 1, v, w)
+    wanted = rng.normal(size=(n, 3))
+    moved = pull.to_move(wanted)
+    np.testing.assert_allclose(moved + pull.on(moved), wanted, atol=2e-3)
+    np.testing.assert_array_equal(Pull().to_move(wanted), wanted)
