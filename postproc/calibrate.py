@@ -27,6 +27,7 @@ from postproc.accuracy.reading import DETECT, Reading
 from postproc.accuracy.registration import Registration, register
 from postproc.accuracy.schema import Method
 from postproc.accuracy.tool_groups import find_groups
+from postproc.accuracy.tool_shift import ToolShift
 from postproc.pose import MM
 from postproc.robot.arm import Arm
 from postproc.robot.cell import Cell
@@ -103,20 +104,30 @@ def fit_measurements(
 
 def moved_tools(fitted: Fit, survey: Measurements) -> tuple[str, ...]:
     """Tell of rows that look as if the tool, or the nest, had moved between them."""
+    told = [
+        f"the tool or its nest slipped {_at(survey, effect.row)}: fitted as "
+        "tool_shift, not compensated"
+        for effect in fitted.combination.effects
+        if isinstance(effect, ToolShift)
+    ]
     found = find_groups(fitted.residual, fitted.batch.walk.flange)
     if found is None:
-        return ()
+        return tuple(told)
     far = f"{found.describe()} in the flange frame"
-    if len(found.changes) == 1:
-        row = survey.ids[int(found.changes[0])]
-        return (
-            f"the tool or its nest has moved by {far} at row {row}: run postproc "
-            "diagnose, which fits it as tool_shift and does not compensate it",
-        )
+    if found.step is not None:
+        where = _at(survey, float(survey.states.order[found.step]))
+        cure = "run postproc diagnose, or fit without --effects"
+        return (*told, f"the tool or its nest has moved by {far} {where}: {cure}")
     return (
+        *told,
         f"the rows look like several tools, the others at {far} from the first: if "
         "they are, add tool_id; if not, run postproc diagnose",
     )
+
+
+def _at(survey: Measurements, order: float) -> str:
+    """Name the first row from a place in the visit order."""
+    return f"at row {survey.ids[int(np.argmax(survey.states.order >= order))]}"
 
 
 def several_points(survey: Measurements) -> tuple[str, ...]:

@@ -17,6 +17,8 @@ from postproc.accuracy.evidence import LOG_SPREAD, Normal, maximise
 from postproc.accuracy.fit import fit_effects
 from postproc.accuracy.fitted import Fit
 from postproc.accuracy.library import BASE_EFFECTS, propose
+from postproc.accuracy.tool_groups import find_groups
+from postproc.accuracy.tool_shift import ToolShift
 from postproc.accuracy.turns import Turns
 from postproc.robot.arm import Arm
 from postproc.robot.state import States
@@ -76,12 +78,20 @@ def fit_best(
     kept = base
     fitted = fit_effects(batch, position, base, origin, turns=turns)
     for names in (candidates(states), *((name,) for name in free)):
-        tried = (*kept, *propose(names, arm, states))
+        tried = (*kept, *propose(names, arm, states), *slipped(fitted))
         fitted = fit_effects(batch, position, tried, origin, fitted)
         kept = keep_needed(fitted, always=base)
     if kept != fitted.combination.effects:
         fitted = fit_effects(batch, position, kept, origin, fitted)
     return fitted
+
+
+def slipped(fitted: Fit) -> tuple[Effect, ...]:
+    """Propose a step of the tool where what is left falls in two heaps in its order."""
+    found = find_groups(fitted.residual, fitted.batch.walk.flange)
+    if found is None or found.step is None:
+        return ()
+    return (ToolShift(row=float(fitted.batch.states.order[found.step])),)
 
 
 def keep_needed(fitted: Fit, always: tuple[Effect, ...]) -> tuple[Effect, ...]:

@@ -22,6 +22,7 @@ APART = 4.0  # distance of heaps over the typical distance within one; noise has
 FEWEST = 0.05  # share of the rows that a heap must have
 MOST = 4  # heaps that are looked for
 STARTS = 8
+STRAY = 0.01  # share of rows that noise may put on the wrong heap
 
 
 @dataclass(frozen=True)
@@ -48,9 +49,18 @@ class ToolGroups:
         return float(gaps[np.triu_indices(len(self.centre), 1)].min())
 
     @property
-    def changes(self) -> Ints:
-        """Rows at which another heap begins."""
-        return np.flatnonzero(np.diff(self.which)) + 1
+    def step(self) -> int | None:
+        """Row from which the second heap holds, if the rows fall in two in their order.
+
+        A row in a hundred may lie nearer to the other heap by its noise.
+        """
+        if len(self.centre) != 2:
+            return None
+        later = self.which != self.which[0]
+        before = np.concatenate([[0], np.cumsum(later)])
+        wrong = before + (~later).sum() - np.cumsum(np.concatenate([[0], ~later]))
+        row = int(np.argmin(wrong))
+        return row if wrong[row] <= STRAY * len(later) else None
 
     def describe(self) -> str:
         """Say where the others lie, as seen from the first row's."""

@@ -7,7 +7,7 @@ import pytest
 
 from postproc.accuracy.batch import Batch
 from postproc.accuracy.plausibility import check_survey
-from postproc.accuracy.tool_groups import find_groups
+from postproc.accuracy.tool_groups import ToolGroups, find_groups
 from postproc.calibrate import fit_measurements
 from postproc.exceptions import MeasurementError
 from postproc.robot.cell import Cell, load_cell
@@ -47,6 +47,16 @@ def test_three_nests_without_tool_id_are_counted() -> None:
         check_survey(survey, NJ)
 
 
+def test_a_step_is_found_in_spite_of_a_stray_row() -> None:
+    which = np.repeat([0, 1], [150, 90])
+    centre = np.array([[0.0, 0, 0], [1.0, 0, 0]])
+    assert ToolGroups(which, centre).step == 150
+    which[[40, 200]] = [1, 0]
+    assert ToolGroups(which, centre).step == 150
+    assert ToolGroups(np.arange(240) % 2, centre).step is None
+    assert ToolGroups(np.repeat([0, 1, 0], 80), centre).step is None
+
+
 def test_one_tool_is_one_heap() -> None:
     for seed in range(6):
         survey = shifted(np.zeros(240), [0, 0, 0], seed)
@@ -68,6 +78,10 @@ def test_a_nest_that_slips_is_told_with_its_row(cell: Cell) -> None:
     effects = ("geometry", "backlash", "backlash_profile")
     slipped = shifted(after, [0.3, 0.0, -0.2])
     (told,) = fit_measurements(slipped, cell, effects=effects).report.warnings
-    assert "at row 151" in told and "tool_shift" in told
+    assert "at row 151: run postproc diagnose" in told
+    found = fit_measurements(slipped, cell)
+    assert "slipped at row 151: fitted as tool_shift" in found.report.warnings[0]
+    assert "tool_shift" not in {e.name for e in found.model.compensable()[0].effects}
+    assert found.report.after.mean_mm < 0.06
     steady = shifted(after, [0.0, 0.0, 0.0])
     assert not fit_measurements(steady, cell, effects=effects).report.warnings
