@@ -17,7 +17,7 @@ from tests.language.generator import Generator
 from tests.language.test_corpus import chapters
 
 PROGRAMS = Path(__file__).parents[1] / "programs"
-SAMPLES = ("drilling", "handling", "spot")  # milling is one of form, but long
+SAMPLES = ("drilling", "handling", "milling", "spot")
 
 
 def assert_restored(source, cell, model, variables=None):
