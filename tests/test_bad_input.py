@@ -444,3 +444,10 @@ def test_fly_distances_are_legal_whatever_their_sign(desk, distance):
     setting = ("$FLY_TYPE := FLY_CART", f"$FLY_DIST := {distance}")
     report = desk.report(desk.put("job.pdl", program(FIRST, *setting, *flown, POSE)))
     assert {row["status"] for row in report["targets"]} == {"safe"}
+
+
+def test_a_straight_line_to_the_joints_where_the_arm_already_is(desk):
+    again = FIRST.replace("MOVE JOINT", "MOVEFLY LINEAR") + " ADVANCE"
+    source = desk.put("job.pdl", program("REPEAT", again, "UNTIL $DIN[1]"))
+    found = desk.compensate(source)
+    assert found.exit_code in (0, 1), found.stderr

@@ -152,7 +152,9 @@ def _along_line(
 def _branches(work: Workspace, v: int, edge: int, flange: Array) -> Array:
     """All solutions along an edge, the target included, (k, 8, 6) [rad]."""
     if work.samples.ready[edge]:
-        ready: Array = work.branches[work.row[work.span(edge)]]
+        rows = work.row[work.span(edge)]
+        ready = np.full((len(rows), 8, 6), np.nan)  # a joint target has no row
+        ready[rows >= 0] = work.branches[rows[rows >= 0]]
         return ready
     tool = work.targets.tool[v]
     begin = (work.flange[work.source[edge]] @ tool)[None]
