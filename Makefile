@@ -4,6 +4,7 @@
 # make chaos   kill 200 batches of 300 files at random moments and resume them
 # make fuzz    20,000 damaged programs: refused, or rewritten byte for byte
 # make plant-bench   10,000 files, a second run, memory, workers, a cluster: docs/plant.md
+# make generated    1,000 random programs: followed as they run, landing where they say
 # make bench   how long the stages take on this machine
 # make evidence    coverage of the intervals, and what direction is worth
 # make reproduce   the published method and ours, simulated: docs/reproduction.md
@@ -22,7 +23,7 @@ export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
 
 .PHONY: help demo test lint format bench evidence reproduce accuracy undeclared blind chaos fuzz docs clean
-.PHONY: plant-bench
+.PHONY: plant-bench generated
 .DELETE_ON_ERROR:
 
 help:
@@ -76,6 +77,9 @@ docs: $(STAMP)
 
 plant-bench: $(STAMP)
 	@$(PYTHON_BIN) -m tests.plant_bench --files $(or $(FILES),10000)
+
+generated: $(STAMP)
+	@$(PYTHON_BIN) -m tests.generated --count $(or $(COUNT),1000)
 
 clean:
 	rm -rf $(VENV) demo build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis

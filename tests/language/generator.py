@@ -49,6 +49,7 @@ class Generator:
     in_loops: tuple[str, ...] = ()
     parameter: str = ""
     in_main: bool = False
+    cycle: int = 0
 
     # ---- writing --------------------------------------------------------------------
     def emit(self, text: str, *op: Any) -> int:
@@ -69,8 +70,12 @@ class Generator:
     def number(self) -> float:
         return round(self.rng.uniform(-900.0, 900.0), 4)
 
-    def record(self) -> tuple[tuple[float, ...], str]:
-        numbers = tuple(self.number() for _ in range(6))
+    def drawn(self, kind: str) -> tuple[float, ...]:
+        """Draw six numbers of a pose, joint angles, a tool or a uframe."""
+        return tuple(self.number() for _ in range(6))
+
+    def record(self, kind: str = "pose") -> tuple[tuple[float, ...], str]:
+        numbers = self.drawn(kind)
         gap = self.rng.choice([", ", ",", " , "])
         return numbers, gap.join(f"{n:.4f}" for n in numbers)
 
@@ -79,6 +84,7 @@ class Generator:
         self.lines += [f"  {', '.join(POINTS)}, q : POSITION"]
         self.lines += [f"  {', '.join(JOINTS)} : JOINTPOS FOR ARM[1]"]
         self.lines += [f"  {', '.join(COUNTS)}, i1, i2, i3, k1, k2, k3 : INTEGER"]
+        self.lines += ["  xt : XTNDPOS FOR ARM[1]"]
         self.lines += [f"  {TABLE} : ARRAY[9] OF POSITION"]
         self.lines += ["ROUTINE ext(a : POSITION) EXPORTED FROM other"]
         for name in ("r1", "r2"):
@@ -90,15 +96,22 @@ class Generator:
             self.assign_point(name)
         for name in COUNTS if self.exact else ():
             self.emit(f"{name} := 1", "set", name, 1.0)
+        self.opening()
         self.block(self.rng.randrange(4, 12), 0)
         if not self.exact and self.rng.random() < 0.3:
             start = self.emit("CYCLE", "nop")
+            self.cycle = start
             self.block(3, 0)
+            self.exit_cycle()
+            self.block(1, 0)
             self.emit("END job", "cycle", start)
         else:
             self.emit("END job", "stop")
         text = self.rng.choice(["\r\n", "\n"]).join(self.lines)
         return Generated(text, self.ops, entry, self.routines, self.exact)
+
+    def opening(self) -> None:
+        """Write what every program begins with."""
 
     def _routine(self, name: str) -> None:
         self.parameter = "a" if self.rng.random() < 0.5 else ""
@@ -126,6 +139,10 @@ class Generator:
             self.assign_joints,
             self.assign_count,
             self.copy,
+            self.shift,
+            self.move_shifted,
+            self.extended,
+            self.move_extended,
             self.frame,
             self.fill,
             self.move_table,
@@ -146,11 +163,12 @@ class Generator:
         return self.rng.choice([*POINTS, *([self.parameter] if self.parameter else [])])
 
     def move_literal(self) -> None:
-        numbers, text = self.record()
+        posed = self.rng.random() < 0.5
+        numbers, text = self.record("pose" if posed else "joints")
         word = self.rng.choice(["MOVE", "MOVEFLY"])
         how = self.rng.choice(["JOINT", "LINEAR"])
         end = " ADVANCE" if word == "MOVEFLY" else ""
-        if self.rng.random() < 0.5:
+        if posed:
             self.emit(f"{word} {how} TO POS({text}, ''){end}", "move", numbers)
         else:
             self.emit(f"{word} {how} TO {{{text}}}{end}", "move", numbers)
@@ -164,7 +182,7 @@ class Generator:
         self.emit(f"{name} := POS({text}, '')", "set", name.lower(), numbers)
 
     def assign_joints(self) -> None:
-        numbers, text = self.record()
+        numbers, text = self.record("joints")
         self.emit(f"j1 := {{{text}}}", "set", "j1", numbers)
 
     def assign_component(self) -> None:
@@ -192,9 +210,40 @@ class Generator:
         a, b = self.point(), self.point()
         self.emit(f"{a} := {b}", "copy", a.lower(), b.lower())
 
-    def frame(self) -> None:
+    def shift(self) -> None:
+        a, b = self.point(), self.point()
+        by, text = self.vector()
+        text = f"{a} := POS_SHIFT({b}, VEC({text}))"
+        self.emit(text, "shift", a.lower(), b.lower(), by)
+
+    def move_shifted(self) -> None:
+        name = self.point()
+        by, text = self.vector()
+        how = self.rng.choice(["JOINT", "LINEAR"])
+        text = f"MOVE {how} TO POS_SHIFT({name}, VEC({text}))"
+        self.emit(text, "move_shifted", name.lower(), by)
+
+    def vector(self) -> tuple[tuple[float, ...], str]:
+        by = tuple(round(self.rng.uniform(-40.0, 40.0), 3) for _ in range(3))
+        return by, ", ".join(f"{n:.3f}" for n in by)
+
+    def extended(self) -> None:
         numbers, text = self.record()
+        self.emit(f"xt.POS := POS({text}, '')", "set", "xt", numbers)
+        self.emit(f"xt.AUX[1] := {self.rng.randrange(90)}", "nop")
+
+    def move_extended(self) -> None:
+        self.emit("MOVE LINEAR TO xt", "move_to", "xt")
+
+    def exit_cycle(self) -> None:
+        line = self.emit("IF $DIN[5] THEN")
+        self.emit("EXIT CYCLE", "jump", self.cycle)
+        self.patch(line, "unless", ("random",), self.here)
+        self.emit("ENDIF", "nop")
+
+    def frame(self) -> None:
         name = self.rng.choice(["TOOL", "UFRAME"])
+        numbers, text = self.record(name.lower())
         self.emit(f"${name} := POS({text}, '')", "frame", name.lower(), numbers)
 
     def fill(self) -> None:
@@ -378,6 +427,18 @@ class Interpreter:
 
     def do_copy(self, a: str, b: str) -> None:
         self.values[self.name(a)] = self.values.get(self.name(b))
+
+    def do_shift(self, a: str, b: str, by: Any) -> None:
+        self.values[self.name(a)] = self.shifted(b, by)
+
+    def do_move_shifted(self, name: str, by: Any) -> None:
+        self.log(self.shifted(name, by))
+
+    def shifted(self, name: str, by: Any) -> Any:
+        held = self.values.get(self.name(name))
+        if held is None:
+            return None
+        return (*(v + d for v, d in zip(held[:3], by, strict=True)), *held[3:])
 
     def do_component(self, name: str, at: int, number: float, add: bool) -> None:
         name = self.name(name)
