@@ -78,9 +78,15 @@ def groups(trials: Iterable[Trial]) -> list[int]:
 def misnamed(t: Trial) -> bool:
     """Tell whether something without a name was given one with confidence."""
     return t.kind in NAMELESS and any(
-        f["effect"] != "curve" and float(str(f["p"])) < CLEAR and t.verdict == "effect"
+        not _open(f) and float(str(f["p"])) < CLEAR and t.verdict == "effect"
         for f in t.found
     )
+
+
+def _open(finding: dict[str, object]) -> bool:
+    """Tell whether a finding is a curve, or cannot be told from one."""
+    names = [finding["effect"], *(g[0] for g in finding["group"])]  # type: ignore[attr-defined]
+    return "curve" in names
 
 
 def close(t: Trial) -> bool:

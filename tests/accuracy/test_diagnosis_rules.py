@@ -133,14 +133,13 @@ def test_groups_hold_what_is_within_three_nats_and_never_more_than_three(
     here = replace(found.additions[0].score, evidence=50.0)
     near, far = 50.0 - 0.9 * NEAR, 50.0 - 1.1 * NEAR
     ranked = [
-        score("curve", 1, 51.0, FREE), here, score("lag", 1, 49.0),
-        score(own.effect, own.joint, 48.5), score("lag", 1, 48.4),
-        score("payload", 5, near), score("thermal", None, near),
-        score("compliance", 2, far),
+        score("curve", 1, 51.0, FREE), here, score("curve", 1, 49.5, FREE),
+        score(own.effect, own.joint, 48.5), score("payload", 5, near),
+        score("thermal", None, near), score("compliance", 2, far),
     ]  # fmt: skip
     monkeypatch.setattr(groups, "ranking", lambda *_: ranked)
     rivals = stand(found, 0).confusable
-    assert [s.family.effect for s in rivals] == ["lag", "payload"]
+    assert [s.family.effect for s in rivals] == ["curve", "payload"]
     monkeypatch.setattr(groups, "ranking", lambda *_: [here, *ranked[-1:]])
     assert stand(found, 0).confusable == ()
 

@@ -1,10 +1,13 @@
-"""Which other causes would explain the same rows just as well."""
+"""Which other causes would explain the same rows just as well.
+
+A name is preferred to a free form that is not clearly ahead of it, but that does not
+make the rows speak for the name: such a free form is told with it.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
-from postproc.accuracy.diagnosis.candidate import FREE
 from postproc.accuracy.diagnosis.choice import ranking
 from postproc.accuracy.diagnosis.projection import Projection
 from postproc.accuracy.diagnosis.score import Score
@@ -41,8 +44,7 @@ def stand(found: Search, number: int) -> Standing:
     names = {(own.family.effect, own.family.joint)}
     for s in scores:
         name = (s.family.effect, s.family.joint)
-        allowed = s.family.tier <= own.family.tier or own.family.tier == FREE
-        if s.evidence >= here.evidence - NEAR and name not in names and allowed:
+        if s.evidence >= here.evidence - NEAR and name not in names:
             rivals.append(s)
             names.add(name)
     p_value = found.null.p_value(here.evidence)
