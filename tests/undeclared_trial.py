@@ -1,0 +1,202 @@
+"""One virtual arm with an undeclared effect: planted, measured, diagnosed, scored."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from postproc.accuracy.batch import Batch
+from postproc.accuracy.combination import Combination
+from postproc.accuracy.diagnosis.tracing import trace
+from postproc.accuracy.effect import Effect, Parameter
+from postproc.accuracy.fit import fit_effects
+from postproc.accuracy.fitted import Fit
+from postproc.accuracy.library import BASE_EFFECTS, propose
+from postproc.virtual import Arrivals, VirtualArm, virtual_arm
+from tests.accuracy.planted import (
+    ARM,
+    BASE,
+    NAMED,
+    TRACKER,
+    Campaign,
+    campaign,
+    displacement,
+    part_sizes,
+    states_of,
+    survey,
+)
+
+FRESH = 200  # poses at which the true error is checked
+
+
+@dataclass(frozen=True)
+class Trial:
+    """One arm, diagnosed and scored.
+
+    Attributes:
+        kind: What was planted.
+        seed: Of everything.
+        size: rms after projection over the noise.
+        truth: (effect, joints, source joint) of every planted law.
+        verdict: What the tool said.
+        found: Effect, joint, source, p-value and group of every finding.
+        right: Whether every planted law is among the findings or their groups.
+        alone: Whether it is without its group, too.
+        parts: Joint, own size and whether it was named, of a law of several joints.
+        true_mm: True mean error at fresh poses before, after, and of an informed fit.
+        seconds: Processor time of the search.
+    """
+
+    kind: str
+    seed: int
+    size: float
+    truth: list[tuple[str, list[int], int]]
+    verdict: str
+    found: list[dict[str, object]]
+    right: bool
+    alone: bool
+    parts: list[tuple[int, float, bool]]
+    true_mm: tuple[float, float, float]
+    seconds: float
+
+
+@dataclass(frozen=True, eq=False)
+class Known(Effect):
+    """The planted effect itself, of unknown size: what an informed fit uses.
+
+    Attributes:
+        table: Displacement at every row, survey first, then fresh poses, (m, 3) [m].
+    """
+
+    name = "known"
+    table: np.ndarray
+
+    def parameters(self) -> tuple[Parameter, ...]:
+        return (Parameter("size", "1", 1.0, "size"),)
+
+    def columns(self, batch: Batch) -> np.ndarray:
+        return self.table[batch.states.order.astype(int)][:, :, None]
+
+
+def kinds_of(kind: str, seed: int) -> tuple[str, ...]:
+    """Names of the effects that a kind plants."""
+    if kind == "none":
+        return ()
+    if kind == "two":
+        rng = np.random.default_rng([seed, 2])
+        return tuple(map(str, rng.choice(NAMED, 2, replace=False)))
+    return (kind,)
+
+
+def run(kind: str, seed: int, size: float) -> Trial:
+    """Plant, measure, diagnose, score."""
+    planted = kinds_of(kind, seed)
+    c = campaign(seed, planted, size)
+    base = c.base_fit()
+    start = time.process_time()
+    traced = trace(base, seed=0)
+    seconds = time.process_time() - start
+    found: list[dict[str, object]] = [
+        {
+            "effect": f.effect,
+            "joint": f.joint,
+            "source": f.source,
+            "p": f.p_value,
+            "group": [list(x) for x in f.confusable_with],
+        }
+        for f in traced.findings
+    ]
+    laws = [law for law in c.arm.laws if law.effect != "backlash"]
+    truth = [(law.effect, list(law.joints), law.source) for law in laws]
+    hits = [_hit(law, found) for law in truth]
+    before, after = base, traced.search.fit
+    return Trial(
+        kind, seed, size, truth, traced.verdict, found,
+        all(h >= 1 for h in hits), all(h >= 2 for h in hits),
+        _parts(c, found),
+        _true_errors(c, seed, before, after), seconds,
+    )  # fmt: skip
+
+
+def _parts(
+    c: Campaign, found: Sequence[dict[str, object]]
+) -> list[tuple[int, float, bool]]:
+    """Tell of every joint of a law of several how large it is and whether it is named.
+
+    None of them are parts where a campaign has other effects besides.
+    """
+    if len(c.planted) != 1:
+        return []
+    effect = c.arm.laws[-1].effect
+    return [
+        (joint, size, _hit((effect, [joint], 0), found) > 0)
+        for joint, size in part_sizes(c).items()
+    ]
+
+
+def _hit(law: tuple[str, list[int], int], found: Sequence[dict[str, object]]) -> int:
+    """2 where a finding names the law, 1 where one of its group does, else 0.
+
+    A law without a name is hit by a curve on its joint; a coupling must name the joint
+    that drives.
+    """
+    effect, joints, source = law
+    effect = effect or "curve"
+    best = 0
+    for f in found:
+        names = [[f["effect"], f["joint"]], *f["group"]]  # type: ignore[misc]
+        for k, (name, joint) in enumerate(names):
+            driven = k > 0 or not source or f["source"] == f"joint {source}"
+            place = joint in joints or (joint is None and not joints)
+            if name == effect and place and driven:
+                best = max(best, 1 if k else 2)
+    return best
+
+
+def _true_errors(
+    c: Campaign, seed: int, before: Fit, after: Fit
+) -> tuple[float, float, float]:
+    """True mean errors [mm] that three fits leave at fresh poses."""
+    fresh = _fresh(c.arm, seed, len(c.states))
+    truth = c.arm.error(fresh)
+    informed = _informed(c, seed, fresh, truth)
+    out = []
+    for fit, origins in (
+        (before, ("arm", "state")),
+        (after, ("arm", "state")),
+        (informed, ("arm", "state", "setup")),
+    ):
+        keep = tuple(e for e in fit.combination.effects if e.origin in origins)
+        values = fit.values[fit.combination.where(*origins)]
+        batch = Batch(ARM, states_of(fresh))
+        left = truth - Combination(keep).error(batch, values)
+        out.append(float(np.linalg.norm(left, axis=1).mean() * 1e3))
+    return out[0], out[1], out[2]
+
+
+def _fresh(arm: VirtualArm, seed: int, rows: int) -> Arrivals:
+    """Other poses, visited after the survey."""
+    fresh = survey(arm, seed + 10**6, FRESH)
+    later = 14.0 * rows + fresh.time
+    return replace(
+        fresh,
+        order=fresh.order + rows,
+        time=later,
+        temperature=arm.temperature(later, 22.0),
+    )
+
+
+def _informed(c: Campaign, seed: int, fresh: Arrivals, truth: np.ndarray) -> Fit:
+    """Fit the base and exactly the planted effects, sizes unknown."""
+    rows = len(c.states)
+    clean = virtual_arm(seed, BASE, rows=rows)
+    effects: list[Effect] = list(propose(BASE_EFFECTS, ARM, c.states))
+    if c.planted:
+        seen = sum(displacement(clean, seed, p, c.arrivals, rows) for p in c.planted)
+        there = truth - clean.error(fresh)
+        effects.append(Known(np.concatenate([seen, there])))
+    batch = Batch(ARM, c.states)
+    return fit_effects(batch, c.position, tuple(effects), tuple(TRACKER))
