@@ -11,7 +11,13 @@ from collections.abc import Callable
 from pathlib import Path
 
 from measured import blind, ur10
-from simulated import against_the_limit, designs, learning_curve, other_tools
+from simulated import (
+    against_the_limit,
+    designs,
+    learning_curve,
+    other_tools,
+    timings,
+)
 
 from postproc.exceptions import PostprocError
 
@@ -36,6 +42,7 @@ def main() -> None:
             "How many rows: held-out true error, mm",
             lambda: learning_curve(max(n // 4, 1)),
         ),
+        ("How long a fit takes", timings),
         ("Where to measure", lambda: designs(max(n // 2, 1))),
         (
             "A real arm: UR10, tracker frame, nothing known of base and probe",

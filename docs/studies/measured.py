@@ -38,6 +38,14 @@ HEAD = [
 ]
 
 
+BLOCKS = (
+    "Blocks of consecutive rows are 9 of 30 blocks drawn at random, 30 % of the rows; "
+    "what stands between them is fitted. Whole fifths leave out 300 rows in a row, a "
+    "harder question. The orientations in these files are not used: how the probe is "
+    "mounted is not declared."
+)
+
+
 def held_out(
     series: Measurements, arm: Arm, test: np.ndarray, effects: tuple[str, ...]
 ) -> np.ndarray:
@@ -71,7 +79,7 @@ def ur10(folder: Path) -> list[str]:
     fifths = [held_out(b, arm, np.flatnonzero(np.arange(n) * 5 // n == k), UR10_EFFECTS)
               for k in range(5)]  # fmt: skip
     lines.append(describe("each fifth in turn", np.concatenate(fifths)))
-    return [*lines, *_other_series(folder, arm, b)]
+    return [*lines, *_other_series(folder, arm, b), "", BLOCKS]
 
 
 def _other_series(folder: Path, arm: Arm, b: Measurements) -> list[str]:
