@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from postproc.language import pdl2 as ast
 from postproc.language.blocks import recovered
 from postproc.language.effects import rows_effects
@@ -16,7 +18,7 @@ def start_loop(machine: Machine, here: Here, statement: ast.For) -> None:
     rounds = None
     if isinstance(start, float) and isinstance(stop, float) and isinstance(by, float):
         by = -by if statement.down and by > 0 else by
-        if by:
+        if by and math.isfinite((stop - start) / by):
             rounds = max(int((stop - start) / by + 1e-9) + 1, 0)
             rounds = 0 if (stop - start) / by < 0 else rounds
     if rounds == 0:

@@ -25,7 +25,7 @@ Context = tuple[tuple[int, int], ...]
 """Calls (row, CALLED) and loop rounds (row, round), outermost first."""
 
 CALLED, HANDLED, HERE = -1, -3, -2
-MAX_ROWS = 400_000  # rows of unrolled loops and of calls, each time they are run
+MAX_ROWS = 20_000  # rows of unrolled loops and of calls, each time they are run
 MAX_STEPS = 2_000_000  # times a configuration is run again, all in all
 
 Key = tuple[Context, int, int]

@@ -189,3 +189,13 @@ def test_long_lines_and_many_variables() -> None:
     found = body("\n".join(text), declared=declared)
     assert len(found.visits.literals) == 3000
     assert found.visits.values[:, 0].tolist() == list(range(3000))
+
+
+@pytest.mark.parametrize(
+    "bounds", ["1 TO 1e400", "-1e400 TO 1", "1 TO 9 STEP 1e-320", "1 TO 9 STEP 0"]
+)
+def test_loops_without_a_number_of_rounds_are_followed_over_and_over(
+    bounds: str,
+) -> None:
+    found = body(f"FOR i := {bounds} DO\nMOVE JOINT TO {{1,2,3,4,5,6}}\nENDFOR")
+    assert found.visits.predecessors(0).tolist() == [START, 0]
