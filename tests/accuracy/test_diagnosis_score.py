@@ -165,3 +165,23 @@ def test_held_out_errors_come_from_the_other_rows() -> None:
     A, b = X[~out], y[~out]
     p = np.linalg.solve(A.T @ A + np.eye(5), A.T @ b)
     assert errors[out] == pytest.approx(y[out] - X[out] @ p)
+
+
+def test_library_asks_joints_and_axes_about_every_covariate(base: Projection) -> None:
+    candidates = [c for s in Library.of(base.fit).shelves for c in s.candidates]
+    asked: dict[str, set[str]] = {}
+    for c in candidates:
+        place = getattr(c.effect, "direction", f"joint {c.family.joint}")
+        asked.setdefault(place, set()).add(c.source)
+    joints = {f"joint {j}" for j in range(1, 7)}
+    passing = {"speed", "payload", "temperature", "time"}
+    for j in range(1, 7):
+        own = {f"lambda {j}", f"before {j}", f"travel {j}", "torque 2", "torque 3"}
+        assert joints | passing | own <= asked[f"joint {j}"], j
+    for axis in (f"{frame} {k}" for frame in ("base", "tool") for k in "xyz"):
+        assert joints | passing <= asked[axis], axis
+    steps = [c for c in candidates if c.family.effect in ("tool_shift", "base_shift")]
+    assert {c.source for c in steps} == {"order"}
+    rows = sorted({c.effect.settings()["row"] for c in steps})
+    assert len(rows) >= 40
+    assert max(np.diff(rows)) <= len(base.fit.batch) / 40
