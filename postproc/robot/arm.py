@@ -7,6 +7,7 @@ controller's joint angles [rad], lengths metres, the frame the arm's base frame.
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -23,6 +24,7 @@ from postproc.robot.inverse import Branches, Inverse, wrap
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
+Frame = tuple[Array, Array, Array, Array]  # axes x, y, z and origin [m], (3, n) each
 
 GRAVITY = 9.80665  # [m/s^2], standard gravity
 
@@ -43,28 +45,33 @@ class DH:
         theta: Array = self.offset + self.sense * (q @ self.mix.T)
         return theta
 
-    def placed(self, frame: Array, joint: int, theta: Array) -> Array:
-        """Place the next link frame.
+    def frames(self, q: Array) -> Iterator[Frame]:
+        """Walk along the link frames 0 (base) to 6 (flange) for angles (n, 6) [rad].
 
-        Args:
-            frame: Link frames i, (n, 4, 4) [m].
-            joint: i, from 0.
-            theta: D-H angles of the joint, (n,) [rad].
-
-        Returns:
-            Link frames i + 1, (n, 4, 4): turn and shift along z, then along x.
+        Every frame is the one before, turned and shifted along its z, then its new x.
         """
-        x, y, z = frame[:, :3, 0], frame[:, :3, 1], frame[:, :3, 2]
-        c, s = np.cos(theta)[:, None], np.sin(theta)[:, None]
-        ca, sa = np.cos(self.alpha[joint]), np.sin(self.alpha[joint])
-        across, out = c * y - s * x, np.empty_like(frame)
-        out[:, :3, 0] = c * x + s * y
-        out[:, :3, 1] = ca * across + sa * z
-        out[:, :3, 2] = ca * z - sa * across
-        out[:, :3, 3] = frame[:, :3, 3] + self.d[joint] * z
-        out[:, :3, 3] += self.a[joint] * out[:, :3, 0]
-        out[:, 3] = 0.0, 0.0, 0.0, 1.0
-        return out
+        theta = np.ascontiguousarray(self.angles(q).T)
+        cos, sin = np.cos(theta), np.sin(theta)
+        shape = (3, len(q))
+        x, y, z = (np.broadcast_to(axis[:, None], shape) for axis in np.eye(3))
+        p: Array = np.zeros(shape)
+        yield x, y, z, p
+        for i in range(6):
+            ca, sa = np.cos(self.alpha[i]), np.sin(self.alpha[i])
+            p = p + self.d[i] * z
+            x, across = cos[i] * x + sin[i] * y, cos[i] * y - sin[i] * x
+            y, z = ca * across + sa * z, ca * z - sa * across
+            p = p + self.a[i] * x
+            yield x, y, z, p
+
+
+def pose_of(frame: Frame) -> Array:
+    """Write frames as poses, (n, 4, 4) [m]."""
+    pose = np.zeros((frame[3].shape[1], 4, 4))
+    for column, values in enumerate(frame):
+        pose[:, :3, column] = values.T
+    pose[:, 3, 3] = 1.0
+    return pose
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,17 +141,12 @@ class Arm:
 
     def link_frames(self, q: Array) -> Array:
         """Place the D-H frames 0 (base) to 6 (flange): (n, 6) -> (n, 7, 4, 4)."""
-        frames = np.empty((len(q), 7, 4, 4))
-        frames[:, 0] = np.eye(4)
-        theta, T = self.dh.angles(q), frames[:, 0]
-        for i in range(6):
-            T = self.dh.placed(T, i, theta[:, i])
-            frames[:, i + 1] = T
-        return frames
+        return np.stack([pose_of(frame) for frame in self.dh.frames(q)], axis=1)
 
     def flange(self, q: Array) -> Array:
         """Place the flange: (n, 6) [rad] -> (n, 4, 4) [m], base frame."""
-        return self.kinematics(q)[0]
+        *_, last = self.dh.frames(q)
+        return pose_of(last)
 
     def kinematics(self, q: Array) -> tuple[Array, Array]:
         """Place the flange and give the joint screws.
@@ -157,13 +159,12 @@ class Arm:
             lies in the base origin: rows 0-2 its velocity, rows 3-5 the angular
             velocity, per unit of controller joint velocity.
         """
-        theta, screws = self.dh.angles(q), np.empty((len(q), 6, 6))
-        T = np.tile(np.eye(4), (len(q), 1, 1))
-        for i in range(6):
-            point, axis = T[:, :3, 3], T[:, :3, 2]
-            screws[:, :3, i], screws[:, 3:, i] = np.cross(point, axis), axis
-            T = self.dh.placed(T, i, theta[:, i])
-        return T, (screws * self.dh.sense) @ self.dh.mix
+        *joints, last = self.dh.frames(q)
+        screws = np.empty((len(q), 6, 6))
+        for i, (_, _, axis, point) in enumerate(joints):
+            screws[:, :3, i] = np.cross(point, axis, axis=0).T
+            screws[:, 3:, i] = axis.T
+        return pose_of(last), (screws * self.dh.sense) @ self.dh.mix
 
     def joint_axes(self, q: Array) -> tuple[Array, Array]:
         """Give every joint's rotation axis and a point on it.
