@@ -5,7 +5,7 @@
 # make fuzz    20,000 damaged programs: refused, or rewritten byte for byte
 # make plant-bench   10,000 files, a second run, memory, workers, a cluster: docs/plant.md
 # make generated    1,000 random programs: followed as they run, landing where they say
-# make bench   how long the stages take on this machine
+# make bench   where the time goes on this machine: docs/benchmarks.md
 # make evidence    coverage of the intervals, and what direction is worth
 # make reproduce   the published method and ours, simulated: docs/reproduction.md
 # make accuracy    held-out errors, coverage, real and blind data: docs/accuracy.md
@@ -49,7 +49,7 @@ format: $(STAMP)
 	@$(VENV)/bin/ruff format .
 
 bench: $(STAMP)
-	@PATH="$(abspath $(VENV))/bin:$$PATH" python programs/bench.py
+	@$(PYTHON_BIN) -m tests.bench
 
 evidence: $(STAMP)
 	@$(PYTHON_BIN) -m tests.evidence

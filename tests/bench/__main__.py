@@ -1,0 +1,199 @@
+"""Where the time goes: every kind of program at every length, into docs/benchmarks.md.
+
+Run by ``make bench``. Each program runs in a process of its own, the short ones first;
+a length that would not fit into what is left of the budget is left out, and says so.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import os
+import platform
+import subprocess
+import sys
+import time
+from importlib.metadata import version
+from pathlib import Path
+
+from tests.bench.beside import Beside, side_by_side
+from tests.bench.made import KINDS
+
+ROOT = Path(__file__).parents[2]
+CELL = ROOT / "programs" / "cell.toml"
+WORK = ROOT / "demo"
+TABLE = ROOT / "docs" / "benchmarks.md"
+LENGTHS = (1_000, 10_000, 100_000, 1_000_000)
+STAGES = (
+    "read", "parse", "plan", "solve", "decide", "plan again", "rewrite", "verify",
+    "report", "write", "report file",
+)  # fmt: skip
+LIBRARIES = ("numpy", "scipy", "toppra", "ruckig", "lark", "pin")
+ABOUT_STAGES = """Seconds. `all` is from opening the files to written output, the start
+of Python and the JSON report (`report file`) not included. `parse` resolves too, `plan`
+holds the inverse kinematics, `solve` predicts, `plan again` is every round of
+corrections."""
+ABOUT_KERNELS = """toppra by itself solves the same joint angles once, a gridpoint a
+waypoint, and ruckig moves from stop to stop between them. The pipeline calls them only
+for a model with an effect that depends on the speed, which this one has not. Growth is
+from 10,000 targets to the longest program that ran."""
+Row = dict[str, float]
+
+
+def model() -> Path:
+    """Return the model of ``make demo``; make it where there is none."""
+    made = WORK / "model.json"
+    if not made.exists():
+        WORK.mkdir(exist_ok=True)
+        survey, data = WORK / "survey.pdl", WORK / "survey.csv"
+        run("survey", "--cell", CELL, "-o", survey)
+        run("simulate", survey, "--cell", CELL, "-o", data)
+        run("fit", data, "--cell", CELL, "-o", made)
+    return made
+
+
+def run(*arguments: str | Path) -> float:
+    """Run a command of ours; return its seconds. Exit code 1 is a result."""
+    start = time.perf_counter()
+    command = [Path(sys.executable).with_name("postproc"), *arguments]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
+    if done.returncode not in (0, 1):
+        raise SystemExit(done.stderr)
+    return time.perf_counter() - start
+
+
+def measure(kind: str, n: int, fitted: Path) -> Row:
+    """Compensate a made program in a process of its own."""
+    command = [sys.executable, "-m", "tests.bench.stages", kind, str(n)]
+    kernels = ["--kernels"] if n == 10_000 else []
+    start = time.perf_counter()
+    done = subprocess.run(
+        [*command, str(CELL), str(fitted), *kernels],
+        cwd=ROOT, capture_output=True, text=True,
+    )  # fmt: skip
+    if done.returncode:
+        raise SystemExit(done.stderr)
+    row: Row = json.loads(done.stdout)
+    return {**row, "process": time.perf_counter() - start}
+
+
+def measure_all(fitted: Path, budget: float) -> dict[tuple[str, int], Row]:
+    """Measure what fits into so many seconds, the short programs first."""
+    rows: dict[tuple[str, int], Row] = {}
+    end = time.perf_counter() + budget
+    for n in LENGTHS:
+        for kind in KINDS:
+            last = rows.get((kind, n // 10))
+            if n > LENGTHS[0] and last is None:
+                continue
+            expected = 0.0 if last is None else 10 * last["process"]
+            if time.perf_counter() + expected < end:
+                print(f"{kind} {n}", file=sys.stderr, flush=True)
+                rows[kind, n] = measure(kind, n, fitted)
+    return rows
+
+
+def stage_table(rows: dict[tuple[str, int], Row]) -> list[str]:
+    """Write seconds by stage."""
+    head = ["program", "targets", *STAGES, "all", "targets/s", "us/target", "MiB"]
+    lines = ["| " + " | ".join(head) + " |", "|" + "---|" * len(head)]
+    for kind in KINDS:
+        for n in LENGTHS:
+            row = rows.get((kind, n))
+            if row is None:
+                lines.append(f"| {kind} | {n:,} | not run: beyond the budget |")
+                continue
+            cells = [f"{row.get(stage, 0.0):.2f}" for stage in STAGES]
+            rate, each = row["targets"] / row["all"], row["all"] / row["targets"]
+            cells += [f"{row['all']:.2f}", f"{rate:,.0f}", f"{each * 1e6:.0f}"]
+            told = [kind, f"{row['targets']:,.0f}", *cells, f"{row['peak_mib']:,.0f}"]
+            lines.append("| " + " | ".join(told) + " |")
+    return lines
+
+
+def share_table(rows: dict[tuple[str, int], Row]) -> list[str]:
+    """Write how toppra and ruckig by themselves compare, and how time grows."""
+    lines = [
+        "| program | toppra alone, us a waypoint | ruckig alone, us a move | pipeline, "
+        "us a target | pipeline / toppra | growth exponent |",
+        "|---|---|---|---|---|---|",
+    ]
+    for kind in KINDS:
+        own = {n: row for (k, n), row in rows.items() if k == kind}
+        if LENGTHS[1] not in own:
+            continue
+        row, largest = own[LENGTHS[1]], own[max(own)]
+        each = largest["all"] / largest["targets"]
+        growth = "-"
+        if max(own) > LENGTHS[1]:
+            more = largest["targets"] / row["targets"]
+            growth = f"{math.log(largest['all'] / row['all']) / math.log(more):.2f}"
+        lines.append(
+            f"| {kind} | {row['toppra'] * 1e6:.1f} | {row['ruckig'] * 1e6:.1f} | "
+            f"{each * 1e6:.0f} | {each / row['toppra']:.1f} | {growth} |"
+        )
+    return lines
+
+
+def beside_lines(beside: Beside) -> list[str]:
+    """Write what a user would write today, beside ours."""
+    return [
+        "| | a second | times |",
+        "|---|---|---|",
+        f"| lines, lark for every line | {beside.lark:,.0f} | 1 |",
+        f"| lines, by their shapes | {beside.shapes:,.0f} | "
+        f"{beside.shapes / beside.lark:.0f} |",
+        f"| targets, loop with a numeric inverse (scipy) | {beside.loop:,.0f} | 1 |",
+        f"| targets, the same solved in arrays | {beside.solved:,.0f} | "
+        f"{beside.solved / beside.loop:.0f} |",
+        f"| targets, the whole pipeline | {beside.ours:,.0f} | "
+        f"{beside.ours / beside.loop:.0f} |",
+        "",
+        f"Loop and arrays give the same commands to {beside.apart * 1e6:.3f} um.",
+    ]
+
+
+def machine() -> str:
+    """Describe the machine and the versions."""
+    cpu = platform.processor() or platform.machine()
+    names = Path("/proc/cpuinfo")
+    if names.exists():
+        told = [r for r in names.read_text().splitlines() if r.startswith("model name")]
+        cpu = told[0].partition(":")[2].strip() if told else cpu
+    libraries = ", ".join(f"{name} {version(name)}" for name in LIBRARIES)
+    return (
+        f"{os.cpu_count()} cores ({cpu}), Python {platform.python_version()}, "
+        f"{libraries}; OMP_NUM_THREADS={os.environ.get('OMP_NUM_THREADS', 'unset')}."
+    )
+
+
+def main() -> None:
+    """Measure, and write the page."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--budget", type=float, default=540.0, help="seconds")
+    budget = parser.parse_args().budget
+    fitted = model()
+    load = os.getloadavg()[0]
+    helps = min(run("--help") for _ in range(3))
+    beside = side_by_side(CELL, fitted)
+    rows = measure_all(fitted, budget)
+    text = [
+        "# Where the time goes",
+        f"Written by `make bench`. {machine()} Load at the beginning: {load:.1f}.",
+        "## Stages",
+        ABOUT_STAGES,
+        "\n".join(stage_table(rows)),
+        "## Kernels and growth",
+        ABOUT_KERNELS,
+        "\n".join(share_table(rows)),
+        "## Side by side",
+        "\n".join(beside_lines(beside)),
+        f"`postproc --help`: {helps:.2f} s.",
+    ]
+    TABLE.write_text("\n\n".join(text) + "\n", encoding="utf-8")
+    print("\n\n".join(text))
+
+
+if __name__ == "__main__":
+    main()

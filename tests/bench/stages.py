@@ -1,0 +1,69 @@
+"""One program through the whole pipeline in a process of its own."""
+
+from __future__ import annotations
+
+import json
+import resource
+import sys
+import time
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from postproc.jobs import Job
+from postproc.options import AS_USUAL
+from tests.bench.kernels import planned, ruckig_alone, toppra_alone
+from tests.bench.made import KINDS
+
+KIBI = 1024
+
+
+def measure(kind: str, n: int, cell: Path, model: Path) -> dict[str, float]:
+    """Compensate a program of n targets.
+
+    Returns:
+        Seconds of every stage, the whole, and peak memory [MiB].
+    """
+    made = KINDS[kind](n)
+    with TemporaryDirectory() as folder:
+        place = Path(folder) / made.name
+        place.write_bytes(made.source)
+        if made.variables is not None:
+            place.with_suffix(".lsv").write_bytes(made.variables)
+        lines = made.source.count(b"\n")
+        del made
+        start = time.perf_counter()
+        job = Job.open(str(place), cell, model)
+        read = time.perf_counter() - start
+        outcome = job.run(AS_USUAL)
+        pipeline = time.perf_counter() - start
+        begin = time.perf_counter()
+        job.write(outcome, place.with_name("out.pdl"))
+        write = time.perf_counter() - begin
+        begin = time.perf_counter()
+        job.write(outcome, place.with_name("again.pdl"), place.with_name("r.json"))
+        report = time.perf_counter() - begin - write
+    found = {
+        "targets": len(outcome.visits), "lines": lines, "read": read,
+        **outcome.stages, "write": write, "report file": max(report, 0.0),
+        "all": pipeline + write, "peak_mib": peak_mib(),
+    }  # fmt: skip
+    return found
+
+
+def peak_mib() -> float:
+    """Return the most memory this process has held [MiB]."""
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / KIBI
+
+
+def main() -> None:
+    """Print what was measured as JSON: kind, n, cell, model; --kernels: alone too."""
+    kind, n, cell, model = sys.argv[1:5]
+    found = measure(kind, int(n), Path(cell), Path(model))
+    if "--kernels" in sys.argv:
+        arm, q = planned(KINDS[kind](int(n)), Path(cell))
+        found["toppra"], found["ruckig"] = toppra_alone(arm, q), ruckig_alone(arm, q)
+    print(json.dumps(found))
+
+
+if __name__ == "__main__":
+    main()
