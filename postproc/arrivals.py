@@ -65,9 +65,8 @@ class Arrivals:
             KeyError, ValueError, TypeError: It is something else.
         """
         line = np.array(told["line"], dtype=np.int64)
-        status = np.array([int(c) for c in told["status"]], dtype=np.int64)
-        direction = [SIGNS.index(c) - 1 for c in told["direction"]]
-        sides = np.array(direction, dtype=np.int64).reshape(len(line), 6)
+        status = _places(told["status"], "0123456789")
+        sides = (_places(told["direction"], SIGNS) - 1).reshape(len(line), 6)
         size = np.array(told["correction_mm"], dtype=np.float64)
         why = np.array(told["why"], dtype=np.int64)
         rank = np.argsort(URGENCY)[status]
@@ -89,6 +88,21 @@ class Arrivals:
             else size,
             counts={s.name.lower(): int((status == s).sum()) for s in Status},
         )
+
+
+def _places(text: str, letters: str) -> Ints:
+    """Return the place of every character of a text among some letters.
+
+    Raises:
+        ValueError: A character is none of them.
+    """
+    codes = np.frombuffer(text.encode("latin-1", "replace"), dtype=np.uint8)
+    table = np.full(256, -1, dtype=np.int64)
+    table[[ord(c) for c in letters]] = range(len(letters))
+    places: Ints = table[codes]
+    if (places < 0).any():
+        raise ValueError(f"a character is none of {letters}")
+    return places
 
 
 def tell_arrivals(

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 
 from postproc.arrivals import LEFT_ALONE, Arrivals, read_arrivals
-from postproc.compared import VARIABLES, Compared, Row, compare_files
+from postproc.changed_lines import Row
+from postproc.compared import VARIABLES, Compared, compare_files
 from postproc.report import Status
 
 
@@ -35,8 +36,8 @@ class Difference:
         told = {
             "stamped": self.stamped,
             "counts": dict(self.counts),
-            "rows": [vars(row) for row in self.rows],
-            "left": [vars(row) for row in self.left],
+            "rows": [row._asdict() for row in self.rows],
+            "left": [row._asdict() for row in self.left],
         }
         return json.dumps(told, indent=1) + "\n"
 
@@ -84,8 +85,7 @@ def _marked(rows: Sequence[Row], told: Arrivals | None) -> Iterator[Row]:
 
 def _with(row: Row, told: Arrivals, k: int) -> Row:
     """Add the k-th entry of a record to a row."""
-    return replace(
-        row,
+    return row._replace(
         status=Status(told.status[k]).name.lower(),
         why=told.reasons[told.why[k]],
         direction=tuple(told.direction[k].tolist()),

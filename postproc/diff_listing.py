@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from typing import TextIO
 
-from postproc.compared import VARIABLES, Row
+from postproc.changed_lines import Row
+from postproc.compared import VARIABLES
 from postproc.console import Column
 from postproc.diff import Difference
 from postproc.listing import arrows, print_listing, status_colour
 
-DECIMALS = 4  # shown of a number
+NUMBER = "%.4f"
 STATUS = "status"
 PLACE = (Column("file", "left"), Column("line"), Column("target", "left"))
 NUMBERS = (Column("original"), Column("", "left"), Column("compensated"))
@@ -58,7 +59,9 @@ def _numbers(row: Row) -> tuple[str, str]:
     """Write the numbers that changed, or the text."""
     if row.text or not row.original:
         return row.text, ""
-    pairs = zip(row.original, row.compensated, strict=True)
-    moved = [(old, new) for old, new in pairs if old != new]
-    old = ", ".join([f"{a:.{DECIMALS}f}" for a, _ in moved])
-    return old, ", ".join([f"{b:.{DECIMALS}f}" for _, b in moved])
+    old, new = row.original, row.compensated
+    moved = [k for k in range(len(old)) if old[k] != new[k]]
+    written = ", ".join([NUMBER] * len(moved))
+    return written % tuple([old[k] for k in moved]), written % tuple(
+        [new[k] for k in moved]
+    )
