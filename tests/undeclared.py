@@ -79,8 +79,9 @@ def main() -> None:
     parser.add_argument("-o", "--output", type=Path, default=Path("docs/undeclared.md"))
     chosen = parser.parse_args()
     chosen.log.parent.mkdir(parents=True, exist_ok=True)
-    run_all(jobs_of(chosen.seeds, chosen.none), chosen.log, chosen.jobs)
-    write_table(read_log(chosen.log), chosen.output)
+    jobs = jobs_of(chosen.seeds, chosen.none)
+    run_all(jobs, chosen.log, chosen.jobs)
+    write_table(read_log(chosen.log), chosen.output, len(jobs))
 
 
 if __name__ == "__main__":

@@ -42,8 +42,8 @@ informed fit's (`tests/accuracy/test_diagnosis_search.py` holds it).
 """
 
 
-def write_table(trials: Sequence[Trial], output: Path) -> None:
-    """Write the page, and the plot beside it."""
+def write_table(trials: Sequence[Trial], output: Path, wanted: int) -> None:
+    """Write the page, and the plot beside it, of so many of the trials wanted."""
     by_kind: dict[str, list[Trial]] = defaultdict(list)
     for t in trials:
         by_kind[t.kind].append(t)
@@ -51,7 +51,7 @@ def write_table(trials: Sequence[Trial], output: Path) -> None:
     planted = [t for t in trials if t.kind != "none"]
     lines = [
         *INTRODUCTION.splitlines(),
-        *_summary(trials),
+        *_summary(trials, wanted),
         "",
         *_by_size(planted),
         "",
@@ -83,7 +83,7 @@ def _rate(hits: Sequence[bool]) -> str:
     return f"{sum(hits)} / {len(hits)}" if hits else "-"
 
 
-def _summary(trials: Sequence[Trial]) -> list[str]:
+def _summary(trials: Sequence[Trial], wanted: int) -> list[str]:
     none = [t for t in trials if t.kind == "none"]
     named = [t for t in trials if t.kind in NAMED]
     nameless = [t for t in trials if t.kind in NAMELESS]
@@ -95,7 +95,7 @@ def _summary(trials: Sequence[Trial]) -> list[str]:
     seeds = sorted({t.seed for t in trials})
     seconds = np.median([t.seconds for t in trials])
     return [
-        f"- {len(trials)} trials, seeds {seeds[0]} to {seeds[-1]}",
+        f"- {len(trials)} of {wanted} trials, seeds {seeds[0]} to {seeds[-1]}",
         f"- named effects at 1 to 3 times the noise: {_rate([ok(t) for t in large])}",
         f"- named effects at half the noise: {_rate([ok(t) for t in small])}",
         f"- two at once, both right: {_rate([ok(t) for t in two])}",
