@@ -101,6 +101,18 @@ def test_full_poses_are_written_and_given_back(desk):
     assert out.read_bytes() == before
 
 
+def test_a_batch_corrects_orientations_when_asked_to(desk):
+    (desk.folder / "src").mkdir()
+    source = desk.put("src/job.pdl", inline()["job.pdl"])
+    out, target = desk.folder / "out.pdl", desk.folder / "dst"
+    given = ("batch", source.parent, target, "--jobs", 1, "--resume",
+             "--cell", desk.cell, "--model", desk.model)  # fmt: skip
+    for options in ((), ("--orientation",), ("--orientation",), ()):
+        assert desk.compensate(source, "-o", out, *options).exit_code == 0
+        assert cli(*given, *options).exit_code == 0  # redone for another option
+        assert (target / "job.pdl").read_bytes() == out.read_bytes()
+
+
 def test_a_model_of_one_point_does_not_know_rotations(desk, job_cell, job_model):
     single = job_model.ranges.tools[:1]
     model = replace(job_model, ranges=replace(job_model.ranges, tools=single))

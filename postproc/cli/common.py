@@ -34,6 +34,13 @@ LsvOption = Annotated[
 HtmlOption = Annotated[
     Path | None, typer.Option("--html", help="Write a report (HTML) here.")
 ]
+CloneOption = Annotated[
+    bool, typer.Option("--clone", help="Clone variables whose arrivals disagree.")
+]
+OrientationOption = Annotated[
+    bool,
+    typer.Option("--orientation", help="Correct orientations too, not only places."),
+]
 TemperatureOption = Annotated[
     float | None, typer.Option("--temperature", help="Arm temperature [deg C].")
 ]

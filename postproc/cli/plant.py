@@ -9,8 +9,10 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from postproc.cli.common import (
+    CloneOption,
     HtmlOption,
     JsonOption,
+    OrientationOption,
     TemperatureOption,
     app,
     explained,
@@ -60,9 +62,8 @@ def batch(
         Path | None, typer.Option("--log", help="Log; default: DST.batch.jsonl.")
     ] = None,
     html: HtmlOption = None,
-    clone: Annotated[
-        bool, typer.Option("--clone", help="Clone variables whose arrivals disagree.")
-    ] = False,
+    clone: CloneOption = False,
+    orientation: OrientationOption = False,
     temperature: TemperatureOption = None,
 ) -> None:
     """Compensate a tree of programs; what could not be compensated is not in DST."""
@@ -72,7 +73,8 @@ def batch(
         from postproc.console import progress_bar
         from postproc.options import Options
 
-        made = make_plan(plan, cell, model, Options(clone, temperature=temperature))
+        options = Options(clone, temperature=temperature, orientation=orientation)
+        made = make_plan(plan, cell, model, options)
         check_places([html], [cell, model, plan])
         order = run.Order(source, target, made, log or run.default_log(target), resume)
         with progress_bar(f"{source} -> {target}") as told:

@@ -10,10 +10,12 @@ import typer
 
 from postproc.cli.common import (
     CellOption,
+    CloneOption,
     HtmlOption,
     JsonOption,
     LsvOption,
     ModelOption,
+    OrientationOption,
     TemperatureOption,
     app,
     as_path,
@@ -51,19 +53,12 @@ def compensate(
     strict: Annotated[
         bool, typer.Option("--strict", help="Fail, and write nothing, if any is left.")
     ] = False,
-    clone: Annotated[
-        bool, typer.Option("--clone", help="Clone variables whose arrivals disagree.")
-    ] = False,
+    clone: CloneOption = False,
     shared: Annotated[
         bool,
         typer.Option("--shared", help="Edit variables that other programs may read."),
     ] = False,
-    orientation: Annotated[
-        bool,
-        typer.Option(
-            "--orientation", help="Correct orientations too, not only places."
-        ),
-    ] = False,
+    orientation: OrientationOption = False,
     temperature: TemperatureOption = None,
 ) -> None:
     """Rewrite a program so that the tool lands where its targets say."""
