@@ -14,6 +14,7 @@ from tests.conftest import SEED
 from tests.made_visits import visits
 from tests.running import Executed, Runner
 from tests.shared_points import SWEEP, Writer
+from tests.test_orientation import LOST, errors
 
 PROGRAMS = 12
 
@@ -30,11 +31,11 @@ def visits_of(moves: list[Executed], cell) -> Visits:
     )
 
 
-@pytest.mark.parametrize("seed", range(PROGRAMS))
-def test_compensated_visits_land_where_they_should(seed, job_cell, job_model):
+def compensated(seed: int, cell, model, options: Options) -> tuple[Visits, Visits]:
+    """Compensate a program; return the moves that it and its output make."""
     program, values = Writer(seed).program()
-    outcome = compensate(program, job_cell, job_model, name="job.pdl",
-                         variables=values, options=Options(clone=True))  # fmt: skip
+    outcome = compensate(program, cell, model, name="job.pdl",
+                         variables=values, options=options)  # fmt: skip
     new, new_values = (
         outcome.outputs.get(name, given).decode()
         for name, given in (("job.pdl", program), ("job.lsv", values))
@@ -43,10 +44,31 @@ def test_compensated_visits_land_where_they_should(seed, job_cell, job_model):
     done = Runner.of(new, new_values).run()
     assert len(asked) == len(done) == len(outcome.visits)
     assert "cloned" in {d.code for d in outcome.diagnostics}
-    landing = land(virtual_arm(SEED), setup_of(job_cell), visits_of(asked, job_cell),
-                   visits_of(done, job_cell))  # fmt: skip
-    moved = [a.numbers != b.numbers for a, b in zip(asked, done, strict=True)]
-    rows = [k for k, i in enumerate(landing.visit) if moved[i] and i >= len(SWEEP)]
-    error = 1e3 * np.linalg.norm(landing.error, axis=1)[rows]
-    assert len(rows) > 0.5 * len(asked)
-    assert error.mean() < 0.03
+    return visits_of(asked, cell), visits_of(done, cell)
+
+
+def moved_targets(asked: Visits, done: Visits) -> np.ndarray:
+    """Tell which targets have new numbers, but for the sweep."""
+    moved = (asked.values != done.values).any(axis=1)
+    moved[: len(SWEEP)] = False
+    assert moved.sum() > 0.5 * len(moved)
+    return moved
+
+
+@pytest.mark.parametrize("seed", range(PROGRAMS))
+def test_compensated_visits_land_where_they_should(seed, job_cell, job_model):
+    asked, done = compensated(seed, job_cell, job_model, Options(clone=True))
+    landing = land(virtual_arm(SEED), setup_of(job_cell), asked, done)
+    error = 1e3 * np.linalg.norm(landing.error, axis=1)
+    assert error[moved_targets(asked, done)[landing.visit]].mean() < 0.03
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_clones_are_turned_as_written_too(seed, job_cell, job_model):
+    options = Options(clone=True, orientation=True)
+    asked, done = compensated(seed, job_cell, job_model, options)
+    moved = moved_targets(asked, done)[LOST:]
+    before, after = (errors(job_cell, asked, ran) for ran in (asked, done))
+    assert before[1][moved].mean() > 1.0
+    assert after[0][moved].mean() < 0.03
+    assert after[1][moved].mean() < 0.1
