@@ -227,7 +227,7 @@ def load_model(path: str | Path) -> Model:
     if len(file.covariance) not in (0, count * (count + 1) // 2):
         problem = "covariance does not match the parameters"
         raise ModelError(path, problem, cure, place="$.covariance")
-    return Model(
+    model = Model(
         method=file.method,
         arm_name=file.arm.name,
         arm_id=file.arm.id,
@@ -244,6 +244,9 @@ def load_model(path: str | Path) -> Model:
         statistics=file.statistics,
         history=file.history,
     )
+    # A file of an older release lacks keys that have been added since: it keeps its id.
+    vars(model)["id"] = file.id
+    return model
 
 
 def _chunks(n: int) -> list[slice]:

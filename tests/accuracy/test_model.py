@@ -17,6 +17,7 @@ from postproc.accuracy.fit import fit_effects
 from postproc.accuracy.full import fit_survey, model_of
 from postproc.accuracy.library import BASE_EFFECTS, EFFECTS, propose
 from postproc.accuracy.model import Model, load_model
+from postproc.accuracy.schema import content_id
 from postproc.exceptions import ModelError, OutputError
 from postproc.robot.state import make_states
 from tests.accuracy.simulator import (
@@ -50,6 +51,15 @@ def test_a_model_file_gives_back_the_model(tmp_path: Path) -> None:
     a, b = saved.predict(NJ, states), loaded.predict(NJ, states)
     np.testing.assert_array_equal(a.error, b.error)
     np.testing.assert_allclose(a.std_arrival, b.std_arrival, rtol=1e-9)
+
+
+def test_a_model_file_of_an_older_release_keeps_its_id(tmp_path: Path) -> None:
+    data = model().to_dict()
+    del data["ranges"]["oriented"]  # a key that was added later
+    data["id"] = content_id(data)
+    path = tmp_path / "m.json"
+    path.write_text(json.dumps(data))
+    assert load_model(path).id == data["id"] != model().id
 
 
 def test_a_model_file_is_written_whole_or_not_at_all(
