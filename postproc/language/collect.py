@@ -10,6 +10,7 @@ from postproc.language.columns import Collector, Columns
 from postproc.language.literals import Numbering, find_literals
 from postproc.language.machine import HERE, Key, Machine
 from postproc.language.setting_columns import SettingColumns
+from postproc.language.store import MANY
 from postproc.language.uses import find_uses
 from postproc.language.visits import ELSEWHERE, Visits
 
@@ -91,7 +92,9 @@ def _predecessors(
     counts = np.ones(n, dtype=np.int64)
     sets: list[tuple[int, list[int]]] = []
     for at, (_, record) in zip(offsets.tolist(), ordered, strict=False):
-        found = {int(visit[p]) if p >= 0 else p for p in record.predecessors}
+        found = {int(visit[p]) if p >= 0 else p for p in record.predecessors - {MANY}}
+        if MANY in record.predecessors:
+            found.add(ELSEWHERE)
         if id(record.place.body) in machine.recursive:
             found.add(ELSEWHERE)
         origins = sorted(found)

@@ -16,7 +16,7 @@ from postproc.language.arrivals import Arrival, Run
 from postproc.language.effects import PURE, invocations, references
 from postproc.language.evaluate import Point
 from postproc.language.program import Body, Program
-from postproc.language.store import Store
+from postproc.language.store import MANY, MOST_ORIGINS, Store
 from postproc.language.values import Nothing
 from postproc.language.visits import ELSEWHERE
 from postproc.language.world import Place, World
@@ -103,8 +103,17 @@ class Machine:
         """Keep a visit; return its (first) id."""
         key = (here.context, self.position(here.place.program, here.row), sub)
         self.arrivals[key] = arrival
+        if MANY in arrival.predecessors:
+            self._report_many(here)
         count = arrival.last - arrival.first if isinstance(arrival, Run) else 1
         return self.visit_id(key, count)
+
+    def _report_many(self, here: Here) -> None:
+        here.world.report_once(
+            here.place.program, here.row, "many-origins", str(here.row),
+            f"more than {MOST_ORIGINS} arrivals may come before this move: they are "
+            "not told apart, and from which side it arrives is not known",
+        )  # fmt: skip
 
     def predecessors(self, here: Here) -> frozenset[int]:
         """Return where the arm may come from."""

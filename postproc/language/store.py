@@ -11,6 +11,9 @@ from postproc.language.visits import NO_VALUE
 
 Settings = Mapping[str, Value]
 
+MANY = -3  # origin: one of so many visits that they are not told apart
+MOST_ORIGINS = 500
+
 _NEVER_SET = Nothing(NO_VALUE)
 
 
@@ -25,7 +28,7 @@ class Store:
     Attributes:
         values: Assigned values. A Nothing at ``job/tab`` hides its elements.
         settings: Frames and motion variables; replaced, never changed.
-        last: Visits the arm may come from.
+        last: Visits the arm may come from; START, ELSEWHERE or MANY.
         compound: Keys that ever had elements or fields; shared by all copies.
     """
 
@@ -88,8 +91,8 @@ class Store:
     def merge(self, other: Store) -> bool:
         """Take in what may hold too; tell whether anything changed."""
         changed = False
-        if not other.last <= self.last:
-            self.last |= other.last
+        if MANY not in self.last and not other.last <= self.last:
+            self.last = _merge_origins(self.last, other.last)
             changed = True
         if other.settings is not self.settings and other.settings != self.settings:
             merged = _merge_settings(self.settings, other.settings)
@@ -108,6 +111,13 @@ class Store:
 
 def _root(key: str) -> str:
     return key.partition("[")[0].partition(".")[0]
+
+
+def _merge_origins(a: frozenset[int], b: frozenset[int]) -> frozenset[int]:
+    """Unite two sets of origins; the sum of their sizes stays linear in the program."""
+    both = a | b
+    many = MANY in both or len(both) > MOST_ORIGINS
+    return frozenset({MANY}) if many else both
 
 
 def _merge_settings(a: Settings, b: Settings) -> Settings:
