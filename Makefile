@@ -2,7 +2,7 @@
 # make test    all tests
 # make lint    ruff and mypy
 # make chaos   kill 200 batches of 300 files at random moments and resume them
-# make fuzz    20,000 damaged programs: refused, or rewritten byte for byte
+# make fuzz    20,000 damaged programs: refused, or rewritten byte for byte; the parsers by coverage
 # make plant-bench   10,000 files, a second run, memory, workers, a cluster: docs/plant.md
 # make generated    1,000 random programs: followed as they run, landing where they say
 # make bench   where the time goes on this machine: docs/benchmarks.md
@@ -71,6 +71,8 @@ chaos: $(STAMP)
 
 fuzz: $(STAMP)
 	@$(PYTHON_BIN) -m tests.fuzz --count $(or $(COUNT),20000)
+	@$(PYTHON_BIN) -c 'import atheris' 2>/dev/null || $(PYTHON_BIN) -m pip install --quiet -e '.[fuzz]' || true
+	@$(PYTHON_BIN) -m tests.fuzz.guided --runs $(or $(RUNS),20000)
 
 docs: $(STAMP)
 	@PATH="$(abspath $(VENV))/bin:$$PATH" python docs/tools/build.py $(UPDATE)

@@ -8,6 +8,7 @@ from postproc.exceptions import PostprocError
 from postproc.language.flow import resolve
 from postproc.language.source import source_from_bytes
 from postproc.language.structure import parse
+from tests.fuzz import parsers
 from tests.fuzz.case import compensated, rewrite
 from tests.fuzz.originals import damaged
 
@@ -26,6 +27,14 @@ def test_damaged_programs_are_compensated_and_given_back(
     number: int, job_cell, job_model
 ) -> None:
     compensated(damaged(SEED, number), job_cell, job_model)
+
+
+@pytest.mark.parametrize("first", range(0, READ, 20))
+def test_the_numbers_of_damaged_files_can_be_written_anew(first: int) -> None:
+    for number in range(first, first + 20):
+        files = damaged(SEED, number)
+        parsers.program(files["job.pdl"])
+        parsers.variables(files.get("job.lsv", b""))
 
 
 @pytest.mark.parametrize("text", ["((((" * 3000, "a+" * 3000, "'" * 9999, "{" * 5000])

@@ -1,0 +1,51 @@
+"""What must hold of the two parsers for any bytes."""
+
+from __future__ import annotations
+
+import contextlib
+
+import numpy as np
+
+from postproc.exceptions import PostprocError
+from postproc.language.edits import Replacements
+from postproc.language.lines import Lines, read_lines
+from postproc.language.lsv import read_variables
+from postproc.language.rewrite import compare
+from postproc.language.source import Source, apply, source_from_bytes
+from postproc.language.structure import parse
+
+
+def program(data: bytes) -> None:
+    """Parse bytes as a program."""
+    with contextlib.suppress(PostprocError):
+        source = source_from_bytes("fuzz.pdl", data)
+        check_numbers(parse(source).lines)
+
+
+def variables(data: bytes) -> None:
+    """Read bytes as a variable file."""
+    with contextlib.suppress(PostprocError):
+        source = source_from_bytes("fuzz.lsv", data)
+        read = read_variables(source)
+        slots = [s for e in read.entries.values() for s in e.slots if s >= 0]
+        assert all(slot < len(read.start) for slot in slots)
+        check_numbers(read_lines(source))
+
+
+def check_numbers(lines: Lines) -> None:
+    """Check that the numbers can be written anew, and nothing else changes by that.
+
+    Raises:
+        AssertionError: Numbers overlap, or bytes between them would change.
+    """
+    source, start, end = lines.source, lines.start, lines.end
+    same = [source.data[a:b] for a, b in zip(start, end, strict=True)]
+    assert apply(source.data, replaced(lines, same)) == source.data
+    other = replaced(lines, [b"7.5"] * len(start))
+    problems = compare(source, Source(source.name, apply(source.data, other)), other)
+    assert not problems, problems
+
+
+def replaced(lines: Lines, texts: list[bytes]) -> Replacements:
+    """Return the edits that give every number a text."""
+    return Replacements(lines.start, lines.end, np.array(texts, dtype=np.bytes_))
