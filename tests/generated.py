@@ -27,7 +27,7 @@ from postproc.simulate import setup_of
 from postproc.virtual import land, virtual_arm
 from tests.conftest import SEED, make_job
 from tests.fuzz.case import check_bytes, records_of
-from tests.language.generator import Executed, Generated, Interpreter
+from tests.language.interpreter import Executed, Generated, Interpreter
 from tests.language.reachable import OPENING, reachable, reread, straight
 from tests.language.test_flow_random import follow, generate
 
@@ -61,11 +61,11 @@ def flows(seed: int) -> None:
     """
     made, visits = generate(seed, exact=False)
     for run in range(RUNS):
-        follow(visits, Interpreter(made, run).run(), made.text)
+        follow(visits, Interpreter(made, run).run(), made.whole)
     made, visits = generate(seed, exact=True)
     trace = Interpreter(made, 0, most=100_000).run()
-    assert all(len(now) == 1 for now in follow(visits, trace, made.text))
-    if made.text.count("IF n") == 0 and "SELECT" not in made.text:
+    assert all(len(now) == 1 for now in follow(visits, trace, made.whole))
+    if made.whole.count("IF n") == 0 and "SELECT" not in made.whole:
         assert len(visits) == len(trace)
         assert (np.diff(visits.pred_start) == 1).all()
 

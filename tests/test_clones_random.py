@@ -18,7 +18,8 @@ from postproc.cloning import give_own_points
 from postproc.planning import Reading, read_program
 from postproc.proposal import Proposal
 from postproc.report import Decisions, Status
-from tests.language.generator import Generated, Generator, Interpreter
+from tests.language.generator import Generator
+from tests.language.interpreter import Generated, Interpreter
 
 PROGRAMS = 120
 ASSIGNED = re.compile(r"\s*(\w+__\d+) := [^\d-]*([-\d., ]+)")

@@ -1,41 +1,22 @@
-"""Random programs with known flow, and an interpreter that runs them.
+"""Random programs with known flow.
 
 The generator writes the text of a program and, beside every line, an instruction of a
-tiny machine. The interpreter runs the instructions; it shares nothing with the parser
-or the analysis, so that both can be wrong only in the same way by chance.
+tiny machine, which the interpreter runs.
 """
 
 from __future__ import annotations
 
 import random
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
+
+from tests.language.interpreter import Generated
 
 POINTS = ("p1", "p2", "P3")
 JOINTS = ("j1",)
 COUNTS = ("n1", "n2")
 TABLE = "tab"
-
-
-@dataclass(frozen=True)
-class Executed:
-    """One move that was run."""
-
-    line: int
-    values: tuple[float, ...] | None  # None: a variable that was never set
-    tool: tuple[float, ...]
-    uframe: tuple[float, ...]
-
-
-@dataclass
-class Generated:
-    """A program: its text, its instructions by line, and its routines."""
-
-    text: str
-    ops: dict[int, tuple[Any, ...]]
-    entry: int
-    routines: dict[str, int]
-    deterministic: bool
 
 
 @dataclass
@@ -45,19 +26,22 @@ class Generator:
     lines: list[str] = field(default_factory=list)
     ops: dict[int, tuple[Any, ...]] = field(default_factory=dict)
     routines: dict[str, int] = field(default_factory=dict)
+    takes: dict[str, bool] = field(default_factory=dict)  # a parameter, by routine
     labels: int = 0
     in_loops: tuple[str, ...] = ()
     parameter: str = ""
     in_main: bool = False
     cycle: int = 0
+    base: int = 0  # what the lines of its file are counted from
 
     # ---- writing --------------------------------------------------------------------
     def emit(self, text: str, *op: Any) -> int:
         noise = self.rng.choice(["", "", "", "  ", " -- it's -- a 'note", ";"])
         self.lines.append("  " * self.rng.randrange(3) + text + noise)
+        line = self.base + len(self.lines)
         if op:
-            self.ops[len(self.lines)] = op
-        return len(self.lines)
+            self.ops[line] = op
+        return line
 
     def patch(self, line: int, *op: Any) -> None:
         self.ops[line] = op
@@ -65,7 +49,7 @@ class Generator:
     @property
     def here(self) -> int:
         """The next line."""
-        return len(self.lines) + 1
+        return self.base + len(self.lines) + 1
 
     def number(self) -> float:
         return round(self.rng.uniform(-900.0, 900.0), 4)
@@ -80,22 +64,14 @@ class Generator:
         return numbers, gap.join(f"{n:.4f}" for n in numbers)
 
     def program(self) -> Generated:
-        self.lines = ["PROGRAM job EZ", "VAR"]
-        self.lines += [f"  {', '.join(POINTS)}, q : POSITION"]
-        self.lines += [f"  {', '.join(JOINTS)} : JOINTPOS FOR ARM[1]"]
-        self.lines += [f"  {', '.join(COUNTS)}, i1, i2, i3, k1, k2, k3 : INTEGER"]
-        self.lines += ["  xt : XTNDPOS FOR ARM[1]"]
-        self.lines += [f"  {TABLE} : ARRAY[9] OF POSITION"]
+        self.declare("job")
         self.lines += ["ROUTINE ext(a : POSITION) EXPORTED FROM other"]
         for name in ("r1", "r2"):
             self._routine(name)
         self.lines.append("BEGIN")
         self.in_main = True
         entry = self.here
-        for name in POINTS:
-            self.assign_point(name)
-        for name in COUNTS if self.exact else ():
-            self.emit(f"{name} := 1", "set", name, 1.0)
+        self.assignments()
         self.opening()
         self.block(self.rng.randrange(4, 12), 0)
         if not self.exact and self.rng.random() < 0.3:
@@ -107,21 +83,48 @@ class Generator:
             self.emit("END job", "cycle", start)
         else:
             self.emit("END job", "stop")
-        text = self.rng.choice(["\r\n", "\n"]).join(self.lines)
-        return Generated(text, self.ops, entry, self.routines, self.exact)
+        return Generated(
+            self.text(), self.ops, entry, self.routines, self.exact, self.page_texts()
+        )
+
+    def text(self) -> str:
+        return self.rng.choice(["\r\n", "\n"]).join(self.lines)
+
+    def page_texts(self) -> tuple[str, ...]:
+        """Return the texts of other files of the job."""
+        return ()
+
+    def declare(self, name: str) -> None:
+        """Write what stands before the routines."""
+        self.lines = [f"PROGRAM {name} EZ", "VAR"]
+        self.lines += [f"  {', '.join(POINTS)}, q : POSITION"]
+        self.lines += [f"  {', '.join(JOINTS)} : JOINTPOS FOR ARM[1]"]
+        self.lines += [f"  {', '.join(COUNTS)}, i1, i2, i3, k1, k2, k3 : INTEGER"]
+        self.lines += ["  xt : XTNDPOS FOR ARM[1]"]
+        self.lines += [f"  {TABLE} : ARRAY[9] OF POSITION"]
+
+    def assignments(self) -> None:
+        """Write what every program knows at its start."""
+        for name in POINTS:
+            self.assign_point(name)
+        for name in COUNTS if self.exact else ():
+            self.emit(f"{name} := 1", "set", name, 1.0)
 
     def opening(self) -> None:
         """Write what every program begins with."""
 
     def _routine(self, name: str) -> None:
         self.parameter = "a" if self.rng.random() < 0.5 else ""
-        self.lines.append(f"ROUTINE {name}{'(a : POSITION)' * bool(self.parameter)}")
+        self.lines.append(self.heading(name))
         self.lines.append("BEGIN")
         self.routines[name] = self.here
-        self.ops[-len(self.routines)] = ("parameter", name, self.parameter)
+        self.takes[name] = bool(self.parameter)
         self.block(self.rng.randrange(1, 5), 1)
         self.emit(f"END {name}", "return")
         self.parameter = ""
+
+    def heading(self, name: str) -> str:
+        return f"ROUTINE {name}{'(a : POSITION)' * bool(self.parameter)}"
 
     # ---- statements -----------------------------------------------------------------
     def block(self, count: int, depth: int) -> None:
@@ -147,8 +150,10 @@ class Generator:
             self.fill,
             self.move_table,
             self.call,
+            *self.more(),
         ]
         nested = [self.if_, self.for_, self.select, self.if_]
+        nested += self.more_nested()
         unsure = [self.while_, self.repeat, self.read, self.goto, self.return_]
         choices = simple + (nested if depth < 3 else [])
         if not self.exact:
@@ -158,6 +163,14 @@ class Generator:
             chosen(depth)  # type: ignore[call-arg]
         else:
             chosen()  # type: ignore[call-arg]
+
+    def more(self) -> list[Callable[[], Any]]:
+        """Return statements that some generators write as well."""
+        return []
+
+    def more_nested(self) -> list[Callable[[int], None]]:
+        """Return the same of blocks."""
+        return []
 
     def point(self) -> str:
         return self.rng.choice([*POINTS, *([self.parameter] if self.parameter else [])])
@@ -259,16 +272,18 @@ class Generator:
         self.emit(f"MOVE LINEAR TO {TABLE}[{index}]", "move_table", index)
 
     def call(self) -> None:
-        callable_now = list(self.routines)[: 2 if self.in_main else 0]
-        if not callable_now:
+        if not self.in_main:
             self.move_literal()
             return
-        name = self.rng.choice(callable_now)
-        at = list(self.routines).index(name) + 1
-        takes = self.ops[-at][2]
-        point = self.rng.choice(POINTS)
-        argument = f"({point})" if takes else ""
-        self.emit(f"{name}{argument}", "call", name, point.lower() if takes else "")
+        self.call_with_point(self.rng.choice(["r1", "r2"]))
+
+    def call_with_point(self, name: str) -> None:
+        """Call a routine, with a point where it takes one."""
+        if self.takes[name]:
+            point = self.point()
+            self.emit(f"{name}({point})", "call", name, point.lower())
+        else:
+            self.emit(name, "call", name, "")
 
     def condition(self) -> tuple[str, tuple[Any, ...]]:
         if self.exact or self.rng.random() < 0.4:
@@ -367,144 +382,3 @@ class Generator:
         self.emit("RETURN", "return")
         self.patch(line, "unless", ("random",), self.here)
         self.emit("ENDIF", "nop")
-
-
-class Interpreter:
-    """Runs a generated program once, with random inputs."""
-
-    def __init__(self, program: Generated, seed: int, most: int = 400) -> None:
-        self.program = program
-        self.rng = random.Random(seed)
-        self.most = most
-        self.values: dict[str, Any] = {}
-        self.frames = {"tool": (0.0,) * 6, "uframe": (0.0,) * 6}
-        self.stack: list[tuple[int, str]] = []
-        self.limits: dict[int, float] = {}
-        self.trace: list[Executed] = []
-        self.line = program.entry
-
-    def run(self) -> list[Executed]:
-        for _ in range(20 * self.most):
-            op = self.program.ops.get(self.line, ("nop",))
-            following = getattr(self, f"do_{op[0]}")(*op[1:])
-            if following == 0 or len(self.trace) >= self.most:
-                break
-            self.line = following or self.line + 1
-        return self.trace
-
-    def name(self, name: str) -> str:
-        return self.stack[-1][1] if name == "a" else name
-
-    def log(self, values: Any) -> None:
-        self.trace.append(
-            Executed(self.line, values, self.frames["tool"], self.frames["uframe"])
-        )
-
-    def test(self, kind: str, name: str = "", value: float = 0.0) -> bool:
-        if kind == "random":
-            return self.rng.random() < 0.5
-        held = self.values.get(name)
-        if held is None:
-            return self.rng.random() < 0.5
-        return held == value if kind == "equal" else held < value
-
-    def do_nop(self) -> None: ...
-
-    def do_move(self, numbers: Any) -> None:
-        self.log(numbers)
-
-    def do_move_to(self, name: str) -> None:
-        self.log(self.values.get(self.name(name)))
-
-    def do_move_table(self, index: str) -> None:
-        self.log(self.values.get(f"tab[{self.subscript(index)}]"))
-
-    def subscript(self, index: str) -> str:
-        return index if index.isdigit() else str(self.values.get(index))
-
-    def do_set(self, name: str, value: Any) -> None:
-        self.values[self.name(name)] = value
-
-    def do_copy(self, a: str, b: str) -> None:
-        self.values[self.name(a)] = self.values.get(self.name(b))
-
-    def do_shift(self, a: str, b: str, by: Any) -> None:
-        self.values[self.name(a)] = self.shifted(b, by)
-
-    def do_move_shifted(self, name: str, by: Any) -> None:
-        self.log(self.shifted(name, by))
-
-    def shifted(self, name: str, by: Any) -> Any:
-        held = self.values.get(self.name(name))
-        if held is None:
-            return None
-        return (*(v + d for v, d in zip(held[:3], by, strict=True)), *held[3:])
-
-    def do_component(self, name: str, at: int, number: float, add: bool) -> None:
-        name = self.name(name)
-        held = self.values.get(name)
-        if held is not None:
-            new = held[at] + number if add else number
-            self.values[name] = (*held[:at], new, *held[at + 1 :])
-
-    def do_input(self, name: str) -> None:
-        self.values[name] = float(self.rng.randrange(5))
-
-    def do_add(self, name: str) -> None:
-        if self.values.get(name) is not None:
-            self.values[name] += 1.0
-
-    def do_frame(self, name: str, numbers: Any) -> None:
-        self.frames[name] = numbers
-
-    def do_fill(self, index: str, numbers: Any) -> None:
-        index = self.subscript(index)
-        self.values[f"tab[{str(float(index)) if index != 'None' else index}]"] = numbers
-        self.values[f"tab[{index}]"] = numbers
-        if "." in index and index != "None":
-            self.values[f"tab[{int(float(index))}]"] = numbers
-
-    def do_scramble(self, name: str) -> None:
-        self.values[self.name(name)] = tuple(self.rng.random() for _ in range(6))
-
-    def do_call(self, name: str, argument: str) -> int:
-        self.stack.append((self.line + 1, argument))
-        return self.program.routines[name]
-
-    def do_return(self) -> int:
-        return self.stack.pop()[0] if self.stack else 0
-
-    def do_stop(self) -> int:
-        return 0
-
-    def do_cycle(self, start: int) -> int:
-        return start
-
-    def do_jump(self, line: int) -> int:
-        return line
-
-    def do_unless(self, test: Any, line: int) -> int | None:
-        return None if self.test(*test) else line
-
-    def do_select(self, name: str, cases: Any, otherwise: int) -> int:
-        held = self.values.get(name)
-        if held is None:
-            held = float(self.rng.randrange(5))
-        return next((line for value, line in cases if value == held), otherwise)
-
-    def do_for(self, name: str, first: float, last: Any, by: float, end: int) -> Any:
-        self.limits[self.line] = float(self.rng.randrange(4)) if last is None else last
-        self.values[name] = first
-        return None if self._inside(self.line, first, by) else end + 1
-
-    def do_next(self, start: int, name: str, by: float) -> Any:
-        value = self.values[name] + by
-        if self._inside(start, value, by):
-            self.values[name] = value
-            return start + 1
-        self.values.pop(name)
-        return None
-
-    def _inside(self, start: int, value: float, by: float) -> bool:
-        last = self.limits[start]
-        return value <= last if by > 0 else value >= last

@@ -6,7 +6,8 @@ import random
 import re
 from dataclasses import replace
 
-from tests.language.generator import Executed, Generated, Generator
+from tests.language.generator import Generator
+from tests.language.interpreter import Executed, Generated
 
 # Around the frames of the tests' cell: middle and half width of every number.
 BOXES = {
