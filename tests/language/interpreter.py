@@ -25,7 +25,7 @@ class Executed:
         line: Its line, counted through all pages of the job.
         values: Its numbers; None: a variable that was never set.
         tool, uframe: The frames then.
-        how: TO, NEAR, AWAY, RELATIVE_TOOL, RELATIVE_BASE or RELATIVE_UFRAME.
+        how: TO, VIA, NEAR, AWAY, RELATIVE_TOOL, RELATIVE_BASE or RELATIVE_UFRAME.
         short_mm: How far NEAR stays away.
     """
 
@@ -128,6 +128,10 @@ class Interpreter:
 
     def do_near(self, name: str, short_mm: float) -> None:
         self.log(self.held(name), "NEAR", short_mm)
+
+    def do_arc(self, name: str, via: str) -> None:
+        self.log(self.held(via), "VIA")
+        self.log(self.held(name))
 
     def do_without(self, how: str, numbers: Any) -> None:
         self.log(numbers, how)

@@ -34,6 +34,8 @@ def generate(seed: int, exact: bool) -> tuple[Generated, Visits]:
 
 
 def fits(visits: Visits, visit: int, executed: Executed) -> bool:
+    if visits.via[visit] != (executed.how == "VIA"):
+        return False
     frames = (
         (visits.tool[visit], executed.tool),
         (visits.uframe[visit], executed.uframe),
@@ -49,7 +51,7 @@ def fits(visits: Visits, visit: int, executed: Executed) -> bool:
 def same_goal(visits: Visits, visit: int, executed: Executed) -> bool:
     """Compare the kind of a move, and its numbers: angles by the rotation they say."""
     target, held = Target(visits.target[visit]), executed.values or ()
-    if target.name != executed.how and executed.how != "TO":
+    if target.name != executed.how and executed.how not in ("TO", "VIA"):
         return False
     if executed.how == "NEAR" and visits.distance_mm[visit] != executed.short_mm:
         return False

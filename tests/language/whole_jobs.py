@@ -30,7 +30,14 @@ class Rarer(Generator):
 
     def more(self) -> list[Callable[[], Any]]:
         """Return statements that are written beside the usual ones."""
-        return [self.near, self.away, self.relative, self.compose, self.invert]
+        return [
+            self.near,
+            self.away,
+            self.relative,
+            self.arc,
+            self.compose,
+            self.invert,
+        ]
 
     def more_nested(self) -> list[Callable[[int], None]]:
         """Return blocks that are written beside the usual ones."""
@@ -51,6 +58,11 @@ class Rarer(Generator):
         by, text = self.vector()
         text = f"MOVE LINEAR RELATIVE VEC({text}) IN {frame}"
         self.emit(text, "without", f"RELATIVE_{frame}", by)
+
+    def arc(self) -> None:
+        name, via = self.point(), self.point()
+        text = f"MOVE CIRCULAR TO {name} VIA {via}"
+        self.emit(text, "arc", name.lower(), via.lower())
 
     def compose(self) -> None:
         a, b = self.point(), self.point()
