@@ -33,12 +33,17 @@ def collect(machine: Machine) -> Visits:
     c, world = collector.columns, machine.world
     if machine.exhausted:
         c.reason[:] = collector.reasons("the program is too complex to be followed")
-    literals, literal = find_literals(c, Numbering.of(world), collector.names)
+    numbering = Numbering.of(world)
+    literals, literal = find_literals(c, numbering, collector.names)
     literals, follows = find_uses(literals, c.slots, c.bases, literal, world.pinned)
     overlapping = (literal < 0) & (c.slots[:, 0] >= 0) & (c.reason == 0)
     if overlapping.any():
+        apart = overlapping & numbering.apart(c.slots)
         why = "a number of the target belongs to another target too"
         c.reason[overlapping] = collector.reasons(why)
+        if apart.any():
+            why = "some of its numbers stand in the program, others in another file"
+            c.reason[apart] = collector.reasons(why)
     pred_start, pred = _predecessors(machine, ordered, offsets)
     return Visits(
         files=tuple(world.files),

@@ -63,13 +63,24 @@ class Numbering:
             np.concatenate([end for _, _, end in numbered]),
         )
 
+    def apart(self, slots: Ints) -> Bools:
+        """Tell which targets have their numbers in more than one file, (k,).
+
+        Args:
+            slots: Six numbers of each target, (k, 6).
+        """
+        file = np.searchsorted(self.first, slots, side="right")
+        different: Bools = (file != file[:, :1]).any(axis=1)
+        return different
+
 
 def find_literals(
     columns: SlotColumns, numbering: Numbering, names: _Texts
 ) -> tuple[Literals, Ints]:
     """Find the distinct literals; also return the literal of every visit.
 
-    Visits whose numbers partly belong to another target get none (-1).
+    Visits whose numbers partly belong to another target, or to another file, get none
+    (-1).
     """
     literal = np.full(len(columns.slots), -1, dtype=np.int64)
     rows = np.flatnonzero(columns.slots[:, 0] >= 0)
@@ -79,7 +90,7 @@ def find_literals(
     mixed = np.zeros(len(distinct), dtype=bool)
     np.logical_or.at(mixed, inverse, (slots != distinct[inverse]).any(axis=1))
     used = np.bincount(distinct.ravel(), minlength=len(numbering.start))
-    mixed |= (used[distinct] > 1).any(axis=1)
+    mixed |= (used[distinct] > 1).any(axis=1) | numbering.apart(distinct)
     kept = np.flatnonzero(~mixed)
     index = np.full(len(distinct), -1, dtype=np.int64)
     index[kept] = np.arange(len(kept))
