@@ -5,50 +5,30 @@ from __future__ import annotations
 from dataclasses import replace
 
 from postproc.language import pdl2 as ast
-from postproc.language.effects import (
-    CHANGING,
-    PURE,
-    body_effects,
-    changed_arguments,
-)
-from postproc.language.machine import (
-    Here,
-    Machine,
-    forget,
-    forget_names,
-    pin_names,
-)
+from postproc.language.effects import CHANGING, PURE, changed_arguments
+from postproc.language.machine import Here, Machine, forget
+from postproc.language.reach import FRAMES, HANDS_OVER, reach_of
+from postproc.language.unfollowed import leave_out
 from postproc.language.values import Alias, Nothing, Position
 from postproc.language.visits import ELSEWHERE
 from postproc.language.world import Place, Record
 
-_HANDS_OVER = ("sensor_", "c5gopen", "c4gopen", "open_controller", "opencontrol")
-_FRAMES = ("tool", "base", "uframe")
-
 
 def call_statement(machine: Machine, here: Here, call: ast.Call) -> bool:
     """Run a call; tell whether control went into a routine of the job."""
-    inside = _program(here, call.name) if call.program else None
-    if not call.program:
-        inside = here.world.find_routine(here.place.program, call.name)
+    find = here.world.find_program if call.program else here.world.find_routine
+    inside = find(here.place.program, call.name)
     if inside is None:
         outside(here, call.name, call.arguments)
         return False
     if inside.body in machine.calls_in(here.context):
         running = machine.calls_in(here.context)
         machine.recursive |= {id(b) for b in running[running.index(inside.body) :]}
-        _refuse_recursion(here, inside)
+        _refuse_recursion(machine, here, inside)
         return False
     _bind(here, inside, call.arguments)
     machine.call(here, inside)
     return True
-
-
-def _program(here: Here, name: str) -> Place | None:
-    program = here.world.others.get(name)
-    if program is None or program.main is None:
-        return None
-    return Place(program, program.main)
 
 
 def calls_in_expressions(
@@ -60,22 +40,19 @@ def calls_in_expressions(
         if inside is None:
             outside(here, call.name, call.arguments)
         else:
-            _summarised(here, inside, call.arguments)
+            _summarised(machine, here, inside, call.arguments)
 
 
 def _summarised(
-    here: Here, inside: Place, arguments: tuple[ast.Expression | None, ...]
+    machine: Machine,
+    here: Here,
+    inside: Place,
+    arguments: tuple[ast.Expression | None, ...],
 ) -> None:
     """Take a function's effects from its text instead of running it."""
-    name = inside.body.name
-    effects = body_effects(inside.program, inside.body)
-    within = replace_place(here, inside)
-    pin_names(within, effects.read, f"{name} may compute with it")
-    forget_names(within, effects.assigned, f"{name} may change it")
-    for argument in changed_arguments(arguments):
-        forget(here, argument, f"{name} may change it")
-    if effects.moves:
-        here.store.last = frozenset({ELSEWHERE})
+    name, reach = inside.body.name, reach_of(here.world, inside)
+    leave_out(machine, here, name, reach, arguments)
+    if reach.moves:
         here.world.report_once(
             here.place.program,
             here.row,
@@ -86,12 +63,7 @@ def _summarised(
         )
 
 
-def replace_place(here: Here, place: Place) -> Here:
-    """Return the same point as seen from another body."""
-    return replace(here, place=place)
-
-
-def _refuse_recursion(here: Here, inside: Place) -> None:
+def _refuse_recursion(machine: Machine, here: Here, inside: Place) -> None:
     name = inside.body.name or inside.program.name
     here.world.report_once(
         here.place.program,
@@ -101,10 +73,7 @@ def _refuse_recursion(here: Here, inside: Place) -> None:
         f"{name} calls itself: what it does is not followed; moves after it are taken "
         "to come from an unknown place",
     )
-    effects = body_effects(inside.program, inside.body)
-    within = replace_place(here, inside)
-    pin_names(within, effects.read, f"{name} may compute with it")
-    forget_names(within, effects.assigned, f"{name} may change it")
+    leave_out(machine, here, name, reach_of(here.world, inside))
     here.store.last = frozenset({ELSEWHERE})
 
 
@@ -147,7 +116,7 @@ def outside(
     said = start.routines.get(name)
     if name in start.frame_tables:
         _frames_from_table(here, name, arguments)
-    elif name.startswith(_HANDS_OVER):
+    elif name.startswith(HANDS_OVER):
         here.store.last = frozenset({ELSEWHERE})
         _say(here, "position-unknown", name, "hands the arm over to a sensor or an "
              "outside stream: the next move comes from an unknown place")  # fmt: skip
@@ -167,7 +136,7 @@ def _say(here: Here, code: str, name: str, text: str) -> None:
 
 
 def _unknown_frames(here: Here, why: str) -> None:
-    here.store.set(**{frame: Nothing(why) for frame in _FRAMES})
+    here.store.set(**{frame: Nothing(why) for frame in FRAMES})
 
 
 def _frames_from_table(

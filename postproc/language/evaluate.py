@@ -26,7 +26,7 @@ from postproc.language.values import (
     inverted,
     shifted,
 )
-from postproc.language.world import Place, World
+from postproc.language.world import Place, World, base_variable
 
 _TRUTH = {"true": True, "on": True, "false": False, "off": False}
 _WORDS = frozenset(
@@ -157,7 +157,7 @@ class Point:
         target = self.locate(reference)
         if not target.exact:
             return Nothing("its index is known only at run time")
-        if name in self.volatile:
+        if self._unsteady(target):
             return Nothing("a condition handler changes it")
         held = self.store.read(target.key)
         if target.component == ():
@@ -166,6 +166,11 @@ class Point:
         if at >= 0:
             self.world.pin(held, "the program computes with a part of it", (at,))
         return part_of(held, target.component)
+
+    def _unsteady(self, target: Target) -> bool:
+        """Tell whether a handler may change a variable, whatever name it has here."""
+        names = {base_variable(key.rpartition("/")[2]) for key in target.keys}
+        return not names.isdisjoint(self.volatile)
 
     def _system(self, reference: ast.Reference) -> Value:
         name = self.setting_name(reference)
@@ -222,11 +227,11 @@ class Point:
 
     def _part(self, reference: ast.Reference) -> Written | None:
         """Return a component that stands in the text, None for anything else."""
-        if reference.name.startswith("$") or reference.name in self.volatile:
+        if reference.name.startswith("$"):
             return None
         target = self.locate(reference)
         at = component_index(target)
-        if at < 0 or not target.exact:
+        if at < 0 or not target.exact or self._unsteady(target):
             return None
         held = self.store.read(target.key)
         if not isinstance(held, Position) or held.slots[at] < 0:

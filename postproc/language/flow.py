@@ -13,11 +13,11 @@ from postproc.language.arrivals import Run
 from postproc.language.calls import frame_value
 from postproc.language.collect import collect
 from postproc.language.diagnostic import Diagnostic
-from postproc.language.effects import rows_effects
 from postproc.language.initial import fill_initial
 from postproc.language.lsv import Variables
 from postproc.language.machine import HANDLED, Here, Machine
 from postproc.language.program import Program
+from postproc.language.reach import reach_rows
 from postproc.language.steps import run_broken, step
 from postproc.language.store import Store
 from postproc.language.values import Nothing
@@ -95,16 +95,18 @@ def _start(machine: Machine) -> None:
 def _handlers(machine: Machine, store: Store) -> None:
     """Condition handlers run at any time: nothing they change is ever known."""
     world = machine.world
-    unknown = Store(lambda key: None, last=frozenset({ELSEWHERE}))
-    why = "a condition handler runs at any time"
-    unknown.set(tool=Nothing(why), base=Nothing(why), uframe=Nothing(why))
+    nothing = Nothing("a condition handler runs at any time")
+    unknown = Store(lambda key: nothing, last=frozenset({ELSEWHERE}))
+    unknown.set(tool=nothing, base=nothing, uframe=nothing)
     for program in world.programs():
         for body in (program.main, *program.routines.values()):
             for first, last in body.blocks.handlers if body else ():
-                effects = rows_effects(program, first, last)
-                machine.volatile |= effects.assigned
-                if effects.moves and body is not None:
-                    _moving_handler(machine, Place(program, body), first, unknown)
+                assert body is not None
+                place = Place(program, body)
+                reach = reach_rows(world, place, first, last)
+                machine.volatile |= reach.assigned
+                if reach.moves:
+                    _moving_handler(machine, place, first, unknown)
     for name in machine.volatile:
         if name.startswith("$"):
             store.set(**{name[1:]: Nothing("a condition handler changes it")})

@@ -47,7 +47,8 @@ def _unrolled(
     if loop in machine.ranges:
         return True
     program = here.place.program
-    if statement.name in rows_effects(program, here.row + 1, end).assigned:
+    changed = rows_effects(program, here.row + 1, end).assigned | here.volatile
+    if statement.name in changed:
         return False
     machine.rows += rounds * (end - here.row)
     if machine.rows <= MAX_ROWS:

@@ -85,6 +85,7 @@ class World:
     diagnostics: dict[Diagnostic, None] = field(default_factory=dict)
     pinned: dict[int, str] = field(default_factory=dict)
     taught_lines: dict[str, frozenset[int]] = field(default_factory=dict)
+    reached: dict[int, object] = field(default_factory=dict)
     _said: set[tuple[str, str]] = field(default_factory=set)
 
     def __post_init__(self) -> None:
@@ -177,10 +178,22 @@ class World:
         exporter = program.outside.get(name)
         files = [exporter] if exporter else map(base_name, program.imports)
         for file in files:
-            other = self.others.get(file)
+            other = self._file(file)
             if other is not None and name in other.routines:
                 return Place(other, other.routines[name])
         return None
+
+    def find_program(self, program: Program, name: str) -> Place | None:
+        """Return the main part of a program of the job; `program` calls it."""
+        found = self._file(name)
+        if found is None or found.main is None:
+            return None
+        return Place(found, found.main)
+
+    def _file(self, name: str) -> Program | None:
+        """Return the program that a name or a file's name means."""
+        own = {self.main.name, base_name(self.main.lines.source.name)}
+        return self.others.get(name) or (self.main if name in own else None)
 
 
 def base_variable(name: str) -> str:

@@ -1,0 +1,124 @@
+"""Handlers, recursion and functions: what they may do is found in every file."""
+
+from __future__ import annotations
+
+from postproc.language.flow import Resolved, resolve
+from postproc.language.source import Source
+from postproc.language.structure import parse
+from postproc.language.visits import ELSEWHERE, Target
+
+AT = "POS(1, 2, 3, 0, 180, 0, '')"
+ON = ["ENABLE CONDITION[1]"]
+
+
+def program(name: str, head: list[str], body: list[str]) -> str:
+    return "\n".join([f"PROGRAM {name}", *head, "BEGIN", *body, f"END {name}", ""])
+
+
+def handler(*actions: str) -> list[str]:
+    return ["CONDITION[1] :", "WHEN $DIN[1]+ DO", *actions, "ENDCONDITION", *ON]
+
+
+def routine(name: str, *body: str, takes: str = "") -> list[str]:
+    return [f"ROUTINE {name}{takes}", "BEGIN", *body, f"END {name}"]
+
+
+def resolved(main: str, **pages: str) -> Resolved:
+    found = {n: parse(Source(f"{n}.pdl", t.encode())) for n, t in pages.items()}
+    return resolve(parse(Source("job.pdl", main.encode())), others=found)
+
+
+def codes(found: Resolved) -> set[str]:
+    return {d.code for d in found.diagnostics}
+
+
+def last(found: Resolved, file: int = 0) -> tuple[Target, list[int], str]:
+    """Return target, origins and reason of the last visit in a file."""
+    v = found.visits
+    row = max(n for n in range(len(v)) if v.file[n] == file)
+    reason = v.reasons[v.reason[row]]
+    return Target(v.target[row]), v.predecessors(row).tolist(), reason
+
+
+def test_a_handler_changes_what_a_parameter_stands_for():
+    head = [
+        "VAR p : POSITION",
+        *routine("r", "MOVE LINEAR TO a", takes="(a : POSITION)"),
+    ]
+    body = [*handler("p.X := 9"), f"p := {AT}", "r(p)"]
+    target, _, reason = last(resolved(program("job", head, body)))
+    assert target == Target.UNKNOWN and "handler changes it" in reason
+
+
+def test_a_handler_changes_a_component_that_is_copied():
+    head = ["VAR p, q : POSITION"]
+    copy = [f"q := {AT}", f"p := {AT}", "q.X := p.X", "MOVE LINEAR TO q"]
+    body = [*handler("p.X := 9"), *copy]
+    assert last(resolved(program("job", head, body)))[0] == Target.UNKNOWN
+
+
+def test_a_handler_moves_by_a_routine_of_another_file():
+    page = program("page", routine("s", f"MOVE LINEAR TO {AT}"), [])
+    head = ["IMPORT 'page'", "ROUTINE s EXPORTED FROM page"]
+    found = resolved(program("job", head, [*handler("s"), f"MOVE LINEAR TO {AT}"]),
+                     page=page)  # fmt: skip
+    assert "handler-moves" in codes(found)
+    assert ELSEWHERE in last(found)[1]
+
+
+def test_a_handler_changes_variables_by_a_routine_of_another_file():
+    share = "g : POSITION EXPORTED FROM page"
+    page = program("page", [f"VAR {share} GLOBAL", *routine("s", "g.X := 9")], [])
+    head = ["IMPORT 'page'", f"VAR {share}", "ROUTINE s EXPORTED FROM page"]
+    body = [*handler("s"), f"g := {AT}", "MOVE LINEAR TO g"]
+    found = resolved(program("job", head, body), page=page)
+    assert last(found)[0] == Target.UNKNOWN
+
+
+def test_a_loop_whose_counter_a_handler_changes_has_any_number_of_rounds():
+    loop = ["FOR i := 1 TO 3 DO", f"MOVE LINEAR TO {AT}", "ENDFOR"]
+    found = resolved(program("job", ["VAR i : INTEGER"], [*handler("i := 3"), *loop]))
+    assert len(found.visits) == 1
+    assert sorted(last(found)[1]) == [-1, 0]
+
+
+def test_a_page_calls_a_routine_of_the_program_that_calls_it():
+    head = ["IMPORT 'job'", "ROUTINE r EXPORTED FROM job"]
+    page = program("page", [*head, *routine("s", "r")], [])
+    head = ["IMPORT 'page'", "ROUTINE s EXPORTED FROM page"]
+    head += routine("r", f"MOVE LINEAR TO {AT}")
+    found = resolved(program("job", head, ["s"]), page=page)
+    assert "assumed-still" not in codes(found) and len(found.visits) == 1
+
+
+def test_recursion_through_another_file_forgets_what_that_file_changes():
+    share = "g : POSITION EXPORTED FROM page"
+    back = ["IMPORT 'job'", "ROUTINE r EXPORTED FROM job", f"VAR {share} GLOBAL"]
+    page = program("page", [*back, *routine("s", "r", "g.X := 9")], [])
+    head = ["IMPORT 'page'", "ROUTINE s EXPORTED FROM page", f"VAR {share}"]
+    inside = ["IF $DIN[1] THEN", "s", "ENDIF"]
+    head += routine("r", *inside)
+    body = [f"g := {AT}", "r", "MOVE LINEAR TO g"]
+    found = resolved(program("job", head, body), page=page)
+    assert "recursion" in codes(found)
+    assert last(found)[0] == Target.UNKNOWN
+
+
+def test_moves_that_a_function_may_make_are_listed_with_their_points():
+    moving = routine("r", f"MOVE LINEAR TO {AT}")
+    head = [*moving, "ROUTINE f : INTEGER", "BEGIN", "r", "RETURN(1)", "END f"]
+    found = resolved(program("job", ["VAR n : INTEGER", *head], ["r", "n := f"]))
+    v = found.visits
+    origins = [v.predecessors(n).tolist() for n in range(len(v))]
+    assert sorted(origins) == [[ELSEWHERE], [-1]]
+    unknown = origins.index([ELSEWHERE])
+    assert "f, which is not followed" in v.reasons[v.reason[unknown]]
+    assert len(set(v.literal.tolist())) == 1  # so that its numbers stay
+
+
+def test_a_point_given_to_a_function_keeps_its_numbers():
+    head = ["ROUTINE f(a : POSITION) : INTEGER", "BEGIN", "MOVE LINEAR TO a"]
+    head += ["RETURN(1)", "END f"]
+    body = [f"p := {AT}", "MOVE LINEAR TO p", "n := f(p)"]
+    found = resolved(program("job", ["VAR p : POSITION", "n : INTEGER", *head], body))
+    assert found.visits.literals.pinned == ("f may move to it",)
