@@ -61,10 +61,10 @@ def flows(seed: int) -> None:
     """
     made, visits = generate(seed, exact=False)
     for run in range(RUNS):
-        follow(visits, Interpreter(made, run).run(), made.whole)
+        follow(visits, Interpreter(made, run).run(), made)
     made, visits = generate(seed, exact=True)
     trace = Interpreter(made, 0, most=100_000).run()
-    assert all(len(now) == 1 for now in follow(visits, trace, made.whole))
+    assert all(len(now) == 1 for now in follow(visits, trace, made))
     if made.whole.count("IF n") == 0 and "SELECT" not in made.whole:
         assert len(visits) == len(trace)
         assert (np.diff(visits.pred_start) == 1).all()
