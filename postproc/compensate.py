@@ -173,7 +173,7 @@ def report(
             *reading.diagnostics,
             *followed_pages(visits),
             *missing_file(visits),
-            *overruled_strings(visits, planned.plan),
+            *overruled_strings(visits, planned.targets, planned.plan),
             *untimed_runs(visits, planned.plan),
             *rounded_points(visits, planned.plan),
             *unsure_sides(visits, rows, d.side, d.std_error),

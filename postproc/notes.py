@@ -8,9 +8,11 @@ from numpy.typing import NDArray
 from postproc.language.diagnostic import Diagnostic
 from postproc.language.visits import NO_VALUE, Target, Visits
 from postproc.motion.planner import Plan
+from postproc.motion.targets import Targets
 from postproc.pose import MM
 from postproc.robot.arm import Arm
 from postproc.robot.cell import Cell
+from postproc.strings import overruled
 
 Array = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -53,13 +55,18 @@ def missing_file(visits: Visits) -> list[Diagnostic]:
     ]
 
 
-def overruled_strings(visits: Visits, plan: Plan) -> list[Diagnostic]:
-    """List targets whose configuration string the path does not follow."""
+def overruled_strings(visits: Visits, targets: Targets, plan: Plan) -> list[Diagnostic]:
+    """List targets whose configuration string the path does not follow.
+
+    Where the program says whether strings are checked, it is as the program wants it,
+    or the target is left alone.
+    """
     text = (
         "the path arrives on another branch or turn than the configuration string "
         "says: the string is kept, the path decides"
     )
-    return _each(visits, plan.overruled, "configuration-overruled", text)
+    rows = overruled(targets, plan).unchecked(visits)
+    return _each(visits, rows, "configuration-overruled", text)
 
 
 def untimed_runs(visits: Visits, plan: Plan) -> list[Diagnostic]:

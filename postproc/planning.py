@@ -25,6 +25,7 @@ from postproc.reasons import Reasons
 from postproc.resolve import targets_from_visits
 from postproc.robot.cell import Cell
 from postproc.robot.state import States, make_states
+from postproc.strings import mark_strings
 
 Array = NDArray[np.float64]
 
@@ -155,6 +156,7 @@ def plan_visits(visits: Visits, cell: Cell, timed: bool = True) -> Planned:
     targets, reasons = targets_from_visits(visits, cell)
     planned = plan(cell.arm, targets, np.deg2rad(cell.limits.wrist_deg), timed)
     reasons.adopt(planned.reason, planned.reasons)
+    mark_strings(visits, targets, planned, cell.arm, reasons)
     return Planned(targets, planned, reasons, np.zeros((len(visits), 3)))
 
 

@@ -34,10 +34,11 @@ def visits(target: list[int], values: list[list[float]], **more: object) -> Visi
         "follows": zeros - 1, "name": zeros, "names": ("",),
         "tool": zeros, "base": zeros + 1, "uframe": zeros + 2, "frames": FRAMES,
         "frame_taught": np.zeros(3, dtype=bool), "tool_remote": no,
-        "nearest_turn": no, "fly": no, "fly_dist_mm": nan, "fly_per": nan,
+        "nearest_turn": no, "care": np.zeros((n, 3), dtype=np.int64), "fly": no,
+        "fly_dist_mm": nan, "fly_per": nan,
         "fly_type": zeros, "fly_traj": zeros, "lin_spd": nan, "rot_spd": nan,
         "override": np.ones(n),
-        "wrist_joint": no, "reason": zeros, "reasons": ("",),
+        "wrist_joint": no, "ornt_type": zeros, "reason": zeros, "reasons": ("",),
         "pred_start": np.arange(n + 1), "pred": np.arange(n) - 1,
         "measure_id": ("",) * n, "literals": NO_LITERALS,
     }  # fmt: skip

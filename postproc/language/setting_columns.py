@@ -9,11 +9,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from postproc.language.store import Settings
-from postproc.language.values import Nothing, Position
-from postproc.language.visits import FlyTrajectory, FlyType, Target
+from postproc.language.values import Nothing, Position, Value
+from postproc.language.visits import (
+    FlyTrajectory,
+    FlyType,
+    OrntType,
+    Switch,
+    Target,
+)
 
 Ints = NDArray[np.int64]
 _FRAMES = ("tool", "base", "uframe")
+_CARE = ("cnfg_care", "turn_care", "jnt_mturn")
 _OVERRIDES = ("arm_spd_ovr", "prog_spd_ovr", "gen_ovr")
 _WITHOUT_UFRAME = (Target.JOINTS, Target.HOME, Target.CALIBRATION, Target.BY)
 
@@ -72,6 +79,7 @@ def _row(settings: Settings, frame: Any) -> dict[str, Any]:
         **{name: frame(settings.get(name)) for name in _FRAMES},
         "tool_remote": settings.get("tool_rmt") is True,
         "nearest_turn": settings.get("jnt_mturn") is False,
+        "care": [_switch(settings.get(name)) for name in _CARE],
         "fly_dist_mm": _number(settings, "fly_dist"),
         "fly_per": _number(settings, "fly_per"),
         "fly_type": _word(settings, "fly_type", FlyType),
@@ -80,6 +88,7 @@ def _row(settings: Settings, frame: Any) -> dict[str, Any]:
         "rot_spd": _number(settings, "rot_spd"),
         "override": _override(settings),
         "wrist_joint": settings.get("ornt_type") == "wrist_jnt",
+        "ornt_type": _ornt_type(settings),
     }
 
 
@@ -92,6 +101,20 @@ def _word(settings: Settings, name: str, words: type[IntEnum]) -> int:
     """Return the number of a predefined word, 0 where it is not set or not known."""
     said = str(settings.get(name)).upper()
     return int(words[said]) if said in words.__members__ else 0
+
+
+def _ornt_type(settings: Settings) -> OrntType:
+    if "ornt_type" not in settings:
+        return OrntType.UNSET
+    return OrntType(_word(settings, "ornt_type", OrntType) or OrntType.UNKNOWN)
+
+
+def _switch(value: Value | None) -> Switch:
+    if value is None:
+        return Switch.UNSET
+    if isinstance(value, bool):
+        return Switch.ON if value else Switch.OFF
+    return Switch.UNKNOWN
 
 
 def _override(settings: Settings) -> float:

@@ -41,7 +41,17 @@ class Target(IntEnum):
     NEAR = 8  # numbers of the pose as POSE, `distance_mm` short of it along approach
     ABOUT = 9  # x, y, z: axis, a: angle [deg], e: frame (4, 5 or 6 as above)
     BY = 10  # joint increments [deg]
+    FOR = 11  # numbers of the pose as POSE, gone towards for `distance_mm`
     UNKNOWN = 99  # the arm moves, the program text does not tell where to
+
+
+class Switch(IntEnum):
+    """A setting that is TRUE or FALSE, as far as the program tells."""
+
+    UNSET = 0
+    ON = 1
+    OFF = 2
+    UNKNOWN = 3  # it is set, to what only the run tells
 
 
 class FlyType(IntEnum):
@@ -50,6 +60,18 @@ class FlyType(IntEnum):
     UNSET = 0
     FLY_NORM = 1
     FLY_CART = 2
+
+
+class OrntType(IntEnum):
+    """$ORNT_TYPE: how the tool turns on its way along a line or an arc."""
+
+    UNSET = 0
+    RS_WORLD = 1
+    RS_TRAJ = 2
+    EUL_WORLD = 3
+    RPY_WORLD = 4
+    WRIST_JNT = 5
+    UNKNOWN = 6  # it is set, to what only the run tells
 
 
 class FlyTrajectory(IntEnum):
@@ -109,7 +131,7 @@ class Visits:
         target: `Target`, (n,).
         via: True at the VIA point of an arc, (n,).
         values: The six numbers, (n, 6), NaN where not known.
-        distance_mm: For NEAR, (n,).
+        distance_mm: For NEAR and FOR, (n,).
         aux: Auxiliary axis values, (n, k), NaN where there is none.
         config: Index into `configs`, (n,).
         configs: Configuration strings verbatim; "" where none was written.
@@ -123,6 +145,7 @@ class Visits:
         frame_taught: True where the text marks the frame as taught, (k,).
         tool_remote: $TOOL_RMT is TRUE: the arm holds the part, (n,).
         nearest_turn: $JNT_MTURN is FALSE, (n,).
+        care: $CNFG_CARE, $TURN_CARE and $JNT_MTURN as `Switch`, (n, 3).
         fly: True for MOVEFLY, (n,).
         fly_dist_mm: $FLY_DIST, (n,), NaN where unset; negative: off.
         fly_per: $FLY_PER [%], (n,), NaN where unset.
@@ -131,6 +154,7 @@ class Visits:
         rot_spd: $ROT_SPD [rad/s], (n,), NaN where unset.
         override: Product of the speed overrides that hold, (n,) in (0, 1].
         wrist_joint: $ORNT_TYPE is WRIST_JNT, (n,).
+        ornt_type: `OrntType`, (n,).
         reason: Index into `reasons`, (n,); 0 means that the visit may be compensated.
         reasons: Why a visit is display only; reasons[0] is "".
         pred_start: Offsets into `pred`, (n + 1,).
@@ -162,6 +186,7 @@ class Visits:
     frame_taught: Bools
     tool_remote: Bools
     nearest_turn: Bools
+    care: Ints
     fly: Bools
     fly_dist_mm: Floats
     fly_per: Floats
@@ -171,6 +196,7 @@ class Visits:
     rot_spd: Floats
     override: Floats
     wrist_joint: Bools
+    ornt_type: Ints
     reason: Ints
     reasons: tuple[str, ...]
     pred_start: Ints

@@ -5,7 +5,13 @@ import pytest
 from postproc.language.flow import Resolved, Start, resolve
 from postproc.language.source import source_from_bytes
 from postproc.language.structure import Program, parse
-from postproc.language.visits import START, FlyTrajectory, FlyType
+from postproc.language.visits import (
+    START,
+    FlyTrajectory,
+    FlyType,
+    OrntType,
+    Switch,
+)
 
 
 def program(text: str, name: str = "job") -> Program:
@@ -98,6 +104,22 @@ def test_settings_become_columns() -> None:
     assert v.tool_remote.tolist() == [True, False, False]
     assert v.config_given.tolist() == [True, False, False]
     assert [v.configs[i] for i in v.config] == ["W", "", ""]
+
+
+def test_switches_and_orientation_types_are_told_from_what_is_not_known() -> None:
+    move = "MOVE LINEAR TO POS(1,2,3,4,5,6,'W')\n"
+    found = body(
+        f"{move}$CNFG_CARE := TRUE\n$TURN_CARE := OFF\n$JNT_MTURN := $DIN[1]\n"
+        f"$ORNT_TYPE := EUL_WORLD\n{move}"
+        "MOVE LINEAR TO POS(1,2,3,4,5,6,'W') WITH $CNFG_CARE = FALSE\n"
+        f"IF $DIN[2] THEN\n$TURN_CARE := TRUE\n$ORNT_TYPE := RS_WORLD\nENDIF\n{move}"
+    )
+    off, on, unset, unknown = Switch.OFF, Switch.ON, Switch.UNSET, Switch.UNKNOWN
+    assert found.visits.care.tolist() == [
+        [unset] * 3, [on, off, unknown], [off, off, unknown], [on, unknown, unknown],
+    ]  # fmt: skip
+    euler, either = OrntType.EUL_WORLD, OrntType.UNKNOWN
+    assert found.visits.ornt_type.tolist() == [OrntType.UNSET, euler, euler, either]
 
 
 def test_a_variable_used_twice_is_one_literal() -> None:

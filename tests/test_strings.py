@@ -1,0 +1,145 @@
+"""Which configuration strings count: $CNFG_CARE, $TURN_CARE, $JNT_MTURN."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from postproc.notes import overruled_strings
+from postproc.planning import Planned, Reading, plan_visits, read_program
+from postproc.pose import record_from_pose
+from postproc.robot.cell import Cell, load_cell
+
+HERE, THERE = [0.0, 0.0, -90.0, 0.0, 45.0, 0.0], [5.0, 5.0, -95.0, 10.0, 40.0, 8.0]
+START = "MOVE JOINT TO {0, 0, -90, 0, 45, 0}"
+
+
+@pytest.fixture(scope="module")
+def cell(tmp_path_factory: pytest.TempPathFactory) -> Cell:
+    path: Path = tmp_path_factory.mktemp("cell") / "cell.toml"
+    path.write_text('[robot]\narm = "nj220-2.7"\n')
+    return load_cell(path)
+
+
+def pos(cell: Cell, joints: list[float], config: str) -> str:
+    pose = cell.arm.flange(np.deg2rad([joints]))[0]
+    numbers = ", ".join(f"{x:.6f}" for x in record_from_pose(pose))
+    return f"POS({numbers}, '{config}')"
+
+
+def planned(cell: Cell, *lines: str) -> tuple[Reading, Planned]:
+    text = "\n".join(["PROGRAM job", "VAR x : BOOLEAN", "BEGIN", *lines, "END job"])
+    reading = read_program({"job.pdl": text.encode()}, cell)
+    return reading, plan_visits(reading.visits, cell)
+
+
+def whys(found: Planned, n: int) -> list[str]:
+    return [found.reasons[i] for i in range(n)]
+
+
+@pytest.mark.parametrize(
+    ("said", "why", "noted"),
+    [
+        ("-- nothing", "", 1),
+        ("$CNFG_CARE := TRUE", "$CNFG_CARE is TRUE", 0),
+        ("$CNFG_CARE := FALSE", "", 0),
+        ("READ (x)\n$CNFG_CARE := x", "$CNFG_CARE is not known here", 0),
+        ("IF $DIN[1] THEN\n$CNFG_CARE := TRUE\nENDIF", "$CNFG_CARE is not known", 0),
+    ],
+)
+def test_a_line_to_another_branch(cell: Cell, said: str, why: str, noted: int) -> None:
+    line = f"MOVE LINEAR TO {pos(cell, THERE, 'W')}"
+    reading, found = planned(cell, START, said, line)
+    assert found.reasons[1].startswith(why) and bool(why) == bool(found.reasons[1])
+    notes = overruled_strings(reading.visits, found.targets, found.plan)
+    assert len(notes) == noted
+
+
+@pytest.mark.parametrize(
+    ("said", "why"),
+    [
+        ("-- nothing", ""),
+        ("$TURN_CARE := TRUE", "$TURN_CARE is TRUE"),
+        ("$TURN_CARE := FALSE", ""),
+        ("$TURN_CARE := $DIN[2]", "$TURN_CARE is not known here"),
+    ],
+)
+def test_a_line_to_another_turn(cell: Cell, said: str, why: str) -> None:
+    line = f"MOVE LINEAR TO {pos(cell, THERE, 'T1:0 T2:1')}"
+    _, found = planned(cell, START, said, line)
+    assert found.reasons[1].startswith(why) and bool(why) == bool(found.reasons[1])
+    right = f"MOVE LINEAR TO {pos(cell, THERE, 'T1:0 T2:0')}"
+    assert planned(cell, START, said, right)[1].reasons[1] == ""
+
+
+def test_with_items_hold_for_one_move(cell: Cell) -> None:
+    line = f"MOVE LINEAR TO {pos(cell, THERE, 'W')}"
+    back = f"MOVE LINEAR TO {pos(cell, HERE, 'W')}"
+    with_ = f"{line} WITH $CNFG_CARE = FALSE"
+    _, found = planned(cell, START, "$CNFG_CARE := TRUE", with_, back)
+    assert whys(found, 2) == ["", ""]
+    assert found.reasons[2].startswith("$CNFG_CARE is TRUE")
+    _, other = planned(cell, START, "$ARM_DATA[2].CNFG_CARE := TRUE", line)
+    assert other.reasons[1] == ""
+
+
+@pytest.mark.parametrize(
+    ("said", "doubted"),
+    [("TRUE", False), ("FALSE", True), ("$DIN[1]", True), (None, False)],
+)
+def test_a_joint_move_to_another_branch(
+    cell: Cell, said: str | None, doubted: bool
+) -> None:
+    care = f"$CNFG_CARE := {said}" if said else "-- nothing"
+    flipped = [*THERE[:3], THERE[3] - 180, -THERE[4], THERE[5] - 180]
+    other = f"MOVE JOINT TO {pos(cell, flipped, 'W T1:0 T2:0')}"
+    after = f"MOVE LINEAR TO {pos(cell, HERE, 'W T1:0 T2:0')}"
+    _, found = planned(cell, START, care, other, after, START, after)
+    assert ("another branch than the arm is on" in found.reasons[1]) == doubted
+    comes = "it comes from a move whose branch or turn is not sure"
+    assert (found.reasons[2] == comes) == doubted
+    assert (found.reasons[3] == comes) == doubted
+    assert "comes from" not in found.reasons[4]
+    np.testing.assert_allclose(np.rad2deg(found.plan.q[1]), flipped, atol=1e-3)
+    same = f"MOVE JOINT TO {pos(cell, THERE, '')}"
+    _, found = planned(cell, START, care, same, same)
+    assert whys(found, 3) == ["", "", ""]
+
+
+@pytest.mark.parametrize(
+    ("turn", "multi", "planned_turn", "doubted"),
+    [
+        (None, None, 1, False),
+        ("TRUE", "TRUE", 1, False),
+        ("FALSE", None, 1, True),
+        ("FALSE", "FALSE", 0, False),
+        (None, "FALSE", 0, False),
+        ("TRUE", "FALSE", 0, True),
+        ("TRUE", "$DIN[1]", 1, True),
+        ("$DIN[1]", "FALSE", 0, True),
+    ],
+)
+def test_a_joint_move_to_another_turn(
+    cell: Cell, turn: str | None, multi: str | None, planned_turn: int, doubted: bool
+) -> None:
+    said = [f"$TURN_CARE := {turn}"] * bool(turn) + [f"$JNT_MTURN := {multi}"] * bool(
+        multi
+    )
+    move = f"MOVE JOINT TO {pos(cell, THERE, 'T1:0 T2:1')}"
+    _, found = planned(cell, START, *said, move)
+    assert ("another turn than the nearest" in found.reasons[1]) == doubted
+    wanted = THERE[5] + 360 * planned_turn
+    assert np.rad2deg(found.plan.q[1, 5]) == pytest.approx(wanted, abs=1e-3)
+    near = f"MOVE JOINT TO {pos(cell, THERE, 'T1:0 T2:0')}"
+    assert planned(cell, START, *said, near)[1].reasons[1] == ""
+
+
+def test_an_unknown_start_goes_by_the_string(cell: Cell) -> None:
+    move = f"MOVE JOINT TO {pos(cell, THERE, 'T1:0 T2:1')}"
+    _, found = planned(cell, "$CNFG_CARE := FALSE", "$TURN_CARE := FALSE", move)
+    assert found.reasons[0] == ""
+    np.testing.assert_allclose(
+        np.rad2deg(found.plan.q[0]), [*THERE[:5], THERE[5] + 360], atol=1e-3
+    )
