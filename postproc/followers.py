@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from postproc.language.visits import Visits
+from postproc.language.visits import Target, Visits
 from postproc.reconcile import Agreement
 
 Array = NDArray[np.float64]
@@ -30,6 +30,7 @@ def worsened(
 
     A target such as ``POS_SHIFT(p, ..)`` or ``NEAR p BY d`` needs a change of its own
     and gets that of ``p``. What it is then off must be no more than what it is off now.
+    ``FOR d TO p`` only takes its direction from ``p``: it is a part of the way there.
 
     Args:
         visits: n arrivals.
@@ -39,6 +40,8 @@ def worsened(
         agree_mm: Changes that differ less are the same.
     """
     rows, at = followers(visits, agreement)
+    whole = visits.target[rows] != Target.FOR
+    rows, at = rows[whole], at[whole]
     needed = change_mm[rows]
     left = np.linalg.norm(agreement.change_mm[at] - needed, axis=1)
     allowed = np.maximum(np.linalg.norm(needed, axis=1), agree_mm)

@@ -26,6 +26,7 @@ Bools = NDArray[np.bool_]
 
 FLAG = re.compile(r"([SEW])|T([123])\s*:\s*([+-]?\d+)", re.IGNORECASE)
 JOINTS = (Target.JOINTS, Target.HOME, Target.CALIBRATION)
+PLACED = (Kind.POSE, Kind.TOOL_STEP, Kind.BASE_STEP, Kind.TOWARDS)
 STEPS_IN = {
     Target.RELATIVE_TOOL: "tool",
     Target.RELATIVE_BASE: "base",
@@ -60,7 +61,7 @@ def targets_from_visits(visits: Visits, cell: Cell) -> tuple[Targets, Reasons]:
     outside = _auxiliary(visits, cell, reasons)
     _explain(visits, frames, values, poses, reasons)
     lost = (outside | visits.tool_remote) & (kind != Kind.JOINTS)
-    placed = np.isin(kind, (Kind.POSE, Kind.TOOL_STEP, Kind.BASE_STEP))
+    placed = np.isin(kind, PLACED)
     lost |= placed & np.isnan(tcp + frames.tool).any(axis=(1, 2))
     lost |= np.isnan(joints).any(axis=1) & np.isin(kind, (Kind.JOINTS, Kind.JOINT_STEP))
     slot, turns = configurations(visits.configs)
@@ -70,6 +71,7 @@ def targets_from_visits(visits: Visits, cell: Cell) -> tuple[Targets, Reasons]:
         kind=np.where(lost, Kind.UNKNOWN, kind),
         via=visits.via,
         tcp=tcp,
+        distance=np.where(visits.target == Target.FOR, visits.distance_mm * MM, np.nan),
         joints=joints,
         tool=frames.tool,
         slot=np.where(visits.config_given & poses, slot[visits.config], -1),
@@ -118,11 +120,15 @@ def _frames(visits: Visits) -> Frames:
 
 
 def _values(visits: Visits, cell: Cell) -> Array:
-    """Fill in $HOME where the program does not tell it."""
+    """Fill in $HOME and $CAL_SYS where the program does not tell them."""
     values = np.array(visits.values)
-    home = (visits.target == Target.HOME) & np.isnan(values).any(axis=1)
-    if cell.home is not None:
-        values[home] = np.rad2deg(cell.home)
+    untold = np.isnan(values).any(axis=1)
+    for target, joints in (
+        (Target.HOME, cell.home),
+        (Target.CALIBRATION, cell.calibration),
+    ):
+        if joints is not None:
+            values[untold & (visits.target == target)] = np.rad2deg(joints)
     return values
 
 
@@ -135,8 +141,8 @@ def _places(visits: Visits, frames: Frames, values: Array) -> tuple[Ints, Array,
     kind[in_joints], kind[target == Target.BY] = Kind.JOINTS, Kind.JOINT_STEP
     in_joints |= target == Target.BY
     joints[in_joints] = np.deg2rad(values[in_joints])
-    poses = np.isin(target, (Target.POSE, Target.NEAR))
-    kind[poses] = Kind.POSE
+    poses = np.isin(target, (Target.POSE, Target.NEAR, Target.FOR))
+    kind[poses] = np.where(target[poses] == Target.FOR, Kind.TOWARDS, Kind.POSE)
     user = frames.base_inverse[poses] @ frames.uframe[poses]
     tcp[poses] = user @ pose_from_record(values[poses])
     near = target == Target.NEAR

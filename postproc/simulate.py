@@ -84,6 +84,7 @@ def setup_of(cell: Cell) -> Setup:
         uframe=cell.uframe.pose,
         tools=probes,
         home=cell.home,
+        calibration=cell.calibration,
         payload=float(np.nan_to_num(cell.payload_mass)),
         payload_com=cell.payload_com,
         temperature=warm if np.isfinite(warm) else usual.temperature,

@@ -94,8 +94,29 @@ def with_steps(cell: Cell, rng: np.random.Generator) -> Visits:
     return visits(target, values, motion=np.array(motion))
 
 
+def with_parts(cell: Cell, rng: np.random.Generator) -> Visits:
+    """After every joint target two moves that go only a part of the way to a pose."""
+    tool, base, uframe = pose_from_record(FRAMES)
+    to_user = np.linalg.inv(uframe) @ base
+    target, values, distance = [], [], []
+    for _ in range(HOLES):
+        q = rng.uniform([-40, -20, -110, -80, 25, -80], [40, 20, -80, 80, 70, 80])
+        target.append(int(Target.JOINTS))
+        values.append(q.tolist())
+        distance.append(np.nan)
+        for _ in range(2):
+            there = np.deg2rad(q + rng.uniform(3.0, 8.0, 6) * rng.choice([-1, 1], 6))
+            T = (cell.arm.flange(there[None]) @ tool)[0]
+            target.append(int(Target.FOR))
+            values.append(record_from_pose(to_user @ T).tolist())
+            distance.append(rng.uniform(0.0, 40.0))
+    joints = np.array(target) == Target.JOINTS
+    motion = np.where(joints, Motion.JOINT, Motion.LINEAR)
+    return visits(target, values, motion=motion, distance_mm=np.array(distance))
+
+
 @pytest.mark.parametrize("seed", [0, 1])
-@pytest.mark.parametrize("write", [program, with_steps])
+@pytest.mark.parametrize("write", [program, with_steps, with_parts])
 def test_joint_angles_and_directions_agree(
     cell: Cell, seed: int, write: Callable[[Cell, np.random.Generator], Visits]
 ) -> None:

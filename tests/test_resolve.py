@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -50,6 +51,15 @@ def test_joints_and_home(cell: Cell) -> None:
     np.testing.assert_allclose(np.rad2deg(targets.joints[3]), [1, 0, 0, 0, 0, -5])
     assert reasons[2] == "a value is not known"
     assert (targets.slot == -1).all()
+
+
+def test_the_calibration_position_is_the_cells(cell: Cell) -> None:
+    angles = np.deg2rad([0.0, 0.0, -90.0, 0.0, 90.0, 0.0])
+    given = visits([Target.CALIBRATION, Target.HOME], [[np.nan] * 6] * 2)
+    known = replace(cell, calibration=angles, home=None)
+    targets, _ = targets_from_visits(given, known)
+    assert targets.kind.tolist() == [Kind.JOINTS, Kind.UNKNOWN]
+    np.testing.assert_allclose(targets.joints[0], angles)
 
 
 def test_steps_along_the_frames(cell: Cell) -> None:

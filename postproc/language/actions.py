@@ -23,7 +23,7 @@ class Move(Statement):
         settings: ``WITH $X = value`` of this move alone.
         conditions: ``WITH CONDITION[..]``: what runs beside the move.
         til: The move may end before its target.
-        sync: Another arm moves along.
+        sync: Moves of other arms that run along (SYNCMOVE).
     """
 
     fly: bool
@@ -36,7 +36,7 @@ class Move(Statement):
     settings: tuple[tuple[Reference, Expression], ...] = ()
     conditions: tuple[Expression | Index, ...] = ()
     til: bool = False
-    sync: bool = False
+    sync: tuple[Move, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

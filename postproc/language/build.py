@@ -7,6 +7,7 @@ rule's children: tokens (strings that know their type) and what other rules gave
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Any
 
 from postproc.language import pdl2 as ast
@@ -76,11 +77,15 @@ def _parameters(c: Children) -> list[ast.Parameter]:
 
 
 def _motion(c: Children) -> ast.Move:
+    return _move(c[0].kind == "MOVEFLY", c[1:])
+
+
+def _move(fly: bool, c: Children) -> ast.Move:
     arm = _of(c, ArmPart)
     how, where, via, frame = _of(c, DestinationPart)[0]
-    trajectory = [str(m).upper() for m in c[1:] if type(m) is Mark]
+    trajectory = [str(m).upper() for m in c if type(m) is Mark]
     return ast.Move(
-        fly=c[0].kind == "MOVEFLY",
+        fly=fly,
         arm=arm[0][0] if arm else None,
         trajectory=trajectory[0] if trajectory else "",
         how=how,
@@ -90,7 +95,7 @@ def _motion(c: Children) -> ast.Move:
         settings=tuple((s[0], s[1]) for s in _of(c, SettingPart)),
         conditions=tuple(b[0] for b in _of(c, BesidePart)),
         til=bool(_of(c, TilPart)),
-        sync=bool(_of(c, SyncPart)),
+        sync=tuple(replace(s[0], fly=fly) for s in _of(c, SyncPart)),
     )
 
 
@@ -198,7 +203,7 @@ RULES: dict[str, Rule] = {
     "destination": _destination,
     "clause": _clause,
     "with": lambda c: c[0],
-    "sync": lambda c: SyncPart(),
+    "sync": lambda c: SyncPart((_move(False, c),)),
     "item": SettingPart,
     "item_condition": _beside,
     "assign": lambda c: ast.Assign(c[0], str(c[1]), c[2]),

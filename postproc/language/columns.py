@@ -17,6 +17,8 @@ from postproc.language.world import base_variable
 
 Ints = NDArray[np.int64]
 
+_COMPUTED = (Target.POSE, Target.NEAR, Target.FOR)  # may move along with a literal
+
 
 @dataclass
 class Table:
@@ -104,7 +106,7 @@ class Collector:
                 c.aux[at, axis - 1] = value
         if position.editable and arrival.target in (Target.POSE, Target.JOINTS):
             c.slots[at] = position.slots
-        elif -1 not in position.slots and arrival.target in (Target.POSE, Target.NEAR):
+        elif -1 not in position.slots and arrival.target in _COMPUTED:
             c.bases[at] = position.slots
         else:
             world.pin(position, "a target is computed from a part of it")

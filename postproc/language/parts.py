@@ -41,8 +41,8 @@ class TilPart:
     """A TIL clause."""
 
 
-class SyncPart:
-    """A SYNCMOVE clause."""
+class SyncPart(tuple[Any, ...]):
+    """The move of a SYNCMOVE clause."""
 
 
 class DestinationPart(tuple[Any, ...]):

@@ -64,7 +64,9 @@ def arrive(work: Workspace, v: int, edge: int) -> Arrival:
         q = near + targets.joints[v]
         return Arrival(q, work.arm.flange(q[None])[0], -1, q[None], 0)
     flange = work.flange[v]
-    if np.isnan(flange).any():
+    if kind == Kind.TOWARDS:
+        flange = part_way(work, v, work.flange[source])
+    elif np.isnan(flange).any():
         flange = work.after_step(v, work.flange[source])
     if kind == Kind.JOINTS:
         end = Arrival(work.q[v], flange, -1, work.q[v][None], 0)
@@ -84,6 +86,23 @@ def arrive(work: Workspace, v: int, edge: int) -> Arrival:
         reason = end.reason if len(path) else end.reason or CODE[PATH_REACH]
         return Arrival(end.q, flange, end.slot, path, reason)
     return _along_line(work, v, edge, flange, end)
+
+
+def part_way(work: Workspace, v: int, flange: Array) -> Array:
+    """Place the flange after going a distance towards a pose, (4, 4) [m].
+
+    The tool turns in proportion; NaN where the pose is nearer than the distance, for
+    what the arm does then is not known.
+    """
+    targets = work.targets
+    line = lines((flange @ targets.tool[v])[None], targets.tcp[v][None])
+    distance, length = float(targets.distance[v]), float(line.length[0])
+    if not distance <= length:
+        return np.full((4, 4), np.nan)
+    share = np.array([distance / length if length > 0.0 else 0.0])
+    tcp = line.poses(np.zeros(1, dtype=np.int64), share)[0]
+    reached: Array = tcp @ work.tool_inverse[v]
+    return reached
 
 
 def choose(work: Workspace, v: int, flange: Array, near: Array | None) -> Arrival:

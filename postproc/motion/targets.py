@@ -39,6 +39,7 @@ class Kind(IntEnum):
     BASE_STEP = 3  # `tcp` is a turn and a shift of the TCP along the base frame's axes
     JOINT_STEP = 4  # `joints` are added to where the arm is
     UNKNOWN = 5  # the arm goes where nobody knows
+    TOWARDS = 6  # `tcp` is a pose that the arm goes `distance` towards on a line
 
 
 @dataclass(frozen=True)
@@ -52,6 +53,7 @@ class Targets:
         kind: `Kind`, (n,).
         via: True at the point on the way of an arc, (n,).
         tcp: Wanted TCP pose in the base frame, or a step, (n, 4, 4); else NaN.
+        distance: Of TOWARDS, (n,) [m]; else NaN.
         joints: Controller joint angles, or a step, (n, 6) [rad]; else NaN.
         tool: TCP in the flange frame, (n, 4, 4); NaN where not known.
         slot: Branch 4 W + 2 S + E of the configuration string, (n,); -1 without one.
@@ -74,6 +76,7 @@ class Targets:
     kind: Ints
     via: Bools
     tcp: Array
+    distance: Array
     joints: Array
     tool: Array
     slot: Ints
@@ -132,6 +135,7 @@ def make_targets(
         "move": np.zeros(n, dtype=np.int64),
         "via": np.zeros(n, dtype=bool),
         "tcp": np.full((n, 4, 4), np.nan) if tcp is None else tcp,
+        "distance": np.full(n, np.nan),
         "joints": np.full((n, 6), np.nan) if joints is None else joints,
         "tool": np.tile(np.eye(4), (n, 1, 1)),
         "slot": np.full(n, -1),

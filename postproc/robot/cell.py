@@ -66,8 +66,8 @@ class RobotSection(Strict):
     absolute_accuracy: bool = False
 
 
-class HomeSection(Strict):
-    """Where $HOME is."""
+class JointSection(Strict):
+    """Where $HOME or $CAL_SYS is."""
 
     joints_deg: Sextuple
 
@@ -133,7 +133,8 @@ class CellFile(Strict):
     tool: FrameSection | None = None
     base: FrameSection | None = None
     uframe: FrameSection | None = None
-    home: HomeSection | None = None
+    home: JointSection | None = None
+    calibration: JointSection | None = None
     payload: PayloadSection | None = None
     environment: EnvironmentSection | None = None
     tracker: TrackerSection | None = None
@@ -165,6 +166,7 @@ class Cell:
         base: The arm's base in the world at program start.
         uframe: The user frame in the world at program start.
         home: $HOME, (6,) [rad], or None.
+        calibration: $CAL_SYS, (6,) [rad], or None.
         payload_mass: [kg], NaN where not declared.
         payload_com: Centre of mass in the flange frame, (3,) [m].
         temperature: [deg C], NaN where not declared.
@@ -188,6 +190,7 @@ class Cell:
     base: Frame
     uframe: Frame
     home: Array | None
+    calibration: Array | None
     payload_mass: float
     payload_com: Array
     temperature: float
@@ -229,7 +232,8 @@ def load_cell(path: str | Path) -> Cell:
         tool=_frame(file.tool),
         base=_frame(file.base),
         uframe=_frame(file.uframe),
-        home=_home(file, arm, path),
+        home=_angles(file.home, "home", arm, path),
+        calibration=_angles(file.calibration, "calibration", arm, path),
         payload_mass=np.nan if payload is None else payload.mass_kg,
         payload_com=np.array(NO_ANGLES if payload is None else payload.com_mm) * MM,
         temperature=file.environment.temperature_c if file.environment else np.nan,
@@ -258,20 +262,22 @@ def _taught_frames(file: CellFile) -> dict[tuple[float, ...], Array | None]:
     }
 
 
-def _home(file: CellFile, arm: Arm, path: Path) -> Array | None:
-    """Convert and check $HOME."""
-    if file.home is None:
+def _angles(
+    section: JointSection | None, name: str, arm: Arm, path: Path
+) -> Array | None:
+    """Convert and check $HOME or $CAL_SYS."""
+    if section is None:
         return None
-    home: Array = np.deg2rad(file.home.joints_deg)
-    if not arm.within_limits(home[None])[0]:
-        j = int(np.argmax((home < arm.lower) | (home > arm.upper)))
+    joints: Array = np.deg2rad(section.joints_deg)
+    if not arm.within_limits(joints[None])[0]:
+        j = int(np.argmax((joints < arm.lower) | (joints > arm.upper)))
         raise CellError(
             path,
-            f"{file.home.joints_deg[j]:g} deg is outside the range of axis {j + 1}",
+            f"{section.joints_deg[j]:g} deg is outside the range of axis {j + 1}",
             "Correct the angle or the arm file",
-            place=f"$.home.joints_deg[{j + 1}]",
+            place=f"$.{name}.joints_deg[{j + 1}]",
         )
-    return home
+    return joints
 
 
 def _probes(file: CellFile) -> Array:

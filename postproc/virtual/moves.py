@@ -11,7 +11,13 @@ from postproc.exceptions import PlanError
 from postproc.language.visits import Motion, Target, Visits
 from postproc.virtual.controller import flange_of, joints_along, joints_of_pose
 from postproc.virtual.path import arc, straight
-from postproc.virtual.rotation import exponential, pose, pose_of_record, undo
+from postproc.virtual.rotation import (
+    exponential,
+    logarithm,
+    pose,
+    pose_of_record,
+    undo,
+)
 from postproc.virtual.setup import Setup
 from postproc.virtual.wrist import joints_with_wrist
 
@@ -132,8 +138,8 @@ def _goal_joints(
         return _known(np.radians(values))
     if kind is Target.BY:
         return here + _known(np.radians(values))
-    if kind is Target.HOME:
-        return _home(setup)
+    if kind in (Target.HOME, Target.CALIBRATION):
+        return _place_of(setup, kind)
     config = None
     if kind in (Target.POSE, Target.NEAR) and visits.config_given[i]:
         config = visits.configs[visits.config[i]]
@@ -148,15 +154,17 @@ def _goal_pose(
     """Return the TCP pose in the arm base, (4, 4), that visit i asks for."""
     kind, values = Target(visits.target[i]), visits.values[i]
     tool = frames.tool
-    if kind in (Target.JOINTS, Target.HOME, Target.BY):
+    if kind in (Target.JOINTS, Target.HOME, Target.CALIBRATION, Target.BY):
         joints = _goal_joints(setup, visits, i, frames, here)
         return np.asarray(setup.chain.flange(joints[None])[0] @ tool)
-    if kind in (Target.POSE, Target.NEAR):
+    present = setup.chain.flange(here[None])[0] @ tool
+    if kind in (Target.POSE, Target.NEAR, Target.FOR):
         target = pose_of_record(_known(values))
         if kind is Target.NEAR:
             target = target @ _shift(0.0, 0.0, -visits.distance_mm[i])
-        return flange_of(target, tool, frames.base, frames.uframe) @ tool
-    present = setup.chain.flange(here[None])[0] @ tool
+        goal = flange_of(target, tool, frames.base, frames.uframe) @ tool
+        distance = visits.distance_mm[i] * 1e-3
+        return goal if kind is not Target.FOR else _towards(present, goal, distance)
     if kind is Target.AWAY:
         return np.asarray(present @ _shift(0.0, 0.0, -_known(values[:1])[0]))
     if kind is Target.RELATIVE_TOOL:
@@ -200,7 +208,25 @@ def _known(values: Array) -> Array:
     return np.asarray(values)
 
 
-def _home(setup: Setup) -> Array:
-    if setup.home is None:
-        raise PlanError("$HOME is not known; give [home] joints_deg in the cell file")
-    return setup.home
+def _place_of(setup: Setup, kind: Target) -> Array:
+    """Return the joints (6,) [rad] of a place that the controller holds."""
+    home = kind is Target.HOME
+    joints = setup.home if home else setup.calibration
+    if joints is None:
+        name, key = ("$HOME", "home") if home else ("$CAL_SYS", "calibration")
+        raise PlanError(
+            f"{name} is not known; give [{key}] joints_deg in the cell file"
+        )
+    return joints
+
+
+def _towards(present: Array, goal: Array, distance: float) -> Array:
+    """Go a distance [m] from one pose towards another; the tool turns with the way."""
+    way = goal[:3, 3] - present[:3, 3]
+    length = float(np.linalg.norm(way))
+    if distance > length:
+        raise PlanError("the pose is nearer than the move is to go towards it")
+    share = distance / length if length else 0.0
+    turn = logarithm(present[:3, :3].T @ goal[:3, :3])
+    turned = present[:3, :3] @ exponential(share * turn)
+    return pose(turned, present[:3, 3] + share * way)

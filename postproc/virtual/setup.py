@@ -33,6 +33,7 @@ class Setup:
         uframe: World to user frame, (4, 4).
         tools: Tools that `tool_id` columns count, (k, 4, 4); empty: always `tool`.
         home: $HOME and where programs start, (6,) [rad], or None.
+        calibration: $CAL_SYS, (6,) [rad], or None.
         payload: [kg].
         payload_com: In the flange frame, (3,) [m].
         temperature: At the start, [deg C].
@@ -46,6 +47,7 @@ class Setup:
     uframe: Array = field(default_factory=_identity)
     tools: Array = field(default_factory=lambda: np.zeros((0, 4, 4)))
     home: Array | None = None
+    calibration: Array | None = None
     payload: float = 0.0
     payload_com: Array = field(default_factory=lambda: np.zeros(3))
     temperature: float = 22.0
