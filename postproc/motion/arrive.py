@@ -26,6 +26,7 @@ from postproc.motion.reasons import (
     PATH_REACH,
 )
 from postproc.motion.targets import Kind, Move
+from postproc.motion.ways import Solved, Ways
 from postproc.motion.workspace import Workspace
 from postproc.motion.wrist import wrist_interpolated
 from postproc.robot.arm import Arm
@@ -118,8 +119,7 @@ def choose(work: Workspace, v: int, flange: Array, near: Array | None) -> Arriva
     unknown = np.full(6, np.nan)
     if np.isnan(flange).any():
         return Arrival(unknown, flange, -1, NO_PATH, CODE[OUT_OF_REACH])
-    row = work.solved[v]
-    branches = work.branches[row] if row >= 0 else arm.inverse(flange[None]).q[0]
+    branches = work.solutions(v, flange)
     if np.isnan(branches).any(axis=1).all():
         return Arrival(unknown, flange, -1, NO_PATH, CODE[OUT_OF_REACH])
     slot = int(targets.slot[v])
@@ -149,11 +149,9 @@ def _along_line(
     """Follow a Cartesian path; where that fails, keep the end and say why."""
     near = work.q[work.source[edge]]
     joints = work.targets.kind[v] == Kind.JOINTS
-    branches = _branches(work, v, edge, flange)
-    if joints:
-        branches = branches[:-1]
-    done = follow(near, branches)
-    if len(done.q) < len(branches):
+    ways = _ways(work, v, edge, flange, not joints)
+    done = follow(near, ways)
+    if len(done.q) < len(ways):
         lost = OUT_OF_REACH if len(end.path) == 0 else PATH_REACH
         reason = CODE[PATH_JUMP if done.reached else lost]
         return Arrival(end.q, flange, end.slot, NO_PATH, reason)
@@ -168,18 +166,15 @@ def _along_line(
     return Arrival(end.q, flange, -1, np.vstack([done.q, end.q]), 0)
 
 
-def _branches(work: Workspace, v: int, edge: int, flange: Array) -> Array:
-    """All solutions along an edge, the target included, (k, 8, 6) [rad]."""
+def _ways(work: Workspace, v: int, edge: int, flange: Array, target: bool) -> Ways:
+    """Return the solutions along an edge, with or without those at the target."""
     if work.samples.ready[edge]:
-        rows = work.row[work.span(edge)]
-        ready = np.full((len(rows), 8, 6), np.nan)  # a joint target has no row
-        ready[rows >= 0] = work.branches[rows[rows >= 0]]
-        return ready
+        span = work.span(edge)
+        return work.ways(slice(span.start, span.stop if target else span.stop - 1))
     tool = work.targets.tool[v]
     begin = (work.flange[work.source[edge]] @ tool)[None]
     line = lines(begin, (flange @ tool)[None])
     k = work.samples.count(edge)
-    u = np.arange(1, k + 1) / k
-    tcp = line.poses(np.zeros(k, dtype=np.int64), u)
-    solved: Array = work.arm.inverse(tcp @ work.tool_inverse[v]).q
-    return solved
+    u = np.arange(1, k + (1 if target else 0)) / k
+    tcp = line.poses(np.zeros(len(u), dtype=np.int64), u)
+    return Solved(work.arm.inverse(tcp @ work.tool_inverse[v]).q)

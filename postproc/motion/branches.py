@@ -7,6 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from postproc.motion.ways import Ways
+
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
@@ -64,24 +66,24 @@ class Followed:
     reached: bool
 
 
-def follow(begin: Array, branches: Array) -> Followed:
+def follow(begin: Array, ways: Ways) -> Followed:
     """Follow the branch and the turns that continue a motion.
 
     Args:
         begin: Joint angles before the first sample, (6,) [rad].
-        branches: All solutions at the samples, (s, 8, 6) [rad], NaN where none.
+        ways: The solutions at the s samples.
 
     Returns:
         The whole path, or its beginning up to where it cannot be followed.
     """
-    s = len(branches)
+    s = len(ways)
     q, slots = np.empty((s, 6)), np.empty(s, dtype=np.int64)
     done, last = 0, begin
     while done < s:
-        slot = nearest_slot(branches[done], last)
+        slot = nearest_slot(ways.all(done), last)
         if slot < 0:
             return Followed(q[:done], slots[:done], False)
-        path = np.unwrap(np.vstack([last, branches[done:, slot]]), axis=0)
+        path = np.unwrap(np.vstack([last, ways.on(slot, done)]), axis=0)
         step = np.abs(np.diff(path, axis=0)).max(axis=1)
         if step[0] > LOST:
             return Followed(q[:done], slots[:done], True)

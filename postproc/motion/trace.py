@@ -21,7 +21,7 @@ from postproc.motion.reasons import (
     PATH_LIMITS,
 )
 from postproc.motion.targets import Kind, Move, Targets
-from postproc.motion.workspace import Workspace
+from postproc.motion.workspace import Known, Workspace
 from postproc.robot.arm import Arm
 from postproc.robot.chains import Edges
 
@@ -64,46 +64,37 @@ class Trace:
     pull: Pull = field(default_factory=Pull)
 
 
-def trace(arm: Arm, targets: Targets) -> Trace:
+def trace(arm: Arm, targets: Targets, known: Known | None = None) -> Trace:
     """Find the joint angles at all targets and along all paths.
+
+    Args:
+        arm: The arm.
+        targets: The moves.
+        known: Targets whose joint angles are known beforehand.
 
     Raises:
         PlanError: The arm has no closed-form inverse kinematics.
     """
-    work = Workspace(arm, targets)
-    settled = _from_strings(work)
-    smooth = _single_lines(work) & ~settled
-    _in_order(work, np.flatnonzero(~settled), smooth)
+    work = Workspace(arm, targets, known)
+    settled = _from_strings(work) | work.given
+    _in_order(work, np.flatnonzero(~settled), work.single & ~settled)
     return _finished(work)
 
 
 def _from_strings(work: Workspace) -> Bools:
     """Settle what does not depend on where the arm comes from; tell which."""
-    t = work.targets
+    t, rows = work.targets, np.flatnonzero(work.by_string)
     work.reason[t.kind == Kind.UNKNOWN] = CODE[NO_TARGET]
-    joint_moves = t.move == Move.JOINT
-    direct = joint_moves & (t.kind == Kind.POSE) & (t.slot >= 0) & ~t.nearest_turn
-    rows = np.flatnonzero(direct & (work.solved >= 0))
-    branches = work.branches[work.solved[rows]]
-    q = branches[np.arange(len(rows)), t.slot[rows]]
+    slot = t.slot[rows]
+    q = work.arm.into_range(work.arm.on_branch(work.flange[rows], slot))
     work.q[rows] = on_written_turns(q, t.turns[rows])
-    work.slot[rows] = t.slot[rows]
-    missing, nowhere = np.isnan(q[:, 0]), np.isnan(branches[..., 0]).all(axis=1)
-    work.reason[rows[missing]] = CODE[NO_BRANCH]
-    work.reason[rows[nowhere]] = CODE[OUT_OF_REACH]
-    settled = (t.kind == Kind.UNKNOWN) | (joint_moves & (t.kind == Kind.JOINTS))
-    settled[rows] = True
-    return np.asarray(settled)
-
-
-def _single_lines(work: Workspace) -> Bools:
-    """Tell which targets continue a Cartesian path from the one before, and only it."""
-    n, samples = len(work.q), work.samples
-    out = np.zeros(n, dtype=bool)
-    single = np.flatnonzero(np.diff(work.targets.pred_start) == 1)
-    edge = work.targets.pred_start[single]
-    out[single] = samples.ready[edge] & (samples.source[edge] == single - 1)
-    return out & (work.solved >= 0)
+    work.slot[rows] = slot
+    missing = rows[np.isnan(q[:, 0])]
+    work.reason[missing] = CODE[NO_BRANCH]
+    nowhere = np.isnan(work.arm.inverse(work.flange[missing]).q[..., 0]).all(axis=1)
+    work.reason[missing[nowhere]] = CODE[OUT_OF_REACH]
+    joints = (t.move == Move.JOINT) & (t.kind == Kind.JOINTS)
+    return np.asarray(work.by_string | (t.kind == Kind.UNKNOWN) | joints)
 
 
 def _in_order(work: Workspace, visits: Ints, smooth: Bools) -> None:
@@ -130,7 +121,7 @@ def _stretch(work: Workspace, v: int, count: int) -> int:
     first = int(work.targets.pred_start[v])
     start = work.samples.start
     span = slice(int(start[first]), int(start[first + count]))
-    done = follow(work.q[v - 1], work.branches[work.row[span]])
+    done = follow(work.q[v - 1], work.ways(span))
     ends = start[first + 1 : first + count + 1] - span.start
     reached = int(np.searchsorted(ends, len(done.q), side="right"))
     at = ends[:reached] - 1

@@ -2,20 +2,42 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
 from postproc.motion.sampling import sample
-from postproc.motion.targets import Kind, Targets
+from postproc.motion.targets import Kind, Move, Targets
+from postproc.motion.ways import OnDemand, Solved, Ways
 from postproc.pose import inverse
 from postproc.robot.arm import Arm
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
+Bools = NDArray[np.bool_]
 
 STRAIGHT = 1e-3  # [rad] at axis 5, below this the two wrist branches are one
 CHUNK = 50_000  # poses solved at a time; solving needs room for copies
 SAME_POSE = 1e-7  # [m] and sines; poses that several predecessors agree on
+LONG = 64  # targets on one path from which on one branch is cheaper than all of them
+
+
+@dataclass(frozen=True)
+class Known:
+    """What is known beforehand of k targets, whatever leads to them.
+
+    Attributes:
+        rows: The targets, (k,).
+        q: Their joint angles, (k, 6) [rad].
+        flange: Their flange poses, (k, 4, 4) [m].
+        slot: Their branches, (k,).
+    """
+
+    rows: Ints
+    q: Array
+    flange: Array
+    slot: Ints
 
 
 class Workspace:
@@ -29,12 +51,12 @@ class Workspace:
         samples: Where the samples stand.
         source: Predecessor of each edge, (e,); becomes -1 where a path stays unknown.
         path: Joint angles at the samples, (s, 6) [rad], NaN where not known yet.
-        branches: All solutions of what could be solved beforehand, (r, 8, 6) [rad].
-        row: Row of `branches` for each sample, (s,), -1 where there is none.
-        solved: Row of `branches` for each target, (n,), -1 where there is none.
+        placed: Flange poses known beforehand that joint angles must be found for, (n,).
+        long: Targets of long stretches of single Cartesian paths, (n,); these are
+            followed on one branch, and the others are not looked for.
     """
 
-    def __init__(self, arm: Arm, targets: Targets) -> None:
+    def __init__(self, arm: Arm, targets: Targets, known: Known | None = None) -> None:
         """Place what does not depend on joint angles and solve for it in one batch."""
         self.arm, self.targets = arm, targets
         n = len(targets)
@@ -44,10 +66,18 @@ class Workspace:
         self.reason = np.zeros(n, dtype=np.int64)
         self.flange = np.full((n, 4, 4), np.nan)
         self._place()
+        self.given = np.zeros(n, dtype=bool)
+        if known is not None:
+            self._give(known)
         self._settle_steps()
         self.samples = sample(targets, self.flange)
         self.source = np.array(self.samples.source)
         self.path = np.full((int(self.samples.start[-1]), 6), np.nan)
+        placed = ~np.isnan(self.flange).any(axis=(1, 2))
+        self.placed = placed & (targets.kind != Kind.JOINTS) & ~self.given
+        self.by_string = self._by_string()
+        self.single = self._single_lines()
+        self.long = self.single & (_run_lengths(self.single) >= LONG)
         self._solve()
 
     def _place(self) -> None:
@@ -85,21 +115,70 @@ class Workspace:
         moved: Array = tcp @ self.tool_inverse[v]
         return moved
 
+    def _give(self, known: Known) -> None:
+        """Take over what is known of some targets."""
+        self.q[known.rows], self.slot[known.rows] = known.q, known.slot
+        self.flange[known.rows] = known.flange
+        self.given[known.rows] = True
+
+    def _by_string(self) -> Bools:
+        """Tell which targets need nothing but their configuration string."""
+        t = self.targets
+        told = (t.kind == Kind.POSE) & (t.slot >= 0) & ~t.nearest_turn
+        return np.asarray(told & (t.move == Move.JOINT) & self.placed)
+
+    def _single_lines(self) -> Bools:
+        """Tell which targets continue a Cartesian path from the one before alone."""
+        samples, out = self.samples, np.zeros(len(self.q), dtype=bool)
+        single = np.flatnonzero(np.diff(self.targets.pred_start) == 1)
+        edge = self.targets.pred_start[single]
+        out[single] = samples.ready[edge] & (samples.source[edge] == single - 1)
+        return np.asarray(out & self.placed)
+
     def _solve(self) -> None:
-        """Solve for all known poses, then all inner samples, in one batch."""
-        n, kind, samples = len(self.q), self.targets.kind, self.samples
-        known = ~np.isnan(self.flange).any(axis=(1, 2)) & (kind != Kind.JOINTS)
-        poses = np.flatnonzero(known)
-        self.solved = np.full(n, -1)
-        self.solved[poses] = np.arange(len(poses))
-        everything = np.concatenate([self.flange[poses], samples.flange])
-        self.branches = np.empty((len(everything), 8, 6))
-        for i in range(0, len(everything), CHUNK):
+        """Solve for all branches where there is no long stretch, in one batch."""
+        samples, start = self.samples, self.samples.start
+        poses = np.flatnonzero(self.placed & ~self.by_string & ~self.long)
+        edge = np.searchsorted(start, samples.inner, side="right") - 1
+        inner = np.flatnonzero(~self.long[samples.visit[edge]])
+        asked = np.concatenate([self.flange[poses], samples.flange[inner]])
+        self.branches = np.empty((len(asked), 8, 6))
+        for i in range(0, len(asked), CHUNK):
             rows = slice(i, i + CHUNK)
-            self.branches[rows] = self.arm.inverse(everything[rows]).q
-        self.row = np.full(int(samples.start[-1]), -1)
-        self.row[samples.inner] = len(poses) + np.arange(len(samples.inner))
-        self.row[samples.start[1:] - 1] = self.solved[samples.visit]
+            self.branches[rows] = self.arm.inverse(asked[rows]).q
+        self.solved = np.full(len(self.q), -1)
+        self.solved[poses] = np.arange(len(poses))
+        self.row = np.full(int(start[-1]), -1)
+        self.row[samples.inner[inner]] = len(poses) + np.arange(len(inner))
+        self.row[start[1:] - 1] = self.solved[samples.visit]
+        self._inner = np.full(int(start[-1]), -1)
+        self._inner[samples.inner] = np.arange(len(samples.inner))
+
+    def solutions(self, v: int, flange: Array) -> Array:
+        """Return all branches at target v with its flange pose, (8, 6) [rad]."""
+        if self.solved[v] >= 0:
+            known: Array = self.branches[self.solved[v]]
+            return known
+        found: Array = self.arm.inverse(flange[None]).q[0]
+        return found
+
+    def ways(self, span: slice) -> Ways:
+        """Return the solutions at some samples of ready edges."""
+        rows = self.row[span]
+        if len(rows) and (rows >= 0).all():
+            return Solved(self.branches[rows])
+        return OnDemand(self.arm, self._flange_at(span))
+
+    def _flange_at(self, span: slice) -> Array:
+        """Look up the flange poses at samples of ready edges, (k, 4, 4) [m]."""
+        samples, ends = self.samples, self.samples.start[1:] - 1
+        at = self._inner[span]
+        inside = np.flatnonzero(at >= 0)
+        edges = slice(*np.searchsorted(ends, (span.start, span.stop)))
+        out = np.empty((span.stop - span.start, 4, 4))
+        out[inside] = samples.flange.take(at[inside], axis=0)
+        out[ends[edges] - span.start] = self.flange[samples.visit[edges]]
+        return out
 
     def is_known(self, v: int) -> bool:
         """Tell whether the joint angles at a target are known already."""
@@ -113,3 +192,12 @@ class Workspace:
     def span(self, edge: int) -> slice:
         """Return the samples of an edge."""
         return slice(int(self.samples.start[edge]), int(self.samples.start[edge + 1]))
+
+
+def _run_lengths(inside: Bools) -> Ints:
+    """Return the length of the run of True that each place lies in, (n,); else 0."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], inside, [0]])))
+    begin, end = edges[::2], edges[1::2]
+    out = np.zeros(len(inside), dtype=np.int64)
+    out[inside] = np.repeat(end - begin, end - begin)
+    return out

@@ -64,6 +64,25 @@ class DH:
             p = p + self.a[i] * x
             yield x, y, z, p
 
+    def placed(self, q: Array, point: Array) -> Array:
+        """Express points of the flange frame in the base frame, (n, 3) [m].
+
+        Going back along the chain, T_i = Rot_z(theta) Trans(a, 0, d) Rot_x(alpha).
+
+        Args:
+            q: Controller angles, (n, 6) [rad].
+            point: Flange frame, (n, 3) [m].
+        """
+        theta = np.ascontiguousarray(self.angles(q).T)
+        cos, sin = np.cos(theta), np.sin(theta)
+        x, y, z = np.array(np.broadcast_to(point, (len(q), 3)).T)
+        for i in reversed(range(6)):
+            ca, sa = np.cos(self.alpha[i]), np.sin(self.alpha[i])
+            y, z = ca * y - sa * z, sa * y + ca * z + self.d[i]
+            x = x + self.a[i]
+            x, y = cos[i] * x - sin[i] * y, sin[i] * x + cos[i] * y
+        return np.stack([x, y, z], axis=1)
+
 
 def pose_of(frame: Frame) -> Array:
     """Write frames as poses, (n, 4, 4) [m]."""
@@ -147,6 +166,15 @@ class Arm:
         """Place the flange: (n, 6) [rad] -> (n, 4, 4) [m], base frame."""
         *_, last = self.dh.frames(q)
         return pose_of(last)
+
+    def tcp(self, q: Array, tool: Array) -> Array:
+        """Place the TCP alone: (n, 3) [m], base frame.
+
+        Args:
+            q: Joint angles, (n, 6) [rad].
+            tool: TCP in the flange frame, (n, 3) [m].
+        """
+        return self.dh.placed(q, tool)
 
     def kinematics(self, q: Array) -> tuple[Array, Array]:
         """Place the flange and give the joint screws.
@@ -270,6 +298,14 @@ class Arm:
             PlanError: The arm file has no closed-form inverse kinematics.
         """
         return self._solver.branch(flange, slot)
+
+    def into_range(self, q: Array) -> Array:
+        """Shift joint angles (.., 6) [rad] by turns into the range, as `inverse` does.
+
+        Raises:
+            PlanError: The arm file has no closed-form inverse kinematics.
+        """
+        return self._solver.into_range(q)
 
     def branch(self, q: Array) -> Ints:
         """Name the branch (slot 4 W + 2 S + E) of joint angles (n, 6) [rad]."""

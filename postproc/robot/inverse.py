@@ -46,7 +46,7 @@ class Inverse:
     def branches(self, flange: Array) -> Branches:
         """Solve for all branches of flange poses (n, 4, 4) [m]."""
         q = self._closed.branches(flange) @ self._unmix.T
-        return Branches(self._into_range(q))
+        return Branches(self.into_range(q))
 
     def branch(self, flange: Array, slot: Ints) -> Array:
         """Solve for one branch each of flange poses (n, 4, 4) [m], on any turn.
@@ -61,7 +61,7 @@ class Inverse:
         """Name the branch (slot 4 W + 2 S + E) of joint angles (n, 6) [rad]."""
         return self._closed.slot(q @ self._mix.T)
 
-    def _into_range(self, q: Array) -> Array:
+    def into_range(self, q: Array) -> Array:
         """Shift angles by whole turns into the joint range where that is possible."""
         turn = 2 * np.pi
         below = np.pi - q

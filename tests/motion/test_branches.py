@@ -1,9 +1,24 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 from postproc.motion.branches import follow, on_written_turns
+from postproc.motion.ways import OnDemand, Solved, Ways
 from postproc.robot.arm import Arm
+
+
+@pytest.fixture(params=["beforehand", "on demand"])
+def ways(request):
+    """The solutions at joint angles (k, 6) [rad], found in one of both ways."""
+
+    def solutions(arm: Arm, q: np.ndarray) -> Ways:
+        flange = arm.flange(q)
+        if request.param == "on demand":
+            return OnDemand(arm, flange)
+        return Solved(arm.inverse(flange).q)
+
+    return solutions
 
 
 def test_turns_come_from_the_string() -> None:
@@ -16,19 +31,19 @@ def test_turns_come_from_the_string() -> None:
     np.testing.assert_array_equal(k, turns[1])
 
 
-def test_a_path_through_a_straight_wrist_changes_the_branch(arm: Arm) -> None:
+def test_a_path_through_a_straight_wrist_changes_the_branch(arm: Arm, ways) -> None:
     # Axes 4 and 6 rest while axis 5 passes zero: the sign of axis 5 is the W flag.
     q = np.tile(np.deg2rad([10.0, 0, -90, 0, 0, 0]), (41, 1))
     q[:, 4] = np.linspace(np.deg2rad(20.3), np.deg2rad(-20), 41)
-    found = follow(q[0], arm.inverse(arm.flange(q[1:])).q)
+    found = follow(q[0], ways(arm, q[1:]))
     np.testing.assert_allclose(found.q, q[1:], atol=1e-7)
     assert found.slot[0] == 0 and found.slot[-1] == 4
 
 
-def test_turns_add_up_over_several_rounds(arm: Arm) -> None:
+def test_turns_add_up_over_several_rounds(arm: Arm, ways) -> None:
     q = np.tile(np.deg2rad([10.0, 0, -90, 20, 40, 0]), (200, 1))
     q[:, 5] = np.linspace(0, np.deg2rad(1500), 200)
-    found = follow(q[0], arm.inverse(arm.flange(q[1:])).q)
+    found = follow(q[0], ways(arm, q[1:]))
     np.testing.assert_allclose(found.q, q[1:], atol=1e-7)
 
 
@@ -36,12 +51,12 @@ def test_it_stops_where_there_is_no_solution(arm: Arm) -> None:
     q = np.tile(np.deg2rad([10.0, 0, -90, 20, 40, 0]), (5, 1))
     branches = arm.inverse(arm.flange(q)).q.copy()
     branches[3] = np.nan
-    found = follow(q[0], branches)
+    found = follow(q[0], Solved(branches))
     assert len(found.q) == 3 and not found.reached
 
 
-def test_it_stops_at_a_jump(arm: Arm) -> None:
+def test_it_stops_at_a_jump(arm: Arm, ways) -> None:
     q = np.tile(np.deg2rad([10.0, 0, -90, 20, 40, 0]), (4, 1))
     q[2:, 0] += 2.0
-    found = follow(q[0], arm.inverse(arm.flange(q)).q)
+    found = follow(q[0], ways(arm, q))
     assert len(found.q) == 2 and found.reached

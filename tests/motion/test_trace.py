@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from postproc.motion.planner import plan, reach
+from postproc.motion.planner import plan
+from postproc.motion.reach import reach
 from postproc.motion.reasons import (
     AMBIGUOUS,
     LIMITS,
@@ -102,7 +103,7 @@ def test_joint_4_turns_back_before_the_end_of_a_straight_line(
 ) -> None:
     home, end = turning_line(arm, tool)
     found = reach(arm, lines_from(arm, tool, home, [end]))
-    q, side = found.q, np.sign(found.side)
+    q, side = found.passed.q, np.sign(found.side)
     assert side[1, 3] == -np.sign(q[1, 3] - q[0, 3]) != 0
 
 
@@ -396,3 +397,31 @@ def test_a_lone_move_from_anywhere(
     found = plan(arm, targets, np.deg2rad(3.0))
     np.testing.assert_allclose(found.q[0, :3], home[:3], atol=1e-9)
     assert (found.direction == 0).all()
+
+
+def test_long_paths_with_arcs_are_followed_on_demand(
+    arm: Arm, tool: np.ndarray, home: np.ndarray
+) -> None:
+    # Lines and arcs in turns, more of them than are solved beforehand.
+    T0, poses = at(arm, tool, home), []
+    move, via = [Move.JOINT], [False]
+    for k in range(60):
+        x = 0.004 * k
+        for xyz, kind, on_way in (
+            ((x, 0.02, 0.0), Move.LINEAR, False),
+            ((x + 0.001, 0.03, 0.01), Move.CIRCULAR, True),
+            ((x + 0.002, 0.02, 0.02), Move.CIRCULAR, False),
+        ):
+            poses.append(shifted(T0, xyz))
+            move.append(kind)
+            via.append(on_way)
+    targets = lines_from(arm, tool, home, poses, move=np.array(move), via=np.array(via))
+    found = trace(arm, targets)
+    assert (found.reason == 0).all() and (found.edges.source[1:] >= 0).all()
+    tcp = arm.flange(found.edges.path) @ tool
+    ends = found.edges.start[2:] - 1
+    np.testing.assert_allclose(
+        tcp[ends][:, :3, 3], np.array(poses)[:, :3, 3], atol=1e-9
+    )
+    steps = np.linalg.norm(np.diff(tcp[:, :3, 3], axis=0), axis=1)
+    assert steps[1:].max() < 0.03

@@ -1,0 +1,77 @@
+"""The solutions at the samples of a path: all branches, or only those asked for."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from postproc.robot.arm import Arm
+
+Array = NDArray[np.float64]
+
+
+class Ways(Protocol):
+    """Solutions of the inverse kinematics at k samples."""
+
+    def __len__(self) -> int:
+        """Return the number of samples."""
+        ...
+
+    def all(self, i: int) -> Array:
+        """Return all branches at sample i, (8, 6) [rad], NaN where none."""
+        ...
+
+    def on(self, slot: int, first: int) -> Array:
+        """Return one branch at samples from `first` on, (.., 6) [rad], on any turn."""
+        ...
+
+
+@dataclass(frozen=True)
+class Solved:
+    """Ways of samples that were solved beforehand, (k, 8, 6) [rad]."""
+
+    branches: Array
+
+    def __len__(self) -> int:
+        """Return the number of samples."""
+        return len(self.branches)
+
+    def all(self, i: int) -> Array:
+        """Look all branches up."""
+        branches: Array = self.branches[i]
+        return branches
+
+    def on(self, slot: int, first: int) -> Array:
+        """Look one branch up."""
+        branch: Array = self.branches[first:, slot]
+        return branch
+
+
+@dataclass(frozen=True)
+class OnDemand:
+    """Ways of a long path, which keeps to one branch: the others are hardly needed.
+
+    Attributes:
+        arm: The arm.
+        flange: Flange poses, (k, 4, 4) [m].
+    """
+
+    arm: Arm
+    flange: Array
+
+    def __len__(self) -> int:
+        """Return the number of samples."""
+        return len(self.flange)
+
+    def all(self, i: int) -> Array:
+        """Solve for all branches at one sample."""
+        branches: Array = self.arm.inverse(self.flange[i : i + 1]).q[0]
+        return branches
+
+    def on(self, slot: int, first: int) -> Array:
+        """Solve for one branch."""
+        ahead = self.flange[first:]
+        return self.arm.on_branch(ahead, np.full(len(ahead), slot))
