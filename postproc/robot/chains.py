@@ -129,4 +129,5 @@ def _refined(
     inside = np.ones(len(values), dtype=bool)
     inside[lasts] = inside[edges.uneven] = False
     inside[begins[source[filled] < 0]] = False
-    return with_turning_values(before, values, inside).reshape(-1, 6), start * 3
+    out, count = with_turning_values(before, values, inside)
+    return out, np.append(0, np.cumsum(count))[start]

@@ -17,6 +17,8 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
+BLOCK = 64  # steps that are composed one after the other
+
 
 @dataclass(frozen=True)
 class Clamps:
@@ -51,20 +53,36 @@ def passing(q: Array, half_width: Array) -> Clamps:
 def prefix(steps: Clamps) -> Clamps:
     """Compose all steps up to and including each one, (n, k) -> (n, k).
 
-    Blocks of about sqrt(n) steps run side by side, then the blocks are joined: two
-    short loops instead of one long one, in linear time.
+    Blocks of steps run side by side, then what leads to each block is put in front of
+    it: a short loop over long rows instead of a long loop over short ones.
     """
     n, k = steps.lo.shape
-    length = isqrt(max(n - 1, 0)) + 1
+    length = min(isqrt(max(n - 1, 0)) + 1, BLOCK)
     blocks = -(-n // length)
-    pad = identity((blocks * length, k))
-    pad.lo[:n], pad.hi[:n] = steps.lo, steps.hi
-    lo, hi = pad.lo.reshape(blocks, length, k), pad.hi.reshape(blocks, length, k)
+    lo = _side_by_side(steps.lo, length, -np.inf)
+    hi = _side_by_side(steps.hi, length, np.inf)
     for i in range(1, length):
-        _compose(lo[:, i - 1], hi[:, i - 1], lo[:, i], hi[:, i])
-    for b in range(1, blocks):
-        _compose(lo[b - 1, -1], hi[b - 1, -1], lo[b], hi[b])
-    return Clamps(lo.reshape(-1, k)[:n], hi.reshape(-1, k)[:n])
+        _compose(lo[i - 1], hi[i - 1], lo[i], hi[i])
+    if blocks > 1:
+        before = prefix(Clamps(lo[-1, :-1], hi[-1, :-1]))
+        _compose(before.lo, before.hi, lo[:, 1:], hi[:, 1:])
+    rows = (blocks * length, k)
+    return Clamps(
+        lo.swapaxes(0, 1).reshape(rows)[:n], hi.swapaxes(0, 1).reshape(rows)[:n]
+    )
+
+
+def _side_by_side(rows: Array, length: int, rest: float) -> Array:
+    """Cut rows (n, k) into blocks: (length, blocks, k), step by step."""
+    n, k = rows.shape
+    blocks = -(-n // length)
+    out = np.empty((length, blocks, k))
+    whole = n // length
+    out[:, :whole] = rows[: whole * length].reshape(whole, length, k).swapaxes(0, 1)
+    if whole < blocks:
+        out[:, whole] = rest
+        out[: n - whole * length, whole] = rows[whole * length :]
+    return out
 
 
 def _compose(lo0: Array, hi0: Array, lo: Array, hi: Array) -> None:
@@ -74,12 +92,14 @@ def _compose(lo0: Array, hi0: Array, lo: Array, hi: Array) -> None:
     lo[...] = low
 
 
-def with_turning_values(before: Array, path: Array, inside: Array) -> Array:
+def with_turning_values(
+    before: Array, path: Array, inside: NDArray[np.bool_]
+) -> tuple[Array, Ints]:
     """Put the extreme values between samples into sampled paths.
 
     The parabola through three consecutive equidistant samples turns somewhere; where
     that lies between them its value is inserted, so that a joint that turns between the
-    last two samples is not missed.
+    last two samples is not missed. The others pass their value at the sample again.
 
     Args:
         before: The sample before each sample, (s, 6) [rad].
@@ -87,18 +107,28 @@ def with_turning_values(before: Array, path: Array, inside: Array) -> Array:
         inside: True where the next sample belongs to the same path, (s,).
 
     Returns:
-        (s, 3, 6): what to pass before, at and after each sample; repeated values where
-        there is nothing to insert.
+        What to pass, (t, 6) [rad], and how many rows stand for each sample, (s,).
     """
-    out = np.repeat(path[:, None, :], 3, axis=1)
     at = np.flatnonzero(inside)
-    if not len(at):
-        return out
-    middle, rise = path[at], (path[at + 1] - before[at]) / 2
-    bend = (path[at + 1] + before[at]) / 2 - middle
-    with np.errstate(divide="ignore", invalid="ignore"):
-        where = -rise / (2 * bend)
-        value = middle - rise**2 / (4 * bend)
-    out[at, 0] = np.where((where > -1) & (where < 0), value, middle)
-    out[at, 2] = np.where((where > 0) & (where < 1), value, middle)
-    return out
+    middle, ahead, behind = (
+        path[at],
+        path[np.minimum(at + 1, len(path) - 1)],
+        before[at],
+    )
+    rise, bend = (ahead - behind) / 2, (ahead + behind) / 2 - middle
+    # It turns at -rise / (2 bend) of the way to a neighbour.
+    turns = (np.abs(rise) < 2 * np.abs(bend)) & (rise != 0)
+    row = np.flatnonzero(turns.any(axis=1))
+    middle, rise, bend, turns = middle[row], rise[row], bend[row], turns[row]
+    value = middle - rise**2 / (4 * np.where(turns, bend, 1.0))
+    later = (rise > 0) != (bend > 0)
+    early, late = turns & ~later, turns & later
+    count = np.ones(len(path), dtype=np.int64)
+    count[at[row]] += early.any(axis=1).astype(np.int64) + late.any(axis=1)
+    end = np.cumsum(count)
+    out = np.repeat(path, count, axis=0)
+    for inserted, place in ((early, end[at[row]] - count[at[row]]),
+                            (late, end[at[row]] - 1)):  # fmt: skip
+        some = inserted.any(axis=1)
+        out[place[some]] = np.where(inserted, value, middle)[some]
+    return out, count

@@ -114,9 +114,18 @@ def test_turning_values_are_exact_for_parabolas() -> None:
     vertex, height = rng.uniform(-0.99, 0.99, 6), rng.normal(size=6)
     t = np.array([-1.0, 0.0, 1.0])[:, None]
     y = height + 1.7 * (t - vertex) ** 2
-    out = with_turning_values(y[[0, 0, 1]], y, np.array([False, True, False]))
-    found = np.where(vertex < 0, out[1, 0], out[1, 2])
+    out, count = with_turning_values(y[[0, 0, 1]], y, np.array([False, True, False]))
+    assert count.tolist() == [1, 3, 1]
+    found = np.where(vertex < 0, out[1], out[3])
     np.testing.assert_allclose(found, height, atol=1e-12)
+    np.testing.assert_array_equal(out[[0, 2, 4]], y)
+
+
+def test_nothing_is_inserted_where_nothing_turns() -> None:
+    y = np.arange(24.0).reshape(4, 6) ** 2
+    out, count = with_turning_values(y[[0, 0, 1, 2]], y, np.array([0, 1, 1, 0]) > 0)
+    np.testing.assert_array_equal(out, y)
+    assert count.tolist() == [1, 1, 1, 1]
 
 
 def test_predecessors_that_agree_and_that_do_not(arm: Arm) -> None:
