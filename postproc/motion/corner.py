@@ -15,7 +15,7 @@ the way by the square of the zone over the size of the arm: 1 um for 1 mm.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,12 +24,14 @@ from postproc.motion.paths import along
 from postproc.motion.targets import Fly, Targets
 from postproc.motion.trace import Trace
 from postproc.motion.zone import Zones, zones
+from postproc.pieces import in_pieces
 from postproc.robot.arm import Arm
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 
+ALL = slice(None)
 GRID = np.linspace(0.0, 1.0, 9)  # where the search for the nearest point begins
 ROUNDS = 5  # of Newton's method
 FLAT = 4e-5  # [rad] bend below which a corner's moves are as good as straight
@@ -55,15 +57,23 @@ class Corners:
     @property
     def flat(self) -> Bools:
         """Tell where the nearest point alone tells of the corner, (c,)."""
-        return np.asarray(np.abs(self.bend).max(axis=1) < FLAT)
+        return _is_flat(self.bend)
 
 
 def corners(arm: Arm, targets: Targets, traced: Trace) -> Corners:
     """Find all corners and where the path passes them."""
     found = zones(arm, targets, traced)
-    if len(found.visit) == 0:
-        return Corners(found, np.empty(0), np.empty((0, 6)), np.empty((0, 6)))
-    first, last, nearest, miss = _passing(arm, targets, traced, found)
+    parts = in_pieces(
+        lambda rows: _passed(arm, targets, traced, found[rows]), len(found.visit)
+    )
+    return _joined(parts)
+
+
+def _passed(arm: Arm, targets: Targets, traced: Trace, found: Zones) -> Corners:
+    """Find where the path passes some corners, and keep to their tolerances."""
+    tool = targets.tool.take(found.visit, axis=0)[:, :3, 3]
+    point = _tcp(traced.flange.take(found.visit, axis=0), tool)
+    first, last, nearest, miss = _passing(arm, traced, found, tool, point)
     within = targets.rounding[found.visit] == Fly.WITHIN
     wanted = targets.fly_distance[found.visit]
     too_far = within & (miss > wanted)
@@ -71,53 +81,86 @@ def corners(arm: Arm, targets: Targets, traced: Trace) -> Corners:
         shrink = np.where(too_far, wanted / np.maximum(miss, 1e-12), 1.0)
         found = Zones(found.visit, found.into, found.out, found.before * shrink,
                       found.behind * shrink)  # fmt: skip
-        first, last, nearest, _ = _passing(arm, targets, traced, found)
-    bend = first + last - 2 * traced.q[found.visit]
-    sharp = np.flatnonzero(np.abs(bend).max(axis=1) >= FLAT)
-    nearest[sharp] = _refined(arm, targets, traced, found, sharp, nearest[sharp])
-    q = on_corner(traced, found, np.arange(len(nearest)), nearest)
-    return Corners(found, nearest, q, bend)
+        first, last, nearest, _ = _passing(arm, traced, found, tool, point)
+    bend = first + last - 2 * traced.q.take(found.visit, axis=0)
+    sharp = np.flatnonzero(~_is_flat(bend))
+    nearest[sharp] = _refined(
+        arm, traced, found[sharp], nearest[sharp], tool[sharp], point[sharp]
+    )
+    return Corners(found, nearest, on_corner(traced, found, ALL, nearest), bend)
 
 
-def on_corner(traced: Trace, found: Zones, row: Ints, s: Array) -> Array:
+def _is_flat(bend: Array) -> Bools:
+    """Tell which corners are as good as straight, (c,)."""
+    return np.asarray((np.abs(bend) < FLAT).all(axis=1))
+
+
+def _tcp(flange: Array, tool: Array) -> Array:
+    """Place tools (c, 3) [m] at flange poses (c, 4, 4): (c, 3) [m]."""
+    turned: Array = np.einsum("nij,nj->ni", flange[:, :3, :3], tool)
+    return turned + flange[:, :3, 3]
+
+
+def _joined(parts: list[Corners]) -> Corners:
+    """Put corners one after the other."""
+    if not parts:
+        none = np.empty(0, dtype=np.int64)
+        zone = Zones(none, none, none, np.empty(0), np.empty(0))
+        return Corners(zone, np.empty(0), np.empty((0, 6)), np.empty((0, 6)))
+    zone = Zones(
+        *(
+            np.concatenate([getattr(part.zones, f.name) for part in parts])
+            for f in fields(Zones)
+        )
+    )
+    return Corners(
+        zone,
+        np.concatenate([part.nearest for part in parts]),
+        np.concatenate([part.q for part in parts]),
+        np.concatenate([part.bend for part in parts]),
+    )
+
+
+def on_corner(traced: Trace, found: Zones, row: Ints | slice, s: Array) -> Array:
     """Follow the formula above on corners `row` (m,) at s (m,): (m, 6) [rad]."""
     before = along(traced, found.into[row], 1 - found.before[row] * (1 - s) ** 2)
     behind = along(traced, found.out[row], found.behind[row] * s**2)
-    q: Array = before + behind - traced.q[found.visit[row]]
+    q: Array = before + behind - traced.q.take(found.visit[row], axis=0)
     return q
 
 
 def _passing(
-    arm: Arm, targets: Targets, traced: Trace, found: Zones
+    arm: Arm, traced: Trace, found: Zones, tool: Array, point: Array
 ) -> tuple[Array, Array, Array, Array]:
     """Find where corners begin and end, where they pass closest, and how far off.
+
+    Args:
+        arm: The arm.
+        traced: The path without corners.
+        found: The corners' zones.
+        tool: TCP in the flange frame, (c, 3) [m].
+        point: The fly points, (c, 3) [m].
 
     Returns:
         Joint angles at begin and end (c, 6) [rad], s (c,), distance (c,) [m].
     """
-    one = np.ones(len(found.visit))
-    first = along(traced, found.into, one - found.before)
+    first = along(traced, found.into, 1 - found.before)
     last = along(traced, found.out, found.behind)
-    tool = targets.tool[found.visit]
-    point = (traced.flange[found.visit] @ tool)[:, :3, 3]
-    ends = [(arm.flange(q) @ tool)[:, :3, 3] - point for q in (first, last)]
+    ends = [arm.tcp(q, tool) - point for q in (first, last)]
     nearest = nearest_on_parabola(ends[0], ends[1])
     s = nearest[:, None]
-    miss = np.linalg.norm(ends[0] * (1 - s) ** 2 + ends[1] * s**2, axis=1)
-    return first, last, nearest, miss
+    off = ends[0] * (1 - s) ** 2 + ends[1] * s**2
+    return first, last, nearest, np.sqrt(np.einsum("ni,ni->n", off, off))
 
 
 def _refined(
-    arm: Arm, targets: Targets, traced: Trace, found: Zones, row: Ints, s: Array
+    arm: Arm, traced: Trace, found: Zones, s: Array, tool: Array, point: Array
 ) -> Array:
-    """Improve the nearest points of corners `row`, whose moves are not straight."""
-    visit = found.visit[row]
-    tool = targets.tool[visit]
-    point = (traced.flange[visit] @ tool)[:, :3, 3]
+    """Improve the nearest points of corners whose moves are not straight."""
     for _ in range(REFINED):
         s = np.clip(s, STEP, 1 - STEP)
         before, x, after = (
-            (arm.flange(on_corner(traced, found, row, at)) @ tool)[:, :3, 3] - point
+            arm.tcp(on_corner(traced, found, ALL, at), tool) - point
             for at in (s - STEP, s, s + STEP)
         )
         slope, curve = (after - before) / 2, after - 2 * x + before

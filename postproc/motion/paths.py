@@ -17,24 +17,41 @@ def along(traced: Trace, edge: Ints, u: Array) -> Array:
     Parabolas through the three nearest of the equidistant samples, the place where the
     edge comes from being the first one; straight where an edge has but one sample.
     """
-    edges, count = traced.edges, np.diff(traced.edges.start)[edge]
+    start = traced.edges.start
+    count = start.take(edge + 1) - start.take(edge)
+    if (count == 1).all():
+        return _straight(traced, edge, u)
+    out, one = np.empty((len(edge), 6)), count == 1
+    out[one] = _straight(traced, edge[one], u[one])
+    out[~one] = _curved(traced, edge[~one], u[~one], count[~one])
+    return out
+
+
+def _straight(traced: Trace, edge: Ints, u: Array) -> Array:
+    """Interpolate on edges with one sample."""
+    edges = traced.edges
+    end = edges.path.take(edges.start.take(edge), axis=0)
+    begin = traced.q.take(edges.source.take(edge), axis=0)
+    out: Array = end + (u - 1)[:, None] * (end - begin)
+    return out
+
+
+def _curved(traced: Trace, edge: Ints, u: Array, count: Ints) -> Array:
+    """Interpolate on edges with more samples."""
     x = u * count
     middle = np.clip(np.rint(x), 1, np.maximum(count - 1, 1)).astype(np.int64)
     t = (x - middle)[:, None]
-    after = np.minimum(middle + 1, count)
-    here, next_ = _node(traced, edge, middle), _node(traced, edge, after)
+    here, after = _node(traced, edge, middle), _node(traced, edge, middle + 1)
     before = _node(traced, edge, middle - 1)
-    bend = np.where((count > 1)[:, None], next_ - 2 * here + before, 0.0)
-    slope = np.where((count > 1)[:, None], (next_ - before) / 2, here - before)
-    assert edges.source[edge].min(initial=0) >= 0
+    bend, slope = after - 2 * here + before, (after - before) / 2
     out: Array = here + t * slope + t**2 / 2 * bend
     return out
 
 
 def _node(traced: Trace, edge: Ints, i: Ints) -> Array:
     """Return sample i of each edge, counted from 1; 0 is where the edge comes from."""
-    edges = traced.edges
-    sample = np.maximum(edges.start[edge] + i - 1, 0)
-    begin = traced.q[edges.source[edge]]
-    out: Array = np.where((i == 0)[:, None], begin, edges.path[sample])
+    edges, first = traced.edges, np.flatnonzero(i == 0)
+    sample = np.maximum(edges.start.take(edge) + i - 1, 0)
+    out: Array = edges.path.take(sample, axis=0)
+    out[first] = traced.q[edges.source[edge[first]]]
     return out

@@ -12,6 +12,7 @@ from postproc.motion.paths import along
 from postproc.motion.pull import Pull
 from postproc.motion.targets import Targets
 from postproc.motion.trace import Trace
+from postproc.pieces import in_pieces
 from postproc.robot.arm import Arm
 from postproc.robot.chains import Edges
 
@@ -114,12 +115,20 @@ def _resampled(traced: Trace, found: Corners) -> tuple[Edges, Array]:
         corner = pieces.corner[side, edge[rows]]
         part = nth[rows] - (0 if side == 0 else split[1][rows])
         s, step = _places(found, corner, part, pieces.count[2 * side, edge[rows]], side)
-        path[rows] = on_corner(traced, found.zones, corner, s)
+        path[rows] = _on_corners(traced, found, corner, s)
         size = (found.zones.behind, found.zones.before)[side][corner]
         share[rows] = 2 * size * step
     return replace(
         old, path=path, start=start, uneven=_uneven(pieces, touched, start)
     ), share
+
+
+def _on_corners(traced: Trace, found: Corners, corner: Ints, s: Array) -> Array:
+    """Place samples on corners, (m, 6) [rad]."""
+    parts = in_pieces(
+        lambda rows: on_corner(traced, found.zones, corner[rows], s[rows]), len(s)
+    )
+    return np.concatenate([np.empty((0, 6)), *parts])
 
 
 def _places(
@@ -142,4 +151,7 @@ def _uneven(pieces: _Pieces, touched: Bools, start: Ints) -> Ints:
     ends = [start[:-1] + first, start[:-1] + first + middle]
     joints = [ends[0][touched & (first > 0)], ends[1][touched & (middle > 0)]]
     after = start[:-1][touched & flat] + 1
-    return np.unique(np.concatenate([*(j - 1 for j in joints), after - 1]))
+    uneven = np.zeros(start[-1] + 1, dtype=bool)
+    for samples in (*joints, after):
+        uneven[samples - 1] = True
+    return np.flatnonzero(uneven)

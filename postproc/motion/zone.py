@@ -47,7 +47,7 @@ class Zones:
     before: Array
     behind: Array
 
-    def __getitem__(self, rows: Bools) -> Zones:
+    def __getitem__(self, rows: Bools | Ints | slice) -> Zones:
         """Return some of the corners."""
         return Zones(
             self.visit[rows], self.into[rows], self.out[rows],
@@ -58,16 +58,18 @@ class Zones:
 def zones(arm: Arm, targets: Targets, traced: Trace) -> Zones:
     """Find the corners with one way in and one way out, and their largest zones."""
     visit, into, out = _corners(targets, traced)
-    after = np.repeat(np.arange(len(targets)), np.diff(targets.pred_start))[out]
-    cartesian = (targets.move[visit] != Move.JOINT) & (
-        targets.move[after] != Move.JOINT
-    )
-    by_distance = cartesian & (targets.rounding[visit] != Fly.OVERLAP)
-    near = _by_distance(targets, traced, visit, into, out)
-    late = _by_overlap(arm, targets, traced, visit, (into, out))
-    before, behind = np.where(by_distance, near, late)
-    found = Zones(visit, into, out, before, behind)
-    return found[(before > 0) & (behind > 0)]
+    to = np.repeat(np.arange(len(targets)), np.diff(targets.pred_start))
+    cartesian = targets.move != Move.JOINT
+    both = cartesian[visit] & cartesian[to[out]]
+    by_distance = both & (targets.rounding[visit] != Fly.OVERLAP)
+    share = np.empty((2, len(visit)))
+    for rows, law in ((by_distance, _by_distance), (~by_distance, _by_overlap)):
+        chosen = np.flatnonzero(rows)
+        if len(chosen):
+            ways = [_ways(targets, traced, to, edge[chosen]) for edge in (into, out)]
+            share[:, chosen] = law(arm, targets, visit[chosen], ways)
+    found = Zones(visit, into, out, share[0], share[1])
+    return found[np.asarray((share > 0).all(axis=0))]
 
 
 def _corners(targets: Targets, traced: Trace) -> tuple[Ints, Ints, Ints]:
@@ -89,56 +91,70 @@ def _corners(targets: Targets, traced: Trace) -> tuple[Ints, Ints, Ints]:
     return visit, targets.pred_start[visit], out[visit]
 
 
-def _by_distance(
-    targets: Targets, traced: Trace, visit: Ints, into: Ints, out: Ints
-) -> Array:
-    """Take the same length of both edges, all there is where only WITHIN bounds it."""
-    length = np.stack([_length(targets, traced, edge) for edge in (into, out)])
+@dataclass(frozen=True)
+class _Ways:
+    """The moves on c edges.
+
+    Attributes:
+        to: Target that they lead to, (c,).
+        length: Length of the TCP's way, its chord where the path is not Cartesian,
+            (c,) [m].
+        turned: What the joints turn by, (c, 6) [rad].
+    """
+
+    to: Ints
+    length: Array
+    turned: Array
+
+
+def _ways(targets: Targets, traced: Trace, to: Ints, edge: Ints) -> _Ways:
+    """Describe the moves on edges."""
+    end, begin = to.take(edge), traced.edges.source.take(edge)
+    tool = targets.tool.take(end, axis=0)[:, :3, 3]
+    chord = np.zeros((len(edge), 3))
+    for sign, visit in ((1, end), (-1, begin)):
+        flange = traced.flange.take(visit, axis=0)
+        place = np.einsum("nij,nj->ni", flange[:, :3, :3], tool) + flange[:, :3, 3]
+        chord += sign * place
+    length = np.sqrt(np.einsum("ni,ni->n", chord, chord))
+    turned = np.abs(traced.q.take(end, axis=0) - traced.q.take(begin, axis=0))
+    return _Ways(end, np.fmax(traced.length.take(edge), length), turned)
+
+
+def _by_distance(arm: Arm, targets: Targets, visit: Ints, ways: list[_Ways]) -> Array:
+    """Take the same length of both moves, all there is where only WITHIN bounds it."""
+    length = np.stack([way.length for way in ways])
     distance = targets.fly_distance[visit]
     begin = np.where(targets.rounding[visit] == Fly.WITHIN, np.inf, distance)
-    zone = np.minimum(begin, HALF * length.min(axis=0))
+    shortest = length.min(axis=0)
+    zone = np.minimum(begin, HALF * shortest)
     share: Array = np.where(length > NOTHING, zone / np.maximum(length, NOTHING), 0.0)
-    return np.where(length.min(axis=0) > NOTHING, share, 0.0)
+    return np.where(shortest > NOTHING, share, 0.0)
 
 
-def _length(targets: Targets, traced: Trace, edge: Ints) -> Array:
-    """Length of the TCP's way on edges, its chord where the path is not Cartesian."""
-    n = len(targets)
-    to = np.repeat(np.arange(n), np.diff(targets.pred_start))[edge]
-    begin = (traced.flange[traced.edges.source[edge]] @ targets.tool[to])[:, :3, 3]
-    end = (traced.flange[to] @ targets.tool[to])[:, :3, 3]
-    chord = np.linalg.norm(end - begin, axis=1)
-    return np.asarray(np.fmax(traced.length[edge], chord))
-
-
-def _by_overlap(
-    arm: Arm, targets: Targets, traced: Trace, visit: Ints, edges: tuple[Ints, Ints]
-) -> Array:
+def _by_overlap(arm: Arm, targets: Targets, visit: Ints, ways: list[_Ways]) -> Array:
     """Let the moves overlap while the first brakes and the second starts, (2, c).
 
     At full override: a path that changes with the override knob could not be proved.
     """
-    ramps = [_ramp(arm, targets, traced, edge) for edge in edges]
+    ramps = [_ramp(arm, targets, way) for way in ways]
     time = targets.overlap[visit] * np.minimum(ramps[0][1], ramps[1][1])
     return np.stack([push * time**2 / 2 for push, _ in ramps])
 
 
-def _ramp(arm: Arm, targets: Targets, traced: Trace, edge: Ints) -> tuple[Array, Array]:
-    """Give the acceleration of u [1/s^2] along edges, and how long it lasts [s], (c,).
+def _ramp(arm: Arm, targets: Targets, way: _Ways) -> tuple[Array, Array]:
+    """Give the acceleration of u [1/s^2] along moves, and how long it lasts [s], (c,).
 
     u goes from 0 to 1; the joints' limits are the bounds, and the programmed speed.
     """
-    to = np.repeat(np.arange(len(targets)), np.diff(targets.pred_start))[edge]
-    way = np.abs(traced.q[to] - traced.q[traced.edges.source[edge]])
-    way = np.maximum(way, NOTHING)
-    push = (arm.acceleration / way).min(axis=1)
-    speed = (arm.velocity / way).min(axis=1)
-    length = np.maximum(_length(targets, traced, edge), NOTHING)
-    programmed = np.where(
-        targets.move[to] == Move.JOINT, np.inf, targets.linear_speed[to] / length
-    )
+    turned = np.maximum(way.turned, NOTHING)
+    push = (arm.acceleration / turned).min(axis=1)
+    speed = (arm.velocity / turned).min(axis=1)
+    length = np.maximum(way.length, NOTHING)
+    joint = targets.move[way.to] == Move.JOINT
+    programmed = np.where(joint, np.inf, targets.linear_speed[way.to] / length)
     speed = np.fmin(speed, programmed)
-    moves = (way > NOTHING).any(axis=1)
+    moves = (turned > NOTHING).any(axis=1)
     push = np.where(moves, push, 0.0)
     with np.errstate(divide="ignore"):
         lasts = np.minimum(speed / push, np.sqrt(1.0 / push))

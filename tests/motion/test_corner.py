@@ -9,7 +9,8 @@ import pytest
 
 from postproc.motion import rounding
 from postproc.motion.corner import corners, nearest_on_parabola, on_corner
-from postproc.motion.planner import plan, reach
+from postproc.motion.planner import plan
+from postproc.motion.reach import reach
 from postproc.motion.rounding import rounded
 from postproc.motion.targets import Fly, Kind, Move, Targets, make_targets
 from postproc.motion.trace import trace
