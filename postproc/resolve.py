@@ -34,9 +34,13 @@ STEPS_IN = {
 }
 
 
+Rows = Ints | slice
+ALL = slice(None)
+
+
 @dataclass(frozen=True)
 class Frames:
-    """The frames that hold at each of n visits, (n, 4, 4) [m], NaN where not known."""
+    """The frames that hold at some visits, (m, 4, 4) [m], NaN where not known."""
 
     tool: Array
     base_inverse: Array
@@ -91,6 +95,20 @@ def targets_from_visits(visits: Visits, cell: Cell) -> tuple[Targets, Reasons]:
     return targets, reasons
 
 
+def moved_targets(targets: Targets, visits: Visits, cell: Cell, rows: Ints) -> Targets:
+    """Express some visits anew, whose numbers have changed, and nothing else.
+
+    Args:
+        targets: All visits as they were.
+        visits: All visits as they are now.
+        cell: As in `targets_from_visits`.
+        rows: Visits with other numbers, (m,).
+    """
+    frames, values = _frames(visits, rows), _values(visits, cell, rows)
+    _, tcp, joints = _places(visits, frames, values, rows)
+    return targets.moved_to(rows, tcp, joints)
+
+
 def configurations(configs: tuple[str, ...]) -> tuple[Ints, Array]:
     """Read configuration strings.
 
@@ -112,29 +130,33 @@ def configurations(configs: tuple[str, ...]) -> tuple[Ints, Array]:
     return slots, turns
 
 
-def _frames(visits: Visits) -> Frames:
-    """Look up the frames of every visit."""
+def _frames(visits: Visits, rows: Rows = ALL) -> Frames:
+    """Look up the frames of visits."""
     unknown = np.full((1, 4, 4), np.nan)
     poses = np.concatenate([pose_from_record(visits.frames.reshape(-1, 6)), unknown])
-    return Frames(poses[visits.tool], inverse(poses)[visits.base], poses[visits.uframe])
+    tool, base, uframe = visits.tool[rows], visits.base[rows], visits.uframe[rows]
+    return Frames(poses[tool], inverse(poses)[base], poses[uframe])
 
 
-def _values(visits: Visits, cell: Cell) -> Array:
+def _values(visits: Visits, cell: Cell, rows: Rows = ALL) -> Array:
     """Fill in $HOME and $CAL_SYS where the program does not tell them."""
-    values = np.array(visits.values)
+    values, goal = np.array(visits.values[rows]), visits.target[rows]
     untold = np.isnan(values).any(axis=1)
     for target, joints in (
         (Target.HOME, cell.home),
         (Target.CALIBRATION, cell.calibration),
     ):
         if joints is not None:
-            values[untold & (visits.target == target)] = np.rad2deg(joints)
+            values[untold & (goal == target)] = np.rad2deg(joints)
     return values
 
 
-def _places(visits: Visits, frames: Frames, values: Array) -> tuple[Ints, Array, Array]:
-    """Turn numbers into kinds, TCP poses (n, 4, 4) [m] and joints (n, 6) [rad]."""
-    n, target = len(visits), visits.target
+def _places(
+    visits: Visits, frames: Frames, values: Array, rows: Rows = ALL
+) -> tuple[Ints, Array, Array]:
+    """Turn numbers into kinds, TCP poses (m, 4, 4) [m] and joints (m, 6) [rad]."""
+    target = visits.target[rows]
+    n = len(target)
     kind = np.full(n, int(Kind.UNKNOWN))
     tcp, joints = np.full((n, 4, 4), np.nan), np.full((n, 6), np.nan)
     in_joints = np.isin(target, JOINTS)
@@ -146,7 +168,7 @@ def _places(visits: Visits, frames: Frames, values: Array) -> tuple[Ints, Array,
     user = frames.base_inverse[poses] @ frames.uframe[poses]
     tcp[poses] = user @ pose_from_record(values[poses])
     near = target == Target.NEAR
-    tcp[near] = tcp[near] @ _along_approach(-visits.distance_mm[near])
+    tcp[near] = tcp[near] @ _along_approach(-visits.distance_mm[rows][near])
     away = target == Target.AWAY
     kind[away], tcp[away] = Kind.TOOL_STEP, _along_approach(-values[away, 0])
     steps = np.isin(target, (*STEPS_IN, Target.ABOUT))

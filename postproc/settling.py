@@ -10,13 +10,13 @@ from numpy.typing import NDArray
 
 from postproc.accuracy.model import Model
 from postproc.clock import Clock
-from postproc.language.visits import Visits
-from postproc.motion.planner import Plan, Reached, reach
+from postproc.courses import Courses, where
+from postproc.motion.planner import Plan
+from postproc.motion.reach import Reached
 from postproc.options import Options
 from postproc.output import Output, write_numbers
 from postproc.planning import Planned, Reading, read_program
 from postproc.proposal import Proposal, propose
-from postproc.resolve import targets_from_visits
 from postproc.robot.cell import Cell
 from postproc.robot.state import States
 from postproc.side_search import SideSearch
@@ -65,6 +65,7 @@ def settle(
     held, search = np.zeros(len(states), dtype=bool), SideSearch()
     with clock("solve"):
         solved = solve_visits(model, cell, planned, states, options.orientation)
+    courses = Courses(reading.visits, planned.targets, cell)
     bent = np.zeros_like(planned.plan.aside)
     settled_for = np.zeros(len(states), dtype=bool)
     for number in count():  # ends: from round ROUNDS on, `settled_for` or `held` grows
@@ -72,7 +73,7 @@ def settle(
             aside = aside_after(planned.plan, solved, held) + bent
             proposal = propose(reading, planned, solved, aside, held, cell, options)
         with clock("plan again"):
-            after = reached_after(reading.visits, proposal, cell)
+            after = courses.after(proposal.decisions.corrected)
         found, missed = after.side, np.zeros_like(bent)
         sharp = planned.plan.pull.visit
         missed[sharp] = (after.aside - aside)[sharp]
@@ -104,18 +105,6 @@ def aside_after(plan: Plan, solved: Solved, held: Bools) -> Array:
     wanted = np.nan_to_num(solved.command[:, :3, 3] - plan.tcp[:, :3, 3])
     wanted[held] = 0.0
     return plan.aside + plan.pull.on(plan.pull.to_move(wanted))
-
-
-def reached_after(visits: Visits, proposal: Proposal, cell: Cell) -> Reached:
-    """Find where targets lead the arm once they have moved."""
-    moved = replace(visits, values=proposal.decisions.corrected)
-    return where(moved, cell)
-
-
-def where(visits: Visits, cell: Cell) -> Reached:
-    """Find where the targets of visits lead the arm."""
-    targets, _ = targets_from_visits(visits, cell)
-    return reach(cell.arm, targets)
 
 
 def write_and_verify(

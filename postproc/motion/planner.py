@@ -9,12 +9,13 @@ from numpy.typing import NDArray
 
 from postproc.motion.clock import no_time, tell_time
 from postproc.motion.pull import Pull
+from postproc.motion.reach import aside_of
 from postproc.motion.reasons import CODE, REASONS, WRIST
 from postproc.motion.rounding import rounded
 from postproc.motion.targets import Targets
 from postproc.motion.trace import Trace, trace
 from postproc.robot.arm import Arm
-from postproc.robot.direction import arrivals, sides
+from postproc.robot.direction import arrivals
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -98,47 +99,14 @@ def plan(arm: Arm, targets: Targets, wrist: float, timed: bool = True) -> Plan:
     traced = rounded(arm, targets, exact)
     arrived = arrivals(arm, traced.q, traced.edges)
     clock = tell_time(arm, targets, traced) if timed else no_time(len(targets))
-    tcp = traced.flange @ targets.tool
+    tool = targets.tool
+    aside = aside_of(exact.flange, traced.flange, tool)
     return Plan(
-        traced.q, tcp, _aside(exact, traced, targets), targets.tool, arrived.direction,
-        arrived.side, arrived.travel, clock.speed, clock.time, traced.slot,
+        traced.q, traced.flange @ tool, aside, tool, arrived.direction, arrived.side,
+        arrived.travel, clock.speed, clock.time, traced.slot,
         _guard(traced, wrist), REASONS, traced.overruled, clock.untimed,
         traced.pull,
     )  # fmt: skip
-
-
-@dataclass(frozen=True)
-class Reached:
-    """Where n arrivals end up, without a time law.
-
-    Attributes:
-        q: Joint angles, (n, 6) [rad], NaN where not known; as in `Plan`.
-        tcp: TCP pose, (n, 4, 4) [m], base frame, NaN where not known; as in `Plan`.
-        aside: From the target to that place, (n, 3) [m].
-        side: Where every joint lies in its play, (n, 6) from -1 to 1; 0: not known.
-    """
-
-    q: Array
-    tcp: Array
-    aside: Array
-    side: Array
-
-
-def reach(arm: Arm, targets: Targets) -> Reached:
-    """Find joint angles and sides only.
-
-    For targets that a correction has moved: their speeds are those of the plan.
-    """
-    exact = trace(arm, targets)
-    traced = rounded(arm, targets, exact)
-    tcp, aside = traced.flange @ targets.tool, _aside(exact, traced, targets)
-    return Reached(traced.q, tcp, aside, sides(arm, traced.q, traced.edges))
-
-
-def _aside(exact: Trace, traced: Trace, targets: Targets) -> Array:
-    """Measure from targets to where the path passes them, (n, 3) [m]."""
-    moved = (traced.flange - exact.flange) @ targets.tool
-    return np.array(moved[:, :3, 3])
 
 
 def _guard(traced: Trace, wrist: float) -> Ints:

@@ -101,20 +101,28 @@ class Targets:
         """Return the number of moves."""
         return len(self.move)
 
-    def moved_to(self, tcp: Array, joints: Array) -> Targets:
-        """Return a copy whose targets lie elsewhere; steps stay what they are.
+    def part(self, rows: Ints, pred_start: Ints, pred: Ints) -> Targets:
+        """Return some of the moves, with predecessors among themselves.
 
         Args:
-            tcp: TCP poses in the base frame, (n, 4, 4) [m]; used for `Kind.POSE`.
-            joints: Joint angles, (n, 6) [rad]; used for `Kind.JOINTS`.
+            rows: Which moves, (m,).
+            pred_start: As in the class, (m + 1,).
+            pred: Their predecessors, counted among the rows.
         """
-        pose = (self.kind == Kind.POSE)[:, None, None]
-        angles = (self.kind == Kind.JOINTS)[:, None]
-        return replace(
-            self,
-            tcp=np.where(pose, tcp, self.tcp),
-            joints=np.where(angles, joints, self.joints),
-        )
+        own = {f.name: getattr(self, f.name)[rows] for f in fields(self)[:-2]}
+        return Targets(**own, pred_start=pred_start, pred=pred)
+
+    def moved_to(self, rows: Ints, tcp: Array, joints: Array) -> Targets:
+        """Return a copy of which some targets lie elsewhere.
+
+        Args:
+            rows: Which, (m,).
+            tcp: As in the class, (m, 4, 4).
+            joints: As in the class, (m, 6).
+        """
+        poses, angles = np.array(self.tcp), np.array(self.joints)
+        poses[rows], angles[rows] = tcp, joints
+        return replace(self, tcp=poses, joints=angles)
 
 
 def make_targets(

@@ -1,0 +1,53 @@
+"""Where the numbers of one program lead, as they change from round to round."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from postproc.language.visits import Visits
+from postproc.motion.again import reach_again
+from postproc.motion.reach import Course, Reached, reach
+from postproc.motion.targets import Targets
+from postproc.resolve import moved_targets, targets_from_visits
+from postproc.robot.cell import Cell
+
+Array = NDArray[np.float64]
+
+
+class Courses:
+    """The last course of a program, and the way to the next one."""
+
+    def __init__(self, visits: Visits, targets: Targets, cell: Cell) -> None:
+        """Begin with the program as it is.
+
+        Args:
+            visits: Its visits.
+            targets: Where they go.
+            cell: The arm and its surroundings.
+        """
+        self._visits, self._targets, self._cell = visits, targets, cell
+        self._last: Course | None = None
+
+    def after(self, values: Array) -> Reached:
+        """Find where the program leads with other numbers, (n, 6) in its units."""
+        new = replace(self._visits, values=values)
+        old = self._visits.values
+        moved = ((values != old) & ~(np.isnan(values) & np.isnan(old))).any(axis=1)
+        rows = np.flatnonzero(moved)
+        targets = moved_targets(self._targets, new, self._cell, rows)
+        arm, last = self._cell.arm, self._last
+        if last is None:
+            self._last = reach(arm, targets)
+        else:
+            self._last = reach_again(arm, last, targets, moved)
+        self._visits, self._targets = new, targets
+        return self._last.reached
+
+
+def where(visits: Visits, cell: Cell) -> Reached:
+    """Find where the targets of visits lead the arm."""
+    targets, _ = targets_from_visits(visits, cell)
+    return reach(cell.arm, targets).reached

@@ -1,0 +1,227 @@
+"""Another look at a course, after a few of its targets have moved.
+
+A moved target changes the edges into and out of it and the corners at both ends of
+these; farther off, the same numbers come out as before as long as the path arrives
+there on the same branch and turn. So it is enough to trace a stretch round each moved
+target, from a place that is known; where a stretch does not join the old course again,
+or lies where the flow branches, the whole course is traced anew.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from postproc.motion.reach import Course, Points, points, reach
+from postproc.motion.rounding import rounded
+from postproc.motion.targets import Kind, Targets
+from postproc.motion.trace import trace
+from postproc.motion.workspace import Known
+from postproc.robot.arm import Arm
+from postproc.robot.chains import Edges
+from postproc.robot.direction import sides
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Bools = NDArray[np.bool_]
+
+CHANGED = 2  # targets on each side of a moved one whose passing may change
+TRACED = 3  # targets on each side that must be traced for that
+SAME = 1e-9  # [rad] arriving on the same branch and turn
+MOST = 0.5  # of all targets; if more have to be traced, all are
+STEPS = (Kind.TOOL_STEP, Kind.BASE_STEP, Kind.JOINT_STEP, Kind.TOWARDS)
+
+
+@dataclass(frozen=True)
+class _Part:
+    """Some stretches of a program.
+
+    Attributes:
+        rows: Their m targets, in the program's order, (m,).
+        seeds: Targets among them that stretches begin at, from a known place, (m,).
+        lasts: Targets among them that the program goes on from, (m,).
+        kept: Targets among them whose passing may change, (m,).
+        targets: The stretches as a program of their own.
+    """
+
+    rows: Ints
+    seeds: Bools
+    lasts: Bools
+    kept: Bools
+    targets: Targets
+
+
+def reach_again(arm: Arm, before: Course, targets: Targets, moved: Bools) -> Course:
+    """Find where targets lead of which only some have moved.
+
+    The result is that of `reach`.
+
+    Args:
+        arm: The arm.
+        before: The course before they moved.
+        targets: All targets as they are now.
+        moved: Which have another `tcp` or other `joints` than in `before`, (n,).
+
+    Raises:
+        PlanError: The arm has no closed-form inverse kinematics.
+    """
+    part = _part(targets, moved)
+    if part is None:
+        return reach(arm, targets)
+    begins = part.rows[part.seeds]
+    known = Known(
+        np.flatnonzero(part.seeds), before.exact.q[begins],
+        before.exact.flange[begins], before.slot[begins],
+    )  # fmt: skip
+    exact = trace(arm, part.targets, known)
+    old, new = before.exact.q[part.rows], exact.q
+    same = np.isclose(new, old, rtol=0, atol=SAME, equal_nan=True).all(axis=1)
+    same &= exact.slot == before.slot[part.rows]
+    if not same[part.lasts].all():
+        return reach(arm, targets)
+    traced = rounded(arm, part.targets, exact)
+    slot = np.array(before.slot)
+    slot[part.rows[part.kept]] = exact.slot[part.kept]
+    passed = _patched(before.passed, part, points(traced))
+    edges = _spliced(before.edges, part, traced.edges)
+    return Course(
+        targets, _patched(before.exact, part, points(exact)), passed, slot, edges,
+        sides(arm, passed.q, edges),
+    )  # fmt: skip
+
+
+def _part(targets: Targets, moved: Bools) -> _Part | None:
+    """Cut out what moved targets touch; None where that has no simple answer."""
+    n, first = len(targets), targets.pred_start
+    begins = _from_nowhere(targets)
+    touched = _touched(targets, moved)
+    inside, kept = _with_arcs(targets, _near(touched, TRACED)), _near(touched, CHANGED)
+    if not inside.any() or np.count_nonzero(inside) > MOST * n:
+        return None
+    starts = inside & (begins | ~np.append(False, inside[:-1]))
+    simple = starts | _one_after_another(targets)
+    clipped = inside[0] and not begins[0]
+    if clipped or not simple[inside].all() or (touched & starts & ~begins).any():
+        return None
+    rows = np.flatnonzero(inside)
+    seeds = starts & ~begins
+    row = np.cumsum(inside) - 1
+    count = np.where(seeds, 0, np.diff(first))[rows]
+    pred_start = np.concatenate([[0], np.cumsum(count)])
+    edge = np.repeat(first[rows] - pred_start[:-1], count) + np.arange(pred_start[-1])
+    pred = targets.pred[edge]
+    pred = np.where(pred >= 0, row[np.maximum(pred, 0)], pred)
+    goes_on = np.append(~inside[1:] & ~begins[1:], False)
+    return _Part(
+        rows, seeds[rows], goes_on[rows], kept[rows],
+        targets.part(rows, pred_start, pred),
+    )  # fmt: skip
+
+
+def _from_nowhere(targets: Targets) -> Bools:
+    """Tell which targets are reached from unknown places alone, (n,)."""
+    known = np.append(0, np.cumsum(targets.pred >= 0))
+    return np.asarray(known[targets.pred_start[1:]] == known[targets.pred_start[:-1]])
+
+
+def _one_after_another(targets: Targets) -> Bools:
+    """Tell which targets have the one before as the only predecessor, alone, (n,)."""
+    n = len(targets)
+    single = np.flatnonzero(np.diff(targets.pred_start) == 1)
+    out = np.zeros(n, dtype=bool)
+    out[single] = targets.pred[targets.pred_start[single]] == single - 1
+    out[:1] = False
+    ways = np.bincount(targets.pred[targets.pred >= 0], minlength=n)
+    out[1:] &= ways[:-1] == 1
+    return out
+
+
+def _touched(targets: Targets, moved: Bools) -> Bools:
+    """Add the targets whose edges change with others: steps, and both parts of arcs."""
+    touched = np.array(moved)
+    via = np.flatnonzero(targets.via)
+    last = len(moved) - 1
+    near = np.stack([np.clip(via + k, 0, last) for k in (-1, 0, 1)])
+    arcs = via[moved[near].any(axis=0)]
+    touched[arcs] = touched[np.minimum(arcs + 1, last)] = True
+    steps = np.isin(targets.kind, STEPS)
+    while True:
+        more = steps & np.append(False, touched[:-1]) & ~touched
+        if not more.any():
+            return touched
+        touched |= more
+
+
+def _with_arcs(targets: Targets, inside: Bools) -> Bools:
+    """Add both ends of the arcs whose point on the way is inside."""
+    out, via = np.array(inside), inside & targets.via
+    out[1:] |= via[:-1]
+    out[:-1] |= via[1:]
+    return out
+
+
+def _near(rows: Bools, distance: int) -> Bools:
+    """Tell which places are at most so far from True ones, (n,)."""
+    out = np.array(rows)
+    for k in range(1, distance + 1):
+        out[k:] |= rows[:-k]
+        out[:-k] |= rows[k:]
+    return out
+
+
+def _patched(before: Points, part: _Part, now: Points) -> Points:
+    """Put new places in."""
+    q, flange, rows = np.array(before.q), np.array(before.flange), part.rows[part.kept]
+    q[rows], flange[rows] = now.q[part.kept], now.flange[part.kept]
+    return Points(q, flange)
+
+
+def _spliced(before: Edges, part: _Part, now: Edges) -> Edges:
+    """Put new edges in: those between targets whose passing may change."""
+    last_kept = np.append(False, part.kept[:-1]) & ~part.seeds
+    alone = _from_nowhere(part.targets)
+    rows = np.flatnonzero(part.kept & ~part.seeds & (last_kept | alone))
+    edge = _edges_of(before.first, part.rows[rows])
+    new = _edges_of(now.first, rows)
+    source, count = np.array(before.source), np.diff(before.start)
+    found = now.source[new]
+    source[edge] = np.where(found >= 0, part.rows[np.maximum(found, 0)], found)
+    count[edge] = np.diff(now.start)[new]
+    start = np.concatenate([[0], np.cumsum(count)])
+    taken = np.zeros(len(source), dtype=bool)
+    taken[edge] = True
+    at = np.repeat(taken, count)
+    here = np.repeat(~taken, np.diff(before.start))
+    there = _samples_of(now.start, new)
+    path, uneven = np.empty((len(at), 6)), np.zeros(len(at), dtype=bool)
+    path[~at], path[at] = before.path[here], now.path[there]
+    uneven[~at] = _marked(before)[here]
+    uneven[at] = _marked(now)[there]
+    return replace(
+        before, source=source, path=path, start=start, uneven=np.flatnonzero(uneven)
+    )
+
+
+def _marked(edges: Edges) -> Bools:
+    """Tell which samples are uneven, (s,)."""
+    marked = np.zeros(len(edges.path), dtype=bool)
+    marked[edges.uneven] = True
+    return marked
+
+
+def _edges_of(first: Ints, rows: Ints) -> Ints:
+    """List the edges that lead to visits."""
+    return _spans(first[rows], first[rows + 1] - first[rows])
+
+
+def _samples_of(start: Ints, edge: Ints) -> Ints:
+    """List the samples of edges."""
+    return _spans(start[edge], start[edge + 1] - start[edge])
+
+
+def _spans(begin: Ints, count: Ints) -> Ints:
+    """List begin, begin + 1, .., begin + count - 1 of every span."""
+    offset = np.cumsum(count) - count
+    return np.repeat(begin - offset, count) + np.arange(int(count.sum()))

@@ -1,0 +1,116 @@
+"""Where moved targets lead the arm: joint angles and sides, without a time law."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from postproc.motion.rounding import rounded
+from postproc.motion.targets import Targets
+from postproc.motion.trace import Trace, trace
+from postproc.robot.arm import Arm
+from postproc.robot.chains import Edges
+from postproc.robot.direction import sides
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Reached:
+    """Where n arrivals end up.
+
+    Attributes:
+        q: Joint angles, (n, 6) [rad], NaN where not known; as in `Plan`.
+        tcp: TCP pose, (n, 4, 4) [m], base frame, NaN where not known; as in `Plan`.
+        aside: From the target to that place, (n, 3) [m].
+        side: Where every joint lies in its play, (n, 6) from -1 to 1; 0: not known.
+    """
+
+    q: Array
+    tcp: Array
+    aside: Array
+    side: Array
+
+
+@dataclass(frozen=True)
+class Points:
+    """The path at n targets.
+
+    Attributes:
+        q: Joint angles, (n, 6) [rad], NaN where not known.
+        flange: (n, 4, 4) [m], NaN where not known.
+    """
+
+    q: Array
+    flange: Array
+
+
+@dataclass(frozen=True)
+class Course:
+    """The way through n targets, with what it takes to look at parts of it again.
+
+    Attributes:
+        targets: The moves.
+        exact: At the targets, as if the arm stopped at each.
+        passed: Where the path, its corners rounded, passes them.
+        slot: Branch taken, (n,), -1 where it was not looked up.
+        edges: The rounded paths between.
+        side: As in `Reached`.
+    """
+
+    targets: Targets
+    exact: Points
+    passed: Points
+    slot: Ints
+    edges: Edges
+    side: Array
+
+    @property
+    def reached(self) -> Reached:
+        """Return where the arrivals end up."""
+        tcp = self.passed.flange @ self.targets.tool
+        return Reached(self.passed.q, tcp, self.aside, self.side)
+
+    @property
+    def aside(self) -> Array:
+        """Return the way from targets to where the path passes them, (n, 3) [m]."""
+        tool = self.targets.tool
+        return aside_of(self.exact.flange, self.passed.flange, tool)
+
+
+def reach(arm: Arm, targets: Targets) -> Course:
+    """Find joint angles and sides only.
+
+    For targets that a correction has moved: their speeds are those of the plan.
+
+    Raises:
+        PlanError: The arm has no closed-form inverse kinematics.
+    """
+    exact = trace(arm, targets)
+    traced = rounded(arm, targets, exact)
+    side = sides(arm, traced.q, traced.edges)
+    return Course(
+        targets, points(exact), points(traced), exact.slot, traced.edges, side
+    )
+
+
+def points(traced: Trace) -> Points:
+    """Return the path of a trace at its targets."""
+    return Points(traced.q, traced.flange)
+
+
+def aside_of(exact: Array, passed: Array, tool: Array) -> Array:
+    """Measure from targets to where the path passes them.
+
+    Args:
+        exact: Flange poses at the targets, (n, 4, 4) [m].
+        passed: Flange poses where the path passes them, (n, 4, 4) [m].
+        tool: TCP in the flange frame, (n, 4, 4) [m].
+
+    Returns:
+        (n, 3) [m].
+    """
+    return np.array(((passed - exact) @ tool)[:, :3, 3])
