@@ -126,7 +126,22 @@ def absolute(here: Here, expression: ast.Expression) -> Goal:
         return _from_value(held or Nothing(f"${name} is a system variable"), True)
     if isinstance(expression, ast.Reference):
         _check_declared(here, expression.name)
+        type_ = here.world.type_of(here.place, expression.name)
+        if type_ is not None and type_.path:
+            return _node(here, expression)
     return _from_value(here.value(expression), False)
+
+
+def _node(here: Here, reference: ast.Reference) -> Goal:
+    """Tell what a node of a path holds, as far as the program assigns it."""
+    value = here.value(reference)
+    if isinstance(value, Position):
+        return _from_value(value, False)
+    return Goal(
+        Target.UNKNOWN,
+        reason=f"the node of {reference.name} is not known: nodes are read where the "
+        "program assigns their positions one by one, not from variable files",
+    )
 
 
 def _check_declared(here: Here, name: str) -> None:

@@ -9,6 +9,8 @@ from typing import Any
 from postproc.language.build import Rule
 from postproc.language.pdl2 import Number
 
+_ACCESS = frozenset({"priv", "xport", "local"})
+
 
 @dataclass(frozen=True)
 class Entered:
@@ -18,6 +20,8 @@ class Entered:
         name, type: Of the head, "" where the line has none.
         arm: Slot of the arm number, -1 where there is none.
         shared: The head says Xport.
+        variable: The head says whose variable it is (Priv, Xport, Local): fields of
+            records and of path nodes do not.
         element: Slots of an element's index.
         components: (letter, slot) pairs.
         axes: (axis slot, value slot) pairs.
@@ -29,6 +33,7 @@ class Entered:
     type: str = ""
     arm: int = -1
     shared: bool = False
+    variable: bool = False
     element: tuple[int, ...] = ()
     components: tuple[tuple[str, int], ...] = ()
     axes: tuple[tuple[int, int], ...] = ()
@@ -74,7 +79,9 @@ def _line(c: Sequence[Any]) -> Entered:
 def _head(c: Sequence[Any]) -> Entered:
     arms = [int(x) for x in c if isinstance(x, _Arm)]
     words = {str(x).lower() for x in c if isinstance(x, _Word)}
-    return Entered(str(c[0]), str(c[1]), max([-1, *arms]), "xport" in words)
+    return Entered(
+        str(c[0]), str(c[1]), max([-1, *arms]), "xport" in words, bool(words & _ACCESS)
+    )
 
 
 def _plain(c: Sequence[Any]) -> tuple[str, int] | None:

@@ -119,12 +119,16 @@ class _Reader:
     def take(self, row: int, entered: Entered) -> None:
         self.row = row
         line = int(self.lines.line[row])
+        if entered.name and self._is_field(entered):
+            self.close()
+            return
         if entered.name:
             self.close()
             arm = self._number(entered.arm) if entered.arm >= 0 else 0.0
             kind = entered.type.upper()
             array = kind.startswith("A") and kind != "ARM"
-            kind = _KINDS.get(kind[1:] if array else kind, kind)
+            kind = kind[1:] if array else kind
+            kind = _KINDS.get(kind, kind)
             self.head = _Open(entered.name, kind, line, entered.shared, int(arm or 0))
             self.open = None if array else self.head
         if entered.element and self.head is not None:
@@ -134,6 +138,11 @@ class _Reader:
             name = f"{head.name}[{index}]"
             self.open = _Open(name, head.kind, line, head.shared, head.arm)
         self._values(entered)
+
+    def _is_field(self, entered: Entered) -> bool:
+        """Tell a field of a record or path node from a variable of its own."""
+        nested = self.head is not None and self.head.kind in _NESTED
+        return nested and (entered.name.startswith("$") or not entered.variable)
 
     def _values(self, entered: Entered) -> None:
         now = self.open
@@ -201,7 +210,9 @@ def read_variables(source: Source) -> Variables:
         entered = parse_value_line(lines.text(row))
         if entered is not None:
             reader.take(row, entered)
-        elif reader.head is None or reader.head.kind not in _NESTED:
+            continue
+        reader.close()  # what follows may belong to what was not understood
+        if reader.head is None or reader.head.kind not in _NESTED:
             line = int(lines.line[row])
             text = source.line_text(line).strip()[:60]
             reader.report(line, "lsv-line", f"not understood, kept: {text!r}")

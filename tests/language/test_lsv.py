@@ -111,3 +111,63 @@ def test_an_auxiliary_axis_must_be_declared() -> None:
         v = resolve(program, Start(aux=aux), variables).visits
         assert word in v.reasons[v.reason[0]]
         assert v.literal[0] >= 0
+
+
+NESTED = b"""p POS Priv
+ X: 1 Y: 2 Z: 3 A: 4 E: 5 R: 6
+ CNFG: ''
+pth PATH nd Priv
+ NODE[1]
+ $MAIN_POS POS
+ X: 7 Y: 2 Z: 3 A: 4 E: 5 R: 6
+ CNFG: ''
+ p POS
+ X: 8 Y: 2 Z: 3 A: 4 E: 5 R: 6
+ CNFG: ''
+ NODE[2]
+ $MAIN_POS POS Priv
+ X: 9 Y: 2 Z: 3 A: 4 E: 5 R: 6
+ CNFG: ''
+rec AREC[2] frame_table Priv
+ [1]:
+ p POS
+ X: 9 Y: 2 Z: 3 A: 4 E: 5 R: 6
+ CNFG: ''
+r REC frame_table Priv
+ p POS
+ X: 9 Y: 2 Z: 3 A: 4 E: 5 R: 6
+ CNFG: ''
+q POS Priv
+ X: 5 Y: 2 Z: 3 A: 4 E: 5 R: 6
+ CNFG: ''
+?!?
+ X: 6 Y: 2 Z: 3 A: 4 E: 5 R: 6
+"""
+
+
+def test_fields_of_records_and_nodes_are_no_variables() -> None:
+    variables = read_variables(source_from_bytes("job.lsv", NESTED))
+    assert sorted(variables.entries) == ["p", "q"]
+    assert variables.entries["p"].numbers[0] == 1.0
+    assert variables.entries["q"].numbers[0] == 5.0
+    assert [d.code for d in variables.diagnostics] == ["lsv-line"]
+
+
+def test_nodes_are_known_where_the_program_assigns_them_only() -> None:
+    text = (
+        "PROGRAM job\nVAR pth : PATH OF nd\nBEGIN\n"
+        "pth.NODE[2].$MAIN_POS := POS(9,2,3,4,5,6,'')\n"
+        "MOVE LINEAR TO pth.NODE[1]\nMOVE LINEAR TO pth.NODE[1].$MAIN_POS\n"
+        "MOVE LINEAR TO pth.NODE[2].$MAIN_POS\nMOVE LINEAR TO pth.NODE[n].$MAIN_POS\n"
+        "END job"
+    )
+    variables = read_variables(source_from_bytes("job.lsv", NESTED))
+    visits = resolve(
+        parse(source_from_bytes("job.pdl", text.encode())), None, variables
+    )
+    visits = visits.visits
+    why = [visits.reasons[i] for i in visits.reason]
+    assert visits.literal.tolist() == [-1, -1, 0, -1]
+    assert why[2] == ""
+    for i in (0, 1, 3):
+        assert why[i].startswith("the node of pth is not known")
