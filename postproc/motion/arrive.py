@@ -20,6 +20,7 @@ from postproc.motion.reasons import (
     NO_BRANCH,
     NO_CIRCLE,
     NO_START,
+    NO_TARGET,
     OTHER_BRANCH,
     OUT_OF_REACH,
     PATH_JUMP,
@@ -67,6 +68,8 @@ def arrive(work: Workspace, v: int, edge: int) -> Arrival:
     flange = work.flange[v]
     if kind == Kind.TOWARDS:
         flange = part_way(work, v, work.flange[source])
+        if np.isnan(flange).any():
+            return Arrival(np.full(6, np.nan), flange, -1, NO_PATH, CODE[NO_TARGET])
     elif np.isnan(flange).any():
         flange = work.after_step(v, work.flange[source])
     if kind == Kind.JOINTS:
