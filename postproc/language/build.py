@@ -220,6 +220,9 @@ RULES: dict[str, Rule] = {
     "group": lambda c: None,
     "binary": lambda c: ast.Binary(str(c[1]).upper(), c[0], c[2]),
     "unary": lambda c: ast.Unary(str(c[0]).upper(), c[1]),
+    "parenthesised": lambda c: (
+        ast.Unary("()", c[0]) if isinstance(c[0], ast.Reference) else c[0]
+    ),
     "number": lambda c: c[0],
     "string": lambda c: ast.Text(_unquoted(c[0])),
     "aggregate": lambda c: ast.Aggregate(tuple(c)),

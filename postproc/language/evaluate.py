@@ -132,6 +132,8 @@ class Point:
                 return text
             case ast.Reference():
                 return self.read(expression)
+            case ast.Unary("()", operand):
+                return self.value(operand)
             case ast.Unary(sign, operand):
                 return unary(sign, self.value(operand))
             case ast.Binary(sign, left, right):
@@ -217,6 +219,8 @@ class Point:
         match expression:
             case ast.Number(slot):
                 return Written(self.real(expression), self.global_slot(slot))
+            case ast.Unary("()", operand):
+                return self.written(operand)
             case ast.Reference():
                 return self._part(expression) or Written(self.real(expression))
             case ast.Binary("+" | "-" as sign, ast.Reference() as left, right):

@@ -48,7 +48,10 @@ class Invoke:
 
 @dataclass(frozen=True, slots=True)
 class Unary:
-    """An operator before its operand."""
+    """An operator before its operand; ``()`` is a variable in parentheses.
+
+    As an argument that is the variable's value, not the variable itself.
+    """
 
     operator: str
     operand: Expression
