@@ -47,6 +47,10 @@ NEAREST = (
     "the configuration string says another turn than the nearest: which of them counts "
     "is not sure with $TURN_CARE {} and $JNT_MTURN {}"
 )
+WRIST = (
+    "the configuration string says another branch or turn than the nearest: whether a "
+    "line with $ORNT_TYPE WRIST_JNT leads there is not sure"
+)
 AFTER = "it comes from a move whose branch or turn is not sure"
 
 
@@ -110,15 +114,18 @@ def _mark_stops(visits: Visits, path: Overruled, reasons: Reasons) -> None:
 def _mark_either_way(
     visits: Visits, targets: Targets, plan: Plan, arm: Arm, reasons: Reasons
 ) -> Bools:
-    """Leave JOINT moves alone that two readings of their string lead elsewhere."""
-    placed = (targets.move == Move.JOINT) & (targets.kind == Kind.POSE)
-    placed &= (targets.slot >= 0) & ~np.isnan(plan.q[:, 0])
-    branch = placed & _doubted(visits.care[:, CNFG])
-    turn = placed & _turns_doubted(visits, targets)
+    """Leave moves alone that two readings of their string lead elsewhere."""
+    placed = (targets.kind == Kind.POSE) & (targets.slot >= 0)
+    placed &= ~np.isnan(plan.q[:, 0])
+    joint = placed & (targets.move == Move.JOINT)
+    wrist = placed & ~joint & targets.wrist_joint
+    branch = wrist | (joint & _doubted(visits.care[:, CNFG]))
+    turn = wrist | (joint & _turns_doubted(visits, targets))
     if branch.any():
         branch &= _from_other_branch(visits, targets, plan, arm, branch)
     if turn.any():
         turn &= _other_turn(visits, targets, plan, arm)
+    reasons.mark(wrist & (branch | turn), WRIST)
     for value in Switch:
         rows = branch & (visits.care[:, CNFG] == value)
         reasons.mark(rows, BRANCH.format(SAID[value]))

@@ -136,6 +136,17 @@ def test_a_joint_move_to_another_turn(
     assert planned(cell, START, *said, near)[1].reasons[1] == ""
 
 
+@pytest.mark.parametrize("config", ["W T1:0 T2:0", "T1:0 T2:1", "T1:0 T2:0"])
+@pytest.mark.parametrize("care", ["TRUE", "FALSE"])
+def test_wrist_axes_on_a_line_keep_branch_and_turn(
+    cell: Cell, config: str, care: str
+) -> None:
+    switch = [f"$CNFG_CARE := {care}", f"$TURN_CARE := {care}"]
+    line = f"MOVE LINEAR TO {pos(cell, THERE, config)} WITH $ORNT_TYPE = WRIST_JNT"
+    _, found = planned(cell, START, *switch, line)
+    assert ("WRIST_JNT" in found.reasons[1]) == (config != "T1:0 T2:0")
+
+
 def test_an_unknown_start_goes_by_the_string(cell: Cell) -> None:
     move = f"MOVE JOINT TO {pos(cell, THERE, 'T1:0 T2:1')}"
     _, found = planned(cell, "$CNFG_CARE := FALSE", "$TURN_CARE := FALSE", move)
