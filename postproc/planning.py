@@ -26,6 +26,7 @@ from postproc.resolve import targets_from_visits
 from postproc.robot.cell import Cell
 from postproc.robot.state import States, make_states
 from postproc.strings import mark_strings
+from postproc.turning import mark_turning
 
 Array = NDArray[np.float64]
 
@@ -157,6 +158,7 @@ def plan_visits(visits: Visits, cell: Cell, timed: bool = True) -> Planned:
     planned = plan(cell.arm, targets, np.deg2rad(cell.limits.wrist_deg), timed)
     reasons.adopt(planned.reason, planned.reasons)
     mark_strings(visits, targets, planned, cell.arm, reasons)
+    mark_turning(visits, targets, planned, reasons)
     return Planned(targets, planned, reasons, np.zeros((len(visits), 3)))
 
 
