@@ -138,10 +138,10 @@ def must_stay(
     Returns:
         The reasons, and which of the m literals of the agreement have each, (m,).
     """
-    pinned = np.array([visits.literals.pinned[row] for row in agreement.literal], str)
     hurt = worsened(visits, agreement, change, trusted, cell.limits.agree_mm)
-    found = {f"{why}: give the move a point of its own (see --clone)": pinned == why
-             for why in sorted({*pinned.tolist()} - {""})}  # fmt: skip
+    found = {f"{why}: give the move a point of its own (see --clone)": rows
+             for why, pins in visits.literals.pins.items()
+             if (rows := np.isin(agreement.literal, pins)).any()}  # fmt: skip
     text = "a target computed from it would land farther off (see --clone)"
     return found | {text: hurt}
 

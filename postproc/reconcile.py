@@ -55,6 +55,12 @@ def agree(
     group = np.full(len(literal), -1, dtype=np.int64)
     group[rows] = inverse
     m = len(names)
+    if m == len(rows):  # every literal has one arrival: nothing to compare
+        order = np.empty(m, dtype=np.int64)
+        order[inverse] = rows
+        mean, change = corrected[order] + 0.0, correction_mm[order, :3] + 0.0
+        spread = 0.0 * np.abs(correction_mm[order]).sum(axis=1)
+        return Agreement(names, group, usable[order], spread, mean, change, count)
     all_usable = np.ones(m, dtype=bool)
     np.logical_and.at(all_usable, inverse, usable[rows])
     width = (m, correction_mm.shape[1])

@@ -97,10 +97,11 @@ def solve_again(
     lost = np.isnan(plan.q).any(axis=1) | np.isnan(plan.tcp).any(axis=(1, 2))
     known = np.asarray(rows & ~lost)
     here = states[known]
-    part = solve(
-        model, cell.arm, planned.wanted[known], plan.tool[known], here, orientation
-    )
     predicted = model.predict(cell.arm, here)
+    part = solve(
+        model, cell.arm, planned.wanted[known], plan.tool[known], here, orientation,
+        predicted.error,
+    )  # fmt: skip
     out = Solved(
         direction=np.where(rows[:, None], states.direction, solved.direction),
         q=np.array(solved.q),

@@ -48,9 +48,12 @@ def new_numbers(visits: Visits, plan: Plan, solved: Solved, aside: Array) -> Arr
 def turns(plan: Plan, solved: Solved) -> Array:
     """Return the rotation of the commands against the targets, (n, 3) [rad]."""
     new, old = solved.command[:, :3, :3], plan.tcp[:, :3, :3]
-    apart = np.abs(new - old).max(axis=(1, 2))
-    out = np.where(np.isnan(apart)[:, None], np.nan, np.zeros(3))
-    rows = np.flatnonzero(apart > 0)
+    apart = (new != old).any(axis=(1, 2))
+    out = np.zeros((len(new), 3))
+    lost = np.flatnonzero(apart & np.isnan(new + old).any(axis=(1, 2)))
+    out[lost] = np.nan
+    apart[lost] = False
+    rows = np.flatnonzero(apart)
     out[rows] = rotation_vector(new[rows] @ np.swapaxes(old[rows], 1, 2))
     return out
 
@@ -59,12 +62,17 @@ def base_in_uframe(visits: Visits, rows: Ints) -> Array:
     """Return the pose of the arm's base in the user frame, (k, 4, 4) [m]."""
     unknown = np.full((1, 4, 4), np.nan)
     frames = np.concatenate([pose_from_record(visits.frames.reshape(-1, 6)), unknown])
-    return np.asarray(inverse(frames)[visits.uframe[rows]] @ frames[visits.base[rows]])
+    count = len(frames)
+    pair = visits.uframe[rows] % count * count + visits.base[rows] % count
+    used, which = np.unique(pair, return_inverse=True)
+    poses = np.asarray(inverse(frames)[used // count] @ frames[used % count])
+    return np.asarray(poses[which])
 
 
 def turns_in_file(visits: Visits, turn: Array) -> Array:
     """Give the rotations in the frame that the numbers are in, (n, 3) [rad]."""
     out, poses = np.array(turn), np.flatnonzero(visits.target == Target.POSE)
+    poses = poses[(turn[poses] != 0).any(axis=1)]
     axes = base_in_uframe(visits, poses)[:, :3, :3]
     out[poses] = np.einsum("nij,nj->ni", axes, turn[poses])
     return out

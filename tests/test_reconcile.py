@@ -28,3 +28,18 @@ def test_unusable_arrival_spoils_the_group():
         np.array([0, 0]), np.array([True, False]), np.zeros((2, 6)), np.zeros((2, 3))
     )
     assert not found.usable[0]
+
+
+def test_literals_with_one_arrival_each_are_groups_of_one():
+    rng = np.random.default_rng(2)
+    literal = np.array([7, -1, 2, 9, 4])
+    corrected, change = rng.normal(size=(5, 6)), rng.normal(size=(5, 3))
+    usable = np.array([True, True, False, True, True])
+    alone = agree(literal, usable, corrected, change)
+    # The same with one more arrival, at another literal twice: the general case.
+    again = [0, 1, 2, 3, 4, 4, 4]
+    literal, usable = np.append(literal, [11, 11]), usable[again]
+    general = agree(literal, usable, corrected[again], change[again])
+    for name in ("literal", "usable", "spread_mm", "values", "change_mm", "arrivals"):
+        np.testing.assert_array_equal(getattr(alone, name), getattr(general, name)[:4])
+    np.testing.assert_array_equal(alone.group, general.group[:5])

@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from postproc.accuracy.chain import NOMINAL, Deviation, Walk, walk
+from postproc.accuracy.chain import NOMINAL, Deviation, Walk, tcp, walk
 from postproc.robot.arm import Arm
 from postproc.robot.state import States
 
@@ -96,6 +96,19 @@ class Batch:
         """Axes, points and TCP along the (deviated) chain."""
         q = self.states.q if self.shift is None else self.states.q + self.shift
         return walk(self.arm.dh, q, self.states.tool, self.deviation)
+
+    @cached_property
+    def tcp(self) -> Array:
+        """Tool centre point along the (deviated) chain, (n, 3) [m]."""
+        if "walk" in vars(self):
+            return self.walk.tcp
+        q = self.states.q if self.shift is None else self.states.q + self.shift
+        return tcp(self.arm.dh, q, self.states.tool, self.deviation)
+
+    def __getitem__(self, rows: NDArray[np.int64]) -> Batch:
+        """Return some of the states, with the kinematics taken at the same arm."""
+        shift = None if self.shift is None else self.shift[rows]
+        return Batch(self.arm, self.states[rows], self.deviation, shift)
 
     @cached_property
     def jacobian(self) -> Array:

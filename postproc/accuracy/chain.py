@@ -7,7 +7,7 @@ chain that keeps the axes and points of every elementary motion.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -108,3 +108,22 @@ def walk(dh: DH, q: Array, tool: Array, deviation: Deviation = NOMINAL) -> Walk:
     tcp = p + np.einsum("nij,nj->ni", flange, tool + deviation.tool)
     point = np.array(deviation.base[:3])
     return Walk(turn, pivot, link, corner, bend, about, point, flange, tcp)
+
+
+def tcp(dh: DH, q: Array, tool: Array, deviation: Deviation = NOMINAL) -> Array:
+    """Place the tool centre point alone, (n, 3) [m]: `Walk.tcp` at a third of the cost.
+
+    Args:
+        dh: Nominal parameters.
+        q: Joint angles, (n, 6) [rad].
+        tool: TCP in the flange frame, (n, 3) [m].
+        deviation: Deviations of the placements.
+    """
+    da, dd, dalpha, dtheta, beta = deviation.link.T
+    real = replace(
+        dh, a=dh.a + da, d=dh.d + dd, alpha=dh.alpha + dalpha, offset=dh.offset + dtheta
+    )
+    axes, _ = _base(deviation)
+    placed = real.placed(q, tool + deviation.tool, beta)
+    moved: Array = placed @ axes.T + deviation.base[:3]
+    return moved

@@ -93,7 +93,7 @@ class Combination:
 
     def error_at(self, at: Batch, batch: Batch, p: Array) -> Array:
         """Sum the errors where the kinematics at parameters p are known already."""
-        error: Array = at.walk.tcp - batch.walk.tcp
+        error: Array = at.tcp - batch.tcp
         for effect, part in zip(self.effects, self.slices, strict=True):
             if not isinstance(effect, Geometry | JointEffect):
                 error = error + effect.displacement(batch, p[part])

@@ -127,8 +127,7 @@ class Model:
             variance = _side_variance(effects, at, values)
             variance = variance + np.square(self.spread)
             if len(covariance):
-                X = effects.columns(at)
-                variance += np.einsum("nip,nip->ni", X @ covariance, X)
+                variance += _parameter_variance(effects.columns(at), covariance)
             model[rows] = variance
             arrival[rows] = variance + self.noise.arrival_variance(at.jacobian)
         model, arrival = np.sqrt(np.maximum(model, 0)), np.sqrt(np.maximum(arrival, 0))
@@ -254,10 +253,18 @@ def _chunks(n: int) -> list[slice]:
     return [slice(i, min(i + CHUNK, n)) for i in range(0, n, CHUNK)]
 
 
+def _parameter_variance(columns: Array, covariance: Array) -> Array:
+    """Variance that uncertain parameters give, (n, 3) [m^2]; columns (n, 3, p)."""
+    rows = columns.reshape(-1, columns.shape[2])  # one large product, not n small ones
+    return np.asarray(np.einsum("rp,rp->r", rows @ covariance, rows)).reshape(-1, 3)
+
+
 def _side_variance(effects: Combination, at: Batch, values: Array) -> Array:
     """Variance that unknown directions give, (n, 3) [m^2]."""
     unknown = 1.0 - np.clip(at.states.direction, -1.0, 1.0) ** 2
-    if not unknown.any():
-        return np.zeros((len(at), 3))
-    slopes = effects.direction_slopes(at, values)
-    return np.asarray(np.einsum("nij,nj->ni", slopes**2, unknown))
+    out = np.zeros((len(at), 3))
+    rows = np.flatnonzero((unknown > 0.0).any(axis=1))
+    if len(rows):
+        slopes = effects.direction_slopes(at[rows], values)
+        out[rows] = np.einsum("nij,nj->ni", slopes**2, unknown[rows])
+    return out

@@ -115,6 +115,15 @@ class Literals:
         """Return the number of literals."""
         return len(self.file)
 
+    @cached_property
+    def pins(self) -> dict[str, Ints]:
+        """The literals (k,) by what pins them; free ones are not there."""
+        found: dict[str, list[int]] = {}
+        for row, why in enumerate(self.pinned):
+            if why:
+                found.setdefault(why, []).append(row)
+        return {why: np.array(found[why]) for why in sorted(found)}
+
 
 @dataclass(frozen=True)
 class Visits:

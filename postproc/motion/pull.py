@@ -48,14 +48,20 @@ class Pull:
         Args:
             moved: What all n targets move by, (n, 3).
         """
-        out, here = np.zeros_like(moved), moved[self.visit]
-        out[self.visit] = self.v[:, None] * (moved[self.before] - here)
-        out[self.visit] += self.w[:, None] * (moved[self.behind] - here)
+        out = np.zeros_like(moved)
+        out[self.visit] = self._at_points(moved)
+        return out
+
+    def _at_points(self, moved: Array) -> Array:
+        """Return the rows of `on` that are not zero, (c, 3)."""
+        here = moved.take(self.visit, axis=0)
+        out: Array = self.v[:, None] * (moved.take(self.before, axis=0) - here)
+        out += self.w[:, None] * (moved.take(self.behind, axis=0) - here)
         return out
 
     def to_move(self, wanted: Array) -> Array:
         """Move targets so that the path moves as wanted where it passes, (n, 3)."""
-        moved = np.array(wanted)
+        moved, here = np.array(wanted), wanted.take(self.visit, axis=0)
         for _ in range(ROUNDS if len(self.visit) else 0):
-            moved = wanted - self.on(moved)
+            moved[self.visit] = here - self._at_points(moved)
         return moved

@@ -64,22 +64,26 @@ class DH:
             p = p + self.a[i] * x
             yield x, y, z, p
 
-    def placed(self, q: Array, point: Array) -> Array:
+    def placed(self, q: Array, point: Array, beta: Array | None = None) -> Array:
         """Express points of the flange frame in the base frame, (n, 3) [m].
 
-        Going back along the chain, T_i = Rot_z(theta) Trans(a, 0, d) Rot_x(alpha).
+        Going back along the chain, T_i = Rot_z(theta) Trans(a, 0, d) Rot_x(alpha)
+        Rot_y(beta).
 
         Args:
             q: Controller angles, (n, 6) [rad].
             point: Flange frame, (n, 3) [m].
+            beta: Hayati's rotations of the links, (6,) [rad].
         """
         theta = np.ascontiguousarray(self.angles(q).T)
         cos, sin = np.cos(theta), np.sin(theta)
         x, y, z = np.array(np.broadcast_to(point, (len(q), 3)).T)
         for i in reversed(range(6)):
+            if beta is not None and beta[i] != 0.0:
+                cb, sb = np.cos(beta[i]), np.sin(beta[i])
+                x, z = cb * x + sb * z, cb * z - sb * x
             ca, sa = np.cos(self.alpha[i]), np.sin(self.alpha[i])
-            y, z = ca * y - sa * z, sa * y + ca * z + self.d[i]
-            x = x + self.a[i]
+            x, y, z = x + self.a[i], ca * y - sa * z, sa * y + ca * z + self.d[i]
             x, y = cos[i] * x - sin[i] * y, sin[i] * x + cos[i] * y
         return np.stack([x, y, z], axis=1)
 

@@ -109,26 +109,21 @@ def with_turning_values(
     Returns:
         What to pass, (t, 6) [rad], and how many rows stand for each sample, (s,).
     """
-    at = np.flatnonzero(inside)
-    middle, ahead, behind = (
-        path[at],
-        path[np.minimum(at + 1, len(path) - 1)],
-        before[at],
-    )
-    rise, bend = (ahead - behind) / 2, (ahead + behind) / 2 - middle
+    ahead = np.vstack([path[1:], path[-1:]])
     # It turns at -rise / (2 bend) of the way to a neighbour.
-    turns = (np.abs(rise) < 2 * np.abs(bend)) & (rise != 0)
+    rise, bend = (ahead - before) / 2, (ahead + before) / 2 - path
+    turns = (np.abs(rise) < 2 * np.abs(bend)) & (rise != 0) & inside[:, None]
     row = np.flatnonzero(turns.any(axis=1))
-    middle, rise, bend, turns = middle[row], rise[row], bend[row], turns[row]
+    middle, rise, bend, turns = path[row], rise[row], bend[row], turns[row]
     value = middle - rise**2 / (4 * np.where(turns, bend, 1.0))
     later = (rise > 0) != (bend > 0)
     early, late = turns & ~later, turns & later
     count = np.ones(len(path), dtype=np.int64)
-    count[at[row]] += early.any(axis=1).astype(np.int64) + late.any(axis=1)
+    count[row] += early.any(axis=1).astype(np.int64) + late.any(axis=1)
     end = np.cumsum(count)
     out = np.repeat(path, count, axis=0)
-    for inserted, place in ((early, end[at[row]] - count[at[row]]),
-                            (late, end[at[row]] - 1)):  # fmt: skip
+    for inserted, place in ((early, end[row] - count[row]),
+                            (late, end[row] - 1)):  # fmt: skip
         some = inserted.any(axis=1)
         out[place[some]] = np.where(inserted, value, middle)[some]
     return out, count

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from postproc.accuracy.batch import Batch
+from postproc.accuracy.chain import NOMINAL
 from postproc.accuracy.geometry import Geometry
 from tests.accuracy.simulator import NJ, TOOL, Simulated, random_states
 
@@ -33,6 +34,9 @@ def test_deviations_move_the_tool_as_an_independent_chain_does() -> None:
     truth = real.tcp(states.q, still, states.tool)
     nominal = Simulated().tcp(states.q, still, states.tool)
     np.testing.assert_allclose(batch.walk.tcp, nominal, atol=1e-12)
+    moved = batch.moved(geometry.deviation(p), None)
+    np.testing.assert_allclose(moved.tcp, truth, atol=1e-12)
+    np.testing.assert_allclose(moved.walk.tcp, truth, atol=1e-12)
     np.testing.assert_allclose(
         geometry.displacement(batch, p), truth - nominal, atol=1e-12
     )
@@ -47,6 +51,17 @@ def test_kinematics_agree_with_the_arm() -> None:
     np.testing.assert_allclose(
         batch.walk.flange, NJ.flange(states.q)[:, :3, :3], atol=1e-12
     )
+
+
+def test_the_tcp_alone_is_that_of_the_walk() -> None:
+    states = random_states(30, np.random.default_rng(5))
+    shift = 1e-3 * np.random.default_rng(6).standard_normal((30, 6))
+    batch = Batch(NJ, states).moved(NOMINAL, shift)
+    alone = batch.tcp
+    assert "walk" not in vars(batch)
+    np.testing.assert_allclose(alone, batch.walk.tcp, atol=1e-12)
+    rows = np.array([4, 4, 17])
+    np.testing.assert_array_equal(batch[rows].jacobian, batch.jacobian[rows])
 
 
 def test_the_parameters_are_complete() -> None:

@@ -64,6 +64,9 @@ def test_link_frames_are_the_dh_product(arm, q):
         T = T @ A
         np.testing.assert_allclose(frames[:, i + 1], T, atol=1e-12)
     np.testing.assert_allclose(arm.flange(q[:20]), T, atol=1e-12)
+    tool = np.linspace(-0.3, 0.4, 60).reshape(20, 3)
+    tcp = np.einsum("nij,nj->ni", T[:, :3, :3], tool) + T[:, :3, 3]
+    np.testing.assert_allclose(arm.tcp(q[:20], tool), tcp, atol=1e-12)
 
 
 def test_jacobian_is_the_derivative(arm, q):
