@@ -76,7 +76,7 @@ def arrive(work: Workspace, v: int, edge: int) -> Arrival:
         end = Arrival(work.q[v], flange, -1, work.q[v][None], 0)
     else:
         end = choose(work, v, flange, near)
-    if targets.move[v] == Move.JOINT:
+    if targets.move[v] == Move.JOINT or np.isnan(flange).any():
         return end
     if work.samples.broken[edge]:
         return Arrival(end.q, flange, end.slot, NO_PATH, CODE[NO_CIRCLE])
