@@ -9,13 +9,17 @@ from postproc.language.effects import references
 from postproc.language.machine import Here, Machine, pin_names
 from postproc.language.store import Settings
 from postproc.language.values import Value
-from postproc.language.visits import ELSEWHERE, Motion
+from postproc.language.visits import ELSEWHERE, Motion, Target
 
 _MOTIONS = {
     "joint": Motion.JOINT,
     "linear": Motion.LINEAR,
     "circular": Motion.CIRCULAR,
 }
+_FROM_HERE = frozenset(
+    {Target.RELATIVE_TOOL, Target.RELATIVE_BASE, Target.RELATIVE_UFRAME, Target.AWAY,
+     Target.ABOUT, Target.BY, Target.FOR}
+)  # fmt: skip
 _VIA, _END = 0, 1
 
 
@@ -33,16 +37,19 @@ def move(machine: Machine, here: Here, statement: ast.Move) -> None:
         reason = "the arm that moves (ARM[..]) is known only at run time"
     reason = here.reason or reason
     predecessors = machine.predecessors(here)
+    several = len(predecessors) > 1
     if statement.via is not None:
         goal = absolute(here, statement.via)
         via = _arrival(here, statement, predecessors, settings, motion, goal, reason)
         predecessors = frozenset({machine.record(here, _VIA, _as_via(via))})
-        if machine.interrupted:
+        if several or machine.interrupted:  # the arc depends on where it starts
             predecessors |= {ELSEWHERE}
     goal = goal_of(here, statement, motion)
     end = _arrival(here, statement, predecessors, settings, motion, goal, reason)
     arrived = machine.record(here, _END, end)
     store.last = frozenset({arrived})
+    if several and goal.target in _FROM_HERE:
+        store.last |= {ELSEWHERE}
     if statement.til or whose is None:
         store.last |= {ELSEWHERE} if statement.til else predecessors
 
