@@ -9,6 +9,22 @@ PAGE = 100_000  # lines of the k-th page of a job are counted from k * PAGE
 EVERYWHERE = ("gp",)  # variables that all files of a job share
 
 
+class Literal(tuple[float, ...]):
+    """Numbers that stand in the text as they are; what is computed from them is none.
+
+    Attributes:
+        line: Where they stand.
+    """
+
+    line: int
+
+    @classmethod
+    def at(cls, line: int, numbers: tuple[float, ...]) -> Literal:
+        made = cls(numbers)
+        made.line = line
+        return made
+
+
 @dataclass(frozen=True)
 class Executed:
     """One move that was run.
@@ -17,8 +33,8 @@ class Executed:
         line: Its line, counted through all pages of the job.
         values: Its numbers; None: a variable that was never set.
         tool, uframe: The frames then.
-        how: TO, VIA, NEAR, AWAY, BY, or RELATIVE or ABOUT with a frame: RELATIVE_TOOL.
-        short_mm: How far NEAR stays away.
+        how: TO, VIA, NEAR, FOR, AWAY, BY, or RELATIVE or ABOUT and a frame: ABOUT_TOOL.
+        short_mm: How far NEAR stays away, or FOR goes.
     """
 
     line: int
@@ -28,6 +44,11 @@ class Executed:
     how: str = "TO"
     short_mm: float = 0.0
 
+    @property
+    def origin(self) -> int:
+        """The line in which its numbers stand, 0 where they are computed."""
+        return self.values.line if isinstance(self.values, Literal) else 0
+
 
 @dataclass
 class Generated:
@@ -35,7 +56,7 @@ class Generated:
 
     Attributes:
         handlers: First line of what each condition handler does.
-        unfollowed: First and last lines of functions, which are called in expressions.
+        extra: Lines that another program of the same moves has not: they take no time.
     """
 
     text: str
@@ -45,7 +66,7 @@ class Generated:
     deterministic: bool
     pages: tuple[str, ...] = ()
     handlers: dict[int, int] = field(default_factory=dict)
-    functions: tuple[tuple[int, int], ...] = ()
+    extra: frozenset[int] = frozenset()
 
     @property
     def whole(self) -> str:
@@ -58,7 +79,3 @@ class Generated:
         names = ["job.pdl", *(f"page{k + 1}.pdl" for k in range(len(self.pages)))]
         texts = (self.text, *self.pages)
         return {n: t.encode("latin-1") for n, t in zip(names, texts, strict=True)}
-
-    def within_function(self, line: int) -> bool:
-        """Tell whether a line belongs to a function."""
-        return any(first <= line <= last for first, last in self.functions)

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from tests.language.executed import EVERYWHERE, PAGE, Executed, Generated
+from tests.language.executed import EVERYWHERE, PAGE, Executed, Generated, Literal
 from tests.language.poses import composed, inverted
 from tests.language.running import Running
 
@@ -23,7 +23,7 @@ class Interpreter(Running):
 
     # ---- moves ----------------------------------------------------------------------
     def do_move(self, numbers: Any) -> None:
-        self.log(numbers)
+        self.log(Literal.at(self.line, numbers))
 
     def do_move_to(self, name: str) -> None:
         self.log(self.held(name))
@@ -34,8 +34,8 @@ class Interpreter(Running):
     def do_move_shifted(self, name: str, by: Any) -> None:
         self.log(self.shifted(name, by))
 
-    def do_near(self, name: str, short_mm: float) -> None:
-        self.log(self.held(name), "NEAR", short_mm)
+    def do_near(self, name: str, short_mm: float, how: str = "NEAR") -> None:
+        self.log(self.held(name), how, short_mm)
 
     def do_arc(self, name: str, via: str) -> None:
         self.log(self.held(via), "VIA")
@@ -47,7 +47,9 @@ class Interpreter(Running):
 
     # ---- values ---------------------------------------------------------------------
     def do_set(self, name: str, value: Any) -> None:
-        self.values[self.name(name)] = value
+        point = isinstance(value, tuple)
+        held = Literal.at(self.line, value) if point else value
+        self.values[self.name(name)] = held
 
     def do_copy(self, a: str, b: str) -> None:
         self.values[self.name(a)] = self.held(b)
@@ -80,7 +82,9 @@ class Interpreter(Running):
         self.frames[name] = numbers
 
     def do_fill(self, index: str, numbers: Any) -> None:
-        self.values[self.name(f"tab[{self.subscript(index)}]")] = numbers
+        self.values[self.name(f"tab[{self.subscript(index)}]")] = Literal.at(
+            self.line, numbers
+        )
 
     def do_scramble(self, name: str) -> None:
         self.values[self.name(name)] = tuple(self.rng.random() for _ in range(6))

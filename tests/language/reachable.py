@@ -1,13 +1,16 @@
-"""Random programs that the arm of the tests can run, and what it does then."""
+"""Random programs and jobs that the arm of the tests can run."""
 
 from __future__ import annotations
 
 import random
-import re
-from dataclasses import replace
+from dataclasses import dataclass
 
-from tests.language.generator import Generator
-from tests.language.interpreter import Executed, Generated
+from tests.language.executed import EVERYWHERE, Generated
+from tests.language.generator.assignments import Assignments
+from tests.language.generator.blocks import Blocks
+from tests.language.generator.motions import Motions
+from tests.language.generator.rarer import Kinds, Rarer
+from tests.language.whole_jobs import Job, Page
 
 # Around the frames of the tests' cell: middle and half width of every number.
 BOXES = {
@@ -15,32 +18,32 @@ BOXES = {
     "joints": ((-10, 8), (15, 8), (-100, 8), (20, 10), (60, 8), (0, 10)),
     "tool": ((80, 10), (-40, 10), (150, 10), (0, 0), (0, 0), (0, 0)),
     "uframe": ((1600, 30), (-300, 30), (900, 30), (0, 3), (0, 2), (0, 3)),
+    "step": ((0, 30), (0, 30), (0, 30), (0, 10), (2, 2), (0, 10)),
 }
 OPENING = (
     (-40.0, -10.0, -80.0, -20.0, 30.0, -40.0),
     (-25.0, 0.0, -90.0, 0.0, 45.0, -20.0),
 )
-_SIX = re.compile(r"(?:POS\(|\{)([^'{}()]*?)(?:,\s*''\)|\})")
-_LAST = re.compile(r"(-?\d+\.\d+)[^\d]*$")
-Pose = tuple[float, ...]
+PARTS = (0.25, 0.2, 0.1, 0.25)  # of programs with handlers, that move, recursion, ..
 
 
-class Reachable(Generator):
-    """Draws poses, joint angles and frames within reach."""
+class Within(Motions, Assignments, Blocks):
+    """Draws poses, joint angles and frames within reach.
 
-    def opening(self) -> None:
-        """Move all joints one way, so that every gear's side is known; set points."""
-        for numbers in OPENING:
-            text = ", ".join(f"{n:.4f}" for n in numbers)
-            self.emit(f"MOVE JOINT TO {{{text}}}", "move", numbers)
-        self.assign_joints()
-        self.extended()
-        for index in ("1", "2"):
-            numbers, text = self.record()
-            line = f"tab[{index}] := POS({text}, '')"
-            self.emit(line, "fill", index, numbers)
+    Attributes:
+        shares: Part of statements that are moves to the same few points.
+    """
 
-    def drawn(self, kind: str) -> Pose:
+    shares: float = 0.0
+
+    def statement(self, depth: int) -> None:
+        """Write a move to a point, or any statement."""
+        if self.rng.random() < self.shares:
+            self.move_variable()
+        else:
+            super().statement(depth)
+
+    def drawn(self, kind: str) -> tuple[float, ...]:
         """Draw six numbers."""
         rng = self.rng
         return tuple(round(rng.uniform(m - w, m + w), 4) for m, w in BOXES[kind])
@@ -49,57 +52,63 @@ class Reachable(Generator):
         """Draw a component, or what is added to one."""
         return round(self.rng.uniform(10.0, 40.0), 4)
 
+    def give_values(self) -> None:
+        """Give values to what a file has beside its points."""
+        self.assign_joints()
+        self.extended()
+        for index in ("1", "2"):
+            numbers, text = self.record()
+            line = f"tab[{index}] := POS({text}, '')"
+            self.emit(line, "fill", index, numbers)
 
-def reachable(seed: int, exact: bool) -> Generated:
-    """Write a program that starts at a known place."""
-    made = Reachable(random.Random(seed), exact).program()
-    return made
-
-
-def reread(made: Generated, text: str) -> Generated:
-    """Take the numbers of a rewritten text, one stamp line longer, into the ops."""
-    lines, ops = text.splitlines()[1:], dict(made.ops)
-    for line, op in made.ops.items():
-        if line < 1 or op[0] not in ("move", "set", "fill", "component"):
-            continue
-        code = lines[line - 1].split("--")[0]
-        six = _SIX.search(code)
-        if six and len(numbers := _numbers(six[1])) == 6:
-            ops[line] = (*op[:-1], numbers)
-        elif op[0] == "component" and (last := _LAST.search(code)):
-            ops[line] = (*op[:3], float(last[1]), op[4])
-    return replace(made, text=text, ops=ops)
+    def move_away(self) -> None:
+        """Move all joints one way, so that every gear's side is known."""
+        for numbers in OPENING:
+            text = ", ".join(f"{n:.4f}" for n in numbers)
+            self.emit(f"MOVE JOINT TO {{{text}}}", "move", numbers)
 
 
-def _numbers(text: str) -> Pose:
-    parts = text.split(",")
-    try:
-        return tuple(float(part) for part in parts)
-    except ValueError:
-        return ()
+@dataclass
+class ReachablePage(Within, Page):
+    """A page within reach."""
+
+    def assignments(self) -> None:
+        """Give values to everything."""
+        super().assignments()
+        self.give_values()
 
 
-def straight(made: Generated, trace: list[Executed]) -> bytes:
-    """Write what was executed as a program without branches, move after move."""
-    lines = ["PROGRAM job EZ", "VAR", "BEGIN"]
-    source = made.text.splitlines()
-    shift = source[0].startswith("-- postproc")
-    frames: dict[str, Pose] = {}
-    for executed in trace:
-        for name in ("tool", "uframe"):
-            now = getattr(executed, name)
-            if now != frames.get(name) and any(now):
-                lines.append(f"  ${name.upper()} := POS({_text(now)}, '')")
-                frames[name] = now
-        words = source[executed.line - 1 + shift].split("--")[0]
-        how = "LINEAR" if "LINEAR" in words else "JOINT"
-        fly, end = ("MOVEFLY", " ADVANCE") if "MOVEFLY" in words else ("MOVE", "")
-        numbers = _text(executed.values or ())
-        joints = "{" in words or " TO j1" in words
-        target = f"{{{numbers}}}" if joints else f"POS({numbers}, '')"
-        lines.append(f"  {fly} {how} TO {target}{end}")
-    return "\n".join([*lines, "END job", ""]).encode("ascii")
+@dataclass
+class Reachable(Within, Rarer):
+    """A program of one file within reach."""
+
+    def opening(self) -> None:
+        """Begin at a known place, with everything known."""
+        self.move_away()
+        self.give_values()
 
 
-def _text(numbers: Pose) -> str:
-    return ", ".join(f"{n:.7f}" for n in numbers)
+@dataclass
+class ReachableJob(Within, Job):
+    """A job of several files within reach."""
+
+    page_type: type[Page] = ReachablePage
+
+    def opening(self) -> None:
+        """Begin at a known place, with everything known in all pages."""
+        self.move_away()
+        self.give_values()
+        self.assign_point(EVERYWHERE[0])
+        self.run_pages()
+
+
+def reachable(seed: int, exact: bool, pages: bool, shares: float = 0.0) -> Generated:
+    """Write a program, or a job of several files, that starts at a known place."""
+    rng = random.Random(seed)
+    handlers, moving, recursion, functions = (rng.random() < part for part in PARTS)
+    live = not exact
+    kinds = Kinds(handlers, moving and live, recursion and live, functions and live)
+    kind = ReachableJob if pages else Reachable
+    writer = kind(rng, exact, kinds=kinds)
+    writer.shares = shares
+    return writer.program()

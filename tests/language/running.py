@@ -42,15 +42,16 @@ class Running:
     def run(self) -> list[Executed]:
         try:
             while self.line:
-                self.fire()
                 self.step()
         except StoppedError:
             pass
         return self.trace
 
     def step(self) -> None:
-        """Run one line; the line after the last is 0."""
-        self.budget -= 1
+        """Run one line, and perhaps a handler before; after the last, the line is 0."""
+        if self.line not in self.program.extra:
+            self.fire()
+            self.budget -= 1
         if self.budget < 0 or len(self.trace) >= self.most:
             raise StoppedError
         op = self.program.ops.get(self.line, ("nop",))

@@ -16,7 +16,7 @@ from tests.language.whole_jobs import Job
 PROGRAMS = 150
 
 
-POSES = (Target.POSE, Target.NEAR)
+POSES = (Target.POSE, Target.NEAR, Target.FOR)
 
 
 def generate(seed: int, exact: bool) -> tuple[Generated, Visits]:
@@ -61,7 +61,7 @@ def same_goal(visits: Visits, visit: int, executed: Executed) -> bool:
             return False
     elif target.name != how and how not in ("TO", "VIA"):
         return False
-    if executed.how == "NEAR" and visits.distance_mm[visit] != executed.short_mm:
+    if how in ("NEAR", "FOR") and visits.distance_mm[visit] != executed.short_mm:
         return False
     numbers = visits.values[visit][: len(held)]
     if target in POSES:
@@ -70,20 +70,13 @@ def same_goal(visits: Visits, visit: int, executed: Executed) -> bool:
 
 
 def follow(visits: Visits, trace: list[Executed], made: Generated) -> list[set[int]]:
-    """Return the visits that each executed move may be, along predecessors.
-
-    Moves in functions have none: nothing follows them into an expression. What comes
-    after them must be taken to come from anywhere.
-    """
+    """Return the visits that each executed move may be, along predecessors."""
     by_line: dict[int, list[int]] = {}
     lines = visits.file * PAGE + visits.line
     for visit, line in enumerate(lines.tolist()):
         by_line.setdefault(line, []).append(visit)
     before, found = {START}, []
     for executed in trace:
-        if made.within_function(executed.line):
-            before = set()
-            continue
         now = {
             visit
             for visit in by_line.get(executed.line, [])

@@ -98,7 +98,11 @@ class Job(Sheet):
 
     def opening(self) -> None:
         """Run every page once where all must be known."""
-        for number in range(1, PAGES + 1) if self.exact else ():
+        if self.exact:
+            self.run_pages()
+
+    def run_pages(self) -> None:
+        for number in range(1, PAGES + 1):
             self.emit(f"CALL page{number}", "call", f"page{number}", "")
 
     def call(self) -> None:

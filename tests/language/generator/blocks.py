@@ -6,10 +6,14 @@ from tests.language.generator.writer import COUNTS, UNKNOWN, Writer
 
 
 class Blocks(Writer):
-    """Writes blocks; whoever uses it says what a block holds."""
+    """Writes blocks; a subclass says what a block holds."""
 
     def block(self, count: int, depth: int) -> None:
         """Write some statements."""
+        raise NotImplementedError
+
+    def statement(self, depth: int) -> None:
+        """Write any statement."""
         raise NotImplementedError
 
     def guarded(self, text: str, *op: object) -> int:

@@ -12,13 +12,11 @@ class Functions(Blocks, Writer):
     Attributes:
         points_of, numbers_of: Those that give a point, and those that give a number.
         giving: What the function that is being written gives, and how it is written.
-        bodies: First and last line of each.
     """
 
     points_of: tuple[str, ...] = ()
     numbers_of: tuple[str, ...] = ()
     giving: tuple[str, tuple[object, ...]] | tuple[()] = ()
-    bodies: tuple[tuple[int, int], ...] = ()
 
     def function(self, name: str, posed: bool) -> None:
         """Write one; it takes a point and gives a point, or gives a number."""
@@ -32,8 +30,7 @@ class Functions(Blocks, Writer):
         self.giving = ("a", ("point", "a")) if posed else ("1", ("number", 1.0))
         self.block(self.rng.randrange(1, 4), 2)
         self.emit(f"RETURN({self.giving[0]})", "give", *self.giving[1])
-        last = self.emit(f"END {name}", "return")
-        self.bodies = (*self.bodies, (self.routines[name], last))
+        self.emit(f"END {name}", "return")
         self.parameter, self.giving = "", ()
         if posed:
             self.points_of = (*self.points_of, name)

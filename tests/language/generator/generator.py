@@ -15,13 +15,7 @@ ROUTINES = ("r1", "r2")
 
 
 class Generator(Motions, Assignments, Blocks):
-    """Writes a program of the usual statements.
-
-    Attributes:
-        bodies: First and last lines of functions.
-    """
-
-    bodies: tuple[tuple[int, int], ...] = ()
+    """Writes a program of the usual statements."""
 
     def program(self) -> Generated:
         self.takes |= {name: self.rng.random() < 0.5 for name in ROUTINES}
@@ -42,7 +36,7 @@ class Generator(Motions, Assignments, Blocks):
             self.emit("END job", "stop")
         return Generated(
             self.text(), self.ops, entry, self.routines, self.exact,
-            self.page_texts(), self.handlers, self.bodies,
+            self.page_texts(), self.handlers,
         )  # fmt: skip
 
     def _cycle(self) -> None:

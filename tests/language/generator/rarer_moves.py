@@ -12,12 +12,18 @@ class RarerMoves(Writer):
 
     def rarer_moves(self) -> list[object]:
         return [self.near, self.away, self.relative, self.about, self.by,
-                self.arc, self.arc, self.together, self.other_arm]  # fmt: skip
+                self.towards, self.arc, self.arc, self.together,
+                self.other_arm]  # fmt: skip
 
     def near(self) -> None:
         name, short = self.point(), abs(self.number())
         text = f"MOVE LINEAR NEAR {name} BY {short:.4f}"
         self.emit(text, "near", name.lower(), short)
+
+    def towards(self) -> None:
+        name, far = self.point(), abs(self.number())
+        text = f"MOVE LINEAR FOR {far:.4f} TO {name}"
+        self.emit(text, "near", name.lower(), far, "FOR")
 
     def away(self) -> None:
         by = abs(self.number())

@@ -1,0 +1,1 @@
+"""Many random programs: followed as they run, and landing where they say."""

@@ -1,0 +1,74 @@
+"""What came of generated programs, and the figures that are made of it."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+
+import numpy as np
+
+KNOWN = "compensated arrivals, sides known"
+UNSURE = "compensated arrivals, a side listed as not sure"
+CLONED = "of these, at clones"
+ROUNDED = "compensated fly points, rounded on the way"
+LISTED = "moves listed as not compensated to points that moved"
+PAIRS = (KNOWN, CLONED, UNSURE, ROUNDED, LISTED)
+ALL = "all compensated arrivals"
+DONE = "compensated"
+
+
+@dataclass
+class Found:
+    """What came of one program, or of several.
+
+    Attributes:
+        error_mm: True errors before and after, by kind of arrival.
+        z: True errors after where a side is not sure, in standard errors that the
+            report states for them.
+        once: What came of targets that are seen at one value from one side.
+        left_once: Of those in programs without inputs, the ones left alone for no
+            reason that is allowed: seed, line and reason.
+    """
+
+    error_mm: dict[str, list[tuple[float, float]]] = field(
+        default_factory=lambda: {kind: [] for kind in PAIRS}
+    )
+    z: list[float] = field(default_factory=list)
+    once: Counter[str] = field(default_factory=Counter)
+    left_once: list[tuple[int, int, str]] = field(default_factory=list)
+
+    def add(self, other: Found) -> None:
+        """Take in what came of another program."""
+        for kind in PAIRS:
+            self.error_mm[kind] += other.error_mm[kind]
+        self.z += other.z
+        self.once += other.once
+        self.left_once += other.left_once
+
+    def pairs(self, kind: str) -> np.ndarray:
+        """Return errors before and after, (n, 2) [mm]; `ALL` for known and unsure."""
+        kinds = (KNOWN, UNSURE) if kind == ALL else (kind,)
+        found = [pair for one in kinds for pair in self.error_mm[one]]
+        return np.array(found).reshape(-1, 2)
+
+
+def lines(found: Found) -> Iterable[str]:
+    """Say what came of it."""
+    for kind in (ALL, *PAIRS):
+        e = found.pairs(kind)
+        if len(e):
+            yield (
+                f"{kind}: {len(e)}, mean {e[:, 0].mean():.3f} -> {e[:, 1].mean():.4f} "
+                f"mm, 95 % {np.percentile(e[:, 1], 95):.4f}, max {e[:, 1].max():.4f}"
+            )
+    if found.z:
+        yield f"  not sure: within 2 stated standard errors {within(found.z):.1%}"
+    yield f"targets seen at one value from one side: {found.once.total()}"
+    for text, count in found.once.most_common():
+        yield f"  {count:6d} {text}"
+
+
+def within(z: list[float]) -> float:
+    """Return the part of errors of up to two standard errors."""
+    return float((np.array(z) <= 2.0).mean())

@@ -1,0 +1,83 @@
+"""Targets that are seen at one value, from one side: they must be compensated."""
+
+from __future__ import annotations
+
+import re
+from collections import defaultdict
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from postproc.report import Outcome, Status
+from tests.generated.found import DONE, Found
+from tests.language.executed import Executed
+
+# Why a target may be left alone that is seen at one value from one side.
+ALLOWED = tuple(
+    re.compile(text)
+    for text in (
+        "out of reach", "the path to it", "axis . beyond", "singularity",
+        "three points of the arc", "would flip the wrist", "beyond a joint limit",
+        "other programs may read", "computes? with", "composes it", "is set to it",
+        "a target computed from it", "another arm goes to it",
+        "steps by more than step_mm", "a number of the target belongs to another",
+    )
+)  # fmt: skip
+Flanks = tuple[float, ...]
+
+
+def count_once(
+    found: Found,
+    seed: int,
+    asked: Sequence[Executed],
+    ran: Sequence[Executed],
+    done: Outcome,
+    rows: Sequence[set[int]],
+    sides: Mapping[int, Flanks],
+) -> None:
+    """Count what came of targets that are seen at one value, from one side.
+
+    A target is the line in which its numbers stand. Every move that goes to it must go
+    to nothing else, with the same frames, and with every gear on the same flank; so
+    none may lie beyond what the arm could run. In programs without inputs, what is
+    left alone must have a reason that is allowed.
+    """
+    d = done.decisions
+    for line, steps in seen_once(asked, sides).items():
+        mine = sorted(set().union(*(rows[k] for k in steps)))
+        moved = all(ran[k].values != asked[k].values for k in steps)
+        safe = bool(mine) and bool((d.status[mine] == Status.SAFE).all())
+        assert moved or not safe, f"seed {seed}, line {line}"
+        why = {d.reasons[d.why[row]] for row in mine if d.status[row] != Status.SAFE}
+        text = DONE if safe else " / ".join(sorted(why)) or "no visit"
+        text = text if moved == safe else f"{DONE} for some of its moves: {text}"
+        found.once[text] += 1
+        allowed = all(any(a.search(one) for a in ALLOWED) for one in why)
+        if seed % 2 == 0 and not moved and not (mine and allowed):
+            found.left_once.append((seed, line, text))
+
+
+def seen_once(
+    asked: Sequence[Executed], sides: Mapping[int, Flanks]
+) -> dict[int, list[int]]:
+    """Return the moves to each such target, by the line of its numbers."""
+    origins: dict[tuple[int, str], set[int]] = defaultdict(set)
+    steps: dict[int, list[int]] = defaultdict(list)
+    for k, step in enumerate(asked):
+        origins[step.line, step.how].add(step.origin)
+        if step.origin and step.how in ("TO", "VIA"):
+            steps[step.origin].append(k)
+    found = {}
+    for line, mine in steps.items():
+        single = all(len(origins[asked[k].line, asked[k].how]) == 1 for k in mine)
+        frames = {(asked[k].tool, asked[k].uframe) for k in mine}
+        flanks = {sides.get(k) for k in mine}
+        whole = len(flanks) == 1 and None not in flanks
+        if single and whole and len(frames) == 1 and resting(sides[mine[0]]):
+            found[line] = mine
+    return found
+
+
+def resting(flanks: Flanks) -> bool:
+    """Tell whether every gear lies on a flank, not between."""
+    return bool((np.abs(flanks) > 0.99).all())
