@@ -10,51 +10,74 @@ import pytest
 
 from postproc.compensate import compensate
 from postproc.exceptions import PostprocError
+from postproc.options import Options
 from postproc.restore import restore
 from postproc.robot.cell import load_cell
 from postproc.sidecar import FileRecord
+from tests.fuzz.originals import case_programs
+from tests.generated.landing import program
 from tests.language.generator import Generator
 from tests.language.test_corpus import chapters
+from tests.language.whole_jobs import Job
 
 PROGRAMS = Path(__file__).parents[1] / "programs"
-SAMPLES = ("drilling", "handling", "milling", "spot")
+SAMPLES = sorted(path.stem for path in PROGRAMS.glob("*.pdl"))
+WAYS = (Options(), Options(clone=True), Options(orientation=True, shared=True))
 
 
-def assert_restored(source, cell, model, variables=None):
-    """Compensate, and give back every file that came out."""
-    outcome = compensate(source, cell, model, name="x.pdl", variables=variables)
+def assert_restored(files, cell, model, options=WAYS[0]):
+    """Compensate a program with its files, and give back every one that came out."""
+    main, *others = files
+    values = main.replace(".pdl", ".lsv")
+    pages = {name: files[name] for name in others if name != values}
+    outcome = compensate(files[main], cell, model, name=main, pages=pages,
+                         variables=files.get(values), options=options)  # fmt: skip
     records = json.loads(outcome.sidecar)["files"]
-    sources = {"x.pdl": source, "x.lsv": variables}
     assert set(records) <= set(outcome.outputs)
     for name, data in outcome.outputs.items():
         if name in records:
             record = FileRecord.read(records[name])
-            assert restore(data, record, name) == sources[name]
+            assert restore(data, record, name) == files[name]
         else:
-            assert data == sources[name]
+            assert data == files[name]
     return records
 
 
 @pytest.mark.parametrize("name", SAMPLES)
-def test_samples(name, job_model):
+@pytest.mark.parametrize("options", WAYS)
+def test_samples(name, options, job_model):
     cell = load_cell(PROGRAMS / "cell.toml")
-    values = PROGRAMS / f"{name}.lsv"
-    source = (PROGRAMS / f"{name}.pdl").read_bytes()
-    variables = values.read_bytes() if values.exists() else None
-    assert assert_restored(source, cell, job_model, variables)
+    paths = (PROGRAMS / f"{name}.pdl", PROGRAMS / f"{name}.lsv")
+    files = {path.name: path.read_bytes() for path in paths if path.exists()}
+    assert assert_restored(files, cell, job_model, options)
 
 
-def test_the_corpus(job_cell, job_model):
+def test_the_corpus_and_the_cases(job_cell, job_model):
+    texts = [program.encode() for _, program, _ in chapters()]
+    texts += [files["job.pdl"] for files in case_programs()]
     restored = 0
-    for _, program, _ in chapters():
+    for text in texts:
         try:
-            restored += bool(assert_restored(program.encode(), job_cell, job_model))
+            restored += bool(assert_restored({"x.pdl": text}, job_cell, job_model))
         except PostprocError:
             continue  # refused: nothing came out that could be restored
-    assert restored > 0.9 * len(chapters())
+    assert restored > 0.9 * len(texts)
 
 
-@pytest.mark.parametrize("seed", range(30))
+@pytest.mark.parametrize("seed", range(16))
 def test_generated_programs(seed, job_cell, job_model):
-    text = Generator(random.Random(seed), exact=seed % 2 == 0).program().text
-    assert assert_restored(text.encode("latin-1"), job_cell, job_model)
+    made = Generator(random.Random(seed), exact=seed % 2 == 0).program()
+    assert assert_restored(made.files, job_cell, job_model)
+
+
+@pytest.mark.parametrize("seed", range(16))
+def test_generated_jobs_of_several_files(seed, job_cell, job_model):
+    made = Job(random.Random(seed), exact=seed % 2 == 0).program()
+    options = WAYS[seed % len(WAYS)]
+    assert assert_restored(made.files, job_cell, job_model, options)
+
+
+@pytest.mark.parametrize("seed", range(24))
+def test_generated_programs_within_reach(seed, job_cell, job_model):
+    made, options = program(seed)
+    assert assert_restored(made.files, job_cell, job_model, options)

@@ -62,7 +62,7 @@ def keep(folder: Path, seed: int, number: int) -> None:
     """Write the files of a case for a closer look."""
     folder.mkdir(parents=True, exist_ok=True)
     for name, data in damaged(seed, number).items():
-        (folder / f"{seed}-{number}{Path(name).suffix}").write_bytes(data)
+        (folder / f"{seed}-{number}-{name}").write_bytes(data)
 
 
 def main() -> int:

@@ -92,7 +92,7 @@ def compensated(files: Mapping[str, bytes], cell: Cell, model: Model) -> str:
         with limited(files):
             done = compensate(
                 files["job.pdl"], cell, model, name="job.pdl",
-                variables=files.get("job.lsv"),
+                variables=files.get("job.lsv"), pages=pages_of(files),
             )  # fmt: skip
     except PostprocError:
         return "refused"
@@ -101,6 +101,11 @@ def compensated(files: Mapping[str, bytes], cell: Cell, model: Model) -> str:
     for name, record in records.items():
         assert restore(done.outputs[name], record, name) == files[name], name
     return "compensated" if (done.decisions.status == 0).any() else "left"
+
+
+def pages_of(files: Mapping[str, bytes]) -> dict[str, bytes]:
+    """Return the pages of a job, which are neither its program nor its values."""
+    return {n: data for n, data in files.items() if not n.startswith("job.")}
 
 
 def records_of(sidecar: str) -> dict[str, FileRecord]:

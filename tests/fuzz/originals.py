@@ -9,9 +9,13 @@ from pathlib import Path
 
 from tests.fuzz.mutation import mutated
 from tests.language.generator import POINTS, Generator
+from tests.language.generator.rarer import Rarer
+from tests.language.reachable import Reachable, ReachableJob
+from tests.language.whole_jobs import Job
 
 ROOT = Path(__file__).parents[2]
 Files = dict[str, bytes]
+KINDS = (Generator, Rarer, Reachable, Job, ReachableJob)
 
 
 @cache
@@ -22,8 +26,7 @@ def written() -> tuple[Mapping[str, bytes], ...]:
         for case in path.read_bytes().split(b"==== ")[1:]:
             text = case.split(b"\n", 1)[1].partition(b"----\n")[0]
             found.append({"job.pdl": text})
-    for path in sorted((ROOT / "tests" / "cases").glob("*.pdl")):
-        found.append({"job.pdl": path.read_bytes().partition(b"-- output")[0]})
+    found += case_programs()
     for path in sorted((ROOT / "programs").glob("*.pdl")):
         values = path.with_suffix(".lsv")
         more = {"job.lsv": values.read_bytes()} if values.exists() else {}
@@ -31,10 +34,16 @@ def written() -> tuple[Mapping[str, bytes], ...]:
     return tuple(found)
 
 
+def case_programs() -> list[Mapping[str, bytes]]:
+    """Return the inputs of the cases."""
+    paths = sorted((ROOT / "tests" / "cases").glob("*.pdl"))
+    return [{"job.pdl": p.read_bytes().partition(b"-- output")[0]} for p in paths]
+
+
 def generated(rng: random.Random) -> Files:
-    """Write a program at random, and half of the time values for its variables."""
-    made = Generator(rng, exact=rng.random() < 0.3).program()
-    files = {"job.pdl": made.text.encode("latin-1")}
+    """Write a program at random, often with pages, and half of the time with values."""
+    kind = rng.choice(KINDS)
+    files = kind(rng, exact=rng.random() < 0.3).program().files
     if rng.random() < 0.5:
         files["job.lsv"] = values(rng)
     return files
