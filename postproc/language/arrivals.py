@@ -2,15 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
+import numpy as np
+from numpy.typing import NDArray
+
+from postproc.language.actions import Move
 from postproc.language.store import Settings
-from postproc.language.values import Position
+from postproc.language.values import Position, Value
 from postproc.language.visits import Motion, Target
 from postproc.language.world import Place
 
+Ints = NDArray[np.int64]
 Numbers = tuple[float | None, ...]
 _NO_NUMBERS: Numbers = (None,) * 6
+
+WRITTEN, HELD = -1, -2  # instead of a row of the variable file
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,18 +52,40 @@ class Arrival:
     distance: float | None = None
     reason: str = ""
 
+    def __len__(self) -> int:
+        """Return the number of visits."""
+        return 1
+
 
 @dataclass(frozen=True, slots=True)
 class Run:
-    """Consecutive moves to inline literals, from row first to last - 1.
+    """Moves that follow each other, each from the one before.
 
     Attributes:
+        place: Where they stand.
+        rows: Their rows, (k,).
+        variant: Which lines differ in numbers and points only, (k,).
+        moves: What each variant says.
+        ways: Trajectory of each variant, and why that is not known.
         predecessors: Visits the first of them may come from.
+        settings: Frames and motion variables that hold, but for those of WITH.
+        point: Row of the variable file that each goes to, (k,); WRITTEN where the
+            numbers stand in the move, HELD where a variable holds something else.
+        held: What that is, by the index of the move.
+        reason: Why none of them can be compensated, "" where they can.
     """
 
     place: Place
-    first: int
-    last: int
+    rows: Ints
+    variant: Ints
+    moves: Mapping[int, Move]
+    ways: Mapping[int, tuple[Motion, str]]
     predecessors: frozenset[int]
     settings: Settings
+    point: Ints
+    held: Mapping[int, Value]
     reason: str = ""
+
+    def __len__(self) -> int:
+        """Return the number of visits."""
+        return len(self.rows)

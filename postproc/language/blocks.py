@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from postproc.language import pdl2 as ast
+from postproc.language.forms import Formed
 from postproc.language.lines import Lines
 
 _CLOSED_BY: dict[type, type] = {
@@ -69,7 +70,7 @@ def recovered(statement: ast.Statement) -> ast.Statement:
 
 
 def build_blocks(
-    lines: Lines, statements: tuple[ast.Statement, ...], first: int, last: int
+    lines: Lines, statements: Formed[ast.Statement], first: int, last: int
 ) -> tuple[Blocks, list[tuple[int, str]]]:
     """Match the blocks of rows first to last - 1; also return (row, problem)."""
     end: dict[int, int] = {}
@@ -79,10 +80,10 @@ def build_blocks(
     problems: list[tuple[int, str]] = []
     cycle, gotos = -1, []
     stack: list[tuple[int, ast.Statement]] = []
-    structural = np.array([not isinstance(s, _PLAIN) for s in statements], dtype=bool)
+    structural = statements.which(lambda said: not isinstance(said, _PLAIN))
     rows = first + np.flatnonzero(structural[lines.shape[first:last]])
     for row in rows.tolist():
-        statement = recovered(statements[lines.shape[row]])
+        statement = recovered(statements[int(lines.shape[row])])
         if isinstance(statement, ast.Label):
             labels[statement.name] = row
             statement = statement.then or ast.Statement()
@@ -123,7 +124,7 @@ def build_blocks(
 
 def _blocks(
     lines: Lines,
-    statements: tuple[ast.Statement, ...],
+    statements: Formed[ast.Statement],
     end: dict[int, int],
     opener: dict[int, int],
     inner: dict[int, list[int]],
@@ -134,7 +135,7 @@ def _blocks(
     joins = {*labels.values(), *opener}
     loops, handlers = [], []
     for row, start in opener.items():
-        kind = recovered(statements[lines.shape[start]])
+        kind = recovered(statements[int(lines.shape[start])])
         if isinstance(kind, ast.Label) and kind.then is not None:
             kind = kind.then
         if isinstance(kind, ast.For):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -9,25 +11,30 @@ from postproc.language.arrivals import Arrival, Run
 from postproc.language.columns import Collector, Columns
 from postproc.language.literals import Numbering, find_literals
 from postproc.language.machine import HERE, Key, Machine
+from postproc.language.run_columns import fill_run
 from postproc.language.setting_columns import SettingColumns
 from postproc.language.store import MANY
 from postproc.language.uses import find_uses
+from postproc.language.values import Position
 from postproc.language.visits import ELSEWHERE, Visits
+from postproc.language.world import World
 
 Ints = NDArray[np.int64]
+
+MOST_AXES = 12  # auxiliary axes that are told
 
 
 def collect(machine: Machine) -> Visits:
     """Put the visits in program order and make arrays of them."""
     ordered = sorted(machine.arrivals.items(), key=lambda item: _order(item[0]))
-    counts = [r.last - r.first if isinstance(r, Run) else 1 for _, r in ordered]
+    counts = [len(record) for _, record in ordered]
     offsets = np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
-    axes = max((_axes(record) for _, record in ordered), default=0)
+    axes = max((_axes(record, machine.world) for _, record in ordered), default=0)
     settings = SettingColumns()
     collector = Collector(machine, Columns(int(offsets[-1]), axes), settings)
     for at, (_, record) in zip(offsets.tolist(), ordered, strict=False):
         if isinstance(record, Run):
-            collector.run(at, record)
+            fill_run(collector, at, record)
         else:
             collector.arrival(at, record)
     c, world = collector.columns, machine.world
@@ -78,10 +85,22 @@ def _order(key: Key) -> tuple[tuple[tuple[int, int], ...], int]:
     return (*context, (at, HERE)), sub
 
 
-def _axes(record: Arrival | Run) -> int:
-    if isinstance(record, Run) or record.position is None:
-        return 0
-    return max((min(axis, 12) for axis, _ in record.position.aux or ()), default=0)
+def _axes(record: Arrival | Run, world: World) -> int:
+    """Return the last auxiliary axis that targets give a value of."""
+    if isinstance(record, Arrival):
+        return _last_axis([record.position])
+    held = [value for value in record.held.values() if isinstance(value, Position)]
+    points, rows = world.initial.points, record.point[record.point >= 0]
+    if points is None:
+        return _last_axis(held)
+    used: list[int] = np.unique(points.entries.layout[rows]).tolist()
+    axes = [axis for k in used for axis in points.entries.layouts[k].axes]
+    return max([_last_axis(held), *(min(axis, MOST_AXES) for axis in axes)])
+
+
+def _last_axis(positions: Iterable[Position | None]) -> int:
+    found = [axis for p in positions if p is not None for axis, _ in p.aux or ()]
+    return max([0, *(min(axis, MOST_AXES) for axis in found)])
 
 
 def _predecessors(
@@ -91,9 +110,8 @@ def _predecessors(
     n = int(offsets[-1])
     visit = np.zeros(machine.next_id, dtype=np.int64)
     for at, (key, record) in zip(offsets.tolist(), ordered, strict=False):
-        count = record.last - record.first if isinstance(record, Run) else 1
         base = machine.ids[key]
-        visit[base : base + count] = np.arange(at, at + count)
+        visit[base : base + len(record)] = np.arange(at, at + len(record))
     counts = np.ones(n, dtype=np.int64)
     sets: list[tuple[int, list[int]]] = []
     for at, (_, record) in zip(offsets.tolist(), ordered, strict=False):

@@ -12,7 +12,8 @@ from postproc.language.arrivals import Arrival, Run
 from postproc.language.machine import Machine
 from postproc.language.program import Program
 from postproc.language.setting_columns import SettingColumns
-from postproc.language.visits import Motion, Target
+from postproc.language.values import Position
+from postproc.language.visits import Target
 from postproc.language.world import base_variable
 
 Ints = NDArray[np.int64]
@@ -70,7 +71,7 @@ class Collector:
     configs: Table = field(default_factory=Table)
     names: Table = field(default_factory=Table)
     reasons: Table = field(default_factory=Table)
-    marks: dict[int, dict[int, str]] = field(default_factory=dict)
+    marks: dict[int, tuple[Ints, list[str]]] = field(default_factory=dict)
 
     def arrival(self, at: int, arrival: Arrival) -> None:
         """Fill one visit."""
@@ -84,13 +85,14 @@ class Collector:
             c.distance_mm[at] = arrival.distance
         c.setting[at] = self.settings.index(arrival.settings)
         if not arrival.via:
-            c.measure_id[at] = self.measured(program).get(arrival.row, "")
+            c.measure_id[at] = self._mark(program, arrival.row)
         self._position(at, arrival)
         c.reason[at] = self.reasons(
             arrival.reason
-            or self._recursion(arrival)
+            or self.recursion(arrival)
             or self.settings.problem(c.setting[at], arrival.target)
-            or self._aux_problem(arrival)
+            or (arrival.position and self.aux_problem(_axes(arrival.position)))
+            or ""
         )
 
     def _position(self, at: int, arrival: Arrival) -> None:
@@ -112,26 +114,24 @@ class Collector:
             world.pin(position, "a target is computed from a part of it")
         lines = world.taught_lines[arrival.place.program.lines.source.name]
         inline = not position.name and int(c.line[at]) in lines
-        name = position.name.lower()
-        taught = world.start.taught
-        listed = name in taught or base_variable(name) in taught
+        listed = self.is_listed(position.name)
         c.taught[at] = position.taught or inline or listed
         c.shared[at] = position.shared
 
-    def _recursion(self, record: Arrival | Run) -> str:
+    def recursion(self, record: Arrival | Run) -> str:
+        """Return why visits of a routine that calls itself stay, "" for others."""
         if id(record.place.body) not in self.machine.recursive:
             return ""
         return "it stands in a routine that calls itself, which is not followed"
 
-    def _aux_problem(self, arrival: Arrival) -> str:
+    def aux_problem(self, axes: tuple[int, ...] | None) -> str:
+        """Return why a target with some auxiliary axes stays, None: not known which."""
         kinds = self.machine.world.start.aux
-        if arrival.position is None:
-            return ""
-        if arrival.position.aux is None:
+        if axes is None:
             if kinds and all(kind == "gun" for kind in kinds.values()):
                 return ""
             return "its auxiliary axes are not known before the program runs"
-        for axis, _ in arrival.position.aux:
+        for axis in axes:
             kind = kinds.get(axis)
             if kind is None:
                 return (
@@ -142,86 +142,36 @@ class Collector:
                 return f"auxiliary axis {axis} is a {kind}: it moves arm or part"
         return ""
 
-    def run(self, at: int, run: Run) -> None:
-        """Fill a stretch of moves to inline literals, shape by shape."""
-        c, program = self.columns, run.place.program
-        lines = program.lines
-        rows = np.arange(run.first, run.last)
-        here = slice(at, at + len(rows))
-        c.file[here] = self.machine.world.files.index(lines.source.name)
-        c.line[here] = lines.line[rows]
-        setting = self.settings.index(run.settings)
-        c.setting[here] = setting
-        base = self.machine.world.slot_base[lines.source.name]
-        shapes = lines.shape[rows]
-        for shape in np.unique(shapes).tolist():
-            statement = program.statements[shape]
-            assert isinstance(statement, ast.Move)
-            mine = at + np.flatnonzero(shapes == shape)
-            self._shape(mine, statement, run, lines.first[rows[mine - at]], base)
-        taught = self.machine.world.taught_lines[lines.source.name]
-        if taught:
-            c.taught[here] = np.isin(c.line[here], np.array(sorted(taught)))
-        for row, mark in self.measured(program).items():
-            if run.first <= row < run.last:
-                c.measure_id[at + row - run.first] = mark
+    def is_listed(self, name: str) -> bool:
+        """Tell whether the cell file says that a point was taught."""
+        taught = self.machine.world.start.taught
+        name = name.lower()
+        return name in taught or base_variable(name) in taught
 
-    def _shape(
-        self, mine: Ints, statement: ast.Move, run: Run, first: Ints, base: int
-    ) -> None:
-        c, lines = self.columns, run.place.program.lines
-        literal = statement.where[0]
-        joints = isinstance(literal, ast.Aggregate)
-        items = literal_items(literal)
-        slots = np.array([i.slot for i in items[:6] if isinstance(i, ast.Number)])
-        numbers = first[:, None] + slots[None, :]
-        c.values[mine] = lines.value[numbers]
-        c.slots[mine] = numbers + base
-        said = statement.trajectory.lower() or str(run.settings.get("move_type"))
-        c.motion[mine] = Motion.LINEAR if said == "linear" else Motion.JOINT
-        target = Target.JOINTS if joints else Target.POSE
-        c.target[mine] = target
-        c.fly[mine] = statement.fly
-        config = items[6] if len(items) > 6 else None
-        if isinstance(config, ast.Text):
-            c.config[mine] = self.configs(config.value)
-            c.config_given[mine] = True
-        setting = self.settings.index(run.settings)
-        reason = (
-            run.reason or self._recursion(run) or self.settings.problem(setting, target)
-        )
-        c.reason[mine] = self.reasons(reason)
-        wrong = mine[~np.isfinite(c.values[mine]).all(axis=1)]
-        c.target[wrong] = Target.UNKNOWN
-        c.slots[wrong] = -1
-        c.values[wrong] = np.nan
-        if len(wrong):
-            c.reason[wrong] = self.reasons("a number of the target cannot be read")
+    def _mark(self, program: Program, row: int) -> str:
+        rows, ids = self.measured(program)
+        k = int(np.searchsorted(rows, row)) if len(rows) else 0
+        return ids[k] if k < len(rows) and rows[k] == row else ""
 
-    def measured(self, program: Program) -> dict[int, str]:
-        """Return the ids of ``-- MEASURE`` comments by the row of their move."""
+    def measured(self, program: Program) -> tuple[Ints, list[str]]:
+        """Return the rows of moves with a ``-- MEASURE`` comment, and its ids."""
         known = self.marks.get(id(program))
         if known is None:
             known = self.marks[id(program)] = _measured(program)
         return known
 
 
-def literal_items(
-    literal: ast.Expression,
-) -> tuple[ast.Expression | None, ...]:
-    """Return what stands between the brackets of ``{..}`` or ``POS(..)``."""
-    if isinstance(literal, ast.Aggregate):
-        return literal.items
-    return literal.arguments if isinstance(literal, ast.Invoke) else ()
+def _axes(position: Position) -> tuple[int, ...] | None:
+    return None if position.aux is None else tuple(axis for axis, _ in position.aux)
 
 
-def _measured(program: Program) -> dict[int, str]:
+def _measured(program: Program) -> tuple[Ints, list[str]]:
     lines = program.lines
-    moves = np.array([isinstance(s, ast.Move) for s in program.statements], dtype=bool)
+    moves = program.statements.which(lambda said: isinstance(said, ast.Move))
     rows = np.flatnonzero(moves[lines.shape])
     found: dict[int, str] = {}
     for line, mark in lines.marks("MEASURE"):
         at = int(np.searchsorted(lines.line[rows], line))
         if at < len(rows):
             found.setdefault(int(rows[at]), mark)
-    return found
+    return np.array([*found], dtype=np.int64), [*found.values()]

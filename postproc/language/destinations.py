@@ -123,20 +123,20 @@ def absolute(here: Here, expression: ast.Expression) -> Goal:
         held = here.store.settings.get(name or "")
         if held is None and name in _PLACES:
             return Goal(_PLACES[name], reason=_why(f"${name.upper()}"))
-        return _from_value(held or Nothing(f"${name} is a system variable"), True)
+        return from_value(held or Nothing(f"${name} is a system variable"), True)
     if isinstance(expression, ast.Reference):
         _check_declared(here, expression.name)
         type_ = here.world.type_of(here.place, expression.name)
         if type_ is not None and type_.path:
             return _node(here, expression)
-    return _from_value(here.value(expression), False)
+    return from_value(here.value(expression))
 
 
 def _node(here: Here, reference: ast.Reference) -> Goal:
     """Tell what a node of a path holds, as far as the program assigns it."""
     value = here.value(reference)
     if isinstance(value, Position):
-        return _from_value(value, False)
+        return from_value(value)
     return Goal(
         Target.UNKNOWN,
         reason=f"the node of {reference.name} is not known: nodes are read where the "
@@ -157,7 +157,8 @@ def _check_declared(here: Here, name: str) -> None:
         )
 
 
-def _from_value(value: Value, system: bool) -> Goal:
+def from_value(value: Value, system: bool = False) -> Goal:
+    """Tell what a move to a value means; `system`: to that of a system variable."""
     if isinstance(value, Nothing):
         return Goal(Target.UNKNOWN, reason=f"the target is not known: {value.why}")
     if not isinstance(value, Position):

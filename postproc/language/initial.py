@@ -3,18 +3,22 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from dataclasses import replace
 
+import numpy as np
+
 from postproc.language.diagnostic import Diagnostic
+from postproc.language.entry_columns import POSITIONS
 from postproc.language.evaluate import Point
+from postproc.language.initial_values import Points
 from postproc.language.lsv import Entry, Variables
-from postproc.language.program import Body, Program
+from postproc.language.program import Body, Program, Variable
 from postproc.language.store import Store
 from postproc.language.values import Nothing, Position, Value, Vector
 from postproc.language.world import Place, World, base_variable
 
 _WORD = re.compile(r"[A-Za-z_]\w*")
-_POSITIONS = ("POS", "XTND", "JNTP")
 
 
 def fill_initial(world: World) -> None:
@@ -22,11 +26,14 @@ def fill_initial(world: World) -> None:
     for program in world.programs():
         bodies = [b for b in (program.main, *program.routines.values()) if b]
         for body in bodies:
-            _declared(world, program, body)
+            seen = program.variables
+            if body is not bodies[0]:  # it sees the rest as the first body does
+                hidden = bodies[0].own_names | body.own_names
+                seen = {name: seen[name] for name in hidden if name in seen}
+            _declared(world, program, body, seen)
     if world.variables is not None and world.main.main is not None:
         place = Place(world.main, world.main.main)
-        for entry in world.variables.entries.values():
-            _entered(world, place, world.variables, entry)
+        _enter_all(world, place, world.variables)
         _report_drift(world, place, world.variables)
 
 
@@ -34,12 +41,9 @@ def _report_drift(world: World, place: Place, file: Variables) -> None:
     """Say where a program and its variable file have drifted apart."""
     for found in file.diagnostics:
         world.diagnostics[found] = None
-    words = {
-        word.lower()
-        for mask in place.program.lines.shapes
-        for word in _WORD.findall(mask)
-    }
-    names = {base_variable(entry.name): entry.name for entry in file.entries.values()}
+    words = {*_WORD.findall("\n".join(place.program.lines.shapes).lower())}
+    written = [file.entries.name[row] for row in file.entries.row.values()]
+    names = {base_variable(name): name for name in written}
     unused = [written for name, written in names.items() if name not in words]
     undeclared = [
         written
@@ -65,10 +69,12 @@ def _some(names: list[str]) -> str:
     return ", ".join(names[:10]) + rest
 
 
-def _declared(world: World, program: Program, body: Body) -> None:
+def _declared(
+    world: World, program: Program, body: Body, seen: Mapping[str, Variable]
+) -> None:
     place = Place(program, body)
-    store = Store(world.initial.get)
-    for variable in (*program.variables.values(), *body.variables.values()):
+    store = Store(world.initial.find)
+    for variable in (*seen.values(), *body.variables.values()):
         key = world.root(place, variable.name.lower())
         world.spelling.setdefault(key, variable.name)
         if variable.initial is None or key in world.initial:
@@ -84,31 +90,41 @@ def _declared(world: World, program: Program, body: Body) -> None:
         world.initial[key] = value
 
 
-def _entered(world: World, place: Place, file: Variables, entry: Entry) -> None:
-    name = entry.name.lower()
-    root = base_variable(name)
-    key = world.root(place, root) + name[len(root) :]
-    declared = world.declared(place, root)
-    base = world.slot_base[file.source.name]
+def _enter_all(world: World, place: Place, file: Variables) -> None:
+    """Enter what a variable file says: points as columns, the rest one by one."""
+    entries, base = file.entries, world.slot_base[file.source.name]
+    places = [layout.kind in POSITIONS for layout in entries.layouts]
+    known = np.array(places, dtype=bool)[entries.layout]
+    known &= np.isfinite(entries.numbers).all(axis=1)
+    known &= np.isin(entries.arm, (0, world.arm))
+    shared = np.array([layout.shared for layout in entries.layouts], dtype=bool)
+    points = Points(
+        {}, entries, base, shared[entries.layout], np.zeros(len(known), dtype=bool)
+    )
+    for name, row in entries.row.items():
+        root = base_variable(name)
+        key = world.root(place, root) + name[len(root) :]
+        declared = world.declared(place, root)
+        if known[row]:
+            points.row[key] = row
+            points.taught[row] = bool(declared and declared.taught)
+            points.shared[row] |= bool(declared and declared.exported)
+        elif not _entered(world, file, entries.entry(row), key):
+            continue
+        world.spelling.setdefault(key, entries.name[row])
+    world.initial.points = points
+
+
+def _entered(world: World, file: Variables, entry: Entry, key: str) -> bool:
+    """Enter a value that is no known point; tell whether there is any."""
     value: Value | None = entry.numbers[0] if entry.numbers else None
-    if entry.kind in _POSITIONS:
-        value = Position(
-            entry.kind == "JNTP",
-            entry.numbers,
-            tuple(base + s if s >= 0 else -1 for s in entry.slots),
-            entry.config,
-            entry.aux,
-            entry.name,
-            taught=bool(declared and declared.taught),
-            shared=entry.shared or bool(declared and declared.exported),
-        )
+    if entry.kind in POSITIONS:
+        value = Nothing(f"its value is not initialised in {file.source.name}")
     if entry.kind == "VEC":
         x, y, z = entry.numbers[:3]
         value = Vector((x, y, z))
     if entry.arm not in (0, world.arm):
         value = Nothing(f"its value is one of arm {entry.arm}")
-    if isinstance(value, Position) and not value.complete:
-        value = Nothing(f"its value is not initialised in {file.source.name}")
     if value is not None:
         world.initial[key] = value
-        world.spelling.setdefault(key, entry.name)
+    return value is not None

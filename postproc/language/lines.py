@@ -15,6 +15,7 @@ from postproc.language.source import Source
 
 Ints = NDArray[np.int64]
 Floats = NDArray[np.float64]
+Bools = NDArray[np.bool_]
 
 _PIECE = 1 << 20  # bytes masked at once: array passes that fit the cache
 _OPENS = re.compile(rb" *(?:\w+ *:: *)?(?:MOVE|MOVEFLY|OPEN)\b[^\n]*, *\Z", re.I)
@@ -22,6 +23,7 @@ _CLAUSE = re.compile(
     rb" *(?:WITH|ADVANCE|TIL|VIA|SYNCMOVE|SYNCMOVEFLY|CONDITION|\$)", re.I
 )
 _WITH = re.compile(rb" *(?:WITH|SYNCMOVE|SYNCMOVEFLY)\b", re.I)
+_COMMA = re.compile(rb"[^\n]*,\s*\Z")
 _CLOSES = re.compile(rb" *(?:ENDMOVE|ENDOPEN)\b", re.I)
 
 
@@ -137,25 +139,28 @@ def _logical(
     source: Source, masks: tuple[bytes, ...], shape: Ints, numbers: Masked
 ) -> Lines:
     """Join the continued lines and drop the empty ones."""
-    blank = np.array([not mask.strip() for mask in masks], dtype=bool)
+    stripped = [mask.strip() for mask in masks]
+    code = np.flatnonzero(np.array([*map(bool, stripped)], dtype=bool)[shape])
+    shape = shape[code]
     opens = np.array([bool(_OPENS.match(mask)) for mask in masks], dtype=bool)
-    shape, keep = shape.copy(), ~blank[shape]
+    starts = np.flatnonzero(opens[shape])
+    length = _lengths(masks, shape, starts)
+    starts, length = starts[length > 1], length[length > 1]
     joined: dict[bytes, int] = {}
-    for row in np.flatnonzero(opens[shape]).tolist():
-        rows = _continued(masks, blank, shape, row)
-        if len(rows) > 1:
-            mask = b" ".join(masks[shape[r]].strip() for r in rows)
-            shape[row] = len(masks) + joined.setdefault(mask, len(joined))
-            keep[rows[1:]] = False
-    texts = tuple(m.strip().decode("latin-1") for m in (*masks, *joined))
-    kept = np.flatnonzero(keep)
-    first = np.append(numbers.first[kept], len(numbers.start))
+    parts, keep = shape.tolist() if len(starts) else [], np.ones(len(shape), dtype=bool)
+    for row, count in zip(starts.tolist(), length.tolist(), strict=True):
+        mask = b" ".join([stripped[k] for k in parts[row : row + count]])
+        shape[row] = len(masks) + joined.setdefault(mask, len(joined))
+        keep[row + 1 : row + count] = False
+    kept = code[keep]
+    used, shape = np.unique(shape[keep], return_inverse=True)
+    texts = (*stripped, *joined)
     return Lines(
         source,
-        texts,
-        shape[kept],
+        tuple(texts[k].decode("latin-1") for k in used.tolist()),
+        shape,
         kept + 1,
-        first.astype(np.int64),
+        np.append(numbers.first[kept], len(numbers.start)).astype(np.int64),
         numbers.start,
         numbers.end,
         numbers.value,
@@ -163,19 +168,26 @@ def _logical(
     )
 
 
-def _continued(
-    masks: tuple[bytes, ...], blank: NDArray[np.bool_], shape: Ints, row: int
-) -> list[int]:
-    """Return the physical rows of the statement that starts at a row."""
-    rows = [row]
-    for at in range(row + 1, len(shape)):
-        if blank[shape[at]]:
-            continue
-        mask = masks[shape[at]]
-        if _CLOSES.match(mask):
-            return [*rows, at]
-        comma = masks[shape[rows[-1]]].rstrip().endswith(b",")
-        if not (_CLAUSE.match(mask) if comma else _WITH.match(mask)):
-            break
-        rows.append(at)
-    return rows
+def _lengths(masks: tuple[bytes, ...], shape: Ints, starts: Ints) -> Ints:
+    """Count the lines of the statements that start at some lines of code, (k,).
+
+    All statements grow by one line at a time, for as long as the next one belongs.
+    """
+    length = np.ones(len(starts), dtype=np.int64)
+    growing = np.arange(len(starts))
+    while len(growing := growing[(starts + length)[growing] < len(shape)]):
+        following = shape[(starts + length)[growing]]
+        closes = _which(masks, following, _CLOSES)
+        comma = _which(masks, shape[(starts + length - 1)[growing]], _COMMA)
+        clause = _which(masks, following, _CLAUSE)
+        more = ~closes & np.where(comma, clause, _which(masks, following, _WITH))
+        length[growing[closes | more]] += 1
+        growing = growing[more]
+    return length
+
+
+def _which(masks: tuple[bytes, ...], shape: Ints, pattern: re.Pattern[bytes]) -> Bools:
+    """Tell which of some lines match a pattern."""
+    used, at = np.unique(shape, return_inverse=True)
+    found = [bool(pattern.match(masks[k])) for k in used.tolist()]
+    return np.array(found, dtype=bool)[at]

@@ -105,8 +105,7 @@ class Machine:
         self.arrivals[key] = arrival
         if MANY in arrival.predecessors:
             self._report_many(here)
-        count = arrival.last - arrival.first if isinstance(arrival, Run) else 1
-        return self.visit_id(key, count)
+        return self.visit_id(key, len(arrival))
 
     def _report_many(self, here: Here) -> None:
         here.world.report_once(

@@ -32,7 +32,7 @@ def move(machine: Machine, here: Here, statement: ast.Move) -> None:
         _keep(here, statement)
         return
     settings = _with(here, statement)
-    motion, reason = _motion(here, statement, settings)
+    motion, reason = motion_of(here, statement, settings)
     if whose is None:
         reason = "the arm that moves (ARM[..]) is known only at run time"
     reason = here.reason or reason
@@ -133,7 +133,10 @@ def _with(here: Here, statement: ast.Move) -> Settings:
     return {**here.store.settings, **changes} if changes else here.store.settings
 
 
-def _motion(here: Here, statement: ast.Move, settings: Settings) -> tuple[Motion, str]:
+def motion_of(
+    here: Here, statement: ast.Move, settings: Settings
+) -> tuple[Motion, str]:
+    """Return the trajectory of a move, and why it is not known or not followed."""
     said: Value | None = statement.trajectory.lower() or settings.get("move_type")
     with_ = any(r.name == "$move_type" for r, _ in statement.settings)
     if with_:

@@ -3,24 +3,29 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from functools import cache, lru_cache
-from itertools import count
+from itertools import compress, count, islice
+from operator import not_
 from pathlib import Path
+from typing import cast
 
 import lark
 
 from postproc.language import pdl2 as ast
 from postproc.language.build import RULES, Rule
 from postproc.language.entered import VALUE_RULES, Entered
+from postproc.language.forms import filled, open_name
 from postproc.language.parts import Mark
 
 _PACKAGE = Path(__file__).resolve().parent.parent
-_NUMBERED_NAME = re.compile(
-    r"'(?:\\.|[^'\\])*'|'[^']*'|\"[^\"]*\""
-    r"|(?<![\w$])(?P<name>[A-Za-z_]\w*\d\w*)(?!\w)(?!\s*::)"
+_NUMBERED = r"(?<![\w$])[A-Za-z_]\w*\d\w*(?!\w)(?! *::)"
+_NAME = re.compile(f"({_NUMBERED})")
+_STRING_OR_NAME = re.compile(
+    rf"(?P<string>'(?:\\.|[^'\\])*'|'[^']*'|\"[^\"]*\")|{_NUMBERED}"
 )
-_NAME_MARK = "\x01"
+NAME_MARK = "\x01"  # a numbered name, in a form
+UNREADABLE = NAME_MARK * 2  # begins the form of a line that holds such a mark itself
 _FAILED = object()
 
 
@@ -49,68 +54,98 @@ def line_parser(name: str, start: str) -> lark.Lark:
     )
 
 
+def form_of(mask: str) -> tuple[str, tuple[str, ...]]:
+    """Take the numbered names out of the mask of a line.
+
+    Returns:
+        Its form and the names; `parse_form` and `parse_value_form` say what a form
+        says, its names open.
+    """
+    if NAME_MARK in mask:  # the text holds that character: no line of any grammar
+        return UNREADABLE + mask, ()
+    names: list[str] = []
+
+    def mark(found: re.Match[str]) -> str:
+        if found["string"] is not None:
+            return found.group()
+        names.append(found.group())
+        return NAME_MARK
+
+    return _STRING_OR_NAME.sub(mark, mask), tuple(names)
+
+
+def forms_of(masks: Sequence[str]) -> Iterator[tuple[str, tuple[str, ...]]]:
+    """Do for many masks what `form_of` does for one."""
+    odd = [NAME_MARK in mask or "'" in mask or '"' in mask for mask in masks]
+    plain = "\n".join(compress(masks, map(not_, odd)))
+    pieces = _NAME.split(plain)
+    forms = iter(NAME_MARK.join(pieces[0::2]).split("\n"))
+    names = iter(pieces[1::2])
+    for mask, alone in zip(masks, odd, strict=True):
+        if alone:
+            yield form_of(mask)
+        else:
+            form = next(forms)
+            yield form, tuple(islice(names, form.count(NAME_MARK)))
+
+
+@lru_cache(maxsize=8192)
+def parse_form(form: str) -> ast.Statement:
+    """Parse the form of a logical line of PDL2, `Unknown` where the grammar cannot."""
+    found = _parse("pdl2", form, RULES)
+    if found is _FAILED:
+        numbered = count()
+        text = re.sub(NAME_MARK, lambda _: open_name(next(numbered)), form)
+        return ast.Unknown(text if form[:2] != UNREADABLE else form[2:])
+    return found if isinstance(found, ast.Statement) else ast.Statement()
+
+
+@lru_cache(maxsize=8192)
+def parse_value_form(form: str) -> Entered | None:
+    """Parse the form of a line of a variable file, None where the grammar cannot."""
+    found = _parse("lsv", form, VALUE_RULES)
+    return found if isinstance(found, Entered) else None
+
+
 def parse_line(mask: str) -> ast.Statement:
     """Parse the mask of one logical line of PDL2.
-
-    Programs name points ``p1`` to ``p3000``: names with digits are masked too, so that
-    lark sees each form of line once.
 
     Returns:
         Its statement, or `Unknown` where the grammar knows none.
     """
-    found = _parse("pdl2", mask, RULES)
-    if found is _FAILED:
-        return ast.Unknown(mask)
-    return found if isinstance(found, ast.Statement) else ast.Statement()
+    form, names = form_of(mask)
+    said = parse_form(form)
+    return cast(ast.Statement, filled(said, names)) if names else said
 
 
 def parse_value_line(mask: str) -> Entered | None:
     """Parse the mask of one line of a variable file, None where it is none."""
-    found = _parse("lsv", mask, VALUE_RULES)
-    return found if isinstance(found, Entered) else None
+    form, names = form_of(mask)
+    said = parse_value_form(form)
+    return cast(Entered | None, filled(said, names)) if names else said
 
 
-def _parse(name: str, mask: str, rules: Mapping[str, Rule]) -> object:
-    """Parse a mask and build what it says, _FAILED where the grammar has no rule."""
-    names: list[str] = []
-
-    def mark(found: re.Match[str]) -> str:
-        if found["name"] is None:
-            return found.group()
-        names.append(found["name"])
-        return _NAME_MARK
-
-    if _NAME_MARK in mask:
-        return _FAILED
-    tree = _tree(name, _NUMBERED_NAME.sub(mark, mask))
-    if tree is None:
+def _parse(name: str, form: str, rules: Mapping[str, Rule]) -> object:
+    """Parse a form and build what it says, _FAILED where the grammar has no rule."""
+    if form.startswith(UNREADABLE):
         return _FAILED
     try:
-        return _build(tree, names, rules)
+        return _build(line_parser(name, "line").parse(form), rules)
+    except lark.exceptions.LarkError:
+        return _FAILED
     except RecursionError:  # hundreds of nested parentheses: no program has them
         return _FAILED
 
 
-@lru_cache(maxsize=8192)
-def _tree(name: str, form: str) -> lark.Tree[lark.Token] | None:
-    try:
-        return line_parser(name, "line").parse(form)
-    except lark.exceptions.LarkError:
-        return None
-
-
-def _build(
-    tree: lark.Tree[lark.Token], names: list[str], rules: Mapping[str, Rule]
-) -> object:
-    """Build what a tree says, stamping names and counting numbers."""
-    waiting = iter(names)
-    slots = count()
+def _build(tree: lark.Tree[lark.Token], rules: Mapping[str, Rule]) -> object:
+    """Build what a tree says, counting its names and its numbers."""
+    names, slots = count(), count()
 
     def walk(node: lark.Tree[lark.Token] | lark.Token) -> object:
         if isinstance(node, lark.Token):
             if node.type == "NUMBER":
                 return ast.Number(next(slots))
-            text = next(waiting) if node == _NAME_MARK else str(node)
+            text = open_name(next(names)) if node == NAME_MARK else str(node)
             return Mark(text, node.type)
         return rules[str(node.data)]([walk(child) for child in node.children])
 

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 
 from postproc.language import pdl2 as ast
 from postproc.language.blocks import Blocks
 from postproc.language.diagnostic import Diagnostic
+from postproc.language.forms import Formed
 from postproc.language.lines import Lines
 
 
@@ -53,6 +55,11 @@ class Body:
     variables: Mapping[str, Variable]
     blocks: Blocks
 
+    @cached_property
+    def own_names(self) -> frozenset[str]:
+        """Return the names that mean something else here than around it."""
+        return frozenset(self.variables) | {p.name for p in self.parameters}
+
 
 @dataclass(frozen=True)
 class Program:
@@ -73,7 +80,7 @@ class Program:
 
     name: str
     lines: Lines
-    statements: tuple[ast.Statement, ...]
+    statements: Formed[ast.Statement]
     main: Body | None
     routines: Mapping[str, Body]
     outside: Mapping[str, str]

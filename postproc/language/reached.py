@@ -28,7 +28,7 @@ def never_reached(programs: Sequence[Program], visits: Visits) -> list[Diagnosti
     found = []
     for program in programs:
         name = program.lines.source.name
-        moves = np.array([_has_target(s) for s in program.statements], dtype=bool)
+        moves = program.statements.which(_has_target)
         lines = program.lines.line[moves[program.lines.shape]]
         own = visits.file == visits.files.index(name)
         missed = lines[~np.isin(lines, visits.line[own])]

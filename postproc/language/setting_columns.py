@@ -49,6 +49,10 @@ class SettingColumns:
             )
         return row
 
+    def kept(self, row: int) -> Settings:
+        """Return the state of the settings of a row."""
+        return self._kept[row]
+
     def problem(self, row: int, target: Target) -> str:
         """Return why a visit cannot be compensated under these settings, or ""."""
         pose, joints = self._problems[row]

@@ -14,7 +14,7 @@ Settings = Mapping[str, Value]
 MANY = -3  # origin: one of so many visits that they are not told apart
 MOST_ORIGINS = 500
 
-_NEVER_SET = Nothing(NO_VALUE)
+NEVER_SET = Nothing(NO_VALUE)
 
 
 @dataclass
@@ -46,14 +46,15 @@ class Store:
 
     def read(self, key: str) -> Value:
         """Return what a key holds."""
+        found = self.assigned(key)
+        if found is None:
+            found = self.initial(key)
+        return NEVER_SET if found is None else found
+
+    def assigned(self, key: str) -> Value | None:
+        """Return what the program has given a key, None where it has not."""
         found = self.values.get(key)
-        if found is not None:
-            return found
-        hidden = self._hidden(key)
-        if hidden is not None:
-            return hidden
-        initial = self.initial(key)
-        return _NEVER_SET if initial is None else initial
+        return self._hidden(key) if found is None else found
 
     def _hidden(self, key: str) -> Value | None:
         """Return the unknown array or record that an element belongs to."""

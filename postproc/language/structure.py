@@ -9,8 +9,9 @@ import numpy as np
 from postproc.language import pdl2 as ast
 from postproc.language.blocks import build_blocks
 from postproc.language.diagnostic import Diagnostic
+from postproc.language.forms import Formed, formed
 from postproc.language.lines import Lines, read_lines
-from postproc.language.parser import parse_line
+from postproc.language.parser import forms_of, parse_form
 from postproc.language.program import Body, Program, Variable
 from postproc.language.source import Source
 
@@ -33,7 +34,7 @@ class _Reader:
     """Collects the parts of a program, one structural line after the other."""
 
     lines: Lines
-    statements: tuple[ast.Statement, ...]
+    statements: Formed[ast.Statement]
     taught: frozenset[int]
     name: str = ""
     arm: int = 0
@@ -152,16 +153,12 @@ def parse(source: Source) -> Program:
         ProgramError: A string does not end on its line.
     """
     lines = read_lines(source)
-    parsed: dict[int, ast.Statement] = {
-        shape: parse_line(lines.shapes[shape])
-        for shape in np.unique(lines.shape).tolist()
-    }
-    statements = tuple(parsed.get(i, ast.Statement()) for i in range(len(lines.shapes)))
+    statements = formed(lines.shapes, forms_of, parse_form)
     taught = frozenset(line for line, _ in lines.marks("TAUGHT"))
     reader = _Reader(lines, statements, taught)
-    structural = np.array([not isinstance(s, _PLAIN) for s in statements], dtype=bool)
+    structural = statements.which(lambda said: not isinstance(said, _PLAIN))
     for row in np.flatnonzero(structural[lines.shape]).tolist():
-        statement = statements[lines.shape[row]]
+        statement = statements[int(lines.shape[row])]
         if isinstance(statement, ast.Unknown):
             _report_unknown(reader, row)
         reader.take(row, statement)

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 from postproc.language import pdl2 as ast
 from postproc.language.diagnostic import Diagnostic
+from postproc.language.initial_values import InitialValues
 from postproc.language.lsv import Variables
 from postproc.language.program import Body, Program, Variable
 from postproc.language.values import Position, Value
@@ -80,7 +81,7 @@ class World:
     variables: Variables | None
     slot_base: dict[str, int] = field(default_factory=dict)
     files: list[str] = field(default_factory=list)
-    initial: dict[str, Value] = field(default_factory=dict)
+    initial: InitialValues = field(default_factory=InitialValues)
     spelling: dict[str, str] = field(default_factory=dict)
     diagnostics: dict[Diagnostic, None] = field(default_factory=dict)
     pinned: dict[int, str] = field(default_factory=dict)
@@ -142,7 +143,7 @@ class World:
     def root(self, place: Place, name: str) -> str:
         """Return the key of a variable: its routine's own, or its program's."""
         program, body = place.program, place.body
-        if name in body.variables or any(p.name == name for p in body.parameters):
+        if name in body.own_names:
             return f"{program.name}:{body.name}/{name}"
         declared = program.variables.get(name)
         if declared is not None and declared.exported:

@@ -1,0 +1,283 @@
+"""From the lines of a variable file to its entries: one of each layout is read.
+
+An entry is a head, or the index of an array's element, with the lines up to the next.
+Files hold many thousands that are written alike; what one says of its numbers holds
+for all of its layout.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from postproc.language.entered import Entered
+from postproc.language.entry_columns import NESTED, Entries, Layout, kind_of
+from postproc.language.forms import Formed, name_index
+from postproc.language.lines import Lines
+
+Ints = NDArray[np.int64]
+Floats = NDArray[np.float64]
+
+_LETTERS = "XYZAER"
+_NONE = (0, -1)  # the place of a value that is not written
+
+Place = tuple[int, int]
+"""Where a value stands: which line of the entry, and which number of that line."""
+
+
+@dataclass(frozen=True)
+class Records:
+    """The k entries of a file, in order, as far as their lines tell.
+
+    Attributes:
+        head: Row of the head that each belongs to, (k,).
+        first, closed: Their rows, `closed` is that at which the next begins, (k,).
+        element: Its own index stands in its first line, (k,).
+    """
+
+    head: Ints
+    first: Ints
+    closed: Ints
+    element: NDArray[np.bool_]
+
+
+def find_records(lines: Lines, said: Formed[Entered | None]) -> Records:
+    """Find where the entries of a file begin and end.
+
+    The fields of records and of path nodes, and lines that are not understood, end an
+    entry and begin none.
+    """
+    n, shape, head = len(lines), lines.shape, last_head(lines, said)
+    own = head == np.arange(n)
+    other = (said.which(_is_head) | said.which(lambda e: e is None))[shape] & ~own
+    elements = said.which(lambda e: e is not None and bool(e.element))[shape]
+    elements &= (head >= 0) & ~other
+    arrays = said.which(lambda e: e is not None and kind_of(e.type)[1])[shape]
+    # a line may hold a head, then an element: two places on an axis of half lines
+    half = [2 * np.flatnonzero(own | other), 2 * np.flatnonzero(elements) + 1]
+    place = np.sort(np.concatenate(half))
+    after = np.append(place[1:], 2 * n)
+    begins = (place % 2 == 1) | (own & ~arrays)[place // 2]
+    first, closed = place[begins] // 2, after[begins] // 2
+    return Records(head[first], first, closed, place[begins] % 2 == 1)
+
+
+def last_head(lines: Lines, said: Formed[Entered | None]) -> Ints:
+    """Return the row of the last variable's head up to every row, (n,), -1: none.
+
+    A head below that of a record or path which does not say whose variable it is heads
+    a field, not a variable.
+    """
+    rows = np.flatnonzero(said.which(_is_head)[lines.shape])
+    shapes = lines.shape[rows]
+    heads, within = [], False
+    for row, is_field, nested in zip(
+        rows.tolist(),
+        said.which(_may_be_field)[shapes].tolist(),
+        said.which(is_nested)[shapes].tolist(),
+        strict=True,
+    ):
+        if not (within and is_field):
+            heads.append(row)
+            within = nested
+    last = np.full(len(lines), -1, dtype=np.int64)
+    last[heads] = heads
+    return np.asarray(np.maximum.accumulate(last))
+
+
+def is_nested(entered: Entered | None) -> bool:
+    """Tell whether a line heads a record or a path, whose fields have heads too."""
+    return entered is not None and kind_of(entered.type)[0] in NESTED
+
+
+def _is_head(entered: Entered | None) -> bool:
+    return entered is not None and bool(entered.name)
+
+
+def _may_be_field(entered: Entered | None) -> bool:
+    if entered is None:
+        return False
+    return entered.name.startswith("$") or not entered.variable
+
+
+@dataclass
+class _Read:
+    """One entry of a layout, read for all of them: places instead of numbers."""
+
+    kind: str
+    places: list[Place] = field(default_factory=lambda: [_NONE] * 6)
+    aux: dict[int, Place] = field(default_factory=dict)
+    config: str | None = None
+    seen: int = 0
+
+    def put(self, at: int, place: Place) -> None:
+        self.seen += 1
+        if at < 6:
+            self.places[at] = place
+
+    def take(self, row: int, entered: Entered, axes: Iterator[int]) -> None:
+        """Take in a line; `axes` are the numbers of the axes in it."""
+        for letter, slot in entered.components:
+            self.put(_LETTERS.index(letter.upper()), (row, slot))
+        for _, slot in entered.axes:
+            axis = next(axes)
+            joint = self.kind == "JNTP"
+            if joint and 1 <= axis <= 6:
+                self.put(axis - 1, (row, slot))
+            elif axis >= 1:
+                self.aux[axis - 6 if joint else axis] = (row, slot)
+        for slot in entered.plain:
+            self.put(self.seen, (row, slot))
+        if entered.config is not None:
+            self.config = entered.config
+
+
+def read_records(
+    lines: Lines, said: Formed[Entered | None], records: Records
+) -> Entries:
+    """Read the entries of a file, layout by layout; no name is told yet to be twice."""
+    k = len(records.first)
+    form = said.form[lines.shape].tolist()
+    numbers = np.full((k, 6), np.nan)
+    slots = np.full((k, 6), -1, dtype=np.int64)
+    layout = np.zeros(k, dtype=np.int64)
+    layouts: list[Layout] = []
+    aux: list[tuple[Ints, Floats]] = []
+    arm = np.zeros(k, dtype=np.int64)
+    for mine in _alike(form, records):
+        a, b = int(records.first[mine[0]]), int(records.closed[mine[0]])
+        parts = [said.said[f] for f in form[a:b]]
+        head = said.said[form[int(records.head[mine[0]])]]
+        assert head is not None
+        if head.arm >= 0:
+            arm[mine] = _whole(_values(lines, records.head[mine], head.arm))
+        for some, axes in _by_axes(lines, records.first, mine, parts):
+            read = _Read(kind_of(head.type)[0])
+            numbered = iter(axes)
+            for row, entered in enumerate(parts):
+                if entered is not None:
+                    read.take(row, entered, numbered)
+            first = records.first[some]
+            for at, (row, slot) in enumerate(read.places):
+                if slot >= 0:
+                    numbers[some, at] = _values(lines, first + row, slot)
+                    slots[some, at] = lines.first[first + row] + slot
+            own = sorted(read.aux.items())
+            aux.append((some, _columns(lines, first, [place for _, place in own])))
+            layout[some] = len(layouts)
+            layouts.append(
+                Layout(
+                    read.kind,
+                    head.shared,
+                    read.config,
+                    tuple(axis for axis, _ in own),
+                    read.seen,
+                )
+            )
+    return Entries(
+        {},
+        list(_names(lines, said, records)),
+        lines.line[records.first],
+        layout,
+        tuple(layouts),
+        numbers,
+        slots,
+        _stacked(aux, k),
+        arm,
+    )
+
+
+def _alike(form: Sequence[int], records: Records) -> Iterator[Ints]:
+    """Group the entries whose lines have the same forms."""
+    groups: dict[tuple[int, ...], list[int]] = {}
+    columns = (records.head, records.first, records.closed)
+    rows = zip(*(column.tolist() for column in columns), strict=True)
+    for at, (head, first, last) in enumerate(rows):
+        groups.setdefault((form[head], *form[first:last]), []).append(at)
+    return (np.array(group, dtype=np.int64) for group in groups.values())
+
+
+def _by_axes(
+    lines: Lines, first: Ints, mine: Ints, parts: Sequence[Entered | None]
+) -> Iterator[tuple[Ints, list[int]]]:
+    """Split entries that are written alike by the axes that they give values of."""
+    places = [
+        (row, axis)
+        for row, entered in enumerate(parts)
+        if entered is not None
+        for axis, _ in entered.axes
+    ]
+    if not places:
+        yield mine, []
+        return
+    axes = _whole(_columns(lines, first[mine], places))
+    distinct, which = np.unique(axes, axis=0, return_inverse=True)
+    for number, one in enumerate(distinct.tolist()):
+        yield mine[which.ravel() == number], one
+
+
+def _columns(lines: Lines, first: Ints, places: Sequence[Place]) -> Floats:
+    """Return the values at some places of entries that begin at some rows, (k, p)."""
+    found = np.full((len(first), len(places)), np.nan)
+    for column, (row, slot) in enumerate(places):
+        if slot >= 0:
+            found[:, column] = _values(lines, first + row, slot)
+    return found
+
+
+def _values(lines: Lines, rows: Ints, slot: int) -> Floats:
+    """Return a number of every row, NaN where it cannot be read."""
+    value = lines.value[lines.first[rows] + slot]
+    return np.where(np.isfinite(value), value, np.nan)
+
+
+def _whole(values: Floats) -> Ints:
+    """Cut numbers down to whole ones, 0 where not known."""
+    return np.trunc(np.nan_to_num(values)).astype(np.int64)
+
+
+def _stacked(parts: Sequence[tuple[Ints, Floats]], k: int) -> Floats:
+    most = max((values.shape[1] for _, values in parts), default=0)
+    stacked = np.full((k, most), np.nan)
+    for rows, values in parts:
+        stacked[rows, : values.shape[1]] = values
+    return stacked
+
+
+def _names(
+    lines: Lines, said: Formed[Entered | None], records: Records
+) -> Iterator[str]:
+    """Name every entry: as its head does, elements with their index."""
+    heads, at = np.unique(records.head, return_inverse=True)
+    names = [_head_name(said, shape) for shape in lines.shape[heads].tolist()]
+    index = _indices(lines, said, records)
+    for row, name in enumerate(at.tolist()):
+        yield names[name] + index.get(row, "")
+
+
+def _indices(
+    lines: Lines, said: Formed[Entered | None], records: Records
+) -> dict[int, str]:
+    """Write the indices of the entries that are elements of an array."""
+    elements = np.flatnonzero(records.element)
+    form = said.form[lines.shape[records.first[elements]]]
+    found = {}
+    for one in np.unique(form).tolist():
+        mine = elements[form == one]
+        entered = said.said[one]
+        assert entered is not None
+        places = [(0, slot) for slot in entered.element]
+        numbers = _whole(_columns(lines, records.first[mine], places)).tolist()
+        for row, index in zip(mine.tolist(), numbers, strict=True):
+            found[row] = f"[{','.join(map(str, index))}]"
+    return found
+
+
+def _head_name(said: Formed[Entered | None], shape: int) -> str:
+    head = said.said[said.form[shape]]
+    assert head is not None
+    at = name_index(head.name)
+    return said.names[shape][at] if at >= 0 else head.name
