@@ -15,6 +15,7 @@ Ints = NDArray[np.int64]
 FULL = 2 * np.pi
 SUSPICIOUS = 0.3  # [rad] a step between samples that another branch might shorten
 LOST = 1.2  # [rad] a step between samples that no arm makes
+FEW, MORE = 256, 4  # samples looked ahead, and their growth while nothing happens
 TURN_AXES = ((3, 0), (5, 1), (2, 2))  # (axis, which of T1, T2, T3)
 
 
@@ -78,21 +79,23 @@ def follow(begin: Array, ways: Ways) -> Followed:
     """
     s = len(ways)
     q, slots = np.empty((s, 6)), np.empty(s, dtype=np.int64)
-    done, last = 0, begin
+    done, last, slot, ahead = 0, begin, -1, FEW
     while done < s:
-        slot = nearest_slot(ways.all(done), last)
-        if slot < 0:
-            return Followed(q[:done], slots[:done], False)
-        path = np.unwrap(np.vstack([last, ways.on(slot, done)]), axis=0)
+        fresh = slot < 0
+        if fresh:
+            slot, ahead = nearest_slot(ways.all(done), last), FEW
+            if slot < 0:
+                return Followed(q[:done], slots[:done], False)
+        path = np.unwrap(np.vstack([last, ways.on(slot, done, ahead)]), axis=0)
         step = np.abs(np.diff(path, axis=0)).max(axis=1)
-        if step[0] > LOST:
+        if fresh and step[0] > LOST:
             return Followed(q[:done], slots[:done], True)
         # The first step is the shortest there is; go on to the next suspicious one.
         good = ~(step > SUSPICIOUS) & ~np.isnan(step)
-        good[0] = True
-        count = s - done if good.all() else int(np.argmin(good))
+        good[0] |= fresh
+        count = len(step) if good.all() else int(np.argmin(good))
         q[done : done + count] = path[1 : count + 1]
         slots[done : done + count] = slot
-        done += count
-        last = q[done - 1]
+        done, last = done + count, path[count]
+        slot, ahead = (slot if good.all() else -1), MORE * ahead
     return Followed(q, slots, True)

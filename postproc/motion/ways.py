@@ -24,8 +24,14 @@ class Ways(Protocol):
         """Return all branches at sample i, (8, 6) [rad], NaN where none."""
         ...
 
-    def on(self, slot: int, first: int) -> Array:
-        """Return one branch at samples from `first` on, (.., 6) [rad], on any turn."""
+    def on(self, slot: int, first: int, most: int) -> Array:
+        """Return one branch at samples from `first` on, (.., 6) [rad], on any turn.
+
+        Args:
+            slot: The branch.
+            first: The first sample.
+            most: How many are enough for the moment; more may come.
+        """
         ...
 
 
@@ -44,7 +50,7 @@ class Solved:
         branches: Array = self.branches[i]
         return branches
 
-    def on(self, slot: int, first: int) -> Array:
+    def on(self, slot: int, first: int, most: int) -> Array:
         """Look one branch up."""
         branch: Array = self.branches[first:, slot]
         return branch
@@ -71,7 +77,7 @@ class OnDemand:
         branches: Array = self.arm.inverse(self.flange[i : i + 1]).q[0]
         return branches
 
-    def on(self, slot: int, first: int) -> Array:
+    def on(self, slot: int, first: int, most: int) -> Array:
         """Solve for one branch."""
-        ahead = self.flange[first:]
+        ahead = self.flange[first : first + most]
         return self.arm.on_branch(ahead, np.full(len(ahead), slot))

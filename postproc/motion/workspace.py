@@ -20,7 +20,7 @@ Bools = NDArray[np.bool_]
 STRAIGHT = 1e-3  # [rad] at axis 5, below this the two wrist branches are one
 CHUNK = 50_000  # poses solved at a time; solving needs room for copies
 SAME_POSE = 1e-7  # [m] and sines; poses that several predecessors agree on
-LONG = 64  # targets on one path from which on one branch is cheaper than all of them
+LONG = 256  # targets on one path from which on one branch is cheaper than all of them
 
 
 @dataclass(frozen=True)
