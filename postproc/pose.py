@@ -100,6 +100,18 @@ def inverse(T: Array) -> Array:
     return out
 
 
+def cross(a: Array, b: Array) -> Array:
+    """Return the cross products of vectors (..., 3) with others that broadcast.
+
+    What `numpy.cross` does for any axes takes ten times as long for a hundred vectors.
+    """
+    out = np.empty(np.broadcast_shapes(a.shape, b.shape))
+    for i in range(3):
+        j, k = (i + 1) % 3, (i + 2) % 3
+        out[..., i] = a[..., j] * b[..., k] - a[..., k] * b[..., j]
+    return out
+
+
 def rotation_vector(R: Array) -> Array:
     """Return the rotation vectors (..., 3) [rad] of rotations (..., 3, 3)."""
     flat = Rotation.from_matrix(R.reshape(-1, 3, 3)).as_rotvec()

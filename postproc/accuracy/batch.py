@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from postproc.accuracy.chain import NOMINAL, Deviation, Walk, tcp, walk
+from postproc.pose import cross
 from postproc.robot.arm import Arm
 from postproc.robot.state import States
 
@@ -114,7 +115,7 @@ class Batch:
     def jacobian(self) -> Array:
         """Derivative of the TCP by the controller's joint angles, (n, 3, 6) [m/rad]."""
         w = self.walk
-        turned = np.cross(w.turn, w.tcp[:, None, :] - w.pivot)
+        turned = cross(w.turn, w.tcp[:, None, :] - w.pivot)
         return self._to_controller(turned)
 
     @cached_property

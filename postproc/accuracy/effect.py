@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, fields
+from functools import cached_property
 from typing import Any, ClassVar, Literal, Self
 
 import numpy as np
@@ -104,6 +105,11 @@ class JointEffect(Effect):
 
     def acts_on(self) -> NDArray[np.int64]:
         """Return the 0-based joint that each parameter turns, (p,)."""
+        return self._acts_on
+
+    @cached_property
+    def _acts_on(self) -> NDArray[np.int64]:
+        """Find them once: a program asks some hundred times."""
         return np.array([(p.joint or 1) - 1 for p in self.parameters()], dtype=int)
 
     def columns(self, batch: Batch) -> Array:

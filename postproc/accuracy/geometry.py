@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from postproc.accuracy.batch import Batch
 from postproc.accuracy.chain import Deviation
 from postproc.accuracy.effect import Effect, Parameter
+from postproc.pose import cross
 from postproc.robot.arm import Arm
 from postproc.robot.state import States
 
@@ -94,10 +95,10 @@ class Geometry(Effect):
         if self.base:
             columns += [np.tile(np.eye(3)[k], (n, 1)) for k in range(3)]
             lever = w.tcp - w.base_point
-            columns += [np.cross(w.base_axes[k], lever) for k in range(3)]
+            columns += [cross(w.base_axes[k], lever) for k in range(3)]
         for j, k in self._links():
             axis, point = self._kind(batch, k, j)
-            columns.append(axis if point is None else np.cross(axis, w.tcp - point))
+            columns.append(axis if point is None else cross(axis, w.tcp - point))
         columns += [w.flange[:, :, k] for k in range(3)]
         return np.stack(columns, axis=-1)
 
