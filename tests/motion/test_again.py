@@ -16,6 +16,7 @@ from postproc.resolve import targets_from_visits
 from postproc.robot.cell import Cell, load_cell
 from tests.bench.made import drilling, handling, milling
 from tests.conftest import ROOT
+from tests.language.reachable import reachable
 
 SHIFT = 3e-4  # [m]
 
@@ -111,6 +112,13 @@ def arcs() -> bytes:
 )
 def test_the_same_as_traced_anew(cell: Cell, source: bytes, share: float) -> None:
     compared(cell, read(cell, source), share, seed=7)
+
+
+@pytest.mark.parametrize("seed", range(24))
+def test_random_flow(cell: Cell, seed: int) -> None:
+    made = reachable(seed, exact=seed % 2 == 0, pages=seed % 3 == 0)
+    visits = read_program(made.files, cell).visits
+    compared(cell, targets_from_visits(visits, cell)[0], 0.08, seed)
 
 
 @pytest.mark.parametrize("row", range(6))

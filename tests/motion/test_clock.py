@@ -159,3 +159,23 @@ def test_a_plan_without_times_is_the_same_path(arm: Arm, home: np.ndarray) -> No
     for name in ("q", "tcp", "side", "travel", "reason"):
         np.testing.assert_array_equal(getattr(timed, name), getattr(untimed, name))
     assert np.isfinite(timed.speed).all() and np.isnan(untimed.speed).all()
+
+
+def test_windows_change_no_direction(
+    arm: Arm, tool: np.ndarray, home: np.ndarray, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    whole = milling(arm, tool, home, 0.1)
+    for place, size in (
+        ("toppra.WINDOW", 60), ("clock.BATCH", 50), ("trace.WINDOW", 7),
+        ("workspace.LONG", 5), ("branches.FEW", 3),
+    ):  # fmt: skip
+        monkeypatch.setattr(f"postproc.motion.{place}", size)
+    pieces = milling(arm, tool, home, 0.1)
+    for name in ("direction", "slot", "reason"):
+        np.testing.assert_array_equal(getattr(pieces, name), getattr(whole, name))
+    assert set(np.unique(whole.direction)) >= {-1.0, 1.0}
+    for name in ("q", "side", "travel"):
+        ours, theirs = getattr(pieces, name), getattr(whole, name)
+        np.testing.assert_allclose(ours, theirs, rtol=0, atol=1e-9)
+    np.testing.assert_allclose(pieces.speed, whole.speed, rtol=3e-4)
+    np.testing.assert_allclose(pieces.time, whole.time, rtol=3e-4)
