@@ -9,6 +9,18 @@ from dataclasses import asdict
 import numpy as np
 from numpy.typing import NDArray
 
+from postproc.byte_columns import (
+    Column,
+    beside,
+    blanked,
+    fixed,
+    joined,
+    listed,
+    named,
+    repeated,
+    shortest,
+    whole,
+)
 from postproc.language.visits import Motion
 from postproc.pose import MM
 from postproc.report import Outcome, Status
@@ -23,11 +35,10 @@ def report_pieces(outcome: Outcome) -> Iterator[str]:
     """Write the report piece by piece."""
     head = {"program": outcome.program, "model": outcome.model}
     yield json.dumps(head)[:-1] + ', "targets": ['
-    comma = "\n"
     for first in range(0, len(outcome.visits), AT_ONCE):
         rows = np.arange(first, min(first + AT_ONCE, len(outcome.visits)))
-        yield comma + ",\n".join(_rows(_columns(outcome, rows)))
-        comma = ",\n"
+        comma = ",\n" if first else "\n"
+        yield comma + _objects(_columns(outcome, rows))[: -len(",\n")]
     tail = {
         "predicted": {"before": asdict(outcome.before), "after": asdict(outcome.after)},
         "diagnostics": [asdict(d) for d in outcome.diagnostics],
@@ -38,17 +49,20 @@ def report_pieces(outcome: Outcome) -> Iterator[str]:
 
 def target_row(outcome: Outcome, i: int) -> dict[str, object]:
     """Describe visit i in the keys of the report."""
-    row: dict[str, object] = json.loads(*_rows(_columns(outcome, np.array([i]))))
+    text = _objects(_columns(outcome, np.array([i])))
+    row: dict[str, object] = json.loads(text[: -len(",\n")])
     return row
 
 
-def _rows(columns: Mapping[str, list[str]]) -> Iterator[str]:
-    """Write visits as JSON objects of the given keys."""
-    row = "{" + ", ".join(f'"{key}": %s' for key in columns) + "}"
-    return (row % values for values in zip(*columns.values(), strict=True))
+def _objects(columns: Mapping[str, Column]) -> str:
+    """Write visits as JSON objects of the given keys, each with a comma behind it."""
+    parts: list[Column | bytes] = []
+    for number, (key, column) in enumerate(columns.items()):
+        parts += [f'{", " if number else "{"}"{key}": '.encode(), column]
+    return joined([*parts, b"},\n"]).decode("ascii")
 
 
-def _columns(outcome: Outcome, rows: Ints) -> dict[str, list[str]]:
+def _columns(outcome: Outcome, rows: Ints) -> dict[str, Column]:
     """Write the values of every key as JSON, for some visits."""
     v, d = outcome.visits, outcome.decisions
     move = np.where(v.via[rows], len(Motion), v.motion[rows])
@@ -58,13 +72,13 @@ def _columns(outcome: Outcome, rows: Ints) -> dict[str, list[str]]:
         {"correction_deg": _rounded(np.rad2deg(d.turn[rows]), 6)} if turned else {}
     )
     return {
-        "line": list(map(str, v.line[rows].tolist())),
+        "line": whole(v.line[rows]),
         "file": _named(v.files, v.file[rows]),
         "literal": _literals(outcome, rows),
         "name": _named([name or None for name in v.names], v.name[rows]),
         "move": _named([*(m.name for m in Motion), "VIA"], move),
         "q_deg": _rounded(np.rad2deg(d.q[rows]), 5),
-        "lambda": _whole(d.direction[rows]),
+        "lambda": _signs(d.direction[rows]),
         "side": _rounded(d.side[rows], 3),
         "status": _named([s.name.lower() for s in Status], d.status[rows]),
         "why": _named(d.reasons, d.why[rows]),
@@ -72,7 +86,7 @@ def _columns(outcome: Outcome, rows: Ints) -> dict[str, list[str]]:
         "corrected": _as_written(d.corrected[rows], has),
         "position_mm": _rounded(outcome.position[rows] / MM, 4)
         if placed
-        else ["[]"] * len(rows),
+        else repeated(b"[]", len(rows)),
         "correction_mm": _rounded(d.correction[rows] / MM, 5),
         **degrees,
         "step_mm": _steps(outcome, rows),
@@ -80,57 +94,48 @@ def _columns(outcome: Outcome, rows: Ints) -> dict[str, list[str]]:
     }
 
 
-def _steps(outcome: Outcome, rows: Ints) -> list[str]:
+def _steps(outcome: Outcome, rows: Ints) -> Column:
     """Write how far the correction moves from the fly point before, null without."""
     before, correction = outcome.visits.run_mates[rows], outcome.decisions.correction
     step = np.linalg.norm(correction[rows] - correction[before], axis=1) / MM
-    return [
-        "null" if mate < 0 else f"{size:.5f}"
-        for mate, size in zip(before.tolist(), step.tolist(), strict=True)
-    ]
+    return fixed(np.where(before < 0, np.nan, step), 5)
 
 
-def _named(texts: Sequence[str | None], index: Ints) -> list[str]:
+def _named(texts: Sequence[str | None], index: Ints) -> Column:
     """Write one of some texts for every visit."""
     used, at = np.unique(index, return_inverse=True)
-    written = [json.dumps(texts[k]) for k in used.tolist()]
-    return [written[k] for k in at.tolist()]
+    return named([json.dumps(texts[k]) for k in used.tolist()], at)
 
 
-def _literals(outcome: Outcome, rows: Ints) -> list[str]:
+def _literals(outcome: Outcome, rows: Ints) -> Column:
     """Write where the numbers of every visit stand."""
     v = outcome.visits
     literal = v.literal[rows]
-    out, has = ["null"] * len(rows), np.flatnonzero(literal >= 0)
-    files = _named(v.files, v.literals.file[literal[has]])
-    lines = v.literals.line[literal[has]].tolist()
-    for k, file, line in zip(has.tolist(), files, lines, strict=True):
-        out[k] = f'{{"file": {file}, "line": {line}}}'
-    return out
+    has = np.flatnonzero(literal >= 0)
+    if not len(has):
+        return repeated(b"null", len(rows))
+    literal[literal < 0] = literal[has[0]]
+    files = _named(v.files, v.literals.file[literal])
+    lines = whole(v.literals.line[literal])
+    told = beside([b'{"file": ', files, b', "line": ', lines, b"}"])
+    return blanked(told, v.literal[rows] < 0, b"null")
 
 
-def _rounded(values: Array, decimals: int) -> list[str]:
+def _rounded(values: Array, decimals: int) -> Column:
     """Write rows of numbers (k, p) for a person; what is not known becomes null."""
-    row = "[" + ", ".join([f"%.{decimals}f"] * values.shape[1]) + "]"
-    text = "\n".join([row] * len(values)) % tuple(values.ravel().tolist())
-    return text.replace("nan", "null").split("\n")
+    return listed([fixed(values[:, k], decimals) for k in range(values.shape[1])])
 
 
-def _whole(values: Array) -> list[str]:
-    """Write rows of whole numbers (k, p)."""
-    return [str(row) for row in values.astype(np.int64).tolist()]
+def _signs(values: Array) -> Column:
+    """Write rows of -1, 0 and 1 (k, p)."""
+    signs = values.astype(np.int64) + 1
+    return listed([named(["-1", "0", "1"], column) for column in signs.T])
 
 
-def _as_written(values: Array, written: NDArray[np.bool_]) -> list[str]:
+def _as_written(values: Array, written: NDArray[np.bool_]) -> Column:
     """Write the numbers of the file (k, 6); nothing where the file holds none."""
-    exact = [
-        json.dumps([None if v != v else round(v, 9) for v in row])
-        for row in values[written].tolist()
-    ]
-    out = ["[]"] * len(values)
-    for k, text in zip(np.flatnonzero(written).tolist(), exact, strict=True):
-        out[k] = text
-    return out
+    told = listed([shortest(values[:, k]) for k in range(values.shape[1])])
+    return blanked(told, ~written, b"[]")
 
 
 def finite(value: object) -> object:

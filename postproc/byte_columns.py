@@ -1,0 +1,170 @@
+"""Texts of thousands of rows as columns of bytes, put side by side without a loop.
+
+A column is an array of bytes (k, w), filled up with NUL, which no text holds: rows are
+what is left of all columns, in order, without the NULs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+Column = NDArray[np.uint8]
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Bools = NDArray[np.bool_]
+
+TIE = 1e-4  # nearer to halfway than this the last digit is left to Python
+MOST = 1e10  # scaled numbers from here on, too: they are not exact enough
+_FOUR = 10_000
+
+
+def _digits(texts: Sequence[str]) -> Column:
+    return np.array([t.encode() for t in texts], "S4").view(np.uint8).reshape(-1, 4)
+
+
+_BARE = _digits([str(n) for n in range(_FOUR)])
+_FULL = _digits([f"{n:04d}" for n in range(_FOUR)])
+_MORE = np.concatenate([np.zeros((1, 4), dtype=np.uint8), _BARE[1:]])  # 0: nothing
+
+
+def joined(columns: Sequence[Column | bytes]) -> bytes:
+    """Return the rows one after the other; bytes are the same text in every row."""
+    return beside(columns).tobytes().translate(None, b"\0")
+
+
+def beside(columns: Sequence[Column | bytes]) -> Column:
+    """Put columns side by side; bytes are the same text in every row."""
+    rows = max(len(c) for c in columns if isinstance(c, np.ndarray))
+    parts = [repeated(c, rows) if isinstance(c, bytes) else c for c in columns]
+    return np.concatenate(parts, axis=1)
+
+
+def repeated(text: bytes, rows: int) -> Column:
+    """Return a text as a column."""
+    return np.broadcast_to(np.frombuffer(text, dtype=np.uint8), (rows, len(text)))
+
+
+def named(texts: Sequence[str], index: Ints) -> Column:
+    """Return one of some ASCII texts for every row."""
+    used, at = np.unique(index, return_inverse=True)
+    table = np.array([texts[k].encode("ascii") for k in used.tolist()], "S")
+    return table.view(np.uint8).reshape(len(used), -1)[at.ravel()]
+
+
+def blanked(column: Column, rows: Bools, text: bytes) -> Column:
+    """Put a text in the place of some rows."""
+    out = np.zeros((len(column), max(column.shape[1], len(text))), dtype=np.uint8)
+    out[:, : column.shape[1]] = column
+    out[rows] = 0
+    out[rows, : len(text)] = np.frombuffer(text, dtype=np.uint8)
+    return out
+
+
+def listed(columns: Sequence[Column]) -> Column:
+    """Return a column of lists in square brackets."""
+    parts: list[Column | bytes] = [b"["]
+    for number, column in enumerate(columns):
+        parts += [b", ", column] if number else [column]
+    return beside([*parts, b"]"])
+
+
+def whole(values: Ints) -> Column:
+    """Write whole numbers from 0 on."""
+    return fixed(values.astype(float), 0)
+
+
+def fixed(values: Floats, decimals: int) -> Column:
+    """Write numbers as ``%.3f`` does for 3 decimals; NaN becomes ``null``.
+
+    Args:
+        values: (k,).
+        decimals: At most 8.
+
+    >>> joined([fixed(np.array([-0.0625, 12345.678, np.nan]), 3), b" "])
+    b'-0.062 12345.678 null '
+    """
+    scaled = np.abs(values) * 10.0**decimals
+    with np.errstate(invalid="ignore"):
+        sure = (scaled < MOST) & (np.abs(scaled - np.floor(scaled) - 0.5) > TIE)
+    rounded = np.rint(np.where(sure, scaled, 0.0)).astype(np.int64)
+    rows = _written(rounded, decimals, np.signbit(values))
+    rows = blanked(rows, np.isnan(values), b"null")
+    return _by_python(
+        rows, values, ~(sure | np.isnan(values)), f"%.{decimals}f".__mod__
+    )
+
+
+def shortest(values: Floats, decimals: int = 5) -> Column:
+    """Write numbers as Python does, rounded to 9 decimals; NaN becomes ``null``.
+
+    Numbers of few decimals are exact in that many, and what is shorter is the same
+    without zeros at the end.
+
+    Args:
+        values: (k,).
+        decimals: What most numbers are written with at most, 2 to 8.
+
+    >>> joined([shortest(np.array([12.5, -3.0, 0.1 + 0.2, 1e-5])), b" "])
+    b'12.5 -3.0 0.3 1e-05 '
+    """
+    size = np.abs(values)
+    with np.errstate(invalid="ignore"):
+        scaled = np.rint(size * 10.0**decimals)
+        sure = (scaled < MOST) & (scaled / 10.0**decimals == size)
+        sure &= (size >= 1e-4) | (size == 0.0)  # smaller ones have an exponent
+    rows = _written(
+        np.where(sure, scaled, 0.0).astype(np.int64), decimals, np.signbit(values)
+    )
+    ends = np.ones(len(rows), dtype=bool)
+    for column in range(rows.shape[1] - 1, rows.shape[1] - decimals, -1):
+        ends &= rows[:, column] == ord("0")
+        rows[ends, column] = 0
+    rows = blanked(rows, np.isnan(values), b"null")
+    return _by_python(rows, values, ~(sure | np.isnan(values)), _short)
+
+
+def _short(value: float) -> str:
+    return repr(round(value, 9))
+
+
+def _written(scaled: Ints, decimals: int, negative: Bools) -> Column:
+    """Write numbers that are whole when scaled, with their sign."""
+    before = scaled // 10**decimals
+    after = scaled - before * 10**decimals
+    high = before // _FOUR
+    low = before - high * _FOUR
+    higher = high // _FOUR
+    sign = np.where(negative, ord("-"), 0).astype(np.uint8)[:, None]
+    parts = [sign]
+    if higher.any():
+        parts += [_MORE[higher]]
+    if high.any():
+        high -= higher * _FOUR
+        parts += [np.where((higher > 0)[:, None], _FULL[high], _MORE[high])]
+        parts += [np.where((before >= _FOUR)[:, None], _FULL[low], _BARE[low])]
+    else:
+        parts += [_BARE[low]]
+    if decimals:
+        parts.append(repeated(b".", len(scaled)))
+    for left in range(decimals, 0, -4):  # digits that are still to be written
+        rest = 10 ** max(left - 4, 0)
+        four = after // rest
+        after = after - four * rest
+        parts.append(_FULL[four][:, max(4 - left, 0) :])
+    return np.concatenate(parts, axis=1)
+
+
+def _by_python(
+    rows: Column, values: Floats, some: Bools, text: Callable[[float], str]
+) -> Column:
+    """Write some numbers one by one."""
+    if not some.any():
+        return rows
+    texts = np.array([text(value).encode() for value in values[some].tolist()])
+    own = texts.view(np.uint8).reshape(len(texts), -1)
+    rows = blanked(rows, some, b" " * own.shape[1])
+    rows[some, : own.shape[1]] = own
+    return rows

@@ -1,0 +1,59 @@
+"""Numbers written by the column are those that Python writes one by one."""
+
+import json
+
+import numpy as np
+import pytest
+
+from postproc.byte_columns import (
+    blanked,
+    fixed,
+    joined,
+    listed,
+    named,
+    shortest,
+    whole,
+)
+
+AWKWARD = (
+    0.0, -0.0, 0.5, -0.5, 1.5, 0.125, 2.675, 1e-5, 9.9999e-5, 1e-4, -1e-12, 9999.5,
+    9999.99999, 10000.0, 99999999.0, 123456789.125, 1e15, 1e22, -1e300, 0.1 + 0.2,
+    1 / 3, float("inf"), float("-inf"), float("nan"),
+)  # fmt: skip
+
+
+def numbers() -> np.ndarray:
+    rng = np.random.default_rng(8)
+    size = 10.0 ** rng.integers(-8, 12, 3000)
+    free = rng.normal(0.0, 1.0, 3000) * size
+    few = [
+        round(v, int(k)) for v, k in zip(free, rng.integers(0, 9, 3000), strict=True)
+    ]
+    ties = (rng.integers(-(10**6), 10**6, 500) + 0.5) / 10.0 ** rng.integers(0, 7, 500)
+    return np.concatenate([AWKWARD, free, few, ties])
+
+
+def lines(column: np.ndarray) -> list[str]:
+    return joined([column, b"\n"]).decode().split("\n")[:-1]
+
+
+@pytest.mark.parametrize("decimals", range(9))
+def test_fixed_is_what_python_writes(decimals: int) -> None:
+    values = numbers()
+    wanted = [f"{v:.{decimals}f}".replace("nan", "null") for v in values.tolist()]
+    assert lines(fixed(values, decimals)) == wanted
+
+
+@pytest.mark.parametrize("decimals", [2, 4, 5, 8])
+def test_shortest_is_what_python_writes(decimals: int) -> None:
+    values = numbers()
+    wanted = [repr(round(v, 9)).replace("nan", "null") for v in values.tolist()]
+    assert lines(shortest(values, decimals)) == wanted
+
+
+def test_rows_are_json() -> None:
+    rows = listed([whole(np.array([1, 20_000])), fixed(np.array([0.5, np.nan]), 2)])
+    rows = blanked(rows, np.array([False, True]), b"[]")
+    texts = named([json.dumps(t) for t in ("a", 'é "b"')], np.array([1, 0]))
+    told = [json.loads(line) for line in lines(listed([rows, texts]))]
+    assert told == [[[1, 0.5], 'é "b"'], [[], "a"]]
