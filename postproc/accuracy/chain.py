@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from postproc.robot.arm import DH
+from postproc.robot.dh import DH
 
 Array = NDArray[np.float64]
 

@@ -1,0 +1,80 @@
+"""The Denavit-Hartenberg chain: frames and points along it, for many poses at once."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Frame = tuple[Array, Array, Array, Array]  # axes x, y, z and origin [m], (3, n) each
+
+
+@dataclass(frozen=True)
+class DH:
+    """Standard D-H parameters; D-H angle = offset + sense * (mix @ q), each (6,)."""
+
+    a: Array  # [m]
+    d: Array  # [m]
+    alpha: Array  # [rad]
+    offset: Array  # [rad]
+    sense: Array
+    mix: Array  # (6, 6): geometric joint angles from the controller's
+
+    def angles(self, q: Array) -> Array:
+        """Convert controller angles (n, 6) to D-H angles (n, 6) [rad]."""
+        theta: Array = self.offset + self.sense * (q @ self.mix.T)
+        return theta
+
+    def frames(self, q: Array) -> Iterator[Frame]:
+        """Walk along the link frames 0 (base) to 6 (flange) for angles (n, 6) [rad].
+
+        Every frame is the one before, turned and shifted along its z, then its new x.
+        """
+        theta = np.ascontiguousarray(self.angles(q).T)
+        cos, sin = np.cos(theta), np.sin(theta)
+        shape = (3, len(q))
+        x, y, z = (np.broadcast_to(axis[:, None], shape) for axis in np.eye(3))
+        p: Array = np.zeros(shape)
+        yield x, y, z, p
+        for i in range(6):
+            ca, sa = np.cos(self.alpha[i]), np.sin(self.alpha[i])
+            p = p + self.d[i] * z
+            x, across = cos[i] * x + sin[i] * y, cos[i] * y - sin[i] * x
+            y, z = ca * across + sa * z, ca * z - sa * across
+            p = p + self.a[i] * x
+            yield x, y, z, p
+
+    def placed(self, q: Array, point: Array, beta: Array | None = None) -> Array:
+        """Express points of the flange frame in the base frame, (n, 3) [m].
+
+        Going back along the chain, T_i = Rot_z(theta) Trans(a, 0, d) Rot_x(alpha)
+        Rot_y(beta).
+
+        Args:
+            q: Controller angles, (n, 6) [rad].
+            point: Flange frame, (n, 3) [m].
+            beta: Hayati's rotations of the links, (6,) [rad].
+        """
+        theta = np.ascontiguousarray(self.angles(q).T)
+        cos, sin = np.cos(theta), np.sin(theta)
+        x, y, z = np.array(np.broadcast_to(point, (len(q), 3)).T)
+        for i in reversed(range(6)):
+            if beta is not None and beta[i] != 0.0:
+                cb, sb = np.cos(beta[i]), np.sin(beta[i])
+                x, z = cb * x + sb * z, cb * z - sb * x
+            ca, sa = np.cos(self.alpha[i]), np.sin(self.alpha[i])
+            x, y, z = x + self.a[i], ca * y - sa * z, sa * y + ca * z + self.d[i]
+            x, y = cos[i] * x - sin[i] * y, sin[i] * x + cos[i] * y
+        return np.stack([x, y, z], axis=1)
+
+
+def pose_of(frame: Frame) -> Array:
+    """Write frames as poses, (n, 4, 4) [m]."""
+    pose = np.zeros((frame[3].shape[1], 4, 4))
+    for column, values in enumerate(frame):
+        pose[:, :3, column] = values.T
+    pose[:, 3, 3] = 1.0
+    return pose
