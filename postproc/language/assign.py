@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from postproc.language import pdl2 as ast
+from postproc.language.copies import copied, owned
 from postproc.language.evaluate import component_index
 from postproc.language.machine import Here
 from postproc.language.target import Target
@@ -21,6 +22,10 @@ def assign(here: Here, statement: ast.Assign, taught: bool) -> None:
     if _assigns_component(here, statement.target):
         _assign_component(here, statement.target, here.written(new))
         return
+    if not statement.target.name.startswith("$") and copied(
+        here, new, statement.target
+    ):
+        return
     value = here.value(new)
     if taught and isinstance(value, Position):
         value = replace(value, taught=True)
@@ -34,7 +39,7 @@ def assign(here: Here, statement: ast.Assign, taught: bool) -> None:
         return
     held = _new_value(here, statement, target, value)
     if isinstance(held, Position):
-        held = _owned(here, statement.target.name, target.key, held)
+        held = owned(here, statement.target.name, target.key, held)
     if isinstance(held, Nothing) and target.component == ():
         here.store.forget(target.key, held.why)
     else:
@@ -56,7 +61,7 @@ def _assign_component(here: Here, reference: ast.Reference, new: Written) -> Non
     if not isinstance(held, Position):
         held = _blank(here, reference.name, held)
     held = held.with_component(component_index(target), new)
-    here.store.write(target.key, _owned(here, reference.name, target.key, held))
+    here.store.write(target.key, owned(here, reference.name, target.key, held))
 
 
 def _setting(here: Here, reference: ast.Reference, value: Value) -> None:
@@ -112,12 +117,3 @@ def _blank(here: Here, name: str, held: Value) -> Position:
     joints = type_ is not None and type_.name == "jointpos"
     never = isinstance(held, Nothing) and held.why.startswith("it has no value")
     return Position(joints, aux=() if never else None)
-
-
-def _owned(here: Here, name: str, key: str, value: Position) -> Position:
-    """Say which variable a literal is the value of."""
-    declared = here.world.declared(here.place, name)
-    shared = value.shared or bool(declared and declared.exported)
-    taught = value.taught or bool(declared and declared.taught)
-    owner = value.name or here.world.written(key)
-    return replace(value, name=owner, shared=shared, taught=taught)

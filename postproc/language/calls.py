@@ -5,8 +5,9 @@ from __future__ import annotations
 from dataclasses import replace
 
 from postproc.language import pdl2 as ast
+from postproc.language.copies import bare, fill, parts_of
 from postproc.language.effects import CHANGING, PURE, changed_arguments
-from postproc.language.machine import Here, Machine, forget
+from postproc.language.machine import Here, Machine, forget, pin_names
 from postproc.language.reach import FRAMES, HANDS_OVER, reach_of
 from postproc.language.unfollowed import leave_out
 from postproc.language.values import Alias, Nothing, Position
@@ -95,6 +96,10 @@ def _bind(
         if argument is None:
             here.store.write(key, Nothing("the argument is not given"))
             continue
+        given = bare(argument)
+        if given is not None and (parts := parts_of(here, given)):
+            fill(here, key, parameter.name, given.name, parts)
+            continue
         value = here.value(argument)
         if isinstance(value, Position) and not value.name:
             value = replace(value, name=f"{inside.body.name}.{parameter.name}")
@@ -106,12 +111,15 @@ def outside(
 ) -> None:
     """Take in what a routine that the job does not hold is said, or assumed, to do."""
     start = here.world.start
-    if name in CHANGING or name in PURE:
-        for given in arguments:
-            here.world.pin(here.value(given), f"{name.upper()} computes with it")
+    built_in = name in CHANGING or name in PURE
+    why = f"{name.upper()} computes with it" if built_in else f"{name} is given it"
+    for given in arguments:
+        here.world.pin(here.value(given), why)
+    named = frozenset(r.name for r in map(bare, arguments) if r is not None)
+    pin_names(here, named, why)
     for argument in changed_arguments(arguments):
         forget(here, argument, f"{name} may change it (arguments go by reference)")
-    if name in CHANGING or name in PURE:
+    if built_in:
         return
     said = start.routines.get(name)
     if name in start.frame_tables:
