@@ -234,8 +234,9 @@ def test_a_move_that_may_find_another_value_keeps_its_point(run):
     outcome = run(text_of(SET, HIGH, TO_P, LOW, TO_P, maybe, TO_P))
     out = outcome.outputs["job.pdl"].split(b"\r\n")
     assert [x for x in out if x.startswith(b"  MOVE JOINT TO p")] == [
-        b"  MOVE JOINT TO p", b"  MOVE JOINT TO p__2", b"  MOVE JOINT TO p",
+        b"  MOVE JOINT TO p__2", b"  MOVE JOINT TO p__3", b"  MOVE JOINT TO p",
     ]  # fmt: skip
+    assert f"  p := POS({RECORD}, '')".encode() in out
 
 
 def test_exported_points_are_cloned_with_shared_only(run):

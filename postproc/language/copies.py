@@ -82,4 +82,5 @@ def owned(here: Point, name: str, key: str, value: Position) -> Position:
     shared = value.shared or bool(declared and declared.exported)
     taught = value.taught or bool(declared and declared.taught)
     owner = value.name or here.world.written(key)
+    here.world.hold(key, value)
     return replace(value, name=owner, shared=shared, taught=taught)

@@ -14,6 +14,7 @@ _FRAME = {
     "BASE": Target.RELATIVE_BASE,
     "UFRAME": Target.RELATIVE_UFRAME,
 }
+UNSURE = "a move whose target is not sure may go to it"
 _PLACES = {"home": Target.HOME, "cal_sys": Target.CALIBRATION}
 
 
@@ -129,7 +130,10 @@ def absolute(here: Here, expression: ast.Expression) -> Goal:
         type_ = here.world.type_of(here.place, expression.name)
         if type_ is not None and type_.path:
             return _node(here, expression)
-    return from_value(here.value(expression))
+    value = here.value(expression)
+    if isinstance(value, Nothing):
+        here.world.pin(value, UNSURE)
+    return from_value(value)
 
 
 def _node(here: Here, reference: ast.Reference) -> Goal:

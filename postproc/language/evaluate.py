@@ -158,6 +158,8 @@ class Point:
             return Nothing(f"it comes from {name.upper()}, known only at run time")
         target = self.locate(reference)
         if not target.exact:
+            for key in target.keys:
+                self.world.loosen(key, "only the run tells which element a move uses")
             return Nothing("its index is known only at run time")
         if self._unsteady(target):
             return Nothing("a condition handler changes it")

@@ -67,6 +67,7 @@ def resolve(
             program, 0, "too-complex", "", "the program has too many ways to be "
             "followed to the end: nothing in it is compensated",
         )  # fmt: skip
+    world.pin_loose()
     return Resolved(collect(machine), tuple(sorted(world.diagnostics)))
 
 
@@ -99,6 +100,10 @@ def _handlers(machine: Machine, store: Store) -> None:
                 place = Place(program, body)
                 reach = reach_rows(world, place, first, last)
                 machine.volatile |= reach.assigned
+                for part in reach.parts:
+                    for name in part.effects.read:
+                        root = world.root(part.place, name)
+                        world.loosen(root, "a condition handler may use it")
                 if reach.moves:
                     _moving_handler(machine, place, first, unknown)
     for name in machine.volatile:

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from postproc.language import pdl2 as ast
 from postproc.language.arrivals import Arrival, Run
 from postproc.language.columns import Collector
-from postproc.language.destinations import from_value
+from postproc.language.destinations import UNSURE, from_value
 from postproc.language.initial_values import Points
 from postproc.language.values import Nothing, Value
 from postproc.language.visits import Target
@@ -140,6 +140,8 @@ def _points(collector: Collector, at: int, run: Run, points: Points) -> None:
 def _held(collector: Collector, visit: int, run: Run, k: int, value: Value) -> Arrival:
     """Return a move to a variable that holds something else than the file says."""
     variant = int(run.variant[k])
+    if isinstance(value, Nothing):
+        collector.machine.world.pin(value, UNSURE)
     goal, (motion, reason) = from_value(value), run.ways[variant]
     return Arrival(
         run.place,

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 from postproc.language.shelves import Shelves
-from postproc.language.values import Alias, Nothing, Value, join
+from postproc.language.values import Alias, Nothing, Value, join, unsure
 from postproc.language.visits import NO_VALUE
 
 Settings = Mapping[str, Value]
@@ -54,9 +54,12 @@ class Store:
     def assigned(self, key: str) -> Value | None:
         """Return what the program has given a key, None where it has not."""
         found = self.values.get(key)
-        return self._hidden(key) if found is None else found
+        if found is not None:
+            return found
+        hidden = self._hidden(key)
+        return None if hidden is None else unsure(hidden, self.initial(key))
 
-    def _hidden(self, key: str) -> Value | None:
+    def _hidden(self, key: str) -> Nothing | None:
         """Return the unknown array or record that an element belongs to."""
         at = len(key)
         while (at := max(key.rfind("[", 0, at), key.rfind(".", 0, at))) > 0:
@@ -73,12 +76,17 @@ class Store:
             self.compound.add(root)
 
     def forget(self, key: str, why: str) -> None:
-        """What a variable and all its elements hold is no longer known."""
+        """What a variable and all its elements hold is no longer known.
+
+        They may still hold what they did.
+        """
+        held = [self.read(key)]
         if _root(key) in self.compound:
             inside = (f"{key}[", f"{key}.")
             for other in [k for k in self.values if k.startswith(inside)]:
+                held.append(self.read(other))
                 del self.values[other]
-        self.values[key] = Nothing(why)
+        self.values[key] = unsure(Nothing(why), *held)
 
     def forget_alias(self, alias: Alias, why: str) -> None:
         """Forget whatever a parameter may stand for."""

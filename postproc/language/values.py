@@ -15,13 +15,19 @@ COMPONENTS = {"x": 0, "y": 1, "z": 2, "a": 3, "e": 4, "r": 5}
 
 @dataclass(frozen=True, slots=True)
 class Nothing:
-    """A value that the program text does not tell, and why."""
+    """A value that the program text does not tell, and why.
+
+    Attributes:
+        why: Ends a message.
+        of: Numbers (by their index in the job) of positions that it may be.
+    """
 
     why: str
+    of: frozenset[int] = frozenset()
 
     def __eq__(self, other: object) -> bool:
         """Unknown is unknown, whatever the reason."""
-        return isinstance(other, Nothing)
+        return isinstance(other, Nothing) and self.of == other.of
 
     def __hash__(self) -> int:
         """Hash like every other unknown."""
@@ -125,14 +131,29 @@ def join(a: Value, b: Value) -> Value:
     if a is b or (type(a) is type(b) and a == b):
         return a
     if isinstance(a, Nothing):
-        return a
+        return unsure(a, b)
     if isinstance(b, Nothing):
-        return b
+        return unsure(b, a)
     if isinstance(a, Alias) and isinstance(b, Alias):
         return Alias(a.keys | b.keys, False)
     if isinstance(a, Position) and isinstance(b, Position):
         return _join_positions(a, b)
-    return Nothing("it may hold different values here")
+    return unsure(Nothing("it may hold different values here"), a, b)
+
+
+def may_be(value: Value | None) -> frozenset[int]:
+    """Return the numbers of the positions that a value is, or may be."""
+    if isinstance(value, Nothing):
+        return value.of
+    if isinstance(value, Position):
+        return frozenset(slot for slot in value.slots if slot >= 0)
+    return frozenset()
+
+
+def unsure(unknown: Nothing, *others: Value | None) -> Nothing:
+    """Return an unknown value that may be others too."""
+    of = unknown.of.union(*map(may_be, others))
+    return unknown if of == unknown.of else replace(unknown, of=of)
 
 
 def _join_positions(a: Position, b: Position) -> Value:
@@ -144,7 +165,7 @@ def _join_positions(a: Position, b: Position) -> Value:
         b.config,
     )
     if not same:
-        return Nothing("it may hold different values here")
+        return Nothing("it may hold different values here", may_be(a) | may_be(b))
     return replace(
         a,
         aux=a.aux if a.aux == b.aux else None,

@@ -10,7 +10,7 @@ from postproc.language.diagnostic import Diagnostic
 from postproc.language.initial_values import InitialValues
 from postproc.language.lsv import Variables
 from postproc.language.program import Body, Program, Variable
-from postproc.language.values import Position, Value
+from postproc.language.values import Nothing, Position, Value
 
 Record = tuple[float, ...] | None
 
@@ -71,6 +71,9 @@ class World:
         spelling: How variables are written, by key.
         taught_lines: Lines marked ``-- TAUGHT``, by file name.
         diagnostics: What was found; a message is kept once.
+        loose: Variables, by key, that are used where it is not known what they hold,
+            and how.
+        held: Numbers of the positions that variables, or their parts, ever hold.
         pinned: Numbers (by their index in the job) that say more than where a move
             goes, and what else they are used for: they must stay as they are.
     """
@@ -84,10 +87,13 @@ class World:
     initial: InitialValues = field(default_factory=InitialValues)
     spelling: dict[str, str] = field(default_factory=dict)
     diagnostics: dict[Diagnostic, None] = field(default_factory=dict)
+    loose: dict[str, str] = field(default_factory=dict)
+    held: dict[str, set[tuple[int, ...]]] = field(default_factory=dict)
     pinned: dict[int, str] = field(default_factory=dict)
     taught_lines: dict[str, frozenset[int]] = field(default_factory=dict)
     reached: dict[int, object] = field(default_factory=dict)
     _said: set[tuple[str, str]] = field(default_factory=set)
+    _kept: set[frozenset[int]] = field(default_factory=set)
 
     def __post_init__(self) -> None:
         base = 0
@@ -135,6 +141,28 @@ class World:
             for at in components:
                 if value.slots[at] >= 0:
                     self.pinned.setdefault(value.slots[at], why)
+        elif isinstance(value, Nothing) and value.of not in self._kept:
+            self._kept.add(value.of)
+            for slot in value.of:
+                self.pinned.setdefault(slot, why)
+
+    def hold(self, key: str, value: Position) -> None:
+        """Note that a variable, or a part of it, holds a position at some time."""
+        self.held.setdefault(_root(key), set()).add(value.slots)
+
+    def loosen(self, key: str, why: str) -> None:
+        """Note that some part of a variable is used, which only the run tells."""
+        self.loose.setdefault(_root(key), why)
+
+    def pin_loose(self) -> None:
+        """Keep the numbers of all that a loose variable holds at some time."""
+        for key in self.initial if self.loose else ():
+            value = self.initial.find(key) if _root(key) in self.loose else None
+            if isinstance(value, Position):
+                self.hold(key, value)
+        for root, why in self.loose.items():
+            for slots in self.held.get(root, ()):
+                self.pin(Position(slots=slots), why)
 
     def declared(self, place: Place, name: str) -> Variable | None:
         """Return the declaration that a name means."""
@@ -195,6 +223,10 @@ class World:
         """Return the program that a name or a file's name means."""
         own = {self.main.name, base_name(self.main.lines.source.name)}
         return self.others.get(name) or (self.main if name in own else None)
+
+
+def _root(key: str) -> str:
+    return key.partition("[")[0].partition(".")[0]
 
 
 def base_variable(name: str) -> str:
