@@ -6,6 +6,7 @@
 # make plant-bench   10,000 files, a second run, memory, workers, a cluster: docs/plant.md
 # make generated    1,000 random programs: followed as they run, landing where they say
 # make bench   where the time goes on this machine: docs/benchmarks.md
+# make growth  how the time to read a program grows with its lines, variables and branches
 # make evidence    coverage of the intervals, and what direction is worth
 # make reproduce   the published method and ours, simulated: docs/reproduction.md
 # make accuracy    held-out errors, coverage, real and blind data: docs/accuracy.md
@@ -23,7 +24,7 @@ export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
 
 .PHONY: help demo test lint format bench evidence reproduce accuracy undeclared blind chaos fuzz docs clean
-.PHONY: plant-bench generated
+.PHONY: plant-bench generated growth
 .DELETE_ON_ERROR:
 
 help:
@@ -50,6 +51,9 @@ format: $(STAMP)
 
 bench: $(STAMP)
 	@$(PYTHON_BIN) -m tests.bench
+
+growth: $(STAMP)
+	@$(PYTHON_BIN) -m tests.bench.growth
 
 evidence: $(STAMP)
 	@$(PYTHON_BIN) -m tests.evidence
