@@ -42,7 +42,9 @@ def test_what_is_not_sure_is_listed_with_an_error_that_holds(found):
 
 def test_what_is_seen_at_one_value_from_one_side_is_compensated(found):
     assert found.left_once == []
-    assert found.once[DONE] > 0.9 * found.once.total() > 100
+    compensated = sum(n for text, n in found.once.items() if text.startswith(DONE))
+    assert compensated > 0.9 * found.once.total() > 100
+    assert found.once[DONE] > 100
 
 
 @pytest.mark.parametrize("seed", range(24))

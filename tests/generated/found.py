@@ -11,9 +11,10 @@ import numpy as np
 KNOWN = "compensated arrivals, sides known"
 UNSURE = "compensated arrivals, a side listed as not sure"
 CLONED = "of these, at clones"
+FIRST = "of these, first moves of programs"
 ROUNDED = "compensated fly points, rounded on the way"
 LISTED = "moves listed as not compensated to points that moved"
-PAIRS = (KNOWN, CLONED, UNSURE, ROUNDED, LISTED)
+PAIRS = (KNOWN, CLONED, UNSURE, FIRST, ROUNDED, LISTED)
 ALL = "all compensated arrivals"
 DONE = "compensated"
 

@@ -20,7 +20,7 @@ from postproc.virtual import land, virtual_arm
 from postproc.virtual.program import run_program
 from tests.conftest import SEED
 from tests.fuzz.case import check_bytes, records_of
-from tests.generated.found import CLONED, KNOWN, LISTED, ROUNDED, UNSURE, Found
+from tests.generated.found import CLONED, FIRST, KNOWN, LISTED, ROUNDED, UNSURE, Found
 from tests.generated.once import count_once
 from tests.language.executed import PAGE, Executed, Generated
 from tests.language.interpreter import Interpreter
@@ -135,6 +135,8 @@ def count_errors(
             found.error_mm[UNSURE if unsure else KNOWN].append(pair)
             size = np.linalg.norm(d.std_error[mine], axis=1).max() / MM
             found.z += [now[k] / size] if unsure else []
+            if unsure and k == 0:
+                found.error_mm[FIRST].append(pair)
             at_clone = CLONE.search(line_of(run.after.files, ran[k].line))
             if at_clone and not unsure:
                 found.error_mm[CLONED].append(pair)

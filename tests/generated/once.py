@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from postproc.notes import SURE
 from postproc.report import Outcome, Status
 from tests.generated.found import DONE, Found
 from tests.language.executed import Executed
@@ -23,6 +24,8 @@ ALLOWED = tuple(
         "steps by more than step_mm", "a number of the target belongs to another",
     )
 )  # fmt: skip
+SECOND = "another arrival at the same point"  # it says that another one has a reason
+BLIND = ", and the plan does not know a side of it"
 Flanks = tuple[float, ...]
 
 
@@ -40,7 +43,8 @@ def count_once(
     A target is the line in which its numbers stand. Every move that goes to it must go
     to nothing else, with the same frames, and with every gear on the same flank; so
     none may lie beyond what the arm could run. In programs without inputs, what is
-    left alone must have a reason that is allowed.
+    left alone must have a reason that is allowed, or a side that the plan does not
+    know: before the first move, after a rounded corner, ..
     """
     d = done.decisions
     for line, steps in seen_once(asked, sides).items():
@@ -51,10 +55,16 @@ def count_once(
         why = {d.reasons[d.why[row]] for row in mine if d.status[row] != Status.SAFE}
         text = DONE if safe else " / ".join(sorted(why)) or "no visit"
         text = text if moved == safe else f"{DONE} for some of its moves: {text}"
-        found.once[text] += 1
-        allowed = all(any(a.search(one) for a in ALLOWED) for one in why)
-        if seed % 2 == 0 and not moved and not (mine and allowed):
+        lost = bool((np.abs(d.side[mine]) < SURE).any())
+        found.once[text + BLIND * lost] += 1
+        if seed % 2 == 0 and not moved and not (lost or allowed(why)):
             found.left_once.append((seed, line, text))
+
+
+def allowed(why: set[str]) -> bool:
+    """Tell whether a target may be left alone for some reasons."""
+    first = {one for one in why if not one.startswith(SECOND)}
+    return bool(first) and all(any(a.search(one) for a in ALLOWED) for one in first)
 
 
 def seen_once(
