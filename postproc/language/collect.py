@@ -49,7 +49,10 @@ def collect(machine: Machine) -> Visits:
         why = "a number of the target belongs to another target too"
         c.reason[overlapping] = collector.reasons(why)
         if apart.any():
-            why = "some of its numbers stand in the program, others in another file"
+            why = (
+                "some of its numbers stand in the program, others in another file: "
+                "write them in one"
+            )
             c.reason[apart] = collector.reasons(why)
     pred_start, pred = _predecessors(machine, ordered, offsets)
     return Visits(
