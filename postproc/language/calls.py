@@ -7,7 +7,8 @@ from dataclasses import replace
 from postproc.language import pdl2 as ast
 from postproc.language.copies import bare, fill, parts_of
 from postproc.language.effects import CHANGING, PURE, changed_arguments
-from postproc.language.machine import Here, Machine, forget, pin_names
+from postproc.language.forgetting import forget, pin_names
+from postproc.language.machine import Here, Machine
 from postproc.language.reach import FRAMES, HANDS_OVER, reach_of
 from postproc.language.unfollowed import leave_out
 from postproc.language.values import Alias, Nothing, Position

@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 from postproc.language import pdl2 as ast
-from postproc.language.machine import Here, pin_names
+from postproc.language.forgetting import pin_names
+from postproc.language.machine import Here
 from postproc.language.values import Nothing, Position, Value, Vector
 from postproc.language.visits import NO_TARGET, Motion, Target
 

@@ -7,7 +7,8 @@ import math
 from postproc.language import pdl2 as ast
 from postproc.language.blocks import recovered
 from postproc.language.effects import rows_effects
-from postproc.language.machine import MAX_ROWS, Here, Machine, forget
+from postproc.language.forgetting import forget
+from postproc.language.machine import MAX_ROWS, Here, Machine
 
 
 def start_loop(machine: Machine, here: Here, statement: ast.For) -> None:

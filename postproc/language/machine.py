@@ -17,7 +17,6 @@ from postproc.language.effects import PURE, invocations, references
 from postproc.language.evaluate import Point
 from postproc.language.program import Body, Program
 from postproc.language.store import MANY, MOST_ORIGINS, Store
-from postproc.language.values import Nothing
 from postproc.language.visits import ELSEWHERE
 from postproc.language.world import Place, World
 
@@ -222,38 +221,3 @@ def _forget_locals(here: Here) -> None:
         values = here.store.values
         for key in [k for k in values if k.startswith(prefix)]:
             del values[key]
-
-
-def forget_names(here: Here, names: frozenset[str], why: str) -> None:
-    """Forget variables and settings (with ``$``) by name."""
-    for name in names:
-        if name.startswith("$"):
-            here.store.set(**{name[1:]: Nothing(why)})
-        elif name:
-            forget(here, ast.Reference(name), why)
-
-
-def pin_names(here: Here, names: frozenset[str], why: str) -> None:
-    """Keep the numbers of variables that something not followed may depend on."""
-    for name in sorted(names):
-        if not name.startswith("$"):
-            for key in here.locate(ast.Reference(name)).keys:
-                inside = (f"{key}[", f"{key}.")
-                held = [k for k in here.store.values if k.startswith(inside)]
-                first = [k for k in here.world.initial if k.startswith(inside)]
-                for part in (key, *held, *first):
-                    here.world.pin(here.store.read(part), why)
-
-
-def forget(here: Here, reference: ast.Reference, why: str) -> None:
-    """Forget what a variable holds, unless it is a constant."""
-    declared = here.world.declared(here.place, reference.name)
-    if declared is not None and declared.constant:
-        return
-    if reference.name.startswith("$"):
-        name = here.setting_name(reference)
-        if name in here.store.settings:
-            here.store.set(**{str(name): Nothing(why)})
-        return
-    for key in here.locate(reference).keys:
-        here.store.forget(key, why)

@@ -6,7 +6,8 @@ from postproc.language import pdl2 as ast
 from postproc.language.arrivals import Arrival
 from postproc.language.destinations import Goal, absolute, goal_of
 from postproc.language.effects import references
-from postproc.language.machine import Here, Machine, pin_names
+from postproc.language.forgetting import pin_names
+from postproc.language.machine import Here, Machine
 from postproc.language.store import Settings
 from postproc.language.values import Value
 from postproc.language.visits import ELSEWHERE, Motion, Target

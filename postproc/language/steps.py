@@ -10,14 +10,9 @@ from postproc.language.assign import assign
 from postproc.language.blocks import recovered
 from postproc.language.calls import call_statement, calls_in_expressions
 from postproc.language.effects import changed_arguments, rows_effects
+from postproc.language.forgetting import forget, forget_names, pin_names
 from postproc.language.loops import end_round, start_loop
-from postproc.language.machine import (
-    Here,
-    Machine,
-    forget,
-    forget_names,
-    pin_names,
-)
+from postproc.language.machine import Here, Machine
 from postproc.language.moves import move
 from postproc.language.values import Nothing, Value
 from postproc.language.visits import ELSEWHERE, Motion, Target
@@ -50,7 +45,10 @@ def step(machine: Machine, here: Here, statement: ast.Statement) -> bool:
             return not call_statement(machine, here, statement)
         case ast.Label(_, then) | ast.Case(_, then) | ast.Else(then) | ast.When(then):
             return then is None or step(machine, here, then)
-        case ast.Transfer(word, operands) if word != "WRITE":
+        case ast.Transfer("WRITE", operands):
+            for operand in operands:
+                here.world.pin(here.value(operand), "the program writes it out")
+        case ast.Transfer(word, operands):
             for operand in changed_arguments(operands):
                 forget(here, operand, f"{word} changes it")
         case ast.Unknown():

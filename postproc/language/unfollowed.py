@@ -8,7 +8,8 @@ from __future__ import annotations
 
 from postproc.language import pdl2 as ast
 from postproc.language.effects import changed_arguments
-from postproc.language.machine import Here, Machine, forget, forget_names, pin_names
+from postproc.language.forgetting import forget, forget_names, pin_names
+from postproc.language.machine import Here, Machine
 from postproc.language.moves import move
 from postproc.language.reach import FRAMES, Reach
 from postproc.language.store import Store
