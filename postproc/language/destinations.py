@@ -121,11 +121,7 @@ def _along(here: Here, path: ast.Expression) -> Goal:
 def absolute(here: Here, expression: ast.Expression) -> Goal:
     """Tell what a place means that does not depend on where the arm is."""
     if isinstance(expression, ast.Reference) and expression.name.startswith("$"):
-        name = here.setting_name(expression)
-        held = here.store.settings.get(name or "")
-        if held is None and name in _PLACES:
-            return Goal(_PLACES[name], reason=_why(f"${name.upper()}"))
-        return from_value(held or Nothing(f"${name} is a system variable"), True)
+        return _system(here, expression)
     if isinstance(expression, ast.Reference):
         _check_declared(here, expression.name)
         type_ = here.world.type_of(here.place, expression.name)
@@ -135,6 +131,23 @@ def absolute(here: Here, expression: ast.Expression) -> Goal:
     if isinstance(value, Nothing):
         here.world.pin(value, UNSURE)
     return from_value(value)
+
+
+def _system(here: Here, reference: ast.Reference) -> Goal:
+    """Tell where a place of the controller is; it belongs to no target."""
+    name = here.setting_name(reference)
+    if name is None:
+        last = reference.steps[-1] if reference.steps else reference.name
+        said = str(last).lstrip("$").upper() if isinstance(last, str) else "it"
+        why = f"${said} belongs to another arm, or only the run tells to which"
+        return from_value(Nothing(why))
+    held = here.store.settings.get(name)
+    if name not in _PLACES:
+        unknown = Nothing(f"${name.upper()} is a system variable")
+        return from_value(held or unknown, True)
+    if held is None:
+        return Goal(_PLACES[name], reason=_why(f"${name.upper()}"))
+    return replace(from_value(held), reason=_why(f"${name.upper()}"))
 
 
 def _node(here: Here, reference: ast.Reference) -> Goal:
