@@ -140,6 +140,15 @@ def test_resume_redoes_all_with_another_cell_model_or_option(tmp_path, run, job_
     assert len(run(resume=True, plan=make_plan(None, cell, model, AS_USUAL)).tasks) == 2
 
 
+def test_resume_redoes_all_with_another_release(tmp_path, run, job_folder, monkeypatch):
+    grow(tmp_path / "src", 2, 1)
+    run()
+    files = (job_folder / "cell.toml", job_folder / "model.json")
+    assert not run(resume=True, plan=make_plan(None, *files, AS_USUAL)).tasks
+    monkeypatch.setattr("postproc.batch.setup.__version__", "99.0.0")
+    assert len(run(resume=True, plan=make_plan(None, *files, AS_USUAL)).tasks) == 2
+
+
 def test_resume_survives_a_torn_or_foreign_log(tmp_path, run):
     grow(tmp_path / "src", 3, 1)
     run()
