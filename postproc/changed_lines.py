@@ -15,6 +15,7 @@ from postproc.language.masking import Masked, mask_lines
 PIECE = 20_000  # lines that are masked at a time
 
 _ASSIGNED = re.compile(r"\s*([A-Za-z_$][\w$.\[\]]*)\s*(?::=|:)")
+_TWO_WORDS = re.compile(r"\s*([A-Za-z_]+)\s+([A-Za-z_]+)")
 _WORD = re.compile(r"[A-Za-z_]+")
 
 
@@ -66,22 +67,54 @@ def _compare(
 ) -> Iterator[Row]:
     """Describe how pairs of lines differ."""
     a, b = _masked(before), _masked(after)
-    comments = zip(_comments(before, a), _comments(after, b), strict=True)
-    same = [
-        x == y and old == new
-        for x, y, (old, new) in zip(a.masks, b.masks, comments, strict=True)
-    ]
+    same = _only_numbers(before, after, a, b)
+    size, name = _moves(a, b), _Names()
+    rows = zip(lines, before, after, same, size, a.masks, strict=True)
+    old_numbers, new_numbers = _numbers(a), _numbers(b)
+    for line, text, other, alike, moved, mask in rows:
+        old, new = next(old_numbers), next(new_numbers)
+        if not alike or old == new:
+            yield Row(file, line, "", (), (), None, f"{text} -> {other}")
+            continue
+        change = moved if len(old) >= 3 and "{" not in text else None
+        yield Row(file, line, name(mask, text), old, new, change)
+
+
+def _only_numbers(
+    before: list[str], after: list[str], a: Masked, b: Masked
+) -> list[bool]:
+    """Tell which pairs of lines differ in nothing but numbers."""
+    same = [x == y for x, y in zip(a.masks, b.masks, strict=True)]
+    if (a.comment >= 0).any() or (b.comment >= 0).any():
+        comments = zip(_comments(before, a), _comments(after, b), strict=True)
+        alike = zip(same, comments, strict=True)
+        same = [is_same and old == new for is_same, (old, new) in alike]
     for number in {*a.unterminated, *b.unterminated}:
         same[number] = False
-    size = _moves(a, b)
-    old_numbers, new_numbers = _numbers(a), _numbers(b)
-    for k, line in enumerate(lines):
-        text, old, new = before[k], next(old_numbers), next(new_numbers)
-        if not same[k] or old == new:
-            yield Row(file, line, "", (), (), None, f"{text} -> {after[k]}")
-            continue
-        change = size[k] if len(old) >= 3 and "{" not in text else None
-        yield Row(file, line, target_name(text), old, new, change)
+    return same
+
+
+class _Names:
+    """Names what the numbers of lines belong to, once for lines that begin alike."""
+
+    def __init__(self) -> None:
+        self._known: dict[bytes, str | None] = {}
+
+    def __call__(self, mask: bytes, text: str) -> str:
+        """Return `target_name` of a line with a mask."""
+        begin = mask.partition(b"\0")[0]
+        if begin not in self._known:
+            self._known[begin] = _told_by(begin.decode("latin-1"))
+        name = self._known[begin]
+        return target_name(text) if name is None else name
+
+
+def _told_by(begin: str) -> str | None:
+    """Name what numbers belong to by what is before the first, None if not told."""
+    words, assigned = _TWO_WORDS.match(begin), _ASSIGNED.match(begin)
+    if words:
+        return f"{words[1]} {words[2]}"
+    return assigned[1] if assigned else None
 
 
 def _masked(lines: list[str]) -> Masked:

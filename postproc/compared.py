@@ -51,7 +51,8 @@ def _read_lines(path: Path) -> tuple[list[str], bool]:
     except OSError as exc:
         problem = f"cannot be read ({exc.strerror})"
         raise ProgramError(path, problem, "Check the path") from None
-    lines = re.split(r"\r\n|\n|\r", data.decode("latin-1"))
+    text = data.decode("latin-1")
+    lines = re.split(r"\r\n|\n|\r", text) if "\r" in text else text.split("\n")
     stamped = read_stamp(data) is not None
     return lines[stamped:], stamped
 

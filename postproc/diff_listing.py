@@ -59,9 +59,10 @@ def _numbers(row: Row) -> tuple[str, str]:
     """Write the numbers that changed, or the text."""
     if row.text or not row.original:
         return row.text, ""
-    old, new = row.original, row.compensated
-    moved = [k for k in range(len(old)) if old[k] != new[k]]
+    pairs = zip(row.original, row.compensated, strict=True)
+    moved = [pair for pair in pairs if pair[0] != pair[1]]
+    if not moved:
+        return "", ""
     written = ", ".join([NUMBER] * len(moved))
-    return written % tuple([old[k] for k in moved]), written % tuple(
-        [new[k] for k in moved]
-    )
+    old, new = zip(*moved, strict=True)
+    return written % old, written % new

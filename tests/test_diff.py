@@ -6,6 +6,7 @@ import json
 
 import pytest
 
+from postproc.changed_lines import changed_rows, target_name
 from postproc.diff import diff
 from tests.written import FIRST, LISTED, NEXT, POSE, cli, entry, program
 
@@ -138,3 +139,19 @@ def test_trouble_is_exit_2(desk):
     source = desk.put("job.pdl", program(FIRST))
     found = cli("diff", source, desk.folder / "none.pdl")
     assert found.exit_code == 2 and "none.pdl: cannot be read" in found.stderr
+
+
+LINES = (
+    "MOVE LINEAR TO POS({0}, 2.0, 3.0, 4.0, 5.0, 6.0, '') -- to {{3}}",
+    "  WP_1:={{{0}, 2, 3, 4, 5, 6}}", "tab[3].x := {0}", "rec.p[{0}] := 4",
+    "p1 : POSITION ({0})", "x1 := {0} -- y2 := 3", "WAIT FOR {0}", "  f({0})",
+    "MOVEFLY TO p3 WITH $LIN_SPD = {0}", " X: {0} Y: 2 Z: 3", "{0}", "'a b' {0}",
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("line", LINES)
+def test_a_line_is_named_as_it_is_by_itself(line) -> None:
+    before, after = [line.format(text) for text in ("1.5", "2.25")]
+    rows = list(changed_rows("a.pdl", [7, 8], [before] * 2, [after] * 2))
+    assert [row.target for row in rows] == [target_name(before)] * 2
+    assert all(row.original != row.compensated for row in rows)
