@@ -58,7 +58,7 @@ def give_own_points(reading: Reading, proposal: Proposal, cell: Cell) -> Reading
         text = "clones would change what the program does: nothing is cloned"
         found = Diagnostic(reading.sources[0].name, 1, "not-cloned", text)
         return replace(reading, diagnostics=(*reading.diagnostics, found))
-    return Reading(again.sources, visits, notes, cloned, reading.sources)
+    return Reading(again.texts, visits, notes, cloned, reading.sources)
 
 
 def _stops(visits: Visits) -> dict[Stop, Ints]:

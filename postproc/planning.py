@@ -15,6 +15,7 @@ from postproc.language.diagnostic import Diagnostic
 from postproc.language.flow import Start, resolve
 from postproc.language.lsv import Variables, read_variables
 from postproc.language.reached import never_reached
+from postproc.language.skeleton import Skeleton
 from postproc.language.source import Edit, Source, source_from_bytes
 from postproc.language.structure import Program, parse
 from postproc.language.visits import Visits
@@ -38,7 +39,7 @@ class Reading:
     """A program as the language understands it.
 
     Attributes:
-        sources: Its files in the order of `Visits.files`.
+        texts: Its files as they were read, in the order of `Visits.files`.
         visits: Every arrival at a target.
         diagnostics: What else was found.
         cloned: Edits, file by file, that gave `sources` clones of variables; empty
@@ -46,11 +47,16 @@ class Reading:
         given: The files as they were before that; empty where nothing was cloned.
     """
 
-    sources: tuple[Source, ...]
+    texts: tuple[Skeleton, ...]
     visits: Visits
     diagnostics: tuple[Diagnostic, ...]
     cloned: tuple[tuple[Edit, ...], ...] = ()
     given: tuple[Source, ...] = ()
+
+    @property
+    def sources(self) -> tuple[Source, ...]:
+        """Return its files."""
+        return tuple(text.source for text in self.texts)
 
     @property
     def originals(self) -> tuple[tuple[Source, tuple[Edit, ...]], ...]:
@@ -126,26 +132,30 @@ def read_program(files: Mapping[str, bytes], cell: Cell) -> Reading:
     Raises:
         ProgramError: A file is no program text.
     """
-    sources = tuple(source_from_bytes(name, data) for name, data in files.items())
+    sources = [source_from_bytes(name, data) for name, data in files.items()]
     program = parse(sources[0])
     if program.main is None and not program.routines:
         problem, cure = "the file holds no BEGIN .. END", "Give a PDL2 program"
         raise ProgramError(sources[0].name, problem, cure)
     others: dict[str, Program] = {}
     variables: Variables | None = None
+    texts = [Skeleton.of(program.lines)]
     for source in sources[1:]:
         if source.name.lower().endswith(VARIABLES):
             variables = read_variables(source)
+            texts.append(Skeleton.of(variables.lines))
         else:
             page = parse(source)
             others |= {page.name: page, base_name(source.name): page}
+            texts.append(Skeleton.of(page.lines))
     resolved = resolve(program, start_of(cell), variables, others)
     for name in {source.name for source in sources} - {*resolved.visits.files}:
         problem, cure = "its program has the name of another file", "Rename one"
         raise ProgramError(name, problem, cure)
     programs = list({id(p): p for p in (program, *others.values())}.values())
     missed = never_reached(programs, resolved.visits)
-    return Reading(sources, resolved.visits, (*resolved.diagnostics, *missed))
+    found = (*resolved.diagnostics, *missed)
+    return Reading(tuple(texts), resolved.visits, found)
 
 
 def plan_visits(visits: Visits, cell: Cell, timed: bool = True) -> Planned:

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
 from postproc.exceptions import PostprocError
+from postproc.language.edits import Replacements
 from postproc.language.rewrite import compare
-from postproc.language.source import Source
+from postproc.language.skeleton import Skeleton
+from postproc.language.source import UTF8_MARK, Source
 from postproc.language.stamp import strip_stamp
 from postproc.language.visits import Visits
 from postproc.output import Output
@@ -36,12 +40,10 @@ def check_output(before: Reading, after: Reading, output: Output, edited: Ints) 
     Raises:
         VerificationError: Another byte differs, or the program reads differently.
     """
-    for old, new, edits in zip(
-        before.sources, after.sources, output.edits, strict=True
-    ):
-        text = strip_stamp(new.data) if old.name in output.records else new.data
-        for problem in compare(old, Source(new.name, text), edits):
-            raise VerificationError(f"{old.name}: {problem}; nothing is written")
+    for old, new, edits in zip(before.texts, after.texts, output.edits, strict=True):
+        for problem in _differences(old, new, edits, old.source.name in output.records):
+            name = old.source.name
+            raise VerificationError(f"{name}: {problem}; nothing is written")
     v, w = before.visits, after.visits
     if len(v) != len(w) or not np.array_equal(v.literal, w.literal):
         raise VerificationError(f"{v.files[0]}: the output makes other moves")
@@ -50,9 +52,39 @@ def check_output(before: Reading, after: Reading, output: Output, edited: Ints) 
         raise VerificationError(f"{v.files[0]}: a target changed that was to be kept")
     if not np.allclose(_shares(v, w), w.values - v.values, atol=SAME, equal_nan=True):
         raise VerificationError(f"{v.files[0]}: a computed target changed otherwise")
+    numbers, direct = _meant(v, output.edits), w.literal >= 0
+    if not np.array_equal(w.values[direct], numbers[w.literal[direct]]):
+        raise VerificationError(f"{v.files[0]}: a number does not read as it was meant")
     for name in CONSTANT:
         if not np.array_equal(getattr(v, name), getattr(w, name), equal_nan=True):
             raise VerificationError(f"{v.files[0]}: the output has another {name}")
+
+
+def _differences(
+    old: Skeleton, new: Skeleton, edits: Replacements, stamped: bool
+) -> tuple[str, ...]:
+    """Compare two texts as they were read; the second may begin with a stamp line."""
+    text = strip_stamp(new.source.data) if stamped else new.source.data
+    if old.source.data.startswith(UTF8_MARK):  # it is no code on line 1 alone
+        return compare(old, Source(new.source.name, text), edits)
+    return compare(old, new, edits, len(new.source.data) - len(text))
+
+
+def _meant(visits: Visits, edits: Sequence[Replacements]) -> Array:
+    """Return what the numbers of all literals should be after the edits, (m, 6)."""
+    literals, direct = visits.literals, np.flatnonzero(visits.literal >= 0)
+    numbers = np.full((len(literals), 6), np.nan)
+    numbers[visits.literal[direct]] = visits.values[direct]
+    for file, some in enumerate(edits):
+        if not len(some):
+            continue
+        mine = np.flatnonzero(literals.file == file)
+        start = literals.start[mine]
+        at = np.minimum(np.searchsorted(some.start, start), len(some) - 1)
+        new = some.new.astype(float)
+        edited = some.start[at] == start
+        numbers[mine] = np.where(edited, new[at], numbers[mine])
+    return numbers
 
 
 def _shares(before: Visits, after: Visits) -> Array:

@@ -36,17 +36,29 @@ class Variables:
     """A variable file.
 
     Attributes:
-        source: The text.
-        start, end: Byte offsets of every number, its sign included, (m,).
+        lines: The text.
         entries: Entries by lower-case name; a name with two entries has none.
         diagnostics: What was found while reading.
     """
 
-    source: Source
-    start: Ints
-    end: Ints
+    lines: Lines
     entries: Entries
     diagnostics: tuple[Diagnostic, ...]
+
+    @property
+    def source(self) -> Source:
+        """Return the text."""
+        return self.lines.source
+
+    @property
+    def start(self) -> Ints:
+        """Return the byte offsets of every number, its sign included, (m,)."""
+        return self.lines.start
+
+    @property
+    def end(self) -> Ints:
+        """Return the byte offsets at which they end, (m,)."""
+        return self.lines.end
 
 
 def read_variables(source: Source) -> Variables:
@@ -66,7 +78,7 @@ def read_variables(source: Source) -> Variables:
     ]
     found.sort(key=lambda finding: finding[0])
     told = tuple(diagnostic for _, diagnostic in found)
-    return Variables(source, lines.start, lines.end, entries, told)
+    return Variables(lines, entries, told)
 
 
 def _told_apart(entries: Entries) -> tuple[Entries, list[int]]:

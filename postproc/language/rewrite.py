@@ -11,7 +11,7 @@ from postproc.exceptions import ProgramError
 from postproc.language import digits
 from postproc.language.edits import Replacements
 from postproc.language.lexis import number_value
-from postproc.language.lines import Lines, read_lines
+from postproc.language.skeleton import Skeleton, differences
 from postproc.language.source import Source, apply
 from postproc.language.visits import Literals
 
@@ -122,48 +122,40 @@ def _texts(values: Floats, decimals: Ints, least: Ints) -> NDArray[np.bytes_]:
     return new
 
 
-def compare(before: Source, after: Source, allowed: Replacements) -> tuple[str, ...]:
+def compare(
+    before: Source | Skeleton,
+    after: Source | Skeleton,
+    allowed: Replacements,
+    stamp: int = 0,
+) -> tuple[str, ...]:
     """Check that a text differs from its origin only by the edits meant.
 
-    Both texts are read anew: every line must have the shape it had, and every number
-    its text, but for the numbers that were to change, which must have the new ones.
+    Texts that have not been read yet are; `differences` says what is looked at.
 
     Args:
         before: The original.
-        after: The rewritten text, without its stamp line.
+        after: The rewritten text.
         allowed: The edits of numbers that were meant.
+        stamp: Bytes of the stamp line that it begins with.
 
     Returns:
         What is wrong, empty where all is well.
     """
-    if apply(before.data, allowed) != after.data:
-        return (_first_difference(before, after, allowed),)
+    old, new = (s.source if isinstance(s, Skeleton) else s for s in (before, after))
+    meant = apply(old.data, allowed)
+    if len(meant) != len(new.data) - stamp or not new.data.endswith(meant):
+        return (_first_difference(meant, new, stamp),)
     try:
-        old, new = read_lines(before), read_lines(after)
+        a = before if isinstance(before, Skeleton) else Skeleton.read(before)
+        b = after if isinstance(after, Skeleton) else Skeleton.read(after)
     except ProgramError as problem:
         return (str(problem),)
-    if len(old) != len(new) or len(old.start) != len(new.start):
-        return ("the rewritten text has other lines or numbers than the original",)
-    if old.shapes != new.shapes or (old.shape != new.shape).any():
-        row = int(np.flatnonzero(old.shape != new.shape)[:1].sum())
-        return (f"line {old.line[row]}: the rewritten line has another shape",)
-    return _stray_edits(old, allowed)
+    return differences(a, b, allowed, stamp)
 
 
-def _stray_edits(old: Lines, allowed: Replacements) -> tuple[str, ...]:
-    """Find edits that do not replace exactly one number."""
-    at = np.minimum(np.searchsorted(old.start, allowed.start), len(old.start) - 1)
-    whole = (old.start[at] == allowed.start) & (old.end[at] == allowed.end)
-    if whole.all():
-        return ()
-    line = old.source.line_of(int(allowed.start[~whole][0]))
-    return (f"line {line}: an edit does not replace one whole number",)
-
-
-def _first_difference(before: Source, after: Source, allowed: Replacements) -> str:
-    meant = apply(before.data, allowed)
-    length = min(len(meant), len(after.data))
-    pairs = zip(meant, after.data, strict=False)
+def _first_difference(meant: bytes, after: Source, stamp: int) -> str:
+    length = min(len(meant), len(after.data) - stamp)
+    pairs = zip(meant, after.data[stamp:], strict=False)
     at = next((i for i, (a, b) in enumerate(pairs) if a != b), length)
-    line = after.line_of(min(at, max(len(after.data) - 1, 0)))
+    line = after.line_of(min(at + stamp, max(len(after.data) - 1, 0)))
     return f"line {line}: the text is not what was meant"

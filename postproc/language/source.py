@@ -25,7 +25,7 @@ __all__ = [
 ]
 
 _LINE_END = re.compile(rb"\r\n|\n|\r")
-_UTF8_MARK = b"\xef\xbb\xbf"
+UTF8_MARK = b"\xef\xbb\xbf"
 
 
 @dataclass(frozen=True)
@@ -78,7 +78,7 @@ def source_from_bytes(name: str, data: bytes) -> Source:
     Raises:
         ProgramError: The file is empty or binary.
     """
-    if not data.removeprefix(_UTF8_MARK).strip():
+    if not data.removeprefix(UTF8_MARK).strip():
         raise ProgramError(name, "the file is empty", "Give a PDL2 program text.")
     nul = data.find(b"\0")
     if nul >= 0:

@@ -1,0 +1,96 @@
+"""What new numbers must leave alone: the shapes of lines and where numbers stand."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from postproc.language.edits import Replacements
+from postproc.language.lines import Lines, read_lines
+from postproc.language.source import Source
+
+Ints = NDArray[np.int64]
+Places = NDArray[Any]
+"""Whole numbers that are as short as they can be."""
+
+
+@dataclass(frozen=True)
+class Skeleton:
+    """A text as it was read: n lines of code with m numbers.
+
+    It is kept while a program is worked on.
+
+    Attributes:
+        source: The text.
+        shapes: The distinct masks of its lines.
+        shape: Index into `shapes`, (n,).
+        line: 1-based physical lines, (n,).
+        start, end: Byte offsets of the numbers, (m,).
+    """
+
+    source: Source
+    shapes: tuple[str, ...]
+    shape: Places
+    line: Places
+    start: Places
+    end: Places
+
+    @classmethod
+    def of(cls, lines: Lines) -> Skeleton:
+        """Take over what the lines of a text tell."""
+        short = np.int32 if len(lines.source.data) < 2**31 else np.int64
+        places = (lines.shape, lines.line, lines.start, lines.end)
+        shape, line, start, end = (column.astype(short) for column in places)
+        return cls(lines.source, lines.shapes, shape, line, start, end)
+
+    @classmethod
+    def read(cls, source: Source) -> Skeleton:
+        """Read a text.
+
+        Raises:
+            ProgramError: A string does not end on its line.
+        """
+        return cls.of(read_lines(source))
+
+
+def differences(
+    before: Skeleton, after: Skeleton, allowed: Replacements, stamp: int
+) -> tuple[str, ...]:
+    """Check what was read of a rewritten text against the edits that were meant.
+
+    Every line must have the shape it had, every edit must replace one whole number,
+    and every number must stand where the edits move it to.
+
+    Args:
+        before: The original.
+        after: The rewritten text, read by itself.
+        allowed: The edits of numbers that were meant.
+        stamp: Bytes of the rewritten text before the first line of the original.
+
+    Returns:
+        What is wrong, empty where all is well.
+    """
+    if len(before.shape) != len(after.shape) or len(before.start) != len(after.start):
+        return ("the rewritten text has other lines or numbers than the original",)
+    if before.shapes != after.shapes or (before.shape != after.shape).any():
+        row = int(np.flatnonzero(before.shape != after.shape)[:1].sum())
+        return (f"line {before.line[row]}: the rewritten line has another shape",)
+    at: Ints = np.searchsorted(before.start, allowed.start)
+    ends = np.append(before.end, -1)
+    whole = np.append(before.start, -1)[at] == allowed.start
+    whole &= ends[at] == allowed.end
+    if not whole.all():
+        line = before.source.line_of(int(allowed.start[~whole][0]))
+        return (f"line {line}: an edit does not replace one whole number",)
+    growth = np.zeros(len(before.start) + 1, dtype=np.int64)
+    growth[at + 1] = np.char.str_len(allowed.new) - (allowed.end - allowed.start)
+    shift = stamp + np.cumsum(growth)
+    wrong = after.start != before.start + shift[:-1]
+    wrong |= after.end != before.end + shift[1:]
+    if not wrong.any():
+        return ()
+    line = before.source.line_of(int(before.start[wrong][0]))
+    return (f"line {line}: a number stands elsewhere than it should",)

@@ -1,0 +1,95 @@
+"""The output as it is read again: other bytes, places or numbers are refused."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from postproc.language.edits import Replacements
+from postproc.language.skeleton import Skeleton, differences
+from postproc.language.source import Source
+from postproc.output import write_numbers
+from postproc.planning import read_program
+from postproc.robot.cell import load_cell
+from postproc.verify import VerificationError, check_output
+from tests.bench.__main__ import CELL
+from tests.bench.made import spot
+
+POSES = b"""PROGRAM a
+VAR p : POSITION := POS(7, 8, 9, 0, 0, 0, '') -- x
+BEGIN
+  MOVE LINEAR TO POS(1.5, 2.25, -3.125, 4, 5, 6, '') -- 12
+  MOVE JOINT TO {1, 2, 3, 4, 5, 6}
+  MOVE LINEAR TO p
+  MOVE LINEAR TO POS(1.5, 2.25, -3.125, 4, 5, 6, '') WITH $LIN_SPD = 0.5
+END a
+"""
+
+
+@pytest.fixture(scope="module")
+def cell():
+    return load_cell(CELL)
+
+
+@pytest.fixture(params=["poses", "crlf", "mark", "spot"])
+def job(request, cell):
+    """Yield a reading, its output with all literals moved, and those literals."""
+    files = {"a.pdl": POSES}
+    if request.param == "crlf":
+        files = {"a.pdl": POSES.replace(b"\n", b"\r\n")}
+    if request.param == "mark":
+        files = {"a.pdl": b"\xef\xbb\xbf" + POSES}
+    if request.param == "spot":
+        made = spot(12)
+        files = {"spot.pdl": made.source, "spot.lsv": made.variables}
+    reading = read_program(files, cell)
+    v = reading.visits
+    rows = np.arange(len(v.literals))
+    first = [int(np.flatnonzero(v.literal == row)[0]) for row in rows]
+    moved = v.values[first] + np.array([0.25, -11.5, 100.0, 0.5, 0.25, 0.125])
+    return reading, write_numbers(reading, rows, moved, "m"), rows
+
+
+def test_what_was_meant_is_accepted(job, cell) -> None:
+    reading, output, rows = job
+    check_output(reading, read_program(output.files, cell), output, rows)
+
+
+@pytest.mark.parametrize("old, new", [(b"5", b"6"), (b"MOVE", b"MOVE "), (b"\n", b" ")])
+def test_another_byte_is_refused(job, cell, old, new) -> None:
+    reading, output, rows = job
+    for name in output.records:
+        head, _, rest = output.files[name].rpartition(old)
+        if not head:
+            continue
+        files = {**output.files, name: head + new + rest}
+        with pytest.raises(VerificationError):
+            check_output(reading, read_program(files, cell), output, rows)
+
+
+def test_a_number_that_reads_otherwise_is_refused(job, cell) -> None:
+    reading, output, rows = job
+    after = read_program(output.files, cell)
+    values = after.visits.values.copy()
+    values[after.visits.literal >= 0, 3] += 1e-4
+    wrong = replace(after, visits=replace(after.visits, values=values))
+    with pytest.raises(VerificationError, match="not read as it was meant"):
+        check_output(reading, wrong, output, rows)
+
+
+def test_a_number_elsewhere_is_refused() -> None:
+    before = Skeleton.read(Source("a.pdl", POSES))
+    start = before.start[2:3].astype(np.int64)
+    edits = Replacements(start, start + 1, np.array([b"9.500"]))
+    data = POSES[: start[0]] + b"9.500" + POSES[start[0] + 1 :]
+    after = Skeleton.read(Source("a.pdl", data))
+    assert differences(before, after, edits, 0) == ()
+    assert differences(before, after, edits, 1)
+    for places in ("start", "end"):
+        moved = getattr(after, places).copy()
+        moved[5] += 1
+        assert differences(before, replace(after, **{places: moved}), edits, 0)
+    half = Replacements(start, start, np.array([b"9.500"]))
+    assert "one whole number" in differences(before, after, half, 0)[0]
+    none = replace(before, start=before.start[:0], end=before.end[:0])
+    assert differences(none, none, edits, 0)
