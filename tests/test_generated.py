@@ -2,7 +2,17 @@
 
 import pytest
 
-from tests.generated.found import ALL, CLONED, DONE, KNOWN, PAIRS, UNSURE, Found, within
+from tests.generated.found import (
+    ALL,
+    ALONG,
+    CLONED,
+    DONE,
+    KNOWN,
+    PAIRS,
+    UNSURE,
+    Found,
+    within,
+)
 from tests.generated.landing import lands, program
 from tests.language.reread import reread
 
@@ -38,6 +48,12 @@ def test_what_is_not_sure_is_listed_with_an_error_that_holds(found):
     assert within(found.z) >= 0.95
     assert len(found.pairs(ALL)) == len(errors) + len(found.pairs(KNOWN))
     assert set(found.error_mm) == set(PAIRS)
+
+
+def test_only_what_is_computed_from_a_target_moves_along(found):
+    errors = found.pairs(ALONG)
+    assert found.moved_unknown == []
+    assert errors[:, 1].mean() < 0.5 * errors[:, 0].mean()
 
 
 def test_what_is_seen_at_one_value_from_one_side_is_compensated(found):

@@ -51,7 +51,9 @@ def main() -> int:
     print("\n".join(lines(whole)))
     for seed, line, why in whole.left_once:
         print(f"left alone for no reason that is allowed: {seed}, line {line}: {why}")
-    return 1 if whole.left_once else 0
+    for seed, line, why in whole.moved_unknown:
+        print(f"not known, but it went to new numbers: {seed}, line {line}: {why}")
+    return 1 if whole.left_once or whole.moved_unknown else 0
 
 
 if __name__ == "__main__":

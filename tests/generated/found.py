@@ -13,8 +13,8 @@ UNSURE = "compensated arrivals, a side listed as not sure"
 CLONED = "of these, at clones"
 FIRST = "of these, first moves of programs"
 ROUNDED = "compensated fly points, rounded on the way"
-LISTED = "moves listed as not compensated to points that moved"
-PAIRS = (KNOWN, CLONED, UNSURE, FIRST, ROUNDED, LISTED)
+ALONG = "targets that move along with one (NEAR, FOR, POS_SHIFT)"
+PAIRS = (KNOWN, CLONED, UNSURE, FIRST, ROUNDED, ALONG)
 ALL = "all compensated arrivals"
 DONE = "compensated"
 
@@ -30,6 +30,8 @@ class Found:
         once: What came of targets that are seen at one value from one side.
         left_once: Of those in programs without inputs, the ones left alone for no
             reason that is allowed: seed, line and reason.
+        moved_unknown: Moves whose target is listed as not known, but that went to
+            numbers which were corrected: seed, line and reason.
     """
 
     error_mm: dict[str, list[tuple[float, float]]] = field(
@@ -38,6 +40,7 @@ class Found:
     z: list[float] = field(default_factory=list)
     once: Counter[str] = field(default_factory=Counter)
     left_once: list[tuple[int, int, str]] = field(default_factory=list)
+    moved_unknown: list[tuple[int, int, str]] = field(default_factory=list)
 
     def add(self, other: Found) -> None:
         """Take in what came of another program."""
@@ -46,6 +49,7 @@ class Found:
         self.z += other.z
         self.once += other.once
         self.left_once += other.left_once
+        self.moved_unknown += other.moved_unknown
 
     def pairs(self, kind: str) -> np.ndarray:
         """Return errors before and after, (n, 2) [mm]; `ALL` for known and unsure."""

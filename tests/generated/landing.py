@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+import re
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -11,48 +11,19 @@ from postproc.accuracy.model import Model
 from postproc.compensate import compensate
 from postproc.notes import SURE
 from postproc.options import Options
-from postproc.planning import read_program
 from postproc.pose import MM
 from postproc.report import Outcome, Status
 from postproc.robot.cell import Cell
-from postproc.simulate import setup_of
-from postproc.virtual import land, virtual_arm
-from postproc.virtual.program import run_program
-from tests.conftest import SEED
 from tests.fuzz.case import check_bytes, records_of
-from tests.generated.found import CLONED, FIRST, KNOWN, LISTED, ROUNDED, UNSURE, Found
+from tests.generated.execution import Ran, executed
+from tests.generated.found import ALONG, CLONED, FIRST, KNOWN, ROUNDED, UNSURE, Found
 from tests.generated.once import count_once
-from tests.language.executed import PAGE, Executed, Generated
-from tests.language.interpreter import Interpreter
+from tests.language.executed import PAGE, Generated
 from tests.language.reachable import OPENING, reachable
-from tests.language.reread import CLONE, Lines, reread
-from tests.language.straight import straight
+from tests.language.reread import CLONE
 from tests.language.test_flow_random import follow
 
-MOST = 80  # executed moves that are run on the virtual arm
-LONGEST = 10_000  # executed moves in which targets are looked for
-
-
-@dataclass(frozen=True)
-class Ran:
-    """A program before and after, as it was executed, move for move.
-
-    Attributes:
-        made: The program.
-        after: With the numbers and clones of its compensated text.
-        back: The original line of each line of that.
-        asked, ran: The executed moves of both, as far as the arm gets.
-        whole: All that would be executed of the program.
-        flanks: On which flank every gear really lies after every move.
-    """
-
-    made: Generated
-    after: Generated
-    back: Lines
-    asked: list[Executed]
-    ran: list[Executed]
-    whole: list[Executed]
-    flanks: Mapping[int, tuple[float, ...]]
+COMPUTED = re.compile(r"\((?:NEAR|FOR|POS_SHIFT)\)|is computed, not written")
 
 
 def lands(seed: int, cell: Cell, model: Model) -> Found:
@@ -74,7 +45,7 @@ def lands(seed: int, cell: Cell, model: Model) -> Found:
     found = Found()
     if len(run.asked) > len(OPENING):
         rows = follow(done.visits, run.asked, made)
-        count_errors(found, run, done, rows, cell)
+        count_errors(found, seed, run, done, rows)
         count_once(found, seed, run.whole, run.ran, done, rows, run.flanks)
     return found
 
@@ -87,54 +58,27 @@ def program(seed: int) -> tuple[Generated, Options]:
     return made, Options(clone=cloned)
 
 
-def executed(made: Generated, done: Outcome, cell: Cell) -> Ran:
-    """Run a program before and after, in the cell's frames, as far as the robot gets.
-
-    It stops at a variable that was never set, and at a move that the arm cannot make.
-    """
-    after, back = reread(made, done.outputs)
-    whole, ran = (started(m, cell) for m in (made, after))
-    assert [back[step.line] for step in ran] == [step.line for step in whole]
-    known = [step.values is not None for step in whole[:MOST]]
-    end = known.index(False) if False in known else len(known)
-    flanks = sides(made, whole[:end], cell)
-    end = next((k for k in range(end) if k not in flanks), end)
-    flanks = {k: f for k, f in flanks.items() if k < end}
-    return Ran(made, after, back, whole[:end], ran[:end], whole, flanks)
-
-
-def started(made: Generated, cell: Cell) -> list[Executed]:
-    """Run a program, in the cell's frames."""
-    interpreter = Interpreter(made, 7, most=LONGEST)
-    interpreter.frames = {
-        name: tuple(getattr(cell, name).record) for name in ("tool", "uframe")
-    }
-    return interpreter.run()
-
-
 def count_errors(
-    found: Found, run: Ran, done: Outcome, rows: Sequence[set[int]], cell: Cell
+    found: Found, seed: int, run: Ran, done: Outcome, rows: Sequence[set[int]]
 ) -> None:
     """Sort the true errors of moves whose numbers changed by what the report says."""
-    asked, ran = run.asked, run.ran
-    before, now = (
-        errors(run.made, asked, *other, cell)
-        for other in ((run.made, asked), (run.after, ran))
-    )
-    d, visits = done.decisions, done.visits
-    for k, step in enumerate(asked):
-        if ran[k].values == step.values or k not in before or k not in now:
+    ran, d, visits = run.ran, done.decisions, done.visits
+    for k, step in enumerate(run.asked):
+        if ran[k].values == step.values:
             continue
-        mine, pair = sorted(rows[k]), (before[k], now[k])
+        mine, pair = sorted(rows[k]), (run.before[k], run.now[k])
         if not mine or (d.status[mine] != Status.SAFE).any():
-            found.error_mm[LISTED].append(pair)
+            found.error_mm[ALONG].append(pair)
+            why = {d.reasons[d.why[row]] for row in mine}
+            if not all(COMPUTED.search(one) for one in why):
+                found.moved_unknown.append((seed, step.line, " / ".join(why)))
         elif (visits.fly & ~visits.via)[mine].any():
             found.error_mm[ROUNDED].append(pair)
         else:
             unsure = bool((np.abs(d.side[mine]) < SURE).any())
             found.error_mm[UNSURE if unsure else KNOWN].append(pair)
             size = np.linalg.norm(d.std_error[mine], axis=1).max() / MM
-            found.z += [now[k] / size] if unsure else []
+            found.z += [run.now[k] / size] if unsure else []
             if unsure and k == 0:
                 found.error_mm[FIRST].append(pair)
             at_clone = CLONE.search(line_of(run.after.files, ran[k].line))
@@ -146,28 +90,3 @@ def line_of(files: dict[str, bytes], line: int) -> str:
     """Return a line of a job, without its comment."""
     text = list(files.values())[line // PAGE].decode("latin-1")
     return text.splitlines()[line % PAGE - 1].split("--")[0]
-
-
-def errors(
-    made: Generated,
-    asked: list[Executed],
-    executed: Generated,
-    steps: list[Executed],
-    cell: Cell,
-) -> dict[int, float]:
-    """Return the true error [mm] of every executed move that the arm can make."""
-    wanted = read_program({"job.pdl": straight(made, asked)}, cell).visits
-    commanded = read_program({"job.pdl": straight(executed, steps)}, cell).visits
-    landing = land(virtual_arm(SEED), setup_of(cell), wanted, commanded)
-    size = np.linalg.norm(landing.error, axis=1) / MM
-    return dict(zip(landing.visit.tolist(), size.tolist(), strict=True))
-
-
-def sides(
-    made: Generated, asked: list[Executed], cell: Cell
-) -> dict[int, tuple[float, ...]]:
-    """Return the flanks of all gears after the moves that the arm can make."""
-    visits = read_program({"job.pdl": straight(made, asked)}, cell).visits
-    ran = run_program(virtual_arm(SEED), setup_of(cell), visits)
-    flanks = ran.arrivals.side.round(2).tolist()
-    return {k: tuple(f) for k, f in zip(ran.visit.tolist(), flanks, strict=True)}

@@ -19,9 +19,10 @@ ALLOWED = tuple(
     for text in (
         "out of reach", "the path to it", "axis . beyond", "singularity",
         "three points of the arc", "would flip the wrist", "beyond a joint limit",
-        "other programs may read", "computes? with", "composes it", "is set to it",
-        "a target computed from it", "another arm goes to it",
-        "steps by more than step_mm", "a number of the target belongs to another",
+        "steps by more than step_mm", "other programs may read", "computes? with",
+        "composes it", "is set to it", "is given it", "may move to it",
+        "a target computed from it", "a move whose target is not sure",
+        "another arm goes to it", "a number of the target belongs to another",
     )
 )  # fmt: skip
 SECOND = "another arrival at the same point"  # it says that another one has a reason

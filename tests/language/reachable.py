@@ -102,7 +102,9 @@ class ReachableJob(Within, Job):
         self.run_pages()
 
 
-def reachable(seed: int, exact: bool, pages: bool, shares: float = 0.0) -> Generated:
+def reachable(
+    seed: int, exact: bool, pages: bool = False, shares: float = 0.0
+) -> Generated:
     """Write a program, or a job of several files, that starts at a known place."""
     rng = random.Random(seed)
     handlers, moving, recursion, functions = (rng.random() < part for part in PARTS)
