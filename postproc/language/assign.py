@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from postproc.language import pdl2 as ast
-from postproc.language.copies import copied, owned
+from postproc.language.copies import copied, forget_key, owned
 from postproc.language.evaluate import component_index
 from postproc.language.machine import Here
 from postproc.language.target import Target
@@ -35,7 +35,7 @@ def assign(here: Here, statement: ast.Assign, taught: bool) -> None:
     target = here.locate(statement.target)
     if not target.exact:
         for key in target.keys:
-            here.store.forget(key, "an element known only at run time is assigned")
+            forget_key(here, key, "an element known only at run time is assigned")
         return
     held = _new_value(here, statement, target, value)
     if isinstance(held, Position):

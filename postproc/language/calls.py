@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from postproc.language import pdl2 as ast
-from postproc.language.copies import bare, fill, parts_of
+from postproc.language.copies import bare, fill, forget_key, parts_of
 from postproc.language.effects import CHANGING, PURE, changed_arguments
 from postproc.language.forgetting import forget, pin_names
 from postproc.language.machine import Here, Machine
@@ -93,7 +93,7 @@ def _bind(
                 here.store.write(key, Alias(target.keys, target.exact))
                 continue
             for aliased in target.keys:
-                here.store.forget(aliased, f"{inside.body.name} may change it")
+                forget_key(here, aliased, f"{inside.body.name} may change it")
         if argument is None:
             here.store.write(key, Nothing("the argument is not given"))
             continue

@@ -28,7 +28,7 @@ def copied(here: Point, value: ast.Expression, target: ast.Reference) -> bool:
     for part in parts.values():
         here.world.pin(part, f"{origin.name} is copied, to where only the run tells")
     for key in place.keys:
-        here.store.forget(key, f"a copy of {origin.name} is assigned")
+        forget_key(here, key, f"a copy of {origin.name} is assigned")
     return True
 
 
@@ -55,14 +55,23 @@ def parts_of(here: Point, origin: ast.Reference) -> dict[str, Value]:
     """
     found: dict[str, Value] = {}
     for key in sorted(here.locate(origin).keys):
-        inside = (f"{key}[", f"{key}.")
-        held = [k for k in here.store.values if k.startswith(inside)]
-        first = [k for k in here.world.initial if k.startswith(inside)]
-        for part in (*first, *held):
+        for part in parts_under(here, key):
             value = here.store.read(part)
             if not isinstance(value, Nothing):
                 found[part[len(key) :]] = value
     return found
+
+
+def parts_under(here: Point, key: str) -> list[str]:
+    """Return the keys of elements and fields that a key has or ever had."""
+    return here.world.first_parts(key) + here.store.parts(key)
+
+
+def forget_key(here: Point, key: str, why: str) -> None:
+    """Forget what a key and its parts hold: any of it may still be there."""
+    if key in here.store.compound or here.world.first_parts(key):
+        here.world.loosen(key, why)
+    here.store.forget(key, why)
 
 
 def fill(

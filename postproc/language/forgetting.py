@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from postproc.language import pdl2 as ast
+from postproc.language.copies import forget_key, parts_under
 from postproc.language.machine import Here
 from postproc.language.values import Nothing
 
@@ -21,10 +22,7 @@ def pin_names(here: Here, names: frozenset[str], why: str) -> None:
     for name in sorted(names):
         if not name.startswith("$"):
             for key in here.locate(ast.Reference(name)).keys:
-                inside = (f"{key}[", f"{key}.")
-                held = [k for k in here.store.values if k.startswith(inside)]
-                first = [k for k in here.world.initial if k.startswith(inside)]
-                for part in (key, *held, *first):
+                for part in (key, *parts_under(here, key)):
                     here.world.pin(here.store.read(part), why)
 
 
@@ -39,4 +37,4 @@ def forget(here: Here, reference: ast.Reference, why: str) -> None:
             here.store.set(**{str(name): Nothing(why)})
         return
     for key in here.locate(reference).keys:
-        here.store.forget(key, why)
+        forget_key(here, key, why)

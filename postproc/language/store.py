@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 
 from postproc.language.shelves import Shelves
@@ -29,14 +29,15 @@ class Store:
         values: Assigned values. A Nothing at ``job/tab`` hides its elements.
         settings: Frames and motion variables; replaced, never changed.
         last: Visits the arm may come from; START, ELSEWHERE or MANY.
-        compound: Keys that ever had elements or fields; shared by all copies.
+        compound: Keys of the elements and fields that a key ever had; shared by all
+            copies.
     """
 
     initial: Callable[[str], Value | None]
     values: Shelves = field(default_factory=Shelves)
     settings: Settings = field(default_factory=dict)
     last: frozenset[int] = frozenset()
-    compound: set[str] = field(default_factory=set)
+    compound: dict[str, dict[str, None]] = field(default_factory=dict)
 
     def copy(self) -> Store:
         """Return a store that can change on its own."""
@@ -61,9 +62,8 @@ class Store:
 
     def _hidden(self, key: str) -> Nothing | None:
         """Return the unknown array or record that an element belongs to."""
-        at = len(key)
-        while (at := max(key.rfind("[", 0, at), key.rfind(".", 0, at))) > 0:
-            found = self.values.get(key[:at])
+        for whole in wholes(key):
+            found = self.values.get(whole)
             if isinstance(found, Nothing):
                 return found
         return None
@@ -71,22 +71,20 @@ class Store:
     def write(self, key: str, value: Value) -> None:
         """Let a key hold a value."""
         self.values[key] = value
-        root = _root(key)
-        if len(root) < len(key):
-            self.compound.add(root)
+        for whole in wholes(key):
+            self.compound.setdefault(whole, {})[key] = None
+
+    def parts(self, key: str) -> list[str]:
+        """Return the keys of elements and fields that a key has."""
+        ever = self.compound.get(key, ())
+        return [part for part in ever if self.values.get(part) is not None]
 
     def forget(self, key: str, why: str) -> None:
-        """What a variable and all its elements hold is no longer known.
-
-        They may still hold what they did.
-        """
-        held = [self.read(key)]
-        if _root(key) in self.compound:
-            inside = (f"{key}[", f"{key}.")
-            for other in [k for k in self.values if k.startswith(inside)]:
-                held.append(self.read(other))
-                del self.values[other]
-        self.values[key] = unsure(Nothing(why), *held)
+        """What a variable and all its elements hold is no longer known."""
+        held = self.read(key)
+        for part in self.parts(key):
+            del self.values[part]
+        self.write(key, unsure(Nothing(why), held))
 
     def forget_alias(self, alias: Alias, why: str) -> None:
         """Forget whatever a parameter may stand for."""
@@ -118,8 +116,20 @@ class Store:
         return changed
 
 
-def _root(key: str) -> str:
+def root_of(key: str) -> str:
+    """Return the key of the variable that a key belongs to."""
     return key.partition("[")[0].partition(".")[0]
+
+
+def wholes(key: str) -> Iterator[str]:
+    """Yield the keys of what a key is an element or a field of, the innermost first.
+
+    >>> list(wholes("job/tab[3].place"))
+    ['job/tab[3]', 'job/tab']
+    """
+    at = len(key)
+    while (at := max(key.rfind("[", 0, at), key.rfind(".", 0, at))) > 0:
+        yield key[:at]
 
 
 def _merge_origins(a: frozenset[int], b: frozenset[int]) -> frozenset[int]:

@@ -152,8 +152,11 @@ def may_be(value: Value | None) -> frozenset[int]:
 
 def unsure(unknown: Nothing, *others: Value | None) -> Nothing:
     """Return an unknown value that may be others too."""
-    of = unknown.of.union(*map(may_be, others))
-    return unknown if of == unknown.of else replace(unknown, of=of)
+    of = unknown.of
+    for other in map(may_be, others):
+        if not other <= of:
+            of = of | other if of else other
+    return unknown if of is unknown.of else replace(unknown, of=of)
 
 
 def _join_positions(a: Position, b: Position) -> Value:

@@ -10,6 +10,7 @@ from postproc.language.diagnostic import Diagnostic
 from postproc.language.initial_values import InitialValues
 from postproc.language.lsv import Variables
 from postproc.language.program import Body, Program, Variable
+from postproc.language.store import root_of, wholes
 from postproc.language.values import Nothing, Position, Value
 
 Record = tuple[float, ...] | None
@@ -94,6 +95,7 @@ class World:
     reached: dict[int, object] = field(default_factory=dict)
     _said: set[tuple[str, str]] = field(default_factory=set)
     _kept: set[frozenset[int]] = field(default_factory=set)
+    _first: dict[str, list[str]] | None = None
 
     def __post_init__(self) -> None:
         base = 0
@@ -148,19 +150,28 @@ class World:
 
     def hold(self, key: str, value: Position) -> None:
         """Note that a variable, or a part of it, holds a position at some time."""
-        self.held.setdefault(_root(key), set()).add(value.slots)
+        self.held.setdefault(root_of(key), set()).add(value.slots)
+
+    def first_parts(self, key: str) -> list[str]:
+        """Return the elements and fields that a key has when the job starts."""
+        if self._first is None:
+            self._first = {}
+            for part in self.initial:
+                for whole in wholes(part):
+                    self._first.setdefault(whole, []).append(part)
+        return self._first.get(key, [])
 
     def loosen(self, key: str, why: str) -> None:
         """Note that some part of a variable is used, which only the run tells."""
-        self.loose.setdefault(_root(key), why)
+        self.loose.setdefault(root_of(key), why)
 
     def pin_loose(self) -> None:
         """Keep the numbers of all that a loose variable holds at some time."""
-        for key in self.initial if self.loose else ():
-            value = self.initial.find(key) if _root(key) in self.loose else None
-            if isinstance(value, Position):
-                self.hold(key, value)
         for root, why in self.loose.items():
+            for key in (root, *self.first_parts(root)):
+                value = self.initial.find(key)
+                if isinstance(value, Position):
+                    self.hold(key, value)
             for slots in self.held.get(root, ()):
                 self.pin(Position(slots=slots), why)
 
@@ -223,10 +234,6 @@ class World:
         """Return the program that a name or a file's name means."""
         own = {self.main.name, base_name(self.main.lines.source.name)}
         return self.others.get(name) or (self.main if name in own else None)
-
-
-def _root(key: str) -> str:
-    return key.partition("[")[0].partition(".")[0]
 
 
 def base_variable(name: str) -> str:
