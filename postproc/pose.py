@@ -13,20 +13,11 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Bools = NDArray[np.bool_]
 
 MM = 1e-3  # [m]
 SAME_ROTATION = 1e-10  # elements of a matrix that differ less are the same
-
-
-def _axis_rotation(angle: Array, axis: int) -> Array:
-    """Rotate about coordinate axis 1 (y) or 2 (z): (..., ) [rad] -> (..., 3, 3)."""
-    c, s = np.cos(angle), np.sin(angle)
-    R = np.zeros((*np.shape(angle), 3, 3))
-    i, j = (0, 1) if axis == 2 else (2, 0)
-    R[..., axis, axis] = 1.0
-    R[..., i, i] = R[..., j, j] = c
-    R[..., i, j], R[..., j, i] = -s, s
-    return R
 
 
 def rotation_from_zyz(zyz_deg: Array) -> Array:
@@ -35,8 +26,15 @@ def rotation_from_zyz(zyz_deg: Array) -> Array:
     >>> np.round(rotation_from_zyz(np.array([90.0, 0.0, 0.0])) @ [1, 0, 0], 12).tolist()
     [0.0, 1.0, 0.0]
     """
-    a, e, r = np.moveaxis(np.deg2rad(np.asarray(zyz_deg, dtype=float)), -1, 0)
-    R: Array = _axis_rotation(a, 2) @ _axis_rotation(e, 1) @ _axis_rotation(r, 2)
+    angles = np.deg2rad(np.asarray(zyz_deg, dtype=float))
+    (ca, ce, cr), (sa, se, sr) = (
+        np.moveaxis(f(angles), -1, 0) for f in (np.cos, np.sin)
+    )
+    R = np.empty((*angles.shape[:-1], 3, 3))
+    R[..., 0, 0], R[..., 0, 1] = ca * ce * cr - sa * sr, -ca * ce * sr - sa * cr
+    R[..., 1, 0], R[..., 1, 1] = sa * ce * cr + ca * sr, -sa * ce * sr + ca * cr
+    R[..., 0, 2], R[..., 1, 2] = ca * se, sa * se
+    R[..., 2, 0], R[..., 2, 1], R[..., 2, 2] = -se * cr, se * sr, ce
     return R
 
 
@@ -98,6 +96,29 @@ def inverse(T: Array) -> Array:
     out[..., :3, 3] = -(Rt @ T[..., :3, 3, None])[..., 0]
     out[..., 3, 3] = 1.0
     return out
+
+
+def products(left: Array, right: Array, i: Ints, j: Ints) -> Array:
+    """Multiply some of few poses with each other, every pair once.
+
+    Args:
+        left: Poses, (k, 4, 4).
+        right: Poses, (l, 4, 4).
+        i: Which of `left`, (n,); negative ones count from the end.
+        j: Which of `right`, (n,), likewise.
+
+    Returns:
+        left[i] @ right[j], (n, 4, 4).
+    """
+    count = len(right)
+    pair = i % len(left) * count + j % count
+    used, which = np.unique(pair, return_inverse=True)
+    return np.asarray((left[used // count] @ right[used % count])[which])
+
+
+def is_unknown(T: Array) -> Bools:
+    """Tell which poses (n, 4, 4) hold a number that is not known, (n,)."""
+    return np.asarray(np.isnan(np.einsum("nij->n", T)))
 
 
 def cross(a: Array, b: Array) -> Array:

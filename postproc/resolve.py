@@ -16,7 +16,7 @@ from scipy.spatial.transform import Rotation
 from postproc.flying import rounding_of
 from postproc.language.visits import Target, Visits
 from postproc.motion.targets import Kind, Targets
-from postproc.pose import MM, inverse, pose_from_record
+from postproc.pose import MM, inverse, is_unknown, pose_from_record, products
 from postproc.reasons import Reasons
 from postproc.robot.cell import Cell
 
@@ -40,11 +40,15 @@ ALL = slice(None)
 
 @dataclass(frozen=True)
 class Frames:
-    """The frames that hold at some visits, (m, 4, 4) [m], NaN where not known."""
+    """The frames that hold at some visits, (m, 4, 4) [m], NaN where not known.
+
+    Attributes:
+        tool: TCP in the flange frame.
+        user: User frame in the arm's base frame.
+    """
 
     tool: Array
-    base_inverse: Array
-    uframe: Array
+    user: Array
 
 
 def targets_from_visits(visits: Visits, cell: Cell) -> tuple[Targets, Reasons]:
@@ -63,10 +67,10 @@ def targets_from_visits(visits: Visits, cell: Cell) -> tuple[Targets, Reasons]:
     kind, tcp, joints = _places(visits, frames, values)
     poses = np.isin(visits.target, (Target.POSE, Target.NEAR))
     outside = _auxiliary(visits, cell, reasons)
-    _explain(visits, frames, values, poses, reasons)
+    _explain(visits, values, poses, reasons)
     lost = (outside | visits.tool_remote) & (kind != Kind.JOINTS)
     placed = np.isin(kind, PLACED)
-    lost |= placed & np.isnan(tcp + frames.tool).any(axis=(1, 2))
+    lost |= placed & (is_unknown(tcp) | is_unknown(frames.tool))
     lost |= np.isnan(joints).any(axis=1) & np.isin(kind, (Kind.JOINTS, Kind.JOINT_STEP))
     slot, turns = configurations(visits.configs)
     rounding, distance, overlap = rounding_of(visits)
@@ -132,10 +136,16 @@ def configurations(configs: tuple[str, ...]) -> tuple[Ints, Array]:
 
 def _frames(visits: Visits, rows: Rows = ALL) -> Frames:
     """Look up the frames of visits."""
+    poses = few_frames(visits)
+    base, uframe = visits.base[rows], visits.uframe[rows]
+    user = products(inverse(poses), poses, base, uframe)
+    return Frames(poses[visits.tool[rows]], user)
+
+
+def few_frames(visits: Visits) -> Array:
+    """Return the frames that the program uses, and last one that is not known."""
     unknown = np.full((1, 4, 4), np.nan)
-    poses = np.concatenate([pose_from_record(visits.frames.reshape(-1, 6)), unknown])
-    tool, base, uframe = visits.tool[rows], visits.base[rows], visits.uframe[rows]
-    return Frames(poses[tool], inverse(poses)[base], poses[uframe])
+    return np.concatenate([pose_from_record(visits.frames.reshape(-1, 6)), unknown])
 
 
 def _values(visits: Visits, cell: Cell, rows: Rows = ALL) -> Array:
@@ -165,8 +175,7 @@ def _places(
     joints[in_joints] = np.deg2rad(values[in_joints])
     poses = np.isin(target, (Target.POSE, Target.NEAR, Target.FOR))
     kind[poses] = np.where(target[poses] == Target.FOR, Kind.TOWARDS, Kind.POSE)
-    user = frames.base_inverse[poses] @ frames.uframe[poses]
-    tcp[poses] = user @ pose_from_record(values[poses])
+    tcp[poses] = frames.user[poses] @ pose_from_record(values[poses])
     near = target == Target.NEAR
     tcp[near] = tcp[near] @ _along_approach(-visits.distance_mm[rows][near])
     away = target == Target.AWAY
@@ -190,7 +199,7 @@ def _step(target: int, value: Array, frames: Frames, v: int) -> tuple[Kind, Arra
     frame = STEPS_IN.get(Target(int(value[4])) if about else Target(int(target)), "")
     axes = np.eye(3)
     if frame == "uframe":
-        axes = (frames.base_inverse[v] @ frames.uframe[v])[:3, :3]
+        axes = frames.user[v, :3, :3]
     step = np.eye(4)
     vector = axes @ value[:3]
     if np.isnan(vector).any() or (about and not np.linalg.norm(vector) > 0):
@@ -223,21 +232,20 @@ def _auxiliary(visits: Visits, cell: Cell, reasons: Reasons) -> Bools:
     return outside
 
 
-def _explain(
-    visits: Visits, frames: Frames, values: Array, poses: Bools, reasons: Reasons
-) -> None:
+def _explain(visits: Visits, values: Array, poses: Bools, reasons: Reasons) -> None:
     """Say why visits are not compensated."""
     reasons.mark(visits.tool_remote, "$TOOL_RMT: the arm holds the part")
     reasons.mark(
         np.isnan(values).any(axis=1) & (poses | np.isin(visits.target, JOINTS)),
         "a value is not known",
     )
-    for name, where, who in (
-        ("$TOOL", frames.tool, np.ones(len(visits), dtype=bool)),
-        ("$BASE", frames.base_inverse, poses),
-        ("$UFRAME", frames.uframe, poses),
+    unknown = is_unknown(few_frames(visits))
+    for name, which, who in (
+        ("$TOOL", visits.tool, np.ones(len(visits), dtype=bool)),
+        ("$BASE", visits.base, poses),
+        ("$UFRAME", visits.uframe, poses),
     ):
         reasons.mark(
-            np.isnan(where).any(axis=(1, 2)) & who,
+            unknown[which] & who,
             f"{name} is not known at this move: add it to the cell file",
         )

@@ -11,6 +11,7 @@ from postproc.accuracy.model import Model
 from postproc.accuracy.orientation import UNSURE, refuse_unknown_rotations, unsure_turn
 from postproc.accuracy.solve import solve
 from postproc.planning import Planned
+from postproc.pose import is_unknown
 from postproc.robot.cell import Cell
 from postproc.robot.state import States
 
@@ -94,7 +95,7 @@ def solve_again(
         orientation: Correct the orientation as well as the position.
     """
     plan = planned.plan
-    lost = np.isnan(plan.q).any(axis=1) | np.isnan(plan.tcp).any(axis=(1, 2))
+    lost = np.isnan(plan.q).any(axis=1) | is_unknown(plan.tcp)
     known = np.asarray(rows & ~lost)
     here = states[known]
     predicted = model.predict(cell.arm, here)

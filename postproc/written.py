@@ -12,10 +12,11 @@ from postproc.pose import (
     MM,
     angles_near,
     inverse,
-    pose_from_record,
+    products,
     rotation_from_zyz,
     rotation_vector,
 )
+from postproc.resolve import few_frames
 from postproc.solved import Solved
 
 Array = NDArray[np.float64]
@@ -60,13 +61,8 @@ def turns(plan: Plan, solved: Solved) -> Array:
 
 def base_in_uframe(visits: Visits, rows: Ints) -> Array:
     """Return the pose of the arm's base in the user frame, (k, 4, 4) [m]."""
-    unknown = np.full((1, 4, 4), np.nan)
-    frames = np.concatenate([pose_from_record(visits.frames.reshape(-1, 6)), unknown])
-    count = len(frames)
-    pair = visits.uframe[rows] % count * count + visits.base[rows] % count
-    used, which = np.unique(pair, return_inverse=True)
-    poses = np.asarray(inverse(frames)[used // count] @ frames[used % count])
-    return np.asarray(poses[which])
+    frames = few_frames(visits)
+    return products(inverse(frames), frames, visits.uframe[rows], visits.base[rows])
 
 
 def turns_in_file(visits: Visits, turn: Array) -> Array:

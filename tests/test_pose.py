@@ -7,8 +7,11 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from postproc.pose import (
+    cross,
     inverse,
+    is_unknown,
     pose_from_record,
+    products,
     record_from_pose,
     rotation_vector,
 )
@@ -48,3 +51,20 @@ def test_rotation_vector_of_many():
     R = Rotation.random(12, random_state=0)
     found = rotation_vector(R.as_matrix().reshape(3, 4, 3, 3))
     np.testing.assert_allclose(found.reshape(-1, 3), R.as_rotvec(), atol=1e-12)
+
+
+def test_products_of_few_poses_for_many_pairs():
+    rng = np.random.default_rng(4)
+    few = pose_from_record(rng.uniform(-90, 90, (5, 6)))
+    few[4] = np.nan
+    i, j = rng.integers(-1, 4, 40), rng.integers(-5, 5, 40)
+    found = products(inverse(few), few, i, j)
+    np.testing.assert_array_equal(found, inverse(few)[i] @ few[j])
+    unknown = (i == -1) | np.isin(j, (-1, 4))
+    np.testing.assert_array_equal(is_unknown(found), unknown)
+
+
+def test_cross_is_that_of_numpy():
+    a, b = np.random.default_rng(5).normal(size=(2, 7, 6, 3))
+    np.testing.assert_array_equal(cross(a, b), np.cross(a, b))
+    np.testing.assert_array_equal(cross(a[0, 0], b), np.cross(a[0, 0], b))

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from postproc.motion.sampling import sample
 from postproc.motion.targets import Kind, Move, Targets
 from postproc.motion.ways import OnDemand, Solved, Ways
-from postproc.pose import inverse
+from postproc.pose import inverse, is_unknown
 from postproc.robot.arm import Arm
 
 Array = NDArray[np.float64]
@@ -73,7 +73,7 @@ class Workspace:
         self.samples = sample(targets, self.flange)
         self.source = np.array(self.samples.source)
         self.path = np.full((int(self.samples.start[-1]), 6), np.nan)
-        placed = ~np.isnan(self.flange).any(axis=(1, 2))
+        placed = ~is_unknown(self.flange)
         self.placed = placed & (targets.kind != Kind.JOINTS) & ~self.given
         self.by_string = self._by_string()
         self.single = self._single_lines()
