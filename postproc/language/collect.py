@@ -16,7 +16,7 @@ from postproc.language.setting_columns import SettingColumns
 from postproc.language.store import MANY
 from postproc.language.uses import find_uses
 from postproc.language.values import Position
-from postproc.language.visits import ELSEWHERE, Visits
+from postproc.language.visits import ELSEWHERE, Visits, slim
 from postproc.language.world import World
 
 Ints = NDArray[np.int64]
@@ -31,7 +31,9 @@ def collect(machine: Machine) -> Visits:
     offsets = np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
     axes = max((_axes(record, machine.world) for _, record in ordered), default=0)
     settings = SettingColumns()
-    collector = Collector(machine, Columns(int(offsets[-1]), axes), settings)
+    numbering = Numbering.of(machine.world)
+    columns = Columns(int(offsets[-1]), axes, len(numbering.start))
+    collector = Collector(machine, columns, settings)
     for at, (_, record) in zip(offsets.tolist(), ordered, strict=False):
         if isinstance(record, Run):
             fill_run(collector, at, record)
@@ -40,7 +42,6 @@ def collect(machine: Machine) -> Visits:
     c, world = collector.columns, machine.world
     if machine.exhausted:
         c.reason[:] = collector.reasons("the program is too complex to be followed")
-    numbering = Numbering.of(world)
     literals, literal = find_literals(c, numbering, collector.names)
     literals, follows = find_uses(literals, c.slots, c.bases, literal, world.pinned)
     overlapping = (literal < 0) & (c.slots[:, 0] >= 0) & (c.reason == 0)
@@ -57,23 +58,23 @@ def collect(machine: Machine) -> Visits:
     pred_start, pred = _predecessors(machine, ordered, offsets)
     return Visits(
         files=tuple(world.files),
-        file=c.file,
-        line=c.line,
-        motion=c.motion,
-        target=c.target,
-        via=c.via,
+        file=slim(c.file),
+        line=slim(c.line),
+        motion=slim(c.motion),
+        target=slim(c.target),
+        via=slim(c.via),
         values=c.values,
-        distance_mm=c.distance_mm,
-        aux=c.aux,
-        config=c.config,
+        distance_mm=slim(c.distance_mm),
+        aux=slim(c.aux),
+        config=slim(c.config),
         configs=collector.configs.texts(),
-        config_given=c.config_given,
+        config_given=slim(c.config_given),
         literal=literal,
-        follows=follows,
-        name=c.name,
+        follows=slim(follows),
+        name=slim(c.name),
         names=collector.names.texts(),
-        fly=c.fly,
-        reason=c.reason,
+        fly=slim(c.fly),
+        reason=slim(c.reason),
         reasons=collector.reasons.texts(),
         pred_start=pred_start,
         pred=pred,

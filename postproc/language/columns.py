@@ -39,7 +39,15 @@ class Table:
 class Columns:
     """Columns of n visits, filled visit by visit or stretch by stretch."""
 
-    def __init__(self, n: int, axes: int) -> None:
+    def __init__(self, n: int, axes: int, slots: int) -> None:
+        """Make room.
+
+        Args:
+            n: Visits.
+            axes: The last auxiliary axis.
+            slots: Numbers in all files: theirs are the longest columns.
+        """
+        short = np.int32 if slots < 2**31 else np.int64
         self.file = np.zeros(n, dtype=np.int64)
         self.line = np.zeros(n, dtype=np.int64)
         self.motion = np.zeros(n, dtype=np.int64)
@@ -54,8 +62,8 @@ class Columns:
         self.name = np.zeros(n, dtype=np.int64)
         self.reason = np.zeros(n, dtype=np.int64)
         self.setting = np.zeros(n, dtype=np.int64)
-        self.slots = np.full((n, 6), -1, dtype=np.int64)
-        self.bases = np.full((n, 6), -1, dtype=np.int64)
+        self.slots = np.full((n, 6), -1, dtype=short)
+        self.bases: dict[int, tuple[int, ...]] = {}
         self.taught = np.zeros(n, dtype=bool)
         self.shared = np.zeros(n, dtype=bool)
         self.measure_id = [""] * n

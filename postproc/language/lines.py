@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +14,8 @@ from postproc.exceptions import ProgramError
 from postproc.language.masking import Masked, mask_lines
 from postproc.language.source import Source
 
-Ints = NDArray[np.int64]
+Ints = NDArray[np.signedinteger[Any]]
+"""Whole numbers, as short as the length of the file allows: there are millions."""
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 
@@ -79,6 +81,7 @@ def read_lines(source: Source) -> Lines:
     ids: dict[bytes, int] = {}
     pieces: list[Masked] = []
     shape: list[Ints] = []
+    short = np.int32 if len(source.data) < 2**31 else np.int64
     for data, starts, at in _pieces(source):
         masked = mask_lines(data, starts - at)
         if masked.unterminated:
@@ -86,8 +89,8 @@ def read_lines(source: Source) -> Lines:
             _refuse(source, line + masked.unterminated[0])
         for mask in dict.fromkeys(masked.masks):
             ids.setdefault(mask, len(ids))
-        shape.append(np.fromiter(map(ids.__getitem__, masked.masks), np.int64))
-        pieces.append(_moved(masked, at))
+        shape.append(np.fromiter(map(ids.__getitem__, masked.masks), np.int32))
+        pieces.append(_moved(masked, at, short))
     return _logical(source, tuple(ids), np.concatenate(shape), _merged(pieces))
 
 
@@ -114,20 +117,27 @@ def _pieces(source: Source) -> Iterator[tuple[bytes, Ints, int]]:
         at = end
 
 
-def _moved(piece: Masked, at: int) -> Masked:
-    comment = np.where(piece.comment >= 0, piece.comment + at, -1)
+def _moved(piece: Masked, at: int, short: type[np.signedinteger[Any]]) -> Masked:
+    """Count the offsets of a piece from the beginning of its file."""
     return Masked(
-        [], comment, piece.first, piece.start + at, piece.end + at, piece.value, ()
+        [],
+        np.where(piece.comment >= 0, piece.comment + at, -1).astype(short),
+        piece.first,
+        (piece.start + at).astype(short),
+        (piece.end + at).astype(short),
+        piece.value,
+        (),
     )
 
 
 def _merged(pieces: list[Masked]) -> Masked:
     offsets = np.cumsum([0, *(len(p.start) for p in pieces)])
     first = [p.first[:-1] + o for p, o in zip(pieces, offsets[:-1], strict=True)]
+    whole = [column.astype(pieces[0].start.dtype) for column in (*first, offsets[-1:])]
     return Masked(
         [],
         np.concatenate([p.comment for p in pieces]),
-        np.concatenate([*first, offsets[-1:]]),
+        np.concatenate(whole),
         np.concatenate([p.start for p in pieces]),
         np.concatenate([p.end for p in pieces]),
         np.concatenate([p.value for p in pieces]),
@@ -152,15 +162,15 @@ def _logical(
         mask = b" ".join([stripped[k] for k in parts[row : row + count]])
         shape[row] = len(masks) + joined.setdefault(mask, len(joined))
         keep[row + 1 : row + count] = False
-    kept = code[keep]
+    kept, short = code[keep], numbers.start.dtype
     used, shape = np.unique(shape[keep], return_inverse=True)
     texts = (*stripped, *joined)
     return Lines(
         source,
         tuple(texts[k].decode("latin-1") for k in used.tolist()),
-        shape,
-        kept + 1,
-        np.append(numbers.first[kept], len(numbers.start)).astype(np.int64),
+        shape.astype(short),
+        (kept + 1).astype(short),
+        np.append(numbers.first[kept], len(numbers.start)).astype(short),
         numbers.start,
         numbers.end,
         numbers.value,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +12,7 @@ from postproc.language.source import Source
 from postproc.language.visits import Literals, Target
 from postproc.language.world import World
 
-Ints = NDArray[np.int64]
+Ints = NDArray[np.signedinteger[Any]]
 Bools = NDArray[np.bool_]
 
 
@@ -59,8 +59,8 @@ class Numbering:
         return Numbering(
             tuple(source for source, _, _ in numbered),
             np.array(first, dtype=np.int64),
-            np.concatenate([start for _, start, _ in numbered]),
-            np.concatenate([end for _, _, end in numbered]),
+            _together([start for _, start, _ in numbered]),
+            _together([end for _, _, end in numbered]),
         )
 
     def apart(self, slots: Ints) -> Bools:
@@ -69,9 +69,16 @@ class Numbering:
         Args:
             slots: Six numbers of each target, (k, 6).
         """
+        if len(self.first) == 1:
+            return np.zeros(len(slots), dtype=bool)
         file = np.searchsorted(self.first, slots, side="right")
         different: Bools = (file != file[:, :1]).any(axis=1)
         return different
+
+
+def _together(columns: list[Ints]) -> Ints:
+    """Put the columns of files one after the other; one by itself is not copied."""
+    return columns[0] if len(columns) == 1 else np.concatenate(columns)
 
 
 def find_literals(

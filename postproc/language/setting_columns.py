@@ -16,6 +16,7 @@ from postproc.language.visits import (
     OrntType,
     Switch,
     Target,
+    slim,
 )
 
 Ints = NDArray[np.int64]
@@ -68,7 +69,7 @@ class SettingColumns:
         """Return the columns of `Visits` that come from settings."""
         frames = list(self._frames)
         columns: dict[str, Any] = {
-            name: np.array(values)[rows] for name, values in self._table.items()
+            name: slim(np.array(values)[rows]) for name, values in self._table.items()
         }
         if not columns:
             empty = _row({}, lambda value: -1)

@@ -12,9 +12,7 @@ from postproc.language.edits import Replacements
 from postproc.language.lines import Lines, read_lines
 from postproc.language.source import Source
 
-Ints = NDArray[np.int64]
-Places = NDArray[Any]
-"""Whole numbers that are as short as they can be."""
+Ints = NDArray[np.signedinteger[Any]]
 
 
 @dataclass(frozen=True)
@@ -33,18 +31,17 @@ class Skeleton:
 
     source: Source
     shapes: tuple[str, ...]
-    shape: Places
-    line: Places
-    start: Places
-    end: Places
+    shape: Ints
+    line: Ints
+    start: Ints
+    end: Ints
 
     @classmethod
     def of(cls, lines: Lines) -> Skeleton:
         """Take over what the lines of a text tell."""
-        short = np.int32 if len(lines.source.data) < 2**31 else np.int64
-        places = (lines.shape, lines.line, lines.start, lines.end)
-        shape, line, start, end = (column.astype(short) for column in places)
-        return cls(lines.source, lines.shapes, shape, line, start, end)
+        return cls(
+            lines.source, lines.shapes, lines.shape, lines.line, lines.start, lines.end
+        )
 
     @classmethod
     def read(cls, source: Source) -> Skeleton:

@@ -18,7 +18,7 @@ _IN_PART = "a target is computed from a part of it"
 def find_uses(
     literals: Literals,
     slots: Ints,
-    bases: Ints,
+    bases: Mapping[int, tuple[int, ...]],
     literal: Ints,
     pinned: Mapping[int, str],
 ) -> tuple[Literals, Ints]:
@@ -27,7 +27,7 @@ def find_uses(
     Args:
         literals: m literals.
         slots: Numbers of every visit's literal, (n, 6), -1 where it has none.
-        bases: Numbers that a computed target is made of, (n, 6), -1 likewise.
+        bases: The six numbers that computed targets are made of, by visit.
         literal: Literal of every visit, (n,), -1 where it has none.
         pinned: Numbers that must stay, and why.
 
@@ -36,18 +36,17 @@ def find_uses(
         along with, (n,), -1 where there is none.
     """
     direct = np.flatnonzero(literal >= 0)
-    numbers = np.full((len(literals), 6), -1, dtype=np.int64)
+    numbers = np.full((len(literals), 6), -1, dtype=slots.dtype)
     numbers[literal[direct]] = slots[direct]
-    computed = np.flatnonzero(bases[:, 0] >= 0)
-    most = max([-1, *pinned, bases.max(initial=-1), numbers.max(initial=-1)])
-    owner = np.full(int(most) + 2, -1, dtype=np.int64)  # the last is that of slot -1
+    most = max([-1, *pinned, *map(max, bases.values()), numbers.max(initial=-1)])
+    owner = np.full(int(most) + 2, -1, dtype=slots.dtype)  # the last is that of slot -1
     owner[numbers] = np.arange(len(literals))[:, None]
     owner[-1] = -1
     stay = {int(owner[slot]): why for slot, why in pinned.items() if owner[slot] >= 0}
     follows = np.full(len(literal), -1, dtype=np.int64)
-    for visit in computed.tolist():
-        rows = owner[bases[visit]]
-        if rows[0] >= 0 and (numbers[rows[0]] == bases[visit]).all():
+    for visit, base in bases.items():
+        rows = owner[[*base]]
+        if rows[0] >= 0 and (numbers[rows[0]] == base).all():
             follows[visit] = rows[0]
         else:
             stay |= {row: _IN_PART for row in rows.tolist() if 0 <= row not in stay}

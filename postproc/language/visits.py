@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, fields
 from enum import IntEnum
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -82,6 +83,19 @@ class FlyTrajectory(IntEnum):
     FLY_PASS = 2
     FLY_TOL = 3
     FLY_FROM = 4
+
+
+def slim(column: NDArray[Any]) -> NDArray[Any]:
+    """Keep a column that holds one value throughout as that value alone.
+
+    >>> slim(np.zeros(1000)).strides
+    (0,)
+    """
+    if not len(column):
+        return column
+    first = column[0]
+    same = (column == first) | ((column != column) & (first != first))
+    return np.broadcast_to(first, column.shape) if same.all() else column
 
 
 @dataclass(frozen=True)
