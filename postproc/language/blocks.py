@@ -88,6 +88,12 @@ def build_blocks(
             labels[statement.name] = row
             statement = statement.then or ast.Statement()
         kind = type(statement)
+        behind = _behind(statement)
+        if type(behind) in (*_CLOSED_BY, *_CLOSED_BY.values()):
+            text = f"this {_word(behind)} stands behind {_word(statement)}"
+            problems.append((row, f"{text}: put it on a line of its own"))
+        elif isinstance(behind, ast.Goto):
+            gotos.append((row, behind.label))
         if kind in _CLOSED_BY:
             stack.append((row, statement))
             inner[row] = []
@@ -120,6 +126,14 @@ def build_blocks(
         _blocks(lines, statements, end, opener, inner, labels, cycle, problems),
         problems,
     )
+
+
+def _behind(statement: ast.Statement) -> ast.Statement:
+    """Return what a division of a block, or an event, has on its line."""
+    match statement:
+        case ast.Else(then) | ast.Case(_, then) | ast.When(then) if then is not None:
+            return then
+    return ast.Statement()
 
 
 def _blocks(
