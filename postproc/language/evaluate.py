@@ -17,6 +17,7 @@ from postproc.language.store import Store
 from postproc.language.target import Target
 from postproc.language.values import (
     COMPONENTS,
+    FARTHEST,
     Alias,
     Nothing,
     Position,
@@ -298,6 +299,6 @@ def component_index(target: Target) -> int:
 
 
 def _moved(part: Written, by: float | None, sign: str) -> Written:
-    if part.number is None or by is None:
+    if part.number is None or by is None or abs(by) > FARTHEST:
         return replace(part, number=None)
     return replace(part, number=part.number + (by if sign == "+" else -by))

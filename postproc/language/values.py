@@ -10,6 +10,7 @@ from postproc.pose import inverse, pose_from_record, record_from_pose
 
 Numbers = tuple[float | None, ...]
 
+FARTHEST = 1e6  # [mm] and [deg]: beyond, rounding would hide what is added
 COMPONENTS = {"x": 0, "y": 1, "z": 2, "a": 3, "e": 4, "r": 5}
 
 
@@ -202,6 +203,8 @@ def shifted(a: Position, by: Vector) -> Value:
         n + d  # type: ignore[operator]
         for n, d in zip(a.numbers[:3], by.numbers, strict=True)
     )
+    if max(map(abs, moved)) > FARTHEST:
+        return Nothing("POS_SHIFT takes it out of any reach")
     return replace(
         a,
         numbers=moved + a.numbers[3:],
