@@ -137,7 +137,7 @@ def read_program(files: Mapping[str, bytes], cell: Cell) -> Reading:
     if program.main is None and not program.routines:
         problem, cure = "the file holds no BEGIN .. END", "Give a PDL2 program"
         raise ProgramError(sources[0].name, problem, cure)
-    others: dict[str, Program] = {}
+    pages: list[Program] = []
     variables: Variables | None = None
     texts = [Skeleton.of(program.lines)]
     for source in sources[1:]:
@@ -145,17 +145,39 @@ def read_program(files: Mapping[str, bytes], cell: Cell) -> Reading:
             variables = read_variables(source)
             texts.append(Skeleton.of(variables.lines))
         else:
-            page = parse(source)
-            others |= {page.name: page, base_name(source.name): page}
-            texts.append(Skeleton.of(page.lines))
+            pages.append(_named(parse(source)))
+            texts.append(Skeleton.of(pages[-1].lines))
+    others = _by_name(program, pages)
     resolved = resolve(program, start_of(cell), variables, others)
-    for name in {source.name for source in sources} - {*resolved.visits.files}:
-        problem, cure = "its program has the name of another file", "Rename one"
-        raise ProgramError(name, problem, cure)
-    programs = list({id(p): p for p in (program, *others.values())}.values())
-    missed = never_reached(programs, resolved.visits)
+    missed = never_reached([program, *pages], resolved.visits)
     found = (*resolved.diagnostics, *missed)
     return Reading(tuple(texts), resolved.visits, found)
+
+
+def _named(page: Program) -> Program:
+    """Name a page whose PROGRAM line is not understood after its file."""
+    return page if page.name else replace(page, name=_file(page))
+
+
+def _file(program: Program) -> str:
+    return base_name(program.lines.source.name)
+
+
+def _by_name(program: Program, pages: list[Program]) -> dict[str, Program]:
+    """Find pages by the names of their files and programs, in their order.
+
+    Raises:
+        ProgramError: A name means two of them: their variables could not be told apart.
+    """
+    own = {_file(program): program, program.name: program}
+    found = {_file(page): page for page in pages}
+    for page in pages:
+        file = _file(page)
+        same = [own.get(page.name, page), own.get(file, page), found[file]]
+        if any(one is not page for one in (*same, found.setdefault(page.name, page))):
+            problem, cure = "its program has the name of another file", "Rename one"
+            raise ProgramError(page.lines.source.name, problem, cure)
+    return found
 
 
 def plan_visits(visits: Visits, cell: Cell, timed: bool = True) -> Planned:

@@ -5,7 +5,11 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import pytest
+
+from postproc.exceptions import ProgramError
 from postproc.page_files import find_pages
+from postproc.planning import read_program
 from tests.plant import contents, pages
 from tests.written import cli
 
@@ -89,3 +93,28 @@ def test_programs_under_the_names_of_other_files_are_refused(desk):
     desk.put("b.pdl", "PROGRAM a\nBEGIN\nEND a")
     found = desk.compensate(main)
     assert found.exit_code == 2 and "a.pdl: its program has the name" in found.stderr
+
+
+PAGE = "PROGRAM {0}\nROUTINE r_{1}\nBEGIN\nMOVE JOINT TO {{{2}, 0, -90, 0, 60, 0}}\n"
+PAGE += "END r_{1}\nBEGIN\nEND {0}"
+
+
+@pytest.mark.parametrize("names", [("x", "x"), ("job", "b"), ("a", "a")])
+def test_two_programs_of_one_name_are_refused(job_cell, names):
+    files = {"job.pdl": b"PROGRAM job\nIMPORT 'a'\nIMPORT 'b'\nBEGIN\nEND job"}
+    for name, said in zip("ab", names, strict=True):
+        files[f"{name}.pdl"] = PAGE.format(said, name, 1).encode()
+    with pytest.raises(ProgramError, match="its program has the name of another file"):
+        read_program(files, job_cell)
+
+
+def test_pages_without_a_name_keep_their_numbers(job_cell):
+    files = {
+        "job.pdl": b"PROGRAM job\nIMPORT 'a'\nIMPORT 'b'\nBEGIN\nr_a\nr_b\nEND job"
+    }
+    for number, name in enumerate("ab", start=1):
+        files[f"{name}.pdl"] = PAGE.format("7", name, number).encode()
+    reading = read_program(files, job_cell)
+    assert [source.name for source in reading.sources] == list(reading.visits.files)
+    assert reading.visits.values[:, 0].tolist() == [1.0, 2.0]
+    assert reading.visits.literals.file.tolist() == [1, 2]
