@@ -52,12 +52,11 @@ def test_what_is_not_sure_is_listed_with_an_error_that_holds(found):
 
 def test_only_what_is_computed_from_a_target_moves_along(found):
     errors = found.pairs(ALONG)
-    assert found.moved_unknown == []
     assert errors[:, 1].mean() < 0.5 * errors[:, 0].mean()
 
 
 def test_what_is_seen_at_one_value_from_one_side_is_compensated(found):
-    assert found.left_once == []
+    assert found.wrong == []
     compensated = sum(n for text, n in found.once.items() if text.startswith(DONE))
     assert compensated > 0.9 * found.once.total() > 100
     assert found.once[DONE] > 100

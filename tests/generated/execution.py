@@ -41,6 +41,8 @@ class Ran:
         whole: All that would be executed of the program.
         flanks: On which flank every gear really lies after every move.
         before, now: How far the tool lands from where it was wanted [mm], by move.
+        lost: The line of the first move that the arm can make as it was written, but
+            not as it was corrected, 0 where there is none.
     """
 
     made: Generated
@@ -51,6 +53,7 @@ class Ran:
     flanks: Mapping[int, Flanks]
     before: Mapping[int, float]
     now: Mapping[int, float]
+    lost: int
 
 
 def executed(made: Generated, done: Outcome, cell: Cell) -> Ran:
@@ -59,8 +62,7 @@ def executed(made: Generated, done: Outcome, cell: Cell) -> Ran:
     It stops at a variable that was never set, and at a move that the arm cannot make.
 
     Raises:
-        AssertionError: The compensated program makes other moves, or the arm cannot
-            make them all.
+        AssertionError: The compensated program makes other moves.
     """
     after, back = reread(made, done.outputs)
     whole, ran = (started(m, cell) for m in (made, after))
@@ -73,13 +75,15 @@ def executed(made: Generated, done: Outcome, cell: Cell) -> Ran:
     second = on_arm(after, ran[:end], cell)
     wanted = by_move(first.visit, arm(SEED).nominal_tcp(first.arrivals))
     landed = [by_move(r.visit, arm(SEED).tcp(r.arrivals)) for r in (first, second)]
-    assert set(range(end)) <= set(landed[1]), "the arm cannot make a corrected move"
+    stuck = next((k for k in range(end) if k not in landed[1]), end)
+    lost = whole[stuck].line if stuck < end else 0
+    end = stuck
     before, now = (
         {k: float(np.linalg.norm(at[k] - wanted[k]) / MM) for k in range(end)}
         for at in landed
     )
     flanks = {k: flanks[k] for k in range(end)}
-    return Ran(made, after, whole[:end], ran[:end], whole, flanks, before, now)
+    return Ran(made, after, whole[:end], ran[:end], whole, flanks, before, now, lost)
 
 
 def known_until(steps: list[Executed]) -> int:

@@ -28,10 +28,7 @@ class Found:
         z: True errors after where a side is not sure, in standard errors that the
             report states for them.
         once: What came of targets that are seen at one value from one side.
-        left_once: Of those in programs without inputs, the ones left alone for no
-            reason that is allowed: seed, line and reason.
-        moved_unknown: Moves whose target is listed as not known, but that went to
-            numbers which were corrected: seed, line and reason.
+        wrong: What must not be: seed, line and what it is.
     """
 
     error_mm: dict[str, list[tuple[float, float]]] = field(
@@ -39,8 +36,7 @@ class Found:
     )
     z: list[float] = field(default_factory=list)
     once: Counter[str] = field(default_factory=Counter)
-    left_once: list[tuple[int, int, str]] = field(default_factory=list)
-    moved_unknown: list[tuple[int, int, str]] = field(default_factory=list)
+    wrong: list[tuple[int, int, str]] = field(default_factory=list)
 
     def add(self, other: Found) -> None:
         """Take in what came of another program."""
@@ -48,8 +44,7 @@ class Found:
             self.error_mm[kind] += other.error_mm[kind]
         self.z += other.z
         self.once += other.once
-        self.left_once += other.left_once
-        self.moved_unknown += other.moved_unknown
+        self.wrong += other.wrong
 
     def pairs(self, kind: str) -> np.ndarray:
         """Return errors before and after, (n, 2) [mm]; `ALL` for known and unsure."""

@@ -23,6 +23,7 @@ from tests.language.reachable import OPENING, reachable
 from tests.language.reread import CLONE
 from tests.language.test_flow_random import follow
 
+STUCK = "the arm can make this move as it was written, but not as it was corrected"
 COMPUTED = re.compile(r"\((?:NEAR|FOR|POS_SHIFT)\)|is computed, not written")
 
 
@@ -42,7 +43,7 @@ def lands(seed: int, cell: Cell, model: Model) -> Found:
         check_bytes(files, {**files, **done.outputs}, records_of(done.sidecar),
                     done.visits)  # fmt: skip
     run = executed(made, done, cell)
-    found = Found()
+    found = Found(wrong=[(seed, run.lost, STUCK)] if run.lost else [])
     if len(run.asked) > len(OPENING):
         rows = follow(done.visits, run.asked, made)
         count_errors(found, seed, run, done, rows)
@@ -71,7 +72,8 @@ def count_errors(
             found.error_mm[ALONG].append(pair)
             why = {d.reasons[d.why[row]] for row in mine}
             if not all(COMPUTED.search(one) for one in why):
-                found.moved_unknown.append((seed, step.line, " / ".join(why)))
+                text = "is listed as not known, but went to new numbers"
+                found.wrong.append((seed, step.line, f"{text}: {' / '.join(why)}"))
         elif (visits.fly & ~visits.via)[mine].any():
             found.error_mm[ROUNDED].append(pair)
         else:

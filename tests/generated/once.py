@@ -25,6 +25,7 @@ ALLOWED = tuple(
         "another arm goes to it", "a number of the target belongs to another",
     )
 )  # fmt: skip
+LEFT = "is left alone, though it is seen at one value from one side"
 SECOND = "another arrival at the same point"  # it says that another one has a reason
 BLIND = ", and the plan does not know a side of it"
 Flanks = tuple[float, ...]
@@ -59,7 +60,7 @@ def count_once(
         lost = bool((np.abs(d.side[mine]) < SURE).any())
         found.once[text + BLIND * lost] += 1
         if seed % 2 == 0 and not moved and not (lost or allowed(why)):
-            found.left_once.append((seed, line, text))
+            found.wrong.append((seed, line, f"{LEFT}: {text}"))
 
 
 def allowed(why: set[str]) -> bool:
