@@ -67,9 +67,9 @@ def reach_again(arm: Arm, before: Course, targets: Targets, moved: Bools) -> Cou
     Raises:
         PlanError: The arm has no closed-form inverse kinematics.
     """
-    part = _part(targets, moved)
+    part = _part(targets, moved, len(before.begin) > 0)
     if part is None:
-        return reach(arm, targets)
+        return reach(arm, targets, before.begin)
     begins = part.rows[part.seeds]
     known = Known(
         np.flatnonzero(part.seeds), before.exact.q[begins],
@@ -80,7 +80,7 @@ def reach_again(arm: Arm, before: Course, targets: Targets, moved: Bools) -> Cou
     same = np.isclose(new, old, rtol=0, atol=SAME, equal_nan=True).all(axis=1)
     same &= exact.slot == before.slot[part.rows]
     if not same[part.lasts].all():
-        return reach(arm, targets)
+        return reach(arm, targets, before.begin)
     traced = rounded(arm, part.targets, exact)
     slot = np.array(before.slot)
     slot[part.rows[part.kept]] = exact.slot[part.kept]
@@ -88,21 +88,22 @@ def reach_again(arm: Arm, before: Course, targets: Targets, moved: Bools) -> Cou
     edges = _spliced(before.edges, part, traced.edges)
     return Course(
         targets, _patched(before.exact, part, points(exact)), passed, slot, edges,
-        sides(arm, passed.q, edges),
+        sides(arm, passed.q, edges, before.begin.past.play), before.begin,
     )  # fmt: skip
 
 
-def _part(targets: Targets, moved: Bools) -> _Part | None:
+def _part(targets: Targets, moved: Bools, begun: bool) -> _Part | None:
     """Cut out what moved targets touch; None where that has no simple answer."""
     n, first = len(targets), targets.pred_start
     begins = _from_nowhere(targets)
+    begins[:1] &= not begun
     touched = _touched(targets, moved)
     inside, kept = _with_arcs(targets, _near(touched, TRACED)), _near(touched, CHANGED)
     if not inside.any() or np.count_nonzero(inside) > MOST * n:
         return None
     starts = inside & (begins | ~np.append(False, inside[:-1]))
     simple = starts | _one_after_another(targets)
-    clipped = inside[0] and not begins[0]
+    clipped = inside[0] and not begins[0] and not begun
     if clipped or not simple[inside].all() or (touched & starts & ~begins).any():
         return None
     rows = np.flatnonzero(inside)

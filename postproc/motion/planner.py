@@ -12,6 +12,7 @@ from postproc.motion.pull import Pull
 from postproc.motion.reach import aside_of
 from postproc.motion.reasons import CODE, REASONS, WRIST
 from postproc.motion.rounding import rounded
+from postproc.motion.standing import NOWHERE, Standing
 from postproc.motion.targets import Targets
 from postproc.motion.trace import Trace, trace
 from postproc.robot.arm import Arm
@@ -44,6 +45,7 @@ class Plan:
         overruled: Continuity took another branch or turn than the string says, (n,).
         untimed: Time and speed are estimates: no time law was found, (n,).
         pull: How rounded fly points move with their neighbours.
+        end: Where the arm stands at the last arrival.
     """
 
     q: Array
@@ -61,6 +63,7 @@ class Plan:
     overruled: Bools
     untimed: Bools
     pull: Pull
+    end: Standing
 
     def __post_init__(self) -> None:
         for f in fields(self):
@@ -83,7 +86,13 @@ class Plan:
         return arm.gravity_torque(self.q, payload, payload_com)
 
 
-def plan(arm: Arm, targets: Targets, wrist: float, timed: bool = True) -> Plan:
+def plan(
+    arm: Arm,
+    targets: Targets,
+    wrist: float,
+    timed: bool = True,
+    begin: Standing = NOWHERE,
+) -> Plan:
     """Plan every move the way the controller moves.
 
     Args:
@@ -91,13 +100,15 @@ def plan(arm: Arm, targets: Targets, wrist: float, timed: bool = True) -> Plan:
         targets: The moves.
         wrist: Axis 5 nearer to zero than this is the wrist singularity [rad].
         timed: Find out how fast the arm passes; else speed and time stay unknown.
+        begin: Where the arm stands at the first move, if that is known beforehand.
 
     Raises:
         PlanError: The arm has no closed-form inverse kinematics.
     """
-    exact = trace(arm, targets)
+    exact = trace(arm, targets, begin.known)
     traced = rounded(arm, targets, exact)
-    arrived = arrivals(arm, traced.q, traced.edges)
+    arrived = arrivals(arm, traced.q, traced.edges, begin.past)
+    end = Standing.at_end(exact.q, exact.flange, exact.slot, arrived.past)
     clock = tell_time(arm, targets, traced) if timed else no_time(len(targets))
     tool = targets.tool
     aside = aside_of(exact.flange, traced.flange, tool)
@@ -105,7 +116,7 @@ def plan(arm: Arm, targets: Targets, wrist: float, timed: bool = True) -> Plan:
         traced.q, traced.flange @ tool, aside, tool, arrived.direction, arrived.side,
         arrived.travel, clock.speed, clock.time, traced.slot,
         _guard(traced, wrist), REASONS, traced.overruled, clock.untimed,
-        traced.pull,
+        traced.pull, end,
     )  # fmt: skip
 
 

@@ -8,11 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from postproc.motion.rounding import rounded
+from postproc.motion.standing import NOWHERE, Standing
 from postproc.motion.targets import Targets
 from postproc.motion.trace import Trace, trace
 from postproc.robot.arm import Arm
 from postproc.robot.chains import Edges
-from postproc.robot.direction import sides
+from postproc.robot.direction import Sides, sides
+from postproc.robot.past import NOTHING, Past
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -58,7 +60,8 @@ class Course:
         passed: Where the path, its corners rounded, passes them.
         slot: Branch taken, (n,), -1 where it was not looked up.
         edges: The rounded paths between.
-        side: As in `Reached`.
+        sides: On which sides the joints arrive.
+        begin: Where the arm stands at the first target, if that is known beforehand.
     """
 
     targets: Targets
@@ -66,7 +69,19 @@ class Course:
     passed: Points
     slot: Ints
     edges: Edges
-    side: Array
+    sides: Sides
+    begin: Standing = NOWHERE
+
+    @property
+    def side(self) -> Array:
+        """Return where every joint lies in its play, as in `Reached`."""
+        return self.sides.side
+
+    @property
+    def end(self) -> Standing:
+        """Return where the arm stands at the last target; reversals are not kept."""
+        past = Past(self.sides.play, NOTHING.turned)
+        return Standing.at_end(self.exact.q, self.exact.flange, self.slot, past)
 
     @property
     def reached(self) -> Reached:
@@ -81,19 +96,24 @@ class Course:
         return aside_of(self.exact.flange, self.passed.flange, tool)
 
 
-def reach(arm: Arm, targets: Targets) -> Course:
+def reach(arm: Arm, targets: Targets, begin: Standing = NOWHERE) -> Course:
     """Find joint angles and sides only.
 
     For targets that a correction has moved: their speeds are those of the plan.
 
+    Args:
+        arm: The arm.
+        targets: The moves.
+        begin: Where the arm stands at the first target, if that is known beforehand.
+
     Raises:
         PlanError: The arm has no closed-form inverse kinematics.
     """
-    exact = trace(arm, targets)
+    exact = trace(arm, targets, begin.known)
     traced = rounded(arm, targets, exact)
-    side = sides(arm, traced.q, traced.edges)
+    found = sides(arm, traced.q, traced.edges, begin.past.play)
     return Course(
-        targets, points(exact), points(traced), exact.slot, traced.edges, side
+        targets, points(exact), points(traced), exact.slot, traced.edges, found, begin
     )
 
 

@@ -18,10 +18,12 @@ import numpy as np
 
 from postproc.robot.arm import Arm
 from postproc.robot.chains import Chains, Edges, cut
+from postproc.robot.past import NOTHING, Past
 from postproc.robot.play import Array, Clamps, Ints, identity, passing, prefix
-from postproc.robot.travel import travel_since_reversal
+from postproc.robot.travel import last_reversals
 
 WIDTH_IN_PLAYS = 4.0
+LAST = np.array([-1])  # copied, so that the others need not be kept
 ON_FLANK = 0.999  # of half the width: as good as resting on the flank
 
 
@@ -36,11 +38,26 @@ class Arrivals:
             middle of what is known; 0 where nothing is.
         travel: Travel since the last reversal, (n, 6) [rad]; where the last reversal is
             not known, the travel since then that is sure. NaN where q is not known.
+        past: What the joints remember at the last visit.
     """
 
     direction: Array
     side: Array
     travel: Array
+    past: Past
+
+
+@dataclass(frozen=True)
+class Sides:
+    """Where every joint lies in its play, without the travel.
+
+    Attributes:
+        side: As in `Arrivals`, (n, 6).
+        play: What is known of the play's state at the last visit, (1, 6) [rad].
+    """
+
+    side: Array
+    play: Clamps
 
 
 def chain(n: int) -> tuple[Ints, Ints]:
@@ -64,32 +81,36 @@ def directions_of_rows(arm: Arm, q: Array) -> Array:
     return arrivals_of_rows(arm, q).direction
 
 
-def arrivals(arm: Arm, q: Array, edges: Edges) -> Arrivals:
+def arrivals(arm: Arm, q: Array, edges: Edges, before: Past = NOTHING) -> Arrivals:
     """Run the play operator over a graph of visits.
 
     Args:
         arm: The arm; its play and coupling are used.
         q: Joint angles at the visits, (n, 6) [rad], NaN where not known.
         edges: The geometric paths between them.
+        before: What the joints remember at the first visit.
     """
     if len(q) == 0:
-        return Arrivals(np.empty((0, 6)), np.empty((0, 6)), np.empty((0, 6)))
+        return Arrivals(np.empty((0, 6)), np.empty((0, 6)), np.empty((0, 6)), NOTHING)
     chains = cut(q, arm.coupling, edges)
     half = _half_width(arm)
-    z = _states(chains, half)
+    z = _states(chains, half, before.play)
     forward = chains.angles - z.hi >= half / 2
     backward = chains.angles - z.lo <= -half / 2
     direction = forward.astype(float) - backward.astype(float)
-    travel = travel_since_reversal(chains, arm.play)
-    return Arrivals(direction, _side(chains.angles, z, half), travel)
+    turned = last_reversals(chains, arm.play, before.turned)
+    travel = np.abs(chains.angles - turned.angle)
+    past = Past(z[LAST], turned[LAST])
+    return Arrivals(direction, _side(chains.angles, z, half), travel, past)
 
 
-def sides(arm: Arm, q: Array, edges: Edges) -> Array:
-    """Return the sides of `arrivals` alone, (n, 6)."""
+def sides(arm: Arm, q: Array, edges: Edges, before: Clamps = NOTHING.play) -> Sides:
+    """Return the sides of `arrivals` alone."""
     if len(q) == 0:
-        return np.empty((0, 6))
+        return Sides(np.empty((0, 6)), NOTHING.play)
     chains, half = cut(q, arm.coupling, edges), _half_width(arm)
-    return _side(chains.angles, _states(chains, half), half)
+    z = _states(chains, half, before)
+    return Sides(_side(chains.angles, z, half), z[LAST])
 
 
 def _half_width(arm: Arm) -> Array:
@@ -106,7 +127,7 @@ def _side(angles: Array, z: Clamps, half: Array) -> Array:
     return np.where(on_flank, np.sign(side), side)
 
 
-def _states(chains: Chains, half: Array) -> Clamps:
+def _states(chains: Chains, half: Array, before: Clamps) -> Clamps:
     """Find what is known of the play's state at every visit, as intervals (n, 6).
 
     The intervals at the heads only grow and their ends come from a finite set, so that
@@ -119,7 +140,8 @@ def _states(chains: Chains, half: Array) -> Clamps:
     while waiting:
         c = waiting.popleft()
         queued[c] = False
-        new, old = _at_head(chains, c, half, known, since_head), known[c]
+        given = before if c == 0 else NOTHING.play
+        new, old = _at_head(chains, c, half, known, since_head, given), known[c]
         if new is None or (old is not None and _same(old, new)):
             continue
         known[c] = new
@@ -154,8 +176,11 @@ def _at_head(
     half: Array,
     known: list[Clamps | None],
     since_head: Clamps,
+    given: Clamps,
 ) -> Clamps | None:
     """Take the hull of what arrives at a head; None while nothing is known to."""
+    if len(given.lo):
+        return given[0]
     head = int(chains.heads[c])
     found: list[Clamps] = []
     for edge in chains.edges_to(head):

@@ -18,6 +18,7 @@ from postproc.robot.direction import (
     chain,
     directions_of_rows,
 )
+from postproc.robot.past import NOTHING
 from postproc.robot.play import Clamps, passing, prefix, with_turning_values
 
 
@@ -255,3 +256,19 @@ def test_travel_matches_its_definition(steps: list[int]) -> None:
         expected.append(abs(angle - turn))
     found = one_joint(arm, (q / play).tolist()).travel[:, 0]
     np.testing.assert_allclose(found, expected, atol=1e-12)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_walk_goes_on_where_it_was_cut(arm: Arm, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    q = np.cumsum(rng.normal(0, arm.play, (300, 6)), axis=0)
+    first, source = chain(len(q))
+    whole, begin, at = arrivals(arm, q, Edges(first, source, q, first)), NOTHING, 0
+    for end in (1, 2, 40, 41, 170, 300):
+        some = q[max(at - 1, 0) : end]
+        first, source = chain(len(some))
+        part = arrivals(arm, some, Edges(first, source, some, first), begin)
+        for name in ("direction", "side", "travel"):
+            found = getattr(part, name)[min(at, 1) :]
+            np.testing.assert_array_equal(found, getattr(whole, name)[at:end])
+        begin, at = part.past, end

@@ -1,0 +1,109 @@
+"""Long programs in windows, cut at stops that nothing but the arm's standing crosses.
+
+Behind such a stop the program goes on from there alone, no jump leads across it, and no
+number is used on both sides. Nothing before it depends on what comes after, and what
+comes after depends on the past only through where the arm stands and what its joints
+remember.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields, replace
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from postproc.language.visits import Visits
+
+Ints = NDArray[np.int64]
+Bools = NDArray[np.bool_]
+
+LEAST = 20_000  # visits of a window; shorter programs are one
+SHARED = {
+    "files", "configs", "names", "frames", "frame_taught", "reasons", "pred_start",
+    "pred", "literals",
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Window:
+    """Visits first .. end - 1 of a program.
+
+    Attributes:
+        first, end: The visits.
+    """
+
+    first: int
+    end: int
+
+    @property
+    def seeds(self) -> int:
+        """Return how many visits before the first are part of it: the stop, or none."""
+        return min(self.first, 1)
+
+    def of(self, visits: Visits) -> Visits:
+        """Cut a window out; its first visit is the stop, a move without a target."""
+        if self.first == 0 and self.end == len(visits):
+            return visits
+        rows = slice(self.first - self.seeds, self.end)
+        values = {
+            f.name: getattr(visits, f.name)[rows]
+            for f in fields(Visits)
+            if f.name not in SHARED
+        }
+        for name in ("literal", "follows"):
+            values[name] = np.array(values[name])
+            values[name][: self.seeds] = -1
+        start = visits.pred_start[self.first : self.end + 1]
+        pred = visits.pred[start[0] : start[-1]]
+        pred = np.where(pred >= 0, pred - rows.start, pred)
+        start = np.concatenate([np.zeros(self.seeds, dtype=np.int64), start - start[0]])
+        return replace(visits, **values, pred_start=start, pred=pred)
+
+
+def windows(visits: Visits, least: int) -> list[Window]:
+    """Cut a program into windows, none shorter than `least` visits if there are two."""
+    n = len(visits)
+    if n < 2 * least:
+        return [Window(0, n)]
+    ends = [0]
+    for end in (np.flatnonzero(quiet_stops(visits)) + 1).tolist():
+        if end - ends[-1] >= least and n - end >= least:
+            ends.append(end)
+    ends.append(n)
+    return [Window(a, b) for a, b in pairwise(ends)]
+
+
+def quiet_stops(visits: Visits) -> Bools:
+    """Tell behind which visits a program may be cut, (n,)."""
+    n = len(visits)
+    to = np.repeat(np.arange(n), np.diff(visits.pred_start))
+    known = visits.pred >= 0
+    single = (np.diff(visits.pred_start) == 1)[to]
+    goes_on = known & single & (visits.pred == to - 1)
+    jumps = known & ~goes_on
+    crossed = _covered(visits.pred[jumps], to[jumps], n) | _same_numbers(visits)
+    quiet = np.zeros(n, dtype=bool)
+    quiet[visits.pred[goes_on]] = True
+    quiet &= ~visits.fly & ~visits.via & ~crossed
+    return np.asarray(quiet)
+
+
+def _same_numbers(visits: Visits) -> Bools:
+    """Tell behind which visits numbers are used again, (n,)."""
+    n, m = len(visits), len(visits.literals)
+    first, last = np.full(m, n), np.full(m, -1)
+    for column in (visits.literal, visits.follows):
+        rows = np.flatnonzero(column >= 0)
+        np.minimum.at(first, column[rows], rows)
+        np.maximum.at(last, column[rows], rows)
+    used = np.flatnonzero(first < last)
+    return _covered(first[used], last[used], n)
+
+
+def _covered(a: Ints, b: Ints, n: int) -> Bools:
+    """Tell behind which of n visits one passes on the ways from a to b, (n,)."""
+    begin = np.bincount(np.minimum(a, b), minlength=n)
+    end = np.bincount(np.maximum(a, b), minlength=n)
+    return np.asarray(np.cumsum(begin - end) > 0)
