@@ -7,16 +7,14 @@ from collections.abc import Mapping
 from dataclasses import asdict
 from types import MappingProxyType, ModuleType
 
-import numpy as np
-from numpy.typing import NDArray
-
 from postproc.accuracy.error_statistics import ErrorStatistics
 from postproc.accuracy.model import Model
 from postproc.arrivals import tell_arrivals
 from postproc.clock import Clock, Progress, silent
-from postproc.cloning import give_own_points
+from postproc.correcting import correct
 from postproc.exceptions import CellError, ProgramError
 from postproc.flying import rounded_points
+from postproc.kept import Kept
 from postproc.language.source import Source
 from postproc.language.stamp import is_stamped
 from postproc.notes import (
@@ -29,22 +27,11 @@ from postproc.notes import (
     untimed_runs,
 )
 from postproc.options import AS_USUAL, Options
-from postproc.planning import (
-    Planned,
-    Reading,
-    plan_visits,
-    read_program,
-    states_of,
-    with_measured_play,
-)
+from postproc.output import Output, write_edits
+from postproc.planning import Reading, read_program, with_measured_play
 from postproc.report import Outcome
 from postproc.robot.cell import Cell
-from postproc.robot.state import States
-from postproc.settling import Corrected, settle
-from postproc.taught import correct_taught
-
-Array = NDArray[np.float64]
-Bools = NDArray[np.bool_]
+from postproc.verify import check_numbers, check_output
 
 NO_PAGES: Mapping[str, bytes] = MappingProxyType({})
 
@@ -84,20 +71,10 @@ def compensate(
     cell = with_measured_play(cell, model)
     with clock("parse"):
         reading = read_program(files, cell)
-    with clock("plan"):
-        planned = plan_visits(reading.visits, cell, timed="speed" in model.needs)
-        planned = correct_taught(planned, reading.visits, cell, model)
-    states = states_of(planned.plan, cell, _temperature(cell, options))
-    corrected = settle(reading, planned, states, cell, model, options, clock)
-    if options.clone:
-        with clock("clone"):
-            reading = give_own_points(reading, corrected.proposal, cell)
-        if reading.cloned:
-            corrected = settle(reading, planned, states, cell, model, options, clock)
+    reading, kept = correct(reading, cell, model, options, clock)
+    output = write_and_verify(reading, kept, cell, model, clock)
     with clock("report"):
-        return report(
-            name, reading, planned, states, corrected, cell, model, options, clock
-        )
+        return report(name, reading, kept, output, cell, model, options, clock)
 
 
 def name_files(
@@ -139,25 +116,35 @@ def refuse(files: Mapping[str, bytes], cell: Cell, model: Model) -> None:
     model.check_arm(cell.arm)
 
 
+def write_and_verify(
+    reading: Reading, kept: Kept, cell: Cell, model: Model, clock: Clock
+) -> Output:
+    """Write the numbers, and read what was written.
+
+    Raises:
+        VerificationError: The output is not what was meant.
+    """
+    with clock("rewrite"):
+        output = write_edits(reading, kept.edits, model.id)
+    with clock("verify"):
+        again = read_program(output.files, cell)
+        check_output(reading, again, output, kept.edited)
+        check_numbers(reading.visits, kept.decisions.corrected, again.visits)
+    return output
+
+
 def report(
     name: str,
     reading: Reading,
-    planned: Planned,
-    states: States,
-    corrected: Corrected,
+    kept: Kept,
+    output: Output,
     cell: Cell,
     model: Model,
     options: Options,
     clock: Clock,
 ) -> Outcome:
     """Say what came of every visit, and what error the model expects now."""
-    proposal, done = corrected.proposal, corrected.reached
-    d, rows, visits = proposal.decisions, proposal.corrected, reading.visits
-    output = corrected.output
-    wanted = planned.wanted[rows, :3, 3]
-    new = states.with_(q=np.array(done.q), direction=np.array(done.side))[rows]
-    before = model.error(cell.arm, states[rows]) - planned.shift[rows]
-    after = done.tcp[rows, :3, 3] + model.error(cell.arm, new) - wanted
+    d, rows, visits = kept.decisions, kept.corrected, reading.visits
     return Outcome(
         program=name,
         model=model.id,
@@ -167,28 +154,23 @@ def report(
         ),
         visits=visits,
         decisions=d,
-        before=ErrorStatistics.of(before),
-        after=ErrorStatistics.of(after),
+        before=ErrorStatistics.of(kept.before),
+        after=ErrorStatistics.of(kept.after),
         diagnostics=(
             *reading.diagnostics,
             *followed_pages(visits),
             *missing_file(visits),
-            *overruled_strings(visits, planned.targets, planned.plan),
-            *untimed_runs(visits, planned.plan),
-            *rounded_points(visits, planned.plan),
+            *overruled_strings(visits, kept.overruled),
+            *untimed_runs(visits, kept.untimed),
+            *rounded_points(visits, kept.away),
             *unsure_sides(visits, rows, d.side, d.std_error),
-            *listing_cost(visits, rows, planned.plan, cell.arm),
+            *listing_cost(visits, rows, d.q, cell.arm),
             assumed_off(name, cell),
         ),
         stages=clock.stages,
-        position=planned.wanted[:, :3, 3] - planned.plan.aside,
+        position=kept.position,
         sources={source.name: source.data for source, _ in reading.originals},
     )
-
-
-def _temperature(cell: Cell, options: Options) -> float:
-    """Choose the temperature to compensate for [deg C]."""
-    return cell.temperature if options.temperature is None else options.temperature
 
 
 class _Verb(ModuleType):

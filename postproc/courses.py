@@ -9,9 +9,10 @@ from numpy.typing import NDArray
 
 from postproc.language.visits import Visits
 from postproc.motion.again import reach_again
-from postproc.motion.reach import Course, Reached, reach
+from postproc.motion.reach import Course, reach
+from postproc.motion.standing import Standing
 from postproc.motion.targets import Targets
-from postproc.resolve import moved_targets, targets_from_visits
+from postproc.resolve import moved_targets
 from postproc.robot.cell import Cell
 
 Array = NDArray[np.float64]
@@ -31,23 +32,22 @@ class Courses:
         self._visits, self._targets, self._cell = visits, targets, cell
         self._last: Course | None = None
 
-    def after(self, values: Array) -> Reached:
-        """Find where the program leads with other numbers, (n, 6) in its units."""
+    def after(self, values: Array, begin: Standing) -> Course:
+        """Find where the program leads with other numbers.
+
+        Args:
+            values: The numbers, (n, 6) in the program's units.
+            begin: Where the arm stands at the first visit, if that is known beforehand.
+        """
         new = replace(self._visits, values=values)
         old = self._visits.values
         moved = ((values != old) & ~(np.isnan(values) & np.isnan(old))).any(axis=1)
         rows = np.flatnonzero(moved)
         targets = moved_targets(self._targets, new, self._cell, rows)
         arm, last = self._cell.arm, self._last
-        if last is None:
-            self._last = reach(arm, targets)
+        if last is None or last.begin is not begin:
+            self._last = reach(arm, targets, begin)
         else:
             self._last = reach_again(arm, last, targets, moved)
         self._visits, self._targets = new, targets
-        return self._last.reached
-
-
-def where(visits: Visits, cell: Cell) -> Reached:
-    """Find where the targets of visits lead the arm."""
-    targets, _ = targets_from_visits(visits, cell)
-    return reach(cell.arm, targets).reached
+        return self._last

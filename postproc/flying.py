@@ -7,7 +7,6 @@ from numpy.typing import NDArray
 
 from postproc.language.diagnostic import Diagnostic
 from postproc.language.visits import FlyTrajectory, FlyType, Motion, Visits
-from postproc.motion.planner import Plan
 from postproc.motion.targets import Fly
 from postproc.pose import MM
 
@@ -32,9 +31,13 @@ def rounding_of(visits: Visits) -> tuple[Ints, Array, Array]:
     return rounding, np.maximum(distance, 0.0), np.clip(overlap, 0.0, 1.0)
 
 
-def rounded_points(visits: Visits, plan: Plan) -> list[Diagnostic]:
-    """Say once how far the path passes rounded fly points, and what was assumed."""
-    away = np.linalg.norm(np.nan_to_num(plan.aside), axis=1) / MM
+def rounded_points(visits: Visits, away: Array) -> list[Diagnostic]:
+    """Say once how far the path passes rounded fly points, and what was assumed.
+
+    Args:
+        visits: Every arrival.
+        away: How far the path passes each, (n,) [mm].
+    """
     rows = np.flatnonzero(away > 0)
     if len(rows) == 0:
         return []

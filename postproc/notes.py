@@ -7,12 +7,10 @@ from numpy.typing import NDArray
 
 from postproc.language.diagnostic import Diagnostic
 from postproc.language.visits import NO_VALUE, Target, Visits
-from postproc.motion.planner import Plan
-from postproc.motion.targets import Targets
+from postproc.pieces import in_pieces
 from postproc.pose import MM
 from postproc.robot.arm import Arm
 from postproc.robot.cell import Cell
-from postproc.strings import overruled
 
 Array = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -55,8 +53,8 @@ def missing_file(visits: Visits) -> list[Diagnostic]:
     ]
 
 
-def overruled_strings(visits: Visits, targets: Targets, plan: Plan) -> list[Diagnostic]:
-    """List targets whose configuration string the path does not follow.
+def overruled_strings(visits: Visits, rows: Bools) -> list[Diagnostic]:
+    """List targets whose configuration string the path does not follow, rows (n,).
 
     Where the program says whether strings are checked, it is as the program wants it,
     or the target is left alone.
@@ -65,25 +63,24 @@ def overruled_strings(visits: Visits, targets: Targets, plan: Plan) -> list[Diag
         "the path arrives on another branch or turn than the configuration string "
         "says: the string is kept, the path decides"
     )
-    rows = overruled(targets, plan).unchecked(visits)
     return _each(visits, rows, "configuration-overruled", text)
 
 
-def untimed_runs(visits: Visits, plan: Plan) -> list[Diagnostic]:
-    """List targets in runs that no time law was found for."""
+def untimed_runs(visits: Visits, rows: Bools) -> list[Diagnostic]:
+    """List targets in runs that no time law was found for, rows (n,)."""
     text = "no time law was found for this run: times and speeds are estimates"
-    return _each(visits, plan.untimed, "no-time-law", text)
+    return _each(visits, rows, "no-time-law", text)
 
 
 def listing_cost(
-    visits: Visits, corrected: Bools, plan: Plan, arm: Arm
+    visits: Visits, corrected: Bools, q: Array, arm: Arm
 ) -> list[Diagnostic]:
     """Say what is lost when the controller lists corrected values with its 2 decimals.
 
     Args:
         visits: Every arrival.
         corrected: Visits whose target moves, (n,).
-        plan: Where they are.
+        q: Joint angles there, (n, 6) [rad].
         arm: How far a joint angle moves the TCP.
     """
     if len(visits.literals) == 0:
@@ -93,7 +90,7 @@ def listing_cost(
     found = []
     poses = rows & (visits.target != Target.JOINTS)
     if poses.any():
-        lever = np.linalg.norm(plan.tool[poses, :3, 3], axis=1).max() / MM
+        lever = np.linalg.norm(_tool(visits, poses), axis=1).max() / MM
         lost = np.sqrt(3) * LISTED / 2
         found.append(
             f"up to {lost:.4f} mm of position and, in orientation, {LISTED / 2:g} deg "
@@ -101,8 +98,9 @@ def listing_cost(
         )
     joints = rows & (visits.target == Target.JOINTS)
     if joints.any():
-        J = arm.jacobian(plan.q[joints], plan.tool[joints, :3, 3])[:, :3]
-        lost = np.linalg.norm(J, axis=1).sum(axis=1).max() * np.deg2rad(LISTED / 2)
+        at, tool = q[joints], _tool(visits, joints)
+        reach = in_pieces(lambda some: _reach(arm, at[some], tool[some]), len(at))
+        lost = max(reach) * np.deg2rad(LISTED / 2)
         found.append(f"up to {lost / MM:.3f} mm at joint targets")
     first = np.flatnonzero(rows)[:1]
     return [
@@ -115,6 +113,17 @@ def listing_cost(
         )
         for v in first
     ]
+
+
+def _tool(visits: Visits, rows: Bools) -> Array:
+    """Return the TCP in the flange frame at some visits, (k, 3) [m]."""
+    return np.asarray(visits.frames[visits.tool[rows], :3] * MM)
+
+
+def _reach(arm: Arm, q: Array, tool: Array) -> float:
+    """Return how far the TCP moves at most if all joints turn a little [m/rad]."""
+    J = arm.jacobian(q, tool)[:, :3]
+    return float(np.linalg.norm(J, axis=1).sum(axis=1).max())
 
 
 def _each(visits: Visits, rows: Bools, code: str, text: str) -> list[Diagnostic]:

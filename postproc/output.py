@@ -78,7 +78,14 @@ def write_numbers(
         values: Their numbers, (m, 6) in the file's units.
         model: Id of the model, for the stamp.
     """
-    edits = number_edits(reading.visits.literals, reading.sources, literals, values)
+    found = number_edits(reading.visits.literals, reading.sources, literals, values)
+    return write_edits(reading, found, model)
+
+
+def write_edits(
+    reading: Reading, edits: tuple[Replacements, ...], model: str
+) -> Output:
+    """Make edits of numbers, file by file; as `write_numbers`."""
     nothing = not any(edits) and not any(reading.cloned)
     files, records = {}, {}
     for number, (source, cloned) in enumerate(reading.originals):

@@ -21,6 +21,7 @@ from postproc.language.structure import Program, parse
 from postproc.language.visits import Visits
 from postproc.language.world import base_name
 from postproc.motion.planner import Plan, plan
+from postproc.motion.standing import NOWHERE, Standing
 from postproc.motion.targets import Targets
 from postproc.reasons import Reasons
 from postproc.resolve import targets_from_visits
@@ -76,12 +77,14 @@ class Planned:
         reasons: Why visits must not be compensated.
         shift: From where the controller takes every target to be to where it is, as
             far as a frame was taught with the arm's error in it, (n, 3) [m].
+        doubtful: What comes from the last target is doubtful (see `strings`).
     """
 
     targets: Targets
     plan: Plan
     reasons: Reasons
     shift: Array
+    doubtful: bool = False
 
     @property
     def wanted(self) -> Array:
@@ -180,18 +183,32 @@ def _by_name(program: Program, pages: list[Program]) -> dict[str, Program]:
     return found
 
 
-def plan_visits(visits: Visits, cell: Cell, timed: bool = True) -> Planned:
+def plan_visits(
+    visits: Visits,
+    cell: Cell,
+    timed: bool = True,
+    begin: Standing = NOWHERE,
+    doubtful: bool = False,
+) -> Planned:
     """Plan every move of a program, with the time that it takes or without.
+
+    Args:
+        visits: What the program says.
+        cell: The arm and its surroundings.
+        timed: As in `plan`.
+        begin: Where the arm stands at the first visit, if that is known beforehand.
+        doubtful: What comes from there is doubtful (see `strings`).
 
     Raises:
         PlanError: The arm has no inverse kinematics.
     """
     targets, reasons = targets_from_visits(visits, cell)
-    planned = plan(cell.arm, targets, np.deg2rad(cell.limits.wrist_deg), timed)
+    wrist = np.deg2rad(cell.limits.wrist_deg)
+    planned = plan(cell.arm, targets, wrist, timed, begin)
     reasons.adopt(planned.reason, planned.reasons)
-    mark_strings(visits, targets, planned, cell.arm, reasons)
+    on = mark_strings(visits, targets, planned, cell.arm, reasons, doubtful)
     mark_turning(visits, targets, planned, reasons)
-    return Planned(targets, planned, reasons, np.zeros((len(visits), 3)))
+    return Planned(targets, planned, reasons, np.zeros((len(visits), 3)), on)
 
 
 def states_of(planned: Plan, cell: Cell, temperature: float) -> States:

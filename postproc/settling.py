@@ -1,4 +1,4 @@
-"""Correct, write and plan again, until the sides are those corrected for."""
+"""Correct and plan again, until the sides are those corrected for."""
 
 from __future__ import annotations
 
@@ -9,19 +9,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from postproc.accuracy.model import Model
+from postproc.as_read import numbers_as_read
 from postproc.clock import Clock
-from postproc.courses import Courses, where
+from postproc.courses import Courses
+from postproc.language.edits import Replacements
+from postproc.language.rewrite import edits as number_edits
 from postproc.motion.planner import Plan
 from postproc.motion.reach import Reached
+from postproc.motion.standing import NOWHERE, Standing
 from postproc.options import Options
-from postproc.output import Output, write_numbers
-from postproc.planning import Planned, Reading, read_program
+from postproc.planning import Planned, Reading
 from postproc.proposal import Proposal, propose
 from postproc.robot.cell import Cell
 from postproc.robot.state import States
 from postproc.side_search import SideSearch
 from postproc.solved import Solved, solve_again, solve_visits
-from postproc.verify import check_output
 
 Array = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -34,12 +36,31 @@ CORNERS = 3  # rounds for what is curved there
 
 
 @dataclass(frozen=True)
+class Left:
+    """How the last target of some visits is left, for what comes after it.
+
+    Attributes:
+        looked: Where the arm stands with its number as it was corrected.
+        written: .. with its number as it is written, which has less digits.
+        wanted: What it moves by, (k, 3) [m]; k is 1, or 0 where nothing was before.
+    """
+
+    looked: Standing
+    written: Standing
+    wanted: Array
+
+
+AT_START = Left(NOWHERE, NOWHERE, np.empty((0, 3)))
+
+
+@dataclass(frozen=True)
 class Corrected:
-    """A proposal, the files that hold it, and where those files lead."""
+    """A proposal, the edits that write it, and where the written numbers lead."""
 
     proposal: Proposal
-    output: Output
+    edits: tuple[Replacements, ...]
     reached: Reached
+    left: Left
 
 
 def settle(
@@ -50,8 +71,9 @@ def settle(
     model: Model,
     options: Options,
     clock: Clock,
+    before: Left = AT_START,
 ) -> Corrected:
-    """Correct, write and plan again, until the sides are those corrected for.
+    """Correct and plan again, until the sides are those corrected for.
 
     The corrected program makes slightly other moves than the original, so a joint may
     come from the other side, or lie elsewhere in its play: the correction is computed
@@ -60,7 +82,7 @@ def settle(
     the whole correction, and move its neighbours' sides with it.
 
     A rounded fly point also moves with its neighbours' corrections, which its own makes
-    up for.
+    up for. The last look is at the numbers as they will be read from the output.
     """
     held, search = np.zeros(len(states), dtype=bool), SideSearch()
     with clock("solve"):
@@ -70,10 +92,12 @@ def settle(
     settled_for = np.zeros(len(states), dtype=bool)
     for number in count():  # ends: from round ROUNDS on, `settled_for` or `held` grows
         with clock("decide"):
-            aside = aside_after(planned.plan, solved, held) + bent
+            wanted = wanted_moves(planned.plan, solved, held, before)
+            aside = aside_after(planned.plan, wanted) + bent
             proposal = propose(reading, planned, solved, aside, held, cell, options)
         with clock("plan again"):
-            after = courses.after(proposal.decisions.corrected)
+            looked = courses.after(proposal.decisions.corrected, before.looked)
+            after = looked.reached
         found, missed = after.side, np.zeros_like(bent)
         sharp = planned.plan.pull.visit
         missed[sharp] = (after.aside - aside)[sharp]
@@ -84,11 +108,15 @@ def settle(
         moved = proposal.corrected & ~settled_for
         moved = moved & (off > (SAME if number < ROUNDS else OTHER))
         if not moved.any() and not rounds_on:
-            done = write_and_verify(reading, proposal, cell, model, clock)
-            off = np.abs(done.reached.side - solved.direction)
+            edits, proposal = write(reading, proposal, clock)
+            stood = looked.end
+            with clock("plan again"):
+                last = courses.after(proposal.decisions.corrected, before.written)
+            off = np.abs(last.side - solved.direction)
             flipped = proposal.corrected & ~settled_for & (off > OTHER).any(axis=1)
             if not flipped.any():
-                return done
+                left = Left(stood, last.end, wanted[-1:].copy())
+                return Corrected(proposal, edits, last.reached, left)
             held = held | flipped
             continue
         settled_for = settled_for | moved if number >= ROUNDS else settled_for
@@ -100,26 +128,26 @@ def settle(
     raise AssertionError("unreachable")
 
 
-def aside_after(plan: Plan, solved: Solved, held: Bools) -> Array:
-    """Foretell where the path passes its fly points once targets have moved, (n, 3)."""
+def wanted_moves(plan: Plan, solved: Solved, held: Bools, before: Left) -> Array:
+    """Say what the path should move by at every target, (n, 3) [m]."""
     wanted = np.nan_to_num(solved.command[:, :3, 3] - plan.tcp[:, :3, 3])
     wanted[held] = 0.0
+    wanted[: len(before.wanted)] = before.wanted
+    return wanted
+
+
+def aside_after(plan: Plan, wanted: Array) -> Array:
+    """Foretell where the path passes its fly points once targets have moved, (n, 3)."""
     return plan.aside + plan.pull.on(plan.pull.to_move(wanted))
 
 
-def write_and_verify(
-    reading: Reading, proposal: Proposal, cell: Cell, model: Model, clock: Clock
-) -> Corrected:
-    """Write the numbers, and read and plan what was written.
-
-    Raises:
-        VerificationError: The output is not what was meant.
-    """
+def write(
+    reading: Reading, proposal: Proposal, clock: Clock
+) -> tuple[tuple[Replacements, ...], Proposal]:
+    """Write the numbers; return the edits, and the proposal as it will be read."""
     with clock("rewrite"):
-        output = write_numbers(reading, proposal.edited, proposal.values, model.id)
-    with clock("verify"):
-        again = read_program(output.files, cell)
-        check_output(reading, again, output, proposal.edited)
-        reached = where(again.visits, cell)
-    decisions = replace(proposal.decisions, corrected=np.array(again.visits.values))
-    return Corrected(replace(proposal, decisions=decisions), output, reached)
+        literals, edited = reading.visits.literals, proposal.edited
+        edits = number_edits(literals, reading.sources, edited, proposal.values)
+        values = numbers_as_read(reading.visits, edited, edits)
+    decisions = replace(proposal.decisions, corrected=values)
+    return edits, replace(proposal, decisions=decisions)

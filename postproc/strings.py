@@ -83,8 +83,13 @@ def overruled(targets: Targets, plan: Plan) -> Overruled:
 
 
 def mark_strings(
-    visits: Visits, targets: Targets, plan: Plan, arm: Arm, reasons: Reasons
-) -> None:
+    visits: Visits,
+    targets: Targets,
+    plan: Plan,
+    arm: Arm,
+    reasons: Reasons,
+    begun: bool = False,
+) -> bool:
     """Leave alone what configuration strings make doubtful.
 
     Args:
@@ -93,11 +98,19 @@ def mark_strings(
         plan: Where they lead.
         arm: The arm.
         reasons: Why visits must not be compensated; more are added.
+        begun: The first visit is a place that makes what comes from there doubtful.
+
+    Returns:
+        Whether what comes from the last visit is doubtful.
     """
     _mark_stops(visits, overruled(targets, plan), reasons)
     doubtful = _mark_either_way(visits, targets, plan, arm, reasons)
-    if doubtful.any():
-        reasons.mark(_followers(visits, targets, doubtful), AFTER)
+    doubtful[:1] |= begun
+    if not doubtful.any():
+        return False
+    reached, on = _followers(visits, targets, doubtful)
+    reasons.mark(reached, AFTER)
+    return bool(on[-1])
 
 
 def _mark_stops(visits: Visits, path: Overruled, reasons: Reasons) -> None:
@@ -187,10 +200,15 @@ def _seen(n: int, rows: Ints) -> Bools:
     return found
 
 
-def _followers(visits: Visits, targets: Targets, doubtful: Bools) -> Bools:
+def _followers(
+    visits: Visits, targets: Targets, doubtful: Bools
+) -> tuple[Bools, Bools]:
     """Find what comes from doubtful places, up to the next ones that are sure, (n,).
 
     A sure place is among them itself: the side that it is reached from is not sure.
+
+    Returns:
+        What comes from doubtful places, and which places make others doubtful.
     """
     sure = (targets.move == Move.JOINT) & (
         (targets.kind == Kind.JOINTS)
@@ -207,4 +225,4 @@ def _followers(visits: Visits, targets: Targets, doubtful: Bools) -> Bools:
             if not (reached[w] or sure[w]):
                 waiting.append(w)
             reached[w] = True
-    return np.asarray(reached & ~doubtful)
+    return reached & ~doubtful, doubtful | (reached & ~sure)

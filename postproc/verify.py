@@ -21,7 +21,12 @@ Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 SAME = 1e-6  # [mm] and [deg]: what adding constants to numbers may round off
-CONSTANT = ("frames", "tool", "base", "uframe", "pred_start", "pred", "target")
+CONSTANT = (
+    "frames", "tool", "base", "uframe", "pred_start", "pred", "target", "motion", "via",
+    "distance_mm", "aux", "config", "configs", "config_given", "literal", "follows",
+    "tool_remote", "nearest_turn", "care", "fly", "fly_dist_mm", "fly_per", "fly_type",
+    "fly_traj", "lin_spd", "rot_spd", "override", "wrist_joint", "ornt_type",
+)  # fmt: skip
 
 
 class VerificationError(PostprocError):
@@ -56,7 +61,7 @@ def check_output(before: Reading, after: Reading, output: Output, edited: Ints) 
     if not np.array_equal(w.values[direct], numbers[w.literal[direct]]):
         raise VerificationError(f"{v.files[0]}: a number does not read as it was meant")
     for name in CONSTANT:
-        if not np.array_equal(getattr(v, name), getattr(w, name), equal_nan=True):
+        if not _equal(getattr(v, name), getattr(w, name)):
             raise VerificationError(f"{v.files[0]}: the output has another {name}")
 
 
@@ -85,6 +90,34 @@ def _meant(visits: Visits, edits: Sequence[Replacements]) -> Array:
         edited = some.start[at] == start
         numbers[mine] = np.where(edited, new[at], numbers[mine])
     return numbers
+
+
+def check_numbers(before: Visits, looked: Array, after: Visits) -> None:
+    """Check that the output has the numbers that the last look was at.
+
+    Args:
+        before: The source.
+        looked: The numbers, (n, 6).
+        after: The output, parsed again.
+
+    Raises:
+        VerificationError: A written number is not that one bit by bit, or a computed
+            one differs by more than what adding constants rounds off.
+    """
+    computed = before.follows >= 0
+    same = (looked == after.values) | (np.isnan(looked) & np.isnan(after.values))
+    if not same[~computed].all():
+        raise VerificationError(f"{before.files[0]}: a number is not read as written")
+    far = ~np.isclose(looked, after.values, rtol=0, atol=SAME, equal_nan=True)
+    if far[computed].any():
+        raise VerificationError(f"{before.files[0]}: a computed target is elsewhere")
+
+
+def _equal(a: Array | tuple[str, ...], b: Array | tuple[str, ...]) -> bool:
+    """Compare two columns."""
+    if isinstance(a, tuple) or isinstance(b, tuple):
+        return a == b
+    return np.array_equal(a, b, equal_nan=a.dtype.kind == "f")
 
 
 def _shares(before: Visits, after: Visits) -> Array:

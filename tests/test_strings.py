@@ -11,6 +11,7 @@ from postproc.notes import overruled_strings
 from postproc.planning import Planned, Reading, plan_visits, read_program
 from postproc.pose import record_from_pose
 from postproc.robot.cell import Cell, load_cell
+from postproc.strings import overruled
 
 HERE, THERE = [0.0, 0.0, -90.0, 0.0, 45.0, 0.0], [5.0, 5.0, -95.0, 10.0, 40.0, 8.0]
 START = "MOVE JOINT TO {0, 0, -90, 0, 45, 0}"
@@ -53,7 +54,8 @@ def test_a_line_to_another_branch(cell: Cell, said: str, why: str, noted: int) -
     line = f"MOVE LINEAR TO {pos(cell, THERE, 'W')}"
     reading, found = planned(cell, START, said, line)
     assert found.reasons[1].startswith(why) and bool(why) == bool(found.reasons[1])
-    notes = overruled_strings(reading.visits, found.targets, found.plan)
+    rows = overruled(found.targets, found.plan).unchecked(reading.visits)
+    notes = overruled_strings(reading.visits, rows)
     assert len(notes) == noted
 
 

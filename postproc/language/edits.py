@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import NamedTuple, overload
 
 import numpy as np
@@ -59,6 +60,21 @@ class Replacements(Sequence[Edit]):
             np.concatenate([none, *(p.end for p in parts)]),
             np.concatenate([np.empty(0, dtype="S1"), *(p.new for p in parts)]),
         )
+
+    @classmethod
+    def merged(cls, parts: Sequence[Replacements]) -> Replacements:
+        """Put edits together whatever their order."""
+        if all(a.before(b) for a, b in pairwise(part for part in parts if len(part))):
+            return cls.joined(parts)
+        start = np.concatenate([part.start for part in parts])
+        end = np.concatenate([part.end for part in parts])
+        new = np.concatenate([part.new for part in parts])
+        order = np.argsort(start, kind="stable")
+        return cls(start[order], end[order], new[order])
+
+    def before(self, other: Replacements) -> bool:
+        """Tell whether all of these end before the others begin."""
+        return bool(self.end[-1] <= other.start[0])
 
     @classmethod
     def of(cls, edits: Iterable[Edit]) -> Replacements:

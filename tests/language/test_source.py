@@ -6,6 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from postproc.exceptions import FileError, ProgramError
+from postproc.language.edits import Replacements
 from postproc.language.source import (
     Edit,
     Source,
@@ -108,3 +109,18 @@ def test_two_rounds_of_edits_make_one(data: bytes, draw: st.DataObject) -> None:
 def test_an_edit_over_the_border_of_another_is_refused() -> None:
     with pytest.raises(ValueError, match="border"):
         compose([Edit(Span(2, 2), b"xy")], [Edit(Span(1, 3), b"")])
+
+
+def test_edits_from_several_places_are_merged_in_order() -> None:
+    def edits(*starts: int) -> Replacements:
+        return Replacements.of(Edit(Span(s, s + 1), b"%d" % s) for s in starts)
+
+    nothing = edits()
+    for parts in (
+        [edits(0, 2), edits(4)],
+        [edits(4), edits(0, 2)],
+        [edits(2, 4), nothing, edits(0)],
+    ):
+        assert list(Replacements.merged(parts)) == list(edits(0, 2, 4))
+    with pytest.raises(ValueError, match="overlap"):
+        Replacements.merged([edits(4), edits(4)])
