@@ -170,11 +170,13 @@ def run_broken(machine: Machine, here: Here) -> None:
     why = f"the block structure is broken (line {body.blocks.broken})"
     here.reason = why
     for row in range(body.first + 1, body.last):
-        statement = program.statement(row)
-        if isinstance(statement, ast.Move):
+        said: ast.Statement | None = program.statement(row)
+        while isinstance(said, ast.Label | ast.Case | ast.Else | ast.When):
+            said = said.then
+        if isinstance(said, ast.Move):
             here.row = row
             here.store.last = frozenset({ELSEWHERE})
-            move(machine, here, statement)
+            move(machine, here, said)
     effects = rows_effects(program, body.first, body.last)
     pin_names(here, effects.read, f"{why}: it may be used in a computation")
     forget_names(here, effects.assigned, why)
