@@ -1,0 +1,54 @@
+"""Lines that differ in numbered names share a form, and say what they would alone."""
+
+import random
+
+import pytest
+
+from postproc.language import pdl2 as ast
+from postproc.language.parser import form_of, forms_of, parse_line, parse_value_line
+
+PIECES = (
+    "MOVE TO WP_1 p2 _a3b x $v1 a$b2 weld l1:: 7up 'p3' '\\'q4' \"r5\" :: , := ( ) [ ] "
+    "\x00 \x01 \xe9t6 t\xe97 VAR POSITION + {"
+).split(" ")
+
+
+def test_many_masks_are_split_as_each_by_itself() -> None:
+    rng = random.Random(8)
+    masks = [
+        rng.choice(["", " "]).join(rng.choices(PIECES, k=rng.randrange(9)))
+        for _ in range(3000)
+    ]
+    assert list(forms_of(masks)) == [form_of(mask) for mask in masks]
+
+
+@pytest.mark.parametrize(
+    ("mask", "names"),
+    [
+        (
+            "MOVE LINEAR TO WP_1 WITH CONDITION[Spot2(\x00, Id_3)]",
+            ("WP_1", "Spot2", "Id_3"),
+        ),
+        ("v1, V2 : POSITION", ("v1", "V2")),
+        ("x := 'p1' + $v2", ()),
+    ],
+)
+def test_names_are_taken_out_and_filled_in(mask, names) -> None:
+    assert form_of(mask)[1] == names
+    plain = parse_line(mask.translate(str.maketrans("123", "abc")))
+    said = repr(parse_line(mask)).translate(str.maketrans("123", "abc"))
+    assert said == repr(plain)
+
+
+def test_case_is_kept_where_it_is_shown_only() -> None:
+    declared = parse_line("Wp1, WP2 : POSITION")
+    assert isinstance(declared, ast.Declare) and declared.names == ("Wp1", "WP2")
+    moved = parse_line("MOVE TO Wp1")
+    assert isinstance(moved, ast.Move) and moved.where == (ast.Reference("wp1"),)
+    entered = parse_value_line("Wp1 XTND Arm: \x00 Priv")
+    assert entered is not None and entered.name == "Wp1"
+
+
+@pytest.mark.parametrize("mask", ["?? Wp1 ?? x2", "MOVE TO \x01", "\x01\x01 p1"])
+def test_what_is_not_understood_keeps_its_text(mask) -> None:
+    assert parse_line(mask) == ast.Unknown(mask)
