@@ -35,7 +35,11 @@ def correct(
     """Plan a program, and correct it until its sides are those corrected for.
 
     Moves can only be given points of their own when all arrivals are at hand: with
-    --clone a program is one window, however long.
+    --clone a program is one window, however long; so is one fly run.
+
+    A window is settled before the next one begins, while a whole program settles at
+    once: fly points may differ by what `CLOSE` allows, and the first targets behind a
+    cut within the play of joints that hardly move there.
 
     Args:
         reading: The program.

@@ -1,9 +1,10 @@
 """A program that is corrected window by window comes out as if it were corrected whole.
 
-Two things differ, and both are bounded here. Rounds for rounded corners end when those
-of the window are hit to `CLOSE`, while those of a whole program go on as long as any is
-not; and a window begins from where the one before has settled, so that the sides of a
-joint that turns at the cut are found on another way.
+Two things differ. Rounds for rounded corners end when those of the window are hit to
+`CLOSE`, while those of a whole program go on as long as any is not: that is bounded
+here. And a window begins from where the one before has settled: where the first move
+behind a cut is so short that joints stay within their play, the sides there are found
+on another way, and a target that never settles may come out elsewhere within the play.
 """
 
 from __future__ import annotations
