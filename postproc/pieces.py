@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import TypeVar
 
 T = TypeVar("T")
-PIECE = 4096  # rows at a time
+PIECE = 2048  # rows at a time
 
 
 def in_pieces(work: Callable[[slice], T], n: int, size: int = PIECE) -> list[T]:
