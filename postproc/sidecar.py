@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import hashlib
 import json
+import re
 import zlib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import islice, pairwise
 from pathlib import Path
 from typing import Any, Self
 
@@ -17,6 +19,7 @@ from postproc.inputs import read_input
 from postproc.language.edits import Replacements
 
 SUFFIX = ".postproc.json"
+_LINE_END = re.compile(rb"\r\n|\n|\r")
 BLOCK = 50  # lines per checksum: how closely a later edit can be located
 
 
@@ -36,9 +39,11 @@ def sha256(data: bytes) -> str:
 
 def block_checksums(data: bytes) -> list[int]:
     """Checksum every `BLOCK` lines, so that a later edit can be located."""
-    lines = data.splitlines(keepends=True)
-    blocks = (lines[i : i + BLOCK] for i in range(0, len(lines), BLOCK))
-    return [zlib.crc32(b"".join(block)) for block in blocks]
+    ends = (m.end() for m in islice(_LINE_END.finditer(data), BLOCK - 1, None, BLOCK))
+    marks = [0, *ends]
+    if marks[-1] < len(data):
+        marks.append(len(data))
+    return [zlib.crc32(data[a:b]) for a, b in pairwise(marks)]
 
 
 @dataclass(frozen=True)
