@@ -17,6 +17,7 @@ from tests.generated.landing import lands, program
 from tests.language.reread import reread
 
 SEEDS = range(100, 148)
+HANDLED = 5361  # moves to a point that a handler changes, computed from another one
 
 
 @pytest.fixture(scope="module")
@@ -60,6 +61,10 @@ def test_what_is_seen_at_one_value_from_one_side_is_compensated(found):
     compensated = sum(n for text, n in found.once.items() if text.startswith(DONE))
     assert compensated > 0.9 * found.once.total() > 100
     assert found.once[DONE] > 100
+
+
+def test_what_a_point_that_a_handler_changes_may_be_stays(job_cell, job_model):
+    assert lands(HANDLED, job_cell, job_model).wrong == []
 
 
 @pytest.mark.parametrize("seed", range(24))

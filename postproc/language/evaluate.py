@@ -26,6 +26,7 @@ from postproc.language.values import (
     Written,
     inverted,
     shifted,
+    unsure,
 )
 from postproc.language.world import Place, World, base_variable
 
@@ -163,7 +164,8 @@ class Point:
                 self.world.loosen(key, "only the run tells which element a move uses")
             return Nothing("its index is known only at run time")
         if self._unsteady(target):
-            return Nothing("a condition handler changes it")
+            changed = Nothing("a condition handler changes it")
+            return unsure(changed, self.store.read(target.key))
         held = self.store.read(target.key)
         if target.component == ():
             return held
