@@ -21,6 +21,7 @@ from postproc.language.lines import Lines
 Ints = NDArray[np.int64]
 Floats = NDArray[np.float64]
 
+MOST = 2.0**53  # beyond it a number does not tell which whole one it is
 _LETTERS = "XYZAER"
 _NONE = (0, -1)  # the place of a value that is not written
 
@@ -235,8 +236,9 @@ def _values(lines: Lines, rows: Ints, slot: int) -> Floats:
 
 
 def _whole(values: Floats) -> Ints:
-    """Cut numbers down to whole ones, 0 where not known."""
-    return np.trunc(np.nan_to_num(values)).astype(np.int64)
+    """Cut numbers down to whole ones, 0 where not known or beyond all bounds."""
+    sound = np.abs(values) < MOST  # NaN is not
+    return np.trunc(np.where(sound, values, 0.0)).astype(np.int64)
 
 
 def _stacked(parts: Sequence[tuple[Ints, Floats]], k: int) -> Floats:
