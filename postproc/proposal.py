@@ -86,6 +86,9 @@ def propose(
     turn = turns(plan, solved)
     guard_turn(reasons, cell.limits, turn)
     guard_size(reasons, cell.limits, correction, solved.residual)
+    # A fly point also moves for what the corner at it is rounded by.
+    moved = correction - (aside - plan.aside)
+    guard_size(reasons, cell.limits, moved, solved.residual)
     guard_steps(reasons, cell.limits, correction, side, visits.run_mates)
     reasons.mark(held, HELD)
     numbers = new_numbers(visits, plan, solved, aside)

@@ -1,7 +1,10 @@
 """A few of the random programs of `make generated`, landing on the virtual arm."""
 
+import numpy as np
 import pytest
 
+from postproc.compensate import compensate
+from postproc.language.visits import Target
 from tests.generated.found import (
     ALL,
     ALONG,
@@ -17,6 +20,9 @@ from tests.generated.landing import lands, program
 from tests.language.reread import reread
 
 SEEDS = range(100, 148)
+WIDE = (
+    5858  # a rounded corner before an arc, which no small shift of its point makes up
+)
 HANDLED = 5361  # moves to a point that a handler changes, computed from another one
 
 
@@ -65,6 +71,18 @@ def test_what_is_seen_at_one_value_from_one_side_is_compensated(found):
 
 def test_what_a_point_that_a_handler_changes_may_be_stays(job_cell, job_model):
     assert lands(HANDLED, job_cell, job_model).wrong == []
+
+
+def test_no_point_moves_farther_than_a_correction_may(job_cell, job_model):
+    made, options = program(WIDE)
+    pages = {name: data for name, data in made.files.items() if name != "job.pdl"}
+    done = compensate(
+        made.files["job.pdl"], job_cell, job_model, pages=pages, options=options
+    )
+    moved = (done.decisions.corrected - done.visits.values)[:, :3]
+    poses = done.visits.target == Target.POSE
+    way = np.linalg.norm(np.nan_to_num(moved[poses]), axis=1)
+    assert 0 < way.max() <= job_cell.limits.correction_mm
 
 
 @pytest.mark.parametrize("seed", range(24))

@@ -80,7 +80,7 @@ def test_no_defect_of_ours_shows_a_trace(desk, monkeypatch, capsys, error) -> No
     def fail(*_: object) -> None:
         raise error("job.pdl: another byte differs; nothing is written")
 
-    monkeypatch.setattr("postproc.settling.check_output", fail)
+    monkeypatch.setattr("postproc.compensate.check_output", fail)
     source, out = desk.put("job.pdl", program(FIRST, POSE)), desk.folder / "out.pdl"
     if error is VerificationError:
         found = desk.compensate(source, "-o", out)
