@@ -29,7 +29,7 @@ def numbers_as_read(
         edits: The edits of their numbers, file by file.
     """
     values = np.array(visits.values)
-    new, changed = _texts(visits.literals, edited, edits)
+    new, changed = edited_numbers(visits.literals, edited, edits)
     rows, at = _among(visits.literal, edited)
     values[rows] = np.where(changed[at], new[at], values[rows])
     moved = np.zeros((len(edited), 6))
@@ -39,10 +39,16 @@ def numbers_as_read(
     return values
 
 
-def _texts(
+def edited_numbers(
     literals: Literals, edited: Ints, edits: Sequence[Replacements]
 ) -> tuple[Array, Bools]:
-    """Read the new numbers of edited literals, (m, 6), and tell which there are."""
+    """Read the new numbers of some literals, (m, 6), and tell which there are.
+
+    Args:
+        literals: All literals of a program.
+        edited: Those to look at, (m,).
+        edits: The edits of numbers, file by file.
+    """
     new = np.zeros((len(edited), 6))
     changed = np.zeros((len(edited), 6), dtype=bool)
     for file, own in enumerate(edits):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import TypeVar
 
 T = TypeVar("T")
@@ -15,4 +15,9 @@ def in_pieces(work: Callable[[slice], T], n: int, size: int = PIECE) -> list[T]:
     >>> in_pieces(lambda rows: (rows.start, rows.stop), 5, 2)
     [(0, 2), (2, 4), (4, 5)]
     """
-    return [work(slice(a, min(a + size, n))) for a in range(0, n, size)]
+    return [work(rows) for rows in pieces(n, size)]
+
+
+def pieces(n: int, size: int = PIECE) -> Iterator[slice]:
+    """Cut n rows into slices."""
+    return (slice(a, min(a + size, n)) for a in range(0, n, size))

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from postproc.language.visits import Switch, Visits
-from postproc.motion.branches import nearest_turns, on_written_turns
+from postproc.motion.branches import OTHER_TURN, nearest_turns, on_other_turns
 from postproc.motion.planner import Plan
 from postproc.motion.targets import Kind, Move, Targets
 from postproc.reasons import Reasons
@@ -23,7 +23,6 @@ from postproc.robot.arm import Arm
 Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 
-OTHER_TURN = 1.0  # [rad] more than rounding of a turn
 CNFG, TURN, MULTI = 0, 1, 2  # columns of `Visits.care`
 SAID = {
     Switch.UNSET: "not set",
@@ -78,7 +77,7 @@ def overruled(targets: Targets, plan: Plan) -> Overruled:
     path = plan.overruled & ~targets.via
     return Overruled(
         path & (plan.slot != targets.slot),
-        path & _unlike_written(targets, plan) & ~targets.nearest_turn,
+        path & on_other_turns(plan.q, targets.turns) & ~targets.nearest_turn,
     )
 
 
@@ -176,13 +175,7 @@ def _other_turn(visits: Visits, targets: Targets, plan: Plan, arm: Arm) -> Bools
     allowed = (turned >= arm.lower) & (turned <= arm.upper)
     other = allowed & (np.abs(turned - plan.q[edge]) > OTHER_TURN)
     far = _seen(len(visits), edge[other.any(axis=1)])
-    return np.where(targets.nearest_turn, _unlike_written(targets, plan), far)
-
-
-def _unlike_written(targets: Targets, plan: Plan) -> Bools:
-    """Tell which arrivals are on other turns than those written, (n,)."""
-    gap = np.abs(on_written_turns(plan.q, targets.turns) - plan.q)
-    return np.asarray((gap > OTHER_TURN).any(axis=1))
+    return np.where(targets.nearest_turn, on_other_turns(plan.q, targets.turns), far)
 
 
 def _edges(visits: Visits, plan: Plan, rows: Bools) -> tuple[Ints, Ints]:

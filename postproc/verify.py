@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from postproc.as_read import edited_numbers
 from postproc.exceptions import PostprocError
 from postproc.language.edits import Replacements
 from postproc.language.rewrite import compare
@@ -80,16 +81,8 @@ def _meant(visits: Visits, edits: Sequence[Replacements]) -> Array:
     literals, direct = visits.literals, np.flatnonzero(visits.literal >= 0)
     numbers = np.full((len(literals), 6), np.nan)
     numbers[visits.literal[direct]] = visits.values[direct]
-    for file, some in enumerate(edits):
-        if not len(some):
-            continue
-        mine = np.flatnonzero(literals.file == file)
-        start = literals.start[mine]
-        at = np.minimum(np.searchsorted(some.start, start), len(some) - 1)
-        new = some.new.astype(float)
-        edited = some.start[at] == start
-        numbers[mine] = np.where(edited, new[at], numbers[mine])
-    return numbers
+    new, edited = edited_numbers(literals, np.arange(len(literals)), edits)
+    return np.where(edited, new, numbers)
 
 
 def check_numbers(before: Visits, looked: Array, after: Visits) -> None:

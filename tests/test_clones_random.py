@@ -9,7 +9,6 @@ from __future__ import annotations
 import random
 import re
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
@@ -20,6 +19,7 @@ from postproc.proposal import Proposal
 from postproc.report import Decisions, Status
 from tests.language.generator import Generator
 from tests.language.interpreter import Generated, Interpreter
+from tests.language.reread import moved
 
 PROGRAMS = 120
 ASSIGNED = re.compile(r"\s*(\w+__\d+) := [^\d-]*([-\d., ]+)")
@@ -58,23 +58,6 @@ def all_disagree(reading: Reading, seed: int) -> Proposal:
         change[row] = own.setdefault(place, change[row])  # one move agrees with itself
     empty = np.zeros(0, dtype=np.int64)
     return Proposal(empty, nothing, usable & False, decisions, usable, change, empty)
-
-
-def moved(op: tuple[Any, ...], at: dict[int, int]) -> tuple[Any, ...]:
-    """Give an instruction the lines of the program with clones."""
-    match op:
-        case ("jump" | "cycle", line):
-            return op[0], at[line]
-        case ("unless", test, line):
-            return "unless", test, at[line]
-        case ("select", name, cases, otherwise):
-            new = [(value, at[line]) for value, line in cases]
-            return "select", name, new, at[otherwise]
-        case ("next", start, name, by):
-            return "next", at[start], name, by
-        case ("for", *rest, end):
-            return "for", *rest, at[end]
-    return op
 
 
 def with_clones(made: Generated, text: str) -> tuple[Generated, dict[int, int]]:

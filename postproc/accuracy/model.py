@@ -27,6 +27,7 @@ from postproc.accuracy.schema import (
 )
 from postproc.exceptions import ModelError
 from postproc.files import write_all
+from postproc.pieces import in_pieces, pieces
 from postproc.robot.arm import Arm
 from postproc.robot.state import States
 
@@ -101,10 +102,11 @@ class Model:
     def error(self, arm: Arm, states: States) -> Array:
         """Predict the error without its uncertainty, (n, 3) [m]."""
         effects, values, _ = self.compensable()
-        parts = [
-            effects.error(Batch(arm, states[rows]), values)
-            for rows in _chunks(len(states))
-        ]
+        parts = in_pieces(
+            lambda rows: effects.error(Batch(arm, states[rows]), values),
+            len(states),
+            CHUNK,
+        )
         return np.concatenate([np.zeros((0, 3)), *parts])
 
     def measured_error(self, arm: Arm, states: States) -> Array:
@@ -120,7 +122,7 @@ class Model:
         effects, values, covariance = self.compensable()
         error, model = np.empty((len(states), 3)), np.empty((len(states), 3))
         arrival = np.empty((len(states), 3))
-        for rows in _chunks(len(states)):
+        for rows in pieces(len(states), CHUNK):
             batch = Batch(arm, states[rows])
             at = effects.at(batch, values)
             error[rows] = effects.error_at(at, batch, values)
@@ -246,11 +248,6 @@ def load_model(path: str | Path) -> Model:
     # A file of an older release lacks keys that have been added since: it keeps its id.
     vars(model)["id"] = file.id
     return model
-
-
-def _chunks(n: int) -> list[slice]:
-    """Cut n states into pieces."""
-    return [slice(i, min(i + CHUNK, n)) for i in range(0, n, CHUNK)]
 
 
 def _parameter_variance(columns: Array, covariance: Array) -> Array:

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 
 from postproc.language.shelves import Shelves
-from postproc.language.values import Alias, Nothing, Value, join, unsure
+from postproc.language.values import Nothing, Value, join, unsure
 from postproc.language.visits import NO_VALUE
 
 Settings = Mapping[str, Value]
@@ -85,11 +85,6 @@ class Store:
         for part in self.parts(key):
             del self.values[part]
         self.write(key, unsure(Nothing(why), held))
-
-    def forget_alias(self, alias: Alias, why: str) -> None:
-        """Forget whatever a parameter may stand for."""
-        for key in alias.keys:
-            self.forget(key, why)
 
     def set(self, **settings: Value) -> None:
         """Change frames or motion variables (names without ``$``)."""

@@ -111,8 +111,7 @@ def _part(targets: Targets, moved: Bools, begun: bool) -> _Part | None:
     row = np.cumsum(inside) - 1
     count = np.where(seeds, 0, np.diff(first))[rows]
     pred_start = np.concatenate([[0], np.cumsum(count)])
-    edge = np.repeat(first[rows] - pred_start[:-1], count) + np.arange(pred_start[-1])
-    pred = targets.pred[edge]
+    pred = targets.pred[_spans(first[rows], count)]
     pred = np.where(pred >= 0, row[np.maximum(pred, 0)], pred)
     goes_on = np.append(~inside[1:] & ~begins[1:], False)
     return _Part(

@@ -11,9 +11,11 @@ from postproc.motion.ways import Ways
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
+Bools = NDArray[np.bool_]
 
 FULL = 2 * np.pi
 SUSPICIOUS = 0.3  # [rad] a step between samples that another branch might shorten
+OTHER_TURN = 1.0  # [rad] more than rounding of a turn
 LOST = 1.2  # [rad] a step between samples that no arm makes
 FEW, MORE = 256, 4  # samples looked ahead, and their growth while nothing happens
 TURN_AXES = ((3, 0), (5, 1), (2, 2))  # (axis, which of T1, T2, T3)
@@ -37,6 +39,12 @@ def on_written_turns(q: Array, turns: Array) -> Array:
         keep = np.isnan(turn) if axis == 2 else np.zeros(len(q), dtype=bool)
         out[:, axis] = np.where(keep, q[:, axis], moved)
     return out
+
+
+def on_other_turns(q: Array, turns: Array) -> Bools:
+    """Tell which angles (n, 6) [rad] are on other turns than those written, (n,)."""
+    gap = np.abs(on_written_turns(q, turns) - q)
+    return np.asarray((gap > OTHER_TURN).any(axis=1))
 
 
 def nearest_turns(q: Array, near: Array) -> Array:

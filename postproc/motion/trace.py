@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from postproc.motion.arrive import Arrival, arrive, choose
-from postproc.motion.branches import follow, on_written_turns
+from postproc.motion.branches import follow, on_other_turns, on_written_turns
 from postproc.motion.pull import Pull
 from postproc.motion.reasons import (
     AMBIGUOUS,
@@ -30,7 +30,6 @@ Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 
 AGREE = 1e-6  # [rad] several predecessors lead to the same joint angles
-OTHER_TURN = 1.0  # [rad] more than rounding of a turn
 SLACK = 1e-9  # [rad] rounding at a joint limit
 WINDOW = 4096  # targets followed at a time, so that a break costs little
 
@@ -203,8 +202,8 @@ def _finished(work: Workspace) -> Trace:
     work.path[holes] = work.q[samples.visit[edge_of[holes]]]
     _limits(work, edge_of)
     written = (t.slot >= 0) & (t.move != Move.JOINT) & (work.slot >= 0)
-    turned = np.abs(on_written_turns(work.q, t.turns) - work.q) > OTHER_TURN
-    other = (work.slot != t.slot) | (turned.any(axis=1) & ~t.nearest_turn)
+    turned = on_other_turns(work.q, t.turns)
+    other = (work.slot != t.slot) | (turned & ~t.nearest_turn)
     edges = Edges(t.pred_start, work.source, work.path, samples.start)
     share = 1.0 / np.diff(samples.start)[edge_of]
     return Trace(

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from postproc.motion.sampling import sample
 from postproc.motion.targets import Kind, Move, Targets
 from postproc.motion.ways import OnDemand, Solved, Ways
+from postproc.pieces import pieces
 from postproc.pose import inverse, is_unknown
 from postproc.robot.arm import Arm
 
@@ -143,8 +144,7 @@ class Workspace:
         inner = np.flatnonzero(~self.long[samples.visit[edge]])
         asked = np.concatenate([self.flange[poses], samples.flange[inner]])
         self.branches = np.empty((len(asked), 8, 6))
-        for i in range(0, len(asked), CHUNK):
-            rows = slice(i, i + CHUNK)
+        for rows in pieces(len(asked), CHUNK):
             self.branches[rows] = self.arm.inverse(asked[rows]).q
         self.solved = np.full(len(self.q), -1)
         self.solved[poses] = np.arange(len(poses))

@@ -11,6 +11,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from postproc.pieces import pieces
 from postproc.pose import MM
 from postproc.robot.arm_file import OpwSection
 
@@ -50,8 +51,7 @@ class ClosedForm:
             branch does not exist.
         """
         out = np.empty((len(flange), 8, 6))
-        for a in range(0, len(flange), CHUNK):
-            rows = slice(a, a + CHUNK)
+        for rows in pieces(len(flange), CHUNK):
             for slot in range(4):
                 one = self._angles(flange[rows], slot)
                 out[rows, slot] = self._to_joints(one)
@@ -70,8 +70,7 @@ class ClosedForm:
             branch does not exist.
         """
         out = np.empty((len(flange), 6))
-        for a in range(0, len(flange), CHUNK):
-            rows = slice(a, a + CHUNK)
+        for rows in pieces(len(flange), CHUNK):
             one = self._angles(flange[rows], slot[rows])
             flipped = ((slot[rows] & WRIST) > 0)[:, None]
             out[rows] = self._to_joints(np.where(flipped, _wrist_flipped(one), one))

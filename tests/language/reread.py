@@ -45,7 +45,7 @@ def reread(made: Generated, outputs: Mapping[str, bytes]) -> tuple[Generated, Li
         at |= {base + line + 1: base + k + 1 for line, k in enumerate(kept)}
         extra |= {base + k + 1 for k in range(len(new))} - {base + k + 1 for k in kept}
         texts[number] = new
-    ops = {at[line]: _moved(op, at) for line, op in made.ops.items()}
+    ops = {at[line]: moved(op, at) for line, op in made.ops.items()}
     for line in (*ops, *sorted(extra)):
         code = texts[line // PAGE][line % PAGE - 1].split("--")[0]
         ops[line] = _read(ops.get(line, ("nop",)), code)
@@ -59,7 +59,7 @@ def reread(made: Generated, outputs: Mapping[str, bytes]) -> tuple[Generated, Li
     return after, {new: line for line, new in at.items()}
 
 
-def _moved(op: Op, at: Lines) -> Op:
+def moved(op: Op, at: Lines) -> Op:
     """Give an instruction the lines of the new text."""
     match op:
         case ("jump" | "cycle", line):
