@@ -11,6 +11,7 @@ from __future__ import annotations
 import os
 import re
 import subprocess
+import sys
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from difflib import unified_diff
@@ -83,10 +84,12 @@ def run_page(text: str, folder: Path) -> tuple[str, list[str]]:
 def run_step(command: str, folder: Path) -> str:
     """Run a command as a user of bash does, and return what it prints."""
     quiet = {"NO_COLOR": "1", "COLUMNS": "200", "LC_ALL": "C.UTF-8"}
+    # The tool of this environment, whether a shell has activated it or not.
+    own = f"{Path(sys.executable).parent}{os.pathsep}{os.environ.get('PATH', '')}"
     done = subprocess.run(
         ["bash", "-c", command],
         cwd=folder,
-        env={**os.environ, **quiet},
+        env={**os.environ, **quiet, "PATH": own},
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
         check=False,
