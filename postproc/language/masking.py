@@ -13,30 +13,21 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from postproc.language.lexis import BLANKS, UNARY_CONTEXT, mask_line, number_value
+from postproc.language.lexis import BLANKS, mask_line, number_value
+from postproc.language.plain_numbers import (
+    byte_table,
+    digit_runs,
+    plain_numbers,
+    values,
+    with_signs,
+)
 
 Bytes = NDArray[np.uint8]
 Bools = NDArray[np.bool_]
 Ints = NDArray[np.int64]
 Floats = NDArray[np.float64]
 
-_TENS = 10 ** np.arange(16, dtype=np.int64)
-_MAX_BLANKS = 6  # blanks between a sign and what is before it; more: line by line
-
-
-def _table(characters: str) -> Bools:
-    table = np.zeros(256, dtype=bool)
-    table[[ord(c) for c in characters]] = True
-    return table
-
-
-_DIGITS = "0123456789"
-_LETTERS = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ_$"
-_IS_DIGIT, _IS_LETTER = _table(_DIGITS), _table(_LETTERS)
-_IS_WORD, _IS_NUMERIC = _table(_LETTERS + _DIGITS), _table(_DIGITS + ".")
-_IS_BLANK, _IS_IDLE = _table(BLANKS), _table(BLANKS + ",({\n\r")
-_IS_ODD = _table('"\\')
-_IS_UNARY = _table(UNARY_CONTEXT + "\n\r")
+_IS_IDLE = byte_table(BLANKS + ",({\n\r")
 
 
 @dataclass(frozen=True)
@@ -69,116 +60,100 @@ def mask_lines(data: bytes, line_starts: Ints) -> Masked:
         line_starts: Offset of every line in `data`, ascending from 0.
     """
     a = np.frombuffer(data, dtype=np.uint8)
-    quotes, comment, odd_line = _quotes_and_comments(a, line_starts)
-    line_ends = np.append(line_starts[1:], len(a))
-    in_comment = _cover(len(a), comment[comment >= 0], line_ends[comment >= 0])
-    ending = (a == 10) | (a == 13)
-    in_comment &= ~ending
-    in_string = _cover(len(a), quotes[0::2], quotes[1::2] + 1)
-    code = ~(in_comment | in_string)
-    start, end, odd_place = _numbers(a, code)
-    odd_line[_line_of(line_starts, odd_place)] = True
-    plain = ~odd_line[_line_of(line_starts, start)]
-    start, end = start[plain], end[plain]
-    in_number = _cover(len(a), start, end)
-    masks = _squeeze(a, code, in_comment | in_number, start)
-    value = _values(a, in_number, start, end)
-    return _with_odd_lines(
-        data,
-        line_starts,
-        odd_line,
-        Masked(masks, comment, start, start, end, value, ()),
-    )
+    quotes, comment, odd_line = quotes_and_comments(a, line_starts)
+    start, end = digit_runs(a)
+    code = in_code(start, quotes, comment, line_starts)
+    runs = plain_numbers(a, start[code], end[code])
+    numbers = runs.take(runs.number)
+    start, far = with_signs(a, numbers.first)
+    odd_line[line_of(line_starts, runs.first[runs.odd])] = True
+    odd_line[line_of(line_starts, far)] = True
+    if odd_line.any():
+        plain = ~odd_line[line_of(line_starts, start)]
+        numbers, start = numbers.take(plain), start[plain]
+    dropped = _cover(len(a), start, numbers.end)
+    if (comment >= 0).any():
+        dropped |= _in_comments(a, comment, line_starts)
+    masks = _squeeze(a, dropped, quotes, start)
+    first = np.append(np.searchsorted(start, line_starts), len(start))
+    value = values(a, numbers, start)
+    masked = Masked(masks, comment, first, start, numbers.end, value, ())
+    return _with_odd_lines(data, line_starts, odd_line, masked)
 
 
-def _line_of(line_starts: Ints, place: Ints) -> Ints:
-    line: Ints = np.searchsorted(line_starts, place, side="right") - 1
+def line_of(line_starts: Ints, place: Ints) -> Ints:
+    """Return the line of every place, ascending."""
+    first = np.append(np.searchsorted(place, line_starts), len(place))
+    line: Ints = np.repeat(np.arange(len(line_starts)), np.diff(first))
     return line
+
+
+def _inside(quotes: Ints, place: Ints) -> Bools:
+    """Tell which places, ascending, are in a string."""
+    count = np.diff(np.searchsorted(place, quotes), prepend=0, append=len(place))
+    inside: Bools = np.repeat(np.arange(len(count)) % 2 == 1, count)
+    return inside
 
 
 def _cover(n: int, start: Ints, end: Ints) -> Bools:
     """Return what n bytes lie in the (disjoint) spans."""
-    change = np.zeros(n + 1, dtype=np.int8)
-    change[start] += 1
-    change[end] -= 1
-    covered: Bools = np.cumsum(change[:-1], dtype=np.int8).view(np.bool_)
+    change = np.zeros(n + 1, dtype=bool)
+    change[start] = True
+    change[end] ^= True
+    covered: Bools = np.logical_xor.accumulate(change[:-1])
     return covered
 
 
-def _quotes_and_comments(a: Bytes, line_starts: Ints) -> tuple[Ints, Ints, Bools]:
+def quotes_and_comments(a: Bytes, line_starts: Ints) -> tuple[Ints, Ints, Bools]:
     """Find the quotes of plain strings, the comments, and the lines that are odd.
 
     The first ``--`` with an even number of quotes before it on its line starts the
     comment, for all quotes before it are code.
     """
     quotes = np.flatnonzero(a == 39)
-    dashes = np.flatnonzero((a[:-1] == 45) & (a[1:] == 45))
-    before_line = np.searchsorted(quotes, line_starts)
-    line = _line_of(line_starts, dashes)
-    even = (np.searchsorted(quotes, dashes) - before_line[line]) % 2 == 0
     comment = np.full(len(line_starts), -1, dtype=np.int64)
-    first_line, first = np.unique(line[even], return_index=True)
-    comment[first_line] = dashes[even][first]
+    dashes = np.flatnonzero((a[:-1] == 45) & (a[1:] == 45))
+    if len(dashes):
+        before_line = np.searchsorted(quotes, line_starts)
+        line = line_of(line_starts, dashes)
+        even = (np.searchsorted(quotes, dashes) - before_line[line]) % 2 == 0
+        first_line, first = np.unique(line[even], return_index=True)
+        comment[first_line] = dashes[even][first]
 
-    line = _line_of(line_starts, quotes)
+    line = line_of(line_starts, quotes)
     real = (comment[line] < 0) | (quotes < comment[line])
     quotes, line = quotes[real], line[real]
     odd = np.bincount(line, minlength=len(line_starts)) % 2 == 1
-    odd[_line_of(line_starts, np.flatnonzero(_IS_ODD[a]))] = True
+    odd[line_of(line_starts, np.flatnonzero((a == 34) | (a == 92)))] = True
     return quotes[~odd[line]], comment, odd
 
 
-def _numbers(a: Bytes, code: Bools) -> tuple[Ints, Ints, Ints]:
-    """Find plain decimal numbers, and the places that need a closer look."""
-    numeric = _IS_NUMERIC[a] & code
-    change = np.flatnonzero(np.diff(numeric.view(np.int8), prepend=0, append=0))
-    start, end = change[0::2], change[1::2]
-    padded = np.concatenate([[10], a, [10]]).astype(np.uint8)  # shifted by one
-    before, after = padded[start], padded[end + 1]
-    dots = np.add.reduceat(padded == 46, np.stack([start + 1, end + 1], 1).ravel())
-    dots = dots[0::2] if len(start) else np.zeros(0, dtype=np.int64)
-    digits = dots < end - start
-    in_word = _IS_WORD[before]
-    leading_dot = a[start] == 46
-    # `1..n`, `1e5`, `0x3F`, `].5`, `x1.5`: rare, and not worth an array pass
-    odd = digits & ((dots > 1) | ~in_word & _IS_LETTER[after])
-    odd |= digits & leading_dot & (in_word | (before == 41) | (before == 93))
-    odd |= digits & in_word & (dots > 0) & (a[end - 1] != 46)
-    number = digits & ~odd & ~in_word
-    odd_place = start[odd]
-    start, end = start[number], end[number]
-    start, far = _signs(padded, start)
-    return start, end, np.concatenate([odd_place, far])
+def in_code(place: Ints, quotes: Ints, comment: Ints, line_starts: Ints) -> Bools:
+    """Tell which places, ascending, are in no string and no comment."""
+    code = ~_inside(quotes, place)
+    if (comment >= 0).any():
+        own = comment[line_of(line_starts, place)]
+        code &= (own < 0) | (place < own)
+    return code
 
 
-def _signs(padded: Bytes, start: Ints) -> tuple[Ints, Ints]:
-    """Move starts to the number's sign; also return places too far to look back."""
-    minus, lost = _previous(padded, start)
-    signed = padded[minus] == 45
-    context, lost_context = _previous(padded, minus - signed)
-    context = np.where(signed, context, 0)
-    signed &= _IS_UNARY[padded[context]]
-    return np.where(signed, minus - 1, start), start[lost | lost_context & signed]
+def _in_comments(a: Bytes, comment: Ints, line_starts: Ints) -> Bools:
+    """Return what bytes are in a comment; the end of its line is not."""
+    line_ends = np.append(line_starts[1:], len(a))
+    has = comment >= 0
+    covered = _cover(len(a), comment[has], line_ends[has])
+    covered &= (a != 10) & (a != 13)
+    return covered
 
 
-def _previous(padded: Bytes, at: Ints) -> tuple[Ints, Bools]:
-    """Return where the last byte before `at` stands that is no blank (padded)."""
-    at = at.copy()
-    for _ in range(_MAX_BLANKS):
-        blank = _IS_BLANK[padded[at]]
-        if not blank.any():
-            break
-        at[blank] -= 1
-    return at, _IS_BLANK[padded[at]]
-
-
-def _squeeze(a: Bytes, code: Bools, dropped: Bools, start: Ints) -> list[bytes]:
+def _squeeze(a: Bytes, dropped: Bools, quotes: Ints, start: Ints) -> list[bytes]:
     """Return the masks: numbers to NUL, comments and idle blanks dropped."""
-    blank = _IS_BLANK[a] & code
-    idle = blank.copy()
-    idle[1:] &= _IS_IDLE[a[:-1]] & code[:-1]
-    out = np.where(blank, np.uint8(32), a)
-    keep = ~(dropped | idle)
+    out, keep = a.copy(), ~dropped
+    blank = np.flatnonzero((a <= 32) & (a != 10) & (a != 13) & (a > 0) | (a == 127))
+    blank = blank[~_inside(quotes, blank)]
+    idle = blank[(blank == 0) | _IS_IDLE[a[blank - 1]]]
+    out[blank] = 32
+    keep[idle] = False
     keep[start] = True
     out[start] = 0
     returns = np.flatnonzero(a == 13)
@@ -192,36 +167,13 @@ def _squeeze(a: Bytes, code: Bools, dropped: Bools, start: Ints) -> list[bytes]:
     return masks
 
 
-def _values(a: Bytes, in_number: Bools, start: Ints, end: Ints) -> Floats:
-    """Return the values of plain decimal numbers, all at once.
-
-    Up to 15 digits and 22 decimals the digits are an exact integer and the power of
-    ten an exact float, so that one rounded division gives what reading the text would.
-    """
-    if not len(start):
-        return np.zeros(0)
-    at = np.flatnonzero(in_number & _IS_DIGIT[a])
-    first = np.searchsorted(at, start)
-    count = np.diff(np.append(first, len(at)))
-    dot = np.flatnonzero(in_number & (a == 46))
-    owner = np.searchsorted(start, dot, side="right") - 1
-    decimals = np.zeros(len(start), dtype=np.int64)
-    decimals[owner] = end[owner] - dot - 1
-    power = np.repeat(first + count - 1, count) - np.arange(len(at))
-    digits = (a[at] - np.uint8(48)).astype(np.int64)
-    whole = np.add.reduceat(digits * _TENS[np.minimum(power, 15)], first)
-    value: Floats = whole / _TENS[np.minimum(decimals, 15)].astype(float)
-    value[a[start] == 45] *= -1.0
-    for i in np.flatnonzero(count > 15).tolist():
-        value[i] = number_value(a[start[i] : end[i]].tobytes().decode("latin-1"))
-    return value
-
-
 def _with_odd_lines(
     data: bytes, line_starts: Ints, odd: Bools, plain: Masked
 ) -> Masked:
     """Mask the odd lines one by one and merge them with the plain ones."""
-    starts, ends, values = [plain.start], [plain.end], [plain.value]
+    if not odd.any():
+        return plain
+    starts, ends, numbers = [plain.start], [plain.end], [plain.value]
     unterminated: list[int] = []
     line_ends = np.append(line_starts[1:], len(data))
     for line in np.flatnonzero(odd).tolist():
@@ -233,7 +185,7 @@ def _with_odd_lines(
         starts.append(np.array(masked.start, dtype=np.int64) + at)
         ends.append(np.array(masked.end, dtype=np.int64) + at)
         spans = zip(masked.start, masked.end, strict=True)
-        values.append(np.array([number_value(text[s:e]) for s, e in spans], float))
+        numbers.append(np.array([number_value(text[s:e]) for s, e in spans], float))
         if masked.unterminated:
             unterminated.append(line)
     start = np.concatenate(starts)
@@ -245,6 +197,6 @@ def _with_odd_lines(
         np.append(np.searchsorted(start, line_starts), len(start)).astype(np.int64),
         start,
         np.concatenate(ends)[order],
-        np.concatenate(values)[order],
+        np.concatenate(numbers)[order],
         tuple(unterminated),
     )
