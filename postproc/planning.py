@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from postproc.accuracy.lost_motion import measured_play
 from postproc.accuracy.model import Model
+from postproc.arcs import mark_arcs
 from postproc.exceptions import ProgramError
 from postproc.language.diagnostic import Diagnostic
 from postproc.language.flow import Start, resolve
@@ -208,6 +209,7 @@ def plan_visits(
     reasons.adopt(planned.reason, planned.reasons)
     on = mark_strings(visits, targets, planned, cell.arm, reasons, doubtful)
     mark_turning(visits, targets, planned, reasons)
+    mark_arcs(targets, planned, reasons)
     return Planned(targets, planned, reasons, np.zeros((len(visits), 3)), on)
 
 

@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from postproc.accuracy.guard import guard_size, guard_solutions, guard_steps, guard_turn
-from postproc.followers import carry_along, worsened
-from postproc.language.visits import NO_TARGET, Target, Visits
+from postproc.arcs import STRAYS, strayed
+from postproc.followers import carry_along
+from postproc.marks import mark_disagreement, mark_display, mark_unchanged, must_stay
 from postproc.options import Options
 from postproc.planning import Planned, Reading
+from postproc.pose import MM
 from postproc.reasons import Reasons
-from postproc.reconcile import Agreement, agree
+from postproc.reconcile import agree
 from postproc.report import Decisions, Status
 from postproc.robot.cell import Cell
 from postproc.solved import Solved
@@ -63,6 +64,34 @@ def propose(
     cell: Cell,
     options: Options,
 ) -> Proposal:
+    """Decide what moves, until no arc becomes quite another one by it.
+
+    Args and returns are those of `decide`: every round leaves more points alone.
+    """
+    strays, step = np.zeros(len(held), dtype=bool), cell.limits.step_mm * MM
+    shift = solved.command[:, :3, 3] - planned.plan.tcp[:, :3, 3]
+    shift -= aside - planned.plan.aside
+    while True:
+        found = decide(
+            reading, planned, solved, aside, held, strays, cell, options
+        )  # fmt: skip
+        moves = np.where(found.corrected[:, None], shift, 0.0)
+        more = strayed(planned.targets, planned.plan, moves, step) & ~strays
+        if not more.any():
+            return found
+        strays = strays | more
+
+
+def decide(
+    reading: Reading,
+    planned: Planned,
+    solved: Solved,
+    aside: Array,
+    held: Bools,
+    strays: Bools,
+    cell: Cell,
+    options: Options,
+) -> Proposal:
     """Guard every solved visit, and compare the arrivals at every literal.
 
     Args:
@@ -71,6 +100,7 @@ def propose(
         solved: The corrected command of every visit.
         aside: From targets to where the corrected path passes them, (n, 3) [m].
         held: Visits that must be left alone, (n,).
+        strays: Visits whose correction would make another arc, (n,).
         cell: Guards and frames.
         options: What the user asked for.
     """
@@ -91,6 +121,7 @@ def propose(
     guard_size(reasons, cell.limits, moved, solved.residual)
     guard_steps(reasons, cell.limits, correction, side, visits.run_mates)
     reasons.mark(held, HELD)
+    reasons.mark(strays, STRAYS)
     numbers = new_numbers(visits, plan, solved, aside)
     change = change_mm(visits, numbers, correction)
     both = np.concatenate([change, turns_in_file(visits, turn) * LEVER_MM], axis=1)
@@ -131,86 +162,3 @@ def propose(
         both,
         agreement.literal[np.any([*stay.values()], axis=0)],
     )
-
-
-def must_stay(
-    visits: Visits, agreement: Agreement, change: Array, trusted: Bools, cell: Cell
-) -> dict[str, Bools]:
-    """Find literals that must keep their values for what else depends on them.
-
-    Returns:
-        The reasons, and which of the m literals of the agreement have each, (m,).
-    """
-    hurt = worsened(visits, agreement, change, trusted, cell.limits.agree_mm)
-    found = {f"{why}: give the move a point of its own (see --clone)": rows
-             for why, pins in visits.literals.pins.items()
-             if (rows := np.isin(agreement.literal, pins)).any()}  # fmt: skip
-    text = "a target computed from it would land farther off (see --clone)"
-    return found | {text: hurt}
-
-
-def mark_display(visits: Visits, planned: Planned, reasons: Reasons) -> Bools:
-    """Mark targets whose value is known only at run time, (n,)."""
-    holds = ~without_target(visits)
-    display = holds & ((visits.reason > 0) | (visits.literal < 0))
-    reasons.adopt(visits.reason, visits.reasons)
-    reasons.mark(display, "its numbers are not written in the program")
-    return display
-
-
-def without_target(visits: Visits) -> Bools:
-    """Tell which moves go where no target of theirs says, (n,): $HOME, RELATIVE, .."""
-    none = np.array([text.startswith(NO_TARGET) for text in visits.reasons])
-    named = np.isin(
-        visits.target, (Target.POSE, Target.JOINTS, Target.NEAR, Target.UNKNOWN)
-    )
-    return np.asarray(~named | none[visits.reason])
-
-
-def mark_unchanged(visits: Visits, reasons: Reasons, options: Options) -> Bools:
-    """Mark moves without a target, taught points and shared variables, (n,)."""
-    empty = without_target(visits)
-    reasons.mark(empty, "this move holds no target")
-    has = visits.literal >= 0
-    literal = np.where(has, visits.literal, 0)
-    if len(visits.literals) == 0:
-        return empty
-    taught = has & visits.literals.taught[literal]
-    reasons.mark(taught, "a taught point already contains the arm's error")
-    if not options.shared:
-        shared = has & visits.literals.shared[literal]
-        reasons.mark(shared, "other programs may read this variable too (see --shared)")
-    return np.asarray(empty | taught)
-
-
-def mark_disagreement(
-    visits: Visits,
-    agreement: Agreement,
-    stay: Mapping[str, Bools],
-    cell: Cell,
-    reasons: Reasons,
-) -> tuple[Bools, Bools]:
-    """Mark the visits of literals whose arrivals disagree, or that must stay.
-
-    Returns:
-        The literals that agree, (m,), and the visits that would be corrected if the
-        others at their literal agreed, (n,).
-    """
-    limit = cell.limits.agree_mm
-    has = agreement.group >= 0
-    apart = ~(agreement.spread_mm <= limit)
-    stays = np.any([apart, *stay.values()], axis=0)
-    together = agreement.usable & ~stays
-    if len(together) == 0:
-        return together, np.zeros(len(visits), dtype=bool)
-    at = np.where(has, agreement.group, 0)
-    unsafe = reasons.none & has & ~together[at]
-    text = (
-        f"its arrivals differ by more than agree_mm = {limit:g}: give each move a "
-        "point of its own (see --clone)"
-    )
-    reasons.mark(unsafe & agreement.usable[at] & apart[at], text)
-    for why, literals in stay.items():
-        reasons.mark(unsafe & literals[at], why)
-    reasons.mark(unsafe, "another arrival at the same point cannot be corrected")
-    return together, unsafe

@@ -65,7 +65,10 @@ def test_only_what_is_computed_from_a_target_moves_along(found):
 def test_what_is_seen_at_one_value_from_one_side_is_compensated(found):
     assert found.wrong == []
     compensated = sum(n for text, n in found.once.items() if text.startswith(DONE))
-    assert compensated > 0.9 * found.once.total() > 100
+    # Points drawn at random often make arcs that no correction should touch.
+    arcs = sum(n for text, n in found.once.items() if "three points of" in text)
+    assert compensated > 0.9 * (found.once.total() - arcs) > 100
+    assert arcs < 0.1 * found.once.total()
     assert found.once[DONE] > 100
 
 

@@ -1,9 +1,9 @@
 """Long programs in windows, cut at stops that nothing but the arm's standing crosses.
 
-Behind such a stop the program goes on from there alone, no jump leads across it, and no
-number is used on both sides. Nothing before it depends on what comes after, and what
-comes after depends on the past only through where the arm stands and what its joints
-remember.
+Behind such a stop the program goes on from there alone, no jump leads across it, no
+number is used on both sides, and no arc begins there. Nothing before it depends on what
+comes after, and what comes after depends on the past only through where the arm stands
+and what its joints remember.
 """
 
 from __future__ import annotations
@@ -86,7 +86,8 @@ def quiet_stops(visits: Visits) -> Bools:
     crossed = _covered(visits.pred[jumps], to[jumps], n) | _same_numbers(visits)
     quiet = np.zeros(n, dtype=bool)
     quiet[visits.pred[goes_on]] = True
-    quiet &= ~visits.fly & ~visits.via & ~crossed
+    begins_arc = np.append(visits.via[1:], False)
+    quiet &= ~visits.fly & ~visits.via & ~begins_arc & ~crossed
     return np.asarray(quiet)
 
 

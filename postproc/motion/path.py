@@ -22,6 +22,7 @@ STEP = 5e-3  # [m] between samples
 TURN = np.deg2rad(1.0)  # [rad] between samples
 MOST = 2000  # samples of one path
 COLLINEAR = 1e-6  # sine of the angle at VIA below which three points make no circle
+APART = 1e-6  # [m] nor do they where two are nearer: rounding alone would place it
 
 
 @dataclass(frozen=True)
@@ -114,8 +115,9 @@ def _circles(a: Array, b: Array, c: Array) -> tuple[Array, Array, Bools]:
     u, v = b - a, c - a
     w = np.cross(u, v)
     size = np.linalg.norm(w, axis=1)
-    scale = np.linalg.norm(u, axis=1) * np.linalg.norm(c - b, axis=1)
-    valid = np.asarray(size > COLLINEAR * scale)
+    sides = np.array([np.linalg.norm(side, axis=1) for side in (u, c - b, v)])
+    valid = np.asarray(size > COLLINEAR * sides[0] * sides[1])
+    valid &= (sides > APART).all(axis=0)
     size = np.where(valid, size, 1.0)[:, None]
     uu, vv = (u**2).sum(1)[:, None], (v**2).sum(1)[:, None]
     centre = a + np.cross(uu * v - vv * u, w) / (2 * size**2)

@@ -14,6 +14,7 @@ Array = NDArray[np.float64]
 STEP = 3e-3  # [m]
 TURN_STEP = np.radians(1.0)
 FEWEST = 4
+APART = 1e-6  # [m] points nearer than this are one: they make no circle with a third
 
 
 def straight(start: Array, end: Array) -> Array:
@@ -88,7 +89,8 @@ def _circle(p: Array, q: Array, r: Array) -> tuple[Array, Array]:
     u, v = q - p, r - p
     normal = np.cross(u, v)
     area = float(np.linalg.norm(normal))
-    if area < 1e-6 * np.linalg.norm(u) * np.linalg.norm(v) or area == 0.0:
+    sides = [float(np.linalg.norm(side)) for side in (u, v, r - q)]
+    if area < 1e-6 * sides[0] * sides[1] or min(sides) < APART:
         raise PlanError("the three points of the arc lie on a line")
     to_centre = np.cross(u @ u * v - v @ v * u, normal) / (2 * area**2)
     return p + to_centre, normal / area

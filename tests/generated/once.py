@@ -18,7 +18,8 @@ ALLOWED = tuple(
     re.compile(text)
     for text in (
         "out of reach", "the path to it", "axis . beyond", "singularity",
-        "three points of the arc", "would flip the wrist", "beyond a joint limit",
+        "three points of the arc", "three points of an arc", "would flip the wrist",
+        "beyond a joint limit",
         "steps by more than step_mm", "other programs may read", "computes? with",
         "composes it", "is set to it", "is given it", "may move to it",
         "a target computed from it", "a move whose target is not sure",

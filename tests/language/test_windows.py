@@ -36,12 +36,12 @@ def test_every_stop_of_a_straight_program_but_the_last() -> None:
     assert quiet(stop(1000), stop(1010), stop(1020)) == [True, True, False]
 
 
-def test_fly_points_and_points_on_arcs_are_none() -> None:
+def test_fly_points_and_where_arcs_begin_or_pass_are_none() -> None:
     fly = stop(1010).replace("MOVE ", "MOVEFLY ").replace("\n", " ADVANCE\n")
     arc = "  MOVE CIRCULAR TO POS(1040, 0, 900, 0, 180, 0, '') "
     arc += "VIA POS(1030, 10, 900, 0, 180, 0, '')\n"
     body = stop(1000), fly, stop(1020), arc, stop(1050)
-    assert quiet(*body) == [True, False, True, False, True, False]
+    assert quiet(*body) == [True, False, False, False, True, False]
 
 
 def test_jumps_are_not_cut() -> None:
