@@ -15,6 +15,7 @@ from scipy.spatial.transform import Rotation
 
 from postproc.flying import rounding_of
 from postproc.language.visits import Target, Visits
+from postproc.motion.rounds import from_every_start
 from postproc.motion.targets import Kind, Targets
 from postproc.pose import MM, inverse, is_unknown, pose_from_record, products
 from postproc.reasons import Reasons
@@ -74,6 +75,9 @@ def targets_from_visits(visits: Visits, cell: Cell) -> tuple[Targets, Reasons]:
     lost |= np.isnan(joints).any(axis=1) & np.isin(kind, (Kind.JOINTS, Kind.JOINT_STEP))
     slot, turns = configurations(visits.configs)
     rounding, distance, overlap = rounding_of(visits)
+    pred_start, pred = from_every_start(
+        visits.motion, visits.via, visits.pred_start, visits.pred
+    )
     targets = Targets(
         move=visits.motion,
         kind=np.where(lost, Kind.UNKNOWN, kind),
@@ -93,8 +97,8 @@ def targets_from_visits(visits: Visits, cell: Cell) -> tuple[Targets, Reasons]:
         rotary_speed=visits.rot_spd,
         override=visits.override,
         wrist_joint=visits.wrist_joint,
-        pred_start=visits.pred_start,
-        pred=visits.pred,
+        pred_start=pred_start,
+        pred=pred,
     )
     return targets, reasons
 

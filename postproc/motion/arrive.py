@@ -2,18 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
-from postproc.motion.branches import (
-    LOST,
-    follow,
-    nearest_slot,
-    nearest_turns,
-    on_written_turns,
-)
+from postproc.motion.along import along_late_arc, along_line
+from postproc.motion.arrival import NO_PATH, Arrival
+from postproc.motion.branches import nearest_slot, nearest_turns, on_written_turns
 from postproc.motion.path import lines
 from postproc.motion.reasons import (
     CODE,
@@ -21,41 +15,15 @@ from postproc.motion.reasons import (
     NO_CIRCLE,
     NO_START,
     NO_TARGET,
-    OTHER_BRANCH,
     OUT_OF_REACH,
-    PATH_JUMP,
     PATH_REACH,
 )
 from postproc.motion.targets import Kind, Move
-from postproc.motion.ways import Solved, Ways
 from postproc.motion.workspace import Workspace
 from postproc.motion.wrist import wrist_interpolated
 from postproc.robot.arm import Arm
 
 Array = NDArray[np.float64]
-
-
-@dataclass(frozen=True)
-class Arrival:
-    """Where one edge leads to.
-
-    Attributes:
-        q: (6,) [rad], NaN where not known.
-        flange: (4, 4) [m].
-        slot: Branch, -1 where unknown.
-        path: Joint angles along the edge, the target included, (k, 6); empty where the
-            path is not known.
-        reason: Index into `REASONS`.
-    """
-
-    q: Array
-    flange: Array
-    slot: int
-    path: Array
-    reason: int
-
-
-NO_PATH = np.empty((0, 6))
 
 
 def arrive(work: Workspace, v: int, edge: int) -> Arrival:
@@ -80,16 +48,17 @@ def arrive(work: Workspace, v: int, edge: int) -> Arrival:
         return end
     if work.samples.broken[edge]:
         return Arrival(end.q, flange, end.slot, NO_PATH, CODE[NO_CIRCLE])
-    arc_unknown = targets.move[v] == Move.CIRCULAR and not work.samples.ready[edge]
-    if arc_unknown or np.isnan(targets.tool[v]).any():
+    if np.isnan(targets.tool[v]).any():
         return Arrival(end.q, flange, end.slot, NO_PATH, end.reason)
+    if targets.move[v] == Move.CIRCULAR and not work.samples.ready[edge]:
+        return along_late_arc(work, v, edge, flange, end)
     if targets.wrist_joint[v]:
         path = wrist_interpolated(
             work.arm, near, end.q, targets.tool[v], work.samples.count(edge)
         )
         reason = end.reason if len(path) else end.reason or CODE[PATH_REACH]
         return Arrival(end.q, flange, end.slot, path, reason)
-    return _along_line(work, v, edge, flange, end)
+    return along_line(work, v, edge, flange, end)
 
 
 def part_way(work: Workspace, v: int, flange: Array) -> Array:
@@ -144,40 +113,3 @@ def _nearest_allowed(arm: Arm, q: Array, near: Array) -> Array:
     """Take the nearest turn of every axis that has it in its range."""
     turned = nearest_turns(q, near)
     return np.where((turned >= arm.lower) & (turned <= arm.upper), turned, q)
-
-
-def _along_line(
-    work: Workspace, v: int, edge: int, flange: Array, end: Arrival
-) -> Arrival:
-    """Follow a Cartesian path; where that fails, keep the end and say why."""
-    near = work.q[work.source[edge]]
-    joints = work.targets.kind[v] == Kind.JOINTS
-    ways = _ways(work, v, edge, flange, not joints)
-    done = follow(near, ways)
-    if len(done.q) < len(ways):
-        lost = OUT_OF_REACH if len(end.path) == 0 else PATH_REACH
-        reason = CODE[PATH_JUMP if done.reached else lost]
-        return Arrival(end.q, flange, end.slot, NO_PATH, reason)
-    if not joints:
-        before = work.branch_at(int(work.source[edge]))
-        single = (done.slot == (done.slot[0] if before < 0 else before)).all()
-        reason = 0 if single else CODE[PATH_JUMP]
-        return Arrival(done.q[-1], flange, int(done.slot[-1]), done.q, reason)
-    last = done.q[-1] if len(done.q) else near
-    if np.abs(last - end.q).max() > LOST:
-        return Arrival(end.q, flange, -1, NO_PATH, CODE[OTHER_BRANCH])
-    return Arrival(end.q, flange, -1, np.vstack([done.q, end.q]), 0)
-
-
-def _ways(work: Workspace, v: int, edge: int, flange: Array, target: bool) -> Ways:
-    """Return the solutions along an edge, with or without those at the target."""
-    if work.samples.ready[edge]:
-        span = work.span(edge)
-        return work.ways(slice(span.start, span.stop if target else span.stop - 1))
-    tool = work.targets.tool[v]
-    begin = (work.flange[work.source[edge]] @ tool)[None]
-    line = lines(begin, (flange @ tool)[None])
-    k = work.samples.count(edge)
-    u = np.arange(1, k + (1 if target else 0)) / k
-    tcp = line.poses(np.zeros(len(u), dtype=np.int64), u)
-    return Solved(work.arm.inverse(tcp @ work.tool_inverse[v]).q)

@@ -13,6 +13,7 @@ NO_START = (
 PATH_REACH = "the path to it leaves the reach: add a point between, or use JOINT"
 PATH_JUMP = "the path to it passes through a singularity: lead it round, or use JOINT"
 NO_CIRCLE = "the three points of the arc lie on one line: move VIA, or use LINEAR"
+ARC_END = "where the arc through it ends is not known"
 AMBIGUOUS = "its predecessors lead to different joint angles"
 OTHER_BRANCH = "the path to it arrives on another branch or turn than its joint angles"
 LIMITS = tuple(
@@ -23,6 +24,6 @@ WRIST = "at the wrist singularity: turn the tool, or lower wrist_deg in the cell
 
 REASONS = (
     REACHED, NO_TARGET, OUT_OF_REACH, NO_BRANCH, NO_START, PATH_REACH, PATH_JUMP,
-    NO_CIRCLE, AMBIGUOUS, OTHER_BRANCH, *LIMITS, *PATH_LIMITS, WRIST,
+    NO_CIRCLE, ARC_END, AMBIGUOUS, OTHER_BRANCH, *LIMITS, *PATH_LIMITS, WRIST,
 )  # fmt: skip
 CODE = {reason: code for code, reason in enumerate(REASONS)}

@@ -92,6 +92,33 @@ def rounds(targets: Targets, tcp: Array, aside: Array) -> Rounds:
     return Rounds(arcs_at, points - aside[arcs_at])
 
 
+def from_every_start(
+    move: Ints, via: Bools, pred_start: Ints, pred: Ints
+) -> tuple[Ints, Ints]:
+    """Let the end of an arc have VIA as its predecessor once for every start of it.
+
+    From another start the same VIA and end make another circle.
+
+    Args:
+        move: `Move` of n moves, (n,).
+        via: True at the point on the way of an arc, (n,).
+        pred_start: Predecessors of move v are pred[pred_start[v] : pred_start[v + 1]].
+        pred: Predecessors; negative for a place that is not known.
+
+    Returns:
+        `pred_start` and `pred` with the repetitions.
+    """
+    visit = np.repeat(np.arange(len(move)), np.diff(pred_start))
+    ends = (move[visit] == Move.CIRCULAR) & ~via[visit]
+    ends &= (pred >= 0) & (pred == visit - 1) & via[pred]
+    starts = np.diff(pred_start)[np.maximum(pred, 0)]
+    times = np.where(ends, np.maximum(starts, 1), 1)
+    if (times == 1).all():
+        return pred_start, pred
+    before = np.concatenate([[0], np.cumsum(times)])
+    return before[pred_start], np.repeat(pred, times)
+
+
 def _parts(points: Array) -> tuple[Segments, Segments]:
     """Build both parts of arcs through points (k, 3, 3) [m]."""
     poses = np.tile(np.eye(4), (*points.shape[:2], 1, 1))

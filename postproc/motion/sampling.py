@@ -29,6 +29,7 @@ class Samples:
         cartesian: The TCP's path is a line or an arc, (e,).
         ready: The poses of the samples are known, (e,).
         broken: The three points of an arc make no circle, (e,).
+        begins: On both parts of an arc, the edge from its start to VIA, (e,); else -1.
         start: Samples start[i] .. start[i + 1] - 1 are those of edge i, the last of
             them the move's own target, (e + 1,).
         length: Length of the TCP's path, (e,) [m], 0 where it is not ready.
@@ -42,6 +43,7 @@ class Samples:
     cartesian: Bools
     ready: Bools
     broken: Bools
+    begins: Ints
     start: Ints
     length: Array
     turning: Array
@@ -71,7 +73,8 @@ def sample(targets: Targets, flange: Array) -> Samples:
     straight = np.flatnonzero(ready & (targets.move[visit] == Move.LINEAR))
     begin = flange[source[straight]] @ targets.tool[visit[straight]]
     end = flange[visit[straight]] @ targets.tool[visit[straight]]
-    round_, arc = _arcs(targets, flange, visit, source, ready)
+    begins = _begins(targets, visit, source)
+    round_, arc = _arcs(targets, flange, visit, source, ready, begins)
     segments, edge = joined([lines(begin, end), arc]), np.append(straight, round_)
     broken = np.zeros(len(visit), dtype=bool)
     broken[edge] = ~segments.valid
@@ -83,7 +86,9 @@ def sample(targets: Targets, flange: Array) -> Samples:
     count[edge] = segments.intervals(np.where(free[edge], 1, LEAST))
     count[broken] = 1
     start = np.concatenate([[0], np.cumsum(count)])
-    return _inner(targets, segments, edge, visit, source, cartesian, broken, start)
+    return _inner(
+        targets, segments, edge, visit, source, cartesian, broken, begins, start
+    )
 
 
 def _inner(
@@ -94,6 +99,7 @@ def _inner(
     source: Ints,
     cartesian: Bools,
     broken: Bools,
+    begins: Ints,
     start: Ints,
 ) -> Samples:
     """Place the inner samples of the segments that belong to edges."""
@@ -108,33 +114,55 @@ def _inner(
     length, turning = np.zeros(len(visit)), np.zeros(len(visit))
     length[edge], turning[edge] = segments.length, segments.turning
     return Samples(
-        visit, source, cartesian, ready, broken, start, length, turning,
+        visit, source, cartesian, ready, broken, begins, start, length, turning,
         inner=start[edge[path]] + nth, flange=tcp @ tool_inverse[path],
     )  # fmt: skip
 
 
-def _arcs(
-    targets: Targets, flange: Array, visit: Ints, source: Ints, ready: Bools
-) -> tuple[Ints, Segments]:
-    """Build both parts of every arc: edges (m,) and their segments.
+def _begins(targets: Targets, visit: Ints, source: Ints) -> Ints:
+    """Find the edge on which the arc of every edge begins, (e,), -1 without one.
 
-    The part after VIA belongs to the circle from VIA's first predecessor.
+    The edges from VIA to the end are as many as those to VIA, and in their order.
     """
-    arc = ready & (targets.move[visit] == Move.CIRCULAR)
-    to_via = arc & targets.via[visit]
+    n, begins = len(targets), np.full(len(visit), -1)
+    arc = targets.move[visit] == Move.CIRCULAR
+    first = np.flatnonzero(arc & targets.via[visit] & (visit + 1 < n))
+    begins[first] = first
+    at = np.maximum(source, 0)
+    second = np.flatnonzero(
+        arc & ~targets.via[visit] & (source == visit - 1) & targets.via[at]
+    )
+    via = source[second]
+    starts = np.diff(targets.pred_start)
+    same = np.bincount(via, minlength=n)[via] == starts[via]
+    nth = np.arange(len(second)) - np.searchsorted(via, via)
+    begins[second[same]] = (targets.pred_start[via] + nth)[same]
+    return begins
+
+
+def _arcs(
+    targets: Targets,
+    flange: Array,
+    visit: Ints,
+    source: Ints,
+    ready: Bools,
+    begins: Ints,
+) -> tuple[Ints, Segments]:
+    """Build both parts of every arc: edges (m,) and their segments."""
     n = len(targets)
-    to_via &= visit + 1 < n
+    to_via = ready & (begins == np.arange(len(visit)))
     to_via &= ~np.isnan(flange[np.minimum(visit + 1, n - 1), 0, 0])
     first = np.flatnonzero(to_via)
-    begin = flange[source[first]] @ targets.tool[visit[first]]
-    via = flange[visit[first]] @ targets.tool[visit[first]]
-    end = flange[visit[first] + 1] @ targets.tool[visit[first]]
-    to, after = arcs(begin, via, end)
-    row, at = np.full(n, -1), np.maximum(source, 0)
-    row[visit[first][::-1]] = np.arange(len(first))[::-1]
-    second = np.flatnonzero(arc & ~targets.via[visit] & (row[at] >= 0))
-    second = second[source[second] == visit[second] - 1]
-    used = row[source[second]]
+    tool = targets.tool[visit[first]]
+    to, after = arcs(
+        flange[source[first]] @ tool,
+        flange[visit[first]] @ tool,
+        flange[visit[first] + 1] @ tool,
+    )
+    row = np.full(len(visit) + 1, -1)  # the last one is that of no edge
+    row[first] = np.arange(len(first))
+    second = np.flatnonzero(ready & ~targets.via[visit] & (row[begins] >= 0))
+    used = row[begins[second]]
     picked = Segments(
         *(getattr(after, name)[used] for name in Segments.__dataclass_fields__)
     )

@@ -7,7 +7,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from postproc.motion.arrive import Arrival, arrive, choose
+from postproc.motion.arrival import Arrival
+from postproc.motion.arrive import arrive, choose
 from postproc.motion.branches import follow, on_other_turns, on_written_turns
 from postproc.motion.pull import Pull
 from postproc.motion.reasons import (

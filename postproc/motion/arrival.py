@@ -1,0 +1,33 @@
+"""Where one move leads to from one place."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Arrival:
+    """Where one edge leads to.
+
+    Attributes:
+        q: (6,) [rad], NaN where not known.
+        flange: (4, 4) [m].
+        slot: Branch, -1 where unknown.
+        path: Joint angles along the edge, the target included, (k, 6); empty where the
+            path is not known.
+        reason: Index into `REASONS`.
+    """
+
+    q: Array
+    flange: Array
+    slot: int
+    path: Array
+    reason: int
+
+
+NO_PATH = np.empty((0, 6))
