@@ -14,7 +14,7 @@ from postproc.exceptions import ProgramError
 from postproc.language.visits import Visits
 from postproc.pose import MM
 from postproc.report import Decisions, Status
-from postproc.sidecar import read_sidecar, sha256, sidecar_path
+from postproc.sidecar import read_without_edits, sha256, sidecar_path
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -49,7 +49,7 @@ class Arrivals:
     correction_mm: Array
     counts: Mapping[str, int]
 
-    def find(self, lines: Sequence[int]) -> Ints:
+    def find(self, lines: Sequence[int] | Ints) -> Ints:
         """Return the index of every line, -1 where it holds no target."""
         wanted = np.asarray(lines, dtype=np.int64)
         if len(self.line) == 0:
@@ -160,7 +160,7 @@ def read_arrivals(
         where a file has changed since.
     """
     try:
-        record = read_sidecar(sidecar_path(compensated))
+        record = read_without_edits(sidecar_path(compensated))
     except ProgramError:
         return {}
     told = {}

@@ -97,7 +97,14 @@ def fixed(values: Floats, decimals: int) -> Column:
     )
 
 
-def shortest(values: Floats, decimals: int = 5) -> Column:
+def short(value: float) -> str:
+    """Write a number as Python does, rounded to 9 decimals."""
+    return repr(round(value, 9))
+
+
+def shortest(
+    values: Floats, decimals: int = 5, text: Callable[[float], str] = short
+) -> Column:
     """Write numbers as Python does, rounded to 9 decimals; NaN becomes ``null``.
 
     Numbers of few decimals are exact in that many, and what is shorter is the same
@@ -106,6 +113,7 @@ def shortest(values: Floats, decimals: int = 5) -> Column:
     Args:
         values: (k,).
         decimals: What most numbers are written with at most, 2 to 8.
+        text: How a number with more decimals is written.
 
     >>> joined([shortest(np.array([12.5, -3.0, 0.1 + 0.2, 1e-5])), b" "])
     b'12.5 -3.0 0.3 1e-05 '
@@ -123,11 +131,7 @@ def shortest(values: Floats, decimals: int = 5) -> Column:
         ends &= rows[:, column] == ord("0")
         rows[ends, column] = 0
     rows = blanked(rows, np.isnan(values), b"null")
-    return _by_python(rows, values, ~(sure | np.isnan(values)), _short)
-
-
-def _short(value: float) -> str:
-    return repr(round(value, 9))
+    return _by_python(rows, values, ~(sure | np.isnan(values)), text)
 
 
 def _written(scaled: Ints, decimals: int, negative: Bools) -> Column:

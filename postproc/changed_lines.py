@@ -3,110 +3,124 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
-from itertools import islice, pairwise
-from typing import NamedTuple
+from collections.abc import Sequence
+from itertools import islice
 
 import numpy as np
 from numpy.typing import NDArray
 
+from postproc.language.lexis import BLANKS
 from postproc.language.masking import Masked, mask_lines
+from postproc.rows import Rows, joined_rows
 
-PIECE = 20_000  # lines that are masked at a time
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Bools = NDArray[np.bool_]
+
+PIECE = 5_000  # lines that are masked at a time
+THREADS = 1
 
 _ASSIGNED = re.compile(r"\s*([A-Za-z_$][\w$.\[\]]*)\s*(?::=|:)")
 _TWO_WORDS = re.compile(r"\s*([A-Za-z_]+)\s+([A-Za-z_]+)")
 _WORD = re.compile(r"[A-Za-z_]+")
-
-
-class Row(NamedTuple):
-    """One line that differs, or whose target was left alone.
-
-    Attributes:
-        file: Name of the original file.
-        line: 1-based line in the original; 0 for a line that it does not have.
-        target: What the numbers belong to: a variable, or the statement's first word.
-        original, compensated: The numbers on the line; empty where the text differs.
-        change_mm: Length of the change of the first three of six numbers or more, for
-            a position; None for joint angles and text.
-        text: The line's two texts where more than numbers differ, else "".
-        status, why: What came of the line's target, "" where no record tells.
-        direction: In which every joint arrives, see `postproc.arrivals`; or ().
-        correction_mm: How far the TCP is moved there, or None.
-    """
-
-    file: str
-    line: int
-    target: str
-    original: tuple[float, ...]
-    compensated: tuple[float, ...]
-    change_mm: float | None
-    text: str = ""
-    status: str = ""
-    why: str = ""
-    direction: tuple[int, ...] = ()
-    correction_mm: float | None = None
+_AS_BLANKS = bytes(32 if chr(c) in BLANKS else c for c in range(256))
 
 
 def changed_rows(
-    file: str, lines: Sequence[int], before: Sequence[str], after: Sequence[str]
-) -> Iterator[Row]:
-    """Describe those of equally many lines that differ, some at a time."""
+    file: str, lines: Sequence[int], before: Sequence[bytes], after: Sequence[bytes]
+) -> Rows:
+    """Describe those of equally many lines that differ.
+
+    Args:
+        file: Name of the original.
+        lines: Numbers of its lines.
+        before: Its lines, without their endings.
+        after: Those of the other file.
+    """
     pairs = zip(before, after, strict=True)
     places = [k for k, (old, new) in enumerate(pairs) if old != new]
+
+    parts = []
     for first in range(0, len(places), PIECE):
         part = places[first : first + PIECE]
-        numbers = [lines[k] for k in part]
-        yield from _compare(
-            file, numbers, [before[k] for k in part], [after[k] for k in part]
-        )
+        numbers = np.array([lines[k] for k in part], dtype=np.int64)
+        old, new = [before[k] for k in part], [after[k] for k in part]
+        parts.append(_compare(file, numbers, old, new))
+    return joined_rows(file, parts)
 
 
 def _compare(
-    file: str, lines: Sequence[int], before: list[str], after: list[str]
-) -> Iterator[Row]:
+    file: str, lines: Ints, before: Sequence[bytes], after: Sequence[bytes]
+) -> Rows:
     """Describe how pairs of lines differ."""
     a, b = _masked(before), _masked(after)
-    same = _only_numbers(before, after, a, b)
-    size, name = _moves(a, b), _Names()
-    rows = zip(lines, before, after, same, size, a.masks, strict=True)
-    old_numbers, new_numbers = _numbers(a), _numbers(b)
-    for line, text, other, alike, moved, mask in rows:
-        old, new = next(old_numbers), next(new_numbers)
-        if not alike or old == new:
-            yield Row(file, line, "", (), (), None, f"{text} -> {other}")
-            continue
-        change = moved if len(old) >= 3 and "{" not in text else None
-        yield Row(file, line, name(mask, text), old, new, change)
+    alike = _only_numbers(before, after, a, b)
+    count, other = np.diff(a.first), np.diff(b.first)
+    alike &= count == other
+    old = a.value[np.repeat(alike, count)]
+    new = b.value[np.repeat(alike, other)]
+    count = np.where(alike, count, 0)
+    owner = np.repeat(np.arange(len(lines)), count)
+    moved = np.bincount(owner[old != new], minlength=len(lines)) > 0
+    old, new = old[moved[owner]], new[moved[owner]]
+    first = np.cumsum(np.append(0, np.where(moved, count, 0)))
+    has, change = _changes(first, old, new, before)
+    targets = _targets(before, a, moved)
+    names = {name: k for k, name in enumerate(dict.fromkeys(targets))}
+    texts = {
+        k: f"{before[k].decode('latin-1')} -> {after[k].decode('latin-1')}"
+        for k in np.flatnonzero(~moved).tolist()
+    }
+    at = np.array([names[name] for name in targets], dtype=np.int64)
+    return Rows(file, lines, list(names), at, first, old, new, change, has, texts)
 
 
 def _only_numbers(
-    before: list[str], after: list[str], a: Masked, b: Masked
-) -> list[bool]:
+    before: Sequence[bytes], after: Sequence[bytes], a: Masked, b: Masked
+) -> Bools:
     """Tell which pairs of lines differ in nothing but numbers."""
-    same = [x == y for x, y in zip(a.masks, b.masks, strict=True)]
+    same = np.array([x == y for x, y in zip(a.masks, b.masks, strict=True)])
     if (a.comment >= 0).any() or (b.comment >= 0).any():
         comments = zip(_comments(before, a), _comments(after, b), strict=True)
-        alike = zip(same, comments, strict=True)
-        same = [is_same and old == new for is_same, (old, new) in alike]
-    for number in {*a.unterminated, *b.unterminated}:
-        same[number] = False
+        same &= np.array([x == y for x, y in comments])
+    same[[*a.unterminated, *b.unterminated]] = False
     return same
 
 
-class _Names:
-    """Names what the numbers of lines belong to, once for lines that begin alike."""
+def _comments(lines: Sequence[bytes], masked: Masked) -> list[bytes]:
+    """Return the comment of every line, b"" where it has none."""
+    places = zip(lines, masked.comment - _starts(lines), masked.comment, strict=True)
+    return [line[own:] if at >= 0 else b"" for line, own, at in places]
 
-    def __init__(self) -> None:
-        self._known: dict[bytes, str | None] = {}
 
-    def __call__(self, mask: bytes, text: str) -> str:
-        """Return `target_name` of a line with a mask."""
-        begin = mask.partition(b"\0")[0]
-        if begin not in self._known:
-            self._known[begin] = _told_by(begin.decode("latin-1"))
-        name = self._known[begin]
-        return target_name(text) if name is None else name
+def _changes(
+    first: Ints, old: Floats, new: Floats, before: Sequence[bytes]
+) -> tuple[Bools, Floats]:
+    """Return which lines hold a position, and how far it moved, NaN elsewhere."""
+    braces = np.array([b"{" in line for line in before])
+    has = (np.diff(first) >= 3) & ~braces
+    at = first[:-1][has, None] + np.arange(3)
+    change = np.full(len(has), np.nan)
+    with np.errstate(invalid="ignore"):  # numbers too long for a float are infinite
+        change[has] = np.linalg.norm(new[at] - old[at], axis=1)
+    return has, change
+
+
+def _targets(before: Sequence[bytes], a: Masked, moved: Bools) -> list[str]:
+    """Name what the numbers of lines belong to, once for lines that begin alike."""
+    known: dict[bytes, str | None] = {}
+    begins = np.where(moved, np.append(a.start, 0)[a.first[:-1]] - _starts(before), -1)
+    names = []
+    for line, length in zip(before, begins.tolist(), strict=True):
+        if length < 0:
+            names.append("")
+            continue
+        begin = line[:length]
+        if begin not in known:
+            known[begin] = _told_by(begin.translate(_AS_BLANKS).decode("latin-1"))
+        name = known[begin]
+        names.append(target_name(line.decode("latin-1")) if name is None else name)
+    return names
 
 
 def _told_by(begin: str) -> str | None:
@@ -117,47 +131,24 @@ def _told_by(begin: str) -> str | None:
     return assigned[1] if assigned else None
 
 
-def _masked(lines: list[str]) -> Masked:
-    """Mask lines without their endings."""
-    data = [f"{line}\n".encode("latin-1") for line in lines]
-    starts = np.concatenate([[0], np.cumsum([len(line) for line in data])[:-1]])
-    return mask_lines(b"".join(data), starts.astype(np.int64))
-
-
-def shapes(lines: list[str]) -> list[bytes]:
-    """Return the masks of all lines."""
-    return _masked(lines).masks if lines else []
-
-
-def _comments(lines: list[str], masked: Masked) -> Iterator[str]:
-    """Return the comment of every line, "" where it has none."""
-    begin = 0
-    for line, at in zip(lines, masked.comment.tolist(), strict=True):
-        yield line[at - begin :] if at >= 0 else ""
-        begin += len(line) + 1
-
-
-def _numbers(masked: Masked) -> Iterator[tuple[float, ...]]:
-    """Return the numbers of every line."""
-    values = masked.value.tolist()
-    for start, end in pairwise(masked.first.tolist()):
-        yield tuple(values[start:end])
-
-
-def _moves(a: Masked, b: Masked) -> list[float]:
-    """Return how far the first three numbers of every line moved."""
-    both = np.minimum(np.diff(a.first), np.diff(b.first)) >= 3
-    moved: NDArray[np.float64] = np.full(len(both), np.nan)
-    axis = np.arange(3)
-    old = a.value[a.first[:-1][both, None] + axis]
-    new = b.value[b.first[:-1][both, None] + axis]
-    moved[both] = np.linalg.norm(new - old, axis=1)
-    return [float(m) for m in moved.tolist()]
-
-
 def target_name(line: str) -> str:
     """Name what a line's numbers belong to."""
     assigned = _ASSIGNED.match(line)
     if assigned:
         return assigned.group(1)
     return " ".join(found.group() for found in islice(_WORD.finditer(line), 2))
+
+
+def _starts(lines: Sequence[bytes]) -> Ints:
+    """Return where lines begin once they are joined."""
+    return np.cumsum([0, *map(len, lines[:-1])]) + np.arange(len(lines))
+
+
+def _masked(lines: Sequence[bytes]) -> Masked:
+    """Mask lines without their endings; at least one."""
+    return mask_lines(b"\n".join([*lines, b""]), _starts(lines))
+
+
+def shapes(lines: Sequence[bytes]) -> list[bytes]:
+    """Return the masks of all lines."""
+    return _masked(lines).masks if lines else []

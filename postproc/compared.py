@@ -4,13 +4,19 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from difflib import SequenceMatcher
 from pathlib import Path
 
-from postproc.changed_lines import Row, changed_rows, shapes, target_name
+import numpy as np
+from numpy.typing import NDArray
+
+from postproc.changed_lines import changed_rows, shapes, target_name
 from postproc.exceptions import ProgramError
 from postproc.language.stamp import read_stamp
+from postproc.rows import Rows, joined_rows
+
+Ints = NDArray[np.int64]
 
 VARIABLES = ".lsv"
 
@@ -30,31 +36,29 @@ class Compared:
 
     original: Path
     compensated: Path
-    lines: Sequence[str]
-    rows: tuple[Row, ...]
+    lines: Sequence[bytes]
+    rows: Rows
     stamped: bool
 
-    def target(self, line: int) -> str:
-        """Name what the numbers on a line of the original belong to."""
-        named = self.original.suffix.lower() == VARIABLES
-        return (
-            _entry_name(self.lines, line)
-            if named
-            else target_name(self.lines[line - 1])
-        )
+    def targets(self, lines: Ints) -> list[str]:
+        """Name what the numbers on lines of the original, ascending, belong to."""
+        if self.original.suffix.lower() == VARIABLES:
+            return list(_entry_names(self.lines, lines.tolist()))
+        texts = (self.lines[line - 1].decode("latin-1") for line in lines.tolist())
+        return [target_name(text) for text in texts]
 
 
-def _read_lines(path: Path) -> tuple[list[str], bool]:
+def _read_lines(path: Path) -> tuple[list[bytes], bool]:
     """Read a file's lines without their endings; the stamp line is dropped."""
     try:
         data = path.read_bytes()
     except OSError as exc:
         problem = f"cannot be read ({exc.strerror})"
         raise ProgramError(path, problem, "Check the path") from None
-    text = data.decode("latin-1")
-    lines = re.split(r"\r\n|\n|\r", text) if "\r" in text else text.split("\n")
     stamped = read_stamp(data) is not None
-    return lines[stamped:], stamped
+    if b"\r" in data:
+        data = data.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
+    return data.split(b"\n")[stamped:], stamped
 
 
 def compare_files(original: Path, compensated: Path) -> Compared:
@@ -65,36 +69,61 @@ def compare_files(original: Path, compensated: Path) -> Compared:
     """
     before, _ = _read_lines(original)
     after, stamped = _read_lines(compensated)
-    rows = list(_rows(original.name, before, after))
+    rows = joined_rows(original.name, list(_rows(original.name, before, after)))
     if original.suffix.lower() == VARIABLES:
-        rows = [
-            r._replace(target=_entry_name(before, r.line) or r.target) for r in rows
-        ]
-    return Compared(original, compensated, before, tuple(rows), stamped)
+        rows = _named_by_entries(rows, before)
+    return Compared(original, compensated, before, rows, stamped)
 
 
-def _rows(file: str, before: list[str], after: list[str]) -> Iterator[Row]:
+def _rows(file: str, before: list[bytes], after: list[bytes]) -> Iterator[Rows]:
     """Describe the lines that differ, in order."""
     if len(before) == len(after):
-        yield from changed_rows(file, range(1, len(before) + 1), before, after)
+        yield changed_rows(file, range(1, len(before) + 1), before, after)
         return
     masks = shapes(before), shapes(after)
     matcher = SequenceMatcher(None, *masks, autojunk=False)
     for kind, a0, a1, b0, b1 in matcher.get_opcodes():
         if kind == "equal":
             lines = range(a0 + 1, a1 + 1)
-            yield from changed_rows(file, lines, before[a0:a1], after[b0:b1])
+            yield changed_rows(file, lines, before[a0:a1], after[b0:b1])
             continue
-        for k in range(a0, a1):
-            yield Row(file, k + 1, "", (), (), None, f"- {before[k]}")
-        for text in after[b0:b1]:
-            yield Row(file, 0, "", (), (), None, f"+ {text}")
+        gone = np.arange(a0 + 1, a1 + 1)
+        yield _text_rows(file, gone, "- ", before[a0:a1])
+        yield _text_rows(file, np.zeros(b1 - b0, dtype=int), "+ ", after[b0:b1])
 
 
-def _entry_name(lines: Sequence[str], line: int) -> str:
-    """Find the variable that a line of a variable file belongs to."""
-    for k in range(max(line, 1) - 1, -1, -1):
-        found = _ENTRY.match(lines[k])
-        if found:
-            return found.group(1)
-    return ""
+def _text_rows(file: str, lines: Ints, sign: str, texts: Sequence[bytes]) -> Rows:
+    """Describe lines that only one of the files has."""
+    told = {k: f"{sign}{text.decode('latin-1')}" for k, text in enumerate(texts)}
+    return replace(Rows.bare(file, lines, [""] * len(lines)), texts=told)
+
+
+def _named_by_entries(rows: Rows, lines: Sequence[bytes]) -> Rows:
+    """Name rows of a variable file by their variables."""
+    own = (rows.targets[k] for k in rows.target.tolist())
+    entries = _entry_names(lines, rows.line.tolist())
+    names = [name or target for name, target in zip(entries, own, strict=True)]
+    return replace(rows, targets=names, target=np.arange(len(names)))
+
+
+def _entry_names(lines: Sequence[bytes], wanted: Sequence[int]) -> Iterator[str]:
+    """Find the variables that lines of a variable file belong to.
+
+    Args:
+        lines: The file.
+        wanted: 1-based lines, ascending but for 0: those that it does not have.
+    """
+    name, seen = "", 0
+    for line in wanted:
+        if line == 0:
+            yield _entry_name(lines[0]) if lines else ""
+            continue
+        backwards = (_entry_name(lines[k]) for k in range(line - 1, seen - 1, -1))
+        name, seen = next(filter(None, backwards), name), line
+        yield name
+
+
+def _entry_name(line: bytes) -> str:
+    """Return the variable that a line begins to describe, "" if it does not."""
+    found = _ENTRY.match(line.decode("latin-1"))
+    return found.group(1) if found else ""

@@ -20,6 +20,8 @@ from postproc.language.edits import Replacements
 
 SUFFIX = ".postproc.json"
 _LINE_END = re.compile(rb"\r\n|\n|\r")
+EDITS, TARGETS = b'"edits": [', b'], "targets": {'
+CURE = "Restore needs the record that was written beside the program"
 BLOCK = 50  # lines per checksum: how closely a later edit can be located
 
 
@@ -133,11 +135,39 @@ def read_sidecar(path: Path) -> Sidecar:
     Raises:
         ProgramError: It is missing, or not a record.
     """
-    cure = "Restore needs the record that was written beside the program"
+    return _record(path, read_input(path, CURE))
+
+
+def read_without_edits(path: Path) -> Sidecar:
+    """Read a record but for its edits, which are most of it; it has none then.
+
+    Raises:
+        ProgramError: It is missing, or not a record.
+    """
+    return _record(path, _without_edits(read_input(path, CURE)))
+
+
+def _without_edits(text: bytes) -> bytes:
+    """Cut the edits out of a record as `FileRecord.to_json` writes it.
+
+    A quote in a text is escaped, so that neither mark can stand inside of one.
+    """
+    head, *files = text.split(EDITS)
+    kept = [head]
+    for file in files:
+        _, found, rest = file.partition(TARGETS)
+        if not found:
+            return text
+        kept.append(found + rest)
+    return EDITS.join(kept)
+
+
+def _record(path: Path, text: bytes) -> Sidecar:
+    """Take the text of a record."""
     try:
-        data = json.loads(read_input(path, cure))
+        data = json.loads(text)
         files = {name: FileRecord.read(told) for name, told in data["files"].items()}
         version, model = str(data["postproc"]), str(data["model"])
         return Sidecar(version, model, files, data.get("options", {}))
     except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
-        raise ProgramError(path, "is not a record of postproc", cure) from None
+        raise ProgramError(path, "is not a record of postproc", CURE) from None

@@ -152,6 +152,7 @@ LINES = (
 @pytest.mark.parametrize("line", LINES)
 def test_a_line_is_named_as_it_is_by_itself(line) -> None:
     before, after = [line.format(text) for text in ("1.5", "2.25")]
-    rows = list(changed_rows("a.pdl", [7, 8], [before] * 2, [after] * 2))
+    texts = [[text.encode("latin-1")] * 2 for text in (before, after)]
+    rows = list(changed_rows("a.pdl", [7, 8], *texts))
     assert [row.target for row in rows] == [target_name(before)] * 2
     assert all(row.original != row.compensated for row in rows)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated
@@ -100,15 +100,17 @@ def as_path(target: str | None) -> Path | None:
     return None if target is None else Path(target)
 
 
-def write_text(target: str, text: str) -> None:
-    """Write text to a file, or to stdout for ``-``.
+def write_text(target: str, text: str | Iterable[str]) -> None:
+    """Write text to a file, or to stdout for ``-``; a long one piece by piece.
 
     Raises:
         OutputError: The file cannot be written.
     """
     from postproc.files import write_all
 
+    if isinstance(text, str):
+        text = [text if target != "-" or text.endswith("\n") else text + "\n"]
     if target == "-":
-        sys.stdout.write(text if text.endswith("\n") else text + "\n")
+        sys.stdout.writelines(text)
     else:
-        write_all({Path(target): text.encode()})
+        write_all({Path(target): map(str.encode, text)})

@@ -113,6 +113,7 @@ def diff(
 ) -> None:
     """Compare the targets of two programs: exit 0 same, 1 different, 2 trouble."""
     from postproc import diff as differ
+    from postproc.diff_json import difference_pieces
     from postproc.diff_listing import print_difference
 
     with explained():
@@ -120,10 +121,10 @@ def diff(
         with busy("compare"):
             found = differ.diff(original, compensated)
         if json:
-            write_text(json, found.to_json())
+            write_text(json, difference_pieces(found))
         if json != "-":
             print_difference(found)
-    raise typer.Exit(1 if found.rows else 0)
+    raise typer.Exit(1 if found else 0)
 
 
 @app.command()

@@ -16,8 +16,9 @@ from numpy.typing import NDArray
 from postproc.language.lexis import BLANKS, mask_line, number_value
 from postproc.language.plain_numbers import (
     byte_table,
-    digit_runs,
+    numeric_bytes,
     plain_numbers,
+    runs_of,
     values,
     with_signs,
 )
@@ -61,7 +62,7 @@ def mask_lines(data: bytes, line_starts: Ints) -> Masked:
     """
     a = np.frombuffer(data, dtype=np.uint8)
     quotes, comment, odd_line = quotes_and_comments(a, line_starts)
-    start, end = digit_runs(a)
+    start, end = runs_of(numeric_bytes(a))
     code = in_code(start, quotes, comment, line_starts)
     runs = plain_numbers(a, start[code], end[code])
     numbers = runs.take(runs.number)

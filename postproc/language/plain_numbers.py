@@ -17,9 +17,11 @@ Bytes = NDArray[np.uint8]
 Bools = NDArray[np.bool_]
 Ints = NDArray[np.int64]
 Floats = NDArray[np.float64]
+Words = NDArray[np.uint64]
 
 EXACT = 15  # digits of a number that is read here: exact as a float
 _TENS = 10 ** np.arange(EXACT + 1, dtype=np.int64)
+_SCALES = _TENS.astype(float)
 _MAX_BLANKS = 6  # blanks between a sign and what is before it; more: line by line
 _DOT, _MINUS = 46, 45
 _PAIRED = tuple(
@@ -67,10 +69,16 @@ class Plain:
         return Plain(*(column[some] for column in vars(self).values()))
 
 
-def digit_runs(a: Bytes) -> tuple[Ints, Ints]:
-    """Find all runs of digits and dots: where they begin and end."""
-    numeric = ((a - np.uint8(_DOT)) < 12) & (a != 47)  # from the dot to 9, no slash
-    edge = np.zeros(len(a) + 1, dtype=bool)
+def numeric_bytes(a: Bytes) -> Bools:
+    """Tell which bytes are digits or dots."""
+    numeric: Bools = (a - np.uint8(_DOT)) < 12  # from the dot to 9, the slash too
+    numeric &= a != 47
+    return numeric
+
+
+def runs_of(numeric: Bools) -> tuple[Ints, Ints]:
+    """Find where runs of bytes begin and end."""
+    edge = np.zeros(len(numeric) + 1, dtype=bool)
     edge[:-1] = numeric
     edge[1:] ^= numeric
     at = np.flatnonzero(edge)
@@ -145,9 +153,13 @@ def values(a: Bytes, numbers: Plain, start: Ints) -> Floats:
         return np.zeros(0)
     before = numbers.point - numbers.first
     after = np.maximum(numbers.end - numbers.point - 1, 0)
-    scale = _TENS[np.minimum(after, EXACT)]
-    whole = _digits(a, numbers.point, before) * scale + _digits(a, numbers.end, after)
-    value: Floats = whole / scale.astype(float)
+    whole = _short(a, numbers.end, before, after, numbers.point < numbers.end)
+    long = np.flatnonzero(numbers.end - numbers.first > 8)
+    if len(long):
+        whole[long] = _digits(a, numbers.point[long], before[long])
+        whole[long] *= _TENS[np.minimum(after[long], EXACT)]
+        whole[long] += _digits(a, numbers.end[long], after[long])
+    value: Floats = whole / _SCALES[np.minimum(after, EXACT)]
     value[a[start] == _MINUS] *= -1.0
     for i in np.flatnonzero(before + after > EXACT).tolist():
         text = a[start[i] : numbers.end[i]].tobytes()
@@ -155,22 +167,41 @@ def values(a: Bytes, numbers: Plain, start: Ints) -> Floats:
     return value
 
 
+def _short(a: Bytes, end: Ints, before: Ints, after: Ints, dotted: Bools) -> Ints:
+    """Read numbers of at most 8 bytes: what is before the dot moves over it."""
+    word = _words(a, end)
+    cut = _shift(8 - after)
+    decimals = (word >> cut) << cut
+    front = (word << _shift(after + 1)) >> _shift(after)
+    return _read(np.where(dotted, decimals | front, word), before + after)
+
+
 def _digits(a: Bytes, end: Ints, count: Ints) -> Ints:
     """Read up to 15 digits that end at places of a text."""
-    value = _eight(a, end, np.minimum(count, 8))
+    value = _read(_words(a, end), np.minimum(count, 8))
     long = np.flatnonzero(count > 8)
     if len(long):
         more = np.minimum(count[long] - 8, 8)
-        value[long] += 10**8 * _eight(a, end[long] - 8, more)
+        value[long] += 10**8 * _read(_words(a, end[long] - 8), more)
     return value
 
 
-def _eight(a: Bytes, end: Ints, count: Ints) -> Ints:
-    """Read up to 8 digits as the bytes of one word: pairs, fours, then all of them."""
+def _words(a: Bytes, end: Ints) -> Words:
+    """Return the eight bytes before places of a text as words, the last one on top."""
     padded = np.concatenate([np.zeros(8, dtype=np.uint8), a])
     rows = np.lib.stride_tricks.sliding_window_view(padded, 8)[end]
-    word = rows.view("<u8")[:, 0]
-    drop = (8 * (8 - count)).astype(np.uint64)
+    words: Words = rows.view("<u8")[:, 0]
+    return words
+
+
+def _shift(count: Ints) -> Words:
+    """Return the bits of some bytes; eight bytes and more shift everything out."""
+    return (8 * np.maximum(count, 0)).astype(np.uint64)
+
+
+def _read(word: Words, count: Ints) -> Ints:
+    """Read words of up to 8 digits: pairs, fours, then all of them."""
+    drop = _shift(8 - count)
     word = (word >> drop) << drop & np.uint64(0x0F0F0F0F0F0F0F0F)
     for ten, shift, mask in _PAIRED:
         word = (word * ten + (word >> shift)) & mask

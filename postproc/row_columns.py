@@ -1,0 +1,83 @@
+"""Numbers and words of the rows of `diff` as columns of bytes, some thousand at a time.
+
+Rows with text, with many numbers or with names that cannot be printed are few: whoever
+writes rows writes them one by one, as `Row`, and asks here which they are.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from postproc.byte_columns import Column
+from postproc.rows import Rows
+
+Bools = NDArray[np.bool_]
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+AT_ONCE = 5_000  # rows
+MOST = 12  # numbers of a row that is written with others
+
+
+def single_rows(rows: Rows) -> Ints:
+    """Return the rows that are written one by one."""
+    count = np.diff(rows.first)
+    many = count > MOST
+    many[list(rows.texts)] = True
+    finite = np.isfinite(rows.original) & np.isfinite(rows.compensated)
+    many[np.repeat(np.arange(len(rows)), count)[~finite]] = True
+    many |= rows.has_change & ~np.isfinite(rows.change_mm)
+    if rows.told is not None and len(rows.told.line):
+        many |= ~np.isfinite(rows.told.correction_mm)[rows.entry]
+        unclear = ~np.array([why.isprintable() for why in rows.told.reasons])
+        many |= unclear[rows.told.why[rows.entry]]
+    return np.flatnonzero(many)
+
+
+def number_places(first: Ints, k: Ints) -> tuple[Ints, Ints]:
+    """Return where the numbers of some rows stand, and the row (from 0) of each.
+
+    Args:
+        first: CSR offsets of all rows.
+        k: Rows.
+    """
+    count = first[k + 1] - first[k]
+    owner = np.repeat(np.arange(len(k)), count)
+    before = np.cumsum(count) - count
+    return np.arange(len(owner)) + (first[k] - before)[owner], owner
+
+
+def strung(cells: Column, owner: Ints, rows: int, between: bytes) -> Column:
+    """Put the texts of every row beside each other.
+
+    Args:
+        cells: Texts, row by row.
+        owner: The row of each, ascending.
+        rows: How many rows there are.
+        between: What stands between two texts.
+    """
+    count = np.bincount(owner, minlength=rows)
+    at = np.arange(len(owner)) - (np.cumsum(count) - count)[owner]
+    width = cells.shape[1] + len(between)
+    out = np.zeros((rows, int(count.max(initial=0)), width), dtype=np.uint8)
+    out[owner, at, len(between) :] = cells
+    later = at > 0
+    out[owner[later], at[later], : len(between)] = np.frombuffer(between, np.uint8)
+    return out.reshape(rows, -1)
+
+
+def words(texts: Sequence[str], index: Ints, text: Callable[[str], str]) -> Column:
+    """Write one of some texts for every row, as UTF-8.
+
+    Args:
+        texts: What there is.
+        index: Which one a row has.
+        text: How it is written.
+    """
+    used, at = np.unique(index, return_inverse=True)
+    table = np.array([text(texts[k]).encode() for k in used.tolist()], dtype="S")
+    rows: Column = table.view(np.uint8).reshape(len(used), -1)[at.ravel()]
+    return rows

@@ -1,0 +1,85 @@
+"""What `diff` says, worked out line by line from the definitions: slow and simple."""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+from collections.abc import Sequence
+from typing import TextIO
+
+from postproc.changed_lines import target_name
+from postproc.console import Column
+from postproc.language.lexis import mask_line, number_value
+from postproc.listing import arrows, print_listing, status_colour
+from postproc.rows import Row
+
+ASSIGNED = re.compile(r"\s*([A-Za-z_$][\w$.\[\]]*)\s*(?::=|:)")
+TWO_WORDS = re.compile(r"\s*([A-Za-z_]+)\s+([A-Za-z_]+)")
+
+
+def rows_of(file: str, before: Sequence[str], after: Sequence[str]) -> list[Row]:
+    """Describe those of equally many lines that differ."""
+    pairs = enumerate(zip(before, after, strict=True), 1)
+    return [row_of(file, line, old, new) for line, (old, new) in pairs if old != new]
+
+
+def row_of(file: str, line: int, old: str, new: str) -> Row:
+    """Describe one pair of lines."""
+    a, b = mask_line(old), mask_line(new)
+    numbers = [
+        tuple(number_value(text[s:e]) for s, e in zip(m.start, m.end, strict=True))
+        for m, text in ((a, old), (b, new))
+    ]
+    comments = [
+        text[m.comment :] if m.comment >= 0 else "" for m, text in ((a, old), (b, new))
+    ]
+    bare = a.unterminated or b.unterminated or a.mask != b.mask
+    if bare or comments[0] != comments[1] or numbers[0] == numbers[1]:
+        return Row(file, line, "", (), (), None, f"{old} -> {new}")
+    change = None
+    if len(numbers[0]) >= 3 and "{" not in old:
+        moved = [n - o for o, n in zip(*numbers, strict=True)]
+        change = math.sqrt(sum(m * m for m in moved[:3]))
+    return Row(file, line, name_of(a.mask, old), *numbers, change)
+
+
+def name_of(mask: str, line: str) -> str:
+    """Name what the numbers of a line belong to, by what is before the first."""
+    begin = mask.partition("\0")[0]
+    if words := TWO_WORDS.match(begin):
+        return f"{words[1]} {words[2]}"
+    assigned = ASSIGNED.match(begin)
+    return assigned[1] if assigned else target_name(line)
+
+
+def json_of(
+    stamped: bool, counts: dict[str, int], rows: Sequence[Row], left: Sequence[Row]
+) -> str:
+    """Write all of it as JSON."""
+    told = {"rows": [r._asdict() for r in rows], "left": [r._asdict() for r in left]}
+    return json.dumps({"stamped": stamped, "counts": counts, **told}, indent=1) + "\n"
+
+
+def list_rows(rows: Sequence[Row], skip: int, told: bool, out: TextIO) -> None:
+    """List rows that differ, one by one."""
+    titles = ["file", "line", "target", "original", "", "compensated"]
+    titles += ["|c| mm", "J1-6", "status"] if told else ["change mm"]
+    left = {"file", "target", "", "J1-6", "status"}
+    columns = [Column(t, "left" if t in left else "right") for t in titles]
+    cells = (cells_of(row, told)[skip:] for row in rows)
+    print_listing(columns[skip:], cells, {"status": status_colour}, out)
+
+
+def cells_of(row: Row, told: bool) -> list[str]:
+    """Write the cells of a row."""
+    size = row.correction_mm if told and row.status else row.change_mm
+    old, new = row.text, ""
+    if row.original and not row.text:
+        pairs = zip(row.original, row.compensated, strict=True)
+        moved = [pair for pair in pairs if pair[0] != pair[1]]
+        old, new = (", ".join(f"{p[k]:.4f}" for p in moved) for k in (0, 1))
+    cells = [row.file, str(row.line or ""), row.target, old, "->" if new else "", new]
+    cells.append("" if size is None else f"{size:.3f}")
+    status = f"{row.status}: {row.why}" if row.why else row.status
+    return [*cells, arrows(row.direction), status] if told else cells
