@@ -110,8 +110,9 @@ def from_every_start(
     """
     visit = np.repeat(np.arange(len(move)), np.diff(pred_start))
     ends = (move[visit] == Move.CIRCULAR) & ~via[visit]
-    ends &= (pred >= 0) & (pred == visit - 1) & via[pred]
-    starts = np.diff(pred_start)[np.maximum(pred, 0)]
+    at = np.maximum(pred, 0)  # no move: looked up, and never used
+    ends &= (pred >= 0) & (pred == visit - 1) & via[at]
+    starts = np.diff(pred_start)[at]
     times = np.where(ends, np.maximum(starts, 1), 1)
     if (times == 1).all():
         return pred_start, pred

@@ -41,6 +41,8 @@ def test_vias_end_is_reached_once_for_every_start() -> None:
     assert first.tolist() == [0, 1, 2, 4, 6] and pred.tolist() == [-1, -1, 0, 1, 2, 2]
     first, pred = from_every_start(MOVE, VIA, *FROM["first"])
     assert pred.tolist() == [-1, -1, 0, 2]
+    first, pred = from_every_start(MOVE[:1], VIA[:1], np.array([0, 1]), np.array([-2]))
+    assert first.tolist() == [0, 1] and pred.tolist() == [-2]
 
 
 def test_every_start_has_a_circle_of_its_own(
