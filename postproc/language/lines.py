@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from postproc.exceptions import ProgramError
+from postproc.language.divided import Rows, divided
 from postproc.language.masking import Masked, mask_lines
 from postproc.language.source import Source
 
@@ -163,14 +164,15 @@ def _logical(
         shape[row] = len(masks) + joined.setdefault(mask, len(joined))
         keep[row + 1 : row + count] = False
     kept, short = code[keep], numbers.start.dtype
-    used, shape = np.unique(shape[keep], return_inverse=True)
-    texts = (*stripped, *joined)
+    first = np.append(numbers.first[kept], len(numbers.start)).astype(short)
+    rows = divided(Rows((*stripped, *joined), shape[keep], kept + 1, first))
+    used, shape = np.unique(rows.shape, return_inverse=True)
     return Lines(
         source,
-        tuple(texts[k].decode("latin-1") for k in used.tolist()),
+        tuple(rows.masks[k].decode("latin-1") for k in used.tolist()),
         shape.astype(short),
-        (kept + 1).astype(short),
-        np.append(numbers.first[kept], len(numbers.start)).astype(short),
+        rows.line.astype(short),
+        rows.first,
         numbers.start,
         numbers.end,
         numbers.value,
