@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from postproc.language.lexis import BLANKS
 from postproc.language.masking import Masked, mask_lines
+from postproc.number_pairs import Pairs, pair_numbers
 from postproc.rows import Rows, joined_rows
 
 Floats = NDArray[np.float64]
@@ -53,19 +54,20 @@ def _compare(
     file: str, lines: Ints, before: Sequence[bytes], after: Sequence[bytes]
 ) -> Rows:
     """Describe how pairs of lines differ."""
-    a, b = _masked(before), _masked(after)
-    alike = _only_numbers(before, after, a, b)
-    count, other = np.diff(a.first), np.diff(b.first)
-    alike &= count == other
-    old = a.value[np.repeat(alike, count)]
-    new = b.value[np.repeat(alike, other)]
-    count = np.where(alike, count, 0)
-    owner = np.repeat(np.arange(len(lines)), count)
-    moved = np.bincount(owner[old != new], minlength=len(lines)) > 0
-    old, new = old[moved[owner]], new[moved[owner]]
-    first = np.cumsum(np.append(0, np.where(moved, count, 0)))
+    pairs = pair_numbers(before, after)
+    rest = np.flatnonzero(~pairs.alike)
+    if len(rest):
+        own = [[texts[k] for k in rest.tolist()] for texts in (before, after)]
+        pairs = pairs.with_more(rest, _by_shapes(*own))
+    differ = pairs.owner[pairs.old != pairs.new]
+    moved = np.bincount(differ, minlength=len(lines)) > 0
+    mine = moved[pairs.owner]
+    owner, old, new = pairs.owner[mine], pairs.old[mine], pairs.new[mine]
+    first = np.append(np.searchsorted(owner, np.arange(len(lines))), len(owner))
     has, change = _changes(first, old, new, before)
-    targets = _targets(before, a, moved)
+    begins = np.full(len(lines), -1)
+    begins[moved] = pairs.place[mine][first[:-1][moved]]
+    targets = _targets(before, begins)
     names = {name: k for k, name in enumerate(dict.fromkeys(targets))}
     texts = {
         k: f"{before[k].decode('latin-1')} -> {after[k].decode('latin-1')}"
@@ -73,6 +75,17 @@ def _compare(
     }
     at = np.array([names[name] for name in targets], dtype=np.int64)
     return Rows(file, lines, list(names), at, first, old, new, change, has, texts)
+
+
+def _by_shapes(before: Sequence[bytes], after: Sequence[bytes]) -> Pairs:
+    """Read the numbers of pairs of lines that have the same shape."""
+    a, b = _masked(before), _masked(after)
+    count = np.diff(a.first)
+    alike = _only_numbers(before, after, a, b) & (count == np.diff(b.first))
+    mine, own = (np.repeat(alike, np.diff(m.first)) for m in (a, b))
+    owner = np.repeat(np.arange(len(before)), count)[mine]
+    place = a.start[mine] - _starts(before)[owner]
+    return Pairs(alike, owner, a.value[mine], b.value[own], place)
 
 
 def _only_numbers(
@@ -97,8 +110,10 @@ def _changes(
     first: Ints, old: Floats, new: Floats, before: Sequence[bytes]
 ) -> tuple[Bools, Floats]:
     """Return which lines hold a position, and how far it moved, NaN elsewhere."""
-    braces = np.array([b"{" in line for line in before])
-    has = (np.diff(first) >= 3) & ~braces
+    has = np.diff(first) >= 3
+    text = np.frombuffer(b"\n".join(before), dtype=np.uint8)
+    braces = np.flatnonzero(text == ord("{"))
+    has[np.searchsorted(_starts(before), braces, side="right") - 1] = False
     at = first[:-1][has, None] + np.arange(3)
     change = np.full(len(has), np.nan)
     with np.errstate(invalid="ignore"):  # numbers too long for a float are infinite
@@ -106,10 +121,14 @@ def _changes(
     return has, change
 
 
-def _targets(before: Sequence[bytes], a: Masked, moved: Bools) -> list[str]:
-    """Name what the numbers of lines belong to, once for lines that begin alike."""
+def _targets(before: Sequence[bytes], begins: Ints) -> list[str]:
+    """Name what the numbers of lines belong to, once for lines that begin alike.
+
+    Args:
+        before: The lines.
+        begins: Where their first number starts, -1 for a line without a name.
+    """
     known: dict[bytes, str | None] = {}
-    begins = np.where(moved, np.append(a.start, 0)[a.first[:-1]] - _starts(before), -1)
     names = []
     for line, length in zip(before, begins.tolist(), strict=True):
         if length < 0:

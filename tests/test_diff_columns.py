@@ -16,6 +16,7 @@ from postproc.diff import Difference, diff
 from postproc.diff_json import difference_pieces
 from postproc.diff_listing import print_difference
 from postproc.language.lexis import mask_line, number_value
+from postproc.number_pairs import pair_numbers
 from postproc.report import Status
 from postproc.rows import Row, Rows, joined_rows
 from tests.diff_reference import json_of, list_rows, rows_of
@@ -180,3 +181,24 @@ def test_files_that_also_came_and_went(tmp_path, ending: str) -> None:
         masked = mask_line(text)
         spans = zip(masked.start, masked.end, strict=True)
         assert row.original == tuple(number_value(text[a:b]) for a, b in spans)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_pairs_are_alike_where_the_definition_says_so(seed: int) -> None:
+    before, after = texts(seed, 500)
+    before.append("p := \0 1")  # a mark of our own in a text is no number
+    after.append("p := 5 1")
+    pairs = pair_numbers(as_bytes(before), as_bytes(after))
+    assert not pairs.alike[-1]
+    found = pair_numbers(as_bytes(before[:-1]), as_bytes(after[:-1]))
+    assert 0.2 < found.alike.mean() < 1.0  # signs differ in many
+    for line in np.flatnonzero(found.alike).tolist():
+        own = found.owner == line
+        masks = mask_line(before[line]), mask_line(after[line])
+        assert masks[0].mask == masks[1].mask
+        assert found.place[own].tolist() == list(masks[0].start)
+        numbers = zip((before, after), masks, (found.old, found.new), strict=True)
+        for lines, masked, values in numbers:
+            spans = zip(masked.start, masked.end, strict=True)
+            wanted = [number_value(lines[line][a:b]) for a, b in spans]
+            assert values[own].tolist() == wanted
