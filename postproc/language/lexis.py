@@ -18,7 +18,8 @@ NUMBER = (
     r"|(?:[0-9]+(?:\.(?!\.)[0-9]*)?|(?<![A-Za-z0-9_$.\])])\.[0-9]+)(?:[eE][-+]?[0-9]+)?"
 )
 UNARY_CONTEXT = "(,{[=<>*/:@#&+"
-"""A minus that follows one of these, or starts a line, is the sign of its number."""
+"""A sign that follows one of these, or starts a line, is that of its number."""
+SIGNS = "-+"
 
 _STRINGS = (r"'(?:\\.|[^'\\])*'", r"'[^']*'")
 _UNICODE = r'"(?:\\.|[^"\\])*"'
@@ -93,29 +94,29 @@ def _mask(line: str, tokens: re.Pattern[str]) -> MaskedLine:
         if kind == "number":
             starts.append(found.start() if sign < 0 else sign)
             if sign >= 0:
-                del out[_last_minus(out) :]
+                del out[_last_sign(out) :]
             ends.append(found.end())
             text = NUMBER_MARK
         out.append(text)
         sign = -1
-        if text == "-" and (not before or before in UNARY_CONTEXT):
+        if text in SIGNS and (not before or before in UNARY_CONTEXT):
             sign = found.start()
         before = text[-1]
         idle = text[-1] in ",({" and kind == "other"
     return MaskedLine("".join(out), tuple(starts), tuple(ends), comment, False)
 
 
-def _last_minus(out: list[str]) -> int:
-    return len(out) - 1 - out[::-1].index("-")
+def _last_sign(out: list[str]) -> int:
+    return max(k for k, text in enumerate(out) if text in SIGNS)
 
 
 def number_value(text: str) -> float:
     """Return the value of a number as it is written, NaN where it is none.
 
-    >>> number_value("- 0x1F"), number_value("1.5e3")
+    >>> number_value("- 0x1F"), number_value("+1.5e3")
     (-31.0, 1500.0)
     """
-    digits = text.lstrip("-+" + BLANKS)
+    digits = text.lstrip(SIGNS + BLANKS)
     try:
         if digits[0] != "0":
             return -float(digits) if text[0] == "-" else float(digits)

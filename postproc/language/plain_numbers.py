@@ -23,7 +23,7 @@ EXACT = 15  # digits of a number that is read here: exact as a float
 _TENS = 10 ** np.arange(EXACT + 1, dtype=np.int64)
 _SCALES = _TENS.astype(float)
 _MAX_BLANKS = 6  # blanks between a sign and what is before it; more: line by line
-_DOT, _MINUS = 46, 45
+_DOT, _MINUS, _PLUS = 46, 45, 43
 _PAIRED = tuple(
     (np.uint64(ten), np.uint64(shift), np.uint64(mask))
     for ten, shift, mask in (
@@ -117,13 +117,13 @@ def with_signs(a: Bytes, first: Ints) -> tuple[Ints, Ints]:
     Returns:
         The starts, and places too far from what is before them to tell.
     """
-    minus, lost = _previous(a, first)
-    signed = (minus >= 0) & (a[minus] == _MINUS)
+    sign, lost = _previous(a, first)
+    signed = (sign >= 0) & ((a[sign] == _MINUS) | (a[sign] == _PLUS))
     start, tied = first.copy(), np.flatnonzero(signed)
-    context, far = _previous(a, minus[tied])
+    context, far = _previous(a, sign[tied])
     unary = (context < 0) | _IS_UNARY[a[context]]
     lost[tied] |= far & unary
-    start[tied[unary]] = minus[tied[unary]]
+    start[tied[unary]] = sign[tied[unary]]
     return start, first[lost]
 
 

@@ -17,6 +17,7 @@ from postproc.language.visits import Literals
 
 Ints = NDArray[np.int64]
 Floats = NDArray[np.float64]
+Texts = NDArray[np.bytes_]
 
 MM_DECIMALS, DEGREE_DECIMALS, JOINT_DECIMALS = 3, 4, 5
 _PIECE = 100_000  # numbers rewritten at a time
@@ -106,8 +107,18 @@ def _edits_of(
     moved = ~(np.abs(values - before) <= 0.5 * 10.0 ** -np.maximum(had, least))
     rows = np.flatnonzero(moved)
     new = _texts(values[rows], had[rows], least[rows])
+    new = _with_plus(new, old[rows])
     other = new.astype(float) != before[rows]
     return Replacements(start[rows[other]], end[rows[other]], new[other])
+
+
+def _with_plus(new: Texts, old: Texts) -> Texts:
+    """Keep the plus of numbers that had one and are not below zero."""
+    rows = np.char.startswith(old, b"+") & ~np.char.startswith(new, b"-")
+    if not rows.any():
+        return new
+    signed: Texts = np.where(rows, np.char.add(b"+", new), new)
+    return signed
 
 
 def _texts(values: Floats, decimals: Ints, least: Ints) -> NDArray[np.bytes_]:

@@ -60,3 +60,18 @@ def test_digits_written(value: float, decimals: int, least: int) -> None:
     assert decimals_of(text) == max(decimals, least)
     assert abs(float(text) - value) <= 0.5 * 10.0 ** -max(decimals, least) + 1e-11
     assert not text.startswith("-0.000") or float(text) != 0.0
+
+
+def test_a_plus_belongs_to_its_number_and_stays_while_it_is_not_below_zero() -> None:
+    move = b"MOVE TO POS(+1500.0, + 2, +0.01, +90, -45, +1.5e1, '')"
+    text = b"PROGRAM a\nBEGIN\n" + move + b"\nEND a\n"
+    source = source_from_bytes("a.pdl", text)
+    visits = resolve(parse(source)).visits
+    assert visits.values[0].tolist() == [1500.0, 2.0, 0.01, 90.0, -45.0, 15.0]
+    wanted = np.array([[1501.25, 3.5, -0.02, 91.0, 44.0, 16.0]])
+    (mine,) = edits(visits.literals, (source,), np.array([0]), wanted)
+    out = apply(source.data, mine)
+    assert b"POS(+1501.250, +3.500, -0.020, +91.0000, 44.0000, +16.0000, '')" in out
+    again = resolve(parse(source_from_bytes("a.pdl", out))).visits
+    np.testing.assert_array_equal(again.values, wanted)
+    assert compare(source, Source("a.pdl", out), mine) == ()
