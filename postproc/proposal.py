@@ -150,7 +150,7 @@ def decide(
         side=side,
         corrected=values,
         correction=np.where(corrected[:, None], correction, 0.0),
-        std_error=solved.std_error,
+        std_error=np.full_like(correction, np.nan),  # when it is settled
         turn=np.where(corrected[:, None], turn, 0.0) if options.orientation else NONE,
     )
     return Proposal(

@@ -23,7 +23,7 @@ from postproc.proposal import Proposal, propose
 from postproc.robot.cell import Cell
 from postproc.robot.state import States
 from postproc.side_search import SideSearch
-from postproc.solved import Solved, solve_again, solve_visits
+from postproc.solved import Solved, solve_again, solve_visits, std_errors
 
 Array = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -116,6 +116,10 @@ def settle(
             flipped = proposal.corrected & ~settled_for & (off > OTHER).any(axis=1)
             if not flipped.any():
                 left = Left(stood, last.end, wanted[-1:].copy())
+                with clock("solve"):
+                    std_error = std_errors(model, cell, planned, states, solved)
+                decided = replace(proposal.decisions, std_error=std_error)
+                proposal = replace(proposal, decisions=decided)
                 return Corrected(proposal, edits, last.reached, left)
             held = held | flipped
             continue

@@ -7,8 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from postproc.accuracy.model import Model
-from postproc.accuracy.orientation import UNSURE, refuse_unknown_rotations, unsure_turn
+from postproc.accuracy.model import UNSURE, Model
+from postproc.accuracy.orientation import (
+    UNSURE_TURN,
+    refuse_unknown_rotations,
+    unsure_turn,
+)
 from postproc.accuracy.solve import solve
 from postproc.planning import Planned
 from postproc.pose import is_unknown
@@ -28,7 +32,6 @@ class Solved:
         q: Joint angles, (n, 6) [rad], NaN where the command cannot be reached.
         command: TCP poses to command, base frame, (n, 4, 4) [m].
         residual: Predicted landing against the wanted position, (n,) [m].
-        std_error: Standard error of the predicted error, per axis, (n, 3) [m].
         outside: Reasons why visits lie outside what was surveyed, (n,) each.
     """
 
@@ -36,7 +39,6 @@ class Solved:
     q: Array
     command: Array
     residual: Array
-    std_error: Array
     outside: dict[str, Bools]
 
 
@@ -67,8 +69,7 @@ def solve_visits(
         q=np.full((n, 6), np.nan),
         command=np.full((n, 4, 4), np.nan),
         residual=np.full(n, np.nan),
-        std_error=np.full((n, 3), np.nan),
-        outside={},
+        outside=_outside_survey(model, planned, states),
     )
     everything = np.ones(n, dtype=bool)
     return solve_again(empty, everything, model, cell, planned, states, orientation)
@@ -94,30 +95,61 @@ def solve_again(
         states: Planned states, with the directions to correct for.
         orientation: Correct the orientation as well as the position.
     """
-    plan = planned.plan
-    lost = np.isnan(plan.q).any(axis=1) | is_unknown(plan.tcp)
-    known = np.asarray(rows & ~lost)
+    known = rows & _known(planned)
     here = states[known]
-    predicted = model.predict(cell.arm, here)
     part = solve(
-        model, cell.arm, planned.wanted[known], plan.tool[known], here, orientation,
-        predicted.error,
+        model, cell.arm, planned.wanted[known], planned.plan.tool[known], here,
+        orientation,
     )  # fmt: skip
     out = Solved(
         direction=np.where(rows[:, None], states.direction, solved.direction),
         q=np.array(solved.q),
         command=np.array(solved.command),
         residual=np.array(solved.residual),
-        std_error=np.array(solved.std_error),
-        outside={text: mask & ~known for text, mask in solved.outside.items()},
+        outside=dict(solved.outside),
     )
     out.q[known], out.command[known] = part.q, part.command
-    out.residual[known], out.std_error[known] = part.residual, predicted.std_model
-    for text, mask in predicted.outside.items():
-        merged = out.outside.setdefault(text, np.zeros(len(states), dtype=bool))
-        merged[known] = mask
+    out.residual[known] = part.residual
+    _mark(out.outside, UNSURE, known, model.unsure(cell.arm, here))
     if orientation:
-        unsure = unsure_turn(model, cell.arm, here)
-        merged = out.outside.setdefault(UNSURE, np.zeros(len(states), dtype=bool))
-        merged[known] = unsure
+        _mark(out.outside, UNSURE_TURN, known, unsure_turn(model, cell.arm, here))
     return out
+
+
+def std_errors(
+    model: Model, cell: Cell, planned: Planned, states: States, solved: Solved
+) -> Array:
+    """Standard errors of the errors that visits are corrected for, per axis.
+
+    They are many times as costly as the errors, and wanted of the last round alone.
+
+    Returns:
+        (n, 3) [m], NaN where pose or joint angles are not known.
+    """
+    out, known = np.full((len(states), 3), np.nan), _known(planned)
+    here = states.with_(direction=solved.direction)[known]
+    out[known] = model.std_error(cell.arm, here)
+    return out
+
+
+def _known(planned: Planned) -> Bools:
+    """Tell which visits can be solved, (n,)."""
+    lost = np.isnan(planned.plan.q).any(axis=1) | is_unknown(planned.plan.tcp)
+    return np.asarray(~lost)
+
+
+def _outside_survey(model: Model, planned: Planned, states: States) -> dict[str, Bools]:
+    """Say which visits lie outside of what was surveyed, whatever their directions."""
+    known = _known(planned)
+    found: dict[str, Bools] = {}
+    for text, mask in model.ranges.outside(states[known], model.needs).items():
+        _mark(found, text, known, mask)
+    return found
+
+
+def _mark(outside: dict[str, Bools], text: str, known: Bools, mask: Bools) -> None:
+    """Say anew of known visits whether they lie outside for a reason."""
+    if text in outside or mask.any():
+        marked = np.array(outside.get(text, np.zeros(len(known), dtype=bool)))
+        marked[known] = mask
+        outside[text] = marked

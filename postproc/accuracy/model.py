@@ -28,13 +28,16 @@ from postproc.accuracy.schema import (
 from postproc.exceptions import ModelError
 from postproc.files import write_all
 from postproc.pieces import in_pieces, pieces
+from postproc.pose import MM
 from postproc.robot.arm import Arm
 from postproc.robot.state import States
 
 Array = NDArray[np.float64]
+Bools = NDArray[np.bool_]
 
 CHUNK = 5000  # states evaluated together: the columns stay in the cache
 COMPENSATED = ("arm", "state")
+UNSURE = "standard error above three times the survey's worst"
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,27 +122,43 @@ class Model:
         Where a direction is not known (0), the error is that of the middle of the gap,
         and half the gap enters both standard deviations.
         """
+        model, arrival = self._deviations(arm, states)
+        outside = self.ranges.outside(states, self.needs)
+        unsure = self.unsure(arm, states)
+        if unsure.any():
+            outside[UNSURE] = unsure
+        return Prediction(self.error(arm, states), model, arrival, outside)
+
+    def std_error(self, arm: Arm, states: States) -> Array:
+        """Standard error of the predicted error, (n, 3) [m], as `predict` gives it."""
+        return self._deviations(arm, states)[0]
+
+    def unsure(self, arm: Arm, states: States) -> Bools:
+        """Tell which states have a standard error beyond all of the survey, (n,).
+
+        States with unknown directions are no such: their error is said to be the
+        middle's.
+        """
+        out = np.zeros(len(states), dtype=bool)
+        worst = self.statistics.get("worst_std_mm", np.inf) * MM
+        rows = np.flatnonzero((np.abs(states.direction) == 1).all(axis=1))
+        if len(rows) and np.isfinite(worst):
+            out[rows] = (self.std_error(arm, states[rows]) > 3 * worst).any(axis=1)
+        return out
+
+    def _deviations(self, arm: Arm, states: States) -> tuple[Array, Array]:
+        """Standard deviations of the error and of one arrival, (n, 3) [m] each."""
         effects, values, covariance = self.compensable()
-        error, model = np.empty((len(states), 3)), np.empty((len(states), 3))
-        arrival = np.empty((len(states), 3))
+        model, arrival = np.empty((len(states), 3)), np.empty((len(states), 3))
         for rows in pieces(len(states), CHUNK):
-            batch = Batch(arm, states[rows])
-            at = effects.at(batch, values)
-            error[rows] = effects.error_at(at, batch, values)
+            at = effects.at(Batch(arm, states[rows]), values)
             variance = _side_variance(effects, at, values)
             variance = variance + np.square(self.spread)
             if len(covariance):
                 variance += _parameter_variance(effects.columns(at), covariance)
             model[rows] = variance
             arrival[rows] = variance + self.noise.arrival_variance(at.jacobian)
-        model, arrival = np.sqrt(np.maximum(model, 0)), np.sqrt(np.maximum(arrival, 0))
-        outside = self.ranges.outside(states, self.needs)
-        worst = self.statistics.get("worst_std_mm", np.inf) * 1e-3
-        on_flank = (np.abs(states.direction) == 1).all(axis=1)
-        unsure = (model > 3 * worst).any(axis=1) & on_flank
-        if unsure.any():
-            outside["standard error above three times the survey's worst"] = unsure
-        return Prediction(error, model, arrival, outside)
+        return np.sqrt(np.maximum(model, 0)), np.sqrt(np.maximum(arrival, 0))
 
     def measured_std(self, arm: Arm, states: States) -> Array:
         """Standard deviation of one measured row, tracker included, (n, 3) [m]."""

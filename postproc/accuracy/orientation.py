@@ -15,7 +15,7 @@ Array = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 
 UNSURE_RAD = 3e-4  # [rad] 0.03 mm at 0.1 m from the TCP
-UNSURE = "the tool's rotation is not known well enough there to correct it"
+UNSURE_TURN = "the tool's rotation is not known well enough there to correct it"
 
 
 def turn(model: Model, arm: Arm, states: States) -> Array:

@@ -45,7 +45,6 @@ def solve(
     tool: Array,
     states: States,
     orientation: bool = False,
-    error: Array | None = None,
 ) -> Solution:
     """Find the command whose predicted landing is the wanted place.
 
@@ -59,7 +58,6 @@ def solve(
         tool: Tool in the flange frame, (4, 4) or (n, 4, 4).
         states: The nominal states at the targets: angles, direction, loads.
         orientation: Correct the orientation as well as the position.
-        error: The error at the states where it is known already, (n, 3) [m].
     """
     n = len(wanted)
     tool = np.broadcast_to(tool, (n, 4, 4))
@@ -68,7 +66,7 @@ def solve(
     command, q = np.array(wanted), np.array(states.q)
     place = wanted[:, :3, 3]
     branch = arm.branch(np.nan_to_num(q)) if arm.has_inverse else None
-    landing = place + (model.error(arm, states) if error is None else error)
+    landing = place + model.error(arm, states)
     turned, allowed = np.zeros((n, 3)), np.zeros((n, 3))  # [rad] found and allowed for
     if orientation:
         turned = turn(model, arm, states)

@@ -219,3 +219,18 @@ def test_a_state_effect_needs_its_state() -> None:
     states = random_states(10, rng, TOOL[None])
     p = m.predict(NJ, states)
     assert p.any_outside.all() and "payload is not known" in p.why(0)[0]
+
+
+def test_states_beyond_the_survey_are_unsure_when_both_sides_are_known() -> None:
+    m = model()
+    states = random_states(30, np.random.default_rng(8), TOOL[None])
+    p = m.predict(NJ, states)
+    np.testing.assert_array_equal(m.std_error(NJ, states), p.std_model)
+    worst = np.sort(p.std_model.max(axis=1))[15] / 3  # half of them beyond three times
+    strict = replace(m, statistics={**m.statistics, "worst_std_mm": worst * 1e3})
+    found = strict.unsure(NJ, states)
+    np.testing.assert_array_equal(found, p.std_model.max(axis=1) > 3 * worst)
+    assert 0 < found.sum() < 30
+    direction = np.array(states.direction)
+    direction[found, 2] = 0.5
+    assert not strict.unsure(NJ, states.with_(direction=direction)).any()
