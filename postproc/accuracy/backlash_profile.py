@@ -58,13 +58,21 @@ class BacklashProfile(JointEffect):
 
     def basis(self, batch: Batch) -> Array:
         """Evaluate lambda times the harmonics, (n, p)."""
-        q, side = batch.states.q, batch.states.direction
-        inside = fade_turns(q, np.array(self.lower), np.array(self.upper))
-        columns = []
+        inside, waves = batch.once(self, self._waves)
+        turned: Array = batch.states.direction[:, self.acts_on()] * inside * waves
+        return turned
+
+    def _waves(self, q: Array) -> tuple[Array, Array]:
+        """Evaluate how far inside of the range, and the harmonics, (n, p) each."""
+        within = fade_turns(q, np.array(self.lower), np.array(self.upper))
+        inside, waves = (np.ones((len(q), len(self.acts_on()))) for _ in range(2))
+        column = 0
         for j in np.array(self.joints, dtype=int) - 1:
-            if self.constant:
-                columns.append(side[:, j])
+            column += self.constant
             for k in self.orders:
-                waved = side[:, j] * inside[:, j]
-                columns += [waved * np.sin(k * q[:, j]), waved * np.cos(k * q[:, j])]
-        return np.stack(columns, axis=-1)
+                both = slice(column, column + 2)
+                inside[:, both] = within[:, j, None]
+                waves[:, column] = np.sin(k * q[:, j])
+                waves[:, column + 1] = np.cos(k * q[:, j])
+                column += 2
+        return inside, waves

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Hashable
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +16,7 @@ from postproc.robot.arm import Arm
 from postproc.robot.state import States
 
 Array = NDArray[np.float64]
+T = TypeVar("T")
 
 
 @dataclass(eq=False)
@@ -64,6 +67,7 @@ class Batch:
         states: n states.
         deviation: Placement errors that the kinematics are taken at.
         shift: Joint errors that the kinematics are taken at, (n, 6) [rad].
+        known: What effects have asked for `once`, shared by batches of the same poses.
     """
 
     arm: Arm
@@ -71,6 +75,7 @@ class Batch:
     deviation: Deviation = NOMINAL
     shift: Array | None = None
     loads: Loads = field(init=False)
+    known: dict[Hashable, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         self.loads = Loads(self.arm, self.states)
@@ -81,16 +86,29 @@ class Batch:
 
     def moved(self, deviation: Deviation, shift: Array | None) -> Batch:
         """Return the same states with the kinematics taken at a deviated arm."""
-        batch = Batch(self.arm, self.states, deviation, shift)
-        batch.loads = self.loads
-        return batch
+        return self._beside(Batch(self.arm, self.states, deviation, shift))
 
     def arriving(self, direction: Array) -> Batch:
         """Return the same poses reached from other sides, (n, 6)."""
         states = self.states.with_(direction=direction)
-        batch = Batch(self.arm, states, self.deviation, self.shift)
-        batch.loads = self.loads
+        return self._beside(Batch(self.arm, states, self.deviation, self.shift))
+
+    def _beside(self, batch: Batch) -> Batch:
+        """Share what depends on the nominal poses alone."""
+        batch.loads, batch.known = self.loads, self.known
         return batch
+
+    def once(self, who: Hashable, evaluate: Callable[[Array], T]) -> T:
+        """Evaluate a function of the joint angles alone, once for all directions.
+
+        Args:
+            who: Names the function.
+            evaluate: Takes the joint angles (n, 6) [rad].
+        """
+        if who not in self.known:
+            self.known[who] = evaluate(self.states.q)
+        found: T = self.known[who]
+        return found
 
     @property
     def _angles(self) -> Array:

@@ -130,9 +130,19 @@ class JointEffect(Effect):
         """Return the joint errors (n, 6) [rad] for parameters p."""
         out = np.zeros((len(batch), 6))
         turned = self.basis(batch) * p
-        for k, joint in enumerate(self.acts_on()):
-            out[:, joint] += turned[:, k]
+        for joints, columns in self._layers:
+            out[:, joints] += turned[:, columns]
         return out
+
+    @cached_property
+    def _layers(self) -> list[tuple[NDArray[np.int64], NDArray[np.int64]]]:
+        """Name the first parameter of every joint, then the second ones, .."""
+        acts_on = self.acts_on()
+        nth = np.array(
+            [np.count_nonzero(acts_on[:k] == j) for k, j in enumerate(acts_on)]
+        )
+        columns = [np.flatnonzero(nth == k) for k in range(nth.max(initial=-1) + 1)]
+        return [(acts_on[c], c) for c in columns]
 
 
 def fade(x: Array, lower: Array, upper: Array) -> Array:

@@ -129,3 +129,17 @@ def test_free_forms_fade_outside_the_survey() -> None:
     x = np.linspace(-1, 2, 301)
     f = fade(x, np.array(0.0), np.array(1.0))
     assert (np.diff(f[x >= 0.5]) <= 0).all() and (f[(x >= 0) & (x <= 1)] == 1).all()
+
+
+def test_what_is_known_once_serves_the_same_poses_alone() -> None:
+    effect = EFFECTS["backlash_profile"].propose(NJ, STATES)
+    one, p = Combination((effect,)), RNG.standard_normal(len(effect.parameters()))
+    batch = Batch(NJ, STATES)
+    effect.angles(batch, p)
+    for other in (
+        batch.arriving(-STATES.direction),
+        batch.moved(one.deviation(p), one.shift(batch, p)),
+        batch[np.array([7, 3])],
+    ):
+        fresh = effect.angles(Batch(NJ, other.states), p)
+        np.testing.assert_array_equal(effect.angles(other, p), fresh)
