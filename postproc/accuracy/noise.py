@@ -12,7 +12,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import minimize
 
 from postproc.accuracy.batch import Batch
 
@@ -135,6 +134,8 @@ class Whitener:
             slope = w * (1.0 / v - S / v**2)
             grad = np.array([(slope * t2 * T).sum(), (slope * r2 * R).sum()])
             return float(0.5 * (w * (np.log(v) + S / v)).sum()), grad
+
+        from scipy.optimize import minimize  # slow to load, and for fits alone
 
         bounds = [(np.log(SMALLEST / s), np.log(LARGEST / s)) for s in (t0, r0)]
         begin = np.clip(np.log([start.tracker, start.joint]), *np.array(bounds).T)

@@ -11,7 +11,6 @@ from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import CubicSpline
 
 Array = NDArray[np.float64]
 
@@ -56,4 +55,6 @@ def smooth_columns(x: Array, lower: float, upper: float, length: float) -> Array
     """
     modes = _modes(*_grid(upper - lower, length))
     grid = np.linspace(lower, upper, len(modes))
+    from scipy.interpolate import CubicSpline  # slow to load, and seldom wanted
+
     return np.asarray(CubicSpline(grid, modes)(np.clip(x, lower, upper)))

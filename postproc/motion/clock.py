@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from postproc.exceptions import PlanError
-from postproc.motion import toppra
 from postproc.motion.ruckig import JointMoves
 from postproc.motion.targets import Move, Targets
 from postproc.motion.trace import Trace
@@ -114,6 +113,8 @@ def _run_times(arm: Arm, points: Waypoints) -> tuple[Array, Array, Bools]:
     failed = np.zeros(k, dtype=bool)
     if k == 0:
         return since, velocity, failed
+    from postproc.motion import toppra  # slow to load: it brings a plotting library
+
     begins = np.flatnonzero(points.begins)
     limit, s = points.limit(), np.cumsum(points.ds)
     batch = begins // BATCH
