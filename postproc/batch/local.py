@@ -13,17 +13,10 @@ from concurrent.futures.process import BrokenProcessPool
 from postproc import __version__
 from postproc.batch.crew import Working
 from postproc.batch.pace import Chunk
+from postproc.batch.server import start_server
 from postproc.batch.setup import Setup
 from postproc.batch.task import Result
 from postproc.batch.work import run_tasks
-
-# Numerical libraries and their pools: processes use the cores, not threads.
-POOLS = (
-    "OMP_NUM_THREADS",
-    "OPENBLAS_NUM_THREADS",
-    "MKL_NUM_THREADS",
-    "RAYON_NUM_THREADS",
-)
 
 _setups: Sequence[Setup] = ()
 
@@ -44,11 +37,8 @@ class LocalCrew:
             setups: What units mean by their `setup`.
             jobs: Number of processes.
         """
-        for name in POOLS:
-            os.environ.setdefault(name, "1")
         self._setups, self._jobs = tuple(setups), jobs
-        self._context = multiprocessing.get_context("forkserver")
-        self._context.set_forkserver_preload([run_tasks.__module__])
+        self._context = start_server()
         self._before = set(multiprocessing.active_children())
         self._pool = self._open()
 

@@ -68,6 +68,10 @@ def batch(
 ) -> None:
     """Compensate a tree of programs; what could not be compensated is not in DST."""
     with explained():
+        if scheduler is None:
+            from postproc.batch.server import start_server
+
+            start_server()
         from postproc.batch import run
         from postproc.batch.plan import make_plan
         from postproc.console import progress_bar
