@@ -16,6 +16,7 @@ from postproc.motion.reasons import (
     CODE,
     LIMITS,
     NO_BRANCH,
+    NO_START,
     NO_TARGET,
     OUT_OF_REACH,
     PATH_JUMP,
@@ -32,6 +33,7 @@ Bools = NDArray[np.bool_]
 
 AGREE = 1e-6  # [rad] several predecessors lead to the same joint angles
 SLACK = 1e-9  # [rad] rounding at a joint limit
+FEW = 256  # targets whose solutions are looked at together
 WINDOW = 4096  # targets followed at a time, so that a break costs little
 
 
@@ -100,6 +102,7 @@ def _from_strings(work: Workspace) -> Bools:
 def _in_order(work: Workspace, visits: Ints, smooth: Bools) -> None:
     """Go through targets in program order, smooth stretches at once."""
     late: list[int] = []
+    poses = smooth & (work.targets.kind == Kind.POSE)
     i = 0
     while i < len(visits):
         v = int(visits[i])
@@ -110,6 +113,9 @@ def _in_order(work: Workspace, visits: Ints, smooth: Bools) -> None:
             i += done
             if done == count:
                 continue
+        elif poses[v]:
+            i += _without_pasts(work, v, poses)
+            continue
         late += _one(work, int(visits[i]))
         i += 1
     for edge in late:
@@ -133,6 +139,26 @@ def _stretch(work: Workspace, v: int, count: int) -> int:
     flipped = np.searchsorted(ends, flips, side="right")
     work.reason[v + flipped[flipped < reached]] = CODE[PATH_JUMP]
     return reached
+
+
+def _without_pasts(work: Workspace, v: int, poses: Bools) -> int:
+    """Go on from an unknown place up to one that is known; count the targets."""
+    ahead = poses[v : v + FEW]
+    ends = np.flatnonzero(~ahead)
+    rows = np.arange(v, v + (int(ends[0]) if len(ends) else len(ahead)))
+    slot, branches = work.targets.slot[rows], work.all_solutions(rows)
+    own = branches[np.arange(len(rows)), slot]
+    own[slot < 0] = np.nan
+    found = np.flatnonzero(~np.isnan(own).any(axis=1))
+    count = int(found[0]) + 1 if len(found) else len(rows)
+    nowhere = np.isnan(branches.max(axis=2)).all(axis=1)
+    reason = np.where(slot < 0, CODE[NO_START], CODE[NO_BRANCH])
+    reason[nowhere], reason[found] = CODE[OUT_OF_REACH], 0
+    own = on_written_turns(own, work.targets.turns[rows])
+    work.q[rows[found[:1]]] = own[found[:1]]
+    work.slot[rows[:count]] = np.where(nowhere, -1, slot)[:count]
+    work.reason[rows[:count]] = reason[:count]
+    return count
 
 
 def _one(work: Workspace, v: int) -> list[int]:

@@ -162,6 +162,14 @@ class Workspace:
         found: Array = self.arm.inverse(flange[None]).q[0]
         return found
 
+    def all_solutions(self, rows: Ints) -> Array:
+        """Return all branches at placed targets, (k, 8, 6) [rad]."""
+        found = np.empty((len(rows), 8, 6))
+        known = self.solved[rows] >= 0
+        found[known] = self.branches[self.solved[rows[known]]]
+        found[~known] = self.arm.inverse(self.flange[rows[~known]]).q
+        return found
+
     def ways(self, span: slice) -> Ways:
         """Return the solutions at some samples of ready edges."""
         rows = self.row[span]

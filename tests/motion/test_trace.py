@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+import postproc.motion.trace as trace_module
 from postproc.motion.planner import plan
 from postproc.motion.reach import reach
 from postproc.motion.reasons import (
@@ -21,6 +22,7 @@ from postproc.motion.reasons import (
 )
 from postproc.motion.targets import Kind, Move, Targets, make_targets
 from postproc.motion.trace import Trace, trace
+from postproc.motion.workspace import Workspace
 from postproc.robot.arm import Arm
 
 
@@ -425,3 +427,37 @@ def test_long_paths_with_arcs_are_followed_on_demand(
     )
     steps = np.linalg.norm(np.diff(tcp[:, :3, 3], axis=0), axis=1)
     assert steps[1:].max() < 0.03
+
+
+@pytest.mark.parametrize("few", [1, 3, 256])
+@pytest.mark.parametrize("seed", range(4))
+def test_lines_without_a_start_are_found_as_one_by_one(
+    arm: Arm,
+    tool: np.ndarray,
+    home: np.ndarray,
+    seed: int,
+    few: int,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    rng, n = np.random.default_rng(seed), 40
+    T0 = at(arm, tool, home)
+    ends = [shifted(T0, tuple(rng.uniform(-0.1, 0.1, 3))) for _ in range(n)]
+    for i in np.flatnonzero(rng.random(n) < 0.3):
+        ends[i] = shifted(T0, (9.0, 0, 0))
+    slot = np.where(rng.random(n + 1) < 0.7, rng.integers(-1, 8, n + 1), 0)
+    turns = np.where(rng.random((n + 1, 3)) < 0.2, 0.0, np.nan)
+    targets = lines_from(arm, tool, home, ends, slot=slot, turns=turns)
+    monkeypatch.setattr("postproc.motion.trace.FEW", few)
+    together = trace(arm, targets)
+    assert {NO_BRANCH, OUT_OF_REACH} < {reason(together, v) for v in range(n + 1)}
+
+    def alone(work: Workspace, v: int, poses: np.ndarray) -> int:
+        trace_module._one(work, v)
+        return 1
+
+    monkeypatch.setattr(trace_module, "_without_pasts", alone)
+    singly = trace(arm, targets)
+    for name in ("q", "slot", "reason", "flange"):
+        np.testing.assert_array_equal(getattr(together, name), getattr(singly, name))
+    np.testing.assert_array_equal(together.edges.source, singly.edges.source)
+    np.testing.assert_array_equal(together.edges.path, singly.edges.path)
