@@ -27,9 +27,9 @@ def rotation_from_zyz(zyz_deg: Array) -> Array:
     [0.0, 1.0, 0.0]
     """
     angles = np.deg2rad(np.asarray(zyz_deg, dtype=float))
-    (ca, ce, cr), (sa, se, sr) = (
-        np.moveaxis(f(angles), -1, 0) for f in (np.cos, np.sin)
-    )
+    cos, sin = np.cos(angles), np.sin(angles)
+    ca, ce, cr = cos[..., 0], cos[..., 1], cos[..., 2]
+    sa, se, sr = sin[..., 0], sin[..., 1], sin[..., 2]
     R = np.empty((*angles.shape[:-1], 3, 3))
     R[..., 0, 0], R[..., 0, 1] = ca * ce * cr - sa * sr, -ca * ce * sr - sa * cr
     R[..., 1, 0], R[..., 1, 1] = sa * ce * cr + ca * sr, -sa * ce * sr + ca * cr

@@ -61,6 +61,8 @@ def turns(plan: Plan, solved: Solved) -> Array:
 
 def base_in_uframe(visits: Visits, rows: Ints) -> Array:
     """Return the pose of the arm's base in the user frame, (k, 4, 4) [m]."""
+    if len(rows) == 0:
+        return np.empty((0, 4, 4))
     frames = few_frames(visits)
     return products(inverse(frames), frames, visits.uframe[rows], visits.base[rows])
 

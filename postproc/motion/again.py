@@ -32,6 +32,7 @@ TRACED = 3  # targets on each side that must be traced for that
 SAME = 1e-9  # [rad] arriving on the same branch and turn
 MOST = 0.5  # of all targets; if more have to be traced, all are
 STEPS = (Kind.TOOL_STEP, Kind.BASE_STEP, Kind.JOINT_STEP, Kind.TOWARDS)
+IS_STEP = np.isin(np.arange(max(Kind) + 1), STEPS)
 
 
 @dataclass(frozen=True)
@@ -146,12 +147,13 @@ def _touched(targets: Targets, moved: Bools) -> Bools:
     near = np.stack([np.clip(via + k, 0, last) for k in (-1, 0, 1)])
     arcs = via[moved[near].any(axis=0)]
     touched[arcs] = touched[np.minimum(arcs + 1, last)] = True
-    steps = np.isin(targets.kind, STEPS)
-    while True:
+    steps = IS_STEP[targets.kind]
+    while steps.any():
         more = steps & np.append(False, touched[:-1]) & ~touched
         if not more.any():
-            return touched
+            break
         touched |= more
+    return touched
 
 
 def _with_arcs(targets: Targets, inside: Bools) -> Bools:

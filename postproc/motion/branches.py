@@ -18,7 +18,7 @@ SUSPICIOUS = 0.3  # [rad] a step between samples that another branch might short
 OTHER_TURN = 1.0  # [rad] more than rounding of a turn
 LOST = 1.2  # [rad] a step between samples that no arm makes
 FEW, MORE = 256, 4  # samples looked ahead, and their growth while nothing happens
-TURN_AXES = ((3, 0), (5, 1), (2, 2))  # (axis, which of T1, T2, T3)
+TURN_AXES = [3, 5, 2]  # of T1, T2, T3
 
 
 def on_written_turns(q: Array, turns: Array) -> Array:
@@ -32,12 +32,11 @@ def on_written_turns(q: Array, turns: Array) -> Array:
         turns: T1, T2, T3, (n, 3), NaN where not written.
     """
     out = np.array(q)
-    for axis, which in TURN_AXES:
-        turn = turns[:, which]
-        rest = np.mod(q[:, axis] + np.pi, FULL) - np.pi
-        moved = rest + FULL * np.nan_to_num(turn)
-        keep = np.isnan(turn) if axis == 2 else np.zeros(len(q), dtype=bool)
-        out[:, axis] = np.where(keep, q[:, axis], moved)
+    rest = np.mod(q[:, TURN_AXES] + np.pi, FULL) - np.pi
+    written = ~np.isnan(turns)
+    moved = rest + FULL * np.where(written, turns, 0.0)
+    moved[:, 2] = np.where(written[:, 2], moved[:, 2], q[:, 2])
+    out[:, TURN_AXES] = moved
     return out
 
 
@@ -94,8 +93,12 @@ def follow(begin: Array, ways: Ways) -> Followed:
             slot, ahead = nearest_slot(ways.all(done), last), FEW
             if slot < 0:
                 return Followed(q[:done], slots[:done], False)
-        path = np.unwrap(np.vstack([last, ways.on(slot, done, ahead)]), axis=0)
-        step = np.abs(np.diff(path, axis=0)).max(axis=1)
+        path = np.vstack([last, ways.on(slot, done, ahead)])
+        step = np.abs(np.diff(path, axis=0))
+        if not (step < np.pi).all():
+            path = np.unwrap(path, axis=0)
+            step = np.abs(np.diff(path, axis=0))
+        step = step.max(axis=1)
         if fresh and step[0] > LOST:
             return Followed(q[:done], slots[:done], True)
         # The first step is the shortest there is; go on to the next suspicious one.

@@ -74,8 +74,10 @@ def sample(targets: Targets, flange: Array) -> Samples:
     begin = flange[source[straight]] @ targets.tool[visit[straight]]
     end = flange[visit[straight]] @ targets.tool[visit[straight]]
     begins = _begins(targets, visit, source)
-    round_, arc = _arcs(targets, flange, visit, source, ready, begins)
-    segments, edge = joined([lines(begin, end), arc]), np.append(straight, round_)
+    segments, edge = lines(begin, end), straight
+    if (begins >= 0).any():
+        round_, arc = _arcs(targets, flange, visit, source, ready, begins)
+        segments, edge = joined([segments, arc]), np.append(straight, round_)
     broken = np.zeros(len(visit), dtype=bool)
     broken[edge] = ~segments.valid
     ready = np.zeros(len(visit), dtype=bool)
