@@ -6,12 +6,10 @@ from dataclasses import replace
 
 from postproc.language import pdl2 as ast
 from postproc.language.copies import copied, forget_key, owned
-from postproc.language.evaluate import component_index
+from postproc.language.evaluate import FRAMES, component_index
 from postproc.language.machine import Here
 from postproc.language.target import Target
 from postproc.language.values import Nothing, Position, Value, Written
-
-_FRAMES = ("tool", "base", "uframe")
 
 
 def assign(here: Here, statement: ast.Assign, taught: bool) -> None:
@@ -30,7 +28,11 @@ def assign(here: Here, statement: ast.Assign, taught: bool) -> None:
     if taught and isinstance(value, Position):
         value = replace(value, taught=True)
     if statement.target.name.startswith("$"):
-        _setting(here, statement.target, value)
+        part = here.frame_part(statement.target)
+        if part is None:
+            _setting(here, statement.target, value)
+        else:
+            _frame_part(here, *part, value, taught)
         return
     target = here.locate(statement.target)
     if not target.exact:
@@ -68,17 +70,37 @@ def _setting(here: Here, reference: ast.Reference, value: Value) -> None:
     """Change a frame or motion variable of our arm."""
     name = here.setting_name(reference)
     if name is None:
-        if reference.name[1:] in _FRAMES:
+        if reference.name[1:] in FRAMES:
             why = f"a part of {reference.name.upper()} is assigned"
             here.store.set(**{reference.name[1:]: Nothing(why)})
         elif reference.name == "$arm_data" and _whose(here, reference) is None:
-            field = str(reference.steps[-1]).lstrip("$")
+            field = str((*reference.steps, "")[1]).lstrip("$")
             here.store.set(**{field: Nothing("it is set for an arm known at run time")})
         return
     here.world.pin(value, f"${name.upper()} is set to it")
     if f"${name}" in here.volatile:
         value = Nothing("a condition handler changes it")
     here.store.set(**{name: value})
+
+
+def _frame_part(here: Here, name: str, at: int, value: Value, taught: bool) -> None:
+    """Change one of the six numbers of a frame of our arm.
+
+    The cell may say of its own frames that they were taught: what comes of one whose
+    numbers change is not known then.
+    """
+    held = here.store.settings.get(name)
+    if not isinstance(held, Position):
+        held = Position()
+    number = value if isinstance(value, float) else None
+    new: Value = replace(
+        held.with_component(at, Written(number)), taught=held.taught or taught
+    )
+    if any(held.numbers) and held.numbers in here.world.start.records:
+        new = Nothing(f"a part of ${name.upper()}, which the cell gives, is assigned")
+    if f"${name}" in here.volatile:
+        new = Nothing("a condition handler changes it")
+    here.store.set(**{name: new})
 
 
 def _whose(here: Here, reference: ast.Reference) -> int | None:

@@ -145,6 +145,6 @@ def _direct(statement: ast.Statement) -> Effects:
 
 
 def _assigned_name(reference: ast.Reference) -> str:
-    if reference.name == "$arm_data" and len(reference.steps) == 2:
+    if reference.name == "$arm_data" and len(reference.steps) >= 2:
         return f"${str(reference.steps[1]).lstrip('$')}"
     return reference.name

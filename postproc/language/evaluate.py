@@ -30,6 +30,7 @@ from postproc.language.values import (
 )
 from postproc.language.world import Place, World, base_variable
 
+FRAMES = ("tool", "base", "uframe")
 _TRUTH = {"true": True, "on": True, "false": False, "off": False}
 _WORDS = frozenset(
     "joint linear circular seg_via fly_norm fly_cart fly_auto fly_pass fly_tol "
@@ -180,10 +181,28 @@ class Point:
         return not names.isdisjoint(self.volatile)
 
     def _system(self, reference: ast.Reference) -> Value:
-        name = self.setting_name(reference)
+        part = self.frame_part(reference)
+        name = self.setting_name(reference) if part is None else part[0]
         if name is None or f"${name}" in self.volatile:
             return RUN_TIME
-        return self.store.settings.get(name, RUN_TIME)
+        held = self.store.settings.get(name, RUN_TIME)
+        if part is None:
+            return held
+        number = held.numbers[part[1]] if isinstance(held, Position) else None
+        return RUN_TIME if number is None else number
+
+    def frame_part(self, reference: ast.Reference) -> tuple[str, int] | None:
+        """Return our arm's frame and which of its six numbers is meant, else None."""
+        match reference:
+            case ast.Reference("$arm_data", (of, str(name), str(part))):
+                whole = ast.Reference("$arm_data", (of, name))
+            case ast.Reference(name, (str(part),)):
+                whole = ast.Reference(name, ())
+            case _:
+                return None
+        frame = self.setting_name(whole)
+        known = frame in FRAMES and part in COMPONENTS
+        return (frame, COMPONENTS[part]) if frame and known else None
 
     def setting_name(self, reference: ast.Reference) -> str | None:
         """Return the name of our arm's setting, None for another arm's or none."""

@@ -32,7 +32,8 @@ def forget(here: Here, reference: ast.Reference, why: str) -> None:
     if declared is not None and declared.constant:
         return
     if reference.name.startswith("$"):
-        name = here.setting_name(reference)
+        part = here.frame_part(reference)
+        name = here.setting_name(reference) if part is None else part[0]
         if name in here.store.settings:
             here.store.set(**{str(name): Nothing(why)})
         return

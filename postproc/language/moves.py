@@ -9,7 +9,7 @@ from postproc.language.effects import references
 from postproc.language.forgetting import pin_names
 from postproc.language.machine import Here, Machine
 from postproc.language.store import Settings
-from postproc.language.values import Value
+from postproc.language.values import Nothing, Value
 from postproc.language.visits import ELSEWHERE, Motion, Target
 
 _MOTIONS = {
@@ -127,6 +127,9 @@ def _with(here: Here, statement: ast.Move) -> Settings:
     """Return the settings that hold during this move."""
     changes: dict[str, Value] = {}
     for reference, expression in statement.settings:
+        part = here.frame_part(reference)
+        if part is not None:
+            changes[part[0]] = Nothing("a part of it is set for this move alone")
         name = here.setting_name(reference)
         if name is not None:
             changes[name] = here.value(expression)

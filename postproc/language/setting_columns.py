@@ -140,5 +140,7 @@ def _unknown(settings: Settings, names: tuple[str, ...]) -> str:
         if name in _FRAMES and not (
             isinstance(value, Position) and value.complete and not value.joints
         ):
-            return f"${name.upper()} is not known here: it is no known position"
+            partly = isinstance(value, Position) and not value.joints
+            why = "a part of it is not known" if partly else "it is no known position"
+            return f"${name.upper()} is not known here: {why}"
     return ""

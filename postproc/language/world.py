@@ -50,6 +50,13 @@ class Start:
         taught = frozenset(name.lower() for name in self.taught)
         object.__setattr__(self, "taught", taught)
 
+    @property
+    def records(self) -> frozenset[Record]:
+        """Return all frames that the cell gives."""
+        tables = [e for table in self.frame_tables.values() for e in table.values()]
+        given = [record for entry in tables for record in entry.values()]
+        return frozenset([self.tool, self.base, self.uframe, *given])
+
 
 @dataclass(frozen=True)
 class Place:

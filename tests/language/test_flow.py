@@ -221,3 +221,50 @@ def test_loops_without_a_number_of_rounds_are_followed_over_and_over(
 ) -> None:
     found = body(f"FOR i := {bounds} DO\nMOVE JOINT TO {{1,2,3,4,5,6}}\nENDFOR")
     assert found.visits.predecessors(0).tolist() == [START, 0]
+
+
+PLAIN = Start()
+
+
+def frames_after(*lines: str, start: Start = PLAIN) -> list[list[float]]:
+    """Return the user frame of every move, [] where it is not known."""
+    text = "\n".join(["PROGRAM a", "VAR p : POSITION", "BEGIN", *lines, "END a", ""])
+    source = source_from_bytes("a.pdl", text.encode())
+    visits = resolve(parse(source), start).visits
+    table = [*visits.frames.tolist(), []]
+    return [table[k] for k in visits.uframe.tolist()]
+
+
+MOVE = "MOVE LINEAR TO POS(1, 2, 3, 4, 5, 6, '')"
+WHOLE = "$UFRAME := POS(1, 2, 3, 0, 90, 0, '')"
+
+
+@pytest.mark.parametrize(
+    ("line", "frame"),
+    [
+        ("$UFRAME.Z := 5", [1, 2, 5, 0, 90, 0]),
+        ("$UFRAME.X += 10", [11, 2, 3, 0, 90, 0]),
+        ("$UFRAME.A := $UFRAME.E - 10", [1, 2, 3, 80, 90, 0]),
+        ("$ARM_DATA[1].UFRAME.Y := -4", [1, -4, 3, 0, 90, 0]),
+        ("$ARM_DATA[2].UFRAME.Y := -4", [1, 2, 3, 0, 90, 0]),
+        ("$ARM_DATA[n].UFRAME.Y := -4", []),
+        ("$UFRAME.Z := $AIN[1]", []),
+        ("READ lun ($UFRAME.Z)", []),
+    ],
+)
+def test_a_part_of_a_frame_is_assigned(line: str, frame: list[float]) -> None:
+    assert frames_after(WHOLE, MOVE, line, MOVE) == [[1, 2, 3, 0, 90, 0], frame]
+
+
+def test_a_frame_of_the_cell_may_be_taught_and_is_not_known_with_another_part() -> None:
+    cell = Start(uframe=(1.0, 2.0, 3.0, 0.0, 90.0, 0.0))
+    assert frames_after("$UFRAME.Z := 5", MOVE, start=cell) == [[]]
+    assert frames_after(WHOLE, "$UFRAME.Z := 5", MOVE, start=cell) == [[]]
+    assert frames_after("$UFRAME.Z := 5", MOVE) == [[0, 0, 5, 0, 0, 0]]
+
+
+def test_a_handler_may_assign_a_part_of_a_frame_at_any_time() -> None:
+    handler = ["CONDITION[1] :", "WHEN $DIN[1]+ DO $UFRAME.Z := 5", "ENDCONDITION"]
+    assert frames_after(*handler, WHOLE, "ENABLE CONDITION[1]", MOVE) == [[]]
+    handler[1] = handler[1].replace("$UFRAME", "$ARM_DATA[1].UFRAME")
+    assert frames_after(*handler, WHOLE, "ENABLE CONDITION[1]", MOVE) == [[]]
