@@ -57,8 +57,10 @@ def edited_numbers(
             continue
         start = literals.start[edited[mine]]
         at = np.minimum(np.searchsorted(own.start, start), len(own) - 1)
-        changed[mine] = own.start[at] == start
-        new[mine] = own.new.astype(float)[at]
+        hit = own.start[at] == start
+        numbers = np.zeros(at.shape)
+        numbers[hit] = own.new[at[hit]].astype(float)
+        changed[mine], new[mine] = hit, numbers
     return new, changed
 
 

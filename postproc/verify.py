@@ -13,15 +13,17 @@ from postproc.language.edits import Replacements
 from postproc.language.rewrite import compare
 from postproc.language.skeleton import Skeleton
 from postproc.language.source import UTF8_MARK, Source
-from postproc.language.stamp import strip_stamp
+from postproc.language.stamp import stamp_length
 from postproc.language.visits import Visits
 from postproc.output import Output
+from postproc.pieces import pieces
 from postproc.planning import Reading
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 SAME = 1e-6  # [mm] and [deg]: what adding constants to numbers may round off
+ROWS = 50_000  # compared at a time: what that takes is small beside two readings
 CONSTANT = (
     "frames", "tool", "base", "uframe", "pred_start", "pred", "target", "motion", "via",
     "distance_mm", "aux", "config", "configs", "config_given", "literal", "follows",
@@ -53,13 +55,16 @@ def check_output(before: Reading, after: Reading, output: Output, edited: Ints) 
     v, w = before.visits, after.visits
     if len(v) != len(w) or not np.array_equal(v.literal, w.literal):
         raise VerificationError(f"{v.files[0]}: the output makes other moves")
-    kept = ~(np.isin(v.literal, edited) | np.isin(v.follows, edited))
-    if not np.array_equal(v.values[kept], w.values[kept], equal_nan=True):
-        raise VerificationError(f"{v.files[0]}: a target changed that was to be kept")
-    if not np.allclose(_shares(v, w), w.values - v.values, atol=SAME, equal_nan=True):
+    changes = np.append(np.zeros(len(v.literals), dtype=bool), False)  # none: -1
+    changes[edited] = True
+    for rows in pieces(len(v), ROWS):
+        kept = ~(changes[v.literal[rows]] | changes[v.follows[rows]])
+        if not _same(v.values[rows][kept], w.values[rows][kept]):
+            problem = "a target changed that was to be kept"
+            raise VerificationError(f"{v.files[0]}: {problem}")
+    if not _move_along(v, w):
         raise VerificationError(f"{v.files[0]}: a computed target changed otherwise")
-    numbers, direct = _meant(v, output.edits), w.literal >= 0
-    if not np.array_equal(w.values[direct], numbers[w.literal[direct]]):
+    if not all(_as_meant(v, w, rows, output.edits) for rows in pieces(len(v), ROWS)):
         raise VerificationError(f"{v.files[0]}: a number does not read as it was meant")
     for name in CONSTANT:
         if not _equal(getattr(v, name), getattr(w, name)):
@@ -70,19 +75,22 @@ def _differences(
     old: Skeleton, new: Skeleton, edits: Replacements, stamped: bool
 ) -> tuple[str, ...]:
     """Compare two texts as they were read; the second may begin with a stamp line."""
-    text = strip_stamp(new.source.data) if stamped else new.source.data
+    length = stamp_length(new.source.data) if stamped else 0
     if old.source.data.startswith(UTF8_MARK):  # it is no code on line 1 alone
+        text = new.source.data[length:]
         return compare(old, Source(new.source.name, text), edits)
-    return compare(old, new, edits, len(new.source.data) - len(text))
+    return compare(old, new, edits, length)
 
 
-def _meant(visits: Visits, edits: Sequence[Replacements]) -> Array:
-    """Return what the numbers of all literals should be after the edits, (m, 6)."""
-    literals, direct = visits.literals, np.flatnonzero(visits.literal >= 0)
-    numbers = np.full((len(literals), 6), np.nan)
-    numbers[visits.literal[direct]] = visits.values[direct]
-    new, edited = edited_numbers(literals, np.arange(len(literals)), edits)
-    return np.where(edited, new, numbers)
+def _as_meant(
+    before: Visits, after: Visits, rows: slice, edits: Sequence[Replacements]
+) -> bool:
+    """Tell whether the numbers in the text are those of the edits, else as before."""
+    literal = after.literal[rows]
+    direct = literal >= 0
+    new, edited = edited_numbers(before.literals, literal[direct], edits)
+    meant = np.where(edited, new, before.values[rows][direct])
+    return np.array_equal(after.values[rows][direct], meant)
 
 
 def check_numbers(before: Visits, looked: Array, after: Visits) -> None:
@@ -97,28 +105,41 @@ def check_numbers(before: Visits, looked: Array, after: Visits) -> None:
         VerificationError: A written number is not that one bit by bit, or a computed
             one differs by more than what adding constants rounds off.
     """
-    computed = before.follows >= 0
-    same = (looked == after.values) | (np.isnan(looked) & np.isnan(after.values))
-    if not same[~computed].all():
-        raise VerificationError(f"{before.files[0]}: a number is not read as written")
-    far = ~np.isclose(looked, after.values, rtol=0, atol=SAME, equal_nan=True)
-    if far[computed].any():
-        raise VerificationError(f"{before.files[0]}: a computed target is elsewhere")
+    for rows in pieces(len(before), ROWS):
+        wanted, read = looked[rows], after.values[rows]
+        computed = before.follows[rows] >= 0
+        if not _same(wanted[~computed], read[~computed]):
+            problem = "a number is not read as written"
+            raise VerificationError(f"{before.files[0]}: {problem}")
+        own = wanted[computed], read[computed]
+        if not np.allclose(*own, rtol=0, atol=SAME, equal_nan=True):
+            problem = "a computed target is elsewhere"
+            raise VerificationError(f"{before.files[0]}: {problem}")
 
 
 def _equal(a: Array | tuple[str, ...], b: Array | tuple[str, ...]) -> bool:
     """Compare two columns."""
     if isinstance(a, tuple) or isinstance(b, tuple):
         return a == b
+    return a.shape == b.shape and all(
+        _same(a[rows], b[rows]) for rows in pieces(len(a), ROWS)
+    )
+
+
+def _same(a: Array, b: Array) -> bool:
+    """Compare some rows of two columns; NaN equals NaN."""
     return np.array_equal(a, b, equal_nan=a.dtype.kind == "f")
 
 
-def _shares(before: Visits, after: Visits) -> Array:
-    """Give the changes of all visits, those of computed targets by their literals."""
-    moved = after.values - before.values
+def _move_along(before: Visits, after: Visits) -> bool:
+    """Tell whether computed targets change as those do that they are computed from."""
+    rows = np.flatnonzero(before.follows >= 0)
+    if not len(rows):
+        return True
     direct = np.flatnonzero(before.literal >= 0)
     change = np.zeros((len(before.literals), 6))
-    change[before.literal[direct]] = moved[direct]
-    rows = before.follows >= 0
-    moved[rows] = change[before.follows[rows]]
-    return moved
+    moved = after.values[direct] - before.values[direct]
+    change[before.literal[direct]] = moved
+    moved = after.values[rows] - before.values[rows]
+    meant = change[before.follows[rows]]
+    return np.allclose(meant, moved, atol=SAME, equal_nan=True)

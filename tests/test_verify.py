@@ -14,6 +14,14 @@ from postproc.robot.cell import Cell
 from postproc.verify import VerificationError, check_output
 from tests.written import FIRST, POSE, program
 
+
+@pytest.fixture(params=[1, 50_000], autouse=True)
+def window(request, monkeypatch):
+    """Check as many rows at a time."""
+    monkeypatch.setattr("postproc.verify.ROWS", request.param)
+    monkeypatch.setattr("postproc.language.skeleton.AT_ONCE", request.param)
+
+
 SHIFTED = (
     "p := POS(100.0, 210.0, 150.0, 0.0, 175.0, 0.0, '')",
     "MOVE LINEAR TO p",

@@ -114,9 +114,17 @@ class Replacements(Sequence[Edit]):
         Raises:
             ValueError: An edit lies outside.
         """
+        return b"".join(self.applied(data))
+
+    def applied(self, data: bytes) -> Iterator[bytes]:
+        """Apply to a text; yield the result piece by piece.
+
+        Raises:
+            ValueError: An edit lies outside.
+        """
         if len(self) and not (self.start[0] >= 0 and self.end[-1] <= len(data)):
             raise ValueError("an edit lies outside")
-        out, done = [], 0
+        done = 0
         for some in self.pieces():
             kept = [done, *some.end[:-1].tolist()]
             parts: list[bytes] = []
@@ -124,9 +132,9 @@ class Replacements(Sequence[Edit]):
                 kept, some.start.tolist(), some.new.tolist(), strict=True
             ):
                 parts += (data[start:end], new)
-            out.append(b"".join(parts))
+            yield b"".join(parts)
             done = int(some.end[-1])
-        return b"".join([*out, data[done:]])
+        yield data[done:]
 
     def undone(self, data: bytes, after: int = 0) -> Replacements:
         """Return the edits of the result that give the text back.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,6 +14,8 @@ from postproc.language.lines import Lines, read_lines
 from postproc.language.source import Source
 
 Ints = NDArray[np.signedinteger[Any]]
+
+AT_ONCE = 200_000  # numbers that are compared
 
 
 @dataclass(frozen=True)
@@ -75,19 +78,31 @@ def differences(
     if before.shapes != after.shapes or (before.shape != after.shape).any():
         row = int(np.flatnonzero(before.shape != after.shape)[:1].sum())
         return (f"line {before.line[row]}: the rewritten line has another shape",)
-    at: Ints = np.searchsorted(before.start, allowed.start)
-    ends = np.append(before.end, -1)
-    whole = np.append(before.start, -1)[at] == allowed.start
-    whole &= ends[at] == allowed.end
-    if not whole.all():
-        line = before.source.line_of(int(allowed.start[~whole][0]))
-        return (f"line {line}: an edit does not replace one whole number",)
-    growth = np.zeros(len(before.start) + 1, dtype=np.int64)
-    growth[at + 1] = np.char.str_len(allowed.new) - (allowed.end - allowed.start)
-    shift = stamp + np.cumsum(growth)
-    wrong = after.start != before.start + shift[:-1]
-    wrong |= after.end != before.end + shift[1:]
-    if not wrong.any():
-        return ()
-    line = before.source.line_of(int(before.start[wrong][0]))
-    return (f"line {line}: a number stands elsewhere than it should",)
+    for rows in _windows(len(allowed)):
+        some = allowed[rows]
+        at = np.searchsorted(before.start, some.start)
+        whole = at < len(before.start)
+        at[~whole] = 0
+        if len(before.start):
+            whole &= before.start[at] == some.start
+            whole &= before.end[at] == some.end
+        if not whole.all():
+            line = before.source.line_of(int(some.start[~whole][0]))
+            return (f"line {line}: an edit does not replace one whole number",)
+    growth = np.char.str_len(allowed.new) - (allowed.end - allowed.start)
+    shift = stamp + np.cumsum(np.append(0, growth))
+    for rows in _windows(len(before.start)):
+        start, end = before.start[rows], before.end[rows]
+        edits = np.searchsorted(allowed.start, start)  # before the number
+        wrong = after.start[rows] != start + shift[edits]
+        edits = np.searchsorted(allowed.start, start, side="right")  # and its own
+        wrong |= after.end[rows] != end + shift[edits]
+        if wrong.any():
+            line = before.source.line_of(int(start[wrong][0]))
+            return (f"line {line}: a number stands elsewhere than it should",)
+    return ()
+
+
+def _windows(n: int) -> Iterator[slice]:
+    """Cut n rows, so that what comparing them takes is small beside two texts."""
+    return (slice(a, a + AT_ONCE) for a in range(0, n, AT_ONCE))

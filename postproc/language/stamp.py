@@ -66,5 +66,10 @@ def is_stamped(source: Source) -> bool:
 
 def strip_stamp(data: bytes) -> bytes:
     """Return the bytes after the stamp line; all of them where there is none."""
+    return data[stamp_length(data) :]
+
+
+def stamp_length(data: bytes) -> int:
+    """Count the bytes of the stamp line; 0 where there is none."""
     found = _STAMP.match(data)
-    return data[found.end() :] if found else data
+    return found.end() if found else 0
