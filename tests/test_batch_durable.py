@@ -6,6 +6,7 @@ import os
 import resource
 import signal
 import subprocess
+import sys
 import time
 
 import pytest
@@ -106,3 +107,20 @@ def test_a_place_that_cannot_be_written_fails_alone(plant):
     assert there["line001"] == contents(target)["line001"]
     assert sum(p.endswith(".pdl") for p in there) == 10
     assert "line001/job00010.pdl" in default_log(target).read_text()
+
+
+def test_ctrl_c_does_not_reach_the_process_that_workers_are_forked_from():
+    code = (
+        "from multiprocessing import forkserver\n"
+        "from postproc.batch.server import start_server\n"
+        "start_server()\n"
+        "pid = forkserver._forkserver._forkserver_pid\n"
+        "print(open(f'/proc/{pid}/status').read())\n"
+    )
+    command = [sys.executable, "-c", code]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    status = dict(
+        line.split(":\t") for line in done.stdout.splitlines() if ":\t" in line
+    )
+    assert int(status["SigBlk"], 16) & 1 << (signal.SIGINT - 1)
+    assert not int(status["SigBlk"], 16) & 1 << (signal.SIGTERM - 1)

@@ -9,7 +9,7 @@ from __future__ import annotations
 import multiprocessing
 import os
 import signal
-from multiprocessing import forkserver
+from multiprocessing import forkserver, resource_tracker
 from multiprocessing.context import ForkServerContext
 
 READY = "postproc.batch.ready"
@@ -29,7 +29,9 @@ def start_server() -> ForkServerContext:
         os.environ.setdefault(name, "1")
     context = multiprocessing.get_context("forkserver")
     context.set_forkserver_preload([READY])
-    # Ctrl-C goes to the whole group, and is for us to answer.
+    # Ctrl-C goes to the whole group, and is for us to answer. The tracker comes first:
+    # starting it ends all blocking of that signal.
+    resource_tracker.ensure_running()
     blocked = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
     try:
         forkserver.ensure_running()
