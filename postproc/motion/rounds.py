@@ -81,6 +81,8 @@ def rounds(targets: Targets, tcp: Array, aside: Array) -> Rounds:
             (n, 4, 4) [m].
         aside: From the targets to there, (n, 3) [m].
     """
+    if not targets.via.any():
+        return Rounds(np.empty((0, 3), dtype=np.int64), np.empty((0, 3, 3)))
     visit = np.repeat(np.arange(len(targets)), np.diff(targets.pred_start))
     source = targets.pred
     arc = (targets.move[visit] == Move.CIRCULAR) & targets.via[visit]
