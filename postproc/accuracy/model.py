@@ -124,7 +124,7 @@ class Model:
         """
         model, arrival = self._deviations(arm, states)
         outside = self.ranges.outside(states, self.needs)
-        unsure = self.unsure(arm, states)
+        unsure = _on_flanks(states) & (model > self._sure_up_to).any(axis=1)
         if unsure.any():
             outside[UNSURE] = unsure
         return Prediction(self.error(arm, states), model, arrival, outside)
@@ -139,12 +139,16 @@ class Model:
         States with unknown directions are no such: their error is said to be the
         middle's.
         """
-        out = np.zeros(len(states), dtype=bool)
-        worst = self.statistics.get("worst_std_mm", np.inf) * MM
-        rows = np.flatnonzero((np.abs(states.direction) == 1).all(axis=1))
-        if len(rows) and np.isfinite(worst):
-            out[rows] = (self.std_error(arm, states[rows]) > 3 * worst).any(axis=1)
+        out, most = np.zeros(len(states), dtype=bool), self._sure_up_to
+        rows = np.flatnonzero(_on_flanks(states))
+        if len(rows) and np.isfinite(most):
+            out[rows] = (self.std_error(arm, states[rows]) > most).any(axis=1)
         return out
+
+    @property
+    def _sure_up_to(self) -> float:
+        """Standard error per axis up to which the survey vouches for it [m]."""
+        return 3 * (self.statistics.get("worst_std_mm", np.inf) * MM)
 
     def _deviations(self, arm: Arm, states: States) -> tuple[Array, Array]:
         """Standard deviations of the error and of one arrival, (n, 3) [m] each."""
@@ -267,6 +271,11 @@ def load_model(path: str | Path) -> Model:
     # A file of an older release lacks keys that have been added since: it keeps its id.
     vars(model)["id"] = file.id
     return model
+
+
+def _on_flanks(states: States) -> Bools:
+    """Tell for which states the directions of all joints are known, (n,)."""
+    return np.asarray((np.abs(states.direction) == 1).all(axis=1))
 
 
 def _parameter_variance(columns: Array, covariance: Array) -> Array:
