@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from postproc.language.lexis import BLANKS
 from postproc.language.masking import Masked, mask_lines
 from postproc.number_pairs import Pairs, pair_numbers
+from postproc.pieces import pieces
 from postproc.rows import Rows, joined_rows
 
 Floats = NDArray[np.float64]
@@ -19,7 +20,6 @@ Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 
 PIECE = 5_000  # lines that are masked at a time
-THREADS = 1
 
 _ASSIGNED = re.compile(r"\s*([A-Za-z_$][\w$.\[\]]*)\s*(?::=|:)")
 _TWO_WORDS = re.compile(r"\s*([A-Za-z_]+)\s+([A-Za-z_]+)")
@@ -40,10 +40,9 @@ def changed_rows(
     """
     pairs = zip(before, after, strict=True)
     places = [k for k, (old, new) in enumerate(pairs) if old != new]
-
     parts = []
-    for first in range(0, len(places), PIECE):
-        part = places[first : first + PIECE]
+    for some in pieces(len(places), PIECE):
+        part = places[some]
         numbers = np.array([lines[k] for k in part], dtype=np.int64)
         old, new = [before[k] for k in part], [after[k] for k in part]
         parts.append(_compare(file, numbers, old, new))

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from postproc.byte_columns import Column, beside, blanked, joined, shortest, whole
 from postproc.diff import Difference
-from postproc.row_columns import AT_ONCE, number_places, single_rows, strung, words
+from postproc.row_columns import blocks_of, number_places, strung, words
 from postproc.rows import STATUSES, Rows
 
 Floats = NDArray[np.float64]
@@ -37,10 +37,8 @@ def difference_pieces(found: Difference) -> Iterator[str]:
 
 def _pieces(rows: Rows) -> Iterator[str]:
     """Write rows with commas between them."""
-    single = single_rows(rows)
-    for begin in range(0, len(rows), AT_ONCE):
-        k = np.arange(begin, min(begin + AT_ONCE, len(rows)))
-        own = single[(single >= begin) & (single <= k[-1])]
+    for k, own in blocks_of(rows):
+        begin = int(k[0])
         texts = np.empty(len(k), dtype=object)
         plain = np.setdiff1d(k, own, assume_unique=True)
         if len(plain):

@@ -17,7 +17,7 @@ from postproc.console import Column
 from postproc.diff import Difference
 from postproc.listing import ARROWS, arrows, is_coloured, paint, status_colour
 from postproc.listing_columns import Block, print_blocks
-from postproc.row_columns import AT_ONCE, number_places, single_rows, strung, words
+from postproc.row_columns import blocks_of, number_places, strung, words
 from postproc.rows import STATUSES, Row, Rows
 
 Ints = NDArray[np.int64]
@@ -65,11 +65,8 @@ class _Writer:
     def blocks(self, parts: Sequence[Rows], shown: Sequence[int]) -> Iterator[Block]:
         """Write the rows of all files, some columns of them."""
         for rows in parts:
-            single = single_rows(rows)
-            for begin in range(0, len(rows), AT_ONCE):
-                k = np.arange(begin, min(begin + AT_ONCE, len(rows)))
-                own = single[(single >= begin) & (single <= k[-1])].tolist()
-                yield self._block(rows, k, own, shown)
+            for k, own in blocks_of(rows):
+                yield self._block(rows, k, own.tolist(), shown)
 
     def _block(
         self, rows: Rows, k: Ints, single: Sequence[int], shown: Sequence[int]

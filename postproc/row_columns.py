@@ -6,12 +6,13 @@ writes rows writes them one by one, as `Row`, and asks here which they are.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from postproc.byte_columns import Column
+from postproc.pieces import pieces
 from postproc.rows import Rows
 
 Bools = NDArray[np.bool_]
@@ -35,6 +36,14 @@ def single_rows(rows: Rows) -> Ints:
         unclear = ~np.array([why.isprintable() for why in rows.told.reasons])
         many |= unclear[rows.told.why[rows.entry]]
     return np.flatnonzero(many)
+
+
+def blocks_of(rows: Rows) -> Iterator[tuple[Ints, Ints]]:
+    """Cut rows: yield the rows of each block, and those that are written one by one."""
+    single = single_rows(rows)
+    for some in pieces(len(rows), AT_ONCE):
+        here = (single >= some.start) & (single < some.stop)
+        yield np.arange(some.start, some.stop), single[here]
 
 
 def number_places(first: Ints, k: Ints) -> tuple[Ints, Ints]:

@@ -12,9 +12,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from postproc.language.lexis import NUMBER_MARK
+
 Ints = NDArray[np.signedinteger[Any]]
 
-NUMBER = b"\x00"  # stands for a number in a mask
+_NUMBER = NUMBER_MARK.encode()
 _IN_PARENTHESES = rb"\((?:'[^']*'|[^'()]|\([^()]*\))*\)"
 _DIVIDED = re.compile(
     rb"(CASE *" + _IN_PARENTHESES + rb" *:|ELSE *:) *"
@@ -55,7 +57,7 @@ def divided(rows: Rows) -> Rows:
     masks = list(rows.masks)
     for k, (before, behind) in found.items():
         head[k], tail[k] = len(masks), len(masks) + 1
-        numbers[k] = before.count(NUMBER)
+        numbers[k] = before.count(_NUMBER)
         masks += [before, behind]
     times = np.where(head[rows.shape] != rows.shape, 2, 1)
     row = np.repeat(np.arange(len(times)), times)

@@ -10,6 +10,8 @@ from typing import NamedTuple, overload
 import numpy as np
 from numpy.typing import NDArray
 
+from postproc.pieces import pieces
+
 Ints = NDArray[np.int64]
 
 AT_ONCE = 50_000  # edits that are Python objects at the same time
@@ -106,7 +108,7 @@ class Replacements(Sequence[Edit]):
 
     def pieces(self) -> Iterator[Replacements]:
         """Cut into pieces that may become Python objects."""
-        return (self[a : a + AT_ONCE] for a in range(0, len(self), AT_ONCE))
+        return (self[some] for some in pieces(len(self), AT_ONCE))
 
     def apply(self, data: bytes) -> bytes:
         """Apply to a text.

@@ -14,6 +14,7 @@ from postproc.language.lexis import number_value
 from postproc.language.skeleton import Skeleton, differences
 from postproc.language.source import Source, apply
 from postproc.language.visits import Literals
+from postproc.pieces import pieces
 
 Ints = NDArray[np.int64]
 Floats = NDArray[np.float64]
@@ -86,11 +87,11 @@ def edits(
         order = np.argsort(start[written], kind="stable")
         start, end = start[written][order], end[written][order]
         values, least = new_values[mine][written][order], least[written][order]
-        pieces = [
+        parts = [
             _edits_of(source, start[some], end[some], values[some], least[some])
-            for some in (slice(a, a + _PIECE) for a in range(0, len(start), _PIECE))
+            for some in pieces(len(start), _PIECE)
         ]
-        found.append(Replacements.joined(pieces))
+        found.append(Replacements.joined(parts))
     return tuple(found)
 
 

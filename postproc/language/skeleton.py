@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,10 +11,11 @@ from numpy.typing import NDArray
 from postproc.language.edits import Replacements
 from postproc.language.lines import Lines, read_lines
 from postproc.language.source import Source
+from postproc.pieces import pieces
 
 Ints = NDArray[np.signedinteger[Any]]
 
-AT_ONCE = 200_000  # numbers that are compared
+AT_ONCE = 200_000  # numbers compared: what that takes is small beside two texts
 
 
 @dataclass(frozen=True)
@@ -78,7 +78,7 @@ def differences(
     if before.shapes != after.shapes or (before.shape != after.shape).any():
         row = int(np.flatnonzero(before.shape != after.shape)[:1].sum())
         return (f"line {before.line[row]}: the rewritten line has another shape",)
-    for rows in _windows(len(allowed)):
+    for rows in pieces(len(allowed), AT_ONCE):
         some = allowed[rows]
         at = np.searchsorted(before.start, some.start)
         whole = at < len(before.start)
@@ -91,7 +91,7 @@ def differences(
             return (f"line {line}: an edit does not replace one whole number",)
     growth = np.char.str_len(allowed.new) - (allowed.end - allowed.start)
     shift = stamp + np.cumsum(np.append(0, growth))
-    for rows in _windows(len(before.start)):
+    for rows in pieces(len(before.start), AT_ONCE):
         start, end = before.start[rows], before.end[rows]
         edits = np.searchsorted(allowed.start, start)  # before the number
         wrong = after.start[rows] != start + shift[edits]
@@ -101,8 +101,3 @@ def differences(
             line = before.source.line_of(int(start[wrong][0]))
             return (f"line {line}: a number stands elsewhere than it should",)
     return ()
-
-
-def _windows(n: int) -> Iterator[slice]:
-    """Cut n rows, so that what comparing them takes is small beside two texts."""
-    return (slice(a, a + AT_ONCE) for a in range(0, n, AT_ONCE))
