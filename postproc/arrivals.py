@@ -132,7 +132,10 @@ def tell_arrivals(
     told = {}
     for name in files:
         rows = np.flatnonzero(file == v.files.index(name))
-        used, why = np.unique(d.why[rows], return_inverse=True)
+        codes, first, why = np.unique(
+            d.why[rows], return_index=True, return_inverse=True
+        )
+        order = np.argsort(first)  # reasons as the visits need them
         told[name] = {
             "line": line[rows].tolist(),
             "status": "".join(d.status[rows].astype(str).tolist()),
@@ -140,8 +143,8 @@ def tell_arrivals(
                 signs[np.asarray(d.direction[rows], dtype=int) + 1].ravel().tolist()
             ),
             "correction_mm": np.round(np.nan_to_num(size[rows]), DIGITS).tolist(),
-            "why": why.tolist(),
-            "reasons": [d.reasons[k] for k in used.tolist()],
+            "why": np.argsort(order)[why].tolist(),
+            "reasons": [d.reasons[k] for k in codes[order].tolist()],
         }
     return told
 
