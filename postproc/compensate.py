@@ -72,9 +72,7 @@ def compensate(
     with clock("parse"):
         reading = read_program(files, cell)
     reading, kept = correct(reading, cell, model, options, clock)
-    output = write_and_verify(reading, kept, cell, model, clock)
-    with clock("report"):
-        return report(name, reading, kept, output, cell, model, options, clock)
+    return finish(name, reading, kept, cell, model, options, clock)
 
 
 def name_files(
@@ -114,6 +112,25 @@ def refuse(files: Mapping[str, bytes], cell: Cell, model: Model) -> None:
             place="$.robot.absolute_accuracy",
         )
     model.check_arm(cell.arm)
+
+
+def finish(
+    name: str,
+    reading: Reading,
+    kept: Kept,
+    cell: Cell,
+    model: Model,
+    options: Options,
+    clock: Clock,
+) -> Outcome:
+    """Write what was corrected, verify it, and say what came of it.
+
+    Raises:
+        VerificationError: The output is not what was meant.
+    """
+    output = write_and_verify(reading, kept, cell, model, clock)
+    with clock("report"):
+        return report(name, reading, kept, output, cell, model, options, clock)
 
 
 def write_and_verify(

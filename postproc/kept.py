@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, fields
 
 import numpy as np
 from numpy.typing import NDArray
@@ -71,7 +71,7 @@ def keep(
     return Kept(
         edited=proposal.edited,
         edits=found.edits,
-        decisions=_without(proposal.decisions, seeds),
+        decisions=proposal.decisions.part(slice(seeds, None)),
         corrected=moved[seeds:],
         before=model.error(cell.arm, states[moved]) - planned.shift[moved],
         after=after,
@@ -97,16 +97,6 @@ def joined(parts: Sequence[Kept]) -> Kept:
         decisions=_one_after_another([part.decisions for part in parts]),
         **arrays,
     )
-
-
-def _without(decisions: Decisions, seeds: int) -> Decisions:
-    """Leave out the first visits."""
-    rows = {
-        f.name: getattr(decisions, f.name)[seeds:]
-        for f in fields(Decisions)
-        if f.name != "reasons"
-    }
-    return replace(decisions, **rows) if seeds else decisions
 
 
 def _one_after_another(parts: Sequence[Decisions]) -> Decisions:

@@ -38,7 +38,7 @@ VARIABLES = ".lsv"  # suffix of variable files
 
 @dataclass(frozen=True)
 class Reading:
-    """A program as the language understands it.
+    """A program as the language understands it, or several side by side.
 
     Attributes:
         texts: Its files as they were read, in the order of `Visits.files`.
@@ -47,6 +47,7 @@ class Reading:
         cloned: Edits, file by file, that gave `sources` clones of variables; empty
             where there are none. Lines of visits are those before these edits.
         given: The files as they were before that; empty where nothing was cloned.
+        begins: The first visit of every program.
     """
 
     texts: tuple[Skeleton, ...]
@@ -54,6 +55,7 @@ class Reading:
     diagnostics: tuple[Diagnostic, ...]
     cloned: tuple[tuple[Edit, ...], ...] = ()
     given: tuple[Source, ...] = ()
+    begins: tuple[int, ...] = (0,)
 
     @property
     def sources(self) -> tuple[Source, ...]:

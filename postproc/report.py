@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields, replace
 from enum import IntEnum
 
 import numpy as np
@@ -59,6 +59,15 @@ class Decisions:
     correction: Array
     std_error: Array
     turn: Array = field(default_factory=lambda: np.empty((0, 3)))
+
+    def part(self, rows: slice) -> Decisions:
+        """Take the decisions for some visits."""
+        own = {
+            f.name: getattr(self, f.name)[rows]
+            for f in fields(self)
+            if f.name != "reasons"
+        }
+        return replace(self, **own)
 
     def count(self, status: Status) -> int:
         """Count the visits of one status."""

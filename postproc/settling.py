@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from itertools import count
+from itertools import count, pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -83,6 +83,9 @@ def settle(
 
     A rounded fly point also moves with its neighbours' corrections, which its own makes
     up for. The last look is at the numbers as they will be read from the output.
+
+    Programs side by side do not wait for each other: what has come to rest in one stays
+    as it is while others go on.
     """
     held, search = np.zeros(len(states), dtype=bool), SideSearch()
     with clock("solve"):
@@ -102,8 +105,9 @@ def settle(
         sharp = planned.plan.pull.visit
         missed[sharp] = (after.aside - aside)[sharp]
         missed[~proposal.corrected] = 0.0
-        rounds_on = number < CORNERS and np.abs(missed).max(initial=0.0) > CLOSE
-        bent = bent + missed if rounds_on else bent
+        far = _far_off(missed, reading.begins)
+        rounds_on = number < CORNERS and bool(far.any())
+        bent = bent + np.where(far, missed, 0.0) if rounds_on else bent
         off = np.abs(found - solved.direction).max(axis=1, initial=0.0)
         moved = proposal.corrected & ~settled_for
         moved = moved & (off > (SAME if number < ROUNDS else OTHER))
@@ -130,6 +134,19 @@ def settle(
                 solved, moved, model, cell, planned, aimed, options.orientation
             )
     raise AssertionError("unreachable")
+
+
+def _far_off(missed: Array, begins: tuple[int, ...]) -> Bools:
+    """Tell the visits of programs with a fly point that is not hit well, (n, 1).
+
+    Args:
+        missed: How far the path passes from where it should, (n, 3) [m].
+        begins: The first visit of every program.
+    """
+    out = np.zeros((len(missed), 1), dtype=bool)
+    for first, end in pairwise((*begins, len(missed))):
+        out[first:end] = np.abs(missed[first:end]).max(initial=0.0) > CLOSE
+    return out
 
 
 def wanted_moves(plan: Plan, solved: Solved, held: Bools, before: Left) -> Array:

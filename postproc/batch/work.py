@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from time import perf_counter
 from typing import Any
 
@@ -12,17 +12,17 @@ import numpy as np
 from postproc import __version__
 from postproc.batch.setup import Setup
 from postproc.batch.task import Result, Task, Unit, failed
-from postproc.compensate import compensate
 from postproc.exceptions import PostprocError
 from postproc.pose import MM
 from postproc.report import Outcome
 from postproc.sidecar import SUFFIX
+from postproc.together import Given, compensate_together
 
 LISTED = 50  # findings of a program that the log lists; the rest is counted
 
 
 def run_tasks(tasks: Sequence[Task], setup: Setup, version: str) -> list[Result]:
-    """Compensate programs one after the other; one that fails stops no other.
+    """Compensate programs; one that fails stops no other.
 
     Args:
         tasks: The programs.
@@ -32,45 +32,51 @@ def run_tasks(tasks: Sequence[Task], setup: Setup, version: str) -> list[Result]
     if version != __version__:
         text = f"the worker has postproc {__version__}, the run {version}: make equal"
         return [failed(task.unit, text) for task in tasks]
-    return [run_task(task, setup) for task in tasks]
-
-
-def run_task(task: Task, setup: Setup) -> Result:
-    """Compensate a program with its pages and variables.
-
-    Whatever goes wrong is a result too: in a batch nothing may stop the rest.
-    """
     start = perf_counter()
+    found = _compensated(tasks, setup)
+    results = [_result(*pair) for pair in zip(tasks, found, strict=True)]
+    seconds = (perf_counter() - start) / max(len(tasks), 1)
+    return [replace(result, seconds=seconds) for result in results]
+
+
+def _compensated(tasks: Sequence[Task], setup: Setup) -> list[Outcome | Exception]:
+    """Compensate the programs of tasks; what fails for all of them is told of each."""
+    given = [_given(task) for task in tasks]
     try:
-        result = _compensated(task, setup)
-    except PostprocError as exc:
-        result = failed(task.unit, str(exc))
-    except RecursionError:
-        result = failed(task.unit, "is nested too deeply")
-    except MemoryError:
-        result = failed(task.unit, "needs more memory than there is")
-    except Exception as exc:  # a defect of ours, or of a library
-        what = f"internal error: {type(exc).__name__}: {exc}"
-        result = failed(task.unit, f"{what}; please report it with the program")
-    seconds = perf_counter() - start
-    return Result(result.unit, result.exit_code, result.outputs, result.facts, seconds)
+        return compensate_together(given, setup.cell, setup.model, setup.options)
+    except Exception as exc:
+        return [exc for _ in tasks]
 
 
-def _compensated(task: Task, setup: Setup) -> Result:
-    """Compensate, and name everything that belongs into the target tree."""
+def _given(task: Task) -> Given:
+    """Name the files of a task as its programs name each other."""
     unit = task.unit
     sources = dict(zip(unit.files, task.sources, strict=True))
-    outcome = compensate(
-        task.sources[0],
-        setup.cell,
-        setup.model,
+    return Given(
         name=_file_name(unit.program),
+        source=task.sources[0],
         variables=None if unit.variables is None else sources[unit.variables],
         pages={_file_name(page): sources[page] for page in unit.pages},
-        options=setup.options,
     )
-    outputs = _outputs(unit, sources, outcome)
-    return Result(unit, outcome.exit_code, outputs, facts_of(outcome))
+
+
+def _result(task: Task, found: Outcome | Exception) -> Result:
+    """Say what came of a task; whatever went wrong is a result too."""
+    unit = task.unit
+    match found:
+        case Outcome():
+            sources = dict(zip(unit.files, task.sources, strict=True))
+            outputs = _outputs(unit, sources, found)
+            return Result(unit, found.exit_code, outputs, facts_of(found))
+        case PostprocError():
+            return failed(unit, str(found))
+        case RecursionError():
+            return failed(unit, "is nested too deeply")
+        case MemoryError():
+            return failed(unit, "needs more memory than there is")
+    # A defect of ours, or of a library.
+    what = f"internal error: {type(found).__name__}: {found}"
+    return failed(unit, f"{what}; please report it with the program")
 
 
 def _outputs(

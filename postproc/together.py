@@ -1,0 +1,182 @@
+"""Several small programs compensated in one pass, each as if it were alone.
+
+Arrays of a thousand rows cost little more than arrays of a hundred: what a small
+program takes is mostly the way through the code, and side by side many go that way at
+once.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import accumulate, chain
+from typing import ParamSpec, TypeVar
+
+import numpy as np
+
+from postproc.accuracy.model import Model
+from postproc.clock import Clock, silent
+from postproc.compensate import finish, name_files, refuse
+from postproc.correcting import correct
+from postproc.kept import Kept
+from postproc.language.beside import begins, beside
+from postproc.options import Options
+from postproc.planning import Reading, read_program, with_measured_play
+from postproc.report import Outcome
+from postproc.robot.cell import Cell
+
+T = TypeVar("T")
+P = ParamSpec("P")
+
+PASS = 2_000  # visits of a pass; more gain nothing, and wait for each other
+
+
+@dataclass(frozen=True)
+class Given:
+    """A program as it comes: the arguments of `compensate`."""
+
+    name: str
+    source: bytes
+    variables: bytes | None
+    pages: Mapping[str, bytes]
+
+
+def compensate_together(
+    programs: Sequence[Given], cell: Cell, model: Model, options: Options
+) -> list[Outcome | Exception]:
+    """Compensate programs with the same cell and model.
+
+    Args:
+        programs: The programs.
+        cell: The robot's surroundings.
+        model: The arm's error.
+        options: What the user asked for.
+
+    Returns:
+        For every program what `compensate` returns, or else what it raises. `stages` is
+        the time of all programs that were worked on.
+    """
+    shop = _Shop(with_measured_play(cell, model), model, options, Clock(silent))
+    readings = [_tried(shop.read, program) for program in programs]
+    readable = [found for found in readings if isinstance(found, Reading)]
+    corrected = chain.from_iterable(map(shop.corrected, _passes(readable)))
+    out: list[Outcome | Exception] = []
+    for program, reading in zip(programs, readings, strict=True):
+        found = reading if isinstance(reading, Exception) else next(corrected)
+        out.append(
+            found
+            if isinstance(found, Exception)
+            else _tried(shop.finished, program, *found)
+        )
+    return out
+
+
+@dataclass(frozen=True)
+class _Shop:
+    """What all programs are worked on with."""
+
+    cell: Cell
+    model: Model
+    options: Options
+    clock: Clock
+
+    def read(self, given: Given) -> Reading:
+        """Read a program that may be compensated."""
+        files = name_files(given.name, given.source, given.variables, given.pages)
+        refuse(files, self.cell, self.model)
+        with self.clock("parse"):
+            return read_program(files, self.cell)
+
+    def corrected(
+        self, readings: Sequence[Reading]
+    ) -> list[tuple[Reading, Kept] | Exception]:
+        """Correct the programs of a pass; one that fails leaves the others alone."""
+        with_ = (self.cell, self.model, self.options, self.clock)
+        if len(readings) > 1 and not self.options.clone:
+            found = _tried(correct_together, readings, *with_)
+            if not isinstance(found, Exception):
+                return list(zip(readings, found, strict=True))
+        return [_tried(correct, reading, *with_) for reading in readings]
+
+    def finished(self, given: Given, reading: Reading, kept: Kept) -> Outcome:
+        """Write a corrected program and verify it."""
+        with_ = (self.cell, self.model, self.options, self.clock)
+        return finish(given.name, reading, kept, *with_)
+
+
+def _tried(work: Callable[P, T], *args: P.args, **named: P.kwargs) -> T | Exception:
+    """Return what comes of it, an exception too: nothing may stop the others."""
+    try:
+        return work(*args, **named)
+    except Exception as exc:
+        return exc
+
+
+def _passes(readings: Sequence[Reading]) -> Iterator[list[Reading]]:
+    """Put programs into passes, one after the other; an empty one goes alone."""
+    waiting: list[Reading] = []
+    size = 0
+    for reading in readings:
+        n = len(reading.visits)
+        if waiting and (n == 0 or size == 0 or size + n > PASS):
+            yield waiting
+            waiting, size = [], 0
+        waiting.append(reading)
+        size += n
+    if waiting:
+        yield waiting
+
+
+def correct_together(
+    readings: Sequence[Reading],
+    cell: Cell,
+    model: Model,
+    options: Options,
+    clock: Clock,
+) -> list[Kept]:
+    """Plan and correct programs side by side; what fails for one fails for all.
+
+    Args:
+        readings: The programs, none without visits.
+        cell: The robot's surroundings, with the play that was measured.
+        model: The arm's error.
+        options: What the user asked for; no clones.
+        clock: Times the stages of all.
+
+    Returns:
+        What `correct` keeps of each alone.
+    """
+    own = [reading.visits for reading in readings]
+    texts = tuple(text for reading in readings for text in reading.texts)
+    all_ = Reading(texts, beside(own), (), begins=begins(own))
+    _, kept = correct(all_, cell, model, options, clock)
+    return list(_apart(kept, readings))
+
+
+def _apart(kept: Kept, readings: Sequence[Reading]) -> Iterator[Kept]:
+    """Give every program what is its own."""
+    moved = np.append(0, np.cumsum(kept.corrected))
+    visits = _ends([len(reading.visits) for reading in readings])
+    literals = _ends([len(reading.visits.literals) for reading in readings])
+    files = _ends([len(reading.texts) for reading in readings])
+    edited = np.searchsorted(kept.edited, literals).tolist()
+    for k in range(len(readings)):
+        rows = slice(*visits[k : k + 2])
+        found = slice(*moved[visits[k : k + 2]])
+        yield Kept(
+            edited=kept.edited[slice(*edited[k : k + 2])] - literals[k],
+            edits=kept.edits[slice(*files[k : k + 2])],
+            decisions=kept.decisions.part(rows),
+            corrected=kept.corrected[rows],
+            before=kept.before[found],
+            after=kept.after[found],
+            position=kept.position[rows],
+            away=kept.away[rows],
+            overruled=kept.overruled[rows],
+            untimed=kept.untimed[rows],
+        )
+
+
+def _ends(sizes: Sequence[int]) -> list[int]:
+    """Return where the first part begins and where each one ends."""
+    return list(accumulate(sizes, initial=0))

@@ -1,0 +1,81 @@
+"""Programs side by side: every visit says what it says in its own program."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from postproc.language.beside import begins, beside
+from postproc.language.visits import Visits
+from postproc.planning import read_program
+from tests.generated.landing import program
+
+SEEDS = range(40)
+TOLD = (  # columns that mean the same wherever they stand
+    "line", "motion", "target", "via", "distance_mm", "config_given", "tool_remote",
+    "nearest_turn", "care", "fly", "fly_dist_mm", "fly_per", "fly_type", "fly_traj",
+    "lin_spd", "rot_spd", "override", "wrist_joint", "ornt_type",
+)  # fmt: skip
+LOOKED_UP = (
+    ("file", "files"), ("config", "configs"), ("name", "names"), ("reason", "reasons"),
+    ("tool", "frames"), ("base", "frames"), ("uframe", "frames"),
+)  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def programs(job_cell):
+    made = [program(seed)[0].files for seed in SEEDS]
+    return [v for files in made if len(v := read_program(files, job_cell).visits)]
+
+
+def told(visits: Visits, v: int, first: int) -> list[object]:
+    """Tell one visit of a program that begins at `first` without any index."""
+    told: list[object] = [getattr(visits, name)[v].tolist() for name in TOLD]
+    told += [visits.values[v].tolist(), visits.measure_id[v]]
+    told.append([x for x in visits.aux[v].tolist() if x == x])
+    for column, table in LOOKED_UP:
+        row = getattr(visits, column)[v]
+        found = getattr(visits, table)[row] if row >= 0 else None
+        told.append(found.tolist() if isinstance(found, np.ndarray) else found)
+    for column in ("literal", "follows"):
+        row, all_ = getattr(visits, column)[v], visits.literals
+        told.append(row >= 0 and [
+            visits.files[all_.file[row]], int(all_.line[row]), all_.start[row].tolist(),
+            all_.end[row].tolist(), bool(all_.joints[row]), all_.name[row],
+            bool(all_.shared[row]), bool(all_.taught[row]), all_.pinned[row],
+        ])  # fmt: skip
+    pred = visits.predecessors(v)
+    return [*told, np.where(pred >= 0, pred - first, pred).tolist()]
+
+
+def test_every_visit_says_the_same(programs):
+    together = beside(programs)
+    assert len(together) == sum(map(len, programs))
+    for own, first in zip(programs, begins(programs), strict=True):
+        for v in range(len(own)):
+            alone, among = told(own, v, 0), told(together, first + v, first)
+            np.testing.assert_equal(among, alone)
+
+
+def test_literals_follow_each_other(programs):
+    together = beside(programs)
+    assert len(together.literals) == sum(len(own.literals) for own in programs)
+    used = together.literal[together.literal >= 0]
+    assert used.max() < len(together.literals)
+
+
+def test_one_program_stays_as_it_is(programs):
+    (own,) = programs[:1]
+    assert begins([own]) == (0,)
+    np.testing.assert_equal(told(beside([own]), 0, 0), told(own, 0, 0))
+
+
+def test_each_program_has_as_many_auxiliary_axes_as_it_uses(job_cell):
+    head, tail = b"PROGRAM a\nVAR p : XTNDPOS\nBEGIN\n", b"END a\n"
+    moves = [b"MOVE TO {1, 2, 3, 4, 5, 6}\n", b"MOVE TO {1, 2, 3, 4, 5, 6, 7, 8}\n"]
+    own = [
+        read_program({"a.pdl": head + move + tail}, job_cell).visits for move in moves
+    ]
+    together = beside(own)
+    assert [v.aux.shape[1] for v in own] == [0, 2]
+    np.testing.assert_array_equal(together.aux, [[np.nan, np.nan], [7.0, 8.0]])
