@@ -216,8 +216,5 @@ class Machine:
 
 def _forget_locals(here: Here) -> None:
     body = here.place.body
-    if body.variables or body.parameters:
-        prefix = f"{here.place.program.name}:{body.name}/"
-        values = here.store.values
-        for key in [k for k in values if k.startswith(prefix)]:
-            del values[key]
+    for name in body.own_names:
+        here.store.drop(here.world.root(here.place, name))

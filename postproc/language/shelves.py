@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import Generic, TypeVar
 
-from postproc.language.values import Value
-
+T = TypeVar("T")
 _COUNT = 256
 
 
-class Shelves:
+class Shelves(Generic[T]):
     """Values by key on 256 shelves; a copy shares a shelf until one side writes to it.
 
     An analysis keeps one copy for every place of a program, and merges copies that
@@ -19,22 +19,21 @@ class Shelves:
     __slots__ = ("_mine", "_shelves")
 
     def __init__(self) -> None:
-        self._shelves: list[dict[str, Value]] = [{}] * _COUNT
-        self._mine: set[int] = set()
+        self._shelves: list[dict[str, T]] = [{}] * _COUNT
+        self._mine: set[int] | None = set()  # None: not even the row of shelves is
 
-    def copy(self) -> Shelves:
+    def copy(self) -> Shelves[T]:
         """Return a mapping that can change on its own."""
-        other = Shelves.__new__(Shelves)
-        other._shelves = self._shelves.copy()
-        other._mine = set()
-        self._mine = set()
+        other: Shelves[T] = Shelves.__new__(Shelves)
+        other._shelves = self._shelves
+        other._mine = self._mine = None
         return other
 
-    def get(self, key: str) -> Value | None:
+    def get(self, key: str) -> T | None:
         """Return what a key holds, None where it holds nothing."""
         return self._shelves[hash(key) % _COUNT].get(key)
 
-    def __setitem__(self, key: str, value: Value) -> None:
+    def __setitem__(self, key: str, value: T) -> None:
         """Let a key hold a value."""
         self._own(hash(key) % _COUNT)[key] = value
 
@@ -42,7 +41,9 @@ class Shelves:
         """Let a key hold nothing."""
         self._own(hash(key) % _COUNT).pop(key, None)
 
-    def _own(self, at: int) -> dict[str, Value]:
+    def _own(self, at: int) -> dict[str, T]:
+        if self._mine is None:
+            self._shelves, self._mine = self._shelves.copy(), set()
         if at not in self._mine:
             self._shelves[at] = self._shelves[at].copy()
             self._mine.add(at)
@@ -53,7 +54,7 @@ class Shelves:
         for shelf in self._shelves:
             yield from shelf
 
-    def differing(self, other: Shelves) -> list[str]:
+    def differing(self, other: Shelves[T]) -> list[str]:
         """Return the keys that may hold other values in another mapping."""
         found: list[str] = []
         for mine, theirs in zip(self._shelves, other._shelves, strict=True):

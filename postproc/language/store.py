@@ -11,6 +11,9 @@ from postproc.language.visits import NO_VALUE
 
 Settings = Mapping[str, Value]
 
+Log = tuple[str, "Log | None"]
+"""A key that was given a value, and those before it: copies share what they share."""
+
 MANY = -3  # origin: one of so many visits that they are not told apart
 MOST_ORIGINS = 500
 
@@ -29,20 +32,27 @@ class Store:
         values: Assigned values. A Nothing at ``job/tab`` hides its elements.
         settings: Frames and motion variables; replaced, never changed.
         last: Visits the arm may come from; START, ELSEWHERE or MANY.
-        compound: Keys of the elements and fields that a key ever had; shared by all
-            copies.
+        logs: Elements and fields that a key has been given since it was forgotten,
+            by key; some of them may hold nothing any more.
+        compound: Keys that ever had elements or fields; shared by all copies.
     """
 
     initial: Callable[[str], Value | None]
-    values: Shelves = field(default_factory=Shelves)
+    values: Shelves[Value] = field(default_factory=Shelves)
+    logs: Shelves[Log] = field(default_factory=Shelves)
     settings: Settings = field(default_factory=dict)
     last: frozenset[int] = frozenset()
-    compound: dict[str, dict[str, None]] = field(default_factory=dict)
+    compound: set[str] = field(default_factory=set)
 
     def copy(self) -> Store:
         """Return a store that can change on its own."""
         return Store(
-            self.initial, self.values.copy(), self.settings, self.last, self.compound
+            self.initial,
+            self.values.copy(),
+            self.logs.copy(),
+            self.settings,
+            self.last,
+            self.compound,
         )
 
     def read(self, key: str) -> Value:
@@ -70,20 +80,36 @@ class Store:
 
     def write(self, key: str, value: Value) -> None:
         """Let a key hold a value."""
+        if self.values.get(key) is None:
+            self._log(key)
         self.values[key] = value
+
+    def _log(self, key: str) -> None:
+        """Enter a new key with all that it is an element or a field of."""
         for whole in wholes(key):
-            self.compound.setdefault(whole, {})[key] = None
+            self.logs[whole] = (key, self.logs.get(whole))
+            self.compound.add(whole)
 
     def parts(self, key: str) -> list[str]:
         """Return the keys of elements and fields that a key has."""
-        ever = self.compound.get(key, ())
-        return [part for part in ever if self.values.get(part) is not None]
+        found: dict[str, None] = {}
+        log = self.logs.get(key)
+        while log is not None:
+            part, log = log
+            if self.values.get(part) is not None:
+                found[part] = None
+        return [*reversed(found)]
+
+    def drop(self, key: str) -> None:
+        """Let a key and all its elements and fields hold nothing."""
+        for part in (key, *self.parts(key)):
+            del self.values[part]
+            del self.logs[part]
 
     def forget(self, key: str, why: str) -> None:
         """What a variable and all its elements hold is no longer known."""
         held = self.read(key)
-        for part in self.parts(key):
-            del self.values[part]
+        self.drop(key)
         self.write(key, unsure(Nothing(why), held))
 
     def set(self, **settings: Value) -> None:
@@ -107,7 +133,7 @@ class Store:
             after = join(before, other.read(key) if theirs is None else theirs)
             if mine is None or after is not mine:
                 changed |= after != before
-                self.values[key] = after
+                self.write(key, after)
         return changed
 
 

@@ -96,6 +96,26 @@ def calls(n: int) -> Files:
     return job(*lines, head=head)
 
 
+def elements(n: int) -> Files:
+    """Write elements of an array, and others of which only the run tells which."""
+    lines = [f"  t[{k + 1}] := {AT.format(k % 900)}" for k in range(n)]
+    lines.append("  n := $AIN[1]")
+    for k in range(n):
+        at = "n" if k % 2 else f"{k + 1}"
+        lines += [f"  t[{at}] := {AT.format(k % 800)}", f"  MOVE LINEAR TO t[{at}]"]
+    return job(*lines, head=(f"VAR t : ARRAY[{n}] OF POSITION", "  n : INTEGER"))
+
+
+def locals_(n: int) -> Files:
+    """Write as many calls of a routine with a variable of its own as variables."""
+    names = [f"p{k}" for k in range(n)]
+    head = ("VAR", *(f"  {name} : POSITION" for name in names), "ROUTINE r",
+            "VAR a : POSITION", "BEGIN", f"  a := {AT.format(7)}",
+            "  MOVE LINEAR TO a", "END r")  # fmt: skip
+    lines = [f"  {name} := {AT.format(k % 900)}" for k, name in enumerate(names)]
+    return job(*lines, *["  r"] * n, head=head)
+
+
 def functions(n: int) -> Files:
     """Write calls of a function in expressions."""
     head = ("VAR n : INTEGER", "ROUTINE f(k : INTEGER) : INTEGER", "BEGIN",
@@ -141,6 +161,8 @@ KINDS: dict[str, tuple[Callable[[int], Files], int]] = {
     "moves in an IF each": (branches, 3_000),
     "cases of one SELECT": (nested, 2_000),
     "calls with a parameter": (calls, 3_000),
+    "elements, known or not": (elements, 2_000),
+    "calls among variables": (locals_, 3_000),
     "calls of a function": (functions, 3_000),
     "condition handlers": (handlers, 1_000),
     "arcs and steps": (arcs, 5_000),
