@@ -126,15 +126,24 @@ class Store:
             merged = _merge_settings(self.settings, other.settings)
             changed |= merged != self.settings
             self.settings = merged
-        for key in self.values.differing(other.values):
-            mine = self.values.get(key)
-            theirs = other.values.get(key)
-            before = self.read(key) if mine is None else mine
-            after = join(before, other.read(key) if theirs is None else theirs)
+        for key, mine, before, after in self._joined(other):
             if mine is None or after is not mine:
                 changed |= after != before
                 self.write(key, after)
         return changed
+
+    def _joined(self, other: Store) -> list[tuple[str, Value | None, Value, Value]]:
+        """Return what keys are given here, what they hold and what they may hold.
+
+        All is read before anything is written: an array hides its elements.
+        """
+        found = []
+        for key in self.values.differing(other.values):
+            mine, theirs = self.values.get(key), other.values.get(key)
+            before = self.read(key) if mine is None else mine
+            after = join(before, other.read(key) if theirs is None else theirs)
+            found.append((key, mine, before, after))
+        return found
 
 
 def root_of(key: str) -> str:
