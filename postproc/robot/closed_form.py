@@ -8,6 +8,8 @@ correction stays on its branch.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -21,6 +23,46 @@ Bools = NDArray[np.bool_]
 
 CHUNK = 8192  # poses solved at a time: what they need stays in the cache
 WRIST, SHOULDER, ELBOW = 4, 2, 1  # bits of a slot
+
+
+@dataclass(frozen=True)
+class _Centre:
+    """Where the wrist centre of n poses is, seen from axis 1.
+
+    Attributes:
+        R: Orientation of the flange, (n, 3, 3).
+        azimuth: Direction of it, (n,) [rad].
+        aside: How far the arm's plane lies off that, (n,) [rad].
+        reach, z: Distance in that plane, and height above axis 2, (n,) [m].
+    """
+
+    R: Array
+    azimuth: Array
+    aside: Array
+    reach: Array
+    z: Array
+
+
+@dataclass(frozen=True)
+class _Facing:
+    """The triangle of upper arm and forearm for n poses.
+
+    Attributes:
+        t1: Axis 1, (n,) [rad].
+        slope, lean, fold: Of the line from axis 2 to the wrist centre against the
+            vertical, of the upper arm against that line, and between the arms, (n,)
+            [rad].
+        ahead, across, up: Components of the flange's axes ahead of axis 1, across and
+            upwards, (n, 3).
+    """
+
+    t1: Array
+    slope: Array
+    lean: Array
+    fold: Array
+    ahead: Array
+    across: Array
+    up: Array
 
 
 class ClosedForm:
@@ -52,10 +94,14 @@ class ClosedForm:
         """
         out = np.empty((len(flange), 8, 6))
         for rows in pieces(len(flange), CHUNK):
-            for slot in range(4):
-                one = self._angles(flange[rows], slot)
-                out[rows, slot] = self._to_joints(one)
-                out[rows, slot + WRIST] = self._to_joints(_wrist_flipped(one))
+            centre = self._centre(flange[rows])
+            for behind in (False, True):
+                facing = self._facing(centre, np.asarray(behind))
+                for elbow, side in enumerate((1.0, -1.0)):
+                    one = self._angles(facing, np.asarray(side))
+                    slot = SHOULDER * behind + ELBOW * elbow
+                    out[rows, slot] = self._to_joints(one)
+                    out[rows, slot + WRIST] = self._to_joints(_wrist_flipped(one))
         return out
 
     def branch(self, flange: Array, slot: Ints) -> Array:
@@ -71,7 +117,11 @@ class ClosedForm:
         """
         out = np.empty((len(flange), 6))
         for rows in pieces(len(flange), CHUNK):
-            one = self._angles(flange[rows], slot[rows])
+            facing = self._facing(
+                self._centre(flange[rows]), (slot[rows] & SHOULDER) > 0
+            )
+            side = np.where((slot[rows] & ELBOW) > 0, -1.0, 1.0)
+            one = self._angles(facing, side)
             flipped = ((slot[rows] & WRIST) > 0)[:, None]
             out[rows] = self._to_joints(np.where(flipped, _wrist_flipped(one), one))
         return out
@@ -93,36 +143,54 @@ class ClosedForm:
         joints: Array = (angles + self._offset) * self._sign
         return joints
 
-    def _angles(self, flange: Array, slot: Ints | int) -> Array:
-        """Solve for the branches with a positive axis 5, (n, 6) [rad]."""
-        behind = (np.asarray(slot) & SHOULDER) > 0
-        side = np.where((np.asarray(slot) & ELBOW) > 0, -1.0, 1.0)
-        R, upper, forearm = flange[:, :3, :3], self._upper, self._forearm
+    def _centre(self, flange: Array) -> _Centre:
+        """Find what all branches have in common."""
+        R = flange[:, :3, :3]
         centre = flange[:, :3, 3] - self._c4 * R[:, :, 2]
         cx, cy, z = centre[:, 0], centre[:, 1], centre[:, 2] - self._c1
-        with np.errstate(invalid="ignore", divide="ignore"):
+        with np.errstate(invalid="ignore"):
             reach = np.sqrt(cx**2 + cy**2 - self._b**2)
-            aside = np.arctan2(self._b, reach)
-            t1 = np.arctan2(cy, cx) + np.where(behind, aside - np.pi, -aside)
-            x = np.where(behind, -reach, reach) - self._a1
-            far = x**2 + z**2
+        azimuth, aside = np.arctan2(cy, cx), np.arctan2(self._b, reach)
+        return _Centre(R, azimuth, aside, reach, z)
+
+    def _facing(self, at: _Centre, behind: Bools) -> _Facing:
+        """Find what both elbows have in common, with axis 1 towards the target or away.
+
+        Args:
+            at: Where the wrist centre is.
+            behind: It is behind axis 1, (n,) or for all.
+        """
+        R, upper, forearm = at.R, self._upper, self._forearm
+        t1 = at.azimuth + np.where(behind, at.aside - np.pi, -at.aside)
+        x = np.where(behind, -at.reach, at.reach) - self._a1
+        far = x**2 + at.z**2
+        with np.errstate(invalid="ignore", divide="ignore"):
             gap = far - forearm**2 + upper**2
             lean = np.arccos(gap / (2 * np.sqrt(far) * upper))
-            t2 = np.arctan2(x, z) - side * lean
             fold = np.arccos((far - upper**2 - forearm**2) / (2 * upper * forearm))
-            t3 = side * fold - self._bent
         s1, c1 = np.sin(t1)[:, None], np.cos(t1)[:, None]
-        s23, c23 = np.sin(t2 + t3)[:, None], np.cos(t2 + t3)[:, None]
-        # The flange's axes ahead of and across axis 1, out of and along the forearm.
         ahead, across = c1 * R[:, 0] + s1 * R[:, 1], c1 * R[:, 1] - s1 * R[:, 0]
-        out, along = ahead * c23 - R[:, 2] * s23, ahead[:, 2] * s23[:, 0]
-        along += R[:, 2, 2] * c23[:, 0]
-        t4 = np.arctan2(across[:, 2], out[:, 2])
-        t5 = np.arctan2(np.hypot(across[:, 2], out[:, 2]), along)
+        return _Facing(t1, np.arctan2(x, at.z), lean, fold, ahead, across, R[:, 2])
+
+    def _angles(self, at: _Facing, side: Array) -> Array:
+        """Solve for the branches with a positive axis 5, (n, 6) [rad].
+
+        Args:
+            at: What both elbows have in common.
+            side: 1 or -1, the elbow, (n,) or for all.
+        """
+        t2 = at.slope - side * at.lean
+        t3 = side * at.fold - self._bent
+        s23, c23 = np.sin(t2 + t3)[:, None], np.cos(t2 + t3)[:, None]
+        # The flange's axes out of and along the forearm.
+        out, along = at.ahead * c23 - at.up * s23, at.ahead[:, 2] * s23[:, 0]
+        along += at.up[:, 2] * c23[:, 0]
+        t4 = np.arctan2(at.across[:, 2], out[:, 2])
+        t5 = np.arctan2(np.hypot(at.across[:, 2], out[:, 2]), along)
         # Axis 5 seen from the flange; a straight wrist has it too.
-        bend = np.cos(t4)[:, None] * across - np.sin(t4)[:, None] * out
+        bend = np.cos(t4)[:, None] * at.across - np.sin(t4)[:, None] * out
         t6 = np.arctan2(bend[:, 0], bend[:, 1])
-        angles = np.stack([t1, t2, t3, t4, t5, t6], axis=1)
+        angles = np.stack([at.t1, t2, t3, t4, t5, t6], axis=1)
         angles[np.isnan(angles).any(axis=1)] = np.nan
         return angles
 

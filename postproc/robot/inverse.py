@@ -65,9 +65,15 @@ class Inverse:
         """Shift angles by whole turns into the joint range where that is possible."""
         turn = 2 * np.pi
         below = np.pi - q
-        around = (below < 0) | (below >= turn)
-        below[around] = np.mod(below[around], turn)
+        around = np.flatnonzero((below < 0) | (below >= turn))
+        if len(around):
+            below.flat[around] = np.mod(below.flat[around], turn)
         q = np.pi - below
-        q[(q < self._lower) & (q + turn <= self._upper)] += turn
-        q[(q > self._upper) & (q - turn >= self._lower)] -= turn
+        low, high = np.nonzero(q < self._lower), np.nonzero(q > self._upper)
+        if len(low[0]):
+            up = q[low] + turn
+            q[low] = np.where(up <= self._upper[low[-1]], up, q[low])
+        if len(high[0]):
+            down = q[high] - turn
+            q[high] = np.where(down >= self._lower[high[-1]], down, q[high])
         return q
