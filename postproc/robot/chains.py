@@ -77,6 +77,18 @@ class Chains:
         last = self.start[begin + 1 : end + 1] - offset - 1
         return self.values[offset : self.start[end]], last
 
+    def begins(self) -> Ints:
+        """List the edges that begin a path of their own, if they have samples, (k,).
+
+        Those to the heads, and the first one behind each.
+        """
+        n = len(self.angles)
+        own = np.zeros(n + 1, dtype=bool)
+        own[self.heads] = own[self.heads + 1] = True
+        edges = np.flatnonzero(np.repeat(own[:n], np.diff(self.first)))
+        filled: Ints = edges[np.diff(self.start)[edges] > 0]
+        return filled
+
     def followers(self) -> list[list[int]]:
         """List, for each chain, the chains whose head is reached from it."""
         out: list[list[int]] = [[] for _ in self.heads]

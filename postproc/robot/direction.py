@@ -133,7 +133,8 @@ def _states(chains: Chains, half: Array, before: Clamps) -> Clamps:
     The intervals at the heads only grow and their ends come from a finite set, so that
     the work list runs dry.
     """
-    since_head = _since_head(chains, half)
+    passed = _passed(chains, half)
+    since_head = _since_head(chains, passed)
     known: list[Clamps | None] = [None] * len(chains.heads)
     followers = chains.followers()
     waiting, queued = deque(range(len(known))), [True] * len(known)
@@ -141,7 +142,8 @@ def _states(chains: Chains, half: Array, before: Clamps) -> Clamps:
         c = waiting.popleft()
         queued[c] = False
         given = before if c == 0 else NOTHING.play
-        new, old = _at_head(chains, c, half, known, since_head, given), known[c]
+        new = _at_head(chains, c, half, known, since_head, passed, given)
+        old = known[c]
         if new is None or (old is not None and _same(old, new)):
             continue
         known[c] = new
@@ -149,24 +151,43 @@ def _states(chains: Chains, half: Array, before: Clamps) -> Clamps:
             if not queued[follower]:
                 queued[follower] = True
                 waiting.append(follower)
+    return _from_heads(chains, known, since_head, half)
+
+
+def _from_heads(
+    chains: Chains, known: list[Clamps | None], since_head: Clamps, half: Array
+) -> Clamps:
+    """Carry what is known at the heads on to all visits; the others know nothing."""
     out = passing(chains.angles, half)
-    for c, at_head in enumerate(known):
-        if at_head is not None:
-            rows = slice(int(chains.heads[c]), int(chains.ends[c]))
-            arrived = at_head.then(since_head[rows])
-            out.lo[rows], out.hi[rows] = arrived.lo, arrived.hi
+    found = [(c, clamps) for c, clamps in enumerate(known) if clamps is not None]
+    if found:
+        row = np.full(len(known), -1)
+        row[[c for c, _ in found]] = np.arange(len(found))
+        lo, hi = (np.stack([getattr(s, n) for _, s in found]) for n in ("lo", "hi"))
+        at = row[chains.chain_of]
+        rows = np.flatnonzero(at >= 0)
+        arrived = Clamps(lo, hi)[at[rows]].then(since_head[rows])
+        out.lo[rows], out.hi[rows] = arrived.lo, arrived.hi
     return out
 
 
-def _since_head(chains: Chains, half: Array) -> Clamps:
+def _passed(chains: Chains, half: Array) -> Clamps:
+    """Compose the clamps of each edge, within chains those since the head, (e, 6)."""
+    if len(chains.values) == 0:
+        return identity((len(chains.source), 6))
+    begins = np.zeros(len(chains.values), dtype=bool)
+    begins[chains.start[chains.begins()]] = True
+    steps = prefix(passing(chains.values, half), begins)
+    return steps[np.maximum(chains.start[1:] - 1, 0)]
+
+
+def _since_head(chains: Chains, passed: Clamps) -> Clamps:
     """Compose the clamps from each visit's chain head (not included) to the visit."""
     out = identity(chains.angles.shape)
-    for c, head in enumerate(chains.heads):
-        if chains.ends[c] > head + 1:
-            samples, visits = chains.body(c)
-            steps = prefix(passing(samples, half))[visits]
-            out.lo[head + 1 : chains.ends[c]] = steps.lo
-            out.hi[head + 1 : chains.ends[c]] = steps.hi
+    inner = np.ones(len(chains.angles), dtype=bool)
+    inner[chains.heads] = False
+    edge = chains.first[:-1][inner]
+    out.lo[inner], out.hi[inner] = passed.lo[edge], passed.hi[edge]
     return out
 
 
@@ -176,6 +197,7 @@ def _at_head(
     half: Array,
     known: list[Clamps | None],
     since_head: Clamps,
+    passed: Clamps,
     given: Clamps,
 ) -> Clamps | None:
     """Take the hull of what arrives at a head; None while nothing is known to."""
@@ -189,8 +211,7 @@ def _at_head(
             return passing(chains.angles[head], half)
         before = known[chains.chain_of[source]]
         if before is not None:
-            steps = prefix(passing(chains.samples_of(edge), half))
-            found.append(before.then(since_head[source]).then(steps[-1]))
+            found.append(before.then(since_head[source]).then(passed[edge]))
     if not found:
         return None
     low = np.min([f.lo for f in found], axis=0)

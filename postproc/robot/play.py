@@ -10,12 +10,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import isqrt
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
+Bools = NDArray[np.bool_]
+T = TypeVar("T", np.float64, np.bool_)
 
 BLOCK = 64  # steps that are composed one after the other
 
@@ -50,33 +53,44 @@ def passing(q: Array, half_width: Array) -> Clamps:
     return Clamps(q - half_width, q + half_width)
 
 
-def prefix(steps: Clamps) -> Clamps:
-    """Compose all steps up to and including each one, (n, k) -> (n, k).
+def prefix(steps: Clamps, begins: Bools | None = None) -> Clamps:
+    """Compose all steps since the last beginning up to each one, (n, k) -> (n, k).
 
     Blocks of steps run side by side, then what leads to each block is put in front of
     it: a short loop over long rows instead of a long loop over short ones.
+
+    Args:
+        steps: The steps of several sequences, one after the other.
+        begins: With which steps a sequence begins, (n,), beside the first one.
     """
     n, k = steps.lo.shape
+    begins = np.zeros(n, dtype=bool) if begins is None else begins
     length = min(isqrt(max(n - 1, 0)) + 1, BLOCK)
     blocks = -(-n // length)
     lo = _side_by_side(steps.lo, length, -np.inf)
     hi = _side_by_side(steps.hi, length, np.inf)
+    new = _side_by_side(begins[:, None], length, False)
+    parted: list[bool] = np.any(new, axis=(1, 2)).tolist()
     for i in range(1, length):
-        _compose(lo[i - 1], hi[i - 1], lo[i], hi[i])
+        _compose(lo[i - 1], hi[i - 1], lo[i], hi[i], new[i] if parted[i] else None)
     if blocks > 1:
-        before = prefix(Clamps(lo[-1, :-1], hi[-1, :-1]))
-        _compose(before.lo, before.hi, lo[:, 1:], hi[:, 1:])
+        ends = Clamps(lo[-1, :-1], hi[-1, :-1])
+        before = prefix(ends, np.asarray(new[:, :-1, 0].any(axis=0)))
+        since: Bools = np.logical_or.accumulate(new[:, 1:], axis=0)
+        _compose(
+            before.lo, before.hi, lo[:, 1:], hi[:, 1:], since if since.any() else None
+        )
     rows = (blocks * length, k)
     return Clamps(
         lo.swapaxes(0, 1).reshape(rows)[:n], hi.swapaxes(0, 1).reshape(rows)[:n]
     )
 
 
-def _side_by_side(rows: Array, length: int, rest: float) -> Array:
+def _side_by_side(rows: NDArray[T], length: int, rest: float) -> NDArray[T]:
     """Cut rows (n, k) into blocks: (length, blocks, k), step by step."""
     n, k = rows.shape
     blocks = -(-n // length)
-    out = np.empty((length, blocks, k))
+    out = np.empty((length, blocks, k), dtype=rows.dtype)
     whole = n // length
     out[:, :whole] = rows[: whole * length].reshape(whole, length, k).swapaxes(0, 1)
     if whole < blocks:
@@ -85,8 +99,13 @@ def _side_by_side(rows: Array, length: int, rest: float) -> Array:
     return out
 
 
-def _compose(lo0: Array, hi0: Array, lo: Array, hi: Array) -> None:
-    """Put earlier clamps in front of later ones, in place: `Clamps.then`."""
+def _compose(lo0: Array, hi0: Array, lo: Array, hi: Array, new: Bools | None) -> None:
+    """Put earlier clamps in front of later ones, in place: `Clamps.then`.
+
+    Those that are `new` have nothing in front of them; None: no one is.
+    """
+    if new is not None:
+        lo0, hi0 = np.where(new, -np.inf, lo0), np.where(new, np.inf, hi0)
     low = np.minimum(np.maximum(lo0, lo), hi)
     np.minimum(np.maximum(hi0, lo), hi, out=hi)
     lo[...] = low
