@@ -1,7 +1,8 @@
 """How the tool turns on its way: $ORNT_TYPE, as far as it matters.
 
-Lines and arcs are planned with the tool turning about one fixed axis (RS_WORLD), or
-with the wrist axes in proportion (WRIST_JNT). EUL_WORLD and RPY_WORLD let three angles
+Lines and arcs are planned with the tool turning about one fixed axis (RS_WORLD), lines
+also with the wrist axes in proportion (WRIST_JNT): on arcs that is not planned, so that
+the sides from which they arrive are not known. EUL_WORLD and RPY_WORLD let three angles
 run in proportion instead (likely), RS_TRAJ takes the tool along an arc. The ends are
 the same, the way between is not: where it may be off by more than a joint's play, a
 joint may arrive from another side, and the target is left alone.
@@ -34,7 +35,7 @@ ANGLES = (
     "with $ORNT_TYPE {} how the tool turns on the way is not sure: use RS_WORLD, or "
     "turn it in smaller steps"
 )
-ARC = "with $ORNT_TYPE RS_TRAJ how the tool turns on this arc is not sure: use RS_WORLD"
+ARC = "with $ORNT_TYPE {} how the tool turns on this arc is not sure: use RS_WORLD"
 
 
 def mark_turning(
@@ -50,9 +51,10 @@ def mark_turning(
     """
     kind, cartesian = visits.ornt_type, targets.move != Move.JOINT
     reasons.mark(cartesian & (kind == OrntType.UNKNOWN), UNKNOWN)
-    arc = (targets.move == Move.CIRCULAR) & (kind == OrntType.RS_TRAJ)
+    arc = targets.move == Move.CIRCULAR
+    reasons.mark(arc & targets.wrist_joint, ARC.format("WRIST_JNT"))
     for rows, text in (
-        (arc, ARC),
+        (arc & (kind == OrntType.RS_TRAJ), ARC.format("RS_TRAJ")),
         (cartesian & (kind == OrntType.EUL_WORLD), ANGLES.format("EUL_WORLD")),
         (cartesian & (kind == OrntType.RPY_WORLD), ANGLES.format("RPY_WORLD")),
     ):

@@ -60,6 +60,17 @@ def test_what_is_not_known_and_what_goes_along_an_arc(cell: Cell) -> None:
     assert left(cell, "RS_TRAJ", plain, straight) == [False, False, False]
 
 
+@pytest.mark.parametrize("turn", [0, 10])
+def test_arcs_on_which_the_wrist_axes_turn_in_proportion(cell: Cell, turn: int) -> None:
+    plain = line(10, 0, 150, 0)
+    arc = f"MOVE CIRCULAR TO POS(1500, 40, 1700, 0, 150, {turn}, '') "
+    arc += f"VIA POS(1510, 20, 1700, 0, 150, {turn / 2}, '')"
+    assert left(cell, "WRIST_JNT", plain, arc, plain) == [False, True, True, False]
+    assert left(cell, "RS_WORLD", plain, arc, plain) == [False] * 4
+    away = arc.replace("1510", "9510")
+    assert left(cell, "WRIST_JNT", plain, away) == [False, False, True]  # out of reach
+
+
 def test_the_bound_holds_for_angles_in_proportion() -> None:
     rng = np.random.default_rng(0)
     u = np.linspace(0.0, 1.0, 41)[:, None]
