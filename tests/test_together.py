@@ -18,7 +18,7 @@ from tests.conftest import ROOT
 from tests.generated.landing import program as generated
 from tests.plant import program
 
-CORPUS = 40  # generated programs
+CORPUS = 30  # generated programs
 EMPTY = b"PROGRAM nothing\nBEGIN\nEND nothing\n"
 
 
@@ -85,7 +85,7 @@ def test_mixed_programs(mixed, job_model):
 @pytest.mark.parametrize("options", [Options(clone=True), Options(orientation=True)])
 def test_other_options(mixed, options, job_model):
     cell = load_cell(ROOT / "programs" / "cell.toml")
-    assert_as_alone(mixed[:20], cell, job_model, options)
+    assert_as_alone(mixed[:10], cell, job_model, options)
 
 
 def test_small_programs_share_a_pass(job_cell, job_model, monkeypatch):
