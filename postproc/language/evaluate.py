@@ -90,7 +90,7 @@ class Point:
                 keys = frozenset(f"{key}.{step}" for key in keys)
                 continue
             array = False
-            if type_ is None and not isinstance(step, str) and self._is_joints(keys):
+            if not plain and self._is_joints(keys):
                 return Target(keys, exact, self._component(rest))
             index = [
                 None if isinstance(s, tuple) else self.integer(s)
