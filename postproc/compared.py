@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from difflib import SequenceMatcher
@@ -12,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from postproc.changed_lines import changed_rows, shapes, target_name
+from postproc.entry_names import entry_names
 from postproc.exceptions import ProgramError
 from postproc.language.stamp import read_stamp
 from postproc.rows import Rows, joined_rows
@@ -19,8 +19,6 @@ from postproc.rows import Rows, joined_rows
 Ints = NDArray[np.int64]
 
 VARIABLES = ".lsv"
-
-_ENTRY = re.compile(r"([A-Za-z_]\w*(?:\[[\d, ]+\])?)\s+[A-Z]{3,4}\b")
 
 
 @dataclass(frozen=True)
@@ -43,7 +41,7 @@ class Compared:
     def targets(self, lines: Ints) -> list[str]:
         """Name what the numbers on lines of the original, ascending, belong to."""
         if self.original.suffix.lower() == VARIABLES:
-            return list(_entry_names(self.lines, lines.tolist()))
+            return list(entry_names(self.lines, lines.tolist()))
         texts = (self.lines[line - 1].decode("latin-1") for line in lines.tolist())
         return [target_name(text) for text in texts]
 
@@ -101,29 +99,6 @@ def _text_rows(file: str, lines: Ints, sign: str, texts: Sequence[bytes]) -> Row
 def _named_by_entries(rows: Rows, lines: Sequence[bytes]) -> Rows:
     """Name rows of a variable file by their variables."""
     own = (rows.targets[k] for k in rows.target.tolist())
-    entries = _entry_names(lines, rows.line.tolist())
+    entries = entry_names(lines, rows.line.tolist())
     names = [name or target for name, target in zip(entries, own, strict=True)]
     return replace(rows, targets=names, target=np.arange(len(names)))
-
-
-def _entry_names(lines: Sequence[bytes], wanted: Sequence[int]) -> Iterator[str]:
-    """Find the variables that lines of a variable file belong to.
-
-    Args:
-        lines: The file.
-        wanted: 1-based lines, ascending but for 0: those that it does not have.
-    """
-    name, seen = "", 0
-    for line in wanted:
-        if line == 0:
-            yield _entry_name(lines[0]) if lines else ""
-            continue
-        backwards = (_entry_name(lines[k]) for k in range(line - 1, seen - 1, -1))
-        name, seen = next(filter(None, backwards), name), line
-        yield name
-
-
-def _entry_name(line: bytes) -> str:
-    """Return the variable that a line begins to describe, "" if it does not."""
-    found = _ENTRY.match(line.decode("latin-1"))
-    return found.group(1) if found else ""

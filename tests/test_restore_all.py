@@ -17,7 +17,7 @@ from postproc.sidecar import FileRecord
 from tests.fuzz.originals import case_programs
 from tests.generated.landing import program
 from tests.language.generator import Generator
-from tests.language.test_corpus import chapters
+from tests.language.test_corpus import chapters, with_values
 from tests.language.whole_jobs import Job
 
 PROGRAMS = Path(__file__).parents[1] / "programs"
@@ -53,15 +53,18 @@ def test_samples(name, options, job_model):
 
 
 def test_the_corpus_and_the_cases(job_cell, job_model):
-    texts = [program.encode() for _, program, _ in chapters()]
-    texts += [files["job.pdl"] for files in case_programs()]
+    jobs = []
+    for _, case, _ in chapters():
+        program, values = (text.encode() for text in with_values(case))
+        jobs.append({"x.pdl": program} | ({"x.lsv": values} if values else {}))
+    jobs += [{"x.pdl": files["job.pdl"]} for files in case_programs()]
     restored = 0
-    for text in texts:
+    for files in jobs:
         try:
-            restored += bool(assert_restored({"x.pdl": text}, job_cell, job_model))
+            restored += bool(assert_restored(files, job_cell, job_model))
         except PostprocError:
             continue  # refused: nothing came out that could be restored
-    assert restored > 0.9 * len(texts)
+    assert restored > 0.9 * len(jobs)
 
 
 @pytest.mark.parametrize("seed", range(16))

@@ -8,7 +8,7 @@ from postproc.language import pdl2 as ast
 from postproc.language.evaluate import Point
 from postproc.language.values import Nothing, Position, Value
 
-_SINGLE = frozenset(
+SINGLE = frozenset(
     "integer real boolean string vector position jointpos xtndpos semaphore".split()
 )
 
@@ -44,7 +44,7 @@ def _may_have_parts(here: Point, origin: ast.Reference) -> bool:
     type_ = here.world.type_of(here.place, origin.name)
     if type_ is None or type_.array or type_.path:
         return True
-    return type_.name not in _SINGLE
+    return type_.name not in SINGLE
 
 
 def parts_of(here: Point, origin: ast.Reference) -> dict[str, Value]:

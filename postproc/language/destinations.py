@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from postproc.language import pdl2 as ast
 from postproc.language.forgetting import pin_names
 from postproc.language.machine import Here
+from postproc.language.nodes import destination, may_be_node
 from postproc.language.values import Nothing, Position, Value, Vector
 from postproc.language.visits import NO_TARGET, Motion, Target
 
@@ -124,10 +125,10 @@ def absolute(here: Here, expression: ast.Expression) -> Goal:
         return _system(here, expression)
     if isinstance(expression, ast.Reference):
         _check_declared(here, expression.name)
-        type_ = here.world.type_of(here.place, expression.name)
-        if type_ is not None and type_.path:
-            return _node(here, expression)
-    value = here.value(expression)
+    if isinstance(expression, ast.Reference) and may_be_node(here, expression):
+        value = destination(here, expression)
+    else:
+        value = here.value(expression)
     if isinstance(value, Nothing):
         here.world.pin(value, UNSURE)
     return from_value(value)
@@ -148,18 +149,6 @@ def _system(here: Here, reference: ast.Reference) -> Goal:
     if held is None:
         return Goal(_PLACES[name], reason=_why(f"${name.upper()}"))
     return replace(from_value(held), reason=_why(f"${name.upper()}"))
-
-
-def _node(here: Here, reference: ast.Reference) -> Goal:
-    """Tell what a node of a path holds, as far as the program assigns it."""
-    value = here.value(reference)
-    if isinstance(value, Position):
-        return from_value(value)
-    return Goal(
-        Target.UNKNOWN,
-        reason=f"the node of {reference.name} is not known: nodes are read where the "
-        "program assigns their positions one by one, not from variable files",
-    )
 
 
 def _check_declared(here: Here, name: str) -> None:

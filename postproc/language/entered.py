@@ -23,6 +23,7 @@ class Entered:
         variable: The head says whose variable it is (Priv, Xport, Local): fields of
             records and of path nodes do not.
         element: Slots of an element's index.
+        node: Slot of the number of a path's node, -1 where the line names none.
         components: (letter, slot) pairs.
         axes: (axis slot, value slot) pairs.
         plain: Slots of numbers by themselves.
@@ -35,10 +36,17 @@ class Entered:
     shared: bool = False
     variable: bool = False
     element: tuple[int, ...] = ()
+    node: int = -1
     components: tuple[tuple[str, int], ...] = ()
     axes: tuple[tuple[int, int], ...] = ()
     plain: tuple[int, ...] = ()
     config: str | None = None
+
+    @property
+    def says_value(self) -> bool:
+        """Tell whether a number or a configuration stands in the line."""
+        numbers = self.components or self.axes or self.plain
+        return bool(numbers) or self.config is not None
 
 
 class _Value(int):
@@ -53,6 +61,10 @@ class _Element(tuple[int, ...]):
     """Slots of an index."""
 
 
+class _Node(int):
+    """Slot of the number of a node."""
+
+
 class _Word(str):
     """A word of a head."""
 
@@ -65,6 +77,8 @@ def _line(c: Sequence[Any]) -> Entered:
                 line = part
             case _Element():
                 line = replace(line, element=tuple(part))
+            case _Node():
+                line = replace(line, node=int(part))
             case ("component", letter, slot):
                 line = replace(line, components=(*line.components, (letter, slot)))
             case ("axis", axis, slot):
@@ -96,6 +110,7 @@ VALUE_RULES: Mapping[str, Rule] = {
     "counted": lambda c: None,
     "word": lambda c: _Word(c[0]),
     "element": lambda c: _Element(n.slot for n in c if isinstance(n, Number)),
+    "node": lambda c: _Node(c[1].slot),
     "component": lambda c: ("component", str(c[0]), int(c[1])),
     "axis": lambda c: ("axis", c[0].slot, int(c[1])),
     "config": lambda c: ("config", str(c[1])[1:-1] if len(c) > 1 else ""),

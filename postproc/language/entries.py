@@ -4,9 +4,13 @@ from __future__ import annotations
 
 import re
 
+import numpy as np
+
+from postproc.language.forms import formed
 from postproc.language.layout import CloneError, inserted_after
 from postproc.language.lines import read_lines
-from postproc.language.parser import parse_value_line
+from postproc.language.parser import forms_of, parse_value_form
+from postproc.language.records import is_nested, last_head
 from postproc.language.source import Edit, Source
 
 _XPORT = re.compile(r"\bXport\b(?P<other>\s+from\b)?", re.I)
@@ -28,13 +32,16 @@ def copied_entry(
         CloneError: The entry is not one of this variable alone.
     """
     lines = read_lines(values)
-    entered = [parse_value_line(lines.text(row)) for row in range(len(lines))]
-    heads = [row for row, part in enumerate(entered) if part and part.name]
-    at = max((h for h in heads if lines.line[h] <= line), default=-1)
-    head = entered[at] if at >= 0 else None
+    said = formed(lines.shapes, forms_of, parse_value_form)
+    heads = last_head(lines, said)
+    row = int(np.searchsorted(lines.line, line, side="right")) - 1
+    at = int(heads[row]) if row >= 0 else -1
+    head = said[int(lines.shape[at])] if at >= 0 else None
     if head is None or head.name.lower() != old.lower() or head.element:
         raise CloneError(f"line {line} of {values.name} is no entry of {old}")
-    after = min((h for h in heads if h > at), default=len(lines))
+    if is_nested(head):
+        raise CloneError(f"{old} is a record or a path: its parts are not cloned")
+    after = int(np.searchsorted(heads, at, side="right"))
     first, last = int(lines.line[at]), int(lines.line[after - 1])
     end = [*values.line_starts.tolist(), len(values.data)][last]
     begin = int(values.line_starts[first - 1])

@@ -43,7 +43,7 @@ def _report_drift(world: World, place: Place, file: Variables) -> None:
         world.diagnostics[found] = None
     words = {*_WORD.findall("\n".join(place.program.lines.shapes).lower())}
     written = [file.entries.name[row] for row in file.entries.row.values()]
-    names = {base_variable(name): name for name in written}
+    names = {base_variable(name): name.partition(".")[0] for name in written}
     unused = [written for name, written in names.items() if name not in words]
     undeclared = [
         written
@@ -123,6 +123,8 @@ def _entered(world: World, file: Variables, entry: Entry, key: str) -> bool:
     if entry.kind == "VEC":
         x, y, z = entry.numbers[:3]
         value = Vector((x, y, z))
+    if value is None and "." in entry.name:  # that it is there counts, see `nodes`
+        value = Nothing(f"its value in {file.source.name} is no number")
     if entry.arm not in (0, world.arm):
         value = Nothing(f"its value is one of arm {entry.arm}")
     if value is not None:

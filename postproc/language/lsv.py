@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from postproc.language.diagnostic import Diagnostic
 from postproc.language.entered import Entered
 from postproc.language.entry_columns import NESTED, POSITIONS, Entries, Entry
+from postproc.language.fields import completed, find_fields, with_fields
 from postproc.language.forms import Formed, formed
 from postproc.language.lines import Lines, read_lines
 from postproc.language.parser import forms_of, parse_value_form
@@ -19,6 +20,7 @@ from postproc.language.records import (
     Records,
     find_records,
     is_nested,
+    is_no_value,
     last_head,
     read_records,
 )
@@ -69,26 +71,39 @@ def read_variables(source: Source) -> Variables:
     """
     lines = read_lines(source)
     said = formed(lines.shapes, forms_of, parse_value_form)
-    records = find_records(lines, said)
-    entries, twice = _told_apart(read_records(lines, said, records))
+    head = last_head(lines, said)
+    fields = find_fields(lines, said, head)
+    records = with_fields(find_records(lines, said, head), fields)
+    read = completed(read_records(lines, said, records), fields)
+    entries, twice = _told_apart(read, fields.twice)
     found = [
         *_named_twice(source, entries, records, twice),
         *_incomplete(source, entries, records, {*twice}),
-        *_not_understood(lines, said),
+        *_not_understood(lines, said, head),
+        *fields.findings,
     ]
     found.sort(key=lambda finding: finding[0])
     told = tuple(diagnostic for _, diagnostic in found)
     return Variables(lines, entries, told)
 
 
-def _told_apart(entries: Entries) -> tuple[Entries, list[int]]:
-    """Name the entries; also return those whose name an earlier one has."""
+def _told_apart(
+    entries: Entries, ambiguous: frozenset[str]
+) -> tuple[Entries, list[int]]:
+    """Name the entries; also return those whose name an earlier one has.
+
+    Args:
+        entries: All of a file.
+        ambiguous: Names that records or paths have too.
+    """
     nested = [layout.kind in NESTED for layout in entries.layouts]
     names = [
         (row, name.lower())
         for row, name in enumerate(entries.name)
         if not nested[entries.layout[row]]
     ]
+    if ambiguous:
+        names = [(k, name) for k, name in names if _root(name) not in ambiguous]
     count = Counter(name for _, name in names)
     single = {name: row for row, name in names if count[name] == 1}
     first = {name: row for row, name in reversed(names)}
@@ -96,11 +111,16 @@ def _told_apart(entries: Entries) -> tuple[Entries, list[int]]:
     return replace(entries, row=single), twice
 
 
-def _not_understood(lines: Lines, said: Formed[Entered | None]) -> Iterator[Finding]:
+def _root(name: str) -> str:
+    return name.partition("[")[0].partition(".")[0]
+
+
+def _not_understood(
+    lines: Lines, said: Formed[Entered | None], head: Ints
+) -> Iterator[Finding]:
     """Report lines that the grammar does not know, but for those of nested values."""
     nested = said.which(is_nested)[lines.shape]
-    head = last_head(lines, said)
-    for row in np.flatnonzero(said.which(lambda e: e is None)[lines.shape]).tolist():
+    for row in np.flatnonzero(said.which(is_no_value)[lines.shape]).tolist():
         if head[row] < 0 or not nested[head[row]]:
             line = int(lines.line[row])
             text = lines.source.line_text(line).strip()[:60]
@@ -131,5 +151,7 @@ def _incomplete(
         if seen < 6:
             code = "lsv-incomplete"
             text = f"{name} has {seen} of 6 values: is the file cut?"
+        elif seen > 6:
+            code, text = "lsv-too-many", f"{name} has {seen} values in place of 6"
         found = Diagnostic(source.name, int(entries.line[row]), code, text)
         yield int(records.closed[row]), found

@@ -45,15 +45,20 @@ class Records:
     element: NDArray[np.bool_]
 
 
-def find_records(lines: Lines, said: Formed[Entered | None]) -> Records:
+def find_records(lines: Lines, said: Formed[Entered | None], head: Ints) -> Records:
     """Find where the entries of a file begin and end.
 
     The fields of records and of path nodes, and lines that are not understood, end an
     entry and begin none.
+
+    Args:
+        lines: The file.
+        said: What its shapes of lines say.
+        head: Row of the last variable's head up to every row, (n,).
     """
-    n, shape, head = len(lines), lines.shape, last_head(lines, said)
+    n, shape = len(lines), lines.shape
     own = head == np.arange(n)
-    other = (said.which(_is_head) | said.which(lambda e: e is None))[shape] & ~own
+    other = (said.which(_is_head) | said.which(is_no_value))[shape] & ~own
     elements = said.which(lambda e: e is not None and bool(e.element))[shape]
     elements &= (head >= 0) & ~other
     arrays = said.which(lambda e: e is not None and kind_of(e.type)[1])[shape]
@@ -96,6 +101,11 @@ def is_nested(entered: Entered | None) -> bool:
 
 def _is_head(entered: Entered | None) -> bool:
     return entered is not None and bool(entered.name)
+
+
+def is_no_value(entered: Entered | None) -> bool:
+    """Tell whether a line is not understood, or names a node: no variable has any."""
+    return entered is None or entered.node >= 0
 
 
 def _may_be_field(entered: Entered | None) -> bool:

@@ -17,6 +17,18 @@ ROOT = Path(__file__).parents[2]
 Files = dict[str, bytes]
 KINDS = (Generator, Rarer, Reachable, Job, ReachableJob)
 
+PARTS = (
+    "pth PATH nd Priv",
+    "NODE[1]:",
+    "$MAIN_POS POS X: 100.00 Y: 200.00 Z: 150.00 A: 0.00 E: 175.00 R: 0.00 CNFG: ''",
+    "$LIN_SPD REA",
+    " 0.5",
+    "rec AREC[2] frame_table Xport",
+    " [1]: ",
+    " p JNTP Arm: 1 Ax: 6",
+    " 1: 0.00 2: -20.00 3: -110.00 4: 0.00 5: 60.00 6: 0.00",
+)  # what a variable file may hold more
+
 
 @cache
 def written() -> tuple[Mapping[str, bytes], ...]:
@@ -25,7 +37,9 @@ def written() -> tuple[Mapping[str, bytes], ...]:
     for path in sorted((ROOT / "tests" / "corpus").glob("*.txt")):
         for case in path.read_bytes().split(b"==== ")[1:]:
             text = case.split(b"\n", 1)[1].partition(b"----\n")[0]
-            found.append({"job.pdl": text})
+            program, _, listed = text.partition(b"-- values\n")
+            more = {"job.lsv": listed} if listed else {}
+            found.append({"job.pdl": program, **more})
     found += case_programs()
     for path in sorted((ROOT / "programs").glob("*.pdl")):
         values = path.with_suffix(".lsv")
@@ -66,7 +80,7 @@ def values(rng: random.Random) -> bytes:
         text.append(f" [{index}]: {pairs} CNFG: ''")
     text += ["n1 INT Priv", " 1", "j1 JNTP Arm: 1 AX: 6 Priv"]
     text.append(" 1: 0.00 2: -20.00 3: -110.00 4: 0.00 5: 60.00 6: 0.00")
-    return "\r\n".join([*text, ""]).encode("latin-1")
+    return "\r\n".join([*text, *PARTS, ""]).encode("latin-1")
 
 
 def damaged(seed: int, number: int) -> Files:

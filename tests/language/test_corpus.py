@@ -5,6 +5,7 @@ from pathlib import Path
 import pytest
 
 from postproc.language.flow import Resolved, Start, resolve
+from postproc.language.lsv import read_variables
 from postproc.language.rewrite import edits
 from postproc.language.source import apply, source_from_bytes
 from postproc.language.structure import parse
@@ -27,7 +28,13 @@ def chapters() -> list[tuple[str, str, str]]:
     return found
 
 
-def described(resolved: Resolved, text: str) -> str:
+def with_values(case: str) -> tuple[str, str]:
+    """Return the program of a case, and its variable file ("" for none)."""
+    program, _, values = case.partition("-- values\n")
+    return program, values
+
+
+def described(resolved: Resolved, *texts: str) -> str:
     """Return one line for each visit, then one for each diagnostic."""
     v = resolved.visits
     out = []
@@ -39,6 +46,7 @@ def described(resolved: Resolved, text: str) -> str:
         if v.literal[i] >= 0:
             row = v.literal[i]
             places = zip(v.literals.start[row], v.literals.end[row], strict=True)
+            text = texts[v.literals.file[row]]
             literal = ",".join(text[a:b] for a, b in places)
             literal += " taught" * bool(v.literals.taught[row])
         name = v.names[v.name[i]] or "-"
@@ -61,10 +69,18 @@ def described(resolved: Resolved, text: str) -> str:
 )
 @pytest.mark.parametrize("newline", ["\n", "\r\n"])
 def test_chapter(title: str, program: str, expected: str, newline: str) -> None:
-    text = program.replace("\n", newline)
-    source = source_from_bytes("case.pdl", text.encode("latin-1"))
-    resolved = resolve(parse(source), CELL)
-    assert described(resolved, source.text) == expected
+    files = [
+        source_from_bytes(
+            f"case.{suffix}", text.replace("\n", newline).encode("latin-1")
+        )
+        for suffix, text in zip(("pdl", "lsv"), with_values(program), strict=True)
+        if text
+    ]
+    source, *listed = files
+    variables = read_variables(listed[0]) if listed else None
+    resolved = resolve(parse(source), CELL, variables)
+    assert described(resolved, *(file.text for file in files)) == expected
     visits = resolved.visits
-    same = edits(visits.literals, (source,), [], [])
-    assert apply(source.data, same[0]) == source.data
+    same = edits(visits.literals, files, [], [])
+    for file, own in zip(files, same, strict=True):
+        assert apply(file.data, own) == file.data
