@@ -119,6 +119,18 @@ def test_a_node_is_not_cloned(desk):
     assert f"not-cloned: {text}" in found.stderr
 
 
+def test_a_point_that_holds_a_node_is_not_cloned(desk):
+    moves = ["p := pth.NODE[1].$MAIN_POS"]
+    for side in ("{-20.0, -15.0, -130.0, -60.0, 20.0, -80.0}",
+                 "{20.0, 25.0, -80.0, 60.0, 80.0, 80.0}"):  # fmt: skip
+        moves += [f"MOVE JOINT TO {side}", "MOVE JOINT TO p"]
+    declared = f"p : POSITION\r\n  {DECLARED}"
+    source = desk.put("job.pdl", program(FIRST, *moves, declared=declared))
+    desk.put("job.lsv", VALUES)
+    found = desk.compensate(source, "--clone")
+    assert "not-cloned: p holds a copy of pth.NODE[1].$MAIN_POS" in found.stderr
+
+
 def test_names_of_lines_whatever_their_layout():
     text = VALUES.replace("\r\n ", "\r\n")
     lines = text.encode().split(b"\r\n")

@@ -3,7 +3,9 @@
 import numpy as np
 import pytest
 
+from postproc.language.entries import copied_entry
 from postproc.language.flow import Resolved, Start, resolve
+from postproc.language.layout import CloneError
 from postproc.language.lsv import Variables, read_variables
 from postproc.language.rewrite import edits
 from postproc.language.source import apply, source_from_bytes
@@ -265,3 +267,14 @@ def test_edits_hit_their_node_and_nothing_else():
     new = found.values + np.array([0.5, 0, 0, 0, 0, 0])
     _, own = edits(found.literals, files, found.literal, new)
     assert apply(values.encode(), own) == values.replace("X: 2.00", "X: 2.500").encode()
+
+
+def test_a_field_is_no_entry_to_copy_for_the_variable_of_its_name():
+    text = "r REC rt Priv\np POS\n" + place(1) + "p POS Priv\n" + place(2)
+    values = source_from_bytes("job.lsv", text.encode())
+    with pytest.raises(CloneError, match=r"line 3 of job\.lsv is no entry of p"):
+        copied_entry(values, 3, "p", "p__2", [])
+    with pytest.raises(CloneError, match="r is a record or a path"):
+        copied_entry(values, 3, "r", "r__2", [])
+    copy = copied_entry(values, 6, "p", "p__2", [])
+    assert apply(values.data, [copy]).decode() == text + "p__2 POS Priv\n" + place(2)
