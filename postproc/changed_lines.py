@@ -24,6 +24,12 @@ PIECE = 5_000  # lines that are masked at a time
 _ASSIGNED = re.compile(r"\s*([A-Za-z_$][\w$.\[\]]*)\s*(?::=|:)")
 _TWO_WORDS = re.compile(r"\s*([A-Za-z_]+)\s+([A-Za-z_]+)")
 _WORD = re.compile(r"[A-Za-z_]+")
+_LEAD = re.compile(
+    r"\s*(?:ELSE\s*:|CASE\s*\(.*?\)\s*:|WHEN\b.*?\bDO\b|[A-Za-z_]\w*\s*::)"
+    r"(?=\s*[A-Za-z_$])",
+    re.I,
+)  # what may stand before a statement on its line
+_LED = re.compile(r"\s*(?:ELSE\s*:|CASE\s*\(|WHEN\b|[A-Za-z_]\w*\s*::)", re.I)
 _AS_BLANKS = bytes(32 if chr(c) in BLANKS else c for c in range(256))
 
 
@@ -143,6 +149,8 @@ def _targets(before: Sequence[bytes], begins: Ints) -> list[str]:
 
 def _told_by(begin: str) -> str | None:
     """Name what numbers belong to by what is before the first, None if not told."""
+    if _LED.match(begin):
+        return None
     words, assigned = _TWO_WORDS.match(begin), _ASSIGNED.match(begin)
     if words:
         return f"{words[1]} {words[2]}"
@@ -150,7 +158,13 @@ def _told_by(begin: str) -> str | None:
 
 
 def target_name(line: str) -> str:
-    """Name what a line's numbers belong to."""
+    """Name what a line's numbers belong to.
+
+    >>> target_name("CASE (2): MOVE LINEAR TO POS(1, 2, 3, 4, 5, 6, '')")
+    'MOVE LINEAR'
+    """
+    while lead := _LEAD.match(line):
+        line = line[lead.end() :]
     assigned = _ASSIGNED.match(line)
     if assigned:
         return assigned.group(1)

@@ -15,6 +15,7 @@ from postproc.listing import arrows, print_listing, status_colour
 from postproc.rows import Row
 
 ASSIGNED = re.compile(r"\s*([A-Za-z_$][\w$.\[\]]*)\s*(?::=|:)")
+LED = re.compile(r"(?:ELSE\s*:|CASE\s*\([^()]*\)\s*:|\w+\s*::)(.*)", re.S)
 TWO_WORDS = re.compile(r"\s*([A-Za-z_]+)\s+([A-Za-z_]+)")
 
 
@@ -46,6 +47,9 @@ def row_of(file: str, line: int, old: str, new: str) -> Row:
 
 def name_of(mask: str, line: str) -> str:
     """Name what the numbers of a line belong to, by what is before the first."""
+    if led := LED.match(line):
+        line = led[1]
+        mask = mask_line(line).mask
     begin = mask.partition("\0")[0]
     if words := TWO_WORDS.match(begin):
         return f"{words[1]} {words[2]}"

@@ -156,3 +156,29 @@ def test_a_line_is_named_as_it_is_by_itself(line) -> None:
     rows = list(changed_rows("a.pdl", [7, 8], *texts))
     assert [row.target for row in rows] == [target_name(before)] * 2
     assert all(row.original != row.compensated for row in rows)
+
+
+POS = "POS({0}, 2, 3, 4, 5, 6, '')"
+
+
+@pytest.mark.parametrize(
+    ("line", "name"),
+    [
+        (f"  ELSE: MOVE LINEAR TO {POS}", "MOVE LINEAR"),
+        (f"else :MOVE CIRCULAR TO {POS} VIA {POS}", "MOVE CIRCULAR"),
+        (f"CASE (1): MOVE LINEAR TO {POS}", "MOVE LINEAR"),
+        (f"CASE (1..3, 5) : p1 := {POS}", "p1"),
+        (f"CASE('M'):  tab[2].p:={POS}", "tab[2].p"),
+        (f"again:: MOVEFLY LINEAR TO {POS} ADVANCE", "MOVEFLY LINEAR"),
+        (f"WHEN $DIN[1]+ DO MOVE JOINT TO {POS}", "MOVE JOINT"),
+        (f"again:: ELSE: MOVE LINEAR TO {POS}", "MOVE LINEAR"),
+        ("CASE ({0}):", "CASE"),
+        ("WHEN $DIN[{0}]+ DO", "WHEN DIN"),
+        (f"elsewhere := {POS}", "elsewhere"),
+        (f"  WP_1 : POSITION ({POS})", "WP_1"),
+    ],
+)
+def test_a_target_is_named_by_its_own_statement(line, name) -> None:
+    before, after = [line.format(text) for text in ("1.5", "2.25")]
+    (row,) = changed_rows("a.pdl", [7], [before.encode()], [after.encode()])
+    assert row.target == target_name(before) == name

@@ -36,6 +36,9 @@ LINES = (
     "list := [" + ", ".join(["{}"] * 20) + "]",
     "huge := POS(1e999, {}, {}, {}, {})",
     "\x01x\x1by := {} ",
+    "ELSE: MOVE LINEAR TO POS({}, {}, {}, {}, {}, {}, '')",
+    "CASE ({n}): MOVEFLY JOINT TO {{{}, {}, {}, {}, {}, {}}} ADVANCE",
+    "again:: wp[{n}] := POS({}, {}, {}, {}, {}, {}, '')",
 )
 
 
