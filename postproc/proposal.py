@@ -8,12 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from postproc.accuracy.guard import guard_size, guard_solutions, guard_steps, guard_turn
-from postproc.arcs import STRAYS, strayed
+from postproc.arcs import STRAYS
+from postproc.carried import strayed_along
 from postproc.followers import carry_along
 from postproc.marks import mark_disagreement, mark_display, mark_unchanged, must_stay
 from postproc.options import Options
 from postproc.planning import Planned, Reading
-from postproc.pose import MM
 from postproc.reasons import Reasons
 from postproc.reconcile import agree
 from postproc.report import Decisions, Status
@@ -68,7 +68,7 @@ def propose(
 
     Args and returns are those of `decide`: every round leaves more points alone.
     """
-    strays, step = np.zeros(len(held), dtype=bool), cell.limits.step_mm * MM
+    strays = np.zeros(len(held), dtype=bool)
     shift = solved.command[:, :3, 3] - planned.plan.tcp[:, :3, 3]
     shift -= aside - planned.plan.aside
     while True:
@@ -76,7 +76,8 @@ def propose(
             reading, planned, solved, aside, held, strays, cell, options
         )  # fmt: skip
         moves = np.where(found.corrected[:, None], shift, 0.0)
-        more = strayed(planned.targets, planned.plan, moves, step) & ~strays
+        values = found.decisions.corrected
+        more = strayed_along(reading.visits, planned, cell, values, moves) & ~strays
         if not more.any():
             return found
         strays = strays | more

@@ -59,7 +59,61 @@ def test_all_three_points_are_left_alone(run, via, end, reason):
     assert "VIA" in found[1]
 
 
+@pytest.mark.parametrize("step", ["RELATIVE VEC(0, 0, 5) IN BASE", "AWAY 5"])
+def test_a_program_is_not_cut_where_a_step_begins(job_cell, step):
+    lines = [f"MOVE LINEAR TO {point(*START)}", f"MOVE LINEAR {step}", NEXT]
+    visits = read_program({"job.pdl": job(*lines)}, job_cell).visits
+    assert quiet_stops(visits).tolist() == [True, False, True, True, False]
+
+
 def test_a_program_is_not_cut_where_an_arc_begins(job_cell):
     source = program(point(350, 150, 200), point(300, 200, 200))
     visits = read_program({"job.pdl": source}, job_cell).visits
     assert quiet_stops(visits).tolist() == [True, False, False, True, False]
+
+
+NEXT = f"MOVE LINEAR TO {point(250, 50, 250)}"
+SET = f"p := {point(300, 100, 220)}"
+START_BY = [
+    "MOVE LINEAR TO POS_SHIFT(p, VEC(0, 0, -20))",
+    "MOVE LINEAR TO POS(p.X, p.Y, p.Z - 20, p.A, p.E, p.R, '')",
+    "MOVE LINEAR RELATIVE VEC(0, 0, -20) IN BASE",
+    "MOVE LINEAR RELATIVE VEC(0, 0, -10) IN BASE\nMOVE LINEAR RELATIVE VEC(0, 0, -10) "
+    "IN UFRAME",
+    "MOVE LINEAR NEAR p BY -20",
+]
+
+
+def whys(done) -> list[str]:
+    d = done.decisions
+    why = [d.reasons[k] for k in d.why]
+    return [
+        "" if status == Status.SAFE else text
+        for status, text in zip(d.status, why, strict=True)
+    ]
+
+
+def job(*lines: str) -> bytes:
+    head = ["PROGRAM job", "VAR p : POSITION", "BEGIN"]
+    begin = f"MOVE JOINT TO {point(250, 150, 250)}"
+    return "\n".join([*head, begin, *lines, NEXT, "END job", ""]).encode()
+
+
+@pytest.mark.parametrize("begin", START_BY)
+def test_a_start_that_moves_along_counts(job_cell, job_model, begin):
+    for x, left in ((300.4, True), (340, False)):
+        arc = f"MOVE CIRCULAR TO {point(x, 100, 200)} VIA {point(350, 150, 200)}"
+        source = job(SET, "MOVE LINEAR TO p", begin, f"{arc} -- TAUGHT")
+        found = whys(compensate(source, job_cell, job_model, name="job.pdl"))
+        assert found[0] == found[-1] == ""
+        assert ("quite another circle" in found[1]) == left
+        assert left or found[1] == ""
+
+
+def test_points_that_all_move_alike_make_the_same_circle(job_cell, job_model):
+    x, y, z = START
+    via = "VIA POS_SHIFT(p, VEC(0.5, 0.5, -20))"
+    arc = f"MOVE CIRCULAR TO {point(x, y + 1, z)} {via}"
+    source = job(SET, "MOVE LINEAR TO p", f"MOVE LINEAR TO {point(*START)}", arc)
+    found = whys(compensate(source, job_cell, job_model, name="job.pdl"))
+    assert found[1] == found[2] == found[4] == "", found

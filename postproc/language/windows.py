@@ -1,9 +1,9 @@
 """Long programs in windows, cut at stops that nothing but the arm's standing crosses.
 
 Behind such a stop the program goes on from there alone, no jump leads across it, no
-number is used on both sides, and no arc begins there. Nothing before it depends on what
-comes after, and what comes after depends on the past only through where the arm stands
-and what its joints remember.
+number is used on both sides, and neither an arc nor a step begins there. Nothing before
+it depends on what comes after, and what comes after depends on the past only through
+where the arm stands and what its joints remember.
 """
 
 from __future__ import annotations
@@ -14,12 +14,16 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from postproc.language.visits import Visits
+from postproc.language.visits import Target, Visits
 
 Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 
 LEAST = 20_000  # visits of a window; shorter programs are one
+STEPS = (
+    Target.RELATIVE_TOOL, Target.RELATIVE_BASE, Target.RELATIVE_UFRAME, Target.AWAY,
+    Target.ABOUT, Target.BY, Target.FOR,
+)  # fmt: skip
 SHARED = {
     "files", "configs", "names", "frames", "frame_taught", "reasons", "pred_start",
     "pred", "literals",
@@ -86,8 +90,8 @@ def quiet_stops(visits: Visits) -> Bools:
     crossed = _covered(visits.pred[jumps], to[jumps], n) | _same_numbers(visits)
     quiet = np.zeros(n, dtype=bool)
     quiet[visits.pred[goes_on]] = True
-    begins_arc = np.append(visits.via[1:], False)
-    quiet &= ~visits.fly & ~visits.via & ~begins_arc & ~crossed
+    begins = visits.via | np.isin(visits.target, STEPS)  # an arc, or a step
+    quiet &= ~visits.fly & ~visits.via & ~np.append(begins[1:], False) & ~crossed
     return np.asarray(quiet)
 
 
