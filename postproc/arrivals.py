@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Self
 
@@ -39,6 +39,8 @@ class Arrivals:
             `BOTH` where the visits differ.
         correction_mm: Largest correction of the TCP, (k,).
         counts: Visits of every status in this file, by name.
+        mixed: Visits of every status on a line, the most urgent first, by its index;
+            for lines whose visits have several.
     """
 
     line: Ints
@@ -48,6 +50,7 @@ class Arrivals:
     direction: Ints
     correction_mm: Array
     counts: Mapping[str, int]
+    mixed: Mapping[int, Mapping[str, int]] = field(default_factory=dict)
 
     def find(self, lines: Sequence[int] | Ints) -> Ints:
         """Return the index of every line, -1 where it holds no target."""
@@ -87,7 +90,24 @@ class Arrivals:
             if len(line)
             else size,
             counts={s.name.lower(): int((status == s).sum()) for s in Status},
+            mixed=_mixed(status[order], first),
         )
+
+
+def _mixed(status: Ints, first: Ints) -> dict[int, dict[str, int]]:
+    """Count the visits of lines that have several statuses.
+
+    Args:
+        status: Of every visit, line by line, the most urgent one first.
+        first: Where each line begins.
+    """
+    last = np.append(first[1:], len(status)) - 1
+    several = np.flatnonzero(status[first] != status[last]) if len(status) else first
+    found = {}
+    for k in several.tolist():
+        own = status[first[k] : last[k] + 1].tolist()
+        found[k] = {s.name.lower(): own.count(s) for s in URGENCY if s in own}
+    return found
 
 
 def _places(text: str, letters: str) -> Ints:

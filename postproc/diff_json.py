@@ -60,6 +60,7 @@ def _objects(rows: Rows, k: Ints) -> list[str]:
         "change_mm": _sizes(np.where(rows.has_change[k], rows.change_mm[k], np.nan)),
         "text": b'""',
         **_told(rows, k),
+        "visits": b"{}",
     }
     parts: list[Column | bytes] = []
     for number, (key, column) in enumerate(columns.items()):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TextIO
 
@@ -114,12 +114,15 @@ class _Writer:
         length = "" if size is None else f"{size:.3f}"
         place = [row.file, str(row.line or ""), row.target]
         cells = [*place, old, "->" if new else "", new, length]
-        told = [arrows(row.direction), _said(row.status, row.why)]
+        told = [arrows(row.direction), _said(row.status, row.why, row.visits)]
         return [*cells, *told] if self.told else cells
 
 
-def _said(status: str, why: str) -> str:
-    """Say what came of a target."""
+def _said(status: str, why: str, visits: Mapping[str, int] | None = None) -> str:
+    """Say what came of a target, and of the others on its line."""
+    others = ", ".join(f"{n} {name}" for name, n in (visits or {}).items())
+    if others:
+        why = f"{why} ({others})" if why else others
     return f"{status}: {why}" if why else status
 
 

@@ -1,7 +1,8 @@
 """Numbers and words of the rows of `diff` as columns of bytes, some thousand at a time.
 
-Rows with text, with many numbers or with names that cannot be printed are few: whoever
-writes rows writes them one by one, as `Row`, and asks here which they are.
+Rows with text, with many numbers, with visits of several statuses or with names that
+cannot be printed are few: whoever writes rows writes them one by one, as `Row`, and
+asks here which they are.
 """
 
 from __future__ import annotations
@@ -35,6 +36,7 @@ def single_rows(rows: Rows) -> Ints:
         many |= ~np.isfinite(rows.told.correction_mm)[rows.entry]
         unclear = ~np.array([why.isprintable() for why in rows.told.reasons])
         many |= unclear[rows.told.why[rows.entry]]
+        many |= np.isin(rows.entry, [*rows.told.mixed])
     return np.flatnonzero(many)
 
 

@@ -33,6 +33,8 @@ class Row(NamedTuple):
         status, why: What came of the line's target, "" where no record tells.
         direction: In which every joint arrives, see `postproc.arrivals`; or ().
         correction_mm: How far the TCP is moved there, or None.
+        visits: Visits of the line by status where they have several, the most urgent
+            first; else empty.
     """
 
     file: str
@@ -46,6 +48,7 @@ class Row(NamedTuple):
     why: str = ""
     direction: tuple[int, ...] = ()
     correction_mm: float | None = None
+    visits: dict[str, int] = {}  # noqa: RUF012
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,6 +129,7 @@ class Rows(Sequence[Row]):
             why=told.reasons[told.why[at]],
             direction=tuple(told.direction[at].tolist()),
             correction_mm=float(told.correction_mm[at]),
+            visits=dict(told.mixed.get(at, {})),
         )
 
 

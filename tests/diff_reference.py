@@ -85,5 +85,7 @@ def cells_of(row: Row, told: bool) -> list[str]:
         old, new = (", ".join(f"{p[k]:.4f}" for p in moved) for k in (0, 1))
     cells = [row.file, str(row.line or ""), row.target, old, "->" if new else "", new]
     cells.append("" if size is None else f"{size:.3f}")
-    status = f"{row.status}: {row.why}" if row.why else row.status
+    others = ", ".join(f"{n} {name}" for name, n in row.visits.items())
+    why = f"{row.why} ({others})" if row.why and others else row.why or others
+    status = f"{row.status}: {why}" if why else row.status
     return [*cells, arrows(row.direction), status] if told else cells

@@ -43,6 +43,7 @@ def test_visits_of_one_line_are_told_together():
     assert found.direction[1].tolist() == [1, BOTH, BOTH, BOTH, BOTH, 1]
     assert found.correction_mm.tolist() == [0.0, 0.7]
     assert found.find([7, 4, 3]).tolist() == [1, -1, 0]
+    assert found.mixed == {}
 
 
 def test_the_most_urgent_status_of_a_line_counts():
@@ -52,6 +53,22 @@ def test_the_most_urgent_status_of_a_line_counts():
                                       "reasons": ["a", "b", "c"]})  # fmt: skip
         assert found.status.tolist() == [wanted]
         assert found.why.tolist() == [status.index(str(wanted))]
+        assert sum(found.mixed[0].values()) == 3
+    assert found.mixed == {0: {"safe": 1, "unchanged": 2}}
+
+
+def test_lines_whose_visits_have_several_statuses_are_counted():
+    told = {
+        "line": [7, 3, 7, 9, 7, 9],
+        "status": "030304",
+        "direction": "0" * 36,
+        "correction_mm": [0.0] * 6,
+        "why": [0] * 6,
+        "reasons": [""],
+    }
+    found = Arrivals.read(told)
+    assert found.line.tolist() == [3, 7, 9]
+    assert found.mixed == {2: {"guarded": 1, "unchanged": 1}}
 
 
 def test_numbers_in_a_file_that_is_not_written_belong_to_their_move():

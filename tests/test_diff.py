@@ -77,6 +77,22 @@ def test_directions_and_statuses_are_those_of_the_report(desk):
     assert found["counts"]["safe"] == 3 and found["counts"]["guarded"] == 1
 
 
+def test_a_line_with_several_statuses_counts_its_visits(desk):
+    via = "POS(320.0, 120.0, 200.0, 0.0, 175.0, 0.0, '')"
+    arc = f"MOVE CIRCULAR TO POS(300.0, 200.0, 200.0, 0.0, 175.0, 0.0, 'W') VIA {via}"
+    source = desk.put("job.pdl", program("$CNFG_CARE := ON", FIRST, POSE, arc))
+    out = desk.folder / "out.pdl"
+    report = desk.report(source, "-o", out)["targets"]
+    assert [row["status"] for row in report] == ["safe", "safe", "safe", "guarded"]
+    *others, row = json.loads(cli("diff", source, out, "--json", "-").stdout)["rows"]
+    assert [other["visits"] for other in others] == [{}, {}]
+    assert row["visits"] == {"guarded": 1, "safe": 1}
+    assert (row["status"], row["why"]) == ("guarded", report[3]["why"])
+    assert row["correction_mm"] > 0.5 and row["original"] != row["compensated"]
+    listed = cli("diff", source, out).stdout
+    assert f"guarded: {row['why']} (1 guarded, 1 safe)\n" in listed
+
+
 def test_what_was_left_alone_is_listed_with_its_reason(desk):
     source = desk.put("job.pdl", program(FIRST, FAR))
     out = desk.folder / "out.pdl"

@@ -80,6 +80,7 @@ def told_of(rng: np.random.Generator, lines: int) -> Arrivals:
         rng.integers(-1, 3, (len(line), 6)),
         np.where(rng.random(len(line)) < 0.1, np.nan, rng.random(len(line))),
         {s.name.lower(): int(s) for s in Status},
+        {k: {"guarded": 1, "safe": k} for k in rng.integers(0, len(line), 9).tolist()},
     )
 
 
@@ -93,6 +94,7 @@ def with_told(row: Row, told: Arrivals) -> Row:
         why=told.reasons[told.why[at[0]]],
         direction=tuple(told.direction[at[0]].tolist()),
         correction_mm=float(told.correction_mm[at[0]]),
+        visits=dict(told.mixed.get(int(at[0]), {})),
     )
 
 
