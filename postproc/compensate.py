@@ -171,8 +171,8 @@ def report(
         ),
         visits=visits,
         decisions=d,
-        before=ErrorStatistics.of(kept.before),
-        after=ErrorStatistics.of(kept.after),
+        before=ErrorStatistics.of_sizes(kept.before),
+        after=ErrorStatistics.of_sizes(kept.after),
         diagnostics=(
             *reading.diagnostics,
             *followed_pages(visits),

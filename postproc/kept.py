@@ -33,7 +33,7 @@ class Kept:
         edits: The edits of these, file by file.
         decisions: What was decided for n visits.
         corrected: Visits whose target moves, (n,).
-        before, after: Predicted error of the k visits that move, (k, 3) [m].
+        before, after: Size of the predicted error of the k visits that move, (k,) [m].
         position: Where the program wants the TCP, (n, 3) [m], base frame.
         away: How far the path passes it, (n,) [mm].
         overruled: The path does not follow the configuration string, and nobody said
@@ -67,14 +67,15 @@ def keep(
     moved = proposal.corrected
     new = states.with_(q=np.array(done.q), direction=np.array(done.side))[moved]
     wanted = planned.wanted[:, :3, 3]
+    before = model.error(cell.arm, states[moved]) - planned.shift[moved]
     after = done.tcp[moved, :3, 3] + model.error(cell.arm, new) - wanted[moved]
     return Kept(
         edited=proposal.edited,
         edits=found.edits,
         decisions=proposal.decisions.part(slice(seeds, None)),
         corrected=moved[seeds:],
-        before=model.error(cell.arm, states[moved]) - planned.shift[moved],
-        after=after,
+        before=np.linalg.norm(before, axis=1),
+        after=np.linalg.norm(after, axis=1),
         position=(wanted - plan.aside)[seeds:],
         away=np.linalg.norm(np.nan_to_num(plan.aside), axis=1)[seeds:] / MM,
         overruled=overruled(planned.targets, plan).unchecked(visits)[seeds:],

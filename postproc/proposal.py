@@ -147,7 +147,7 @@ def decide(
         why=reasons.index,
         reasons=reasons.texts,
         q=plan.q,
-        direction=np.where(np.abs(side) < KNOWN, 0.0, np.sign(side)),
+        direction=np.where(np.abs(side) < KNOWN, 0.0, np.sign(side)).astype(np.int8),
         side=side,
         corrected=values,
         correction=np.where(corrected[:, None], correction, 0.0),

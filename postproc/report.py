@@ -17,6 +17,7 @@ from postproc.sidecar import Sidecar
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
+Signs = NDArray[np.int8]
 
 DONE, NOT_ALL, FAILED = 0, 1, 2  # exit codes
 
@@ -53,7 +54,7 @@ class Decisions:
     why: Ints
     reasons: tuple[str, ...]
     q: Array
-    direction: Array
+    direction: Signs
     side: Array
     corrected: Array
     correction: Array

@@ -126,7 +126,7 @@ def _rounded(values: Array, decimals: int) -> Column:
     return listed([fixed(values[:, k], decimals) for k in range(values.shape[1])])
 
 
-def _signs(values: Array) -> Column:
+def _signs(values: NDArray[np.int8]) -> Column:
     """Write rows of -1, 0 and 1 (k, p)."""
     signs = values.astype(np.int64) + 1
     return listed([named(["-1", "0", "1"], column) for column in signs.T])

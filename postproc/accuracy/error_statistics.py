@@ -25,7 +25,12 @@ class ErrorStatistics:
     @classmethod
     def of(cls, error: Array) -> ErrorStatistics:
         """Summarise error vectors (n, 3) [m]; NaN figures where there are none."""
-        size = np.linalg.norm(error, axis=1) / MM
+        return cls.of_sizes(np.linalg.norm(error, axis=1))
+
+    @classmethod
+    def of_sizes(cls, size: Array) -> ErrorStatistics:
+        """Summarise lengths of error vectors (n,) [m], as `of` does."""
+        size = size / MM
         if len(size) == 0:
             return cls(np.nan, np.nan, np.nan, np.nan, 0)
         p95 = float(np.percentile(size, 95))
