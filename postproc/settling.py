@@ -53,6 +53,10 @@ class Left:
 AT_START = Left(NOWHERE, NOWHERE, np.empty((0, 3)))
 
 
+class NotTogetherError(Exception):
+    """A program goes on by rounds that others beside it did not take."""
+
+
 @dataclass(frozen=True)
 class Corrected:
     """A proposal, the edits that write it, and where the written numbers lead."""
@@ -85,7 +89,11 @@ def settle(
     up for. The last look is at the numbers as they will be read from the output.
 
     Programs side by side do not wait for each other: what has come to rest in one stays
-    as it is while others go on.
+    as it is while others go on. Only what the last look finds would come rounds later
+    than in a program alone, and how targets are settled depends on the round.
+
+    Raises:
+        NotTogetherError: The last look found something in programs side by side.
     """
     held, search = np.zeros(len(states), dtype=bool), SideSearch()
     with clock("solve"):
@@ -125,6 +133,8 @@ def settle(
                 decided = replace(proposal.decisions, std_error=std_error)
                 proposal = replace(proposal, decisions=decided)
                 return Corrected(proposal, edits, last.reached, left)
+            if len(reading.begins) > 1:
+                raise NotTogetherError
             held = held | flipped
             continue
         settled_for = settled_for | moved if number >= ROUNDS else settled_for

@@ -145,6 +145,9 @@ def correct_together(
 
     Returns:
         What `correct` keeps of each alone.
+
+    Raises:
+        NotTogetherError: They would not come out as each alone.
     """
     own = [reading.visits for reading in readings]
     texts = tuple(text for reading in readings for text in reading.texts)

@@ -5,8 +5,10 @@ from __future__ import annotations
 import json
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
+import postproc.settling as settling
 import postproc.together as together
 from postproc.compensate import compensate
 from postproc.exceptions import CellError, ModelError, PostprocError, ProgramError
@@ -146,3 +148,33 @@ def test_a_wrong_cell_or_model_is_said_of_every_program(job_cell, job_model):
 
 def test_nothing_at_all(job_cell, job_model):
     assert compensate_together([], job_cell, job_model, AS_USUAL) == []
+
+
+def test_what_changes_sides_as_it_is_written_is_corrected_alone(
+    job_cell, job_model, monkeypatch
+):
+    monkeypatch.setattr(settling, "OTHER", 0.006)  # so that rounding is enough
+    begins, write = [], settling.write
+
+    def watched(reading, *given):
+        begins.append(len(reading.begins))
+        return write(reading, *given)
+
+    monkeypatch.setattr(settling, "write", watched)
+    programs = [given(f"p{k}.pdl", crowded(f"p{k}", k)) for k in range(6)]
+    for one in programs:
+        alone(one, job_cell, job_model, AS_USUAL)
+    assert len(begins) > len(programs)  # some are written twice
+    assert_as_alone(programs, job_cell, job_model)
+    assert len(programs) in begins  # they were begun side by side
+
+
+def crowded(name: str, seed: int) -> bytes:
+    """Write moves by not much more than what joints have play."""
+    rng, at = np.random.default_rng(seed), np.array([100.0, 100.0, 250.0])
+    lines = [f"PROGRAM {name}", "BEGIN", "  MOVE JOINT TO {0, 0, -90, 0, 60, 0}"]
+    for _ in range(10):
+        at = at + rng.normal(0.0, 0.5, 3)
+        numbers = ", ".join(f"{v:.1f}" for v in (*at, 0.0, 170.0, 0.0))
+        lines.append(f"  MOVE LINEAR TO POS({numbers}, '')")
+    return "\r\n".join([*lines, f"END {name}", ""]).encode("ascii")
