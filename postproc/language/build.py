@@ -72,6 +72,11 @@ def _variables(c: Children) -> ast.Declare:
     return ast.Declare(tuple(c[0]), c[1], initial, exported, words)
 
 
+def _node_fields(c: Children) -> ast.NodeFields:
+    names = (str(part).lower() for part in c if isinstance(part, str))
+    return ast.NodeFields(tuple(name for name in names if name.startswith("$")))
+
+
 def _parameters(c: Children) -> list[ast.Parameter]:
     return [p for group in c for p in group]
 
@@ -167,7 +172,7 @@ RULES: dict[str, Rule] = {
     "variables": _variables,
     "constant": lambda c: ast.Constant(_name(c[0]), c[1]),
     "structure": lambda c: ast.Structure(_name(c[0])),
-    "node_fields": lambda c: ast.Statement(),
+    "node_fields": _node_fields,
     "end_structure": lambda c: ast.EndStructure(),
     "names": lambda c: NamesPart(str(n) for n in c),
     "exported": lambda c: ExportedPart(_name(c[0])),

@@ -94,6 +94,13 @@ class Structure(Statement):
 
 
 @dataclass(frozen=True, slots=True)
+class NodeFields(Statement):
+    """``$MAIN_POS, $LIN_SPD``: standard fields that nodes have, in lower case."""
+
+    names: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
 class EndStructure(Statement):
     """``ENDRECORD``, ``ENDNODEDEF``."""
 

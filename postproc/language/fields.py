@@ -32,11 +32,14 @@ class Fields:
         each: Their fields.
         findings: What is not read of them, and the rows at which that shows.
         twice: Names, in lower case, that a record or path and something else have.
+        unread: Records, paths and parts of them, in lower case, that are not read as
+            a whole.
     """
 
     each: tuple[Field, ...] = ()
     findings: tuple[Finding, ...] = ()
     twice: frozenset[str] = frozenset()
+    unread: frozenset[str] = frozenset()
 
 
 def find_fields(lines: Lines, said: Formed[Entered | None], head: Ints) -> Fields:
@@ -55,24 +58,28 @@ def find_fields(lines: Lines, said: Formed[Entered | None], head: Ints) -> Field
     count, ends = Counter(names), np.append(own[1:], len(head))
     each: list[Field] = []
     findings: list[Finding] = []
+    unread: set[str] = set()
     for at in nested.tolist():
         row, end = int(own[at]), int(ends[at])
         if count[names[at]] > 1:
             text = "has two entries: it is not compensated; delete one"
             findings.append((end, _finding(lines, said, row, row, "lsv-twice", text)))
+            unread.add(names[at])
             continue
         entry = Nested(lines, said, row)
         try:
             each += entry.fields(end)
         except OddLine as odd:
+            unread.add(names[at])
             text = f"is not read: {odd}"
             findings.append(
                 (end, _finding(lines, said, row, odd.row, "lsv-parts", text))
             )
         else:
             findings += _unread(lines, said, entry, end)
+            unread |= {names[at] + part.lower() for part in entry.dropped}
     twice = frozenset(names[at] for at in nested.tolist() if count[names[at]] > 1)
-    return Fields(tuple(each), tuple(findings), twice)
+    return Fields(tuple(each), tuple(findings), twice, frozenset(unread))
 
 
 def _unread(

@@ -41,11 +41,13 @@ class Variables:
         lines: The text.
         entries: Entries by lower-case name; a name with two entries has none.
         diagnostics: What was found while reading.
+        unread: As in `Fields`.
     """
 
     lines: Lines
     entries: Entries
     diagnostics: tuple[Diagnostic, ...]
+    unread: frozenset[str] = frozenset()
 
     @property
     def source(self) -> Source:
@@ -84,7 +86,7 @@ def read_variables(source: Source) -> Variables:
     ]
     found.sort(key=lambda finding: finding[0])
     told = tuple(diagnostic for _, diagnostic in found)
-    return Variables(lines, entries, told)
+    return Variables(lines, entries, told, fields.unread)
 
 
 def _told_apart(

@@ -25,6 +25,7 @@ class Nested:
         row: Row of its head.
         found: Its fields by part (``.NODE[1]``, ``[1]``, "") and lower-case name.
         unread: Rows of what is not read, and why not.
+        dropped: Parts of which nothing is read.
     """
 
     lines: Lines
@@ -32,7 +33,7 @@ class Nested:
     row: int
     found: dict[str, dict[str, Field]] = field(default_factory=dict)
     unread: list[tuple[int, str]] = field(default_factory=list)
-    _dropped: set[str] = field(default_factory=set)
+    dropped: set[str] = field(default_factory=set)
     _part: str | None = None
     _words: bool | None = None  # parts begin with NODE[1], not with [1]
     _listed: bool = False  # a field of this part has elements
@@ -55,7 +56,7 @@ class Nested:
             one
             for part, own in self.found.items()
             for one in own.values()
-            if part not in self._dropped
+            if part not in self.dropped
         ]
 
     def _entered(self, row: int) -> Entered:
@@ -151,7 +152,7 @@ class Nested:
     def _drop(self, row: int, why: str) -> None:
         """Read nothing of this part: which of its values is meant is not sure."""
         assert self._part is not None
-        self._dropped.add(self._part)
+        self.dropped.add(self._part)
         self.unread.append((row, why))
 
     def _close(self, row: int) -> None:
@@ -160,7 +161,7 @@ class Nested:
             return
         first, line = self._open
         self._open, name = None, line.name.lower()
-        if name in HIDDEN or self._part in self._dropped:
+        if name in HIDDEN or self._part in self.dropped:
             return
         own = self.found.setdefault(self._part, {})
         if name in own:

@@ -30,17 +30,37 @@ def destination(here: Here, reference: ast.Reference) -> Value:
         return whole
     (key,) = target.keys
     under = len(key) + 1
-    names = sorted({part[under:] for part in parts_under(here, key)})
-    standard = [name for name in names if name[:1] == "$" and "." not in name]
+    names = {part[under:] for part in parts_under(here, key)}
+    found = {name for name in names if name[:1] == "$" and "." not in name}
+    standard = sorted(found | _declared(here, reference))
     fields = [
         here.value(ast.Reference(reference.name, (*reference.steps, name)))
         for name in standard
         if name in MAIN
     ]
-    if len(fields) == 1 == len(standard):
-        return fields[0]
     if not fields:
         return whole
+    if _unread(here, key):
+        return unsure(Nothing("its values in the variable file are not read"), *fields)
+    if len(fields) == 1 == len(standard):
+        return fields[0]
     several = len(fields) > 1
     why = "it has several positions" if several else "it has settings of its own"
     return unsure(Nothing(f"{why} ({', '.join(standard).upper()})"), *fields)
+
+
+def _declared(here: Here, reference: ast.Reference) -> frozenset[str]:
+    """Return the standard fields that the type of a node declares."""
+    type_ = here.world.type_of(here.place, reference.name)
+    steps = [step for step in reference.steps if isinstance(step, str)]
+    if type_ is None or steps not in ([], ["node"]):
+        return frozenset()
+    found = [one.nodes.get(type_.name) for one in here.world.programs()]
+    return frozenset().union(*filter(None, found))
+
+
+def _unread(here: Here, key: str) -> bool:
+    """Tell whether the variable file may say more of a node than what was read."""
+    file, name = here.world.variables, key.rpartition("/")[2]
+    unread = file.unread if file is not None else ()
+    return any(f"{name}.".startswith((f"{one}.", f"{one}[")) for one in unread)

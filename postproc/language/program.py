@@ -76,6 +76,7 @@ class Program:
         imports: Files named by IMPORT.
         arm: ``PROG_ARM``, 0 where it is not said.
         diagnostics: What was found while reading.
+        nodes: Standard fields that types of nodes declare, all in lower case.
     """
 
     name: str
@@ -88,6 +89,7 @@ class Program:
     imports: tuple[str, ...]
     arm: int
     diagnostics: tuple[Diagnostic, ...]
+    nodes: Mapping[str, frozenset[str]]
 
     def statement(self, row: int) -> ast.Statement:
         """Return what a logical line says."""

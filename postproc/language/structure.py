@@ -44,7 +44,8 @@ class _Reader:
     imports: list[str] = field(default_factory=list)
     diagnostics: list[Diagnostic] = field(default_factory=list)
     scopes: list[_Scope] = field(default_factory=lambda: [_Scope()])
-    structure: bool = False  # between RECORD and ENDRECORD
+    structure: str = ""  # its name, between RECORD and ENDRECORD
+    nodes: dict[str, frozenset[str]] = field(default_factory=dict)
 
     def report(self, row: int, code: str, message: str) -> None:
         name = self.lines.source.name
@@ -62,8 +63,13 @@ class _Reader:
                     self.arm = int(self.lines.value[self.lines.first[row] + slot])
             case ast.Import(file):
                 self.imports.append(file)
-            case ast.Structure() | ast.EndStructure():
-                self.structure = isinstance(statement, ast.Structure)
+            case ast.Structure(name):
+                self.structure = name
+            case ast.NodeFields(names) if self.structure:
+                known = self.nodes.get(self.structure, frozenset())
+                self.nodes[self.structure] = known.union(names)
+            case ast.EndStructure():
+                self.structure = ""
             case ast.Declare() | ast.Constant() if scope.begin < 0:
                 self._declare(row, statement)
             case ast.Routine(name, _, exported):
@@ -174,6 +180,7 @@ def parse(source: Source) -> Program:
         tuple(reader.imports),
         reader.arm,
         tuple(reader.diagnostics),
+        reader.nodes,
     )
 
 
