@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from postproc.language import pdl2 as ast
 from postproc.language.evaluate import Point
-from postproc.language.values import Nothing, Position, Value
+from postproc.language.values import Nothing, Position, Value, unsure
 
 SINGLE = frozenset(
     "integer real boolean string vector position jointpos xtndpos semaphore".split()
@@ -50,6 +50,8 @@ def _may_have_parts(here: Point, origin: ast.Reference) -> bool:
 def parts_of(here: Point, origin: ast.Reference) -> dict[str, Value]:
     """Return what is known of the elements and fields of a variable.
 
+    Standard fields of nodes count too where what they hold is not known.
+
     Returns:
         Values by what follows the variable's own key: ``[2]``, ``.place``.
     """
@@ -57,7 +59,7 @@ def parts_of(here: Point, origin: ast.Reference) -> dict[str, Value]:
     for key in sorted(here.locate(origin).keys):
         for part in parts_under(here, key):
             value = here.store.read(part)
-            if not isinstance(value, Nothing):
+            if not isinstance(value, Nothing) or is_standard(part):
                 found[part[len(key) :]] = value
     return found
 
@@ -65,6 +67,11 @@ def parts_of(here: Point, origin: ast.Reference) -> dict[str, Value]:
 def parts_under(here: Point, key: str) -> list[str]:
     """Return the keys of elements and fields that a key has or ever had."""
     return here.world.first_parts(key) + here.store.parts(key)
+
+
+def is_standard(key: str) -> bool:
+    """Tell whether a key is that of a standard field of a node: ``n.$main_pos``."""
+    return key.rpartition(".")[2].startswith("$")
 
 
 def forget_key(here: Point, key: str, why: str) -> None:
@@ -82,6 +89,8 @@ def fill(
     for suffix, value in parts.items():
         if isinstance(value, Position):
             value = owned(here, name, key + suffix, value)
+        if isinstance(value, Nothing):
+            value = unsure(value, here.store.read(key + suffix))
         here.store.write(key + suffix, value)
 
 
