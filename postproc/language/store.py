@@ -102,14 +102,19 @@ class Store:
 
     def drop(self, key: str) -> None:
         """Let a key and all its elements and fields hold nothing."""
-        for part in (key, *self.parts(key)):
+        self._drop_parts(key)
+        del self.values[key]
+
+    def _drop_parts(self, key: str) -> None:
+        for part in self.parts(key):
             del self.values[part]
             del self.logs[part]
+        del self.logs[key]
 
     def forget(self, key: str, why: str) -> None:
         """What a variable and all its elements hold is no longer known."""
         held = self.read(key)
-        self.drop(key)
+        self._drop_parts(key)
         self.write(key, unsure(Nothing(why), held))
 
     def set(self, **settings: Value) -> None:

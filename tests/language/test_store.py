@@ -56,3 +56,10 @@ def test_an_element_that_is_the_same_on_both_ways_is_known() -> None:
     one.merge(other)
     assert [one.read(f"{key}[1]") for key in ARRAYS] == [7.0] * len(ARRAYS)
     assert all(isinstance(one.read(f"{key}[2]"), Nothing) for key in ARRAYS)
+
+
+def test_an_element_that_is_forgotten_again_is_entered_once() -> None:
+    store = Store(lambda key: None)
+    for _ in range(5):
+        store.forget("job/tab[1]", "it may change")
+    assert store.logs.get("job/tab") == ("job/tab[1]", None)
