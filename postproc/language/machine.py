@@ -184,12 +184,16 @@ class Machine:
 
     # ---- calls ----------------------------------------------------------------------
     def calls_in(self, context: Context) -> list[Body]:
-        """Return the bodies that are running."""
-        return [
-            self.places[context[:i]].body
+        """Return the bodies that are running.
+
+        Below a handler of a file without a main body there is none.
+        """
+        ways = [
+            context[:i]
             for i in range(len(context) + 1)
             if i == 0 or context[i - 1][1] < 0
         ]
+        return [self.places[way].body for way in ways if way in self.places]
 
     def leave(self, here: Here, by_return: bool = False) -> None:
         """The body ends: go back to the caller, or into the next cycle."""

@@ -268,3 +268,14 @@ def test_a_handler_may_assign_a_part_of_a_frame_at_any_time() -> None:
     assert frames_after(*handler, WHOLE, "ENABLE CONDITION[1]", MOVE) == [[]]
     handler[1] = handler[1].replace("$UFRAME", "$ARM_DATA[1].UFRAME")
     assert frames_after(*handler, WHOLE, "ENABLE CONDITION[1]", MOVE) == [[]]
+
+
+def test_a_handler_calls_a_routine_where_there_is_no_main_body() -> None:
+    library = program(
+        "PROGRAM a\nROUTINE go\nBEGIN\nMOVE JOINT TO {1,2,3,4,5,6}\nEND go\n"
+        "ROUTINE arm\nBEGIN\nCONDITION[1] :\nWHEN $DIN[1]+ DO\ngo\nENDCONDITION\n"
+        "ENABLE CONDITION[1]\nEND arm\n"
+    )
+    found = resolve(library)
+    assert found.visits.line.tolist() == [4]
+    assert {d.code for d in found.diagnostics} == {"handler-moves"}
