@@ -30,7 +30,8 @@ class Ways(Protocol):
         Args:
             slot: The branch.
             first: The first sample.
-            most: How many are enough for the moment; more may come.
+            most: How many are enough for the moment: a path that breaks off again and
+                again must not be looked through to its end every time.
         """
         ...
 
@@ -52,7 +53,7 @@ class Solved:
 
     def on(self, slot: int, first: int, most: int) -> Array:
         """Look one branch up."""
-        branch: Array = self.branches[first:, slot]
+        branch: Array = self.branches[first : first + most, slot]
         return branch
 
 
