@@ -35,13 +35,17 @@ def variables(data: bytes) -> None:
 def check_numbers(lines: Lines) -> None:
     """Check that the numbers can be written anew, and nothing else changes by that.
 
+    What stands behind a sign of its own (``+-5``) is computed, and never written.
+
     Raises:
         AssertionError: Numbers overlap, or bytes between them would change.
     """
     source, start, end = lines.source, lines.start, lines.end
     same = [source.data[a:b] for a, b in zip(start, end, strict=True)]
     assert apply(source.data, replaced(lines, same)) == source.data
-    other = replaced(lines, [b"7.5"] * len(start))
+    signed = [source.data[max(a - 1, 0) : a] in (b"+", b"-") for a in start.tolist()]
+    new = [own if kept else b"7.5" for own, kept in zip(same, signed, strict=True)]
+    other = replaced(lines, new)
     problems = compare(source, Source(source.name, apply(source.data, other)), other)
     assert not problems, problems
 
