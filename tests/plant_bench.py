@@ -176,7 +176,7 @@ def main() -> None:
     """Run from the command line."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--files", type=int, default=10_000)
-    parser.add_argument("--compared", type=int, default=400, help="files of the ratios")
+    parser.add_argument("--compared", type=int, default=800, help="files of the ratios")
     parser.add_argument("--page", type=Path, default=PAGE)
     args = parser.parse_args()
     found = Findings()
