@@ -109,10 +109,7 @@ def settle(
         with clock("plan again"):
             looked = courses.after(proposal.decisions.corrected, before.looked)
             after = looked.reached
-        found, missed = after.side, np.zeros_like(bent)
-        sharp = planned.plan.pull.visit
-        missed[sharp] = (after.aside - aside)[sharp]
-        missed[~proposal.corrected] = 0.0
+        found, missed = after.side, _missed(planned.plan, proposal, after.aside, aside)
         far = _far_off(missed, reading.begins)
         rounds_on = number < CORNERS and bool(far.any())
         bent = bent + np.where(far, missed, 0.0) if rounds_on else bent
@@ -144,6 +141,21 @@ def settle(
                 solved, moved, model, cell, planned, aimed, options.orientation
             )
     raise AssertionError("unreachable")
+
+
+def _missed(plan: Plan, proposal: Proposal, aside: Array, meant: Array) -> Array:
+    """Tell how far the path passes from where it should at sharp corners, (n, 3) [m].
+
+    Args:
+        plan: Tells which corners are sharp.
+        proposal: Tells which targets can make up for it.
+        aside: From targets to where the path passes them, (n, 3) [m].
+        meant: .. to where it should.
+    """
+    missed, sharp = np.zeros_like(aside), plan.pull.visit
+    missed[sharp] = (aside - meant)[sharp]
+    missed[~proposal.corrected] = 0.0
+    return missed
 
 
 def _far_off(missed: Array, begins: tuple[int, ...]) -> Bools:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import accumulate, chain
+from itertools import chain
 from typing import ParamSpec, TypeVar
 
 import numpy as np
@@ -19,7 +19,7 @@ from postproc.clock import Clock, silent
 from postproc.compensate import finish, name_files, refuse
 from postproc.correcting import correct
 from postproc.kept import Kept
-from postproc.language.beside import begins, beside
+from postproc.language.beside import begins, beside, offsets
 from postproc.options import Options
 from postproc.planning import Reading, read_program, with_measured_play
 from postproc.report import Outcome
@@ -159,9 +159,9 @@ def correct_together(
 def _apart(kept: Kept, readings: Sequence[Reading]) -> Iterator[Kept]:
     """Give every program what is its own."""
     moved = np.append(0, np.cumsum(kept.corrected))
-    visits = _ends([len(reading.visits) for reading in readings])
-    literals = _ends([len(reading.visits.literals) for reading in readings])
-    files = _ends([len(reading.texts) for reading in readings])
+    visits = offsets([len(reading.visits) for reading in readings])
+    literals = offsets([len(reading.visits.literals) for reading in readings])
+    files = offsets([len(reading.texts) for reading in readings])
     edited = np.searchsorted(kept.edited, literals).tolist()
     for k in range(len(readings)):
         rows = slice(*visits[k : k + 2])
@@ -178,8 +178,3 @@ def _apart(kept: Kept, readings: Sequence[Reading]) -> Iterator[Kept]:
             overruled=kept.overruled[rows],
             untimed=kept.untimed[rows],
         )
-
-
-def _ends(sizes: Sequence[int]) -> list[int]:
-    """Return where the first part begins and where each one ends."""
-    return list(accumulate(sizes, initial=0))

@@ -49,6 +49,11 @@ class Task:
     sources: tuple[bytes, ...]
 
     @property
+    def files(self) -> dict[str, bytes]:
+        """Return the bytes of its files by path."""
+        return dict(zip(self.unit.files, self.sources, strict=True))
+
+    @property
     def size(self) -> int:
         """Return the number of bytes, the measure of how long it takes."""
         return sum(map(len, self.sources))

@@ -50,8 +50,7 @@ def _compensated(tasks: Sequence[Task], setup: Setup) -> list[Outcome | Exceptio
 
 def _given(task: Task) -> Given:
     """Name the files of a task as its programs name each other."""
-    unit = task.unit
-    sources = dict(zip(unit.files, task.sources, strict=True))
+    unit, sources = task.unit, task.files
     return Given(
         name=_file_name(unit.program),
         source=task.sources[0],
@@ -65,8 +64,7 @@ def _result(task: Task, found: Outcome | Exception) -> Result:
     unit = task.unit
     match found:
         case Outcome():
-            sources = dict(zip(unit.files, task.sources, strict=True))
-            outputs = _outputs(unit, sources, found)
+            outputs = _outputs(unit, task.files, found)
             return Result(unit, found.exit_code, outputs, facts_of(found))
         case PostprocError():
             return failed(unit, str(found))

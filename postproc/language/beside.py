@@ -5,7 +5,7 @@ No move leads from one to another, and no number belongs to two of them.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import fields
 from itertools import accumulate, chain
 from typing import Any
@@ -50,7 +50,16 @@ def beside(programs: Sequence[Visits]) -> Visits:
 
 def begins(programs: Sequence[Visits]) -> tuple[int, ...]:
     """Return the first visit of each program where they are side by side."""
-    return tuple(accumulate(map(len, programs[:-1]), initial=0))
+    return tuple(offsets(map(len, programs))[:-1])
+
+
+def offsets(sizes: Iterable[int]) -> list[int]:
+    """Return where parts of these sizes begin, and at last where they end.
+
+    >>> offsets([2, 0, 3])
+    [0, 2, 2, 5]
+    """
+    return list(accumulate(sizes, initial=0))
 
 
 def _joined(name: str, programs: Sequence[Visits]) -> Any:
@@ -68,11 +77,11 @@ def _moved_on(
 ) -> list[NDArray[np.int64]]:
     """Let indices point to where their table's rows have come to."""
     table = TABLES[name]
-    sizes = [len(getattr(program, table)) for program in programs]
+    starts = offsets(len(getattr(program, table)) for program in programs)
     least = 1 if table in NOTHING_FIRST else 0
     return [
         np.where(part >= least, part + offset, part)
-        for part, offset in zip(parts, accumulate(sizes[:-1], initial=0), strict=True)
+        for part, offset in zip(parts, starts[:-1], strict=True)
     ]
 
 

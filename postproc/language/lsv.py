@@ -25,6 +25,7 @@ from postproc.language.records import (
     read_records,
 )
 from postproc.language.source import Source
+from postproc.language.store import root_of
 
 __all__ = ["Entries", "Entry", "Variables", "read_variables"]
 
@@ -105,16 +106,12 @@ def _told_apart(
         if not nested[entries.layout[row]]
     ]
     if ambiguous:
-        names = [(k, name) for k, name in names if _root(name) not in ambiguous]
+        names = [(k, name) for k, name in names if root_of(name) not in ambiguous]
     count = Counter(name for _, name in names)
     single = {name: row for row, name in names if count[name] == 1}
     first = {name: row for row, name in reversed(names)}
     twice = [row for row, name in names if first[name] != row]
     return replace(entries, row=single), twice
-
-
-def _root(name: str) -> str:
-    return name.partition("[")[0].partition(".")[0]
 
 
 def _not_understood(

@@ -118,13 +118,6 @@ def parse_line(mask: str) -> ast.Statement:
     return cast(ast.Statement, filled(said, names)) if names else said
 
 
-def parse_value_line(mask: str) -> Entered | None:
-    """Parse the mask of one line of a variable file, None where it is none."""
-    form, names = form_of(mask)
-    said = parse_value_form(form)
-    return cast(Entered | None, filled(said, names)) if names else said
-
-
 def _parse(name: str, form: str, rules: Mapping[str, Rule]) -> object:
     """Parse a form and build what it says, _FAILED where the grammar has no rule."""
     if form.startswith(UNREADABLE):

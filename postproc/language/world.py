@@ -249,7 +249,7 @@ def base_variable(name: str) -> str:
     >>> base_variable("Tab[3].place")
     'tab'
     """
-    return name.lower().split("[", 1)[0].split(".", 1)[0]
+    return root_of(name.lower())
 
 
 def base_name(file: str) -> str:

@@ -5,7 +5,8 @@ import random
 import pytest
 
 from postproc.language import pdl2 as ast
-from postproc.language.parser import form_of, forms_of, parse_line, parse_value_line
+from postproc.language.forms import formed
+from postproc.language.parser import form_of, forms_of, parse_line, parse_value_form
 
 PIECES = (
     "MOVE TO WP_1 p2 _a3b x $v1 a$b2 weld l1:: 7up 'p3' '\\'q4' \"r5\" :: , := ( ) [ ] "
@@ -45,7 +46,7 @@ def test_case_is_kept_where_it_is_shown_only() -> None:
     assert isinstance(declared, ast.Declare) and declared.names == ("Wp1", "WP2")
     moved = parse_line("MOVE TO Wp1")
     assert isinstance(moved, ast.Move) and moved.where == (ast.Reference("wp1"),)
-    entered = parse_value_line("Wp1 XTND Arm: \x00 Priv")
+    (entered,) = formed(["Wp1 XTND Arm: \x00 Priv"], forms_of, parse_value_form)
     assert entered is not None and entered.name == "Wp1"
 
 
