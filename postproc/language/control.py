@@ -134,3 +134,10 @@ class When(Statement):
 @dataclass(frozen=True, slots=True)
 class EndCondition(Statement):
     """``ENDCONDITION``."""
+
+
+def action(statement: Statement | None) -> Statement | None:
+    """Return what a line does behind its label, CASE, ELSE or WHEN, if anything."""
+    while isinstance(statement, Label | Case | Else | When):
+        statement = statement.then
+    return statement

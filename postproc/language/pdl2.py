@@ -28,6 +28,7 @@ from postproc.language.control import (
     Until,
     When,
     While,
+    action,
 )
 from postproc.language.declarations import (
     Begin,
@@ -108,4 +109,5 @@ __all__ = [
     "Until",
     "When",
     "While",
+    "action",
 ]

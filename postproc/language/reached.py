@@ -43,11 +43,12 @@ def never_reached(programs: Sequence[Program], visits: Visits) -> list[Diagnosti
 
 
 def _has_target(statement: ast.Statement) -> bool:
-    """Tell whether a line is a move to a target, and not to a system variable.
+    """Tell whether a line moves to a target, and not to a system variable.
 
     A move that names its arm may be one of another arm, and does not count.
     """
-    if not isinstance(statement, ast.Move) or statement.how != "TO" or statement.arm:
+    move = ast.action(statement)
+    if not isinstance(move, ast.Move) or move.how != "TO" or move.arm:
         return False
-    where = statement.where[0] if statement.where else None
+    where = move.where[0] if move.where else None
     return not (isinstance(where, ast.Reference) and where.name.startswith("$"))

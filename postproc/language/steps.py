@@ -170,9 +170,7 @@ def run_broken(machine: Machine, here: Here) -> None:
     why = f"the block structure is broken (line {body.blocks.broken})"
     here.reason = why
     for row in range(body.first + 1, body.last):
-        said: ast.Statement | None = program.statement(row)
-        while isinstance(said, ast.Label | ast.Case | ast.Else | ast.When):
-            said = said.then
+        said = ast.action(program.statement(row))
         if isinstance(said, ast.Move):
             here.row = row
             here.store.last = frozenset({ELSEWHERE})

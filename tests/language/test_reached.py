@@ -33,6 +33,14 @@ def test_moves_behind_the_end_are_told():
     assert lines(POINT, "RETURN", POINT) == [(5, 1)]
 
 
+def test_moves_behind_a_label_or_a_case_that_is_never_taken_are_told():
+    assert lines("RETURN", f"on:: {POINT}") == [(4, 1)]
+    cases = ("SELECT 1 OF", f"CASE (1): {POINT}", f"ELSE: {POINT}", "ENDSELECT")
+    assert lines(*cases) == [(5, 1)]
+    cases = ("SELECT 2 OF", f"CASE (1): {POINT}", f"ELSE: {POINT}", "ENDSELECT")
+    assert lines(*cases) == [(4, 1)]
+
+
 def test_moves_without_a_target_and_of_other_arms_are_not():
     moves = ("MOVE TO $HOME", "MOVE AWAY 10", "MOVE ARM[2] LINEAR TO p")
     assert lines("RETURN", *moves) == []
