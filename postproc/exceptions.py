@@ -43,6 +43,10 @@ class FileError(PostprocError):
         text += f". {cure}" if cure else ""
         super().__init__(text)
 
+    def __reduce__(self) -> tuple[object, ...]:
+        """Be the same in another process: `args` hold the text, not what made it."""
+        return Exception.__new__, (type(self), *self.args), vars(self)
+
 
 class ProgramError(FileError):
     """A robot program or variable file that cannot be read or must be refused."""
