@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import re
+import sys
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from functools import cache, lru_cache
+from io import BytesIO
 from itertools import compress, count, islice
 from operator import not_
 from pathlib import Path
@@ -16,6 +19,7 @@ from postproc.language import pdl2 as ast
 from postproc.language.build import RULES, Rule
 from postproc.language.entered import VALUE_RULES, Entered
 from postproc.language.forms import filled, open_name
+from postproc.language.kept_tables import keep, kept, key_of
 from postproc.language.parts import Mark
 
 _PACKAGE = Path(__file__).resolve().parent.parent
@@ -27,6 +31,7 @@ _STRING_OR_NAME = re.compile(
 NAME_MARK = "\x01"  # a numbered name, in a form
 UNREADABLE = NAME_MARK * 2  # begins the form of a line that holds such a mark itself
 _FAILED = object()
+_OPTIONS = {"parser": "lalr", "lexer": "contextual", "maybe_placeholders": False}
 
 
 def grammar(name: str) -> str:
@@ -44,14 +49,18 @@ def grammar(name: str) -> str:
 
 @cache
 def line_parser(name: str, start: str) -> lark.Lark:
-    """Return the LALR parser of a grammar."""
-    return lark.Lark(
-        grammar(name),
-        parser="lalr",
-        lexer="contextual",
-        start=start,
-        maybe_placeholders=False,
-    )
+    """Return the LALR parser of a grammar, its tables from an earlier run if kept."""
+    text = grammar(name)
+    key = key_of(text, start, repr(_OPTIONS), lark.__version__, sys.version)
+    data = kept(key)
+    if data is not None:
+        with suppress(Exception):  # whatever is wrong with it, it can be made
+            return lark.Lark.load(BytesIO(data))
+    made = lark.Lark(text, start=start, **_OPTIONS)
+    tables = BytesIO()
+    made.save(tables)
+    keep(key, tables.getvalue())
+    return made
 
 
 def form_of(mask: str) -> tuple[str, tuple[str, ...]]:
