@@ -82,7 +82,7 @@ def reach_again(arm: Arm, before: Course, targets: Targets, moved: Bools) -> Cou
     same &= exact.slot == before.slot[part.rows]
     if not same[part.lasts].all():
         return reach(arm, targets, before.begin)
-    traced = rounded(arm, part.targets, exact)
+    traced = rounded(arm, part.targets, exact, timed=False)
     slot = np.array(before.slot)
     slot[part.rows[part.kept]] = exact.slot[part.kept]
     passed = _patched(before.passed, part, points(traced))

@@ -106,7 +106,7 @@ def plan(
         PlanError: The arm has no closed-form inverse kinematics.
     """
     exact = trace(arm, targets, begin.known)
-    traced = rounded(arm, targets, exact)
+    traced = rounded(arm, targets, exact, timed)
     arrived = arrivals(arm, traced.q, traced.edges, begin.past)
     end = Standing.at_end(exact.q, exact.flange, exact.slot, arrived.past)
     clock = tell_time(arm, targets, traced) if timed else no_time(len(targets))

@@ -110,7 +110,7 @@ def reach(arm: Arm, targets: Targets, begin: Standing = NOWHERE) -> Course:
         PlanError: The arm has no closed-form inverse kinematics.
     """
     exact = trace(arm, targets, begin.known)
-    traced = rounded(arm, targets, exact)
+    traced = rounded(arm, targets, exact, timed=False)
     found = sides(arm, traced.q, traced.edges, begin.past.play)
     return Course(
         targets, points(exact), points(traced), exact.slot, traced.edges, found, begin

@@ -21,6 +21,7 @@ Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 
 SAMPLES = 4  # on each side of the nearest point of a corner that is not flat
+ONE_SAMPLE = [[0], [0], [1]]  # of the three pieces: where the next corner is passed
 EMPTY = 1e-9  # part of a move between two zones that is nothing
 
 
@@ -40,12 +41,19 @@ class _Pieces:
     count: Ints
 
 
-def rounded(arm: Arm, targets: Targets, traced: Trace) -> Trace:
+def rounded(arm: Arm, targets: Targets, traced: Trace, timed: bool = True) -> Trace:
     """Round the fly points of a trace.
 
     Its joint angles and flange poses at rounded points become those of the point of the
     path that lies nearest to the target; that is also where an edge ends and the next
     one begins. Edges without a corner stay as they are.
+
+    Args:
+        arm: The arm.
+        targets: The moves.
+        traced: Their paths without corners.
+        timed: Sample the edges for a time law; else where no joint turns there are
+            only the ends of the way, which is all that the joints' play sees of it.
     """
     found = corners(arm, targets, traced)
     visit = found.zones.visit
@@ -53,7 +61,10 @@ def rounded(arm: Arm, targets: Targets, traced: Trace) -> Trace:
         return traced
     q, flange = np.array(traced.q), np.array(traced.flange)
     q[visit], flange[visit] = found.q, arm.flange(found.q)
-    edges, share = _resampled(traced, found)
+    pieces = _pieces(traced, found)
+    if not timed:
+        pieces.count[:, _one_way(arm, traced, found)] = ONE_SAMPLE
+    edges, share = _resampled(traced, found, pieces)
     pull = _pull(targets, traced, found)
     return replace(traced, q=q, flange=flange, edges=edges, share=share, pull=pull)
 
@@ -70,6 +81,24 @@ def _pull(targets: Targets, traced: Trace, found: Corners) -> Pull:
         zones.visit, traced.edges.source[zones.into], to[zones.out],
         zones.before * (1 - s) ** 2, zones.behind * s**2,
     )  # fmt: skip
+
+
+def _one_way(arm: Arm, traced: Trace, found: Corners) -> Bools:
+    """Tell on which edges no joint's drive turns back, (e,).
+
+    Straight ones into a corner, if at both ends every drive goes on as it goes here:
+    so it does on the parabolas between straight moves.
+    """
+    zones, edges = found.zones, traced.edges
+    one = np.diff(edges.start) == 1
+    here = traced.q.take(zones.visit, axis=0)
+    into = here - traced.q.take(edges.source[zones.into], axis=0)
+    out = edges.path.take(edges.start[zones.out], axis=0) - here
+    back = (into @ arm.coupling.T) * (out @ arm.coupling.T) < 0
+    goes_on = one[zones.into] & one[zones.out] & ~back.any(axis=1)
+    before, behind = np.ones_like(one), np.zeros_like(one)
+    before[zones.out], behind[zones.into] = goes_on, goes_on
+    return np.asarray(before & behind)
 
 
 def _pieces(traced: Trace, found: Corners) -> _Pieces:
@@ -90,9 +119,9 @@ def _pieces(traced: Trace, found: Corners) -> _Pieces:
     return _Pieces(corner, begin, end, count)
 
 
-def _resampled(traced: Trace, found: Corners) -> tuple[Edges, Array]:
+def _resampled(traced: Trace, found: Corners, pieces: _Pieces) -> tuple[Edges, Array]:
     """Sample all edges anew; return them and their samples' share of the way."""
-    pieces, old = _pieces(traced, found), traced.edges
+    old = traced.edges
     touched = np.asarray((pieces.corner >= 0).any(axis=0))
     start = np.concatenate([[0], np.cumsum(pieces.count.sum(axis=0))])
     edge = np.repeat(np.arange(len(old.source)), np.diff(start))

@@ -15,6 +15,7 @@ from postproc.motion.rounding import rounded
 from postproc.motion.targets import Fly, Kind, Move, Targets, make_targets
 from postproc.motion.trace import trace
 from postproc.robot.arm import Arm
+from postproc.robot.direction import arrivals
 
 MM = 1e-3
 
@@ -173,3 +174,22 @@ def test_few_samples_tell_the_sides_that_many_do(
     np.testing.assert_allclose(few.side, many.side, atol=0.01)
     np.testing.assert_array_equal(few.aside, many.aside)
     assert np.linalg.norm(few.aside, axis=1).max() > 5 * MM
+
+
+def test_sides_need_no_samples_where_nothing_turns(
+    arm: Arm, tool: np.ndarray, home: np.ndarray
+) -> None:
+    rng = np.random.default_rng(5)
+    heading = np.cumsum(rng.normal(scale=0.2, size=(3, 400)), axis=1)
+    points = np.cumsum(2 * MM * np.sin(heading.T), axis=0)
+    targets = run(arm, tool, home, points)
+    targets = replace(targets, fly_distance=rng.uniform(0.1, 1.5, 401) * MM)
+    # Drives that turn although no joint does.
+    coupling = np.eye(6) + 0.3 * np.eye(6, k=-1)
+    arm, exact = replace(arm, coupling=coupling), trace(arm, targets)
+    all_, few = (rounded(arm, targets, exact, timed) for timed in (True, False))
+    assert len(targets) < len(few.edges.path) < 0.8 * len(all_.edges.path)
+    wanted, found = (arrivals(arm, one.q, one.edges) for one in (all_, few))
+    np.testing.assert_allclose(found.side, wanted.side, rtol=0, atol=1e-9)
+    np.testing.assert_allclose(found.travel, wanted.travel, rtol=0, atol=1e-12)
+    assert (np.abs(wanted.side) < 1).any() and (wanted.travel > 0).any()
