@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from time import perf_counter
 
@@ -27,4 +27,9 @@ class Clock:
         self._progress(stage)
         start = perf_counter()
         yield
-        self.stages[stage] = self.stages.get(stage, 0.0) + perf_counter() - start
+        self.add({stage: perf_counter() - start})
+
+    def add(self, seconds: Mapping[str, float]) -> None:
+        """Add stages that ran elsewhere, such as in another process."""
+        for stage, spent in seconds.items():
+            self.stages[stage] = self.stages.get(stage, 0.0) + spent

@@ -46,6 +46,7 @@ def compensate(
     pages: Mapping[str, bytes] = NO_PAGES,
     options: Options = AS_USUAL,
     progress: Progress = silent,
+    processes: int = 1,
 ) -> Outcome:
     """Move every target of a program against the error the arm would make there.
 
@@ -59,6 +60,7 @@ def compensate(
             are followed and rewritten with it.
         options: What the user asked for.
         progress: Told the name of every stage as it begins.
+        processes: How many may work at once on a long program; the result is the same.
 
     Raises:
         ProgramError: The source is no program text, or is compensated already.
@@ -71,7 +73,7 @@ def compensate(
     cell = with_measured_play(cell, model)
     with clock("parse"):
         reading = read_program(files, cell)
-    reading, kept = correct(reading, cell, model, options, clock)
+    reading, kept = correct(reading, cell, model, options, clock, processes)
     return finish(name, reading, kept, cell, model, options, clock)
 
 

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 from postproc.accuracy.model import Model
-from postproc.clock import Clock
+from postproc.ahead import in_processes, steady
+from postproc.clock import Clock, silent
 from postproc.cloning import give_own_points
+from postproc.exceptions import PostprocError
 from postproc.kept import Kept, joined, keep
 from postproc.language import windows as cuts
-from postproc.language.windows import Window, windows
+from postproc.language.visits import Visits
+from postproc.language.windows import Window, run_up, windows
 from postproc.motion.standing import NOWHERE, Standing
 from postproc.options import Options
 from postproc.planning import Reading, plan_visits, states_of
@@ -21,7 +23,7 @@ from postproc.taught import correct_taught
 
 
 @dataclass(frozen=True)
-class _Stop:
+class Stop:
     """How a window leaves the program as it was, and as it is corrected."""
 
     planned: Standing = NOWHERE
@@ -30,7 +32,12 @@ class _Stop:
 
 
 def correct(
-    reading: Reading, cell: Cell, model: Model, options: Options, clock: Clock
+    reading: Reading,
+    cell: Cell,
+    model: Model,
+    options: Options,
+    clock: Clock,
+    processes: int = 1,
 ) -> tuple[Reading, Kept]:
     """Plan a program, and correct it until its sides are those corrected for.
 
@@ -47,60 +54,72 @@ def correct(
         model: The arm's error.
         options: What the user asked for.
         clock: Times the stages.
+        processes: How many may work at once; the result is the same.
 
     Returns:
         The program, with clones where they were asked for, and what came of it.
     """
-    given = (cell, model, options, clock)
+    work = _Work(reading, cell, model, options)
     if not options.clone:
-        return reading, joined([kept for kept, _ in _each(reading, cuts.LEAST, *given)])
-    whole = len(reading.visits)
-    ((kept, proposal),) = _each(reading, whole, *given)
+        cut = windows(reading.visits, cuts.LEAST)
+        return reading, joined(list(in_processes(work, cut, Stop(), clock, processes)))
+    kept, proposal = work.whole(clock)
     with clock("clone"):
         reading = give_own_points(reading, proposal, cell)
     if reading.cloned:
-        ((kept, _),) = _each(reading, whole, *given)
+        kept, _ = replace(work, reading=reading).whole(clock)
     return reading, kept
 
 
-def _each(
-    reading: Reading,
-    least: int,
-    cell: Cell,
-    model: Model,
-    options: Options,
-    clock: Clock,
-) -> Iterator[tuple[Kept, Proposal]]:
-    """Correct window by window; yield what is kept of each, and all of its proposal."""
-    stop = _Stop()
-    for window in windows(reading.visits, least):
-        kept, proposal, stop = _corrected(
-            window, stop, reading, cell, model, options, clock
-        )
-        yield kept, proposal
+@dataclass(frozen=True)
+class _Work:
+    """What it takes to correct any window of a program."""
 
+    reading: Reading
+    cell: Cell
+    model: Model
+    options: Options
 
-def _corrected(
-    window: Window,
-    begin: _Stop,
-    reading: Reading,
-    cell: Cell,
-    model: Model,
-    options: Options,
-    clock: Clock,
-) -> tuple[Kept, Proposal, _Stop]:
-    """Correct one window."""
-    visits = window.of(reading.visits)
-    part, timed = replace(reading, visits=visits), "speed" in model.needs
-    with clock("plan"):
-        planned = plan_visits(visits, cell, timed, begin.planned, begin.doubtful)
-        planned = correct_taught(planned, visits, cell, model)
-    temperature = options.temperature
-    states = states_of(
-        planned.plan, cell, cell.temperature if temperature is None else temperature
-    )
-    found = settle(part, planned, states, cell, model, options, clock, begin.corrected)
-    with clock("report"):
-        kept = keep(visits, planned, states, found, cell, model, window.seeds)
-    end = _Stop(planned.plan.end, planned.doubtful, found.left)
-    return kept, found.proposal, end
+    def whole(self, clock: Clock) -> tuple[Kept, Proposal]:
+        """Correct the program as one window; return all of its proposal."""
+        kept, proposal, _ = self._correct(self.reading.visits, 0, Stop(), clock)
+        return kept, proposal
+
+    def correct(self, window: Window, begin: Stop, clock: Clock) -> tuple[Kept, Stop]:
+        """Correct a window; return what is kept of it, and how it ends."""
+        visits = window.of(self.reading.visits)
+        kept, _, end = self._correct(visits, window.seeds, begin, clock)
+        return kept, end
+
+    def foretell(self, window: Window) -> Stop | None:
+        """Tell how the windows before will end, by the last targets there alone.
+
+        Right where the joints have lost their memory of what was before these.
+        """
+        visits = run_up(self.reading.visits, window)
+        if visits is None:
+            return None
+        try:
+            _, _, end = self._correct(visits, 1, Stop(), Clock(silent))
+        except PostprocError:
+            return None
+        return end
+
+    def _correct(
+        self, visits: Visits, seeds: int, begin: Stop, clock: Clock
+    ) -> tuple[Kept, Proposal, Stop]:
+        """Correct some visits, the first `seeds` of which are only where they begin."""
+        cell, model, options = self.cell, self.model, self.options
+        part, timed = replace(self.reading, visits=visits), "speed" in model.needs
+        with clock("plan"):
+            planned = plan_visits(visits, cell, timed, begin.planned, begin.doubtful)
+            planned = correct_taught(planned, visits, cell, model)
+        given = options.temperature
+        temperature = cell.temperature if given is None else given
+        states = states_of(planned.plan, cell, temperature)
+        left = begin.corrected
+        found = settle(part, planned, states, cell, model, options, clock, left)
+        with clock("report"):
+            kept = keep(visits, planned, states, found, cell, model, seeds)
+        end = steady(Stop(planned.plan.end, planned.doubtful, found.left))
+        return kept, found.proposal, end

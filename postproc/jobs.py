@@ -82,8 +82,10 @@ class Job:
             path, name, source, values, pages, found.notes, loaded, fitted, inputs
         )
 
-    def run(self, options: Options, progress: Progress = silent) -> Outcome:
-        """Compensate the program."""
+    def run(
+        self, options: Options, progress: Progress = silent, processes: int = 1
+    ) -> Outcome:
+        """Compensate the program, with so many processes at the most."""
         variables = None if self.variables is None else self.variables[1]
         outcome = compensate(
             self.source,
@@ -94,6 +96,7 @@ class Job:
             pages={page.name: data for page, data in self.pages},
             options=options,
             progress=progress,
+            processes=processes,
         )
         left = (Diagnostic(self.name, 1, "not-followed", text) for text in self.notes)
         return replace(outcome, diagnostics=(*outcome.diagnostics, *left))

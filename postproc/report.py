@@ -89,7 +89,7 @@ class Outcome:
         decisions: What was decided for every visit.
         before, after: Predicted error on the visits that could be compensated.
         diagnostics: What else was found, in order of line.
-        stages: Seconds spent in every stage.
+        stages: Seconds spent in every stage, by all processes together.
         position: Where the program wants the TCP at every visit, base frame, (n, 3)
             [m], NaN where it is not known; empty where nobody asked.
         sources: The bytes of the source files by name, for showing lines.

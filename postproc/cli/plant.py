@@ -11,6 +11,7 @@ import typer
 from postproc.cli.common import (
     CloneOption,
     HtmlOption,
+    JobsOption,
     JsonOption,
     OrientationOption,
     TemperatureOption,
@@ -45,9 +46,7 @@ def batch(
     cell: CellFile = None,
     model: ModelFile = None,
     plan: PlanFile = None,
-    jobs: Annotated[
-        int, typer.Option("--jobs", "-j", min=0, help="Processes; 0: one for a core.")
-    ] = 0,
+    jobs: JobsOption = 0,
     scheduler: Annotated[
         str | None, typer.Option("--scheduler", help="Dask: tcp://host:8786.")
     ] = None,

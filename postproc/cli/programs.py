@@ -12,6 +12,7 @@ from postproc.cli.common import (
     CellOption,
     CloneOption,
     HtmlOption,
+    JobsOption,
     JsonOption,
     LsvOption,
     ModelOption,
@@ -60,9 +61,10 @@ def compensate(
     ] = False,
     orientation: OrientationOption = False,
     temperature: TemperatureOption = None,
+    processes: JobsOption = 0,
 ) -> None:
     """Rewrite a program so that the tool lands where its targets say."""
-    from postproc import jobs
+    from postproc import forked, jobs
     from postproc.console import stages
     from postproc.options import Options
 
@@ -74,7 +76,7 @@ def compensate(
         check_places([output, report, html], [given, lsv, cell, model])
         job = jobs.Job.open(program, cell, model, lsv)
         with stages() as progress:
-            outcome = job.run(options, progress)
+            outcome = job.run(options, progress, processes or forked.available())
         if strict and outcome.exit_code:
             _print_outcome(outcome)
             raise PostprocError(

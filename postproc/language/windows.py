@@ -20,6 +20,7 @@ Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 
 LEAST = 20_000  # visits of a window; shorter programs are one
+RUN_UP = 2_000  # visits that tell how the arm comes to a window
 STEPS = (
     Target.RELATIVE_TOOL, Target.RELATIVE_BASE, Target.RELATIVE_UFRAME, Target.AWAY,
     Target.ABOUT, Target.BY, Target.FOR,
@@ -79,8 +80,34 @@ def windows(visits: Visits, least: int) -> list[Window]:
     return [Window(a, b) for a, b in pairwise(ends)]
 
 
+def run_up(visits: Visits, window: Window) -> Visits | None:
+    """Cut out what leads to a window, the first target reached from anywhere.
+
+    Its first visit may be a fly point: a path on which the arm has not stopped, but
+    which nothing else crosses.
+
+    Returns:
+        At least `RUN_UP` visits, or None where there is no such place before them.
+    """
+    places = np.flatnonzero(seams(visits)[: max(window.first - RUN_UP, 0)])
+    if len(places) == 0:
+        return None
+    before = Window(int(places[-1]) + 1, window.first).of(visits)
+    start = before.pred_start + 1
+    start[0] = 0
+    return replace(before, pred_start=start, pred=np.append(-1, before.pred))
+
+
 def quiet_stops(visits: Visits) -> Bools:
     """Tell behind which visits a program may be cut, (n,)."""
+    return np.asarray(seams(visits) & ~visits.fly)
+
+
+def seams(visits: Visits) -> Bools:
+    """Tell behind which visits a program goes on as if they were its beginning, (n,).
+
+    If the arm stops there, that is.
+    """
     n = len(visits)
     to = np.repeat(np.arange(n), np.diff(visits.pred_start))
     known = visits.pred >= 0
@@ -91,7 +118,7 @@ def quiet_stops(visits: Visits) -> Bools:
     quiet = np.zeros(n, dtype=bool)
     quiet[visits.pred[goes_on]] = True
     begins = visits.via | np.isin(visits.target, STEPS)  # an arc, or a step
-    quiet &= ~visits.fly & ~visits.via & ~np.append(begins[1:], False) & ~crossed
+    quiet &= ~visits.via & ~np.append(begins[1:], False) & ~crossed
     return np.asarray(quiet)
 
 

@@ -8,6 +8,7 @@ import time
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+from postproc import forked
 from postproc.jobs import Job
 from postproc.options import AS_USUAL
 from tests.bench.kernels import planned, ruckig_alone, toppra_alone
@@ -33,7 +34,7 @@ def measure(kind: str, n: int, cell: Path, model: Path) -> dict[str, float]:
         start = time.perf_counter()
         job = Job.open(str(place), cell, model)
         read = time.perf_counter() - start
-        outcome = job.run(AS_USUAL)
+        outcome = job.run(AS_USUAL, processes=forked.available())
         pipeline = time.perf_counter() - start
         begin = time.perf_counter()
         job.write(outcome, place.with_name("out.pdl"))

@@ -8,12 +8,13 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from postproc.language import windows as cuts
 from postproc.language.flow import resolve
 from postproc.language.source import source_from_bytes
 from postproc.language.structure import parse
 from postproc.language.visits import Visits
-from postproc.language.windows import SHARED, quiet_stops, windows
-from tests.bench.made import drilling
+from postproc.language.windows import SHARED, quiet_stops, run_up, windows
+from tests.bench.made import drilling, milling
 from tests.language.reachable import reachable
 
 HEAD = "PROGRAM job\nVAR p, q : POSITION\nROUTINE there\nBEGIN\n"
@@ -111,3 +112,29 @@ def test_a_short_program_is_one_window() -> None:
     visits = read(drilling(79).source.decode())
     (window,) = windows(visits, 41)
     assert window.of(visits) is visits
+
+
+@pytest.mark.parametrize("make", [drilling, milling])
+def test_a_run_up_is_the_last_targets_from_anywhere(monkeypatch, make) -> None:
+    monkeypatch.setattr(cuts, "RUN_UP", 30)
+    visits = read(make(300).source.decode())
+    window = cuts.Window(250, len(visits))
+    found = run_up(visits, window)
+    assert found is not None and 30 <= len(found) < 40
+    first = window.first - len(found)
+    np.testing.assert_array_equal(found.values, visits.values[first : window.first])
+    np.testing.assert_array_equal(found.literal[1:], visits.literal[first + 1 : 250])
+    assert found.literal[0] == -1
+    before = [found.predecessors(v).tolist() for v in range(len(found))]
+    assert before == [[-1], *([v] for v in range(len(found) - 1))]
+    assert run_up(visits, cuts.Window(30, 300)) is None
+    assert run_up(visits, cuts.Window(32, 300)) is not None
+
+
+def test_no_run_up_begins_where_something_crosses(monkeypatch) -> None:
+    monkeypatch.setattr(cuts, "RUN_UP", 2)
+    loop = "  FOR i := 1 TO 3 DO\n" + stop(1010) * 8 + "  ENDFOR\n"
+    head = HEAD.replace("VAR ", "VAR i : INTEGER\n    ")
+    visits = read(head + stop(990) + stop(1000) + loop + stop(1030) + "END job\n")
+    found = run_up(visits, cuts.Window(8, len(visits)))
+    assert found is not None and len(found) == 7  # the loop uses its numbers again
