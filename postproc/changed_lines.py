@@ -14,6 +14,7 @@ from postproc.language.masking import Masked, mask_lines
 from postproc.number_pairs import Pairs, pair_numbers
 from postproc.pieces import pieces
 from postproc.rows import Rows, joined_rows
+from postproc.side_by_side import in_turns
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -44,21 +45,25 @@ def changed_rows(
         before: Its lines, without their endings.
         after: Those of the other file.
     """
-    pairs = zip(before, after, strict=True)
-    places = [k for k, (old, new) in enumerate(pairs) if old != new]
-    parts = []
-    for some in pieces(len(places), PIECE):
-        part = places[some]
-        numbers = np.array([lines[k] for k in part], dtype=np.int64)
-        old, new = [before[k] for k in part], [after[k] for k in part]
-        parts.append(_compare(file, numbers, old, new))
-    return joined_rows(file, parts)
+
+    def compare(some: slice) -> Rows:
+        old, new = before[some], after[some]
+        pairs = enumerate(zip(old, new, strict=True))
+        places = [k for k, (a, b) in pairs if a != b]
+        numbers = np.array(lines[some], dtype=np.int64)[places]
+        own = ([texts[k] for k in places] for texts in (old, new))
+        return _compare(file, numbers, *own)
+
+    tasks = list(pieces(len(before), PIECE))
+    return joined_rows(file, list(in_turns(compare, tasks)))
 
 
 def _compare(
     file: str, lines: Ints, before: Sequence[bytes], after: Sequence[bytes]
 ) -> Rows:
     """Describe how pairs of lines differ."""
+    if not len(lines):
+        return joined_rows(file, ())
     pairs = pair_numbers(before, after)
     rest = np.flatnonzero(~pairs.alike)
     if len(rest):

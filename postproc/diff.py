@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +13,9 @@ from postproc.arrivals import LEFT_ALONE, Arrivals, read_arrivals
 from postproc.compared import VARIABLES, Compared, compare_files
 from postproc.report import Status
 from postproc.rows import Row, Rows
+from postproc.side_by_side import meanwhile
+
+LONG = 10_000_000  # bytes of a file whose record is read beside it
 
 
 @dataclass(frozen=True)
@@ -69,15 +72,23 @@ def diff(original: Path, compensated: Path) -> Difference:
     Raises:
         ProgramError: A file cannot be read.
     """
-    files = [compare_files(original, compensated)]
+    pairs = [(original, compensated)]
     values = original.with_suffix(VARIABLES), compensated.with_suffix(VARIABLES)
     if original.suffix.lower() != VARIABLES and all(v.is_file() for v in values):
-        files.append(compare_files(*values))
-    told = read_arrivals(compensated, [(f.original, f.compensated) for f in files])
+        pairs.append(values)
+    told_by = partial(read_arrivals, compensated, pairs)
+    with meanwhile(told_by, worth=_long(pairs)) as ask:
+        files = [compare_files(*pair) for pair in pairs]
+        told = ask()
     found = [(f, told.get(f.original.name)) for f in files]
     rows = tuple(f.rows.with_told(own) for f, own in found)
     left = tuple(_left(f, own) for f, own in found if own is not None)
     return Difference(rows, files[0].stamped, left, _counts(told))
+
+
+def _long(pairs: Iterable[tuple[Path, Path]]) -> bool:
+    """Tell whether reading the record takes long."""
+    return any(old.is_file() and old.stat().st_size > LONG for old, _ in pairs)
 
 
 def _left(file: Compared, told: Arrivals) -> Rows:

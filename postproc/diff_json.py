@@ -12,6 +12,7 @@ from postproc.byte_columns import Column, beside, blanked, joined, shortest, who
 from postproc.diff import Difference
 from postproc.row_columns import blocks_of, number_places, strung, words
 from postproc.rows import STATUSES, Rows
+from postproc.side_by_side import in_turns
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -27,26 +28,25 @@ def difference_pieces(found: Difference) -> Iterator[str]:
     for key, parts in (("rows", found.differing), ("left", found.untouched)):
         yield f',\n "{key}": ['
         comma = ""
-        for rows in parts:
-            for piece in _pieces(rows):
-                yield comma + piece
-                comma = ","
+        tasks = [(rows, *block) for rows in parts for block in blocks_of(rows)]
+        for piece in in_turns(lambda task: _piece(*task), tasks):
+            yield comma + piece
+            comma = ","
         yield "\n ]" if comma else "]"
     yield "\n}\n"
 
 
-def _pieces(rows: Rows) -> Iterator[str]:
-    """Write rows with commas between them."""
-    for k, own in blocks_of(rows):
-        begin = int(k[0])
-        texts = np.empty(len(k), dtype=object)
-        plain = np.setdiff1d(k, own, assume_unique=True)
-        if len(plain):
-            texts[plain - begin] = _objects(rows, plain)
-        for row in own.tolist():
-            told = json.dumps(rows.row(row)._asdict(), indent=1)
-            texts[row - begin] = "\n  " + told.replace("\n", "\n  ")
-        yield ",".join(texts.tolist())
+def _piece(rows: Rows, k: Ints, single: Ints) -> str:
+    """Write some rows with commas between them."""
+    begin = int(k[0])
+    texts = np.empty(len(k), dtype=object)
+    plain = np.setdiff1d(k, single, assume_unique=True)
+    if len(plain):
+        texts[plain - begin] = _objects(rows, plain)
+    for row in single.tolist():
+        told = json.dumps(rows.row(row)._asdict(), indent=1)
+        texts[row - begin] = "\n  " + told.replace("\n", "\n  ")
+    return ",".join(texts.tolist())
 
 
 def _objects(rows: Rows, k: Ints) -> list[str]:

@@ -19,10 +19,12 @@ from postproc.listing import ARROWS, arrows, is_coloured, paint, status_colour
 from postproc.listing_columns import Block, print_blocks
 from postproc.row_columns import blocks_of, number_places, strung, words
 from postproc.rows import STATUSES, Row, Rows
+from postproc.side_by_side import in_turns
 
 Ints = NDArray[np.int64]
 
 DECIMALS = 4
+HERE = 4  # every fourth block is made where all of them are laid out
 STATUS = "status"
 PLACE = (Column("file", "left"), Column("line"), Column("target", "left"))
 NUMBERS = (Column("original"), Column("", "left"), Column("compensated"))
@@ -64,19 +66,16 @@ class _Writer:
 
     def blocks(self, parts: Sequence[Rows], shown: Sequence[int]) -> Iterator[Block]:
         """Write the rows of all files, some columns of them."""
-        for rows in parts:
-            for k, own in blocks_of(rows):
-                yield self._block(rows, k, own.tolist(), shown)
+        tasks = [(rows, *block) for rows in parts for block in blocks_of(rows)]
+        return in_turns(lambda task: self._block(*task, shown), tasks, HERE)
 
-    def _block(
-        self, rows: Rows, k: Ints, single: Sequence[int], shown: Sequence[int]
-    ) -> Block:
+    def _block(self, rows: Rows, k: Ints, single: Ints, shown: Sequence[int]) -> Block:
         """Write some rows."""
         plain = ~np.isin(k, single)
         cells = [*_place(rows, k), *_numbers(rows, k, plain), self._size(rows, k)]
         if self.told:
             cells += self._told(rows, k)
-        texts = {row - int(k[0]): self._texts(rows.row(row)) for row in single}
+        texts = {row - int(k[0]): self._texts(rows.row(row)) for row in single.tolist()}
         return Block(
             [_masked(cells[c], plain) for c in shown],
             np.column_stack([_lengths(cells[c]) * plain for c in shown]),
