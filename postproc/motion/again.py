@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from postproc.motion.reach import Course, Points, points, reach
 from postproc.motion.rounding import rounded
+from postproc.motion.spans import spans
 from postproc.motion.targets import Kind, Targets
 from postproc.motion.trace import trace
 from postproc.motion.workspace import Known
@@ -112,7 +113,7 @@ def _part(targets: Targets, moved: Bools, begun: bool) -> _Part | None:
     row = np.cumsum(inside) - 1
     count = np.where(seeds, 0, np.diff(first))[rows]
     pred_start = np.concatenate([[0], np.cumsum(count)])
-    pred = targets.pred[_spans(first[rows], count)]
+    pred = targets.pred[spans(first[rows], count)]
     pred = np.where(pred >= 0, row[np.maximum(pred, 0)], pred)
     goes_on = np.append(~inside[1:] & ~begins[1:], False)
     return _Part(
@@ -215,15 +216,9 @@ def _marked(edges: Edges) -> Bools:
 
 def _edges_of(first: Ints, rows: Ints) -> Ints:
     """List the edges that lead to visits."""
-    return _spans(first[rows], first[rows + 1] - first[rows])
+    return spans(first[rows], first[rows + 1] - first[rows])
 
 
 def _samples_of(start: Ints, edge: Ints) -> Ints:
     """List the samples of edges."""
-    return _spans(start[edge], start[edge + 1] - start[edge])
-
-
-def _spans(begin: Ints, count: Ints) -> Ints:
-    """List begin, begin + 1, .., begin + count - 1 of every span."""
-    offset = np.cumsum(count) - count
-    return np.repeat(begin - offset, count) + np.arange(int(count.sum()))
+    return spans(start[edge], start[edge + 1] - start[edge])

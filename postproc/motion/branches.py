@@ -58,6 +58,14 @@ def nearest_slot(branches: Array, near: Array) -> int:
     return -1 if np.isnan(gap).all() else int(np.nanargmin(gap))
 
 
+def nearest_slots(branches: Array, near: Array) -> Ints:
+    """Name the branches (r, 8, 6) nearest to joint angles (r, 6) [rad], (r,)."""
+    near = near[:, None]
+    gap = np.abs(nearest_turns(branches, near) - near).max(axis=2)
+    gap[np.isnan(gap)] = np.inf
+    return np.where((gap < np.inf).any(axis=1), gap.argmin(axis=1), -1)
+
+
 @dataclass(frozen=True)
 class Followed:
     """A path in joint space.

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from postproc.motion.arrival import Arrival
 from postproc.motion.arrive import arrive, choose
+from postproc.motion.at_once import at_once
 from postproc.motion.branches import follow, on_other_turns, on_written_turns
 from postproc.motion.pull import Pull
 from postproc.motion.reasons import (
@@ -79,6 +80,8 @@ def trace(arm: Arm, targets: Targets, known: Known | None = None) -> Trace:
     """
     work = Workspace(arm, targets, known)
     settled = _from_strings(work) | work.given
+    settled |= at_once(work, work.single & ~settled, WINDOW)
+    work.solve(settled)
     _in_order(work, np.flatnonzero(~settled), work.single & ~settled)
     return _finished(work)
 

@@ -74,12 +74,13 @@ class Workspace:
         self.samples = sample(targets, self.flange)
         self.source = np.array(self.samples.source)
         self.path = np.full((int(self.samples.start[-1]), 6), np.nan)
+        self._inner = np.full(len(self.path), -1)
+        self._inner[self.samples.inner] = np.arange(len(self.samples.inner))
         placed = ~is_unknown(self.flange)
         self.placed = placed & (targets.kind != Kind.JOINTS) & ~self.given
         self.by_string = self._by_string()
         self.single = self._single_lines()
         self.long = self.single & (_run_lengths(self.single) >= LONG)
-        self._solve()
 
     def _place(self) -> None:
         """Place the flange at poses and joint angles."""
@@ -136,12 +137,17 @@ class Workspace:
         out[single] = samples.ready[edge] & (samples.source[edge] == single - 1)
         return np.asarray(out & self.placed)
 
-    def _solve(self) -> None:
-        """Solve for all branches where there is no long stretch, in one batch."""
+    def solve(self, settled: Bools) -> None:
+        """Solve for all branches where there is no long stretch, in one batch.
+
+        Args:
+            settled: Targets that are settled, with the ways to them, (n,).
+        """
         samples, start = self.samples, self.samples.start
-        poses = np.flatnonzero(self.placed & ~self.by_string & ~self.long)
+        poses = np.flatnonzero(self.placed & ~settled & ~self.long)
         edge = np.searchsorted(start, samples.inner, side="right") - 1
-        inner = np.flatnonzero(~self.long[samples.visit[edge]])
+        visit = samples.visit[edge]
+        inner = np.flatnonzero(~self.long[visit] & ~settled[visit])
         asked = np.concatenate([self.flange[poses], samples.flange[inner]])
         self.branches = np.empty((len(asked), 8, 6))
         for rows in pieces(len(asked), CHUNK):
@@ -151,8 +157,6 @@ class Workspace:
         self.row = np.full(int(start[-1]), -1)
         self.row[samples.inner[inner]] = len(poses) + np.arange(len(inner))
         self.row[start[1:] - 1] = self.solved[samples.visit]
-        self._inner = np.full(int(start[-1]), -1)
-        self._inner[samples.inner] = np.arange(len(samples.inner))
 
     def solutions(self, v: int, flange: Array) -> Array:
         """Return all branches at target v with its flange pose, (8, 6) [rad]."""
@@ -175,17 +179,16 @@ class Workspace:
         rows = self.row[span]
         if len(rows) and (rows >= 0).all():
             return Solved(self.branches[rows])
-        return OnDemand(self.arm, self._flange_at(span))
+        return OnDemand(self.arm, self.flange_at(np.arange(span.start, span.stop)))
 
-    def _flange_at(self, span: slice) -> Array:
+    def flange_at(self, at: Ints) -> Array:
         """Look up the flange poses at samples of ready edges, (k, 4, 4) [m]."""
-        samples, ends = self.samples, self.samples.start[1:] - 1
-        at = self._inner[span]
-        inside = np.flatnonzero(at >= 0)
-        edges = slice(*np.searchsorted(ends, (span.start, span.stop)))
-        out = np.empty((span.stop - span.start, 4, 4))
-        out[inside] = samples.flange.take(at[inside], axis=0)
-        out[ends[edges] - span.start] = self.flange[samples.visit[edges]]
+        samples, inner = self.samples, self._inner[at]
+        last, inside = np.flatnonzero(inner < 0), np.flatnonzero(inner >= 0)
+        edge = np.searchsorted(samples.start, at[last], side="right") - 1
+        out = np.empty((len(at), 4, 4))
+        out[last] = self.flange.take(samples.visit[edge], axis=0)
+        out[inside] = samples.flange.take(inner[inside], axis=0)
         return out
 
     def is_known(self, v: int) -> bool:
@@ -194,8 +197,12 @@ class Workspace:
 
     def branch_at(self, v: int) -> int:
         """Return the branch at a target, -1 where it is not known or not one alone."""
-        straight = abs(self.q[v, 4]) < STRAIGHT
-        return -1 if straight else int(self.slot[v])
+        return int(self.branches_at(np.array([v]))[0])
+
+    def branches_at(self, rows: Ints) -> Ints:
+        """Return the branches at targets, (k,), likewise."""
+        straight = np.abs(self.q[rows, 4]) < STRAIGHT
+        return np.where(straight, -1, self.slot[rows])
 
     def span(self, edge: int) -> slice:
         """Return the samples of an edge."""
