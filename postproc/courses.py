@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from postproc.language.visits import Visits
 from postproc.motion.again import reach_again
 from postproc.motion.reach import Course, reach
-from postproc.motion.standing import Standing
+from postproc.motion.standing import NOWHERE, Standing
 from postproc.motion.targets import Targets
 from postproc.resolve import moved_targets
 from postproc.robot.cell import Cell
@@ -31,6 +31,11 @@ class Courses:
         """
         self._visits, self._targets, self._cell = visits, targets, cell
         self._last: Course | None = None
+
+    @property
+    def end(self) -> Standing:
+        """Return where the last course leaves the arm; nowhere before the first."""
+        return NOWHERE if self._last is None else self._last.end
 
     def after(self, values: Array, begin: Standing) -> Course:
         """Find where the program leads with other numbers.

@@ -3,27 +3,27 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from itertools import count, pairwise
+from itertools import count
 
 import numpy as np
 from numpy.typing import NDArray
 
 from postproc.accuracy.model import Model
+from postproc.aiming import Aim, Window
 from postproc.as_read import numbers_as_read
 from postproc.clock import Clock
 from postproc.courses import Courses
 from postproc.language.edits import Replacements
 from postproc.language.rewrite import edits as number_edits
-from postproc.motion.planner import Plan
 from postproc.motion.reach import Reached
 from postproc.motion.standing import NOWHERE, Standing
 from postproc.options import Options
 from postproc.planning import Planned, Reading
-from postproc.proposal import Proposal, propose
+from postproc.proposal import Proposal
 from postproc.robot.cell import Cell
 from postproc.robot.state import States
 from postproc.side_search import SideSearch
-from postproc.solved import Solved, solve_again, solve_visits, std_errors
+from postproc.solved import std_errors
 
 Array = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -31,7 +31,6 @@ Bools = NDArray[np.bool_]
 ROUNDS = 8  # of correcting for changed sides, before targets are settled for
 SAME = 0.01  # sides closer than this are the same
 OTHER = 1.0  # sides farther apart than this are different ones
-CLOSE = 5e-6  # [m] how well rounded fly points are hit
 CORNERS = 3  # rounds for what is curved there
 
 
@@ -95,93 +94,60 @@ def settle(
     Raises:
         NotTogetherError: The last look found something in programs side by side.
     """
-    held, search = np.zeros(len(states), dtype=bool), SideSearch()
-    with clock("solve"):
-        solved = solve_visits(model, cell, planned, states, options.orientation)
-    courses = Courses(reading.visits, planned.targets, cell)
-    bent = np.zeros_like(planned.plan.aside)
-    settled_for = np.zeros(len(states), dtype=bool)
-    for number in count():  # ends: from round ROUNDS on, `settled_for` or `held` grows
-        with clock("decide"):
-            wanted = wanted_moves(planned.plan, solved, held, before)
-            aside = aside_after(planned.plan, wanted) + bent
-            proposal = propose(reading, planned, solved, aside, held, cell, options)
+    window = Window(
+        reading, planned, states, cell, model, options, clock, before.wanted
+    )
+    courses, search = Courses(reading.visits, planned.targets, cell), SideSearch()
+    aim = window.first_aim()
+    for number in count():  # ends: from round ROUNDS on, `settled` or `held` grows
+        proposal, meant = window.propose(aim)
         with clock("plan again"):
             looked = courses.after(proposal.decisions.corrected, before.looked)
-            after = looked.reached
-        found, missed = after.side, _missed(planned.plan, proposal, after.aside, aside)
-        far = _far_off(missed, reading.begins)
-        rounds_on = number < CORNERS and bool(far.any())
-        bent = bent + np.where(far, missed, 0.0) if rounds_on else bent
-        off = np.abs(found - solved.direction).max(axis=1, initial=0.0)
-        moved = proposal.corrected & ~settled_for
-        moved = moved & (off > (SAME if number < ROUNDS else OTHER))
-        if not moved.any() and not rounds_on:
-            edits, proposal = write(reading, proposal, clock)
-            stood = looked.end
-            with clock("plan again"):
-                last = courses.after(proposal.decisions.corrected, before.written)
-            off = np.abs(last.side - solved.direction)
-            flipped = proposal.corrected & ~settled_for & (off > OTHER).any(axis=1)
-            if not flipped.any():
-                left = Left(stood, last.end, wanted[-1:].copy())
-                with clock("solve"):
-                    std_error = std_errors(model, cell, planned, states, solved)
-                decided = replace(proposal.decisions, std_error=std_error)
-                proposal = replace(proposal, decisions=decided)
-                return Corrected(proposal, edits, last.reached, left)
-            if len(reading.begins) > 1:
-                raise NotTogetherError
-            held = held | flipped
+        most = SAME if number < ROUNDS else OTHER
+        moved = aim.turned(proposal, looked.side, most)
+        missed = window.missed(proposal, looked.aside, meant)
+        bend_on = number < CORNERS and bool(missed.any())
+        if not moved.any() and not bend_on:
+            found, flipped = _written(window, aim, proposal, courses, before)
+            if found is not None:
+                return found
+            aim = replace(aim, held=aim.held | flipped)
             continue
-        settled_for = settled_for | moved if number >= ROUNDS else settled_for
-        with clock("solve"):
-            aimed = states.with_(direction=search.next_aim(solved.direction, found))
-            solved = solve_again(
-                solved, moved, model, cell, planned, aimed, options.orientation
-            )
+        bent = aim.bent + missed if bend_on else aim.bent
+        settled = aim.settled | moved if number >= ROUNDS else aim.settled
+        aim = replace(aim, bent=bent, settled=settled)
+        aim = window.next_aim(aim, moved, looked.side, search)
     raise AssertionError("unreachable")
 
 
-def _missed(plan: Plan, proposal: Proposal, aside: Array, meant: Array) -> Array:
-    """Tell how far the path passes from where it should at sharp corners, (n, 3) [m].
+def _written(
+    window: Window, aim: Aim, proposal: Proposal, courses: Courses, before: Left
+) -> tuple[Corrected | None, Bools]:
+    """Write the numbers, and look at them as they will be read.
 
-    Args:
-        plan: Tells which corners are sharp.
-        proposal: Tells which targets can make up for it.
-        aside: From targets to where the path passes them, (n, 3) [m].
-        meant: .. to where it should.
+    Returns:
+        What came of it, None where targets now come from another side; and those.
+
+    Raises:
+        NotTogetherError: There are some, in programs side by side.
     """
-    missed, sharp = np.zeros_like(aside), plan.pull.visit
-    missed[sharp] = (aside - meant)[sharp]
-    missed[~proposal.corrected] = 0.0
-    return missed
-
-
-def _far_off(missed: Array, begins: tuple[int, ...]) -> Bools:
-    """Tell the visits of programs with a fly point that is not hit well, (n, 1).
-
-    Args:
-        missed: How far the path passes from where it should, (n, 3) [m].
-        begins: The first visit of every program.
-    """
-    out = np.zeros((len(missed), 1), dtype=bool)
-    for first, end in pairwise((*begins, len(missed))):
-        out[first:end] = np.abs(missed[first:end]).max(initial=0.0) > CLOSE
-    return out
-
-
-def wanted_moves(plan: Plan, solved: Solved, held: Bools, before: Left) -> Array:
-    """Say what the path should move by at every target, (n, 3) [m]."""
-    wanted = np.nan_to_num(solved.command[:, :3, 3] - plan.tcp[:, :3, 3])
-    wanted[held] = 0.0
-    wanted[: len(before.wanted)] = before.wanted
-    return wanted
-
-
-def aside_after(plan: Plan, wanted: Array) -> Array:
-    """Foretell where the path passes its fly points once targets have moved, (n, 3)."""
-    return plan.aside + plan.pull.on(plan.pull.to_move(wanted))
+    looked = courses.end
+    edits, proposal = write(window.reading, proposal, window.clock)
+    with window.clock("plan again"):
+        last = courses.after(proposal.decisions.corrected, before.written)
+    flipped = aim.turned(proposal, last.side, OTHER)
+    if flipped.any():
+        if len(window.reading.begins) > 1:
+            raise NotTogetherError
+        return None, flipped
+    left = Left(looked, last.end, window.wanted(aim)[-1:].copy())
+    with window.clock("solve"):
+        std_error = std_errors(
+            window.model, window.cell, window.planned, window.states, aim.solved
+        )
+    decided = replace(proposal.decisions, std_error=std_error)
+    proposal = replace(proposal, decisions=decided)
+    return Corrected(proposal, edits, last.reached, left), flipped
 
 
 def write(

@@ -17,6 +17,7 @@ import pytest
 
 from postproc import correcting
 from postproc.accuracy.model import Model, load_model
+from postproc.aiming import CLOSE
 from postproc.compensate import compensate
 from postproc.language import windows as cuts
 from postproc.language.windows import windows
@@ -24,7 +25,6 @@ from postproc.planning import read_program
 from postproc.pose import MM
 from postproc.report import Outcome, Status
 from postproc.robot.cell import Cell, load_cell
-from postproc.settling import CLOSE
 from tests.bench import made
 from tests.bench.__main__ import CELL
 from tests.conftest import make_job
