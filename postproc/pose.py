@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -18,6 +17,7 @@ Bools = NDArray[np.bool_]
 
 MM = 1e-3  # [m]
 SAME_ROTATION = 1e-10  # elements of a matrix that differ less are the same
+SMALL = 1e-3  # [rad] below which a series stands for a quotient of two small numbers
 
 
 def rotation_from_zyz(zyz_deg: Array) -> Array:
@@ -133,7 +133,60 @@ def cross(a: Array, b: Array) -> Array:
     return out
 
 
+def rotation_from_vector(vector: Array) -> Array:
+    """Return the rotations (..., 3, 3) about vectors (..., 3) [rad].
+
+    As in scipy, which takes longer to load than a small program to compensate.
+    """
+    x, y, z = np.moveaxis(vector, -1, 0)
+    angle = np.sqrt(x * x + y * y + z * z)
+    square, small = angle * angle, angle <= SMALL
+    half_sinc = np.sin(angle / 2) / np.where(small, 1.0, angle)
+    series = 0.5 - square / 48 + square * square / 3840
+    scale = np.where(small, series, half_sinc)
+    x, y, z, w = scale * x, scale * y, scale * z, np.cos(angle / 2)
+    xx, yy, zz, ww = x * x, y * y, z * z, w * w
+    R = np.empty((*vector.shape, 3))
+    R[..., 0, 0], R[..., 1, 1] = xx - yy - zz + ww, -xx + yy - zz + ww
+    R[..., 2, 2] = -xx - yy + zz + ww
+    R[..., 1, 0], R[..., 0, 1] = 2 * (x * y + z * w), 2 * (x * y - z * w)
+    R[..., 2, 0], R[..., 0, 2] = 2 * (x * z - y * w), 2 * (x * z + y * w)
+    R[..., 2, 1], R[..., 1, 2] = 2 * (y * z + x * w), 2 * (y * z - x * w)
+    return R
+
+
 def rotation_vector(R: Array) -> Array:
-    """Return the rotation vectors (..., 3) [rad] of rotations (..., 3, 3)."""
-    flat = Rotation.from_matrix(R.reshape(-1, 3, 3)).as_rotvec()
-    return np.asarray(flat, dtype=float).reshape(*R.shape[:-2], 3)
+    """Return the rotation vectors (..., 3) [rad] of rotations (..., 3, 3).
+
+    Lengths are in [0, pi].
+    """
+    q = _quaternion(R.reshape(-1, 3, 3))
+    x, y, z, w = np.where(q[3] < 0, -q, q)
+    angle = 2 * np.arctan2(np.sqrt(x * x + y * y + z * z), w)
+    square, small = angle * angle, angle <= SMALL
+    quotient = angle / np.where(small, 1.0, np.sin(angle / 2))
+    scale = np.where(small, 2 + square / 12 + 7 * square * square / 2880, quotient)
+    return np.stack([scale * x, scale * y, scale * z], axis=1).reshape(R.shape[:-1])
+
+
+def _quaternion(R: Array) -> Array:
+    """Return the unit quaternions x, y, z, w of rotations (n, 3, 3), (4, n).
+
+    Each is taken from that of four formulas whose divisor is the largest.
+    """
+    xx, yy, zz = R[:, 0, 0], R[:, 1, 1], R[:, 2, 2]
+    trace = xx + yy + zz
+    xy, xz, yz = (R[:, j, i] + R[:, i, j] for i, j in ((0, 1), (0, 2), (1, 2)))
+    xw, yw, zw = (R[:, j, i] - R[:, i, j] for i, j in ((1, 2), (2, 0), (0, 1)))
+    formulas = np.array(
+        [
+            [1 - trace + 2 * xx, xy, xz, xw],
+            [xy, 1 - trace + 2 * yy, yz, yw],
+            [xz, yz, 1 - trace + 2 * zz, zw],
+            [xw, yw, zw, 1 + trace],
+        ]
+    )
+    best = np.argmax([xx, yy, zz, trace], axis=0)
+    q = formulas[best, :, np.arange(len(R))].T
+    x, y, z, w = q
+    return np.asarray(q / np.sqrt(x * x + y * y + z * z + w * w))

@@ -11,13 +11,19 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from postproc.flying import rounding_of
 from postproc.language.visits import Target, Visits
 from postproc.motion.rounds import from_every_start
 from postproc.motion.targets import Kind, Targets
-from postproc.pose import MM, inverse, is_unknown, pose_from_record, products
+from postproc.pose import (
+    MM,
+    inverse,
+    is_unknown,
+    pose_from_record,
+    products,
+    rotation_from_vector,
+)
 from postproc.reasons import Reasons
 from postproc.robot.cell import Cell
 
@@ -210,7 +216,7 @@ def _step(target: int, value: Array, frames: Frames, v: int) -> tuple[Kind, Arra
         return Kind.UNKNOWN, np.full((4, 4), np.nan)
     if about:
         turn = np.deg2rad(value[3]) * vector / np.linalg.norm(vector)
-        step[:3, :3] = Rotation.from_rotvec(turn).as_matrix()
+        step[:3, :3] = rotation_from_vector(turn)
     else:
         step[:3, 3] = vector * MM
     return (Kind.TOOL_STEP if frame == "tool" else Kind.BASE_STEP), step

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from postproc.language.visits import Target, Visits
 from postproc.motion.planner import Plan
@@ -13,6 +12,7 @@ from postproc.pose import (
     angles_near,
     inverse,
     products,
+    rotation_from_vector,
     rotation_from_zyz,
     rotation_vector,
 )
@@ -40,7 +40,7 @@ def new_numbers(visits: Visits, plan: Plan, solved: Solved, aside: Array) -> Arr
     numbers[poses, :3] = point[:, :3] / MM
     turn = turns_in_file(visits, turns(plan, solved))[poses]
     turned = np.any(turn != 0, axis=1) & ~np.isnan(turn[:, 0])
-    rows, by = poses[turned], Rotation.from_rotvec(turn[turned]).as_matrix()
+    rows, by = poses[turned], rotation_from_vector(turn[turned])
     written = numbers[rows, 3:]
     numbers[rows, 3:] = angles_near(written, by @ rotation_from_zyz(written))
     return numbers

@@ -13,6 +13,7 @@ from postproc.pose import (
     pose_from_record,
     products,
     record_from_pose,
+    rotation_from_vector,
     rotation_vector,
 )
 
@@ -51,6 +52,27 @@ def test_rotation_vector_of_many():
     R = Rotation.random(12, random_state=0)
     found = rotation_vector(R.as_matrix().reshape(3, 4, 3, 3))
     np.testing.assert_allclose(found.reshape(-1, 3), R.as_rotvec(), atol=1e-12)
+
+
+@pytest.mark.parametrize("angle", [0, 1e-9, 9e-4, 1.1e-3, 0.5, 2.5, np.pi - 1e-9])
+def test_rotations_about_vectors_are_those_of_scipy(angle):
+    axes = Rotation.random(60, random_state=1).as_matrix().reshape(-1, 3)
+    axes[:6] = [*np.eye(3), *-np.eye(3)]  # each of the formulas is the best for some
+    vectors = angle * axes
+    R = rotation_from_vector(vectors)
+    expected = Rotation.from_rotvec(vectors).as_matrix()
+    np.testing.assert_allclose(R, expected, rtol=0, atol=1e-15)
+    given = Rotation.from_matrix(R).as_rotvec()
+    np.testing.assert_allclose(rotation_vector(R), given, rtol=0, atol=1e-14)
+    np.testing.assert_array_equal(rotation_from_vector(vectors[7]), R[7])
+
+
+def test_half_a_turn_is_kept_and_more_goes_round_the_other_way():
+    half = rotation_vector(np.diag([-1.0, 1.0, -1.0]))
+    np.testing.assert_allclose(half, [0.0, np.pi, 0.0])
+    back = rotation_vector(rotation_from_vector(np.array([0.0, 0.0, 4.0])))
+    np.testing.assert_allclose(back, [0.0, 0.0, 4.0 - 2 * np.pi])
+    assert rotation_vector(np.empty((0, 3, 3))).shape == (0, 3)
 
 
 def test_products_of_few_poses_for_many_pairs():

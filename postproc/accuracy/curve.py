@@ -8,7 +8,6 @@ from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import eval_legendre
 
 from postproc.accuracy.batch import Batch
 from postproc.accuracy.covariate import covariate
@@ -86,6 +85,8 @@ class Curve(Effect):
 
     def shape(self, batch: Batch) -> Array:
         """Evaluate the terms without their direction in space, (n, p)."""
+        from scipy.special import eval_legendre  # slow to load, and seldom wanted
+
         value, inside = np.ones((len(batch), len(self._orders()))), np.ones(len(batch))
         order = np.array(self._orders())
         for k, name in enumerate(self.source):

@@ -11,7 +11,6 @@ from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import expit
 
 from postproc.accuracy.effect import FAR
 from postproc.robot.state import States
@@ -82,5 +81,8 @@ class HiddenLayer:
         if weights.shape[1] == 12:
             x = np.hstack([x, states.direction])
         z = x @ weights.T + np.array(self.bias)
-        h: Array = expit(z) if self.activation == "sigmoid" else np.tanh(z)
-        return h
+        if self.activation != "sigmoid":
+            return np.asarray(np.tanh(z))
+        from scipy.special import expit  # slow to load, and seldom wanted
+
+        return np.asarray(expit(z))

@@ -7,7 +7,6 @@ from typing import ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from postproc.accuracy.batch import Batch
 from postproc.accuracy.effect import Effect, Parameter
@@ -49,6 +48,8 @@ class Interpolation(Effect):
 
     def _weights(self, batch: Batch) -> tuple[NDArray[np.int64], Array]:
         """Find neighbours and their weights, (n, k) each."""
+        from scipy.spatial import cKDTree  # slow to load, and seldom wanted
+
         tree = cKDTree(np.array(self.points))
         gap, index = tree.query(batch.walk.tcp, k=list(range(1, self.neighbours + 1)))
         weight = np.maximum(np.asarray(gap), NEAREST_GAP) ** -self.power

@@ -11,7 +11,6 @@ from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import cho_factor, cho_solve
 
 from postproc.accuracy.batch import Batch
 from postproc.accuracy.effect import Effect, Parameter
@@ -99,6 +98,8 @@ def train(states: States, error: Array, seed: int) -> tuple[Kriging, Array]:
     Raises:
         PostprocError: Too many rows.
     """
+    from scipy.linalg import cho_factor, cho_solve  # slow to load, and for fits alone
+
     if len(states) > MOST_CENTRES:
         raise PostprocError(
             f"kriging of {len(states)} rows is too large. Use at most {MOST_CENTRES}"
@@ -123,6 +124,9 @@ def train(states: States, error: Array, seed: int) -> tuple[Kriging, Array]:
 
 def _tune(x: Array, y: Array) -> tuple[Array, float, float]:
     """Maximise the marginal likelihood over lengths, noise and signal variance."""
+    from scipy.linalg import cho_factor, cho_solve
+    from scipy.optimize import minimize  # slow to load, and for fits alone
+
     inputs = x.shape[1]
     gaps = (x[:, None] - x) ** 2
 
@@ -143,8 +147,6 @@ def _tune(x: Array, y: Array) -> tuple[Array, float, float]:
         by_length = 0.5 * np.einsum("ij,ijk->k", W * S, gaps) * inverse_square
         by_noise, by_signal = 0.5 * noise * np.trace(W), 0.5 * float((W * S).sum())
         return value, np.concatenate([by_length, [by_noise, by_signal]])
-
-    from scipy.optimize import minimize  # slow to load, and for fits alone
 
     start = np.concatenate([np.full(inputs, 0.7), [-3.0, 0.0]])
     bounds = [LOG_LENGTH] * inputs + [LOG_NOISE, (-3.0, 5.0)]

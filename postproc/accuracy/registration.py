@@ -12,7 +12,6 @@ from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from postproc.accuracy.base_shift import rigid_columns, rigid_rotations
 from postproc.accuracy.batch import Batch
@@ -106,6 +105,8 @@ def register(
 
 def _procrustes(a: Array, b: Array, weight: Array) -> Array:
     """Find the rigid transform (4, 4) that takes points a (n, 3) to b best."""
+    from scipy.spatial.transform import Rotation  # slow to load, and for fits alone
+
     total = weight.sum()
     ca, cb = weight @ a / total, weight @ b / total
     turn, _ = Rotation.align_vectors(b - cb, a - ca, weights=weight)

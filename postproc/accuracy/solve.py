@@ -6,11 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from postproc.accuracy.model import Model
 from postproc.accuracy.orientation import turn
-from postproc.pose import inverse, rotation_vector
+from postproc.pose import inverse, rotation_from_vector, rotation_vector
 from postproc.robot.arm import Arm
 from postproc.robot.state import States
 
@@ -98,7 +97,7 @@ def _distance(a: Array, b: Array) -> Array:
 
 def _turned(rotation: Array, by: Array) -> Array:
     """Turn rotations (n, 3, 3) by rotation vectors (n, 3) [rad] in the base frame."""
-    return np.asarray(Rotation.from_rotvec(by).as_matrix() @ rotation)
+    return np.asarray(rotation_from_vector(by) @ rotation)
 
 
 def _nearest(

@@ -10,9 +10,8 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
-from postproc.pose import rotation_vector
+from postproc.pose import rotation_from_vector, rotation_vector
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -77,7 +76,7 @@ class Segments:
         T[:, :3, 3] += (
             np.cos(phi) * self.radius[path] + np.sin(phi) * self.tangent[path]
         )
-        turned = Rotation.from_rotvec(u[:, None] * self.turn[path]).as_matrix()
+        turned = rotation_from_vector(u[:, None] * self.turn[path])
         T[:, :3, :3] = self.rotation[path] @ turned
         T[:, 3, 3] = 1.0
         return T

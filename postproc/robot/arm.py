@@ -13,7 +13,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pinocchio as pin
 from numpy.typing import NDArray
 
 from postproc.exceptions import ArmError, PlanError
@@ -66,6 +65,8 @@ class Arm:
     @cached_property
     def _chain(self) -> Any:
         """Build the pinocchio model: joint i turns about z of D-H frame i - 1."""
+        import pinocchio as pin  # slow to load, and for loads alone
+
         model, parent, placement = pin.Model(), 0, pin.SE3.Identity()
         model.gravity.linear = np.array([0.0, 0.0, -GRAVITY])
         for i in range(6):
@@ -165,6 +166,8 @@ class Arm:
         n = len(q)
         own = np.zeros((n, 6))
         if self.file.links is not None and n:
+            import pinocchio as pin
+
             pool = pin.ModelPool(self._chain, 1)
             theta = np.asfortranarray(self.dh.angles(q).T)
             rest = np.zeros((6, n), order="F")
