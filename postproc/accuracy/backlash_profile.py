@@ -58,21 +58,43 @@ class BacklashProfile(JointEffect):
 
     def basis(self, batch: Batch) -> Array:
         """Evaluate lambda times the harmonics, (n, p)."""
-        inside, waves = batch.once(self, self._waves)
-        turned: Array = batch.states.direction[:, self.acts_on()] * inside * waves
+        joint, waves = self.acts_on(), batch.once(self, self._waves)
+        flat = waves.reshape(len(joint), len(batch)).T
+        turned: Array = batch.states.direction[:, joint] * flat
         return turned
 
-    def _waves(self, q: Array) -> tuple[Array, Array]:
-        """Evaluate how far inside of the range, and the harmonics, (n, p) each."""
+    def angles(self, batch: Batch, p: Array) -> Array:
+        """Return the joint errors (n, 6) [rad], summed joint by joint."""
+        waves = batch.once(self, self._waves)
+        sizes = p.reshape(*waves.shape[:2], 1)
+        profile = np.zeros((len(self.joints), len(batch)))
+        for k in range(waves.shape[1]):
+            profile += sizes[:, k] * waves[:, k]
+        out = np.zeros((len(batch), 6))
+        out[:, self._turned] = profile.T
+        return out * batch.states.direction
+
+    @property
+    def _turned(self) -> NDArray[np.int64]:
+        """Return the 0-based joints that have a profile, (j,)."""
+        return np.array(self.joints, dtype=int) - 1
+
+    def _waves(self, q: Array) -> Array:
+        """Evaluate b0 and the harmonics of every joint, (j, m, n), as far as surveyed.
+
+        Sine and cosine of k theta come from those of (k - 1) theta, which takes a
+        quarter of the time and is as good but for the last digit.
+        """
+        angle = np.ascontiguousarray(q[:, self._turned].T)
+        waves = np.ones((len(angle), self.constant + 2 * len(self.orders), len(q)))
+        sin, cos = np.sin(angle), np.cos(angle)
+        s, c = np.zeros_like(sin), np.ones_like(cos)
+        for k in range(1, max(self.orders, default=0) + 1):
+            s, c = s * cos + c * sin, c * cos - s * sin
+            if k in self.orders:
+                at = self.constant + 2 * self.orders.index(k)
+                waves[:, at], waves[:, at + 1] = s, c
         within = fade_turns(q, np.array(self.lower), np.array(self.upper))
-        inside, waves = (np.ones((len(q), len(self.acts_on()))) for _ in range(2))
-        column = 0
-        for j in np.array(self.joints, dtype=int) - 1:
-            column += self.constant
-            for k in self.orders:
-                both = slice(column, column + 2)
-                inside[:, both] = within[:, j, None]
-                waves[:, column] = np.sin(k * q[:, j])
-                waves[:, column + 1] = np.cos(k * q[:, j])
-                column += 2
-        return inside, waves
+        if (within != 1.0).any():
+            waves[:, int(self.constant) :] *= within.T[self._turned, None]
+        return waves

@@ -166,7 +166,12 @@ def fade_turns(q: Array, lower: Array, upper: Array) -> Array:
     >>> fade_turns(np.array([0.1 + 2 * np.pi]), np.array(0.0), np.array(1.0)).tolist()
     [1.0]
     """
-    middle = (lower + upper) / 2
-    near = middle + np.mod(q - middle + np.pi, 2 * np.pi) - np.pi
-    whole = upper - lower > 0.95 * 2 * np.pi
-    return np.where(whole, 1.0, fade(near, lower, upper))
+    out = np.ones(np.broadcast_shapes(q.shape, lower.shape))
+    odd = ~((q >= lower) & (q <= upper))  # most are inside as they are
+    if odd.any():
+        x, low, high = (np.broadcast_to(a, odd.shape)[odd] for a in (q, lower, upper))
+        middle = (low + high) / 2
+        near = middle + np.mod(x - middle + np.pi, 2 * np.pi) - np.pi
+        whole = high - low > 0.95 * 2 * np.pi
+        out[odd] = np.where(whole, 1.0, fade(near, low, high))
+    return out

@@ -9,7 +9,7 @@ import pytest
 
 from postproc.accuracy.batch import Batch
 from postproc.accuracy.combination import Combination
-from postproc.accuracy.effect import Effect, fade
+from postproc.accuracy.effect import Effect, JointEffect, fade, fade_turns
 from postproc.accuracy.library import EFFECTS, propose, restore
 from postproc.exceptions import PostprocError
 from tests.accuracy.simulator import NJ, PLATE, covariates, random_states
@@ -129,6 +129,46 @@ def test_free_forms_fade_outside_the_survey() -> None:
     x = np.linspace(-1, 2, 301)
     f = fade(x, np.array(0.0), np.array(1.0))
     assert (np.diff(f[x >= 0.5]) <= 0).all() and (f[(x >= 0) & (x <= 1)] == 1).all()
+
+
+def test_joint_errors_are_their_basis_times_the_parameters() -> None:
+    for effect in (e for e in variants() if isinstance(e, JointEffect)):
+        batch, acts_on = Batch(NJ, STATES), effect.acts_on()
+        p = np.random.default_rng(4).standard_normal(len(acts_on))
+        wanted = np.zeros((len(STATES), 6))
+        for k, column in enumerate((effect.basis(batch) * p).T):
+            wanted[:, acts_on[k]] += column
+        assert np.allclose(effect.angles(batch, p), wanted, rtol=0, atol=1e-13)
+
+
+def test_a_profile_of_some_joints_is_its_harmonics_as_far_as_surveyed() -> None:
+    low, high = np.full(6, -1.0), np.full(6, 1.5)
+    effect = EFFECTS["backlash_profile"](
+        joints=(2, 5), orders=(4, 1), constant=True, lower=tuple(low), upper=tuple(high)
+    )
+    q, direction = STATES.q, STATES.direction
+    inside = fade_turns(q, low, high)
+    assert 0 < (inside < 1).sum() < inside.size
+    wanted = [
+        direction[:, j] * part
+        for j in (1, 4)
+        for part in (
+            np.ones(len(q)),
+            inside[:, j] * np.sin(4 * q[:, j]), inside[:, j] * np.cos(4 * q[:, j]),
+            inside[:, j] * np.sin(q[:, j]), inside[:, j] * np.cos(q[:, j]),
+        )
+    ]  # fmt: skip
+    basis = effect.basis(Batch(NJ, STATES))
+    assert np.allclose(basis, np.stack(wanted, axis=1), rtol=0, atol=1e-14)
+
+
+def test_an_angle_fades_as_its_nearest_turn_does() -> None:
+    low, high = np.array([-1.0, -3.1, 0.0]), np.array([1.0, 3.1, 2.0])
+    q = np.random.default_rng(6).uniform(-9.0, 9.0, (200, 3))
+    near = (low + high) / 2 + np.mod(q - (low + high) / 2 + np.pi, 2 * np.pi) - np.pi
+    wanted = np.where([False, True, False], 1.0, fade(near, low, high))
+    assert np.array_equal(fade_turns(q, low, high), wanted)
+    assert np.isnan(fade_turns(np.array([[np.nan, 0.0, 0.0]]), low, high)[0, 0])
 
 
 def test_what_is_known_once_serves_the_same_poses_alone() -> None:
