@@ -32,6 +32,8 @@ class Solved:
         q: Joint angles, (n, 6) [rad], NaN where the command cannot be reached.
         command: TCP poses to command, base frame, (n, 4, 4) [m].
         residual: Predicted landing against the wanted position, (n,) [m].
+        std_error: Standard error of the model there, per axis, (n, 3) [m], as far as
+            that was asked for.
         outside: Reasons why visits lie outside what was surveyed, (n,) each.
     """
 
@@ -39,6 +41,7 @@ class Solved:
     q: Array
     command: Array
     residual: Array
+    std_error: Array
     outside: dict[str, Bools]
 
 
@@ -69,6 +72,7 @@ def solve_visits(
         q=np.full((n, 6), np.nan),
         command=np.full((n, 4, 4), np.nan),
         residual=np.full(n, np.nan),
+        std_error=np.full((n, 3), np.nan),
         outside=_outside_survey(model, planned, states),
     )
     everything = np.ones(n, dtype=bool)
@@ -106,11 +110,13 @@ def solve_again(
         q=np.array(solved.q),
         command=np.array(solved.command),
         residual=np.array(solved.residual),
+        std_error=np.array(solved.std_error),
         outside=dict(solved.outside),
     )
     out.q[known], out.command[known] = part.q, part.command
     out.residual[known] = part.residual
-    _mark(out.outside, UNSURE, known, model.unsure(cell.arm, here))
+    out.std_error[known] = model.std_on_flanks(cell.arm, here)
+    _mark(out.outside, UNSURE, known, model.unsure(out.std_error[known]))
     if orientation:
         _mark(out.outside, UNSURE_TURN, known, unsure_turn(model, cell.arm, here))
     return out
@@ -121,14 +127,16 @@ def std_errors(
 ) -> Array:
     """Standard errors of the errors that visits are corrected for, per axis.
 
-    They are many times as costly as the errors, and wanted of the last round alone.
+    They are many times as costly as the errors: what solving has asked for is kept, the
+    others are wanted of the last round alone.
 
     Returns:
         (n, 3) [m], NaN where pose or joint angles are not known.
     """
-    out, known = np.full((len(states), 3), np.nan), _known(planned)
-    here = states.with_(direction=solved.direction)[known]
-    out[known] = model.std_error(cell.arm, here)
+    out = np.array(solved.std_error)
+    rows = np.flatnonzero(_known(planned) & np.isnan(out[:, 0]))
+    here = states.with_(direction=solved.direction)[rows]
+    out[rows] = model.std_error(cell.arm, here)
     return out
 
 

@@ -133,17 +133,27 @@ class Model:
         """Standard error of the predicted error, (n, 3) [m], as `predict` gives it."""
         return self._deviations(arm, states)[0]
 
-    def unsure(self, arm: Arm, states: States) -> Bools:
+    def std_on_flanks(self, arm: Arm, states: States) -> Array:
+        """Standard error where the directions of all joints are known, (n, 3) [m].
+
+        NaN elsewhere, and everywhere where a survey does not say what is too large.
+        """
+        out = np.full((len(states), 3), np.nan)
+        rows = np.flatnonzero(_on_flanks(states))
+        if len(rows) and np.isfinite(self._sure_up_to):
+            out[rows] = self.std_error(arm, states[rows])
+        return out
+
+    def unsure(self, std_on_flanks: Array) -> Bools:
         """Tell which states have a standard error beyond all of the survey, (n,).
 
         States with unknown directions are no such: their error is said to be the
         middle's.
+
+        Args:
+            std_on_flanks: Of the states, (n, 3) [m], see above.
         """
-        out, most = np.zeros(len(states), dtype=bool), self._sure_up_to
-        rows = np.flatnonzero(_on_flanks(states))
-        if len(rows) and np.isfinite(most):
-            out[rows] = (self.std_error(arm, states[rows]) > most).any(axis=1)
-        return out
+        return np.asarray((std_on_flanks > self._sure_up_to).any(axis=1))
 
     @property
     def _sure_up_to(self) -> float:

@@ -228,9 +228,12 @@ def test_states_beyond_the_survey_are_unsure_when_both_sides_are_known() -> None
     np.testing.assert_array_equal(m.std_error(NJ, states), p.std_model)
     worst = np.sort(p.std_model.max(axis=1))[15] / 3  # half of them beyond three times
     strict = replace(m, statistics={**m.statistics, "worst_std_mm": worst * 1e3})
-    found = strict.unsure(NJ, states)
+    std = strict.std_on_flanks(NJ, states)
+    found = strict.unsure(std)
+    np.testing.assert_array_equal(std, p.std_model)
     np.testing.assert_array_equal(found, p.std_model.max(axis=1) > 3 * worst)
     assert 0 < found.sum() < 30
     direction = np.array(states.direction)
     direction[found, 2] = 0.5
-    assert not strict.unsure(NJ, states.with_(direction=direction)).any()
+    between = strict.std_on_flanks(NJ, states.with_(direction=direction))
+    assert np.isnan(between[found]).all() and not strict.unsure(between).any()
