@@ -71,4 +71,4 @@ class LoadBacklash(JointEffect):
             sign = side if self.form == "signed" else np.ones_like(side)
             law = np.tanh(torque)
             law, second = sign * law, sign * (1.0 - law**2)
-        return np.stack([law, second], axis=2).reshape(len(batch), -1)
+        return np.stack([law, second], axis=2).reshape(len(batch), 2 * len(joint))

@@ -139,6 +139,9 @@ def test_joint_errors_are_their_basis_times_the_parameters() -> None:
         for k, column in enumerate((effect.basis(batch) * p).T):
             wanted[:, acts_on[k]] += column
         assert np.allclose(effect.angles(batch, p), wanted, rtol=0, atol=1e-13)
+        none = Batch(NJ, STATES[:0])
+        assert effect.basis(none).shape == (0, len(p))
+        assert effect.angles(none, p).shape == (0, 6)
 
 
 def test_a_profile_of_some_joints_is_its_harmonics_as_far_as_surveyed() -> None:
