@@ -110,8 +110,9 @@ class Combination:
         at = self.at(batch, p).walk.flange
         turn = rotation_vector(at @ np.swapaxes(batch.walk.flange, 1, 2))
         for effect, part in zip(self.effects, self.slices, strict=True):
-            columns = effect.rotation_columns(batch)
-            if columns is not None and not isinstance(effect, Geometry | JointEffect):
+            if isinstance(effect, Geometry | JointEffect):
+                continue
+            if (columns := effect.rotation_columns(batch)) is not None:
                 turn = turn + columns @ p[part]
         return turn
 
