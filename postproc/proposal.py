@@ -19,7 +19,7 @@ from postproc.reconcile import agree
 from postproc.report import Decisions, Status
 from postproc.robot.cell import Cell
 from postproc.solved import Solved
-from postproc.written import change_mm, new_numbers, turns, turns_in_file
+from postproc.written import change_mm, new_numbers, turns_in_file
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -114,8 +114,7 @@ def decide(
     for text, outside in solved.outside.items():
         reasons.mark(outside, text)
     guard_solutions(reasons, cell.arm, cell.limits, plan.q, solved.q)
-    turn = turns(plan, solved)
-    guard_turn(reasons, cell.limits, turn)
+    guard_turn(reasons, cell.limits, solved.turn)
     guard_size(reasons, cell.limits, correction, solved.residual)
     # A fly point also moves for what the corner at it is rounded by.
     moved = correction - (aside - plan.aside)
@@ -125,7 +124,9 @@ def decide(
     reasons.mark(strays, STRAYS)
     numbers = new_numbers(visits, plan, solved, aside)
     change = change_mm(visits, numbers, correction)
-    both = np.concatenate([change, turns_in_file(visits, turn) * LEVER_MM], axis=1)
+    both = np.concatenate(
+        [change, turns_in_file(visits, solved.turn) * LEVER_MM], axis=1
+    )
     agreement = agree(visits.literal, reasons.none, numbers, both)
     trusted = ~np.any([held, *solved.outside.values()], axis=0)
     usable = reasons.none
@@ -152,7 +153,9 @@ def decide(
         corrected=values,
         correction=np.where(corrected[:, None], correction, 0.0),
         std_error=np.full_like(correction, np.nan),  # when it is settled
-        turn=np.where(corrected[:, None], turn, 0.0) if options.orientation else NONE,
+        turn=np.where(corrected[:, None], solved.turn, 0.0)
+        if options.orientation
+        else NONE,
     )
     return Proposal(
         agreement.literal[chosen],

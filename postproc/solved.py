@@ -15,7 +15,7 @@ from postproc.accuracy.orientation import (
 )
 from postproc.accuracy.solve import solve
 from postproc.planning import Planned
-from postproc.pose import is_unknown
+from postproc.pose import is_unknown, rotation_vector
 from postproc.robot.cell import Cell
 from postproc.robot.state import States
 
@@ -31,6 +31,7 @@ class Solved:
         direction: Arrival direction that they are solved for, (n, 6).
         q: Joint angles, (n, 6) [rad], NaN where the command cannot be reached.
         command: TCP poses to command, base frame, (n, 4, 4) [m].
+        turn: Rotation of the commands against the targets, (n, 3) [rad].
         residual: Predicted landing against the wanted position, (n,) [m].
         std_error: Standard error of the model there, per axis, (n, 3) [m], as far as
             that was asked for.
@@ -40,6 +41,7 @@ class Solved:
     direction: Array
     q: Array
     command: Array
+    turn: Array
     residual: Array
     std_error: Array
     outside: dict[str, Bools]
@@ -71,6 +73,7 @@ def solve_visits(
         direction=np.array(states.direction),
         q=np.full((n, 6), np.nan),
         command=np.full((n, 4, 4), np.nan),
+        turn=np.full((n, 3), np.nan),
         residual=np.full(n, np.nan),
         std_error=np.full((n, 3), np.nan),
         outside=_outside_survey(model, planned, states),
@@ -99,21 +102,22 @@ def solve_again(
         states: Planned states, with the directions to correct for.
         orientation: Correct the orientation as well as the position.
     """
-    known = rows & _known(planned)
-    here = states[known]
-    part = solve(
-        model, cell.arm, planned.wanted[known], planned.plan.tool[known], here,
-        orientation,
-    )  # fmt: skip
+    plan, known = planned.plan, rows & _known(planned)
+    here, targets = states[known], plan.tcp[known]
+    wanted = np.array(targets)
+    wanted[:, :3, 3] += planned.shift[known]
+    part = solve(model, cell.arm, wanted, plan.tool[known], here, orientation)
     out = Solved(
         direction=np.where(rows[:, None], states.direction, solved.direction),
         q=np.array(solved.q),
         command=np.array(solved.command),
+        turn=np.array(solved.turn),
         residual=np.array(solved.residual),
         std_error=np.array(solved.std_error),
         outside=dict(solved.outside),
     )
     out.q[known], out.command[known] = part.q, part.command
+    out.turn[known] = _turns(part.command, targets)
     out.residual[known] = part.residual
     out.std_error[known] = model.std_on_flanks(cell.arm, here)
     _mark(out.outside, UNSURE, known, model.unsure(out.std_error[known]))
@@ -144,6 +148,17 @@ def _known(planned: Planned) -> Bools:
     """Tell which visits can be solved, (n,)."""
     lost = np.isnan(planned.plan.q).any(axis=1) | is_unknown(planned.plan.tcp)
     return np.asarray(~lost)
+
+
+def _turns(new: Array, old: Array) -> Array:
+    """Return the rotation from old poses to new ones (n, 4, 4), (n, 3) [rad]."""
+    new, old, out = new[:, :3, :3], old[:, :3, :3], np.zeros((len(new), 3))
+    rows = np.unique(np.nonzero(new != old)[0])
+    lost = np.isnan(new[rows]).any(axis=(1, 2))
+    out[rows[lost]] = np.nan
+    rows = rows[~lost]
+    out[rows] = rotation_vector(new[rows] @ np.swapaxes(old[rows], 1, 2))
+    return out
 
 
 def _outside_survey(model: Model, planned: Planned, states: States) -> dict[str, Bools]:

@@ -14,7 +14,6 @@ from postproc.pose import (
     products,
     rotation_from_vector,
     rotation_from_zyz,
-    rotation_vector,
 )
 from postproc.resolve import few_frames
 from postproc.solved import Solved
@@ -38,25 +37,12 @@ def new_numbers(visits: Visits, plan: Plan, solved: Solved, aside: Array) -> Arr
     command[:, :3] -= aside[poses]
     point = np.einsum("nij,nj->ni", placed, command)
     numbers[poses, :3] = point[:, :3] / MM
-    turn = turns_in_file(visits, turns(plan, solved))[poses]
+    turn = turns_in_file(visits, solved.turn)[poses]
     turned = np.any(turn != 0, axis=1) & ~np.isnan(turn[:, 0])
     rows, by = poses[turned], rotation_from_vector(turn[turned])
     written = numbers[rows, 3:]
     numbers[rows, 3:] = angles_near(written, by @ rotation_from_zyz(written))
     return numbers
-
-
-def turns(plan: Plan, solved: Solved) -> Array:
-    """Return the rotation of the commands against the targets, (n, 3) [rad]."""
-    new, old = solved.command[:, :3, :3], plan.tcp[:, :3, :3]
-    apart = (new != old).any(axis=(1, 2))
-    out = np.zeros((len(new), 3))
-    lost = np.flatnonzero(apart & np.isnan(new + old).any(axis=(1, 2)))
-    out[lost] = np.nan
-    apart[lost] = False
-    rows = np.flatnonzero(apart)
-    out[rows] = rotation_vector(new[rows] @ np.swapaxes(old[rows], 1, 2))
-    return out
 
 
 def base_in_uframe(visits: Visits, rows: Ints) -> Array:

@@ -35,10 +35,11 @@ def test_visits_solved_anew_are_as_if_solved_so_at_once(solving, orientation):
     aimed = states.with_(direction=direction)
     again = solve_again(first, rows, model, cell, planned, aimed, orientation)
     at_once = solve_visits(model, cell, planned, aimed, orientation)
-    for name in ("direction", "q", "command", "residual"):
+    for name in ("direction", "q", "command", "turn", "residual"):
         found, wanted = getattr(again, name), getattr(at_once, name)
         np.testing.assert_allclose(found, wanted, rtol=0, atol=1e-12)
     assert np.abs(again.q - first.q)[rows].max() > 1e-5
+    assert (np.nanmax(np.abs(again.turn)) > 1e-5) == orientation
 
 
 def test_standard_errors_are_those_of_the_sides_that_were_solved_for(solving):
