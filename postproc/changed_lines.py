@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from itertools import islice
+from itertools import compress, islice
+from operator import ne
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from postproc.language.lexis import BLANKS
@@ -21,6 +23,7 @@ Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 
 PIECE = 5_000  # lines that are masked at a time
+WIDEST = 64  # bytes of beginnings that are compared; wider: line by line
 
 _ASSIGNED = re.compile(r"\s*([A-Za-z_$][\w$.\[\]]*)\s*(?::=|:)")
 _TWO_WORDS = re.compile(r"\s*([A-Za-z_]+)\s+([A-Za-z_]+)")
@@ -48,11 +51,11 @@ def changed_rows(
 
     def compare(some: slice) -> Rows:
         old, new = before[some], after[some]
-        pairs = enumerate(zip(old, new, strict=True))
-        places = [k for k, (a, b) in pairs if a != b]
-        numbers = np.array(lines[some], dtype=np.int64)[places]
-        own = ([texts[k] for k in places] for texts in (old, new))
-        return _compare(file, numbers, *own)
+        differ = np.fromiter(map(ne, old, new), bool, len(old))
+        numbers = np.array(lines[some], dtype=np.int64)[differ]
+        if not differ.all():
+            old, new = (list(compress(texts, differ)) for texts in (old, new))
+        return _compare(file, numbers, old, new)
 
     tasks = list(pieces(len(before), PIECE))
     return joined_rows(file, list(in_turns(compare, tasks)))
@@ -77,14 +80,12 @@ def _compare(
     has, change = _changes(first, old, new, before)
     begins = np.full(len(lines), -1)
     begins[moved] = pairs.place[mine][first[:-1][moved]]
-    targets = _targets(before, begins)
-    names = {name: k for k, name in enumerate(dict.fromkeys(targets))}
+    names, target = _targets(before, begins)
     texts = {
         k: f"{before[k].decode('latin-1')} -> {after[k].decode('latin-1')}"
         for k in np.flatnonzero(~moved).tolist()
     }
-    at = np.array([names[name] for name in targets], dtype=np.int64)
-    return Rows(file, lines, list(names), at, first, old, new, change, has, texts)
+    return Rows(file, lines, names, target, first, old, new, change, has, texts)
 
 
 def _by_shapes(before: Sequence[bytes], after: Sequence[bytes]) -> Pairs:
@@ -131,25 +132,46 @@ def _changes(
     return has, change
 
 
-def _targets(before: Sequence[bytes], begins: Ints) -> list[str]:
+def _targets(before: Sequence[bytes], begins: Ints) -> tuple[list[str], Ints]:
     """Name what the numbers of lines belong to, once for lines that begin alike.
 
     Args:
         before: The lines.
         begins: Where their first number starts, -1 for a line without a name.
+
+    Returns:
+        Names, and the index of each line's, (n,).
     """
+    lead = np.flatnonzero(~_begin_as_before(before, begins))
     known: dict[bytes, str | None] = {}
-    names = []
-    for line, length in zip(before, begins.tolist(), strict=True):
-        if length < 0:
-            names.append("")
-            continue
-        begin = line[:length]
+    told: list[str | None] = []
+    for k, length in zip(lead.tolist(), begins[lead].tolist(), strict=True):
+        begin = before[k][: max(length, 0)]
         if begin not in known:
             known[begin] = _told_by(begin.translate(_AS_BLANKS).decode("latin-1"))
-        name = known[begin]
-        names.append(target_name(line.decode("latin-1")) if name is None else name)
-    return names
+        told.append(known[begin] if length >= 0 else "")
+    names: dict[str, int] = {}
+    code = [-1 if t is None else names.setdefault(t, len(names)) for t in told]
+    index = np.repeat(code, np.diff(lead, append=len(before)))
+    for k in np.flatnonzero(index < 0).tolist():
+        name = target_name(before[k].decode("latin-1"))
+        index[k] = names.setdefault(name, len(names))
+    return list(names), index
+
+
+def _begin_as_before(lines: Sequence[bytes], length: Ints) -> Bools:
+    """Tell which lines begin with the same so many bytes as the one before them."""
+    same: Bools = np.diff(length, prepend=-2) == 0
+    width = int(length.max(initial=0))
+    if width > WIDEST:
+        return np.zeros_like(same)
+    if not width:
+        return same
+    text = np.frombuffer(b"\n".join([*lines, bytes(width)]), dtype=np.uint8)
+    begin = sliding_window_view(text, width)[_starts(lines)]
+    other = (begin[1:] != begin[:-1]) & (np.arange(width) < length[1:, None])
+    same[1:] &= ~other.any(axis=1)
+    return same
 
 
 def _told_by(begin: str) -> str | None:

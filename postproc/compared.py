@@ -15,6 +15,7 @@ from postproc.entry_names import entry_names
 from postproc.exceptions import ProgramError
 from postproc.language.stamp import read_stamp
 from postproc.rows import Rows, joined_rows
+from postproc.text_lines import TextLines
 
 Ints = NDArray[np.int64]
 
@@ -46,7 +47,7 @@ class Compared:
         return [target_name(text) for text in texts]
 
 
-def _read_lines(path: Path) -> tuple[list[bytes], bool]:
+def _read_lines(path: Path) -> tuple[TextLines, bool]:
     """Read a file's lines without their endings; the stamp line is dropped."""
     try:
         data = path.read_bytes()
@@ -56,7 +57,7 @@ def _read_lines(path: Path) -> tuple[list[bytes], bool]:
     stamped = read_stamp(data) is not None
     if b"\r" in data:
         data = data.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
-    return data.split(b"\n")[stamped:], stamped
+    return TextLines.of(data, stamped), stamped
 
 
 def compare_files(original: Path, compensated: Path) -> Compared:
@@ -73,7 +74,7 @@ def compare_files(original: Path, compensated: Path) -> Compared:
     return Compared(original, compensated, before, rows, stamped)
 
 
-def _rows(file: str, before: list[bytes], after: list[bytes]) -> Iterator[Rows]:
+def _rows(file: str, before: Sequence[bytes], after: Sequence[bytes]) -> Iterator[Rows]:
     """Describe the lines that differ, in order."""
     if len(before) == len(after):
         yield changed_rows(file, range(1, len(before) + 1), before, after)

@@ -158,7 +158,10 @@ def _masked(cells: Bytes, plain: NDArray[np.bool_]) -> Bytes:
 
 def _lengths(cells: Bytes) -> Ints:
     """Count the characters of UTF-8 texts."""
-    lengths: Ints = ((cells != 0) & (cells & 0xC0 != 0x80)).sum(axis=1)
+    shown = cells != 0
+    if (cells >= 0x80).any():
+        shown &= cells & 0xC0 != 0x80
+    lengths: Ints = np.count_nonzero(shown, axis=1)
     return lengths
 
 

@@ -71,8 +71,8 @@ def print_blocks(
     bold = [(lambda _: "bold") if shown else None for _ in titles]
     print(_Layout(layout.left, bold).line(titles, widths), file=out)
     for block in chain(first, given):
-        lines, widths = layout.lines(block, widths)
-        out.write("\n".join([*lines, ""]))
+        text, widths = layout.text(block, widths)
+        out.write(text)
 
 
 def _measured(titles: Sequence[str], blocks: Sequence[Block]) -> Ints:
@@ -94,7 +94,7 @@ class _Layout:
     left: Sequence[bool]
     colours: Sequence[Callable[[str], str] | None]
 
-    def lines(self, block: Block, widths: Ints) -> tuple[list[str], Ints]:
+    def text(self, block: Block, widths: Ints) -> tuple[str, Ints]:
         """Write rows; return the widths from there on, too."""
         lengths = block.lengths.copy()
         for k, row in block.single.items():
@@ -109,11 +109,13 @@ class _Layout:
                 parts += [cells]
             else:
                 parts += [cells, blanks] if self.left[number] else [blanks, cells]
-        lines = joined([*parts, b"\n"]).decode().split("\n")[:-1]
-        lines = [*map(str.rstrip, lines)]
-        for k, row in block.single.items():
-            lines[k] = self.line(row, wide[k])
-        return lines, wide[-1]
+        text = joined([*parts, b"\n"]).decode()
+        if block.single or " \n" in text:
+            lines = [*map(str.rstrip, text.split("\n"))]
+            for k, row in block.single.items():
+                lines[k] = self.line(row, wide[k])
+            text = "\n".join(lines)
+        return text, wide[-1]
 
     def line(self, row: Sequence[str], widths: Ints) -> str:
         """Write a row of texts."""

@@ -114,9 +114,20 @@ def pair_numbers(before: Sequence[bytes], after: Sequence[bytes]) -> Pairs:
         return Pairs(np.zeros(len(before), dtype=bool), ints, none, none, ints)
     if np.array_equal(a.rest, b.rest):
         return _read(a, b, np.ones(len(before), dtype=bool))
-    rests = (text.rest.tobytes().split(b"\n")[:-1] for text in (a, b))
-    same = np.array([x == y for x, y in zip(*rests, strict=True)])
+    same = _same_lines(a.rest, b.rest)
     return _read(a.on(same), b.on(same), same)
+
+
+def _same_lines(a: Bytes, b: Bytes) -> Bools:
+    """Tell which of equally many lines, each with its line feed, are the same."""
+    lengths = [np.diff(np.flatnonzero(text == 10), prepend=-1) for text in (a, b)]
+    same: Bools = lengths[0] == lengths[1]
+    if not same.all():
+        both = zip((a, b), lengths, strict=True)
+        a, b = (text[np.repeat(same, length)] for text, length in both)
+    lines, ends = np.flatnonzero(same), np.cumsum(lengths[0][same])
+    same[lines[np.searchsorted(ends, np.flatnonzero(a != b), side="right")]] = False
+    return same
 
 
 def _read(a: _Text, b: _Text, alike: Bools) -> Pairs:

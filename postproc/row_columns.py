@@ -88,7 +88,10 @@ def words(texts: Sequence[str], index: Ints, text: Callable[[str], str]) -> Colu
         index: Which one a row has.
         text: How it is written.
     """
-    used, at = np.unique(index, return_inverse=True)
-    table = np.array([text(texts[k]).encode() for k in used.tolist()], dtype="S")
-    rows: Column = table.view(np.uint8).reshape(len(used), -1)[at.ravel()]
+    least = int(index.min(initial=len(texts)))
+    used = np.bincount(index - least) > 0
+    wanted = (np.flatnonzero(used) + least).tolist()
+    table = np.array([text(texts[k]).encode() for k in wanted], dtype="S")
+    at = (np.cumsum(used) - 1)[index - least]
+    rows: Column = table.view(np.uint8).reshape(len(wanted), -1)[at]
     return rows

@@ -1,0 +1,24 @@
+"""Lines cut out of a file are those of a split."""
+
+from __future__ import annotations
+
+import pytest
+
+from postproc import text_lines
+from postproc.text_lines import TextLines
+
+
+@pytest.mark.parametrize("data", [b"", b"\n", b"one", b"a\nbc\n\nd\n", b"\n\n\nlast"])
+@pytest.mark.parametrize("at_once", [2, 1_000_000])
+def test_lines_are_those_of_a_split(monkeypatch, data: bytes, at_once: int) -> None:
+    monkeypatch.setattr(text_lines, "AT_ONCE", at_once)
+    wanted = data.split(b"\n")
+    lines = TextLines.of(data)
+    assert len(lines) == len(wanted) and list(lines) == wanted
+    assert [lines[k] for k in range(len(wanted))] == wanted
+    assert lines[-1] == wanted[-1]
+    for some in (slice(1, 3), slice(0, 0), slice(2, 99), slice(None, None, -1)):
+        assert lines[some] == wanted[some]
+    with pytest.raises(IndexError):
+        lines[len(wanted)]
+    assert list(TextLines.of(data, 1)) == wanted[1:]
