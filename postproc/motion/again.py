@@ -9,20 +9,20 @@ or lies where the flow branches, the whole course is traced anew.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from postproc.motion.reach import Course, Points, points, reach
 from postproc.motion.rounding import rounded
-from postproc.motion.spans import spans
 from postproc.motion.targets import Kind, Targets
 from postproc.motion.trace import trace
 from postproc.motion.workspace import Known
 from postproc.robot.arm import Arm
-from postproc.robot.chains import Edges
-from postproc.robot.direction import sides
+from postproc.robot.direction import Passages, passages, sides
+from postproc.robot.play import Clamps
+from postproc.spans import spans
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -87,10 +87,11 @@ def reach_again(arm: Arm, before: Course, targets: Targets, moved: Bools) -> Cou
     slot = np.array(before.slot)
     slot[part.rows[part.kept]] = exact.slot[part.kept]
     passed = _patched(before.passed, part, points(traced))
-    edges = _spliced(before.edges, part, traced.edges)
+    now = passages(arm, traced.q, traced.edges)
+    ways = _spliced(before.passages, part, now)
     return Course(
-        targets, _patched(before.exact, part, points(exact)), passed, slot, edges,
-        sides(arm, passed.q, edges, before.begin.past.play), before.begin,
+        targets, _patched(before.exact, part, points(exact)), passed, slot, ways,
+        sides(arm, passed.q, ways, before.begin.past.play), before.begin,
     )  # fmt: skip
 
 
@@ -181,44 +182,20 @@ def _patched(before: Points, part: _Part, now: Points) -> Points:
     return Points(q, flange)
 
 
-def _spliced(before: Edges, part: _Part, now: Edges) -> Edges:
+def _spliced(before: Passages, part: _Part, now: Passages) -> Passages:
     """Put new edges in: those between targets whose passing may change."""
     last_kept = np.append(False, part.kept[:-1]) & ~part.seeds
     alone = _from_nowhere(part.targets)
     rows = np.flatnonzero(part.kept & ~part.seeds & (last_kept | alone))
     edge = _edges_of(before.first, part.rows[rows])
     new = _edges_of(now.first, rows)
-    source, count = np.array(before.source), np.diff(before.start)
-    found = now.source[new]
+    source, found = np.array(before.source), now.source[new]
     source[edge] = np.where(found >= 0, part.rows[np.maximum(found, 0)], found)
-    count[edge] = np.diff(now.start)[new]
-    start = np.concatenate([[0], np.cumsum(count)])
-    taken = np.zeros(len(source), dtype=bool)
-    taken[edge] = True
-    at = np.repeat(taken, count)
-    here = np.repeat(~taken, np.diff(before.start))
-    there = _samples_of(now.start, new)
-    path, uneven = np.empty((len(at), 6)), np.zeros(len(at), dtype=bool)
-    path[~at], path[at] = before.path[here], now.path[there]
-    uneven[~at] = _marked(before)[here]
-    uneven[at] = _marked(now)[there]
-    return replace(
-        before, source=source, path=path, start=start, uneven=np.flatnonzero(uneven)
-    )
-
-
-def _marked(edges: Edges) -> Bools:
-    """Tell which samples are uneven, (s,)."""
-    marked = np.zeros(len(edges.path), dtype=bool)
-    marked[edges.uneven] = True
-    return marked
+    lo, hi = np.array(before.clamps.lo), np.array(before.clamps.hi)
+    lo[edge], hi[edge] = now.clamps.lo[new], now.clamps.hi[new]
+    return Passages(before.first, source, Clamps(lo, hi))
 
 
 def _edges_of(first: Ints, rows: Ints) -> Ints:
     """List the edges that lead to visits."""
     return spans(first[rows], first[rows + 1] - first[rows])
-
-
-def _samples_of(start: Ints, edge: Ints) -> Ints:
-    """List the samples of edges."""
-    return spans(start[edge], start[edge + 1] - start[edge])

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from postproc.motion.branches import LOST, SUSPICIOUS, nearest_slots
 from postproc.motion.reasons import CODE, PATH_JUMP
-from postproc.motion.spans import spans
 from postproc.motion.workspace import Workspace
+from postproc.spans import spans
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]

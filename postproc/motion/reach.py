@@ -12,8 +12,7 @@ from postproc.motion.standing import NOWHERE, Standing
 from postproc.motion.targets import Targets
 from postproc.motion.trace import Trace, trace
 from postproc.robot.arm import Arm
-from postproc.robot.chains import Edges
-from postproc.robot.direction import Sides, sides
+from postproc.robot.direction import Passages, Sides, passages, sides
 from postproc.robot.past import NOTHING, Past
 
 Array = NDArray[np.float64]
@@ -59,7 +58,7 @@ class Course:
         exact: At the targets, as if the arm stopped at each.
         passed: Where the path, its corners rounded, passes them.
         slot: Branch taken, (n,), -1 where it was not looked up.
-        edges: The rounded paths between.
+        passages: What the rounded paths between do to the joints' play.
         sides: On which sides the joints arrive.
         begin: Where the arm stands at the first target, if that is known beforehand.
     """
@@ -68,7 +67,7 @@ class Course:
     exact: Points
     passed: Points
     slot: Ints
-    edges: Edges
+    passages: Passages
     sides: Sides
     begin: Standing = NOWHERE
 
@@ -111,9 +110,10 @@ def reach(arm: Arm, targets: Targets, begin: Standing = NOWHERE) -> Course:
     """
     exact = trace(arm, targets, begin.known)
     traced = rounded(arm, targets, exact, timed=False)
-    found = sides(arm, traced.q, traced.edges, begin.past.play)
+    ways = passages(arm, traced.q, traced.edges)
+    found = sides(arm, traced.q, ways, begin.past.play)
     return Course(
-        targets, points(exact), points(traced), exact.slot, traced.edges, found, begin
+        targets, points(exact), points(traced), exact.slot, ways, found, begin
     )
 
 

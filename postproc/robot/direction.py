@@ -17,10 +17,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from postproc.robot.arm import Arm
-from postproc.robot.chains import Chains, Edges, cut
+from postproc.robot.chains import Chains, Edges, chained
 from postproc.robot.past import NOTHING, Past
 from postproc.robot.play import Array, Clamps, Ints, identity, passing, prefix
 from postproc.robot.travel import last_reversals
+from postproc.robot.walks import walks
 
 WIDTH_IN_PLAYS = 4.0
 LAST = np.array([-1])  # copied, so that the others need not be kept
@@ -60,6 +61,20 @@ class Sides:
     play: Clamps
 
 
+@dataclass(frozen=True)
+class Passages:
+    """What passing each of e edges does to the joints' play.
+
+    Attributes:
+        first, source: As in `Edges`.
+        clamps: The whole way over an edge, (e, 6) [rad].
+    """
+
+    first: Ints
+    source: Ints
+    clamps: Clamps
+
+
 def chain(n: int) -> tuple[Ints, Ints]:
     """Return `Edges.first` and `Edges.source` of n visits, one after the other."""
     return np.arange(n + 1), np.arange(n) - 1
@@ -92,24 +107,38 @@ def arrivals(arm: Arm, q: Array, edges: Edges, before: Past = NOTHING) -> Arriva
     """
     if len(q) == 0:
         return Arrivals(np.empty((0, 6)), np.empty((0, 6)), np.empty((0, 6)), NOTHING)
-    chains = cut(q, arm.coupling, edges)
-    half = _half_width(arm)
-    z = _states(chains, half, before.play)
+    chains = chained(q, arm.coupling, edges.first, edges.source)
+    ways, half = walks(chains, arm.coupling, edges), _half_width(arm)
+    z = _states(chains, ways.clamps(half), half, before.play)
     forward = chains.angles - z.hi >= half / 2
     backward = chains.angles - z.lo <= -half / 2
     direction = forward.astype(float) - backward.astype(float)
-    turned = last_reversals(chains, arm.play, before.turned)
+    turned = last_reversals(chains, ways, arm.play, before.turned)
     travel = np.abs(chains.angles - turned.angle)
     past = Past(z[LAST], turned[LAST])
     return Arrivals(direction, _side(chains.angles, z, half), travel, past)
 
 
-def sides(arm: Arm, q: Array, edges: Edges, before: Clamps = NOTHING.play) -> Sides:
-    """Return the sides of `arrivals` alone."""
+def passages(arm: Arm, q: Array, edges: Edges) -> Passages:
+    """Find what passing the edges does to the joints' play.
+
+    Args:
+        arm: The arm; its play and coupling are used.
+        q: Joint angles at the visits, (n, 6) [rad], NaN where not known.
+        edges: The geometric paths between them.
+    """
+    chains = chained(q, arm.coupling, edges.first, edges.source)
+    ways = walks(chains, arm.coupling, edges)
+    return Passages(edges.first, edges.source, ways.clamps(_half_width(arm)))
+
+
+def sides(arm: Arm, q: Array, passed: Passages, before: Clamps = NOTHING.play) -> Sides:
+    """Return the sides of `arrivals` alone, from what passing the edges does."""
     if len(q) == 0:
         return Sides(np.empty((0, 6)), NOTHING.play)
-    chains, half = cut(q, arm.coupling, edges), _half_width(arm)
-    z = _states(chains, half, before)
+    chains = chained(q, arm.coupling, passed.first, passed.source)
+    half = _half_width(arm)
+    z = _states(chains, passed.clamps, half, before)
     return Sides(_side(chains.angles, z, half), z[LAST])
 
 
@@ -127,13 +156,19 @@ def _side(angles: Array, z: Clamps, half: Array) -> Array:
     return np.where(on_flank, np.sign(side), side)
 
 
-def _states(chains: Chains, half: Array, before: Clamps) -> Clamps:
+def _states(chains: Chains, own: Clamps, half: Array, before: Clamps) -> Clamps:
     """Find what is known of the play's state at every visit, as intervals (n, 6).
 
     The intervals at the heads only grow and their ends come from a finite set, so that
     the work list runs dry.
+
+    Args:
+        chains: The visits.
+        own: The clamps of each edge alone, (e, 6).
+        half: Half of the width of the play, (6,) [rad].
+        before: What is known at the first visit.
     """
-    passed = _passed(chains, half)
+    passed = prefix(own, chains.begins()) if len(own.lo) else own
     since_head = _since_head(chains, passed)
     known: list[Clamps | None] = [None] * len(chains.heads)
     followers = chains.followers()
@@ -169,16 +204,6 @@ def _from_heads(
         arrived = Clamps(lo, hi)[at[rows]].then(since_head[rows])
         out.lo[rows], out.hi[rows] = arrived.lo, arrived.hi
     return out
-
-
-def _passed(chains: Chains, half: Array) -> Clamps:
-    """Compose the clamps of each edge, within chains those since the head, (e, 6)."""
-    if len(chains.values) == 0:
-        return identity((len(chains.source), 6))
-    begins = np.zeros(len(chains.values), dtype=bool)
-    begins[chains.start[chains.begins()]] = True
-    steps = prefix(passing(chains.values, half), begins)
-    return steps[np.maximum(chains.start[1:] - 1, 0)]
 
 
 def _since_head(chains: Chains, passed: Clamps) -> Clamps:

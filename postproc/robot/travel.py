@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from postproc.robot.chains import Chains
 from postproc.robot.play import Array, Ints, passing, prefix
+from postproc.robot.walks import Walks
 
 ROUNDS = 2  # the second one sees what arrives over jumps backwards
 
@@ -39,7 +40,7 @@ def never_turned(angle: Array) -> Turned:
     return Turned(np.zeros_like(angle), np.array(angle), np.array(angle))
 
 
-def last_reversals(chains: Chains, play: Array, before: Turned) -> Turned:
+def last_reversals(chains: Chains, ways: Walks, play: Array, before: Turned) -> Turned:
     """Find the last reversal before every visit, (n, 6); travel counts from there.
 
     A reversal is a return by more than one play from the extreme value, so that jitter
@@ -48,7 +49,8 @@ def last_reversals(chains: Chains, play: Array, before: Turned) -> Turned:
     direction the smallest of them, else 0.
 
     Args:
-        chains: The paths.
+        chains: The visits.
+        ways: The paths between them.
         play: As in `along`.
         before: What is known at the first visit, (1, 6); (0, 6) where nothing is.
     """
@@ -58,11 +60,11 @@ def last_reversals(chains: Chains, play: Array, before: Turned) -> Turned:
     for _ in range(ROUNDS if len(chains.heads) > 1 else 1):
         for c, head in enumerate(chains.heads):
             given = before if head == 0 else before[:0]
-            at_head = _merged(chains, head, last, seen, play, given)
+            at_head = _merged(chains, ways, head, last, seen, play, given)
             last.side[head], last.angle[head] = at_head.side, at_head.angle
             last.z[head] = at_head.z
             if chains.ends[c] > head + 1:
-                samples, visits = chains.body(c)
+                samples, visits = ways.of(chains.body(c))
                 since = along(samples, at_head, play)
                 rows = slice(head + 1, chains.ends[c])
                 last.side[rows] = since.side[visits]
@@ -98,6 +100,7 @@ def along(values: Array, before: Turned, play: Array) -> Turned:
 
 def _merged(
     chains: Chains,
+    ways: Walks,
     head: int,
     last: Turned,
     seen: NDArray[np.bool_],
@@ -117,7 +120,8 @@ def _merged(
             side = last.side[source]
             z = chains.angles[source] - side * half
             before = Turned(side, last.angle[source], z)
-            pasts.append(along(chains.samples_of(edge), before, play)[-1])
+            samples, _ = ways.of(slice(edge, edge + 1))
+            pasts.append(along(samples, before, play)[-1])
     if not pasts:
         return never_turned(q)
     side = np.array([p.side for p in pasts])
