@@ -66,10 +66,10 @@ class Lines:
     def marks(self, word: str) -> Iterator[tuple[int, str]]:
         """Yield (physical line, next word) of comments like ``-- MEASURE P12``."""
         pattern = re.compile(rb"--+[ \t]*" + word.encode() + rb"\b[ \t]*([^\s]*)", re.I)
-        starts = self.source.line_starts
-        for found in pattern.finditer(self.source.data):
-            row = int(np.searchsorted(starts, found.start(), side="right")) - 1
-            if self.comment[row] == found.start():
+        rows = np.flatnonzero(self.comment >= 0)
+        for row, start in zip(rows.tolist(), self.comment[rows].tolist(), strict=True):
+            found = pattern.match(self.source.data, start)
+            if found:
                 yield row + 1, found.group(1).decode("latin-1")
 
 

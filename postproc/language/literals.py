@@ -95,7 +95,7 @@ def find_literals(
     _, example, inverse = np.unique(slots[:, 0], return_index=True, return_inverse=True)
     distinct = slots[example]
     mixed = np.zeros(len(distinct), dtype=bool)
-    np.logical_or.at(mixed, inverse, (slots != distinct[inverse]).any(axis=1))
+    mixed[inverse[(slots != distinct[inverse]).any(axis=1)]] = True
     used = np.bincount(distinct.ravel(), minlength=len(numbering.start))
     mixed |= (used[distinct] > 1).any(axis=1) | numbering.apart(distinct)
     kept = np.flatnonzero(~mixed)
@@ -128,7 +128,7 @@ def _literals(
         start=start,
         end=end,
         joints=columns.target[visit] == Target.JOINTS,
-        name=tuple(texts[i] for i in columns.name[visit].tolist()),
+        name=tuple(map(texts.__getitem__, columns.name[visit].tolist())),
         shared=_any(columns.shared, literal, len(slots)),
         taught=_any(columns.taught, literal, len(slots)),
         pinned=("",) * len(slots),

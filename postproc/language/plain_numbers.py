@@ -189,9 +189,8 @@ def _digits(a: Bytes, end: Ints, count: Ints) -> Ints:
 def _words(a: Bytes, end: Ints) -> Words:
     """Return the eight bytes before places of a text as words, the last one on top."""
     padded = np.concatenate([np.zeros(8, dtype=np.uint8), a])
-    rows = np.lib.stride_tricks.sliding_window_view(padded, 8)[end]
-    words: Words = rows.view("<u8")[:, 0]
-    return words
+    words: Words = np.ndarray(len(a) + 1, "<u8", padded, strides=(1,))
+    return words[end]
 
 
 def _shift(count: Ints) -> Words:

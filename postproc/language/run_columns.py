@@ -15,6 +15,8 @@ from postproc.language.visits import Target
 
 Ints = NDArray[np.int64]
 
+KINDS = max(Target) + 1  # what a target can be is less
+
 
 def fill_run(collector: Collector, at: int, run: Run) -> None:
     """Fill the visits of a stretch, the first of which is visit `at`."""
@@ -96,15 +98,15 @@ def _reasons(
     """Say why moves of one variant must not be compensated."""
     c = collector.columns
     known = run.reason or run.ways[variant][1] or collector.recursion(run)
-    pairs = np.stack([c.setting[mine], c.target[mine]], axis=1)
-    distinct, which = np.unique(pairs, axis=0, return_inverse=True)
+    pairs = c.setting[mine] * KINDS + c.target[mine]  # many rows, few pairs
+    distinct, which = np.unique(pairs, return_inverse=True)
     reason = [
         collector.reasons(
             known or collector.settings.problem(setting, Target(target)) or otherwise
         )
-        for setting, target in distinct.tolist()
+        for setting, target in (divmod(pair, KINDS) for pair in distinct.tolist())
     ]
-    c.reason[mine] = np.array(reason, dtype=np.int64)[which.ravel()]
+    c.reason[mine] = np.array(reason, dtype=np.int64)[which]
 
 
 def _points(collector: Collector, at: int, run: Run, points: Points) -> None:

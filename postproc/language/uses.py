@@ -50,5 +50,7 @@ def find_uses(
             follows[visit] = rows[0]
         else:
             stay |= {row: _IN_PART for row in rows.tolist() if 0 <= row not in stay}
+    if not stay:
+        return literals, follows
     why = tuple(stay.get(row, "") for row in range(len(literals)))
-    return replace(literals, pinned=why) if stay else literals, follows
+    return replace(literals, pinned=why), follows
