@@ -51,7 +51,7 @@ def measure(kind: str, n: int, cell: Path, model: Path) -> dict[str, float]:
 
 
 def peak_mib() -> float:
-    """Return the most memory this process has held [MiB].
+    """Return the most memory this process has held [MiB], without those it forked.
 
     Not by getrusage: a process begins with the peak of the one that started it.
     """

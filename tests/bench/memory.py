@@ -1,0 +1,40 @@
+"""Memory of a process and of those that it forks, watched from outside."""
+
+from __future__ import annotations
+
+import subprocess
+import time
+from pathlib import Path
+
+EVERY = 0.2  # [s]
+KIBI = 1024
+
+
+def watched(command: list[str], folder: Path) -> tuple[str, str, int, float]:
+    """Run a command; return output, errors, exit code and its most memory [MiB].
+
+    Pages that several of its processes share count once. What is held for less than
+    `EVERY` may be missed.
+    """
+    most = 0.0
+    with subprocess.Popen(
+        command, cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    ) as process:
+        while process.poll() is None:
+            most = max(most, held_mib(process.pid))
+            time.sleep(EVERY)
+        out, errors = process.communicate()
+    return out, errors, process.returncode, most
+
+
+def held_mib(pid: int) -> float:
+    """Return what a process and all below it hold now [MiB]; 0 where it is gone."""
+    place = Path("/proc") / str(pid)
+    try:
+        told = (place / "smaps_rollup").read_text(encoding="ascii")
+        below = [task.read_text() for task in place.glob("task/*/children")]
+    except OSError:
+        return 0.0
+    (own,) = (row for row in told.splitlines() if row.startswith("Pss:"))
+    children = (int(child) for listed in below for child in listed.split())
+    return int(own.split()[1]) / KIBI + sum(map(held_mib, children))
