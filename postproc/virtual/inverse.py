@@ -15,6 +15,8 @@ from postproc.virtual.kinematics import Chain
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
+RIGHT = np.radians([-90.0, 0.0, -90.0, 90.0, -90.0, 0.0])
+NOT_RIGHT = 1e-5  # [rad]
 WRIST, SHOULDER, ELBOW = 4, 2, 1  # weights of the flags in a branch number
 
 
@@ -24,9 +26,9 @@ def require_closed_form(chain: Chain) -> None:
     Raises:
         PlanError: The arm is no ortho-parallel arm with a spherical wrist.
     """
-    right = np.radians([-90.0, 0.0, -90.0, 90.0, -90.0, 0.0])
-    zeros = [*chain.d[[1, 2, 4]], *chain.a[3:], *chain.beta]
-    if not np.allclose(chain.alpha, right) or np.any(np.abs(zeros) > 1e-9):
+    zeros = np.concatenate([chain.d[[1, 2, 4]], chain.a[3:], chain.beta])
+    bent = np.abs(chain.alpha - RIGHT).max() > NOT_RIGHT
+    if bent or np.abs(zeros).max() > 1e-9:
         raise PlanError(
             "the virtual arm solves Cartesian targets only for arms with a parallel "
             "second and third axis and a spherical wrist; give it joint targets"

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-
-from postproc.virtual.rotation import pose
 
 Array = NDArray[np.float64]
 
@@ -52,21 +51,42 @@ class Chain:
         """Convert D-H angles (n, 6) to controller angles (n, 6) [rad]."""
         return np.asarray((theta - self.offset) / self.sense - self.shift)
 
+    @cached_property
+    def twists(self) -> Array:
+        """Return Rx(alpha) Ry(beta) of every link, (6, 3, 3)."""
+        ca, sa = np.cos(self.alpha), np.sin(self.alpha)
+        cb, sb = np.cos(self.beta), np.sin(self.beta)
+        zero = np.zeros(6)
+        rows = [[cb, zero, sb], [sa * sb, ca, -sa * cb], [-ca * sb, sa, ca * cb]]
+        return np.moveaxis(np.array(rows), -1, 0)
+
+    def links(self, q: Array) -> Array:
+        """Return Rz(theta) Tz(d) Tx(a) Rx(alpha) Ry(beta), (n, 6, 4, 4).
+
+        Args:
+            q: Controller joint angles, (n, 6) [rad].
+        """
+        theta = self.dh_angles(q)
+        turn, out = np.zeros((*theta.shape, 3, 3)), np.zeros((*theta.shape, 4, 4))
+        ct, st = np.cos(theta), np.sin(theta)
+        turn[..., 0, 0] = turn[..., 1, 1] = ct
+        turn[..., 0, 1], turn[..., 1, 0], turn[..., 2, 2] = -st, st, 1.0
+        out[..., :3, :3] = turn @ self.twists
+        out[..., 0, 3], out[..., 1, 3] = self.a * ct, self.a * st
+        out[..., 2, 3], out[..., 3, 3] = self.d, 1.0
+        return out
+
     def frames(self, q: Array) -> Array:
         """Return all frames (n, 7, 4, 4), arm base to flange, in the arm base.
 
         Args:
             q: Controller joint angles, (n, 6) [rad].
         """
-        theta = self.dh_angles(np.asarray(q, dtype=float))
-        a, d = (np.broadcast_to(x, theta.shape) for x in (self.a, self.d))
-        out = np.empty((len(theta), 7, 4, 4))
+        links = self.links(np.asarray(q, dtype=float))
+        out = np.empty((len(links), 7, 4, 4))
         out[:, 0] = np.eye(4)
         for i in range(6):
-            link = link_transform(
-                theta[:, i], d[:, i], a[:, i], self.alpha[i], self.beta[i]
-            )
-            out[:, i + 1] = out[:, i] @ link
+            np.matmul(out[:, i], links[:, i], out=out[:, i + 1])
         return out
 
     def flange(self, q: Array) -> Array:
@@ -76,19 +96,6 @@ class Chain:
     def bent(self, growth: Array) -> Chain:
         """Return a chain whose lengths grew by the relative amounts (n, 6)."""
         return replace(self, a=self.a * (1 + growth), d=self.d * (1 + growth))
-
-
-def link_transform(
-    theta: Array, d: Array, a: Array, alpha: float, beta: float
-) -> Array:
-    """Return Rz(theta) Tz(d) Tx(a) Rx(alpha) Ry(beta) as poses (n, 4, 4)."""
-    ct, st = np.cos(theta), np.sin(theta)
-    ca, sa, cb, sb = np.cos(alpha), np.sin(alpha), np.cos(beta), np.sin(beta)
-    twist = np.array([[cb, 0, sb], [sa * sb, ca, -sa * cb], [-ca * sb, sa, ca * cb]])
-    turn = np.zeros((len(theta), 3, 3))
-    turn[:, 0, 0] = turn[:, 1, 1] = ct
-    turn[:, 0, 1], turn[:, 1, 0], turn[:, 2, 2] = -st, st, 1.0
-    return pose(turn @ twist, np.stack([a * ct, a * st, d], axis=-1))
 
 
 def _nj220() -> Chain:
