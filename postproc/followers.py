@@ -64,6 +64,8 @@ def carry_along(
     """
     rows, at = followers(visits, agreement)
     rows, at = rows[chosen[at]], at[chosen[at]]
+    if len(rows) == 0:
+        return
     direct = np.flatnonzero(visits.literal >= 0)
     written = np.zeros((len(visits.literals), 6))
     written[visits.literal[direct]] = visits.values[direct]

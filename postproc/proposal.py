@@ -68,13 +68,15 @@ def propose(
 
     Args and returns are those of `decide`: every round leaves more points alone.
     """
-    strays = np.zeros(len(held), dtype=bool)
-    shift = solved.command[:, :3, 3] - planned.plan.tcp[:, :3, 3]
-    shift -= aside - planned.plan.aside
+    strays, arcs = np.zeros(len(held), dtype=bool), planned.targets.via.any()
     while True:
         found = decide(
             reading, planned, solved, aside, held, strays, cell, options
         )  # fmt: skip
+        if not arcs:
+            return found
+        shift = solved.command[:, :3, 3] - planned.plan.tcp[:, :3, 3]
+        shift -= aside - planned.plan.aside
         moves = np.where(found.corrected[:, None], shift, 0.0)
         values = found.decisions.corrected
         more = strayed_along(reading.visits, planned, cell, values, moves) & ~strays
@@ -124,9 +126,10 @@ def decide(
     reasons.mark(strays, STRAYS)
     numbers = new_numbers(visits, plan, solved, aside)
     change = change_mm(visits, numbers, correction)
-    both = np.concatenate(
-        [change, turns_in_file(visits, solved.turn) * LEVER_MM], axis=1
-    )
+    both = change
+    if len(solved.turned):
+        turn = turns_in_file(visits, solved)
+        both = np.concatenate([change, turn * LEVER_MM], axis=1)
     agreement = agree(visits.literal, reasons.none, numbers, both)
     trusted = ~np.any([held, *solved.outside.values()], axis=0)
     usable = reasons.none

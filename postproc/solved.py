@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,11 +16,12 @@ from postproc.accuracy.orientation import (
 )
 from postproc.accuracy.solve import solve
 from postproc.planning import Planned
-from postproc.pose import is_unknown, rotation_vector
+from postproc.pose import has_unknown, is_unknown, rotation_vector
 from postproc.robot.cell import Cell
 from postproc.robot.state import States
 
 Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 
 
@@ -45,6 +47,12 @@ class Solved:
     residual: Array
     std_error: Array
     outside: dict[str, Bools]
+
+    @cached_property
+    def turned(self) -> Ints:
+        """Visits whose command is known to turn the tool, ascending."""
+        some = (self.turn < 0.0) | (self.turn > 0.0)
+        return np.unique(np.nonzero(some)[0])
 
 
 def solve_visits(
@@ -146,7 +154,7 @@ def std_errors(
 
 def _known(planned: Planned) -> Bools:
     """Tell which visits can be solved, (n,)."""
-    lost = np.isnan(planned.plan.q).any(axis=1) | is_unknown(planned.plan.tcp)
+    lost = has_unknown(planned.plan.q) | is_unknown(planned.plan.tcp)
     return np.asarray(~lost)
 
 

@@ -37,9 +37,10 @@ def new_numbers(visits: Visits, plan: Plan, solved: Solved, aside: Array) -> Arr
     command[:, :3] -= aside[poses]
     point = np.einsum("nij,nj->ni", placed, command)
     numbers[poses, :3] = point[:, :3] / MM
-    turn = turns_in_file(visits, solved.turn)[poses]
-    turned = np.any(turn != 0, axis=1) & ~np.isnan(turn[:, 0])
-    rows, by = poses[turned], rotation_from_vector(turn[turned])
+    rows = solved.turned[visits.target[solved.turned] == Target.POSE]
+    if len(rows) == 0:
+        return numbers
+    by = rotation_from_vector(turns_in_file(visits, solved)[rows])
     written = numbers[rows, 3:]
     numbers[rows, 3:] = angles_near(written, by @ rotation_from_zyz(written))
     return numbers
@@ -53,12 +54,12 @@ def base_in_uframe(visits: Visits, rows: Ints) -> Array:
     return products(inverse(frames), frames, visits.uframe[rows], visits.base[rows])
 
 
-def turns_in_file(visits: Visits, turn: Array) -> Array:
-    """Give the rotations in the frame that the numbers are in, (n, 3) [rad]."""
-    out, poses = np.array(turn), np.flatnonzero(visits.target == Target.POSE)
-    poses = poses[(turn[poses] != 0).any(axis=1)]
+def turns_in_file(visits: Visits, solved: Solved) -> Array:
+    """Give the commands' rotations in the frame of the numbers, (n, 3) [rad]."""
+    out = np.array(solved.turn)
+    poses = solved.turned[visits.target[solved.turned] == Target.POSE]
     axes = base_in_uframe(visits, poses)[:, :3, :3]
-    out[poses] = np.einsum("nij,nj->ni", axes, turn[poses])
+    out[poses] = np.einsum("nij,nj->ni", axes, out[poses])
     return out
 
 

@@ -8,8 +8,10 @@ from scipy.spatial.transform import Rotation
 
 from postproc.pose import (
     cross,
+    has_unknown,
     inverse,
     is_unknown,
+    lengths,
     pose_from_record,
     products,
     record_from_pose,
@@ -90,3 +92,15 @@ def test_cross_is_that_of_numpy():
     a, b = np.random.default_rng(5).normal(size=(2, 7, 6, 3))
     np.testing.assert_array_equal(cross(a, b), np.cross(a, b))
     np.testing.assert_array_equal(cross(a[0, 0], b), np.cross(a[0, 0], b))
+
+
+def test_lengths_are_those_of_numpy_to_the_last_digit():
+    vectors = np.random.default_rng(3).standard_normal((1000, 3))
+    np.testing.assert_array_equal(lengths(vectors), np.linalg.norm(vectors, axis=1))
+    assert np.isnan(lengths(np.array([[1.0, np.nan, 0.0]]))).all()
+
+
+def test_a_row_with_one_unknown_number_is_unknown():
+    rows = np.zeros((3, 6))
+    rows[1, 5] = np.nan
+    assert has_unknown(rows).tolist() == [False, True, False]

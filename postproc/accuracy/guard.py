@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from postproc.pose import MM
+from postproc.pose import MM, has_unknown, lengths
 from postproc.reasons import Reasons
 from postproc.robot.arm import Arm
 from postproc.robot.cell import LimitSection
@@ -32,9 +32,10 @@ def guard_solutions(
             corrected pose has no solution.
     """
     with np.errstate(invalid="ignore"):
-        lost = np.asarray(np.isnan(solved).any(axis=1) & ~np.isnan(q).any(axis=1))
+        unsolved = has_unknown(solved)
+        lost = np.asarray(unsolved & ~has_unknown(q))
         reasons.mark(lost, "the corrected pose is out of reach on its branch")
-        over = ~arm.within_limits(solved) & ~np.isnan(solved).any(axis=1)
+        over = ~arm.within_limits(solved) & ~unsolved
         reasons.mark(over, "the corrected pose is beyond a joint limit")
         wrist = np.abs(q[:, 4]) < np.deg2rad(limits.wrist_deg)
         wrist |= np.abs(solved[:, 4]) < np.deg2rad(limits.wrist_deg)
@@ -56,7 +57,7 @@ def guard_size(
         residual: Predicted landing against the wanted position, (n,) [m].
     """
     with np.errstate(invalid="ignore"):
-        size = np.linalg.norm(correction, axis=1) / MM
+        size = lengths(correction) / MM
         text = f"the correction exceeds correction_mm = {limits.correction_mm:g}"
         reasons.mark(size > limits.correction_mm, text)
         reasons.mark(~(residual <= SOLVED), "the correction did not converge to 1 um")
@@ -71,7 +72,7 @@ def guard_turn(reasons: Reasons, limits: LimitSection, turn: Array) -> None:
         turn: Rotation of the commanded tool, (n, 3) [rad].
     """
     with np.errstate(invalid="ignore"):
-        angle = np.rad2deg(np.linalg.norm(turn, axis=1))
+        angle = np.rad2deg(lengths(turn))
         text = f"the correction exceeds correction_deg = {limits.correction_deg:g}"
         reasons.mark(angle > limits.correction_deg, text)
 
@@ -97,7 +98,7 @@ def guard_steps(
     inside = before >= 0
     last = np.where(inside, before, 0)
     with np.errstate(invalid="ignore"):
-        step = np.linalg.norm(correction - correction[last], axis=1) / MM
+        step = lengths(correction - correction[last]) / MM
         same_side = (np.abs(direction - direction[last]) < TURNED).all(axis=1)
         jump = inside & same_side & (step > limits.step_mm)
     text = (

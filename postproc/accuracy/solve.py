@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from postproc.accuracy.model import Model
 from postproc.accuracy.orientation import turn
-from postproc.pose import inverse, rotation_from_vector, rotation_vector
+from postproc.pose import inverse, lengths, rotation_from_vector, rotation_vector
 from postproc.robot.arm import Arm
 from postproc.robot.state import States
 
@@ -72,7 +72,9 @@ def solve(
     iterations = 0
     while iterations < MOST:
         off = _distance(landing, place) > CLOSE  # NaN is not far
-        far = np.flatnonzero(off | (_distance(turned, allowed) > CLOSE_TURN))
+        if orientation:
+            off |= _distance(turned, allowed) > CLOSE_TURN
+        far = np.flatnonzero(off)
         if len(far) == 0:
             break
         command[far, :3, 3] += (place - landing)[far]
@@ -91,8 +93,7 @@ def solve(
 
 def _distance(a: Array, b: Array) -> Array:
     """Distance between points (n, 3), (n,) [m]."""
-    gap: Array = np.linalg.norm(a - b, axis=1)
-    return gap
+    return lengths(a - b)
 
 
 def _turned(rotation: Array, by: Array) -> Array:
