@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from hashlib import file_digest
 from pathlib import Path
 from typing import Any, Self
 
@@ -14,10 +15,11 @@ from postproc.exceptions import ProgramError
 from postproc.language.visits import Visits
 from postproc.pose import MM
 from postproc.report import Decisions, Status
-from postproc.sidecar import read_without_edits, sha256, sidecar_path
+from postproc.sidecar import read_without_edits, sidecar_path
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
+Bytes = NDArray[np.int8]
 
 SIGNS = "-0+"  # direction of a joint: -1, 0, 1
 BOTH = 2  # arrivals at one line from both sides of a joint
@@ -47,7 +49,7 @@ class Arrivals:
     status: Ints
     why: Ints
     reasons: tuple[str, ...]
-    direction: Ints
+    direction: Bytes
     correction_mm: Array
     counts: Mapping[str, int]
     mixed: Mapping[int, Mapping[str, int]] = field(default_factory=dict)
@@ -68,7 +70,7 @@ class Arrivals:
             KeyError, ValueError, TypeError: It is something else.
         """
         line = np.array(told["line"], dtype=np.int64)
-        status = _places(told["status"], "0123456789")
+        status = _places(told["status"], "0123456789").astype(np.int64)
         sides = (_places(told["direction"], SIGNS) - 1).reshape(len(line), 6)
         size = np.array(told["correction_mm"], dtype=np.float64)
         why = np.array(told["why"], dtype=np.int64)
@@ -110,16 +112,16 @@ def _mixed(status: Ints, first: Ints) -> dict[int, dict[str, int]]:
     return found
 
 
-def _places(text: str, letters: str) -> Ints:
+def _places(text: str, letters: str) -> Bytes:
     """Return the place of every character of a text among some letters.
 
     Raises:
         ValueError: A character is none of them.
     """
     codes = np.frombuffer(text.encode("latin-1", "replace"), dtype=np.uint8)
-    table = np.full(256, -1, dtype=np.int64)
+    table = np.full(256, -1, dtype=np.int8)
     table[[ord(c) for c in letters]] = range(len(letters))
-    places: Ints = table[codes]
+    places: Bytes = table[codes]
     if (places < 0).any():
         raise ValueError(f"a character is none of {letters}")
     return places
@@ -191,10 +193,16 @@ def read_arrivals(
         mine = record.files.get(output.name)
         if mine is None or not mine.targets:
             continue
-        same = sha256(original.read_bytes()) == mine.source_sha256
-        if same and sha256(output.read_bytes()) == mine.output_sha256:
+        same = _hashed(original) == mine.source_sha256
+        if same and _hashed(output) == mine.output_sha256:
             told[original.name] = _read(mine.targets)
     return {name: arrivals for name, arrivals in told.items() if arrivals is not None}
+
+
+def _hashed(path: Path) -> str:
+    """Hash a file without holding it."""
+    with path.open("rb") as file:
+        return file_digest(file, "sha256").hexdigest()
 
 
 def _read(told: Mapping[str, Any]) -> Arrivals | None:

@@ -80,7 +80,9 @@ def strung(cells: Column, owner: Ints, rows: int, between: bytes) -> Column:
     return out.reshape(rows, -1)
 
 
-def words(texts: Sequence[str], index: Ints, text: Callable[[str], str]) -> Column:
+def words(
+    texts: Sequence[str], index: NDArray[np.integer], text: Callable[[str], str]
+) -> Column:
     """Write one of some texts for every row, as UTF-8.
 
     Args:
