@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import hashlib
 import json
-import re
 import zlib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from itertools import islice, pairwise
+from itertools import pairwise
 from pathlib import Path
 from typing import Any, Self
 
@@ -17,9 +16,9 @@ import numpy as np
 from postproc.exceptions import ProgramError
 from postproc.inputs import read_input
 from postproc.language.edits import Replacements
+from postproc.language.source import Source
 
 SUFFIX = ".postproc.json"
-_LINE_END = re.compile(rb"\r\n|\n|\r")
 EDITS, TARGETS = b'"edits": [', b'], "targets": {'
 CURE = "Restore needs the record that was written beside the program"
 BLOCK = 50  # lines per checksum: how closely a later edit can be located
@@ -41,10 +40,8 @@ def sha256(data: bytes) -> str:
 
 def block_checksums(data: bytes) -> list[int]:
     """Checksum every `BLOCK` lines, so that a later edit can be located."""
-    ends = (m.end() for m in islice(_LINE_END.finditer(data), BLOCK - 1, None, BLOCK))
-    marks = [0, *ends]
-    if marks[-1] < len(data):
-        marks.append(len(data))
+    starts = Source("", data).line_starts[::BLOCK].tolist()
+    marks = [*starts, len(data)] if data else []
     return [zlib.crc32(data[a:b]) for a, b in pairwise(marks)]
 
 

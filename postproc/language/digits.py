@@ -55,10 +55,8 @@ def cut(data: bytes, start: Ints, end: Ints) -> tuple[Texts, Bools]:
 
 def decimals(texts: Texts) -> Ints:
     """Count the decimals of plain numbers, (m,)."""
-    rows = _bytes(texts)
-    dot = rows == _DOT
-    length = (rows > 0).sum(axis=1)
-    return np.where(dot.any(axis=1), length - dot.argmax(axis=1) - 1, 0)
+    dot = np.char.find(texts, b".")
+    return np.where(dot < 0, 0, np.char.str_len(texts) - dot - 1)
 
 
 def fixed(values: Floats, decimals: Ints) -> tuple[Texts, Bools]:
@@ -112,9 +110,3 @@ def _texts(rows: Bytes) -> Texts:
     """See rows of bytes as texts."""
     texts: Texts = np.ascontiguousarray(rows).view(f"S{rows.shape[1]}")[:, 0]
     return texts
-
-
-def _bytes(texts: Texts) -> Bytes:
-    """See texts as rows of bytes."""
-    rows: Bytes = np.ascontiguousarray(texts).view(np.uint8)
-    return rows.reshape(len(texts), texts.dtype.itemsize)

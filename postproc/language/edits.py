@@ -128,12 +128,10 @@ class Replacements(Sequence[Edit]):
             raise ValueError("an edit lies outside")
         done = 0
         for some in self.pieces():
-            kept = [done, *some.end[:-1].tolist()]
-            parts: list[bytes] = []
-            for start, end, new in zip(
-                kept, some.start.tolist(), some.new.tolist(), strict=True
-            ):
-                parts += (data[start:end], new)
+            parts: list[bytes] = [b""] * (2 * len(some))
+            kept = map(slice, [done, *some.end[:-1].tolist()], some.start.tolist())
+            parts[0::2] = map(data.__getitem__, kept)
+            parts[1::2] = some.new.tolist()
             yield b"".join(parts)
             done = int(some.end[-1])
         yield data[done:]
@@ -148,9 +146,18 @@ class Replacements(Sequence[Edit]):
         length = np.char.str_len(self.new).astype(np.int64)
         growth = length - (self.end - self.start)
         start = self.start + after + np.cumsum(growth) - growth
-        old = [
-            np.array([data[a:b] for a, b in zip(s.start, s.end, strict=True)], "S")
-            for s in self.pieces()
-        ]
+        old = [_cut(data, some.start, some.end) for some in self.pieces()]
         originals = np.concatenate([np.empty(0, dtype="S1"), *old])
         return Replacements(start, start + length, originals)
+
+
+def _cut(data: bytes, start: Ints, end: Ints) -> NDArray[np.bytes_]:
+    """Cut short pieces out of a text, which holds no NUL."""
+    length = end - start
+    width = max(int(length.max()), 1)
+    column = np.arange(width)
+    place = np.minimum(start[:, None] + column, len(data) - 1)
+    rows = np.frombuffer(data, dtype=np.uint8)[place]
+    rows[column >= length[:, None]] = 0
+    cut: NDArray[np.bytes_] = rows.view(f"S{width}")[:, 0]
+    return cut
