@@ -15,12 +15,13 @@ the way by the square of the zone over the size of the arm: 1 um for 1 mm.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, fields
 
 import numpy as np
 from numpy.typing import NDArray
 
-from postproc.motion.paths import along
+from postproc.motion.paths import along, between
 from postproc.motion.targets import Fly, Targets
 from postproc.motion.trace import Trace
 from postproc.motion.zone import Zones, zones
@@ -123,10 +124,20 @@ def _joined(parts: list[Corners]) -> Corners:
 
 def on_corner(traced: Trace, found: Zones, row: Ints | slice, s: Array) -> Array:
     """Follow the formula above on corners `row` (m,) at s (m,): (m, 6) [rad]."""
-    before = along(traced, found.into[row], 1 - found.before[row] * (1 - s) ** 2)
-    behind = along(traced, found.out[row], found.behind[row] * s**2)
-    q: Array = before + behind - traced.q.take(found.visit[row], axis=0)
-    return q
+    return parabolas(traced, found[row])(s)
+
+
+def parabolas(traced: Trace, found: Zones) -> Callable[[Array], Array]:
+    """Prepare to follow c corners: s (c,) to joint angles (c, 6) [rad]."""
+    into, out = between(traced, found.into), between(traced, found.out)
+    point = traced.q.take(found.visit, axis=0)
+
+    def at(s: Array) -> Array:
+        before = into(1 - found.before * (1 - s) ** 2)
+        behind = out(found.behind * s**2)
+        return before + behind - point
+
+    return at
 
 
 def _passing(
@@ -157,11 +168,11 @@ def _refined(
     arm: Arm, traced: Trace, found: Zones, s: Array, tool: Array, point: Array
 ) -> Array:
     """Improve the nearest points of corners whose moves are not straight."""
+    q = parabolas(traced, found)
     for _ in range(REFINED):
         s = np.clip(s, STEP, 1 - STEP)
         before, x, after = (
-            arm.tcp(on_corner(traced, found, ALL, at), tool) - point
-            for at in (s - STEP, s, s + STEP)
+            arm.tcp(q(at), tool) - point for at in (s - STEP, s, s + STEP)
         )
         slope, curve = (after - before) / 2, after - 2 * x + before
         down, curved = (x * slope).sum(axis=1), (slope**2 + x * curve).sum(axis=1)
@@ -176,16 +187,15 @@ def nearest_on_parabola(begin: Array, end: Array) -> Array:
         begin: Where the zones begin, seen from the point, (c, 3) [m].
         end: Where they end, likewise.
     """
-    grid = GRID[:, None, None]
-    away = np.linalg.norm(begin * (1 - grid) ** 2 + end * grid**2, axis=2)
-    s = GRID[np.argmin(away, axis=0)]
-    bend = 2 * (begin + end)
+    b, e = np.ascontiguousarray(begin.T), np.ascontiguousarray(end.T)
+    away = [((b * (1 - s) ** 2 + e * s**2) ** 2).sum(axis=0) for s in GRID]
+    s = GRID[np.argmin(np.sqrt(away), axis=0)]
+    bend = 2 * (b + e)
     for _ in range(ROUNDS):
-        t = s[:, None]
-        x = begin * (1 - t) ** 2 + end * t**2
-        slope = 2 * (end * t - begin * (1 - t))
-        down = (x * slope).sum(axis=1)
-        curved = (slope * slope + x * bend).sum(axis=1)
+        x = b * (1 - s) ** 2 + e * s**2
+        slope = 2 * (e * s - b * (1 - s))
+        down = (x * slope).sum(axis=0)
+        curved = (slope * slope + x * bend).sum(axis=0)
         step = np.where(curved > 0, down / np.where(curved > 0, curved, 1.0), 0.0)
         s = np.clip(s - step, 0.0, 1.0)
     return np.asarray(s)

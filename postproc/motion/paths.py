@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -17,23 +19,38 @@ def along(traced: Trace, edge: Ints, u: Array) -> Array:
     Parabolas through the three nearest of the equidistant samples, the place where the
     edge comes from being the first one; straight where an edge has but one sample.
     """
+    return between(traced, edge)(u)
+
+
+def between(traced: Trace, edge: Ints) -> Callable[[Array], Array]:
+    """Prepare to interpolate on edges again and again, as `along` does once."""
     start = traced.edges.start
     count = start.take(edge + 1) - start.take(edge)
     if (count == 1).all():
-        return _straight(traced, edge, u)
-    out, one = np.empty((len(edge), 6)), count == 1
-    out[one] = _straight(traced, edge[one], u[one])
-    out[~one] = _curved(traced, edge[~one], u[~one], count[~one])
-    return out
+        return _straight(traced, edge)
+    one = count == 1
+    straight = _straight(traced, edge[one])
+
+    def at(u: Array) -> Array:
+        out = np.empty((len(edge), 6))
+        out[one] = straight(u[one])
+        out[~one] = _curved(traced, edge[~one], u[~one], count[~one])
+        return out
+
+    return at
 
 
-def _straight(traced: Trace, edge: Ints, u: Array) -> Array:
+def _straight(traced: Trace, edge: Ints) -> Callable[[Array], Array]:
     """Interpolate on edges with one sample."""
     edges = traced.edges
     end = edges.path.take(edges.start.take(edge), axis=0)
-    begin = traced.q.take(edges.source.take(edge), axis=0)
-    out: Array = end + (u - 1)[:, None] * (end - begin)
-    return out
+    way = end - traced.q.take(edges.source.take(edge), axis=0)
+
+    def at(u: Array) -> Array:
+        out: Array = end + (u - 1)[:, None] * way
+        return out
+
+    return at
 
 
 def _curved(traced: Trace, edge: Ints, u: Array, count: Ints) -> Array:

@@ -66,7 +66,9 @@ class DH:
                 cb, sb = np.cos(beta[i]), np.sin(beta[i])
                 x, z = cb * x + sb * z, cb * z - sb * x
             ca, sa = np.cos(self.alpha[i]), np.sin(self.alpha[i])
-            x, y, z = x + self.a[i], ca * y - sa * z, sa * y + ca * z + self.d[i]
+            x += self.a[i]
+            y, z = ca * y - sa * z, sa * y + ca * z
+            z += self.d[i]
             x, y = cos[i] * x - sin[i] * y, sin[i] * x + cos[i] * y
         return np.stack([x, y, z], axis=1)
 
