@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from postproc.motion.reach import Course, Points, points, reach
+from postproc.motion.reach import Course, Points, reach
 from postproc.motion.rounding import rounded
 from postproc.motion.targets import Kind, Targets
 from postproc.motion.trace import trace
@@ -86,12 +86,16 @@ def reach_again(arm: Arm, before: Course, targets: Targets, moved: Bools) -> Cou
     traced = rounded(arm, part.targets, exact, timed=False)
     slot = np.array(before.slot)
     slot[part.rows[part.kept]] = exact.slot[part.kept]
-    passed = _patched(before.passed, part, points(traced))
+    passed = _patched(before.passed, part, traced.q)
+    at_targets = Points(
+        _patched(before.exact.q, part, exact.q),
+        _patched(before.exact.flange, part, exact.flange),
+    )
     now = passages(arm, traced.q, traced.edges)
     ways = _spliced(before.passages, part, now)
     return Course(
-        targets, _patched(before.exact, part, points(exact)), passed, slot, ways,
-        sides(arm, passed.q, ways, before.begin.past.play), before.begin,
+        arm, targets, at_targets, passed, _patched(before.aside, part, traced.aside),
+        slot, ways, sides(arm, passed, ways, before.begin.past.play), before.begin,
     )  # fmt: skip
 
 
@@ -175,11 +179,11 @@ def _near(rows: Bools, distance: int) -> Bools:
     return out
 
 
-def _patched(before: Points, part: _Part, now: Points) -> Points:
-    """Put new places in."""
-    q, flange, rows = np.array(before.q), np.array(before.flange), part.rows[part.kept]
-    q[rows], flange[rows] = now.q[part.kept], now.flange[part.kept]
-    return Points(q, flange)
+def _patched(before: Array, part: _Part, now: Array) -> Array:
+    """Put new rows in, of targets whose passing may change."""
+    out = np.array(before)
+    out[part.rows[part.kept]] = now[part.kept]
+    return out
 
 
 def _spliced(before: Passages, part: _Part, now: Passages) -> Passages:

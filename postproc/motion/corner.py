@@ -47,12 +47,14 @@ class Corners:
         zones: What they take of the neighbouring moves.
         nearest: Where on the corner the TCP passes closest to the point, (c,) in s.
         q: Joint angles there, (c, 6) [rad].
+        aside: From the point to there, (c, 3) [m].
         bend: What the parabola bends by, half of its second derivative, (c, 6) [rad].
     """
 
     zones: Zones
     nearest: Array
     q: Array
+    aside: Array
     bend: Array
 
     @property
@@ -88,7 +90,8 @@ def _passed(arm: Arm, targets: Targets, traced: Trace, found: Zones) -> Corners:
     nearest[sharp] = _refined(
         arm, traced, found[sharp], nearest[sharp], tool[sharp], point[sharp]
     )
-    return Corners(found, nearest, on_corner(traced, found, ALL, nearest), bend)
+    q = on_corner(traced, found, ALL, nearest)
+    return Corners(found, nearest, q, arm.tcp(q, tool) - point, bend)
 
 
 def _is_flat(bend: Array) -> Bools:
@@ -107,18 +110,17 @@ def _joined(parts: list[Corners]) -> Corners:
     if not parts:
         none = np.empty(0, dtype=np.int64)
         zone = Zones(none, none, none, np.empty(0), np.empty(0))
-        return Corners(zone, np.empty(0), np.empty((0, 6)), np.empty((0, 6)))
+        q, aside = np.empty((0, 6)), np.empty((0, 3))
+        return Corners(zone, np.empty(0), q, aside, q)
     zone = Zones(
         *(
             np.concatenate([getattr(part.zones, f.name) for part in parts])
             for f in fields(Zones)
         )
     )
+    names = ("nearest", "q", "aside", "bend")
     return Corners(
-        zone,
-        np.concatenate([part.nearest for part in parts]),
-        np.concatenate([part.q for part in parts]),
-        np.concatenate([part.bend for part in parts]),
+        zone, *(np.concatenate([getattr(p, name) for p in parts]) for name in names)
     )
 
 

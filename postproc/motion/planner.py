@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from postproc.motion.clock import no_time, tell_time
 from postproc.motion.pull import Pull
-from postproc.motion.reach import aside_of
+from postproc.motion.reach import points, where_passed
 from postproc.motion.reasons import CODE, REASONS, WRIST
 from postproc.motion.rounding import rounded
 from postproc.motion.standing import NOWHERE, Standing
@@ -111,9 +111,9 @@ def plan(
     end = Standing.at_end(exact.q, exact.flange, exact.slot, arrived.past)
     clock = tell_time(arm, targets, traced) if timed else no_time(len(targets))
     tool = targets.tool
-    aside = aside_of(exact.flange, traced.flange, tool)
+    tcp = where_passed(arm, points(exact), traced.q) @ tool
     return Plan(
-        traced.q, traced.flange @ tool, aside, tool, arrived.direction, arrived.side,
+        traced.q, tcp, traced.aside, tool, arrived.direction, arrived.side,
         arrived.travel, clock.speed, clock.time, traced.slot,
         _guard(traced, wrist), REASONS, traced.overruled, clock.untimed,
         traced.pull, end,

@@ -38,7 +38,7 @@ class Reached:
 
 @dataclass(frozen=True)
 class Points:
-    """The path at n targets.
+    """The n targets themselves.
 
     Attributes:
         q: Joint angles, (n, 6) [rad], NaN where not known.
@@ -54,18 +54,23 @@ class Course:
     """The way through n targets, with what it takes to look at parts of it again.
 
     Attributes:
+        arm: The arm.
         targets: The moves.
         exact: At the targets, as if the arm stopped at each.
-        passed: Where the path, its corners rounded, passes them.
+        passed: Joint angles where the path, its corners rounded, passes them, (n, 6)
+            [rad], NaN where not known.
+        aside: From the targets to there, (n, 3) [m].
         slot: Branch taken, (n,), -1 where it was not looked up.
         passages: What the rounded paths between do to the joints' play.
         sides: On which sides the joints arrive.
         begin: Where the arm stands at the first target, if that is known beforehand.
     """
 
+    arm: Arm
     targets: Targets
     exact: Points
-    passed: Points
+    passed: Array
+    aside: Array
     slot: Ints
     passages: Passages
     sides: Sides
@@ -85,14 +90,9 @@ class Course:
     @property
     def reached(self) -> Reached:
         """Return where the arrivals end up."""
-        tcp = self.passed.flange @ self.targets.tool
-        return Reached(self.passed.q, tcp, self.aside, self.side)
-
-    @property
-    def aside(self) -> Array:
-        """Return the way from targets to where the path passes them, (n, 3) [m]."""
-        tool = self.targets.tool
-        return aside_of(self.exact.flange, self.passed.flange, tool)
+        flange = where_passed(self.arm, self.exact, self.passed)
+        tcp = flange @ self.targets.tool
+        return Reached(self.passed, tcp, self.aside, self.side)
 
 
 def reach(arm: Arm, targets: Targets, begin: Standing = NOWHERE) -> Course:
@@ -113,24 +113,25 @@ def reach(arm: Arm, targets: Targets, begin: Standing = NOWHERE) -> Course:
     ways = passages(arm, traced.q, traced.edges)
     found = sides(arm, traced.q, ways, begin.past.play)
     return Course(
-        targets, points(exact), points(traced), exact.slot, ways, found, begin
-    )
+        arm, targets, points(exact), traced.q, traced.aside, exact.slot, ways, found,
+        begin,
+    )  # fmt: skip
 
 
 def points(traced: Trace) -> Points:
-    """Return the path of a trace at its targets."""
+    """Return the targets of a trace."""
     return Points(traced.q, traced.flange)
 
 
-def aside_of(exact: Array, passed: Array, tool: Array) -> Array:
-    """Measure from targets to where the path passes them.
+def where_passed(arm: Arm, exact: Points, q: Array) -> Array:
+    """Place the flange where the path passes targets, (n, 4, 4) [m].
 
     Args:
-        exact: Flange poses at the targets, (n, 4, 4) [m].
-        passed: Flange poses where the path passes them, (n, 4, 4) [m].
-        tool: TCP in the flange frame, (n, 4, 4) [m].
-
-    Returns:
-        (n, 3) [m].
+        arm: The arm.
+        exact: At the targets themselves.
+        q: Joint angles where the path passes them, (n, 6) [rad].
     """
-    return np.array(((passed - exact) @ tool)[:, :3, 3])
+    flange = np.array(exact.flange)
+    beside = np.flatnonzero((q != exact.q).any(axis=1) & ~np.isnan(q).any(axis=1))
+    flange[beside] = arm.flange(q[beside])
+    return flange

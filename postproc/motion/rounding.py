@@ -44,9 +44,9 @@ class _Pieces:
 def rounded(arm: Arm, targets: Targets, traced: Trace, timed: bool = True) -> Trace:
     """Round the fly points of a trace.
 
-    Its joint angles and flange poses at rounded points become those of the point of the
-    path that lies nearest to the target; that is also where an edge ends and the next
-    one begins. Edges without a corner stay as they are.
+    Its joint angles at rounded points become those of the point of the path that lies
+    nearest to the target; that is also where an edge ends and the next one begins. Its
+    flange poses remain those of the targets. Edges without a corner stay as they are.
 
     Args:
         arm: The arm.
@@ -59,14 +59,14 @@ def rounded(arm: Arm, targets: Targets, traced: Trace, timed: bool = True) -> Tr
     visit = found.zones.visit
     if len(visit) == 0:
         return traced
-    q, flange = np.array(traced.q), np.array(traced.flange)
-    q[visit], flange[visit] = found.q, arm.flange(found.q)
+    q, aside = np.array(traced.q), np.array(traced.aside)
+    q[visit], aside[visit] = found.q, found.aside
     pieces = _pieces(traced, found)
     if not timed:
         pieces.count[:, _one_way(arm, traced, found)] = ONE_SAMPLE
     edges, share = _resampled(traced, found, pieces)
     pull = _pull(targets, traced, found)
-    return replace(traced, q=q, flange=flange, edges=edges, share=share, pull=pull)
+    return replace(traced, q=q, aside=aside, edges=edges, share=share, pull=pull)
 
 
 def _pull(targets: Targets, traced: Trace, found: Corners) -> Pull:

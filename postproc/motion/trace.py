@@ -25,6 +25,7 @@ from postproc.motion.reasons import (
 )
 from postproc.motion.targets import Kind, Move, Targets
 from postproc.motion.workspace import Known, Workspace
+from postproc.pose import is_unknown
 from postproc.robot.arm import Arm
 from postproc.robot.chains import Edges
 
@@ -44,7 +45,7 @@ class Trace:
 
     Attributes:
         q: (n, 6) [rad], NaN where not known.
-        flange: (n, 4, 4) [m], NaN where not known.
+        flange: (n, 4, 4) [m] at the targets themselves, NaN where not known.
         slot: Branch taken, (n,), -1 where it was not looked up.
         edges: The paths from every predecessor; source -1 where a path is not known.
         reason: Index into `REASONS`, (n,).
@@ -52,6 +53,8 @@ class Trace:
             0 for JOINT moves and where they are not known.
         share: Part of its edge's way that leads to each sample of the edges, (s,).
         overruled: Continuity took another branch or turn than the string says, (n,).
+        aside: From the targets to where the path passes them, (n, 3) [m], NaN where not
+            known.
         pull: How rounded fly points move with their neighbours.
     """
 
@@ -64,6 +67,7 @@ class Trace:
     share: Array
     reason: Ints
     overruled: Bools
+    aside: Array
     pull: Pull = field(default_factory=Pull)
 
 
@@ -236,9 +240,11 @@ def _finished(work: Workspace) -> Trace:
     other = (work.slot != t.slot) | (turned & ~t.nearest_turn)
     edges = Edges(t.pred_start, work.source, work.path, samples.start)
     share = 1.0 / np.diff(samples.start)[edge_of]
+    aside = np.zeros((len(t), 3))
+    aside[is_unknown(work.flange) | is_unknown(t.tool)] = np.nan
     return Trace(
         work.q, work.flange, work.slot, edges, samples.length, samples.turning, share,
-        work.reason, np.asarray(written & other),
+        work.reason, np.asarray(written & other), aside,
     )  # fmt: skip
 
 

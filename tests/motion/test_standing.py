@@ -122,7 +122,7 @@ def test_what_moves_next_to_the_stop_is_traced_from_there(cell: Cell, row: int) 
         reach_again(cell.arm, course, new, moved),
         reach(cell.arm, new, first.end),
     )
-    np.testing.assert_allclose(found.passed.q, wanted.passed.q, rtol=0, atol=CLOSE)
+    np.testing.assert_allclose(found.passed, wanted.passed, rtol=0, atol=CLOSE)
     np.testing.assert_allclose(found.side, wanted.side, rtol=0, atol=FINE)
 
 

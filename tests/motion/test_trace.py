@@ -105,7 +105,7 @@ def test_joint_4_turns_back_before_the_end_of_a_straight_line(
 ) -> None:
     home, end = turning_line(arm, tool)
     found = reach(arm, lines_from(arm, tool, home, [end]))
-    q, side = found.passed.q, np.sign(found.side)
+    q, side = found.passed, np.sign(found.side)
     assert side[1, 3] == -np.sign(q[1, 3] - q[0, 3]) != 0
 
 
