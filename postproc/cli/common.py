@@ -34,9 +34,6 @@ LsvOption = Annotated[
 HtmlOption = Annotated[
     Path | None, typer.Option("--html", help="Write a report (HTML) here.")
 ]
-JobsOption = Annotated[
-    int, typer.Option("--jobs", "-j", min=0, help="Processes; 0: one for a core.")
-]
 CloneOption = Annotated[
     bool, typer.Option("--clone", help="Clone variables whose arrivals disagree.")
 ]

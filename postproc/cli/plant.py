@@ -11,7 +11,6 @@ import typer
 from postproc.cli.common import (
     CloneOption,
     HtmlOption,
-    JobsOption,
     JsonOption,
     OrientationOption,
     TemperatureOption,
@@ -46,7 +45,9 @@ def batch(
     cell: CellFile = None,
     model: ModelFile = None,
     plan: PlanFile = None,
-    jobs: JobsOption = 0,
+    jobs: Annotated[
+        int, typer.Option("--jobs", "-j", min=0, help="Processes; 0: one for a core.")
+    ] = 0,
     scheduler: Annotated[
         str | None, typer.Option("--scheduler", help="Dask: tcp://host:8786.")
     ] = None,

@@ -12,7 +12,6 @@ from postproc.cli.common import (
     CellOption,
     CloneOption,
     HtmlOption,
-    JobsOption,
     JsonOption,
     LsvOption,
     ModelOption,
@@ -31,6 +30,7 @@ from postproc.files import STREAM, check_places
 if TYPE_CHECKING:
     from postproc.report import Outcome
 
+CROWD = 8  # processes, each with a window of its own in memory
 SHOWN = 20  # targets left alone whose source lines are shown
 
 
@@ -61,7 +61,12 @@ def compensate(
     ] = False,
     orientation: OrientationOption = False,
     temperature: TemperatureOption = None,
-    processes: JobsOption = 0,
+    processes: Annotated[
+        int,
+        typer.Option(
+            "--jobs", "-j", min=0, help="Processes; 0: one for a core, 8 at the most."
+        ),
+    ] = 0,
 ) -> None:
     """Rewrite a program so that the tool lands where its targets say."""
     from postproc import forked, jobs
@@ -75,8 +80,9 @@ def compensate(
             raise PostprocError("--report -: stdout holds the program. Name a file")
         check_places([output, report, html], [given, lsv, cell, model])
         job = jobs.Job.open(program, cell, model, lsv)
+        most = min(forked.available(), CROWD)
         with stages() as progress:
-            outcome = job.run(options, progress, processes or forked.available())
+            outcome = job.run(options, progress, processes or most)
         if strict and outcome.exit_code:
             _print_outcome(outcome)
             raise PostprocError(
