@@ -10,6 +10,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
+from itertools import chain
 from typing import Generic, TypeVar, overload
 
 import numpy as np
@@ -20,6 +21,7 @@ Bools = NDArray[np.bool_]
 T = TypeVar("T")
 
 OPEN = "\x01"  # no program text holds it
+_WORD = re.compile(r"[A-Za-z_]\w*")
 _PLACE = re.compile(rf"{OPEN}(aa|aA|AA)(\d+){OPEN}", re.ASCII)
 
 
@@ -71,11 +73,13 @@ class Formed(Sequence[T], Generic[T]):
 
     Attributes:
         said: What each form says, its names open.
+        texts: The forms themselves.
         form: Index into `said`, (k,).
         names: The names of every shape.
     """
 
     said: tuple[T, ...]
+    texts: tuple[str, ...]
     form: Ints
     names: Sequence[tuple[str, ...]]
     _made: dict[int, T] = field(default_factory=dict)
@@ -103,6 +107,11 @@ class Formed(Sequence[T], Generic[T]):
         """Go through the shapes."""
         return (self[k] for k in range(len(self)))
 
+    def words(self) -> frozenset[str]:
+        """Return all words in the shapes, in lower case."""
+        texts = "\n".join(chain(self.texts, chain.from_iterable(self.names)))
+        return frozenset(_WORD.findall(texts.lower()))
+
     def which(self, test: Callable[[T], bool]) -> Bools:
         """Tell which shapes pass a test that no name in them decides, (k,)."""
         passed = np.array([test(one) for one in self.said], dtype=bool)
@@ -128,4 +137,4 @@ def formed(
     for at, (text, own) in enumerate(split(shapes)):
         form[at] = number.setdefault(text, len(number))
         names.append(own)
-    return Formed(tuple(map(parse, number)), form, names)
+    return Formed(tuple(map(parse, number)), tuple(number), form, names)

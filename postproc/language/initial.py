@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping
 from dataclasses import replace
 
@@ -14,11 +13,9 @@ from postproc.language.evaluate import Point
 from postproc.language.initial_values import Points
 from postproc.language.lsv import Entry, Variables
 from postproc.language.program import Body, Program, Variable
-from postproc.language.store import Store
+from postproc.language.store import Store, root_of
 from postproc.language.values import Nothing, Position, Value, Vector
 from postproc.language.world import Place, World, base_variable
-
-_WORD = re.compile(r"[A-Za-z_]\w*")
 
 
 def fill_initial(world: World) -> None:
@@ -41,7 +38,7 @@ def _report_drift(world: World, place: Place, file: Variables) -> None:
     """Say where a program and its variable file have drifted apart."""
     for found in file.diagnostics:
         world.diagnostics[found] = None
-    words = {*_WORD.findall("\n".join(place.program.lines.shapes).lower())}
+    words = place.program.statements.words()
     written = [file.entries.name[row] for row in file.entries.row.values()]
     names = {base_variable(name): name.partition(".")[0] for name in written}
     unused = [written for name, written in names.items() if name not in words]
@@ -101,14 +98,17 @@ def _enter_all(world: World, place: Place, file: Variables) -> None:
     points = Points(
         {}, entries, base, shared[entries.layout], np.zeros(len(known), dtype=bool)
     )
+    told = known.tolist()
     for name, row in entries.row.items():
-        root = base_variable(name)
+        root = root_of(name)
         key = world.root(place, root) + name[len(root) :]
         declared = world.declared(place, root)
-        if known[row]:
+        if told[row]:
             points.row[key] = row
-            points.taught[row] = bool(declared and declared.taught)
-            points.shared[row] |= bool(declared and declared.exported)
+            if declared is not None and declared.taught:
+                points.taught[row] = True
+            if declared is not None and declared.exported:
+                points.shared[row] = True
         elif not _entered(world, file, entries.entry(row), key):
             continue
         world.spelling.setdefault(key, entries.name[row])

@@ -153,7 +153,10 @@ def _logical(
     stripped = [mask.strip() for mask in masks]
     code = np.flatnonzero(np.array([*map(bool, stripped)], dtype=bool)[shape])
     shape = shape[code]
-    opens = np.array([bool(_OPENS.match(mask)) for mask in masks], dtype=bool)
+    opens = np.array(
+        [mask.endswith(b",") and bool(_OPENS.match(mask)) for mask in stripped],
+        dtype=bool,
+    )
     starts = np.flatnonzero(opens[shape])
     length = _lengths(masks, shape, starts)
     starts, length = starts[length > 1], length[length > 1]

@@ -23,7 +23,9 @@ from postproc.language.kept_tables import keep, kept, key_of
 from postproc.language.parts import Mark
 
 _PACKAGE = Path(__file__).resolve().parent.parent
-_NUMBERED = r"(?<![\w$])[A-Za-z_]\w*\d\w*(?!\w)(?! *::)"
+# A name up to its first digit, and the rest: what cannot begin one is passed over, and
+# nothing is tried twice.
+_NUMBERED = r"[A-Za-z_](?<![\w$].)[A-Za-z_]*+[^\W\d]*+\d\w*+(?! *::)"
 _NAME = re.compile(f"({_NUMBERED})")
 _STRING_OR_NAME = re.compile(
     rf"(?P<string>'(?:\\.|[^'\\])*'|'[^']*'|\"[^\"]*\")|{_NUMBERED}"
