@@ -62,12 +62,15 @@ def zones(arm: Arm, targets: Targets, traced: Trace) -> Zones:
     cartesian = targets.move != Move.JOINT
     both = cartesian[visit] & cartesian[to[out]]
     by_distance = both & (targets.rounding[visit] != Fly.OVERLAP)
-    share = np.empty((2, len(visit)))
-    for rows, law in ((by_distance, _by_distance), (~by_distance, _by_overlap)):
-        chosen = np.flatnonzero(rows)
-        if len(chosen):
-            ways = [_ways(targets, traced, to, edge[chosen]) for edge in (into, out)]
-            share[:, chosen] = law(arm, targets, visit[chosen], ways)
+    edge = np.stack([into, out])
+    length, share = _lengths(targets, traced, to, edge), np.empty(edge.shape)
+    near, rest = np.flatnonzero(by_distance), np.flatnonzero(~by_distance)
+    share[:, near] = _by_distance(targets, visit[near], length[:, near])
+    ways = [
+        _Ways.on(traced, to, way[rest], long[rest])
+        for way, long in zip(edge, length, strict=True)
+    ]
+    share[:, rest] = _by_overlap(arm, targets, visit[rest], ways)
     found = Zones(visit, into, out, share[0], share[1])
     return found[np.asarray((share > 0).all(axis=0))]
 
@@ -91,14 +94,47 @@ def _corners(targets: Targets, traced: Trace) -> tuple[Ints, Ints, Ints]:
     return visit, targets.pred_start[visit], out[visit]
 
 
+def _lengths(targets: Targets, traced: Trace, to: Ints, edge: Ints) -> Array:
+    """Measure the TCP's ways on edges (2, c) [m], chords where they are no lines."""
+    used = np.zeros(len(to), dtype=bool)
+    used[edge] = True
+    at = np.flatnonzero(used)
+    end, begin = to[at], traced.edges.source[at]
+    tool = targets.tool.take(end, axis=0)[:, :3, 3]
+    chord = np.zeros((len(at), 3))
+    for sign, visit in ((1, end), (-1, begin)):
+        flange = traced.flange.take(visit, axis=0)
+        place = np.einsum("nij,nj->ni", flange[:, :3, :3], tool) + flange[:, :3, 3]
+        chord += sign * place
+    length = np.zeros(len(to))
+    chords = np.sqrt(np.einsum("ni,ni->n", chord, chord))
+    length[at] = np.fmax(traced.length[at], chords)
+    return length[edge]
+
+
+def _by_distance(targets: Targets, visit: Ints, length: Array) -> Array:
+    """Take the same length of both moves, all there is where only WITHIN bounds it.
+
+    Args:
+        targets: The moves.
+        visit: The fly points, (c,).
+        length: Lengths of the moves before and behind, (2, c) [m].
+    """
+    distance = targets.fly_distance[visit]
+    begin = np.where(targets.rounding[visit] == Fly.WITHIN, np.inf, distance)
+    shortest = length.min(axis=0)
+    zone = np.minimum(begin, HALF * shortest)
+    share: Array = np.where(length > NOTHING, zone / np.maximum(length, NOTHING), 0.0)
+    return np.where(shortest > NOTHING, share, 0.0)
+
+
 @dataclass(frozen=True)
 class _Ways:
     """The moves on c edges.
 
     Attributes:
         to: Target that they lead to, (c,).
-        length: Length of the TCP's way, its chord where the path is not Cartesian,
-            (c,) [m].
+        length: Length of the TCP's way, (c,) [m].
         turned: What the joints turn by, (c, 6) [rad].
     """
 
@@ -106,30 +142,11 @@ class _Ways:
     length: Array
     turned: Array
 
-
-def _ways(targets: Targets, traced: Trace, to: Ints, edge: Ints) -> _Ways:
-    """Describe the moves on edges."""
-    end, begin = to.take(edge), traced.edges.source.take(edge)
-    tool = targets.tool.take(end, axis=0)[:, :3, 3]
-    chord = np.zeros((len(edge), 3))
-    for sign, visit in ((1, end), (-1, begin)):
-        flange = traced.flange.take(visit, axis=0)
-        place = np.einsum("nij,nj->ni", flange[:, :3, :3], tool) + flange[:, :3, 3]
-        chord += sign * place
-    length = np.sqrt(np.einsum("ni,ni->n", chord, chord))
-    turned = np.abs(traced.q.take(end, axis=0) - traced.q.take(begin, axis=0))
-    return _Ways(end, np.fmax(traced.length.take(edge), length), turned)
-
-
-def _by_distance(arm: Arm, targets: Targets, visit: Ints, ways: list[_Ways]) -> Array:
-    """Take the same length of both moves, all there is where only WITHIN bounds it."""
-    length = np.stack([way.length for way in ways])
-    distance = targets.fly_distance[visit]
-    begin = np.where(targets.rounding[visit] == Fly.WITHIN, np.inf, distance)
-    shortest = length.min(axis=0)
-    zone = np.minimum(begin, HALF * shortest)
-    share: Array = np.where(length > NOTHING, zone / np.maximum(length, NOTHING), 0.0)
-    return np.where(shortest > NOTHING, share, 0.0)
+    @classmethod
+    def on(cls, traced: Trace, to: Ints, edge: Ints, length: Array) -> _Ways:
+        """Describe the moves on edges of known lengths."""
+        end, begin = to[edge], traced.edges.source[edge]
+        return cls(end, length, np.abs(traced.q[end] - traced.q[begin]))
 
 
 def _by_overlap(arm: Arm, targets: Targets, visit: Ints, ways: list[_Ways]) -> Array:
