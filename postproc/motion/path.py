@@ -7,6 +7,7 @@ from start to VIA to end), as $ORNT_TYPE RS_WORLD does.
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -49,14 +50,14 @@ class Segments:
     angle: Array
     valid: Bools
 
-    @property
+    @cached_property
     def length(self) -> Array:
         """Lengths of the paths, (m,) [m]."""
         arc = np.linalg.norm(self.radius, axis=1) * self.angle
         length: Array = np.linalg.norm(self.chord, axis=1) + arc
         return length
 
-    @property
+    @cached_property
     def turning(self) -> Array:
         """Angles of reorientation, (m,) [rad]."""
         return np.asarray(np.linalg.norm(self.turn, axis=1))

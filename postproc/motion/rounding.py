@@ -141,10 +141,15 @@ def _resampled(traced: Trace, found: Corners, pieces: _Pieces) -> tuple[Edges, A
     share[rows] = long
     for side, chosen in ((0, end_of_zone), (1, begin_of_zone)):
         rows = np.flatnonzero(chosen)
-        corner = pieces.corner[side, edge[rows]]
+        corner, count = (
+            pieces.corner[side, edge[rows]],
+            pieces.count[2 * side][edge[rows]],
+        )
         part = nth[rows] - (0 if side == 0 else split[1][rows])
-        s, step = _places(found, corner, part, pieces.count[2 * side, edge[rows]], side)
-        path[rows] = _on_corners(traced, found, corner, s)
+        s, step = _places(found, corner, part, count, side)
+        path[rows] = found.q.take(corner, axis=0)
+        others = np.flatnonzero(s != found.nearest[corner])
+        path[rows[others]] = _on_corners(traced, found, corner[others], s[others])
         size = (found.zones.behind, found.zones.before)[side][corner]
         share[rows] = 2 * size * step
     return replace(

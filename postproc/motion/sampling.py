@@ -71,8 +71,9 @@ def sample(targets: Targets, flange: Array) -> Samples:
     ready = cartesian & (source >= 0) & known[visit] & tool_known[visit]
     ready &= known[at] & ~targets.wrist_joint[visit]
     straight = np.flatnonzero(ready & (targets.move[visit] == Move.LINEAR))
-    begin = flange[source[straight]] @ targets.tool[visit[straight]]
-    end = flange[visit[straight]] @ targets.tool[visit[straight]]
+    tool = targets.tool.take(visit[straight], axis=0)
+    begin = flange.take(source[straight], axis=0) @ tool
+    end = flange.take(visit[straight], axis=0) @ tool
     begins = _begins(targets, visit, source)
     segments, edge = lines(begin, end), straight
     if (begins >= 0).any():
@@ -112,12 +113,12 @@ def _inner(
     first = np.concatenate([[0], np.cumsum(np.bincount(path, minlength=len(edge)))])
     nth = np.arange(len(path)) - first[path]
     tcp = segments.poses(path, (nth + 1) / intervals[path])
-    tool_inverse = inverse(targets.tool[visit[edge]])
+    tool = targets.tool.take(visit[edge[path]], axis=0)
     length, turning = np.zeros(len(visit)), np.zeros(len(visit))
     length[edge], turning[edge] = segments.length, segments.turning
     return Samples(
         visit, source, cartesian, ready, broken, begins, start, length, turning,
-        inner=start[edge[path]] + nth, flange=tcp @ tool_inverse[path],
+        inner=start[edge[path]] + nth, flange=tcp @ inverse(tool),
     )  # fmt: skip
 
 

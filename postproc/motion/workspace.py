@@ -65,7 +65,6 @@ class Workspace:
         self.q = np.full((n, 6), np.nan)
         self.slot = np.full(n, -1, dtype=np.int64)
         self.reason = np.zeros(n, dtype=np.int64)
-        self.flange = np.full((n, 4, 4), np.nan)
         self._place()
         self.given = np.zeros(n, dtype=bool)
         if known is not None:
@@ -85,8 +84,8 @@ class Workspace:
     def _place(self) -> None:
         """Place the flange at poses and joint angles."""
         targets = self.targets
-        pose = targets.kind == Kind.POSE
-        self.flange[pose] = targets.tcp[pose] @ self.tool_inverse[pose]
+        self.flange = targets.tcp @ self.tool_inverse
+        self.flange[targets.kind != Kind.POSE] = np.nan
         joints = np.flatnonzero(targets.kind == Kind.JOINTS)
         self.q[joints] = targets.joints[joints]
         known = joints[~np.isnan(self.q[joints]).any(axis=1)]

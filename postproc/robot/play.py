@@ -128,12 +128,15 @@ def with_turning_values(
     Returns:
         What to pass, (t, 6) [rad], and how many rows stand for each sample, (s,).
     """
-    ahead = np.vstack([path[1:], path[-1:]])
+    row = np.flatnonzero(inside)
+    behind, middle = before.take(row, axis=0), path.take(row, axis=0)
+    ahead = path.take(row + 1, axis=0)
     # It turns at -rise / (2 bend) of the way to a neighbour.
-    rise, bend = (ahead - before) / 2, (ahead + before) / 2 - path
-    turns = (np.abs(rise) < 2 * np.abs(bend)) & (rise != 0) & inside[:, None]
-    row = np.flatnonzero(turns.any(axis=1))
-    middle, rise, bend, turns = path[row], rise[row], bend[row], turns[row]
+    rise, bend = (ahead - behind) / 2, (ahead + behind) / 2 - middle
+    turns = (np.abs(rise) < 2 * np.abs(bend)) & (rise != 0)
+    some = np.unique(np.flatnonzero(turns) // turns.shape[1])
+    row, middle = row[some], middle[some]
+    rise, bend, turns = rise[some], bend[some], turns[some]
     value = middle - rise**2 / (4 * np.where(turns, bend, 1.0))
     later = (rise > 0) != (bend > 0)
     early, late = turns & ~later, turns & later
