@@ -126,7 +126,8 @@ def cross(a: Array, b: Array) -> Array:
 
     What `numpy.cross` does for any axes takes ten times as long for a hundred vectors.
     """
-    out = np.empty(np.broadcast_shapes(a.shape, b.shape))
+    like = a if a.ndim >= b.ndim else b  # in its order of memory
+    out = np.empty_like(like, shape=np.broadcast_shapes(a.shape, b.shape))
     for i in range(3):
         j, k = (i + 1) % 3, (i + 2) % 3
         out[..., i] = a[..., j] * b[..., k] - a[..., k] * b[..., j]

@@ -59,9 +59,9 @@ class BacklashProfile(JointEffect):
     def basis(self, batch: Batch) -> Array:
         """Evaluate lambda times the harmonics, (n, p)."""
         joint, waves = self.acts_on(), batch.once(self, self._waves)
-        flat = waves.reshape(len(joint), len(batch)).T
-        turned: Array = batch.states.direction[:, joint] * flat
-        return turned
+        flat = waves.reshape(len(joint), len(batch))
+        turned: Array = batch.states.direction.T[joint] * flat
+        return turned.T
 
     def angles(self, batch: Batch, p: Array) -> Array:
         """Return the joint errors (n, 6) [rad], summed joint by joint."""

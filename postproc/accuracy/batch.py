@@ -146,6 +146,7 @@ class Batch:
 
     def _to_controller(self, per_axis: Array) -> Array:
         """Convert derivatives (n, 6, 3) by geometric angles to the controller's."""
-        dh = self.arm.dh
-        out: Array = (np.swapaxes(per_axis, 1, 2) * dh.sense) @ dh.mix
-        return out
+        dh, axes = self.arm.dh, np.moveaxis(per_axis, 0, 2)
+        flat = (axes * dh.sense[:, None, None]).reshape(6, -1)
+        out: Array = (dh.mix.T @ flat).reshape(axes.shape)
+        return out.T

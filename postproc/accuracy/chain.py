@@ -40,6 +40,8 @@ NOMINAL = Deviation(np.zeros(6), np.zeros((6, 5)), np.zeros(3))
 class Walk:
     """Axes and points met along the chain, base frame; n poses.
 
+    Poses lie next to each other in memory: long passes are faster than short ones.
+
     Attributes:
         turn, pivot: Axis z of every joint and a point on it, (n, 6, 3).
         link, corner: Axis x of a and alpha and a point on it, (n, 6, 3).
@@ -87,27 +89,30 @@ def walk(dh: DH, q: Array, tool: Array, deviation: Deviation = NOMINAL) -> Walk:
         tool: TCP in the flange frame, (n, 3) [m].
         deviation: Deviations of the placements.
     """
-    n = len(q)
-    theta = dh.angles(q) + deviation.link[:, 3]
+    shape = (3, len(q))
+    theta = np.ascontiguousarray((dh.angles(q) + deviation.link[:, 3]).T)
+    cos, sin = np.cos(theta), np.sin(theta)
     axes, about = _base(deviation)
-    x, y, z = (np.tile(axes[:, k], (n, 1)) for k in range(3))
-    p = np.tile(deviation.base[:3], (n, 1))
-    turn, pivot, link, corner, bend = (np.empty((n, 6, 3)) for _ in range(5))
+    x, y, z = (np.broadcast_to(axis[:, None], shape) for axis in axes.T)
+    p: Array = np.broadcast_to(deviation.base[:3, None], shape)
+    turn, pivot, link, corner, bend = (np.empty((6, *shape)) for _ in range(5))
     for i in range(6):
         da, dd, dalpha, _, beta = deviation.link[i]
         alpha = dh.alpha[i] + dalpha
-        turn[:, i], pivot[:, i] = z, p
-        c, s = np.cos(theta[:, i, None]), np.sin(theta[:, i, None])
-        x, y = _turned(x, y, c, s)
+        turn[i], pivot[i] = z, p
+        x, y = _turned(x, y, cos[i], sin[i])
         p = p + (dh.d[i] + dd) * z + (dh.a[i] + da) * x
         y, z = _turned(y, z, np.cos(alpha), np.sin(alpha))
-        link[:, i], corner[:, i], bend[:, i] = x, p, y
+        link[i], corner[i], bend[i] = x, p, y
         if beta != 0.0:
             z, x = _turned(z, x, np.cos(beta), np.sin(beta))
-    flange = np.stack([x, y, z], axis=-1)
-    tcp = p + np.einsum("nij,nj->ni", flange, tool + deviation.tool)
+    flange, (tx, ty, tz) = np.stack([x, y, z]), (tool + deviation.tool).T
+    tcp = p + (x * tx + y * ty + z * tz)
     point = np.array(deviation.base[:3])
-    return Walk(turn, pivot, link, corner, bend, about, point, flange, tcp)
+    turn, pivot, link, corner, bend = (
+        np.moveaxis(a, 2, 0) for a in (turn, pivot, link, corner, bend)
+    )
+    return Walk(turn, pivot, link, corner, bend, about, point, flange.T, tcp.T)
 
 
 def tcp(dh: DH, q: Array, tool: Array, deviation: Deviation = NOMINAL) -> Array:

@@ -114,17 +114,16 @@ class JointEffect(Effect):
 
     def columns(self, batch: Batch) -> Array:
         """Differentiate the TCP position: (n, 3, p) [m per unit]."""
-        columns: Array = (
-            batch.jacobian[:, :, self.acts_on()] * self.basis(batch)[:, None]
-        )
-        return columns
+        return self._about(batch.jacobian, batch)
 
     def rotation_columns(self, batch: Batch) -> Array:
         """Differentiate the tool's rotation: (n, 3, p) [rad per unit]."""
-        columns: Array = (
-            batch.angular[:, :, self.acts_on()] * self.basis(batch)[:, None]
-        )
-        return columns
+        return self._about(batch.angular, batch)
+
+    def _about(self, joints: Array, batch: Batch) -> Array:
+        """Turn the joints, (n, 3, 6) per unit, by each parameter, (n, 3, p)."""
+        columns: Array = joints.T[self.acts_on()] * self.basis(batch).T[:, None]
+        return columns.T
 
     def angles(self, batch: Batch, p: Array) -> Array:
         """Return the joint errors (n, 6) [rad] for parameters p."""

@@ -100,7 +100,7 @@ class Geometry(Effect):
             axis, point = self._kind(batch, k, j)
             columns.append(axis if point is None else cross(axis, w.tcp - point))
         columns += [w.flange[:, :, k] for k in range(3)]
-        return np.stack(columns, axis=-1)
+        return np.stack([column.T for column in columns]).T
 
     def rotation_columns(self, batch: Batch) -> Array:
         """Differentiate the tool's rotation, (n, 3, p) [rad per unit]."""

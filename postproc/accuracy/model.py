@@ -290,8 +290,9 @@ def _on_flanks(states: States) -> Bools:
 
 def _parameter_variance(columns: Array, covariance: Array) -> Array:
     """Variance that uncertain parameters give, (n, 3) [m^2]; columns (n, 3, p)."""
-    rows = columns.reshape(-1, columns.shape[2])  # one large product, not n small ones
-    return np.asarray(np.einsum("rp,rp->r", rows @ covariance, rows)).reshape(-1, 3)
+    rows = columns.T.reshape(columns.shape[2], -1)  # one large product
+    summed = np.einsum("pr,pr->r", covariance @ rows, rows)
+    return np.asarray(summed.reshape(3, -1).T)
 
 
 def _side_variance(effects: Combination, at: Batch, values: Array) -> Array:
