@@ -142,9 +142,7 @@ def _written(
         return None, flipped
     left = Left(looked, last.end, window.wanted(aim)[-1:].copy())
     with window.clock("solve"):
-        std_error = std_errors(
-            window.model, window.cell, window.planned, window.states, aim.solved
-        )
+        std_error = std_errors(window.model, window.cell, window.states, aim.solved)
     decided = replace(proposal.decisions, std_error=std_error)
     proposal = replace(proposal, decisions=decided)
     return Corrected(proposal, edits, last.reached, left), flipped

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -30,6 +30,7 @@ class Solved:
     """Corrected commands of n visits, NaN where pose or joint angles are not known.
 
     Attributes:
+        known: Visits that can be solved, (n,).
         direction: Arrival direction that they are solved for, (n, 6).
         q: Joint angles, (n, 6) [rad], NaN where the command cannot be reached.
         command: TCP poses to command, base frame, (n, 4, 4) [m].
@@ -40,6 +41,7 @@ class Solved:
         outside: Reasons why visits lie outside what was surveyed, (n,) each.
     """
 
+    known: Bools
     direction: Array
     q: Array
     command: Array
@@ -76,15 +78,17 @@ def solve_visits(
     """
     if orientation:
         refuse_unknown_rotations(model)
-    n = len(states)
+    n, plan = len(states), planned.plan
+    known = ~(has_unknown(plan.q) | is_unknown(plan.tcp))
     empty = Solved(
+        known=known,
         direction=np.array(states.direction),
         q=np.full((n, 6), np.nan),
         command=np.full((n, 4, 4), np.nan),
         turn=np.full((n, 3), np.nan),
         residual=np.full(n, np.nan),
         std_error=np.full((n, 3), np.nan),
-        outside=_outside_survey(model, planned, states),
+        outside=_outside_survey(model, known, states),
     )
     everything = np.ones(n, dtype=bool)
     return solve_again(empty, everything, model, cell, planned, states, orientation)
@@ -110,12 +114,13 @@ def solve_again(
         states: Planned states, with the directions to correct for.
         orientation: Correct the orientation as well as the position.
     """
-    plan, known = planned.plan, rows & _known(planned)
+    plan, known = planned.plan, np.flatnonzero(rows & solved.known)
     here, targets = states[known], plan.tcp[known]
     wanted = np.array(targets)
     wanted[:, :3, 3] += planned.shift[known]
     part = solve(model, cell.arm, wanted, plan.tool[known], here, orientation)
-    out = Solved(
+    out = replace(
+        solved,
         direction=np.where(rows[:, None], states.direction, solved.direction),
         q=np.array(solved.q),
         command=np.array(solved.command),
@@ -127,16 +132,16 @@ def solve_again(
     out.q[known], out.command[known] = part.q, part.command
     out.turn[known] = _turns(part.command, targets)
     out.residual[known] = part.residual
-    out.std_error[known] = model.std_on_flanks(cell.arm, here)
-    _mark(out.outside, UNSURE, known, model.unsure(out.std_error[known]))
+    std = model.std_on_flanks(cell.arm, here)
+    out.std_error[known] = std
+    _mark(out.outside, UNSURE, known, model.unsure(std), len(rows))
     if orientation:
-        _mark(out.outside, UNSURE_TURN, known, unsure_turn(model, cell.arm, here))
+        unsure = unsure_turn(model, cell.arm, here)
+        _mark(out.outside, UNSURE_TURN, known, unsure, len(rows))
     return out
 
 
-def std_errors(
-    model: Model, cell: Cell, planned: Planned, states: States, solved: Solved
-) -> Array:
+def std_errors(model: Model, cell: Cell, states: States, solved: Solved) -> Array:
     """Standard errors of the errors that visits are corrected for, per axis.
 
     They are many times as costly as the errors: what solving has asked for is kept, the
@@ -146,16 +151,10 @@ def std_errors(
         (n, 3) [m], NaN where pose or joint angles are not known.
     """
     out = np.array(solved.std_error)
-    rows = np.flatnonzero(_known(planned) & np.isnan(out[:, 0]))
+    rows = np.flatnonzero(solved.known & np.isnan(out[:, 0]))
     here = states.with_(direction=solved.direction)[rows]
     out[rows] = model.std_error(cell.arm, here)
     return out
-
-
-def _known(planned: Planned) -> Bools:
-    """Tell which visits can be solved, (n,)."""
-    lost = has_unknown(planned.plan.q) | is_unknown(planned.plan.tcp)
-    return np.asarray(~lost)
 
 
 def _turns(new: Array, old: Array) -> Array:
@@ -169,18 +168,19 @@ def _turns(new: Array, old: Array) -> Array:
     return out
 
 
-def _outside_survey(model: Model, planned: Planned, states: States) -> dict[str, Bools]:
+def _outside_survey(model: Model, known: Bools, states: States) -> dict[str, Bools]:
     """Say which visits lie outside of what was surveyed, whatever their directions."""
-    known = _known(planned)
-    found: dict[str, Bools] = {}
-    for text, mask in model.ranges.outside(states[known], model.needs).items():
-        _mark(found, text, known, mask)
+    rows, found = np.flatnonzero(known), dict[str, Bools]()
+    for text, mask in model.ranges.outside(states[rows], model.needs).items():
+        _mark(found, text, rows, mask, len(known))
     return found
 
 
-def _mark(outside: dict[str, Bools], text: str, known: Bools, mask: Bools) -> None:
-    """Say anew of known visits whether they lie outside for a reason."""
+def _mark(
+    outside: dict[str, Bools], text: str, rows: Ints, mask: Bools, n: int
+) -> None:
+    """Say anew of some of n visits whether they lie outside for a reason."""
     if text in outside or mask.any():
-        marked = np.array(outside.get(text, np.zeros(len(known), dtype=bool)))
-        marked[known] = mask
+        marked = np.array(outside.get(text, np.zeros(n, dtype=bool)))
+        marked[rows] = mask
         outside[text] = marked

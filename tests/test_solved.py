@@ -50,10 +50,10 @@ def test_standard_errors_are_those_of_the_sides_that_were_solved_for(solving):
     rows[3:7] = True
     aimed = states.with_(direction=direction)
     again = solve_again(first, rows, model, cell, planned, aimed)
-    found = std_errors(model, cell, planned, states, again)
+    found = std_errors(model, cell, states, again)
     known = ~np.isnan(planned.plan.q).any(axis=1)
     assert known.sum() == len(POINTS) + 1 and np.isnan(found[~known]).all()
     wanted = model.std_error(cell.arm, aimed[known])
     np.testing.assert_allclose(found[known], wanted, rtol=1e-9)
-    before = std_errors(model, cell, planned, states, first)
+    before = std_errors(model, cell, states, first)
     assert np.abs(found - before)[6].max() > 1e-6
