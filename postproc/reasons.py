@@ -47,8 +47,9 @@ class Reasons:
 
     def adopt(self, index: Ints, texts: tuple[str, ...]) -> None:
         """Take over reasons found elsewhere, (n,) indices into texts."""
-        for code in np.unique(index):
-            self.mark(index == code, texts[code])
+        for code in np.flatnonzero(np.bincount(index)).tolist():
+            if texts[code]:
+                self.mark(index == code, texts[code])
 
     def __getitem__(self, visit: int) -> str:
         """Return the reason of one visit."""

@@ -43,3 +43,15 @@ def test_literals_with_one_arrival_each_are_groups_of_one():
     for name in ("literal", "usable", "spread_mm", "values", "change_mm", "arrivals"):
         np.testing.assert_array_equal(getattr(alone, name), getattr(general, name)[:4])
     np.testing.assert_array_equal(alone.group, general.group[:5])
+
+
+def test_literals_in_the_order_of_the_visits_agree_as_in_any_other():
+    rng = np.random.default_rng(3)
+    literal = np.array([2, -1, 4, 7])
+    usable = np.array([True, True, False, True])
+    corrected, change = rng.normal(size=(4, 6)), rng.normal(size=(4, 3))
+    found = agree(literal, usable, corrected, change)
+    back = agree(literal[::-1], usable[::-1], corrected[::-1], change[::-1])
+    for name in ("literal", "usable", "spread_mm", "values", "change_mm", "arrivals"):
+        np.testing.assert_array_equal(getattr(found, name), getattr(back, name))
+    np.testing.assert_array_equal(found.group, back.group[::-1])

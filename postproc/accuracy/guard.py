@@ -99,8 +99,10 @@ def guard_steps(
     last = np.where(inside, before, 0)
     with np.errstate(invalid="ignore"):
         step = lengths(correction - correction[last]) / MM
-        same_side = (np.abs(direction - direction[last]) < TURNED).all(axis=1)
-        jump = inside & same_side & (step > limits.step_mm)
+        jump = inside & (step > limits.step_mm)
+    rows = np.flatnonzero(jump)
+    turned = np.abs(direction[rows] - direction[last[rows]])
+    jump[rows] = (turned < TURNED).all(axis=1)
     text = (
         f"the correction steps by more than step_mm = {limits.step_mm:g} in a fly run"
     )
