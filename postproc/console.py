@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import io
 import sys
-import threading
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -25,7 +24,6 @@ from rich.text import Text
 
 from postproc.printable import printable
 
-PATIENCE = 2.0  # [s] before a person is shown what is being done
 PLAIN_WIDTH = 200  # of a table that goes to a file or a pipe
 
 
@@ -70,29 +68,13 @@ def table_text(columns: Sequence[Column], rows: Iterable[Sequence[str]]) -> str:
     return "\n".join(line.rstrip() for line in out.getvalue().splitlines())
 
 
-@contextmanager
-def stages(out: TextIO | None = None) -> Iterator[Callable[[str], None]]:
-    """Show what is being done when it lasts, on a terminal only.
-
-    Args:
-        out: Where to; default: stderr.
-
-    Yields:
-        A function to be told the name of every stage.
-    """
-    out = out or sys.stderr
-    if not out.isatty():
-        yield lambda stage: None
-        return
-    status = Console(file=out).status("starting")
-    timer = threading.Timer(PATIENCE, status.start)
-    timer.daemon = True
-    timer.start()
-    try:
-        yield lambda stage: status.update(printable(stage))
-    finally:
-        timer.cancel()
-        status.stop()
+def show_status(
+    out: TextIO, text: str
+) -> tuple[Callable[[str], None], Callable[[], None]]:
+    """Show a line that moves; return how to change its text, and how to end it."""
+    status = Console(file=out).status(text)
+    status.start()
+    return status.update, status.stop
 
 
 @contextmanager

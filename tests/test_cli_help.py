@@ -94,8 +94,8 @@ def test_help_loads_nothing_heavy():
 
 def test_compensating_loads_nothing_that_it_may_not_need():
     code = (
-        "import sys, postproc.jobs\n"
-        "print(sorted({'matplotlib', 'pinocchio', 'scipy'} & set(sys.modules)))"
+        "import sys, postproc.jobs, postproc.stages\n"
+        "print(sorted({'matplotlib', 'pinocchio', 'rich', 'scipy'} & set(sys.modules)))"
     )
     done = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, check=True

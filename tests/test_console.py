@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import io
+import threading
 
 from postproc.console import (
     Column,
     print_table,
     printable,
     progress_bar,
+    show_status,
     stage_bar,
-    stages,
     table_text,
 )
+from postproc.stages import stages
 
 
 class Screen(io.StringIO):
@@ -58,6 +60,27 @@ def test_nothing_of_progress_reaches_a_pipe():
     with stage_bar(pipe) as share_of:
         share_of("parse", 0.5)
     assert pipe.getvalue() == ""
+
+
+def test_what_lasts_is_shown_on_a_terminal(monkeypatch):
+    shown, screen = threading.Event(), Screen()
+
+    def show(out, text):
+        update, hide = show_status(out, text)
+        shown.set()
+        return update, hide
+
+    monkeypatch.setattr("postproc.stages.PATIENCE", 0.0)
+    monkeypatch.setattr("postproc.console.show_status", show)
+    with stages(screen) as told:
+        told("plan [1]")
+        assert shown.wait(60)
+    assert screen.getvalue()
+    monkeypatch.setattr("postproc.stages.PATIENCE", 60.0)
+    quick = Screen()
+    with stages(quick) as told:
+        told("plan")
+    assert quick.getvalue() == ""
 
 
 def test_progress_shows_on_a_terminal():

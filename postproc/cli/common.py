@@ -88,7 +88,7 @@ def split_names(text: str) -> list[str]:
 @contextmanager
 def busy(doing: str) -> Iterator[None]:
     """Show on a terminal what is being done, where it lasts."""
-    from postproc.console import stages
+    from postproc.stages import stages
 
     with stages() as told:
         told(doing)

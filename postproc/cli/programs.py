@@ -70,8 +70,8 @@ def compensate(
 ) -> None:
     """Rewrite a program so that the tool lands where its targets say."""
     from postproc import forked, jobs
-    from postproc.console import stages
     from postproc.options import Options
+    from postproc.stages import stages
 
     given = None if program == STREAM else Path(program)
     with explained(given, lsv):
