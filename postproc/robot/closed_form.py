@@ -122,8 +122,9 @@ class ClosedForm:
             )
             side = np.where((slot[rows] & ELBOW) > 0, -1.0, 1.0)
             one = self._angles(facing, side)
-            flipped = ((slot[rows] & WRIST) > 0)[:, None]
-            out[rows] = self._to_joints(np.where(flipped, _wrist_flipped(one), one))
+            flipped = np.flatnonzero(slot[rows] & WRIST)
+            one[flipped] = _wrist_flipped(one.take(flipped, axis=0))
+            out[rows] = self._to_joints(one)
         return out
 
     def slot(self, theta: Array) -> Ints:
