@@ -31,7 +31,7 @@ Bools = NDArray[np.bool_]
 CHANGED = 2  # targets on each side of a moved one whose passing may change
 TRACED = 3  # targets on each side that must be traced for that
 SAME = 1e-9  # [rad] arriving on the same branch and turn
-MOST = 0.5  # of all targets; if more have to be traced, all are
+MOST = 0.85  # of all targets; if more have to be traced, all are
 STEPS = (Kind.TOOL_STEP, Kind.BASE_STEP, Kind.JOINT_STEP, Kind.TOWARDS)
 IS_STEP = np.isin(np.arange(max(Kind) + 1), STEPS)
 
