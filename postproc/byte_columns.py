@@ -21,13 +21,10 @@ MOST = 1e10  # scaled numbers from here on, too: they are not exact enough
 _FOUR = 10_000
 
 
-def _digits(texts: Sequence[str]) -> Column:
-    return np.array([t.encode() for t in texts], "S4").view(np.uint8).reshape(-1, 4)
-
-
-_BARE = _digits([str(n) for n in range(_FOUR)])
-_FULL = _digits([f"{n:04d}" for n in range(_FOUR)])
-_MORE = np.concatenate([np.zeros((1, 4), dtype=np.uint8), _BARE[1:]])  # 0: nothing
+_NUMBERS = np.arange(_FOUR)
+_BARE = _NUMBERS.astype("S4").view(np.uint32)  # four digits in one piece
+_FULL = np.strings.zfill(_NUMBERS.astype("S4"), 4).view(np.uint32)
+_MORE = np.where(_NUMBERS > 0, _BARE, np.uint32(0))  # 0: nothing
 
 
 def joined(columns: Sequence[Column | bytes]) -> bytes:
@@ -144,21 +141,27 @@ def _written(scaled: Ints, decimals: int, negative: Bools) -> Column:
     sign = np.where(negative, ord("-"), 0).astype(np.uint8)[:, None]
     parts = [sign]
     if higher.any():
-        parts += [_MORE[higher]]
+        parts += [_bytes(_MORE.take(higher))]
     if high.any():
         high -= higher * _FOUR
-        parts += [np.where((higher > 0)[:, None], _FULL[high], _MORE[high])]
-        parts += [np.where((before >= _FOUR)[:, None], _FULL[low], _BARE[low])]
+        parts += [_bytes(np.where(higher > 0, _FULL.take(high), _MORE.take(high)))]
+        long = before >= _FOUR
+        parts += [_bytes(np.where(long, _FULL.take(low), _BARE.take(low)))]
     else:
-        parts += [_BARE[low]]
+        parts += [_bytes(_BARE.take(low))]
     if decimals:
         parts.append(repeated(b".", len(scaled)))
     for left in range(decimals, 0, -4):  # digits that are still to be written
         rest = 10 ** max(left - 4, 0)
         four = after // rest
         after = after - four * rest
-        parts.append(_FULL[four][:, max(4 - left, 0) :])
+        parts.append(_bytes(_FULL.take(four))[:, max(4 - left, 0) :])
     return np.concatenate(parts, axis=1)
+
+
+def _bytes(four: NDArray[np.uint32]) -> Column:
+    """Return texts of four digits as a column."""
+    return four.view(np.uint8).reshape(-1, 4)
 
 
 def _by_python(

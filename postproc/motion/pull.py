@@ -48,20 +48,30 @@ class Pull:
         Args:
             moved: What all n targets move by, (n, 3).
         """
-        out = np.zeros_like(moved)
-        out[self.visit] = self._at_points(moved)
-        return out
-
-    def _at_points(self, moved: Array) -> Array:
-        """Return the rows of `on` that are not zero, (c, 3)."""
         here = moved.take(self.visit, axis=0)
-        out: Array = self.v[:, None] * (moved.take(self.before, axis=0) - here)
-        out += self.w[:, None] * (moved.take(self.behind, axis=0) - here)
+        pulled = self.v[:, None] * (moved.take(self.before, axis=0) - here)
+        pulled += self.w[:, None] * (moved.take(self.behind, axis=0) - here)
+        out = np.zeros_like(moved)
+        out[self.visit] = pulled
         return out
 
     def to_move(self, wanted: Array) -> Array:
         """Move targets so that the path moves as wanted where it passes, (n, 3)."""
-        moved, here = np.array(wanted), wanted.take(self.visit, axis=0)
-        for _ in range(ROUNDS if len(self.visit) else 0):
-            moved[self.visit] = here - self._at_points(moved)
-        return moved
+        n, c = len(wanted), len(self.visit)
+        if c == 0:
+            return np.array(wanted)
+        others = np.ones(n, dtype=bool)
+        others[self.visit] = False
+        order = np.concatenate([self.visit, np.flatnonzero(others)])
+        place = np.empty(n, dtype=np.int64)
+        place[order] = np.arange(n)
+        before, behind = place.take(self.before), place.take(self.behind)
+        moved = np.array(wanted.take(order, axis=0).T, order="C")  # the points first
+        here, aim = moved[:, :c], np.array(moved[:, :c])
+        for _ in range(ROUNDS):
+            pulled = self.v * (moved.take(before, axis=1) - here)
+            pulled += self.w * (moved.take(behind, axis=1) - here)
+            here[:] = aim - pulled
+        out = np.empty_like(wanted)
+        out[order] = moved.T
+        return out
