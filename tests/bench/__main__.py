@@ -43,8 +43,8 @@ together are more than `all`. MiB is the most that all of them hold, shared page
 counted once."""
 ABOUT_KERNELS = """toppra by itself solves the same joint angles once, a gridpoint a
 waypoint, and ruckig moves from stop to stop between them. The pipeline calls them only
-for a model with an effect that depends on the speed, which this one has not. Growth is
-from 10,000 targets to the longest program that ran."""
+for a model with an effect that depends on the speed, which this one has not. All is of
+the longest program that ran, in one process; growth is from 10,000 targets to that."""
 Row = dict[str, float]
 
 
@@ -73,7 +73,7 @@ def run(*arguments: str | Path) -> float:
 def measure(kind: str, n: int, fitted: Path) -> Row:
     """Compensate a made program in a process of its own."""
     command = [sys.executable, "-m", "tests.bench.stages", kind, str(n)]
-    kernels = ["--kernels"] if n == 10_000 else []
+    kernels = ["--kernels"] if n >= ALWAYS else []
     command += [str(CELL), str(fitted), *kernels]
     out, errors, code, most = watched(command, ROOT)
     if code:
@@ -145,8 +145,9 @@ def share_table(rows: dict[tuple[str, int], Row]) -> list[str]:
             more = largest["targets"] / row["targets"]
             growth = f"{math.log(largest['all'] / row['all']) / math.log(more):.2f}"
         lines.append(
-            f"| {kind} | {row['toppra'] * 1e6:.1f} | {row['ruckig'] * 1e6:.1f} | "
-            f"{each * 1e6:.0f} | {each / row['toppra']:.1f} | {growth} |"
+            f"| {kind} | {largest['toppra'] * 1e6:.1f} | "
+            f"{largest['ruckig'] * 1e6:.1f} | {each * 1e6:.0f} | "
+            f"{each / largest['toppra']:.1f} | {growth} |"
         )
     return lines
 
