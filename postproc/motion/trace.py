@@ -84,6 +84,7 @@ def trace(arm: Arm, targets: Targets, known: Known | None = None) -> Trace:
     """
     work = Workspace(arm, targets, known)
     settled = _from_strings(work) | work.given
+    work.told = ~np.isnan(work.q[:, 0])
     settled |= at_once(work, work.single & ~settled, WINDOW)
     work.solve(settled)
     _in_order(work, np.flatnonzero(~settled), work.single & ~settled)
@@ -172,7 +173,7 @@ def _one(work: Workspace, v: int) -> list[int]:
     """Settle one target from its predecessors; return the edges to look at later."""
     t = work.targets
     edges = range(int(t.pred_start[v]), int(t.pred_start[v + 1]))
-    known = [e for e in edges if work.is_known(int(work.source[e]))]
+    known = [e for e in edges if work.is_known_before(v, int(work.source[e]))]
     later = [e for e in edges if e not in known and work.source[e] >= v]
     arrivals = [arrive(work, v, e) for e in known]
     for edge, arrival in zip(known, arrivals, strict=True):

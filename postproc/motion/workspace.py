@@ -53,6 +53,7 @@ class Workspace:
         source: Predecessor of each edge, (e,); becomes -1 where a path stays unknown.
         path: Joint angles at the samples, (s, 6) [rad], NaN where not known yet.
         placed: Flange poses known beforehand that joint angles must be found for, (n,).
+        told: Targets that are known whatever leads to them, (n,).
         long: Targets of long stretches of single Cartesian paths, (n,); these are
             followed on one branch, and the others are not looked for.
     """
@@ -77,6 +78,7 @@ class Workspace:
         self._inner[self.samples.inner] = np.arange(len(self.samples.inner))
         placed = ~is_unknown(self.flange)
         self.placed = placed & (targets.kind != Kind.JOINTS) & ~self.given
+        self.told = np.zeros(n, dtype=bool)
         self.by_string = self._by_string()
         self.single = self._single_lines()
         self.long = self.single & (_run_lengths(self.single) >= LONG)
@@ -193,6 +195,10 @@ class Workspace:
     def is_known(self, v: int) -> bool:
         """Tell whether the joint angles at a target are known already."""
         return v >= 0 and not np.isnan(self.q[v, 0])
+
+    def is_known_before(self, v: int, source: int) -> bool:
+        """Tell whether a place is known when v is come to, in the program's order."""
+        return self.is_known(source) and (source < v or bool(self.told[source]))
 
     def branch_at(self, v: int) -> int:
         """Return the branch at a target, -1 where it is not known or not one alone."""
