@@ -126,7 +126,8 @@ class Window:
         missed[sharp] = (aside - meant)[sharp]
         missed[~proposal.corrected] = 0.0
         for first, end in pairwise((*self.reading.begins, len(missed))):
-            if np.abs(missed[first:end]).max(initial=0.0) <= CLOSE:
+            far = np.abs(missed[first:end]).max(initial=0.0) > CLOSE
+            if not far:  # nor where it is not known
                 missed[first:end] = 0.0
         return missed
 

@@ -127,7 +127,8 @@ def cross(a: Array, b: Array) -> Array:
     What `numpy.cross` does for any axes takes ten times as long for a hundred vectors.
     """
     like = a if a.ndim >= b.ndim else b  # in its order of memory
-    out = np.empty_like(like, shape=np.broadcast_shapes(a.shape, b.shape))
+    shape = np.broadcast_shapes(a.shape, b.shape)
+    out = np.empty_like(like, dtype=float, shape=shape)
     for i in range(3):
         j, k = (i + 1) % 3, (i + 2) % 3
         out[..., i] = a[..., j] * b[..., k] - a[..., k] * b[..., j]
