@@ -20,7 +20,7 @@ from typing import Any, Protocol, TypeVar, cast
 import numpy as np
 
 from postproc.clock import Clock, silent
-from postproc.forked import in_child
+from postproc.forked import can_fork, in_child
 
 W_contra = TypeVar("W_contra", contravariant=True)
 K_co = TypeVar("K_co", covariant=True)
@@ -60,7 +60,7 @@ def in_processes(
     Raises:
         PostprocError: As the work does, for the first window that fails.
     """
-    own, *others = shared_out(windows, processes)
+    own, *others = shared_out(windows, processes if can_fork() else 1)
     with ExitStack() as children:
         ahead = [
             children.enter_context(in_child(partial(_ahead, work, part), len(part) + 1))

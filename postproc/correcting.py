@@ -8,7 +8,6 @@ from postproc.accuracy.model import Model
 from postproc.ahead import in_processes, steady
 from postproc.clock import Clock, silent
 from postproc.cloning import give_own_points
-from postproc.exceptions import PostprocError
 from postproc.kept import Kept, joined, keep
 from postproc.language import windows as cuts
 from postproc.language.visits import Visits
@@ -94,14 +93,15 @@ class _Work:
     def foretell(self, window: Window) -> Stop | None:
         """Tell how the windows before will end, by the last targets there alone.
 
-        Right where the joints have lost their memory of what was before these.
+        Right where the joints have lost their memory of what was before these. That the
+        program begins there is an invention: what fails of it tells nothing.
         """
         visits = run_up(self.reading.visits, window)
         if visits is None:
             return None
         try:
             _, _, end = self._correct(visits, 1, Stop(), Clock(silent))
-        except PostprocError:
+        except Exception:
             return None
         return end
 

@@ -31,13 +31,18 @@ SIZE = 8  # bytes of the length before every message
 _ITEM, _RAISED, _END = range(3)
 
 
+def can_fork() -> bool:
+    """Tell whether this process may have forked children: on Linux."""
+    return sys.platform == "linux"
+
+
 def available() -> int:
     """Return how many processes are worth using: the cores that we may run on.
 
     It is one where there is no fork, and in a process that shares its work with others
     already.
     """
-    if sys.platform != "linux" or parent_process() is not None:
+    if not can_fork() or parent_process() is not None:
         return 1
     return len(os.sched_getaffinity(0))
 

@@ -83,6 +83,11 @@ def test_the_first_failure_is_told_from_where_the_work_really_stood(window) -> N
             run(Sum(NUMBERS, off=off, breaks_at=window), 3)
 
 
+def test_one_process_does_it_where_there_is_no_fork(monkeypatch) -> None:
+    monkeypatch.setattr(ahead, "can_fork", lambda: False)
+    assert {who for _, who in run(Sum(NUMBERS), 3)} == {os.getpid()}
+
+
 def test_seconds_of_all_processes_are_added() -> None:
     clock = Clock(silent)
     run(Sum(NUMBERS), 2, clock)

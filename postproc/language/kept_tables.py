@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import hashlib
 import os
+import stat
 import tempfile
 from contextlib import suppress
 from pathlib import Path
@@ -24,7 +25,9 @@ def folder() -> Path | None:
     if os.path.isabs(given):
         return Path(given) / "postproc"
     with suppress(RuntimeError):  # no home
-        return Path.home() / ".cache" / "postproc"
+        home = Path.home()
+        if home.is_absolute() and home.is_dir():
+            return home / ".cache" / "postproc"
     return None
 
 
@@ -43,8 +46,11 @@ def kept(key: str) -> bytes | None:
     if place is None:
         return None
     try:
-        with (place / key).open("rb") as file:
-            if not _is_ours(os.fstat(file.fileno())):
+        if not _is_ours(place.stat()):
+            return None
+        with open(place / key, "rb", opener=_open_file) as file:
+            status = os.fstat(file.fileno())
+            if not stat.S_ISREG(status.st_mode) or not _is_ours(status):
                 return None
             digest, data = file.read(SIZE), file.read()
     except OSError:
@@ -52,8 +58,14 @@ def kept(key: str) -> bytes | None:
     return data if hashlib.sha256(data).digest() == digest else None
 
 
+def _open_file(path: str, flags: int) -> int:
+    """Open what stands there itself, and never wait for it, as for a FIFO."""
+    flags |= getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_NOFOLLOW", 0)
+    return os.open(path, flags)
+
+
 def _is_ours(status: os.stat_result) -> bool:
-    """Tell whether nobody but this user can have written a file."""
+    """Tell whether nobody but this user can write to a file or a folder."""
     if not hasattr(os, "geteuid"):  # Windows: the folder is the user's own
         return True
     return status.st_uid == os.geteuid() and not status.st_mode & OTHERS_WRITE
@@ -74,6 +86,6 @@ def keep(key: str, data: bytes) -> None:
             with os.fdopen(handle, "wb") as file:
                 file.write(hashlib.sha256(data).digest() + data)
             os.replace(temporary, place / key)
-        except OSError:
+        except BaseException:  # Ctrl-C too
             os.unlink(temporary)
             raise

@@ -108,6 +108,31 @@ def test_a_file_that_others_may_write_is_not_trusted(cache, made):
     assert cache.stat().st_mode & 0o777 == 0o700
 
 
+def test_a_folder_that_others_may_write_to_is_not_trusted(cache, made):
+    again()
+    cache.chmod(0o777)
+    again()
+    assert len(made) == 2
+
+
+@pytest.mark.parametrize("put", [os.mkfifo, Path.mkdir])
+def test_what_is_no_file_is_not_waited_for(cache, made, put):
+    again()
+    (file,) = cache.iterdir()
+    file.unlink()
+    put(file)
+    again()
+    assert len(made) == 2
+
+
+def test_a_link_is_not_followed(cache, made, tmp_path):
+    again()
+    (file,) = cache.iterdir()
+    file.symlink_to(file.rename(tmp_path / "elsewhere"))
+    again()
+    assert len(made) == 2
+
+
 def test_no_folder_is_no_error(tmp_path, monkeypatch, made):
     (tmp_path / "file").write_text("")
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "file"))
@@ -135,7 +160,10 @@ def full(*_: object) -> None:
     raise OSError(28, "No space left on device")
 
 
-def test_a_relative_folder_is_none_of_ours(monkeypatch):
+def test_a_relative_folder_is_none_of_ours(monkeypatch, tmp_path):
     monkeypatch.setenv("XDG_CACHE_HOME", "relative")
-    monkeypatch.setenv("HOME", "/home/someone")
-    assert kept_tables.folder() == Path("/home/someone/.cache/postproc")
+    monkeypatch.setenv("HOME", str(tmp_path))
+    assert kept_tables.folder() == tmp_path / ".cache" / "postproc"
+    for home in ("relative", str(tmp_path / "not there")):
+        monkeypatch.setenv("HOME", home)
+        assert kept_tables.folder() is None
