@@ -7,6 +7,7 @@ what is left of all columns, in order, without the NULs.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +16,7 @@ Column = NDArray[np.uint8]
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
+T = TypeVar("T")
 
 TIE = 1e-4  # nearer to halfway than this the last digit is left to Python
 MOST = 1e10  # scaled numbers from here on, too: they are not exact enough
@@ -44,11 +46,23 @@ def repeated(text: bytes, rows: int) -> Column:
     return np.broadcast_to(np.frombuffer(text, dtype=np.uint8), (rows, len(text)))
 
 
-def named(texts: Sequence[str], index: Ints) -> Column:
-    """Return one of some ASCII texts for every row."""
-    used, at = np.unique(index, return_inverse=True)
-    table = np.array([texts[k].encode("ascii") for k in used.tolist()], "S")
-    return table.view(np.uint8).reshape(len(used), -1)[at.ravel()]
+def named(
+    texts: Sequence[T], index: NDArray[np.integer], text: Callable[[T], str]
+) -> Column:
+    """Write one of some texts for every row, as UTF-8.
+
+    Args:
+        texts: The texts.
+        index: Which one a row has.
+        text: How it is written.
+    """
+    least = int(index.min(initial=len(texts)))
+    used = np.bincount(index - least) > 0
+    wanted = (np.flatnonzero(used) + least).tolist()
+    table = np.array([text(texts[k]).encode() for k in wanted], dtype="S")
+    at = (np.cumsum(used) - 1)[index - least]
+    rows: Column = table.view(np.uint8).reshape(len(wanted), -1)[at]
+    return rows
 
 
 def blanked(column: Column, rows: Bools, text: bytes) -> Column:

@@ -8,9 +8,17 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from postproc.byte_columns import Column, beside, blanked, joined, shortest, whole
+from postproc.byte_columns import (
+    Column,
+    beside,
+    blanked,
+    joined,
+    named,
+    shortest,
+    whole,
+)
 from postproc.diff import Difference
-from postproc.row_columns import blocks_of, number_places, strung, words
+from postproc.row_columns import blocks_of, number_places, strung
 from postproc.rows import STATUSES, Rows
 from postproc.side_by_side import in_turns
 
@@ -54,7 +62,7 @@ def _objects(rows: Rows, k: Ints) -> list[str]:
     columns = {
         "file": json.dumps(rows.file).encode(),
         "line": whole(rows.line[k]),
-        "target": words(rows.targets, rows.target[k], json.dumps),
+        "target": named(rows.targets, rows.target[k], json.dumps),
         "original": _numbers(rows, rows.original, k),
         "compensated": _numbers(rows, rows.compensated, k),
         "change_mm": _sizes(np.where(rows.has_change[k], rows.change_mm[k], np.nan)),
@@ -77,10 +85,10 @@ def _told(rows: Rows, k: Ints) -> dict[str, Column | bytes]:
         return dict(none)
     entry = rows.entry[k]
     columns = {
-        "status": words(STATUSES, told.status[entry], json.dumps),
-        "why": words(told.reasons, told.why[entry], json.dumps),
+        "status": named(STATUSES, told.status[entry], json.dumps),
+        "why": named(told.reasons, told.why[entry], json.dumps),
         "direction": _lists(
-            words(SIGNS, told.direction[entry].ravel() + 1, str),
+            named(SIGNS, told.direction[entry].ravel() + 1, str),
             np.repeat(np.arange(len(k)), 6),
             len(k),
         ),

@@ -11,13 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from postproc.byte_columns import Column as Bytes
-from postproc.byte_columns import blanked, fixed, repeated, whole
+from postproc.byte_columns import blanked, fixed, named, repeated, whole
 from postproc.compared import VARIABLES
 from postproc.console import Column
 from postproc.diff import Difference
 from postproc.listing import ARROWS, arrows, is_coloured, paint, status_colour
 from postproc.listing_columns import Block, print_blocks
-from postproc.row_columns import blocks_of, number_places, strung, words
+from postproc.row_columns import blocks_of, number_places, strung
 from postproc.rows import STATUSES, Row, Rows
 from postproc.side_by_side import in_turns
 
@@ -97,10 +97,10 @@ class _Writer:
         if told is None or not len(told.line):
             return [repeated(b"", len(k))] * 2
         entry = rows.entry[k]
-        signs = words(SIGNS, told.direction[entry].ravel() + 1, str)
+        signs = named(SIGNS, told.direction[entry].ravel() + 1, str)
         what = told.status[entry] * len(told.reasons) + told.why[entry]
         said = [_said(s, why) for s in STATUSES for why in told.reasons]
-        both = signs.reshape(len(k), -1), words(said, what, self._painted)
+        both = signs.reshape(len(k), -1), named(said, what, self._painted)
         return [blanked(cells, entry < 0, b"") for cells in both]
 
     def _painted(self, status: str) -> str:
@@ -129,7 +129,7 @@ def _place(rows: Rows, k: Ints) -> list[Bytes]:
     """Say where rows stand."""
     file = repeated(rows.file.encode(errors="replace"), len(k))
     line = rows.line[k]
-    names = words(rows.targets, rows.target[k], str)
+    names = named(rows.targets, rows.target[k], str)
     return [file, blanked(whole(line), line == 0, b""), names]
 
 

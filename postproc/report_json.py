@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import asdict
 
 import numpy as np
@@ -73,15 +73,15 @@ def _columns(outcome: Outcome, rows: Ints) -> dict[str, Column]:
     )
     return {
         "line": whole(v.line[rows]),
-        "file": _named(v.files, v.file[rows]),
+        "file": named(v.files, v.file[rows], json.dumps),
         "literal": _literals(outcome, rows),
-        "name": _named([name or None for name in v.names], v.name[rows]),
-        "move": _named([*(m.name for m in Motion), "VIA"], move),
+        "name": named([name or None for name in v.names], v.name[rows], json.dumps),
+        "move": named([*(m.name for m in Motion), "VIA"], move, json.dumps),
         "q_deg": _rounded(np.rad2deg(d.q[rows]), 5),
         "lambda": _signs(d.direction[rows]),
         "side": _rounded(d.side[rows], 3),
-        "status": _named([s.name.lower() for s in Status], d.status[rows]),
-        "why": _named(d.reasons, d.why[rows]),
+        "status": named([s.name.lower() for s in Status], d.status[rows], json.dumps),
+        "why": named(d.reasons, d.why[rows], json.dumps),
         "original": _as_written(v.values[rows], has),
         "corrected": _as_written(d.corrected[rows], has),
         "position_mm": _rounded(outcome.position[rows] / MM, 4)
@@ -101,12 +101,6 @@ def _steps(outcome: Outcome, rows: Ints) -> Column:
     return fixed(np.where(before < 0, np.nan, step), 5)
 
 
-def _named(texts: Sequence[str | None], index: Ints) -> Column:
-    """Write one of some texts for every visit."""
-    used, at = np.unique(index, return_inverse=True)
-    return named([json.dumps(texts[k]) for k in used.tolist()], at)
-
-
 def _literals(outcome: Outcome, rows: Ints) -> Column:
     """Write where the numbers of every visit stand."""
     v = outcome.visits
@@ -115,7 +109,7 @@ def _literals(outcome: Outcome, rows: Ints) -> Column:
     if not len(has):
         return repeated(b"null", len(rows))
     literal[literal < 0] = literal[has[0]]
-    files = _named(v.files, v.literals.file[literal])
+    files = named(v.files, v.literals.file[literal], json.dumps)
     lines = whole(v.literals.line[literal])
     told = beside([b'{"file": ', files, b', "line": ', lines, b"}"])
     return blanked(told, v.literal[rows] < 0, b"null")
@@ -129,7 +123,7 @@ def _rounded(values: Array, decimals: int) -> Column:
 def _signs(values: NDArray[np.int8]) -> Column:
     """Write rows of -1, 0 and 1 (k, p)."""
     signs = values.astype(np.int64) + 1
-    return listed([named(["-1", "0", "1"], column) for column in signs.T])
+    return listed([named(["-1", "0", "1"], column, str) for column in signs.T])
 
 
 def _as_written(values: Array, written: NDArray[np.bool_]) -> Column:

@@ -1,4 +1,4 @@
-"""Numbers and words of the rows of `diff` as columns of bytes, some thousand at a time.
+"""Numbers of the rows of `diff` as columns of bytes, some thousand at a time.
 
 Rows with text, with many numbers, with visits of several statuses or with names that
 cannot be printed are few: whoever writes rows writes them one by one, as `Row`, and
@@ -7,7 +7,7 @@ asks here which they are.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator
 
 import numpy as np
 from numpy.typing import NDArray
@@ -78,22 +78,3 @@ def strung(cells: Column, owner: Ints, rows: int, between: bytes) -> Column:
     later = at > 0
     out[owner[later], at[later], : len(between)] = np.frombuffer(between, np.uint8)
     return out.reshape(rows, -1)
-
-
-def words(
-    texts: Sequence[str], index: NDArray[np.integer], text: Callable[[str], str]
-) -> Column:
-    """Write one of some texts for every row, as UTF-8.
-
-    Args:
-        texts: What there is.
-        index: Which one a row has.
-        text: How it is written.
-    """
-    least = int(index.min(initial=len(texts)))
-    used = np.bincount(index - least) > 0
-    wanted = (np.flatnonzero(used) + least).tolist()
-    table = np.array([text(texts[k]).encode() for k in wanted], dtype="S")
-    at = (np.cumsum(used) - 1)[index - least]
-    rows: Column = table.view(np.uint8).reshape(len(wanted), -1)[at]
-    return rows

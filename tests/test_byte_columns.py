@@ -54,6 +54,6 @@ def test_shortest_is_what_python_writes(decimals: int) -> None:
 def test_rows_are_json() -> None:
     rows = listed([whole(np.array([1, 20_000])), fixed(np.array([0.5, np.nan]), 2)])
     rows = blanked(rows, np.array([False, True]), b"[]")
-    texts = named([json.dumps(t) for t in ("a", 'é "b"')], np.array([1, 0]))
+    texts = named(("a", 'é "b"'), np.array([1, 0]), json.dumps)
     told = [json.loads(line) for line in lines(listed([rows, texts]))]
     assert told == [[[1, 0.5], 'é "b"'], [[], "a"]]
