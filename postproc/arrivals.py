@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from hashlib import file_digest
 from pathlib import Path
 from typing import Any, Self
 
@@ -15,7 +14,7 @@ from postproc.exceptions import ProgramError
 from postproc.language.visits import Visits
 from postproc.pose import MM
 from postproc.report import Decisions, Status
-from postproc.sidecar import read_without_edits, sidecar_path
+from postproc.sidecar import file_sha256, read_without_edits, sidecar_path
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -193,16 +192,10 @@ def read_arrivals(
         mine = record.files.get(output.name)
         if mine is None or not mine.targets:
             continue
-        same = _hashed(original) == mine.source_sha256
-        if same and _hashed(output) == mine.output_sha256:
+        same = file_sha256(original) == mine.source_sha256
+        if same and file_sha256(output) == mine.output_sha256:
             told[original.name] = _read(mine.targets)
     return {name: arrivals for name, arrivals in told.items() if arrivals is not None}
-
-
-def _hashed(path: Path) -> str:
-    """Hash a file without holding it."""
-    with path.open("rb") as file:
-        return file_digest(file, "sha256").hexdigest()
 
 
 def _read(told: Mapping[str, Any]) -> Arrivals | None:

@@ -66,7 +66,7 @@ def keep(
     proposal, done, plan = found.proposal, found.reached, planned.plan
     moved = proposal.corrected
     new = states.with_(q=np.array(done.q), direction=np.array(done.side))[moved]
-    wanted = planned.wanted[:, :3, 3]
+    wanted = plan.tcp[:, :3, 3] + planned.shift
     before = model.error(cell.arm, states[moved]) - planned.shift[moved]
     after = done.tcp[moved, :3, 3] + model.error(cell.arm, new) - wanted[moved]
     return Kept(

@@ -32,6 +32,7 @@ from postproc.strings import mark_strings
 from postproc.turning import mark_turning
 
 Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
 
 VARIABLES = ".lsv"  # suffix of variable files
 
@@ -89,11 +90,10 @@ class Planned:
     shift: Array
     doubtful: bool = False
 
-    @property
-    def wanted(self) -> Array:
-        """Return the TCP poses that should be reached, (n, 4, 4) [m]."""
-        poses = np.array(self.plan.tcp)
-        poses[:, :3, 3] += self.shift
+    def wanted(self, rows: Ints) -> Array:
+        """Return the TCP poses that should be reached at visits, (k, 4, 4) [m]."""
+        poses = self.plan.tcp[rows]
+        poses[:, :3, 3] += self.shift[rows]
         return poses
 
 

@@ -38,6 +38,16 @@ def sha256(data: bytes) -> str:
     return hashlib.sha256(data).hexdigest()
 
 
+def file_sha256(path: str | Path) -> str:
+    """Hash a file without holding it.
+
+    Raises:
+        OSError: It cannot be read.
+    """
+    with open(path, "rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+
 def block_checksums(data: bytes) -> list[int]:
     """Checksum every `BLOCK` lines, so that a later edit can be located."""
     starts = Source("", data).line_starts[::BLOCK].tolist()

@@ -115,9 +115,7 @@ def solve_again(
         orientation: Correct the orientation as well as the position.
     """
     plan, known = planned.plan, np.flatnonzero(rows & solved.known)
-    here, targets = states[known], plan.tcp[known]
-    wanted = np.array(targets)
-    wanted[:, :3, 3] += planned.shift[known]
+    here, wanted = states[known], planned.wanted(known)
     part = solve(model, cell.arm, wanted, plan.tool[known], here, orientation)
     out = replace(
         solved,
@@ -130,7 +128,7 @@ def solve_again(
         outside=dict(solved.outside),
     )
     out.q[known], out.command[known] = part.q, part.command
-    out.turn[known] = _turns(part.command, targets)
+    out.turn[known] = _turns(part.command, plan.tcp[known])
     out.residual[known] = part.residual
     std = model.std_on_flanks(cell.arm, here)
     out.std_error[known] = std

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import os
 import shutil
 from collections.abc import Iterable, Mapping
@@ -12,7 +11,7 @@ from pathlib import Path
 from postproc.batch.task import Unit
 from postproc.exceptions import OutputError
 from postproc.files import disk_error, replace_file, write_all
-from postproc.sidecar import SUFFIX, sha256
+from postproc.sidecar import SUFFIX, file_sha256, sha256
 
 
 @dataclass(frozen=True)
@@ -108,5 +107,4 @@ def file_hash(path: str | Path) -> str:
     """
     if os.path.islink(path):
         raise OSError(f"{path} is a symbolic link")
-    with open(path, "rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()
+    return file_sha256(path)

@@ -54,8 +54,7 @@ def nearest_turns(q: Array, near: Array) -> Array:
 
 def nearest_slot(branches: Array, near: Array) -> int:
     """Name the branch (8, 6) nearest to joint angles (6,) [rad]; -1 without any."""
-    gap = np.abs(nearest_turns(branches, near) - near).max(axis=1)
-    return -1 if np.isnan(gap).all() else int(np.nanargmin(gap))
+    return int(nearest_slots(branches[None], near[None])[0])
 
 
 def nearest_slots(branches: Array, near: Array) -> Ints:

@@ -32,7 +32,6 @@ Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 
-ALL = slice(None)
 GRID = np.linspace(0.0, 1.0, 9)  # where the search for the nearest point begins
 ROUNDS = 5  # of Newton's method
 FLAT = 4e-5  # [rad] bend below which a corner's moves are as good as straight
@@ -90,7 +89,7 @@ def _passed(arm: Arm, targets: Targets, traced: Trace, found: Zones) -> Corners:
     nearest[sharp] = _refined(
         arm, traced, found[sharp], nearest[sharp], tool[sharp], point[sharp]
     )
-    q = on_corner(traced, found, ALL, nearest)
+    q = parabolas(traced, found)(nearest)
     return Corners(found, nearest, q, arm.tcp(q, tool) - point, bend)
 
 
@@ -124,13 +123,8 @@ def _joined(parts: list[Corners]) -> Corners:
     )
 
 
-def on_corner(traced: Trace, found: Zones, row: Ints | slice, s: Array) -> Array:
-    """Follow the formula above on corners `row` (m,) at s (m,): (m, 6) [rad]."""
-    return parabolas(traced, found[row])(s)
-
-
 def parabolas(traced: Trace, found: Zones) -> Callable[[Array], Array]:
-    """Prepare to follow c corners: s (c,) to joint angles (c, 6) [rad]."""
+    """Prepare to follow c corners by the formula above: s (c,) to (c, 6) [rad]."""
     into, out = between(traced, found.into), between(traced, found.out)
     point = traced.q.take(found.visit, axis=0)
 

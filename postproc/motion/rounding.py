@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from postproc.motion.corner import Corners, corners, on_corner
+from postproc.motion.corner import Corners, corners, parabolas
 from postproc.motion.paths import along
 from postproc.motion.pull import Pull
 from postproc.motion.targets import Targets
@@ -160,7 +160,7 @@ def _resampled(traced: Trace, found: Corners, pieces: _Pieces) -> tuple[Edges, A
 def _on_corners(traced: Trace, found: Corners, corner: Ints, s: Array) -> Array:
     """Place samples on corners, (m, 6) [rad]."""
     parts = in_pieces(
-        lambda rows: on_corner(traced, found.zones, corner[rows], s[rows]), len(s)
+        lambda rows: parabolas(traced, found.zones[corner[rows]])(s[rows]), len(s)
     )
     return np.concatenate([np.empty((0, 6)), *parts])
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from postproc.motion import rounding
-from postproc.motion.corner import corners, nearest_on_parabola, on_corner
+from postproc.motion.corner import corners, nearest_on_parabola, parabolas
 from postproc.motion.planner import plan
 from postproc.motion.reach import reach
 from postproc.motion.rounding import rounded
@@ -92,7 +92,7 @@ def test_the_arm_passes_where_the_corner_is_nearest_and_leaves_it_tangentially(
     exact = trace(arm, targets)
     found = corners(arm, targets, exact)
     s = np.linspace(0, 1, 2001)
-    q = on_corner(exact, found.zones, np.zeros(2001, dtype=np.int64), s)
+    q = parabolas(exact, found.zones[np.zeros(2001, dtype=np.int64)])(s)
     tcp = (arm.flange(q) @ tool)[:, :3, 3]
     away = np.linalg.norm(tcp - targets.tcp[1, :3, 3], axis=1)
     at = (arm.flange(found.q) @ tool)[0, :3, 3]
