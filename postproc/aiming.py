@@ -54,7 +54,7 @@ class Aim:
 
 
 @dataclass(frozen=True)
-class Window:
+class Aiming:
     """What does not change from round to round.
 
     Attributes:

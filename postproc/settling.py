@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from postproc.accuracy.model import Model
-from postproc.aiming import Aim, Window
+from postproc.aiming import Aim, Aiming
 from postproc.as_read import numbers_as_read
 from postproc.clock import Clock
 from postproc.courses import Courses
@@ -94,21 +94,21 @@ def settle(
     Raises:
         NotTogetherError: The last look found something in programs side by side.
     """
-    window = Window(
+    aiming = Aiming(
         reading, planned, states, cell, model, options, clock, before.wanted
     )
     courses, search = Courses(reading.visits, planned.targets, cell), SideSearch()
-    aim = window.first_aim()
+    aim = aiming.first_aim()
     for number in count():  # ends: from round ROUNDS on, `settled` or `held` grows
-        proposal, meant = window.propose(aim)
+        proposal, meant = aiming.propose(aim)
         with clock("plan again"):
             looked = courses.after(proposal.decisions.corrected, before.looked)
         most = SAME if number < ROUNDS else OTHER
         moved = aim.turned(proposal, looked.side, most)
-        missed = window.missed(proposal, looked.aside, meant)
+        missed = aiming.missed(proposal, looked.aside, meant)
         bend_on = number < CORNERS and bool(missed.any())
         if not moved.any() and not bend_on:
-            found, flipped = _written(window, aim, proposal, courses, before)
+            found, flipped = _written(aiming, aim, proposal, courses, before)
             if found is not None:
                 return found
             aim = replace(aim, held=aim.held | flipped)
@@ -116,12 +116,12 @@ def settle(
         bent = aim.bent + missed if bend_on else aim.bent
         settled = aim.settled | moved if number >= ROUNDS else aim.settled
         aim = replace(aim, bent=bent, settled=settled)
-        aim = window.next_aim(aim, moved, looked.side, search)
+        aim = aiming.next_aim(aim, moved, looked.side, search)
     raise AssertionError("unreachable")
 
 
 def _written(
-    window: Window, aim: Aim, proposal: Proposal, courses: Courses, before: Left
+    aiming: Aiming, aim: Aim, proposal: Proposal, courses: Courses, before: Left
 ) -> tuple[Corrected | None, Bools]:
     """Write the numbers, and look at them as they will be read.
 
@@ -132,17 +132,17 @@ def _written(
         NotTogetherError: There are some, in programs side by side.
     """
     looked = courses.end
-    edits, proposal = write(window.reading, proposal, window.clock)
-    with window.clock("plan again"):
+    edits, proposal = write(aiming.reading, proposal, aiming.clock)
+    with aiming.clock("plan again"):
         last = courses.after(proposal.decisions.corrected, before.written)
     flipped = aim.turned(proposal, last.side, OTHER)
     if flipped.any():
-        if len(window.reading.begins) > 1:
+        if len(aiming.reading.begins) > 1:
             raise NotTogetherError
         return None, flipped
-    left = Left(looked, last.end, window.wanted(aim)[-1:].copy())
-    with window.clock("solve"):
-        std_error = std_errors(window.model, window.cell, window.states, aim.solved)
+    left = Left(looked, last.end, aiming.wanted(aim)[-1:].copy())
+    with aiming.clock("solve"):
+        std_error = std_errors(aiming.model, aiming.cell, aiming.states, aim.solved)
     decided = replace(proposal.decisions, std_error=std_error)
     proposal = replace(proposal, decisions=decided)
     return Corrected(proposal, edits, last.reached, left), flipped

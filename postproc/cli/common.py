@@ -41,6 +41,12 @@ OrientationOption = Annotated[
     bool,
     typer.Option("--orientation", help="Correct orientations too, not only places."),
 ]
+ProcessesOption = Annotated[
+    int,
+    typer.Option(
+        "--jobs", "-j", min=0, help="Processes; 0: one for a core, 8 at the most."
+    ),
+]
 TemperatureOption = Annotated[
     float | None, typer.Option("--temperature", help="Arm temperature [deg C].")
 ]

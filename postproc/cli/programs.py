@@ -16,6 +16,7 @@ from postproc.cli.common import (
     LsvOption,
     ModelOption,
     OrientationOption,
+    ProcessesOption,
     TemperatureOption,
     app,
     as_path,
@@ -61,12 +62,7 @@ def compensate(
     ] = False,
     orientation: OrientationOption = False,
     temperature: TemperatureOption = None,
-    processes: Annotated[
-        int,
-        typer.Option(
-            "--jobs", "-j", min=0, help="Processes; 0: one for a core, 8 at the most."
-        ),
-    ] = 0,
+    processes: ProcessesOption = 0,
 ) -> None:
     """Rewrite a program so that the tool lands where its targets say."""
     from postproc import forked, jobs
