@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from postproc.accuracy.library import BASE_EFFECTS
+from postproc.accuracy.model import Model, load_model
 from postproc.calibrate import fit
-from postproc.robot.cell import load_cell
+from postproc.robot.cell import Cell, load_cell
 from postproc.virtual import (
     measure_rows,
     read_rows,
@@ -44,6 +45,19 @@ points_mm = [[80.0, -40.0, 150.0], [-120.0, 60.0, 180.0], [30.0, 130.0, 320.0]]
 def job_folder(tmp_path_factory):
     """A folder with cell.toml and model.json of virtual arm SEED."""
     return make_job(tmp_path_factory.mktemp("job"))
+
+
+@pytest.fixture(scope="session")
+def bench_cell() -> Cell:
+    """The cell of the shipped programs, and of those that the bench makes."""
+    return load_cell(ROOT / "programs" / "cell.toml")
+
+
+@pytest.fixture(scope="session")
+def bench_model(tmp_path_factory) -> Model:
+    """A model fitted to the arm of that cell."""
+    text = (ROOT / "programs" / "cell.toml").read_text()
+    return load_model(make_job(tmp_path_factory.mktemp("job"), text) / "model.json")
 
 
 def make_job(folder: Path, text: str = CELL) -> Path:

@@ -11,17 +11,13 @@ import numpy as np
 import pytest
 
 from postproc import ahead, correcting
-from postproc.accuracy.model import Model, load_model
 from postproc.ahead import in_processes, is_same, shared_out
 from postproc.clock import Clock, silent
 from postproc.compensate import compensate
 from postproc.exceptions import PostprocError
 from postproc.language import windows as cuts
 from postproc.report import Outcome
-from postproc.robot.cell import Cell, load_cell
 from tests.bench import made
-from tests.bench.__main__ import CELL
-from tests.conftest import make_job
 
 LEAST, RUN_UP = 60, 150
 
@@ -122,19 +118,8 @@ def test_rounding_leaves_the_rest_of_a_stop_alone() -> None:
     assert 0 < np.abs(found.planned.q - 1 / 3).max() <= 0.5 * 10.0**-ahead.DIGITS
 
 
-@pytest.fixture(scope="module")
-def cell() -> Cell:
-    return load_cell(CELL)
-
-
-@pytest.fixture(scope="module")
-def model(tmp_path_factory) -> Model:
-    folder = make_job(tmp_path_factory.mktemp("job"), CELL.read_text())
-    return load_model(folder / "model.json")
-
-
 @pytest.fixture
-def job(cell, model, monkeypatch):
+def job(bench_cell, bench_model, monkeypatch):
     monkeypatch.setattr(cuts, "LEAST", LEAST)
     monkeypatch.setattr(cuts, "RUN_UP", RUN_UP)
     monkeypatch.setattr(made, "ROW", 40)
@@ -144,8 +129,8 @@ def job(cell, model, monkeypatch):
         program = made.KINDS[kind](900)
         return compensate(
             program.source,
-            cell,
-            model,
+            bench_cell,
+            bench_model,
             name=program.name,
             variables=program.variables,
             processes=processes,

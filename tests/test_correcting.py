@@ -16,7 +16,6 @@ import numpy as np
 import pytest
 
 from postproc import correcting
-from postproc.accuracy.model import Model, load_model
 from postproc.aiming import CLOSE
 from postproc.compensate import compensate
 from postproc.language import windows as cuts
@@ -24,35 +23,20 @@ from postproc.language.windows import windows
 from postproc.planning import read_program
 from postproc.pose import MM
 from postproc.report import Outcome, Status
-from postproc.robot.cell import Cell, load_cell
 from tests.bench import made
-from tests.bench.__main__ import CELL
-from tests.conftest import make_job
 
 LEAST = 60
 SLACK = 1e-9  # [m] what summing in blocks rounds off, once a model has seen it
 
 
-@pytest.fixture(scope="module")
-def cell() -> Cell:
-    return load_cell(CELL)
-
-
-@pytest.fixture(scope="module")
-def model(tmp_path_factory) -> Model:
-    """A model fitted to the arm of the programs' cell."""
-    folder = make_job(tmp_path_factory.mktemp("job"), CELL.read_text())
-    return load_model(folder / "model.json")
-
-
 @pytest.fixture
-def job(cell, model, monkeypatch):
+def job(bench_cell, bench_model, monkeypatch):
     def run(program: made.Made, least: int = LEAST) -> Outcome:
         monkeypatch.setattr(cuts, "LEAST", least)
         return compensate(
             program.source,
-            cell,
-            model,
+            bench_cell,
+            bench_model,
             name=program.name,
             variables=program.variables,
         )
@@ -135,7 +119,9 @@ def test_one_window_is_in_memory_at_a_time(job, monkeypatch) -> None:
     assert len(alive) > 4 and not any(alive)
 
 
-def test_what_was_looked_at_last_is_what_is_read_from_the_output(job, cell) -> None:
+def test_what_was_looked_at_last_is_what_is_read_from_the_output(
+    job, bench_cell
+) -> None:
     outcome = job(made.drilling(400))
-    again = read_program(dict(outcome.outputs), cell).visits
+    again = read_program(dict(outcome.outputs), bench_cell).visits
     np.testing.assert_array_equal(again.values, outcome.decisions.corrected)

@@ -6,6 +6,8 @@ import subprocess
 import time
 from pathlib import Path
 
+from tests.chaos import descendants
+
 EVERY = 1.0  # [s]; a look at 2 GiB costs 20 ms
 KIBI = 1024
 
@@ -29,12 +31,14 @@ def watched(command: list[str], folder: Path) -> tuple[str, str, int, float]:
 
 def held_mib(pid: int) -> float:
     """Return what a process and all below it hold now [MiB]; 0 where it is gone."""
-    place = Path("/proc") / str(pid)
+    return sum(map(_own_mib, (pid, *descendants(pid))))
+
+
+def _own_mib(pid: int) -> float:
+    """Return what one process holds, its share of what others hold too."""
     try:
-        told = (place / "smaps_rollup").read_text(encoding="ascii")
-        below = [task.read_text() for task in place.glob("task/*/children")]
+        told = Path(f"/proc/{pid}/smaps_rollup").read_text(encoding="ascii")
     except OSError:
         return 0.0
     (own,) = (row for row in told.splitlines() if row.startswith("Pss:"))
-    children = (int(child) for listed in below for child in listed.split())
-    return int(own.split()[1]) / KIBI + sum(map(held_mib, children))
+    return int(own.split()[1]) / KIBI
