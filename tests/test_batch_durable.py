@@ -7,14 +7,18 @@ import resource
 import signal
 import subprocess
 import sys
+import threading
 import time
 
 import pytest
 
 from postproc.batch.guard import locked
+from postproc.batch.local import LocalCrew
+from postproc.batch.plan import make_plan
 from postproc.batch.run import default_log
 from postproc.exceptions import OutputError
 from postproc.files import TEMPORARY
+from postproc.options import AS_USUAL
 from tests.chaos import Plant, build, chaos, descendants, gone
 from tests.plant import contents, grow
 
@@ -57,6 +61,20 @@ def test_an_interrupted_run_stops_in_order_and_can_go_on(plant):
     gone(workers)
     assert plant.run(plant.root / "dst", "--resume") == 0
     assert len([p for p in contents(plant.root / "dst") if p.endswith(".pdl")]) == 60
+
+
+def test_closed_workers_leave_no_thread_behind(plant):
+    # The interpreter would close its pipe a second time on its way out.
+    plan = make_plan(None, plant.cell, plant.model, AS_USUAL)
+    before = set(threading.enumerate())
+    crew = LocalCrew(plan.setups, 2)
+    for _ in range(5):
+        working = [crew.submit([]) for _ in range(4)]
+        crew.renew()
+        working += [crew.submit([])]
+    crew.close()
+    assert set(threading.enumerate()) <= before
+    assert all(w.done() for w in working)
 
 
 def test_a_full_disk_stops_the_run_and_loses_nothing(plant):

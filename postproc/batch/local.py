@@ -63,11 +63,17 @@ class LocalCrew:
     def close(self) -> None:
         """End the processes; what they were doing is lost."""
         own = set(multiprocessing.active_children()) - self._before
-        self._pool.shutdown(wait=False, cancel_futures=True)
+        # The pool's own thread must have ended before the interpreter does: both would
+        # close the same pipe. It ends when the processes have, so wait beside it.
+        ending = threading.Thread(
+            target=self._pool.shutdown, kwargs={"cancel_futures": True}
+        )
+        ending.start()
         for process in own:
             process.terminate()
         for process in own:
             process.join()
+        ending.join()
 
 
 def _begin(setups: Sequence[Setup]) -> None:
