@@ -146,7 +146,7 @@ def write_and_verify(
     with clock("rewrite"):
         output = write_edits(reading, kept.edits, model.id)
     with clock("verify"):
-        again = read_program(output.files, cell)
+        again = read_program(output.files, cell, reading.programs)
         check_output(reading, again, output, kept.edited)
         check_numbers(reading.visits, kept.decisions.corrected, again.visits)
     return output

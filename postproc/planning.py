@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -49,6 +49,8 @@ class Reading:
             where there are none. Lines of visits are those before these edits.
         given: The files as they were before that; empty where nothing was cloned.
         begins: The first visit of every program.
+        programs: What was parsed of the files that hold no number of a target: they
+            come out as they went in, and need not be parsed again.
     """
 
     texts: tuple[Skeleton, ...]
@@ -57,6 +59,7 @@ class Reading:
     cloned: tuple[tuple[Edit, ...], ...] = ()
     given: tuple[Source, ...] = ()
     begins: tuple[int, ...] = (0,)
+    programs: tuple[Program, ...] = ()
 
     @property
     def sources(self) -> tuple[Source, ...]:
@@ -127,19 +130,22 @@ def with_measured_play(cell: Cell, model: Model) -> Cell:
     return replace(cell, arm=arm)
 
 
-def read_program(files: Mapping[str, bytes], cell: Cell) -> Reading:
+def read_program(
+    files: Mapping[str, bytes], cell: Cell, known: Sequence[Program] = ()
+) -> Reading:
     """Parse a program and resolve its visits.
 
     Args:
         files: Bytes by name: first the program itself, then the programs that it
             imports, last, where there is one, its variable file.
         cell: What holds at program start.
+        known: Programs that were parsed before; those of the same bytes are not again.
 
     Raises:
         ProgramError: A file is no program text.
     """
     sources = [source_from_bytes(name, data) for name, data in files.items()]
-    program = parse(sources[0])
+    program = _parsed(sources[0], known)
     if program.main is None and not program.routines:
         problem, cure = "the file holds no BEGIN .. END", "Give a PDL2 program"
         raise ProgramError(sources[0].name, problem, cure)
@@ -151,13 +157,24 @@ def read_program(files: Mapping[str, bytes], cell: Cell) -> Reading:
             variables = read_variables(source)
             texts.append(Skeleton.of(variables.lines))
         else:
-            pages.append(_named(parse(source)))
+            pages.append(_named(_parsed(source, known)))
             texts.append(Skeleton.of(pages[-1].lines))
     others = _by_name(program, pages)
     resolved = resolve(program, start_of(cell), variables, others)
     missed = never_reached([program, *pages], resolved.visits)
     found = (*resolved.diagnostics, *missed)
-    return Reading(tuple(texts), resolved.visits, found)
+    visits, parsed = resolved.visits, (program, *pages)
+    corrected = {visits.files[k] for k in np.unique(visits.literals.file).tolist()}
+    kept = tuple(p for p in parsed if p.lines.source.name not in corrected)
+    return Reading(tuple(texts), visits, found, programs=kept)
+
+
+def _parsed(source: Source, known: Sequence[Program]) -> Program:
+    """Parse a file, unless it was parsed before."""
+    for program in known:
+        if program.lines.source == source:
+            return program
+    return parse(source)
 
 
 def _named(page: Program) -> Program:

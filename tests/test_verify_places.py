@@ -93,3 +93,19 @@ def test_a_number_elsewhere_is_refused() -> None:
     assert "one whole number" in differences(before, after, half, 0)[0]
     none = replace(before, start=before.start[:0], end=before.end[:0])
     assert differences(none, none, edits, 0)
+
+
+def test_a_file_without_targets_is_not_parsed_again(cell) -> None:
+    made = spot(12)
+    files = {"spot.pdl": made.source, "spot.lsv": made.variables}
+    reading = read_program(files, cell)
+    (program,) = reading.programs
+    values = made.variables.replace(b"88.100", b"88.125")
+    again = read_program({**files, "spot.lsv": values}, cell, reading.programs)
+    assert again.programs[0] is program
+    assert not np.array_equal(again.visits.values, reading.visits.values)
+    other = made.source.replace(b"MOVE JOINT TO WP_3", b"MOVE JOINT TO WP_4")
+    again = read_program({**files, "spot.pdl": other}, cell, reading.programs)
+    assert again.programs[0] is not program
+    assert again.visits.names[again.visits.name[3]] == "WP_4"
+    assert read_program({"a.pdl": POSES}, cell).programs == ()
