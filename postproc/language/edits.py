@@ -15,6 +15,7 @@ from postproc.pieces import pieces
 Ints = NDArray[np.int64]
 
 AT_ONCE = 50_000  # edits that are Python objects at the same time
+WOVEN = 10_000  # edits made at once: array passes that fit the cache
 
 
 class Span(NamedTuple):
@@ -127,12 +128,9 @@ class Replacements(Sequence[Edit]):
         if len(self) and not (self.start[0] >= 0 and self.end[-1] <= len(data)):
             raise ValueError("an edit lies outside")
         done = 0
-        for some in self.pieces():
-            parts: list[bytes] = [b""] * (2 * len(some))
-            kept = map(slice, [done, *some.end[:-1].tolist()], some.start.tolist())
-            parts[0::2] = map(data.__getitem__, kept)
-            parts[1::2] = some.new.tolist()
-            yield b"".join(parts)
+        for rows in pieces(len(self), WOVEN):
+            some = self[rows]
+            yield _woven(data, done, some)
             done = int(some.end[-1])
         yield data[done:]
 
@@ -149,6 +147,32 @@ class Replacements(Sequence[Edit]):
         old = [_cut(data, some.start, some.end) for some in self.pieces()]
         originals = np.concatenate([np.empty(0, dtype="S1"), *old])
         return Replacements(start, start + length, originals)
+
+
+def _woven(data: bytes, done: int, edits: Replacements) -> bytes:
+    """Return a text from `done` up to the end of some edits, with these made."""
+    text = np.frombuffer(data, dtype=np.uint8)[done : int(edits.end[-1])]
+    new = as_bytes(edits.new)
+    fills = new != 0
+    kept = edits.start - np.append(done, edits.end[:-1])
+    inside = _every_second(kept, edits.end - edits.start)
+    written = _every_second(kept, np.count_nonzero(fills, axis=1))
+    out = np.empty(len(written), dtype=np.uint8)
+    out[written] = new[fills]
+    out[~written] = text[~inside]
+    return out.tobytes()
+
+
+def _every_second(apart: Ints, length: Ints) -> NDArray[np.bool_]:
+    """Mark stretches of bytes of some lengths that lie so far apart from each other."""
+    marks = np.tile([False, True], len(length))
+    return np.repeat(marks, np.column_stack([apart, length]).ravel())
+
+
+def as_bytes(texts: NDArray[np.bytes_]) -> NDArray[np.uint8]:
+    """See texts as rows of bytes, filled up with NUL, which no text holds."""
+    rows = np.ascontiguousarray(texts).view(np.uint8)
+    return rows.reshape(len(texts), texts.dtype.itemsize)
 
 
 def _cut(data: bytes, start: Ints, end: Ints) -> NDArray[np.bytes_]:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from postproc.exceptions import ProgramError
 from postproc.language import digits
-from postproc.language.edits import Replacements
+from postproc.language.edits import Replacements, as_bytes
 from postproc.language.lexis import number_value
 from postproc.language.skeleton import Skeleton, differences
 from postproc.language.source import Source, apply
@@ -128,10 +128,16 @@ def _texts(values: Floats, decimals: Ints, least: Ints) -> NDArray[np.bytes_]:
     rest = np.flatnonzero(~sure)
     triples = zip(values[rest], decimals[rest], least[rest], strict=True)
     texts = [number_text(v, d, few).encode("ascii") for v, d, few in triples]
-    widest = max([new.dtype.itemsize, *map(len, texts)])
+    widest = max([_width(new), *map(len, texts)])
     new = new.astype(f"S{widest}")
     new[rest] = texts
     return new
+
+
+def _width(texts: Texts) -> int:
+    """Return the length of the longest text, at least 1."""
+    used = np.flatnonzero(as_bytes(texts).any(axis=0))
+    return 1 + int(used.max(initial=0))
 
 
 def compare(

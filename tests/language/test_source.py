@@ -1,5 +1,7 @@
 """Bytes in, bytes out."""
 
+from unittest import mock
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -124,3 +126,17 @@ def test_edits_from_several_places_are_merged_in_order() -> None:
         assert list(Replacements.merged(parts)) == list(edits(0, 2, 4))
     with pytest.raises(ValueError, match="overlap"):
         Replacements.merged([edits(4), edits(4)])
+
+
+@given(
+    st.binary(max_size=40).map(lambda data: data.replace(b"\0", b"x")),
+    st.lists(st.tuples(st.integers(0, 40), st.sampled_from([b"", b"7", b"+12.5"]))),
+    st.integers(1, 5),
+)
+def test_edits_in_pieces_do_what_single_edits_do(data, wanted, woven) -> None:
+    places = sorted(min(place, len(data)) for place, _ in wanted)
+    new = [text for _, text in wanted]
+    spans = map(Span, places[0::2], places[1::2])
+    found = list(map(Edit, spans, new))
+    with mock.patch("postproc.language.edits.WOVEN", woven):
+        assert apply(data, Replacements.of(found)) == apply(data, found)
