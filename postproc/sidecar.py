@@ -13,15 +13,18 @@ from typing import Any, Self
 
 import numpy as np
 
+from postproc.byte_columns import joined, whole
 from postproc.exceptions import ProgramError
 from postproc.inputs import read_input
-from postproc.language.edits import Replacements
+from postproc.language.edits import Replacements, as_bytes
 from postproc.language.source import Source
 
 SUFFIX = ".postproc.json"
 EDITS, TARGETS = b'"edits": [', b'], "targets": {'
 CURE = "Restore needs the record that was written beside the program"
 BLOCK = 50  # lines per checksum: how closely a later edit can be located
+_IS_BARE = np.array([c == 0 or (32 <= c < 127 and c not in b'"\\') for c in range(256)])
+"""Bytes that stand in JSON as they are; NUL, which no text holds, fills up rows."""
 
 
 def sidecar_path(output: Path) -> Path:
@@ -101,11 +104,21 @@ class FileRecord:
         yield json.dumps(told)[:-1] + ', "edits": ['
         comma = ""
         for some in self.edits.pieces():
-            texts = [text.decode("latin-1") for text in some.new.tolist()]
-            rows = zip(some.start.tolist(), some.end.tolist(), texts, strict=True)
-            yield comma + json.dumps(list(rows))[1:-1]
+            yield comma + _rows(some)
             comma = ", "
         yield '], "targets": ' + json.dumps(targets) + "}"
+
+
+def _rows(edits: Replacements) -> str:
+    """Write edits as JSON lists of start, end and text, with commas between."""
+    texts = as_bytes(edits.new)
+    if not _IS_BARE[texts].all():
+        told = [text.decode("latin-1") for text in edits.new.tolist()]
+        rows = zip(edits.start.tolist(), edits.end.tolist(), told, strict=True)
+        return json.dumps(list(rows))[1:-1]
+    start, end = whole(edits.start), whole(edits.end)
+    text = joined([b"[", start, b", ", end, b', "', texts, b'"], '])
+    return text[:-2].decode("ascii")
 
 
 @dataclass(frozen=True)

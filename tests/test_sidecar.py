@@ -63,3 +63,12 @@ def test_a_record_without_edits_is_read(tmp_path) -> None:
     empty = replace(record({}), files={"a.pdl": file})
     path.write_text("".join(empty.to_json()), encoding="utf-8")
     assert bare(read_without_edits(path)) == bare(read_sidecar(path))
+
+
+@pytest.mark.parametrize("texts", [(b"1.5", b"", b"-12.25"), NASTY, (b"1", b"\xe9\n")])
+def test_edits_are_written_as_json_lists(texts) -> None:
+    start = 10 * np.arange(len(texts), dtype=np.int64)
+    edits = Replacements(start, start + 3, np.array(texts, "S"))
+    told = [[*span, new.decode("latin-1")] for span, new in edits]
+    text = "".join(FileRecord("ab", "cd", [], edits).to_json())
+    assert f'"edits": {json.dumps(told)},' in text
