@@ -30,7 +30,7 @@ export OPENBLAS_NUM_THREADS ?= 1
 help:
 	@sed -n 's/^# //p' Makefile
 
-$(STAMP): pyproject.toml .ci/venv
+$(STAMP): pyproject.toml .ci/venv $(wildcard native/Cargo.* native/src/*.rs)
 	@bash .ci/venv $(VENV)
 	@touch $@
 

@@ -11,7 +11,7 @@ import postproc
 
 PACKAGE = Path(postproc.__file__).parent
 ROOMS = ("language", "robot", "motion", "accuracy", "virtual")
-LEAVES = {"exceptions", "pieces", "pose", "printable", "reasons", "spans"}
+LEAVES = {"exceptions", "kernels", "pieces", "pose", "printable", "reasons", "spans"}
 
 # What each room or root module may import of ours, besides itself and the leaves.
 # A root module that is not listed (the verbs) may import everything but the CLI.

@@ -16,11 +16,12 @@ the way by the square of the zone over the size of the arm: 1 um for 1 mm.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from postproc.kernels import native
 from postproc.motion.paths import along, between
 from postproc.motion.targets import Fly, Targets
 from postproc.motion.trace import Trace
@@ -75,6 +76,8 @@ def _passed(arm: Arm, targets: Targets, traced: Trace, found: Zones) -> Corners:
     """Find where the path passes some corners, and keep to their tolerances."""
     tool = targets.tool.take(found.visit, axis=0)[:, :3, 3]
     point = _tcp(traced.flange.take(found.visit, axis=0), tool)
+    if native is not None:
+        return _passed_natively(arm, targets, traced, found, tool, point)
     first, last, nearest, miss = _passing(arm, traced, found, tool, point)
     within = targets.rounding[found.visit] == Fly.WITHIN
     wanted = targets.fly_distance[found.visit]
@@ -91,6 +94,20 @@ def _passed(arm: Arm, targets: Targets, traced: Trace, found: Zones) -> Corners:
     )
     q = parabolas(traced, found)(nearest)
     return Corners(found, nearest, q, arm.tcp(q, tool) - point, bend)
+
+
+def _passed_natively(
+    arm: Arm, targets: Targets, traced: Trace, found: Zones, tool: Array, point: Array
+) -> Corners:
+    """Do as `_passed` with the native kernel."""
+    within = targets.rounding[found.visit] == Fly.WITHIN
+    wanted = np.where(within, targets.fly_distance[found.visit], np.inf)
+    before, behind, nearest, q, aside, bend = native.passed(
+        arm.dh.packed(), traced.edges, traced.q, found, np.ascontiguousarray(tool),
+        point, wanted,
+    )  # fmt: skip
+    found = replace(found, before=before, behind=behind)
+    return Corners(found, nearest, q, aside, bend)
 
 
 def _is_flat(bend: Array) -> Bools:

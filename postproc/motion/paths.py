@@ -7,6 +7,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
+from postproc.kernels import native
 from postproc.motion.trace import Trace
 
 Array = NDArray[np.float64]
@@ -19,6 +20,9 @@ def along(traced: Trace, edge: Ints, u: Array) -> Array:
     Parabolas through the three nearest of the equidistant samples, the place where the
     edge comes from being the first one; straight where an edge has but one sample.
     """
+    if native is not None:
+        out: Array = native.along(traced.edges, traced.q, edge, u)
+        return out
     return between(traced, edge)(u)
 
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from postproc.kernels import native
 from postproc.motion.corner import Corners, corners, parabolas
 from postproc.motion.paths import along
 from postproc.motion.pull import Pull
@@ -159,6 +160,9 @@ def _resampled(traced: Trace, found: Corners, pieces: _Pieces) -> tuple[Edges, A
 
 def _on_corners(traced: Trace, found: Corners, corner: Ints, s: Array) -> Array:
     """Place samples on corners, (m, 6) [rad]."""
+    if native is not None:
+        out: Array = native.followed(traced.edges, traced.q, found.zones[corner], s)
+        return out
     parts = in_pieces(
         lambda rows: parabolas(traced, found.zones[corner[rows]])(s[rows]), len(s)
     )

@@ -100,8 +100,7 @@ class Arm:
 
     def flange(self, q: Array) -> Array:
         """Place the flange: (n, 6) [rad] -> (n, 4, 4) [m], base frame."""
-        *_, last = self.dh.frames(q)
-        return pose_of(last)
+        return self.dh.flange(q)
 
     def tcp(self, q: Array, tool: Array) -> Array:
         """Place the TCP alone: (n, 3) [m], base frame.

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from postproc.kernels import native
 from postproc.pieces import pieces
 from postproc.pose import MM
 from postproc.robot.arm_file import OpwSection
@@ -81,6 +82,8 @@ class ClosedForm:
         self._bent = float(np.arctan2(p.a2_mm, p.c3_mm))
         self._offset = np.deg2rad(p.offsets_deg)
         self._sign = np.where(p.flip_axes, -1.0, 1.0)
+        lengths = self._a1, self._b, self._c1, self._upper, self._forearm, self._c4
+        self._packed = np.array([*lengths, self._bent, *self._offset, *self._sign])
 
     def branches(self, flange: Array) -> Array:
         """Solve for all branches of every pose.
@@ -115,6 +118,10 @@ class ClosedForm:
             Geometric joint angles on no particular turn, (n, 6) [rad], NaN where the
             branch does not exist.
         """
+        if native is not None:
+            flange, slot = np.ascontiguousarray(flange), np.ascontiguousarray(slot)
+            solved: Array = native.branch(self._packed, flange, slot)
+            return solved
         out = np.empty((len(flange), 6))
         for rows in pieces(len(flange), CHUNK):
             facing = self._facing(

@@ -8,6 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from postproc.kernels import native
+
 Array = NDArray[np.float64]
 Frame = tuple[Array, Array, Array, Array]  # axes x, y, z and origin [m], (3, n) each
 
@@ -28,6 +30,16 @@ class DH:
         theta: Array = self.offset + self.sense * (q @ self.mix.T)
         return theta
 
+    def packed(self, beta: Array | None = None) -> Array:
+        """Return what the native kernels know of the chain, (12, 6).
+
+        Args:
+            beta: Hayati's rotations of the links, (6,) [rad].
+        """
+        beta = np.zeros(6) if beta is None else beta
+        rows = self.a, self.d, self.alpha, self.offset, self.sense, beta, *self.mix.T
+        return np.array(rows)
+
     def frames(self, q: Array) -> Iterator[Frame]:
         """Walk along the link frames 0 (base) to 6 (flange) for angles (n, 6) [rad].
 
@@ -47,6 +59,14 @@ class DH:
             p = p + self.a[i] * x
             yield x, y, z, p
 
+    def flange(self, q: Array) -> Array:
+        """Place the flange for angles (n, 6) [rad]: (n, 4, 4) [m]."""
+        if native is not None:
+            placed: Array = native.flange(self.packed(), np.ascontiguousarray(q))
+            return placed
+        *_, last = self.frames(q)
+        return pose_of(last)
+
     def placed(self, q: Array, point: Array, beta: Array | None = None) -> Array:
         """Express points of the flange frame in the base frame, (n, 3) [m].
 
@@ -58,6 +78,10 @@ class DH:
             point: Flange frame, (n, 3) [m].
             beta: Hayati's rotations of the links, (6,) [rad].
         """
+        if native is not None:
+            q, points = np.ascontiguousarray(q), np.array(point, ndmin=2, order="C")
+            native_placed: Array = native.placed(self.packed(beta), q, points)
+            return native_placed
         theta = np.ascontiguousarray(self.angles(q).T)
         cos, sin = np.cos(theta), np.sin(theta)
         x, y, z = np.array(np.broadcast_to(point, (len(q), 3)).T)

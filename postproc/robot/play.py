@@ -15,11 +15,14 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from postproc.kernels import native
+
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 T = TypeVar("T", np.float64, np.bool_)
 
+SIX = 6  # joints: what the native kernel is made for
 BLOCK = 64  # steps that are composed one after the other
 
 
@@ -65,6 +68,9 @@ def prefix(steps: Clamps, begins: Bools | None = None) -> Clamps:
     """
     n, k = steps.lo.shape
     begins = np.zeros(n, dtype=bool) if begins is None else begins
+    if native is not None and k == SIX:
+        lo, hi = map(np.ascontiguousarray, (steps.lo, steps.hi))
+        return Clamps(*native.prefix(lo, hi, begins))
     length = min(isqrt(max(n - 1, 0)) + 1, BLOCK)
     blocks = -(-n // length)
     lo = _side_by_side(steps.lo, length, -np.inf)

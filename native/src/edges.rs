@@ -1,0 +1,98 @@
+//! Places on the sampled paths of edges: `postproc.motion.paths`.
+
+use numpy::{PyArray2, PyReadonlyArray1, PyReadonlyArray2};
+use pyo3::exceptions::PyIndexError;
+use pyo3::prelude::*;
+
+use crate::rows::{array, rows, same_length, Six};
+
+/// `Edges` of the package.
+#[derive(FromPyObject)]
+pub struct Edges<'py> {
+    path: PyReadonlyArray2<'py, f64>,
+    start: PyReadonlyArray1<'py, i64>,
+    source: PyReadonlyArray1<'py, i64>,
+}
+
+/// The paths between visits: samples of all, and joint angles at the visits.
+pub struct Paths<'a> {
+    path: &'a [Six],
+    start: &'a [i64],
+    source: &'a [i64],
+    q: &'a [Six],
+}
+
+/// One way from visit to visit.
+pub struct Way<'a> {
+    from: &'a Six,
+    samples: &'a [Six],
+}
+
+impl<'a> Paths<'a> {
+    pub fn of(edges: &'a Edges<'_>, q: &'a PyReadonlyArray2<'_, f64>) -> PyResult<Self> {
+        Ok(Paths {
+            path: rows(&edges.path)?,
+            start: edges.start.as_slice()?,
+            source: edges.source.as_slice()?,
+            q: rows(q)?,
+        })
+    }
+
+    /// Return the joint angles at a visit.
+    pub fn visit(&self, visit: i64) -> PyResult<&'a Six> {
+        let found = usize::try_from(visit).ok().and_then(|v| self.q.get(v));
+        found.ok_or_else(|| PyIndexError::new_err(format!("there is no visit {visit}")))
+    }
+
+    /// Return an edge with its samples.
+    pub fn way(&self, edge: i64) -> PyResult<Way<'a>> {
+        self.find(edge)
+            .ok_or_else(|| PyIndexError::new_err(format!("edge {edge} leads from nowhere known")))
+    }
+
+    fn find(&self, edge: i64) -> Option<Way<'a>> {
+        let edge = usize::try_from(edge).ok()?;
+        let begin = usize::try_from(*self.start.get(edge)?).ok()?;
+        let end = usize::try_from(*self.start.get(edge + 1)?).ok()?;
+        let source = usize::try_from(*self.source.get(edge)?).ok()?;
+        let samples = self.path.get(begin..end).filter(|s| !s.is_empty())?;
+        Some(Way { from: self.q.get(source)?, samples })
+    }
+}
+
+impl Way<'_> {
+    /// Interpolate at the fraction u: straight, or a parabola through three samples.
+    pub fn at(&self, u: f64) -> Six {
+        if let [end] = self.samples {
+            return std::array::from_fn(|j| end[j] + (u - 1.0) * (end[j] - self.from[j]));
+        }
+        let count = self.samples.len();
+        let x = u * count as f64;
+        let middle = x.round_ties_even().clamp(1.0, (count - 1) as f64);
+        let (i, t) = (middle as usize, x - middle);
+        let before = if i == 1 { self.from } else { &self.samples[i - 2] };
+        let (here, after) = (&self.samples[i - 1], &self.samples[i]);
+        std::array::from_fn(|j| {
+            let bend = after[j] - 2.0 * here[j] + before[j];
+            let slope = (after[j] - before[j]) / 2.0;
+            here[j] + t * slope + t * t / 2.0 * bend
+        })
+    }
+}
+
+/// Interpolate joint angles on edges (m,) at fractions u (m,): (m, 6) [rad].
+#[pyfunction]
+pub fn along<'py>(
+    py: Python<'py>,
+    edges: Edges<'py>,
+    q: PyReadonlyArray2<'py, f64>,
+    edge: PyReadonlyArray1<'py, i64>,
+    u: PyReadonlyArray1<'py, f64>,
+) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    let paths = Paths::of(&edges, &q)?;
+    let (edge, u) = (edge.as_slice()?, u.as_slice()?);
+    same_length(&[edge.len(), u.len()])?;
+    let places: PyResult<Vec<Six>> =
+        edge.iter().zip(u).map(|(e, u)| Ok(paths.way(*e)?.at(*u))).collect();
+    Ok(array(py, places?))
+}

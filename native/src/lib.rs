@@ -1,0 +1,29 @@
+//! Kernels of postproc: what its profile is made of, row by row instead of pass by pass.
+//!
+//! Every function does what the function of the same name in Python does with numpy, to
+//! a few units in the last place; formulas and their sources are documented there.
+
+use pyo3::prelude::*;
+
+mod chain;
+mod corner;
+mod edges;
+mod inverse;
+mod play;
+mod rows;
+
+/// Changes with the meaning of any function here: the package asks for its own number.
+const INTERFACE: u32 = 1;
+
+#[pymodule]
+fn postproc_kernels(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add("INTERFACE", INTERFACE)?;
+    module.add_function(wrap_pyfunction!(chain::placed, module)?)?;
+    module.add_function(wrap_pyfunction!(chain::flange, module)?)?;
+    module.add_function(wrap_pyfunction!(edges::along, module)?)?;
+    module.add_function(wrap_pyfunction!(corner::passed, module)?)?;
+    module.add_function(wrap_pyfunction!(corner::followed, module)?)?;
+    module.add_function(wrap_pyfunction!(inverse::branch, module)?)?;
+    module.add_function(wrap_pyfunction!(play::prefix, module)?)?;
+    Ok(())
+}

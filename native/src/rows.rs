@@ -1,0 +1,44 @@
+//! Rows of arrays, in and out.
+
+use numpy::ndarray::Array2;
+use numpy::{IntoPyArray, PyArray2, PyReadonlyArray2, PyUntypedArrayMethods};
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+
+/// Joint angles of one pose [rad].
+pub type Six = [f64; 6];
+/// A place [m].
+pub type Three = [f64; 3];
+
+/// See a C-contiguous array (n, K) as rows.
+pub fn rows<'a, const K: usize>(array: &'a PyReadonlyArray2<'_, f64>) -> PyResult<&'a [[f64; K]]> {
+    let given = array.shape()[1];
+    if given != K {
+        return Err(PyValueError::new_err(format!("rows of {given}, not of {K}")));
+    }
+    Ok(array.as_slice()?.as_chunks::<K>().0)
+}
+
+/// Give rows to Python as an array (n, K).
+pub fn array<const K: usize>(py: Python<'_>, rows: Vec<[f64; K]>) -> Bound<'_, PyArray2<f64>> {
+    let shape = (rows.len(), K);
+    Array2::from_shape_vec(shape, rows.into_flattened())
+        .expect("as many values as rows have")
+        .into_pyarray(py)
+}
+
+/// Refuse columns that are not of one length.
+pub fn same_length(lengths: &[usize]) -> PyResult<usize> {
+    match lengths.iter().all(|n| *n == lengths[0]) {
+        true => Ok(lengths[0]),
+        false => Err(PyValueError::new_err(format!("columns of {lengths:?} rows"))),
+    }
+}
+
+pub fn minus(a: &Three, b: &Three) -> Three {
+    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
+}
+
+pub fn dot(a: &Three, b: &Three) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}

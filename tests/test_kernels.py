@@ -1,0 +1,170 @@
+"""The native kernels do what numpy does: on random numbers, and on whole programs."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from postproc import kernels
+from postproc.compensate import compensate
+from postproc.motion import corner, paths, rounding
+from postproc.robot.closed_form import ClosedForm
+from postproc.robot.dh import DH
+from postproc.robot.play import Clamps, prefix
+
+PROGRAMS = Path(__file__).parent.parent / "programs"
+CLOSE = {"rtol": 0, "atol": 1e-12, "equal_nan": True}
+
+native = pytest.mark.skipif(
+    kernels.native is None, reason="the native kernels are not installed: ./native"
+)
+
+
+@pytest.fixture
+def by_numpy(monkeypatch):
+    """Call something with the kernels left alone."""
+
+    def call(function, *args):
+        with monkeypatch.context() as patch:
+            for name, module in list(sys.modules.items()):
+                ours = name.startswith("postproc.") and name != kernels.__name__
+                if ours and getattr(module, "native", None) is not None:
+                    patch.setattr(module, "native", None)
+            return function(*args)
+
+    return call
+
+
+@pytest.fixture
+def random():
+    return np.random.default_rng(20)
+
+
+@pytest.fixture
+def chain(random):
+    a, d, alpha, offset = random.normal(size=(4, 6))
+    mix = np.eye(6) + 0.1 * random.normal(size=(6, 6))
+    return DH(a, d, alpha, offset, np.array([1.0, -1, 1, 1, -1, 1]), mix)
+
+
+def test_kernels_of_other_sources_are_not_used(monkeypatch):
+    monkeypatch.delenv(kernels.SWITCH, raising=False)
+    for number, used in ((kernels.INTERFACE, True), (kernels.INTERFACE + 1, False)):
+        found = SimpleNamespace(INTERFACE=number)
+        monkeypatch.setitem(sys.modules, "postproc_kernels", found)
+        assert kernels._native() is (found if used else None)
+    monkeypatch.setenv(kernels.SWITCH, "numpy")
+    monkeypatch.setitem(
+        sys.modules, "postproc_kernels", SimpleNamespace(INTERFACE=kernels.INTERFACE)
+    )
+    assert kernels._native() is None
+
+
+def test_without_kernels_numpy_works(monkeypatch):
+    monkeypatch.setitem(sys.modules, "postproc_kernels", None)
+    assert kernels._native() is None
+
+
+@native
+def test_the_chain(chain, random, by_numpy):
+    q, points = random.uniform(-7, 7, (300, 6)), random.normal(size=(300, 3))
+    beta = np.array([0, 0.1, 0, 0, -0.2, 0])
+    q[7, 2] = np.nan
+    for given in ((q, points), (q, points[0]), (q, points, beta), (q[:0], points[0])):
+        assert np.allclose(
+            chain.placed(*given), by_numpy(chain.placed, *given), **CLOSE
+        )
+    assert np.allclose(chain.flange(q), by_numpy(chain.flange, q), **CLOSE)
+
+
+@native
+def test_one_branch(bench_cell, random, by_numpy):
+    closed = ClosedForm(bench_cell.arm.file.opw)
+    reached = bench_cell.arm.flange(random.uniform(-3, 3, (400, 6)))
+    reached[::7, :3, 3] *= 3.0  # out of reach
+    slot = random.integers(0, 8, 400)
+    assert np.isnan(closed.branch(reached, slot)).any()
+    assert np.allclose(
+        closed.branch(reached, slot), by_numpy(closed.branch, reached, slot), **CLOSE
+    )
+
+
+@native
+def test_play(random, by_numpy):
+    q = np.cumsum(random.normal(size=(500, 6)), axis=0)
+    q[123], begins = np.nan, random.random(500) < 0.02
+    begins[124] = True
+    steps = Clamps(q - 0.7, q + 0.7)
+    for how in (None, begins):
+        found, meant = prefix(steps, how), by_numpy(prefix, steps, how)
+        assert np.array_equal(found.lo, meant.lo, equal_nan=True)
+        assert np.array_equal(found.hi, meant.hi, equal_nan=True)
+
+
+@native
+def test_places_on_edges(random, by_numpy):
+    count = random.integers(1, 6, 40)
+    start = np.append(0, np.cumsum(count))
+    edges = SimpleNamespace(
+        path=random.normal(size=(start[-1], 6)), start=start,
+        source=random.integers(0, 20, 40),
+    )  # fmt: skip
+    traced = SimpleNamespace(edges=edges, q=random.normal(size=(20, 6)))
+    edge, u = random.integers(0, 40, 500), random.uniform(0, 1, 500)
+    u[:2] = 0.0, 1.0
+    meant = by_numpy(paths.along, traced, edge, u)
+    assert np.allclose(paths.along(traced, edge, u), meant, **CLOSE)
+    edges.source[:] = -1
+    with pytest.raises(IndexError, match="nowhere"):
+        paths.along(traced, edge, u)
+
+
+@native
+def test_corners_of_a_program(bench_cell, bench_model, by_numpy, monkeypatch):
+    seen = []
+
+    def compared(module, name, close):
+        function = getattr(module, name)
+
+        def both(*args):
+            found, meant = function(*args), by_numpy(function, *args)
+            seen.append(name)
+            close(found, meant)
+            return found
+
+        monkeypatch.setattr(module, name, both)
+
+    def same_corners(found, meant):
+        assert np.array_equal(found.zones.visit, meant.zones.visit)
+        for name in ("before", "behind"):
+            pair = getattr(found.zones, name), getattr(meant.zones, name)
+            assert np.allclose(*pair, **CLOSE)
+        for name in ("q", "aside", "bend"):
+            assert np.allclose(getattr(found, name), getattr(meant, name), atol=1e-9)
+
+    def same(found, meant):
+        assert np.allclose(found, meant, **CLOSE)
+
+    compared(corner, "_passed", same_corners)
+    compared(rounding, "_on_corners", same)
+    source = (PROGRAMS / "milling.pdl").read_bytes()
+    compensate(source, bench_cell, bench_model)
+    assert {"_passed", "_on_corners"} <= set(seen)
+
+
+@native
+@pytest.mark.parametrize("name", ["milling", "drilling", "spot", "handling"])
+def test_the_same_bytes(name, bench_cell, bench_model, by_numpy):
+    path = PROGRAMS / f"{name}.pdl"
+    values = path.with_suffix(".lsv")
+    more = {"variables": values.read_bytes()} if values.exists() else {}
+
+    def run():
+        return compensate(path.read_bytes(), bench_cell, bench_model, **more)
+
+    found, meant = run(), by_numpy(run)
+    assert found.outputs == meant.outputs
