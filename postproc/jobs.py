@@ -15,10 +15,12 @@ from postproc.inputs import read_input, read_stream
 from postproc.language.diagnostic import Diagnostic
 from postproc.options import Options
 from postproc.page_files import Pages, find_pages
+from postproc.pieces import Each
 from postproc.planning import VARIABLES
 from postproc.report import Outcome
 from postproc.report_json import report_pieces
 from postproc.robot.cell import Cell, load_cell
+from postproc.side_by_side import sharing
 from postproc.sidecar import sidecar_path
 
 
@@ -107,11 +109,19 @@ class Job:
         output: Path | None = None,
         report: Path | None = None,
         html: Path | None = None,
+        processes: int = 1,
     ) -> list[Path]:
         """Write the program, its variable file, the record and the reports.
 
         A program from standard input goes to standard output unless it is told where
         to; values that change go to a file in any case.
+
+        Args:
+            outcome: What came of the program.
+            output: Where the program goes.
+            report: Where the report goes, None for nowhere.
+            html: Where the report for a browser goes.
+            processes: How many may work at once on long texts.
 
         Returns:
             The files written.
@@ -120,15 +130,17 @@ class Job:
             OutputError: The output is the input, or cannot be written.
         """
         check_places([output, report, html], self.inputs)
+        each = sharing(processes)
         files: dict[Path, Content] = {}
         if report is not None and report != Path(STREAM):
-            files[report] = map(str.encode, report_pieces(outcome))
+            files[report] = map(str.encode, report_pieces(outcome, each))
         if html is not None:
             from postproc.html import program_report
 
             files[html] = program_report(outcome).encode()
         piped = self.path is None and output is None
-        files |= self._results(outcome, output or default_output(self._beside()), piped)
+        place = output or default_output(self._beside())
+        files |= self._results(outcome, place, piped, each)
         check_places(files, self.inputs)
         write_all(files)
         if piped:
@@ -143,7 +155,7 @@ class Job:
         return self.path or Path(self.name)
 
     def _results(
-        self, outcome: Outcome, target: Path, piped: bool
+        self, outcome: Outcome, target: Path, piped: bool, each: Each
     ) -> dict[Path, Content]:
         """Name what a compensation gives, the file that users wait for last.
 
@@ -151,30 +163,32 @@ class Job:
             outcome: The compensation.
             target: Where the program goes.
             piped: The program goes elsewhere; only values get a file.
+            each: How pieces of long texts are made.
         """
         values = target.with_suffix(VARIABLES)
         files: dict[Path, Content] = {}
         for page, _ in reversed(self.pages):
             if page.name in outcome.outputs:
                 place = _page_place(page, target)
-                files |= _with_record(outcome, {page.name: place}, place)
+                files |= _with_record(outcome, {page.name: place}, place, each)
         own = {
             name: target if name == self.name else values
             for name in reversed(list(outcome.outputs))
             if name not in {page.name for page, _ in self.pages}
             and not (piped and name == self.name)
         }
-        return files | _with_record(outcome, own, values if piped else target)
+        main = values if piped else target
+        return files | _with_record(outcome, own, main, each)
 
 
 def _with_record(
-    outcome: Outcome, places: Mapping[str, Path], main: Path
+    outcome: Outcome, places: Mapping[str, Path], main: Path, each: Each
 ) -> dict[Path, Content]:
     """Name the files of one program, behind the record that undoes them."""
     if not places:
         return {}
     names = {name: place.name for name, place in places.items()}
-    record = map(str.encode, outcome.record.renamed(names).to_json())
+    record = map(str.encode, outcome.record.renamed(names).to_json(each))
     files = {place: outcome.outputs[name] for name, place in places.items()}
     return {sidecar_path(main): record, **files}
 

@@ -2,11 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from typing import TypeVar
+from collections.abc import Callable, Iterator, Sequence
+from typing import Protocol, TypeVar
 
+K = TypeVar("K")
 T = TypeVar("T")
 PIECE = 2048  # rows at a time
+
+
+class Each(Protocol):
+    """How something is made of every task, in order: by `map`, or on two cores."""
+
+    def __call__(self, make: Callable[[K], T], tasks: Sequence[K], /) -> Iterator[T]:
+        """Make something of every task."""
 
 
 def in_pieces(work: Callable[[slice], T], n: int, size: int = PIECE) -> list[T]:

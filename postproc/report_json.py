@@ -22,6 +22,7 @@ from postproc.byte_columns import (
     whole,
 )
 from postproc.language.visits import Motion
+from postproc.pieces import Each, pieces
 from postproc.pose import MM
 from postproc.report import Outcome, Status
 
@@ -31,20 +32,30 @@ Ints = NDArray[np.int64]
 AT_ONCE = 5_000  # visits
 
 
-def report_pieces(outcome: Outcome) -> Iterator[str]:
-    """Write the report piece by piece."""
+def report_pieces(outcome: Outcome, each: Each = map) -> Iterator[str]:
+    """Write the report piece by piece.
+
+    Args:
+        outcome: What came of a program.
+        each: How the pieces are made.
+    """
     head = {"program": outcome.program, "model": outcome.model}
     yield json.dumps(head)[:-1] + ', "targets": ['
-    for first in range(0, len(outcome.visits), AT_ONCE):
-        rows = np.arange(first, min(first + AT_ONCE, len(outcome.visits)))
-        comma = ",\n" if first else "\n"
-        yield comma + _objects(_columns(outcome, rows))[: -len(",\n")]
+    tasks = list(pieces(len(outcome.visits), AT_ONCE))
+    yield from each(lambda rows: _targets(outcome, rows), tasks)
     tail = {
         "predicted": {"before": asdict(outcome.before), "after": asdict(outcome.after)},
         "diagnostics": [asdict(d) for d in outcome.diagnostics],
         "stages_s": dict(outcome.stages),
     }
     yield "],\n" + json.dumps(finite(tail))[1:] + "\n"
+
+
+def _targets(outcome: Outcome, rows: slice) -> str:
+    """Write some visits; a comma stands before all but the first."""
+    comma = ",\n" if rows.start else "\n"
+    text = _objects(_columns(outcome, np.arange(rows.start, rows.stop)))
+    return comma + text[: -len(",\n")]
 
 
 def target_row(outcome: Outcome, i: int) -> dict[str, object]:

@@ -10,11 +10,17 @@ from contextlib import contextmanager
 from typing import TypeVar
 
 from postproc.forked import available, in_child
+from postproc.pieces import Each
 
 K = TypeVar("K")
 T = TypeVar("T")
 
 LONG = 20  # tasks from which on they are shared out
+
+
+def sharing(processes: int) -> Each:
+    """Return how to make something of every task with so many processes at most."""
+    return map if processes < 2 else in_turns
 
 
 def in_turns(make: Callable[[K], T], tasks: Sequence[K], every: int = 2) -> Iterator[T]:

@@ -18,6 +18,7 @@ from postproc.exceptions import ProgramError
 from postproc.inputs import read_input
 from postproc.language.edits import Replacements, as_bytes
 from postproc.language.source import Source
+from postproc.pieces import Each
 
 SUFFIX = ".postproc.json"
 EDITS, TARGETS = b'"edits": [', b'], "targets": {'
@@ -97,14 +98,14 @@ class FileRecord:
             dict(told.get("targets", {})),
         )
 
-    def to_json(self) -> Iterator[str]:
+    def to_json(self, each: Each = map) -> Iterator[str]:
         """Write the record piece by piece: it is as long as the program."""
         told = {name: value for name, value in vars(self).items() if name != "edits"}
         targets = told.pop("targets")
         yield json.dumps(told)[:-1] + ', "edits": ['
         comma = ""
-        for some in self.edits.pieces():
-            yield comma + _rows(some)
+        for text in each(_rows, list(self.edits.pieces())):
+            yield comma + text
             comma = ", "
         yield '], "targets": ' + json.dumps(targets) + "}"
 
@@ -130,13 +131,17 @@ class Sidecar:
     files: Mapping[str, FileRecord]
     options: Mapping[str, Any] = field(default_factory=dict)
 
-    def to_json(self) -> Iterator[str]:
-        """Write the record as JSON text, piece by piece."""
+    def to_json(self, each: Each = map) -> Iterator[str]:
+        """Write the record as JSON text, piece by piece.
+
+        Args:
+            each: How the pieces are made.
+        """
         head = {"postproc": self.version, "model": self.model}
         yield json.dumps({**head, "options": dict(self.options)})[:-1] + ', "files": {'
         for number, (name, record) in enumerate(self.files.items()):
             yield (", " if number else "") + json.dumps(name) + ": "
-            yield from record.to_json()
+            yield from record.to_json(each)
         yield "}}\n"
 
     def renamed(self, names: Mapping[str, str]) -> Sidecar:

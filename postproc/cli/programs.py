@@ -76,16 +76,16 @@ def compensate(
             raise PostprocError("--report -: stdout holds the program. Name a file")
         check_places([output, report, html], [given, lsv, cell, model])
         job = jobs.Job.open(program, cell, model, lsv)
-        most = min(forked.available(), CROWD)
+        crowd = processes or min(forked.available(), CROWD)
         with stages() as progress:
-            outcome = job.run(options, progress, processes or most)
+            outcome = job.run(options, progress, crowd)
         if strict and outcome.exit_code:
             _print_outcome(outcome)
             raise PostprocError(
                 "--strict: targets were left uncompensated (listed above), nothing is "
                 "written. Mend them, or run without --strict"
             )
-        written = job.write(outcome, output, report, html)
+        written = job.write(outcome, output, report, html, crowd)
         _print_outcome(outcome)
         if report == Path(STREAM):
             write_text(STREAM, outcome.to_json())
