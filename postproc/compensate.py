@@ -31,6 +31,7 @@ from postproc.output import Output, write_edits
 from postproc.planning import Reading, read_program, with_measured_play
 from postproc.report import Outcome
 from postproc.robot.cell import Cell
+from postproc.side_by_side import sharing
 from postproc.verify import check_numbers, check_output
 
 NO_PAGES: Mapping[str, bytes] = MappingProxyType({})
@@ -72,9 +73,9 @@ def compensate(
     refuse(files, cell, model)
     cell = with_measured_play(cell, model)
     with clock("parse"):
-        reading = read_program(files, cell)
+        reading = read_program(files, cell, each=sharing(processes))
     reading, kept = correct(reading, cell, model, options, clock, processes)
-    return finish(name, reading, kept, cell, model, options, clock)
+    return finish(name, reading, kept, cell, model, options, clock, processes)
 
 
 def name_files(
@@ -124,19 +125,25 @@ def finish(
     model: Model,
     options: Options,
     clock: Clock,
+    processes: int = 1,
 ) -> Outcome:
     """Write what was corrected, verify it, and say what came of it.
 
     Raises:
         VerificationError: The output is not what was meant.
     """
-    output = write_and_verify(reading, kept, cell, model, clock)
+    output = write_and_verify(reading, kept, cell, model, clock, processes)
     with clock("report"):
         return report(name, reading, kept, output, cell, model, options, clock)
 
 
 def write_and_verify(
-    reading: Reading, kept: Kept, cell: Cell, model: Model, clock: Clock
+    reading: Reading,
+    kept: Kept,
+    cell: Cell,
+    model: Model,
+    clock: Clock,
+    processes: int = 1,
 ) -> Output:
     """Write the numbers, and read what was written.
 
@@ -146,8 +153,9 @@ def write_and_verify(
     with clock("rewrite"):
         output = write_edits(reading, kept.edits, model.id)
     with clock("verify"):
-        again = read_program(output.files, cell, reading.programs)
-        check_output(reading, again, output, kept.edited)
+        each = sharing(processes)
+        again = read_program(output.files, cell, reading.programs, each)
+        check_output(reading, again, output, kept.edited, processes)
         check_numbers(reading.visits, kept.decisions.corrected, again.visits)
     return output
 

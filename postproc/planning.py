@@ -24,6 +24,7 @@ from postproc.language.world import base_name
 from postproc.motion.planner import Plan, plan
 from postproc.motion.standing import NOWHERE, Standing
 from postproc.motion.targets import Targets
+from postproc.pieces import Each
 from postproc.reasons import Reasons
 from postproc.resolve import targets_from_visits
 from postproc.robot.cell import Cell
@@ -131,7 +132,10 @@ def with_measured_play(cell: Cell, model: Model) -> Cell:
 
 
 def read_program(
-    files: Mapping[str, bytes], cell: Cell, known: Sequence[Program] = ()
+    files: Mapping[str, bytes],
+    cell: Cell,
+    known: Sequence[Program] = (),
+    each: Each = map,
 ) -> Reading:
     """Parse a program and resolve its visits.
 
@@ -140,12 +144,13 @@ def read_program(
             imports, last, where there is one, its variable file.
         cell: What holds at program start.
         known: Programs that were parsed before; those of the same bytes are not again.
+        each: How the pieces of long texts are read.
 
     Raises:
         ProgramError: A file is no program text.
     """
     sources = [source_from_bytes(name, data) for name, data in files.items()]
-    program = _parsed(sources[0], known)
+    program = _parsed(sources[0], known, each)
     if program.main is None and not program.routines:
         problem, cure = "the file holds no BEGIN .. END", "Give a PDL2 program"
         raise ProgramError(sources[0].name, problem, cure)
@@ -154,10 +159,10 @@ def read_program(
     texts = [Skeleton.of(program.lines)]
     for source in sources[1:]:
         if source.name.lower().endswith(VARIABLES):
-            variables = read_variables(source)
+            variables = read_variables(source, each)
             texts.append(Skeleton.of(variables.lines))
         else:
-            pages.append(_named(_parsed(source, known)))
+            pages.append(_named(_parsed(source, known, each)))
             texts.append(Skeleton.of(pages[-1].lines))
     others = _by_name(program, pages)
     resolved = resolve(program, start_of(cell), variables, others)
@@ -169,12 +174,12 @@ def read_program(
     return Reading(tuple(texts), visits, found, programs=kept)
 
 
-def _parsed(source: Source, known: Sequence[Program]) -> Program:
+def _parsed(source: Source, known: Sequence[Program], each: Each) -> Program:
     """Parse a file, unless it was parsed before."""
     for program in known:
         if program.lines.source == source:
             return program
-    return parse(source)
+    return parse(source, each)
 
 
 def _named(page: Program) -> Program:

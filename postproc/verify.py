@@ -18,11 +18,13 @@ from postproc.language.visits import Visits
 from postproc.output import Output
 from postproc.pieces import pieces
 from postproc.planning import Reading
+from postproc.side_by_side import meanwhile
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 SAME = 1e-6  # [mm] and [deg]: what adding constants to numbers may round off
+WORTH = 40_000  # visits from which on a second process compares the texts
 ROWS = 50_000  # compared at a time: what that takes is small beside two readings
 CONSTANT = (
     "frames", "tool", "base", "uframe", "pred_start", "pred", "target", "motion", "via",
@@ -36,7 +38,9 @@ class VerificationError(PostprocError):
     """The output is not the program that was meant; nothing may be written."""
 
 
-def check_output(before: Reading, after: Reading, output: Output, edited: Ints) -> None:
+def check_output(
+    before: Reading, after: Reading, output: Output, edited: Ints, processes: int = 1
+) -> None:
     """Check that a rewritten program differs in the numbers of edited targets only.
 
     Args:
@@ -44,31 +48,47 @@ def check_output(before: Reading, after: Reading, output: Output, edited: Ints) 
         after: The output, parsed again.
         output: What was written.
         edited: Literals that were given new numbers, (m,).
+        processes: How many may work at once on a long program.
 
     Raises:
         VerificationError: Another byte differs, or the program reads differently.
     """
+    worth = processes > 1 and len(before.visits) > WORTH
+    with meanwhile(lambda: _in_texts(before, after, output), worth=worth) as ask:
+        in_visits = _in_visits(before.visits, after.visits, output, edited)
+        problem = ask() or in_visits
+    if problem:
+        raise VerificationError(problem)
+
+
+def _in_texts(before: Reading, after: Reading, output: Output) -> str:
+    """Say where the texts differ otherwise than by the edits, nothing if nowhere."""
     for old, new, edits in zip(before.texts, after.texts, output.edits, strict=True):
-        for problem in _differences(old, new, edits, old.source.name in output.records):
-            name = old.source.name
-            raise VerificationError(f"{name}: {problem}; nothing is written")
-    v, w = before.visits, after.visits
+        name = old.source.name
+        for problem in _differences(old, new, edits, name in output.records):
+            return f"{name}: {problem}; nothing is written"
+    return ""
+
+
+def _in_visits(v: Visits, w: Visits, output: Output, edited: Ints) -> str:
+    """Say what the program does otherwise than it should, nothing if nothing."""
+    name = v.files[0]
     if len(v) != len(w) or not np.array_equal(v.literal, w.literal):
-        raise VerificationError(f"{v.files[0]}: the output makes other moves")
+        return f"{name}: the output makes other moves"
     changes = np.append(np.zeros(len(v.literals), dtype=bool), False)  # none: -1
     changes[edited] = True
     for rows in pieces(len(v), ROWS):
         kept = ~(changes[v.literal[rows]] | changes[v.follows[rows]])
         if not _same(v.values[rows][kept], w.values[rows][kept]):
-            problem = "a target changed that was to be kept"
-            raise VerificationError(f"{v.files[0]}: {problem}")
+            return f"{name}: a target changed that was to be kept"
     if not _move_along(v, w):
-        raise VerificationError(f"{v.files[0]}: a computed target changed otherwise")
+        return f"{name}: a computed target changed otherwise"
     if not all(_as_meant(v, w, rows, output.edits) for rows in pieces(len(v), ROWS)):
-        raise VerificationError(f"{v.files[0]}: a number does not read as it was meant")
-    for name in CONSTANT:
-        if not _equal(getattr(v, name), getattr(w, name)):
-            raise VerificationError(f"{v.files[0]}: the output has another {name}")
+        return f"{name}: a number does not read as it was meant"
+    for column in CONSTANT:
+        if not _equal(getattr(v, column), getattr(w, column)):
+            return f"{name}: the output has another {column}"
+    return ""
 
 
 def _differences(

@@ -14,13 +14,14 @@ from postproc.exceptions import ProgramError
 from postproc.language.divided import Rows, divided
 from postproc.language.masking import Masked, mask_lines
 from postproc.language.source import Source
+from postproc.pieces import Each
 
 Ints = NDArray[np.signedinteger[Any]]
 """Whole numbers, as short as the length of the file allows: there are millions."""
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 
-_PIECE = 1 << 20  # bytes masked at once: array passes that fit the cache
+_PIECE = 1 << 18  # bytes masked at once: array passes that fit the cache
 _OPENS = re.compile(rb" *(?:\w+ *:: *)?(?:MOVE|MOVEFLY|OPEN)\b[^\n]*, *\Z", re.I)
 _CLAUSE = re.compile(
     rb" *(?:WITH|ADVANCE|TIL|VIA|SYNCMOVE|SYNCMOVEFLY|CONDITION|\$)", re.I
@@ -73,26 +74,31 @@ class Lines:
                 yield row + 1, found.group(1).decode("latin-1")
 
 
-def read_lines(source: Source) -> Lines:
+def read_lines(source: Source, each: Each = map) -> Lines:
     """Split a source into logical lines with masked numbers.
+
+    Args:
+        source: The text.
+        each: How the pieces of a long text are read.
 
     Raises:
         ProgramError: A string does not end on its line.
     """
+    data = source.data
+    if data.startswith(b"\xef\xbb\xbf"):
+        data = b"   " + data[3:]  # a byte order mark is no code
     ids: dict[bytes, int] = {}
-    pieces: list[Masked] = []
     shape: list[Ints] = []
-    short = np.int32 if len(source.data) < 2**31 else np.int64
-    for data, starts, at in _pieces(source):
-        masked = mask_lines(data, starts - at)
-        if masked.unterminated:
-            line = int(np.searchsorted(source.line_starts, at)) + 1
-            _refuse(source, line + masked.unterminated[0])
-        for mask in dict.fromkeys(masked.masks):
-            ids.setdefault(mask, len(ids))
-        shape.append(np.fromiter(map(ids.__getitem__, masked.masks), np.int32))
-        pieces.append(_moved(masked, at, short))
-    return _logical(source, tuple(ids), np.concatenate(shape), _merged(pieces))
+    numbers: list[Masked] = []
+    tasks = list(_tasks(source))
+    read = each(lambda task: _read(data, source.line_starts, *task), tasks)
+    for (rows, _), (piece, masks, mask) in zip(tasks, read, strict=True):
+        if piece.unterminated:
+            _refuse(source, rows.start + 1 + piece.unterminated[0])
+        new = [ids.setdefault(text, len(ids)) for text in masks]
+        shape.append(np.array(new, dtype=np.int32)[mask])
+        numbers.append(piece)
+    return _logical(source, tuple(ids), np.concatenate(shape), _merged(numbers))
 
 
 def _refuse(source: Source, line: int) -> None:
@@ -104,18 +110,27 @@ def _refuse(source: Source, line: int) -> None:
     )
 
 
-def _pieces(source: Source) -> Iterator[tuple[bytes, Ints, int]]:
-    """Yield pieces that start and end with lines: bytes, line starts, offset."""
-    data, starts = source.data, source.line_starts
-    if data.startswith(b"\xef\xbb\xbf"):
-        data = b"   " + data[3:]  # a byte order mark is no code
+def _tasks(source: Source) -> Iterator[tuple[slice, slice]]:
+    """Cut a text into pieces that start and end with lines: lines and bytes."""
+    starts, size = source.line_starts, len(source.data)
     at = 0
-    while at < len(data):
+    while at < size:
         row = int(np.searchsorted(starts, at))
         last = int(np.searchsorted(starts, at + _PIECE))
-        end = int(starts[last]) if last < len(starts) else len(data)
-        yield data[at:end], starts[row:last], at
+        end = int(starts[last]) if last < len(starts) else size
+        yield slice(row, last), slice(at, end)
         at = end
+
+
+def _read(
+    data: bytes, starts: Ints, lines: slice, place: slice
+) -> tuple[Masked, tuple[bytes, ...], Ints]:
+    """Mask a piece of a text; return its distinct masks, and which a line has, too."""
+    masked = mask_lines(data[place], starts[lines] - place.start)
+    ids = {mask: k for k, mask in enumerate(dict.fromkeys(masked.masks))}
+    mask = np.fromiter(map(ids.__getitem__, masked.masks), np.int32)
+    short = np.int32 if len(data) < 2**31 else np.int64
+    return _moved(masked, place.start, short), tuple(ids), mask
 
 
 def _moved(piece: Masked, at: int, short: type[np.signedinteger[Any]]) -> Masked:
@@ -127,7 +142,7 @@ def _moved(piece: Masked, at: int, short: type[np.signedinteger[Any]]) -> Masked
         (piece.start + at).astype(short),
         (piece.end + at).astype(short),
         piece.value,
-        (),
+        piece.unterminated,
     )
 
 

@@ -26,6 +26,7 @@ from postproc.language.records import (
 )
 from postproc.language.source import Source
 from postproc.language.store import root_of
+from postproc.pieces import Each
 
 __all__ = ["Entries", "Entry", "Variables", "read_variables"]
 
@@ -66,13 +67,17 @@ class Variables:
         return self.lines.end
 
 
-def read_variables(source: Source) -> Variables:
+def read_variables(source: Source, each: Each = map) -> Variables:
     """Read a variable file; what is wrong in it is reported, not fatal.
+
+    Args:
+        source: The file.
+        each: As in `read_lines`.
 
     Raises:
         ProgramError: A string does not end on its line.
     """
-    lines = read_lines(source)
+    lines = read_lines(source, each)
     said = formed(lines.shapes, forms_of, parse_value_form)
     head = last_head(lines, said)
     fields = find_fields(lines, said, head)

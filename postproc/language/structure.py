@@ -14,6 +14,7 @@ from postproc.language.lines import Lines, read_lines
 from postproc.language.parser import forms_of, parse_form
 from postproc.language.program import Body, Program, Variable
 from postproc.language.source import Source
+from postproc.pieces import Each
 
 __all__ = ["Body", "Program", "Variable", "parse"]
 
@@ -150,15 +151,19 @@ class _Reader:
             self.scopes[-1] = _Scope(variables=scope.variables)
 
 
-def parse(source: Source) -> Program:
+def parse(source: Source, each: Each = map) -> Program:
     """Parse a PDL2 program: every distinct shape of line once.
 
     Lines that the grammar does not know are kept and listed.
 
+    Args:
+        source: The program.
+        each: As in `read_lines`.
+
     Raises:
         ProgramError: A string does not end on its line.
     """
-    lines = read_lines(source)
+    lines = read_lines(source, each)
     statements = formed(lines.shapes, forms_of, parse_form)
     taught = frozenset(line for line, _ in lines.marks("TAUGHT"))
     reader = _Reader(lines, statements, taught)

@@ -1,0 +1,96 @@
+"""A job whose texts are read, checked and written on two cores is the same job."""
+
+from __future__ import annotations
+
+import sys
+
+import pytest
+
+from postproc import side_by_side, verify
+from postproc.compensate import compensate
+from postproc.exceptions import ProgramError
+from postproc.forked import in_child
+from postproc.language import edits, lines
+from postproc.language.source import source_from_bytes
+from postproc.report import Outcome
+from postproc.report_json import report_pieces
+from postproc.side_by_side import sharing
+from postproc.verify import VerificationError
+from tests.bench.made import KINDS
+
+pytestmark = pytest.mark.skipif(
+    sys.platform != "linux", reason="one process does it where there is no fork"
+)
+
+TARGETS = 300
+
+
+@pytest.fixture
+def children(monkeypatch) -> list[object]:
+    """Let two cores share short texts; collect what is done in children."""
+    begun: list[object] = []
+
+    def watched(work, *more):
+        begun.append(work)
+        return in_child(work, *more)
+
+    monkeypatch.setattr(side_by_side, "in_child", watched)
+    monkeypatch.setattr(side_by_side, "available", lambda: 2)
+    monkeypatch.setattr(side_by_side, "LONG", 2)
+    monkeypatch.setattr(lines, "_PIECE", 4_000)
+    monkeypatch.setattr(verify, "WORTH", 1)
+    monkeypatch.setattr(edits, "AT_ONCE", 100)
+    monkeypatch.setattr("postproc.report_json.AT_ONCE", 100)
+    return begun
+
+
+@pytest.fixture
+def job(bench_cell, bench_model):
+    def run(kind: str, processes: int) -> Outcome:
+        made = KINDS[kind](TARGETS)
+        with_ = {"name": made.name, "variables": made.variables}
+        return compensate(
+            made.source, bench_cell, bench_model, **with_, processes=processes
+        )
+
+    return run
+
+
+def told(outcome: Outcome, processes: int) -> list[str]:
+    """Return record and report but for the stages."""
+    each = sharing(processes)
+    report = "".join(report_pieces(outcome, each))
+    return [*outcome.record.to_json(each), report.partition('"stages_s"')[0]]
+
+
+@pytest.mark.parametrize("kind", ["milling", "spot"])
+def test_two_cores_give_what_one_gives(job, children, kind: str) -> None:
+    alone = job(kind, 1)
+    texts = told(alone, 1)
+    assert children == []
+    shared = job(kind, 2)
+    assert len(children) >= 3  # reading, reading again, comparing
+    before = len(children)
+    assert told(shared, 2) == texts and len(children) == before + 2
+    assert shared.outputs == alone.outputs
+
+
+def test_what_is_wrong_with_a_text_is_told_before_what_is_wrong_with_visits(
+    job, children, monkeypatch
+) -> None:
+    monkeypatch.setattr(verify, "_in_visits", lambda *given: "b.pdl: visits")
+    with pytest.raises(VerificationError, match=r"^b\.pdl: visits$"):
+        job("milling", 2)
+    monkeypatch.setattr(verify, "_differences", lambda *given: ("texts",))
+    for processes in (1, 2):
+        with pytest.raises(VerificationError, match="texts; nothing is written"):
+            job("milling", processes)
+
+
+@pytest.mark.parametrize("line", [1, 7, 199, 200])
+def test_an_open_string_is_found_on_its_line(children, line: int) -> None:
+    text = [b"  MOVE TO {1, 2, 3, 4, 5, 6} -- some more text"] * 200
+    text[line - 1] = b"  WRITE ('hello"
+    with pytest.raises(ProgramError, match=f"x:{line}: a string is not terminated"):
+        lines.read_lines(source_from_bytes("x", b"\n".join(text)), sharing(2))
+    assert len(children) == 1
