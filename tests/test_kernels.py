@@ -12,9 +12,12 @@ import pytest
 from postproc import kernels
 from postproc.compensate import compensate
 from postproc.motion import corner, paths, rounding
+from postproc.robot import direction, walks
+from postproc.robot.chains import Edges, chained
 from postproc.robot.closed_form import ClosedForm
 from postproc.robot.dh import DH
-from postproc.robot.play import Clamps, prefix
+from postproc.robot.past import NOTHING
+from postproc.robot.play import Clamps, passing, prefix
 
 PROGRAMS = Path(__file__).parent.parent / "programs"
 CLOSE = {"rtol": 0, "atol": 1e-12, "equal_nan": True}
@@ -91,6 +94,10 @@ def test_one_branch(bench_cell, random, by_numpy):
     assert np.allclose(
         closed.branch(reached, slot), by_numpy(closed.branch, reached, slot), **CLOSE
     )
+    all_of_them = closed.branches(reached)
+    assert np.allclose(all_of_them, by_numpy(closed.branches, reached), **CLOSE)
+    one = all_of_them[np.arange(len(slot)), slot]
+    assert np.array_equal(one, closed.branch(reached, slot), equal_nan=True)
 
 
 @native
@@ -103,6 +110,49 @@ def test_play(random, by_numpy):
         found, meant = prefix(steps, how), by_numpy(prefix, steps, how)
         assert np.array_equal(found.lo, meant.lo, equal_nan=True)
         assert np.array_equal(found.hi, meant.hi, equal_nan=True)
+
+
+@native
+def test_walks_with_turning_values(random, by_numpy):
+    count = random.integers(0, 7, 60)
+    source = np.where(random.random(60) < 0.2, -1, random.integers(0, 20, 60))
+    count[source >= 0] += 1  # none is empty but from an unknown place
+    start = np.append(0, np.cumsum(count))
+    values = np.cumsum(random.normal(size=(start[-1], 6)), axis=0)
+    uneven = np.flatnonzero(random.random(len(values)) < 0.1)
+    edges = Edges(np.empty(0), source, values, start, uneven)
+    given = random.normal(size=(20, 6)), source, values, edges
+    found, meant = walks._refined(*given), by_numpy(walks._refined, *given)
+    assert np.array_equal(found.start, meant.start)
+    assert len(found.values) > len(values)  # some joint did turn
+    assert np.allclose(found.values, meant.values, **CLOSE)
+    half = random.uniform(0.1, 1.0, 6)
+    passed, wanted = found.clamps(half), by_numpy(found.clamps, half)
+    assert np.array_equal(passed.lo, wanted.lo) and np.array_equal(passed.hi, wanted.hi)
+
+
+@native
+@pytest.mark.parametrize("given", [NOTHING.play, passing(np.zeros((1, 6)), np.ones(6))])
+def test_states_in_a_graph(given, random, by_numpy):
+    # Loops, jumps, unknown places and visits with several ways to them.
+    n = 200
+    count = np.where(random.random(n) < 0.2, random.integers(0, 4, n), 1)
+    first = np.append(0, np.cumsum(count))
+    source = np.repeat(np.arange(n), count) - 1
+    odd = random.random(len(source)) < 0.15
+    source[odd] = random.integers(-1, n, odd.sum())
+    q = np.cumsum(random.normal(size=(n, 6)), axis=0)
+    q[random.random(n) < 0.03] = np.nan
+    chains, half = chained(q, np.eye(6), first, source), np.full(6, 0.8)
+    steps = passing(chains.angles[np.repeat(np.arange(n), count)], half)
+    asked = chains, steps, half, given
+    found, meant = direction._states(*asked), by_numpy(direction._states, *asked)
+    assert np.array_equal(found.lo, meant.lo, equal_nan=True)
+    assert np.array_equal(found.hi, meant.hi, equal_nan=True)
+    sides = chains.angles, found, half
+    placed, wanted = direction._side(*sides), by_numpy(direction._side, *sides)
+    assert np.array_equal(placed, wanted)
+    assert {-1.0, 0.0, 1.0} < set(placed.flat)
 
 
 @native

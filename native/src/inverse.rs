@@ -1,9 +1,12 @@
-//! The closed-form inverse kinematics of an ortho-parallel arm, on one branch:
+//! The closed-form inverse kinematics of an ortho-parallel arm:
 //! `postproc.robot.closed_form`.
 
 use std::f64::consts::PI;
 
-use numpy::{PyArray2, PyReadonlyArray1, PyReadonlyArray3, PyUntypedArrayMethods};
+use numpy::ndarray::Array3;
+use numpy::{
+    IntoPyArray, PyArray2, PyArray3, PyReadonlyArray1, PyReadonlyArray3, PyUntypedArrayMethods,
+};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
@@ -12,7 +15,9 @@ use crate::rows::{array, same_length, Six};
 const WRIST: i64 = 4; // bits of a slot
 const SHOULDER: i64 = 2;
 const ELBOW: i64 = 1;
-const POSE: usize = 16;
+
+/// The rows of a pose (4, 4), one after the other.
+type Pose = [f64; 16];
 
 /// Lengths of the arm [m], the angle of its bent forearm [rad], and how the formulas'
 /// angles become those of its joints.
@@ -48,9 +53,28 @@ impl Arm {
     }
 
     /// Solve for one branch; NaN where there is none.
-    fn branch(&self, pose: &[f64; POSE], slot: i64) -> Six {
-        let axis = |k: usize| [pose[k], pose[4 + k], pose[8 + k]];
-        let axes = [axis(0), axis(1), axis(2)];
+    fn branch(&self, pose: &Pose, slot: i64) -> Six {
+        let angles = self.wrist_up(pose, slot);
+        self.to_joints(if slot & WRIST > 0 { flipped(angles) } else { angles })
+    }
+
+    /// Solve for all branches.
+    fn branches(&self, pose: &Pose) -> [Six; 8] {
+        let up: [Six; 4] = std::array::from_fn(|slot| self.wrist_up(pose, slot as i64));
+        std::array::from_fn(|slot| {
+            let angles = up[slot % 4];
+            self.to_joints(if slot >= 4 { flipped(angles) } else { angles })
+        })
+    }
+
+    /// Convert the formulas' angles to the arm's geometric ones.
+    fn to_joints(&self, angles: Six) -> Six {
+        std::array::from_fn(|j| (angles[j] + self.offset[j]) * self.sign[j])
+    }
+
+    /// Solve for the shoulder and elbow of a branch, with a positive axis 5.
+    fn wrist_up(&self, pose: &Pose, slot: i64) -> Six {
+        let axes = [0, 1, 2].map(|k| [pose[k], pose[4 + k], pose[8 + k]]);
         let z_axis = axes[2];
         let cx = pose[3] - self.c4 * z_axis[0];
         let cy = pose[7] - self.c4 * z_axis[1];
@@ -76,15 +100,11 @@ impl Arm {
         // Axis 5 seen from the flange; a straight wrist has it too.
         let (s4, c4) = t4.sin_cos();
         let bend = |k: usize| c4 * across[k] - s4 * out[k];
-        let t6 = bend(0).atan2(bend(1));
-        let mut angles = [t1, t2, t3, t4, t5, t6];
-        if slot & WRIST > 0 {
-            angles = [t1, t2, t3, t4 + PI, -t5, t6 + PI];
-        }
+        let angles = [t1, t2, t3, t4, t5, bend(0).atan2(bend(1))];
         if angles.iter().any(|t| t.is_nan()) {
             return [f64::NAN; 6];
         }
-        std::array::from_fn(|j| (angles[j] + self.offset[j]) * self.sign[j])
+        angles
     }
 
     /// Give the angles of the upper arm against the line to the wrist centre, and
@@ -98,6 +118,18 @@ impl Arm {
     }
 }
 
+/// Turn the wrist to its other solution.
+fn flipped([t1, t2, t3, t4, t5, t6]: Six) -> Six {
+    [t1, t2, t3, t4 + PI, -t5, t6 + PI]
+}
+
+fn poses<'a>(flange: &'a PyReadonlyArray3<'_, f64>) -> PyResult<&'a [Pose]> {
+    if flange.shape()[1..] != [4, 4] {
+        return Err(PyValueError::new_err("poses are (n, 4, 4)"));
+    }
+    Ok(flange.as_slice()?.as_chunks().0)
+}
+
 /// Solve for one branch of every pose (n, 4, 4) [m]: geometric joint angles (n, 6) [rad].
 #[pyfunction]
 pub fn branch<'py>(
@@ -106,12 +138,22 @@ pub fn branch<'py>(
     flange: PyReadonlyArray3<'py, f64>,
     slot: PyReadonlyArray1<'py, i64>,
 ) -> PyResult<Bound<'py, PyArray2<f64>>> {
-    let (arm, slot) = (Arm::new(parameters.as_slice()?)?, slot.as_slice()?);
-    if flange.shape()[1..] != [4, 4] {
-        return Err(PyValueError::new_err("poses are (n, 4, 4)"));
-    }
-    let poses = flange.as_slice()?.as_chunks::<POSE>().0;
+    let (arm, poses) = (Arm::new(parameters.as_slice()?)?, poses(&flange)?);
+    let slot = slot.as_slice()?;
     same_length(&[poses.len(), slot.len()])?;
     let out = poses.iter().zip(slot).map(|(p, s)| arm.branch(p, *s)).collect();
     Ok(array(py, out))
+}
+
+/// Solve for all branches of every pose (n, 4, 4) [m]: (n, 8, 6) [rad].
+#[pyfunction]
+pub fn branches<'py>(
+    py: Python<'py>,
+    parameters: PyReadonlyArray1<'py, f64>,
+    flange: PyReadonlyArray3<'py, f64>,
+) -> PyResult<Bound<'py, PyArray3<f64>>> {
+    let (arm, poses) = (Arm::new(parameters.as_slice()?)?, poses(&flange)?);
+    let out: Vec<f64> = poses.iter().flat_map(|p| arm.branches(p)).flatten().collect();
+    let shaped = Array3::from_shape_vec((poses.len(), 8, 6), out);
+    Ok(shaped.expect("48 values a pose").into_pyarray(py))
 }

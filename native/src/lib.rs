@@ -7,10 +7,12 @@ use pyo3::prelude::*;
 
 mod chain;
 mod corner;
+mod direction;
 mod edges;
 mod inverse;
 mod play;
 mod rows;
+mod walks;
 
 /// Changes with the meaning of any function here: the package asks for its own number.
 const INTERFACE: u32 = 1;
@@ -24,6 +26,11 @@ fn postproc_kernels(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(corner::passed, module)?)?;
     module.add_function(wrap_pyfunction!(corner::followed, module)?)?;
     module.add_function(wrap_pyfunction!(inverse::branch, module)?)?;
+    module.add_function(wrap_pyfunction!(inverse::branches, module)?)?;
     module.add_function(wrap_pyfunction!(play::prefix, module)?)?;
+    module.add_function(wrap_pyfunction!(direction::states, module)?)?;
+    module.add_function(wrap_pyfunction!(direction::side, module)?)?;
+    module.add_function(wrap_pyfunction!(walks::clamps, module)?)?;
+    module.add_function(wrap_pyfunction!(walks::refined, module)?)?;
     Ok(())
 }

@@ -1,7 +1,7 @@
 //! Rows of arrays, in and out.
 
 use numpy::ndarray::Array2;
-use numpy::{IntoPyArray, PyArray2, PyReadonlyArray2, PyUntypedArrayMethods};
+use numpy::{IntoPyArray, PyArray2, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
@@ -25,6 +25,12 @@ pub fn array<const K: usize>(py: Python<'_>, rows: Vec<[f64; K]>) -> Bound<'_, P
     Array2::from_shape_vec(shape, rows.into_flattened())
         .expect("as many values as rows have")
         .into_pyarray(py)
+}
+
+/// See an array (6,) as a row.
+pub fn row(array: &PyReadonlyArray1<'_, f64>) -> PyResult<Six> {
+    let given = array.as_slice()?;
+    given.try_into().map_err(|_| PyValueError::new_err(format!("{} values, not 6", given.len())))
 }
 
 /// Refuse columns that are not of one length.

@@ -95,6 +95,9 @@ class ClosedForm:
             Geometric joint angles on no particular turn, (n, 8, 6) [rad], NaN where a
             branch does not exist.
         """
+        if native is not None:
+            solved: Array = native.branches(self._packed, np.ascontiguousarray(flange))
+            return solved
         out = np.empty((len(flange), 8, 6))
         for rows in pieces(len(flange), CHUNK):
             centre = self._centre(flange[rows])

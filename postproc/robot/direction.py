@@ -16,6 +16,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from postproc.kernels import native
 from postproc.robot.arm import Arm
 from postproc.robot.chains import Chains, Edges, chained
 from postproc.robot.past import NOTHING, Past
@@ -149,6 +150,9 @@ def _half_width(arm: Arm) -> Array:
 
 def _side(angles: Array, z: Clamps, half: Array) -> Array:
     """Place every joint in its play, (n, 6)."""
+    if native is not None:
+        placed: Array = native.side(angles, z, half)
+        return placed
     s = np.clip((angles - (z.lo + z.hi) / 2) / half, -1.0, 1.0)
     on_flank = np.abs(s) > ON_FLANK
     known = (z.hi - z.lo < half / 2) | on_flank
@@ -168,6 +172,8 @@ def _states(chains: Chains, own: Clamps, half: Array, before: Clamps) -> Clamps:
         half: Half of the width of the play, (6,) [rad].
         before: What is known at the first visit.
     """
+    if native is not None:
+        return Clamps(*native.states(chains, own, half, before))
     passed = prefix(own, chains.begins()) if len(own.lo) else own
     since_head = _since_head(chains, passed)
     known: list[Clamps | None] = [None] * len(chains.heads)

@@ -69,8 +69,7 @@ def prefix(steps: Clamps, begins: Bools | None = None) -> Clamps:
     n, k = steps.lo.shape
     begins = np.zeros(n, dtype=bool) if begins is None else begins
     if native is not None and k == SIX:
-        lo, hi = map(np.ascontiguousarray, (steps.lo, steps.hi))
-        return Clamps(*native.prefix(lo, hi, begins))
+        return Clamps(*native.prefix(steps, begins))
     length = min(isqrt(max(n - 1, 0)) + 1, BLOCK)
     blocks = -(-n // length)
     lo = _side_by_side(steps.lo, length, -np.inf)

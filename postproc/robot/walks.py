@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from postproc.kernels import native
 from postproc.robot.chains import Chains, Edges
 from postproc.robot.play import (
     Array,
@@ -42,6 +43,8 @@ class Walks:
 
     def clamps(self, half_width: Array) -> Clamps:
         """Compose the clamps of passing each edge, (e, 6)."""
+        if native is not None:
+            return Clamps(*native.clamps(self.values, self.start, half_width))
         count = np.diff(self.start)
         out = identity((len(count), 6))
         one, more = np.flatnonzero(count == 1), np.flatnonzero(count > 1)
@@ -75,6 +78,8 @@ def walks(chains: Chains, coupling: Array, edges: Edges) -> Walks:
 def _refined(angles: Array, source: Ints, values: Array, edges: Edges) -> Walks:
     """Insert turning values inside every edge from a known place."""
     start = edges.start
+    if native is not None:
+        return Walks(*native.refined(angles, source, values, start, edges.uneven))
     filled = np.flatnonzero(np.diff(start) > 0)
     begins, lasts = start[filled], start[filled + 1] - 1
     before = np.vstack([values[:1], values[:-1]])
