@@ -24,12 +24,12 @@ pub struct Zones<'py> {
 }
 
 /// Two moves that are superposed.
-struct Corner<'a> {
+pub struct Corner<'a> {
     into: Way<'a>,
     out: Way<'a>,
     here: &'a Six,
-    before: f64,
-    behind: f64,
+    pub before: f64,
+    pub behind: f64,
 }
 
 /// Where the path passes a corner.
@@ -50,7 +50,8 @@ struct Look<'a> {
 }
 
 impl Zones<'_> {
-    fn corners<'a>(&self, paths: &Paths<'a>) -> PyResult<Vec<Corner<'a>>> {
+    /// Look up the moves at the corners.
+    pub fn corners<'a>(&self, paths: &Paths<'a>) -> PyResult<Vec<Corner<'a>>> {
         let (visit, into, out) =
             (self.visit.as_slice()?, self.into.as_slice()?, self.out.as_slice()?);
         let (before, behind) = (self.before.as_slice()?, self.behind.as_slice()?);
@@ -76,7 +77,7 @@ impl Look<'_> {
 
 impl Corner<'_> {
     /// Follow the superposed moves, s from 0 to 1.
-    fn at(&self, s: f64) -> Six {
+    pub fn at(&self, s: f64) -> Six {
         let into = self.into.at(1.0 - self.before * (1.0 - s) * (1.0 - s));
         let out = self.out.at(self.behind * s * s);
         std::array::from_fn(|j| into[j] + out[j] - self.here[j])
@@ -193,19 +194,4 @@ pub fn passed<'py>(
         array(py, found.iter().map(|p| p.aside).collect()),
         array(py, found.iter().map(|p| p.bend).collect()),
     ))
-}
-
-/// Follow c corners: s (c,) to (c, 6) [rad].
-#[pyfunction]
-pub fn followed<'py>(
-    py: Python<'py>,
-    edges: Edges<'py>,
-    q: PyReadonlyArray2<'py, f64>,
-    zones: Zones<'py>,
-    s: PyReadonlyArray1<'py, f64>,
-) -> PyResult<Block<'py>> {
-    let paths = Paths::of(&edges, &q)?;
-    let (corners, s) = (zones.corners(&paths)?, s.as_slice()?);
-    same_length(&[corners.len(), s.len()])?;
-    Ok(array(py, corners.iter().zip(s).map(|(c, s)| c.at(*s)).collect()))
 }

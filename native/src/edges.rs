@@ -50,12 +50,24 @@ impl<'a> Paths<'a> {
             .ok_or_else(|| PyIndexError::new_err(format!("edge {edge} leads from nowhere known")))
     }
 
+    /// Tell where the samples of an edge stand.
+    pub fn span(&self, edge: usize) -> PyResult<std::ops::Range<usize>> {
+        let ends = || {
+            let begin = usize::try_from(*self.start.get(edge)?).ok()?;
+            Some(begin..usize::try_from(*self.start.get(edge + 1)?).ok()?)
+        };
+        ends().ok_or_else(|| PyIndexError::new_err(format!("there is no edge {edge}")))
+    }
+
+    /// Return some samples.
+    pub fn samples(&self, span: std::ops::Range<usize>) -> PyResult<&'a [Six]> {
+        self.path.get(span).ok_or_else(|| PyIndexError::new_err("samples that are not there"))
+    }
+
     fn find(&self, edge: i64) -> Option<Way<'a>> {
         let edge = usize::try_from(edge).ok()?;
-        let begin = usize::try_from(*self.start.get(edge)?).ok()?;
-        let end = usize::try_from(*self.start.get(edge + 1)?).ok()?;
+        let samples = self.path.get(self.span(edge).ok()?).filter(|s| !s.is_empty())?;
         let source = usize::try_from(*self.source.get(edge)?).ok()?;
-        let samples = self.path.get(begin..end).filter(|s| !s.is_empty())?;
         Some(Way { from: self.q.get(source)?, samples })
     }
 }

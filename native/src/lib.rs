@@ -11,6 +11,7 @@ mod direction;
 mod edges;
 mod inverse;
 mod play;
+mod rounding;
 mod rows;
 mod walks;
 
@@ -24,7 +25,7 @@ fn postproc_kernels(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(chain::flange, module)?)?;
     module.add_function(wrap_pyfunction!(edges::along, module)?)?;
     module.add_function(wrap_pyfunction!(corner::passed, module)?)?;
-    module.add_function(wrap_pyfunction!(corner::followed, module)?)?;
+    module.add_function(wrap_pyfunction!(rounding::resampled, module)?)?;
     module.add_function(wrap_pyfunction!(inverse::branch, module)?)?;
     module.add_function(wrap_pyfunction!(inverse::branches, module)?)?;
     module.add_function(wrap_pyfunction!(play::prefix, module)?)?;

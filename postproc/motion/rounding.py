@@ -122,9 +122,23 @@ def _pieces(traced: Trace, found: Corners) -> _Pieces:
 
 def _resampled(traced: Trace, found: Corners, pieces: _Pieces) -> tuple[Edges, Array]:
     """Sample all edges anew; return them and their samples' share of the way."""
-    old = traced.edges
     touched = np.asarray((pieces.corner >= 0).any(axis=0))
     start = np.concatenate([[0], np.cumsum(pieces.count.sum(axis=0))])
+    path, share = _samples(traced, found, pieces, touched, start)
+    uneven = _uneven(pieces, touched, start)
+    return replace(traced.edges, path=path, start=start, uneven=uneven), share
+
+
+def _samples(
+    traced: Trace, found: Corners, pieces: _Pieces, touched: Bools, start: Ints
+) -> tuple[Array, Array]:
+    """Place the samples, (s, 6) [rad], and give their shares of the way, (s,)."""
+    old = traced.edges
+    if native is not None:
+        placed: tuple[Array, Array] = native.resampled(
+            old, traced.share, traced.q, found, pieces
+        )
+        return placed
     edge = np.repeat(np.arange(len(old.source)), np.diff(start))
     nth = np.arange(len(edge)) - start[edge] + 1
     path, share = np.empty((len(edge), 6)), np.empty(len(edge))
@@ -153,16 +167,11 @@ def _resampled(traced: Trace, found: Corners, pieces: _Pieces) -> tuple[Edges, A
         path[rows[others]] = _on_corners(traced, found, corner[others], s[others])
         size = (found.zones.behind, found.zones.before)[side][corner]
         share[rows] = 2 * size * step
-    return replace(
-        old, path=path, start=start, uneven=_uneven(pieces, touched, start)
-    ), share
+    return path, share
 
 
 def _on_corners(traced: Trace, found: Corners, corner: Ints, s: Array) -> Array:
     """Place samples on corners, (m, 6) [rad]."""
-    if native is not None:
-        out: Array = native.followed(traced.edges, traced.q, found.zones[corner], s)
-        return out
     parts = in_pieces(
         lambda rows: parabolas(traced, found.zones[corner[rows]])(s[rows]), len(s)
     )
