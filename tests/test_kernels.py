@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from dataclasses import fields
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -11,7 +12,8 @@ import pytest
 
 from postproc import kernels
 from postproc.compensate import compensate
-from postproc.motion import corner, paths, rounding
+from postproc.motion import corner, paths, rounding, sampling, zone
+from postproc.pose import rotation_from_vector
 from postproc.robot import direction, walks
 from postproc.robot.chains import Edges, chained
 from postproc.robot.closed_form import ClosedForm
@@ -171,6 +173,25 @@ def test_places_on_edges(random, by_numpy):
     edges.source[:] = -1
     with pytest.raises(IndexError, match="nowhere"):
         paths.along(traced, edge, u)
+
+
+@native
+def test_straight_ways(bench_cell, random, by_numpy):
+    flange = bench_cell.arm.flange(random.uniform(-3, 3, (300, 6)))
+    flange[100:200, :3, :3] = flange[99, :3, :3]  # no turn at all
+    flange[200:, :3, :3] = flange[200, :3, :3] @ rotation_from_vector(
+        random.normal(size=(100, 3)) * np.logspace(-9, 0, 100)[:, None]
+    )
+    tool = np.repeat(bench_cell.arm.flange(np.ones((1, 6))), 300, axis=0)
+    targets = SimpleNamespace(tool=tool)
+    asked = targets, flange, np.arange(299), np.arange(1, 300)
+    found, meant = sampling._lines(*asked), by_numpy(sampling._lines, *asked)
+    for field in fields(found):
+        one, other = (getattr(s, field.name) for s in (found, meant))
+        assert np.allclose(one, other, **CLOSE), field.name
+    assert np.allclose(zone._chords(*asked), by_numpy(zone._chords, *asked), **CLOSE)
+    with pytest.raises(IndexError, match="not there"):
+        zone._chords(targets, flange, np.array([-1]), np.array([0]))
 
 
 @native

@@ -4,20 +4,16 @@
 use std::f64::consts::PI;
 
 use numpy::ndarray::Array3;
-use numpy::{
-    IntoPyArray, PyArray2, PyArray3, PyReadonlyArray1, PyReadonlyArray3, PyUntypedArrayMethods,
-};
+use numpy::{IntoPyArray, PyArray2, PyArray3, PyReadonlyArray1, PyReadonlyArray3};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
+use crate::lines::{poses, Pose};
 use crate::rows::{array, same_length, Six};
 
 const WRIST: i64 = 4; // bits of a slot
 const SHOULDER: i64 = 2;
 const ELBOW: i64 = 1;
-
-/// The rows of a pose (4, 4), one after the other.
-type Pose = [f64; 16];
 
 /// Lengths of the arm [m], the angle of its bent forearm [rad], and how the formulas'
 /// angles become those of its joints.
@@ -121,13 +117,6 @@ impl Arm {
 /// Turn the wrist to its other solution.
 fn flipped([t1, t2, t3, t4, t5, t6]: Six) -> Six {
     [t1, t2, t3, t4 + PI, -t5, t6 + PI]
-}
-
-fn poses<'a>(flange: &'a PyReadonlyArray3<'_, f64>) -> PyResult<&'a [Pose]> {
-    if flange.shape()[1..] != [4, 4] {
-        return Err(PyValueError::new_err("poses are (n, 4, 4)"));
-    }
-    Ok(flange.as_slice()?.as_chunks().0)
 }
 
 /// Solve for one branch of every pose (n, 4, 4) [m]: geometric joint angles (n, 6) [rad].

@@ -10,13 +10,14 @@ mod corner;
 mod direction;
 mod edges;
 mod inverse;
+mod lines;
 mod play;
 mod rounding;
 mod rows;
 mod walks;
 
-/// Changes with the meaning of any function here: the package asks for its own number.
-const INTERFACE: u32 = 1;
+/// Changes with every function here: the package asks for its own number.
+const INTERFACE: u32 = 2;
 
 #[pymodule]
 fn postproc_kernels(module: &Bound<'_, PyModule>) -> PyResult<()> {
@@ -26,6 +27,8 @@ fn postproc_kernels(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(edges::along, module)?)?;
     module.add_function(wrap_pyfunction!(corner::passed, module)?)?;
     module.add_function(wrap_pyfunction!(rounding::resampled, module)?)?;
+    module.add_function(wrap_pyfunction!(lines::lines, module)?)?;
+    module.add_function(wrap_pyfunction!(lines::chords, module)?)?;
     module.add_function(wrap_pyfunction!(inverse::branch, module)?)?;
     module.add_function(wrap_pyfunction!(inverse::branches, module)?)?;
     module.add_function(wrap_pyfunction!(play::prefix, module)?)?;

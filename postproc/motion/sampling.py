@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from postproc.kernels import native
 from postproc.motion.path import Segments, arcs, joined, lines
 from postproc.motion.targets import Move, Targets
 from postproc.pose import inverse
@@ -71,11 +72,11 @@ def sample(targets: Targets, flange: Array) -> Samples:
     ready = cartesian & (source >= 0) & known[visit] & tool_known[visit]
     ready &= known[at] & ~targets.wrist_joint[visit]
     straight = np.flatnonzero(ready & (targets.move[visit] == Move.LINEAR))
-    tool = targets.tool.take(visit[straight], axis=0)
-    begin = flange.take(source[straight], axis=0) @ tool
-    end = flange.take(visit[straight], axis=0) @ tool
     begins = _begins(targets, visit, source)
-    segments, edge = lines(begin, end), straight
+    segments, edge = (
+        _lines(targets, flange, source[straight], visit[straight]),
+        straight,
+    )
     if (begins >= 0).any():
         round_, arc = _arcs(targets, flange, visit, source, ready, begins)
         segments, edge = joined([segments, arc]), np.append(straight, round_)
@@ -120,6 +121,19 @@ def _inner(
         visit, source, cartesian, ready, broken, begins, start, length, turning,
         inner=start[edge[path]] + nth, flange=tcp @ inverse(tool),
     )  # fmt: skip
+
+
+def _lines(targets: Targets, flange: Array, begin: Ints, end: Ints) -> Segments:
+    """Build the straight paths from targets (m,) to others."""
+    if native is not None:
+        m, nothing = len(end), np.zeros((len(end), 3))
+        rotation, turn, centre, chord = native.lines(flange, targets.tool, begin, end)
+        return Segments(
+            rotation, turn, centre, nothing, nothing, chord,
+            angle=np.zeros(m), valid=np.ones(m, dtype=bool),
+        )  # fmt: skip
+    tool = targets.tool.take(end, axis=0)
+    return lines(flange.take(begin, axis=0) @ tool, flange.take(end, axis=0) @ tool)
 
 
 def _begins(targets: Targets, visit: Ints, source: Ints) -> Ints:

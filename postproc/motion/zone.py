@@ -19,6 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from postproc.kernels import native
 from postproc.motion.targets import Fly, Move, Targets
 from postproc.motion.trace import Trace
 from postproc.robot.arm import Arm
@@ -99,17 +100,24 @@ def _lengths(targets: Targets, traced: Trace, to: Ints, edge: Ints) -> Array:
     used = np.zeros(len(to), dtype=bool)
     used[edge] = True
     at = np.flatnonzero(used)
-    end, begin = to[at], traced.edges.source[at]
-    tool = targets.tool.take(end, axis=0)[:, :3, 3]
-    chord = np.zeros((len(at), 3))
-    for sign, visit in ((1, end), (-1, begin)):
-        flange = traced.flange.take(visit, axis=0)
-        place = np.einsum("nij,nj->ni", flange[:, :3, :3], tool) + flange[:, :3, 3]
-        chord += sign * place
+    chords = _chords(targets, traced.flange, traced.edges.source[at], to[at])
     length = np.zeros(len(to))
-    chords = np.sqrt(np.einsum("ni,ni->n", chord, chord))
     length[at] = np.fmax(traced.length[at], chords)
     return length[edge]
+
+
+def _chords(targets: Targets, flange: Array, begin: Ints, end: Ints) -> Array:
+    """Measure the straight ways of the TCP from targets to others, (m,) [m]."""
+    if native is not None:
+        lengths: Array = native.chords(flange, targets.tool, begin, end)
+        return lengths
+    tool = targets.tool.take(end, axis=0)[:, :3, 3]
+    chord = np.zeros((len(end), 3))
+    for sign, visit in ((1, end), (-1, begin)):
+        at = flange.take(visit, axis=0)
+        place = np.einsum("nij,nj->ni", at[:, :3, :3], tool) + at[:, :3, 3]
+        chord += sign * place
+    return np.sqrt(np.einsum("ni,ni->n", chord, chord))
 
 
 def _by_distance(targets: Targets, visit: Ints, length: Array) -> Array:
