@@ -20,6 +20,7 @@ Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Bytes = NDArray[np.int8]
 
+DIGIT = "0123456789"  # status of a visit
 SIGNS = "-0+"  # direction of a joint: -1, 0, 1
 BOTH = 2  # arrivals at one line from both sides of a joint
 URGENCY = (Status.UNSAFE, Status.GUARDED, Status.DISPLAY, Status.SAFE, Status.UNCHANGED)
@@ -69,7 +70,7 @@ class Arrivals:
             KeyError, ValueError, TypeError: It is something else.
         """
         line = np.array(told["line"], dtype=np.int64)
-        status = _places(told["status"], "0123456789").astype(np.int64)
+        status = _places(told["status"], DIGIT).astype(np.int64)
         sides = (_places(told["direction"], SIGNS) - 1).reshape(len(line), 6)
         size = np.array(told["correction_mm"], dtype=np.float64)
         why = np.array(told["why"], dtype=np.int64)
@@ -126,6 +127,13 @@ def _places(text: str, letters: str) -> Bytes:
     return places
 
 
+def _letters(places: NDArray[np.integer], letters: str) -> str:
+    """Return the text of the letters at some places, as `_places` reads it."""
+    table = np.frombuffer(letters.encode("ascii"), dtype=np.uint8)
+    chosen: NDArray[np.uint8] = table[places]
+    return chosen.tobytes().decode("ascii")
+
+
 def tell_arrivals(
     visits: Visits, decisions: Decisions, files: Sequence[str]
 ) -> dict[str, dict[str, Any]]:
@@ -149,7 +157,6 @@ def tell_arrivals(
         file = np.where(has, v.literals.file[literal], v.file)
         line = np.where(has, v.literals.line[literal], v.line)
     size = np.linalg.norm(d.correction, axis=1) / MM
-    signs = np.array(list(SIGNS))
     told = {}
     for name in files:
         rows = np.flatnonzero(file == v.files.index(name))
@@ -158,13 +165,11 @@ def tell_arrivals(
         )
         order = np.argsort(first)  # reasons as the visits need them
         told[name] = {
-            "line": line[rows].tolist(),
-            "status": "".join(d.status[rows].astype(str).tolist()),
-            "direction": "".join(
-                signs[np.asarray(d.direction[rows], dtype=int) + 1].ravel().tolist()
-            ),
-            "correction_mm": np.round(np.nan_to_num(size[rows]), DIGITS).tolist(),
-            "why": np.argsort(order)[why].tolist(),
+            "line": line[rows],
+            "status": _letters(d.status[rows], DIGIT),
+            "direction": _letters(d.direction[rows] + 1, SIGNS),
+            "correction_mm": np.round(np.nan_to_num(size[rows]), DIGITS),
+            "why": np.argsort(order)[why],
             "reasons": [d.reasons[k] for k in codes[order].tolist()],
         }
     return told

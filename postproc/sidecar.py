@@ -13,7 +13,7 @@ from typing import Any, Self
 
 import numpy as np
 
-from postproc.byte_columns import joined, whole
+from postproc.byte_columns import joined, shortest, whole
 from postproc.exceptions import ProgramError
 from postproc.inputs import read_input
 from postproc.language.edits import Replacements, as_bytes
@@ -69,7 +69,7 @@ class FileRecord:
         edits: What the output's bytes were before, ascending: in a file start, end and
             the original as Latin-1 text. The stamp is the first of them.
         targets: What came of the targets in it, see `postproc.arrivals`; empty in
-            records of older versions.
+            records of older versions. Columns are arrays before they are written.
     """
 
     source_sha256: str
@@ -107,7 +107,18 @@ class FileRecord:
         for text in each(_rows, list(self.edits.pieces())):
             yield comma + text
             comma = ", "
-        yield '], "targets": ' + json.dumps(targets) + "}"
+        texts = (f"{json.dumps(key)}: {_text(told)}" for key, told in targets.items())
+        yield '], "targets": {' + ", ".join(texts) + "}}"
+
+
+def _text(value: Any) -> str:
+    """Write a value as JSON; arrays are columns of numbers from 0 on."""
+    if not isinstance(value, np.ndarray):
+        return json.dumps(value)
+    if not len(value):
+        return "[]"
+    column = shortest(value) if value.dtype.kind == "f" else whole(value)
+    return "[" + joined([column, b", "])[:-2].decode("ascii") + "]"
 
 
 def _rows(edits: Replacements) -> str:

@@ -72,3 +72,15 @@ def test_edits_are_written_as_json_lists(texts) -> None:
     told = [[*span, new.decode("latin-1")] for span, new in edits]
     text = "".join(FileRecord("ab", "cd", [], edits).to_json())
     assert f'"edits": {json.dumps(told)},' in text
+
+
+def test_columns_are_written_as_lists_are() -> None:
+    columns = {
+        "line": np.array([7, 0, 12]),
+        "correction_mm": np.array([0.0, 0.1234, 12.5]),
+        "none": np.empty(0),
+        "reasons": ["", "far \xe9"],
+    }
+    lists = {k: v if k == "reasons" else v.tolist() for k, v in columns.items()}
+    assert "".join(record(columns).to_json()) == "".join(record(lists).to_json())
+    assert json.dumps(lists) in "".join(record(columns).to_json())
