@@ -12,6 +12,7 @@
 # make accuracy    held-out errors, coverage, real and blind data: docs/accuracy.md
 # make undeclared  undeclared effects traced on virtual arms, 1,400 of them: docs/undeclared.md
 # make blind       effects traced in the blind campaigns and on a real arm: docs/blind.md
+# make native      lint and tests of the native kernels, for who changes them (needs Rust)
 # make docs     run every command of the documentation, check links, write build/docs
 # Each target first creates the environment .venv when it is missing or out of date.
 
@@ -24,7 +25,7 @@ export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
 
 .PHONY: help demo test lint format bench evidence reproduce accuracy undeclared blind chaos fuzz docs clean
-.PHONY: plant-bench generated growth
+.PHONY: plant-bench generated growth native
 .DELETE_ON_ERROR:
 
 help:
@@ -77,6 +78,11 @@ fuzz: $(STAMP)
 	@$(PYTHON_BIN) -m tests.fuzz --count $(or $(COUNT),20000)
 	@$(PYTHON_BIN) -c 'import atheris' 2>/dev/null || $(PYTHON_BIN) -m pip install --quiet -e '.[fuzz]' || true
 	@$(PYTHON_BIN) -m tests.fuzz.guided --runs $(or $(RUNS),20000)
+
+native: $(STAMP)
+	@cd native && cargo fmt --check && cargo clippy --release -- -D warnings
+	@cd native && PYO3_PYTHON=$(abspath $(PYTHON_BIN)) cargo test --release --no-default-features
+	@$(PYTHON_BIN) -m pytest tests/test_kernels.py
 
 docs: $(STAMP)
 	@PATH="$(abspath $(VENV))/bin:$$PATH" python docs/tools/build.py $(UPDATE)

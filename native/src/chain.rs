@@ -6,6 +6,7 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
 use crate::rows::{array, rows, Six, Three};
+use crate::trig::sin_cos;
 
 struct Link {
     a: f64,
@@ -42,14 +43,20 @@ impl Chain {
         })))
     }
 
+    /// Return sines and cosines of the D-H angles.
+    fn sin_cos(&self, q: &Six) -> (Six, Six) {
+        sin_cos(&std::array::from_fn(|i| self.0[i].angle(q)))
+    }
+
     /// Express a point of the flange frame in the base frame.
     pub fn placed(&self, q: &Six, point: &Three) -> Three {
         let [mut x, mut y, mut z] = *point;
-        for link in self.0.iter().rev() {
+        let (sin, cos) = self.sin_cos(q);
+        for (i, link) in self.0.iter().enumerate().rev() {
             if let Some((sb, cb)) = link.beta {
                 (x, z) = (cb * x + sb * z, cb * z - sb * x);
             }
-            let ((sa, ca), (st, ct)) = (link.alpha, link.angle(q).sin_cos());
+            let ((sa, ca), (st, ct)) = (link.alpha, (sin[i], cos[i]));
             x += link.a;
             (y, z) = (ca * y - sa * z, sa * y + ca * z + link.d);
             (x, y) = (ct * x - st * y, st * x + ct * y);
@@ -61,8 +68,9 @@ impl Chain {
     fn flange(&self, q: &Six) -> [f64; 16] {
         let (mut x, mut y, mut z) = ([1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]);
         let mut p = [0.0; 3];
-        for link in &self.0 {
-            let ((sa, ca), (st, ct)) = (link.alpha, link.angle(q).sin_cos());
+        let (sin, cos) = self.sin_cos(q);
+        for (i, link) in self.0.iter().enumerate() {
+            let ((sa, ca), (st, ct)) = (link.alpha, (sin[i], cos[i]));
             for k in 0..3 {
                 p[k] += link.d * z[k];
                 let across = ct * y[k] - st * x[k];

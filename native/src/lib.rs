@@ -14,6 +14,7 @@ mod lines;
 mod play;
 mod rounding;
 mod rows;
+mod trig;
 mod walks;
 
 /// Changes with every function here: the package asks for its own number.

@@ -117,7 +117,7 @@ def _chords(targets: Targets, flange: Array, begin: Ints, end: Ints) -> Array:
         at = flange.take(visit, axis=0)
         place = np.einsum("nij,nj->ni", at[:, :3, :3], tool) + at[:, :3, 3]
         chord += sign * place
-    return np.sqrt(np.einsum("ni,ni->n", chord, chord))
+    return np.asarray(np.sqrt(np.einsum("ni,ni->n", chord, chord)))
 
 
 def _by_distance(targets: Targets, visit: Ints, length: Array) -> Array:
