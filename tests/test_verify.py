@@ -83,7 +83,11 @@ def test_a_target_that_was_to_be_kept_is_refused(job_cell: Cell) -> None:
         check_output(reading, fewer, output, rows)
 
 
-@pytest.mark.parametrize("error", [VerificationError, ValueError])
+class Panic(BaseException):
+    """As native code raises it."""
+
+
+@pytest.mark.parametrize("error", [VerificationError, ValueError, Panic])
 def test_no_defect_of_ours_shows_a_trace(desk, monkeypatch, capsys, error) -> None:
     def fail(*_: object) -> None:
         raise error("job.pdl: another byte differs; nothing is written")
@@ -100,5 +104,5 @@ def test_no_defect_of_ours_shows_a_trace(desk, monkeypatch, capsys, error) -> No
     told = capsys.readouterr().err
     assert left.value.code == 2
     assert "another byte differs" in told and "Traceback" not in told
-    assert ("internal error" in told) == (error is ValueError)
+    assert ("internal error" in told) == (error is not VerificationError)
     assert desk.names() == {"job.pdl"}

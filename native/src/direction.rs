@@ -3,6 +3,7 @@
 use std::collections::VecDeque;
 
 use numpy::{PyArray2, PyReadonlyArray1, PyReadonlyArray2};
+use pyo3::exceptions::PyIndexError;
 use pyo3::prelude::*;
 
 use crate::play::{ends, Clamp, Clamps, Ends};
@@ -38,6 +39,22 @@ struct Graph<'a> {
 }
 
 impl Graph<'_> {
+    /// Tell whether all that is referred to is there: nothing below looks again.
+    fn is_sound(&self, chain_ends: &[i64]) -> bool {
+        let (n, e) = (self.angles.len() as i64, self.own.len() as i64);
+        let (chains, spans) = (self.heads.len() as i64, self.heads.iter().zip(chain_ends));
+        let bodies = spans.clone().flat_map(|(head, end)| head + 1..*end);
+        self.first.len() as i64 == n + 1
+            && self.first.iter().all(|edge| (0..=e).contains(edge))
+            && self.source.len() as i64 == e
+            && self.source.iter().all(|visit| *visit < n)
+            && self.heads.len() == chain_ends.len()
+            && spans.clone().all(|(head, end)| 0 <= *head && head < end && *end <= n)
+            && bodies.into_iter().all(|visit| self.first[visit as usize] < e)
+            && self.chain_of.len() as i64 == n
+            && self.chain_of.iter().all(|chain| (0..chains).contains(chain))
+    }
+
     fn edges_to(&self, visit: usize) -> std::ops::Range<usize> {
         self.first[visit] as usize..self.first[visit + 1] as usize
     }
@@ -143,8 +160,11 @@ pub fn states<'py>(
         half,
         known: vec![None; chains.heads.as_slice()?.len()],
     };
-    same_length(&[graph.source.len(), graph.own.len()])?;
-    graph.compose(chains.ends.as_slice()?);
+    let chain_ends = chains.ends.as_slice()?;
+    if !graph.is_sound(chain_ends) {
+        return Err(PyIndexError::new_err("chains of visits or edges that are not there"));
+    }
+    graph.compose(chain_ends);
     graph.settle(before.list()?.first().copied());
     Ok(ends(py, &graph.states()))
 }

@@ -73,6 +73,10 @@ impl Samples {
     }
 }
 
+fn lost(what: &str) -> PyErr {
+    PyIndexError::new_err(format!("{what} is not there"))
+}
+
 /// Sample all edges anew.
 ///
 /// Args: the paths without corners and their samples' shares, joint angles at visits, the
@@ -100,7 +104,7 @@ pub fn resampled<'py>(
     let mut out = Samples { path: Vec::with_capacity(total), share: Vec::with_capacity(total) };
     let at = |c: i64| -> PyResult<Rounded<'_>> {
         let found = usize::try_from(c).ok().filter(|c| *c < all.len());
-        let c = found.ok_or_else(|| PyIndexError::new_err("a corner is not there"))?;
+        let c = found.ok_or_else(|| lost("a corner"))?;
         Ok(Rounded { corner: &all[c], nearest: nearest[c], q: &passed[c] })
     };
     for i in 0..e {
@@ -108,7 +112,8 @@ pub fn resampled<'py>(
         if behind < 0 && ahead < 0 {
             let kept = paths.span(i)?;
             out.path.extend_from_slice(paths.samples(kept.clone())?);
-            out.share.extend_from_slice(&share[kept]);
+            let shares = share.get(kept);
+            out.share.extend_from_slice(shares.ok_or_else(|| lost("a share"))?);
             continue;
         }
         let (leaving, middle, entering) = (count[i], count[e + i], count[2 * e + i]);

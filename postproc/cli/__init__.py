@@ -39,7 +39,9 @@ def main() -> None:
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
         app()
-    except Exception as exc:
+    except (SystemExit, KeyboardInterrupt):
+        raise
+    except BaseException as exc:  # a panic of native code is no Exception
         if os.environ.get("POSTPROC_DEBUG"):
             raise
         say(
