@@ -67,6 +67,8 @@ def named(
 
 def blanked(column: Column, rows: Bools, text: bytes) -> Column:
     """Put a text in the place of some rows."""
+    if not rows.any():
+        return column
     out = np.zeros((len(column), max(column.shape[1], len(text))), dtype=np.uint8)
     out[:, : column.shape[1]] = column
     out[rows] = 0
@@ -140,7 +142,7 @@ def shortest(
     ends = np.ones(len(rows), dtype=bool)
     for column in range(rows.shape[1] - 1, rows.shape[1] - decimals, -1):
         ends &= rows[:, column] == ord("0")
-        rows[ends, column] = 0
+        rows[:, column] *= ~ends
     rows = blanked(rows, np.isnan(values), b"null")
     return _by_python(rows, values, ~(sure | np.isnan(values)), text)
 
