@@ -9,7 +9,7 @@ import numpy as np
 from postproc.language.forms import formed
 from postproc.language.layout import CloneError, inserted_after
 from postproc.language.lines import read_lines
-from postproc.language.parser import forms_of, parse_value_form
+from postproc.language.parser import parse_value_form
 from postproc.language.records import is_nested, last_head
 from postproc.language.source import Edit, Source
 
@@ -32,7 +32,7 @@ def copied_entry(
         CloneError: The entry is not one of this variable alone.
     """
     lines = read_lines(values)
-    said = formed(lines.shapes, forms_of, parse_value_form)
+    said = formed(lines.shapes, parse_value_form)
     heads = last_head(lines, said)
     row = int(np.searchsorted(lines.line, line, side="right")) - 1
     at = int(heads[row]) if row >= 0 else -1

@@ -8,17 +8,19 @@ says is that with the line's names filled in, when somebody asks.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
-from itertools import chain
 from typing import Generic, TypeVar, overload
 
 import numpy as np
 from numpy.typing import NDArray
 
+from postproc.language.shapes import Shapes
+
 Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 T = TypeVar("T")
+Filler = Callable[[Sequence[str]], object]
 
 OPEN = "\x01"  # no program text holds it
 _WORD = re.compile(r"[A-Za-z_]\w*")
@@ -49,16 +51,42 @@ def filled(part: object, names: Sequence[str]) -> object:
     >>> filled(("move", open_name(0).lower()), ["Weld_1"])
     ('move', 'weld_1')
     """
+    fill = filler(part)
+    return fill(names) if fill is not None else part
+
+
+def filler(part: object) -> Filler | None:
+    """Return what fills names into a part, None where none is open in it."""
     if isinstance(part, str):
-        if part[:1] == OPEN == part[-1:] and part.count(OPEN) == 2:
-            return _cased(names[int(part[3:-1])], part[1:3])
-        return _PLACE.sub(lambda at: _cased(names[int(at[2])], at[1]), part)
+        return _text_filler(part)
     if isinstance(part, tuple):
-        return tuple(filled(one, names) for one in part)
+        return _all_filler(tuple, part)
     own = getattr(part, "__match_args__", None)
     if own is None:
-        return part
-    return type(part)(*(filled(getattr(part, name), names) for name in own))
+        return None
+    made = type(part)
+    return _all_filler(lambda parts: made(*parts), [getattr(part, n) for n in own])
+
+
+def _all_filler(
+    made: Callable[[list[object]], object], parts: Sequence[object]
+) -> Filler | None:
+    """Return what fills names into some parts and makes something of them."""
+    pairs = [(filler(part), part) for part in parts]
+    if all(fill is None for fill, _ in pairs):
+        return None
+    return lambda names: made(
+        [part if fill is None else fill(names) for fill, part in pairs]
+    )
+
+
+def _text_filler(part: str) -> Filler | None:
+    if part[:1] == OPEN == part[-1:] and part.count(OPEN) == 2:
+        index, letters = int(part[3:-1]), part[1:3]
+        return lambda names: _cased(names[index], letters)
+    if _PLACE.search(part) is None:
+        return None
+    return lambda names: _PLACE.sub(lambda at: _cased(names[int(at[2])], at[1]), part)
 
 
 def _cased(name: str, letters: str) -> str:
@@ -73,20 +101,17 @@ class Formed(Sequence[T], Generic[T]):
 
     Attributes:
         said: What each form says, its names open.
-        texts: The forms themselves.
-        form: Index into `said`, (k,).
-        names: The names of every shape.
+        shapes: The shapes.
     """
 
     said: tuple[T, ...]
-    texts: tuple[str, ...]
-    form: Ints
-    names: Sequence[tuple[str, ...]]
+    shapes: Shapes
     _made: dict[int, T] = field(default_factory=dict)
+    _fillers: dict[int, Filler | None] = field(default_factory=dict)
 
     def __len__(self) -> int:
         """Return the number of shapes."""
-        return len(self.form)
+        return len(self.shapes)
 
     @overload
     def __getitem__(self, shape: int) -> T: ...
@@ -98,19 +123,29 @@ class Formed(Sequence[T], Generic[T]):
             return [self[k] for k in range(*shape.indices(len(self)))]
         made = self._made.get(shape)
         if made is None:
-            said = self.said[self.form[shape]]
-            made = filled(said, self.names[shape]) if self.names[shape] else said  # type: ignore[assignment]
-            self._made[shape] = made  # type: ignore[assignment]
-        return made  # type: ignore[return-value]
+            form, names = int(self.form[shape]), self.shapes.names_of(shape)
+            made = self.said[form]
+            if names:
+                if form not in self._fillers:
+                    self._fillers[form] = filler(made)
+                fill = self._fillers[form]
+                made = made if fill is None else fill(names)  # type: ignore[assignment]
+            self._made[shape] = made
+        return made
 
     def __iter__(self) -> Iterator[T]:
         """Go through the shapes."""
         return (self[k] for k in range(len(self)))
 
+    @property
+    def form(self) -> Ints:
+        """Return the form of every shape, as an index into `said`, (k,)."""
+        return self.shapes.form
+
     def words(self) -> frozenset[str]:
-        """Return all words in the shapes, in lower case."""
-        texts = "\n".join(chain(self.texts, chain.from_iterable(self.names)))
-        return frozenset(_WORD.findall(texts.lower()))
+        """Return all words in the shapes, in lower case; a name is one word."""
+        words = _WORD.findall("\n".join(self.shapes.texts).lower())
+        return frozenset((*words, *lower(self.shapes.names)))
 
     def which(self, test: Callable[[T], bool]) -> Bools:
         """Tell which shapes pass a test that no name in them decides, (k,)."""
@@ -119,22 +154,20 @@ class Formed(Sequence[T], Generic[T]):
         return found
 
 
-def formed(
-    shapes: Sequence[str],
-    split: Callable[[Sequence[str]], Iterable[tuple[str, tuple[str, ...]]]],
-    parse: Callable[[str], T],
-) -> Formed[T]:
+def formed(shapes: Shapes, parse: Callable[[str], T]) -> Formed[T]:
     """Parse the form of every shape.
 
     Args:
         shapes: Masks of lines.
-        split: Takes masks apart into their forms and names.
         parse: Says what a form says.
     """
-    number: dict[str, int] = {}
-    form = np.empty(len(shapes), dtype=np.int64)
-    names: list[tuple[str, ...]] = []
-    for at, (text, own) in enumerate(split(shapes)):
-        form[at] = number.setdefault(text, len(number))
-        names.append(own)
-    return Formed(tuple(map(parse, number)), tuple(number), form, names)
+    return Formed(tuple(map(parse, shapes.texts)), shapes)
+
+
+def lower(names: Sequence[str]) -> list[str]:
+    """Return names in lower case, all at once.
+
+    >>> lower(["WP_1", "p2"])
+    ['wp_1', 'p2']
+    """
+    return "\n".join(names).lower().split("\n") if names else []

@@ -23,7 +23,7 @@ def fill_initial(world: World) -> None:
     for program in world.programs():
         bodies = [b for b in (program.main, *program.routines.values()) if b]
         for body in bodies:
-            seen = program.variables
+            seen: Mapping[str, Variable] = program.variables
             if body is not bodies[0]:  # it sees the rest as the first body does
                 hidden = bodies[0].own_names | body.own_names
                 seen = {name: seen[name] for name in hidden if name in seen}

@@ -3,32 +3,27 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from postproc.exceptions import ProgramError
+from postproc.language.continued import Names, join, stripped
 from postproc.language.divided import Rows, divided
-from postproc.language.masking import Masked, mask_lines
+from postproc.language.masking import mark_lines
+from postproc.language.shapes import Shapes, find_shapes
 from postproc.language.source import Source
 from postproc.pieces import Each
 
 Ints = NDArray[np.signedinteger[Any]]
 """Whole numbers, as short as the length of the file allows: there are millions."""
 Floats = NDArray[np.float64]
-Bools = NDArray[np.bool_]
+T = TypeVar("T", bytes, str)
 
 _PIECE = 1 << 18  # bytes masked at once: array passes that fit the cache
-_OPENS = re.compile(rb" *(?:\w+ *:: *)?(?:MOVE|MOVEFLY|OPEN)\b[^\n]*, *\Z", re.I)
-_CLAUSE = re.compile(
-    rb" *(?:WITH|ADVANCE|TIL|VIA|SYNCMOVE|SYNCMOVEFLY|CONDITION|\$)", re.I
-)
-_WITH = re.compile(rb" *(?:WITH|SYNCMOVE|SYNCMOVEFLY)\b", re.I)
-_COMMA = re.compile(rb"[^\n]*,\s*\Z")
-_CLOSES = re.compile(rb" *(?:ENDMOVE|ENDOPEN)\b", re.I)
 
 
 @dataclass(frozen=True)
@@ -37,7 +32,7 @@ class Lines:
 
     Attributes:
         source: The text.
-        shapes: The distinct masks, stripped.
+        shapes: The distinct masks, stripped, in the order of appearance.
         shape: Index into `shapes`, (n,).
         line: 1-based physical line on which each logical line starts, (n,).
         first: CSR offsets into the numbers, (n + 1,).
@@ -47,7 +42,7 @@ class Lines:
     """
 
     source: Source
-    shapes: tuple[str, ...]
+    shapes: Shapes
     shape: Ints
     line: Ints
     first: Ints
@@ -88,17 +83,23 @@ def read_lines(source: Source, each: Each = map) -> Lines:
     if data.startswith(b"\xef\xbb\xbf"):
         data = b"   " + data[3:]  # a byte order mark is no code
     ids: dict[bytes, int] = {}
-    shape: list[Ints] = []
-    numbers: list[Masked] = []
+    names: dict[str, int] = {}
+    pieces: list[_Piece] = []
     tasks = list(_tasks(source))
     read = each(lambda task: _read(data, source.line_starts, *task), tasks)
-    for (rows, _), (piece, masks, mask) in zip(tasks, read, strict=True):
+    for (rows, _), piece in zip(tasks, read, strict=True):
         if piece.unterminated:
             _refuse(source, rows.start + 1 + piece.unterminated[0])
-        new = [ids.setdefault(text, len(ids)) for text in masks]
-        shape.append(np.array(new, dtype=np.int32)[mask])
-        numbers.append(piece)
-    return _logical(source, tuple(ids), np.concatenate(shape), _merged(numbers))
+        shape = [ids.setdefault(mask, len(ids)) for mask in piece.masks]
+        name = [names.setdefault(word, len(names)) for word in piece.names]
+        pieces.append(
+            replace(
+                piece,
+                shape=np.array(shape, dtype=np.int32)[piece.shape],
+                name=np.array(name, dtype=np.int32)[piece.name],
+            )
+        )
+    return _logical(source, tuple(ids), names, _merged(pieces))
 
 
 def _refuse(source: Source, line: int) -> None:
@@ -122,102 +123,111 @@ def _tasks(source: Source) -> Iterator[tuple[slice, slice]]:
         at = end
 
 
-def _read(
-    data: bytes, starts: Ints, lines: slice, place: slice
-) -> tuple[Masked, tuple[bytes, ...], Ints]:
-    """Mask a piece of a text; return its distinct masks, and which a line has, too."""
-    masked = mask_lines(data[place], starts[lines] - place.start)
-    ids = {mask: k for k, mask in enumerate(dict.fromkeys(masked.masks))}
-    mask = np.fromiter(map(ids.__getitem__, masked.masks), np.int32)
+@dataclass(frozen=True)
+class _Piece:
+    """The n physical lines of a piece of a file, or of all of it.
+
+    Attributes:
+        masks: Their distinct masks, see `Marked`.
+        shape: Index into `masks`, (n,).
+        comment: As in `Lines`.
+        first: CSR offsets into the numbers, (n + 1,).
+        start: Byte offsets of the numbers in the file, (m,).
+        end: Where they end, (m,).
+        value: What they are worth, (m,).
+        names: The distinct names that are taken out of the masks.
+        name: Index into `names` of all of them, in order, (p,).
+        name_first: CSR offsets into them, (n + 1,).
+        unterminated: As in `Masked`.
+    """
+
+    masks: tuple[bytes, ...]
+    shape: Ints
+    comment: Ints
+    first: Ints
+    start: Ints
+    end: Ints
+    value: Floats
+    names: tuple[str, ...]
+    name: Ints
+    name_first: Ints
+    unterminated: tuple[int, ...]
+
+
+def _read(data: bytes, starts: Ints, lines: slice, place: slice) -> _Piece:
+    """Read a piece of a text; offsets are counted from the beginning of the text."""
+    marked = mark_lines(data[place], starts[lines] - place.start)
+    piece, at = marked.masked, place.start
     short = np.int32 if len(data) < 2**31 else np.int64
-    return _moved(masked, place.start, short), tuple(ids), mask
-
-
-def _moved(piece: Masked, at: int, short: type[np.signedinteger[Any]]) -> Masked:
-    """Count the offsets of a piece from the beginning of its file."""
-    return Masked(
-        [],
+    masks, shape = _distinct(piece.masks)
+    names, name = _distinct(marked.name)
+    return _Piece(
+        masks,
+        shape,
         np.where(piece.comment >= 0, piece.comment + at, -1).astype(short),
         piece.first,
         (piece.start + at).astype(short),
         (piece.end + at).astype(short),
         piece.value,
+        names,
+        name,
+        marked.name_first,
         piece.unterminated,
     )
 
 
-def _merged(pieces: list[Masked]) -> Masked:
-    offsets = np.cumsum([0, *(len(p.start) for p in pieces)])
-    first = [p.first[:-1] + o for p, o in zip(pieces, offsets[:-1], strict=True)]
-    whole = [column.astype(pieces[0].start.dtype) for column in (*first, offsets[-1:])]
-    return Masked(
-        [],
-        np.concatenate([p.comment for p in pieces]),
-        np.concatenate(whole),
-        np.concatenate([p.start for p in pieces]),
-        np.concatenate([p.end for p in pieces]),
-        np.concatenate([p.value for p in pieces]),
+def _distinct(texts: Sequence[T]) -> tuple[tuple[T, ...], Ints]:
+    """Return the distinct ones of some texts, and which each is."""
+    ids = {text: k for k, text in enumerate(dict.fromkeys(texts))}
+    return tuple(ids), np.fromiter(map(ids.__getitem__, texts), np.int32, len(texts))
+
+
+def _merged(pieces: list[_Piece]) -> _Piece:
+    def together(name: str) -> Any:
+        return np.concatenate([getattr(piece, name) for piece in pieces])
+
+    return _Piece(
+        (),
+        together("shape"),
+        together("comment"),
+        _offsets([piece.first for piece in pieces]),
+        together("start"),
+        together("end"),
+        together("value"),
+        (),
+        together("name"),
+        _offsets([piece.name_first for piece in pieces]),
         (),
     )
 
 
+def _offsets(parts: list[Ints]) -> Ints:
+    """Put CSR offsets one behind the other."""
+    begin = np.cumsum([0, *(int(part[-1]) for part in parts)])
+    moved = [part[:-1] + own for part, own in zip(parts, begin, strict=False)]
+    return np.concatenate([*moved, begin[-1:]])
+
+
 def _logical(
-    source: Source, masks: tuple[bytes, ...], shape: Ints, numbers: Masked
+    source: Source, masks: tuple[bytes, ...], names: dict[str, int], found: _Piece
 ) -> Lines:
     """Join the continued lines and drop the empty ones."""
-    stripped = [mask.strip() for mask in masks]
-    code = np.flatnonzero(np.array([*map(bool, stripped)], dtype=bool)[shape])
-    shape = shape[code]
-    opens = np.array(
-        [mask.endswith(b",") and bool(_OPENS.match(mask)) for mask in stripped],
-        dtype=bool,
-    )
-    starts = np.flatnonzero(opens[shape])
-    length = _lengths(masks, shape, starts)
-    starts, length = starts[length > 1], length[length > 1]
-    joined: dict[bytes, int] = {}
-    parts, keep = shape.tolist() if len(starts) else [], np.ones(len(shape), dtype=bool)
-    for row, count in zip(starts.tolist(), length.tolist(), strict=True):
-        mask = b" ".join([stripped[k] for k in parts[row : row + count]])
-        shape[row] = len(masks) + joined.setdefault(mask, len(joined))
-        keep[row + 1 : row + count] = False
-    kept, short = code[keep], numbers.start.dtype
-    first = np.append(numbers.first[kept], len(numbers.start)).astype(short)
-    rows = divided(Rows((*stripped, *joined), shape[keep], kept + 1, first))
-    used, shape = np.unique(rows.shape, return_inverse=True)
+    code = np.array([*map(bool, map(stripped, masks))], dtype=bool)
+    rows = np.flatnonzero(code[found.shape])
+    at = found.name_first[rows]
+    joined = join(masks, found.shape[rows], Names(at, found.name, tuple(names)))
+    kept, short = rows[joined.rows], found.start.dtype
+    first = np.append(found.first[kept], len(found.start)).astype(short)
+    lines = divided(Rows(joined.masks, joined.shape, kept + 1, first, at[joined.rows]))
+    shapes, shape = find_shapes(lines.masks, lines.shape, lines.name, found.name, names)
     return Lines(
         source,
-        tuple(rows.masks[k].decode("latin-1") for k in used.tolist()),
+        shapes,
         shape.astype(short),
-        rows.line.astype(short),
-        rows.first,
-        numbers.start,
-        numbers.end,
-        numbers.value,
-        numbers.comment,
+        lines.line.astype(short),
+        lines.first,
+        found.start,
+        found.end,
+        found.value,
+        found.comment,
     )
-
-
-def _lengths(masks: tuple[bytes, ...], shape: Ints, starts: Ints) -> Ints:
-    """Count the lines of the statements that start at some lines of code, (k,).
-
-    All statements grow by one line at a time, for as long as the next one belongs.
-    """
-    length = np.ones(len(starts), dtype=np.int64)
-    growing = np.arange(len(starts))
-    while len(growing := growing[(starts + length)[growing] < len(shape)]):
-        following = shape[(starts + length)[growing]]
-        closes = _which(masks, following, _CLOSES)
-        comma = _which(masks, shape[(starts + length - 1)[growing]], _COMMA)
-        clause = _which(masks, following, _CLAUSE)
-        more = ~closes & np.where(comma, clause, _which(masks, following, _WITH))
-        length[growing[closes | more]] += 1
-        growing = growing[more]
-    return length
-
-
-def _which(masks: tuple[bytes, ...], shape: Ints, pattern: re.Pattern[bytes]) -> Bools:
-    """Tell which of some lines match a pattern."""
-    used, at = np.unique(shape, return_inverse=True)
-    found = [bool(pattern.match(masks[k])) for k in used.tolist()]
-    return np.array(found, dtype=bool)[at]

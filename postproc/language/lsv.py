@@ -13,9 +13,9 @@ from postproc.language.diagnostic import Diagnostic
 from postproc.language.entered import Entered
 from postproc.language.entry_columns import NESTED, POSITIONS, Entries, Entry
 from postproc.language.fields import completed, find_fields, with_fields
-from postproc.language.forms import Formed, formed
+from postproc.language.forms import Formed, formed, lower
 from postproc.language.lines import Lines, read_lines
-from postproc.language.parser import forms_of, parse_value_form
+from postproc.language.parser import parse_value_form
 from postproc.language.records import (
     Records,
     find_records,
@@ -78,7 +78,7 @@ def read_variables(source: Source, each: Each = map) -> Variables:
         ProgramError: A string does not end on its line.
     """
     lines = read_lines(source, each)
-    said = formed(lines.shapes, forms_of, parse_value_form)
+    said = formed(lines.shapes, parse_value_form)
     head = last_head(lines, said)
     fields = find_fields(lines, said, head)
     records = with_fields(find_records(lines, said, head), fields)
@@ -105,9 +105,14 @@ def _told_apart(
         ambiguous: Names that records or paths have too.
     """
     nested = [layout.kind in NESTED for layout in entries.layouts]
+    written = lower(entries.name)
+    if not any(nested) and not ambiguous:
+        single = dict(zip(written, range(len(written)), strict=True))
+        if len(single) == len(written):
+            return replace(entries, row=single), []
     names = [
-        (row, name.lower())
-        for row, name in enumerate(entries.name)
+        (row, name)
+        for row, name in enumerate(written)
         if not nested[entries.layout[row]]
     ]
     if ambiguous:

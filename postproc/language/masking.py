@@ -14,7 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from postproc.language.lexis import BLANKS, mask_line, number_value
+from postproc.language.numbered import NAME_MARK, WHOLE, find_names, texts_of
 from postproc.language.plain_numbers import (
+    DOT,
+    Plain,
     byte_table,
     numeric_bytes,
     plain_numbers,
@@ -53,6 +56,36 @@ class Masked:
     unterminated: tuple[int, ...]
 
 
+@dataclass(frozen=True)
+class Marked:
+    """The physical lines of a piece of a file, their numbered names marked too.
+
+    Attributes:
+        masked: The lines; in the mask of one whose names are taken out each is one
+            `NAME_MARK`, the mask of any other begins with `WHOLE`.
+        name: The names, in order.
+        name_first: CSR offsets into them, (n + 1,).
+    """
+
+    masked: Masked
+    name: list[str]
+    name_first: Ints
+
+
+@dataclass(frozen=True)
+class _Code:
+    """What array passes find in a text: `runs` of digits and dots are in code."""
+
+    a: Bytes
+    line_starts: Ints
+    quotes: Ints
+    comment: Ints
+    odd: Bools
+    runs: Plain
+    numbers: Plain
+    start: Ints
+
+
 def mask_lines(data: bytes, line_starts: Ints) -> Masked:
     """Mask every physical line of a text that starts at a line start.
 
@@ -60,6 +93,40 @@ def mask_lines(data: bytes, line_starts: Ints) -> Masked:
         data: The text; no NUL.
         line_starts: Offset of every line in `data`, ascending from 0.
     """
+    code = _code(data, line_starts)
+    none = np.zeros(0, dtype=np.int64)
+    return _with_odd_lines(data, line_starts, code.odd, _masked(code, none, none))
+
+
+def mark_lines(data: bytes, line_starts: Ints) -> Marked:
+    """Mask every line, and mark its numbered names where that is not out of the way.
+
+    Args:
+        data: The text; no NUL.
+        line_starts: Offset of every line in `data`, ascending from 0.
+    """
+    code = _code(data, line_starts)
+    a, runs = code.a, code.runs
+    in_word = ~runs.number & ~runs.odd & (a[runs.first] != DOT)
+    start, end, far = find_names(a, runs.first[in_word])
+    whole = code.odd.copy()
+    unusual = np.flatnonzero((a >= 128) | (a == ord(NAME_MARK)))
+    for place in (np.sort(far), unusual):
+        line = line_of(line_starts, place)
+        behind = code.comment[line]
+        whole[line[(behind < 0) | (place < behind)]] = True
+    if whole.any():
+        named = ~whole[line_of(line_starts, start)]
+        start, end = start[named], end[named]
+    masked = _with_odd_lines(data, line_starts, code.odd, _masked(code, start, end))
+    for k in np.flatnonzero(whole).tolist():
+        masked.masks[k] = WHOLE + masked.masks[k]
+    first = np.append(np.searchsorted(start, line_starts), len(start))
+    return Marked(masked, texts_of(a, start, end), first)
+
+
+def _code(data: bytes, line_starts: Ints) -> _Code:
+    """Find numbers, strings and comments."""
     a = np.frombuffer(data, dtype=np.uint8)
     quotes, comment, odd_line = quotes_and_comments(a, line_starts)
     start, end = runs_of(numeric_bytes(a))
@@ -72,14 +139,21 @@ def mask_lines(data: bytes, line_starts: Ints) -> Masked:
     if odd_line.any():
         plain = ~odd_line[line_of(line_starts, start)]
         numbers, start = numbers.take(plain), start[plain]
-    dropped = _cover(len(a), start, numbers.end)
-    if (comment >= 0).any():
-        dropped |= _in_comments(a, comment, line_starts)
-    masks = _squeeze(a, dropped, quotes, start)
+    return _Code(a, line_starts, quotes, comment, odd_line, runs, numbers, start)
+
+
+def _masked(code: _Code, names: Ints, name_ends: Ints) -> Masked:
+    """Mask the lines that are not odd, with the names from some places to others."""
+    a, start, line_starts = code.a, code.start, code.line_starts
+    dropped = _cover(len(a), start, code.numbers.end)
+    if len(names):
+        dropped |= _cover(len(a), names, name_ends)
+    if (code.comment >= 0).any():
+        dropped |= _in_comments(a, code.comment, line_starts)
+    masks = _squeeze(a, dropped, code.quotes, start, names)
     first = np.append(np.searchsorted(start, line_starts), len(start))
-    value = values(a, numbers, start)
-    masked = Masked(masks, comment, first, start, numbers.end, value, ())
-    return _with_odd_lines(data, line_starts, odd_line, masked)
+    value = values(a, code.numbers, start)
+    return Masked(masks, code.comment, first, start, code.numbers.end, value, ())
 
 
 def line_of(line_starts: Ints, place: Ints) -> Ints:
@@ -147,7 +221,9 @@ def _in_comments(a: Bytes, comment: Ints, line_starts: Ints) -> Bools:
     return covered
 
 
-def _squeeze(a: Bytes, dropped: Bools, quotes: Ints, start: Ints) -> list[bytes]:
+def _squeeze(
+    a: Bytes, dropped: Bools, quotes: Ints, start: Ints, names: Ints
+) -> list[bytes]:
     """Return the masks: numbers to NUL, comments and idle blanks dropped."""
     out, keep = a.copy(), ~dropped
     blank = np.flatnonzero((a <= 32) & (a != 10) & (a != 13) & (a > 0) | (a == 127))
@@ -157,6 +233,8 @@ def _squeeze(a: Bytes, dropped: Bools, quotes: Ints, start: Ints) -> list[bytes]
     keep[idle] = False
     keep[start] = True
     out[start] = 0
+    keep[names] = True
+    out[names] = ord(NAME_MARK)
     returns = np.flatnonzero(a == 13)
     alone = a[np.minimum(returns + 1, len(a) - 1)] != 10
     alone |= returns == len(a) - 1

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import re
 import sys
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping
 from contextlib import suppress
 from functools import cache, lru_cache
 from io import BytesIO
-from itertools import compress, count, islice
-from operator import not_
+from itertools import count
 from pathlib import Path
 from typing import cast
 
@@ -20,18 +19,10 @@ from postproc.language.build import RULES, Rule
 from postproc.language.entered import VALUE_RULES, Entered
 from postproc.language.forms import filled, open_name
 from postproc.language.kept_tables import keep, kept, key_of
+from postproc.language.numbered import NAME_MARK, UNREADABLE, form_of
 from postproc.language.parts import Mark
 
 _PACKAGE = Path(__file__).resolve().parent.parent
-# A name up to its first digit, and the rest: what cannot begin one is passed over, and
-# nothing is tried twice.
-_NUMBERED = r"[A-Za-z_](?<![\w$].)[A-Za-z_]*+[^\W\d]*+\d\w*+(?! *::)"
-_NAME = re.compile(f"({_NUMBERED})")
-_STRING_OR_NAME = re.compile(
-    rf"(?P<string>'(?:\\.|[^'\\])*'|'[^']*'|\"[^\"]*\")|{_NUMBERED}"
-)
-NAME_MARK = "\x01"  # a numbered name, in a form
-UNREADABLE = NAME_MARK * 2  # begins the form of a line that holds such a mark itself
 _FAILED = object()
 _OPTIONS = {"parser": "lalr", "lexer": "contextual", "maybe_placeholders": False}
 
@@ -63,41 +54,6 @@ def line_parser(name: str, start: str) -> lark.Lark:
     made.save(tables)
     keep(key, tables.getvalue())
     return made
-
-
-def form_of(mask: str) -> tuple[str, tuple[str, ...]]:
-    """Take the numbered names out of the mask of a line.
-
-    Returns:
-        Its form and the names; `parse_form` and `parse_value_form` say what a form
-        says, its names open.
-    """
-    if NAME_MARK in mask:  # the text holds that character: no line of any grammar
-        return UNREADABLE + mask, ()
-    names: list[str] = []
-
-    def mark(found: re.Match[str]) -> str:
-        if found["string"] is not None:
-            return found.group()
-        names.append(found.group())
-        return NAME_MARK
-
-    return _STRING_OR_NAME.sub(mark, mask), tuple(names)
-
-
-def forms_of(masks: Sequence[str]) -> Iterator[tuple[str, tuple[str, ...]]]:
-    """Do for many masks what `form_of` does for one."""
-    odd = [NAME_MARK in mask or "'" in mask or '"' in mask for mask in masks]
-    plain = "\n".join(compress(masks, map(not_, odd)))
-    pieces = _NAME.split(plain)
-    forms = iter(NAME_MARK.join(pieces[0::2]).split("\n"))
-    names = iter(pieces[1::2])
-    for mask, alone in zip(masks, odd, strict=True):
-        if alone:
-            yield form_of(mask)
-        else:
-            form = next(forms)
-            yield form, tuple(islice(names, form.count(NAME_MARK)))
 
 
 @lru_cache(maxsize=8192)

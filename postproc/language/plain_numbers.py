@@ -23,7 +23,7 @@ EXACT = 15  # digits of a number that is read here: exact as a float
 _TENS = 10 ** np.arange(EXACT + 1, dtype=np.int64)
 _SCALES = _TENS.astype(float)
 _MAX_BLANKS = 6  # blanks between a sign and what is before it; more: line by line
-_DOT, _MINUS, _PLUS = 46, 45, 43
+DOT, _MINUS, _PLUS = 46, 45, 43
 _PAIRED = tuple(
     (np.uint64(ten), np.uint64(shift), np.uint64(mask))
     for ten, shift, mask in (
@@ -71,7 +71,7 @@ class Plain:
 
 def numeric_bytes(a: Bytes) -> Bools:
     """Tell which bytes are digits or dots."""
-    numeric: Bools = (a - np.uint8(_DOT)) < 12  # from the dot to 9, the slash too
+    numeric: Bools = (a - np.uint8(DOT)) < 12  # from the dot to 9, the slash too
     numeric &= a != 47
     return numeric
 
@@ -95,7 +95,7 @@ def plain_numbers(a: Bytes, start: Ints, end: Ints) -> Plain:
     """
     before = np.where(start > 0, a[start - 1], 10)
     after = np.where(end < len(a), a[np.minimum(end, len(a) - 1)], 10)
-    dot = np.append(np.flatnonzero(a == _DOT), [len(a)] * 2)
+    dot = np.append(np.flatnonzero(a == DOT), [len(a)] * 2)
     at = np.searchsorted(dot, start)
     dotted, more = dot[at] < end, np.flatnonzero(dot[at + 1] < end)
     dots = dotted.astype(np.int64)
@@ -104,9 +104,9 @@ def plain_numbers(a: Bytes, start: Ints, end: Ints) -> Plain:
     in_word = _IS_WORD[before]
     # `1..n`, `1e5`, `0x3F`, `].5`, `x1.5`: rare, and not worth an array pass
     odd = digits & ((dots > 1) | ~in_word & _IS_LETTER[after])
-    leading = np.flatnonzero(digits & (a[start] == _DOT))
+    leading = np.flatnonzero(digits & (a[start] == DOT))
     odd[leading] |= in_word[leading] | np.isin(before[leading], (41, 93))
-    odd |= digits & in_word & dotted & (a[end - 1] != _DOT)
+    odd |= digits & in_word & dotted & (a[end - 1] != DOT)
     point = np.where(dotted, dot[at], end)
     return Plain(start, point, end, digits & ~odd & ~in_word, odd)
 

@@ -11,29 +11,9 @@ from postproc.language.blocks import Blocks
 from postproc.language.diagnostic import Diagnostic
 from postproc.language.forms import Formed
 from postproc.language.lines import Lines
+from postproc.language.variables import Variable, Variables
 
-
-@dataclass(frozen=True)
-class Variable:
-    """A declared variable or constant.
-
-    Attributes:
-        name: As it is written.
-        row: Logical line of its declaration.
-        type: Its type, None for a constant.
-        initial: Its initial value or None.
-        exported: The program it is exported from, or "".
-        constant: Declared in a CONST section.
-        taught: Marked ``-- TAUGHT``.
-    """
-
-    name: str
-    row: int
-    type: ast.Type | None = None
-    initial: ast.Expression | None = None
-    exported: str = ""
-    constant: bool = False
-    taught: bool = False
+__all__ = ["Body", "Program", "Variable", "Variables"]
 
 
 @dataclass(frozen=True)
@@ -52,7 +32,7 @@ class Body:
     first: int
     last: int
     parameters: tuple[ast.Parameter, ...]
-    variables: Mapping[str, Variable]
+    variables: Variables
     blocks: Blocks
 
     @cached_property
@@ -85,7 +65,7 @@ class Program:
     main: Body | None
     routines: Mapping[str, Body]
     outside: Mapping[str, str]
-    variables: Mapping[str, Variable]
+    variables: Variables
     imports: tuple[str, ...]
     arm: int
     diagnostics: tuple[Diagnostic, ...]

@@ -157,12 +157,14 @@ class _Variants:
         one = said.said[form]
         where = one.where[0] if isinstance(one, ast.Move) else None
         if not isinstance(where, ast.Reference):
-            return [self._variant(shape, said.names[shape]) for shape in shapes]
+            return [
+                self._variant(shape, said.shapes.names_of(shape)) for shape in shapes
+            ]
         index = _number_slots(where.steps)
         at = name_index(where.name)
         found = []
         for shape in shapes:
-            names = said.names[shape]
+            names = said.shapes.names_of(shape)
             name = names[at].lower() if at >= 0 else where.name
             if index is None or not self._is_point(name, array=bool(where.steps)):
                 found.append(-1)

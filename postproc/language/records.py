@@ -17,9 +17,11 @@ from postproc.language.entered import Entered
 from postproc.language.entry_columns import NESTED, Entries, Layout, kind_of
 from postproc.language.forms import Formed, name_index
 from postproc.language.lines import Lines
+from postproc.language.sequences import alike, in_order
 
 Ints = NDArray[np.int64]
 Floats = NDArray[np.float64]
+Bools = NDArray[np.bool_]
 
 MOST = 2.0**53  # beyond it a number does not tell which whole one it is
 _LETTERS = "XYZAER"
@@ -42,7 +44,7 @@ class Records:
     head: Ints
     first: Ints
     closed: Ints
-    element: NDArray[np.bool_]
+    element: Bools
 
 
 def find_records(lines: Lines, said: Formed[Entered | None], head: Ints) -> Records:
@@ -79,19 +81,24 @@ def last_head(lines: Lines, said: Formed[Entered | None]) -> Ints:
     """
     rows = np.flatnonzero(said.which(_is_head)[lines.shape])
     shapes = lines.shape[rows]
-    heads, within = [], False
-    for row, is_field, nested in zip(
-        rows.tolist(),
-        said.which(_may_be_field)[shapes].tolist(),
-        said.which(is_nested)[shapes].tolist(),
-        strict=True,
-    ):
-        if not (within and is_field):
-            heads.append(row)
-            within = nested
+    nested = said.which(is_nested)[shapes]
+    heads = _heads(rows, said.which(_may_be_field)[shapes], nested)
     last = np.full(len(lines), -1, dtype=np.int64)
     last[heads] = heads
     return np.asarray(np.maximum.accumulate(last))
+
+
+def _heads(rows: Ints, fields: Bools, nested: Bools) -> Ints:
+    """Return which rows of heads are those of variables."""
+    if not nested.any():
+        return rows
+    heads, within = [], False
+    columns = (rows.tolist(), fields.tolist(), nested.tolist())
+    for row, is_field, has_fields in zip(*columns, strict=True):
+        if not (within and is_field):
+            heads.append(row)
+            within = has_fields
+    return np.array(heads, dtype=np.int64)
 
 
 def is_nested(entered: Entered | None) -> bool:
@@ -151,7 +158,7 @@ def read_records(
 ) -> Entries:
     """Read the entries of a file, layout by layout; no name is told yet to be twice."""
     k = len(records.first)
-    form = said.form[lines.shape].tolist()
+    form = said.form[lines.shape]
     numbers = np.full((k, 6), np.nan)
     slots = np.full((k, 6), -1, dtype=np.int64)
     layout = np.zeros(k, dtype=np.int64)
@@ -160,8 +167,8 @@ def read_records(
     arm = np.zeros(k, dtype=np.int64)
     for mine in _alike(form, records):
         a, b = int(records.first[mine[0]]), int(records.closed[mine[0]])
-        parts = [said.said[f] for f in form[a:b]]
-        head = said.said[form[int(records.head[mine[0]])]]
+        parts = [said.said[f] for f in form[a:b].tolist()]
+        head = said.said[int(form[records.head[mine[0]]])]
         assert head is not None
         if head.arm >= 0:
             arm[mine] = _whole(_values(lines, records.head[mine], head.arm))
@@ -190,7 +197,7 @@ def read_records(
             )
     return Entries(
         {},
-        list(_names(lines, said, records)),
+        _names(lines, said, records),
         lines.line[records.first],
         layout,
         tuple(layouts),
@@ -201,14 +208,15 @@ def read_records(
     )
 
 
-def _alike(form: Sequence[int], records: Records) -> Iterator[Ints]:
+def _alike(form: Ints, records: Records) -> Iterator[Ints]:
     """Group the entries whose lines have the same forms."""
-    groups: dict[tuple[int, ...], list[int]] = {}
-    columns = (records.head, records.first, records.closed)
-    rows = zip(*(column.tolist() for column in columns), strict=True)
-    for at, (head, first, last) in enumerate(rows):
-        groups.setdefault((form[head], *form[first:last]), []).append(at)
-    return (np.array(group, dtype=np.int64) for group in groups.values())
+    if len(records.first) == 0:
+        return iter(())
+    own = alike(form, records.first, records.closed)
+    heads = form[records.head]
+    kind, first = in_order(own * (int(heads.max()) + 1) + heads)
+    ends = np.cumsum(np.bincount(kind, minlength=len(first)))
+    return iter(np.split(np.argsort(kind, kind="stable"), ends[:-1]))
 
 
 def _by_axes(
@@ -259,15 +267,14 @@ def _stacked(parts: Sequence[tuple[Ints, Floats]], k: int) -> Floats:
     return stacked
 
 
-def _names(
-    lines: Lines, said: Formed[Entered | None], records: Records
-) -> Iterator[str]:
+def _names(lines: Lines, said: Formed[Entered | None], records: Records) -> list[str]:
     """Name every entry: as its head does, elements with their index."""
     heads, at = np.unique(records.head, return_inverse=True)
-    names = [_head_name(said, shape) for shape in lines.shape[heads].tolist()]
+    names = _head_names(said, lines.shape[heads])[at]
     index = _indices(lines, said, records)
-    for row, name in enumerate(at.tolist()):
-        yield names[name] + index.get(row, "")
+    if not index:
+        return [*names.tolist()]
+    return [name + index.get(row, "") for row, name in enumerate(names.tolist())]
 
 
 def _indices(
@@ -288,8 +295,16 @@ def _indices(
     return found
 
 
-def _head_name(said: Formed[Entered | None], shape: int) -> str:
-    head = said.said[said.form[shape]]
-    assert head is not None
-    at = name_index(head.name)
-    return said.names[shape][at] if at >= 0 else head.name
+def _head_names(said: Formed[Entered | None], shapes: Ints) -> NDArray[np.object_]:
+    """Return the names in some heads, (m,)."""
+    found = np.empty(len(shapes), dtype=object)
+    texts = np.array(said.shapes.names, dtype=object)
+    form = said.form[shapes]
+    for one in np.unique(form).tolist():
+        mine, head = np.flatnonzero(form == one), said.said[one]
+        assert head is not None
+        at = name_index(head.name)
+        found[mine] = head.name
+        if at >= 0:
+            found[mine] = texts[said.shapes.names_at(shapes[mine])[:, at]]
+    return found

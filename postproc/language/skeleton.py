@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from postproc.language.edits import Replacements
 from postproc.language.lines import Lines, read_lines
+from postproc.language.shapes import Shapes
 from postproc.language.source import Source
 from postproc.pieces import pieces
 
@@ -33,7 +34,7 @@ class Skeleton:
     """
 
     source: Source
-    shapes: tuple[str, ...]
+    shapes: Shapes
     shape: Ints
     line: Ints
     start: Ints

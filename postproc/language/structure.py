@@ -11,8 +11,8 @@ from postproc.language.blocks import build_blocks
 from postproc.language.diagnostic import Diagnostic
 from postproc.language.forms import Formed, formed
 from postproc.language.lines import Lines, read_lines
-from postproc.language.parser import forms_of, parse_form
-from postproc.language.program import Body, Program, Variable
+from postproc.language.parser import parse_form
+from postproc.language.program import Body, Program, Variable, Variables
 from postproc.language.source import Source
 from postproc.pieces import Each
 
@@ -27,7 +27,7 @@ class _Scope:
 
     routine: ast.Routine | None = None
     begin: int = -1
-    variables: dict[str, Variable] = field(default_factory=dict)
+    variables: Variables = field(default_factory=Variables)
 
 
 @dataclass
@@ -95,22 +95,21 @@ class _Reader:
         if self.structure:
             return
         variables = self.scopes[-1].variables
-        taught = int(self.lines.line[row]) in self.taught
         if isinstance(statement, ast.Constant):
-            variables[statement.name] = Variable(
-                statement.name, row, initial=statement.value, constant=True
-            )
+            name, value = statement.name, statement.value
+            constant = Variable(name, row, initial=value, constant=True)
+            variables.declare([name], constant)
             return
-        for name in statement.names:
-            variables[name.lower()] = Variable(
-                name,
-                row,
-                statement.type,
-                statement.initial,
-                statement.exported,
-                "const" in statement.attributes,
-                taught,
-            )
+        said = Variable(
+            "",
+            row,
+            statement.type,
+            statement.initial,
+            statement.exported,
+            "const" in statement.attributes,
+            int(self.lines.line[row]) in self.taught,
+        )
+        variables.declare(statement.names, said)
 
     def _before_next(self, row: int) -> None:
         """End or drop a routine because the next body or routine begins."""
@@ -128,7 +127,7 @@ class _Reader:
         """Take a routine that turns out to have no body of its own as declared."""
         scope = self.scopes.pop()
         self.scopes[-1].begin = scope.begin
-        self.scopes[-1].variables.update(scope.variables)
+        self.scopes[-1].variables.declare_all(scope.variables)
 
     def close(self, last: int) -> None:
         """End the innermost routine, or the program."""
@@ -141,7 +140,7 @@ class _Reader:
             self.report(row, "block-structure", message)
         name = routine.name if routine else ""
         parameters = routine.parameters if routine else ()
-        own = scope.variables if routine else {}
+        own = scope.variables if routine else Variables()
         body = Body(name, scope.begin, last, parameters, own, blocks)
         if routine:
             self.routines[name] = body
@@ -164,7 +163,7 @@ def parse(source: Source, each: Each = map) -> Program:
         ProgramError: A string does not end on its line.
     """
     lines = read_lines(source, each)
-    statements = formed(lines.shapes, forms_of, parse_form)
+    statements = formed(lines.shapes, parse_form)
     taught = frozenset(line for line, _ in lines.marks("TAUGHT"))
     reader = _Reader(lines, statements, taught)
     structural = statements.which(lambda said: not isinstance(said, _PLAIN))

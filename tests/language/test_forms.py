@@ -1,26 +1,13 @@
 """Lines that differ in numbered names share a form, and say what they would alone."""
 
-import random
-
 import pytest
 
 from postproc.language import pdl2 as ast
 from postproc.language.forms import formed
-from postproc.language.parser import form_of, forms_of, parse_line, parse_value_form
-
-PIECES = (
-    "MOVE TO WP_1 p2 _a3b x $v1 a$b2 weld l1:: 7up 'p3' '\\'q4' \"r5\" :: , := ( ) [ ] "
-    "\x00 \x01 \xe9t6 t\xe97 VAR POSITION + {"
-).split(" ")
-
-
-def test_many_masks_are_split_as_each_by_itself() -> None:
-    rng = random.Random(8)
-    masks = [
-        rng.choice(["", " "]).join(rng.choices(PIECES, k=rng.randrange(9)))
-        for _ in range(3000)
-    ]
-    assert list(forms_of(masks)) == [form_of(mask) for mask in masks]
+from postproc.language.lines import read_lines
+from postproc.language.numbered import form_of
+from postproc.language.parser import parse_line, parse_value_form
+from postproc.language.source import source_from_bytes
 
 
 @pytest.mark.parametrize(
@@ -46,7 +33,8 @@ def test_case_is_kept_where_it_is_shown_only() -> None:
     assert isinstance(declared, ast.Declare) and declared.names == ("Wp1", "WP2")
     moved = parse_line("MOVE TO Wp1")
     assert isinstance(moved, ast.Move) and moved.where == (ast.Reference("wp1"),)
-    (entered,) = formed(["Wp1 XTND Arm: \x00 Priv"], forms_of, parse_value_form)
+    lines = read_lines(source_from_bytes("job.lsv", b"Wp1 XTND Arm: 1 Priv"))
+    (entered,) = formed(lines.shapes, parse_value_form)
     assert entered is not None and entered.name == "Wp1"
 
 

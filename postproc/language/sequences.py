@@ -1,0 +1,62 @@
+"""Rows that are alike, numbered in the order in which they appear."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Ints = NDArray[np.int64]
+AnyInts = NDArray[np.signedinteger[Any]]
+
+
+def alike(values: AnyInts, first: AnyInts, last: AnyInts) -> Ints:
+    """Number sequences of whole numbers so that equal ones have the same number, (k,).
+
+    Args:
+        values: The numbers, (m,).
+        first: Every sequence is values[first:last], (k,).
+        last: See there.
+
+    >>> alike(np.array([7, 8, 7, 8, 9]), np.array([0, 2, 2]), np.array([2, 4, 5]))
+    array([0, 0, 1])
+    """
+    data = np.ascontiguousarray(values, dtype=np.int32).tobytes()
+    number: dict[bytes, int] = {}
+    ends = zip((4 * first).tolist(), (4 * last).tolist(), strict=True)
+    return np.fromiter(
+        (number.setdefault(data[a:b], len(number)) for a, b in ends),
+        np.int64,
+        len(first),
+    )
+
+
+def in_order(keys: AnyInts) -> tuple[Ints, Ints]:
+    """Number keys in the order in which they appear.
+
+    Args:
+        keys: Whole numbers from 0 on, (n,).
+
+    Returns:
+        The number of every row, (n,), and the first row of every number.
+
+    >>> in_order(np.array([5, 2, 5]))
+    (array([0, 1, 0]), array([0, 1]))
+    """
+    if len(keys) == 0:
+        none = np.zeros(0, dtype=np.int64)
+        return none, none
+    if int(keys.max()) <= 2 * len(keys) + 1000:
+        rows = np.arange(len(keys))[::-1]
+        at = np.full(int(keys.max()) + 1, -1)
+        at[keys[::-1]] = rows  # the last one that is written stays: the first row
+        first = np.sort(at[at >= 0])
+        rank = np.empty_like(at)
+        rank[keys[first]] = np.arange(len(first))
+        return rank[keys], first
+    _, example, which = np.unique(keys, return_index=True, return_inverse=True)
+    order = np.argsort(example)
+    ranks = np.empty(len(order), dtype=np.int64)
+    ranks[order] = np.arange(len(order))
+    return ranks[which.ravel()], example[order]

@@ -1,0 +1,82 @@
+"""Numbered names are taken out of whole files as they are out of one line."""
+
+import random
+
+import numpy as np
+import pytest
+
+from postproc.language.lexis import mask_line
+from postproc.language.lines import Lines, read_lines
+from postproc.language.masking import mark_lines
+from postproc.language.numbered import NAME_MARK, WHOLE, form_of, mask_of
+from postproc.language.source import Source, source_from_bytes
+
+PIECES = (
+    "MOVE TO WP_1 p2 _a3b x $v1 a$b2 weld l1:: 7up 'p3' '\\'q4' \"r5\" :: , := ( ) [ ] "
+    "5 -1.5 1..n 2e3 \x01 \xe9t6 t\xe97 W8\xe9 a.b9 c1.5 -- d1\t:: VAR POSITION + {"
+).split(" ")
+
+
+def text(rng: random.Random, lines: int) -> bytes:
+    """Write lines of names, and of what may be taken for one."""
+    written = [
+        rng.choice(["", " ", "   "]).join(rng.choices(PIECES, k=rng.randrange(9)))
+        for _ in range(lines)
+    ]
+    far = [f"p{k}{' ' * (k % 80)}::" for k in range(160)]
+    return "\n".join([*written, *far, "END"]).encode("latin-1")
+
+
+def test_whole_files_are_read_as_line_by_line() -> None:
+    data = text(random.Random(8), 4000)
+    marked = mark_lines(data, Source("x", data).line_starts)
+    masks, first = marked.masked.masks, marked.name_first
+    taken = 0
+    for row, line in enumerate(data.split(b"\n")):
+        wanted = mask_line(line.decode("latin-1")).mask
+        names = tuple(marked.name[first[row] : first[row + 1]])
+        if masks[row][:1] == WHOLE:
+            assert masks[row][1:].decode("latin-1") == wanted and not names
+        else:
+            assert (masks[row].decode("latin-1"), names) == form_of(wanted)
+            assert mask_of(*form_of(wanted)) == wanted
+            taken += len(names)
+    assert taken > 300
+
+
+def shapes_of(data: bytes) -> tuple[Lines, list[str]]:
+    lines = read_lines(source_from_bytes("x", data))
+    return lines, [lines.text(row) for row in range(len(lines))]
+
+
+def test_shapes_are_what_lines_say_without_numbers() -> None:
+    sound = [p for p in PIECES if p not in ("'\\'q4'", "--", ",", "1..n", "::")]
+    rng = random.Random(3)
+    said = [" ".join(rng.choices(sound, k=rng.randrange(1, 5))) for _ in range(3000)]
+    lines, found = shapes_of("\n".join(said).encode("latin-1"))
+    masks = [mask_line(line).mask.strip() for line in said]
+    assert found == [mask for mask in masks if mask]
+    assert len(lines.shapes) == len({*found}) == len({*lines.shapes})
+    assert [*dict.fromkeys(found)] == [*lines.shapes]
+    forms = {form_of(mask)[0] for mask in found}
+    assert {*lines.shapes.texts} == forms
+
+
+@pytest.mark.parametrize("behind", ["", ' -- "odd"', " -- \\"])
+def test_a_name_is_the_same_where_its_line_is_odd(behind: str) -> None:
+    text = f"MOVE TO p1 ,{behind}\n  WITH CONDITION[c2],\nENDMOVE\nMOVE TO p1"
+    lines, found = shapes_of(text.encode())
+    joined = "MOVE TO p1 , WITH CONDITION[c2], ENDMOVE"
+    assert found == [joined, "MOVE TO p1"]
+    plain, _ = shapes_of(text.replace(behind, "").encode())
+    assert lines.shapes == plain.shapes
+    other, _ = shapes_of(text.replace("c2", "c3").encode())
+    assert lines.shapes != other.shapes
+    assert lines.shapes.names_of(0) == ("p1", "c2")
+    ((name,),) = lines.shapes.names_at(np.array([1]))
+    assert lines.shapes.names[name] == "p1"
+
+
+def test_the_character_that_marks_names_is_kept() -> None:
+    _, found = shapes_of(b"x1 := '\x01'\nx2 := 'y'")
+    assert found == [f"x1 := '{NAME_MARK}'", "x2 := 'y'"]
