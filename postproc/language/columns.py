@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -30,6 +31,12 @@ class Table:
     def __call__(self, text: str) -> int:
         """Return the index of a text."""
         return self.index.setdefault(text, len(self.index))
+
+    def many(self, texts: Sequence[str]) -> Ints:
+        """Return the indices of texts, (m,)."""
+        index = self.index
+        found = (index.setdefault(text, len(index)) for text in texts)
+        return np.fromiter(found, np.int64, len(texts))
 
     def texts(self) -> tuple[str, ...]:
         """Return the texts by index."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -10,9 +9,11 @@ import numpy as np
 from postproc.language.diagnostic import Diagnostic
 from postproc.language.entry_columns import POSITIONS
 from postproc.language.evaluate import Point
+from postproc.language.forms import lower
 from postproc.language.initial_values import Points
-from postproc.language.lsv import Entry, Variables
-from postproc.language.program import Body, Program, Variable
+from postproc.language.lsv import Entries, Entry
+from postproc.language.lsv import Variables as ValueFile
+from postproc.language.program import Program, Variable, Variables
 from postproc.language.store import Store, root_of
 from postproc.language.values import Nothing, Position, Value, Vector
 from postproc.language.world import Place, World, base_variable
@@ -20,32 +21,25 @@ from postproc.language.world import Place, World, base_variable
 
 def fill_initial(world: World) -> None:
     """Enter declared initial values, constants and the variable file's values."""
-    for program in world.programs():
-        bodies = [b for b in (program.main, *program.routines.values()) if b]
-        for body in bodies:
-            seen: Mapping[str, Variable] = program.variables
-            if body is not bodies[0]:  # it sees the rest as the first body does
-                hidden = bodies[0].own_names | body.own_names
-                seen = {name: seen[name] for name in hidden if name in seen}
-            _declared(world, program, body, seen)
+    for place, seen in world.declarations():
+        _declared(world, place, seen)
     if world.variables is not None and world.main.main is not None:
         place = Place(world.main, world.main.main)
         _enter_all(world, place, world.variables)
         _report_drift(world, place, world.variables)
 
 
-def _report_drift(world: World, place: Place, file: Variables) -> None:
+def _report_drift(world: World, place: Place, file: ValueFile) -> None:
     """Say where a program and its variable file have drifted apart."""
     for found in file.diagnostics:
         world.diagnostics[found] = None
-    words = place.program.statements.words()
-    written = [file.entries.name[row] for row in file.entries.row.values()]
-    names = {base_variable(name): name.partition(".")[0] for name in written}
+    words, declared = place.program.statements.words(), place.program.variables
+    names = _bases(file.entries)
     unused = [written for name, written in names.items() if name not in words]
     undeclared = [
         written
         for name, written in names.items()
-        if name in words and world.declared(place, name) is None
+        if name in words and name not in declared
     ]
     if names and len(unused) == len(names):
         _say(world, file, "lsv-other-program", "none of its variables is used by "
@@ -57,7 +51,16 @@ def _report_drift(world: World, place: Place, file: Variables) -> None:
         _say(world, file, "lsv-undeclared", text)
 
 
-def _say(world: World, file: Variables, code: str, text: str) -> None:
+def _bases(entries: Entries) -> dict[str, str]:
+    """Return how variables of a file are written, by name, without their parts."""
+    written = [entries.name[row] for row in entries.row.values()]
+    names = dict(zip(lower(written), written, strict=True))
+    if any(mark in name for mark in "[." for name in names):
+        return {base_variable(name): name.partition(".")[0] for name in written}
+    return names
+
+
+def _say(world: World, file: ValueFile, code: str, text: str) -> None:
     world.diagnostics[Diagnostic(file.source.name, 1, code, text)] = None
 
 
@@ -66,14 +69,11 @@ def _some(names: list[str]) -> str:
     return ", ".join(names[:10]) + rest
 
 
-def _declared(
-    world: World, program: Program, body: Body, seen: Mapping[str, Variable]
-) -> None:
-    place = Place(program, body)
+def _declared(world: World, place: Place, seen: Variables) -> None:
+    """Enter the initial values of declarations, one by one: most have none."""
     store = Store(world.initial.find)
-    for variable in (*seen.values(), *body.variables.values()):
+    for variable in (*_with_value(seen), *_with_value(place.body.variables)):
         key = world.root(place, variable.name.lower())
-        world.spelling.setdefault(key, variable.name)
         if variable.initial is None or key in world.initial:
             continue
         value = Point(world, place, variable.row, store).value(variable.initial)
@@ -87,7 +87,11 @@ def _declared(
         world.initial[key] = value
 
 
-def _enter_all(world: World, place: Place, file: Variables) -> None:
+def _with_value(seen: Variables) -> list[Variable]:
+    return [seen[name] for name in seen.which(lambda said: said.initial is not None)]
+
+
+def _enter_all(world: World, place: Place, file: ValueFile) -> None:
     """Enter what a variable file says: points as columns, the rest one by one."""
     entries, base = file.entries, world.slot_base[file.source.name]
     places = [layout.kind in POSITIONS for layout in entries.layouts]
@@ -95,28 +99,39 @@ def _enter_all(world: World, place: Place, file: Variables) -> None:
     known &= np.isfinite(entries.numbers).all(axis=1)
     known &= np.isin(entries.arm, (0, world.arm))
     shared = np.array([layout.shared for layout in entries.layouts], dtype=bool)
-    points = Points(
-        {}, entries, base, shared[entries.layout], np.zeros(len(known), dtype=bool)
-    )
-    told = known.tolist()
-    for name, row in entries.row.items():
+    shared, taught = shared[entries.layout], np.zeros(len(known), dtype=bool)
+    named = np.fromiter(entries.row.values(), np.int64, len(entries.row))
+    own, other = known.copy(), {}
+    for row in _told_by_declaration(place.program, entries):
+        name = entries.name[row].lower()
+        root = root_of(name)
+        declared = place.program.variables[root]
+        taught[row], shared[row] = (
+            declared.taught,
+            shared[row] | bool(declared.exported),
+        )
+        if known[row] and declared.exported:
+            own[row] = False
+            other[world.root(place, root) + name[len(root) :]] = row
+    for row in named[~known[named]].tolist():
+        name = entries.name[row].lower()
         root = root_of(name)
         key = world.root(place, root) + name[len(root) :]
-        declared = world.declared(place, root)
-        if told[row]:
-            points.row[key] = row
-            if declared is not None and declared.taught:
-                points.taught[row] = True
-            if declared is not None and declared.exported:
-                points.shared[row] = True
-        elif not _entered(world, file, entries.entry(row), key):
-            continue
-        world.spelling.setdefault(key, entries.name[row])
-    world.initial.points = points
+        _enter(world, file, entries.entry(row), key)
+    prefix = f"{place.program.name}/"
+    world.initial.points = Points(prefix, own, other, entries, base, shared, taught)
 
 
-def _entered(world: World, file: Variables, entry: Entry, key: str) -> bool:
-    """Enter a value that is no known point; tell whether there is any."""
+def _told_by_declaration(program: Program, entries: Entries) -> list[int]:
+    """List the rows of variables that are exported, or marked as taught."""
+    marked = {*program.variables.which(lambda v: v.taught or bool(v.exported))}
+    if not marked:
+        return []
+    return [row for name, row in entries.row.items() if root_of(name) in marked]
+
+
+def _enter(world: World, file: ValueFile, entry: Entry, key: str) -> None:
+    """Enter a value that is no known point, where there is any."""
     value: Value | None = entry.numbers[0] if entry.numbers else None
     if entry.kind in POSITIONS:
         value = Nothing(f"its value is not initialised in {file.source.name}")
@@ -129,4 +144,3 @@ def _entered(world: World, file: Variables, entry: Entry, key: str) -> bool:
         value = Nothing(f"its value is one of arm {entry.arm}")
     if value is not None:
         world.initial[key] = value
-    return value is not None

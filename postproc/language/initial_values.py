@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import chain
 
@@ -21,18 +21,50 @@ class Points:
     """Points whose six numbers a variable file tells.
 
     Attributes:
-        row: Row of `entries`, by key.
+        prefix: What keys of the program's own variables begin with, before their names.
+        own: Which rows of `entries` are points of such variables.
+        other: Rows of points of variables of other programs, by key.
         entries: The entries of the file.
         base: Global index of the file's first number.
         shared: Another program may read it too, by row of `entries`.
         taught: Marked as taught where it is declared, likewise.
     """
 
-    row: dict[str, int]
+    prefix: str
+    own: Bools
+    other: Mapping[str, int]
     entries: Entries
     base: int
     shared: Bools
     taught: Bools
+
+    def row(self, key: str) -> int:
+        """Return the row of a key, -1 where it is no point."""
+        if key.startswith(self.prefix):
+            row = self.entries.row.get(key[len(self.prefix) :], -1)
+            if row >= 0 and self.own[row]:
+                return row
+        return self.other.get(key, -1)
+
+    def rows(self, names: Sequence[str]) -> Ints:
+        """Return the rows of the program's own variables, (m,), -1 for no points.
+
+        Args:
+            names: Their names, in lower case.
+        """
+        at = self.entries.row.get
+        rows = np.fromiter((at(name, -1) for name in names), np.int64, len(names))
+        rows[rows >= 0] = np.where(self.own[rows[rows >= 0]], rows[rows >= 0], -1)
+        return rows
+
+    def keys(self) -> Iterator[str]:
+        """Go through the keys, in the order of the file."""
+        elsewhere = {row: key for key, row in self.other.items()}
+        for name, row in self.entries.row.items():
+            if self.own[row]:
+                yield self.prefix + name
+            elif row in elsewhere:
+                yield elsewhere[row]
 
     def position(self, row: int) -> Position:
         """Return the value of a point."""
@@ -58,7 +90,18 @@ class InitialValues:
 
     def point(self, key: str) -> int:
         """Return the row of a point that the variable file tells, -1 for all else."""
-        return -1 if self.points is None else self.points.row.get(key, -1)
+        return -1 if self.points is None else self.points.row(key)
+
+    def rows(self, prefix: str, names: Sequence[str]) -> Ints:
+        """Return the rows of points of a program's own variables, (m,), -1 for others.
+
+        Args:
+            prefix: What the keys of its variables begin with.
+            names: Names of its variables, in lower case.
+        """
+        if self.points is None or prefix != self.points.prefix:
+            return np.full(len(names), -1)
+        return self.points.rows(names)
 
     def find(self, key: str) -> Value | None:
         """Return what a key holds, None where it holds nothing."""
@@ -77,5 +120,5 @@ class InitialValues:
 
     def __iter__(self) -> Iterator[str]:
         """Go through the keys."""
-        own = self.points.row if self.points is not None else {}
-        return chain(own, (key for key in self.other if key not in own))
+        own = self.points.keys() if self.points is not None else ()
+        return chain(own, (key for key in self.other if self.point(key) < 0))

@@ -8,7 +8,7 @@ stretch each time that the analysis comes to it.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,11 +16,13 @@ from numpy.typing import NDArray
 
 from postproc.language import pdl2 as ast
 from postproc.language.effects import CHANGING, PURE, invocations, references
-from postproc.language.forms import name_index
+from postproc.language.forms import lower, name_index
 from postproc.language.reach import HANDS_OVER
+from postproc.language.sequences import alike, in_order
 from postproc.language.world import Place, World
 
 Ints = NDArray[np.int64]
+Bools = NDArray[np.bool_]
 
 _POINTS = ("position", "xtndpos", "jointpos")
 _NOT_WITH = ("$move_type", "$tool", "$base", "$uframe")
@@ -49,7 +51,11 @@ class Quiet:
         statements: What the lines of each variant say, but for numbers and points.
         calls: Which of them call something.
         named: Which of them are moves to points.
-        points: The point that lines of a shape go to.
+        points: The point that lines of a shape go to, unless `name` tells it.
+        prefix: What keys of the program's own variables begin with.
+        names: Names, in lower case, of the program's own variables that lines go to.
+        rows: Their rows in the variable file, -1 where it tells none.
+        name: Index into `names` for every shape, -1 for none.
         ends: Rows at which stretches end, ascending.
     """
 
@@ -59,6 +65,10 @@ class Quiet:
     calls: tuple[bool, ...]
     named: tuple[bool, ...]
     points: Mapping[int, Point]
+    prefix: str
+    names: Sequence[str]
+    rows: Ints
+    name: Ints
     ends: Ints
 
     def end(self, row: int) -> int:
@@ -85,8 +95,9 @@ def find_quiet(world: World, place: Place, volatile: frozenset[str]) -> Quiet:
     of_shape = np.full(len(program.lines.shapes), -1, dtype=np.int64)
     shapes = np.unique(rows[may_be[rows]])
     forms = program.statements.form[shapes]
-    for form in np.unique(forms).tolist():
-        mine = shapes[forms == form].tolist()
+    used, begins = np.unique(np.sort(forms), return_index=True)
+    groups = np.split(shapes[np.argsort(forms, kind="stable")], begins[1:])
+    for form, mine in zip(used.tolist(), groups, strict=False):
         of_shape[mine] = variants.add(form, mine)
     variant = of_shape[rows]
     joins = np.array(sorted(body.blocks.joins), dtype=np.int64)
@@ -98,6 +109,10 @@ def find_quiet(world: World, place: Place, volatile: frozenset[str]) -> Quiet:
         tuple(any(_calls(world, place, s)) for s in variants.statements),
         tuple(_goes_to_point(s) for s in variants.statements),
         variants.points,
+        variants.prefix,
+        variants.names,
+        world.initial.rows(variants.prefix, variants.names),
+        variants.name,
         np.unique(ends),
     )
 
@@ -150,29 +165,75 @@ class _Variants:
         self.points: dict[int, Point] = {}
         self._known: dict[tuple[int, tuple[str, ...]], int] = {}
         self._parameters = {p.name for p in self.place.body.parameters}
+        self.prefix = f"{self.place.program.name}/"
+        self.names: list[str] = []
+        self.name = np.full(len(self.place.program.lines.shapes), -1, dtype=np.int64)
 
-    def add(self, form: int, shapes: list[int]) -> list[int]:
+    def add(self, form: int, shapes: Ints) -> Ints:
         """Return the variants of shapes of one form, -1 where one is not quiet."""
         said = self.place.program.statements
         one = said.said[form]
         where = one.where[0] if isinstance(one, ast.Move) else None
+        names = said.shapes.names_at(shapes)
         if not isinstance(where, ast.Reference):
-            return [
-                self._variant(shape, said.shapes.names_of(shape)) for shape in shapes
-            ]
-        index = _number_slots(where.steps)
-        at = name_index(where.name)
-        found = []
-        for shape in shapes:
-            names = said.shapes.names_of(shape)
-            name = names[at].lower() if at >= 0 else where.name
-            if index is None or not self._is_point(name, array=bool(where.steps)):
-                found.append(-1)
-                continue
-            self.points[shape] = Point(self.world.root(self.place, name), index)
-            others = names[:at] + names[at + 1 :] if at >= 0 else names
-            found.append(self._variant(shape, others))
+            return self._variants(shapes, names)
+        index, at = _number_slots(where.steps), name_index(where.name)
+        variants = np.full(len(shapes), -1)
+        if index is None:
+            return variants
+        goal, which = [where.name], np.zeros(len(shapes), dtype=np.int64)
+        if at >= 0:
+            used, which = np.unique(names[:, at], return_inverse=True)
+            goal = lower([said.shapes.names[k] for k in used.tolist()])
+            names = np.delete(names, at, axis=1)
+        quiet = self._points(shapes, goal, which, index, array=bool(where.steps))
+        variants[quiet] = self._variants(shapes[quiet], names[quiet])
+        return variants
+
+    def _points(
+        self,
+        shapes: Ints,
+        goal: list[str],
+        which: Ints,
+        index: tuple[int, ...],
+        array: bool,
+    ) -> Bools:
+        """Enter where shapes go, and tell which of them go to a point, (m,).
+
+        Args:
+            shapes: Shapes of one form, (m,).
+            goal: Names that they go to.
+            which: The one of each, (m,).
+            index: Number slots of an element's index.
+            array: Whether there is any.
+        """
+        place = self.place
+        declared = place.program.variables
+        points = declared.passing(goal, lambda said: _is_point(said.type, array))
+        alone = ~declared.passing(goal, lambda said: bool(said.exported))
+        alone &= not array and not any(mark in self.prefix for mark in "[.")
+        hidden = place.body.own_names | self.volatile
+        for k in np.flatnonzero([name in hidden for name in goal]).tolist():
+            points[k], alone[k] = self._is_point(goal[k], array), False
+        own = np.flatnonzero((points & alone)[which])
+        self.name[shapes[own]] = len(self.names) + which[own]
+        self.names += goal
+        for k in np.flatnonzero((points & ~alone)[which]).tolist():
+            key = self.world.root(place, goal[which[k]])
+            self.points[int(shapes[k])] = Point(key, index)
+        found: Bools = points[which]
         return found
+
+    def _variants(self, shapes: Ints, names: Ints) -> Ints:
+        """Return the variants of shapes of one form with some names, (m,)."""
+        ends = names.shape[1] * np.arange(1, len(shapes) + 1)
+        kind = alike(names.ravel(), ends - names.shape[1], ends)
+        texts = self.place.program.lines.shapes.names
+        found = [
+            self._variant(int(shapes[k]), tuple([texts[i] for i in names[k].tolist()]))
+            for k in in_order(kind)[1].tolist()
+        ]
+        return np.array(found, dtype=np.int64)[kind]
 
     def _variant(self, shape: int, names: tuple[str, ...]) -> int:
         """Return the variant of a shape, which its form and some names tell."""
@@ -189,12 +250,9 @@ class _Variants:
 
     def _is_point(self, name: str, array: bool) -> bool:
         """Tell whether a name is a variable whose value no call changes unseen."""
-        type_ = self.world.type_of(self.place, name)
-        if type_ is None or type_.name not in _POINTS or type_.path:
-            return False
         if name in self._parameters or name in self.volatile:
             return False
-        return type_.array == array
+        return _is_point(self.world.type_of(self.place, name), array)
 
     def _is_quiet(self, said: ast.Statement) -> bool:
         return all(self._does_nothing(c) for c in _calls(self.world, self.place, said))
@@ -224,6 +282,13 @@ class _Variants:
                 known = name.startswith("$") or name in self._parameters
                 return bare and safe and not known
         return False
+
+
+def _is_point(type_: ast.Type | None, array: bool) -> bool:
+    """Tell whether a type is that of a point, or of an array of them."""
+    if type_ is None or type_.name not in _POINTS or type_.path:
+        return False
+    return type_.array == array
 
 
 def _number_slots(steps: tuple[str | ast.Index, ...]) -> tuple[int, ...] | None:

@@ -118,7 +118,7 @@ def _points(collector: Collector, at: int, run: Run, points: Points) -> None:
     c.slots[visits] = entries.slots[rows] + points.base
     c.taught[visits], c.shared[visits] = points.taught[rows], points.shared[rows]
     names = [entries.name[row] for row in rows.tolist()]
-    c.name[visits] = [collector.names(name) for name in names]
+    c.name[visits] = collector.names.many(names)
     if collector.machine.world.start.taught:
         c.taught[visits] |= [collector.is_listed(name) for name in names]
     found, first = np.unique(entries.layout[rows], return_index=True)

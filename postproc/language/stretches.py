@@ -18,6 +18,7 @@ from postproc.language.values import Nothing, Value
 from postproc.language.visits import Motion
 
 Ints = NDArray[np.int64]
+Bools = NDArray[np.bool_]
 
 _NO_INDEX = Nothing("its index is known only at run time")
 
@@ -114,13 +115,30 @@ def _points(
     held: dict[int, Value] = {}
     named = np.flatnonzero(np.array(quiet.named, dtype=bool)[variant])
     shapes = program.lines.shape[rows[named]]
-    for at, shape in zip(named.tolist(), shapes.tolist(), strict=True):
-        key = _key(program.lines, quiet.points[shape], int(rows[at]))
+    own = quiet.name[shapes]
+    point[named] = np.where(own >= 0, quiet.rows[own], HELD)
+    asked = (point[named] < 0) | _assigned(here, quiet, own)
+    some = (named[asked], shapes[asked], own[asked])
+    for at, shape, name in zip(*(column.tolist() for column in some), strict=True):
+        if name >= 0:
+            key = quiet.prefix + quiet.names[name]
+        else:
+            key = _key(program.lines, quiet.points[shape], int(rows[at]))
         value = here.store.assigned(key) if key else _NO_INDEX
         point[at] = initial.point(key) if value is None else HELD
         if point[at] < 0:
             point[at], held[at] = HELD, value or here.store.read(key)
     return point, held
+
+
+def _assigned(here: Here, quiet: Quiet, names: Ints) -> Bools:
+    """Tell which of the program's own variables it has given a value itself, (m,)."""
+    values, found = here.store.values, np.zeros(len(names), dtype=bool)
+    if values:
+        for at in np.flatnonzero(names >= 0).tolist():
+            key = quiet.prefix + quiet.names[names[at]]
+            found[at] = values.get(key) is not None
+    return found
 
 
 def _key(lines: Lines, point: Point, row: int) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from bisect import bisect_right
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -75,6 +75,14 @@ class Variables(Mapping[str, Variable]):
         for variable in others.values():
             self.declare([variable.name], variable)
 
+    def some(self, names: Iterable[str]) -> Variables:
+        """Return those of some lower-case names that there are."""
+        found = Variables()
+        for name in names:
+            if name in self._at:
+                found.declare([self[name].name], self[name])
+        return found
+
     def __len__(self) -> int:
         """Return the number of names."""
         return len(self._at)
@@ -99,6 +107,10 @@ class Variables(Mapping[str, Variable]):
     def get(self, name: str, default: object = None) -> Variable | None:  # type: ignore[override]
         """Return the variable of a lower-case name, None where there is none."""
         return self[name] if name in self._at else None
+
+    def written(self) -> list[str]:
+        """Return the names as they are written, in order."""
+        return [self._names[at] for at in self._at.values()]
 
     def which(self, test: Callable[[Variable], bool]) -> list[str]:
         """List the lower-case names whose declaration passes a test, in order.

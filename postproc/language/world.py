@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 
 from postproc.language import pdl2 as ast
 from postproc.language.diagnostic import Diagnostic
 from postproc.language.initial_values import InitialValues
-from postproc.language.lsv import Variables
-from postproc.language.program import Body, Program, Variable
+from postproc.language.lsv import Variables as ValueFile
+from postproc.language.program import Body, Program, Variable, Variables
 from postproc.language.store import root_of, wholes
 from postproc.language.values import Nothing, Position, Value
 
@@ -76,7 +77,6 @@ class World:
         start: What the cell says.
         slot_base: First global number index of each file, by file name.
         initial: What variables hold before the program assigns them, by key.
-        spelling: How variables are written, by key.
         taught_lines: Lines marked ``-- TAUGHT``, by file name.
         diagnostics: What was found; a message is kept once.
         loose: Variables, by key, that are used where it is not known what they hold,
@@ -89,11 +89,10 @@ class World:
     main: Program
     others: Mapping[str, Program]
     start: Start
-    variables: Variables | None
+    variables: ValueFile | None
     slot_base: dict[str, int] = field(default_factory=dict)
     files: list[str] = field(default_factory=list)
     initial: InitialValues = field(default_factory=InitialValues)
-    spelling: dict[str, str] = field(default_factory=dict)
     diagnostics: dict[Diagnostic, None] = field(default_factory=dict)
     loose: dict[str, str] = field(default_factory=dict)
     held: dict[str, set[tuple[int, ...]]] = field(default_factory=dict)
@@ -164,8 +163,9 @@ class World:
         if self._first is None:
             self._first = {}
             for part in self.initial:
-                for whole in wholes(part):
-                    self._first.setdefault(whole, []).append(part)
+                if "[" in part or "." in part:
+                    for whole in wholes(part):
+                        self._first.setdefault(whole, []).append(part)
         return self._first.get(key, [])
 
     def loosen(self, key: str, why: str) -> None:
@@ -195,6 +195,36 @@ class World:
         if declared is not None and declared.exported:
             return f"{declared.exported}/{name}"
         return f"{program.name}/{name}"
+
+    def declarations(self) -> Iterator[tuple[Place, Variables]]:
+        """Yield every body, with what its program declares that is new there.
+
+        What a body does not hide means what it means in the first one.
+        """
+        for program in self.programs():
+            bodies = [b for b in (program.main, *program.routines.values()) if b]
+            for body in bodies:
+                seen = program.variables
+                if body is not bodies[0]:
+                    seen = seen.some(bodies[0].own_names | body.own_names)
+                yield Place(program, body), seen
+
+    @cached_property
+    def spelling(self) -> Mapping[str, str]:
+        """Return how variables are written, by key: as where they come first."""
+        found: dict[str, str] = {}
+        for place, seen in self.declarations():
+            own = [variable.name for variable in place.body.variables.values()]
+            for name in (*seen.written(), *own):
+                found.setdefault(self.root(place, name.lower()), name)
+        if self.variables is not None and self.main.main is not None:
+            place, entries = Place(self.main, self.main.main), self.variables.entries
+            for name, row in entries.row.items():
+                root = root_of(name)
+                key = self.root(place, root) + name[len(root) :]
+                if key in self.initial:
+                    found.setdefault(key, entries.name[row])
+        return found
 
     def written(self, key: str) -> str:
         """Return how a variable or element is written."""
