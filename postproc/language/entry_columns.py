@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -98,6 +99,13 @@ class Entries(Mapping[str, Entry]):
     slots: Ints
     aux: Floats
     arm: Ints
+
+    @cached_property
+    def parts(self) -> list[str]:
+        """List the lower-case names of elements and fields."""
+        if not any(mark in "\n".join(self.name) for mark in "[."):
+            return []
+        return [name for name in self.row if "[" in name or "." in name]
 
     def __len__(self) -> int:
         """Return how many names have one entry."""

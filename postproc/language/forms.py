@@ -10,6 +10,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
+from operator import itemgetter
 from typing import Generic, TypeVar, overload
 
 import numpy as np
@@ -60,6 +61,9 @@ def filler(part: object) -> Filler | None:
     if isinstance(part, str):
         return _text_filler(part)
     if isinstance(part, tuple):
+        at = [name_index(one) if isinstance(one, str) else -1 for one in part]
+        if len(part) > 1 and part == tuple(map(open_name, at)):
+            return itemgetter(*at)  # a list of names, as they are written
         return _all_filler(tuple, part)
     own = getattr(part, "__match_args__", None)
     if own is None:

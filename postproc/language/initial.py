@@ -33,7 +33,7 @@ def _report_drift(world: World, place: Place, file: ValueFile) -> None:
     """Say where a program and its variable file have drifted apart."""
     for found in file.diagnostics:
         world.diagnostics[found] = None
-    words, declared = place.program.statements.words(), place.program.variables
+    words, declared = place.program.statements.words(), place.program.variables.names
     names = _bases(file.entries)
     unused = [written for name, written in names.items() if name not in words]
     undeclared = [
@@ -55,7 +55,7 @@ def _bases(entries: Entries) -> dict[str, str]:
     """Return how variables of a file are written, by name, without their parts."""
     written = [entries.name[row] for row in entries.row.values()]
     names = dict(zip(lower(written), written, strict=True))
-    if any(mark in name for mark in "[." for name in names):
+    if entries.parts:
         return {base_variable(name): name.partition(".")[0] for name in written}
     return names
 

@@ -66,6 +66,11 @@ class Points:
             elif row in elsewhere:
                 yield elsewhere[row]
 
+    def parts(self) -> Iterator[str]:
+        """Go through the keys that may be elements or fields."""
+        if self.entries.parts or self.other or any(c in self.prefix for c in "[."):
+            yield from self.keys()
+
     def position(self, row: int) -> Position:
         """Return the value of a point."""
         entry = self.entries.entry(row)
@@ -117,6 +122,11 @@ class InitialValues:
     def __setitem__(self, key: str, value: Value) -> None:
         """Let a key hold a value, unless the variable file says another."""
         self.other[key] = value
+
+    def parts(self) -> Iterator[str]:
+        """Go through the keys, but for most of those that are no parts of others."""
+        own = self.points.parts() if self.points is not None else ()
+        return chain(own, (key for key in self.other if self.point(key) < 0))
 
     def __iter__(self) -> Iterator[str]:
         """Go through the keys."""

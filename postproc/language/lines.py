@@ -91,12 +91,12 @@ def read_lines(source: Source, each: Each = map) -> Lines:
         if piece.unterminated:
             _refuse(source, rows.start + 1 + piece.unterminated[0])
         shape = [ids.setdefault(mask, len(ids)) for mask in piece.masks]
-        name = [names.setdefault(word, len(names)) for word in piece.names]
         pieces.append(
             replace(
                 piece,
                 shape=np.array(shape, dtype=np.int32)[piece.shape],
-                name=np.array(name, dtype=np.int32)[piece.name],
+                name=_numbers(piece.names, names),
+                names=(),
             )
         )
     return _logical(source, tuple(ids), names, _merged(pieces))
@@ -135,8 +135,8 @@ class _Piece:
         start: Byte offsets of the numbers in the file, (m,).
         end: Where they end, (m,).
         value: What they are worth, (m,).
-        names: The distinct names that are taken out of the masks.
-        name: Index into `names` of all of them, in order, (p,).
+        names: The names that are taken out of the masks, in order.
+        name: Their numbers, the same for the same name, (p,).
         name_first: CSR offsets into them, (n + 1,).
         unterminated: As in `Masked`.
     """
@@ -148,7 +148,7 @@ class _Piece:
     start: Ints
     end: Ints
     value: Floats
-    names: tuple[str, ...]
+    names: Sequence[str]
     name: Ints
     name_first: Ints
     unterminated: tuple[int, ...]
@@ -159,27 +159,27 @@ def _read(data: bytes, starts: Ints, lines: slice, place: slice) -> _Piece:
     marked = mark_lines(data[place], starts[lines] - place.start)
     piece, at = marked.masked, place.start
     short = np.int32 if len(data) < 2**31 else np.int64
-    masks, shape = _distinct(piece.masks)
-    names, name = _distinct(marked.name)
+    ids: dict[bytes, int] = {}
+    shape = _numbers(piece.masks, ids)
     return _Piece(
-        masks,
+        tuple(ids),
         shape,
         np.where(piece.comment >= 0, piece.comment + at, -1).astype(short),
         piece.first,
         (piece.start + at).astype(short),
         (piece.end + at).astype(short),
         piece.value,
-        names,
-        name,
+        marked.name,
+        np.zeros(0, dtype=np.int32),
         marked.name_first,
         piece.unterminated,
     )
 
 
-def _distinct(texts: Sequence[T]) -> tuple[tuple[T, ...], Ints]:
-    """Return the distinct ones of some texts, and which each is."""
-    ids = {text: k for k, text in enumerate(dict.fromkeys(texts))}
-    return tuple(ids), np.fromiter(map(ids.__getitem__, texts), np.int32, len(texts))
+def _numbers(texts: Sequence[T], numbers: dict[T, int]) -> Ints:
+    """Return the numbers of texts, new ones in the order in which they come, (n,)."""
+    found = [numbers.setdefault(text, len(numbers)) for text in texts]
+    return np.array(found, dtype=np.int32)
 
 
 def _merged(pieces: list[_Piece]) -> _Piece:

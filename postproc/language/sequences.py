@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 Ints = NDArray[np.int64]
 AnyInts = NDArray[np.signedinteger[Any]]
 
+_SHORT = 12  # longer sequences are told apart in Python
+
 
 def alike(values: AnyInts, first: AnyInts, last: AnyInts) -> Ints:
     """Number sequences of whole numbers so that equal ones have the same number, (k,).
@@ -22,6 +24,9 @@ def alike(values: AnyInts, first: AnyInts, last: AnyInts) -> Ints:
     >>> alike(np.array([7, 8, 7, 8, 9]), np.array([0, 2, 2]), np.array([2, 4, 5]))
     array([0, 0, 1])
     """
+    length = last - first
+    if int(length.max(initial=0)) <= _SHORT:
+        return _by_columns(values, first, length)
     data = np.ascontiguousarray(values, dtype=np.int32).tobytes()
     number: dict[bytes, int] = {}
     ends = zip((4 * first).tolist(), (4 * last).tolist(), strict=True)
@@ -30,6 +35,18 @@ def alike(values: AnyInts, first: AnyInts, last: AnyInts) -> Ints:
         np.int64,
         len(first),
     )
+
+
+def _by_columns(values: AnyInts, first: AnyInts, length: AnyInts) -> Ints:
+    """Number sequences: first by their lengths, then by one value after the other."""
+    kind, rows = in_order(length)[0], np.arange(len(first))
+    size = int(values.max(initial=0)) + 1
+    for at in range(int(length.max(initial=0))):
+        rows = rows[length[rows] > at]
+        others = int(kind.max()) + 1
+        pairs = kind[rows] * size + values[first[rows] + at]
+        kind[rows] = others + in_order(pairs)[0]
+    return in_order(kind)[0]
 
 
 def in_order(keys: AnyInts) -> tuple[Ints, Ints]:

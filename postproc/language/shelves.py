@@ -49,10 +49,6 @@ class Shelves(Generic[T]):
             self._mine.add(at)
         return self._shelves[at]
 
-    def __bool__(self) -> bool:
-        """Tell whether any key holds anything."""
-        return any(self._shelves)
-
     def __iter__(self) -> Iterator[str]:
         """Iterate over the keys."""
         for shelf in self._shelves:

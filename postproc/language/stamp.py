@@ -12,6 +12,7 @@ _STAMP = re.compile(
     rb"-- postproc (?P<version>\S+) model=(?P<model>\S+) "
     rb"source=(?P<source>[0-9a-f]{64})(?P<rest>[^\r\n]*)(?:\r\n|\n|\r|\Z)"
 )
+_MARK = b"-- postproc "  # looked for first: that is much faster
 _ANY_STAMP = re.compile(rb"^[ \t]*-- postproc \S+ model=", re.M)
 
 
@@ -61,7 +62,7 @@ def read_stamp(data: bytes) -> Stamp | None:
 
 def is_stamped(source: Source) -> bool:
     """Tell whether a program is an output of this tool, stamp moved or not."""
-    return _ANY_STAMP.search(source.data) is not None
+    return _MARK in source.data and _ANY_STAMP.search(source.data) is not None
 
 
 def strip_stamp(data: bytes) -> bytes:

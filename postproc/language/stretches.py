@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from itertools import islice
 
 import numpy as np
 from numpy.typing import NDArray
@@ -134,10 +135,13 @@ def _points(
 def _assigned(here: Here, quiet: Quiet, names: Ints) -> Bools:
     """Tell which of the program's own variables it has given a value itself, (m,)."""
     values, found = here.store.values, np.zeros(len(names), dtype=bool)
-    if values:
-        for at in np.flatnonzero(names >= 0).tolist():
-            key = quiet.prefix + quiet.names[names[at]]
-            found[at] = values.get(key) is not None
+    own = np.flatnonzero(names >= 0)
+    keys = [quiet.prefix + quiet.names[name] for name in names[own].tolist()]
+    given = {*islice(values, len(keys))}
+    if len(given) < len(keys):  # all that there are
+        found[own] = [key in given for key in keys]
+    else:
+        found[own] = [values.get(key) is not None for key in keys]
     return found
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from bisect import bisect_right
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -107,6 +107,11 @@ class Variables(Mapping[str, Variable]):
     def get(self, name: str, default: object = None) -> Variable | None:  # type: ignore[override]
         """Return the variable of a lower-case name, None where there is none."""
         return self[name] if name in self._at else None
+
+    @property
+    def names(self) -> Set[str]:
+        """Return the lower-case names."""
+        return self._at.keys()
 
     def written(self) -> list[str]:
         """Return the names as they are written, in order."""

@@ -162,7 +162,7 @@ class World:
         """Return the elements and fields that a key has when the job starts."""
         if self._first is None:
             self._first = {}
-            for part in self.initial:
+            for part in self.initial.parts():
                 if "[" in part or "." in part:
                     for whole in wholes(part):
                         self._first.setdefault(whole, []).append(part)
