@@ -11,7 +11,7 @@ from __future__ import annotations
 import os
 from typing import Any
 
-INTERFACE = 2  # of the kernels that these modules were written for
+INTERFACE = 3  # of the kernels that these modules were written for
 SWITCH = "POSTPROC_KERNELS"  # environment variable: `numpy` leaves the kernels alone
 
 

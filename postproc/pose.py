@@ -2,14 +2,16 @@
 
 A *pose* is an array (..., 4, 4) with lengths in metres. A *position record* is what
 a program or a cell file holds: (..., 6) with x, y, z [mm] and a, e, r [deg] so that
-R = Rz(a) Ry(e) Rz(r). This module imports nothing of the project: the language needs
-it to compose frames, the robot to place them.
+R = Rz(a) Ry(e) Rz(r). This module imports nothing of the project but its kernels: the
+language needs it to compose frames, the robot to place them.
 """
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
+
+from postproc.kernels import native
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -74,6 +76,9 @@ def angles_near(zyz_deg: Array, R: Array) -> Array:
 def pose_from_record(record: Array) -> Array:
     """Convert position records (..., 6) [mm, deg] to poses (..., 4, 4) [m]."""
     record = np.asarray(record, dtype=float)
+    if native is not None and record.ndim == 2:
+        poses: Array = native.pose_from_record(np.ascontiguousarray(record))
+        return poses
     T = np.zeros((*record.shape[:-1], 4, 4))
     T[..., :3, :3] = rotation_from_zyz(record[..., 3:])
     T[..., :3, 3] = record[..., :3] * MM
@@ -90,12 +95,24 @@ def record_from_pose(T: Array) -> Array:
 
 def inverse(T: Array) -> Array:
     """Invert poses (..., 4, 4)."""
+    if native is not None and T.ndim == 3:
+        inverted: Array = native.inverse(np.ascontiguousarray(T))
+        return inverted
     out = np.zeros_like(T)
     Rt = np.swapaxes(T[..., :3, :3], -1, -2)
     out[..., :3, :3] = Rt
     out[..., :3, 3] = -(Rt @ T[..., :3, 3, None])[..., 0]
     out[..., 3, 3] = 1.0
     return out
+
+
+def times(left: Array, right: Array) -> Array:
+    """Multiply poses (n, 4, 4) with others, (n, 4, 4)."""
+    if native is not None:
+        left, right = np.ascontiguousarray(left), np.ascontiguousarray(right)
+        multiplied: Array = native.times(left, right)
+        return multiplied
+    return np.asarray(left @ right)
 
 
 def products(left: Array, right: Array, i: Ints, j: Ints) -> Array:
@@ -112,6 +129,9 @@ def products(left: Array, right: Array, i: Ints, j: Ints) -> Array:
     """
     count = len(right)
     pair = i % len(left) * count + j % count
+    if len(pair) and (pair == pair[0]).all():  # one frame in a whole program, mostly
+        one = left[i[0]] @ right[j[0]]
+        return np.array(np.broadcast_to(one, (len(pair), 4, 4)))
     used, which = np.unique(pair, return_inverse=True)
     return np.asarray((left[used // count] @ right[used % count])[which])
 
@@ -176,6 +196,9 @@ def rotation_vector(R: Array) -> Array:
 
     Lengths are in [0, pi].
     """
+    if native is not None and R.ndim == 3:
+        vectors: Array = native.rotation_vector(np.ascontiguousarray(R))
+        return vectors
     q = _quaternion(R.reshape(-1, 3, 3))
     x, y, z, w = np.where(q[3] < 0, -q, q)
     angle = 2 * np.arctan2(np.sqrt(x * x + y * y + z * z), w)

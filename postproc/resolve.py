@@ -23,6 +23,7 @@ from postproc.pose import (
     pose_from_record,
     products,
     rotation_from_vector,
+    times,
 )
 from postproc.reasons import Reasons
 from postproc.robot.cell import Cell
@@ -185,7 +186,7 @@ def _places(
     joints[in_joints] = np.deg2rad(values[in_joints])
     poses = np.isin(target, (Target.POSE, Target.NEAR, Target.FOR))
     kind[poses] = np.where(target[poses] == Target.FOR, Kind.TOWARDS, Kind.POSE)
-    tcp[poses] = frames.user[poses] @ pose_from_record(values[poses])
+    tcp[poses] = times(frames.user[poses], pose_from_record(values[poses]))
     near = target == Target.NEAR
     tcp[near] = tcp[near] @ _along_approach(-visits.distance_mm[rows][near])
     away = target == Target.AWAY

@@ -10,9 +10,17 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from postproc import kernels
+from postproc import kernels, pose
+from postproc.accuracy.backlash import Backlash
+from postproc.accuracy.backlash_profile import BacklashProfile
+from postproc.accuracy.batch import Batch
+from postproc.accuracy.combination import Combination
+from postproc.accuracy.compliance import Compliance
+from postproc.accuracy.geometry import Geometry
+from postproc.accuracy.variance import parameter_variance
 from postproc.compensate import compensate
 from postproc.motion import corner, paths, rounding, sampling, zone
+from postproc.motion.pull import Pull
 from postproc.pose import rotation_from_vector
 from postproc.robot import direction, walks
 from postproc.robot.chains import Edges, chained
@@ -20,6 +28,7 @@ from postproc.robot.closed_form import ClosedForm
 from postproc.robot.dh import DH
 from postproc.robot.past import NOTHING
 from postproc.robot.play import Clamps, passing, prefix
+from postproc.robot.state import make_states
 
 PROGRAMS = Path(__file__).parent.parent / "programs"
 CLOSE = {"rtol": 0, "atol": 1e-12, "equal_nan": True}
@@ -192,6 +201,79 @@ def test_straight_ways(bench_cell, random, by_numpy):
     assert np.allclose(zone._chords(*asked), by_numpy(zone._chords, *asked), **CLOSE)
     with pytest.raises(IndexError, match="not there"):
         zone._chords(targets, flange, np.array([-1]), np.array([0]))
+
+
+@native
+def test_poses(random, by_numpy):
+    record = random.uniform(-400, 400, (200, 6))
+    record[3], record[4, 4:] = np.nan, 0.0
+    poses = pose.pose_from_record(record)
+    assert np.allclose(poses, by_numpy(pose.pose_from_record, record), **CLOSE)
+    for given in (poses, poses[::2], poses[:0]):
+        assert np.allclose(pose.inverse(given), by_numpy(pose.inverse, given), **CLOSE)
+        both = given, given[::-1]
+        assert np.allclose(pose.times(*both), by_numpy(pose.times, *both), **CLOSE)
+    with pytest.raises(ValueError, match="columns"):
+        pose.times(poses, poses[:3])
+
+
+@native
+def test_rotation_vectors(random, by_numpy):
+    vectors = random.normal(size=(300, 3))
+    vectors *= np.pi / np.linalg.norm(vectors, axis=1)[:, None]
+    vectors[::3] *= random.uniform(0, 1, (100, 1))
+    vectors[1::3] *= 1e-5
+    turned = rotation_from_vector(vectors)
+    turned[7], turned[8] = np.nan, np.eye(3)
+    found, meant = pose.rotation_vector(turned), by_numpy(pose.rotation_vector, turned)
+    assert np.allclose(found, meant, **CLOSE)
+
+
+@native
+def test_corners_that_pull(random, by_numpy):
+    visit = np.setdiff1d(np.arange(1, 299), random.integers(0, 299, 60))
+    shares = random.uniform(0, 0.125, (2, len(visit)))
+    pull = Pull(visit, visit - 1, visit + 1, *shares)
+    wanted = random.normal(size=(300, 3))
+    assert np.array_equal(pull.to_move(wanted), by_numpy(pull.to_move, wanted))
+    with pytest.raises(ValueError, match="none"):
+        pull.to_move(wanted[:250])
+
+
+@native
+@pytest.mark.parametrize(
+    "effect",
+    [
+        BacklashProfile(lower=(-0.5,) * 6, upper=(0.6, 4, 0.6, 0.6, 0.6, 9)),
+        BacklashProfile((2, 5), (4, 1), True, (-1.0,) * 6, (1.0,) * 6),
+    ],
+)
+def test_backlash_along_the_gear(effect, bench_cell, random, by_numpy):
+    q, sizes = random.uniform(-7, 7, (300, 6)), random.normal(size=36)
+    q[5, 1], q[::2] = np.nan, q[::2] / 10.0
+    batch = Batch(bench_cell.arm, make_states(q, random.uniform(-1, 1, (300, 6))))
+    given = batch, sizes[: len(effect.parameters())]
+    found, meant = effect.angles(*given), by_numpy(effect.angles, *given)
+    assert np.allclose(found, meant, **CLOSE)
+
+
+@native
+@pytest.mark.parametrize("base", [True, False])
+@pytest.mark.parametrize(
+    "more", [(), (Backlash(), BacklashProfile(joints=(5, 2, 3)), Compliance())]
+)
+def test_uncertain_parameters(base, more, bench_cell, random, by_numpy):
+    effects = Combination((*more[:1], Geometry((2, 6), base), *more[1:]))
+    values = effects.scales * random.normal(size=len(effects.scales))
+    root = effects.scales[:, None] * random.normal(size=(len(values), len(values)))
+    q, direction = random.uniform(-3, 3, (43, 6)), random.uniform(-1, 1, (43, 6))
+    q[5, 1] = np.nan
+    states = make_states(q, direction, random.uniform(-0.3, 0.3, (43, 3)))
+    at = effects.at(Batch(bench_cell.arm, states), values)
+    given = effects, at, root @ root.T
+    found, meant = parameter_variance(*given), by_numpy(parameter_variance, *given)
+    assert np.allclose(found, meant, rtol=1e-9, atol=0, equal_nan=True)
+    assert np.isnan(meant).any(axis=1).tolist() == np.isnan(q).any(axis=1).tolist()
 
 
 @native

@@ -18,6 +18,7 @@ LEAVES = {"exceptions", "kernels", "pieces", "pose", "printable", "reasons", "sp
 ALLOWED: dict[str, set[str]] = {
     **{leaf: set() for leaf in LEAVES},
     "exceptions": {"printable"},
+    "pose": {"kernels"},
     "language": set(),
     "robot": set(),
     "motion": {"robot"},

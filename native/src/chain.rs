@@ -8,19 +8,19 @@ use pyo3::prelude::*;
 use crate::rows::{array, rows, Six, Three};
 use crate::trig::sin_cos;
 
-struct Link {
-    a: f64,
-    d: f64,
+pub struct Link {
+    pub a: f64,
+    pub d: f64,
     offset: f64,
-    sense: f64,
-    alpha: (f64, f64),
+    pub sense: f64,
+    pub alpha: (f64, f64),
     /// Hayati's rotation, where there is one.
-    beta: Option<(f64, f64)>,
-    mix: Six,
+    pub beta: Option<(f64, f64)>,
+    pub mix: Six,
 }
 
 /// Links from the base to the flange; angles in pairs of sine and cosine.
-pub struct Chain([Link; 6]);
+pub struct Chain(pub [Link; 6]);
 
 /// Rows a [m], d [m], alpha [rad], offset [rad], sense, beta [rad], then the columns of
 /// the mix of joint angles, (12, 6).
@@ -44,7 +44,7 @@ impl Chain {
     }
 
     /// Return sines and cosines of the D-H angles.
-    fn sin_cos(&self, q: &Six) -> (Six, Six) {
+    pub fn sin_cos(&self, q: &Six) -> (Six, Six) {
         sin_cos(&std::array::from_fn(|i| self.0[i].angle(q)))
     }
 

@@ -12,13 +12,18 @@ mod edges;
 mod inverse;
 mod lines;
 mod play;
+mod pose;
+mod profile;
+mod pull;
 mod rounding;
 mod rows;
 mod trig;
+mod variance;
+mod walk;
 mod walks;
 
 /// Changes with every function here: the package asks for its own number.
-const INTERFACE: u32 = 2;
+const INTERFACE: u32 = 3;
 
 #[pymodule]
 fn postproc_kernels(module: &Bound<'_, PyModule>) -> PyResult<()> {
@@ -37,5 +42,12 @@ fn postproc_kernels(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(direction::side, module)?)?;
     module.add_function(wrap_pyfunction!(walks::clamps, module)?)?;
     module.add_function(wrap_pyfunction!(walks::refined, module)?)?;
+    module.add_function(wrap_pyfunction!(pose::inverse, module)?)?;
+    module.add_function(wrap_pyfunction!(pose::pose_from_record, module)?)?;
+    module.add_function(wrap_pyfunction!(pose::rotation_vector, module)?)?;
+    module.add_function(wrap_pyfunction!(pose::times, module)?)?;
+    module.add_function(wrap_pyfunction!(profile::profile, module)?)?;
+    module.add_function(wrap_pyfunction!(pull::to_move, module)?)?;
+    module.add_function(wrap_pyfunction!(variance::variance, module)?)?;
     Ok(())
 }

@@ -14,7 +14,7 @@ const SMALL: f64 = 1e-3; // [rad] below which a series stands for a quotient
 
 /// The rows of a pose (4, 4), one after the other.
 pub type Pose = [f64; 16];
-type Rotation = [Three; 3];
+pub type Rotation = [Three; 3];
 
 /// See an array (n, 4, 4) as poses.
 pub fn poses<'a>(array: &'a PyReadonlyArray3<'_, f64>) -> PyResult<&'a [Pose]> {
@@ -48,7 +48,7 @@ fn turn(begin: &Rotation, end: &Rotation) -> Three {
 }
 
 /// Return the rotation vector of a rotation [rad], of a length in [0, pi].
-fn rotation_vector(r: &Rotation) -> Three {
+pub fn rotation_vector(r: &Rotation) -> Three {
     let mut q = quaternion(r);
     if q[3] < 0.0 {
         q = q.map(|value| -value);

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from postproc.accuracy.batch import Batch
 from postproc.accuracy.effect import FAR, JointEffect, Parameter, fade_turns
+from postproc.kernels import native
 from postproc.robot.arm import Arm
 from postproc.robot.state import States
 
@@ -65,6 +66,14 @@ class BacklashProfile(JointEffect):
 
     def angles(self, batch: Batch, p: Array) -> Array:
         """Return the joint errors (n, 6) [rad], summed joint by joint."""
+        if native is not None:
+            sizes = p.reshape(len(self.joints), -1)
+            states = batch.states.q, batch.states.direction
+            found: Array = native.profile(
+                tuple(map(np.ascontiguousarray, states)), self._turned.tolist(),
+                self.orders, self.constant, sizes, (self.lower, self.upper),
+            )  # fmt: skip
+            return found
         waves = batch.once(self, self._waves)
         sizes = p.reshape(*waves.shape[:2], 1)
         profile = np.zeros((len(self.joints), len(batch)))

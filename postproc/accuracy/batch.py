@@ -111,21 +111,21 @@ class Batch:
         return found
 
     @property
-    def _angles(self) -> Array:
+    def angles(self) -> Array:
         """Joint angles that the kinematics are taken at, (n, 6) [rad]."""
         return self.states.q if self.shift is None else self.states.q + self.shift
 
     @cached_property
     def walk(self) -> Walk:
         """Axes, points and TCP along the (deviated) chain."""
-        return walk(self.arm.dh, self._angles, self.states.tool, self.deviation)
+        return walk(self.arm.dh, self.angles, self.states.tool, self.deviation)
 
     @cached_property
     def tcp(self) -> Array:
         """Tool centre point along the (deviated) chain, (n, 3) [m]."""
         if "walk" in vars(self):
             return self.walk.tcp
-        return tcp(self.arm.dh, self._angles, self.states.tool, self.deviation)
+        return tcp(self.arm.dh, self.angles, self.states.tool, self.deviation)
 
     def __getitem__(self, rows: NDArray[np.int64]) -> Batch:
         """Return some of the states, with the kinematics taken at the same arm."""

@@ -80,6 +80,20 @@ def _base(deviation: Deviation) -> tuple[Array, Array]:
     return axes, about
 
 
+def base_of(deviation: Deviation) -> Array:
+    """Give the base's axes, the axes of its three rotations and its point, (7, 3)."""
+    axes, about = _base(deviation)
+    return np.concatenate([axes.T, about, deviation.base[None, :3]])
+
+
+def deviated(dh: DH, deviation: Deviation) -> DH:
+    """Return the real parameters, but for base, tool and Hayati's rotations."""
+    da, dd, dalpha, dtheta, _ = deviation.link.T
+    return replace(
+        dh, a=dh.a + da, d=dh.d + dd, alpha=dh.alpha + dalpha, offset=dh.offset + dtheta
+    )
+
+
 def walk(dh: DH, q: Array, tool: Array, deviation: Deviation = NOMINAL) -> Walk:
     """Walk along the chain from the base to the tool centre point.
 
@@ -124,11 +138,8 @@ def tcp(dh: DH, q: Array, tool: Array, deviation: Deviation = NOMINAL) -> Array:
         tool: TCP in the flange frame, (n, 3) [m].
         deviation: Deviations of the placements.
     """
-    da, dd, dalpha, dtheta, beta = deviation.link.T
-    real = replace(
-        dh, a=dh.a + da, d=dh.d + dd, alpha=dh.alpha + dalpha, offset=dh.offset + dtheta
-    )
     axes, _ = _base(deviation)
+    real, beta = deviated(dh, deviation), deviation.link[:, 4]
     placed = real.placed(q, tool + deviation.tool, beta)
     moved: Array = placed @ axes.T + deviation.base[:3]
     return moved

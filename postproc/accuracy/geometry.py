@@ -48,7 +48,8 @@ class Geometry(Effect):
         parallel[5] = True
         return cls(beta=tuple(int(j) + 1 for j in np.flatnonzero(parallel)))
 
-    def _links(self) -> list[tuple[int, int]]:
+    @property
+    def links(self) -> list[tuple[int, int]]:
         """List (joint, kind) of the link parameters."""
         return [
             (j, k)
@@ -66,7 +67,7 @@ class Geometry(Effect):
             Parameter(f"{KINDS[k]}{j + 1}", "m", LENGTH, "length", j + 1)
             if k < 2
             else Parameter(f"{KINDS[k]}{j + 1}", "rad", ANGLE, "angle", j + 1)
-            for j, k in self._links()
+            for j, k in self.links
         ]
         tool = [Parameter(f"tool_{a}", "m", LENGTH, "tool") for a in AXES]
         return (*(base if self.base else []), *links, *tool)
@@ -77,7 +78,7 @@ class Geometry(Effect):
         base = p[:6] if self.base else np.zeros(6)
         rest = p[6:] if self.base else p
         link = np.zeros((6, 5))
-        for value, (j, k) in zip(rest, self._links(), strict=False):
+        for value, (j, k) in zip(rest, self.links, strict=False):
             link[j, k] = value
         return Deviation(np.array(base), link, np.array(rest[-3:]))
 
@@ -96,7 +97,7 @@ class Geometry(Effect):
             columns += [np.tile(np.eye(3)[k], (n, 1)) for k in range(3)]
             lever = w.tcp - w.base_point
             columns += [cross(w.base_axes[k], lever) for k in range(3)]
-        for j, k in self._links():
+        for j, k in self.links:
             axis, point = self._kind(batch, k, j)
             columns.append(axis if point is None else cross(axis, w.tcp - point))
         columns += [w.flange[:, :, k] for k in range(3)]
@@ -110,7 +111,7 @@ class Geometry(Effect):
         if self.base:
             columns += [still] * 3
             columns += [np.tile(w.base_axes[k], (n, 1)) for k in range(3)]
-        for j, k in self._links():
+        for j, k in self.links:
             axis, point = self._kind(batch, k, j)
             columns.append(still if point is None else axis)
         columns += [still] * 3

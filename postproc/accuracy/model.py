@@ -25,6 +25,7 @@ from postproc.accuracy.schema import (
     read_model_file,
     square_of,
 )
+from postproc.accuracy.variance import parameter_variance, side_variance
 from postproc.exceptions import ModelError
 from postproc.files import write_all
 from postproc.pieces import in_pieces, pieces
@@ -122,7 +123,11 @@ class Model:
         Where a direction is not known (0), the error is that of the middle of the gap,
         and half the gap enters both standard deviations.
         """
-        model, arrival = self._deviations(arm, states)
+        model, arrival = np.empty((len(states), 3)), np.empty((len(states), 3))
+        for rows in pieces(len(states), CHUNK):
+            model[rows], at = self._variance(arm, states[rows])
+            arrival[rows] = model[rows] + self.noise.arrival_variance(at.jacobian)
+        model, arrival = (np.sqrt(np.maximum(v, 0.0)) for v in (model, arrival))
         outside = self.ranges.outside(states, self.needs)
         unsure = _on_flanks(states) & (model > self._sure_up_to).any(axis=1)
         if unsure.any():
@@ -131,7 +136,11 @@ class Model:
 
     def std_error(self, arm: Arm, states: States) -> Array:
         """Standard error of the predicted error, (n, 3) [m], as `predict` gives it."""
-        return self._deviations(arm, states)[0]
+        parts = in_pieces(
+            lambda rows: self._variance(arm, states[rows])[0], len(states), CHUNK
+        )
+        variance = np.concatenate([np.zeros((0, 3)), *parts])
+        return np.asarray(np.sqrt(np.maximum(variance, 0.0)))
 
     def std_on_flanks(self, arm: Arm, states: States) -> Array:
         """Standard error where the directions of all joints are known, (n, 3) [m].
@@ -160,19 +169,14 @@ class Model:
         """Standard error per axis up to which the survey vouches for it [m]."""
         return 3 * (self.statistics.get("worst_std_mm", np.inf) * MM)
 
-    def _deviations(self, arm: Arm, states: States) -> tuple[Array, Array]:
-        """Standard deviations of the error and of one arrival, (n, 3) [m] each."""
+    def _variance(self, arm: Arm, states: States) -> tuple[Array, Batch]:
+        """Variance of the error, (n, 3) [m^2], and the kinematics that it is of."""
         effects, values, covariance = self.compensable()
-        model, arrival = np.empty((len(states), 3)), np.empty((len(states), 3))
-        for rows in pieces(len(states), CHUNK):
-            at = effects.at(Batch(arm, states[rows]), values)
-            variance = _side_variance(effects, at, values)
-            variance = variance + np.square(self.spread)
-            if len(covariance):
-                variance += _parameter_variance(effects.columns(at), covariance)
-            model[rows] = variance
-            arrival[rows] = variance + self.noise.arrival_variance(at.jacobian)
-        return np.sqrt(np.maximum(model, 0)), np.sqrt(np.maximum(arrival, 0))
+        at = effects.at(Batch(arm, states), values)
+        variance = side_variance(effects, at, values) + np.square(self.spread)
+        if len(covariance):
+            variance += parameter_variance(effects, at, covariance)
+        return variance, at
 
     def measured_std(self, arm: Arm, states: States) -> Array:
         """Standard deviation of one measured row, tracker included, (n, 3) [m]."""
@@ -286,21 +290,3 @@ def load_model(path: str | Path) -> Model:
 def _on_flanks(states: States) -> Bools:
     """Tell for which states the directions of all joints are known, (n,)."""
     return np.asarray((np.abs(states.direction) == 1).all(axis=1))
-
-
-def _parameter_variance(columns: Array, covariance: Array) -> Array:
-    """Variance that uncertain parameters give, (n, 3) [m^2]; columns (n, 3, p)."""
-    rows = columns.T.reshape(columns.shape[2], -1)  # one large product
-    summed = np.einsum("pr,pr->r", covariance @ rows, rows)
-    return np.asarray(summed.reshape(3, -1).T)
-
-
-def _side_variance(effects: Combination, at: Batch, values: Array) -> Array:
-    """Variance that unknown directions give, (n, 3) [m^2]."""
-    unknown = 1.0 - np.clip(at.states.direction, -1.0, 1.0) ** 2
-    out = np.zeros((len(at), 3))
-    rows = np.flatnonzero((unknown > 0.0).any(axis=1))
-    if len(rows):
-        slopes = effects.direction_slopes(at[rows], values)
-        out[rows] = np.einsum("nij,nj->ni", slopes**2, unknown[rows])
-    return out

@@ -9,7 +9,13 @@ from numpy.typing import NDArray
 
 from postproc.accuracy.model import Model
 from postproc.accuracy.orientation import turn
-from postproc.pose import inverse, lengths, rotation_from_vector, rotation_vector
+from postproc.pose import (
+    inverse,
+    lengths,
+    rotation_from_vector,
+    rotation_vector,
+    times,
+)
 from postproc.robot.arm import Arm
 from postproc.robot.state import States
 
@@ -82,7 +88,7 @@ def solve(
             command[far, :3, :3] = _turned(wanted[far, :3, :3], -turned[far])
             allowed[far] = turned[far]
         own = None if branch is None else branch[far]
-        q[far] = _nearest(arm, command[far] @ from_tcp[far], q[far], own)
+        q[far] = _nearest(arm, times(command[far], from_tcp[far]), q[far], own)
         moved = states[far].with_(q=np.array(q[far]))
         landing[far] = command[far, :3, 3] + model.error(arm, moved)
         if orientation:

@@ -12,6 +12,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from postproc.kernels import native
+
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
@@ -60,6 +62,12 @@ class Pull:
         n, c = len(wanted), len(self.visit)
         if c == 0:
             return np.array(wanted)
+        if native is not None:
+            corners, shares = (self.visit, self.before, self.behind), (self.v, self.w)
+            found: Array = native.to_move(
+                np.ascontiguousarray(wanted), corners, shares, ROUNDS
+            )
+            return found
         others = np.ones(n, dtype=bool)
         others[self.visit] = False
         order = np.concatenate([self.visit, np.flatnonzero(others)])

@@ -1,0 +1,106 @@
+//! Rigid transforms, pose by pose: `postproc.pose`.
+
+use numpy::ndarray::Array3;
+use numpy::PyUntypedArrayMethods;
+use numpy::{IntoPyArray, PyArray2, PyArray3, PyReadonlyArray2, PyReadonlyArray3};
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+
+use crate::lines::{self, poses, Pose, Rotation};
+use crate::rows::{array, rows, same_length, Six};
+use crate::trig::sin_cos;
+
+const MM: f64 = 1e-3;
+
+fn to_python(py: Python<'_>, poses: Vec<Pose>) -> Bound<'_, PyArray3<f64>> {
+    let shape = (poses.len(), 4, 4);
+    Array3::from_shape_vec(shape, poses.into_flattened())
+        .expect("16 values a pose")
+        .into_pyarray(py)
+}
+
+fn inverted(t: &Pose) -> Pose {
+    let mut out = [0.0; 16];
+    for i in 0..3 {
+        let (x, y, z) = (t[i], t[4 + i], t[8 + i]);
+        let shift = -(x * t[3] + y * t[7] + z * t[11]);
+        out[4 * i..4 * i + 4].copy_from_slice(&[x, y, z, shift]);
+    }
+    out[15] = 1.0;
+    out
+}
+
+fn from_record(record: &Six) -> Pose {
+    let [a, e, r] = [record[3], record[4], record[5]].map(f64::to_radians);
+    let ([sa, se, sr, ..], [ca, ce, cr, ..]) = sin_cos(&[a, e, r, 0.0, 0.0, 0.0]);
+    let [x, y, z] = [record[0], record[1], record[2]].map(|mm| mm * MM);
+    [
+        ca * ce * cr - sa * sr,
+        -ca * ce * sr - sa * cr,
+        ca * se,
+        x,
+        sa * ce * cr + ca * sr,
+        -sa * ce * sr + ca * cr,
+        sa * se,
+        y,
+        -se * cr,
+        se * sr,
+        ce,
+        z,
+        0.0,
+        0.0,
+        0.0,
+        1.0,
+    ]
+}
+
+fn product(a: &Pose, b: &Pose) -> Pose {
+    std::array::from_fn(|at| {
+        let (i, j) = (at / 4 * 4, at % 4);
+        a[i] * b[j] + a[i + 1] * b[4 + j] + a[i + 2] * b[8 + j] + a[i + 3] * b[12 + j]
+    })
+}
+
+/// Invert poses, (n, 4, 4).
+#[pyfunction]
+pub fn inverse<'py>(
+    py: Python<'py>,
+    given: PyReadonlyArray3<'py, f64>,
+) -> PyResult<Bound<'py, PyArray3<f64>>> {
+    Ok(to_python(py, poses(&given)?.iter().map(inverted).collect()))
+}
+
+/// Convert position records (n, 6) [mm, deg] to poses, (n, 4, 4) [m].
+#[pyfunction]
+pub fn pose_from_record<'py>(
+    py: Python<'py>,
+    record: PyReadonlyArray2<'py, f64>,
+) -> PyResult<Bound<'py, PyArray3<f64>>> {
+    Ok(to_python(py, rows::<6>(&record)?.iter().map(from_record).collect()))
+}
+
+/// Multiply poses with others, (n, 4, 4).
+#[pyfunction]
+pub fn times<'py>(
+    py: Python<'py>,
+    left: PyReadonlyArray3<'py, f64>,
+    right: PyReadonlyArray3<'py, f64>,
+) -> PyResult<Bound<'py, PyArray3<f64>>> {
+    let (left, right) = (poses(&left)?, poses(&right)?);
+    same_length(&[left.len(), right.len()])?;
+    let pairs = left.iter().zip(right);
+    Ok(to_python(py, pairs.map(|(a, b)| product(a, b)).collect()))
+}
+
+/// Return the rotation vectors of rotations (n, 3, 3), (n, 3) [rad].
+#[pyfunction]
+pub fn rotation_vector<'py>(
+    py: Python<'py>,
+    given: PyReadonlyArray3<'py, f64>,
+) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    if given.shape()[1..] != [3, 3] {
+        return Err(PyValueError::new_err("rotations are (n, 3, 3)"));
+    }
+    let rotations: &[Rotation] = given.as_slice()?.as_chunks().0.as_chunks().0;
+    Ok(array(py, rotations.iter().map(lines::rotation_vector).collect()))
+}

@@ -1,0 +1,48 @@
+//! How corners pull at each other: `postproc.motion.pull`.
+
+use numpy::{PyArray2, PyReadonlyArray1, PyReadonlyArray2};
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+
+use crate::rows::{array, rows, same_length, Three};
+
+type Column<'py, T> = PyReadonlyArray1<'py, T>;
+
+/// Move targets so that the path moves as wanted where it passes, (n, 3), by rounds of
+/// Jacobi's method. Corners: the points, the targets before and behind
+/// them, and the shares of those two, (c,) each.
+#[pyfunction]
+pub fn to_move<'py>(
+    py: Python<'py>,
+    wanted: PyReadonlyArray2<'py, f64>,
+    corners: (Column<'py, i64>, Column<'py, i64>, Column<'py, i64>),
+    shares: (Column<'py, f64>, Column<'py, f64>),
+    rounds: usize,
+) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    let wanted = rows::<3>(&wanted)?;
+    let (visit, before, behind) =
+        (corners.0.as_slice()?, corners.1.as_slice()?, corners.2.as_slice()?);
+    let (v, w) = (shares.0.as_slice()?, shares.1.as_slice()?);
+    let count = [visit.len(), before.len(), behind.len(), v.len(), w.len()];
+    let count = same_length(&count)?;
+    let places = 0..wanted.len() as i64;
+    if [visit, before, behind].iter().any(|c| c.iter().any(|at| !places.contains(at))) {
+        return Err(PyValueError::new_err("a corner at a target that is none"));
+    }
+    let mut moved = wanted.to_vec();
+    let mut next: Vec<Three> = vec![[0.0; 3]; count];
+    for _ in 0..rounds {
+        for (c, next) in next.iter_mut().enumerate() {
+            let at = visit[c] as usize;
+            let (aim, here) = (&wanted[at], &moved[at]);
+            let (first, last) = (&moved[before[c] as usize], &moved[behind[c] as usize]);
+            for k in 0..3 {
+                next[k] = aim[k] - (v[c] * (first[k] - here[k]) + w[c] * (last[k] - here[k]));
+            }
+        }
+        for (c, next) in next.iter().enumerate() {
+            moved[visit[c] as usize] = *next;
+        }
+    }
+    Ok(array(py, moved))
+}

@@ -1,0 +1,214 @@
+//! What uncertain parameters of geometry and joints give: `postproc.accuracy.variance`.
+//!
+//! The columns of all parameters that turn one joint are its column of the Jacobian, by
+//! a number each: their part of the covariance shrinks to one row per joint.
+
+use std::ops::Range;
+
+use numpy::{PyArray2, PyReadonlyArray2, PyUntypedArrayMethods};
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+
+use crate::chain::{Chain, Parameters};
+use crate::rows::{array, rows, same_length, Three};
+use crate::walk::{Base, Walk};
+
+/// Poses that are worked on side by side.
+const SIDE: usize = 8;
+/// A number for each of them.
+type Lanes = [f64; SIDE];
+/// Three components of each.
+type Column = [Lanes; 3];
+
+const NOTHING: Column = [[0.0; SIDE]; 3];
+
+fn add(sum: &mut Lanes, factor: f64, of: &Lanes) {
+    for k in 0..SIDE {
+        sum[k] += factor * of[k];
+    }
+}
+
+fn add_product(sum: &mut Lanes, a: &Lanes, b: &Lanes) {
+    for k in 0..SIDE {
+        sum[k] += a[k] * b[k];
+    }
+}
+
+fn put(columns: &mut [Column], lane: usize, values: impl Iterator<Item = Three>) {
+    for (column, value) in columns.iter_mut().zip(values) {
+        for k in 0..3 {
+            column[k][lane] = value[k];
+        }
+    }
+}
+
+/// Parameters of the geometry, in the order of their columns.
+struct Geometry {
+    base: bool,
+    /// Joint, and which of a, d, alpha, theta, beta.
+    links: Vec<(usize, usize)>,
+    tool: bool,
+}
+
+impl Geometry {
+    fn len(&self) -> usize {
+        6 * usize::from(self.base) + self.links.len() + 3 * usize::from(self.tool)
+    }
+
+    /// Derivatives of the TCP, as in `geometry.Geometry.columns`.
+    fn columns(&self, w: &Walk, base: &Base) -> impl Iterator<Item = Three> {
+        let mut out = Vec::with_capacity(self.len());
+        if self.base {
+            out.extend([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]);
+            out.extend(base.about.iter().map(|axis| w.swept(axis, &base.point)));
+        }
+        out.extend(self.links.iter().map(|&(j, kind)| match kind {
+            0 => w.link[j],
+            1 => w.turn[j],
+            2 => w.swept(&w.link[j], &w.corner[j]),
+            3 => w.swept(&w.turn[j], &w.pivot[j]),
+            _ => w.swept(&w.bend[j], &w.corner[j]),
+        }));
+        if self.tool {
+            out.extend(w.flange);
+        }
+        out.into_iter()
+    }
+}
+
+/// What the form is taken of.
+struct Block {
+    fixed: Vec<Column>,
+    jacobian: [Column; 6],
+    basis: Vec<Lanes>,
+}
+
+/// A quadratic form of columns of the geometry, then of joints.
+struct Form {
+    /// Lower half of the covariance, with what is off the diagonal twice.
+    lower: Vec<f64>,
+    size: usize,
+    /// How many columns are the geometry's.
+    fixed: usize,
+    /// Those of each joint, counted from there.
+    joints: [Range<usize>; 6],
+}
+
+impl Form {
+    fn row(&self, k: usize) -> &[f64] {
+        &self.lower[k * self.size..(k + 1) * self.size]
+    }
+
+    fn value(&self, block: &Block) -> Column {
+        let mut total = NOTHING;
+        for (u, column) in block.fixed.iter().enumerate() {
+            for k in 0..3 {
+                let mut sum = [0.0; SIDE];
+                for (c, before) in self.row(u).iter().zip(&block.fixed[..=u]) {
+                    add(&mut sum, *c, &before[k]);
+                }
+                add_product(&mut total[k], &sum, &column[k]);
+            }
+        }
+        let mut with = vec![[0.0; SIDE]; self.fixed];
+        for (a, own) in self.joints.iter().enumerate() {
+            let mut among = [[0.0; SIDE]; 6];
+            with.fill([0.0; SIDE]);
+            for k in own.clone() {
+                let (of_fixed, of_joints) = self.row(self.fixed + k).split_at(self.fixed);
+                let phi = &block.basis[k];
+                for (with, c) in with.iter_mut().zip(of_fixed) {
+                    add(with, *c, phi);
+                }
+                for (b, others) in self.joints[..=a].iter().enumerate() {
+                    let mut inner = [0.0; SIDE];
+                    let lower = others.start..others.end.min(k + 1);
+                    for (c, phi) in of_joints[lower.clone()].iter().zip(&block.basis[lower]) {
+                        add(&mut inner, *c, phi);
+                    }
+                    add_product(&mut among[b], &inner, phi);
+                }
+            }
+            for k in 0..3 {
+                let (mut sum, own) = ([0.0; SIDE], &block.jacobian[a][k]);
+                for (with, column) in with.iter().zip(&block.fixed) {
+                    add_product(&mut sum, with, &column[k]);
+                }
+                for (with, column) in among[..=a].iter().zip(&block.jacobian) {
+                    add_product(&mut sum, with, &column[k]);
+                }
+                add_product(&mut total[k], &sum, own);
+            }
+        }
+        total
+    }
+}
+
+/// Variance of the TCP per axis, (n, 3) [m^2].
+///
+/// Base: its axes, those of its rotations, its point, (7, 3). States: joint angles [rad]
+/// and tools [m], both with the deviations. Geometry: whether it has the base, its links
+/// and whether it has the tool. Basis: of the joints' parameters, (n, k), joint by joint,
+/// with the number of each. Covariance: (p, p), the geometry's parameters first.
+#[pyfunction]
+pub fn variance<'py>(
+    py: Python<'py>,
+    parameters: Parameters<'py>,
+    base: PyReadonlyArray2<'py, f64>,
+    states: (PyReadonlyArray2<'py, f64>, PyReadonlyArray2<'py, f64>),
+    geometry: (bool, Vec<(usize, usize)>, bool),
+    basis: (PyReadonlyArray2<'py, f64>, [usize; 6]),
+    covariance: PyReadonlyArray2<'py, f64>,
+) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    let (chain, base) = (Chain::new(&parameters)?, base_of(rows::<3>(&base)?)?);
+    let (q, tool) = (rows::<6>(&states.0)?, rows::<3>(&states.1)?);
+    let geometry = Geometry { base: geometry.0, links: geometry.1, tool: geometry.2 };
+    let ((basis, count), fixed) = (basis, geometry.len());
+    let (own, shape) = (count.iter().sum::<usize>(), basis.shape().to_vec());
+    same_length(&[q.len(), tool.len(), shape[0]])?;
+    let size = fixed + own;
+    let odd = geometry.links.iter().any(|(j, kind)| *j >= 6 || *kind >= 5);
+    if odd || shape[1] != own || covariance.shape() != [size, size] {
+        return Err(PyValueError::new_err("a covariance of other parameters"));
+    }
+    let (basis, covariance) = (basis.as_slice()?, covariance.as_slice()?);
+    let mut end = 0;
+    let joints = count.map(|n| {
+        end += n;
+        end - n..end
+    });
+    let lower = (covariance.iter().enumerate())
+        .map(|(at, c)| if at / size == at % size { *c } else { 2.0 * c })
+        .collect();
+    let form = Form { lower, size, fixed, joints };
+    let mut block = Block {
+        fixed: vec![NOTHING; fixed],
+        jacobian: [NOTHING; 6],
+        basis: vec![[0.0; SIDE]; own],
+    };
+    let mut out = Vec::with_capacity(q.len());
+    for first in (0..q.len()).step_by(SIDE) {
+        let count = SIDE.min(q.len() - first);
+        for lane in 0..count {
+            let row = first + lane;
+            let walk = Walk::new(&chain, &base, &q[row], &tool[row]);
+            put(&mut block.fixed, lane, geometry.columns(&walk, &base));
+            put(&mut block.jacobian, lane, walk.jacobian(&chain).into_iter());
+            for (phi, value) in block.basis.iter_mut().zip(&basis[row * own..]) {
+                phi[lane] = *value;
+            }
+        }
+        let value = form.value(&block);
+        out.extend((0..count).map(|lane| value.map(|component| component[lane])));
+    }
+    Ok(array(py, out))
+}
+
+fn base_of(rows: &[Three]) -> PyResult<Base> {
+    match rows {
+        [x, y, z, a, b, c, point] => {
+            Ok(Base { axes: [*x, *y, *z], about: [*a, *b, *c], point: *point })
+        }
+        _ => Err(PyValueError::new_err("a base has 7 rows")),
+    }
+}
