@@ -72,7 +72,7 @@ def targets_from_visits(visits: Visits, cell: Cell) -> tuple[Targets, Reasons]:
     """
     frames, reasons = _frames(visits), Reasons(len(visits))
     values = _values(visits, cell)
-    kind, tcp, joints = _places(visits, frames, values)
+    kind, tcp, joints = _places(visits, frames.user, values)
     poses = np.isin(visits.target, (Target.POSE, Target.NEAR))
     outside = _auxiliary(visits, cell, reasons)
     _explain(visits, values, poses, reasons)
@@ -119,8 +119,8 @@ def moved_targets(targets: Targets, visits: Visits, cell: Cell, rows: Ints) -> T
         cell: As in `targets_from_visits`.
         rows: Visits with other numbers, (m,).
     """
-    frames, values = _frames(visits, rows), _values(visits, cell, rows)
-    _, tcp, joints = _places(visits, frames, values, rows)
+    user, values = _user_frames(visits, rows), _values(visits, cell, rows)
+    _, tcp, joints = _places(visits, user, values, rows)
     return targets.moved_to(rows, tcp, joints)
 
 
@@ -145,12 +145,15 @@ def configurations(configs: tuple[str, ...]) -> tuple[Ints, Array]:
     return slots, turns
 
 
-def _frames(visits: Visits, rows: Rows = ALL) -> Frames:
+def _frames(visits: Visits) -> Frames:
     """Look up the frames of visits."""
+    return Frames(few_frames(visits)[visits.tool], _user_frames(visits, ALL))
+
+
+def _user_frames(visits: Visits, rows: Rows) -> Array:
+    """Place the user frames of visits in the arm's base frame, (m, 4, 4) [m]."""
     poses = few_frames(visits)
-    base, uframe = visits.base[rows], visits.uframe[rows]
-    user = products(inverse(poses), poses, base, uframe)
-    return Frames(poses[visits.tool[rows]], user)
+    return products(inverse(poses), poses, visits.base[rows], visits.uframe[rows])
 
 
 def few_frames(visits: Visits) -> Array:
@@ -173,11 +176,14 @@ def _values(visits: Visits, cell: Cell, rows: Rows = ALL) -> Array:
 
 
 def _places(
-    visits: Visits, frames: Frames, values: Array, rows: Rows = ALL
+    visits: Visits, user: Array, values: Array, rows: Rows = ALL
 ) -> tuple[Ints, Array, Array]:
     """Turn numbers into kinds, TCP poses (m, 4, 4) [m] and joints (m, 6) [rad]."""
     target = visits.target[rows]
     n = len(target)
+    if (target == Target.POSE).all():  # most programs are nothing else
+        tcp = times(user, pose_from_record(values))
+        return np.full(n, int(Kind.POSE)), tcp, np.full((n, 6), np.nan)
     kind = np.full(n, int(Kind.UNKNOWN))
     tcp, joints = np.full((n, 4, 4), np.nan), np.full((n, 6), np.nan)
     in_joints = np.isin(target, JOINTS)
@@ -186,14 +192,14 @@ def _places(
     joints[in_joints] = np.deg2rad(values[in_joints])
     poses = np.isin(target, (Target.POSE, Target.NEAR, Target.FOR))
     kind[poses] = np.where(target[poses] == Target.FOR, Kind.TOWARDS, Kind.POSE)
-    tcp[poses] = times(frames.user[poses], pose_from_record(values[poses]))
+    tcp[poses] = times(user[poses], pose_from_record(values[poses]))
     near = target == Target.NEAR
     tcp[near] = tcp[near] @ _along_approach(-visits.distance_mm[rows][near])
     away = target == Target.AWAY
     kind[away], tcp[away] = Kind.TOOL_STEP, _along_approach(-values[away, 0])
     steps = np.isin(target, (*STEPS_IN, Target.ABOUT))
     for v in np.flatnonzero(steps).tolist():
-        kind[v], tcp[v] = _step(target[v], values[v], frames, v)
+        kind[v], tcp[v] = _step(target[v], values[v], user[v])
     return kind, tcp, joints
 
 
@@ -204,13 +210,13 @@ def _along_approach(distance_mm: Array) -> Array:
     return T
 
 
-def _step(target: int, value: Array, frames: Frames, v: int) -> tuple[Kind, Array]:
+def _step(target: int, value: Array, user: Array) -> tuple[Kind, Array]:
     """Turn one RELATIVE or ABOUT into a step of the tool or along the base axes."""
     about = target == Target.ABOUT
     frame = STEPS_IN.get(Target(int(value[4])) if about else Target(int(target)), "")
     axes = np.eye(3)
     if frame == "uframe":
-        axes = frames.user[v, :3, :3]
+        axes = user[:3, :3]
     step = np.eye(4)
     vector = axes @ value[:3]
     if np.isnan(vector).any() or (about and not np.linalg.norm(vector) > 0):
