@@ -49,8 +49,11 @@ class Aim:
             side: From where they are reached, (n, 6).
             most: How far that may be off.
         """
-        off = np.abs(side - self.solved.direction).max(axis=1, initial=0.0)
-        return np.asarray(proposal.corrected & ~self.settled & (off > most))
+        off = np.abs(side - self.solved.direction)
+        far = np.zeros(len(off), dtype=bool)
+        rows = np.unique(np.flatnonzero(off > most) // off.shape[1])  # few
+        far[rows] = off[rows].max(axis=1) > most  # NaN is not far
+        return np.asarray(proposal.corrected & ~self.settled & far)
 
 
 @dataclass(frozen=True)

@@ -151,7 +151,7 @@ def decide(
         why=reasons.index,
         reasons=reasons.texts,
         q=plan.q,
-        direction=np.where(np.abs(side) < KNOWN, 0.0, np.sign(side)).astype(np.int8),
+        direction=(side >= KNOWN).astype(np.int8) - (side <= -KNOWN),
         side=side,
         corrected=values,
         correction=np.where(corrected[:, None], correction, 0.0),

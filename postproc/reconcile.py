@@ -56,8 +56,10 @@ def agree(
     if m == len(rows):  # every literal has one arrival: nothing to compare
         order = np.empty(m, dtype=np.int64)
         order[inverse] = rows
-        mean, change = corrected[order] + 0.0, correction_mm[order, :3] + 0.0
-        spread = 0.0 * np.abs(correction_mm[order]).sum(axis=1)
+        mean, change = corrected.take(order, axis=0), correction_mm.take(order, axis=0)
+        spread = 0.0 * np.einsum("nk->n", np.abs(change))  # NaN where one is not known
+        mean += 0.0  # no -0.0, as in a mean
+        change = change[:, :3] + 0.0
         return Agreement(names, group, usable[order], spread, mean, change, count)
     all_usable = np.ones(m, dtype=bool)
     np.logical_and.at(all_usable, inverse, usable[rows])
