@@ -12,6 +12,7 @@ from postproc.language import pdl2 as ast
 from postproc.language.arrivals import Arrival, Run
 from postproc.language.machine import Machine
 from postproc.language.program import Program
+from postproc.language.sequences import Numbers
 from postproc.language.setting_columns import SettingColumns
 from postproc.language.values import Position
 from postproc.language.visits import Target
@@ -22,25 +23,25 @@ Ints = NDArray[np.int64]
 _COMPUTED = (Target.POSE, Target.NEAR, Target.FOR)  # may move along with a literal
 
 
-@dataclass
 class Table:
     """Distinct texts in order of appearance; index 0 is ""."""
 
-    index: dict[str, int] = field(default_factory=lambda: {"": 0})
+    def __init__(self) -> None:
+        """Begin with ""."""
+        self._index = Numbers[str]()
+        self("")
 
     def __call__(self, text: str) -> int:
         """Return the index of a text."""
-        return self.index.setdefault(text, len(self.index))
+        return self._index[text]
 
     def many(self, texts: Sequence[str]) -> Ints:
         """Return the indices of texts, (m,)."""
-        index = self.index
-        found = (index.setdefault(text, len(index)) for text in texts)
-        return np.fromiter(found, np.int64, len(texts))
+        return self._index.of(texts)
 
     def texts(self) -> tuple[str, ...]:
         """Return the texts by index."""
-        return tuple(self.index)
+        return tuple(self._index)
 
 
 class Columns:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from itertools import chain
+from itertools import chain, repeat
 
 import numpy as np
 from numpy.typing import NDArray
@@ -52,8 +52,8 @@ class Points:
         Args:
             names: Their names, in lower case.
         """
-        at = self.entries.row.get
-        rows = np.fromiter((at(name, -1) for name in names), np.int64, len(names))
+        found = map(self.entries.row.get, names, repeat(-1))
+        rows = np.fromiter(found, np.int64, len(names))
         rows[rows >= 0] = np.where(self.own[rows[rows >= 0]], rows[rows >= 0], -1)
         return rows
 

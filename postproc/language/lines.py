@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +14,7 @@ from postproc.exceptions import ProgramError
 from postproc.language.continued import Names, join, stripped
 from postproc.language.divided import Rows, divided
 from postproc.language.masking import mark_lines
+from postproc.language.sequences import Numbers
 from postproc.language.shapes import Shapes, find_shapes
 from postproc.language.source import Source
 from postproc.pieces import Each
@@ -21,7 +22,6 @@ from postproc.pieces import Each
 Ints = NDArray[np.signedinteger[Any]]
 """Whole numbers, as short as the length of the file allows: there are millions."""
 Floats = NDArray[np.float64]
-T = TypeVar("T", bytes, str)
 
 _PIECE = 1 << 18  # bytes masked at once: array passes that fit the cache
 
@@ -82,20 +82,18 @@ def read_lines(source: Source, each: Each = map) -> Lines:
     data = source.data
     if data.startswith(b"\xef\xbb\xbf"):
         data = b"   " + data[3:]  # a byte order mark is no code
-    ids: dict[bytes, int] = {}
-    names: dict[str, int] = {}
+    ids, names = Numbers[bytes](), Numbers[str]()
     pieces: list[_Piece] = []
     tasks = list(_tasks(source))
     read = each(lambda task: _read(data, source.line_starts, *task), tasks)
     for (rows, _), piece in zip(tasks, read, strict=True):
         if piece.unterminated:
             _refuse(source, rows.start + 1 + piece.unterminated[0])
-        shape = [ids.setdefault(mask, len(ids)) for mask in piece.masks]
         pieces.append(
             replace(
                 piece,
-                shape=np.array(shape, dtype=np.int32)[piece.shape],
-                name=_numbers(piece.names, names),
+                shape=ids.of(piece.masks)[piece.shape],
+                name=names.of(piece.names),
                 names=(),
             )
         )
@@ -159,8 +157,8 @@ def _read(data: bytes, starts: Ints, lines: slice, place: slice) -> _Piece:
     marked = mark_lines(data[place], starts[lines] - place.start)
     piece, at = marked.masked, place.start
     short = np.int32 if len(data) < 2**31 else np.int64
-    ids: dict[bytes, int] = {}
-    shape = _numbers(piece.masks, ids)
+    ids = Numbers[bytes]()
+    shape = ids.of(piece.masks)
     return _Piece(
         tuple(ids),
         shape,
@@ -174,12 +172,6 @@ def _read(data: bytes, starts: Ints, lines: slice, place: slice) -> _Piece:
         marked.name_first,
         piece.unterminated,
     )
-
-
-def _numbers(texts: Sequence[T], numbers: dict[T, int]) -> Ints:
-    """Return the numbers of texts, new ones in the order in which they come, (n,)."""
-    found = [numbers.setdefault(text, len(numbers)) for text in texts]
-    return np.array(found, dtype=np.int32)
 
 
 def _merged(pieces: list[_Piece]) -> _Piece:
@@ -209,7 +201,7 @@ def _offsets(parts: list[Ints]) -> Ints:
 
 
 def _logical(
-    source: Source, masks: tuple[bytes, ...], names: dict[str, int], found: _Piece
+    source: Source, masks: tuple[bytes, ...], names: Numbers[str], found: _Piece
 ) -> Lines:
     """Join the continued lines and drop the empty ones."""
     code = np.array([*map(bool, map(stripped, masks))], dtype=bool)

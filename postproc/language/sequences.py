@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections import defaultdict
+from collections.abc import Sequence
+from itertools import count
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,7 +13,21 @@ from numpy.typing import NDArray
 Ints = NDArray[np.int64]
 AnyInts = NDArray[np.signedinteger[Any]]
 
+T = TypeVar("T", bytes, str)
+
 _SHORT = 12  # longer sequences are told apart in Python
+
+
+class Numbers(defaultdict[T, int]):
+    """Numbers of texts, in the order in which they are asked for first."""
+
+    def __init__(self) -> None:
+        """Begin at 0."""
+        super().__init__(count().__next__)
+
+    def of(self, texts: Sequence[T]) -> Ints:
+        """Return the numbers of texts, (n,)."""
+        return np.fromiter(map(self.__getitem__, texts), np.int64, len(texts))
 
 
 def alike(values: AnyInts, first: AnyInts, last: AnyInts) -> Ints:
@@ -28,13 +45,8 @@ def alike(values: AnyInts, first: AnyInts, last: AnyInts) -> Ints:
     if int(length.max(initial=0)) <= _SHORT:
         return _by_columns(values, first, length)
     data = np.ascontiguousarray(values, dtype=np.int32).tobytes()
-    number: dict[bytes, int] = {}
     ends = zip((4 * first).tolist(), (4 * last).tolist(), strict=True)
-    return np.fromiter(
-        (number.setdefault(data[a:b], len(number)) for a, b in ends),
-        np.int64,
-        len(first),
-    )
+    return Numbers[bytes]().of([data[a:b] for a, b in ends])
 
 
 def _by_columns(values: AnyInts, first: AnyInts, length: AnyInts) -> Ints:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from postproc.language.numbered import NAME_MARK, WHOLE, form_of, mask_of
-from postproc.language.sequences import alike, in_order
+from postproc.language.sequences import Numbers, alike, in_order
 
 Ints = NDArray[np.int64]
 AnyInts = NDArray[np.signedinteger[Any]]
@@ -91,7 +91,7 @@ def find_shapes(
     text: AnyInts,
     at: AnyInts,
     name: Ints,
-    names: dict[str, int],
+    names: Numbers[str],
 ) -> tuple[Shapes, Ints]:
     """Find the distinct shapes of lines, in the order of appearance.
 
@@ -116,7 +116,7 @@ def find_shapes(
         if texts[k][:1] == WHOLE:
             one, found = form_of(one[1:])
             own[k], count[k] = len(name) + len(more), len(found)
-            more += [names.setdefault(word, len(names)) for word in found]
+            more += names.of(found).tolist()
         else:
             count[k] = one.count(NAME_MARK)
         form[k] = forms.setdefault(one, len(forms))

@@ -5,6 +5,7 @@ from __future__ import annotations
 from bisect import bisect_right
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass, replace
+from itertools import repeat
 
 import numpy as np
 from numpy.typing import NDArray
@@ -132,8 +133,8 @@ class Variables(Mapping[str, Variable]):
 
     def passing(self, names: Sequence[str], test: Callable[[Variable], bool]) -> Bools:
         """Tell which lower-case names are declared, and so that it passes a test."""
-        at = self._at.get
-        index = np.fromiter((at(name, -1) for name in names), np.int64, len(names))
+        found_at = map(self._at.get, names, repeat(-1))
+        index = np.fromiter(found_at, np.int64, len(names))
         found = index >= 0
         found[found] = self._passed(test)[self._declaration(index[found])]
         return found
