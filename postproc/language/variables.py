@@ -133,10 +133,11 @@ class Variables(Mapping[str, Variable]):
 
     def passing(self, names: Sequence[str], test: Callable[[Variable], bool]) -> Bools:
         """Tell which lower-case names are declared, and so that it passes a test."""
-        found_at = map(self._at.get, names, repeat(-1))
-        index = np.fromiter(found_at, np.int64, len(names))
+        index = np.fromiter(map(self._at.get, names, repeat(-1)), np.int64, len(names))
         found = index >= 0
-        found[found] = self._passed(test)[self._declaration(index[found])]
+        own = [bisect_right(self._begins, at) - 1 for at in index[found].tolist()]
+        passed = {k: test(self._said[k]) for k in set(own)}
+        found[found] = [passed[k] for k in own]
         return found
 
     def _passed(self, test: Callable[[Variable], bool]) -> Bools:
