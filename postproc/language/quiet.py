@@ -174,6 +174,8 @@ class _Variants:
         said = self.place.program.statements
         one = said.said[form]
         where = one.where[0] if isinstance(one, ast.Move) else None
+        if len(shapes) == 1:
+            return np.array([self._add_one(int(shapes[0]), where)])
         names = said.shapes.names_at(shapes)
         if not isinstance(where, ast.Reference):
             return self._variants(shapes, names)
@@ -189,6 +191,18 @@ class _Variants:
         quiet = self._points(shapes, goal, which, index, array=bool(where.steps))
         variants[quiet] = self._variants(shapes[quiet], names[quiet])
         return variants
+
+    def _add_one(self, shape: int, where: ast.Expression | None) -> int:
+        """Return the variant of the one shape of a form: not worth an array pass."""
+        names = self.place.program.lines.shapes.names_of(shape)
+        if isinstance(where, ast.Reference):
+            index, at = _number_slots(where.steps), name_index(where.name)
+            name = names[at].lower() if at >= 0 else where.name
+            if index is None or not self._is_point(name, array=bool(where.steps)):
+                return -1
+            self.points[shape] = Point(self.world.root(self.place, name), index)
+            names = names[:at] + names[at + 1 :] if at >= 0 else names
+        return self._variant(shape, names)
 
     def _points(
         self,

@@ -117,7 +117,8 @@ def _points(
     named = np.flatnonzero(np.array(quiet.named, dtype=bool)[variant])
     shapes = program.lines.shape[rows[named]]
     own = quiet.name[shapes]
-    point[named] = np.where(own >= 0, quiet.rows[own], HELD)
+    point[named] = HELD
+    point[named[own >= 0]] = quiet.rows[own[own >= 0]]
     asked = (point[named] < 0) | _assigned(here, quiet, own)
     some = (named[asked], shapes[asked], own[asked])
     for at, shape, name in zip(*(column.tolist() for column in some), strict=True):
