@@ -22,7 +22,7 @@ Words = NDArray[np.uint64]
 EXACT = 15  # digits of a number that is read here: exact as a float
 _TENS = 10 ** np.arange(EXACT + 1, dtype=np.int64)
 _SCALES = _TENS.astype(float)
-_MAX_BLANKS = 6  # blanks between a sign and what is before it; more: line by line
+_MAX_BLANKS = 60  # blanks between a sign and what is before it; more: line by line
 DOT, _MINUS, _PLUS = 46, 45, 43
 _PAIRED = tuple(
     (np.uint64(ten), np.uint64(shift), np.uint64(mask))
@@ -122,7 +122,7 @@ def with_signs(a: Bytes, first: Ints) -> tuple[Ints, Ints]:
     start, tied = first.copy(), np.flatnonzero(signed)
     context, far = _previous(a, sign[tied])
     unary = (context < 0) | _IS_UNARY[a[context]]
-    lost[tied] |= far & unary
+    lost[tied] |= far
     start[tied[unary]] = sign[tied[unary]]
     return start, first[lost]
 

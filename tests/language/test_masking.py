@@ -18,7 +18,9 @@ PIECES = (
     "1234567890.123456789"
 ).split()
 TEXT = st.lists(
-    st.sampled_from([*PIECES, " ", "\t", "\n", "\r\n", "\r", "\x1a", "\xe9"]),
+    st.sampled_from(
+        [*PIECES, " ", " " * 7, " " * 70, "\t", "\n", "\r\n", "\r", "\x1a", "\xe9"]
+    ),
     min_size=1,
     max_size=40,
 )
@@ -27,6 +29,8 @@ TEXT = st.lists(
 @settings(max_examples=400, deadline=None)
 @given(TEXT)
 @example(["'", "\\", "'"])
+@example(["{", " " * 7, "-", "1"])
+@example(["{", " " * 70, "-", " " * 70, "1"])
 def test_arrays_agree_with_lines(parts: list[str]) -> None:
     data = "".join(parts).encode("latin-1")
     starts = Source("x", data).line_starts
