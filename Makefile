@@ -31,7 +31,7 @@ export OPENBLAS_NUM_THREADS ?= 1
 help:
 	@sed -n 's/^# //p' Makefile
 
-$(STAMP): pyproject.toml .ci/venv $(wildcard native/Cargo.* native/src/*.rs)
+$(STAMP): pyproject.toml .ci/venv $(wildcard native/*.toml native/*.rs native/src/*.rs)
 	@bash .ci/venv $(VENV)
 	@touch $@
 
@@ -80,8 +80,9 @@ fuzz: $(STAMP)
 	@$(PYTHON_BIN) -m tests.fuzz.guided --runs $(or $(RUNS),20000)
 
 native: $(STAMP)
-	@cd native && cargo fmt --check && cargo clippy --release -- -D warnings
-	@cd native && PYO3_PYTHON=$(abspath $(PYTHON_BIN)) cargo test --release --no-default-features
+	@cd native && PATH="$$PATH:$$HOME/.cargo/bin" && cargo fmt --check && \
+		cargo clippy --release -- -D warnings && \
+		PYO3_PYTHON=$(abspath $(PYTHON_BIN)) cargo test --release --no-default-features
 	@$(PYTHON_BIN) -m pytest tests/test_kernels.py
 
 docs: $(STAMP)
@@ -94,4 +95,4 @@ generated: $(STAMP)
 	@$(PYTHON_BIN) -m tests.generated --count $(or $(COUNT),1000)
 
 clean:
-	rm -rf $(VENV) demo build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	rm -rf $(VENV) demo build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis native/target

@@ -135,6 +135,8 @@ def _told(exc: BaseException) -> bytes:
     """Pickle an exception; one that cannot be is told in words."""
     exc.add_note(f"in a child process:\n{format_exc()}")
     try:
+        if not isinstance(exc, Exception):
+            raise TypeError("ends a process, but not the one that is told")
         told = pickle.dumps((_RAISED, exc))
         pickle.loads(told)
     except Exception:

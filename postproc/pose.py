@@ -77,7 +77,9 @@ def pose_from_record(record: Array) -> Array:
     """Convert position records (..., 6) [mm, deg] to poses (..., 4, 4) [m]."""
     record = np.asarray(record, dtype=float)
     if native is not None and record.ndim == 2:
-        poses: Array = native.pose_from_record(np.ascontiguousarray(record))
+        poses: Array = native.pose_from_record(
+            np.ascontiguousarray(record, dtype=float)
+        )
         return poses
     T = np.zeros((*record.shape[:-1], 4, 4))
     T[..., :3, :3] = rotation_from_zyz(record[..., 3:])
@@ -96,7 +98,7 @@ def record_from_pose(T: Array) -> Array:
 def inverse(T: Array) -> Array:
     """Invert poses (..., 4, 4)."""
     if native is not None and T.ndim == 3:
-        inverted: Array = native.inverse(np.ascontiguousarray(T))
+        inverted: Array = native.inverse(np.ascontiguousarray(T, dtype=float))
         return inverted
     out = np.zeros_like(T)
     Rt = np.swapaxes(T[..., :3, :3], -1, -2)
@@ -197,7 +199,7 @@ def rotation_vector(R: Array) -> Array:
     Lengths are in [0, pi].
     """
     if native is not None and R.ndim == 3:
-        vectors: Array = native.rotation_vector(np.ascontiguousarray(R))
+        vectors: Array = native.rotation_vector(np.ascontiguousarray(R, dtype=float))
         return vectors
     q = _quaternion(R.reshape(-1, 3, 3))
     x, y, z, w = np.where(q[3] < 0, -q, q)

@@ -30,11 +30,13 @@ from postproc.robot.past import NOTHING
 from postproc.robot.play import Clamps, passing, prefix
 from postproc.robot.state import make_states
 
-PROGRAMS = Path(__file__).parent.parent / "programs"
+ROOT = Path(__file__).parent.parent
+PROGRAMS = ROOT / "programs"
 CLOSE = {"rtol": 0, "atol": 1e-12, "equal_nan": True}
 
 native = pytest.mark.skipif(
-    kernels.native is None, reason="the native kernels are not installed: ./native"
+    kernels.native is None,
+    reason="the native kernels are not there, or not wanted: native/README.md",
 )
 
 
@@ -65,17 +67,51 @@ def chain(random):
     return DH(a, d, alpha, offset, np.array([1.0, -1, 1, 1, -1, 1]), mix)
 
 
-def test_kernels_of_other_sources_are_not_used(monkeypatch):
-    monkeypatch.delenv(kernels.SWITCH, raising=False)
-    for number, used in ((kernels.INTERFACE, True), (kernels.INTERFACE + 1, False)):
-        found = SimpleNamespace(INTERFACE=number)
-        monkeypatch.setitem(sys.modules, "postproc_kernels", found)
-        assert kernels._native() is (found if used else None)
-    monkeypatch.setenv(kernels.SWITCH, "numpy")
-    monkeypatch.setitem(
-        sys.modules, "postproc_kernels", SimpleNamespace(INTERFACE=kernels.INTERFACE)
+def hash_of_sources() -> str:
+    """As native/build.rs does it."""
+    found = 0xCBF29CE484222325
+    for path in sorted((ROOT / "native" / "src").iterdir()):
+        for byte in path.read_bytes():
+            found = (found ^ byte) * 0x100000001B3 % 2**64
+    return f"{found:016x}"
+
+
+def test_the_package_asks_for_kernels_of_its_own_sources():
+    assert hash_of_sources() == kernels.SOURCES, (
+        "put the first into postproc/kernels.py"
     )
-    assert kernels._native() is None
+
+
+@pytest.mark.parametrize(
+    ("switch", "more", "used"),
+    [
+        ("", {"SOURCES": kernels.SOURCES}, True),
+        ("", {"SOURCES": "of others"}, False),
+        ("", {}, False),
+        ("numpy", {"SOURCES": kernels.SOURCES}, False),
+    ],
+)
+def test_which_kernels_are_used(monkeypatch, switch, more, used):
+    monkeypatch.setenv(kernels.SWITCH, switch)
+    found = SimpleNamespace(placed=lambda: 7, **more)
+    monkeypatch.setitem(sys.modules, "postproc_kernels", found)
+    native = kernels._native()
+    assert (native is not None) == used
+    assert native is None or native.placed() == 7
+
+
+def test_a_panic_is_an_exception_and_an_interruption_is_none():
+    class PanicException(BaseException):
+        pass
+
+    def fail(exc):
+        raise exc
+
+    with pytest.raises(RuntimeError, match="fail: out of bounds"):
+        kernels._guarded(fail)(PanicException("out of bounds"))
+    for exc in (KeyboardInterrupt, ValueError):
+        with pytest.raises(exc):
+            kernels._guarded(fail)(exc())
 
 
 def test_without_kernels_numpy_works(monkeypatch):
@@ -166,6 +202,17 @@ def test_states_in_a_graph(given, random, by_numpy):
     assert {-1.0, 0.0, 1.0} < set(placed.flat)
 
 
+@pytest.mark.parametrize("alone", [False, pytest.param(True, marks=native)])
+def test_states_that_are_no_numbers_end(alone, by_numpy):
+    # Two visits that lead to each other, one of them from an unknown place.
+    first, source = np.array([0, 1, 3]), np.array([1, 0, -1])
+    chains = chained(np.zeros((2, 6)), np.eye(6), first, source)
+    steps = Clamps(np.full((3, 6), np.nan), np.full((3, 6), np.nan))
+    asked = direction._states, chains, steps, np.ones(6), NOTHING.play
+    found = asked[0](*asked[1:]) if alone else by_numpy(*asked)
+    assert len(found.lo) == 2
+
+
 @native
 def test_places_on_edges(random, by_numpy):
     count = random.integers(1, 6, 40)
@@ -179,6 +226,13 @@ def test_places_on_edges(random, by_numpy):
     u[:2] = 0.0, 1.0
     meant = by_numpy(paths.along, traced, edge, u)
     assert np.allclose(paths.along(traced, edge, u), meant, **CLOSE)
+    u[::9] = np.nan
+    found = paths.along(traced, edge, u)
+    assert np.isnan(found).all(axis=1).tolist() == np.isnan(u).tolist()
+    traced.q = np.asfortranarray(traced.q)
+    with pytest.raises(ValueError, match="behind the other"):
+        paths.along(traced, edge, u)
+    traced.q = np.ascontiguousarray(traced.q)
     edges.source[:] = -1
     with pytest.raises(IndexError, match="nowhere"):
         paths.along(traced, edge, u)

@@ -5,7 +5,7 @@ use pyo3::prelude::*;
 
 use crate::chain::{Chain, Parameters};
 use crate::edges::{Edges, Paths, Way};
-use crate::rows::{array, dot, minus, rows, same_length, Six, Three};
+use crate::rows::{array, dot, flat, minus, rows, same_length, Six, Three};
 
 const GRID: usize = 8; // steps of the first search for the nearest point
 const ROUNDS: usize = 5; // of Newton's method
@@ -52,9 +52,8 @@ struct Look<'a> {
 impl Zones<'_> {
     /// Look up the moves at the corners.
     pub fn corners<'a>(&self, paths: &Paths<'a>) -> PyResult<Vec<Corner<'a>>> {
-        let (visit, into, out) =
-            (self.visit.as_slice()?, self.into.as_slice()?, self.out.as_slice()?);
-        let (before, behind) = (self.before.as_slice()?, self.behind.as_slice()?);
+        let (visit, into, out) = (flat(&self.visit)?, flat(&self.into)?, flat(&self.out)?);
+        let (before, behind) = (flat(&self.before)?, flat(&self.behind)?);
         let n = same_length(&[visit.len(), into.len(), out.len(), before.len(), behind.len()])?;
         let corner = |c: usize| {
             Ok(Corner {
@@ -172,7 +171,7 @@ pub fn passed<'py>(
     within: PyReadonlyArray1<'py, f64>,
 ) -> PyResult<(Column<'py>, Column<'py>, Column<'py>, Block<'py>, Block<'py>, Block<'py>)> {
     let (chain, paths) = (Chain::new(&parameters)?, Paths::of(&edges, &q)?);
-    let (tool, point, within) = (rows::<3>(&tool)?, rows::<3>(&point)?, within.as_slice()?);
+    let (tool, point, within) = (rows::<3>(&tool)?, rows::<3>(&point)?, flat(&within)?);
     let corners = zones.corners(&paths)?;
     same_length(&[corners.len(), tool.len(), point.len(), within.len()])?;
     let found: Vec<Passed> = corners

@@ -7,7 +7,7 @@ use pyo3::exceptions::PyIndexError;
 use pyo3::prelude::*;
 
 use crate::play::{ends, Clamp, Clamps, Ends};
-use crate::rows::{array, row, rows, same_length, Six};
+use crate::rows::{array, flat, row, rows, same_length, Six};
 
 const ON_FLANK: f64 = 0.999; // of half the width: as good as resting on the flank
 
@@ -132,9 +132,14 @@ impl Graph<'_> {
     }
 }
 
+/// NaN equals NaN.
+fn equal(a: &Six, b: &Six) -> bool {
+    a.iter().zip(b).all(|(a, b)| a == b || (a.is_nan() && b.is_nan()))
+}
+
 fn same(a: &Option<Clamp>, b: &Option<Clamp>) -> bool {
     match (a, b) {
-        (Some(a), Some(b)) => a.lo == b.lo && a.hi == b.hi,
+        (Some(a), Some(b)) => equal(&a.lo, &b.lo) && equal(&a.hi, &b.hi),
         _ => false,
     }
 }
@@ -151,16 +156,16 @@ pub fn states<'py>(
     let (angles, half) = (rows::<6>(&chains.angles)?, row(&half)?);
     let mut graph = Graph {
         angles,
-        first: chains.first.as_slice()?,
-        source: chains.source.as_slice()?,
-        heads: chains.heads.as_slice()?,
-        chain_of: chains.chain_of.as_slice()?,
+        first: flat(&chains.first)?,
+        source: flat(&chains.source)?,
+        heads: flat(&chains.heads)?,
+        chain_of: flat(&chains.chain_of)?,
         own: own.list()?,
         since_head: vec![Clamp::IDENTITY; angles.len()],
         half,
-        known: vec![None; chains.heads.as_slice()?.len()],
+        known: vec![None; flat(&chains.heads)?.len()],
     };
-    let chain_ends = chains.ends.as_slice()?;
+    let chain_ends = flat(&chains.ends)?;
     if !graph.is_sound(chain_ends) {
         return Err(PyIndexError::new_err("chains of visits or edges that are not there"));
     }

@@ -4,7 +4,7 @@ use numpy::{PyArray2, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::exceptions::PyIndexError;
 use pyo3::prelude::*;
 
-use crate::rows::{array, rows, same_length, Six};
+use crate::rows::{array, flat, rows, same_length, Six};
 
 /// `Edges` of the package.
 #[derive(FromPyObject)]
@@ -32,8 +32,8 @@ impl<'a> Paths<'a> {
     pub fn of(edges: &'a Edges<'_>, q: &'a PyReadonlyArray2<'_, f64>) -> PyResult<Self> {
         Ok(Paths {
             path: rows(&edges.path)?,
-            start: edges.start.as_slice()?,
-            source: edges.source.as_slice()?,
+            start: flat(&edges.start)?,
+            source: flat(&edges.source)?,
             q: rows(q)?,
         })
     }
@@ -81,7 +81,8 @@ impl Way<'_> {
         let count = self.samples.len();
         let x = u * count as f64;
         let middle = x.round_ties_even().clamp(1.0, (count - 1) as f64);
-        let (i, t) = (middle as usize, x - middle);
+        let (i, t) = ((middle as usize).max(1), x - middle); // NaN is no place
+
         let before = if i == 1 { self.from } else { &self.samples[i - 2] };
         let (here, after) = (&self.samples[i - 1], &self.samples[i]);
         std::array::from_fn(|j| {
@@ -102,7 +103,7 @@ pub fn along<'py>(
     u: PyReadonlyArray1<'py, f64>,
 ) -> PyResult<Bound<'py, PyArray2<f64>>> {
     let paths = Paths::of(&edges, &q)?;
-    let (edge, u) = (edge.as_slice()?, u.as_slice()?);
+    let (edge, u) = (flat(&edge)?, flat(&u)?);
     same_length(&[edge.len(), u.len()])?;
     let places: PyResult<Vec<Six>> =
         edge.iter().zip(u).map(|(e, u)| Ok(paths.way(*e)?.at(*u))).collect();

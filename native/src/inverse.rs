@@ -9,7 +9,7 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
 use crate::lines::{poses, Pose};
-use crate::rows::{array, same_length, Six};
+use crate::rows::{array, flat, same_length, Six};
 
 const WRIST: i64 = 4; // bits of a slot
 const SHOULDER: i64 = 2;
@@ -127,8 +127,8 @@ pub fn branch<'py>(
     flange: PyReadonlyArray3<'py, f64>,
     slot: PyReadonlyArray1<'py, i64>,
 ) -> PyResult<Bound<'py, PyArray2<f64>>> {
-    let (arm, poses) = (Arm::new(parameters.as_slice()?)?, poses(&flange)?);
-    let slot = slot.as_slice()?;
+    let (arm, poses) = (Arm::new(flat(&parameters)?)?, poses(&flange)?);
+    let slot = flat(&slot)?;
     same_length(&[poses.len(), slot.len()])?;
     let out = poses.iter().zip(slot).map(|(p, s)| arm.branch(p, *s)).collect();
     Ok(array(py, out))
@@ -141,7 +141,7 @@ pub fn branches<'py>(
     parameters: PyReadonlyArray1<'py, f64>,
     flange: PyReadonlyArray3<'py, f64>,
 ) -> PyResult<Bound<'py, PyArray3<f64>>> {
-    let (arm, poses) = (Arm::new(parameters.as_slice()?)?, poses(&flange)?);
+    let (arm, poses) = (Arm::new(flat(&parameters)?)?, poses(&flange)?);
     let out: Vec<f64> = poses.iter().flat_map(|p| arm.branches(p)).flatten().collect();
     let shaped = Array3::from_shape_vec((poses.len(), 8, 6), out);
     Ok(shaped.expect("48 values a pose").into_pyarray(py))

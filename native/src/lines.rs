@@ -8,7 +8,7 @@ use numpy::{
 use pyo3::exceptions::{PyIndexError, PyValueError};
 use pyo3::prelude::*;
 
-use crate::rows::{array, dot, minus, same_length, Three};
+use crate::rows::{array, dot, flat, minus, same_length, Three};
 
 const SMALL: f64 = 1e-3; // [rad] below which a series stands for a quotient
 
@@ -21,7 +21,7 @@ pub fn poses<'a>(array: &'a PyReadonlyArray3<'_, f64>) -> PyResult<&'a [Pose]> {
     if array.shape()[1..] != [4, 4] {
         return Err(PyValueError::new_err("poses are (n, 4, 4)"));
     }
-    Ok(array.as_slice()?.as_chunks().0)
+    Ok(flat(array)?.as_chunks().0)
 }
 
 /// Place the TCP.
@@ -102,7 +102,7 @@ fn paths<'a>(
     end: &PyReadonlyArray1<'_, i64>,
 ) -> PyResult<Vec<Ends<'a>>> {
     let (flange, tool) = (poses(flange)?, poses(tool)?);
-    let (begin, end) = (begin.as_slice()?, end.as_slice()?);
+    let (begin, end) = (flat(&begin)?, flat(&end)?);
     same_length(&[begin.len(), end.len()])?;
     let found = |(from, to): (&i64, &i64)| {
         let (from, to) = (usize::try_from(*from).ok()?, usize::try_from(*to).ok()?);

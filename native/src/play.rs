@@ -3,7 +3,7 @@
 use numpy::{PyArray2, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
 
-use crate::rows::{array, rows, same_length, Six};
+use crate::rows::{array, flat, rows, same_length, Six};
 
 type Block<'py> = Bound<'py, PyArray2<f64>>;
 
@@ -92,7 +92,7 @@ pub fn prefix<'py>(
     steps: Clamps<'py>,
     begins: PyReadonlyArray1<'py, bool>,
 ) -> PyResult<Ends<'py>> {
-    let (mut steps, begins) = (steps.list()?, begins.as_slice()?);
+    let (mut steps, begins) = (steps.list()?, flat(&begins)?);
     same_length(&[steps.len(), begins.len()])?;
     for i in 1..steps.len() {
         if !begins[i] {

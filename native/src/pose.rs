@@ -7,7 +7,7 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
 use crate::lines::{self, poses, Pose, Rotation};
-use crate::rows::{array, rows, same_length, Six};
+use crate::rows::{array, flat, rows, same_length, Six};
 use crate::trig::sin_cos;
 
 const MM: f64 = 1e-3;
@@ -101,6 +101,6 @@ pub fn rotation_vector<'py>(
     if given.shape()[1..] != [3, 3] {
         return Err(PyValueError::new_err("rotations are (n, 3, 3)"));
     }
-    let rotations: &[Rotation] = given.as_slice()?.as_chunks().0.as_chunks().0;
+    let rotations: &[Rotation] = flat(&given)?.as_chunks().0.as_chunks().0;
     Ok(array(py, rotations.iter().map(lines::rotation_vector).collect()))
 }

@@ -6,7 +6,7 @@ use numpy::{PyArray2, PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
-use crate::rows::{array, rows, same_length, Six};
+use crate::rows::{array, flat, rows, same_length, Six};
 use crate::trig::sin_cos;
 
 const EDGE: f64 = 0.1; // share of the range over which the profile fades outside of it
@@ -78,7 +78,7 @@ pub fn profile<'py>(
         .map(|k| orders.iter().position(|o| *o == k).unwrap_or(usize::MAX))
         .collect();
     let skipped = usize::from(constant);
-    let sizes = sizes.as_slice()?;
+    let sizes = flat(&sizes)?;
     let joints: Vec<Joint> = (joints.iter().enumerate())
         .map(|(row, at)| {
             let own = &sizes[row * width..(row + 1) * width];

@@ -4,7 +4,7 @@ use numpy::{PyArray2, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
-use crate::rows::{array, rows, same_length, Three};
+use crate::rows::{array, flat, rows, same_length, Three};
 
 type Column<'py, T> = PyReadonlyArray1<'py, T>;
 
@@ -20,9 +20,8 @@ pub fn to_move<'py>(
     rounds: usize,
 ) -> PyResult<Bound<'py, PyArray2<f64>>> {
     let wanted = rows::<3>(&wanted)?;
-    let (visit, before, behind) =
-        (corners.0.as_slice()?, corners.1.as_slice()?, corners.2.as_slice()?);
-    let (v, w) = (shares.0.as_slice()?, shares.1.as_slice()?);
+    let (visit, before, behind) = (flat(&corners.0)?, flat(&corners.1)?, flat(&corners.2)?);
+    let (v, w) = (flat(&shares.0)?, flat(&shares.1)?);
     let count = [visit.len(), before.len(), behind.len(), v.len(), w.len()];
     let count = same_length(&count)?;
     let places = 0..wanted.len() as i64;

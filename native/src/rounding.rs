@@ -6,7 +6,7 @@ use pyo3::prelude::*;
 
 use crate::corner::{Corner, Zones};
 use crate::edges::{Edges, Paths};
-use crate::rows::{array, rows, same_length, Six};
+use crate::rows::{array, flat, rows, same_length, Six};
 
 /// `Corners` of the package.
 #[derive(FromPyObject)]
@@ -93,12 +93,12 @@ pub fn resampled<'py>(
     corners: Corners<'py>,
     pieces: Pieces<'py>,
 ) -> PyResult<(Bound<'py, PyArray2<f64>>, Bound<'py, PyArray1<f64>>)> {
-    let (paths, share) = (Paths::of(&edges, &q)?, share.as_slice()?);
-    let (all, nearest) = (corners.zones.corners(&paths)?, corners.nearest.as_slice()?);
+    let (paths, share) = (Paths::of(&edges, &q)?, flat(&share)?);
+    let (all, nearest) = (corners.zones.corners(&paths)?, flat(&corners.nearest)?);
     let passed = rows::<6>(&corners.q)?;
     same_length(&[all.len(), nearest.len(), passed.len()])?;
-    let (corner, count) = (pieces.corner.as_slice()?, pieces.count.as_slice()?);
-    let (begin, end) = (pieces.begin.as_slice()?, pieces.end.as_slice()?);
+    let (corner, count) = (flat(&pieces.corner)?, flat(&pieces.count)?);
+    let (begin, end) = (flat(&pieces.begin)?, flat(&pieces.end)?);
     let e = same_length(&[begin.len(), end.len(), corner.len() / 2, count.len() / 3])?;
     let total = count.iter().sum::<i64>().max(0) as usize;
     let mut out = Samples { path: Vec::with_capacity(total), share: Vec::with_capacity(total) };

@@ -1,7 +1,10 @@
 //! Rows of arrays, in and out.
 
-use numpy::ndarray::Array2;
-use numpy::{IntoPyArray, PyArray2, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods};
+use numpy::ndarray::{Array2, Dimension};
+use numpy::{
+    Element, IntoPyArray, PyArray2, PyReadonlyArray, PyReadonlyArray1, PyReadonlyArray2,
+    PyUntypedArrayMethods,
+};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
@@ -10,13 +13,23 @@ pub type Six = [f64; 6];
 /// A place [m].
 pub type Three = [f64; 3];
 
+/// See an array as it lies in memory: row behind row, or it is refused.
+pub fn flat<'a, T: Element, D: Dimension>(
+    array: &'a PyReadonlyArray<'_, T, D>,
+) -> PyResult<&'a [T]> {
+    if !array.is_c_contiguous() {
+        return Err(PyValueError::new_err("an array whose rows do not lie one behind the other"));
+    }
+    Ok(array.as_slice()?)
+}
+
 /// See a C-contiguous array (n, K) as rows.
 pub fn rows<'a, const K: usize>(array: &'a PyReadonlyArray2<'_, f64>) -> PyResult<&'a [[f64; K]]> {
     let given = array.shape()[1];
     if given != K {
         return Err(PyValueError::new_err(format!("rows of {given}, not of {K}")));
     }
-    Ok(array.as_slice()?.as_chunks::<K>().0)
+    Ok(flat(array)?.as_chunks::<K>().0)
 }
 
 /// Give rows to Python as an array (n, K).
@@ -29,7 +42,7 @@ pub fn array<const K: usize>(py: Python<'_>, rows: Vec<[f64; K]>) -> Bound<'_, P
 
 /// See an array (6,) as a row.
 pub fn row(array: &PyReadonlyArray1<'_, f64>) -> PyResult<Six> {
-    let given = array.as_slice()?;
+    let given = flat(array)?;
     given.try_into().map_err(|_| PyValueError::new_err(format!("{} values, not 6", given.len())))
 }
 

@@ -10,7 +10,7 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
 use crate::chain::{Chain, Parameters};
-use crate::rows::{array, rows, same_length, Three};
+use crate::rows::{array, flat, rows, same_length, Three};
 use crate::walk::{Base, Walk};
 
 /// Poses that are worked on side by side.
@@ -171,7 +171,7 @@ pub fn variance<'py>(
     if odd || shape[1] != own || covariance.shape() != [size, size] {
         return Err(PyValueError::new_err("a covariance of other parameters"));
     }
-    let (basis, covariance) = (basis.as_slice()?, covariance.as_slice()?);
+    let (basis, covariance) = (flat(&basis)?, flat(&covariance)?);
     let mut end = 0;
     let joints = count.map(|n| {
         end += n;

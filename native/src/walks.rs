@@ -5,7 +5,7 @@ use pyo3::exceptions::PyIndexError;
 use pyo3::prelude::*;
 
 use crate::play::{ends, Clamp, Ends};
-use crate::rows::{array, row, rows, same_length, Six};
+use crate::rows::{array, flat, row, rows, same_length, Six};
 
 /// Walk through the samples start[i] .. start[i + 1] of each edge.
 fn samples<'a>(values: &'a [Six], start: &[i64]) -> PyResult<Vec<&'a [Six]>> {
@@ -26,7 +26,7 @@ pub fn clamps<'py>(
     half: PyReadonlyArray1<'py, f64>,
 ) -> PyResult<Ends<'py>> {
     let half = row(&half)?;
-    let all = samples(rows::<6>(&values)?, start.as_slice()?)?;
+    let all = samples(rows::<6>(&values)?, flat(&start)?)?;
     let along = |edge: &&[Six]| {
         let steps = edge.iter().map(|q| Clamp::passing(q, &half));
         steps.reduce(|before, step| before.then(&step)).unwrap_or(Clamp::IDENTITY)
@@ -89,10 +89,10 @@ pub fn refined<'py>(
     uneven: PyReadonlyArray1<'py, i64>,
 ) -> PyResult<(Bound<'py, PyArray2<f64>>, Bound<'py, PyArray1<i64>>)> {
     let (angles, values) = (rows::<6>(&angles)?, rows::<6>(&values)?);
-    let (source, start) = (source.as_slice()?, start.as_slice()?);
+    let (source, start) = (flat(&source)?, flat(&start)?);
     same_length(&[source.len() + 1, start.len()])?;
     let mut marked = vec![false; values.len()];
-    for sample in uneven.as_slice()? {
+    for sample in flat(&uneven)? {
         let found = usize::try_from(*sample).ok().and_then(|s| marked.get_mut(s));
         *found.ok_or_else(|| PyIndexError::new_err("an uneven sample is not there"))? = true;
     }

@@ -66,7 +66,7 @@ class BacklashProfile(JointEffect):
 
     def angles(self, batch: Batch, p: Array) -> Array:
         """Return the joint errors (n, 6) [rad], summed joint by joint."""
-        if native is not None:
+        if native is not None and self.joints and self._is_ordered:
             sizes = p.reshape(len(self.joints), -1)
             states = batch.states.q, batch.states.direction
             found: Array = native.profile(
@@ -87,6 +87,14 @@ class BacklashProfile(JointEffect):
     def _turned(self) -> NDArray[np.int64]:
         """Return the 0-based joints that have a profile, (j,)."""
         return np.array(self.joints, dtype=int) - 1
+
+    @property
+    def _is_ordered(self) -> bool:
+        """Tell whether every order is a harmonic, and named once."""
+        return (
+            len(set(self.orders)) == len(self.orders)
+            and min(self.orders, default=1) > 0
+        )
 
     def _waves(self, q: Array) -> Array:
         """Evaluate b0 and the harmonics of every joint, (j, m, n), as far as surveyed.

@@ -39,9 +39,7 @@ def main() -> None:
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
         app()
-    except (SystemExit, KeyboardInterrupt):
-        raise
-    except BaseException as exc:  # a panic of native code is no Exception
+    except Exception as exc:
         if os.environ.get("POSTPROC_DEBUG"):
             raise
         say(

@@ -96,7 +96,9 @@ class ClosedForm:
             branch does not exist.
         """
         if native is not None:
-            solved: Array = native.branches(self._packed, np.ascontiguousarray(flange))
+            solved: Array = native.branches(
+                self._packed, np.ascontiguousarray(flange, dtype=float)
+            )
             return solved
         out = np.empty((len(flange), 8, 6))
         for rows in pieces(len(flange), CHUNK):
@@ -122,7 +124,10 @@ class ClosedForm:
             branch does not exist.
         """
         if native is not None:
-            flange, slot = np.ascontiguousarray(flange), np.ascontiguousarray(slot)
+            flange, slot = (
+                np.ascontiguousarray(flange, dtype=float),
+                np.ascontiguousarray(slot),
+            )
             solved: Array = native.branch(self._packed, flange, slot)
             return solved
         out = np.empty((len(flange), 6))

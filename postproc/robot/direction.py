@@ -250,4 +250,6 @@ def _at_head(
 
 
 def _same(a: Clamps, b: Clamps) -> bool:
-    return np.array_equal(a.lo, b.lo) and np.array_equal(a.hi, b.hi)
+    return all(
+        np.array_equal(x, y, equal_nan=True) for x, y in ((a.lo, b.lo), (a.hi, b.hi))
+    )
