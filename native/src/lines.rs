@@ -102,7 +102,7 @@ fn paths<'a>(
     end: &PyReadonlyArray1<'_, i64>,
 ) -> PyResult<Vec<Ends<'a>>> {
     let (flange, tool) = (poses(flange)?, poses(tool)?);
-    let (begin, end) = (flat(&begin)?, flat(&end)?);
+    let (begin, end) = (flat(begin)?, flat(end)?);
     same_length(&[begin.len(), end.len()])?;
     let found = |(from, to): (&i64, &i64)| {
         let (from, to) = (usize::try_from(*from).ok()?, usize::try_from(*to).ok()?);
