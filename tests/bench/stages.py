@@ -35,13 +35,15 @@ def measure(kind: str, n: int, cell: Path, model: Path) -> dict[str, float]:
         start = time.perf_counter()
         job = Job.open(str(place), cell, model)
         read = time.perf_counter() - start
-        outcome = job.run(AS_USUAL, processes=forked.available())
+        crowd = forked.available()  # as the command line does
+        outcome = job.run(AS_USUAL, processes=crowd)
         pipeline = time.perf_counter() - start
         begin = time.perf_counter()
-        job.write(outcome, place.with_name("out.pdl"))
+        job.write(outcome, place.with_name("out.pdl"), processes=crowd)
         write = time.perf_counter() - begin
         begin = time.perf_counter()
-        job.write(outcome, place.with_name("again.pdl"), place.with_name("r.json"))
+        again, told = place.with_name("again.pdl"), place.with_name("r.json")
+        job.write(outcome, again, told, processes=crowd)
         report = time.perf_counter() - begin - write
     found = {
         "targets": len(outcome.visits), "lines": lines, "read": read,
