@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from postproc.kernels import native
+from postproc.kernels import floats, native
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -77,9 +77,7 @@ def pose_from_record(record: Array) -> Array:
     """Convert position records (..., 6) [mm, deg] to poses (..., 4, 4) [m]."""
     record = np.asarray(record, dtype=float)
     if native is not None and record.ndim == 2:
-        poses: Array = native.pose_from_record(
-            np.ascontiguousarray(record, dtype=float)
-        )
+        poses: Array = native.pose_from_record(floats(record))
         return poses
     T = np.zeros((*record.shape[:-1], 4, 4))
     T[..., :3, :3] = rotation_from_zyz(record[..., 3:])
@@ -98,7 +96,7 @@ def record_from_pose(T: Array) -> Array:
 def inverse(T: Array) -> Array:
     """Invert poses (..., 4, 4)."""
     if native is not None and T.ndim == 3:
-        inverted: Array = native.inverse(np.ascontiguousarray(T, dtype=float))
+        inverted: Array = native.inverse(floats(T))
         return inverted
     out = np.zeros_like(T)
     Rt = np.swapaxes(T[..., :3, :3], -1, -2)
@@ -111,8 +109,7 @@ def inverse(T: Array) -> Array:
 def times(left: Array, right: Array) -> Array:
     """Multiply poses (n, 4, 4) with others, (n, 4, 4)."""
     if native is not None:
-        left, right = np.ascontiguousarray(left), np.ascontiguousarray(right)
-        multiplied: Array = native.times(left, right)
+        multiplied: Array = native.times(floats(left), floats(right))
         return multiplied
     return np.asarray(left @ right)
 
@@ -199,7 +196,7 @@ def rotation_vector(R: Array) -> Array:
     Lengths are in [0, pi].
     """
     if native is not None and R.ndim == 3:
-        vectors: Array = native.rotation_vector(np.ascontiguousarray(R, dtype=float))
+        vectors: Array = native.rotation_vector(floats(R))
         return vectors
     q = _quaternion(R.reshape(-1, 3, 3))
     x, y, z, w = np.where(q[3] < 0, -q, q)

@@ -1,11 +1,10 @@
 //! The Denavit-Hartenberg chain: `postproc.robot.dh`.
 
-use numpy::ndarray::Array3;
-use numpy::{IntoPyArray, PyArray2, PyArray3, PyReadonlyArray2};
+use numpy::{PyArray2, PyArray3, PyReadonlyArray2};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
-use crate::rows::{array, rows, Six, Three};
+use crate::rows::{array, blocks, rows, Six, Three};
 use crate::trig::sin_cos;
 
 pub struct Link {
@@ -123,6 +122,5 @@ pub fn flange<'py>(
 ) -> PyResult<Bound<'py, PyArray3<f64>>> {
     let (chain, q) = (Chain::new(&parameters)?, rows::<6>(&q)?);
     let poses: Vec<f64> = q.iter().flat_map(|q| chain.flange(q)).collect();
-    let poses = Array3::from_shape_vec((q.len(), 4, 4), poses);
-    Ok(poses.expect("16 values a pose").into_pyarray(py))
+    Ok(blocks(py, q.len(), (4, 4), poses))
 }

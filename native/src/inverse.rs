@@ -3,13 +3,12 @@
 
 use std::f64::consts::PI;
 
-use numpy::ndarray::Array3;
-use numpy::{IntoPyArray, PyArray2, PyArray3, PyReadonlyArray1, PyReadonlyArray3};
+use numpy::{PyArray2, PyArray3, PyReadonlyArray1, PyReadonlyArray3};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
 use crate::lines::{poses, Pose};
-use crate::rows::{array, flat, same_length, Six};
+use crate::rows::{array, blocks, flat, same_length, Six};
 
 const WRIST: i64 = 4; // bits of a slot
 const SHOULDER: i64 = 2;
@@ -143,6 +142,5 @@ pub fn branches<'py>(
 ) -> PyResult<Bound<'py, PyArray3<f64>>> {
     let (arm, poses) = (Arm::new(flat(&parameters)?)?, poses(&flange)?);
     let out: Vec<f64> = poses.iter().flat_map(|p| arm.branches(p)).flatten().collect();
-    let shaped = Array3::from_shape_vec((poses.len(), 8, 6), out);
-    Ok(shaped.expect("48 values a pose").into_pyarray(py))
+    Ok(blocks(py, poses.len(), (8, 6), out))
 }

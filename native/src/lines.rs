@@ -1,6 +1,5 @@
 //! Straight paths of the TCP: `postproc.motion.path` and `postproc.motion.zone`.
 
-use numpy::ndarray::Array3;
 use numpy::{
     IntoPyArray, PyArray1, PyArray2, PyArray3, PyReadonlyArray1, PyReadonlyArray3,
     PyUntypedArrayMethods,
@@ -8,7 +7,7 @@ use numpy::{
 use pyo3::exceptions::{PyIndexError, PyValueError};
 use pyo3::prelude::*;
 
-use crate::rows::{array, dot, flat, minus, same_length, Three};
+use crate::rows::{array, blocks, dot, flat, minus, same_length, Three};
 
 const SMALL: f64 = 1e-3; // [rad] below which a series stands for a quotient
 
@@ -141,8 +140,7 @@ pub fn lines<'py>(
         chords.push(minus(&point(path.end, path.tool), &start));
         begins.push(start);
     }
-    let rotations = Array3::from_shape_vec((all.len(), 3, 3), rotations);
-    let rotations = rotations.expect("9 values a path").into_pyarray(py);
+    let rotations = blocks(py, all.len(), (3, 3), rotations);
     Ok((rotations, array(py, turns), array(py, begins), array(py, chords)))
 }
 

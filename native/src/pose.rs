@@ -1,22 +1,18 @@
 //! Rigid transforms, pose by pose: `postproc.pose`.
 
-use numpy::ndarray::Array3;
 use numpy::PyUntypedArrayMethods;
-use numpy::{IntoPyArray, PyArray2, PyArray3, PyReadonlyArray2, PyReadonlyArray3};
+use numpy::{PyArray2, PyArray3, PyReadonlyArray2, PyReadonlyArray3};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
 use crate::lines::{self, poses, Pose, Rotation};
-use crate::rows::{array, flat, rows, same_length, Six};
+use crate::rows::{array, blocks, flat, rows, same_length, Six};
 use crate::trig::sin_cos;
 
 const MM: f64 = 1e-3;
 
 fn to_python(py: Python<'_>, poses: Vec<Pose>) -> Bound<'_, PyArray3<f64>> {
-    let shape = (poses.len(), 4, 4);
-    Array3::from_shape_vec(shape, poses.into_flattened())
-        .expect("16 values a pose")
-        .into_pyarray(py)
+    blocks(py, poses.len(), (4, 4), poses.into_flattened())
 }
 
 fn inverted(t: &Pose) -> Pose {

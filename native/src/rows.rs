@@ -1,8 +1,8 @@
 //! Rows of arrays, in and out.
 
-use numpy::ndarray::{Array2, Dimension};
+use numpy::ndarray::{Array2, Array3, Dimension};
 use numpy::{
-    Element, IntoPyArray, PyArray2, PyReadonlyArray, PyReadonlyArray1, PyReadonlyArray2,
+    Element, IntoPyArray, PyArray2, PyArray3, PyReadonlyArray, PyReadonlyArray1, PyReadonlyArray2,
     PyUntypedArrayMethods,
 };
 use pyo3::exceptions::PyValueError;
@@ -44,6 +44,18 @@ pub fn array<const K: usize>(py: Python<'_>, rows: Vec<[f64; K]>) -> Bound<'_, P
 pub fn row(array: &PyReadonlyArray1<'_, f64>) -> PyResult<Six> {
     let given = flat(array)?;
     given.try_into().map_err(|_| PyValueError::new_err(format!("{} values, not 6", given.len())))
+}
+
+/// Give values to Python as n blocks (n, a, b).
+pub fn blocks<'py>(
+    py: Python<'py>,
+    n: usize,
+    (a, b): (usize, usize),
+    values: Vec<f64>,
+) -> Bound<'py, PyArray3<f64>> {
+    Array3::from_shape_vec((n, a, b), values)
+        .expect("as many values as blocks have")
+        .into_pyarray(py)
 }
 
 /// Refuse columns that are not of one length.

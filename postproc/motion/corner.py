@@ -21,7 +21,7 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from postproc.kernels import native
+from postproc.kernels import floats, native
 from postproc.motion.paths import along, between
 from postproc.motion.targets import Fly, Targets
 from postproc.motion.trace import Trace
@@ -76,12 +76,12 @@ def _passed(arm: Arm, targets: Targets, traced: Trace, found: Zones) -> Corners:
     """Find where the path passes some corners, and keep to their tolerances."""
     tool = targets.tool.take(found.visit, axis=0)[:, :3, 3]
     point = _tcp(traced.flange.take(found.visit, axis=0), tool)
-    if native is not None:
-        return _passed_natively(arm, targets, traced, found, tool, point)
-    first, last, nearest, miss = _passing(arm, traced, found, tool, point)
     within = targets.rounding[found.visit] == Fly.WITHIN
-    wanted = targets.fly_distance[found.visit]
-    too_far = within & (miss > wanted)
+    wanted = np.where(within, targets.fly_distance[found.visit], np.inf)
+    if native is not None:
+        return _passed_natively(arm, traced, found, tool, point, wanted)
+    first, last, nearest, miss = _passing(arm, traced, found, tool, point)
+    too_far = miss > wanted
     if too_far.any():
         shrink = np.where(too_far, wanted / np.maximum(miss, 1e-12), 1.0)
         found = Zones(found.visit, found.into, found.out, found.before * shrink,
@@ -97,14 +97,11 @@ def _passed(arm: Arm, targets: Targets, traced: Trace, found: Zones) -> Corners:
 
 
 def _passed_natively(
-    arm: Arm, targets: Targets, traced: Trace, found: Zones, tool: Array, point: Array
+    arm: Arm, traced: Trace, found: Zones, tool: Array, point: Array, wanted: Array
 ) -> Corners:
     """Do as `_passed` with the native kernel."""
-    within = targets.rounding[found.visit] == Fly.WITHIN
-    wanted = np.where(within, targets.fly_distance[found.visit], np.inf)
     before, behind, nearest, q, aside, bend = native.passed(
-        arm.dh.packed(), traced.edges, traced.q, found, np.ascontiguousarray(tool),
-        point, wanted,
+        arm.dh.packed(), traced.edges, traced.q, found, floats(tool), point, wanted,
     )  # fmt: skip
     found = replace(found, before=before, behind=behind)
     return Corners(found, nearest, q, aside, bend)

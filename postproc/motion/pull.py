@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from postproc.kernels import native
+from postproc.kernels import floats, native
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -64,9 +64,7 @@ class Pull:
             return np.array(wanted)
         if native is not None:
             corners, shares = (self.visit, self.before, self.behind), (self.v, self.w)
-            found: Array = native.to_move(
-                np.ascontiguousarray(wanted), corners, shares, ROUNDS
-            )
+            found: Array = native.to_move(floats(wanted), corners, shares, ROUNDS)
             return found
         others = np.ones(n, dtype=bool)
         others[self.visit] = False

@@ -73,10 +73,8 @@ def sample(targets: Targets, flange: Array) -> Samples:
     ready &= known[at] & ~targets.wrist_joint[visit]
     straight = np.flatnonzero(ready & (targets.move[visit] == Move.LINEAR))
     begins = _begins(targets, visit, source)
-    segments, edge = (
-        _lines(targets, flange, source[straight], visit[straight]),
-        straight,
-    )
+    segments = _lines(targets, flange, source[straight], visit[straight])
+    edge = straight
     if (begins >= 0).any():
         round_, arc = _arcs(targets, flange, visit, source, ready, begins)
         segments, edge = joined([segments, arc]), np.append(straight, round_)

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from postproc.kernels import native
+from postproc.kernels import floats, native
 from postproc.pieces import pieces
 from postproc.pose import MM
 from postproc.robot.arm_file import OpwSection
@@ -96,9 +96,7 @@ class ClosedForm:
             branch does not exist.
         """
         if native is not None:
-            solved: Array = native.branches(
-                self._packed, np.ascontiguousarray(flange, dtype=float)
-            )
+            solved: Array = native.branches(self._packed, floats(flange))
             return solved
         out = np.empty((len(flange), 8, 6))
         for rows in pieces(len(flange), CHUNK):
@@ -124,10 +122,7 @@ class ClosedForm:
             branch does not exist.
         """
         if native is not None:
-            flange, slot = (
-                np.ascontiguousarray(flange, dtype=float),
-                np.ascontiguousarray(slot),
-            )
+            flange, slot = floats(flange), np.ascontiguousarray(slot)
             solved: Array = native.branch(self._packed, flange, slot)
             return solved
         out = np.empty((len(flange), 6))

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from postproc.kernels import native
+from postproc.kernels import floats, native
 
 Array = NDArray[np.float64]
 Frame = tuple[Array, Array, Array, Array]  # axes x, y, z and origin [m], (3, n) each
@@ -62,7 +62,7 @@ class DH:
     def flange(self, q: Array) -> Array:
         """Place the flange for angles (n, 6) [rad]: (n, 4, 4) [m]."""
         if native is not None:
-            placed: Array = native.flange(self.packed(), _floats(q))
+            placed: Array = native.flange(self.packed(), floats(q))
             return placed
         *_, last = self.frames(q)
         return pose_of(last)
@@ -79,7 +79,7 @@ class DH:
             beta: Hayati's rotations of the links, (6,) [rad].
         """
         if native is not None:
-            q, points = _floats(q), np.array(point, float, ndmin=2, order="C")
+            q, points = floats(q), np.array(point, float, ndmin=2, order="C")
             native_placed: Array = native.placed(self.packed(beta), q, points)
             return native_placed
         theta = np.ascontiguousarray(self.angles(q).T)
@@ -104,8 +104,3 @@ def pose_of(frame: Frame) -> Array:
         pose[:, :3, column] = values.T
     pose[:, 3, 3] = 1.0
     return pose
-
-
-def _floats(q: Array) -> Array:
-    """Return numbers as the native kernels take them."""
-    return np.ascontiguousarray(q, dtype=float)
