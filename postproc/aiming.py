@@ -6,9 +6,9 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
 from postproc.accuracy.model import Model
+from postproc.arrays import Bools, Floats
 from postproc.clock import Clock
 from postproc.motion.planner import Plan
 from postproc.options import Options
@@ -18,9 +18,6 @@ from postproc.robot.cell import Cell
 from postproc.robot.state import States
 from postproc.side_search import SideSearch
 from postproc.solved import Solved, solve_again, solve_visits
-
-Array = NDArray[np.float64]
-Bools = NDArray[np.bool_]
 
 CLOSE = 5e-6  # [m] how well rounded fly points are hit
 
@@ -37,11 +34,11 @@ class Aim:
     """
 
     solved: Solved
-    bent: Array
+    bent: Floats
     held: Bools
     settled: Bools
 
-    def turned(self, proposal: Proposal, side: Array, most: float) -> Bools:
+    def turned(self, proposal: Proposal, side: Floats, most: float) -> Bools:
         """Tell which corrected targets are reached from other sides than these, (n,).
 
         Args:
@@ -74,7 +71,7 @@ class Aiming:
     model: Model
     options: Options
     clock: Clock
-    given: Array
+    given: Floats
 
     def first_aim(self) -> Aim:
         """Correct for the sides that were planned."""
@@ -86,7 +83,9 @@ class Aiming:
         none = np.zeros(len(self.states), dtype=bool)
         return Aim(solved, np.zeros_like(self.planned.plan.aside), none, none)
 
-    def next_aim(self, aim: Aim, moved: Bools, found: Array, search: SideSearch) -> Aim:
+    def next_aim(
+        self, aim: Aim, moved: Bools, found: Floats, search: SideSearch
+    ) -> Aim:
         """Correct some targets for other sides, by those that were found."""
         orientation = self.options.orientation
         with self.clock("solve"):
@@ -98,7 +97,7 @@ class Aiming:
             )  # fmt: skip
         return replace(aim, solved=solved)
 
-    def propose(self, aim: Aim) -> tuple[Proposal, Array]:
+    def propose(self, aim: Aim) -> tuple[Proposal, Floats]:
         """Decide on numbers; return too where the path is to pass its targets."""
         with self.clock("decide"):
             plan = self.planned.plan
@@ -109,7 +108,7 @@ class Aiming:
             )  # fmt: skip
         return proposal, aside
 
-    def wanted(self, aim: Aim) -> Array:
+    def wanted(self, aim: Aim) -> Floats:
         """Say what the path should move by at every target, (n, 3) [m]."""
         before = self.planned.plan.tcp[:, :3, 3]
         wanted = np.nan_to_num(aim.solved.command[:, :3, 3] - before)
@@ -117,7 +116,7 @@ class Aiming:
         wanted[: len(self.given)] = self.given
         return wanted
 
-    def missed(self, proposal: Proposal, aside: Array, meant: Array) -> Array:
+    def missed(self, proposal: Proposal, aside: Floats, meant: Floats) -> Floats:
         """Say by what programs with a point that is not hit miss theirs, (n, 3) [m].
 
         Args:
@@ -135,6 +134,6 @@ class Aiming:
         return missed
 
 
-def aside_after(plan: Plan, wanted: Array) -> Array:
+def aside_after(plan: Plan, wanted: Floats) -> Floats:
     """Foretell where the path passes its fly points once targets have moved, (n, 3)."""
     return plan.aside + plan.pull.on(plan.pull.to_move(wanted))

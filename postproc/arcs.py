@@ -8,17 +8,13 @@ circle than the program says, or along none.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from postproc.arrays import Bools, Floats, Ints
 from postproc.motion.planner import Plan
 from postproc.motion.rounds import NEAR, rounds
 from postproc.motion.targets import Targets
 from postproc.pose import MM
 from postproc.reasons import Reasons
-
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
-Bools = NDArray[np.bool_]
 
 CURE = "move VIA, or use LINEAR"
 LINE = f"the three points of the arc that begins here lie on one line: {CURE}"
@@ -46,7 +42,7 @@ def mark_arcs(targets: Targets, plan: Plan, reasons: Reasons) -> None:
         reasons.mark(_among(arcs.visit[rows], len(targets)), text)
 
 
-def strayed(targets: Targets, plan: Plan, shift: Array, step: float) -> Bools:
+def strayed(targets: Targets, plan: Plan, shift: Floats, step: float) -> Bools:
     """Tell which targets move so that an arc at them becomes quite another one, (n,).
 
     It does where the path between its points moves more than twice as far as they do:

@@ -10,15 +10,12 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from postproc.arrays import Floats, Ints, Signs
 from postproc.exceptions import ProgramError
 from postproc.language.visits import Visits
 from postproc.pose import MM
 from postproc.report import Decisions, Status
 from postproc.sidecar import file_sha256, read_without_edits, sidecar_path
-
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
-Bytes = NDArray[np.int8]
 
 DIGIT = "0123456789"  # status of a visit
 SIGNS = "-0+"  # direction of a joint: -1, 0, 1
@@ -49,8 +46,8 @@ class Arrivals:
     status: Ints
     why: Ints
     reasons: tuple[str, ...]
-    direction: Bytes
-    correction_mm: Array
+    direction: Signs
+    correction_mm: Floats
     counts: Mapping[str, int]
     mixed: Mapping[int, Mapping[str, int]] = field(default_factory=dict)
 
@@ -112,7 +109,7 @@ def _mixed(status: Ints, first: Ints) -> dict[int, dict[str, int]]:
     return found
 
 
-def _places(text: str, letters: str) -> Bytes:
+def _places(text: str, letters: str) -> Signs:
     """Return the place of every character of a text among some letters.
 
     Raises:
@@ -121,7 +118,7 @@ def _places(text: str, letters: str) -> Bytes:
     codes = np.frombuffer(text.encode("latin-1", "replace"), dtype=np.uint8)
     table = np.full(256, -1, dtype=np.int8)
     table[[ord(c) for c in letters]] = range(len(letters))
-    places: Bytes = table[codes]
+    places: Signs = table[codes]
     if (places < 0).any():
         raise ValueError(f"a character is none of {letters}")
     return places

@@ -5,19 +5,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from postproc.arrays import Bools, Floats, Ints
 from postproc.language.edits import Replacements
 from postproc.language.visits import Literals, Visits
-
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
-Bools = NDArray[np.bool_]
 
 
 def numbers_as_read(
     visits: Visits, edited: Ints, edits: Sequence[Replacements]
-) -> Array:
+) -> Floats:
     """Give the numbers of all visits once the edits are made, (n, 6).
 
     Those of edited literals come out bit by bit, those of targets computed from them
@@ -41,7 +37,7 @@ def numbers_as_read(
 
 def edited_numbers(
     literals: Literals, edited: Ints, edits: Sequence[Replacements]
-) -> tuple[Array, Bools]:
+) -> tuple[Floats, Bools]:
     """Read the new numbers of some literals, (m, 6), and tell which there are.
 
     Args:

@@ -8,17 +8,12 @@ from pathlib import Path
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from postproc.accuracy.combination import Combination
 from postproc.accuracy.fit_report import FitReport, report_fit, report_method
 from postproc.accuracy.fitted import Fit
 from postproc.accuracy.full import fit_survey, model_of
-from postproc.accuracy.measurement import (
-    Measurements,
-    concatenate,
-    read_measurements,
-)
+from postproc.accuracy.measurement import Measurements, concatenate, read_measurements
 from postproc.accuracy.methods import fit_method
 from postproc.accuracy.model import Model
 from postproc.accuracy.mounting import check_orientations
@@ -32,7 +27,6 @@ from postproc.pose import MM
 from postproc.robot.arm import Arm
 from postproc.robot.cell import Cell
 
-Array = NDArray[np.float64]
 Frame = Literal["base", "tracker"]
 
 

@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from postproc.accuracy.comparison import Comparison, compare
 from postproc.accuracy.error_statistics import ErrorStatistics
@@ -22,6 +21,7 @@ from postproc.accuracy.plausibility import check_survey
 from postproc.accuracy.reading import DETECT, Reading
 from postproc.accuracy.table import Table as Cells
 from postproc.accuracy.table import read_table
+from postproc.arrays import Floats
 from postproc.calibrate import (
     Calibration,
     fit,
@@ -35,8 +35,6 @@ from postproc.joining import join_program
 from postproc.pose import MM
 from postproc.robot.cell import Cell, load_cell
 from postproc.robot.state import States
-
-Array = NDArray[np.float64]
 
 COLUMNS = (
     Column("parameter", "left"),
@@ -240,7 +238,7 @@ def predict_table(table: Cells, cell: Cell, model: Model) -> tuple[str, str]:
     return out.getvalue().replace("\r\n", "\n"), summary
 
 
-def nominal_tcp(cell: Cell, states: States) -> Array:
+def nominal_tcp(cell: Cell, states: States) -> Floats:
     """Place the nominal TCP, (n, 3) [m], base frame."""
     flange = cell.arm.flange(states.q)
     turned = np.einsum("nij,nj->ni", flange[:, :3, :3], states.tool)

@@ -10,9 +10,9 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from postproc.arcs import strayed
+from postproc.arrays import Bools, Floats, Ints
 from postproc.language.visits import Visits
 from postproc.motion.again import IS_STEP
 from postproc.motion.targets import Kind
@@ -21,13 +21,9 @@ from postproc.pose import MM
 from postproc.resolve import moved_targets
 from postproc.robot.cell import Cell
 
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
-Bools = NDArray[np.bool_]
-
 
 def strayed_along(
-    visits: Visits, planned: Planned, cell: Cell, values: Array, shift: Array
+    visits: Visits, planned: Planned, cell: Cell, values: Floats, shift: Floats
 ) -> Bools:
     """Tell which targets must stay for every arc to stay what it is, (n,).
 
@@ -42,8 +38,8 @@ def strayed_along(
 
 
 def with_carried(
-    visits: Visits, planned: Planned, cell: Cell, values: Array, shift: Array
-) -> Array:
+    visits: Visits, planned: Planned, cell: Cell, values: Floats, shift: Floats
+) -> Floats:
     """Tell what all targets move by, (n, 3) [m], base frame.
 
     Args:
@@ -77,8 +73,8 @@ def with_movers(visits: Visits, planned: Planned, found: Bools) -> Bools:
 
 
 def _followed(
-    visits: Visits, planned: Planned, cell: Cell, values: Array, rows: Ints
-) -> Array:
+    visits: Visits, planned: Planned, cell: Cell, values: Floats, rows: Ints
+) -> Floats:
     """Tell what computed targets move by, (m, 3) [m]."""
     now = moved_targets(
         planned.targets, replace(visits, values=values), cell, rows
@@ -86,13 +82,13 @@ def _followed(
     return np.nan_to_num((now - planned.targets.tcp[rows])[:, :3, 3])
 
 
-def _turned(way: Array, distance: float, by: Array) -> Array:
+def _turned(way: Floats, distance: float, by: Floats) -> Floats:
     """Tell what a place at a distance on a way moves by as the end of the way does."""
     length = np.linalg.norm(way)
     if not 0.0 < distance <= length:  # so short a way is not known either
         return np.zeros(3)
     u = way / length
-    turned: Array = (by - (by @ u) * u) * (distance / length)
+    turned: Floats = (by - (by @ u) * u) * (distance / length)
     return turned
 
 

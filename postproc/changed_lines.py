@@ -9,18 +9,13 @@ from operator import ne
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
-from numpy.typing import NDArray
 
+from postproc.arrays import Bools, Floats, Ints, pieces
 from postproc.language.lexis import BLANKS
 from postproc.language.masking import Masked, mask_lines
 from postproc.number_pairs import Pairs, pair_numbers
-from postproc.pieces import pieces
 from postproc.rows import Rows, joined_rows
 from postproc.side_by_side import in_turns
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
-Bools = NDArray[np.bool_]
 
 PIECE = 5_000  # lines that are masked at a time
 WIDEST = 64  # bytes of beginnings that are compared; wider: line by line

@@ -10,9 +10,15 @@ from pathlib import Path
 
 from postproc.arrivals import LEFT_ALONE
 from postproc.exceptions import ProgramError
-from postproc.files import TEMPORARY
-from postproc.inputs import read_input
-from postproc.kinds import COMPILED, PROGRAM, VARIABLES, holds_targets, suffix_of
+from postproc.files import (
+    COMPILED,
+    PROGRAM,
+    TEMPORARY,
+    VARIABLES,
+    holds_targets,
+    read_input,
+    suffix_of,
+)
 from postproc.language.stamp import read_stamp
 from postproc.sidecar import FileRecord, Sidecar, read_sidecar, sha256, sidecar_path
 

@@ -8,14 +8,15 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from postproc.arrays import Ints
 from postproc.language.clones import clone, free_name
 from postproc.language.diagnostic import Diagnostic
+from postproc.language.edits import Edit
 from postproc.language.layout import CloneError
 from postproc.language.named import Named, named_at
 from postproc.language.program import Program
-from postproc.language.source import Edit, Source, apply
+from postproc.language.source import Source, apply
 from postproc.language.structure import parse
 from postproc.language.visits import Visits
 from postproc.planning import VARIABLES, Reading, read_program
@@ -24,8 +25,6 @@ from postproc.report import Status
 from postproc.robot.cell import Cell
 from postproc.same import same_moves
 from postproc.sharing import Arrivals, Group, Stop, connected, regroup
-
-Ints = NDArray[np.int64]
 
 _WORD = re.compile(rb"[A-Za-z_]\w*")
 

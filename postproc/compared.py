@@ -8,16 +8,14 @@ from difflib import SequenceMatcher
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from postproc.arrays import Ints
 from postproc.changed_lines import changed_rows, shapes, target_name
 from postproc.entry_names import entry_names
 from postproc.exceptions import ProgramError
 from postproc.language.stamp import read_stamp
 from postproc.rows import Rows, joined_rows
 from postproc.text_lines import TextLines
-
-Ints = NDArray[np.int64]
 
 VARIABLES = ".lsv"
 

@@ -22,7 +22,7 @@ from rich.progress import (
 from rich.table import Table
 from rich.text import Text
 
-from postproc.printable import printable
+from postproc.exceptions import printable
 
 PLAIN_WIDTH = 200  # of a table that goes to a file or a pipe
 

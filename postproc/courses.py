@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from postproc.arrays import Floats
 from postproc.language.visits import Visits
 from postproc.motion.again import reach_again
 from postproc.motion.reach import Course, reach
@@ -14,8 +14,6 @@ from postproc.motion.standing import NOWHERE, Standing
 from postproc.motion.targets import Targets
 from postproc.resolve import moved_targets
 from postproc.robot.cell import Cell
-
-Array = NDArray[np.float64]
 
 
 class Courses:
@@ -37,7 +35,7 @@ class Courses:
         """Return where the last course leaves the arm; nowhere before the first."""
         return NOWHERE if self._last is None else self._last.end
 
-    def after(self, values: Array, begin: Standing) -> Course:
+    def after(self, values: Floats, begin: Standing) -> Course:
         """Find where the program leads with other numbers.
 
         Args:

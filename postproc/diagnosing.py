@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from postproc.accuracy.diagnosis.diagnose import Extension, diagnose
 from postproc.accuracy.diagnosis.result import Diagnosis
@@ -19,13 +18,12 @@ from postproc.accuracy.error_statistics import ErrorStatistics
 from postproc.accuracy.measurement import Measurements, concatenate
 from postproc.accuracy.model import Model, load_model
 from postproc.accuracy.registration import register
+from postproc.arrays import Floats
 from postproc.calibrate import read_surveys, several_points
 from postproc.console import Column, table_text
 from postproc.joining import join_program
 from postproc.pose import inverse
 from postproc.robot.cell import Cell, load_cell
-
-Array = NDArray[np.float64]
 
 HISTORY = (
     Column("model", "left"),
@@ -106,7 +104,7 @@ def from_user_frame(survey: Measurements, cell: Cell) -> Measurements:
 
 def from_tracker_frame(
     survey: Measurements, cell: Cell, model: Model
-) -> tuple[Measurements, Array]:
+) -> tuple[Measurements, Floats]:
     """Convert positions from the tracker's frame, found with the model's help.
 
     A model that was fitted in the tracker's frame has probe points of its own, which

@@ -6,8 +6,8 @@ import json
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
+from postproc.arrays import Floats, Ints
 from postproc.byte_columns import (
     Column,
     beside,
@@ -21,9 +21,6 @@ from postproc.diff import Difference
 from postproc.row_columns import blocks_of, number_places, strung
 from postproc.rows import STATUSES, Rows
 from postproc.side_by_side import in_turns
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 END = b"\x01"  # behind a row; no JSON text holds it
 SIGNS = tuple(map(str, range(-1, 3)))

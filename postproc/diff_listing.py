@@ -10,6 +10,7 @@ from typing import TextIO
 import numpy as np
 from numpy.typing import NDArray
 
+from postproc.arrays import Ints
 from postproc.byte_columns import Column as Bytes
 from postproc.byte_columns import blanked, fixed, named, repeated, whole
 from postproc.compared import VARIABLES
@@ -20,8 +21,6 @@ from postproc.listing_columns import Block, print_blocks
 from postproc.row_columns import blocks_of, number_places, strung
 from postproc.rows import STATUSES, Row, Rows
 from postproc.side_by_side import in_turns
-
-Ints = NDArray[np.int64]
 
 DECIMALS = 4
 HERE = 4  # every fourth block is made where all of them are laid out

@@ -1,10 +1,22 @@
-"""One base exception; the leaves carry the place and the cure."""
+"""One base exception; its leaves carry the place and the cure."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
-from postproc.printable import printable
+# Text from outside, made safe to print.
+
+
+def printable(text: str) -> str:
+    r"""Escape control characters, so that a name cannot steer the terminal.
+
+    >>> printable("a\x1b[31m")
+    'a\\x1b[31m'
+    """
+    return "".join(c if c.isprintable() else repr(c)[1:-1] for c in text)
+
+
+# One base exception; the leaves carry the place and the cure.
 
 
 class PostprocError(Exception):

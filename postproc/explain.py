@@ -11,20 +11,14 @@ import numpy as np
 from postproc.accuracy.model import Model, load_model
 from postproc.compensate import compensate
 from postproc.console import Column
-from postproc.exceptions import ProgramError
+from postproc.exceptions import ProgramError, printable
+from postproc.files import VARIABLES, suffix_of
 from postproc.jobs import read_files
-from postproc.kinds import VARIABLES, suffix_of
 from postproc.language.visits import ELSEWHERE, START, Visits
 from postproc.listing import arrows, print_listing, status_colour
 from postproc.options import Options
-from postproc.planning import (
-    Planned,
-    plan_visits,
-    read_program,
-    with_measured_play,
-)
+from postproc.planning import Planned, plan_visits, read_program, with_measured_play
 from postproc.pose import MM
-from postproc.printable import printable
 from postproc.report import Outcome, Status
 from postproc.report_json import target_row
 from postproc.robot.cell import Cell, load_cell

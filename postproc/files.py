@@ -1,16 +1,19 @@
-"""Writing files so that nothing is ever half written."""
+"""Files as this program reads and writes them: bounded, whole, never half written."""
 
 from __future__ import annotations
 
 import errno
 import os
+import re
 import tempfile
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import IO
+from typing import IO, BinaryIO
 
-from postproc.exceptions import DiskFullError, OutputError
+from postproc.exceptions import DiskFullError, OutputError, ProgramError
+
+# Writing files so that nothing is ever half written.
 
 TEMPORARY = ".postproc-tmp"  # end of the names of files that are being written
 Content = bytes | Iterable[bytes]  # of a file, whole or in pieces
@@ -152,3 +155,73 @@ def _reason(exc: OSError) -> str:
     if isinstance(exc, PermissionError) or exc.errno == errno.EROFS:
         return "the folder is read-only"
     return f"cannot be written ({exc.strerror})"
+
+
+# Kinds of files in a tree of programs, told by their names and contents.
+
+PROGRAM, VARIABLES, COMPILED = ".pdl", ".lsv", (".cod", ".var")
+LARGEST = 500_000_000  # bytes of a program or variable file; a longer one is neither
+
+_TARGETS = re.compile(
+    rb"^[ \t]*\w+[ \t]+A?(?:POS|XTND|JNTP|PATH)\b", re.IGNORECASE | re.MULTILINE
+)
+
+
+def suffix_of(place: str) -> str:
+    """Return a path's suffix in lower case.
+
+    >>> suffix_of("a/JOB.PDL")
+    '.pdl'
+    """
+    return os.path.splitext(place)[1].lower()
+
+
+def base_of(place: str) -> str:
+    """Return a file's name without folder and suffix, in lower case.
+
+    >>> base_of("a/JOB.PDL")
+    'job'
+    """
+    return os.path.splitext(place.rpartition("/")[2])[0].lower()
+
+
+def holds_targets(data: bytes) -> bool:
+    r"""Tell whether a variable file holds positions.
+
+    >>> holds_targets(b"p1 POS Priv\n X: 1 ..")
+    True
+    """
+    return _TARGETS.search(data) is not None
+
+
+# Reading files and streams that somebody else has made.
+
+
+def read_input(path: Path, cure: str = "Check the path") -> bytes:
+    """Read a program, a variable file or a record.
+
+    Args:
+        path: The file.
+        cure: What to do where it cannot be read.
+
+    Raises:
+        ProgramError: It cannot be read, or is too long.
+    """
+    try:
+        with path.open("rb") as stream:
+            return read_stream(stream, path)
+    except OSError as exc:
+        problem = f"cannot be read ({exc.strerror})"
+        raise ProgramError(path, problem, cure) from None
+
+
+def read_stream(stream: BinaryIO, name: str | Path) -> bytes:
+    """Read a stream to its end.
+
+    Raises:
+        ProgramError: It is too long: no more than its beginning has been read then.
+    """
+    data = stream.read(LARGEST + 1)
+    if len(data) > LARGEST:
+        raise ProgramError(name, f"is longer than {LARGEST} bytes", "Is it a program?")
+    return data

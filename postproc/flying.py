@@ -3,23 +3,19 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from postproc.arrays import Floats, Ints
 from postproc.language.diagnostic import Diagnostic
 from postproc.language.visits import FlyTrajectory, FlyType, Motion, Visits
 from postproc.motion.targets import Fly
 from postproc.pose import MM
-
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
-Bools = NDArray[np.bool_]
 
 USUAL_DISTANCE = 5.0  # [mm] where $FLY_DIST is not set, as simulation systems take it
 USUAL_OVERLAP = 100.0  # [%] where $FLY_PER is not set
 FAR = 0.1  # [mm] passing a point farther away than this is worth a note
 
 
-def rounding_of(visits: Visits) -> tuple[Ints, Array, Array]:
+def rounding_of(visits: Visits) -> tuple[Ints, Floats, Floats]:
     """Tell how fly points are rounded: `Fly`, distances [m] and overlaps, (n,) each."""
     cartesian = visits.fly_type == FlyType.FLY_CART
     passing = cartesian & (visits.fly_traj == FlyTrajectory.FLY_PASS)
@@ -31,7 +27,7 @@ def rounding_of(visits: Visits) -> tuple[Ints, Array, Array]:
     return rounding, np.maximum(distance, 0.0), np.clip(overlap, 0.0, 1.0)
 
 
-def rounded_points(visits: Visits, away: Array) -> list[Diagnostic]:
+def rounded_points(visits: Visits, away: Floats) -> list[Diagnostic]:
     """Say once how far the path passes rounded fly points, and what was assumed.
 
     Args:

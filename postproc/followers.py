@@ -3,14 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from postproc.arrays import Bools, Floats, Ints
 from postproc.language.visits import Target, Visits
 from postproc.reconcile import Agreement
-
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
-Bools = NDArray[np.bool_]
 
 
 def followers(visits: Visits, agreement: Agreement) -> tuple[Ints, Ints]:
@@ -22,7 +18,7 @@ def followers(visits: Visits, agreement: Agreement) -> tuple[Ints, Ints]:
 def worsened(
     visits: Visits,
     agreement: Agreement,
-    change_mm: Array,
+    change_mm: Floats,
     trusted: Bools,
     agree_mm: float,
 ) -> Bools:
@@ -52,7 +48,7 @@ def worsened(
 
 
 def carry_along(
-    visits: Visits, agreement: Agreement, chosen: Bools, values: Array
+    visits: Visits, agreement: Agreement, chosen: Bools, values: Floats
 ) -> None:
     """Move the computed targets along with the literals that change, in place.
 

@@ -8,14 +8,20 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from postproc.accuracy.model import Model, load_model
+from postproc.arrays import Each
 from postproc.clock import Progress, silent
 from postproc.compensate import compensate, name_files
-from postproc.files import STREAM, Content, check_places, write_all
-from postproc.inputs import read_input, read_stream
+from postproc.files import (
+    STREAM,
+    Content,
+    check_places,
+    read_input,
+    read_stream,
+    write_all,
+)
 from postproc.language.diagnostic import Diagnostic
 from postproc.options import Options
 from postproc.page_files import Pages, find_pages
-from postproc.pieces import Each
 from postproc.planning import VARIABLES
 from postproc.report import Outcome
 from postproc.report_json import report_pieces

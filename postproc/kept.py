@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, fields
 
 import numpy as np
-from numpy.typing import NDArray
 
 from postproc.accuracy.model import Model
+from postproc.arrays import Bools, Floats, Ints
 from postproc.language.edits import Replacements
 from postproc.language.visits import Visits
 from postproc.planning import Planned
@@ -18,10 +18,6 @@ from postproc.robot.cell import Cell
 from postproc.robot.state import States
 from postproc.settling import Corrected
 from postproc.strings import overruled
-
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
-Bools = NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
@@ -45,10 +41,10 @@ class Kept:
     edits: tuple[Replacements, ...]
     decisions: Decisions
     corrected: Bools
-    before: Array
-    after: Array
-    position: Array
-    away: Array
+    before: Floats
+    after: Floats
+    position: Floats
+    away: Floats
     overruled: Bools
     untimed: Bools
 

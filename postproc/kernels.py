@@ -17,9 +17,8 @@ from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from postproc.arrays import Floats
 
 SOURCES = "696b5005c3b0b83e"  # hash of the kernels that belong to these modules
 SWITCH = "POSTPROC_KERNELS"  # environment variable: `numpy` leaves the kernels alone
@@ -54,7 +53,7 @@ def _guarded(function: Callable[..., Any]) -> Callable[..., Any]:
     return call
 
 
-def floats(rows: Array) -> Array:
+def floats(rows: Floats) -> Floats:
     """Return numbers as the kernels take them."""
     return np.ascontiguousarray(rows, dtype=float)
 

@@ -9,7 +9,7 @@ from itertools import chain, islice
 from typing import TextIO
 
 from postproc.console import Column
-from postproc.printable import printable
+from postproc.exceptions import printable
 
 MEASURED = 1000  # rows that the widths of the columns are taken from
 BATCH = 500  # lines that are written at a time

@@ -14,15 +14,13 @@ from itertools import chain
 from typing import TextIO
 
 import numpy as np
-from numpy.typing import NDArray
 
+from postproc.arrays import Ints
 from postproc.byte_columns import Column as Bytes
 from postproc.byte_columns import joined
 from postproc.console import Column
+from postproc.exceptions import printable
 from postproc.listing import GAP, MEASURED, Colours, is_coloured, paint
-from postproc.printable import printable
-
-Ints = NDArray[np.int64]
 
 
 @dataclass(frozen=True)

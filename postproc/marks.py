@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
+from postproc.arrays import Bools, Floats
 from postproc.followers import worsened
 from postproc.language.visits import NO_TARGET, Target, Visits
 from postproc.options import Options
@@ -15,12 +15,9 @@ from postproc.reasons import Reasons
 from postproc.reconcile import Agreement
 from postproc.robot.cell import Cell
 
-Array = NDArray[np.float64]
-Bools = NDArray[np.bool_]
-
 
 def must_stay(
-    visits: Visits, agreement: Agreement, change: Array, trusted: Bools, cell: Cell
+    visits: Visits, agreement: Agreement, change: Floats, trusted: Bools, cell: Cell
 ) -> dict[str, Bools]:
     """Find literals that must keep their values for what else depends on them.
 

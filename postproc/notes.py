@@ -3,17 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from postproc.arrays import Bools, Floats, in_pieces
 from postproc.language.diagnostic import Diagnostic
 from postproc.language.visits import NO_VALUE, Target, Visits
-from postproc.pieces import in_pieces
 from postproc.pose import MM
 from postproc.robot.arm import Arm
 from postproc.robot.cell import Cell
-
-Array = NDArray[np.float64]
-Bools = NDArray[np.bool_]
 
 SURE = 0.9  # part of its play from its middle at which a joint rests on a flank
 LISTED = 0.01  # [mm] and [deg], the last decimal of the controller's own listing
@@ -73,7 +69,7 @@ def untimed_runs(visits: Visits, rows: Bools) -> list[Diagnostic]:
 
 
 def listing_cost(
-    visits: Visits, corrected: Bools, q: Array, arm: Arm
+    visits: Visits, corrected: Bools, q: Floats, arm: Arm
 ) -> list[Diagnostic]:
     """Say what is lost when the controller lists corrected values with its 2 decimals.
 
@@ -115,12 +111,12 @@ def listing_cost(
     ]
 
 
-def _tool(visits: Visits, rows: Bools) -> Array:
+def _tool(visits: Visits, rows: Bools) -> Floats:
     """Return the TCP in the flange frame at some visits, (k, 3) [m]."""
     return np.asarray(visits.frames[visits.tool[rows], :3] * MM)
 
 
-def _reach(arm: Arm, q: Array, tool: Array) -> float:
+def _reach(arm: Arm, q: Floats, tool: Floats) -> float:
     """Return how far the TCP moves at most if all joints turn a little [m/rad]."""
     J = arm.jacobian(q, tool)[:, :3]
     return float(np.linalg.norm(J, axis=1).sum(axis=1).max())
@@ -138,7 +134,7 @@ def _each(visits: Visits, rows: Bools, code: str, text: str) -> list[Diagnostic]
 
 
 def unsure_sides(
-    visits: Visits, corrected: Bools, side: Array, std_error: Array
+    visits: Visits, corrected: Bools, side: Floats, std_error: Floats
 ) -> list[Diagnostic]:
     """List the corrected targets that a joint reaches from a side that is not sure.
 
@@ -178,13 +174,13 @@ def unsure_sides(
 CODE = "side-not-sure"
 
 
-def _how(side: Array) -> str:
+def _how(side: Floats) -> str:
     """Say why the side is not sure."""
     if not side.any():
         return "reached from a place that the program does not tell"
     return f"reached soon after axis {_axes(side)} turned"
 
 
-def _axes(side: Array) -> str:
+def _axes(side: Floats) -> str:
     """Name the axes whose side is not known."""
     return ", ".join(str(j + 1) for j in np.flatnonzero(np.abs(side) < SURE))

@@ -13,8 +13,8 @@ from dataclasses import dataclass, replace
 from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 
+from postproc.arrays import Bools, Bytes, Floats, Ints
 from postproc.language.masking import in_code, line_of, quotes_and_comments
 from postproc.language.plain_numbers import (
     Plain,
@@ -24,11 +24,6 @@ from postproc.language.plain_numbers import (
     values,
     with_signs,
 )
-
-Bytes = NDArray[np.uint8]
-Bools = NDArray[np.bool_]
-Ints = NDArray[np.int64]
-Floats = NDArray[np.float64]
 
 LONGEST = 24  # digits outside of numbers that are compared; longer: not told alike
 

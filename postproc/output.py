@@ -5,19 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
-import numpy as np
-from numpy.typing import NDArray
-
 from postproc import __version__
+from postproc.arrays import Floats, Ints
 from postproc.language.edits import Edit, Replacements, Span
 from postproc.language.rewrite import edits as number_edits
 from postproc.language.source import Source, apply, compose
 from postproc.language.stamp import stamp_line
 from postproc.planning import Reading
 from postproc.sidecar import FileRecord, Sidecar, block_checksums, sha256
-
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 
 @dataclass(frozen=True)
@@ -65,7 +60,7 @@ class Output:
 
 
 def write_numbers(
-    reading: Reading, literals: Ints, values: Array, model: str
+    reading: Reading, literals: Ints, values: Floats, model: str
 ) -> Output:
     """Write new numbers into a program's files.
 

@@ -6,34 +6,32 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from postproc.accuracy.lost_motion import measured_play
 from postproc.accuracy.model import Model
 from postproc.arcs import mark_arcs
+from postproc.arrays import Each, Floats, Ints
 from postproc.exceptions import ProgramError
 from postproc.language.diagnostic import Diagnostic
-from postproc.language.flow import Start, resolve
+from postproc.language.edits import Edit
+from postproc.language.flow import resolve
 from postproc.language.lsv import Variables, read_variables
+from postproc.language.program import Program
 from postproc.language.reached import never_reached
 from postproc.language.skeleton import Skeleton
-from postproc.language.source import Edit, Source, source_from_bytes
-from postproc.language.structure import Program, parse
+from postproc.language.source import Source, source_from_bytes
+from postproc.language.structure import parse
 from postproc.language.visits import Visits
-from postproc.language.world import base_name
+from postproc.language.world import Start, base_name
 from postproc.motion.planner import Plan, plan
 from postproc.motion.standing import NOWHERE, Standing
 from postproc.motion.targets import Targets
-from postproc.pieces import Each
 from postproc.reasons import Reasons
 from postproc.resolve import targets_from_visits
 from postproc.robot.cell import Cell
 from postproc.robot.state import States, make_states
 from postproc.strings import mark_strings
 from postproc.turning import mark_turning
-
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 VARIABLES = ".lsv"  # suffix of variable files
 
@@ -91,10 +89,10 @@ class Planned:
     targets: Targets
     plan: Plan
     reasons: Reasons
-    shift: Array
+    shift: Floats
     doubtful: bool = False
 
-    def wanted(self, rows: Ints) -> Array:
+    def wanted(self, rows: Ints) -> Floats:
         """Return the TCP poses that should be reached at visits, (k, 4, 4) [m]."""
         poses = self.plan.tcp[rows]
         poses[:, :3, 3] += self.shift[rows]

@@ -8,16 +8,14 @@ from typing import Any
 import numpy as np
 from matplotlib import rc_context
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
 from postproc.accuracy.comparison import Comparison
 from postproc.accuracy.diagnosis.diagnose import Extension
 from postproc.accuracy.diagnosis.locate import Profile, periodogram, profile
 from postproc.accuracy.diagnosis.projection import Projection
+from postproc.arrays import Floats
 from postproc.exceptions import OutputError
 from postproc.pose import MM
-
-Array = NDArray[np.float64]
 
 BEFORE, AFTER = "#d55e00", "#0072b2"  # told apart by all kinds of colour vision
 SPAN = "#767676"
@@ -158,7 +156,7 @@ def _figure(x: str, y: str) -> tuple[Figure, Any]:
     return figure, axes
 
 
-def _running_median(values: Array) -> Array:
+def _running_median(values: Floats) -> Floats:
     """Smooth values in their order, (n,)."""
     half = SMOOTHED // 2
     padded = np.pad(values, half, mode="edge")

@@ -6,10 +6,9 @@ import re
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
-from postproc.exceptions import FileError
+from postproc.exceptions import FileError, printable
 from postproc.language.source import Source
 from postproc.language.visits import Visits
-from postproc.printable import printable
 from postproc.report import Outcome
 
 WIDTH = 96  # characters of a line that are shown

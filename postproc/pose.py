@@ -9,20 +9,16 @@ language needs it to compose frames, the robot to place them.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from postproc.arrays import Bools, Floats, Ints
 from postproc.kernels import floats, native
-
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
-Bools = NDArray[np.bool_]
 
 MM = 1e-3  # [m]
 SAME_ROTATION = 1e-10  # elements of a matrix that differ less are the same
 SMALL = 1e-3  # [rad] below which a series stands for a quotient of two small numbers
 
 
-def rotation_from_zyz(zyz_deg: Array) -> Array:
+def rotation_from_zyz(zyz_deg: Floats) -> Floats:
     """Convert Euler ZYZ angles (..., 3) [deg] to rotations (..., 3, 3).
 
     >>> np.round(rotation_from_zyz(np.array([90.0, 0.0, 0.0])) @ [1, 0, 0], 12).tolist()
@@ -40,7 +36,7 @@ def rotation_from_zyz(zyz_deg: Array) -> Array:
     return R
 
 
-def zyz_from_rotation(R: Array) -> Array:
+def zyz_from_rotation(R: Floats) -> Floats:
     """Convert rotations (..., 3, 3) to Euler ZYZ angles (..., 3) [deg].
 
     e lies in [0, 180]; where it is 0 or 180 the split is free and a = 0.
@@ -51,11 +47,11 @@ def zyz_from_rotation(R: Array) -> Array:
     a = np.where(degenerate, 0.0, np.arctan2(R[..., 1, 2], R[..., 0, 2]))
     upright = np.arctan2(R[..., 1, 0], R[..., 1, 1])
     r = np.where(degenerate, upright, np.arctan2(R[..., 2, 1], -R[..., 2, 0]))
-    zyz: Array = np.rad2deg(np.stack([a, e, r], axis=-1))
+    zyz: Floats = np.rad2deg(np.stack([a, e, r], axis=-1))
     return zyz
 
 
-def angles_near(zyz_deg: Array, R: Array) -> Array:
+def angles_near(zyz_deg: Floats, R: Floats) -> Floats:
     """Convert rotations (n, 3, 3) to the Euler ZYZ angles next to given ones, (n, 3).
 
     (a, e, r) and (a + 180, -e, r + 180) are one rotation, and full turns change none;
@@ -73,11 +69,11 @@ def angles_near(zyz_deg: Array, R: Array) -> Array:
     return out
 
 
-def pose_from_record(record: Array) -> Array:
+def pose_from_record(record: Floats) -> Floats:
     """Convert position records (..., 6) [mm, deg] to poses (..., 4, 4) [m]."""
     record = np.asarray(record, dtype=float)
     if native is not None and record.ndim == 2:
-        poses: Array = native.pose_from_record(floats(record))
+        poses: Floats = native.pose_from_record(floats(record))
         return poses
     T = np.zeros((*record.shape[:-1], 4, 4))
     T[..., :3, :3] = rotation_from_zyz(record[..., 3:])
@@ -86,17 +82,17 @@ def pose_from_record(record: Array) -> Array:
     return T
 
 
-def record_from_pose(T: Array) -> Array:
+def record_from_pose(T: Floats) -> Floats:
     """Convert poses (..., 4, 4) [m] to position records (..., 6) [mm, deg]."""
     angles = zyz_from_rotation(T[..., :3, :3])
-    record: Array = np.concatenate([T[..., :3, 3] / MM, angles], axis=-1)
+    record: Floats = np.concatenate([T[..., :3, 3] / MM, angles], axis=-1)
     return record
 
 
-def inverse(T: Array) -> Array:
+def inverse(T: Floats) -> Floats:
     """Invert poses (..., 4, 4)."""
     if native is not None and T.ndim == 3:
-        inverted: Array = native.inverse(floats(T))
+        inverted: Floats = native.inverse(floats(T))
         return inverted
     out = np.zeros_like(T)
     Rt = np.swapaxes(T[..., :3, :3], -1, -2)
@@ -106,15 +102,15 @@ def inverse(T: Array) -> Array:
     return out
 
 
-def times(left: Array, right: Array) -> Array:
+def times(left: Floats, right: Floats) -> Floats:
     """Multiply poses (n, 4, 4) with others, (n, 4, 4)."""
     if native is not None:
-        multiplied: Array = native.times(floats(left), floats(right))
+        multiplied: Floats = native.times(floats(left), floats(right))
         return multiplied
     return np.asarray(left @ right)
 
 
-def products(left: Array, right: Array, i: Ints, j: Ints) -> Array:
+def products(left: Floats, right: Floats, i: Ints, j: Ints) -> Floats:
     """Multiply some of few poses with each other, every pair once.
 
     Args:
@@ -135,12 +131,12 @@ def products(left: Array, right: Array, i: Ints, j: Ints) -> Array:
     return np.asarray((left[used // count] @ right[used % count])[which])
 
 
-def is_unknown(T: Array) -> Bools:
+def is_unknown(T: Floats) -> Bools:
     """Tell which poses (n, 4, 4) hold a number that is not known, (n,)."""
     return np.asarray(np.isnan(np.einsum("nij->n", T)))
 
 
-def cross(a: Array, b: Array) -> Array:
+def cross(a: Floats, b: Floats) -> Floats:
     """Return the cross products of vectors (..., 3) with others that broadcast.
 
     What `numpy.cross` does for any axes takes ten times as long for a hundred vectors.
@@ -154,7 +150,7 @@ def cross(a: Array, b: Array) -> Array:
     return out
 
 
-def rotation_from_vector(vector: Array) -> Array:
+def rotation_from_vector(vector: Floats) -> Floats:
     """Return the rotations (..., 3, 3) about vectors (..., 3) [rad].
 
     As in scipy, which takes longer to load than a small program to compensate.
@@ -176,7 +172,7 @@ def rotation_from_vector(vector: Array) -> Array:
     return R
 
 
-def lengths(vectors: Array) -> Array:
+def lengths(vectors: Floats) -> Floats:
     """Return the lengths of vectors (n, 3), (n,).
 
     What `numpy.linalg.norm` does along an axis of three takes three times as long.
@@ -185,18 +181,18 @@ def lengths(vectors: Array) -> Array:
     return np.asarray(np.sqrt(x * x + y * y + z * z))
 
 
-def has_unknown(rows: Array) -> Bools:
+def has_unknown(rows: Floats) -> Bools:
     """Tell which rows of finite numbers (n, k) hold one that is not known, (n,)."""
     return np.asarray(np.isnan(np.einsum("nk->n", rows)))
 
 
-def rotation_vector(R: Array) -> Array:
+def rotation_vector(R: Floats) -> Floats:
     """Return the rotation vectors (..., 3) [rad] of rotations (..., 3, 3).
 
     Lengths are in [0, pi].
     """
     if native is not None and R.ndim == 3:
-        vectors: Array = native.rotation_vector(floats(R))
+        vectors: Floats = native.rotation_vector(floats(R))
         return vectors
     q = _quaternion(R.reshape(-1, 3, 3))
     x, y, z, w = np.where(q[3] < 0, -q, q)
@@ -207,7 +203,7 @@ def rotation_vector(R: Array) -> Array:
     return np.stack([scale * x, scale * y, scale * z], axis=1).reshape(R.shape[:-1])
 
 
-def _quaternion(R: Array) -> Array:
+def _quaternion(R: Floats) -> Floats:
     """Return the unit quaternions x, y, z, w of rotations (n, 3, 3), (4, n).
 
     Each is taken from that of four formulas whose divisor is the largest.

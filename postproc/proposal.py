@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from postproc.accuracy.guard import guard_size, guard_solutions, guard_steps, guard_turn
 from postproc.arcs import STRAYS
+from postproc.arrays import Bools, Floats, Ints
 from postproc.carried import strayed_along
 from postproc.followers import carry_along
 from postproc.marks import mark_disagreement, mark_display, mark_unchanged, must_stay
@@ -20,10 +20,6 @@ from postproc.report import Decisions, Status
 from postproc.robot.cell import Cell
 from postproc.solved import Solved
 from postproc.written import change_mm, new_numbers, turns_in_file
-
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
-Bools = NDArray[np.bool_]
 
 LEVER_MM = 100.0  # from the TCP, by which turns count where arrivals must agree
 NONE = np.empty((0, 3))
@@ -47,11 +43,11 @@ class Proposal:
     """
 
     edited: Ints
-    values: Array
+    values: Floats
     corrected: Bools
     decisions: Decisions
     usable: Bools
-    change_mm: Array
+    change_mm: Floats
     fixed: Ints
 
 
@@ -59,7 +55,7 @@ def propose(
     reading: Reading,
     planned: Planned,
     solved: Solved,
-    aside: Array,
+    aside: Floats,
     held: Bools,
     cell: Cell,
     options: Options,
@@ -89,7 +85,7 @@ def decide(
     reading: Reading,
     planned: Planned,
     solved: Solved,
-    aside: Array,
+    aside: Floats,
     held: Bools,
     strays: Bools,
     cell: Cell,

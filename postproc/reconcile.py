@@ -5,11 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
-Bools = NDArray[np.bool_]
+from postproc.arrays import Bools, Floats, Ints
 
 
 @dataclass(frozen=True)
@@ -30,14 +27,14 @@ class Agreement:
     literal: Ints
     group: Ints
     usable: Bools
-    spread_mm: Array
-    values: Array
-    change_mm: Array
+    spread_mm: Floats
+    values: Floats
+    change_mm: Floats
     arrivals: Ints
 
 
 def agree(
-    literal: Ints, usable: Bools, corrected: Array, correction_mm: Array
+    literal: Ints, usable: Bools, corrected: Floats, correction_mm: Floats
 ) -> Agreement:
     """Compare the corrections of all arrivals at every literal.
 

@@ -7,17 +7,13 @@ from dataclasses import dataclass, field, fields, replace
 from enum import IntEnum
 
 import numpy as np
-from numpy.typing import NDArray
 
 from postproc.accuracy.error_statistics import ErrorStatistics
+from postproc.arrays import Floats, Ints, Signs
 from postproc.language.diagnostic import Diagnostic
 from postproc.language.reached import NEVER_REACHED
 from postproc.language.visits import Visits
 from postproc.sidecar import Sidecar
-
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
-Signs = NDArray[np.int8]
 
 DONE, NOT_ALL, FAILED = 0, 1, 2  # exit codes
 
@@ -53,13 +49,13 @@ class Decisions:
     status: Ints
     why: Ints
     reasons: tuple[str, ...]
-    q: Array
+    q: Floats
     direction: Signs
-    side: Array
-    corrected: Array
-    correction: Array
-    std_error: Array
-    turn: Array = field(default_factory=lambda: np.empty((0, 3)))
+    side: Floats
+    corrected: Floats
+    correction: Floats
+    std_error: Floats
+    turn: Floats = field(default_factory=lambda: np.empty((0, 3)))
 
     def part(self, rows: slice) -> Decisions:
         """Take the decisions for some visits."""
@@ -105,7 +101,7 @@ class Outcome:
     after: ErrorStatistics
     diagnostics: tuple[Diagnostic, ...]
     stages: Mapping[str, float] = field(default_factory=dict)
-    position: Array = field(default_factory=lambda: np.empty((0, 3)))
+    position: Floats = field(default_factory=lambda: np.empty((0, 3)))
     sources: Mapping[str, bytes] = field(default_factory=dict)
 
     @property

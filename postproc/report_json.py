@@ -9,6 +9,7 @@ from dataclasses import asdict
 import numpy as np
 from numpy.typing import NDArray
 
+from postproc.arrays import Each, Floats, Ints, pieces
 from postproc.byte_columns import (
     Column,
     beside,
@@ -22,12 +23,8 @@ from postproc.byte_columns import (
     whole,
 )
 from postproc.language.visits import Motion
-from postproc.pieces import Each, pieces
 from postproc.pose import MM
 from postproc.report import Outcome, Status
-
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 AT_ONCE = 5_000  # visits
 
@@ -126,7 +123,7 @@ def _literals(outcome: Outcome, rows: Ints) -> Column:
     return blanked(told, v.literal[rows] < 0, b"null")
 
 
-def _rounded(values: Array, decimals: int) -> Column:
+def _rounded(values: Floats, decimals: int) -> Column:
     """Write rows of numbers (k, p) for a person; what is not known becomes null."""
     return listed([fixed(values[:, k], decimals) for k in range(values.shape[1])])
 
@@ -137,7 +134,7 @@ def _signs(values: NDArray[np.int8]) -> Column:
     return listed([named(["-1", "0", "1"], column, str) for column in signs.T])
 
 
-def _as_written(values: Array, written: NDArray[np.bool_]) -> Column:
+def _as_written(values: Floats, written: NDArray[np.bool_]) -> Column:
     """Write the numbers of the file (k, 6); nothing where the file holds none."""
     told = listed([shortest(values[:, k]) for k in range(values.shape[1])])
     return blanked(told, ~written, b"[]")

@@ -10,8 +10,8 @@ import re
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from postproc.arrays import Bools, Floats, Ints
 from postproc.flying import rounding_of
 from postproc.language.visits import Target, Visits
 from postproc.motion.rounds import from_every_start
@@ -27,10 +27,6 @@ from postproc.pose import (
 )
 from postproc.reasons import Reasons
 from postproc.robot.cell import Cell
-
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
-Bools = NDArray[np.bool_]
 
 FLAG = re.compile(r"([SEW])|T([123])\s*:\s*([+-]?\d+)", re.IGNORECASE)
 JOINTS = (Target.JOINTS, Target.HOME, Target.CALIBRATION)
@@ -55,8 +51,8 @@ class Frames:
         user: User frame in the arm's base frame.
     """
 
-    tool: Array
-    user: Array
+    tool: Floats
+    user: Floats
 
 
 def targets_from_visits(visits: Visits, cell: Cell) -> tuple[Targets, Reasons]:
@@ -124,7 +120,7 @@ def moved_targets(targets: Targets, visits: Visits, cell: Cell, rows: Ints) -> T
     return targets.moved_to(rows, tcp, joints)
 
 
-def configurations(configs: tuple[str, ...]) -> tuple[Ints, Array]:
+def configurations(configs: tuple[str, ...]) -> tuple[Ints, Floats]:
     """Read configuration strings.
 
     Returns:
@@ -150,19 +146,19 @@ def _frames(visits: Visits) -> Frames:
     return Frames(few_frames(visits)[visits.tool], _user_frames(visits, ALL))
 
 
-def _user_frames(visits: Visits, rows: Rows) -> Array:
+def _user_frames(visits: Visits, rows: Rows) -> Floats:
     """Place the user frames of visits in the arm's base frame, (m, 4, 4) [m]."""
     poses = few_frames(visits)
     return products(inverse(poses), poses, visits.base[rows], visits.uframe[rows])
 
 
-def few_frames(visits: Visits) -> Array:
+def few_frames(visits: Visits) -> Floats:
     """Return the frames that the program uses, and last one that is not known."""
     unknown = np.full((1, 4, 4), np.nan)
     return np.concatenate([pose_from_record(visits.frames.reshape(-1, 6)), unknown])
 
 
-def _values(visits: Visits, cell: Cell, rows: Rows = ALL) -> Array:
+def _values(visits: Visits, cell: Cell, rows: Rows = ALL) -> Floats:
     """Fill in $HOME and $CAL_SYS where the program does not tell them."""
     values, goal = np.array(visits.values[rows]), visits.target[rows]
     untold = np.isnan(values).any(axis=1)
@@ -176,8 +172,8 @@ def _values(visits: Visits, cell: Cell, rows: Rows = ALL) -> Array:
 
 
 def _places(
-    visits: Visits, user: Array, values: Array, rows: Rows = ALL
-) -> tuple[Ints, Array, Array]:
+    visits: Visits, user: Floats, values: Floats, rows: Rows = ALL
+) -> tuple[Ints, Floats, Floats]:
     """Turn numbers into kinds, TCP poses (m, 4, 4) [m] and joints (m, 6) [rad]."""
     target = visits.target[rows]
     n = len(target)
@@ -203,14 +199,14 @@ def _places(
     return kind, tcp, joints
 
 
-def _along_approach(distance_mm: Array) -> Array:
+def _along_approach(distance_mm: Floats) -> Floats:
     """Shifts (m, 4, 4) [m] along the tool's z axis."""
     T = np.tile(np.eye(4), (len(distance_mm), 1, 1))
     T[:, 2, 3] = distance_mm * MM
     return T
 
 
-def _step(target: int, value: Array, user: Array) -> tuple[Kind, Array]:
+def _step(target: int, value: Floats, user: Floats) -> tuple[Kind, Floats]:
     """Turn one RELATIVE or ABOUT into a step of the tool or along the base axes."""
     about = target == Target.ABOUT
     frame = STEPS_IN.get(Target(int(value[4])) if about else Target(int(target)), "")
@@ -249,7 +245,7 @@ def _auxiliary(visits: Visits, cell: Cell, reasons: Reasons) -> Bools:
     return outside
 
 
-def _explain(visits: Visits, values: Array, poses: Bools, reasons: Reasons) -> None:
+def _explain(visits: Visits, values: Floats, poses: Bools, reasons: Reasons) -> None:
     """Say why visits are not compensated."""
     reasons.mark(visits.tool_remote, "$TOOL_RMT: the arm holds the part")
     reasons.mark(

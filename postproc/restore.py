@@ -5,8 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from postproc.exceptions import ProgramError
-from postproc.files import write_all
-from postproc.inputs import read_input
+from postproc.files import read_input, write_all
 from postproc.language.source import apply
 from postproc.sidecar import (
     BLOCK,

@@ -10,15 +10,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
+from postproc.arrays import Ints, pieces
 from postproc.byte_columns import Column
-from postproc.pieces import pieces
 from postproc.rows import Rows
-
-Bools = NDArray[np.bool_]
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 AT_ONCE = 5_000  # rows
 MOST = 12  # numbers of a row that is written with others

@@ -7,14 +7,10 @@ from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from postproc.arrays import Bools, Floats, Ints
 from postproc.arrivals import Arrivals
 from postproc.report import Status
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
-Bools = NDArray[np.bool_]
 
 STATUSES = tuple(Status(k).name.lower() for k in range(len(Status)))
 

@@ -6,13 +6,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import fields, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from postproc.language.source import Edit, Source
+from postproc.arrays import Ints
+from postproc.language.edits import Edit
+from postproc.language.source import Source
 from postproc.language.visits import Visits
 from postproc.planning import Reading
-
-Ints = NDArray[np.int64]
 
 _APART = frozenset(
     "line config configs literal literals follows name names reason reasons".split()

@@ -6,10 +6,10 @@ from dataclasses import dataclass, replace
 from itertools import count
 
 import numpy as np
-from numpy.typing import NDArray
 
 from postproc.accuracy.model import Model
 from postproc.aiming import Aim, Aiming
+from postproc.arrays import Bools, Floats
 from postproc.as_read import numbers_as_read
 from postproc.clock import Clock
 from postproc.courses import Courses
@@ -24,9 +24,6 @@ from postproc.robot.cell import Cell
 from postproc.robot.state import States
 from postproc.side_search import SideSearch
 from postproc.solved import std_errors
-
-Array = NDArray[np.float64]
-Bools = NDArray[np.bool_]
 
 ROUNDS = 8  # of correcting for changed sides, before targets are settled for
 SAME = 0.01  # sides closer than this are the same
@@ -46,7 +43,7 @@ class Left:
 
     looked: Standing
     written: Standing
-    wanted: Array
+    wanted: Floats
 
 
 AT_START = Left(NOWHERE, NOWHERE, np.empty((0, 3)))

@@ -6,11 +6,10 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from postproc.arrays import Floats
 
-Box = Mapping[int, tuple[Array, Array]]
+Box = Mapping[int, tuple[Floats, Floats]]
 
 
 @dataclass(frozen=True)
@@ -40,7 +39,7 @@ class Arrivals:
 
     stop: Stop
     variable: str
-    changes: Mapping[int, Array]
+    changes: Mapping[int, Floats]
     usable: bool
 
     def box(self) -> Box:
@@ -64,7 +63,7 @@ class Group:
 
     variable: str
     stops: list[Stop] = field(default_factory=list)
-    bounds: dict[int, tuple[Array, Array]] = field(default_factory=dict)
+    bounds: dict[int, tuple[Floats, Floats]] = field(default_factory=dict)
 
     def take(self, arrivals: Arrivals, agree_mm: float) -> bool:
         """Take in a stop that agrees with those at hand; tell whether it does."""
@@ -111,7 +110,7 @@ def regroup(
     return (original, *groups)
 
 
-def _union(a: Box, b: Box) -> dict[int, tuple[Array, Array]]:
+def _union(a: Box, b: Box) -> dict[int, tuple[Floats, Floats]]:
     box = dict(a)
     for key, (low, high) in b.items():
         if key in box:

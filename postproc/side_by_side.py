@@ -9,8 +9,8 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import TypeVar
 
+from postproc.arrays import Each
 from postproc.forked import available, in_child
-from postproc.pieces import Each
 
 K = TypeVar("K")
 T = TypeVar("T")

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
-Bools = NDArray[np.bool_]
+from postproc.arrays import Bools, Floats
 
 LEAST_SHIFT = 1e-3  # change of an aim that tells how the arrival follows it
 FOLLOWS = 0.75  # gain above which the arrival runs away with the aim
@@ -25,12 +23,12 @@ class SideSearch:
 
     def __init__(self) -> None:
         """Start without a history."""
-        self._aim: Array | None = None
-        self._found: Array | None = None
+        self._aim: Floats | None = None
+        self._found: Floats | None = None
         self._rounds = 0
         self._flanked: Bools = np.zeros((1, 1), dtype=bool)
 
-    def next_aim(self, aim: Array, found: Array) -> Array:
+    def next_aim(self, aim: Floats, found: Floats) -> Floats:
         """Give the sides to aim for next, (n, 6).
 
         Args:
@@ -46,7 +44,7 @@ class SideSearch:
         self._rounds += 1
         return np.clip(aim + step, -1.0, 1.0)
 
-    def _secant(self, step: Array, shift: Array, answer: Array) -> Array:
+    def _secant(self, step: Floats, shift: Floats, answer: Floats) -> Floats:
         """Scale steps by how arrivals answered the last shift of their aims."""
         known = np.abs(shift) > LEAST_SHIFT
         gain = answer / np.where(known, shift, np.inf)

@@ -13,12 +13,12 @@ from typing import Any, Self
 
 import numpy as np
 
+from postproc.arrays import Each
 from postproc.byte_columns import joined, shortest, whole
 from postproc.exceptions import ProgramError
-from postproc.inputs import read_input
+from postproc.files import read_input
 from postproc.language.edits import Replacements, as_bytes
 from postproc.language.source import Source
-from postproc.pieces import Each
 
 SUFFIX = ".postproc.json"
 EDITS, TARGETS = b'"edits": [', b'], "targets": {'

@@ -6,7 +6,6 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from postproc.accuracy.model import UNSURE, Model
 from postproc.accuracy.orientation import (
@@ -15,14 +14,11 @@ from postproc.accuracy.orientation import (
     unsure_turn,
 )
 from postproc.accuracy.solve import solve
+from postproc.arrays import Bools, Floats, Ints
 from postproc.planning import Planned
 from postproc.pose import has_unknown, is_unknown, rotation_vector
 from postproc.robot.cell import Cell
 from postproc.robot.state import States
-
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
-Bools = NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
@@ -42,12 +38,12 @@ class Solved:
     """
 
     known: Bools
-    direction: Array
-    q: Array
-    command: Array
-    turn: Array
-    residual: Array
-    std_error: Array
+    direction: Floats
+    q: Floats
+    command: Floats
+    turn: Floats
+    residual: Floats
+    std_error: Floats
     outside: dict[str, Bools]
 
     @cached_property
@@ -139,7 +135,7 @@ def solve_again(
     return out
 
 
-def std_errors(model: Model, cell: Cell, states: States, solved: Solved) -> Array:
+def std_errors(model: Model, cell: Cell, states: States, solved: Solved) -> Floats:
     """Standard errors of the errors that visits are corrected for, per axis.
 
     They are many times as costly as the errors: what solving has asked for is kept, the
@@ -155,7 +151,7 @@ def std_errors(model: Model, cell: Cell, states: States, solved: Solved) -> Arra
     return out
 
 
-def _turns(new: Array, old: Array) -> Array:
+def _turns(new: Floats, old: Floats) -> Floats:
     """Return the rotation from old poses to new ones (n, 4, 4), (n, 3) [rad]."""
     new, old, out = new[:, :3, :3], old[:, :3, :3], np.zeros((len(new), 3))
     rows = np.unique(np.nonzero(new != old)[0])

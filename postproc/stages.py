@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import TextIO
 
-from postproc.printable import printable
+from postproc.exceptions import printable
 
 PATIENCE = 2.0  # [s] before a person is shown what is being done
 

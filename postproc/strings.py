@@ -11,17 +11,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from postproc.arrays import Bools, Ints
 from postproc.language.visits import Switch, Visits
 from postproc.motion.branches import OTHER_TURN, nearest_turns, on_other_turns
 from postproc.motion.planner import Plan
 from postproc.motion.targets import Kind, Move, Targets
 from postproc.reasons import Reasons
 from postproc.robot.arm import Arm
-
-Ints = NDArray[np.int64]
-Bools = NDArray[np.bool_]
 
 CNFG, TURN, MULTI = 0, 1, 2  # columns of `Visits.care`
 SAID = {

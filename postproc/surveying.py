@@ -5,22 +5,19 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from postproc.accuracy.survey import design_survey
+from postproc.arrays import Floats, Ints
 from postproc.exceptions import PostprocError
 from postproc.files import write_all
 from postproc.pose import MM
 from postproc.robot.cell import Cell, load_cell
 
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
-
 BACK = np.deg2rad(2.0)  # how far to the side every approach starts [rad]
 SETTLE_MS = 1500  # pause before the tracker reads
 
 
-def survey_program(cell: Cell, q: Array, side: Array, probe: Ints, name: str) -> str:
+def survey_program(cell: Cell, q: Floats, side: Floats, probe: Ints, name: str) -> str:
     """Write a survey: every pose is reached twice, with all joints from the other side.
 
     Args:
@@ -56,7 +53,7 @@ def survey_program(cell: Cell, q: Array, side: Array, probe: Ints, name: str) ->
     return "\n".join([*lines, f"END {name}", ""])
 
 
-def _joints(q: Array) -> str:
+def _joints(q: Floats) -> str:
     """Write joint angles [rad] as a joint target."""
     return "{" + ", ".join(f"{v:.5f}" for v in np.rad2deg(q)) + "}"
 
@@ -87,7 +84,7 @@ def write_survey(
     return f"{output}: {design.summary()}"
 
 
-def _position(text: str) -> Array:
+def _position(text: str) -> Floats:
     """Read x,y,z [mm] as a position [m].
 
     Raises:

@@ -9,17 +9,15 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from postproc.accuracy.model import Model
+from postproc.arrays import Floats
 from postproc.exceptions import CellError
 from postproc.language.visits import Target, Visits
 from postproc.planning import Planned
 from postproc.pose import MM, inverse, pose_from_record
 from postproc.robot.cell import Cell
 from postproc.robot.state import make_states
-
-Array = NDArray[np.float64]
 
 APART_MM, APART_DEG = 1.0, 0.1  # a frame of three points may differ by rounding only
 _NO_POINTS = (
@@ -70,8 +68,8 @@ def correct_taught(
 
 
 def moved_frame(
-    joints: Array, record: tuple[float, ...], cell: Cell, model: Model
-) -> tuple[Array, bool]:
+    joints: Floats, record: tuple[float, ...], cell: Cell, model: Model
+) -> tuple[Floats, bool]:
     """Find how a taught frame differs from the one that its points really span.
 
     Args:
@@ -104,7 +102,7 @@ def moved_frame(
     return np.asarray(really @ inverse(spanned[None])[0]), inside
 
 
-def frame_of_points(points: Array) -> Array:
+def frame_of_points(points: Floats) -> Floats:
     """Return the frame (4, 4) with its origin, a point on +x and one at +y, (3, 3)."""
     x = points[1] - points[0]
     z = np.cross(x, points[2] - points[0])
@@ -115,7 +113,7 @@ def frame_of_points(points: Array) -> Array:
     return pose
 
 
-def _check(spanned: Array, frame: Array, cell: Cell) -> None:
+def _check(spanned: Floats, frame: Floats, cell: Cell) -> None:
     """Refuse joint angles that do not give the frame."""
     away = np.linalg.norm(spanned[:3, 3] - frame[:3, 3]) / MM
     cosine = (np.trace(spanned[:3, :3].T @ frame[:3, :3]) - 1.0) / 2.0

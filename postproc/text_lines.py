@@ -7,11 +7,8 @@ from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 
-from postproc.pieces import pieces
-
-Ints = NDArray[np.int64]
+from postproc.arrays import Ints, pieces
 
 AT_ONCE = 1_000_000  # bytes in which line feeds are looked for
 

@@ -16,17 +16,13 @@ as RS_WORLD does.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from postproc.arrays import Bools, Floats, Ints
 from postproc.language.visits import OrntType, Visits
 from postproc.motion.planner import Plan
 from postproc.motion.targets import Move, Targets
 from postproc.pose import inverse, pose_from_record, rotation_vector
 from postproc.reasons import Reasons
-
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
-Bools = NDArray[np.bool_]
 
 PLAY = np.deg2rad(0.01)  # [rad] what a joint may be off without another side
 LEAST = 3e-4  # sine below which e is 0 or 180 deg
@@ -87,7 +83,7 @@ def _may_be_off(visits: Visits, targets: Targets, plan: Plan, rows: Bools) -> Bo
     return found
 
 
-def _sine(R: Array, kind: Ints) -> Array:
+def _sine(R: Floats, kind: Ints) -> Floats:
     """Tell how far from where three angles stop telling orientations apart, (k,).
 
     Sine of the Euler angle e, or cosine of the pitch, of orientations (k, 3, 3).

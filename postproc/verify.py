@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from postproc.arrays import Floats, Ints, pieces
 from postproc.as_read import edited_numbers
 from postproc.exceptions import PostprocError
 from postproc.language.edits import Replacements
@@ -16,12 +16,8 @@ from postproc.language.source import UTF8_MARK, Source
 from postproc.language.stamp import stamp_length
 from postproc.language.visits import Visits
 from postproc.output import Output
-from postproc.pieces import pieces
 from postproc.planning import Reading
 from postproc.side_by_side import meanwhile
-
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 SAME = 1e-6  # [mm] and [deg]: what adding constants to numbers may round off
 WORTH = 40_000  # visits from which on a second process compares the texts
@@ -113,7 +109,7 @@ def _as_meant(
     return np.array_equal(after.values[rows][direct], meant)
 
 
-def check_numbers(before: Visits, looked: Array, after: Visits) -> None:
+def check_numbers(before: Visits, looked: Floats, after: Visits) -> None:
     """Check that the output has the numbers that the last look was at.
 
     Args:
@@ -137,7 +133,7 @@ def check_numbers(before: Visits, looked: Array, after: Visits) -> None:
             raise VerificationError(f"{before.files[0]}: {problem}")
 
 
-def _equal(a: Array | tuple[str, ...], b: Array | tuple[str, ...]) -> bool:
+def _equal(a: Floats | tuple[str, ...], b: Floats | tuple[str, ...]) -> bool:
     """Compare two columns."""
     if isinstance(a, tuple) or isinstance(b, tuple):
         return a == b
@@ -146,7 +142,7 @@ def _equal(a: Array | tuple[str, ...], b: Array | tuple[str, ...]) -> bool:
     )
 
 
-def _same(a: Array, b: Array) -> bool:
+def _same(a: Floats, b: Floats) -> bool:
     """Compare some rows of two columns; NaN equals NaN."""
     return np.array_equal(a, b, equal_nan=a.dtype.kind == "f")
 

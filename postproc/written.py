@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from postproc.arrays import Floats, Ints
 from postproc.language.visits import Target, Visits
 from postproc.motion.planner import Plan
 from postproc.pose import (
@@ -18,11 +18,8 @@ from postproc.pose import (
 from postproc.resolve import few_frames
 from postproc.solved import Solved
 
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
-
-def new_numbers(visits: Visits, plan: Plan, solved: Solved, aside: Array) -> Array:
+def new_numbers(visits: Visits, plan: Plan, solved: Solved, aside: Floats) -> Floats:
     """Express commands in the numbers of the file, (n, 6).
 
     P = inverse(UFRAME) . BASE . command. A fly point is moved so that the path passes
@@ -46,7 +43,7 @@ def new_numbers(visits: Visits, plan: Plan, solved: Solved, aside: Array) -> Arr
     return numbers
 
 
-def base_in_uframe(visits: Visits, rows: Ints) -> Array:
+def base_in_uframe(visits: Visits, rows: Ints) -> Floats:
     """Return the pose of the arm's base in the user frame, (k, 4, 4) [m]."""
     if len(rows) == 0:
         return np.empty((0, 4, 4))
@@ -54,7 +51,7 @@ def base_in_uframe(visits: Visits, rows: Ints) -> Array:
     return products(inverse(frames), frames, visits.uframe[rows], visits.base[rows])
 
 
-def turns_in_file(visits: Visits, solved: Solved) -> Array:
+def turns_in_file(visits: Visits, solved: Solved) -> Floats:
     """Give the commands' rotations in the frame of the numbers, (n, 3) [rad]."""
     out = np.array(solved.turn)
     poses = solved.turned[visits.target[solved.turned] == Target.POSE]
@@ -63,7 +60,7 @@ def turns_in_file(visits: Visits, solved: Solved) -> Array:
     return out
 
 
-def change_mm(visits: Visits, numbers: Array, correction: Array) -> Array:
+def change_mm(visits: Visits, numbers: Floats, correction: Floats) -> Floats:
     """Give the change that arrivals at one literal must agree on, (n, 3) [mm].
 
     For a pose it is that of its numbers (the same literal may be reached in two user

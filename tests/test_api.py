@@ -31,7 +31,7 @@ def test_compensates_bytes(job_folder):
 
 
 def test_module_and_verb_have_one_name(job_cell, job_model):
-    from postproc import compensate
+    from postproc.compensate import compensate
     from postproc.compensate import compensate as function
 
     source = program("job", 1, 1)

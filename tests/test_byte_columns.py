@@ -5,15 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from postproc.byte_columns import (
-    blanked,
-    fixed,
-    joined,
-    listed,
-    named,
-    shortest,
-    whole,
-)
+from postproc.byte_columns import blanked, fixed, joined, listed, named, shortest, whole
 
 AWKWARD = (
     0.0, -0.0, 0.5, -0.5, 1.5, 0.125, 2.675, 1e-5, 9.9999e-5, 1e-4, -1e-12, 9999.5,

@@ -17,8 +17,9 @@ from postproc.cloning import give_own_points
 from postproc.planning import Reading, read_program
 from postproc.proposal import Proposal
 from postproc.report import Decisions, Status
+from tests.language.executed import Generated
 from tests.language.generator import Generator
-from tests.language.interpreter import Generated, Interpreter
+from tests.language.interpreter import Interpreter
 from tests.language.reread import moved
 
 PROGRAMS = 120

@@ -8,12 +8,12 @@ import threading
 from postproc.console import (
     Column,
     print_table,
-    printable,
     progress_bar,
     show_status,
     stage_bar,
     table_text,
 )
+from postproc.exceptions import printable
 from postproc.stages import stages
 
 

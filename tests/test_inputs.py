@@ -7,12 +7,12 @@ from typer.testing import CliRunner
 
 from postproc.cli import app
 from postproc.exceptions import ProgramError
-from postproc.inputs import read_input
+from postproc.files import read_input
 from tests.plant import program
 
 
 def test_reads_no_more_than_a_program_can_be(tmp_path, monkeypatch):
-    monkeypatch.setattr("postproc.inputs.LARGEST", 100)
+    monkeypatch.setattr("postproc.files.LARGEST", 100)
     place = tmp_path / "job.pdl"
     place.write_bytes(bytes(100))
     assert read_input(place) == bytes(100)
@@ -24,7 +24,7 @@ def test_reads_no_more_than_a_program_can_be(tmp_path, monkeypatch):
 
 
 def test_the_filter_reads_no_more_either(job_folder, monkeypatch):
-    monkeypatch.setattr("postproc.inputs.LARGEST", 100)
+    monkeypatch.setattr("postproc.files.LARGEST", 100)
     files = ["--cell", str(job_folder / "cell.toml")]
     files += ["--model", str(job_folder / "model.json")]
     source = program("job", 9, 1)

@@ -8,8 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-import postproc.settling as settling
-import postproc.together as together
+from postproc import settling, together
 from postproc.compensate import compensate
 from postproc.exceptions import CellError, ModelError, PostprocError, ProgramError
 from postproc.options import AS_USUAL, Options

@@ -5,13 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
-import numpy as np
-from numpy.typing import NDArray
-
 from postproc.accuracy.batch import Batch
 from postproc.accuracy.effect import JointEffect, Parameter
-
-Array = NDArray[np.float64]
+from postproc.arrays import Floats
 
 SCALE = 1e-4  # [rad] prior scale of half a backlash
 
@@ -29,7 +25,7 @@ class Backlash(JointEffect):
         """Name one b per joint."""
         return tuple(Parameter(f"b{j}", "rad", SCALE, "b", j) for j in self.joints)
 
-    def basis(self, batch: Batch) -> Array:
+    def basis(self, batch: Batch) -> Floats:
         """Evaluate lambda, (n, p)."""
-        side: Array = batch.states.direction[:, self.acts_on()]
+        side: Floats = batch.states.direction[:, self.acts_on()]
         return side

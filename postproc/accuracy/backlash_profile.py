@@ -10,11 +10,10 @@ from numpy.typing import NDArray
 
 from postproc.accuracy.batch import Batch
 from postproc.accuracy.effect import FAR, JointEffect, Parameter, fade_turns
+from postproc.arrays import Floats
 from postproc.kernels import native
 from postproc.robot.arm import Arm
 from postproc.robot.state import States
-
-Array = NDArray[np.float64]
 
 SCALE = 5e-5  # [rad]
 
@@ -57,19 +56,19 @@ class BacklashProfile(JointEffect):
                     out.append(Parameter(name, "rad", SCALE, f"order {k}", j))
         return tuple(out)
 
-    def basis(self, batch: Batch) -> Array:
+    def basis(self, batch: Batch) -> Floats:
         """Evaluate lambda times the harmonics, (n, p)."""
         joint, waves = self.acts_on(), batch.once(self, self._waves)
         flat = waves.reshape(len(joint), len(batch))
-        turned: Array = batch.states.direction.T[joint] * flat
+        turned: Floats = batch.states.direction.T[joint] * flat
         return turned.T
 
-    def angles(self, batch: Batch, p: Array) -> Array:
+    def angles(self, batch: Batch, p: Floats) -> Floats:
         """Return the joint errors (n, 6) [rad], summed joint by joint."""
         if native is not None and self.joints and self._is_ordered:
             sizes = p.reshape(len(self.joints), -1)
             states = batch.states.q, batch.states.direction
-            found: Array = native.profile(
+            found: Floats = native.profile(
                 tuple(map(np.ascontiguousarray, states)), self._turned.tolist(),
                 self.orders, self.constant, sizes, (self.lower, self.upper),
             )  # fmt: skip
@@ -96,7 +95,7 @@ class BacklashProfile(JointEffect):
             and min(self.orders, default=1) > 0
         )
 
-    def _waves(self, q: Array) -> Array:
+    def _waves(self, q: Floats) -> Floats:
         """Evaluate b0 and the harmonics of every joint, (j, m, n), as far as surveyed.
 
         Sine and cosine of k theta come from those of (k - 1) theta, which takes a

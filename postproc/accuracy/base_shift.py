@@ -6,18 +6,16 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from postproc.accuracy.batch import Batch
 from postproc.accuracy.effect import Effect, Origin, Parameter
-
-Array = NDArray[np.float64]
+from postproc.arrays import Floats
 
 SHIFT, TURN = 1e-4, 5e-5  # [m], [rad]
 AXES = "xyz"
 
 
-def rigid_columns(batch: Batch) -> Array:
+def rigid_columns(batch: Batch) -> Floats:
     """Differentiate the TCP by a shift and a turn of the base frame, (n, 3, 6)."""
     n, tcp = len(batch), batch.walk.tcp
     moved = [np.tile(np.eye(3)[k], (n, 1)) for k in range(3)]
@@ -25,7 +23,7 @@ def rigid_columns(batch: Batch) -> Array:
     return np.stack(moved, axis=2)
 
 
-def rigid_rotations(batch: Batch) -> Array:
+def rigid_rotations(batch: Batch) -> Floats:
     """Differentiate the tool's rotation by the same six motions, (n, 3, 6)."""
     turned = np.concatenate([np.zeros((3, 3)), np.eye(3)], axis=1)
     return np.tile(turned, (len(batch), 1, 1))
@@ -54,12 +52,12 @@ class BaseShift(Effect):
         turn = [Parameter(f"r{a}_row{self.row:g}", "rad", TURN, group) for a in AXES]
         return (*shift, *turn)
 
-    def columns(self, batch: Batch) -> Array:
+    def columns(self, batch: Batch) -> Floats:
         """Differentiate the TCP position, (n, 3, 6)."""
         before = (batch.states.order < self.row)[:, None, None]
         return np.where(before, -rigid_columns(batch), 0.0)
 
-    def rotation_columns(self, batch: Batch) -> Array:
+    def rotation_columns(self, batch: Batch) -> Floats:
         """Differentiate the tool's rotation, (n, 3, 6)."""
         before = (batch.states.order < self.row)[:, None, None]
         return np.where(before, -rigid_rotations(batch), 0.0)

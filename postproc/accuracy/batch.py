@@ -11,11 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from postproc.accuracy.chain import NOMINAL, Deviation, Walk, tcp, walk
+from postproc.arrays import Floats
 from postproc.pose import cross
 from postproc.robot.arm import Arm
 from postproc.robot.state import States
 
-Array = NDArray[np.float64]
 T = TypeVar("T")
 
 
@@ -27,12 +27,12 @@ class Loads:
     states: States
 
     @cached_property
-    def gravity(self) -> Array:
+    def gravity(self) -> Floats:
         """Torque of the arm's own links, (n, 6) [N m]."""
         return self.arm.gravity_torque(self.states.q)
 
     @cached_property
-    def payload(self) -> Array:
+    def payload(self) -> Floats:
         """Torque of the payload, (n, 6) [N m]; 0 where it is not known.
 
         Where no centre of mass is known, the mass is taken to sit at the TCP.
@@ -43,17 +43,17 @@ class Loads:
             return np.zeros((len(s), 6))
         com = np.where(np.isnan(s.payload_com), s.tool, s.payload_com)
         loaded = self.arm.gravity_torque(s.q, mass, com)
-        torque: Array = loaded - self.gravity
+        torque: Floats = loaded - self.gravity
         return torque
 
     @cached_property
-    def total(self) -> Array:
+    def total(self) -> Floats:
         """Torque of links and payload, (n, 6) [N m]."""
-        total: Array = self.gravity + self.payload
+        total: Floats = self.gravity + self.payload
         return total
 
     @cached_property
-    def basis(self) -> Array:
+    def basis(self) -> Floats:
         """Torque per unit of every lumped mass parameter, (n, 6, k)."""
         return self.arm.gravity_basis(self.states.q)
 
@@ -73,7 +73,7 @@ class Batch:
     arm: Arm
     states: States
     deviation: Deviation = NOMINAL
-    shift: Array | None = None
+    shift: Floats | None = None
     loads: Loads = field(init=False)
     known: dict[Hashable, Any] = field(default_factory=dict)
 
@@ -84,11 +84,11 @@ class Batch:
         """Return the number of states."""
         return len(self.states)
 
-    def moved(self, deviation: Deviation, shift: Array | None) -> Batch:
+    def moved(self, deviation: Deviation, shift: Floats | None) -> Batch:
         """Return the same states with the kinematics taken at a deviated arm."""
         return self._beside(Batch(self.arm, self.states, deviation, shift))
 
-    def arriving(self, direction: Array) -> Batch:
+    def arriving(self, direction: Floats) -> Batch:
         """Return the same poses reached from other sides, (n, 6)."""
         states = self.states.with_(direction=direction)
         return self._beside(Batch(self.arm, states, self.deviation, self.shift))
@@ -98,7 +98,7 @@ class Batch:
         batch.loads, batch.known = self.loads, self.known
         return batch
 
-    def once(self, who: Hashable, evaluate: Callable[[Array], T]) -> T:
+    def once(self, who: Hashable, evaluate: Callable[[Floats], T]) -> T:
         """Evaluate a function of the joint angles alone, once for all directions.
 
         Args:
@@ -111,7 +111,7 @@ class Batch:
         return found
 
     @property
-    def angles(self) -> Array:
+    def angles(self) -> Floats:
         """Joint angles that the kinematics are taken at, (n, 6) [rad]."""
         return self.states.q if self.shift is None else self.states.q + self.shift
 
@@ -121,7 +121,7 @@ class Batch:
         return walk(self.arm.dh, self.angles, self.states.tool, self.deviation)
 
     @cached_property
-    def tcp(self) -> Array:
+    def tcp(self) -> Floats:
         """Tool centre point along the (deviated) chain, (n, 3) [m]."""
         if "walk" in vars(self):
             return self.walk.tcp
@@ -133,20 +133,20 @@ class Batch:
         return Batch(self.arm, self.states[rows], self.deviation, shift)
 
     @cached_property
-    def jacobian(self) -> Array:
+    def jacobian(self) -> Floats:
         """Derivative of the TCP by the controller's joint angles, (n, 3, 6) [m/rad]."""
         w = self.walk
         turned = cross(w.turn, w.tcp[:, None, :] - w.pivot)
         return self._to_controller(turned)
 
     @cached_property
-    def angular(self) -> Array:
+    def angular(self) -> Floats:
         """Angular velocity of the tool by joint angle, (n, 3, 6)."""
         return self._to_controller(self.walk.turn)
 
-    def _to_controller(self, per_axis: Array) -> Array:
+    def _to_controller(self, per_axis: Floats) -> Floats:
         """Convert derivatives (n, 6, 3) by geometric angles to the controller's."""
         dh, axes = self.arm.dh, np.moveaxis(per_axis, 0, 2)
         flat = (axes * dh.sense[:, None, None]).reshape(6, -1)
-        out: Array = (dh.mix.T @ flat).reshape(axes.shape)
+        out: Floats = (dh.mix.T @ flat).reshape(axes.shape)
         return out.T

@@ -10,11 +10,9 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from postproc.arrays import Floats
 from postproc.robot.dh import DH
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -28,9 +26,9 @@ class Deviation:
         tool: Shift of the TCP in the flange frame [m], (3,).
     """
 
-    base: Array
-    link: Array
-    tool: Array
+    base: Floats
+    link: Floats
+    tool: Floats
 
 
 NOMINAL = Deviation(np.zeros(6), np.zeros((6, 5)), np.zeros(3))
@@ -51,23 +49,23 @@ class Walk:
         tcp: Tool centre point, (n, 3) [m].
     """
 
-    turn: Array
-    pivot: Array
-    link: Array
-    corner: Array
-    bend: Array
-    base_axes: Array
-    base_point: Array
-    flange: Array
-    tcp: Array
+    turn: Floats
+    pivot: Floats
+    link: Floats
+    corner: Floats
+    bend: Floats
+    base_axes: Floats
+    base_point: Floats
+    flange: Floats
+    tcp: Floats
 
 
-def _turned(a: Array, b: Array, cos: Array | float, sin: Array | float) -> tuple:  # type: ignore[type-arg]
+def _turned(a: Floats, b: Floats, cos: Floats | float, sin: Floats | float) -> tuple:  # type: ignore[type-arg]
     """Turn the orthogonal axes a towards b by an angle, about a x b."""
     return cos * a + sin * b, cos * b - sin * a
 
 
-def _base(deviation: Deviation) -> tuple[Array, Array]:
+def _base(deviation: Deviation) -> tuple[Floats, Floats]:
     """Give the base's axes as columns, and the axes of its three rotations as rows."""
     axes, about = np.eye(3), np.eye(3)
     for k in range(3):
@@ -80,7 +78,7 @@ def _base(deviation: Deviation) -> tuple[Array, Array]:
     return axes, about
 
 
-def base_of(deviation: Deviation) -> Array:
+def base_of(deviation: Deviation) -> Floats:
     """Give the base's axes, the axes of its three rotations and its point, (7, 3)."""
     axes, about = _base(deviation)
     return np.concatenate([axes.T, about, deviation.base[None, :3]])
@@ -94,7 +92,7 @@ def deviated(dh: DH, deviation: Deviation) -> DH:
     )
 
 
-def walk(dh: DH, q: Array, tool: Array, deviation: Deviation = NOMINAL) -> Walk:
+def walk(dh: DH, q: Floats, tool: Floats, deviation: Deviation = NOMINAL) -> Walk:
     """Walk along the chain from the base to the tool centre point.
 
     Args:
@@ -108,7 +106,7 @@ def walk(dh: DH, q: Array, tool: Array, deviation: Deviation = NOMINAL) -> Walk:
     cos, sin = np.cos(theta), np.sin(theta)
     axes, about = _base(deviation)
     x, y, z = (np.broadcast_to(axis[:, None], shape) for axis in axes.T)
-    p: Array = np.broadcast_to(deviation.base[:3, None], shape)
+    p: Floats = np.broadcast_to(deviation.base[:3, None], shape)
     turn, pivot, link, corner, bend = (np.empty((6, *shape)) for _ in range(5))
     for i in range(6):
         da, dd, dalpha, _, beta = deviation.link[i]
@@ -129,7 +127,7 @@ def walk(dh: DH, q: Array, tool: Array, deviation: Deviation = NOMINAL) -> Walk:
     return Walk(turn, pivot, link, corner, bend, about, point, flange.T, tcp.T)
 
 
-def tcp(dh: DH, q: Array, tool: Array, deviation: Deviation = NOMINAL) -> Array:
+def tcp(dh: DH, q: Floats, tool: Floats, deviation: Deviation = NOMINAL) -> Floats:
     """Place the tool centre point alone, (n, 3) [m]: `Walk.tcp` at a third of the cost.
 
     Args:
@@ -141,5 +139,5 @@ def tcp(dh: DH, q: Array, tool: Array, deviation: Deviation = NOMINAL) -> Array:
     axes, _ = _base(deviation)
     real, beta = deviated(dh, deviation), deviation.link[:, 4]
     placed = real.placed(q, tool + deviation.tool, beta)
-    moved: Array = placed @ axes.T + deviation.base[:3]
+    moved: Floats = placed @ axes.T + deviation.base[:3]
     return moved

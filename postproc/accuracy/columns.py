@@ -9,13 +9,11 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from postproc.accuracy.table import Table
+from postproc.arrays import Bools, Floats
 from postproc.exceptions import MeasurementError
 from postproc.pose import MM
 from postproc.robot.arm import Arm
 from postproc.robot.direction import arrivals_of_rows
-
-Array = NDArray[np.float64]
-Bools = NDArray[np.bool_]
 
 SIDES = tuple(f"lambda{j}" for j in range(1, 7))
 TRAVELS = tuple(f"travel{j}_deg" for j in range(1, 7))
@@ -46,8 +44,8 @@ def unique_ids(table: Table) -> tuple[str, ...]:
 
 
 def read_directions(
-    table: Table, arm: Arm, q: Array
-) -> tuple[Array, Array, Bools, tuple[str, ...]]:
+    table: Table, arm: Arm, q: Floats
+) -> tuple[Floats, Floats, Bools, tuple[str, ...]]:
     """Read the arrival directions and travels, or infer them from the row order."""
     arrived = arrivals_of_rows(arm, q)
     travel = arrived.travel
@@ -69,8 +67,8 @@ def read_directions(
 
 
 def read_tools(
-    table: Table, tools: Array | Mapping[int, Array]
-) -> tuple[Array, NDArray[np.int64]]:
+    table: Table, tools: Floats | Mapping[int, Floats]
+) -> tuple[Floats, NDArray[np.int64]]:
     """Look up every row's tool.
 
     Raises:
@@ -98,7 +96,7 @@ def read_tools(
     return np.stack([np.asarray(known[int(one)], float) for one in tool_id]), tool_id
 
 
-def read_rotation(table: Table) -> Array | None:
+def read_rotation(table: Table) -> Floats | None:
     """Read measured orientations, (n, 3, 3): R = Rx Ry Rz (intrinsic x, y', z'')."""
     if not table.has(*ROTATION):
         return None

@@ -13,9 +13,8 @@ from postproc.accuracy.batch import Batch
 from postproc.accuracy.chain import NOMINAL, Deviation
 from postproc.accuracy.effect import Effect, JointEffect, Parameter
 from postproc.accuracy.geometry import Geometry
+from postproc.arrays import Floats
 from postproc.pose import rotation_vector
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -46,7 +45,7 @@ class Combination:
         )
 
     @cached_property
-    def scales(self) -> Array:
+    def scales(self) -> Floats:
         """Prior scales before the data rescale them, (p,)."""
         return np.array([p.scale for p in self.parameters], dtype=float)
 
@@ -63,7 +62,7 @@ class Combination:
             dtype=bool,
         )
 
-    def shift(self, batch: Batch, p: Array) -> Array:
+    def shift(self, batch: Batch, p: Floats) -> Floats:
         """Sum the joint errors of all joint effects, (n, 6) [rad]."""
         total = np.zeros((len(batch), 6))
         for effect, part in zip(self.effects, self.slices, strict=True):
@@ -71,18 +70,18 @@ class Combination:
                 total += effect.angles(batch, p[part])
         return total
 
-    def deviation(self, p: Array) -> Deviation:
+    def deviation(self, p: Floats) -> Deviation:
         """Read the geometry's parameters as deviations of the chain."""
         for effect, part in zip(self.effects, self.slices, strict=True):
             if isinstance(effect, Geometry):
                 return effect.deviation(p[part])
         return NOMINAL
 
-    def at(self, batch: Batch, p: Array) -> Batch:
+    def at(self, batch: Batch, p: Floats) -> Batch:
         """Return the batch with its kinematics taken at parameters p."""
         return batch.moved(self.deviation(p), self.shift(batch, p))
 
-    def error(self, batch: Batch, p: Array) -> Array:
+    def error(self, batch: Batch, p: Floats) -> Floats:
         """Sum the errors: actual minus nominal TCP position, (n, 3) [m].
 
         Args:
@@ -91,21 +90,21 @@ class Combination:
         """
         return self.error_at(self.at(batch, p), batch, p)
 
-    def error_at(self, at: Batch, batch: Batch, p: Array) -> Array:
+    def error_at(self, at: Batch, batch: Batch, p: Floats) -> Floats:
         """Sum the errors where the kinematics at parameters p are known already."""
-        error: Array = at.tcp - batch.tcp
+        error: Floats = at.tcp - batch.tcp
         for effect, part in zip(self.effects, self.slices, strict=True):
             if not isinstance(effect, Geometry | JointEffect):
                 error = error + effect.displacement(batch, p[part])
         return error
 
-    def columns(self, batch: Batch) -> Array:
+    def columns(self, batch: Batch) -> Floats:
         """Differentiate the error at the batch's kinematics, (n, 3, p)."""
         if not self.effects:
             return np.zeros((len(batch), 3, 0))
         return np.concatenate([e.columns(batch) for e in self.effects], axis=2)
 
-    def turn(self, batch: Batch, p: Array) -> Array:
+    def turn(self, batch: Batch, p: Floats) -> Floats:
         """Turn the tool: its rotation from nominal to actual, (n, 3) [rad]."""
         at = self.at(batch, p).walk.flange
         turn = rotation_vector(at @ np.swapaxes(batch.walk.flange, 1, 2))
@@ -116,7 +115,7 @@ class Combination:
                 turn = turn + columns @ p[part]
         return turn
 
-    def rotation_columns(self, batch: Batch) -> Array:
+    def rotation_columns(self, batch: Batch) -> Floats:
         """Differentiate the tool's rotation at the batch's kinematics, (n, 3, p)."""
         out = np.zeros((len(batch), 3, len(self.parameters)))
         for effect, part in zip(self.effects, self.slices, strict=True):
@@ -125,10 +124,10 @@ class Combination:
                 out[:, :, part] = columns
         return out
 
-    def direction_slopes(self, batch: Batch, p: Array) -> Array:
+    def direction_slopes(self, batch: Batch, p: Floats) -> Floats:
         """Give each joint's position error per unit of direction, (n, 3, 6) [m]."""
         ones = np.ones_like(batch.states.q)
         forward = self.shift(batch.arriving(ones), p)
         backward = self.shift(batch.arriving(-ones), p)
-        slopes: Array = batch.jacobian * ((forward - backward) / 2)[:, None, :]
+        slopes: Floats = batch.jacobian * ((forward - backward) / 2)[:, None, :]
         return slopes

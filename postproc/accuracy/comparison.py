@@ -12,10 +12,10 @@ from postproc.accuracy.full import fit_survey, model_of
 from postproc.accuracy.measurement import Measurements
 from postproc.accuracy.methods import fit_method
 from postproc.accuracy.schema import Method
+from postproc.arrays import Floats
 from postproc.pose import MM
 from postproc.robot.arm import Arm
 
-Array = NDArray[np.float64]
 Rows = NDArray[np.int64]
 
 TRAIN_SHARE = 2 / 3  # 300 of 450, as the source
@@ -57,7 +57,7 @@ def random_split(n: int, seed: int, share: float = TRAIN_SHARE) -> tuple[Rows, R
 
 
 def compare(
-    survey: Measurements, arm: Arm, tracker: Array | None = None, seed: int = 0
+    survey: Measurements, arm: Arm, tracker: Floats | None = None, seed: int = 0
 ) -> Comparison:
     """Fit every method to a random part of a survey and test it on the rest.
 
@@ -79,9 +79,9 @@ def compare_on(
     train: Measurements,
     test: Measurements,
     arm: Arm,
-    tracker: Array | None,
+    tracker: Floats | None,
     seed: int,
-    truth: Array | None = None,
+    truth: Floats | None = None,
 ) -> tuple[MethodRow, ...]:
     """Fit every method to one survey and test it on another.
 
@@ -105,7 +105,7 @@ def compare_on(
     return tuple(rows)
 
 
-def _row(method: str, error: Array) -> MethodRow:
+def _row(method: str, error: Floats) -> MethodRow:
     """Summarise errors (n, 3) [m]."""
     e = np.linalg.norm(error, axis=1) / MM
     low, high = float(e.min()), float(e.max())

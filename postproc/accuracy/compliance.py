@@ -6,13 +6,11 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from postproc.accuracy.batch import Batch
 from postproc.accuracy.effect import JointEffect, Parameter
+from postproc.arrays import Floats
 from postproc.robot.arm import Arm
-
-Array = NDArray[np.float64]
 
 SCALE = 1e-7  # [rad/(N m)] softness of a usual gear
 UNSURE = 0.1  # share of the nominal moments by which real links differ
@@ -87,7 +85,7 @@ class Compliance(JointEffect):
                 ]
         return tuple(out)
 
-    def basis(self, batch: Batch) -> Array:
+    def basis(self, batch: Batch) -> Floats:
         """Evaluate torque [N m] and torque per unit of moment, (n, p)."""
         torque = batch.loads.gravity + batch.loads.payload
         unit = batch.loads.basis.reshape(len(batch), 6, 6, 4)

@@ -6,12 +6,10 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from postproc.accuracy.batch import Batch
 from postproc.accuracy.effect import JointEffect, Parameter
-
-Array = NDArray[np.float64]
+from postproc.arrays import Floats
 
 SCALE = 2e-4  # [rad] at the spring's largest torque
 
@@ -40,12 +38,12 @@ class Counterbalance(JointEffect):
         """Name the size, at u = 90 deg."""
         return (Parameter("c2", "rad", SCALE, "2", 2),)
 
-    def basis(self, batch: Batch) -> Array:
+    def basis(self, batch: Batch) -> Floats:
         """Evaluate the spring's torque, 1 at u = 90 deg, (n, 1)."""
         u = batch.states.q[:, 1] - self.upright
         return np.asarray((self._torque(u) / self._torque(np.pi / 2))[:, None])
 
-    def _torque(self, u: Array | float) -> Array:
+    def _torque(self, u: Floats | float) -> Floats:
         """Give the torque at angles u [rad], in units of the spring."""
         r = self.ratio
         length = np.sqrt(1 + r**2 - 2 * r * np.cos(u))

@@ -6,12 +6,10 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from postproc.accuracy.batch import Batch
 from postproc.accuracy.effect import JointEffect, Parameter
-
-Array = NDArray[np.float64]
+from postproc.arrays import Floats
 
 SCALE = 5e-5  # [rad/rad]
 
@@ -35,8 +33,8 @@ class Coupling(JointEffect):
             for j, k in self.pairs
         )
 
-    def basis(self, batch: Batch) -> Array:
+    def basis(self, batch: Batch) -> Floats:
         """Evaluate the driving angles, (n, p)."""
         driving = np.array([k - 1 for _, k in self.pairs], dtype=int)
-        theta: Array = batch.states.q[:, driving]
+        theta: Floats = batch.states.q[:, driving]
         return theta

@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from postproc.accuracy.batch import Batch
-
-Array = NDArray[np.float64]
+from postproc.arrays import Floats
 
 JOINT_KINDS = ("joint", "lambda", "before", "travel", "loop", "torque")
 SHORTEST = 1e-4  # [rad] of a way whose logarithm is taken
 PLAIN = ("speed", "payload", "temperature", "time", "order")
 
 
-def covariate(batch: Batch, name: str) -> Array:
+def covariate(batch: Batch, name: str) -> Floats:
     """Look up a covariate by its name, (n,), NaN where it is not known.
 
     Names are ``joint 5`` (its angle [rad]), ``lambda 5`` (its direction), ``before 5``
@@ -55,7 +53,7 @@ def unit(name: str) -> str:
     }[kind]  # fmt: skip
 
 
-def loops(batch: Batch, joint: int) -> Array:
+def loops(batch: Batch, joint: int) -> Floats:
     """Measure the way of a joint (from 0) between its last two reversals, (n,) [rad].
 
     It follows from this visit and the one before it in the visit order; NaN where that
@@ -79,7 +77,7 @@ def loops(batch: Batch, joint: int) -> Array:
     return out
 
 
-def sides_before(batch: Batch, joint: int) -> Array:
+def sides_before(batch: Batch, joint: int) -> Floats:
     """Return the direction of a joint (from 0) at the visit before, NaN if missing."""
     s = batch.states
     order = np.argsort(s.order, kind="stable")

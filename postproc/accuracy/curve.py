@@ -7,13 +7,11 @@ from itertools import product
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from postproc.accuracy.batch import Batch
 from postproc.accuracy.covariate import covariate
 from postproc.accuracy.effect import Effect, Origin, Parameter, fade
-
-Array = NDArray[np.float64]
+from postproc.arrays import Floats
 
 TURN, SHIFT = 1e-4, 1e-4  # [rad], [m]
 TERMS_ALONE, TERMS_OF_TWO, TERMS_OF_WHOLE = 8, 3, 5
@@ -83,7 +81,7 @@ class Curve(Effect):
             for k in self._orders()
         )  # fmt: skip
 
-    def shape(self, batch: Batch) -> Array:
+    def shape(self, batch: Batch) -> Floats:
         """Evaluate the terms without their direction in space, (n, p)."""
         from scipy.special import eval_legendre  # slow to load, and seldom wanted
 
@@ -97,26 +95,26 @@ class Curve(Effect):
             value *= eval_legendre(order[:, k], 2.0 * u[:, None] - 1.0)
         return np.asarray(value * inside[:, None])
 
-    def columns(self, batch: Batch) -> Array:
+    def columns(self, batch: Batch) -> Floats:
         """Differentiate the TCP position, (n, 3, p)."""
         return self._along(batch, self._axis(batch))
 
-    def rotation_columns(self, batch: Batch) -> Array | None:
+    def rotation_columns(self, batch: Batch) -> Floats | None:
         """Differentiate the tool's rotation, (n, 3, p)."""
         kind, _, which = self.direction.partition(" ")
         if kind != "joint":
             return None
         return self._along(batch, batch.angular[:, :, int(which) - 1])
 
-    def _along(self, batch: Batch, axis: Array) -> Array:
+    def _along(self, batch: Batch, axis: Floats) -> Floats:
         """Multiply a direction per unit (n, 3) by the terms, (n, 3, p)."""
         if self.signed:
             joint = int(self.direction.split()[1]) - 1
             axis = axis * batch.states.direction[:, joint : joint + 1]
-        columns: Array = axis[:, :, None] * self.shape(batch)[:, None, :]
+        columns: Floats = axis[:, :, None] * self.shape(batch)[:, None, :]
         return columns
 
-    def _axis(self, batch: Batch) -> Array:
+    def _axis(self, batch: Batch) -> Floats:
         """Return the direction's displacement per unit, (n, 3)."""
         kind, _, which = self.direction.partition(" ")
         if kind == "joint":

@@ -15,10 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from postproc.accuracy.batch import Batch
+from postproc.arrays import Floats
 from postproc.robot.arm import Arm
 from postproc.robot.state import States
 
-Array = NDArray[np.float64]
 Origin = Literal["arm", "state", "setup"]
 
 FAR = 1e3  # [rad] a joint angle that no arm reaches: no range is known
@@ -78,16 +78,16 @@ class Effect(ABC):
         """Name the p parameters, in the order of the columns."""
 
     @abstractmethod
-    def columns(self, batch: Batch) -> Array:
+    def columns(self, batch: Batch) -> Floats:
         """Differentiate the TCP position: (n, 3, p) [m per unit], base frame."""
 
-    def rotation_columns(self, batch: Batch) -> Array | None:
+    def rotation_columns(self, batch: Batch) -> Floats | None:
         """Differentiate the tool's rotation: (n, 3, p) [rad per unit], None if 0."""
         return None
 
-    def displacement(self, batch: Batch, p: Array) -> Array:
+    def displacement(self, batch: Batch, p: Floats) -> Floats:
         """Move the TCP: (n, 3) [m] for parameters p."""
-        moved: Array = self.columns(batch) @ p
+        moved: Floats = self.columns(batch) @ p
         return moved
 
     def settings(self) -> dict[str, Any]:
@@ -100,7 +100,7 @@ class JointEffect(Effect):
     """An effect that turns joints: columns are J_j(q) phi(covariate)."""
 
     @abstractmethod
-    def basis(self, batch: Batch) -> Array:
+    def basis(self, batch: Batch) -> Floats:
         """Evaluate phi: the angle of each parameter's joint, (n, p) [rad per unit]."""
 
     def acts_on(self) -> NDArray[np.int64]:
@@ -112,20 +112,20 @@ class JointEffect(Effect):
         """Find them once: a program asks some hundred times."""
         return np.array([(p.joint or 1) - 1 for p in self.parameters()], dtype=int)
 
-    def columns(self, batch: Batch) -> Array:
+    def columns(self, batch: Batch) -> Floats:
         """Differentiate the TCP position: (n, 3, p) [m per unit]."""
         return self._about(batch.jacobian, batch)
 
-    def rotation_columns(self, batch: Batch) -> Array:
+    def rotation_columns(self, batch: Batch) -> Floats:
         """Differentiate the tool's rotation: (n, 3, p) [rad per unit]."""
         return self._about(batch.angular, batch)
 
-    def _about(self, joints: Array, batch: Batch) -> Array:
+    def _about(self, joints: Floats, batch: Batch) -> Floats:
         """Turn the joints, (n, 3, 6) per unit, by each parameter, (n, 3, p)."""
-        columns: Array = joints.T[self.acts_on()] * self.basis(batch).T[:, None]
+        columns: Floats = joints.T[self.acts_on()] * self.basis(batch).T[:, None]
         return columns.T
 
-    def angles(self, batch: Batch, p: Array) -> Array:
+    def angles(self, batch: Batch, p: Floats) -> Floats:
         """Return the joint errors (n, 6) [rad] for parameters p."""
         out = np.zeros((len(batch), 6))
         turned = self.basis(batch) * p
@@ -144,7 +144,7 @@ class JointEffect(Effect):
         return [(acts_on[c], c) for c in columns]
 
 
-def fade(x: Array, lower: Array, upper: Array) -> Array:
+def fade(x: Floats, lower: Floats, upper: Floats) -> Floats:
     """Return 1 inside [lower, upper], falling smoothly to 0 a tenth outside.
 
     Free-form parts are multiplied by it: outside the training range they know nothing.
@@ -155,11 +155,11 @@ def fade(x: Array, lower: Array, upper: Array) -> Array:
     width = np.maximum(0.1 * (upper - lower), 1e-9)
     out = np.maximum(np.maximum(lower - x, x - upper), 0.0) / width
     t = np.clip(out, 0.0, 1.0)
-    faded: Array = np.round(1.0 - t * t * (3.0 - 2.0 * t), 12)
+    faded: Floats = np.round(1.0 - t * t * (3.0 - 2.0 * t), 12)
     return faded
 
 
-def fade_turns(q: Array, lower: Array, upper: Array) -> Array:
+def fade_turns(q: Floats, lower: Floats, upper: Floats) -> Floats:
     """Fade what repeats with every turn: an angle counts as its nearest turn's.
 
     >>> fade_turns(np.array([0.1 + 2 * np.pi]), np.array(0.0), np.array(1.0)).tolist()

@@ -6,15 +6,13 @@ from dataclasses import asdict, dataclass
 from typing import Any, ClassVar, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from postproc.accuracy.batch import Batch
 from postproc.accuracy.effect import JointEffect, Parameter, fade
 from postproc.accuracy.hidden_layer import HiddenLayer
+from postproc.arrays import Floats
 from postproc.robot.arm import Arm
 from postproc.robot.state import States
-
-Array = NDArray[np.float64]
 
 SCALE = 3e-5  # [rad] prior scale of one output weight
 NEURONS = 20
@@ -52,7 +50,7 @@ class Elm(JointEffect):
             for k in range(len(self.layer))
         )
 
-    def basis(self, batch: Batch) -> Array:
+    def basis(self, batch: Batch) -> Floats:
         """Evaluate the neurons for every joint, (n, 6 neurons)."""
         low, high = np.array(self.layer.lower), np.array(self.layer.upper)
         inside = fade(batch.states.q, low, high).prod(axis=1)

@@ -6,14 +6,12 @@ from dataclasses import asdict, dataclass
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from postproc.accuracy.batch import Batch
 from postproc.accuracy.effect import Effect, Parameter
 from postproc.accuracy.hidden_layer import HiddenLayer
+from postproc.arrays import Floats
 from postproc.robot.state import States
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -40,7 +38,7 @@ class ElmMap(Effect):
             for k in range(len(self.layer))
         )
 
-    def columns(self, batch: Batch) -> Array:
+    def columns(self, batch: Batch) -> Floats:
         """Lay the neurons out per axis, (n, 3, 3 neurons)."""
         h = self.layer(batch.states)
         out = np.zeros((len(batch), 3, 3, h.shape[1]))
@@ -48,9 +46,9 @@ class ElmMap(Effect):
             out[:, k, k] = h
         return out.reshape(len(batch), 3, -1)
 
-    def displacement(self, batch: Batch, p: Array) -> Array:
+    def displacement(self, batch: Batch, p: Floats) -> Floats:
         """Evaluate the network, (n, 3) [m]."""
-        moved: Array = self.layer(batch.states) @ p.reshape(3, -1).T
+        moved: Floats = self.layer(batch.states) @ p.reshape(3, -1).T
         return moved
 
     def settings(self) -> dict[str, Any]:
@@ -58,7 +56,7 @@ class ElmMap(Effect):
         return {"layer": asdict(self.layer)}
 
 
-def train(layer: HiddenLayer, states: States, error: Array) -> Array:
+def train(layer: HiddenLayer, states: States, error: Floats) -> Floats:
     """Solve for the output weights as the source does: beta = pinv(H) T, (p,)."""
     beta = np.linalg.pinv(layer(states)) @ error
     return np.asarray(beta.T.reshape(-1))

@@ -5,11 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from postproc.arrays import Floats
 from postproc.pose import MM
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -23,12 +21,12 @@ class ErrorStatistics:
     n: int
 
     @classmethod
-    def of(cls, error: Array) -> ErrorStatistics:
+    def of(cls, error: Floats) -> ErrorStatistics:
         """Summarise error vectors (n, 3) [m]; NaN figures where there are none."""
         return cls.of_sizes(np.linalg.norm(error, axis=1))
 
     @classmethod
-    def of_sizes(cls, size: Array) -> ErrorStatistics:
+    def of_sizes(cls, size: Floats) -> ErrorStatistics:
         """Summarise lengths of error vectors (n,) [m], as `of` does."""
         size = size / MM
         if len(size) == 0:

@@ -10,12 +10,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg.lapack import dpotrf, dpotri
 from scipy.optimize import minimize
 
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
+from postproc.arrays import Floats, Ints
 
 LOG_BOUNDS = (-8.0, 7.0)  # of log s_g
 STEPS = 60
@@ -35,8 +33,8 @@ class Normal:
         rows: Number of scalar rows.
     """
 
-    gram: Array
-    moment: Array
+    gram: Floats
+    moment: Floats
     square: float
     log_noise: float
     rows: float
@@ -62,14 +60,14 @@ class Posterior:
         effective: Effective number of parameters that the data determine.
     """
 
-    mean: Array
-    covariance: Array
-    log_scale: Array
+    mean: Floats
+    covariance: Floats
+    log_scale: Floats
     log_evidence: float
     effective: float
 
 
-def posterior(normal: Normal, group: Ints, log_scale: Array) -> Posterior:
+def posterior(normal: Normal, group: Ints, log_scale: Floats) -> Posterior:
     """Compute the posterior for given prior scales.
 
     Args:
@@ -91,7 +89,7 @@ def posterior(normal: Normal, group: Ints, log_scale: Array) -> Posterior:
     return Posterior(mean, covariance, log_scale, evidence, effective)
 
 
-def _factor(B: Array) -> tuple[Array, Array]:
+def _factor(B: Floats) -> tuple[Floats, Floats]:
     """Return the Cholesky factor and the inverse of a positive definite matrix."""
     factor, failed = dpotrf(B, lower=True)
     inverse, _ = dpotri(factor, lower=True)
@@ -102,7 +100,7 @@ def _factor(B: Array) -> tuple[Array, Array]:
 
 
 def maximise(
-    normal: Normal, group: Ints, start: Array, steps: int = STEPS
+    normal: Normal, group: Ints, start: Floats, steps: int = STEPS
 ) -> Posterior:
     """Choose the prior scales by marginal likelihood.
 
@@ -116,7 +114,7 @@ def maximise(
     if count == 0:
         return posterior(normal, group, start)
 
-    def cost(u: Array) -> tuple[float, Array]:
+    def cost(u: Floats) -> tuple[float, Floats]:
         """Negative log evidence with the hyperprior, and its gradient."""
         at = posterior(normal, group, u)
         s = np.exp(u)[group]
@@ -132,7 +130,7 @@ def maximise(
     return posterior(normal, group, np.asarray(best.x, dtype=float))
 
 
-def widened(normal: Normal, group: Ints, at: Posterior) -> Array:
+def widened(normal: Normal, group: Ints, at: Posterior) -> Floats:
     """Covariance at prior scales that are known no better than the data tell them.
 
     A scale that g well-determined parameters have told leaves a Student t with g

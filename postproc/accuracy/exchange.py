@@ -9,16 +9,15 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
-Gain = Callable[[Array, Array], Array]
+from postproc.arrays import Floats, Ints
+
+Gain = Callable[[Floats, Floats], Floats]
 
 SWAPS = 2  # passes of exchange
 
 
-def choose(X: Array, count: int, gain: Gain) -> Ints:
+def choose(X: Floats, count: int, gain: Gain) -> Ints:
     """Choose poses greedily, then exchange each for the best one.
 
     Args:
@@ -33,7 +32,7 @@ def choose(X: Array, count: int, gain: Gain) -> Ints:
     chosen: list[int] = []
     free = np.ones(len(X), dtype=bool)
 
-    def take_best(covariance: Array) -> Array:
+    def take_best(covariance: Floats) -> Floats:
         """Choose the free candidate that adds most."""
         best = int(np.flatnonzero(free)[np.argmax(gain(X[free], covariance))])
         chosen.append(best)
@@ -53,14 +52,14 @@ def choose(X: Array, count: int, gain: Gain) -> Ints:
     return np.array(sorted(chosen), dtype=np.int64)
 
 
-def gain_d(part: Array, covariance: Array) -> Array:
+def gain_d(part: Floats, covariance: Floats) -> Floats:
     """How much candidates lower the log volume of the parameters' uncertainty, (m,)."""
     both = _through(part, covariance)
-    gain: Array = np.linalg.slogdet(np.eye(part.shape[1]) + both).logabsdet
+    gain: Floats = np.linalg.slogdet(np.eye(part.shape[1]) + both).logabsdet
     return gain
 
 
-def gain_i(everywhere: Array) -> Gain:
+def gain_i(everywhere: Floats) -> Gain:
     """Make the gain of I-optimality.
 
     Args:
@@ -69,7 +68,7 @@ def gain_i(everywhere: Array) -> Gain:
     flat = everywhere.reshape(-1, everywhere.shape[2])
     moment = flat.T @ flat / len(flat)
 
-    def gain(part: Array, covariance: Array) -> Array:
+    def gain(part: Floats, covariance: Floats) -> Floats:
         """How much candidates lower the mean variance of predictions, (m,)."""
         both = np.eye(part.shape[1]) + _through(part, covariance)
         seen = _through(part, covariance @ moment @ covariance)
@@ -79,15 +78,15 @@ def gain_i(everywhere: Array) -> Gain:
     return gain
 
 
-def _through(part: Array, square: Array) -> Array:
+def _through(part: Floats, square: Floats) -> Floats:
     """Return X S X^T of every candidate, (m, r, r)."""
     flat = (part.reshape(-1, part.shape[2]) @ square).reshape(part.shape)
     return np.asarray(flat @ np.swapaxes(part, 1, 2))
 
 
-def _updated(inverse: Array, rows: Array, sign: float) -> Array:
+def _updated(inverse: Floats, rows: Floats, sign: float) -> Floats:
     """Add (+1) or remove (-1) rows of an inverse information matrix (Woodbury)."""
     spread = inverse @ rows.T
     middle = np.linalg.inv(sign * np.eye(len(rows)) + rows @ spread)
-    updated: Array = inverse - spread @ middle @ spread.T
+    updated: Floats = inverse - spread @ middle @ spread.T
     return updated

@@ -10,7 +10,6 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from postproc.accuracy.batch import Batch
 from postproc.accuracy.combination import Combination
@@ -20,8 +19,7 @@ from postproc.accuracy.fitted import Fit
 from postproc.accuracy.noise import Noise, Whitener
 from postproc.accuracy.outliers import RowWeights, judge, student_weights
 from postproc.accuracy.turns import Turns
-
-Array = NDArray[np.float64]
+from postproc.arrays import Floats
 
 PASSES = 30
 HEAVY_TAILED = 4  # first passes that a gross outlier must not lead astray
@@ -31,7 +29,7 @@ SETTLED_NOISE = 5e-3  # relative change of the noise that ends the passes
 
 def fit_effects(
     batch: Batch,
-    position: Array,
+    position: Floats,
     effects: tuple[Effect, ...],
     origin: tuple[float, float, float] | None = None,
     start: Fit | None = None,
@@ -62,7 +60,7 @@ def fit_effects(
 
 def _begin(
     batch: Batch,
-    position: Array,
+    position: Floats,
     combination: Combination,
     origin: tuple[float, float, float] | None,
     start: Fit | None,
@@ -129,14 +127,14 @@ def _linearised(state: Fit) -> Fit:
     return replace(state, columns=c.columns(at), residual=residual, turns=turns)
 
 
-def _spread(state: Fit, covariance: Array) -> Array:
+def _spread(state: Fit, covariance: Floats) -> Floats:
     """Posterior variance of every rotated prediction, (n, 3) [m^2]."""
     turned = state.whitener.rotate(state.columns)
-    spread: Array = np.maximum(((turned @ covariance) * turned).sum(axis=2), 0.0)
+    spread: Floats = np.maximum(((turned @ covariance) * turned).sum(axis=2), 0.0)
     return spread
 
 
-def _with_unknown_sides(state: Fit, values: Array) -> Whitener:
+def _with_unknown_sides(state: Fit, values: Floats) -> Whitener:
     """Add the backlash to the variance of rows whose direction is not known."""
     unknown = (state.batch.states.direction == 0).astype(float)
     if not unknown.any():

@@ -6,7 +6,6 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from postproc.accuracy.batch import Batch
 from postproc.accuracy.error_statistics import ErrorStatistics
@@ -14,10 +13,9 @@ from postproc.accuracy.fitted import Fit
 from postproc.accuracy.measurement import DroppedRow, Measurements
 from postproc.accuracy.model import Model
 from postproc.accuracy.observability import Unseen, observe
+from postproc.arrays import Floats
 from postproc.pose import MM
 from postproc.robot.arm import Arm
-
-Array = NDArray[np.float64]
 
 CORRELATED = 0.9
 SHOWN_UNITS = {"m": ("mm", 1e3), "rad": ("mrad", 1e3), "rad/(N m)": ("urad/(N m)", 1e6)}
@@ -124,15 +122,15 @@ def report_method(model: Model, survey: Measurements, arm: Arm) -> FitReport:
     )
 
 
-def _shares(fit: Fit) -> Array:
+def _shares(fit: Fit) -> Floats:
     """Part of the squared error that each parameter explains, (p,)."""
     total = float((fit.error**2).sum())
     along = np.einsum("nip,ni->p", fit.columns, fit.error)
-    shares: Array = along * fit.values / max(total, 1e-300)
+    shares: Floats = along * fit.values / max(total, 1e-300)
     return shares
 
 
-def _table(fit: Fit, shares: Array) -> tuple[ParameterRow, ...]:
+def _table(fit: Fit, shares: Floats) -> tuple[ParameterRow, ...]:
     """Make the parameter table."""
     rows, std = [], np.sqrt(np.diag(fit.stated))
     for k, (name, p) in enumerate(

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import qr
 
 from postproc.accuracy.batch import Batch
@@ -15,9 +14,7 @@ from postproc.accuracy.evidence import Normal, Posterior, widened
 from postproc.accuracy.noise import Noise, Whitener
 from postproc.accuracy.outliers import RowWeights
 from postproc.accuracy.turns import Turns
-
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
+from postproc.arrays import Floats, Ints
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,29 +41,29 @@ class Fit:
 
     batch: Batch
     combination: Combination
-    error: Array
-    values: Array
-    covariance: Array
-    log_scale: Array
+    error: Floats
+    values: Floats
+    covariance: Floats
+    log_scale: Floats
     groups: tuple[str, ...]
     noise: Noise
     rows: RowWeights
-    residual: Array
-    columns: Array
+    residual: Floats
+    columns: Floats
     whitener: Whitener
     log_evidence: float
     effective: float
     turns: Turns | None = None
 
     @property
-    def std(self) -> Array:
+    def std(self) -> Floats:
         """Standard errors of the parameters, (p,)."""
         return np.sqrt(np.diag(self.covariance))
 
     @property
-    def prior_std(self) -> Array:
+    def prior_std(self) -> Floats:
         """Prior standard deviations that the data chose, (p,)."""
-        std: Array = self.combination.scales * np.exp(self.log_scale)[self.group]
+        std: Floats = self.combination.scales * np.exp(self.log_scale)[self.group]
         return std
 
     @cached_property
@@ -76,13 +73,13 @@ class Fit:
         return np.array([index[g] for g in self.combination.groups], dtype=np.int64)
 
     @cached_property
-    def row_scale(self) -> Array:
+    def row_scale(self) -> Floats:
         """What whitening multiplies the rotated components with, (n, 3) [1/m]."""
         v = self.whitener.variance(self.noise)
-        scale: Array = np.sqrt(self.rows.weight[:, None] / v)
+        scale: Floats = np.sqrt(self.rows.weight[:, None] / v)
         return scale
 
-    def whiten(self, rows: Array) -> Array:
+    def whiten(self, rows: Floats) -> Floats:
         """Whiten (n, 3) or (n, 3, k): the noise of the result has unit variance.
 
         Returns:
@@ -94,7 +91,7 @@ class Fit:
         return (turned * self.row_scale[:, :, None]).reshape(-1, rows.shape[2])
 
     @cached_property
-    def basis(self) -> Array:
+    def basis(self) -> Floats:
         """Orthonormal basis of the whitened columns, (3 n, rank)."""
         X = self.whiten(self.columns) * self.prior_std
         Q, R, _ = qr(X, mode="economic", pivoting=True)
@@ -102,9 +99,9 @@ class Fit:
         known = size > max(1e-9 * float(size.max(initial=0.0)), 1e-3)
         return np.asarray(Q[:, : int(known.sum())])
 
-    def project_out(self, whitened: Array) -> Array:
+    def project_out(self, whitened: Floats) -> Floats:
         """Remove from whitened rows what the fitted effects can take up."""
-        left: Array = whitened - self.basis @ (self.basis.T @ whitened)
+        left: Floats = whitened - self.basis @ (self.basis.T @ whitened)
         return left
 
     def normal(self) -> Normal:
@@ -124,13 +121,13 @@ class Fit:
             return normal
         return normal + self.turns.normal(self.values, self.combination.scales)
 
-    def stacked(self) -> Array:
+    def stacked(self) -> Floats:
         """Stack all whitened columns, those of orientations too, (rows, p)."""
         X = self.whiten(self.columns)
         return X if self.turns is None else np.vstack([X, self.turns.whitened()])
 
     @cached_property
-    def stated(self) -> Array:
+    def stated(self) -> Floats:
         """Covariance that knows how unsure the prior scales are themselves, (p, p)."""
         scales = self.combination.scales
         at = Posterior(

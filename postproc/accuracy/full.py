@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from postproc.accuracy.batch import Batch
 from postproc.accuracy.fit import fit_effects
@@ -17,17 +16,16 @@ from postproc.accuracy.probe_turn import ProbeTurn
 from postproc.accuracy.ranges import Ranges
 from postproc.accuracy.selection import fit_best
 from postproc.accuracy.turns import Turns
+from postproc.arrays import Floats
 from postproc.pose import MM
 from postproc.robot.arm import Arm
-
-Array = NDArray[np.float64]
 
 
 def fit_survey(
     survey: Measurements,
     arm: Arm,
     effects: Sequence[str] | None,
-    tracker: Array | None,
+    tracker: Floats | None,
     setup: tuple[str, ...] = (),
 ) -> Fit:
     """Fit effects to a survey in the base frame.

@@ -6,16 +6,14 @@ from dataclasses import dataclass
 from typing import ClassVar, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from postproc.accuracy.batch import Batch
 from postproc.accuracy.chain import Deviation
 from postproc.accuracy.effect import Effect, Parameter
+from postproc.arrays import Floats
 from postproc.pose import cross
 from postproc.robot.arm import Arm
 from postproc.robot.state import States
-
-Array = NDArray[np.float64]
 
 AXES = ("x", "y", "z")
 KINDS = ("a", "d", "alpha", "theta", "beta")
@@ -72,7 +70,7 @@ class Geometry(Effect):
         tool = [Parameter(f"tool_{a}", "m", LENGTH, "tool") for a in AXES]
         return (*(base if self.base else []), *links, *tool)
 
-    def deviation(self, p: Array) -> Deviation:
+    def deviation(self, p: Floats) -> Deviation:
         """Read parameters (p,) as deviations of the chain."""
         p = np.asarray(p, dtype=float)
         base = p[:6] if self.base else np.zeros(6)
@@ -82,14 +80,16 @@ class Geometry(Effect):
             link[j, k] = value
         return Deviation(np.array(base), link, np.array(rest[-3:]))
 
-    def _kind(self, batch: Batch, kind: int, joint: int) -> tuple[Array, Array | None]:
+    def _kind(
+        self, batch: Batch, kind: int, joint: int
+    ) -> tuple[Floats, Floats | None]:
         """Return the axis (n, 3) of a link motion and, if it is a turn, its point."""
         w = batch.walk
         axis = (w.link, w.turn, w.link, w.turn, w.bend)[kind][:, joint]
         point = (None, None, w.corner, w.pivot, w.corner)[kind]
         return axis, None if point is None else point[:, joint]
 
-    def columns(self, batch: Batch) -> Array:
+    def columns(self, batch: Batch) -> Floats:
         """Differentiate the TCP position at the batch's deviation, (n, 3, p)."""
         w, n = batch.walk, len(batch)
         columns = []
@@ -103,7 +103,7 @@ class Geometry(Effect):
         columns += [w.flange[:, :, k] for k in range(3)]
         return np.stack([column.T for column in columns]).T
 
-    def rotation_columns(self, batch: Batch) -> Array:
+    def rotation_columns(self, batch: Batch) -> Floats:
         """Differentiate the tool's rotation, (n, 3, p) [rad per unit]."""
         w, n = batch.walk, len(batch)
         still = np.zeros((n, 3))
@@ -117,7 +117,7 @@ class Geometry(Effect):
         columns += [still] * 3
         return np.stack(columns, axis=-1)
 
-    def displacement(self, batch: Batch, p: Array) -> Array:
+    def displacement(self, batch: Batch, p: Floats) -> Floats:
         """Move the TCP exactly: full kinematics with deviations against without."""
-        moved: Array = batch.moved(self.deviation(p), batch.shift).walk.tcp
+        moved: Floats = batch.moved(self.deviation(p), batch.shift).walk.tcp
         return moved - batch.walk.tcp

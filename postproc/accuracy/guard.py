@@ -3,23 +3,19 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from postproc.arrays import Floats, Ints
 from postproc.pose import MM, has_unknown, lengths
 from postproc.reasons import Reasons
 from postproc.robot.arm import Arm
 from postproc.robot.cell import LimitSection
-
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
-Bools = NDArray[np.bool_]
 
 TURNED = 0.5  # change of a side by which a joint has turned
 SOLVED = 1e-6  # [m] model against wanted pose
 
 
 def guard_solutions(
-    reasons: Reasons, arm: Arm, limits: LimitSection, q: Array, solved: Array
+    reasons: Reasons, arm: Arm, limits: LimitSection, q: Floats, solved: Floats
 ) -> None:
     """Mark corrected commands that the arm cannot or should not be given.
 
@@ -46,7 +42,7 @@ def guard_solutions(
 
 
 def guard_size(
-    reasons: Reasons, limits: LimitSection, correction: Array, residual: Array
+    reasons: Reasons, limits: LimitSection, correction: Floats, residual: Floats
 ) -> None:
     """Mark corrections that are too large or did not converge.
 
@@ -63,7 +59,7 @@ def guard_size(
         reasons.mark(~(residual <= SOLVED), "the correction did not converge to 1 um")
 
 
-def guard_turn(reasons: Reasons, limits: LimitSection, turn: Array) -> None:
+def guard_turn(reasons: Reasons, limits: LimitSection, turn: Floats) -> None:
     """Mark corrections that turn the tool too far.
 
     Args:
@@ -80,8 +76,8 @@ def guard_turn(reasons: Reasons, limits: LimitSection, turn: Array) -> None:
 def guard_steps(
     reasons: Reasons,
     limits: LimitSection,
-    correction: Array,
-    direction: Array,
+    correction: Floats,
+    direction: Floats,
     before: Ints,
 ) -> None:
     """Mark jumps of the correction between neighbours of a fly run.

@@ -10,12 +10,10 @@ from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from postproc.accuracy.effect import FAR
+from postproc.arrays import Floats
 from postproc.robot.state import States
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -66,7 +64,7 @@ class HiddenLayer:
         """Return the number of neurons."""
         return len(self.bias)
 
-    def __call__(self, states: States) -> Array:
+    def __call__(self, states: States) -> Floats:
         """Evaluate the neurons, (n, neurons).
 
         Joints that did not move in the survey are left out. Outside the surveyed

@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 
 from postproc.accuracy.batch import Batch
 from postproc.accuracy.effect import Effect, Parameter
-
-Array = NDArray[np.float64]
+from postproc.arrays import Floats
 
 NEAREST_GAP = 1e-6  # [m] a neighbour at the very place takes all the weight
 
@@ -33,7 +32,7 @@ class Interpolation(Effect):
     power: float = 2.0
 
     @classmethod
-    def through(cls, position: Array) -> Self:
+    def through(cls, position: Floats) -> Self:
         """Interpolate between nominal positions (m, 3) [m]."""
         points = tuple(tuple(map(float, p)) for p in position)
         return cls(points, neighbours=min(8, len(points)))
@@ -46,7 +45,7 @@ class Interpolation(Effect):
             for axis in "xyz"
         )
 
-    def _weights(self, batch: Batch) -> tuple[NDArray[np.int64], Array]:
+    def _weights(self, batch: Batch) -> tuple[NDArray[np.int64], Floats]:
         """Find neighbours and their weights, (n, k) each."""
         from scipy.spatial import cKDTree  # slow to load, and seldom wanted
 
@@ -55,7 +54,7 @@ class Interpolation(Effect):
         weight = np.maximum(np.asarray(gap), NEAREST_GAP) ** -self.power
         return np.asarray(index), weight / weight.sum(axis=1, keepdims=True)
 
-    def columns(self, batch: Batch) -> Array:
+    def columns(self, batch: Batch) -> Floats:
         """Lay the weights out, (n, 3, 3 m)."""
         index, weight = self._weights(batch)
         out = np.zeros((len(batch), 3, len(self.points), 3))
@@ -64,8 +63,8 @@ class Interpolation(Effect):
             out[rows, k, index, k] = weight
         return out.reshape(len(batch), 3, -1)
 
-    def displacement(self, batch: Batch, p: Array) -> Array:
+    def displacement(self, batch: Batch, p: Floats) -> Floats:
         """Average the neighbours' errors, (n, 3) [m]."""
         index, weight = self._weights(batch)
-        moved: Array = (p.reshape(-1, 3)[index] * weight[:, :, None]).sum(axis=1)
+        moved: Floats = (p.reshape(-1, 3)[index] * weight[:, :, None]).sum(axis=1)
         return moved

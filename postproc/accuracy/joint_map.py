@@ -6,14 +6,12 @@ from dataclasses import dataclass
 from typing import ClassVar, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from postproc.accuracy.batch import Batch
 from postproc.accuracy.effect import JointEffect, Parameter
+from postproc.arrays import Floats
 from postproc.robot.arm import Arm
 from postproc.robot.state import States
-
-Array = NDArray[np.float64]
 
 SCALE = 1e-4  # [rad]
 SPACING = 1.5  # distance of the bumps of a map, in their widths
@@ -64,7 +62,7 @@ class JointMap(JointEffect):
             for j, c in self.bumps
         )
 
-    def basis(self, batch: Batch) -> Array:
+    def basis(self, batch: Batch) -> Floats:
         """Evaluate the bumps, (n, p)."""
         joint = np.array([j - 1 for j, _ in self.bumps], dtype=int)
         centre = np.array([c for _, c in self.bumps])

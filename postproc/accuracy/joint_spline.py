@@ -10,15 +10,13 @@ from dataclasses import dataclass
 from typing import ClassVar, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from postproc.accuracy.batch import Batch
 from postproc.accuracy.effect import JointEffect, Parameter, fade
 from postproc.accuracy.smooth import smooth_columns, smooth_count
+from postproc.arrays import Floats
 from postproc.robot.arm import Arm
 from postproc.robot.state import States
-
-Array = NDArray[np.float64]
 
 SCALE = 1e-4  # [rad]
 LONG = np.deg2rad(60.0)
@@ -75,7 +73,7 @@ class JointSpline(JointEffect):
                 )
         return tuple(out)
 
-    def basis(self, batch: Batch) -> Array:
+    def basis(self, batch: Batch) -> Floats:
         """Evaluate the functions, (n, p)."""
         q = batch.states.q
         inside = fade(q, np.array(self.lower), np.array(self.upper))

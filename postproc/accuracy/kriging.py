@@ -10,14 +10,12 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from postproc.accuracy.batch import Batch
 from postproc.accuracy.effect import Effect, Parameter
+from postproc.arrays import Floats
 from postproc.exceptions import PostprocError
 from postproc.robot.state import States
-
-Array = NDArray[np.float64]
 
 MOST_CENTRES = 2500  # the work grows with their cube
 MOST_TUNED = 400  # rows that the lengths are chosen on
@@ -50,13 +48,13 @@ class Kriging(Effect):
             for name in ("mean", *map(str, range(1, len(self.centres) + 1)))
         )
 
-    def _design(self, batch: Batch) -> Array:
+    def _design(self, batch: Batch) -> Floats:
         """Evaluate one and the kernel, (n, 1 + m)."""
         x = scaled(batch.states, np.array(self.lower), np.array(self.upper))
         K = correlation(x, np.array(self.centres), np.array(self.length))
         return np.hstack([np.ones((len(x), 1)), K])
 
-    def columns(self, batch: Batch) -> Array:
+    def columns(self, batch: Batch) -> Floats:
         """Lay the design out per axis, (n, 3, p)."""
         D = self._design(batch)
         out = np.zeros((len(batch), 3, 3, D.shape[1]))
@@ -64,27 +62,27 @@ class Kriging(Effect):
             out[:, k, k] = D
         return out.reshape(len(batch), 3, -1)
 
-    def displacement(self, batch: Batch, p: Array) -> Array:
+    def displacement(self, batch: Batch, p: Floats) -> Floats:
         """Evaluate the process, (n, 3) [m]."""
-        moved: Array = self._design(batch) @ p.reshape(3, -1).T
+        moved: Floats = self._design(batch) @ p.reshape(3, -1).T
         return moved
 
 
-def scaled(states: States, lower: Array, upper: Array) -> Array:
+def scaled(states: States, lower: Floats, upper: Floats) -> Floats:
     """Scale joint angles to [-1, 1] and append the directions, (n, 12)."""
     span = np.where(upper - lower > 1e-9, upper - lower, 2.0)
     x = 2 * (states.q - lower) / span - 1
     return np.hstack([np.clip(x, -1.5, 1.5), states.direction])
 
 
-def correlation(a: Array, b: Array, length: Array) -> Array:
+def correlation(a: Floats, b: Floats, length: Floats) -> Floats:
     """Squared-exponential correlation of inputs (n, 12) and (m, 12), (n, m)."""
     a, b = a / length, b / length
     square = (a**2).sum(1)[:, None] + (b**2).sum(1) - 2 * a @ b.T
     return np.asarray(np.exp(-0.5 * np.maximum(square, 0.0)))
 
 
-def train(states: States, error: Array, seed: int) -> tuple[Kriging, Array]:
+def train(states: States, error: Floats, seed: int) -> tuple[Kriging, Floats]:
     """Choose lengths and noise, and solve for the weights.
 
     Args:
@@ -122,7 +120,7 @@ def train(states: States, error: Array, seed: int) -> tuple[Kriging, Array]:
     return effect, np.concatenate([mean[None], alpha]).T.reshape(-1)
 
 
-def _tune(x: Array, y: Array) -> tuple[Array, float, float]:
+def _tune(x: Floats, y: Floats) -> tuple[Floats, float, float]:
     """Maximise the marginal likelihood over lengths, noise and signal variance."""
     from scipy.linalg import cho_factor, cho_solve
     from scipy.optimize import minimize  # slow to load, and for fits alone
@@ -130,7 +128,7 @@ def _tune(x: Array, y: Array) -> tuple[Array, float, float]:
     inputs = x.shape[1]
     gaps = (x[:, None] - x) ** 2
 
-    def cost(u: Array) -> tuple[float, Array]:
+    def cost(u: Floats) -> tuple[float, Floats]:
         """Negative log likelihood, summed over the axes, and its gradient."""
         inverse_square = np.exp(-2 * u[:inputs])
         noise, signal = np.exp(u[-2]), np.exp(u[-1])

@@ -6,12 +6,10 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from postproc.accuracy.batch import Batch
 from postproc.accuracy.effect import JointEffect, Parameter
-
-Array = NDArray[np.float64]
+from postproc.arrays import Floats
 
 SCALE = 2e-4  # [rad s/m]
 
@@ -36,7 +34,7 @@ class Lag(JointEffect):
             Parameter(f"k{j}", "rad s/m", SCALE, f"{j}", j) for j in self.joints
         )
 
-    def basis(self, batch: Batch) -> Array:
+    def basis(self, batch: Batch) -> Floats:
         """Evaluate lambda * speed [m/s], (n, p)."""
         speed = np.nan_to_num(batch.states.speed)[:, None]
         return np.asarray(batch.states.direction[:, self.acts_on()] * speed)

@@ -6,14 +6,12 @@ from dataclasses import dataclass
 from typing import ClassVar, Literal, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from postproc.accuracy.batch import Batch
 from postproc.accuracy.effect import JointEffect, Parameter
+from postproc.arrays import Floats
 from postproc.robot.arm import Arm
 from postproc.robot.state import States
-
-Array = NDArray[np.float64]
 
 SCALE = 1e-4  # [rad] at the threshold torque
 UNSURE = 0.2  # of the power of the load, and of torque against t0
@@ -58,7 +56,7 @@ class LoadBacklash(JointEffect):
             out.append(Parameter(name, "rad", UNSURE * SCALE, group, j))
         return tuple(out)
 
-    def basis(self, batch: Batch) -> Array:
+    def basis(self, batch: Batch) -> Floats:
         """Evaluate the laws and their corrections, (n, p)."""
         joint = np.array(self.joints) - 1
         torque = (batch.loads.gravity + batch.loads.payload)[:, joint] / self.t0

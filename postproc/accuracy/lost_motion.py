@@ -7,22 +7,20 @@ model knows b for every joint, much better than the guess in an arm file.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from postproc.accuracy.batch import Batch
 from postproc.accuracy.effect import JointEffect
 from postproc.accuracy.model import Model
+from postproc.arrays import Floats
 from postproc.robot.arm import Arm
 from postproc.robot.direction import WIDTH_IN_PLAYS
 from postproc.robot.state import make_states
-
-Array = NDArray[np.float64]
 
 SAMPLES = 60  # angles over the surveyed range of every joint
 LEAST = np.deg2rad(1e-3)  # [rad] plays below this are jitter of the numbers
 
 
-def half_gap(model: Model, arm: Arm) -> Array:
+def half_gap(model: Model, arm: Arm) -> Floats:
     """Give the largest fitted backlash b of every joint over its surveyed range.
 
     Args:
@@ -43,7 +41,7 @@ def half_gap(model: Model, arm: Arm) -> Array:
     return np.asarray(np.abs(angles).max(axis=0))
 
 
-def measured_play(model: Model, arm: Arm) -> Array:
+def measured_play(model: Model, arm: Arm) -> Floats:
     """Give the play of every joint that makes the play operator as wide as its gap.
 
     Returns:

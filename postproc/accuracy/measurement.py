@@ -19,13 +19,11 @@ from postproc.accuracy.columns import (
 from postproc.accuracy.formats import read_foreign
 from postproc.accuracy.reading import DETECT, Reading
 from postproc.accuracy.table import Table
+from postproc.arrays import Bools, Floats
 from postproc.exceptions import MeasurementError
 from postproc.pose import MM
 from postproc.robot.arm import Arm
 from postproc.robot.state import States, make_states
-
-Array = NDArray[np.float64]
-Bools = NDArray[np.bool_]
 
 POSITION = ("x_mm", "y_mm", "z_mm")
 COVARIATES = {  # column: field of States, SI units per unit of the column
@@ -68,15 +66,15 @@ class Measurements:
 
     path: Path
     states: States
-    position: Array
+    position: Floats
     ids: tuple[str, ...]
     line: NDArray[np.int64]
     inferred: Bools
     sha256: str
     dropped: tuple[DroppedRow, ...] = ()
     warnings: tuple[str, ...] = ()
-    rotation: Array | None = field(default=None, repr=False)
-    mounting: Array | None = field(default=None, repr=False)
+    rotation: Floats | None = field(default=None, repr=False)
+    mounting: Floats | None = field(default=None, repr=False)
 
     def __len__(self) -> int:
         """Return the number of rows."""
@@ -103,7 +101,7 @@ class Measurements:
 def read_measurements(
     path: str | Path,
     arm: Arm,
-    tools: Array | Mapping[int, Array],
+    tools: Floats | Mapping[int, Floats],
     *,
     positions: bool = True,
     reading: Reading = DETECT,
@@ -128,7 +126,7 @@ def read_measurements(
 def from_table(
     table: Table,
     arm: Arm,
-    tools: Array | Mapping[int, Array],
+    tools: Floats | Mapping[int, Floats],
     *,
     positions: bool = True,
 ) -> Measurements:

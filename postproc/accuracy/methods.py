@@ -10,7 +10,6 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from postproc.accuracy import elm_map, kriging
 from postproc.accuracy.batch import Batch
@@ -25,12 +24,12 @@ from postproc.accuracy.model import Model
 from postproc.accuracy.noise import Noise
 from postproc.accuracy.ranges import Ranges
 from postproc.accuracy.schema import Method
+from postproc.arrays import Floats
 from postproc.pose import MM
 from postproc.robot.arm import Arm
 
-Array = NDArray[np.float64]
-Trained = tuple[tuple[Effect, ...], Array]
-Trainer = Callable[[Batch, Array, int], Trained]
+Trained = tuple[tuple[Effect, ...], Floats]
+Trainer = Callable[[Batch, Floats, int], Trained]
 
 NEURONS = 40
 FOLDS = 10
@@ -39,7 +38,7 @@ FOLDS = 10
 def _elm(directions: bool) -> Trainer:
     """Make the trainer of an ELM with or without arrival directions."""
 
-    def train(batch: Batch, error: Array, seed: int) -> Trained:
+    def train(batch: Batch, error: Floats, seed: int) -> Trained:
         """Fit the output weights by the pseudo-inverse."""
         layer = HiddenLayer.draw(batch.states, NEURONS, seed, directions)
         return (elm_map.ElmMap(layer),), elm_map.train(layer, batch.states, error)
@@ -47,12 +46,12 @@ def _elm(directions: bool) -> Trainer:
     return train
 
 
-def _interpolation(batch: Batch, error: Array, seed: int) -> Trained:
+def _interpolation(batch: Batch, error: Floats, seed: int) -> Trained:
     """Keep the measured errors at their nominal places."""
     return (Interpolation.through(batch.walk.tcp),), error.reshape(-1)
 
 
-def _kinematic_elm(batch: Batch, error: Array, seed: int) -> Trained:
+def _kinematic_elm(batch: Batch, error: Floats, seed: int) -> Trained:
     """Fit the geometry, then an ELM of the joint angles to what is left."""
     geometry = Geometry.propose(batch.arm, batch.states)
     fitted = fit_effects(batch, batch.walk.tcp + error, (geometry,))
@@ -60,7 +59,7 @@ def _kinematic_elm(batch: Batch, error: Array, seed: int) -> Trained:
     return (geometry, *effects), np.concatenate([fitted.values, weights])
 
 
-def _kriging(batch: Batch, error: Array, seed: int) -> Trained:
+def _kriging(batch: Batch, error: Floats, seed: int) -> Trained:
     """Fit a Gaussian process in the modified joint space."""
     effect, values = kriging.train(batch.states, error, seed)
     return (effect,), values
@@ -103,7 +102,7 @@ def fit_method(method: Method, survey: Measurements, arm: Arm, seed: int) -> Mod
 
 
 def _spread(
-    method: Method, batch: Batch, error: Array, seed: int
+    method: Method, batch: Batch, error: Floats, seed: int
 ) -> tuple[float, float, float]:
     """Root mean square per axis of what cross-validation leaves [m]."""
     n = len(batch)

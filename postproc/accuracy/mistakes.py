@@ -6,15 +6,13 @@ from collections.abc import Iterator
 from itertools import combinations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from postproc.accuracy.combination import Combination
 from postproc.accuracy.measurement import Measurements
 from postproc.accuracy.registration import register
+from postproc.arrays import Floats
 from postproc.robot.arm import Arm
 from postproc.robot.state import States
-
-Array = NDArray[np.float64]
 
 CLOSE = 0.01  # [m] a mended survey agrees at least so well
 TRIED = 60  # rows that a guess is tried on
@@ -30,11 +28,11 @@ def likely_cure(survey: Measurements, arm: Arm) -> str:
     return "Check units, joint order and signs, the tool and the frame (--frame)"
 
 
-def _guesses(states: States, position: Array) -> Iterator[tuple[str, States, Array]]:
+def _guesses(states: States, position: Floats) -> Iterator[tuple[str, States, Floats]]:
     """List mistakes that people make, most frequent first, each undone."""
     q = states.q
 
-    def turned(angles: Array) -> States:
+    def turned(angles: Floats) -> States:
         return states.with_(q=angles)
 
     yield (

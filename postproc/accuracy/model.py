@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from postproc.accuracy.batch import Batch
 from postproc.accuracy.combination import Combination
@@ -26,15 +25,12 @@ from postproc.accuracy.schema import (
     square_of,
 )
 from postproc.accuracy.variance import parameter_variance, side_variance
+from postproc.arrays import Bools, Floats, in_pieces, pieces
 from postproc.exceptions import ModelError
 from postproc.files import write_all
-from postproc.pieces import in_pieces, pieces
 from postproc.pose import MM
 from postproc.robot.arm import Arm
 from postproc.robot.state import States
-
-Array = NDArray[np.float64]
-Bools = NDArray[np.bool_]
 
 CHUNK = 5000  # states evaluated together: the columns stay in the cache
 COMPENSATED = ("arm", "state")
@@ -66,9 +62,9 @@ class Model:
     arm_name: str
     arm_id: str
     effects: Combination
-    values: Array
-    covariance: Array
-    prior_std: Array
+    values: Floats
+    covariance: Floats
+    prior_std: Floats
     noise: Noise
     ranges: Ranges
     rows: int
@@ -89,12 +85,12 @@ class Model:
         used = [e for e in self.effects.effects if e.belongs_to() in COMPENSATED]
         return frozenset(need for e in used for need in e.requires())
 
-    def compensable(self) -> tuple[Combination, Array, Array]:
+    def compensable(self) -> tuple[Combination, Floats, Floats]:
         """Return the effects that may be compensated, their values and covariance."""
         return self._compensable
 
     @cached_property
-    def _compensable(self) -> tuple[Combination, Array, Array]:
+    def _compensable(self) -> tuple[Combination, Floats, Floats]:
         """Choose them once: a program asks some twenty times."""
         keep = self.effects.where(*COMPENSATED)
         part = tuple(e for e in self.effects.effects if e.belongs_to() in COMPENSATED)
@@ -103,7 +99,7 @@ class Model:
             covariance = covariance[np.ix_(keep, keep)]
         return Combination(part), self.values[keep], covariance
 
-    def error(self, arm: Arm, states: States) -> Array:
+    def error(self, arm: Arm, states: States) -> Floats:
         """Predict the error without its uncertainty, (n, 3) [m]."""
         effects, values, _ = self.compensable()
         parts = in_pieces(
@@ -113,7 +109,7 @@ class Model:
         )
         return np.concatenate([np.zeros((0, 3)), *parts])
 
-    def measured_error(self, arm: Arm, states: States) -> Array:
+    def measured_error(self, arm: Arm, states: States) -> Floats:
         """Predict what the survey's set-up would measure, (n, 3) [m]."""
         return self.effects.error(Batch(arm, states), self.values)
 
@@ -134,7 +130,7 @@ class Model:
             outside[UNSURE] = unsure
         return Prediction(self.error(arm, states), model, arrival, outside)
 
-    def std_error(self, arm: Arm, states: States) -> Array:
+    def std_error(self, arm: Arm, states: States) -> Floats:
         """Standard error of the predicted error, (n, 3) [m], as `predict` gives it."""
         parts = in_pieces(
             lambda rows: self._variance(arm, states[rows])[0], len(states), CHUNK
@@ -142,7 +138,7 @@ class Model:
         variance = np.concatenate([np.zeros((0, 3)), *parts])
         return np.asarray(np.sqrt(np.maximum(variance, 0.0)))
 
-    def std_on_flanks(self, arm: Arm, states: States) -> Array:
+    def std_on_flanks(self, arm: Arm, states: States) -> Floats:
         """Standard error where the directions of all joints are known, (n, 3) [m].
 
         NaN elsewhere, and everywhere where a survey does not say what is too large.
@@ -153,7 +149,7 @@ class Model:
             out[rows] = self.std_error(arm, states[rows])
         return out
 
-    def unsure(self, std_on_flanks: Array) -> Bools:
+    def unsure(self, std_on_flanks: Floats) -> Bools:
         """Tell which states have a standard error beyond all of the survey, (n,).
 
         States with unknown directions are no such: their error is said to be the
@@ -169,7 +165,7 @@ class Model:
         """Standard error per axis up to which the survey vouches for it [m]."""
         return 3 * (self.statistics.get("worst_std_mm", np.inf) * MM)
 
-    def _variance(self, arm: Arm, states: States) -> tuple[Array, Batch]:
+    def _variance(self, arm: Arm, states: States) -> tuple[Floats, Batch]:
         """Variance of the error, (n, 3) [m^2], and the kinematics that it is of."""
         effects, values, covariance = self.compensable()
         at = effects.at(Batch(arm, states), values)
@@ -178,7 +174,7 @@ class Model:
             variance += parameter_variance(effects, at, covariance)
         return variance, at
 
-    def measured_std(self, arm: Arm, states: States) -> Array:
+    def measured_std(self, arm: Arm, states: States) -> Floats:
         """Standard deviation of one measured row, tracker included, (n, 3) [m]."""
         arrival = self.predict(arm, states).std_arrival
         tcp = Batch(arm, states).walk.tcp

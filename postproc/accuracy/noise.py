@@ -11,11 +11,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from postproc.accuracy.batch import Batch
-
-Array = NDArray[np.float64]
+from postproc.arrays import Floats
 
 TRACKER_FIXED, TRACKER_RANGE = 1e-5, 5e-6  # [m], [m/m] a laser tracker's data sheet
 SMALLEST, LARGEST = 1e-7, 1e-2  # [m] bounds of both standard deviations at the TCP
@@ -36,18 +34,20 @@ class Noise:
     joint: float
     origin: tuple[float, float, float] | None = None
 
-    def tracker_std(self, position: Array) -> Array:
+    def tracker_std(self, position: Floats) -> Floats:
         """Standard deviation per axis of the tracker at positions (n, 3), (n,) [m]."""
-        std: Array = self.tracker * tracker_shape(position, self.origin)
+        std: Floats = self.tracker * tracker_shape(position, self.origin)
         return std
 
-    def arrival_variance(self, jacobian: Array) -> Array:
+    def arrival_variance(self, jacobian: Floats) -> Floats:
         """Variance per axis that repeatability gives, (n, 3) [m^2]."""
-        variance: Array = self.joint**2 * np.einsum("nij,nij->ni", jacobian, jacobian)
+        variance: Floats = self.joint**2 * np.einsum("nij,nij->ni", jacobian, jacobian)
         return variance
 
 
-def tracker_shape(position: Array, origin: tuple[float, float, float] | None) -> Array:
+def tracker_shape(
+    position: Floats, origin: tuple[float, float, float] | None
+) -> Floats:
     """Data-sheet standard deviation of a tracker at positions (n, 3), (n,) [m]."""
     if origin is None:
         return np.full(len(position), TRACKER_FIXED)
@@ -66,19 +66,19 @@ class Whitener:
         origin: Tracker position, see `Noise`.
     """
 
-    turn: Array
-    tracker: Array
-    joint: Array
-    extra: Array
+    turn: Floats
+    tracker: Floats
+    joint: Floats
+    extra: Floats
     origin: tuple[float, float, float] | None
 
     @classmethod
     def build(
         cls,
         batch: Batch,
-        position: Array,
+        position: Floats,
         origin: tuple[float, float, float] | None,
-        extra: Array | None = None,
+        extra: Floats | None = None,
     ) -> Whitener:
         """Diagonalise the covariance of every row.
 
@@ -100,20 +100,20 @@ class Whitener:
             origin=origin,
         )
 
-    def rotate(self, rows: Array) -> Array:
+    def rotate(self, rows: Floats) -> Floats:
         """Rotate (n, 3) or (n, 3, p) into the eigenbasis."""
         if rows.ndim == 2:
             return np.asarray(np.einsum("nij,nj->ni", self.turn, rows))
         return np.asarray(self.turn @ rows)
 
-    def variance(self, noise: Noise) -> Array:
+    def variance(self, noise: Noise) -> Floats:
         """Variance of every rotated component, (n, 3) [m^2]."""
-        total: Array = (
+        total: Floats = (
             noise.tracker**2 * self.tracker + noise.joint**2 * self.joint + self.extra
         )
         return total
 
-    def estimate(self, squares: Array, weight: Array, start: Noise) -> Noise:
+    def estimate(self, squares: Floats, weight: Floats, start: Noise) -> Noise:
         """Maximise the likelihood of expected squared residuals over t and r.
 
         Args:
@@ -127,7 +127,7 @@ class Whitener:
         T, R = self.tracker[used], self.joint[used]
         E, S, w = self.extra[used], squares[used], weight[used, None]
 
-        def cost(u: Array) -> tuple[float, Array]:
+        def cost(u: Floats) -> tuple[float, Floats]:
             """Negative log likelihood and its gradient by log standard deviations."""
             t2, r2 = np.exp(2 * u)
             v = t2 * T + r2 * R + E

@@ -5,10 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import qr, solve_triangular
 
-Array = NDArray[np.float64]
+from postproc.arrays import Floats
 
 EXACT = 1e-8  # relative size below which a direction is no direction at all
 PARTNER = 0.2  # coefficient from which a parameter is named as a partner
@@ -47,7 +46,7 @@ class Observability:
     o1: float
 
 
-def observe(X: Array, names: tuple[str, ...], floor: float = 0.0) -> Observability:
+def observe(X: Floats, names: tuple[str, ...], floor: float = 0.0) -> Observability:
     """Find the rank of scaled columns by pivoted QR and name what is redundant.
 
     Args:

@@ -3,22 +3,19 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from postproc.accuracy.batch import Batch
 from postproc.accuracy.model import Model
+from postproc.arrays import Bools, Floats
 from postproc.exceptions import ModelError
 from postproc.robot.arm import Arm
 from postproc.robot.state import States
-
-Array = NDArray[np.float64]
-Bools = NDArray[np.bool_]
 
 UNSURE_RAD = 3e-4  # [rad] 0.03 mm at 0.1 m from the TCP
 UNSURE_TURN = "the tool's rotation is not known well enough there to correct it"
 
 
-def turn(model: Model, arm: Arm, states: States) -> Array:
+def turn(model: Model, arm: Arm, states: States) -> Floats:
     """Predict the tool's rotation from nominal to actual.
 
     Returns:
@@ -28,7 +25,7 @@ def turn(model: Model, arm: Arm, states: States) -> Array:
     return effects.turn(Batch(arm, states), values)
 
 
-def turn_std(model: Model, arm: Arm, states: States) -> Array:
+def turn_std(model: Model, arm: Arm, states: States) -> Floats:
     """Standard error of the predicted rotation per axis, (n, 3) [rad]."""
     effects, values, covariance = model.compensable()
     at = effects.at(Batch(arm, states), values)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 from scipy.stats import chi2
 
-Array = NDArray[np.float64]
+from postproc.arrays import Floats
 
 NEIGHBOURS = 6
 AGREES = 0.35  # share of a row's residual that its neighbours must show as well
@@ -31,14 +31,14 @@ class RowWeights:
         spared: Rows that stand out and are kept, because neighbours agree, (n,).
     """
 
-    weight: Array
-    distance: Array
+    weight: Floats
+    distance: Floats
     spared: NDArray[np.bool_]
 
 
-def student_weights(distance: Array) -> Array:
+def student_weights(distance: Floats) -> Floats:
     """Weights of a heavy-tailed first pass, (n,): Student t with 4 degrees."""
-    weight: Array = (4.0 + 3.0) / (4.0 + distance**2)
+    weight: Floats = (4.0 + 3.0) / (4.0 + distance**2)
     return weight
 
 
@@ -47,7 +47,9 @@ def limit_of(n: int) -> float:
     return float(np.sqrt(chi2.isf(FALSE_ALARMS / max(n, 1), 3)))
 
 
-def judge(distance: Array, residual: Array, q: Array, jacobian: Array) -> RowWeights:
+def judge(
+    distance: Floats, residual: Floats, q: Floats, jacobian: Floats
+) -> RowWeights:
     """Weigh the rows of a survey.
 
     Args:
@@ -70,7 +72,9 @@ def judge(distance: Array, residual: Array, q: Array, jacobian: Array) -> RowWei
     return RowWeights(weight, distance, spared)
 
 
-def _together(rows: NDArray[np.int64], residual: Array, q: Array) -> NDArray[np.bool_]:
+def _together(
+    rows: NDArray[np.int64], residual: Floats, q: Floats
+) -> NDArray[np.bool_]:
     """Tell whether the nearest rows in joint space share a row's residual."""
     spread = np.maximum(q.std(axis=0), 1e-9)
     found = cKDTree(q / spread).query(q[rows] / spread, k=NEIGHBOURS + 1)
@@ -82,7 +86,7 @@ def _together(rows: NDArray[np.int64], residual: Array, q: Array) -> NDArray[np.
 
 
 def _same_joint(
-    rows: NDArray[np.int64], residual: Array, q: Array, jacobian: Array
+    rows: NDArray[np.int64], residual: Floats, q: Floats, jacobian: Floats
 ) -> NDArray[np.bool_]:
     """Tell whether rows at the same angle of one joint share the joint's error.
 

@@ -6,13 +6,11 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from postproc.accuracy.batch import Batch
 from postproc.accuracy.compliance import AXES, SCALE, UNSURE_PAYLOAD
 from postproc.accuracy.effect import JointEffect, Origin, Parameter
-
-Array = NDArray[np.float64]
+from postproc.arrays import Floats
 
 UNSURE_LEVER = 0.5  # [m] along the links of an arm of this size
 
@@ -53,7 +51,7 @@ class Payload(JointEffect):
             ]
         return tuple(out)
 
-    def basis(self, batch: Batch) -> Array:
+    def basis(self, batch: Batch) -> Floats:
         """Evaluate the payload's torque, and that per metre of every lever, (n, p)."""
         unit = batch.loads.basis.reshape(len(batch), 6, 6, 4)
         mass = np.nan_to_num(batch.states.payload)[:, None]

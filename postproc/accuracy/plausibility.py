@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from postproc.accuracy.batch import Batch
 from postproc.accuracy.geometry import Geometry
@@ -15,8 +14,6 @@ from postproc.exceptions import MeasurementError
 from postproc.pose import MM
 from postproc.robot.arm import Arm
 from postproc.robot.state import States, make_states
-
-Array = NDArray[np.float64]
 
 FAR = 0.05  # [m] no arm that works is off by more
 APART = 10.0  # rows this many times farther off than the typical one are another kind

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from postproc.arrays import Floats
 
 
 @dataclass(frozen=True)
@@ -23,9 +23,9 @@ class Prediction:
             (n,) each. No reason: all inside.
     """
 
-    error: Array
-    std_model: Array
-    std_arrival: Array
+    error: Floats
+    std_model: Floats
+    std_arrival: Floats
     outside: dict[str, NDArray[np.bool_]]
 
     @property

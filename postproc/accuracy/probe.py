@@ -6,14 +6,12 @@ from dataclasses import dataclass
 from typing import ClassVar, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from postproc.accuracy.batch import Batch
 from postproc.accuracy.effect import Effect, Origin, Parameter
+from postproc.arrays import Floats
 from postproc.robot.arm import Arm
 from postproc.robot.state import States
-
-Array = NDArray[np.float64]
 
 SCALE = 5e-5  # [m]
 
@@ -42,7 +40,7 @@ class Probe(Effect):
             Parameter(f"{a}_{t}", "m", SCALE, "nest") for t in self.tools for a in "xyz"
         )
 
-    def columns(self, batch: Batch) -> Array:
+    def columns(self, batch: Batch) -> Floats:
         """Shift the point that a row measures, (n, 3, p)."""
         R = batch.walk.flange
         parts = [R * (batch.states.tool_id == t)[:, None, None] for t in self.tools]

@@ -6,14 +6,12 @@ from dataclasses import dataclass
 from typing import ClassVar, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from postproc.accuracy.batch import Batch
 from postproc.accuracy.effect import Effect, Origin, Parameter
+from postproc.arrays import Floats
 from postproc.robot.arm import Arm
 from postproc.robot.state import States
-
-Array = NDArray[np.float64]
 
 SCALE = 1e-4  # [rad] of a mounting that was measured
 
@@ -46,11 +44,11 @@ class ProbeTurn(Effect):
             for a in "xyz"
         )
 
-    def columns(self, batch: Batch) -> Array:
+    def columns(self, batch: Batch) -> Floats:
         """Move nothing, (n, 3, p)."""
         return np.zeros((len(batch), 3, 3 * len(self.tools)))
 
-    def rotation_columns(self, batch: Batch) -> Array:
+    def rotation_columns(self, batch: Batch) -> Floats:
         """Turn the probe that a row measures, (n, 3, p)."""
         R = batch.walk.flange
         parts = [R * (batch.states.tool_id == t)[:, None, None] for t in self.tools]

@@ -5,13 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from postproc.arrays import Bools, Floats
 from postproc.pose import MM
 from postproc.robot.state import States
 
-Array = NDArray[np.float64]
-Bools = NDArray[np.bool_]
 Interval = tuple[float, float]
 
 MARGIN = 0.05  # of a joint's surveyed range: random poses do not reach its ends
@@ -78,7 +76,7 @@ class Ranges:
             found[f"{name} is not known, and the model needs it"] = unknown
         return {reason: rows for reason, rows in found.items() if rows.any()}
 
-    def _joints(self, q: Array) -> dict[str, Bools]:
+    def _joints(self, q: Floats) -> dict[str, Bools]:
         """Compare joint angles; an axis surveyed all around has no outside."""
         low, high = np.array(self.lower), np.array(self.upper)
         middle, margin = (low + high) / 2, MARGIN * (high - low) + 1e-6
@@ -92,7 +90,7 @@ class Ranges:
             for j in range(6)
         }
 
-    def _tools(self, tool: Array) -> dict[str, Bools]:
+    def _tools(self, tool: Floats) -> dict[str, Bools]:
         """Compare the tool with the probe points."""
         points = np.array(self.tools).reshape(-1, 3)
         gap = np.linalg.norm(tool[:, None] - points, axis=2).min(axis=1, initial=np.inf)
@@ -112,7 +110,7 @@ class Ranges:
         return len(spread) > 1 and bool(spread[1] > 0.02)  # [m]
 
 
-def _interval(values: Array) -> Interval | None:
+def _interval(values: Floats) -> Interval | None:
     """Return the least and the largest of the known values."""
     known = values[~np.isnan(values)]
     return (float(known.min()), float(known.max())) if len(known) else None

@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from postproc.accuracy.batch import Batch
+from postproc.arrays import Bools, Floats
 from postproc.robot.arm import Arm
 from postproc.robot.state import make_states
-
-Array = NDArray[np.float64]
-Bools = NDArray[np.bool_]
 
 LIMIT_MARGIN = np.deg2rad(5.0)  # every approach starts to the side of its pose
 FLOOR, COLUMN = 0.15, 0.45  # [m] least height, least distance from axis 1 when low
@@ -19,7 +16,7 @@ FACING = np.cos(np.deg2rad(75.0))  # the beam must come from before the flange
 CLEARANCE = 0.2  # [m] between the beam and the arm's links
 
 
-def joint_box(arm: Arm) -> tuple[Array, Array]:
+def joint_box(arm: Arm) -> tuple[Floats, Floats]:
     """Give the joint ranges of a survey: the limits with a margin, half a turn at most.
 
     Returns:
@@ -32,7 +29,7 @@ def joint_box(arm: Arm) -> tuple[Array, Array]:
     return low, high
 
 
-def usable(arm: Arm, q: Array, tool: Array, tracker: Array | None) -> Bools:
+def usable(arm: Arm, q: Floats, tool: Floats, tracker: Floats | None) -> Bools:
     """Tell which poses keep the tool free and the tracker in sight.
 
     Args:

@@ -11,16 +11,14 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from postproc.accuracy.base_shift import rigid_columns, rigid_rotations
 from postproc.accuracy.batch import Batch
 from postproc.accuracy.combination import Combination
 from postproc.accuracy.effect import Effect, Origin, Parameter
+from postproc.arrays import Floats
 from postproc.robot.arm import Arm
 from postproc.robot.state import States
-
-Array = NDArray[np.float64]
 
 PASSES = 60
 SETTLED = 1e-9  # [m]
@@ -38,29 +36,29 @@ class Registration:
         typical: Median distance that is left [m].
     """
 
-    base_from_tracker: Array
-    probes: Array
+    base_from_tracker: Floats
+    probes: Floats
     typical: float
 
     @property
-    def tracker(self) -> Array:
+    def tracker(self) -> Floats:
         """Position of the tracker in the base frame, (3,) [m]."""
-        place: Array = self.base_from_tracker[:3, 3]
+        place: Floats = self.base_from_tracker[:3, 3]
         return place
 
-    def to_base(self, position: Array) -> Array:
+    def to_base(self, position: Floats) -> Floats:
         """Convert positions (n, 3) [m] from the tracker's to the base frame."""
         T = self.base_from_tracker
-        converted: Array = position @ T[:3, :3].T + T[:3, 3]
+        converted: Floats = position @ T[:3, :3].T + T[:3, 3]
         return converted
 
 
 def register(
     arm: Arm,
     states: States,
-    position: Array,
+    position: Floats,
     arm_effects: Combination,
-    values: Array,
+    values: Floats,
 ) -> Registration:
     """Find the tracker and the probe points, the arm's own errors being known.
 
@@ -103,7 +101,7 @@ def register(
     return Registration(T, probes, typical)
 
 
-def _procrustes(a: Array, b: Array, weight: Array) -> Array:
+def _procrustes(a: Floats, b: Floats, weight: Floats) -> Floats:
     """Find the rigid transform (4, 4) that takes points a (n, 3) to b best."""
     from scipy.spatial.transform import Rotation  # slow to load, and for fits alone
 
@@ -116,7 +114,7 @@ def _procrustes(a: Array, b: Array, weight: Array) -> Array:
     return T
 
 
-def _robust(gap: Array) -> Array:
+def _robust(gap: Floats) -> Floats:
     """Weigh rows by their distance over the typical one, (n,)."""
     size = np.linalg.norm(gap, axis=1)
     ratio = size / max(ROBUST * float(np.median(size)), 1e-12)
@@ -154,13 +152,13 @@ class Placement(Effect):
         ]
         return tuple(out)
 
-    def columns(self, batch: Batch) -> Array:
+    def columns(self, batch: Batch) -> Floats:
         """Differentiate the measured position, (n, 3, 6 + 3 k)."""
         flange, which = batch.walk.flange, batch.states.tool_id
         points = [flange * (which == t)[:, None, None] for t in self.tools]
         return np.concatenate([rigid_columns(batch), *points], axis=2)
 
-    def rotation_columns(self, batch: Batch) -> Array:
+    def rotation_columns(self, batch: Batch) -> Floats:
         """Differentiate the measured orientation, (n, 3, 6 + 3 k)."""
         still = np.zeros((len(batch), 3, 3 * len(self.tools)))
         return np.concatenate([rigid_rotations(batch), still], axis=2)

@@ -11,12 +11,9 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from postproc.accuracy.columns import JOINTS
 from postproc.accuracy.table import Table
-
-Array = NDArray[np.float64]
 
 WIDTH = 18
 MEASURED = ("x_mm", "y_mm", "z_mm")

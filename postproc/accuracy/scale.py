@@ -5,13 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
-import numpy as np
-from numpy.typing import NDArray
-
 from postproc.accuracy.batch import Batch
 from postproc.accuracy.effect import JointEffect, Parameter
-
-Array = NDArray[np.float64]
+from postproc.arrays import Floats
 
 SCALE = 5e-5  # [rad/rad]
 
@@ -34,7 +30,7 @@ class Scale(JointEffect):
             Parameter(f"gain{j}", "rad/rad", SCALE, f"{j}", j) for j in self.joints
         )
 
-    def basis(self, batch: Batch) -> Array:
+    def basis(self, batch: Batch) -> Floats:
         """Evaluate theta, (n, p)."""
-        theta: Array = batch.states.q[:, self.acts_on()]
+        theta: Floats = batch.states.q[:, self.acts_on()]
         return theta

@@ -9,12 +9,10 @@ from typing import Any, Literal
 
 import numpy as np
 import pydantic
-from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, NonNegativeFloat, PositiveInt
 
+from postproc.arrays import Floats
 from postproc.exceptions import ModelError
-
-Array = NDArray[np.float64]
 
 FORMAT = 1
 MAX_BYTES = 200_000_000
@@ -134,13 +132,13 @@ def read_model_file(path: Path) -> ModelFile:
     return file
 
 
-def packed(square: Array) -> list[float]:
+def packed(square: Floats) -> list[float]:
     """Pack a symmetric matrix as its upper triangle, row by row."""
     upper: list[float] = square[np.triu_indices(len(square))].tolist()
     return upper
 
 
-def square_of(values: Array, count: int) -> Array:
+def square_of(values: Floats, count: int) -> Floats:
     """Unpack an upper triangle, row by row."""
     if len(values) == 0:
         return np.zeros((0, 0))

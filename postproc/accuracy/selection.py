@@ -20,11 +20,9 @@ from postproc.accuracy.library import BASE_EFFECTS, propose
 from postproc.accuracy.tool_groups import find_groups
 from postproc.accuracy.tool_shift import ToolShift
 from postproc.accuracy.turns import Turns
+from postproc.arrays import Bools, Floats
 from postproc.robot.arm import Arm
 from postproc.robot.state import States
-
-Array = NDArray[np.float64]
-Bools = NDArray[np.bool_]
 
 ENOUGH = 3.0  # nats that an effect must be worth: 20 to 1
 NAMED = (
@@ -57,7 +55,7 @@ def candidates(states: States) -> tuple[str, ...]:
 def fit_best(
     arm: Arm,
     states: States,
-    position: Array,
+    position: Floats,
     origin: tuple[float, float, float] | None,
     setup: tuple[str, ...] = (),
     turns: Turns | None = None,
@@ -150,7 +148,7 @@ def _evidence(
     return best.log_evidence - 0.5 * float((best.log_scale**2).sum()) / LOG_SPREAD**2
 
 
-def _span(values: Array) -> float:
+def _span(values: Floats) -> float:
     """Range of the known values."""
     known = values[~np.isnan(values)]
     return float(np.ptp(known)) if len(known) else 0.0

@@ -10,9 +10,8 @@ from __future__ import annotations
 from functools import cache
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from postproc.arrays import Floats
 
 PER_LENGTH = 2.0  # grid points per correlation length
 FEWEST, MOST = 6, 300  # grid points
@@ -20,7 +19,7 @@ LEFT_OUT = 1e-3  # share of the variance that the columns do not reach
 
 
 @cache
-def _modes(points: int, relative: float) -> Array:
+def _modes(points: int, relative: float) -> Floats:
     """Scaled eigenvectors of a Matern 3/2 process on a grid, (points, k)."""
     grid = np.linspace(0.0, 1.0, points)
     gap = np.sqrt(3.0) * np.abs(grid[:, None] - grid) / relative
@@ -28,7 +27,7 @@ def _modes(points: int, relative: float) -> Array:
     values, vectors = values[::-1], vectors[:, ::-1]
     total = np.cumsum(values) / values.sum()
     keep = int(np.searchsorted(total, 1 - LEFT_OUT)) + 1
-    modes: Array = vectors[:, :keep] * np.sqrt(np.maximum(values[:keep], 0.0))
+    modes: Floats = vectors[:, :keep] * np.sqrt(np.maximum(values[:keep], 0.0))
     return modes
 
 
@@ -44,7 +43,7 @@ def smooth_count(lower: float, upper: float, length: float) -> int:
     return int(_modes(*_grid(upper - lower, length)).shape[1])
 
 
-def smooth_columns(x: Array, lower: float, upper: float, length: float) -> Array:
+def smooth_columns(x: Floats, lower: float, upper: float, length: float) -> Floats:
     """Evaluate the columns, (n, k), which together have unit prior variance.
 
     Args:

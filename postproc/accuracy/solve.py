@@ -9,17 +9,10 @@ from numpy.typing import NDArray
 
 from postproc.accuracy.model import Model
 from postproc.accuracy.orientation import turn
-from postproc.pose import (
-    inverse,
-    lengths,
-    rotation_from_vector,
-    rotation_vector,
-    times,
-)
+from postproc.arrays import Floats
+from postproc.pose import inverse, lengths, rotation_from_vector, rotation_vector, times
 from postproc.robot.arm import Arm
 from postproc.robot.state import States
-
-Array = NDArray[np.float64]
 
 CLOSE = 2e-7  # [m] where iterating stops
 CLOSE_TURN = 2e-7  # [rad] likewise
@@ -37,17 +30,17 @@ class Solution:
         iterations: How many were needed.
     """
 
-    q: Array
-    command: Array
-    residual: Array
+    q: Floats
+    command: Floats
+    residual: Floats
     iterations: int
 
 
 def solve(
     model: Model,
     arm: Arm,
-    wanted: Array,
-    tool: Array,
+    wanted: Floats,
+    tool: Floats,
     states: States,
     orientation: bool = False,
 ) -> Solution:
@@ -97,19 +90,19 @@ def solve(
     return Solution(q, command, _distance(landing, place), iterations)
 
 
-def _distance(a: Array, b: Array) -> Array:
+def _distance(a: Floats, b: Floats) -> Floats:
     """Distance between points (n, 3), (n,) [m]."""
     return lengths(a - b)
 
 
-def _turned(rotation: Array, by: Array) -> Array:
+def _turned(rotation: Floats, by: Floats) -> Floats:
     """Turn rotations (n, 3, 3) by rotation vectors (n, 3) [rad] in the base frame."""
     return np.asarray(rotation_from_vector(by) @ rotation)
 
 
 def _nearest(
-    arm: Arm, flange: Array, near: Array, branch: NDArray[np.int64] | None
-) -> Array:
+    arm: Arm, flange: Floats, near: Floats, branch: NDArray[np.int64] | None
+) -> Floats:
     """Solve for the joint angles next to given ones, in closed form or by Newton."""
     if branch is not None:
         return arm.nearest(flange, near, branch)

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.stats import qmc
 
 from postproc.accuracy.batch import Batch
@@ -14,12 +13,10 @@ from postproc.accuracy.exchange import choose, gain_d, gain_i
 from postproc.accuracy.library import BASE_EFFECTS, propose
 from postproc.accuracy.observability import Observability, observe
 from postproc.accuracy.reachability import joint_box, usable
+from postproc.arrays import Floats, Ints
 from postproc.exceptions import PostprocError
 from postproc.robot.arm import Arm
 from postproc.robot.state import States, make_states
-
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 MODES = ("lhs", "optimal", "d-optimal")
 POOL = 6  # candidate poses per wanted pose in an optimal design
@@ -40,8 +37,8 @@ class Design:
         observability: What the design shows of the base model.
     """
 
-    q: Array
-    side: Array
+    q: Floats
+    side: Floats
     probe: Ints
     mode: str
     observability: Observability
@@ -58,10 +55,10 @@ class Design:
 
 def design_survey(
     arm: Arm,
-    probes: Array,
+    probes: Floats,
     poses: int,
     mode: str = "lhs",
-    tracker: Array | None = None,
+    tracker: Floats | None = None,
     seed: int = 0,
 ) -> Design:
     """Choose the poses of a survey.
@@ -95,7 +92,11 @@ def design_survey(
 
 
 def _candidates(
-    arm: Arm, probes: Array, count: int, tracker: Array | None, rng: np.random.Generator
+    arm: Arm,
+    probes: Floats,
+    count: int,
+    tracker: Floats | None,
+    rng: np.random.Generator,
 ) -> States:
     """Draw poses that can be measured from a Latin hypercube.
 
@@ -125,13 +126,13 @@ def _candidates(
     )
 
 
-def _balanced_sides(count: int, rng: np.random.Generator) -> Array:
+def _balanced_sides(count: int, rng: np.random.Generator) -> Floats:
     """Draw directions, (count, 6): every joint as often from each side."""
     half = np.where(np.arange(count) % 2 == 0, 1.0, -1.0)
     return np.stack([rng.permutation(half) for _ in range(6)], axis=1)
 
 
-def _whitened(arm: Arm, states: States) -> tuple[Array, tuple[str, ...]]:
+def _whitened(arm: Arm, states: States) -> tuple[Floats, tuple[str, ...]]:
     """Columns of the base model per pose, (n, 6, p): three rows from either side."""
     base = Combination(propose(BASE_EFFECTS, arm, states))
     back = states.with_(direction=-states.direction)

@@ -16,9 +16,8 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from postproc.arrays import Floats
 from postproc.exceptions import MeasurementError
-
-Array = NDArray[np.float64]
 
 MAX_BYTES = 500_000_000
 NUMBER = re.compile(r"^\s*[-+]?\d+([.,]\d+)?([eE][-+]?\d+)?\s*$")
@@ -63,7 +62,7 @@ class Table:
         self.require(name)
         return [str(v).strip() for v in self.cells[:, self.columns.index(name)]]
 
-    def numbers(self, name: str, empty: bool = False) -> Array:
+    def numbers(self, name: str, empty: bool = False) -> Floats:
         """Return a column as numbers, (n,).
 
         Args:
@@ -78,7 +77,7 @@ class Table:
             out[i] = self._number(i, name, text, empty)
         return out
 
-    def block(self, names: tuple[str, ...]) -> Array:
+    def block(self, names: tuple[str, ...]) -> Floats:
         """Return several columns as numbers, (n, k)."""
         return np.stack([self.numbers(name) for name in names], axis=1)
 

@@ -6,14 +6,12 @@ from dataclasses import dataclass
 from typing import ClassVar, Literal, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from postproc.accuracy.batch import Batch
 from postproc.accuracy.effect import Effect, Origin, Parameter
+from postproc.arrays import Floats
 from postproc.robot.arm import Arm
 from postproc.robot.state import States
-
-Array = NDArray[np.float64]
 
 STEEL = 12e-6  # [1/K] linear expansion
 WARM_UP = 10.0  # [K] usual rise inside an arm that starts cold
@@ -74,7 +72,7 @@ class Thermal(Effect):
         ]
         return (Parameter(name, unit, scale, group), *each)
 
-    def warmth(self, batch: Batch) -> Array:
+    def warmth(self, batch: Batch) -> Floats:
         """Return temperature above the reference [K], or share of the warm-up, (n,)."""
         if self.form == "temperature":
             return np.nan_to_num(batch.states.temperature - self.reference)
@@ -82,14 +80,14 @@ class Thermal(Effect):
         warm = -np.exp(-since / self.time_constant)
         return np.nan_to_num(warm)
 
-    def columns(self, batch: Batch) -> Array:
+    def columns(self, batch: Batch) -> Floats:
         """Differentiate the TCP position, (n, 3, p)."""
         each = np.stack([self._length(batch, name) for name in self.lengths], axis=2)
         every = each.sum(axis=2, keepdims=True)
         warmth = self.warmth(batch)[:, None, None]
         return np.concatenate([every, each], axis=2) * warmth
 
-    def _length(self, batch: Batch, name: str) -> Array:
+    def _length(self, batch: Batch, name: str) -> Floats:
         """Differentiate the TCP position by the growth of one length, (n, 3) [m]."""
         kind, joint = name[0], int(name[1]) - 1
         if kind == "a":

@@ -10,13 +10,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.cluster.vq import kmeans2
 
+from postproc.arrays import Floats, Ints
 from postproc.pose import MM
-
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 APART = 4.0  # distance of heaps over the typical distance within one; noise has 1.3
 FEWEST = 0.05  # share of the rows that a heap must have
@@ -35,7 +32,7 @@ class ToolGroups:
     """
 
     which: Ints
-    centre: Array
+    centre: Floats
 
     @property
     def kinds(self) -> range:
@@ -71,7 +68,7 @@ class ToolGroups:
         )
 
 
-def find_groups(left: Array, flange: Array) -> ToolGroups | None:
+def find_groups(left: Floats, flange: Floats) -> ToolGroups | None:
     """Look for heaps in what is left of a fit.
 
     Args:
@@ -87,7 +84,7 @@ def find_groups(left: Array, flange: Array) -> ToolGroups | None:
     return None
 
 
-def _heaps(seen: Array, count: int) -> ToolGroups | None:
+def _heaps(seen: Floats, count: int) -> ToolGroups | None:
     """Divide points (n, 3) into heaps that stand apart, if they do."""
     scale = max(float(np.median(np.abs(seen))), 1e-9)
     best, least = None, np.inf

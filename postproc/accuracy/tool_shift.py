@@ -6,12 +6,10 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from postproc.accuracy.batch import Batch
 from postproc.accuracy.effect import Effect, Origin, Parameter
-
-Array = NDArray[np.float64]
+from postproc.arrays import Floats
 
 SHIFT, TURN = 1e-4, 2e-4  # [m], [rad]
 AXES = "xyz"
@@ -41,7 +39,7 @@ class ToolShift(Effect):
         turn = [Parameter(f"r{a}_row{self.row:g}", "rad", TURN, group) for a in AXES]
         return (*shift, *(turn if self.turns else ()))
 
-    def columns(self, batch: Batch) -> Array:
+    def columns(self, batch: Batch) -> Floats:
         """Differentiate the TCP position, (n, 3, p)."""
         axes, before = batch.walk.flange, (batch.states.order < self.row)
         if self.turns:
@@ -49,7 +47,7 @@ class ToolShift(Effect):
             axes = np.concatenate([axes, axes @ np.swapaxes(arms, 1, 2)], axis=2)
         return np.where(before[:, None, None], -axes, 0.0)
 
-    def rotation_columns(self, batch: Batch) -> Array | None:
+    def rotation_columns(self, batch: Batch) -> Floats | None:
         """Differentiate the tool's rotation, (n, 3, p)."""
         if not self.turns:
             return None

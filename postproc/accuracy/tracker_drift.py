@@ -6,15 +6,13 @@ from dataclasses import dataclass
 from typing import ClassVar, Literal, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from postproc.accuracy.base_shift import AXES, rigid_columns, rigid_rotations
 from postproc.accuracy.batch import Batch
 from postproc.accuracy.effect import Effect, Origin, Parameter
+from postproc.arrays import Floats
 from postproc.robot.arm import Arm
 from postproc.robot.state import States
-
-Array = NDArray[np.float64]
 
 SHIFT, TURN = 3e-5, 1e-5  # [m], [rad]
 TERMS = 3
@@ -62,15 +60,15 @@ class TrackerDrift(Effect):
                 out.append(Parameter(f"r{a}_{term + 1}", "rad", TURN * part, "drift"))
         return tuple(out)
 
-    def columns(self, batch: Batch) -> Array:
+    def columns(self, batch: Batch) -> Floats:
         """Differentiate the TCP position, (n, 3, p)."""
         return self._in_time(batch, rigid_columns(batch))
 
-    def rotation_columns(self, batch: Batch) -> Array:
+    def rotation_columns(self, batch: Batch) -> Floats:
         """Differentiate the tool's rotation, (n, 3, p)."""
         return self._in_time(batch, rigid_rotations(batch))
 
-    def _in_time(self, batch: Batch, moved: Array) -> Array:
+    def _in_time(self, batch: Batch, moved: Floats) -> Floats:
         """Multiply six motions (n, 3, 6) by every term, (n, 3, p)."""
         u = (getattr(batch.states, self.clock) - self.start) / self.duration
         u = np.clip(np.nan_to_num(u), 0.0, 1.0)

@@ -6,12 +6,10 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from postproc.accuracy.batch import Batch
 from postproc.accuracy.effect import JointEffect, Parameter
-
-Array = NDArray[np.float64]
+from postproc.arrays import Floats
 
 SCALE = 5e-5  # [rad]
 
@@ -39,7 +37,7 @@ class Transmission(JointEffect):
             for wave in ("sin", "cos")
         )
 
-    def basis(self, batch: Batch) -> Array:
+    def basis(self, batch: Batch) -> Floats:
         """Evaluate the waves, (n, p)."""
         joint = np.array([j - 1 for j, _ in self.waves])
         order = np.array([k for _, k in self.waves])

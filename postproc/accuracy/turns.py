@@ -11,16 +11,14 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from postproc.accuracy.batch import Batch
 from postproc.accuracy.combination import Combination
 from postproc.accuracy.evidence import Normal
 from postproc.accuracy.outliers import DROPPED, limit_of, student_weights
+from postproc.arrays import Floats
 from postproc.pose import rotation_vector
-
-Array = NDArray[np.float64]
 
 TYPICAL = 1e-3  # [rad] scatter to begin with: that of an arm not yet calibrated
 SMALLEST = 1e-7  # [rad]
@@ -41,14 +39,14 @@ class Turns:
         weight: Weight of every row, (n,).
     """
 
-    measured: Array
-    residual: Array
-    columns: Array
+    measured: Floats
+    residual: Floats
+    columns: Floats
     std: float
-    weight: Array
+    weight: Floats
 
     @classmethod
-    def of(cls, batch: Batch, rotation: Array, mounting: Array | None) -> Turns:
+    def of(cls, batch: Batch, rotation: Floats, mounting: Floats | None) -> Turns:
         """Compare measured orientations with the nominal arm's.
 
         Args:
@@ -72,7 +70,7 @@ class Turns:
         """Median angle from nominal to measured [rad]."""
         return float(np.median(np.linalg.norm(self.measured, axis=1)))
 
-    def left(self, effects: Combination, batch: Batch, values: Array) -> Turns:
+    def left(self, effects: Combination, batch: Batch, values: Floats) -> Turns:
         """Take off what effects explain."""
         return replace(self, residual=self.measured - effects.turn(batch, values))
 
@@ -80,13 +78,13 @@ class Turns:
         """Differentiate at the kinematics of a batch."""
         return replace(self, columns=effects.rotation_columns(at))
 
-    def whitened(self) -> Array:
+    def whitened(self) -> Floats:
         """Columns in standard deviations, (3 n, p)."""
         scale = (np.sqrt(self.weight) / self.std)[:, None, None]
-        out: Array = (self.columns * scale).reshape(-1, self.columns.shape[2])
+        out: Floats = (self.columns * scale).reshape(-1, self.columns.shape[2])
         return out
 
-    def normal(self, values: Array, scales: Array) -> Normal:
+    def normal(self, values: Floats, scales: Floats) -> Normal:
         """Write these rows as normal sums, see `Fit.normal`."""
         X = self.whitened() * scales
         target = self.residual + self.columns @ values
@@ -95,7 +93,7 @@ class Turns:
         noise = 2.0 * rows * float(np.log(self.std))
         return Normal(X.T @ X, X.T @ y, float(y @ y), noise, rows)
 
-    def judged(self, covariance: Array, row_weight: Array, heavy: bool) -> Turns:
+    def judged(self, covariance: Floats, row_weight: Floats, heavy: bool) -> Turns:
         """Weigh the rows and estimate the scatter from what is left.
 
         Args:
@@ -118,7 +116,7 @@ class Turns:
         return replace(self, weight=weight, std=max(np.sqrt(variance), SMALLEST))
 
 
-def _mean(rotation: Array) -> Array:
+def _mean(rotation: Floats) -> Floats:
     """Average rotations (n, 3, 3) without those that are far from the others."""
     used = np.ones(len(rotation), dtype=bool)
     mean = np.eye(3)

@@ -3,20 +3,19 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from postproc.accuracy.batch import Batch
 from postproc.accuracy.chain import base_of, deviated
 from postproc.accuracy.combination import Combination
 from postproc.accuracy.effect import JointEffect
 from postproc.accuracy.geometry import Geometry
+from postproc.arrays import Floats
 from postproc.kernels import native
 
-Array = NDArray[np.float64]
 NONE = np.empty(0, dtype=np.int64)
 
 
-def parameter_variance(effects: Combination, at: Batch, covariance: Array) -> Array:
+def parameter_variance(effects: Combination, at: Batch, covariance: Floats) -> Floats:
     """Variance that uncertain parameters give, (n, 3) [m^2].
 
     Args:
@@ -34,7 +33,7 @@ def parameter_variance(effects: Combination, at: Batch, covariance: Array) -> Ar
     return np.asarray(summed.reshape(3, -1).T)
 
 
-def _natively(effects: Combination, at: Batch, covariance: Array) -> Array:
+def _natively(effects: Combination, at: Batch, covariance: Floats) -> Floats:
     """Do it for one geometry and joint effects, whose columns are the Jacobian's."""
     parts = list(zip(effects.effects, effects.slices, strict=True))
     ((geometry, first),) = [(e, s) for e, s in parts if isinstance(e, Geometry)]
@@ -47,7 +46,7 @@ def _natively(effects: Combination, at: Batch, covariance: Array) -> Array:
     given = [np.empty((len(at), 0)), *(e.basis(at) for e, _ in turning)]
     basis = np.ascontiguousarray(np.concatenate(given, axis=1)[:, by_joint])
     tool = at.states.tool + at.deviation.tool
-    found: Array = native.variance(
+    found: Floats = native.variance(
         deviated(at.arm.dh, at.deviation).packed(at.deviation.link[:, 4]),
         base_of(at.deviation),
         (np.ascontiguousarray(at.angles), np.ascontiguousarray(tool)),
@@ -58,7 +57,7 @@ def _natively(effects: Combination, at: Batch, covariance: Array) -> Array:
     return found
 
 
-def side_variance(effects: Combination, at: Batch, values: Array) -> Array:
+def side_variance(effects: Combination, at: Batch, values: Floats) -> Floats:
     """Variance that unknown directions give, (n, 3) [m^2]."""
     unknown = 1.0 - np.clip(at.states.direction, -1.0, 1.0) ** 2
     out = np.zeros((len(at), 3))

@@ -6,12 +6,10 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from postproc.accuracy.batch import Batch
 from postproc.accuracy.effect import JointEffect, Parameter
-
-Array = NDArray[np.float64]
+from postproc.arrays import Floats
 
 SCALE = 3e-5  # [rad]
 
@@ -40,7 +38,7 @@ class Windup(JointEffect):
             for j in self.joints
         )
 
-    def basis(self, batch: Batch) -> Array:
+    def basis(self, batch: Batch) -> Floats:
         """Evaluate lambda (1 - 2 exp(-travel / d0)), (n, p)."""
         joint = self.acts_on()
         travel = np.nan_to_num(batch.states.travel[:, joint], nan=np.inf)

@@ -12,11 +12,11 @@ from postproc.batch.pages import group_pages, named_programs, read_head
 from postproc.batch.plan import Plan
 from postproc.batch.task import Unit
 from postproc.exceptions import OutputError, ProgramError
-from postproc.files import TEMPORARY
-from postproc.kinds import (
+from postproc.files import (
     COMPILED,
     LARGEST,
     PROGRAM,
+    TEMPORARY,
     VARIABLES,
     base_of,
     holds_targets,

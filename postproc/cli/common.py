@@ -10,8 +10,7 @@ from typing import Annotated
 
 import typer
 
-from postproc.exceptions import FileError, PostprocError
-from postproc.printable import printable
+from postproc.exceptions import FileError, PostprocError, printable
 
 app = typer.Typer(
     no_args_is_help=True,

@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from postproc.arrays import Floats
 from postproc.html.figure import (
     AFTER,
     OTHER,
@@ -24,8 +24,6 @@ from postproc.html.figure import (
 from postproc.html.history import steps
 from postproc.html.iso9283 import PoseFigures, pose_figures
 from postproc.html.page import render
-
-Array = NDArray[np.float64]
 
 SCRIPTS = ("page.js", "figures.js")
 SHOWN_UNITS = {"m": ("mm", 1e3), "rad": ("mrad", 1e3), "rad/(N m)": ("urad/(N m)", 1e6)}
@@ -71,14 +69,14 @@ def calibration_report(
     )
 
 
-def _rows(rows: Mapping[str, Sequence[Any]] | None) -> dict[str, Array]:
+def _rows(rows: Mapping[str, Sequence[Any]] | None) -> dict[str, Floats]:
     """Take the rows as arrays."""
     if not rows:
         return {}
     return {k: np.array(v, dtype=float) for k, v in rows.items() if k != "id"}
 
 
-def _iso(rows: Mapping[str, Array]) -> dict[str, PoseFigures]:
+def _iso(rows: Mapping[str, Floats]) -> dict[str, PoseFigures]:
     """Work out the figures of ISO 9283 before and after."""
     if not rows:
         return {}
@@ -89,7 +87,7 @@ def _iso(rows: Mapping[str, Array]) -> dict[str, PoseFigures]:
 WHEN = ("before", "after")
 
 
-def residuals(rows: Mapping[str, Array]) -> dict[str, Figure]:
+def residuals(rows: Mapping[str, Floats]) -> dict[str, Figure]:
     """Show measured errors and what the model leaves of them."""
     errors = {when: rows[f"{when}_mm"] for when in WHEN}
     size = {when: np.linalg.norm(e, axis=1) for when, e in errors.items()}
@@ -107,7 +105,7 @@ def residuals(rows: Mapping[str, Array]) -> dict[str, Figure]:
     }
 
 
-def coverage(ranges: Mapping[str, Any], rows: Mapping[str, Array]) -> Figure:
+def coverage(ranges: Mapping[str, Any], rows: Mapping[str, Floats]) -> Figure:
     """Show which angles of every joint the survey covered."""
     low, high = (np.rad2deg(np.array(ranges[k])) for k in ("lower", "upper"))
     joints = [f"J{j}" for j in range(1, 7)]

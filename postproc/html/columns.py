@@ -7,14 +7,11 @@ from dataclasses import dataclass, fields
 from typing import Any, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
+from postproc.arrays import Floats, Ints
 from postproc.language.visits import Motion
 from postproc.pose import MM
 from postproc.report import Outcome
-
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 MOVES = (*(m.name for m in Motion), "VIA")
 VIA = len(Motion)
@@ -54,12 +51,12 @@ class Columns:
     status: Ints
     why: Ints
     direction: Ints
-    q_deg: Array
-    original: Array
-    corrected: Array
-    position_mm: Array
-    correction_mm: Array
-    std_mm: Array
+    q_deg: Floats
+    original: Floats
+    corrected: Floats
+    position_mm: Floats
+    correction_mm: Floats
+    std_mm: Floats
 
     def __len__(self) -> int:
         """Return the number of visits."""
@@ -75,7 +72,7 @@ class Columns:
         return type(self)(**taken)
 
     @property
-    def size_mm(self) -> Array:
+    def size_mm(self) -> Floats:
         """Length of every correction, (n,)."""
         return np.asarray(np.linalg.norm(self.correction_mm, axis=1))
 

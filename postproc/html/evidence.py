@@ -6,17 +6,15 @@ from dataclasses import asdict
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from postproc.accuracy.batch import Batch
 from postproc.accuracy.fit_report import FitReport
 from postproc.accuracy.measurement import Measurements
 from postproc.accuracy.model import Model
+from postproc.arrays import Floats
 from postproc.html.summary import finite
 from postproc.pose import MM
 from postproc.robot.arm import Arm
-
-Array = NDArray[np.float64]
 
 
 def fit_evidence(
@@ -45,7 +43,7 @@ def fit_evidence(
     return evidence
 
 
-def _lists(values: Array, digits: int) -> list[list[float]]:
+def _lists(values: Floats, digits: int) -> list[list[float]]:
     """Round, as nested lists."""
     lists: list[list[float]] = np.round(values, digits).tolist()
     return lists

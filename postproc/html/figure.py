@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from postproc.arrays import Floats
+
 Figure = dict[str, Any]
 
 # Okabe and Ito: told apart with any kind of colour vision, and in grey by lightness.
@@ -26,7 +27,7 @@ def figure(traces: Sequence[Figure], x: str, y: str, **layout: Any) -> Figure:
     return {"traces": list(traces), "layout": {**axes, **layout}}
 
 
-def rounded(values: Array, digits: int = 5) -> list[float | None]:
+def rounded(values: Floats, digits: int = 5) -> list[float | None]:
     """Round for the page; what is not known becomes None."""
     flat = np.asarray(values, dtype=np.float64).ravel()
     return [v if v == v else None for v in np.round(flat, digits).tolist()]
@@ -43,7 +44,7 @@ def bars(name: str, x: Sequence[Any], y: Sequence[Any], **more: Any) -> Figure:
     return {"type": "bar", "name": name, "x": x, "y": y, "marker": marker, **more}
 
 
-def points(name: str, x: Array, y: Array, **more: Any) -> Figure:
+def points(name: str, x: Floats, y: Floats, **more: Any) -> Figure:
     """Make points: open circles before, dots after."""
     before = name == "before"
     return {
@@ -62,7 +63,7 @@ def points(name: str, x: Array, y: Array, **more: Any) -> Figure:
     }
 
 
-def distribution(errors: Mapping[str, Array]) -> Figure:
+def distribution(errors: Mapping[str, Floats]) -> Figure:
     """Compare distributions of lengths, on a logarithmic scale: both remain visible."""
     known = {k: v[np.isfinite(v) & (v > 0)] for k, v in errors.items()}
     whole = np.concatenate([*known.values(), [1e-3]])
@@ -105,7 +106,7 @@ def colour_of(name: str) -> str:
     return BEFORE if name == "before" else AFTER
 
 
-def along_axes(errors: Mapping[str, Array]) -> Figure:
+def along_axes(errors: Mapping[str, Floats]) -> Figure:
     """Show the spread of errors (n, 3) axis by axis, each set on its own scale."""
     traces, layout = [], {"grid": {"rows": 1, "columns": 2, "pattern": "independent"}}
     for k, (name, e) in enumerate(errors.items()):
@@ -132,7 +133,7 @@ def along_axes(errors: Mapping[str, Array]) -> Figure:
     return {"traces": traces, "layout": layout}
 
 
-def in_space(position_mm: Array, errors: Mapping[str, Array]) -> Figure:
+def in_space(position_mm: Floats, errors: Mapping[str, Floats]) -> Figure:
     """Show errors (n, 3) [mm] where they were measured, each set magnified."""
     rows = thin(len(position_mm))
     p = position_mm[rows]

@@ -5,10 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
+from postproc.arrays import Floats, Ints
 
 SAME = 1e-6  # [deg] commands that differ by less are the same pose
 
@@ -37,7 +35,7 @@ class PoseFigures:
     arrivals: int
 
 
-def pose_figures(q_deg: Array, direction: Ints, error_mm: Array) -> PoseFigures:
+def pose_figures(q_deg: Floats, direction: Ints, error_mm: Floats) -> PoseFigures:
     """Group measured rows by command and side, and work out the figures.
 
     Args:
@@ -72,7 +70,7 @@ def pose_figures(q_deg: Array, direction: Ints, error_mm: Array) -> PoseFigures:
     )
 
 
-def _number(rows: Array | Ints) -> Ints:
+def _number(rows: Floats | Ints) -> Ints:
     """Number equal rows alike, (n,)."""
     return np.asarray(np.unique(rows, axis=0, return_inverse=True)[1]).ravel()
 

@@ -5,14 +5,11 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from postproc.arrays import Floats, Ints
 from postproc.html.columns import MOVES, Columns
 from postproc.html.text import visible
 from postproc.report import Status
-
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 MOST = 100_000  # visits that a page carries
 LARGEST = 2_000  # of the largest corrections, carried whatever is left out
@@ -90,7 +87,7 @@ def pack(columns: Columns) -> dict[str, Any]:
     }
 
 
-def integers(values: Array, step: float) -> list[int | None]:
+def integers(values: Floats, step: float) -> list[int | None]:
     """Round to multiples of a step; what is not known becomes None.
 
     >>> integers(np.array([0.12345, np.nan]), 1e-4)

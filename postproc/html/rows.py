@@ -8,10 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from postproc.arrays import Floats
 from postproc.html.columns import MOVES, Columns
 from postproc.report import Status
-
-Array = NDArray[np.float64]
 
 
 class Texts:
@@ -72,7 +71,7 @@ def columns_from(targets: Sequence[Mapping[str, Any]]) -> Columns:
     )
 
 
-def _numbers(targets: Sequence[Mapping[str, Any]], key: str, width: int) -> Array:
+def _numbers(targets: Sequence[Mapping[str, Any]], key: str, width: int) -> Floats:
     """Stack the lists under a key, (n, width); NaN where there is none."""
     blank = [None] * width
     lists = [t.get(key) or blank for t in targets]

@@ -5,16 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
-
+from postproc.arrays import Ints
 from postproc.language.actions import Move
 from postproc.language.store import Settings
 from postproc.language.values import Position, Value
 from postproc.language.visits import Motion, Target
 from postproc.language.world import Place
 
-Ints = NDArray[np.int64]
 Numbers = tuple[float | None, ...]
 _NO_NUMBERS: Numbers = (None,) * 6
 

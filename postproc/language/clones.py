@@ -8,11 +8,12 @@ from collections.abc import Sequence
 import numpy as np
 
 from postproc.language import pdl2 as ast
+from postproc.language.edits import Edit
 from postproc.language.entries import copied_entry
 from postproc.language.layout import CloneError, check_length, inserted_after
 from postproc.language.named import Named, body_at, code_of
 from postproc.language.program import Program
-from postproc.language.source import Edit, Source
+from postproc.language.source import Source
 from postproc.language.visits import Literals
 
 LONGEST_NAME = 32  # characters of an identifier (likely)

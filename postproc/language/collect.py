@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 import numpy as np
-from numpy.typing import NDArray
 
+from postproc.arrays import Ints
 from postproc.language.arrivals import Arrival, Run
 from postproc.language.columns import Collector, Columns
 from postproc.language.literals import Numbering, find_literals
@@ -18,8 +18,6 @@ from postproc.language.uses import find_uses
 from postproc.language.values import Position
 from postproc.language.visits import ELSEWHERE, Visits, slim
 from postproc.language.world import World
-
-Ints = NDArray[np.int64]
 
 MOST_AXES = 12  # auxiliary axes that are told
 

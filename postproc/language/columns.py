@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
+from postproc.arrays import Ints
 from postproc.language import pdl2 as ast
 from postproc.language.arrivals import Arrival, Run
 from postproc.language.machine import Machine
@@ -17,8 +17,6 @@ from postproc.language.setting_columns import SettingColumns
 from postproc.language.values import Position
 from postproc.language.visits import Target
 from postproc.language.world import base_variable
-
-Ints = NDArray[np.int64]
 
 _COMPUTED = (Target.POSE, Target.NEAR, Target.FOR)  # may move along with a literal
 

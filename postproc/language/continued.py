@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from postproc.arrays import Bools
 from postproc.language.numbered import NAME_MARK, WHOLE, mask_of
 from postproc.language.sequences import alike, in_order
 
 Ints = NDArray[np.signedinteger[Any]]
-Bools = NDArray[np.bool_]
 
 _OPENS = re.compile(rb" *(?:\w+ *:: *)?(?:MOVE|MOVEFLY|OPEN)\b[^\n]*, *\Z", re.I)
 _CLAUSE = re.compile(

@@ -10,11 +10,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from postproc.arrays import Bools, Bytes, Floats, Ints
+
 Texts = NDArray[np.bytes_]
-Bytes = NDArray[np.uint8]
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
-Bools = NDArray[np.bool_]
 
 WIDEST = 24  # bytes of a number that is read here
 MOST_DIGITS = 15  # of a number that is written here: exact as a float

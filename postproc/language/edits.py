@@ -10,9 +10,7 @@ from typing import NamedTuple, overload
 import numpy as np
 from numpy.typing import NDArray
 
-from postproc.pieces import pieces
-
-Ints = NDArray[np.int64]
+from postproc.arrays import Ints, pieces
 
 AT_ONCE = 50_000  # edits that are Python objects at the same time
 WOVEN = 10_000  # edits made at once: array passes that fit the cache

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from postproc.language.build import Rule
-from postproc.language.pdl2 import Number
+from postproc.language.expressions import Number
 
 _ACCESS = frozenset({"priv", "xport", "local"})
 

@@ -6,12 +6,13 @@ import re
 
 import numpy as np
 
+from postproc.language.edits import Edit
 from postproc.language.forms import formed
 from postproc.language.layout import CloneError, inserted_after
 from postproc.language.lines import read_lines
 from postproc.language.parser import parse_value_form
 from postproc.language.records import is_nested, last_head
-from postproc.language.source import Edit, Source
+from postproc.language.source import Source
 
 _XPORT = re.compile(r"\bXport\b(?P<other>\s+from\b)?", re.I)
 

@@ -6,11 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
-import numpy as np
-from numpy.typing import NDArray
-
-Ints = NDArray[np.int64]
-Floats = NDArray[np.float64]
+from postproc.arrays import Floats, Ints
 
 POSITIONS = ("POS", "XTND", "JNTP")
 NESTED = ("REC", "NODE", "PATH")

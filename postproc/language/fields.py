@@ -7,8 +7,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from postproc.arrays import Ints
 from postproc.language.diagnostic import Diagnostic
 from postproc.language.entered import Entered
 from postproc.language.entry_columns import POSITIONS, Entries
@@ -18,7 +18,6 @@ from postproc.language.lines import Lines
 from postproc.language.nested import Nested
 from postproc.language.records import Records, is_nested
 
-Ints = NDArray[np.int64]
 Finding = tuple[int, Diagnostic]
 
 _NUMBERS = {**dict.fromkeys(POSITIONS, 6), "VEC": 3}  # of a value; one of all others

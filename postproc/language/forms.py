@@ -14,12 +14,10 @@ from operator import itemgetter
 from typing import Generic, TypeVar, overload
 
 import numpy as np
-from numpy.typing import NDArray
 
+from postproc.arrays import Bools, Ints
 from postproc.language.shapes import Shapes
 
-Ints = NDArray[np.int64]
-Bools = NDArray[np.bool_]
 T = TypeVar("T")
 Filler = Callable[[Sequence[str]], object]
 

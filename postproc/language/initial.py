@@ -7,15 +7,15 @@ from dataclasses import replace
 import numpy as np
 
 from postproc.language.diagnostic import Diagnostic
-from postproc.language.entry_columns import POSITIONS
+from postproc.language.entry_columns import POSITIONS, Entries, Entry
 from postproc.language.evaluate import Point
 from postproc.language.forms import lower
 from postproc.language.initial_values import Points
-from postproc.language.lsv import Entries, Entry
 from postproc.language.lsv import Variables as ValueFile
-from postproc.language.program import Program, Variable, Variables
+from postproc.language.program import Program
 from postproc.language.store import Store, root_of
 from postproc.language.values import Nothing, Position, Value, Vector
+from postproc.language.variables import Variable, Variables
 from postproc.language.world import Place, World, base_variable
 
 

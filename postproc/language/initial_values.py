@@ -7,13 +7,10 @@ from dataclasses import dataclass, field
 from itertools import chain, repeat
 
 import numpy as np
-from numpy.typing import NDArray
 
+from postproc.arrays import Bools, Ints
 from postproc.language.entry_columns import Entries
 from postproc.language.values import Position, Value
-
-Ints = NDArray[np.int64]
-Bools = NDArray[np.bool_]
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,8 @@ import re
 import numpy as np
 
 from postproc.exceptions import PostprocError
-from postproc.language.source import Edit, Source, Span
+from postproc.language.edits import Edit, Span
+from postproc.language.source import Source
 
 LONGEST_LINE = 254  # characters of a line (likely), unless the file has longer ones
 _LINE_END = re.compile(rb"\r\n|\n|\r")

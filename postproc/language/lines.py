@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from postproc.arrays import Each, Floats
 from postproc.exceptions import ProgramError
 from postproc.language.continued import Names, join, stripped
 from postproc.language.divided import Rows, divided
@@ -17,11 +18,9 @@ from postproc.language.masking import mark_lines
 from postproc.language.sequences import Numbers
 from postproc.language.shapes import Shapes, find_shapes
 from postproc.language.source import Source
-from postproc.pieces import Each
 
 Ints = NDArray[np.signedinteger[Any]]
 """Whole numbers, as short as the length of the file allows: there are millions."""
-Floats = NDArray[np.float64]
 
 _PIECE = 1 << 18  # bytes masked at once: array passes that fit the cache
 

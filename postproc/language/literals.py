@@ -8,12 +8,12 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from postproc.arrays import Bools
 from postproc.language.source import Source
 from postproc.language.visits import Literals, Target
 from postproc.language.world import World
 
 Ints = NDArray[np.signedinteger[Any]]
-Bools = NDArray[np.bool_]
 
 
 class SlotColumns(Protocol):

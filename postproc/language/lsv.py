@@ -7,11 +7,11 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from postproc.arrays import Each, Ints
 from postproc.language.diagnostic import Diagnostic
 from postproc.language.entered import Entered
-from postproc.language.entry_columns import NESTED, POSITIONS, Entries, Entry
+from postproc.language.entry_columns import NESTED, POSITIONS, Entries
 from postproc.language.fields import completed, find_fields, with_fields
 from postproc.language.forms import Formed, formed, lower
 from postproc.language.lines import Lines, read_lines
@@ -26,11 +26,7 @@ from postproc.language.records import (
 )
 from postproc.language.source import Source
 from postproc.language.store import root_of
-from postproc.pieces import Each
 
-__all__ = ["Entries", "Entry", "Variables", "read_variables"]
-
-Ints = NDArray[np.int64]
 Finding = tuple[int, Diagnostic]
 """What was found, and the row at which that shows."""
 

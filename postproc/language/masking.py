@@ -11,8 +11,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from postproc.arrays import Bools, Bytes, Floats, Ints
 from postproc.language.lexis import BLANKS, mask_line, number_value
 from postproc.language.numbered import NAME_MARK, WHOLE, find_names, texts_of
 from postproc.language.plain_numbers import (
@@ -25,11 +25,6 @@ from postproc.language.plain_numbers import (
     values,
     with_signs,
 )
-
-Bytes = NDArray[np.uint8]
-Bools = NDArray[np.bool_]
-Ints = NDArray[np.int64]
-Floats = NDArray[np.float64]
 
 _IS_IDLE = byte_table(BLANKS + ",({\n\r")
 

@@ -9,9 +9,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from postproc.language import pdl2 as ast
+from postproc.language.edits import Span
 from postproc.language.layout import CloneError
-from postproc.language.program import Body, Program, Variable
-from postproc.language.source import Span
+from postproc.language.program import Body, Program
+from postproc.language.variables import Variable
 
 _POINTS = frozenset({"position", "xtndpos", "jointpos"})
 _STRING = re.compile(r"'(?:\\.|[^'\\])*'|'[^']*'|\"[^\"]*\"")

@@ -9,13 +9,10 @@ from __future__ import annotations
 import re
 
 import numpy as np
-from numpy.typing import NDArray
 
+from postproc.arrays import Bytes, Ints
 from postproc.language.lexis import BLANKS
 from postproc.language.plain_numbers import byte_table, runs_of
-
-Bytes = NDArray[np.uint8]
-Ints = NDArray[np.int64]
 
 NAME_MARK = "\x01"  # a numbered name, in a form
 UNREADABLE = NAME_MARK * 2  # begins the form of a line that holds such a mark itself

@@ -11,12 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from postproc.arrays import Bools, Bytes, Floats, Ints
 from postproc.language.lexis import BLANKS, UNARY_CONTEXT, number_value
 
-Bytes = NDArray[np.uint8]
-Bools = NDArray[np.bool_]
-Ints = NDArray[np.int64]
-Floats = NDArray[np.float64]
 Words = NDArray[np.uint64]
 
 EXACT = 15  # digits of a number that is read here: exact as a float

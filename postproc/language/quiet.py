@@ -12,17 +12,14 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from postproc.arrays import Bools, Ints
 from postproc.language import pdl2 as ast
 from postproc.language.effects import CHANGING, PURE, invocations, references
 from postproc.language.forms import lower, name_index
 from postproc.language.reach import HANDS_OVER
 from postproc.language.sequences import alike, in_order
 from postproc.language.world import Place, World
-
-Ints = NDArray[np.int64]
-Bools = NDArray[np.bool_]
 
 _POINTS = ("position", "xtndpos", "jointpos")
 _NOT_WITH = ("$move_type", "$tool", "$base", "$uframe")

@@ -13,15 +13,12 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from postproc.arrays import Bools, Floats, Ints
 from postproc.language.entered import Entered
 from postproc.language.entry_columns import NESTED, Entries, Layout, kind_of
 from postproc.language.forms import Formed, name_index
 from postproc.language.lines import Lines
 from postproc.language.sequences import alike, in_order
-
-Ints = NDArray[np.int64]
-Floats = NDArray[np.float64]
-Bools = NDArray[np.bool_]
 
 MOST = 2.0**53  # beyond it a number does not tell which whole one it is
 _LETTERS = "XYZAER"

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from postproc.arrays import Floats, Ints, pieces
 from postproc.exceptions import ProgramError
 from postproc.language import digits
 from postproc.language.edits import Replacements, as_bytes
@@ -14,10 +15,7 @@ from postproc.language.lexis import number_value
 from postproc.language.skeleton import Skeleton, differences
 from postproc.language.source import Source, apply
 from postproc.language.visits import Literals
-from postproc.pieces import pieces
 
-Ints = NDArray[np.int64]
-Floats = NDArray[np.float64]
 Texts = NDArray[np.bytes_]
 
 MM_DECIMALS, DEGREE_DECIMALS, JOINT_DECIMALS = 3, 4, 5

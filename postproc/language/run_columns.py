@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from postproc.arrays import Ints
 from postproc.language import pdl2 as ast
 from postproc.language.arrivals import Arrival, Run
 from postproc.language.columns import Collector
@@ -12,8 +12,6 @@ from postproc.language.destinations import UNSURE, from_value
 from postproc.language.initial_values import Points
 from postproc.language.values import Nothing, Value
 from postproc.language.visits import Target
-
-Ints = NDArray[np.int64]
 
 KINDS = max(Target) + 1  # what a target can be is less
 

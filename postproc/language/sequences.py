@@ -10,7 +10,8 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-Ints = NDArray[np.int64]
+from postproc.arrays import Ints
+
 AnyInts = NDArray[np.signedinteger[Any]]
 
 T = TypeVar("T", bytes, str)

@@ -6,8 +6,8 @@ from enum import IntEnum
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from postproc.arrays import Ints
 from postproc.language.store import Settings
 from postproc.language.values import Nothing, Position, Value
 from postproc.language.visits import (
@@ -19,7 +19,6 @@ from postproc.language.visits import (
     slim,
 )
 
-Ints = NDArray[np.int64]
 _FRAMES = ("tool", "base", "uframe")
 _CARE = ("cnfg_care", "turn_care", "jnt_mturn")
 _OVERRIDES = ("arm_spd_ovr", "prog_spd_ovr", "gen_ovr")

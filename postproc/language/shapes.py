@@ -9,10 +9,10 @@ from typing import Any, overload
 import numpy as np
 from numpy.typing import NDArray
 
+from postproc.arrays import Ints
 from postproc.language.numbered import NAME_MARK, WHOLE, form_of, mask_of
 from postproc.language.sequences import Numbers, alike, in_order
 
-Ints = NDArray[np.int64]
 AnyInts = NDArray[np.signedinteger[Any]]
 
 

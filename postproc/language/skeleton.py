@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from postproc.arrays import pieces
 from postproc.language.edits import Replacements
 from postproc.language.lines import Lines, read_lines
 from postproc.language.shapes import Shapes
 from postproc.language.source import Source
-from postproc.pieces import pieces
 
 Ints = NDArray[np.signedinteger[Any]]
 

@@ -6,8 +6,8 @@ from dataclasses import dataclass, field
 from itertools import islice
 
 import numpy as np
-from numpy.typing import NDArray
 
+from postproc.arrays import Bools, Ints
 from postproc.language import pdl2 as ast
 from postproc.language.arrivals import HELD, WRITTEN, Run
 from postproc.language.calls import call_statement, calls_in_expressions
@@ -17,9 +17,6 @@ from postproc.language.moves import motion_of
 from postproc.language.quiet import Point, Quiet, find_quiet
 from postproc.language.values import Nothing, Value
 from postproc.language.visits import Motion
-
-Ints = NDArray[np.int64]
-Bools = NDArray[np.bool_]
 
 _NO_INDEX = Nothing("its index is known only at run time")
 

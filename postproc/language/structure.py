@@ -6,17 +6,16 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from postproc.arrays import Each
 from postproc.language import pdl2 as ast
 from postproc.language.blocks import build_blocks
 from postproc.language.diagnostic import Diagnostic
 from postproc.language.forms import Formed, formed
 from postproc.language.lines import Lines, read_lines
 from postproc.language.parser import parse_form
-from postproc.language.program import Body, Program, Variable, Variables
+from postproc.language.program import Body, Program
 from postproc.language.source import Source
-from postproc.pieces import Each
-
-__all__ = ["Body", "Program", "Variable", "parse"]
+from postproc.language.variables import Variable, Variables
 
 _PLAIN = (ast.Move, ast.Assign, ast.Call, ast.Transfer, ast.Still)
 

@@ -6,11 +6,9 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from postproc.arrays import Ints
 from postproc.language.visits import Literals
-
-Ints = NDArray[np.int64]
 
 _IN_PART = "a target is computed from a part of it"
 

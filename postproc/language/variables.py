@@ -8,13 +8,10 @@ from dataclasses import dataclass, replace
 from itertools import repeat
 
 import numpy as np
-from numpy.typing import NDArray
 
+from postproc.arrays import Bools, Ints
 from postproc.language import pdl2 as ast
 from postproc.language.forms import lower
-
-Ints = NDArray[np.int64]
-Bools = NDArray[np.bool_]
 
 
 @dataclass(frozen=True)

@@ -10,9 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
-Bools = NDArray[np.bool_]
+from postproc.arrays import Bools, Floats, Ints
 
 START = -1  # predecessor: wherever the arm stands when the program starts
 NO_VALUE = "it has no value in the program or its variable file"  # ends a reason

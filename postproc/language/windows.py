@@ -12,12 +12,9 @@ from dataclasses import dataclass, fields, replace
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
+from postproc.arrays import Bools, Ints
 from postproc.language.visits import Target, Visits
-
-Ints = NDArray[np.int64]
-Bools = NDArray[np.bool_]
 
 LEAST = 20_000  # visits of a window; shorter programs are one
 RUN_UP = 2_000  # visits that tell how the arm comes to a window

@@ -10,9 +10,10 @@ from postproc.language import pdl2 as ast
 from postproc.language.diagnostic import Diagnostic
 from postproc.language.initial_values import InitialValues
 from postproc.language.lsv import Variables as ValueFile
-from postproc.language.program import Body, Program, Variable, Variables
+from postproc.language.program import Body, Program
 from postproc.language.store import root_of, wholes
 from postproc.language.values import Nothing, Position, Value
+from postproc.language.variables import Variable, Variables
 
 Record = tuple[float, ...] | None
 

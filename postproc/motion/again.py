@@ -12,8 +12,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from postproc.arrays import Bools, Floats, Ints, spans
 from postproc.motion.reach import Course, Points, reach
 from postproc.motion.rounding import rounded
 from postproc.motion.targets import Kind, Targets
@@ -22,11 +22,6 @@ from postproc.motion.workspace import Known
 from postproc.robot.arm import Arm
 from postproc.robot.direction import Passages, passages, sides
 from postproc.robot.play import Clamps
-from postproc.spans import spans
-
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
-Bools = NDArray[np.bool_]
 
 CHANGED = 2  # targets on each side of a moved one whose passing may change
 TRACED = 3  # targets on each side that must be traced for that
@@ -179,7 +174,7 @@ def _near(rows: Bools, distance: int) -> Bools:
     return out
 
 
-def _patched(before: Array, part: _Part, now: Array) -> Array:
+def _patched(before: Floats, part: _Part, now: Floats) -> Floats:
     """Put new rows in, of targets whose passing may change."""
     out = np.array(before)
     out[part.rows[part.kept]] = now[part.kept]

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from postproc.arrays import Floats
 from postproc.motion.arrival import NO_PATH, Arrival
 from postproc.motion.branches import LOST, follow
 from postproc.motion.path import Segments, arcs, lines
@@ -23,11 +23,9 @@ from postproc.motion.targets import Kind
 from postproc.motion.ways import Solved, Ways
 from postproc.motion.workspace import Workspace
 
-Array = NDArray[np.float64]
-
 
 def along_line(
-    work: Workspace, v: int, edge: int, flange: Array, end: Arrival
+    work: Workspace, v: int, edge: int, flange: Floats, end: Arrival
 ) -> Arrival:
     """Follow a Cartesian path; where that fails, keep the end and say why."""
     joints = work.targets.kind[v] == Kind.JOINTS
@@ -44,7 +42,7 @@ def along_line(
 
 
 def along_late_arc(
-    work: Workspace, v: int, edge: int, flange: Array, end: Arrival
+    work: Workspace, v: int, edge: int, flange: Floats, end: Arrival
 ) -> Arrival:
     """Follow a part of an arc whose points were not all known beforehand."""
     t, begins = work.targets, int(work.samples.begins[edge])
@@ -67,7 +65,7 @@ def along_late_arc(
 
 
 def _followed(
-    work: Workspace, v: int, edge: int, flange: Array, end: Arrival, ways: Ways
+    work: Workspace, v: int, edge: int, flange: Floats, end: Arrival, ways: Ways
 ) -> Arrival:
     """Follow a Cartesian path through solutions; see `along_line`."""
     near = work.q[work.source[edge]]

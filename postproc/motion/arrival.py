@@ -5,9 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from postproc.arrays import Floats
 
 
 @dataclass(frozen=True)
@@ -23,10 +22,10 @@ class Arrival:
         reason: Index into `REASONS`.
     """
 
-    q: Array
-    flange: Array
+    q: Floats
+    flange: Floats
     slot: int
-    path: Array
+    path: Floats
     reason: int
 
 

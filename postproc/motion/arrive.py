@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from postproc.arrays import Floats
 from postproc.motion.along import along_late_arc, along_line
 from postproc.motion.arrival import NO_PATH, Arrival
 from postproc.motion.branches import nearest_slot, nearest_turns, on_written_turns
@@ -22,8 +22,6 @@ from postproc.motion.targets import Kind, Move
 from postproc.motion.workspace import Workspace
 from postproc.motion.wrist import wrist_interpolated
 from postproc.robot.arm import Arm
-
-Array = NDArray[np.float64]
 
 
 def arrive(work: Workspace, v: int, edge: int) -> Arrival:
@@ -61,7 +59,7 @@ def arrive(work: Workspace, v: int, edge: int) -> Arrival:
     return along_line(work, v, edge, flange, end)
 
 
-def part_way(work: Workspace, v: int, flange: Array) -> Array:
+def part_way(work: Workspace, v: int, flange: Floats) -> Floats:
     """Place the flange after going a distance towards a pose, (4, 4) [m].
 
     The tool turns in proportion; NaN where the pose is nearer than the distance, for
@@ -74,11 +72,11 @@ def part_way(work: Workspace, v: int, flange: Array) -> Array:
         return np.full((4, 4), np.nan)
     share = np.array([distance / length if length > 0.0 else 0.0])
     tcp = line.poses(np.zeros(1, dtype=np.int64), share)[0]
-    reached: Array = tcp @ work.tool_inverse[v]
+    reached: Floats = tcp @ work.tool_inverse[v]
     return reached
 
 
-def choose(work: Workspace, v: int, flange: Array, near: Array | None) -> Arrival:
+def choose(work: Workspace, v: int, flange: Floats, near: Floats | None) -> Arrival:
     """Choose a solution by configuration string, else the nearest one.
 
     Args:
@@ -109,7 +107,7 @@ def choose(work: Workspace, v: int, flange: Array, near: Array | None) -> Arriva
     return Arrival(q, flange, slot, q[None], 0)
 
 
-def _nearest_allowed(arm: Arm, q: Array, near: Array) -> Array:
+def _nearest_allowed(arm: Arm, q: Floats, near: Floats) -> Floats:
     """Take the nearest turn of every axis that has it in its range."""
     turned = nearest_turns(q, near)
     return np.where((turned >= arm.lower) & (turned <= arm.upper), turned, q)

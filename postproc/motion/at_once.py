@@ -9,16 +9,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from postproc.arrays import Bools, Floats, Ints, spans
 from postproc.motion.branches import LOST, SUSPICIOUS, nearest_slots
 from postproc.motion.reasons import CODE, PATH_JUMP
 from postproc.motion.workspace import Workspace
-from postproc.spans import spans
-
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
-Bools = NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
@@ -89,7 +84,7 @@ def _stretches(work: Workspace, smooth: Bools, most: int) -> _Stretches:
     return _Stretches(first, count, start[edge], start[edge + count] - start[edge])
 
 
-def _steps(q: Array, near: Array, head: Ints) -> Array:
+def _steps(q: Floats, near: Floats, head: Ints) -> Floats:
     """Measure what every joint turns by from sample to sample, (s, 6) [rad]."""
     step = np.empty_like(q)
     step[1:] = q[1:] - q[:-1]
@@ -97,7 +92,7 @@ def _steps(q: Array, near: Array, head: Ints) -> Array:
     return np.abs(step, out=step)
 
 
-def _unwrapped(q: Array, near: Array, head: Ints, size: Ints) -> Array:
+def _unwrapped(q: Floats, near: Floats, head: Ints, size: Ints) -> Floats:
     """Put samples on the turns that continue their stretches, (s, 6) [rad]."""
     wraps = (_steps(q, near, head) >= np.pi).any(axis=1)
     for i in np.flatnonzero(np.logical_or.reduceat(wraps, head)).tolist():
@@ -106,7 +101,7 @@ def _unwrapped(q: Array, near: Array, head: Ints, size: Ints) -> Array:
     return q
 
 
-def _small_steps(q: Array, near: Array, head: Ints) -> Bools:
+def _small_steps(q: Floats, near: Floats, head: Ints) -> Bools:
     """Tell which stretches take none but small steps, (r,); their first may be larger.
 
     As in `follow`: no other branch makes it shorter.
@@ -117,7 +112,7 @@ def _small_steps(q: Array, near: Array, head: Ints) -> Bools:
     return ~np.logical_or.reduceat(large, head)
 
 
-def _settle(work: Workspace, some: _Stretches, q: Array, slot: Ints) -> None:
+def _settle(work: Workspace, some: _Stretches, q: Floats, slot: Ints) -> None:
     """Write down where stretches lead."""
     v = some.first
     before = work.branches_at(v - 1)

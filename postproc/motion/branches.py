@@ -5,13 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from postproc.arrays import Bools, Floats, Ints
 from postproc.motion.ways import Ways
-
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
-Bools = NDArray[np.bool_]
 
 FULL = 2 * np.pi
 SUSPICIOUS = 0.3  # [rad] a step between samples that another branch might shorten
@@ -21,7 +17,7 @@ FEW, MORE = 256, 4  # samples looked ahead, and their growth while nothing happe
 TURN_AXES = [3, 5, 2]  # of T1, T2, T3
 
 
-def on_written_turns(q: Array, turns: Array) -> Array:
+def on_written_turns(q: Floats, turns: Floats) -> Floats:
     """Put solutions on the turns of their configuration strings.
 
     T1 counts the turns of axis 4, T2 of axis 6, T3 of axis 3: floor((q + 180) / 360).
@@ -40,24 +36,24 @@ def on_written_turns(q: Array, turns: Array) -> Array:
     return out
 
 
-def on_other_turns(q: Array, turns: Array) -> Bools:
+def on_other_turns(q: Floats, turns: Floats) -> Bools:
     """Tell which angles (n, 6) [rad] are on other turns than those written, (n,)."""
     gap = np.abs(on_written_turns(q, turns) - q)
     return np.asarray((gap > OTHER_TURN).any(axis=1))
 
 
-def nearest_turns(q: Array, near: Array) -> Array:
+def nearest_turns(q: Floats, near: Floats) -> Floats:
     """Put joint angles (.., 6) [rad] on the turns nearest to others."""
-    turned: Array = q - FULL * np.round((q - near) / FULL)
+    turned: Floats = q - FULL * np.round((q - near) / FULL)
     return turned
 
 
-def nearest_slot(branches: Array, near: Array) -> int:
+def nearest_slot(branches: Floats, near: Floats) -> int:
     """Name the branch (8, 6) nearest to joint angles (6,) [rad]; -1 without any."""
     return int(nearest_slots(branches[None], near[None])[0])
 
 
-def nearest_slots(branches: Array, near: Array) -> Ints:
+def nearest_slots(branches: Floats, near: Floats) -> Ints:
     """Name the branches (r, 8, 6) nearest to joint angles (r, 6) [rad], (r,)."""
     near = near[:, None]
     gap = np.abs(nearest_turns(branches, near) - near).max(axis=2)
@@ -76,12 +72,12 @@ class Followed:
             jump.
     """
 
-    q: Array
+    q: Floats
     slot: Ints
     reached: bool
 
 
-def follow(begin: Array, ways: Ways) -> Followed:
+def follow(begin: Floats, ways: Ways) -> Followed:
     """Follow the branch and the turns that continue a motion.
 
     Args:

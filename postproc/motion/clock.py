@@ -5,18 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from postproc.arrays import Bools, Floats, Ints
 from postproc.exceptions import PlanError
 from postproc.motion.ruckig import JointMoves
 from postproc.motion.targets import Move, Targets
 from postproc.motion.trace import Trace
 from postproc.motion.waypoints import Waypoints, waypoints
 from postproc.robot.arm import Arm
-
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
-Bools = NDArray[np.bool_]
 
 BATCH = 20_000  # waypoints solved at a time, if one run does not need more
 
@@ -32,8 +28,8 @@ class Clock:
             programmed speed or to full joint speed, (n,).
     """
 
-    time: Array
-    speed: Array
+    time: Floats
+    speed: Floats
     untimed: Bools
 
 
@@ -101,7 +97,7 @@ def runs(targets: Targets, source: Ints) -> tuple[Ints, Ints]:
     return first[timed], end[timed]
 
 
-def _run_times(arm: Arm, points: Waypoints) -> tuple[Array, Array, Bools]:
+def _run_times(arm: Arm, points: Waypoints) -> tuple[Floats, Floats, Bools]:
     """Time all waypoints.
 
     Returns:
@@ -139,7 +135,7 @@ def _run_times(arm: Arm, points: Waypoints) -> tuple[Array, Array, Bools]:
     return since, velocity, failed
 
 
-def _estimate(points: Waypoints, rows: slice) -> tuple[Array, Array]:
+def _estimate(points: Waypoints, rows: slice) -> tuple[Floats, Floats]:
     """Guess the times of one run from programmed speeds and full joint speed."""
     dt = np.maximum(points.ds[rows] / points.override[rows], points.least[rows])
     velocity = np.zeros((len(dt), 6))
@@ -147,7 +143,7 @@ def _estimate(points: Waypoints, rows: slice) -> tuple[Array, Array]:
     return np.cumsum(dt), velocity
 
 
-def _speeds(arm: Arm, targets: Targets, traced: Trace, velocity: Array) -> Array:
+def _speeds(arm: Arm, targets: Targets, traced: Trace, velocity: Floats) -> Floats:
     """TCP speeds (n,) [m/s] from joint velocities (n, 6) [rad/s]."""
     speed = np.zeros(len(targets))
     rows = np.flatnonzero(np.abs(velocity).max(axis=1) > 0)
@@ -157,7 +153,7 @@ def _speeds(arm: Arm, targets: Targets, traced: Trace, velocity: Array) -> Array
     return speed
 
 
-def _times(targets: Targets, duration: Array) -> Array:
+def _times(targets: Targets, duration: Floats) -> Floats:
     """Add durations (n,) [s] along the first predecessors."""
     n = len(duration)
     lead = np.arange(n) - 1

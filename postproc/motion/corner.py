@@ -19,19 +19,14 @@ from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from postproc.arrays import Bools, Floats, in_pieces
 from postproc.kernels import floats, native
 from postproc.motion.paths import along, between
 from postproc.motion.targets import Fly, Targets
 from postproc.motion.trace import Trace
 from postproc.motion.zone import Zones, zones
-from postproc.pieces import in_pieces
 from postproc.robot.arm import Arm
-
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
-Bools = NDArray[np.bool_]
 
 GRID = np.linspace(0.0, 1.0, 9)  # where the search for the nearest point begins
 ROUNDS = 5  # of Newton's method
@@ -52,10 +47,10 @@ class Corners:
     """
 
     zones: Zones
-    nearest: Array
-    q: Array
-    aside: Array
-    bend: Array
+    nearest: Floats
+    q: Floats
+    aside: Floats
+    bend: Floats
 
     @property
     def flat(self) -> Bools:
@@ -97,7 +92,7 @@ def _passed(arm: Arm, targets: Targets, traced: Trace, found: Zones) -> Corners:
 
 
 def _passed_natively(
-    arm: Arm, traced: Trace, found: Zones, tool: Array, point: Array, wanted: Array
+    arm: Arm, traced: Trace, found: Zones, tool: Floats, point: Floats, wanted: Floats
 ) -> Corners:
     """Do as `_passed` with the native kernel."""
     before, behind, nearest, q, aside, bend = native.passed(
@@ -107,14 +102,14 @@ def _passed_natively(
     return Corners(found, nearest, q, aside, bend)
 
 
-def _is_flat(bend: Array) -> Bools:
+def _is_flat(bend: Floats) -> Bools:
     """Tell which corners are as good as straight, (c,)."""
     return np.asarray((np.abs(bend) < FLAT).all(axis=1))
 
 
-def _tcp(flange: Array, tool: Array) -> Array:
+def _tcp(flange: Floats, tool: Floats) -> Floats:
     """Place tools (c, 3) [m] at flange poses (c, 4, 4): (c, 3) [m]."""
-    turned: Array = np.einsum("nij,nj->ni", flange[:, :3, :3], tool)
+    turned: Floats = np.einsum("nij,nj->ni", flange[:, :3, :3], tool)
     return turned + flange[:, :3, 3]
 
 
@@ -137,12 +132,12 @@ def _joined(parts: list[Corners]) -> Corners:
     )
 
 
-def parabolas(traced: Trace, found: Zones) -> Callable[[Array], Array]:
+def parabolas(traced: Trace, found: Zones) -> Callable[[Floats], Floats]:
     """Prepare to follow c corners by the formula above: s (c,) to (c, 6) [rad]."""
     into, out = between(traced, found.into), between(traced, found.out)
     point = traced.q.take(found.visit, axis=0)
 
-    def at(s: Array) -> Array:
+    def at(s: Floats) -> Floats:
         before = into(1 - found.before * (1 - s) ** 2)
         behind = out(found.behind * s**2)
         return before + behind - point
@@ -151,8 +146,8 @@ def parabolas(traced: Trace, found: Zones) -> Callable[[Array], Array]:
 
 
 def _passing(
-    arm: Arm, traced: Trace, found: Zones, tool: Array, point: Array
-) -> tuple[Array, Array, Array, Array]:
+    arm: Arm, traced: Trace, found: Zones, tool: Floats, point: Floats
+) -> tuple[Floats, Floats, Floats, Floats]:
     """Find where corners begin and end, where they pass closest, and how far off.
 
     Args:
@@ -175,8 +170,8 @@ def _passing(
 
 
 def _refined(
-    arm: Arm, traced: Trace, found: Zones, s: Array, tool: Array, point: Array
-) -> Array:
+    arm: Arm, traced: Trace, found: Zones, s: Floats, tool: Floats, point: Floats
+) -> Floats:
     """Improve the nearest points of corners whose moves are not straight."""
     q = parabolas(traced, found)
     for _ in range(REFINED):
@@ -190,7 +185,7 @@ def _refined(
     return np.clip(s, 0.0, 1.0)
 
 
-def nearest_on_parabola(begin: Array, end: Array) -> Array:
+def nearest_on_parabola(begin: Floats, end: Floats) -> Floats:
     """Find the s at which begin (1 - s)^2 + end s^2 is shortest, (c,).
 
     Args:

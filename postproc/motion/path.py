@@ -10,13 +10,9 @@ from dataclasses import dataclass, fields
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from postproc.arrays import Bools, Floats, Ints
 from postproc.pose import rotation_from_vector, rotation_vector
-
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
-Bools = NDArray[np.bool_]
 
 STEP = 5e-3  # [m] between samples
 TURN = np.deg2rad(1.0)  # [rad] between samples
@@ -41,24 +37,24 @@ class Segments:
         valid: False where the points of an arc make no circle, (m,).
     """
 
-    rotation: Array
-    turn: Array
-    centre: Array
-    radius: Array
-    tangent: Array
-    chord: Array
-    angle: Array
+    rotation: Floats
+    turn: Floats
+    centre: Floats
+    radius: Floats
+    tangent: Floats
+    chord: Floats
+    angle: Floats
     valid: Bools
 
     @cached_property
-    def length(self) -> Array:
+    def length(self) -> Floats:
         """Lengths of the paths, (m,) [m]."""
         arc = np.linalg.norm(self.radius, axis=1) * self.angle
-        length: Array = np.linalg.norm(self.chord, axis=1) + arc
+        length: Floats = np.linalg.norm(self.chord, axis=1) + arc
         return length
 
     @cached_property
-    def turning(self) -> Array:
+    def turning(self) -> Floats:
         """Angles of reorientation, (m,) [rad]."""
         return np.asarray(np.linalg.norm(self.turn, axis=1))
 
@@ -69,7 +65,7 @@ class Segments:
         wanted = np.clip(np.ceil(steps - 1e-9), least, MOST)
         return np.asarray(wanted, dtype=np.int64)
 
-    def poses(self, path: Ints, u: Array) -> Array:
+    def poses(self, path: Ints, u: Floats) -> Floats:
         """Place the TCP on paths `path` (s,) at fractions u (s,): (s, 4, 4)."""
         phi = (u * self.angle[path])[:, None]
         T = np.zeros((len(u), 4, 4))
@@ -83,7 +79,7 @@ class Segments:
         return T
 
 
-def lines(begin: Array, end: Array) -> Segments:
+def lines(begin: Floats, end: Floats) -> Segments:
     """Build straight paths between TCP poses (m, 4, 4) [m]."""
     m = len(begin)
     nothing = np.zeros((m, 3))
@@ -94,7 +90,7 @@ def lines(begin: Array, end: Array) -> Segments:
     )  # fmt: skip
 
 
-def arcs(begin: Array, via: Array, end: Array) -> tuple[Segments, Segments]:
+def arcs(begin: Floats, via: Floats, end: Floats) -> tuple[Segments, Segments]:
     """Build arcs through three TCP poses (m, 4, 4) [m]: start to VIA, VIA to end."""
     centre, normal, valid = _circles(
         begin[:, :3, 3], via[:, :3, 3], end[:, :3, 3]
@@ -105,7 +101,7 @@ def arcs(begin: Array, via: Array, end: Array) -> tuple[Segments, Segments]:
     )
 
 
-def _circles(a: Array, b: Array, c: Array) -> tuple[Array, Array, Bools]:
+def _circles(a: Floats, b: Floats, c: Floats) -> tuple[Floats, Floats, Bools]:
     """Find the circles through points (m, 3): centres, unit normals, which exist.
 
     With u = b - a, v = c - a, w = u x v the centre is
@@ -125,7 +121,7 @@ def _circles(a: Array, b: Array, c: Array) -> tuple[Array, Array, Bools]:
 
 
 def _arc(
-    begin: Array, end: Array, centre: Array, normal: Array, valid: Bools
+    begin: Floats, end: Floats, centre: Floats, normal: Floats, valid: Bools
 ) -> Segments:
     """Build the arcs from begin to end, counterclockwise about the normal."""
     radius = begin[:, :3, 3] - centre
@@ -139,7 +135,7 @@ def _arc(
     )  # fmt: skip
 
 
-def _turn(begin: Array, end: Array) -> Array:
+def _turn(begin: Floats, end: Floats) -> Floats:
     """Rotation vectors (m, 3) [rad] from begin to end, in the frame of begin."""
     R = np.swapaxes(begin[:, :3, :3], 1, 2) @ end[:, :3, :3]
     return rotation_vector(R) if len(R) else np.empty((0, 3))

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, fields
 
 import numpy as np
-from numpy.typing import NDArray
 
+from postproc.arrays import Bools, Floats, Ints
 from postproc.motion.clock import no_time, tell_time
 from postproc.motion.pull import Pull
 from postproc.motion.reach import points, where_passed
@@ -17,10 +17,6 @@ from postproc.motion.targets import Targets
 from postproc.motion.trace import Trace, trace
 from postproc.robot.arm import Arm
 from postproc.robot.direction import arrivals
-
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
-Bools = NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
@@ -48,15 +44,15 @@ class Plan:
         end: Where the arm stands at the last arrival.
     """
 
-    q: Array
-    tcp: Array
-    aside: Array
-    tool: Array
-    direction: Array
-    side: Array
-    travel: Array
-    speed: Array
-    time: Array
+    q: Floats
+    tcp: Floats
+    aside: Floats
+    tool: Floats
+    direction: Floats
+    side: Floats
+    travel: Floats
+    speed: Floats
+    time: Floats
     slot: Ints
     reason: Ints
     reasons: tuple[str, ...]
@@ -75,7 +71,7 @@ class Plan:
         """Return the number of arrivals."""
         return len(self.q)
 
-    def gravity_torque(self, arm: Arm, payload: float, payload_com: Array) -> Array:
+    def gravity_torque(self, arm: Arm, payload: float, payload_com: Floats) -> Floats:
         """Torque that gravity exerts about every joint, (n, 6) [N m].
 
         Args:

@@ -10,12 +10,9 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
+from postproc.arrays import Floats, Ints
 from postproc.kernels import floats, native
-
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 ROUNDS = 12  # of Jacobi's method; v + w is 1/4 at most, each gains a factor of two
 
@@ -24,7 +21,7 @@ def _no_points() -> Ints:
     return np.empty(0, dtype=np.int64)
 
 
-def _no_shares() -> Array:
+def _no_shares() -> Floats:
     return np.empty(0)
 
 
@@ -41,10 +38,10 @@ class Pull:
     visit: Ints = field(default_factory=_no_points)
     before: Ints = field(default_factory=_no_points)
     behind: Ints = field(default_factory=_no_points)
-    v: Array = field(default_factory=_no_shares)
-    w: Array = field(default_factory=_no_shares)
+    v: Floats = field(default_factory=_no_shares)
+    w: Floats = field(default_factory=_no_shares)
 
-    def on(self, moved: Array) -> Array:
+    def on(self, moved: Floats) -> Floats:
         """Tell how much farther than their targets points move, (n, 3).
 
         Args:
@@ -57,14 +54,14 @@ class Pull:
         out[self.visit] = pulled
         return out
 
-    def to_move(self, wanted: Array) -> Array:
+    def to_move(self, wanted: Floats) -> Floats:
         """Move targets so that the path moves as wanted where it passes, (n, 3)."""
         n, c = len(wanted), len(self.visit)
         if c == 0:
             return np.array(wanted)
         if native is not None:
             corners, shares = (self.visit, self.before, self.behind), (self.v, self.w)
-            found: Array = native.to_move(floats(wanted), corners, shares, ROUNDS)
+            found: Floats = native.to_move(floats(wanted), corners, shares, ROUNDS)
             return found
         others = np.ones(n, dtype=bool)
         others[self.visit] = False

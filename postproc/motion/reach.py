@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from postproc.arrays import Floats, Ints
 from postproc.motion.rounding import rounded
 from postproc.motion.standing import NOWHERE, Standing
 from postproc.motion.targets import Targets
@@ -14,9 +14,6 @@ from postproc.motion.trace import Trace, trace
 from postproc.robot.arm import Arm
 from postproc.robot.direction import Passages, Sides, passages, sides
 from postproc.robot.past import NOTHING, Past
-
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 
 @dataclass(frozen=True)
@@ -30,10 +27,10 @@ class Reached:
         side: Where every joint lies in its play, (n, 6) from -1 to 1; 0: not known.
     """
 
-    q: Array
-    tcp: Array
-    aside: Array
-    side: Array
+    q: Floats
+    tcp: Floats
+    aside: Floats
+    side: Floats
 
 
 @dataclass(frozen=True)
@@ -45,8 +42,8 @@ class Points:
         flange: (n, 4, 4) [m], NaN where not known.
     """
 
-    q: Array
-    flange: Array
+    q: Floats
+    flange: Floats
 
 
 @dataclass(frozen=True)
@@ -69,15 +66,15 @@ class Course:
     arm: Arm
     targets: Targets
     exact: Points
-    passed: Array
-    aside: Array
+    passed: Floats
+    aside: Floats
     slot: Ints
     passages: Passages
     sides: Sides
     begin: Standing = NOWHERE
 
     @property
-    def side(self) -> Array:
+    def side(self) -> Floats:
         """Return where every joint lies in its play, as in `Reached`."""
         return self.sides.side
 
@@ -123,7 +120,7 @@ def points(traced: Trace) -> Points:
     return Points(traced.q, traced.flange)
 
 
-def where_passed(arm: Arm, exact: Points, q: Array) -> Array:
+def where_passed(arm: Arm, exact: Points, q: Floats) -> Floats:
     """Place the flange where the path passes targets, (n, 4, 4) [m].
 
     Args:

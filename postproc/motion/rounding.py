@@ -5,21 +5,16 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from postproc.arrays import Bools, Floats, Ints, in_pieces
 from postproc.kernels import native
 from postproc.motion.corner import Corners, corners, parabolas
 from postproc.motion.paths import along
 from postproc.motion.pull import Pull
 from postproc.motion.targets import Targets
 from postproc.motion.trace import Trace
-from postproc.pieces import in_pieces
 from postproc.robot.arm import Arm
 from postproc.robot.chains import Edges
-
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
-Bools = NDArray[np.bool_]
 
 SAMPLES = 4  # on each side of the nearest point of a corner that is not flat
 ONE_SAMPLE = [[0], [0], [1]]  # of the three pieces: where the next corner is passed
@@ -37,8 +32,8 @@ class _Pieces:
     """
 
     corner: Ints
-    begin: Array
-    end: Array
+    begin: Floats
+    end: Floats
     count: Ints
 
 
@@ -120,7 +115,7 @@ def _pieces(traced: Trace, found: Corners) -> _Pieces:
     return _Pieces(corner, begin, end, count)
 
 
-def _resampled(traced: Trace, found: Corners, pieces: _Pieces) -> tuple[Edges, Array]:
+def _resampled(traced: Trace, found: Corners, pieces: _Pieces) -> tuple[Edges, Floats]:
     """Sample all edges anew; return them and their samples' share of the way."""
     touched = np.asarray((pieces.corner >= 0).any(axis=0))
     start = np.concatenate([[0], np.cumsum(pieces.count.sum(axis=0))])
@@ -131,11 +126,11 @@ def _resampled(traced: Trace, found: Corners, pieces: _Pieces) -> tuple[Edges, A
 
 def _samples(
     traced: Trace, found: Corners, pieces: _Pieces, touched: Bools, start: Ints
-) -> tuple[Array, Array]:
+) -> tuple[Floats, Floats]:
     """Place the samples, (s, 6) [rad], and give their shares of the way, (s,)."""
     old = traced.edges
     if native is not None:
-        placed: tuple[Array, Array] = native.resampled(
+        placed: tuple[Floats, Floats] = native.resampled(
             old, traced.share, traced.q, found, pieces
         )
         return placed
@@ -170,7 +165,7 @@ def _samples(
     return path, share
 
 
-def _on_corners(traced: Trace, found: Corners, corner: Ints, s: Array) -> Array:
+def _on_corners(traced: Trace, found: Corners, corner: Ints, s: Floats) -> Floats:
     """Place samples on corners, (m, 6) [rad]."""
     parts = in_pieces(
         lambda rows: parabolas(traced, found.zones[corner[rows]])(s[rows]), len(s)
@@ -180,7 +175,7 @@ def _on_corners(traced: Trace, found: Corners, corner: Ints, s: Array) -> Array:
 
 def _places(
     found: Corners, corner: Ints, part: Ints, count: Ints, side: int
-) -> tuple[Array, Array]:
+) -> tuple[Floats, Floats]:
     """Give s of samples behind (side 0) or before the nearest point, and its step."""
     nearest = found.nearest[corner]
     step = (1 - nearest if side == 0 else nearest) / count

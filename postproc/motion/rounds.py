@@ -9,15 +9,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from postproc.arrays import Bools, Floats, Ints
 from postproc.motion.path import Segments, arcs
 from postproc.motion.targets import Move, Targets
 from postproc.pose import inverse
-
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
-Bools = NDArray[np.bool_]
 
 NEAR = 1e-4  # [m] points nearer than this do not tell where their circle goes
 BETWEEN = (0.25, 0.5, 0.75)  # fractions of both parts of an arc that are looked at
@@ -34,7 +30,7 @@ class Rounds:
     """
 
     visit: Ints
-    points: Array
+    points: Floats
 
     def __len__(self) -> int:
         """Return the number of arcs."""
@@ -52,7 +48,7 @@ class Rounds:
         gap = self.points - np.roll(self.points, 1, axis=1)
         return np.asarray((np.linalg.norm(gap, axis=2) < NEAR).any(axis=1))
 
-    def strays(self, shift: Array) -> Array:
+    def strays(self, shift: Floats) -> Floats:
         """Tell how much farther the path moves between its points than these do.
 
         Args:
@@ -72,7 +68,7 @@ class Rounds:
         return np.where(known & ~after[0].valid, np.inf, extra)
 
 
-def rounds(targets: Targets, tcp: Array, aside: Array) -> Rounds:
+def rounds(targets: Targets, tcp: Floats, aside: Floats) -> Rounds:
     """Find the arcs of a program.
 
     Args:
@@ -122,14 +118,14 @@ def from_every_start(
     return before[pred_start], np.repeat(pred, times)
 
 
-def _parts(points: Array) -> tuple[Segments, Segments]:
+def _parts(points: Floats) -> tuple[Segments, Segments]:
     """Build both parts of arcs through points (k, 3, 3) [m]."""
     poses = np.tile(np.eye(4), (*points.shape[:2], 1, 1))
     poses[:, :, :3, 3] = points
     return arcs(poses[:, 0], poses[:, 1], poses[:, 2])
 
 
-def _place(part: Segments, u: float) -> Array:
+def _place(part: Segments, u: float) -> Floats:
     """Place the TCP at a fraction of every arc, (k, 3) [m]."""
     k = len(part.angle)
     return part.poses(np.arange(k), np.full(k, u))[:, :3, 3]

@@ -12,12 +12,10 @@ from typing import Any
 
 import numpy as np
 import ruckig
-from numpy.typing import NDArray
 
+from postproc.arrays import Floats
 from postproc.exceptions import PlanError
 from postproc.robot.arm import Arm
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,7 +29,7 @@ class JointMove:
     duration: float
     _trajectory: Any
 
-    def at(self, time: float) -> tuple[Array, Array, Array]:
+    def at(self, time: float) -> tuple[Floats, Floats, Floats]:
         """Return joint angles, velocities and accelerations, (6,) each, at a time."""
         q, v, a = self._trajectory.at_time(time)
         return np.array(q), np.array(v), np.array(a)
@@ -47,7 +45,7 @@ class JointMoves:
         self._input.synchronization = ruckig.Synchronization.Phase
         self._arm = arm
 
-    def move(self, begin: Array, end: Array, override: float = 1.0) -> JointMove:
+    def move(self, begin: Floats, end: Floats, override: float = 1.0) -> JointMove:
         """Plan one move.
 
         Args:

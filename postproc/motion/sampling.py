@@ -5,16 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from postproc.arrays import Bools, Floats, Ints
 from postproc.kernels import native
 from postproc.motion.path import Segments, arcs, joined, lines
 from postproc.motion.targets import Move, Targets
 from postproc.pose import inverse
-
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
-Bools = NDArray[np.bool_]
 
 LEAST = 4  # intervals of a path between stops, however short
 BLIND = 32  # intervals of a path whose length is not known beforehand
@@ -46,17 +42,17 @@ class Samples:
     broken: Bools
     begins: Ints
     start: Ints
-    length: Array
-    turning: Array
+    length: Floats
+    turning: Floats
     inner: Ints
-    flange: Array
+    flange: Floats
 
     def count(self, edge: int) -> int:
         """Return the number of samples of an edge."""
         return int(self.start[edge + 1] - self.start[edge])
 
 
-def sample(targets: Targets, flange: Array) -> Samples:
+def sample(targets: Targets, flange: Floats) -> Samples:
     """Place samples on all Cartesian paths between known flange poses.
 
     Args:
@@ -121,7 +117,7 @@ def _inner(
     )  # fmt: skip
 
 
-def _lines(targets: Targets, flange: Array, begin: Ints, end: Ints) -> Segments:
+def _lines(targets: Targets, flange: Floats, begin: Ints, end: Ints) -> Segments:
     """Build the straight paths from targets (m,) to others."""
     if native is not None:
         m, nothing = len(end), np.zeros((len(end), 3))
@@ -157,7 +153,7 @@ def _begins(targets: Targets, visit: Ints, source: Ints) -> Ints:
 
 def _arcs(
     targets: Targets,
-    flange: Array,
+    flange: Floats,
     visit: Ints,
     source: Ints,
     ready: Bools,

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import solve_banded
 
-Array = NDArray[np.float64]
-Bools = NDArray[np.bool_]
+from postproc.arrays import Bools, Floats
 
 
-def derivatives(s: Array, q: Array, begins: Bools) -> tuple[Array, Array]:
+def derivatives(s: Floats, q: Floats, begins: Bools) -> tuple[Floats, Floats]:
     """Differentiate at the waypoints the natural spline through each run.
 
     With the step h and the slope m of an interval, the first derivatives d satisfy

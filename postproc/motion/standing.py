@@ -5,13 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from postproc.arrays import Floats, Ints
 from postproc.motion.workspace import Known
 from postproc.robot.past import NOTHING, Past
-
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 
 @dataclass(frozen=True)
@@ -25,8 +22,8 @@ class Standing:
         past: What the joints remember.
     """
 
-    q: Array
-    flange: Array
+    q: Floats
+    flange: Floats
     slot: Ints
     past: Past
 
@@ -35,7 +32,7 @@ class Standing:
         return len(self.q)
 
     @classmethod
-    def at_end(cls, q: Array, flange: Array, slot: Ints, past: Past) -> Standing:
+    def at_end(cls, q: Floats, flange: Floats, slot: Ints, past: Past) -> Standing:
         """Keep the last of n targets, none of the others."""
         return cls(np.array(q[-1:]), np.array(flange[-1:]), np.array(slot[-1:]), past)
 

@@ -6,11 +6,8 @@ from dataclasses import dataclass, fields, replace
 from enum import IntEnum
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
-Bools = NDArray[np.bool_]
+from postproc.arrays import Bools, Floats, Ints
 
 
 class Move(IntEnum):
@@ -75,20 +72,20 @@ class Targets:
     move: Ints
     kind: Ints
     via: Bools
-    tcp: Array
-    distance: Array
-    joints: Array
-    tool: Array
+    tcp: Floats
+    distance: Floats
+    joints: Floats
+    tool: Floats
     slot: Ints
-    turns: Array
+    turns: Floats
     nearest_turn: Bools
     fly: Bools
     rounding: Ints
-    fly_distance: Array
-    overlap: Array
-    linear_speed: Array
-    rotary_speed: Array
-    override: Array
+    fly_distance: Floats
+    overlap: Floats
+    linear_speed: Floats
+    rotary_speed: Floats
+    override: Floats
     wrist_joint: Bools
     pred_start: Ints
     pred: Ints
@@ -112,7 +109,7 @@ class Targets:
         own = {f.name: getattr(self, f.name)[rows] for f in fields(self)[:-2]}
         return Targets(**own, pred_start=pred_start, pred=pred)
 
-    def moved_to(self, rows: Ints, tcp: Array, joints: Array) -> Targets:
+    def moved_to(self, rows: Ints, tcp: Floats, joints: Floats) -> Targets:
         """Return a copy of which some targets lie elsewhere.
 
         Args:
@@ -126,7 +123,7 @@ class Targets:
 
 
 def make_targets(
-    kind: Ints, tcp: Array | None = None, joints: Array | None = None, **given: object
+    kind: Ints, tcp: Floats | None = None, joints: Floats | None = None, **given: object
 ) -> Targets:
     """Build targets reached one after the other; what is not given takes a default.
 

@@ -14,16 +14,14 @@ import numpy as np
 import toppra
 import toppra.algorithm
 import toppra.constraint
-from numpy.typing import NDArray
 from scipy.interpolate import CubicHermiteSpline
 
+from postproc.arrays import Bools, Floats
 from postproc.exceptions import PlanError
 from postproc.motion.spline import derivatives
 from postproc.robot.arm import Arm
 
-Array = NDArray[np.float64]
-Bools = NDArray[np.bool_]
-Orders = tuple[Array, Array, Array]  # joint angles and their two derivatives, (k, 6)
+Orders = tuple[Floats, Floats, Floats]  # joint angles and their two derivatives, (k, 6)
 
 GAP = 0.01  # path length put between two runs, where the arm stands
 CREEP = 1e-4  # ds/dt that counts as standing: an exact zero leaves the solver no room
@@ -46,18 +44,18 @@ class Runs:
         time: Time since the run began, (k,) [s].
     """
 
-    s: Array
-    q: Array
-    slope: Array
-    rate: Array
-    time: Array
+    s: Floats
+    q: Floats
+    slope: Floats
+    rate: Floats
+    time: Floats
 
     @property
-    def velocity(self) -> Array:
+    def velocity(self) -> Floats:
         """Joint velocities at the waypoints, (k, 6) [rad/s]."""
         return self.slope * self.rate[:, None]
 
-    def at(self, time: Array) -> tuple[Array, Array, Array]:
+    def at(self, time: Floats) -> tuple[Floats, Floats, Floats]:
         """Follow the first and only run.
 
         Returns:
@@ -78,10 +76,10 @@ class Runs:
 class _Path(toppra.interpolator.AbstractGeometricPath):  # type: ignore[misc]
     """A path that is only asked for its derivatives at all the gridpoints."""
 
-    def __init__(self, s: Array, q: Array, first: Array, second: Array) -> None:
+    def __init__(self, s: Floats, q: Floats, first: Floats, second: Floats) -> None:
         self._s, self._orders = s, (q, first, second)
 
-    def __call__(self, positions: Array, order: int = 0) -> Array:
+    def __call__(self, positions: Floats, order: int = 0) -> Floats:
         if np.ndim(positions) == 0:
             return self._orders[order][np.searchsorted(self._s, positions)]
         return self._orders[order]
@@ -91,27 +89,27 @@ class _Path(toppra.interpolator.AbstractGeometricPath):  # type: ignore[misc]
         return 6
 
     @property
-    def path_interval(self) -> Array:
+    def path_interval(self) -> Floats:
         return self._s[[0, -1]]
 
 
 class _PathSpeed(toppra.constraint.LinearConstraint):  # type: ignore[misc]
     """A bound of the path velocity at each gridpoint."""
 
-    def __init__(self, limit: Array) -> None:
+    def __init__(self, limit: Floats) -> None:
         super().__init__()
         self.dof = 6
         self._square = limit**2
 
     def compute_constraint_params(
-        self, path: Any, gridpoints: Array
+        self, path: Any, gridpoints: Floats
     ) -> tuple[Any, ...]:
         """Return no linear constraint, only bounds of the squared velocity."""
         bound = np.column_stack([np.zeros_like(self._square), self._square])
         return None, None, None, None, None, None, bound
 
 
-def time_laws(arm: Arm, q: Array, s: Array, limit: Array, begins: Bools) -> Runs:
+def time_laws(arm: Arm, q: Floats, s: Floats, limit: Floats, begins: Bools) -> Runs:
     """Find the fastest time laws along paths, from stop to stop.
 
     All runs are solved as one path on which the arm must stand at the seams.
@@ -146,7 +144,7 @@ def time_laws(arm: Arm, q: Array, s: Array, limit: Array, begins: Bools) -> Runs
     return Runs(s, q, first, rate, since)
 
 
-def _in_windows(arm: Arm, along: Array, orders: Orders, bound: Array) -> Array:
+def _in_windows(arm: Arm, along: Floats, orders: Orders, bound: Floats) -> Floats:
     """Solve a long path piece by piece, (k,).
 
     A piece ends at rest, so that its velocities are nowhere above those of the whole
@@ -174,8 +172,8 @@ def _in_windows(arm: Arm, along: Array, orders: Orders, bound: Array) -> Array:
 
 
 def _solve(
-    arm: Arm, along: Array, orders: Orders, rows: slice, bound: Array, begin: float
-) -> Array:
+    arm: Arm, along: Floats, orders: Orders, rows: slice, bound: Floats, begin: float
+) -> Floats:
     """Find the fastest ds/dt, (k,), from a given one to a standstill.
 
     Raises:

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
+from postproc.arrays import Bools, Floats, Ints
 from postproc.motion.arrival import Arrival
 from postproc.motion.arrive import arrive, choose
 from postproc.motion.at_once import at_once
@@ -28,10 +28,6 @@ from postproc.motion.workspace import Known, Workspace
 from postproc.pose import is_unknown
 from postproc.robot.arm import Arm
 from postproc.robot.chains import Edges
-
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
-Bools = NDArray[np.bool_]
 
 AGREE = 1e-6  # [rad] several predecessors lead to the same joint angles
 SLACK = 1e-9  # [rad] rounding at a joint limit
@@ -58,16 +54,16 @@ class Trace:
         pull: How rounded fly points move with their neighbours.
     """
 
-    q: Array
-    flange: Array
+    q: Floats
+    flange: Floats
     slot: Ints
     edges: Edges
-    length: Array
-    turning: Array
-    share: Array
+    length: Floats
+    turning: Floats
+    share: Floats
     reason: Ints
     overruled: Bools
-    aside: Array
+    aside: Floats
     pull: Pull = field(default_factory=Pull)
 
 

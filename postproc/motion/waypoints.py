@@ -5,15 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from postproc.arrays import Bools, Floats, Ints
 from postproc.motion.targets import Move, Targets
 from postproc.motion.trace import Trace
 from postproc.robot.arm import Arm
-
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
-Bools = NDArray[np.bool_]
 
 JOINT_INTERVALS = 8  # gridpoints of a JOINT move inside a fly run
 SHORTEST = 1e-9  # [s at full joint speed] below this two samples are one
@@ -34,14 +30,14 @@ class Waypoints:
         at: Waypoint of each move, (n,), -1 where it is in no run or nothing moves.
     """
 
-    q: Array
-    ds: Array
-    least: Array
-    override: Array
+    q: Floats
+    ds: Floats
+    least: Floats
+    override: Floats
     begins: Bools
     at: Ints
 
-    def limit(self) -> Array:
+    def limit(self) -> Floats:
         """Bound ds/dt at the waypoints by the programmed speeds, (k,).
 
         At full override, between two intervals the mean of their bounds where these
@@ -54,7 +50,7 @@ class Waypoints:
         behind = np.where(after, np.append(before[1:], np.inf), np.inf)
         lower, upper = np.minimum(before, behind), np.maximum(before, behind)
         similar = upper < (1 + SIMILAR) * lower
-        bound: Array = np.where(similar, (lower + upper) / 2, lower)
+        bound: Floats = np.where(similar, (lower + upper) / 2, lower)
         return bound
 
 
@@ -124,7 +120,7 @@ def _runs_of(n: int, first: Ints, end: Ints) -> Ints:
 
 
 def _thinned(
-    q: Array, ds: Array, least: Array, override: Array, run: Ints, at: Ints
+    q: Floats, ds: Floats, least: Floats, override: Floats, run: Ints, at: Ints
 ) -> Waypoints:
     """Drop waypoints where nothing moves, and runs that are nothing else."""
     runs = int(run.max(initial=-1)) + 1
@@ -139,7 +135,7 @@ def _thinned(
     return Waypoints(q[keep], ds[keep], least[keep], override[keep], begins[keep], at)
 
 
-def _programmed(targets: Targets, traced: Trace, edge: Ints) -> Array:
+def _programmed(targets: Targets, traced: Trace, edge: Ints) -> Floats:
     """Time each move takes at its programmed TCP speed, (n,) [s], 0 without one."""
     line = traced.length[edge] / targets.linear_speed
     turn = traced.turning[edge] / targets.rotary_speed

@@ -6,11 +6,9 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from postproc.arrays import Floats
 from postproc.robot.arm import Arm
-
-Array = NDArray[np.float64]
 
 
 class Ways(Protocol):
@@ -20,11 +18,11 @@ class Ways(Protocol):
         """Return the number of samples."""
         ...
 
-    def all(self, i: int) -> Array:
+    def all(self, i: int) -> Floats:
         """Return all branches at sample i, (8, 6) [rad], NaN where none."""
         ...
 
-    def on(self, slot: int, first: int, most: int) -> Array:
+    def on(self, slot: int, first: int, most: int) -> Floats:
         """Return one branch at samples from `first` on, (.., 6) [rad], on any turn.
 
         Args:
@@ -40,20 +38,20 @@ class Ways(Protocol):
 class Solved:
     """Ways of samples that were solved beforehand, (k, 8, 6) [rad]."""
 
-    branches: Array
+    branches: Floats
 
     def __len__(self) -> int:
         """Return the number of samples."""
         return len(self.branches)
 
-    def all(self, i: int) -> Array:
+    def all(self, i: int) -> Floats:
         """Look all branches up."""
-        branches: Array = self.branches[i]
+        branches: Floats = self.branches[i]
         return branches
 
-    def on(self, slot: int, first: int, most: int) -> Array:
+    def on(self, slot: int, first: int, most: int) -> Floats:
         """Look one branch up."""
-        branch: Array = self.branches[first : first + most, slot]
+        branch: Floats = self.branches[first : first + most, slot]
         return branch
 
 
@@ -67,18 +65,18 @@ class OnDemand:
     """
 
     arm: Arm
-    flange: Array
+    flange: Floats
 
     def __len__(self) -> int:
         """Return the number of samples."""
         return len(self.flange)
 
-    def all(self, i: int) -> Array:
+    def all(self, i: int) -> Floats:
         """Solve for all branches at one sample."""
-        branches: Array = self.arm.inverse(self.flange[i : i + 1]).q[0]
+        branches: Floats = self.arm.inverse(self.flange[i : i + 1]).q[0]
         return branches
 
-    def on(self, slot: int, first: int, most: int) -> Array:
+    def on(self, slot: int, first: int, most: int) -> Floats:
         """Solve for one branch."""
         ahead = self.flange[first : first + most]
         return self.arm.on_branch(ahead, np.full(len(ahead), slot))

@@ -5,18 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from postproc.arrays import Bools, Floats, Ints, pieces
 from postproc.motion.sampling import sample
 from postproc.motion.targets import Kind, Move, Targets
 from postproc.motion.ways import OnDemand, Solved, Ways
-from postproc.pieces import pieces
 from postproc.pose import inverse, is_unknown
 from postproc.robot.arm import Arm
-
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
-Bools = NDArray[np.bool_]
 
 STRAIGHT = 1e-3  # [rad] at axis 5, below this the two wrist branches are one
 CHUNK = 50_000  # poses solved at a time; solving needs room for copies
@@ -36,8 +31,8 @@ class Known:
     """
 
     rows: Ints
-    q: Array
-    flange: Array
+    q: Floats
+    flange: Floats
     slot: Ints
 
 
@@ -106,7 +101,7 @@ class Workspace:
                 if np.ptp(after, axis=0).max() < SAME_POSE:
                     self.flange[v] = after[0]
 
-    def after_step(self, v: int, flange: Array) -> Array:
+    def after_step(self, v: int, flange: Floats) -> Floats:
         """Place the flange after step `v` from a flange pose, (4, 4) [m]."""
         step, tcp = self.targets.tcp[v], flange @ self.targets.tool[v]
         if self.targets.kind[v] == Kind.TOOL_STEP:
@@ -115,7 +110,7 @@ class Workspace:
             tcp = tcp.copy()
             tcp[:3, :3] = step[:3, :3] @ tcp[:3, :3]
             tcp[:3, 3] += step[:3, 3]
-        moved: Array = tcp @ self.tool_inverse[v]
+        moved: Floats = tcp @ self.tool_inverse[v]
         return moved
 
     def _give(self, known: Known) -> None:
@@ -159,15 +154,15 @@ class Workspace:
         self.row[samples.inner[inner]] = len(poses) + np.arange(len(inner))
         self.row[start[1:] - 1] = self.solved[samples.visit]
 
-    def solutions(self, v: int, flange: Array) -> Array:
+    def solutions(self, v: int, flange: Floats) -> Floats:
         """Return all branches at target v with its flange pose, (8, 6) [rad]."""
         if self.solved[v] >= 0:
-            known: Array = self.branches[self.solved[v]]
+            known: Floats = self.branches[self.solved[v]]
             return known
-        found: Array = self.arm.inverse(flange[None]).q[0]
+        found: Floats = self.arm.inverse(flange[None]).q[0]
         return found
 
-    def all_solutions(self, rows: Ints) -> Array:
+    def all_solutions(self, rows: Ints) -> Floats:
         """Return all branches at placed targets, (k, 8, 6) [rad]."""
         found = np.empty((len(rows), 8, 6))
         known = self.solved[rows] >= 0
@@ -182,7 +177,7 @@ class Workspace:
             return Solved(self.branches[rows])
         return OnDemand(self.arm, self.flange_at(np.arange(span.start, span.stop)))
 
-    def flange_at(self, at: Ints) -> Array:
+    def flange_at(self, at: Ints) -> Floats:
         """Look up the flange poses at samples of ready edges, (k, 4, 4) [m]."""
         samples, inner = self.samples, self._inner[at]
         last, inside = np.flatnonzero(inner < 0), np.flatnonzero(inner >= 0)

@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from postproc.arrays import Floats
 from postproc.robot.arm import Arm
-
-Array = NDArray[np.float64]
 
 ROUNDS = 20
 CLOSE = 1e-9  # [m]
 
 
 def wrist_interpolated(
-    arm: Arm, begin: Array, end: Array, tool: Array, k: int
-) -> Array:
+    arm: Arm, begin: Floats, end: Floats, tool: Floats, k: int
+) -> Floats:
     """Move the TCP along a line while axes 4 to 6 turn in proportion.
 
     Axes 1 to 3 follow by Newton's method on the TCP's position, from the straight line

@@ -17,16 +17,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from postproc.arrays import Bools, Floats, Ints
 from postproc.kernels import native
 from postproc.motion.targets import Fly, Move, Targets
 from postproc.motion.trace import Trace
 from postproc.robot.arm import Arm
-
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
-Bools = NDArray[np.bool_]
 
 HALF = 0.5  # of a move that a zone may take
 NOTHING = 1e-9  # [m], [rad] a move that goes nowhere has no corner
@@ -45,8 +41,8 @@ class Zones:
     visit: Ints
     into: Ints
     out: Ints
-    before: Array
-    behind: Array
+    before: Floats
+    behind: Floats
 
     def __getitem__(self, rows: Bools | Ints | slice) -> Zones:
         """Return some of the corners."""
@@ -95,7 +91,7 @@ def _corners(targets: Targets, traced: Trace) -> tuple[Ints, Ints, Ints]:
     return visit, targets.pred_start[visit], out[visit]
 
 
-def _lengths(targets: Targets, traced: Trace, to: Ints, edge: Ints) -> Array:
+def _lengths(targets: Targets, traced: Trace, to: Ints, edge: Ints) -> Floats:
     """Measure the TCP's ways on edges (2, c) [m], chords where they are no lines."""
     used = np.zeros(len(to), dtype=bool)
     used[edge] = True
@@ -106,10 +102,10 @@ def _lengths(targets: Targets, traced: Trace, to: Ints, edge: Ints) -> Array:
     return length[edge]
 
 
-def _chords(targets: Targets, flange: Array, begin: Ints, end: Ints) -> Array:
+def _chords(targets: Targets, flange: Floats, begin: Ints, end: Ints) -> Floats:
     """Measure the straight ways of the TCP from targets to others, (m,) [m]."""
     if native is not None:
-        lengths: Array = native.chords(flange, targets.tool, begin, end)
+        lengths: Floats = native.chords(flange, targets.tool, begin, end)
         return lengths
     tool = targets.tool.take(end, axis=0)[:, :3, 3]
     chord = np.zeros((len(end), 3))
@@ -120,7 +116,7 @@ def _chords(targets: Targets, flange: Array, begin: Ints, end: Ints) -> Array:
     return np.asarray(np.sqrt(np.einsum("ni,ni->n", chord, chord)))
 
 
-def _by_distance(targets: Targets, visit: Ints, length: Array) -> Array:
+def _by_distance(targets: Targets, visit: Ints, length: Floats) -> Floats:
     """Take the same length of both moves, all there is where only WITHIN bounds it.
 
     Args:
@@ -132,7 +128,7 @@ def _by_distance(targets: Targets, visit: Ints, length: Array) -> Array:
     begin = np.where(targets.rounding[visit] == Fly.WITHIN, np.inf, distance)
     shortest = length.min(axis=0)
     zone = np.minimum(begin, HALF * shortest)
-    share: Array = np.where(length > NOTHING, zone / np.maximum(length, NOTHING), 0.0)
+    share: Floats = np.where(length > NOTHING, zone / np.maximum(length, NOTHING), 0.0)
     return np.where(shortest > NOTHING, share, 0.0)
 
 
@@ -147,17 +143,17 @@ class _Ways:
     """
 
     to: Ints
-    length: Array
-    turned: Array
+    length: Floats
+    turned: Floats
 
     @classmethod
-    def on(cls, traced: Trace, to: Ints, edge: Ints, length: Array) -> _Ways:
+    def on(cls, traced: Trace, to: Ints, edge: Ints, length: Floats) -> _Ways:
         """Describe the moves on edges of known lengths."""
         end, begin = to[edge], traced.edges.source[edge]
         return cls(end, length, np.abs(traced.q[end] - traced.q[begin]))
 
 
-def _by_overlap(arm: Arm, targets: Targets, visit: Ints, ways: list[_Ways]) -> Array:
+def _by_overlap(arm: Arm, targets: Targets, visit: Ints, ways: list[_Ways]) -> Floats:
     """Let the moves overlap while the first brakes and the second starts, (2, c).
 
     At full override: a path that changes with the override knob could not be proved.
@@ -167,7 +163,7 @@ def _by_overlap(arm: Arm, targets: Targets, visit: Ints, ways: list[_Ways]) -> A
     return np.stack([push * time**2 / 2 for push, _ in ramps])
 
 
-def _ramp(arm: Arm, targets: Targets, way: _Ways) -> tuple[Array, Array]:
+def _ramp(arm: Arm, targets: Targets, way: _Ways) -> tuple[Floats, Floats]:
     """Give the acceleration of u [1/s^2] along moves, and how long it lasts [s], (c,).
 
     u goes from 0 to 1; the joints' limits are the bounds, and the programmed speed.

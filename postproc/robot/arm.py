@@ -15,14 +15,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from postproc.arrays import Floats, Ints
 from postproc.exceptions import ArmError, PlanError
 from postproc.pose import MM
 from postproc.robot.arm_file import ArmFile, arm_path, read_arm_file
 from postproc.robot.dh import DH, pose_of
 from postproc.robot.inverse import Branches, Inverse, wrap
-
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 GRAVITY = 9.80665  # [m/s^2], standard gravity
 
@@ -48,14 +46,14 @@ class Arm:
     name: str
     id: str
     dh: DH
-    lower: Array
-    upper: Array
-    velocity: Array
-    acceleration: Array
-    jerk: Array
-    play: Array
-    coupling: Array
-    gear_ratio: Array
+    lower: Floats
+    upper: Floats
+    velocity: Floats
+    acceleration: Floats
+    jerk: Floats
+    play: Floats
+    coupling: Floats
+    gear_ratio: Floats
     repeatability: float
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -94,15 +92,15 @@ class Arm:
         """Tell whether the arm file holds a closed-form inverse."""
         return self.file.opw is not None
 
-    def link_frames(self, q: Array) -> Array:
+    def link_frames(self, q: Floats) -> Floats:
         """Place the D-H frames 0 (base) to 6 (flange): (n, 6) -> (n, 7, 4, 4)."""
         return np.stack([pose_of(frame) for frame in self.dh.frames(q)], axis=1)
 
-    def flange(self, q: Array) -> Array:
+    def flange(self, q: Floats) -> Floats:
         """Place the flange: (n, 6) [rad] -> (n, 4, 4) [m], base frame."""
         return self.dh.flange(q)
 
-    def tcp(self, q: Array, tool: Array) -> Array:
+    def tcp(self, q: Floats, tool: Floats) -> Floats:
         """Place the TCP alone: (n, 3) [m], base frame.
 
         Args:
@@ -111,7 +109,7 @@ class Arm:
         """
         return self.dh.placed(q, tool)
 
-    def kinematics(self, q: Array) -> tuple[Array, Array]:
+    def kinematics(self, q: Floats) -> tuple[Floats, Floats]:
         """Place the flange and give the joint screws.
 
         Args:
@@ -129,7 +127,7 @@ class Arm:
             screws[:, 3:, i] = axis.T
         return pose_of(last), (screws * self.dh.sense) @ self.dh.mix
 
-    def joint_axes(self, q: Array) -> tuple[Array, Array]:
+    def joint_axes(self, q: Floats) -> tuple[Floats, Floats]:
         """Give every joint's rotation axis and a point on it.
 
         Returns:
@@ -139,7 +137,7 @@ class Arm:
         axes = screws[..., 3:]
         return axes, np.cross(axes, screws[..., :3])
 
-    def jacobian(self, q: Array, tool: Array) -> Array:
+    def jacobian(self, q: Floats, tool: Floats) -> Floats:
         """Differentiate the TCP: (n, 6, 6), rows 0-2 linear [m/rad], 3-5 angular.
 
         Args:
@@ -153,8 +151,11 @@ class Arm:
         return J
 
     def gravity_torque(
-        self, q: Array, payload: Array | float = 0.0, payload_com: Array | float = 0.0
-    ) -> Array:
+        self,
+        q: Floats,
+        payload: Floats | float = 0.0,
+        payload_com: Floats | float = 0.0,
+    ) -> Floats:
         """Give the torque that gravity exerts about every joint, (n, 6) [N m].
 
         Args:
@@ -176,10 +177,10 @@ class Arm:
             return own
         J = self.jacobian(q, np.broadcast_to(payload_com, (n, 3)))
         weight = -GRAVITY * np.broadcast_to(payload, (n,))
-        torque: Array = own + weight[:, None] * J[:, 2]
+        torque: Floats = own + weight[:, None] * J[:, 2]
         return torque
 
-    def gravity_basis(self, q: Array) -> Array:
+    def gravity_basis(self, q: Floats) -> Floats:
         """Give the joint torque per unit of every lumped mass parameter.
 
         Columns are, link by link, the mass at the D-H frame's origin [N m/kg] and the
@@ -199,7 +200,7 @@ class Arm:
                 lever = frames[:, link + 1, None, :3, k]
                 turn = np.cross(axes, lever)[..., 2]
                 basis[:, :, link, 1 + k] = np.where(moved, turn, 0.0)
-        flat: Array = -GRAVITY * basis.reshape(len(q), 6, 24)
+        flat: Floats = -GRAVITY * basis.reshape(len(q), 6, 24)
         return flat
 
     @property
@@ -213,7 +214,7 @@ class Arm:
             raise PlanError(f"arm {self.name} has no closed-form inverse kinematics")
         return self._inverse
 
-    def inverse(self, flange: Array) -> Branches:
+    def inverse(self, flange: Floats) -> Branches:
         """Solve the inverse kinematics of flange poses (n, 4, 4) [m].
 
         Raises:
@@ -221,7 +222,7 @@ class Arm:
         """
         return self._solver.branches(flange)
 
-    def on_branch(self, flange: Array, slot: Ints) -> Array:
+    def on_branch(self, flange: Floats, slot: Ints) -> Floats:
         """Solve for one branch of flange poses (n, 4, 4) [m], on any turn.
 
         Args:
@@ -236,7 +237,7 @@ class Arm:
         """
         return self._solver.branch(flange, slot)
 
-    def into_range(self, q: Array) -> Array:
+    def into_range(self, q: Floats) -> Floats:
         """Shift joint angles (.., 6) [rad] by turns into the range, as `inverse` does.
 
         Raises:
@@ -244,11 +245,13 @@ class Arm:
         """
         return self._solver.into_range(q)
 
-    def branch(self, q: Array) -> Ints:
+    def branch(self, q: Floats) -> Ints:
         """Name the branch (slot 4 W + 2 S + E) of joint angles (n, 6) [rad]."""
         return self._solver.slot(q)
 
-    def nearest(self, flange: Array, near: Array, branch: Ints | None = None) -> Array:
+    def nearest(
+        self, flange: Floats, near: Floats, branch: Ints | None = None
+    ) -> Floats:
         """Solve for the joint angles nearest to given ones.
 
         Args:
@@ -260,16 +263,16 @@ class Arm:
             (n, 6) [rad] on the turn nearest to `near`, NaN where no solution exists.
         """
         if branch is not None:
-            one: Array = near + wrap(self.on_branch(flange, branch) - near)
+            one: Floats = near + wrap(self.on_branch(flange, branch) - near)
             return one
         slots = self.inverse(flange).q
         slots = near[:, None, :] + wrap(slots - near[:, None, :])
         gap = np.abs(slots - near[:, None, :]).max(-1)
         best = np.argmin(np.where(np.isnan(gap), np.inf, gap), axis=1)
-        q: Array = slots[np.arange(len(slots)), best]
+        q: Floats = slots[np.arange(len(slots)), best]
         return q
 
-    def within_limits(self, q: Array) -> NDArray[np.bool_]:
+    def within_limits(self, q: Floats) -> NDArray[np.bool_]:
         """Tell which joint angles (n, 6) [rad] respect the limits, (n,)."""
         return np.asarray(((q >= self.lower) & (q <= self.upper)).all(axis=-1))
 

@@ -8,15 +8,14 @@ from pathlib import Path
 from typing import Annotated, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field, NonNegativeFloat, PositiveFloat, model_validator
 
+from postproc.arrays import Floats
 from postproc.exceptions import CellError
 from postproc.pose import MM, pose_from_record, rotation_from_zyz
 from postproc.robot.arm import Arm, load_arm
 from postproc.robot.schema import Sextuple, Strict, Triple, read_toml
 
-Array = NDArray[np.float64]
 Source = Literal["cad", "tracker", "taught"]
 Effect = Literal["still", "moves", "sets-frames"]
 
@@ -150,7 +149,7 @@ class CellFile(Strict):
 class Frame:
     """A frame of the cell: its pose (4, 4) [m], its record [mm, deg] and its source."""
 
-    pose: Array
+    pose: Floats
     record: tuple[float, ...]
     source: Source
 
@@ -189,20 +188,20 @@ class Cell:
     tool: Frame
     base: Frame
     uframe: Frame
-    home: Array | None
-    calibration: Array | None
+    home: Floats | None
+    calibration: Floats | None
     payload_mass: float
-    payload_com: Array
+    payload_com: Floats
     temperature: float
-    tracker: Array | None
-    probes: Array
-    mounting: Array | None
+    tracker: Floats | None
+    probes: Floats
+    mounting: Floats | None
     aux: Mapping[int, str]
     limits: LimitSection
     routines: Mapping[str, Effect]
     frame_tables: Mapping[str, Mapping[str, FrameTableEntry]]
     taught: frozenset[str]
-    taught_frames: Mapping[tuple[float, ...], Array | None]
+    taught_frames: Mapping[tuple[float, ...], Floats | None]
 
 
 def _frame(section: FrameSection | None) -> Frame:
@@ -249,7 +248,7 @@ def load_cell(path: str | Path) -> Cell:
     )
 
 
-def _taught_frames(file: CellFile) -> dict[tuple[float, ...], Array | None]:
+def _taught_frames(file: CellFile) -> dict[tuple[float, ...], Floats | None]:
     """Collect the taught frames of the cell and of its tables."""
     tables = file.frames.routines.values()
     frames = [file.tool, file.base, file.uframe]
@@ -264,11 +263,11 @@ def _taught_frames(file: CellFile) -> dict[tuple[float, ...], Array | None]:
 
 def _angles(
     section: JointSection | None, name: str, arm: Arm, path: Path
-) -> Array | None:
+) -> Floats | None:
     """Convert and check $HOME or $CAL_SYS."""
     if section is None:
         return None
-    joints: Array = np.deg2rad(section.joints_deg)
+    joints: Floats = np.deg2rad(section.joints_deg)
     if not arm.within_limits(joints[None])[0]:
         j = int(np.argmax((joints < arm.lower) | (joints > arm.upper)))
         raise CellError(
@@ -280,14 +279,14 @@ def _angles(
     return joints
 
 
-def _probes(file: CellFile) -> Array:
+def _probes(file: CellFile) -> Floats:
     """Convert the survey's probe points; the default is the tool's TCP."""
     if file.survey is not None:
         return np.array(file.survey.points_mm) * MM
     return _frame(file.tool).pose[None, :3, 3]
 
 
-def _mounting(file: CellFile) -> Array | None:
+def _mounting(file: CellFile) -> Floats | None:
     """Convert the orientation of a 6D probe."""
     if file.survey is None or file.survey.euler_zyz_deg is None:
         return None

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from postproc.robot.play import Array, Bools, Ints
+from postproc.arrays import Bools, Floats, Ints
 
 
 @dataclass(frozen=True)
@@ -29,7 +29,7 @@ class Edges:
 
     first: Ints
     source: Ints
-    path: Array
+    path: Floats
     start: Ints
     uneven: Ints = field(default_factory=lambda: np.empty(0, dtype=np.int64))
 
@@ -46,7 +46,7 @@ class Chains:
         chain_of: Chain of each visit, (n,).
     """
 
-    angles: Array
+    angles: Floats
     first: Ints
     source: Ints
     heads: Ints
@@ -82,7 +82,7 @@ class Chains:
         return out
 
 
-def chained(q: Array, coupling: Array, first: Ints, source: Ints) -> Chains:
+def chained(q: Floats, coupling: Floats, first: Ints, source: Ints) -> Chains:
     """Move a graph to the drive side and cut it into chains.
 
     Args:

@@ -11,16 +11,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from postproc.arrays import Bools, Floats, Ints, pieces
 from postproc.kernels import floats, native
-from postproc.pieces import pieces
 from postproc.pose import MM
 from postproc.robot.arm_file import OpwSection
-
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
-Bools = NDArray[np.bool_]
 
 CHUNK = 8192  # poses solved at a time: what they need stays in the cache
 WRIST, SHOULDER, ELBOW = 4, 2, 1  # bits of a slot
@@ -37,11 +32,11 @@ class _Centre:
         reach, z: Distance in that plane, and height above axis 2, (n,) [m].
     """
 
-    R: Array
-    azimuth: Array
-    aside: Array
-    reach: Array
-    z: Array
+    R: Floats
+    azimuth: Floats
+    aside: Floats
+    reach: Floats
+    z: Floats
 
 
 @dataclass(frozen=True)
@@ -57,13 +52,13 @@ class _Facing:
             upwards, (n, 3).
     """
 
-    t1: Array
-    slope: Array
-    lean: Array
-    fold: Array
-    ahead: Array
-    across: Array
-    up: Array
+    t1: Floats
+    slope: Floats
+    lean: Floats
+    fold: Floats
+    ahead: Floats
+    across: Floats
+    up: Floats
 
 
 class ClosedForm:
@@ -85,7 +80,7 @@ class ClosedForm:
         lengths = self._a1, self._b, self._c1, self._upper, self._forearm, self._c4
         self._packed = np.array([*lengths, self._bent, *self._offset, *self._sign])
 
-    def branches(self, flange: Array) -> Array:
+    def branches(self, flange: Floats) -> Floats:
         """Solve for all branches of every pose.
 
         Args:
@@ -96,7 +91,7 @@ class ClosedForm:
             branch does not exist.
         """
         if native is not None:
-            solved: Array = native.branches(self._packed, floats(flange))
+            solved: Floats = native.branches(self._packed, floats(flange))
             return solved
         out = np.empty((len(flange), 8, 6))
         for rows in pieces(len(flange), CHUNK):
@@ -110,7 +105,7 @@ class ClosedForm:
                     out[rows, slot + WRIST] = self._to_joints(_wrist_flipped(one))
         return out
 
-    def branch(self, flange: Array, slot: Ints) -> Array:
+    def branch(self, flange: Floats, slot: Ints) -> Floats:
         """Solve for one branch of every pose.
 
         Args:
@@ -123,7 +118,7 @@ class ClosedForm:
         """
         if native is not None:
             flange, slot = floats(flange), np.ascontiguousarray(slot)
-            solved: Array = native.branch(self._packed, flange, slot)
+            solved: Floats = native.branch(self._packed, flange, slot)
             return solved
         out = np.empty((len(flange), 6))
         for rows in pieces(len(flange), CHUNK):
@@ -137,7 +132,7 @@ class ClosedForm:
             out[rows] = self._to_joints(one)
         return out
 
-    def slot(self, theta: Array) -> Ints:
+    def slot(self, theta: Floats) -> Ints:
         """Name the branch of geometric joint angles (n, 6) [rad], (n,)."""
         t = theta * self._sign - self._offset
         elbow = t[:, 2] + self._bent
@@ -149,12 +144,12 @@ class ClosedForm:
         )
         return slots
 
-    def _to_joints(self, angles: Array) -> Array:
+    def _to_joints(self, angles: Floats) -> Floats:
         """Convert the formulas' angles (n, 6) to the arm's geometric ones."""
-        joints: Array = (angles + self._offset) * self._sign
+        joints: Floats = (angles + self._offset) * self._sign
         return joints
 
-    def _centre(self, flange: Array) -> _Centre:
+    def _centre(self, flange: Floats) -> _Centre:
         """Find what all branches have in common."""
         R = flange[:, :3, :3]
         centre = flange[:, :3, 3] - self._c4 * R[:, :, 2]
@@ -183,7 +178,7 @@ class ClosedForm:
         ahead, across = c1 * R[:, 0] + s1 * R[:, 1], c1 * R[:, 1] - s1 * R[:, 0]
         return _Facing(t1, np.arctan2(x, at.z), lean, fold, ahead, across, R[:, 2])
 
-    def _angles(self, at: _Facing, side: Array) -> Array:
+    def _angles(self, at: _Facing, side: Floats) -> Floats:
         """Solve for the branches with a positive axis 5, (n, 6) [rad].
 
         Args:
@@ -206,8 +201,8 @@ class ClosedForm:
         return angles
 
 
-def _wrist_flipped(angles: Array) -> Array:
+def _wrist_flipped(angles: Floats) -> Floats:
     """Turn the wrist (n, 6) [rad] to its other solution."""
-    flipped: Array = angles + np.array([0.0, 0.0, 0.0, np.pi, 0.0, np.pi])
+    flipped: Floats = angles + np.array([0.0, 0.0, 0.0, np.pi, 0.0, np.pi])
     flipped[:, 4] *= -1
     return flipped

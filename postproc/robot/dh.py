@@ -6,31 +6,32 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from postproc.arrays import Floats
 from postproc.kernels import floats, native
 
-Array = NDArray[np.float64]
-Frame = tuple[Array, Array, Array, Array]  # axes x, y, z and origin [m], (3, n) each
+Frame = tuple[
+    Floats, Floats, Floats, Floats
+]  # axes x, y, z and origin [m], (3, n) each
 
 
 @dataclass(frozen=True)
 class DH:
     """Standard D-H parameters; D-H angle = offset + sense * (mix @ q), each (6,)."""
 
-    a: Array  # [m]
-    d: Array  # [m]
-    alpha: Array  # [rad]
-    offset: Array  # [rad]
-    sense: Array
-    mix: Array  # (6, 6): geometric joint angles from the controller's
+    a: Floats  # [m]
+    d: Floats  # [m]
+    alpha: Floats  # [rad]
+    offset: Floats  # [rad]
+    sense: Floats
+    mix: Floats  # (6, 6): geometric joint angles from the controller's
 
-    def angles(self, q: Array) -> Array:
+    def angles(self, q: Floats) -> Floats:
         """Convert controller angles (n, 6) to D-H angles (n, 6) [rad]."""
-        theta: Array = self.offset + self.sense * (q @ self.mix.T)
+        theta: Floats = self.offset + self.sense * (q @ self.mix.T)
         return theta
 
-    def packed(self, beta: Array | None = None) -> Array:
+    def packed(self, beta: Floats | None = None) -> Floats:
         """Return what the native kernels know of the chain, (12, 6).
 
         Args:
@@ -40,7 +41,7 @@ class DH:
         rows = self.a, self.d, self.alpha, self.offset, self.sense, beta, *self.mix.T
         return np.array(rows)
 
-    def frames(self, q: Array) -> Iterator[Frame]:
+    def frames(self, q: Floats) -> Iterator[Frame]:
         """Walk along the link frames 0 (base) to 6 (flange) for angles (n, 6) [rad].
 
         Every frame is the one before, turned and shifted along its z, then its new x.
@@ -49,7 +50,7 @@ class DH:
         cos, sin = np.cos(theta), np.sin(theta)
         shape = (3, len(q))
         x, y, z = (np.broadcast_to(axis[:, None], shape) for axis in np.eye(3))
-        p: Array = np.zeros(shape)
+        p: Floats = np.zeros(shape)
         yield x, y, z, p
         for i in range(6):
             ca, sa = np.cos(self.alpha[i]), np.sin(self.alpha[i])
@@ -59,15 +60,15 @@ class DH:
             p = p + self.a[i] * x
             yield x, y, z, p
 
-    def flange(self, q: Array) -> Array:
+    def flange(self, q: Floats) -> Floats:
         """Place the flange for angles (n, 6) [rad]: (n, 4, 4) [m]."""
         if native is not None:
-            placed: Array = native.flange(self.packed(), floats(q))
+            placed: Floats = native.flange(self.packed(), floats(q))
             return placed
         *_, last = self.frames(q)
         return pose_of(last)
 
-    def placed(self, q: Array, point: Array, beta: Array | None = None) -> Array:
+    def placed(self, q: Floats, point: Floats, beta: Floats | None = None) -> Floats:
         """Express points of the flange frame in the base frame, (n, 3) [m].
 
         Going back along the chain, T_i = Rot_z(theta) Trans(a, 0, d) Rot_x(alpha)
@@ -80,7 +81,7 @@ class DH:
         """
         if native is not None:
             q, points = floats(q), np.array(point, float, ndmin=2, order="C")
-            native_placed: Array = native.placed(self.packed(beta), q, points)
+            native_placed: Floats = native.placed(self.packed(beta), q, points)
             return native_placed
         theta = np.ascontiguousarray(self.angles(q).T)
         cos, sin = np.cos(theta), np.sin(theta)
@@ -97,7 +98,7 @@ class DH:
         return np.stack([x, y, z], axis=1)
 
 
-def pose_of(frame: Frame) -> Array:
+def pose_of(frame: Frame) -> Floats:
     """Write frames as poses, (n, 4, 4) [m]."""
     pose = np.zeros((frame[3].shape[1], 4, 4))
     for column, values in enumerate(frame):

@@ -16,11 +16,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from postproc.arrays import Floats, Ints
 from postproc.kernels import native
 from postproc.robot.arm import Arm
 from postproc.robot.chains import Chains, Edges, chained
 from postproc.robot.past import NOTHING, Past
-from postproc.robot.play import Array, Clamps, Ints, identity, passing, prefix
+from postproc.robot.play import Clamps, identity, passing, prefix
 from postproc.robot.travel import last_reversals
 from postproc.robot.walks import walks
 
@@ -43,9 +44,9 @@ class Arrivals:
         past: What the joints remember at the last visit.
     """
 
-    direction: Array
-    side: Array
-    travel: Array
+    direction: Floats
+    side: Floats
+    travel: Floats
     past: Past
 
 
@@ -58,7 +59,7 @@ class Sides:
         play: What is known of the play's state at the last visit, (1, 6) [rad].
     """
 
-    side: Array
+    side: Floats
     play: Clamps
 
 
@@ -81,7 +82,7 @@ def chain(n: int) -> tuple[Ints, Ints]:
     return np.arange(n + 1), np.arange(n) - 1
 
 
-def arrivals_of_rows(arm: Arm, q: Array) -> Arrivals:
+def arrivals_of_rows(arm: Arm, q: Floats) -> Arrivals:
     """Infer arrivals at rows reached one after the other by straight JOINT moves.
 
     Args:
@@ -92,12 +93,12 @@ def arrivals_of_rows(arm: Arm, q: Array) -> Arrivals:
     return arrivals(arm, q, Edges(first, source, q, first))
 
 
-def directions_of_rows(arm: Arm, q: Array) -> Array:
+def directions_of_rows(arm: Arm, q: Floats) -> Floats:
     """Return the directions of `arrivals_of_rows`, (n, 6)."""
     return arrivals_of_rows(arm, q).direction
 
 
-def arrivals(arm: Arm, q: Array, edges: Edges, before: Past = NOTHING) -> Arrivals:
+def arrivals(arm: Arm, q: Floats, edges: Edges, before: Past = NOTHING) -> Arrivals:
     """Run the play operator over a graph of visits.
 
     Args:
@@ -120,7 +121,7 @@ def arrivals(arm: Arm, q: Array, edges: Edges, before: Past = NOTHING) -> Arriva
     return Arrivals(direction, _side(chains.angles, z, half), travel, past)
 
 
-def passages(arm: Arm, q: Array, edges: Edges) -> Passages:
+def passages(arm: Arm, q: Floats, edges: Edges) -> Passages:
     """Find what passing the edges does to the joints' play.
 
     Args:
@@ -133,7 +134,9 @@ def passages(arm: Arm, q: Array, edges: Edges) -> Passages:
     return Passages(edges.first, edges.source, ways.clamps(_half_width(arm)))
 
 
-def sides(arm: Arm, q: Array, passed: Passages, before: Clamps = NOTHING.play) -> Sides:
+def sides(
+    arm: Arm, q: Floats, passed: Passages, before: Clamps = NOTHING.play
+) -> Sides:
     """Return the sides of `arrivals` alone, from what passing the edges does."""
     if len(q) == 0:
         return Sides(np.empty((0, 6)), NOTHING.play)
@@ -143,24 +146,24 @@ def sides(arm: Arm, q: Array, passed: Passages, before: Clamps = NOTHING.play) -
     return Sides(_side(chains.angles, z, half), z[LAST])
 
 
-def _half_width(arm: Arm) -> Array:
+def _half_width(arm: Arm) -> Floats:
     """Return half the width of every joint's play on the drive side, (6,) [rad]."""
     return np.asarray(WIDTH_IN_PLAYS / 2 * arm.play)
 
 
-def _side(angles: Array, z: Clamps, half: Array) -> Array:
+def _side(angles: Floats, z: Clamps, half: Floats) -> Floats:
     """Place every joint in its play, (n, 6)."""
     if native is not None:
-        placed: Array = native.side(angles, z, half)
+        placed: Floats = native.side(angles, z, half)
         return placed
     s = np.clip((angles - (z.lo + z.hi) / 2) / half, -1.0, 1.0)
     on_flank = np.abs(s) > ON_FLANK
     known = (z.hi - z.lo < half / 2) | on_flank
-    side: Array = np.nan_to_num(np.where(known, s, 0.0))
+    side: Floats = np.nan_to_num(np.where(known, s, 0.0))
     return np.where(on_flank, np.sign(side), side)
 
 
-def _states(chains: Chains, own: Clamps, half: Array, before: Clamps) -> Clamps:
+def _states(chains: Chains, own: Clamps, half: Floats, before: Clamps) -> Clamps:
     """Find what is known of the play's state at every visit, as intervals (n, 6).
 
     The intervals at the heads only grow and their ends come from a finite set, so that
@@ -196,7 +199,7 @@ def _states(chains: Chains, own: Clamps, half: Array, before: Clamps) -> Clamps:
 
 
 def _from_heads(
-    chains: Chains, known: list[Clamps | None], since_head: Clamps, half: Array
+    chains: Chains, known: list[Clamps | None], since_head: Clamps, half: Floats
 ) -> Clamps:
     """Carry what is known at the heads on to all visits; the others know nothing."""
     out = passing(chains.angles, half)
@@ -225,7 +228,7 @@ def _since_head(chains: Chains, passed: Clamps) -> Clamps:
 def _at_head(
     chains: Chains,
     c: int,
-    half: Array,
+    half: Floats,
     known: list[Clamps | None],
     since_head: Clamps,
     passed: Clamps,

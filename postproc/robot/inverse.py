@@ -5,13 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from postproc.arrays import Floats, Ints
 from postproc.robot.arm_file import OpwSection
 from postproc.robot.closed_form import ClosedForm
-
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 
 @dataclass(frozen=True)
@@ -23,12 +20,12 @@ class Branches:
             range where a turn of 360 deg can bring them there, else in (-pi, pi].
     """
 
-    q: Array
+    q: Floats
 
 
-def wrap(angle: Array) -> Array:
+def wrap(angle: Floats) -> Floats:
     """Wrap angles into [-pi, pi)."""
-    wrapped: Array = np.mod(angle + np.pi, 2 * np.pi) - np.pi
+    wrapped: Floats = np.mod(angle + np.pi, 2 * np.pi) - np.pi
     return wrapped
 
 
@@ -36,32 +33,32 @@ class Inverse:
     """The inverse kinematics of one arm."""
 
     def __init__(
-        self, parameters: OpwSection, mix: Array, lower: Array, upper: Array
+        self, parameters: OpwSection, mix: Floats, lower: Floats, upper: Floats
     ) -> None:
         """Build it from the arm file's section, angle mixing and joint limits [rad]."""
         self._closed = ClosedForm(parameters)
         self._mix, self._unmix = mix, np.linalg.inv(mix)
         self._lower, self._upper = lower, upper
 
-    def branches(self, flange: Array) -> Branches:
+    def branches(self, flange: Floats) -> Branches:
         """Solve for all branches of flange poses (n, 4, 4) [m]."""
         q = self._closed.branches(flange) @ self._unmix.T
         return Branches(self.into_range(q))
 
-    def branch(self, flange: Array, slot: Ints) -> Array:
+    def branch(self, flange: Floats, slot: Ints) -> Floats:
         """Solve for one branch each of flange poses (n, 4, 4) [m], on any turn.
 
         Returns:
             (n, 6) [rad], NaN where the branch does not exist.
         """
-        q: Array = self._closed.branch(flange, slot) @ self._unmix.T
+        q: Floats = self._closed.branch(flange, slot) @ self._unmix.T
         return q
 
-    def slot(self, q: Array) -> Ints:
+    def slot(self, q: Floats) -> Ints:
         """Name the branch (slot 4 W + 2 S + E) of joint angles (n, 6) [rad]."""
         return self._closed.slot(q @ self._mix.T)
 
-    def into_range(self, q: Array) -> Array:
+    def into_range(self, q: Floats) -> Floats:
         """Shift angles by whole turns into the joint range where that is possible."""
         turn = 2 * np.pi
         below = np.pi - q

@@ -15,11 +15,9 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from postproc.arrays import Bools, Floats, Ints
 from postproc.kernels import native
 
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
-Bools = NDArray[np.bool_]
 T = TypeVar("T", np.float64, np.bool_)
 
 SIX = 6  # joints: what the native kernel is made for
@@ -30,14 +28,14 @@ BLOCK = 64  # steps that are composed one after the other
 class Clamps:
     """Maps z -> min(max(z, lo), hi) with lo <= hi, any equal shapes [rad]."""
 
-    lo: Array
-    hi: Array
+    lo: Floats
+    hi: Floats
 
     def __getitem__(self, rows: int | slice | Ints) -> Clamps:
         """Return some of the maps."""
         return Clamps(self.lo[rows], self.hi[rows])
 
-    def __call__(self, z: Array) -> Array:
+    def __call__(self, z: Floats) -> Floats:
         """Apply the maps to states."""
         return np.minimum(np.maximum(z, self.lo), self.hi)
 
@@ -51,7 +49,7 @@ def identity(shape: tuple[int, ...]) -> Clamps:
     return Clamps(np.full(shape, -np.inf), np.full(shape, np.inf))
 
 
-def passing(q: Array, half_width: Array) -> Clamps:
+def passing(q: Floats, half_width: Floats) -> Clamps:
     """Return the clamp of passing each angle (..., 6) [rad]."""
     return Clamps(q - half_width, q + half_width)
 
@@ -104,7 +102,9 @@ def _side_by_side(rows: NDArray[T], length: int, rest: float) -> NDArray[T]:
     return out
 
 
-def _compose(lo0: Array, hi0: Array, lo: Array, hi: Array, new: Bools | None) -> None:
+def _compose(
+    lo0: Floats, hi0: Floats, lo: Floats, hi: Floats, new: Bools | None
+) -> None:
     """Put earlier clamps in front of later ones, in place: `Clamps.then`.
 
     Those that are `new` have nothing in front of them; None: no one is.
@@ -117,8 +117,8 @@ def _compose(lo0: Array, hi0: Array, lo: Array, hi: Array, new: Bools | None) ->
 
 
 def with_turning_values(
-    before: Array, path: Array, inside: NDArray[np.bool_]
-) -> tuple[Array, Ints]:
+    before: Floats, path: Floats, inside: NDArray[np.bool_]
+) -> tuple[Floats, Ints]:
     """Put the extreme values between samples into sampled paths.
 
     The parabola through three consecutive equidistant samples turns somewhere; where

@@ -7,7 +7,7 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from postproc.arrays import Floats
 
 
 @dataclass(frozen=True)
@@ -30,17 +30,17 @@ class States:
         order: Position in the visit order, (n,).
     """
 
-    q: Array
-    direction: Array
-    tool: Array
+    q: Floats
+    direction: Floats
+    tool: Floats
     tool_id: NDArray[np.int64]
-    travel: Array
-    speed: Array
-    time: Array
-    temperature: Array
-    payload: Array
-    payload_com: Array
-    order: Array
+    travel: Floats
+    speed: Floats
+    time: Floats
+    temperature: Floats
+    payload: Floats
+    payload_com: Floats
+    order: Floats
 
     def __post_init__(self) -> None:
         for f in fields(self):
@@ -64,9 +64,9 @@ class States:
 
 
 def make_states(
-    q: Array,
-    direction: Array | None = None,
-    tool: Array | None = None,
+    q: Floats,
+    direction: Floats | None = None,
+    tool: Floats | None = None,
     **covariates: NDArray[np.generic] | float,
 ) -> States:
     """Build states from joint angles, with unknown covariates as NaN.

@@ -7,8 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from postproc.arrays import Floats, Ints
 from postproc.robot.chains import Chains
-from postproc.robot.play import Array, Ints, passing, prefix
+from postproc.robot.play import passing, prefix
 from postproc.robot.walks import Walks
 
 ROUNDS = 2  # the second one sees what arrives over jumps backwards
@@ -26,21 +27,21 @@ class Turned:
         z: State of the play operator that looks for reversals [rad].
     """
 
-    side: Array
-    angle: Array
-    z: Array
+    side: Floats
+    angle: Floats
+    z: Floats
 
     def __getitem__(self, rows: int | slice | Ints) -> Turned:
         """Return some of them."""
         return Turned(self.side[rows], self.angle[rows], self.z[rows])
 
 
-def never_turned(angle: Array) -> Turned:
+def never_turned(angle: Floats) -> Turned:
     """Begin at drive-side angles [rad] without a past."""
     return Turned(np.zeros_like(angle), np.array(angle), np.array(angle))
 
 
-def last_reversals(chains: Chains, ways: Walks, play: Array, before: Turned) -> Turned:
+def last_reversals(chains: Chains, ways: Walks, play: Floats, before: Turned) -> Turned:
     """Find the last reversal before every visit, (n, 6); travel counts from there.
 
     A reversal is a return by more than one play from the extreme value, so that jitter
@@ -74,7 +75,7 @@ def last_reversals(chains: Chains, ways: Walks, play: Array, before: Turned) -> 
     return last
 
 
-def along(values: Array, before: Turned, play: Array) -> Turned:
+def along(values: Floats, before: Turned, play: Floats) -> Turned:
     """Follow a path.
 
     Args:
@@ -104,7 +105,7 @@ def _merged(
     head: int,
     last: Turned,
     seen: NDArray[np.bool_],
-    play: Array,
+    play: Floats,
     given: Turned,
 ) -> Turned:
     """Merge the pasts that arrive at a head, unless its past is given."""

@@ -6,18 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from postproc.arrays import Floats, Ints, spans
 from postproc.kernels import native
 from postproc.robot.chains import Chains, Edges
-from postproc.robot.play import (
-    Array,
-    Clamps,
-    Ints,
-    identity,
-    passing,
-    prefix,
-    with_turning_values,
-)
-from postproc.spans import spans
+from postproc.robot.play import Clamps, identity, passing, prefix, with_turning_values
 
 
 @dataclass(frozen=True)
@@ -29,10 +21,10 @@ class Walks:
         start: Samples start[i] .. start[i + 1] - 1 are those of edge i, (e + 1,).
     """
 
-    values: Array
+    values: Floats
     start: Ints
 
-    def of(self, edges: slice) -> tuple[Array, Ints]:
+    def of(self, edges: slice) -> tuple[Floats, Ints]:
         """Return some edges one after the other.
 
         Returns:
@@ -41,7 +33,7 @@ class Walks:
         start = self.start[edges.start : edges.stop + 1]
         return self.values[start[0] : start[-1]], start[1:] - start[0] - 1
 
-    def clamps(self, half_width: Array) -> Clamps:
+    def clamps(self, half_width: Floats) -> Clamps:
         """Compose the clamps of passing each edge, (e, 6)."""
         if native is not None:
             return Clamps(*native.clamps(self.values, self.start, half_width))
@@ -61,7 +53,7 @@ class Walks:
         return out
 
 
-def walks(chains: Chains, coupling: Array, edges: Edges) -> Walks:
+def walks(chains: Chains, coupling: Floats, edges: Edges) -> Walks:
     """Move the ways between visits to the drive side.
 
     Args:
@@ -75,7 +67,7 @@ def walks(chains: Chains, coupling: Array, edges: Edges) -> Walks:
     return Walks(values, edges.start)
 
 
-def _refined(angles: Array, source: Ints, values: Array, edges: Edges) -> Walks:
+def _refined(angles: Floats, source: Ints, values: Floats, edges: Edges) -> Walks:
     """Insert turning values inside every edge from a known place."""
     start = edges.start
     if native is not None:

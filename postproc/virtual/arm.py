@@ -5,16 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from postproc.arrays import Floats
 from postproc.virtual.arrivals import Arrivals
 from postproc.virtual.as_built import AsBuilt
 from postproc.virtual.gears import Gears
 from postproc.virtual.kinematics import Chain
 from postproc.virtual.law import Law, Where, total
 from postproc.virtual.rotation import small_motion
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -37,19 +35,19 @@ class VirtualArm:
     as_built: AsBuilt
     laws: tuple[Law, ...]
     gears: Gears
-    joint_noise: Array
+    joint_noise: Floats
     tracker_noise: tuple[float, float]
     warming: tuple[float, float]
 
-    def nominal_pose(self, arrivals: Arrivals) -> Array:
+    def nominal_pose(self, arrivals: Arrivals) -> Floats:
         """Return where the drawing puts the tool, (n, 4, 4)."""
         return np.asarray(self.nominal.flange(arrivals.q) @ arrivals.tool)
 
-    def nominal_tcp(self, arrivals: Arrivals) -> Array:
+    def nominal_tcp(self, arrivals: Arrivals) -> Floats:
         """Return where the drawing puts the TCP, (n, 3)."""
         return np.asarray(self.nominal_pose(arrivals)[:, :3, 3])
 
-    def tcp(self, arrivals: Arrivals, joint_noise: Array | float = 0.0) -> Array:
+    def tcp(self, arrivals: Arrivals, joint_noise: Floats | float = 0.0) -> Floats:
         """Return where the TCP really is, (n, 3), without noise unless some is given.
 
         Args:
@@ -58,7 +56,7 @@ class VirtualArm:
         """
         return np.asarray(self.pose(arrivals, joint_noise)[:, :3, 3])
 
-    def pose(self, arrivals: Arrivals, joint_noise: Array | float = 0.0) -> Array:
+    def pose(self, arrivals: Arrivals, joint_noise: Floats | float = 0.0) -> Floats:
         """Return where the tool really is, (n, 4, 4).
 
         Args:
@@ -74,19 +72,19 @@ class VirtualArm:
             small_motion(base) @ flange @ small_motion(mount) @ arrivals.tool
         )
 
-    def error(self, arrivals: Arrivals) -> Array:
+    def error(self, arrivals: Arrivals) -> Floats:
         """Return the true error, actual minus nominal TCP, (n, 3), without noise."""
         return self.tcp(arrivals) - self.nominal_tcp(arrivals)
 
-    def seen(self, arrivals: Arrivals, tcp: Array) -> Array:
+    def seen(self, arrivals: Arrivals, tcp: Floats) -> Floats:
         """Return what a tracker whose stand moves would read at TCPs (n, 3)."""
         motion = small_motion(total(self.laws, Where.TRACKER, arrivals))
         turned = np.einsum("nij,nj->ni", motion[:, :3, :3], tcp)
         return np.asarray(turned + motion[:, :3, 3])
 
     def measure(
-        self, arrivals: Arrivals, tracker: Array, rng: np.random.Generator
-    ) -> Array:
+        self, arrivals: Arrivals, tracker: Floats, rng: np.random.Generator
+    ) -> Floats:
         """Return noisy tracker readings (n, 3) in the arm base frame.
 
         Args:
@@ -100,7 +98,7 @@ class VirtualArm:
         sigma = self.tracker_noise[0] + self.tracker_noise[1] * span
         return np.asarray(readings + rng.normal(size=readings.shape) * sigma[:, None])
 
-    def temperature(self, time: Array, start: float) -> Array:
+    def temperature(self, time: Floats, start: float) -> Floats:
         """Return the arm's temperature (n,) [deg C] at times (n,) [s]."""
         rise, constant = self.warming
         return np.asarray(start + rise * (1 - np.exp(-time / constant)))

@@ -8,9 +8,8 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from postproc.arrays import Floats
 from postproc.virtual.rotation import pose
-
-Array = NDArray[np.float64]
 
 LONG_TRAVEL = 1.0  # [rad] travel since a reversal that nobody recorded
 REST_TEMPERATURE = 20.0  # [deg C] where the arm has its nominal lengths (ISO 1)
@@ -35,17 +34,17 @@ class Arrivals:
         tool: The nominal tool, flange to TCP, (n, 4, 4) [m].
     """
 
-    q: Array
-    side: Array
-    travel: Array
-    loop: Array
-    speed: Array
-    time: Array
-    temperature: Array
-    payload: Array
-    payload_com: Array
-    order: Array
-    tool: Array
+    q: Floats
+    side: Floats
+    travel: Floats
+    loop: Floats
+    speed: Floats
+    time: Floats
+    temperature: Floats
+    payload: Floats
+    payload_com: Floats
+    order: Floats
+    tool: Floats
 
     def __post_init__(self) -> None:
         for f in fields(self):
@@ -77,10 +76,10 @@ _DEFAULTS: dict[str, tuple[float, tuple[int, ...]]] = {
 
 
 def make_arrivals(
-    q: Array,
-    side: Array | float = 0.0,
-    tool: Array | None = None,
-    **covariates: Array | float,
+    q: Floats,
+    side: Floats | float = 0.0,
+    tool: Floats | None = None,
+    **covariates: Floats | float,
 ) -> Arrivals:
     """Build arrivals from joint angles; what is not given or NaN takes a default.
 
@@ -95,7 +94,7 @@ def make_arrivals(
     """
     q = np.array(q, dtype=float).reshape(-1, 6)
     n = len(q)
-    given: dict[str, Array | float] = {"side": side, **covariates}
+    given: dict[str, Floats | float] = {"side": side, **covariates}
     order = np.array(np.broadcast_to(given.pop("order", np.arange(n)), n), dtype=float)
     if unknown := sorted(set(given) - set(_DEFAULTS)):
         raise TypeError(f"arrivals have no {', '.join(unknown)}")
@@ -106,7 +105,7 @@ def make_arrivals(
     return Arrivals(q=q, order=order, tool=_tool_poses(tool, n), **values)
 
 
-def _tool_poses(tool: Array | None, n: int) -> Array:
+def _tool_poses(tool: Floats | None, n: int) -> Floats:
     tool = np.zeros(3) if tool is None else np.asarray(tool, dtype=float)
     if tool.shape[-2:] != (4, 4):
         tool = pose(np.eye(3), tool)
@@ -116,16 +115,16 @@ def _tool_poses(tool: Array | None, n: int) -> Array:
 class StatesLike(Protocol):
     """The fields of the model's states that mean something to a real arm."""
 
-    q: Array
-    direction: Array
-    tool: Array
-    travel: Array
-    speed: Array
-    time: Array
-    temperature: Array
-    payload: Array
-    payload_com: Array
-    order: Array
+    q: Floats
+    direction: Floats
+    tool: Floats
+    travel: Floats
+    speed: Floats
+    time: Floats
+    temperature: Floats
+    payload: Floats
+    payload_com: Floats
+    order: Floats
 
 
 def arrivals_of_states(states: StatesLike) -> Arrivals:

@@ -5,12 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from postproc.arrays import Floats
 from postproc.virtual.gravity import Body
 from postproc.virtual.kinematics import Chain
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -25,8 +23,8 @@ class AsBuilt:
     """
 
     chain: Chain
-    base: Array
-    mount: Array
+    base: Floats
+    mount: Floats
 
 
 def draw_as_built(
@@ -70,7 +68,7 @@ def draw_body(rng: np.random.Generator, chain: Chain) -> Body:
 
 def _off(
     rng: np.random.Generator, low: float, high: float, shape: tuple[int, ...]
-) -> Array:
+) -> Floats:
     """Draw sizes between low and high with either sign."""
     size = rng.uniform(low, high, shape)
     return np.asarray(size * rng.choice([-1.0, 1.0], shape))
@@ -78,5 +76,5 @@ def _off(
 
 def _twist(
     rng: np.random.Generator, shift: tuple[float, float], turn: tuple[float, float]
-) -> Array:
+) -> Floats:
     return np.concatenate([_off(rng, *shift, (3,)), _off(rng, *turn, (3,))])

@@ -7,6 +7,7 @@ import re
 import numpy as np
 from numpy.typing import NDArray
 
+from postproc.arrays import Floats
 from postproc.exceptions import PlanError
 from postproc.virtual.inverse import (
     ELBOW,
@@ -20,8 +21,6 @@ from postproc.virtual.inverse import (
 from postproc.virtual.kinematics import Chain
 from postproc.virtual.rotation import undo
 
-Array = NDArray[np.float64]
-
 FLAGS = {"W": WRIST, "S": SHOULDER, "E": ELBOW}
 SINGULAR = np.radians(0.1)  # of axis 5: both wrist branches are tried from here
 TURNING = (3, 5)  # joints 4 and 6 may turn more than once
@@ -29,8 +28,8 @@ TURN_NAMES = {"T1": 3, "T2": 5, "T3": 2}
 
 
 def joints_of_pose(
-    chain: Chain, flange: Array, near: Array, config: str | None, free_turns: bool
-) -> Array:
+    chain: Chain, flange: Floats, near: Floats, config: str | None, free_turns: bool
+) -> Floats:
     """Return the joints that a JOINT move to a Cartesian target ends in.
 
     Args:
@@ -65,7 +64,7 @@ def joints_of_pose(
     return np.asarray(usable[np.argmin(away)])
 
 
-def joints_along(chain: Chain, flanges: Array, start: Array) -> Array:
+def joints_along(chain: Chain, flanges: Floats, start: Floats) -> Floats:
     """Follow a Cartesian path without a jump.
 
     Args:
@@ -92,16 +91,16 @@ def joints_along(chain: Chain, flanges: Array, start: Array) -> Array:
     return np.asarray(track[1:])
 
 
-def flange_of(target: Array, tool: Array, base: Array, uframe: Array) -> Array:
+def flange_of(target: Floats, tool: Floats, base: Floats, uframe: Floats) -> Floats:
     """Return the flange pose in the arm base: BASE^-1 UFRAME P TOOL^-1, (4, 4)."""
     return np.asarray(undo(base) @ uframe @ target @ undo(tool))
 
 
-def _unwrapped(track: Array, start: Array) -> Array:
+def _unwrapped(track: Floats, start: Floats) -> Floats:
     return np.unwrap(np.vstack([start, track]), axis=0)
 
 
-def _into_range(chain: Chain, q: Array) -> Array:
+def _into_range(chain: Chain, q: Floats) -> Floats:
     """Give every joint that cannot turn around the turn that lies in its range."""
     out = q.copy()
     for j in (0, 1, 2, 4):
@@ -112,7 +111,7 @@ def _into_range(chain: Chain, q: Array) -> Array:
     return out
 
 
-def _allowed(chain: Chain, q: Array) -> NDArray[np.bool_]:
+def _allowed(chain: Chain, q: Floats) -> NDArray[np.bool_]:
     slack = 1e-9
     inside = (q >= chain.lower - slack) & (q <= chain.upper + slack)
     return np.asarray(inside.all(axis=1))
@@ -123,7 +122,7 @@ def _branch_of_flags(config: str) -> int:
     return sum(weight for flag, weight in FLAGS.items() if flag in words)
 
 
-def _on_turns(q: Array, config: str) -> Array:
+def _on_turns(q: Floats, config: str) -> Floats:
     """Put axes 4, 6 and 3 on the turns T1, T2, T3 = floor((q + 180 deg) / 360 deg).
 
     What is not written is 0 for axes 4 and 6; axis 3 stays in its range.

@@ -11,14 +11,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from postproc.arrays import Floats
 from postproc.virtual.controller import joints_along
 from postproc.virtual.kinematics import Chain
 from postproc.virtual.moves import Way
 from postproc.virtual.rotation import pose, undo
-
-Array = NDArray[np.float64]
 
 MOMENTS = np.linspace(0.0, 1.0, 33)  # of a corner, from its begin to its end
 STRAIGHT = 1e-12  # [m^2] distances that differ less make no parabola
@@ -38,13 +36,13 @@ class Corner:
 
     before: float
     behind: float
-    to: Array
-    off: Array
+    to: Floats
+    off: Floats
 
 
 def round_corner(
     chain: Chain,
-    tool: Array,
+    tool: Floats,
     ways: tuple[Way, Way],
     shares: tuple[float, float],
     in_space: bool,
@@ -79,19 +77,19 @@ def round_corner(
     )
 
 
-def progress(way: Way, part: Array) -> Array:
+def progress(way: Way, part: Floats) -> Floats:
     """Return the joints (k, 6) at parts (k,) of a way that is sampled evenly."""
     marks = np.linspace(0.0, 1.0, len(way.joints))
     return np.stack([np.interp(part, marks, q) for q in way.joints.T], axis=1)
 
 
-def _added(first: Array, second: Array, point: Array) -> Array:
+def _added(first: Floats, second: Floats, point: Floats) -> Floats:
     """Add the motion from the point to the second poses to the first poses."""
     turn = first[:, :3, :3] @ np.swapaxes(point[:, :3, :3], 1, 2) @ second[:, :3, :3]
     return pose(turn, first[:, :3, 3] + second[:, :3, 3] - point[:, :3, 3])
 
 
-def _nearest(joints: Array, distance: Array) -> tuple[Array, int]:
+def _nearest(joints: Floats, distance: Floats) -> tuple[Floats, int]:
     """Return the joints where a squared distance is least, and the moment before.
 
     By parabolas through the three moments around the least one.

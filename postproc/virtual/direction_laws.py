@@ -7,13 +7,11 @@ short by half the gap: error = side * b with b negative.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from postproc.arrays import Floats
 from postproc.virtual.arrivals import Arrivals
 from postproc.virtual.joint_laws import KILO, total_torque
 from postproc.virtual.law import Draw, Law, Where, on_joint
-
-Array = NDArray[np.float64]
 
 
 def backlash(draw: Draw) -> Law:
@@ -25,7 +23,7 @@ def backlash(draw: Draw) -> Law:
     depth = draw.rng.uniform(0.0, 0.2, (2, 6))
     phase = draw.rng.uniform(0.0, 2 * np.pi, (2, 6))
 
-    def shape(arrivals: Arrivals) -> Array:
+    def shape(arrivals: Arrivals) -> Floats:
         wave = sum(depth[k - 1] * np.cos(k * arrivals.q + phase[k - 1]) for k in (1, 2))
         return np.asarray(-arrivals.side * half_gap * (1 + wave))
 
@@ -38,7 +36,7 @@ def load_backlash(draw: Draw) -> Law:
     """The lost motion of a joint grows with the load on its teeth."""
     joint, power = draw.pick([2, 3, 5]), draw.rng.uniform(0.8, 1.2)
 
-    def shape(arrivals: Arrivals) -> Array:
+    def shape(arrivals: Arrivals) -> Floats:
         load = np.abs(total_torque(draw, arrivals)[:, joint - 1] / KILO)
         return on_joint(joint, -arrivals.side[:, joint - 1] * load**power)
 
@@ -54,7 +52,7 @@ def gravity_side(draw: Draw) -> Law:
     threshold = draw.rng.uniform(0.1, 0.5)  # of what the joint usually carries
     usual = np.array([1.0, 5.0, 1.5, 0.1, 0.1, 0.01])[joint - 1]  # [kN m]
 
-    def shape(arrivals: Arrivals) -> Array:
+    def shape(arrivals: Arrivals) -> Floats:
         load = total_torque(draw, arrivals)[:, joint - 1] / KILO
         return on_joint(joint, np.tanh(load / (threshold * usual)))
 
@@ -67,7 +65,7 @@ def windup(draw: Draw) -> Law:
     joint = draw.pick(range(1, 6))
     way = np.radians(draw.rng.uniform(1.0, 6.0))
 
-    def shape(arrivals: Arrivals) -> Array:
+    def shape(arrivals: Arrivals) -> Floats:
         wound = 1 - 2 * np.exp(-arrivals.travel[:, joint - 1] / way)
         return on_joint(joint, -arrivals.side[:, joint - 1] * wound)
 
@@ -78,7 +76,7 @@ def lag(draw: Draw) -> Law:
     """A joint trails its command in proportion to the speed."""
     joint = draw.pick(range(1, 6))
 
-    def shape(arrivals: Arrivals) -> Array:
+    def shape(arrivals: Arrivals) -> Floats:
         return on_joint(joint, -arrivals.side[:, joint - 1] * arrivals.speed)
 
     return Law("lag", Where.JOINTS, (joint,), 0, {}, shape)
@@ -93,7 +91,7 @@ def hysteresis(draw: Draw) -> Law:
     joint = draw.pick(range(1, 6))
     way, loop = np.radians(draw.rng.uniform([5.0, 10.0], [15.0, 40.0]))
 
-    def shape(arrivals: Arrivals) -> Array:
+    def shape(arrivals: Arrivals) -> Floats:
         fresh = np.exp(-arrivals.travel[:, joint - 1] / way)
         short = 1 - np.exp(-arrivals.loop[:, joint - 1] / loop)
         return on_joint(joint, -arrivals.side[:, joint - 1] * fresh * short)

@@ -7,27 +7,19 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from postproc.arrays import Floats
 from postproc.exceptions import PostprocError
 from postproc.virtual.arm import VirtualArm
 from postproc.virtual.arrivals import Arrivals
 from postproc.virtual.as_built import AsBuilt, draw_as_built, draw_body
-from postproc.virtual.catalogue import (
-    AS_BUILT,
-    DEFAULT,
-    KINDS,
-    Planted,
-    parse_effects,
-)
+from postproc.virtual.catalogue import AS_BUILT, DEFAULT, KINDS, Planted, parse_effects
 from postproc.virtual.direction_laws import backlash
 from postproc.virtual.gears import Gears
 from postproc.virtual.gravity import Body
 from postproc.virtual.kinematics import NJ220, Chain
 from postproc.virtual.law import Draw, Law
 from postproc.virtual.reference import reference_arrivals
-
-Array = NDArray[np.float64]
 
 TRACKER_NOISE = (0.01e-3, 5e-6)  # [m], [m/m] per axis
 SMALL = 1e-6  # a size at which every law is linear
@@ -44,9 +36,9 @@ def virtual_arm(
     effects: str | Sequence[str | Planted] = DEFAULT,
     *,
     chain: Chain = NJ220,
-    coupling: Array | None = None,
+    coupling: Floats | None = None,
     rows: int = 400,
-    tool: Array | None = None,
+    tool: Floats | None = None,
 ) -> VirtualArm:
     """Draw an arm.
 
@@ -86,7 +78,7 @@ def virtual_arm(
     )
 
 
-def _perfect(chain: Chain, coupling: Array | None) -> VirtualArm:
+def _perfect(chain: Chain, coupling: Floats | None) -> VirtualArm:
     """Return an arm that is exactly its drawing."""
     return VirtualArm(
         seed=0,
@@ -100,7 +92,7 @@ def _perfect(chain: Chain, coupling: Array | None) -> VirtualArm:
     )
 
 
-def _half_gap(law: Law) -> Array:
+def _half_gap(law: Law) -> Floats:
     """Return the half gaps (6,) [rad] of the gears of a backlash law."""
     return law.scale * np.array([-law.parameters[f"b_{j}"] for j in range(1, 7)])
 
@@ -158,7 +150,7 @@ class _Planter:
         away = moved - arm.nominal_tcp(self.reference)
         return float(np.linalg.norm(away, axis=1).max() * 1e3)
 
-    def joint_noise(self, rng: np.random.Generator) -> Array:
+    def joint_noise(self, rng: np.random.Generator) -> Floats:
         """Draw joint repeatabilities (6,) [rad] that make a usual one at the TCP."""
         noise = SMALL * rng.uniform(0.5, 1.5, 6)
         wanted = rng.uniform(*REPEATS_WITHIN)

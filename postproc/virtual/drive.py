@@ -5,16 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from postproc.arrays import Floats
 from postproc.exceptions import PlanError
 from postproc.language.visits import START, Motion, Visits
 from postproc.virtual.corner import Corner, round_corner
 from postproc.virtual.moves import Way, frames_at, way_to
 from postproc.virtual.setup import Setup
 from postproc.virtual.zone import in_space, shares
-
-Array = NDArray[np.float64]
 
 NOWHERE = Way(np.zeros((1, 6)), np.zeros((1, 3)))
 
@@ -34,19 +32,19 @@ class Drive:
 
     came_from: int
     stands_there: bool
-    begin: Array
+    begin: Floats
     way: Way
-    path: Array
+    path: Floats
     why: str = ""
 
     @property
-    def end(self) -> Array:
+    def end(self) -> Floats:
         """Joints at the target, (6,) [rad]."""
         return np.asarray(self.begin if self.why else self.way.joints[-1])
 
 
 def plan_drives(
-    setup: Setup, visits: Visits, poses: Array, start: Array
+    setup: Setup, visits: Visits, poses: Floats, start: Floats
 ) -> list[Drive]:
     """Find the way to every visit.
 
@@ -81,8 +79,8 @@ def _predecessor(visits: Visits, i: int) -> int:
 
 
 def _first_joints(
-    setup: Setup, visits: Visits, i: int, poses: Array, start: Array
-) -> Array:
+    setup: Setup, visits: Visits, i: int, poses: Floats, start: Floats
+) -> Floats:
     """Return the joints at the first target, for a cell without a home."""
     try:
         frames = frames_at(visits, i, poses)
@@ -93,7 +91,7 @@ def _first_joints(
 
 
 def _rounded(
-    setup: Setup, visits: Visits, poses: Array, drives: list[Drive]
+    setup: Setup, visits: Visits, poses: Floats, drives: list[Drive]
 ) -> list[Drive]:
     """Round the fly points that have one way in and one way out."""
     ways_out = np.bincount(visits.pred[visits.pred >= 0], minlength=len(visits))
@@ -117,7 +115,7 @@ def _rounded(
 def _corner(
     setup: Setup,
     visits: Visits,
-    poses: Array,
+    poses: Floats,
     moves: tuple[int, int],
     ways: tuple[Way, Way],
 ) -> Corner | None:
@@ -134,7 +132,7 @@ def _corner(
         return None
 
 
-def _joined(way: Way, begin: Corner | None, end: Corner | None) -> Array:
+def _joined(way: Way, begin: Corner | None, end: Corner | None) -> Floats:
     """Put together what a corner leaves of a way, (m, 6)."""
     marks = np.linspace(0.0, 1.0, len(way.joints))
     inside = np.ones(len(marks), dtype=bool)

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from postproc.arrays import Floats
 from postproc.virtual.arrivals import REST_TEMPERATURE, Arrivals
 from postproc.virtual.law import Draw, Law, Where
 from postproc.virtual.reference import DURATION
-
-Array = NDArray[np.float64]
 
 STEEL = 12e-6  # [1/K] linear expansion
 
@@ -18,7 +16,7 @@ def thermal(draw: Draw) -> Law:
     """Every link grows with the temperature, cast iron and aluminium mixed."""
     expansion = STEEL * draw.rng.uniform(0.8, 1.6, 6)
 
-    def shape(arrivals: Arrivals) -> Array:
+    def shape(arrivals: Arrivals) -> Floats:
         return np.outer(arrivals.temperature - REST_TEMPERATURE, expansion)
 
     parameters = {f"alpha_{j + 1}": float(expansion[j]) for j in range(6)}
@@ -30,7 +28,7 @@ def warmup(draw: Draw) -> Law:
     expansion = STEEL * draw.rng.uniform(0.8, 1.6, 6)
     constant = DURATION * draw.rng.uniform(0.15, 0.5)
 
-    def shape(arrivals: Arrivals) -> Array:
+    def shape(arrivals: Arrivals) -> Floats:
         return np.outer(1 - np.exp(-arrivals.time / constant), expansion)
 
     return Law("thermal", Where.LENGTHS, (), 0, {"time_constant": constant}, shape)
@@ -52,7 +50,7 @@ def _step(draw: Draw, name: str, where: Where) -> Law:
     turn = draw.rng.normal(size=3) * 0.3  # [rad / m]: a third of a mrad for a mm
     twist = np.concatenate([shift, turn])
 
-    def shape(arrivals: Arrivals) -> Array:
+    def shape(arrivals: Arrivals) -> Floats:
         return np.outer(arrivals.order >= row, twist)
 
     return Law(name, where, (), 0, {"row": float(row)}, shape)
@@ -63,7 +61,7 @@ def tracker_drift(draw: Draw) -> Law:
     ends = draw.rng.normal(size=(2, 6)) * np.repeat([1.0, 0.3], 3)
     phase = draw.phase()
 
-    def shape(arrivals: Arrivals) -> Array:
+    def shape(arrivals: Arrivals) -> Floats:
         progress = arrivals.time / DURATION
         swing = np.sin(np.pi * progress + phase) - np.sin(phase)
         return np.outer(progress, ends[0]) + 0.5 * np.outer(swing, ends[1])

@@ -10,11 +10,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from postproc.arrays import Floats
 from postproc.virtual.arrivals import LONG_TRAVEL
-
-Array = NDArray[np.float64]
 
 STILL = 1e-12  # [rad] below the rounding of the inverse kinematics
 
@@ -28,8 +26,8 @@ class Gears:
         coupling: (6, 6), motor-side angles = coupling @ joint angles.
     """
 
-    gap: Array
-    coupling: Array
+    gap: Floats
+    coupling: Floats
 
 
 @dataclass(frozen=True)
@@ -45,32 +43,32 @@ class GearState:
         turn_before: Where the reversal before it was.
     """
 
-    angle: Array
-    side: Array
-    heading: Array
-    extreme: Array
-    turn: Array
-    turn_before: Array
+    angle: Floats
+    side: Floats
+    heading: Floats
+    extreme: Floats
+    turn: Floats
+    turn_before: Floats
 
     @property
-    def travel(self) -> Array:
+    def travel(self) -> Floats:
         """Way since the last reversal, (6,) [rad]."""
         return np.abs(self.angle - self.turn)
 
     @property
-    def loop(self) -> Array:
+    def loop(self) -> Floats:
         """Way between the last two reversals, (6,) [rad]."""
         return np.abs(self.turn - self.turn_before)
 
 
-def at_start(gears: Gears, q: Array, side: Array) -> GearState:
+def at_start(gears: Gears, q: Floats, side: Floats) -> GearState:
     """Return the state of an arm that stands at q (6,) with the given sides (6,)."""
     angle = gears.coupling @ q
     turn = angle - side * LONG_TRAVEL
     return GearState(angle, side, side, angle, turn, turn + side * LONG_TRAVEL)
 
 
-def move(gears: Gears, state: GearState, path: Array) -> GearState:
+def move(gears: Gears, state: GearState, path: Floats) -> GearState:
     """Follow a joint path.
 
     Args:
@@ -83,7 +81,7 @@ def move(gears: Gears, state: GearState, path: Array) -> GearState:
     return state
 
 
-def turning_points(path: Array) -> Array:
+def turning_points(path: Floats) -> Floats:
     """Return the points (k, 6) of a path (m, 6) where a joint turns, and its end."""
     steps = np.diff(path, axis=0)
     steps[np.abs(steps) < STILL] = 0.0
@@ -93,7 +91,7 @@ def turning_points(path: Array) -> Array:
     return np.asarray(path[1:][keep])
 
 
-def _step(gap: Array, state: GearState, angle: Array) -> GearState:
+def _step(gap: Floats, state: GearState, angle: Floats) -> GearState:
     """Move every motor one way to the given angles (6,)."""
     side = np.clip(state.side + (angle - state.angle) / gap, -1.0, 1.0)
     advance = state.heading * (angle - state.extreme)

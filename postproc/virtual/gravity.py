@@ -5,11 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from postproc.arrays import Floats
 from postproc.virtual.kinematics import Chain
-
-Array = NDArray[np.float64]
 
 GRAVITY = np.array([0.0, 0.0, -9.80665])  # [m/s^2]
 
@@ -19,11 +17,11 @@ class Body:
     """What the arm weighs: link masses (6,) [kg], centres in link frames (6, 3) [m]."""
 
     chain: Chain
-    mass: Array
-    centre: Array
+    mass: Floats
+    centre: Floats
 
 
-def link_torque(body: Body, q: Array) -> Array:
+def link_torque(body: Body, q: Floats) -> Floats:
     """Return the torque of the links' weight about every joint.
 
     tau_j = sense_j z_j . sum_{i >= j} (c_i - o_j) x m_i g, positive along positive
@@ -42,7 +40,7 @@ def link_torque(body: Body, q: Array) -> Array:
     return _moments(body.chain, frames, centre, body.mass[None, :] + 0 * centre[..., 0])
 
 
-def payload_torque(chain: Chain, q: Array, mass: Array, com: Array) -> Array:
+def payload_torque(chain: Chain, q: Floats, mass: Floats, com: Floats) -> Floats:
     """Return the torque of a payload about every joint, (n, 6) [N m].
 
     Args:
@@ -58,7 +56,7 @@ def payload_torque(chain: Chain, q: Array, mass: Array, com: Array) -> Array:
     return _moments(chain, frames, np.repeat(centre[:, None], 6, axis=1), masses)
 
 
-def _moments(chain: Chain, frames: Array, centre: Array, mass: Array) -> Array:
+def _moments(chain: Chain, frames: Floats, centre: Floats, mass: Floats) -> Floats:
     """Sum the moments about every axis of the masses outward of it."""
     weight = mass[..., None] * GRAVITY
     torque = np.empty((len(frames), 6))

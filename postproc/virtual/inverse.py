@@ -7,13 +7,10 @@ what is left of the orientation gives axes 4 to 6 (Z, Y, Z angles).
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from postproc.arrays import Floats, Ints
 from postproc.exceptions import PlanError
 from postproc.virtual.kinematics import Chain
-
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 RIGHT = np.radians([-90.0, 0.0, -90.0, 90.0, -90.0, 0.0])
 NOT_RIGHT = 1e-5  # [rad]
@@ -35,7 +32,7 @@ def require_closed_form(chain: Chain) -> None:
         )
 
 
-def solve_branch(chain: Chain, flange: Array, branch: int) -> Array:
+def solve_branch(chain: Chain, flange: Floats, branch: int) -> Floats:
     """Return the joint angles that put the flange at the given poses, in one branch.
 
     Args:
@@ -69,7 +66,7 @@ def solve_branch(chain: Chain, flange: Array, branch: int) -> Array:
     return chain.controller_angles(theta)
 
 
-def _wrist_angles(theta: Array, flange: Array, negative: bool) -> Array:
+def _wrist_angles(theta: Floats, flange: Floats, negative: bool) -> Floats:
     """Return the last three D-H angles (n, 3) given the first three (n, 3)."""
     c1, s1 = np.cos(theta[:, 0]), np.sin(theta[:, 0])
     elevation = theta[:, 1] + theta[:, 2]
@@ -87,7 +84,7 @@ def _wrist_angles(theta: Array, flange: Array, negative: bool) -> Array:
     return np.stack([fourth, fifth, sixth], axis=-1)
 
 
-def branch_of(chain: Chain, q: Array) -> Ints:
+def branch_of(chain: Chain, q: Floats) -> Ints:
     """Return the branch numbers (n,) of joint angles (n, 6) [rad]."""
     theta = chain.dh_angles(q)
     frames = chain.frames(q)
@@ -98,6 +95,6 @@ def branch_of(chain: Chain, q: Array) -> Ints:
     return np.asarray(WRIST * negative + SHOULDER * behind + ELBOW * (bend < 0))
 
 
-def nearest_turns(q: Array, near: Array) -> Array:
+def nearest_turns(q: Floats, near: Floats) -> Floats:
     """Add the full turns that bring angles (n, 6) closest to (n, 6) or (6,) [rad]."""
     return np.asarray(q + 2 * np.pi * np.round((near - q) / (2 * np.pi)))

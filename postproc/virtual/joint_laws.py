@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from postproc.arrays import Floats
 from postproc.virtual.arrivals import Arrivals
 from postproc.virtual.gravity import link_torque, payload_torque
 from postproc.virtual.law import Draw, Law, Where, on_joint
 from postproc.virtual.reference import WORKING_RANGE
 
-Array = NDArray[np.float64]
-
 KILO = 1e3  # [N m] torques in the laws are counted in thousands
 
 
-def total_torque(draw: Draw, arrivals: Arrivals) -> Array:
+def total_torque(draw: Draw, arrivals: Arrivals) -> Floats:
     """Return the torque (n, 6) [N m] of links and payload about the joints."""
     payload = payload_torque(
         draw.body.chain, arrivals.q, arrivals.payload, arrivals.payload_com
@@ -34,7 +32,7 @@ def compliance(draw: Draw) -> Law:
     for joint in joints[1:]:
         softness[joint - 1] = draw.rng.uniform(0.4, 1.0)
 
-    def shape(arrivals: Arrivals) -> Array:
+    def shape(arrivals: Arrivals) -> Floats:
         return total_torque(draw, arrivals) / KILO * softness
 
     parameters = {f"softness_{j}": float(softness[j - 1]) for j in joints}
@@ -45,7 +43,7 @@ def payload(draw: Draw) -> Law:
     """A joint yields to the declared payload."""
     joint = draw.pick([2, 3, 5])
 
-    def shape(arrivals: Arrivals) -> Array:
+    def shape(arrivals: Arrivals) -> Floats:
         torque = payload_torque(
             draw.body.chain, arrivals.q, arrivals.payload, arrivals.payload_com
         )
@@ -61,7 +59,7 @@ def counterbalance(draw: Draw) -> Law:
     preload = draw.rng.uniform(0.0, 0.3)  # [m] of spring travel at the shortest length
     shortest = fixed - moving
 
-    def shape(arrivals: Arrivals) -> Array:
+    def shape(arrivals: Arrivals) -> Floats:
         angle = arrivals.q[:, 1] - upright
         length = np.sqrt(
             fixed**2 + moving**2 - 2 * fixed * moving * np.cos(angle)
@@ -87,7 +85,7 @@ def _wave(draw: Draw, order: int) -> Law:
     joint = draw.pick(range(1, 7))
     phase = draw.phase()
 
-    def shape(arrivals: Arrivals) -> Array:
+    def shape(arrivals: Arrivals) -> Floats:
         return on_joint(joint, np.cos(order * arrivals.q[:, joint - 1] + phase))
 
     parameters = {"order": float(order), "phase": phase}
@@ -98,7 +96,7 @@ def scale(draw: Draw) -> Law:
     """An encoder or gear ratio that is slightly wrong: gain * angle."""
     joint, sign = draw.pick(range(1, 7)), draw.sign()
 
-    def shape(arrivals: Arrivals) -> Array:
+    def shape(arrivals: Arrivals) -> Floats:
         return on_joint(joint, sign * arrivals.q[:, joint - 1])
 
     return Law("scale", Where.JOINTS, (joint,), 0, {}, shape)
@@ -110,7 +108,7 @@ def coupling(draw: Draw) -> Law:
     source = int(draw.rng.choice([4] if joint == 5 else [4, 5]))
     sign = draw.sign()
 
-    def shape(arrivals: Arrivals) -> Array:
+    def shape(arrivals: Arrivals) -> Floats:
         return on_joint(joint, sign * arrivals.q[:, source - 1])
 
     return Law("coupling", Where.JOINTS, (joint,), source, {}, shape)
@@ -123,7 +121,7 @@ def worn_spot(draw: Draw) -> Law:
     centre = draw.rng.uniform(low + 0.2 * (high - low), high - 0.2 * (high - low))
     width = np.radians(draw.rng.uniform(4.0, 9.0))
 
-    def shape(arrivals: Arrivals) -> Array:
+    def shape(arrivals: Arrivals) -> Floats:
         away = (arrivals.q[:, joint - 1] - centre) / width
         return on_joint(joint, sign * np.exp(-0.5 * away**2))
 
@@ -138,7 +136,7 @@ def joint_product(draw: Draw) -> Law:
     one, two = (int(j) for j in draw.rng.choice(others, 2, replace=False))
     middle, sign = WORKING_RANGE.mean(axis=1), draw.sign()
 
-    def shape(arrivals: Arrivals) -> Array:
+    def shape(arrivals: Arrivals) -> Floats:
         away = arrivals.q - middle
         return on_joint(joint, sign * away[:, one - 1] * away[:, two - 1])
 

@@ -6,9 +6,8 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from postproc.arrays import Floats
 
 
 @dataclass(frozen=True)
@@ -30,29 +29,29 @@ class Chain:
         lower, upper: Joint range, (6,) [rad].
     """
 
-    a: Array
-    d: Array
-    alpha: Array
-    offset: Array
-    sense: Array
-    shift: Array
-    beta: Array
-    mass: Array
-    centre: Array
-    speed: Array
-    lower: Array
-    upper: Array
+    a: Floats
+    d: Floats
+    alpha: Floats
+    offset: Floats
+    sense: Floats
+    shift: Floats
+    beta: Floats
+    mass: Floats
+    centre: Floats
+    speed: Floats
+    lower: Floats
+    upper: Floats
 
-    def dh_angles(self, q: Array) -> Array:
+    def dh_angles(self, q: Floats) -> Floats:
         """Convert controller angles (n, 6) to D-H angles (n, 6) [rad]."""
         return np.asarray(self.offset + self.sense * (q + self.shift))
 
-    def controller_angles(self, theta: Array) -> Array:
+    def controller_angles(self, theta: Floats) -> Floats:
         """Convert D-H angles (n, 6) to controller angles (n, 6) [rad]."""
         return np.asarray((theta - self.offset) / self.sense - self.shift)
 
     @cached_property
-    def twists(self) -> Array:
+    def twists(self) -> Floats:
         """Return Rx(alpha) Ry(beta) of every link, (6, 3, 3)."""
         ca, sa = np.cos(self.alpha), np.sin(self.alpha)
         cb, sb = np.cos(self.beta), np.sin(self.beta)
@@ -60,7 +59,7 @@ class Chain:
         rows = [[cb, zero, sb], [sa * sb, ca, -sa * cb], [-ca * sb, sa, ca * cb]]
         return np.moveaxis(np.array(rows), -1, 0)
 
-    def links(self, q: Array) -> Array:
+    def links(self, q: Floats) -> Floats:
         """Return Rz(theta) Tz(d) Tx(a) Rx(alpha) Ry(beta), (n, 6, 4, 4).
 
         Args:
@@ -76,7 +75,7 @@ class Chain:
         out[..., 2, 3], out[..., 3, 3] = self.d, 1.0
         return out
 
-    def frames(self, q: Array) -> Array:
+    def frames(self, q: Floats) -> Floats:
         """Return all frames (n, 7, 4, 4), arm base to flange, in the arm base.
 
         Args:
@@ -89,11 +88,11 @@ class Chain:
             np.matmul(out[:, i], links[:, i], out=out[:, i + 1])
         return out
 
-    def flange(self, q: Array) -> Array:
+    def flange(self, q: Floats) -> Floats:
         """Return the flange poses (n, 4, 4) in the arm base [m]."""
         return np.asarray(self.frames(q)[:, 6])
 
-    def bent(self, growth: Array) -> Chain:
+    def bent(self, growth: Floats) -> Chain:
         """Return a chain whose lengths grew by the relative amounts (n, 6)."""
         return replace(self, a=self.a * (1 + growth), d=self.d * (1 + growth))
 

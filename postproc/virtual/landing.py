@@ -5,16 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from postproc.arrays import Floats, Ints
 from postproc.exceptions import PostprocError
 from postproc.language.visits import Visits
 from postproc.virtual.arm import VirtualArm
 from postproc.virtual.program import run_program
 from postproc.virtual.setup import Setup
-
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 
 @dataclass(frozen=True)
@@ -28,11 +25,11 @@ class Landing:
     """
 
     visit: Ints
-    wanted: Array
-    landed: Array
+    wanted: Floats
+    landed: Floats
 
     @property
-    def error(self) -> Array:
+    def error(self) -> Floats:
         """Landed minus wanted, (k, 3) [m]."""
         return np.asarray(self.landed - self.wanted)
 

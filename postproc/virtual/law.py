@@ -7,13 +7,12 @@ from dataclasses import dataclass, replace
 from enum import Enum
 
 import numpy as np
-from numpy.typing import NDArray
 
+from postproc.arrays import Floats
 from postproc.virtual.arrivals import Arrivals
 from postproc.virtual.gravity import Body
 
-Array = NDArray[np.float64]
-Shape = Callable[[Arrivals], Array]
+Shape = Callable[[Arrivals], Floats]
 
 
 class Where(Enum):
@@ -50,7 +49,7 @@ class Law:
     scale: float = 1.0
     peak_mm: float = float("nan")
 
-    def __call__(self, arrivals: Arrivals) -> Array:
+    def __call__(self, arrivals: Arrivals) -> Floats:
         """Return the change (n, 6) that the law makes on each arrival."""
         return np.asarray(self.scale * self.shape(arrivals))
 
@@ -88,14 +87,14 @@ class Draw:
         return float(self.rng.uniform(0.0, 2 * np.pi))
 
 
-def on_joint(joint: int, values: Array) -> Array:
+def on_joint(joint: int, values: Floats) -> Floats:
     """Put values (n,) [rad] into the column of a joint (from 1) of an (n, 6) array."""
     out = np.zeros((len(values), 6))
     out[:, joint - 1] = values
     return out
 
 
-def total(laws: Sequence[Law], where: Where, arrivals: Arrivals) -> Array:
+def total(laws: Sequence[Law], where: Where, arrivals: Arrivals) -> Floats:
     """Sum the changes (n, 6) of all laws that act at one place."""
     parts = [law(arrivals) for law in laws if law.where is where]
     return np.asarray(sum(parts, np.zeros((len(arrivals), 6))))

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from postproc.arrays import Floats, Ints
 from postproc.language.visits import Visits
 from postproc.virtual.arm import VirtualArm
 from postproc.virtual.arrivals import Arrivals
@@ -17,9 +17,6 @@ from postproc.virtual.rotation import exponential
 from postproc.virtual.rows import Rows
 from postproc.virtual.setup import Setup
 from postproc.virtual.survey import USUAL_APPROACH, follow_rows
-
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 
 @dataclass(frozen=True)
@@ -37,8 +34,8 @@ class Campaign:
     ids: tuple[str, ...]
     arrivals: Arrivals
     tool_id: Ints
-    measured: Array
-    true: Array
+    measured: Floats
+    true: Floats
 
     def __len__(self) -> int:
         """Return the number of rows."""
@@ -96,7 +93,7 @@ def measure_rows(arm: VirtualArm, setup: Setup, rows: Rows) -> Campaign:
     return _read(arm, setup, rows.ids, arrivals, rows.tool_id)
 
 
-def _tools(setup: Setup, rows: Rows) -> Array:
+def _tools(setup: Setup, rows: Rows) -> Floats:
     """Return the rows' own tools (n, 3), or those of the cell (n, 4, 4)."""
     if np.isnan(rows.tool).any():
         return setup.tool_of(rows.tool_id)
@@ -123,7 +120,7 @@ def _read(
     return Campaign(tuple(ids), arrivals, tool_id, measured, arm.tcp(arrivals))
 
 
-def _usual_times(setup: Setup, q: Array) -> Array:
+def _usual_times(setup: Setup, q: Floats) -> Floats:
     """Return when each row is measured: the slowest joint's way, then ten seconds."""
     ways = np.abs(np.diff(q, axis=0, prepend=q[:1])) / setup.chain.speed
     return np.asarray(np.cumsum(ways.max(axis=1) + 10.0))

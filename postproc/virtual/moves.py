@@ -5,23 +5,15 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from postproc.arrays import Floats
 from postproc.exceptions import PlanError
 from postproc.language.visits import Motion, Target, Visits
 from postproc.virtual.controller import flange_of, joints_along, joints_of_pose
 from postproc.virtual.path import arc, straight
-from postproc.virtual.rotation import (
-    exponential,
-    logarithm,
-    pose,
-    pose_of_record,
-    undo,
-)
+from postproc.virtual.rotation import exponential, logarithm, pose, pose_of_record, undo
 from postproc.virtual.setup import Setup
 from postproc.virtual.wrist import joints_with_wrist
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -33,8 +25,8 @@ class Way:
         tcp: TCP there, (m, 3) [m] in the arm base.
     """
 
-    joints: Array
-    tcp: Array
+    joints: Floats
+    tcp: Floats
 
     @property
     def length(self) -> float:
@@ -46,12 +38,12 @@ class Way:
 class Frames:
     """The frames that hold at one visit, (4, 4) each."""
 
-    tool: Array
-    base: Array
-    uframe: Array
+    tool: Floats
+    base: Floats
+    uframe: Floats
 
 
-def frames_at(visits: Visits, i: int, poses: Array) -> Frames:
+def frames_at(visits: Visits, i: int, poses: Floats) -> Frames:
     """Return the frames of visit i.
 
     Args:
@@ -69,7 +61,7 @@ def frames_at(visits: Visits, i: int, poses: Array) -> Frames:
 
 
 def way_to(
-    setup: Setup, visits: Visits, i: int, frames: Frames, here: Array, before: Array
+    setup: Setup, visits: Visits, i: int, frames: Frames, here: Floats, before: Floats
 ) -> Way:
     """Find the way to visit i.
 
@@ -110,8 +102,8 @@ def _arc_piece(
     visits: Visits,
     i: int,
     frames: Frames,
-    poses: tuple[Array, Array, Array],
-) -> Array:
+    poses: tuple[Floats, Floats, Floats],
+) -> Floats:
     """Sample the part of an arc that ends at visit i.
 
     Args:
@@ -131,8 +123,8 @@ def _arc_piece(
 
 
 def _goal_joints(
-    setup: Setup, visits: Visits, i: int, frames: Frames, here: Array
-) -> Array:
+    setup: Setup, visits: Visits, i: int, frames: Frames, here: Floats
+) -> Floats:
     kind, values = Target(visits.target[i]), visits.values[i]
     if kind is Target.JOINTS:
         return _known(np.radians(values))
@@ -149,8 +141,8 @@ def _goal_joints(
 
 
 def _goal_pose(
-    setup: Setup, visits: Visits, i: int, frames: Frames, here: Array
-) -> Array:
+    setup: Setup, visits: Visits, i: int, frames: Frames, here: Floats
+) -> Floats:
     """Return the TCP pose in the arm base, (4, 4), that visit i asks for."""
     kind, values = Target(visits.target[i]), visits.values[i]
     tool = frames.tool
@@ -180,7 +172,7 @@ def _goal_pose(
     raise PlanError("the program does not tell where this move goes")
 
 
-def _axes(kind: Target, frames: Frames, present: Array | None = None) -> Array:
+def _axes(kind: Target, frames: Frames, present: Floats | None = None) -> Floats:
     """Return the axes (3, 3) in the arm base of the frame that a step is given in."""
     if kind is Target.RELATIVE_UFRAME:
         return np.asarray((undo(frames.base) @ frames.uframe)[:3, :3])
@@ -189,15 +181,15 @@ def _axes(kind: Target, frames: Frames, present: Array | None = None) -> Array:
     return np.eye(3)
 
 
-def _moved(present: Array, shift: Array, turn: Array) -> Array:
+def _moved(present: Floats, shift: Floats, turn: Floats) -> Floats:
     return pose(exponential(turn) @ present[:3, :3], present[:3, 3] + shift)
 
 
-def _shift(x: float, y: float, z: float) -> Array:
+def _shift(x: float, y: float, z: float) -> Floats:
     return pose(np.eye(3), np.array([x, y, z]) * 1e-3)
 
 
-def _known(values: Array) -> Array:
+def _known(values: Floats) -> Floats:
     """Return the values.
 
     Raises:
@@ -208,7 +200,7 @@ def _known(values: Array) -> Array:
     return np.asarray(values)
 
 
-def _place_of(setup: Setup, kind: Target) -> Array:
+def _place_of(setup: Setup, kind: Target) -> Floats:
     """Return the joints (6,) [rad] of a place that the controller holds."""
     home = kind is Target.HOME
     joints = setup.home if home else setup.calibration
@@ -220,7 +212,7 @@ def _place_of(setup: Setup, kind: Target) -> Array:
     return joints
 
 
-def _towards(present: Array, goal: Array, distance: float) -> Array:
+def _towards(present: Floats, goal: Floats, distance: float) -> Floats:
     """Go a distance [m] from one pose towards another; the tool turns with the way."""
     way = goal[:3, 3] - present[:3, 3]
     length = float(np.linalg.norm(way))

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from postproc.arrays import Floats
 from postproc.exceptions import PlanError
 from postproc.virtual.rotation import exponential, logarithm, pose
-
-Array = NDArray[np.float64]
 
 # A joint that turns between two samples is missed by about step^2 / (8 m): 1 urad.
 STEP = 3e-3  # [m]
@@ -17,7 +15,7 @@ FEWEST = 4
 APART = 1e-6  # [m] points nearer than this are one: they make no circle with a third
 
 
-def straight(start: Array, end: Array) -> Array:
+def straight(start: Floats, end: Floats) -> Floats:
     """Sample a straight line from one pose to another, without its first point.
 
     The orientation turns about one fixed axis.
@@ -40,7 +38,7 @@ def straight(start: Array, end: Array) -> Array:
     return samples
 
 
-def arc(start: Array, via: Array, end: Array) -> tuple[Array, Array]:
+def arc(start: Floats, via: Floats, end: Floats) -> tuple[Floats, Floats]:
     """Sample the arc from `start` through `via` to `end`.
 
     The orientation turns steadily from each pose to the next.
@@ -65,7 +63,7 @@ def arc(start: Array, via: Array, end: Array) -> tuple[Array, Array]:
     )
 
 
-def _turned(start: Array, end: Array, centre: Array, sweep: Array) -> Array:
+def _turned(start: Floats, end: Floats, centre: Floats, sweep: Floats) -> Floats:
     """Sample a piece of a circle that sweeps a rotation vector about its centre."""
     turn = logarithm(start[:3, :3].T @ end[:3, :3])
     radius = start[:3, 3] - centre
@@ -79,12 +77,12 @@ def _turned(start: Array, end: Array, centre: Array, sweep: Array) -> Array:
     return samples
 
 
-def _progress(length: float, angle: float) -> Array:
+def _progress(length: float, angle: float) -> Floats:
     count = max(FEWEST, int(np.ceil(max(length / STEP, angle / TURN_STEP))))
     return np.arange(1, count + 1) / count
 
 
-def _circle(p: Array, q: Array, r: Array) -> tuple[Array, Array]:
+def _circle(p: Floats, q: Floats, r: Floats) -> tuple[Floats, Floats]:
     """Return the centre and the unit normal of the circle through three points."""
     u, v = q - p, r - p
     normal = np.cross(u, v)
@@ -96,7 +94,7 @@ def _circle(p: Array, q: Array, r: Array) -> tuple[Array, Array]:
     return p + to_centre, normal / area
 
 
-def _angle(a: Array, b: Array, normal: Array) -> float:
+def _angle(a: Floats, b: Floats, normal: Floats) -> float:
     """Return the angle in (0, 2 pi] from a to b about a normal."""
     angle = np.arctan2(np.cross(a, b) @ normal, a @ b)
     return float(angle if angle > 0 else angle + 2 * np.pi)

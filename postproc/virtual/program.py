@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from postproc.arrays import Floats, Ints
 from postproc.language.visits import Motion, Visits
 from postproc.virtual.arm import VirtualArm
 from postproc.virtual.arrivals import USUAL_SPEED, Arrivals, make_arrivals
@@ -16,9 +16,6 @@ from postproc.virtual.gears import GearState, at_start, move
 from postproc.virtual.moves import Way
 from postproc.virtual.rotation import pose_of_record
 from postproc.virtual.setup import Setup
-
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 SETTLE = 0.3  # [s] to start and stop a move
 # Where the arm stands when the cell names no home: its upright pose, wrist bent.
@@ -47,7 +44,7 @@ class Run:
 class _Place:
     """The arm after one visit; `why` says why it was not reached."""
 
-    joints: Array
+    joints: Floats
     gears: GearState
     speed: float = USUAL_SPEED
     lasted: float = 0.0
@@ -115,7 +112,7 @@ def _duration(setup: Setup, visits: Visits, i: int, way: Way) -> float:
 
 
 def _collect(
-    arm: VirtualArm, setup: Setup, visits: Visits, poses: Array, places: list[_Place]
+    arm: VirtualArm, setup: Setup, visits: Visits, poses: Floats, places: list[_Place]
 ) -> Run:
     """Gather the reached visits."""
     reached = [i for i, p in enumerate(places) if not p.why]
@@ -139,7 +136,7 @@ def _collect(
     return Run(visit, arrivals, tool_id, tuple(p.why for p in places))
 
 
-def _tool_numbers(setup: Setup, used: list[int], poses: Array) -> dict[int, int]:
+def _tool_numbers(setup: Setup, used: list[int], poses: Floats) -> dict[int, int]:
     """Number the frames that serve as tools."""
     frames = list(dict.fromkeys(used))
     probes = [setup.number_of(poses[frame]) for frame in frames]

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from postproc.arrays import Floats
 from postproc.virtual.arrivals import Arrivals, make_arrivals
-
-Array = NDArray[np.float64]
 
 # Angles between which each joint works in a usual campaign, (6, 2) [rad].
 WORKING_RANGE = np.radians(
@@ -23,7 +21,7 @@ PAYLOADS = np.array([0.0, 40.0, 120.0])  # [kg]
 PAYLOAD_COM = np.array([0.0, 0.0, 0.2])  # [m]
 
 
-def working_angles(rng: np.random.Generator, n: int) -> Array:
+def working_angles(rng: np.random.Generator, n: int) -> Floats:
     """Draw joint sets (n, 6) [rad] by Latin hypercube over the working range."""
     strata = rng.permuted(np.tile(np.arange(n), (6, 1)), axis=1).T
     unit = (strata + rng.random((n, 6))) / n
@@ -31,12 +29,14 @@ def working_angles(rng: np.random.Generator, n: int) -> Array:
     return np.asarray(low + unit * (high - low))
 
 
-def log_uniform(rng: np.random.Generator, ends: Array, shape: tuple[int, ...]) -> Array:
+def log_uniform(
+    rng: np.random.Generator, ends: Floats, shape: tuple[int, ...]
+) -> Floats:
     """Draw numbers between two ends, evenly in their logarithm."""
     return np.asarray(np.exp(rng.uniform(np.log(ends[0]), np.log(ends[1]), size=shape)))
 
 
-def reference_arrivals(rows: int, tool: Array | None = None) -> Arrivals:
+def reference_arrivals(rows: int, tool: Floats | None = None) -> Arrivals:
     """Return one campaign, always the same, in which every covariate varies.
 
     Args:

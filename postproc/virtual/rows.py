@@ -7,13 +7,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from postproc.arrays import Floats, Ints
 from postproc.exceptions import MeasurementError
-
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
-
 
 TOOL = ("tool_x_mm", "tool_y_mm", "tool_z_mm")
 
@@ -36,15 +32,15 @@ class Rows:
     """
 
     ids: tuple[str, ...]
-    q: Array
-    side: Array | None
-    travel: Array
-    time: Array
-    temperature: Array
-    payload: Array
-    speed: Array
+    q: Floats
+    side: Floats | None
+    travel: Floats
+    time: Floats
+    temperature: Floats
+    payload: Floats
+    speed: Floats
     tool_id: Ints
-    tool: Array
+    tool: Floats
 
 
 def read_rows(path: str | Path) -> Rows:
@@ -108,7 +104,7 @@ class _Table:
             return []
         return [row[self.header[name]].strip() for row in self.cells]
 
-    def block(self, names: list[str]) -> Array:
+    def block(self, names: list[str]) -> Floats:
         """Return columns as numbers, (n, len(names)); NaN where there is none."""
         out = np.full((len(self.cells), len(names)), np.nan)
         for k, name in enumerate(names):

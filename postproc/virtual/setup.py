@@ -7,17 +7,16 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from postproc.arrays import Floats
 from postproc.exceptions import PostprocError
 from postproc.virtual.kinematics import NJ220, Chain
-
-Array = NDArray[np.float64]
 
 # Where a tracker stands when nobody says so: to the right in front of the arm.
 USUAL_TRACKER = np.array([4.0, -3.0, 1.5])  # [m] in the arm base frame
 SAME_POINT = 1e-6  # [m]
 
 
-def _identity() -> Array:
+def _identity() -> Floats:
     return np.eye(4)
 
 
@@ -41,19 +40,19 @@ class Setup:
     """
 
     chain: Chain = NJ220
-    coupling: Array = field(default_factory=lambda: np.eye(6))
-    tool: Array = field(default_factory=_identity)
-    base: Array = field(default_factory=_identity)
-    uframe: Array = field(default_factory=_identity)
-    tools: Array = field(default_factory=lambda: np.zeros((0, 4, 4)))
-    home: Array | None = None
-    calibration: Array | None = None
+    coupling: Floats = field(default_factory=lambda: np.eye(6))
+    tool: Floats = field(default_factory=_identity)
+    base: Floats = field(default_factory=_identity)
+    uframe: Floats = field(default_factory=_identity)
+    tools: Floats = field(default_factory=lambda: np.zeros((0, 4, 4)))
+    home: Floats | None = None
+    calibration: Floats | None = None
     payload: float = 0.0
-    payload_com: Array = field(default_factory=lambda: np.zeros(3))
+    payload_com: Floats = field(default_factory=lambda: np.zeros(3))
     temperature: float = 22.0
-    tracker: Array = field(default_factory=lambda: USUAL_TRACKER.copy())
+    tracker: Floats = field(default_factory=lambda: USUAL_TRACKER.copy())
 
-    def tool_of(self, tool_id: NDArray[np.int64]) -> Array:
+    def tool_of(self, tool_id: NDArray[np.int64]) -> Floats:
         """Return the tool poses (n, 4, 4) of tool numbers (n,) from 0.
 
         Numbers that count from 1 to the number of tools are understood too.
@@ -73,7 +72,7 @@ class Setup:
             )
         return np.asarray(self.tools[tool_id])
 
-    def number_of(self, tool: Array) -> int:
+    def number_of(self, tool: Floats) -> int:
         """Return the number from 0 of the probe point at a tool's TCP, or -1."""
         away = np.linalg.norm(self.tools[:, :3, 3] - tool[:3, 3], axis=1)
         same = np.flatnonzero(away < SAME_POINT)

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from postproc.arrays import Floats
 from postproc.virtual.arm import VirtualArm
 from postproc.virtual.arrivals import Arrivals, make_arrivals
 from postproc.virtual.drawing import stream
@@ -18,8 +18,6 @@ from postproc.virtual.reference import (
     working_angles,
 )
 
-Array = NDArray[np.float64]
-
 START_TEMPERATURE = 22.0  # [deg C]
 USUAL_APPROACH = np.radians(2.0)  # where a row says from which side, not from how far
 
@@ -29,9 +27,9 @@ def sample_survey(
     n: int,
     *,
     seed: int = 0,
-    tool: Array | None = None,
-    payload: Array | float = 0.0,
-    payload_com: Array | None = None,
+    tool: Floats | None = None,
+    payload: Floats | float = 0.0,
+    payload_com: Floats | None = None,
 ) -> Arrivals:
     """Send an arm to n joint sets, each from a drawn side and distance.
 
@@ -64,13 +62,13 @@ def sample_survey(
 
 def follow_rows(
     arm: VirtualArm,
-    q: Array,
-    side: Array | None = None,
-    way: Array | float = USUAL_APPROACH,
+    q: Floats,
+    side: Floats | None = None,
+    way: Floats | float = USUAL_APPROACH,
     *,
-    travel: Array | None = None,
-    tool: Array | None = None,
-    **covariates: Array | float,
+    travel: Floats | None = None,
+    tool: Floats | None = None,
+    **covariates: Floats | float,
 ) -> Arrivals:
     """Visit joint targets one after the other with JOINT moves.
 

@@ -3,20 +3,18 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from postproc.arrays import Floats
 from postproc.exceptions import PlanError
 from postproc.virtual.kinematics import Chain
-
-Array = NDArray[np.float64]
 
 NEWTON_STEPS = 12
 CLOSE = 1e-9  # [m]
 
 
 def joints_with_wrist(
-    chain: Chain, points: Array, tool: Array, start: Array, end: Array
-) -> Array:
+    chain: Chain, points: Floats, tool: Floats, start: Floats, end: Floats
+) -> Floats:
     """Follow TCP points while joints 4 to 6 go straight from start to end.
 
     Newton's method on joints 1 to 3, for all points at once.

@@ -8,12 +8,10 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from postproc.arrays import Floats
 from postproc.files import write_all
 from postproc.virtual.measure import Campaign
-
-Array = NDArray[np.float64]
 
 
 def write_measurements(
@@ -64,12 +62,12 @@ def _table(campaign: Campaign, direction: bool) -> tuple[list[str], list[list[st
 
 
 def _columns(
-    names: Sequence[str], values: Array, digits: int
+    names: Sequence[str], values: Floats, digits: int
 ) -> list[tuple[str, Sequence[object]]]:
     texts = [[f"{v:.{digits}f}" for v in column] for column in values.T]
     return list(zip(names, texts, strict=True))
 
 
-def _signs(side: Array) -> Array:
+def _signs(side: Floats) -> Floats:
     """Return the directions that sides in the gap amount to: 0 in its middle half."""
     return np.asarray(np.where(np.abs(side) > 0.5, np.sign(side), 0.0)) + 0.0

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from postproc.arrays import Floats
 from postproc.language.visits import FlyTrajectory, FlyType, Motion, Visits
 from postproc.virtual.kinematics import Chain
 from postproc.virtual.moves import Way
-
-Array = NDArray[np.float64]
 
 USUAL_DISTANCE = 5.0  # [mm], where the program sets no $FLY_DIST
 USUAL_PERCENT = 100.0  # where it sets no $FLY_PER
@@ -69,7 +67,7 @@ def _overlapping(
     return 0.5 * pushes[0] * overlap**2, 0.5 * pushes[1] * overlap**2
 
 
-def _heading(way: Way, end: int) -> Array:
+def _heading(way: Way, end: int) -> Floats:
     """Return the direction of the TCP at the begin (0) or end (-1) of a way, (3,)."""
     step = way.tcp[1] - way.tcp[0] if end == 0 else way.tcp[-1] - way.tcp[-2]
     return np.asarray(step / max(float(np.linalg.norm(step)), NO_WAY))

@@ -24,7 +24,8 @@ from postproc.html import (
 )
 from tests.html.browser import complaints, open_browser, requests
 from tests.html.builders import FIRST_LINE, outcome_of
-from tests.html.test_reports import NASTY, comparison, diagnosis, fit_of, model_file
+from tests.html.test_program import NASTY
+from tests.html.test_reports import comparison, diagnosis, fit_of, model_file
 
 PATIENCE = 60  # seconds; the machine may be busy with other tests
 MANY = 100_000

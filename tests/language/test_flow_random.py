@@ -9,7 +9,8 @@ from postproc.language.flow import resolve
 from postproc.language.source import source_from_bytes
 from postproc.language.structure import parse
 from postproc.language.visits import ELSEWHERE, START, Target, Visits
-from tests.language.interpreter import PAGE, Executed, Generated, Interpreter
+from tests.language.executed import PAGE, Executed, Generated
+from tests.language.interpreter import Interpreter
 from tests.language.poses import matrix
 from tests.language.whole_jobs import Job
 

@@ -4,12 +4,13 @@ import numpy as np
 import pytest
 
 from postproc.language.entries import copied_entry
-from postproc.language.flow import Resolved, Start, resolve
+from postproc.language.flow import Resolved, resolve
 from postproc.language.layout import CloneError
 from postproc.language.lsv import Variables, read_variables
 from postproc.language.rewrite import edits
 from postproc.language.source import apply, source_from_bytes
 from postproc.language.structure import parse
+from postproc.language.world import Start
 
 HEAD = """PROGRAM job
 VAR pth, other : PATH OF nd

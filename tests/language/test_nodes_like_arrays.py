@@ -8,10 +8,11 @@ import re
 import numpy as np
 import pytest
 
-from postproc.language.flow import Start, resolve
+from postproc.language.flow import resolve
 from postproc.language.lsv import read_variables
 from postproc.language.source import source_from_bytes
 from postproc.language.structure import parse
+from postproc.language.world import Start
 
 HEAD = """PROGRAM job
 VAR tab, other : ARRAY[4] OF POSITION

@@ -5,10 +5,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from postproc.language.edits import Replacements
+from postproc.language.edits import Edit, Replacements, Span
 from postproc.language.flow import resolve
 from postproc.language.rewrite import compare, decimals_of, edits, number_text
-from postproc.language.source import Edit, Source, Span, apply, source_from_bytes
+from postproc.language.source import Source, apply, source_from_bytes
 from postproc.language.structure import parse
 
 PROGRAM = (

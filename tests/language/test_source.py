@@ -8,11 +8,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from postproc.exceptions import FileError, ProgramError
-from postproc.language.edits import Replacements
+from postproc.language.edits import Edit, Replacements, Span
 from postproc.language.source import (
-    Edit,
     Source,
-    Span,
     apply,
     compose,
     read_source,

@@ -5,12 +5,13 @@ import random
 import numpy as np
 import pytest
 
-from postproc.language.flow import Start, resolve
+from postproc.language.flow import resolve
 from postproc.language.lsv import read_variables
 from postproc.language.source import source_from_bytes
 from postproc.language.stretches import Stretches
 from postproc.language.structure import parse
 from postproc.language.visits import Visits
+from postproc.language.world import Start
 
 PROGRAMS = 120
 START = Start(

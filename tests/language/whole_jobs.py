@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+from tests.language.executed import EVERYWHERE, PAGE
 from tests.language.generator.rarer import Rarer
-from tests.language.interpreter import EVERYWHERE, PAGE
 
 PAGES = 2
 

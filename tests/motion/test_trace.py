@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-import postproc.motion.trace as trace_module
+from postproc.motion import trace as trace_module
 from postproc.motion.planner import plan
 from postproc.motion.reach import reach
 from postproc.motion.reasons import (

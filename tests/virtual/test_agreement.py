@@ -10,13 +10,7 @@ from postproc.resolve import targets_from_visits
 from postproc.robot.arm import load_arm
 from postproc.robot.cell import load_cell
 from postproc.robot.state import make_states
-from postproc.virtual import (
-    NJ220,
-    Setup,
-    arrivals_of_states,
-    run_program,
-    virtual_arm,
-)
+from postproc.virtual import NJ220, Setup, arrivals_of_states, run_program, virtual_arm
 from postproc.virtual.gravity import Body, link_torque, payload_torque
 from postproc.virtual.inverse import solve_branch
 from postproc.virtual.reference import working_angles

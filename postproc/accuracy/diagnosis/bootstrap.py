@@ -9,7 +9,7 @@ import numpy as np
 from postproc.accuracy.diagnosis.library import Library
 from postproc.accuracy.diagnosis.projection import Projection
 from postproc.accuracy.diagnosis.score import family_maxima
-from postproc.accuracy.effect import Array
+from postproc.arrays import Floats
 
 DRAWS = 300
 LEAST = 1e-300  # p-values below this are all the same to anybody
@@ -24,7 +24,7 @@ class Null:
         maxima: Sorted maxima of the draws, (draws,) [nats].
     """
 
-    maxima: Array
+    maxima: Floats
 
     @property
     def _tail(self) -> tuple[float, float]:

@@ -9,7 +9,8 @@ import numpy as np
 
 from postproc.accuracy.batch import Batch
 from postproc.accuracy.covariate import covariate
-from postproc.accuracy.effect import Array, Effect
+from postproc.accuracy.effect import Effect
+from postproc.arrays import Floats
 
 NAMED, FREE = 0, 1
 
@@ -69,7 +70,7 @@ class Candidate:
         """Whether what drives it passes with time rather than from pose to pose."""
         return self.source in ("order", "time", "temperature")
 
-    def driver(self, batch: Batch) -> Array:
+    def driver(self, batch: Batch) -> Floats:
         """Return the covariate along which the candidate varies, (n,)."""
         name = "order" if self.in_time else self.source.split(" x ")[0]
         return np.nan_to_num(covariate(batch, name))

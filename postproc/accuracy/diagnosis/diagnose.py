@@ -10,29 +10,19 @@ from postproc.accuracy.diagnosis.choice import ranking
 from postproc.accuracy.diagnosis.floor import multi_directional, noise_floor
 from postproc.accuracy.diagnosis.groups import NEAR
 from postproc.accuracy.diagnosis.outer import HeldOut, hold_out
-from postproc.accuracy.diagnosis.planning import (
-    poses_that_separate,
-    poses_that_sharpen,
-)
+from postproc.accuracy.diagnosis.planning import poses_that_separate, poses_that_sharpen
 from postproc.accuracy.diagnosis.projection import Projection
 from postproc.accuracy.diagnosis.refitting import refit
-from postproc.accuracy.diagnosis.result import (
-    Diagnosis,
-    Place,
-    statistics,
-)
-from postproc.accuracy.diagnosis.revision import (
-    Revision,
-    fold_back,
-)
+from postproc.accuracy.diagnosis.result import Diagnosis, Place, statistics
+from postproc.accuracy.diagnosis.revision import Revision, fold_back
 from postproc.accuracy.diagnosis.search import Progress, Search
 from postproc.accuracy.diagnosis.tracing import Trace, silent, trace
-from postproc.accuracy.effect import Array
 from postproc.accuracy.error_statistics import ErrorStatistics
 from postproc.accuracy.fit_report import weighed_down
 from postproc.accuracy.full import model_of
 from postproc.accuracy.measurement import Measurements
 from postproc.accuracy.model import Model
+from postproc.arrays import Floats
 from postproc.pose import MM
 from postproc.robot.arm import Arm
 
@@ -61,7 +51,7 @@ def diagnose(
     arm: Arm,
     model: Model,
     *,
-    tracker: Array | None = None,
+    tracker: Floats | None = None,
     setup: tuple[str, ...] = (),
     seed: int = 0,
     progress: Progress = silent,
@@ -100,7 +90,7 @@ def _conclude(
     survey: Measurements,
     traced: Trace,
     held_out: HeldOut,
-    tracker: Array | None,
+    tracker: Floats | None,
     seed: int,
 ) -> Diagnosis:
     """Put everything together."""
@@ -143,7 +133,7 @@ def _places(found: Search) -> tuple[Place, ...]:
     return tuple(out)
 
 
-def _next(traced: Trace, seed: int) -> tuple[str, Array]:
+def _next(traced: Trace, seed: int) -> tuple[str, Floats]:
     """Propose poses that separate the closest rivals, or sharpen the model."""
     found = traced.search
     for number, standing in enumerate(traced.standings):

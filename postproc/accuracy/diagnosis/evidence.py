@@ -4,19 +4,17 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from postproc.accuracy.diagnosis.choice import ranking
+from postproc.accuracy.diagnosis.diagnose import Extension
 from postproc.accuracy.diagnosis.locate import Profile, profile
 from postproc.accuracy.diagnosis.projection import Projection
-from postproc.accuracy.effect import Array
+from postproc.arrays import Floats
 from postproc.pose import MM
-
-if TYPE_CHECKING:
-    from postproc.accuracy.diagnosis.diagnose import Extension
 
 LISTED = 25  # candidates
 SHOWN = 3000  # rows: more say nothing more
@@ -104,7 +102,7 @@ def thinned(count: int) -> NDArray[np.int64]:
     return np.unique(places.astype(np.int64))
 
 
-def _plain(values: Array) -> list[Any]:
+def _plain(values: Floats) -> list[Any]:
     """Write numbers as short as they deserve, unknown ones as none."""
     listed = np.round(values, 5).astype(object)
     listed[~np.isfinite(values)] = None

@@ -9,8 +9,9 @@ import numpy as np
 from postproc.accuracy.diagnosis.groups import Standing
 from postproc.accuracy.diagnosis.result import Finding
 from postproc.accuracy.diagnosis.search import Addition, Search
-from postproc.accuracy.effect import Array, Effect
+from postproc.accuracy.effect import Effect
 from postproc.accuracy.fit_report import SHOWN_UNITS
+from postproc.arrays import Floats
 from postproc.pose import MM
 
 SPOT = 9  # bumps: more are a map of the whole joint, with no one place
@@ -52,7 +53,7 @@ def _describe(
 
 
 def _parameters(
-    effect: Effect, values: Array, std: Array
+    effect: Effect, values: Floats, std: Floats
 ) -> dict[str, tuple[float, float, str]]:
     """List value, standard error and unit of every parameter."""
     out = {}
@@ -93,7 +94,7 @@ def nonlinear(effect: Effect) -> dict[str, tuple[float, str]]:
     return out
 
 
-def _shares(found: Search) -> Array:
+def _shares(found: Search) -> Floats:
     """Part of the given model's residual variance that each addition explains."""
     fit = found.fit
     first = found.place(0)
@@ -108,12 +109,12 @@ def _shares(found: Search) -> Array:
         part = fit.combination.slices[found.place(number)]
         moved = fit.whiten(fit.columns[:, :, part] @ fit.values[part])
         out.append(float(left @ (moved - base @ (base.T @ moved))) / total)
-    shares: Array = np.clip(np.array(out), 0.0, 1.0)
+    shares: Floats = np.clip(np.array(out), 0.0, 1.0)
     return shares
 
 
-def _without_last(X: Array, count: int) -> Array:
+def _without_last(X: Floats, count: int) -> Floats:
     """Give an orthonormal basis of the first columns, (rows, rank)."""
     basis, size, _ = np.linalg.svd(X[:, :count], full_matrices=False)
-    kept: Array = basis[:, size > 1.0]
+    kept: Floats = basis[:, size > 1.0]
     return kept

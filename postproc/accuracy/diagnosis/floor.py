@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from postproc.accuracy.batch import Batch
-from postproc.accuracy.effect import Array
 from postproc.accuracy.fitted import Fit
 from postproc.accuracy.noise import Noise
+from postproc.arrays import Floats
 
 SAME_POSE = 1e-5  # [rad] joint angles that are one pose
 ENOUGH = 5  # repeats beyond the first that give an estimate
@@ -83,7 +83,7 @@ def _several(label: NDArray[np.int64]) -> list[NDArray[np.int64]]:
     return [rows for rows in np.split(order, cuts) if len(rows) > 1]
 
 
-def multi_directional(batch: Batch, error: Array) -> float | None:
+def multi_directional(batch: Batch, error: Floats) -> float | None:
     """Compute vAP, the multi-directional pose accuracy variation of ISO 9283 [m].
 
     At every pose that is visited from several sides: the largest distance between the

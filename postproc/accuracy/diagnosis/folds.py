@@ -15,14 +15,14 @@ from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 
 from postproc.accuracy.diagnosis.candidate import Candidate
-from postproc.accuracy.effect import Array
 from postproc.accuracy.fitted import Fit
+from postproc.arrays import Floats
 
 FOLDS = 10
 RUN = 4  # rows of a run
 
 
-def deal(values: Array, folds: int, seed: int, run: int = RUN) -> NDArray[np.int64]:
+def deal(values: Floats, folds: int, seed: int, run: int = RUN) -> NDArray[np.int64]:
     """Cut rows into runs along a covariate and deal these to folds.
 
     Args:
@@ -82,7 +82,7 @@ def held_out_gain(fit: Fit, number: int, candidate: Candidate) -> Gain:
     return Gain(float(fall.mean()), error)
 
 
-def held_out_errors(X: Array, y: Array, fold: NDArray[np.int64]) -> Array:
+def held_out_errors(X: Floats, y: Floats, fold: NDArray[np.int64]) -> Floats:
     """Predict every row from the other folds, prior N(0, I); return y - prediction.
 
     Args:

@@ -13,9 +13,9 @@ from postproc.accuracy.diagnosis.candidate import Candidate
 from postproc.accuracy.diagnosis.curves import free_candidates
 from postproc.accuracy.diagnosis.named import named_candidates
 from postproc.accuracy.diagnosis.projection import Blocks, Projection, reduce_columns
-from postproc.accuracy.effect import Array
 from postproc.accuracy.fitted import Fit
 from postproc.accuracy.noise import Whitener
+from postproc.arrays import Floats
 
 KEPT = 60_000_000  # numbers of columns that are kept rather than made again
 CHUNK = 5_000_000  # numbers of columns held at once while they are made
@@ -32,9 +32,9 @@ class Shelf:
     """
 
     candidates: tuple[Candidate, ...]
-    columns: Array | None
+    columns: Floats | None
 
-    def made(self, batch: Batch, whitener: Whitener) -> Array:
+    def made(self, batch: Batch, whitener: Whitener) -> Floats:
         """Return the columns, (3 n, c, k)."""
         if self.columns is not None:
             return self.columns
@@ -76,7 +76,7 @@ class Library:
         ]
         return Library(tuple(shelves))
 
-    def reduce(self, projection: Projection, rows: Array) -> tuple[Blocks, ...]:
+    def reduce(self, projection: Projection, rows: Floats) -> tuple[Blocks, ...]:
         """Filter all candidates and reduce them against rows (3 n, draws)."""
         whitener = projection.fit.whitener
         return tuple(
@@ -96,7 +96,7 @@ def by_width(candidates: Sequence[Candidate]) -> list[tuple[int, list[Candidate]
 
 
 def reduce_some(
-    projection: Projection, candidates: Sequence[Candidate], rows: Array
+    projection: Projection, candidates: Sequence[Candidate], rows: Floats
 ) -> tuple[Blocks, ...]:
     """Filter a few candidates of any widths and reduce them against rows."""
     whitener = projection.fit.whitener
@@ -110,7 +110,7 @@ def reduce_some(
 
 def make_columns(
     candidates: Sequence[Candidate], batch: Batch, whitener: Whitener
-) -> Array:
+) -> Floats:
     """Make the rotated, scaled columns of candidates of one width, (3 n, c, k)."""
     raw = np.concatenate([c.effect.columns(batch) for c in candidates], axis=2)
     raw *= np.array([p.scale for c in candidates for p in c.effect.parameters()])

@@ -10,8 +10,9 @@ from postproc.accuracy.batch import Batch
 from postproc.accuracy.covariate import covariate, unit
 from postproc.accuracy.diagnosis.candidate import Candidate
 from postproc.accuracy.diagnosis.projection import Projection
-from postproc.accuracy.effect import Array, Effect
+from postproc.accuracy.effect import Effect
 from postproc.accuracy.fitted import Fit
+from postproc.arrays import Floats
 from postproc.pose import MM
 
 LARGEST_ORDER = 60
@@ -32,11 +33,11 @@ class Profile:
 
     label: str
     unit: str
-    values: Array
+    values: Floats
     direction: str
-    before: Array
-    after: Array
-    lever: Array
+    before: Floats
+    after: Floats
+    lever: Floats
 
 
 def profile(fit: Fit, place: int, candidate: Candidate) -> Profile:
@@ -95,8 +96,8 @@ class Periodogram:
     """
 
     joint: int
-    orders: Array
-    power: Array
+    orders: Floats
+    power: Floats
 
 
 def periodogram(projection: Projection, joint: int) -> Periodogram:

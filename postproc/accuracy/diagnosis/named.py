@@ -14,7 +14,7 @@ from postproc.accuracy.compliance import Compliance
 from postproc.accuracy.counterbalance import Counterbalance
 from postproc.accuracy.coupling import Coupling
 from postproc.accuracy.diagnosis.candidate import NAMED, Candidate, Family, shared
-from postproc.accuracy.effect import Array, Effect
+from postproc.accuracy.effect import Effect
 from postproc.accuracy.joint_map import JointMap
 from postproc.accuracy.lag import Lag
 from postproc.accuracy.load_backlash import LoadBacklash
@@ -25,6 +25,7 @@ from postproc.accuracy.tool_shift import ToolShift
 from postproc.accuracy.tracker_drift import TrackerDrift
 from postproc.accuracy.transmission import Transmission
 from postproc.accuracy.windup import Windup
+from postproc.arrays import Floats
 
 JOINTS = (1, 2, 3, 4, 5, 6)
 CARRYING = 0.02  # of the largest torque: a joint that carries less cannot yield
@@ -58,7 +59,7 @@ def named_candidates(batch: Batch) -> list[Candidate]:
     ]
 
 
-def known(values: Array) -> bool:
+def known(values: Floats) -> bool:
     """Tell whether a covariate was recorded and varies."""
     return bool(
         not np.isnan(values).any()
@@ -101,7 +102,7 @@ def _loads(batch: Batch) -> list[Candidate]:
     return out + _single("counterbalance", 2, list(springs))
 
 
-def orders(batch: Batch, joint: int) -> Array:
+def orders(batch: Batch, joint: int) -> Floats:
     """Give the free orders to try: steps of half of what the range resolves."""
     covered = max(float(np.ptp(batch.states.q[:, joint - 1])), 0.1)
     return np.arange(FIRST_FREE, LAST_FREE, max(np.pi / covered, 0.25))

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from postproc.accuracy.diagnosis.projection import Projection
-from postproc.accuracy.effect import Array
+from postproc.arrays import Floats
 
 MAPS = 36
 FEATURES = 10
@@ -44,7 +44,7 @@ def leftovers(projection: Projection, seed: int) -> tuple[Leftover, ...]:
     rng = np.random.default_rng(seed)
     rest = projection.rest.reshape(-1, 3) * (projection.fit.rows.weight > 0)[:, None]
     flipped, shuffled = _draws(rest, rng)
-    found: list[tuple[str, Array]] = [
+    found: list[tuple[str, Floats]] = [
         *_maps(projection, flipped, rng),
         *_serial(projection, flipped),
         *_scatter(projection, shuffled),
@@ -60,7 +60,7 @@ def leftovers(projection: Projection, seed: int) -> tuple[Leftover, ...]:
     return tuple(sorted(out, key=lambda x: x.p_value))
 
 
-def _draws(rest: Array, rng: np.random.Generator) -> tuple[Array, Array]:
+def _draws(rest: Floats, rng: np.random.Generator) -> tuple[Floats, Floats]:
     """Make draws of plain noise from the rows themselves, the rows as they are first.
 
     Rows (n, 3) with signs drawn anew keep how large and how round the scatter of every
@@ -78,13 +78,13 @@ def _draws(rest: Array, rng: np.random.Generator) -> tuple[Array, Array]:
     return np.column_stack([first, flipped]), np.column_stack([first, dealt.T])
 
 
-def _standardised(values: Array) -> Array:
+def _standardised(values: Floats) -> Floats:
     """Give values the scale of their draws (all but the first)."""
     draws = values[1:]
     return np.asarray((values - draws.mean()) / max(float(draws.std()), 1e-300))
 
 
-def _tail(worst: Array, value: float) -> float:
+def _tail(worst: Floats, value: float) -> float:
     """Continue the draws by an exponential beyond their top fifth."""
     start = float(np.quantile(worst, 0.8))
     scale = float((worst[worst > start] - start).mean())
@@ -92,8 +92,8 @@ def _tail(worst: Array, value: float) -> float:
 
 
 def _maps(
-    projection: Projection, rows: Array, rng: np.random.Generator
-) -> list[tuple[str, Array]]:
+    projection: Projection, rows: Floats, rng: np.random.Generator
+) -> list[tuple[str, Floats]]:
     """Explain joint errors by random smooth functions of two angles."""
     at = projection.at
     q = at.states.q
@@ -117,7 +117,7 @@ def _maps(
     return out
 
 
-def _thinned(n: int, rng: np.random.Generator) -> Array:
+def _thinned(n: int, rng: np.random.Generator) -> Floats:
     """Mark the rows that the maps use, (n,)."""
     keep = np.ones(n)
     if n > MAPPED_ROWS:
@@ -125,7 +125,7 @@ def _thinned(n: int, rng: np.random.Generator) -> Array:
     return keep
 
 
-def _serial(projection: Projection, rows: Array) -> list[tuple[str, Array]]:
+def _serial(projection: Projection, rows: Floats) -> list[tuple[str, Floats]]:
     """Correlate rows with those that follow, in the base frame and in the tool's."""
     fit = projection.fit
     n, draws = len(fit.batch), rows.shape[1]
@@ -138,7 +138,7 @@ def _serial(projection: Projection, rows: Array) -> list[tuple[str, Array]]:
     return [("rows that follow each other err alike", np.asarray(along / total))]
 
 
-def _scatter(projection: Projection, rows: Array) -> list[tuple[str, Array]]:
+def _scatter(projection: Projection, rows: Floats) -> list[tuple[str, Floats]]:
     """Compare the scatter of every joint soon and late after a reversal."""
     fit = projection.fit
     travel = fit.batch.states.travel

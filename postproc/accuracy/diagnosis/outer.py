@@ -16,9 +16,9 @@ from postproc.accuracy.combination import Combination
 from postproc.accuracy.diagnosis.folds import deal
 from postproc.accuracy.diagnosis.search import Progress, Search
 from postproc.accuracy.diagnosis.withdrawal import investigate
-from postproc.accuracy.effect import Array
 from postproc.accuracy.fit import fit_effects
 from postproc.accuracy.fitted import Fit
+from postproc.arrays import Floats
 
 PARTS = 5
 RUN = 8  # consecutive rows that are held out together
@@ -37,12 +37,12 @@ class HeldOut:
 
     rows: NDArray[np.int64]
     fitted: int
-    before: Array
-    after: Array
+    before: Floats
+    after: Floats
 
 
 def hold_out(
-    found: Search, seed: int, progress: Progress, given: Array | None = None
+    found: Search, seed: int, progress: Progress, given: Floats | None = None
 ) -> HeldOut:
     """Repeat the search without each part of the rows.
 
@@ -85,9 +85,9 @@ def _fit_of(base: Fit, rows: NDArray[np.int64]) -> Fit:
     return fit_effects(batch, position, base.combination.effects, base.noise.origin)
 
 
-def left_by(fit: Fit, every: Fit, rows: NDArray[np.int64]) -> Array:
+def left_by(fit: Fit, every: Fit, rows: NDArray[np.int64]) -> Floats:
     """Return what a fit leaves of the errors of other rows, (m, 3) [m]."""
     batch = Batch(every.batch.arm, every.batch.states[rows])
     predicted = Combination(fit.combination.effects).error(batch, fit.values)
-    left: Array = every.error[rows] - predicted
+    left: Floats = every.error[rows] - predicted
     return left

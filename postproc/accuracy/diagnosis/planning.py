@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 from postproc.accuracy.batch import Batch
 from postproc.accuracy.diagnosis.extending import extend
 from postproc.accuracy.diagnosis.score import Score
-from postproc.accuracy.effect import Array
 from postproc.accuracy.fitted import Fit
+from postproc.arrays import Floats
 from postproc.robot.state import make_states
 
 TRIED = 400  # random poses
@@ -19,7 +19,7 @@ APART = 0.15  # of the joint ranges: poses that differ by less are one
 
 def poses_that_separate(
     fit: Fit, place: int, rival: Score, seed: int, wanted: int = WANTED
-) -> tuple[float, Array]:
+) -> tuple[float, Floats]:
     """Choose poses at which two explanations of the same rows differ most.
 
     Both are fitted to the rows there are. If the first is right, one more visit speaks
@@ -61,7 +61,7 @@ def poses_that_separate(
     return total, np.asarray(batch.states.q[chosen])
 
 
-def poses_that_sharpen(fit: Fit, seed: int) -> tuple[str, Array]:
+def poses_that_sharpen(fit: Fit, seed: int) -> tuple[str, Floats]:
     """Choose poses that lower the model's uncertainty most, one after the other.
 
     Each step takes the pose whose predicted error is known worst against the noise,
@@ -107,13 +107,13 @@ def _tries(fit: Fit, seed: int) -> Batch:
     return Batch(arm, states)
 
 
-def _uncertainty(fit: Fit, batch: Batch) -> tuple[Array, Array]:
+def _uncertainty(fit: Fit, batch: Batch) -> tuple[Floats, Floats]:
     """Return columns at other states, (n, 3, p), and the parameters' covariance."""
     at = fit.combination.at(batch, fit.values)
     return fit.combination.columns(at), np.array(fit.covariance)
 
 
-def _close(q: Array, chosen: list[int]) -> NDArray[np.bool_]:
+def _close(q: Floats, chosen: list[int]) -> NDArray[np.bool_]:
     """Mark the poses (n, 6) that are close to one already taken, (n,)."""
     unit = q / np.maximum(np.ptp(q, axis=0), 1e-9)
     gaps = np.abs(unit[:, None] - unit[None, chosen]).max(axis=2)

@@ -15,8 +15,8 @@ import numpy as np
 
 from postproc.accuracy.batch import Batch
 from postproc.accuracy.diagnosis.candidate import Candidate
-from postproc.accuracy.effect import Array
 from postproc.accuracy.fitted import Fit
+from postproc.arrays import Floats
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,9 +35,9 @@ class Projection:
     fit: Fit
     names: tuple[str, ...]
     at: Batch
-    basis: Array
-    shrink: Array
-    rest: Array
+    basis: Floats
+    shrink: Floats
+    rest: Floats
 
     @classmethod
     def of(cls, fit: Fit, without: int | None = None) -> Projection:
@@ -65,9 +65,9 @@ class Projection:
         """Number of scalar rows that count."""
         return 3 * int((self.fit.rows.weight > 0).sum())
 
-    def filter(self, whitened: Array) -> Array:
+    def filter(self, whitened: Floats) -> Floats:
         """Take the model out of whitened columns (3 n, k)."""
-        left: Array = whitened - self.basis @ (
+        left: Floats = whitened - self.basis @ (
             self.shrink[:, None] * (self.basis.T @ whitened)
         )
         return left
@@ -84,15 +84,15 @@ class Blocks:
     """
 
     candidates: tuple[Candidate, ...]
-    gain: Array
-    along: Array
+    gain: Floats
+    along: Floats
 
 
 def reduce_columns(
     projection: Projection,
     candidates: Sequence[Candidate],
-    columns: Array,
-    rows: Array,
+    columns: Floats,
+    rows: Floats,
 ) -> Blocks:
     """Reduce candidates of one width against rows.
 

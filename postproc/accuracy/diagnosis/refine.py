@@ -14,13 +14,14 @@ from postproc.accuracy.diagnosis.library import reduce_some
 from postproc.accuracy.diagnosis.named import LAST_FREE, LONGEST_WINDUP, STEPS
 from postproc.accuracy.diagnosis.projection import Projection
 from postproc.accuracy.diagnosis.score import Score, rank
-from postproc.accuracy.effect import Array, Effect
+from postproc.accuracy.effect import Effect
 from postproc.accuracy.joint_map import SPACING, JointMap
 from postproc.accuracy.load_backlash import LoadBacklash
 from postproc.accuracy.thermal import Thermal
 from postproc.accuracy.tool_shift import ToolShift
 from postproc.accuracy.transmission import Transmission
 from postproc.accuracy.windup import Windup
+from postproc.arrays import Floats
 
 HARDLY = 2.0  # nats
 OFFSETS = np.linspace(-1.0, 1.0, 9)
@@ -84,7 +85,7 @@ def _plainer(projection: Projection, score: Score) -> Score:
     return replace(found, evidence=score.evidence)
 
 
-def _waves(effect: Effect, offsets: Array, batch: Batch) -> list[Effect]:
+def _waves(effect: Effect, offsets: Floats, batch: Batch) -> list[Effect]:
     assert isinstance(effect, Transmission)
     ((joint, order),) = effect.waves
     if order <= 2:
@@ -94,7 +95,7 @@ def _waves(effect: Effect, offsets: Array, batch: Batch) -> list[Effect]:
     return [Transmission(((joint, float(k)),)) for k in tries]
 
 
-def _rows(effect: Effect, offsets: Array, batch: Batch) -> list[Effect]:
+def _rows(effect: Effect, offsets: Floats, batch: Batch) -> list[Effect]:
     assert isinstance(effect, BaseShift | ToolShift)
     order = np.sort(batch.states.order)
     half = max(len(order) / STEPS, 1.0)
@@ -103,20 +104,20 @@ def _rows(effect: Effect, offsets: Array, batch: Batch) -> list[Effect]:
     return [replace(effect, row=float(r)) for r in rows]
 
 
-def _way(effect: Effect, offsets: Array, batch: Batch) -> list[Effect]:
+def _way(effect: Effect, offsets: Floats, batch: Batch) -> list[Effect]:
     assert isinstance(effect, Windup)
     ways = np.unique(np.minimum(effect.d0 * 2.0**offsets, LONGEST_WINDUP))
     return [replace(effect, d0=float(way)) for way in ways]
 
 
-def _threshold(effect: Effect, offsets: Array, batch: Batch) -> list[Effect]:
+def _threshold(effect: Effect, offsets: Floats, batch: Batch) -> list[Effect]:
     assert isinstance(effect, LoadBacklash)
     if effect.form == "load":
         return []
     return [replace(effect, t0=float(effect.t0 * 3.0**x)) for x in offsets]
 
 
-def _time_constant(effect: Effect, offsets: Array, batch: Batch) -> list[Effect]:
+def _time_constant(effect: Effect, offsets: Floats, batch: Batch) -> list[Effect]:
     assert isinstance(effect, Thermal)
     if effect.form == "temperature":
         return []
@@ -124,7 +125,7 @@ def _time_constant(effect: Effect, offsets: Array, batch: Batch) -> list[Effect]
     return [replace(effect, time_constant=c) for c in each]
 
 
-def _spring(effect: Effect, offsets: Array, batch: Batch) -> list[Effect]:
+def _spring(effect: Effect, offsets: Floats, batch: Batch) -> list[Effect]:
     assert isinstance(effect, Counterbalance)
     turned = [replace(effect, upright=float(effect.upright + 0.1 * x)) for x in offsets]
     ratio = [replace(effect, ratio=float(effect.ratio * 1.5**x)) for x in offsets]
@@ -133,7 +134,7 @@ def _spring(effect: Effect, offsets: Array, batch: Batch) -> list[Effect]:
     return [*turned, *ratio, *loaded]
 
 
-def _bump(effect: Effect, offsets: Array, batch: Batch) -> list[Effect]:
+def _bump(effect: Effect, offsets: Floats, batch: Batch) -> list[Effect]:
     assert isinstance(effect, JointMap)
     if len(effect.bumps) > 1:
         return []
@@ -155,7 +156,7 @@ def _local_map(joint: int, centre: float, width: float, half: int) -> JointMap:
     return JointMap(bumps, float(reach / half / SPACING))
 
 
-VARIATIONS: dict[type[Effect], Callable[[Effect, Array, Batch], list[Effect]]] = {
+VARIATIONS: dict[type[Effect], Callable[[Effect, Floats, Batch], list[Effect]]] = {
     Transmission: _waves,
     BaseShift: _rows,
     ToolShift: _rows,

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from postproc.accuracy.batch import Batch
 from postproc.accuracy.diagnosis.revision import few, only_arm, revise
-from postproc.accuracy.effect import Array
 from postproc.accuracy.fit import fit_effects
 from postproc.accuracy.fitted import Fit
 from postproc.accuracy.library import propose
 from postproc.accuracy.measurement import Measurements
 from postproc.accuracy.model import Model
+from postproc.arrays import Floats
 from postproc.exceptions import PostprocError
 from postproc.robot.arm import Arm
 
@@ -20,7 +20,7 @@ def refit(
     survey: Measurements,
     arm: Arm,
     model: Model,
-    tracker: Array | None,
+    tracker: Floats | None,
     setup: tuple[str, ...] = (),
 ) -> Fit:
     """Fit the given model's effects to the rows, or revise it where they are few.

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 from postproc.accuracy.diagnosis.omnibus import Leftover
-from postproc.accuracy.effect import Array
 from postproc.accuracy.error_statistics import ErrorStatistics
 from postproc.accuracy.measurement import DroppedRow
+from postproc.arrays import Floats
 
 Verdict = Literal["effect", "noise", "unexplained"]
 
@@ -110,7 +110,7 @@ class Diagnosis:
     findings: tuple[Finding, ...]
     leftovers: tuple[Leftover, ...]
     places: tuple[Place, ...]
-    next_measurements: Array
+    next_measurements: Floats
     why_next: str
     dropped: tuple[DroppedRow, ...]
 

@@ -14,11 +14,12 @@ import numpy as np
 
 from postproc.accuracy.batch import Batch
 from postproc.accuracy.combination import Combination
-from postproc.accuracy.effect import Array, Effect, Parameter
+from postproc.accuracy.effect import Effect, Parameter
 from postproc.accuracy.fit import fit_effects
 from postproc.accuracy.fitted import Fit
 from postproc.accuracy.measurement import Measurements
 from postproc.accuracy.model import Model
+from postproc.arrays import Floats
 
 ROWS_PER_PARAMETER = 2  # rows from which a model is refitted rather than revised
 NOTHING = 1e-6  # share of the largest variance below which a direction is known
@@ -36,7 +37,7 @@ class Revision(Effect):
     name: ClassVar[str] = "revision"
 
     model: Model
-    factor: Array
+    factor: Floats
 
     @classmethod
     def of(cls, model: Model) -> Revision:
@@ -51,11 +52,11 @@ class Revision(Effect):
             Parameter(f"eta{k}", "1", 1.0, "model") for k in range(self.factor.shape[1])
         )
 
-    def columns(self, batch: Batch) -> Array:
+    def columns(self, batch: Batch) -> Floats:
         """Differentiate the TCP position, (n, 3, r)."""
         effects = self.model.effects
         at = effects.at(batch, self.model.values)
-        columns: Array = effects.columns(at) @ self.factor
+        columns: Floats = effects.columns(at) @ self.factor
         return columns
 
     def settings(self) -> dict[str, Any]:

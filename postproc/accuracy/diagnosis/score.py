@@ -20,14 +20,14 @@ from scipy.stats import f as fisher
 
 from postproc.accuracy.diagnosis.candidate import Candidate, Family
 from postproc.accuracy.diagnosis.projection import Blocks
-from postproc.accuracy.effect import Array
+from postproc.arrays import Floats
 
 SIGNALS = np.exp(np.linspace(-1.0, 14.0, 31))  # s^2 g that are tried
 SMALL = 1e-9  # Gram eigenvalues below this share of the largest are no direction
 NOTHING_LEFT = 1e-2  # Gram of a block that the model takes up altogether
 
 
-def log_evidence(blocks: Blocks, square: Array, rows: int) -> Array:
+def log_evidence(blocks: Blocks, square: Floats, rows: int) -> Floats:
     """Compute the evidence of every block against every draw, (c, draws) [nats].
 
     Args:
@@ -49,7 +49,7 @@ def log_evidence(blocks: Blocks, square: Array, rows: int) -> Array:
     return best
 
 
-def explained(blocks: Blocks) -> tuple[Array, Array]:
+def explained(blocks: Blocks) -> tuple[Floats, Floats]:
     """Return the squares that blocks explain by least squares, and their ranks.
 
     Returns:
@@ -61,7 +61,7 @@ def explained(blocks: Blocks) -> tuple[Array, Array]:
     return np.einsum("ck,ckd->cd", inverse, blocks.along**2), kept.sum(axis=1)
 
 
-def score_p_value(blocks: Blocks, square: float, rows: int) -> Array:
+def score_p_value(blocks: Blocks, square: float, rows: int) -> Floats:
     """Compute the score (F) test of every block against the first draw, (c,)."""
     squares, rank = explained(blocks)
     top = squares[:, 0] / np.maximum(rank, 1)
@@ -122,9 +122,9 @@ def rank(
     return sorted(out, key=lambda s: -s.evidence)
 
 
-def family_maxima(reduced: tuple[Blocks, ...], square: Array, rows: int) -> Array:
+def family_maxima(reduced: tuple[Blocks, ...], square: Floats, rows: int) -> Floats:
     """Return the largest evidence of any family, for every draw, (draws,)."""
-    total: dict[Family, Array] = {}
+    total: dict[Family, Floats] = {}
     for blocks in reduced:
         each = log_evidence(blocks, square, rows)
         for candidate, e in zip(blocks.candidates, each, strict=True):

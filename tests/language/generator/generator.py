@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
+from tests.language.executed import Generated
 from tests.language.generator.assignments import Assignments
 from tests.language.generator.blocks import Blocks
 from tests.language.generator.motions import Motions
 from tests.language.generator.writer import COUNTS, JOINTS, POINTS, TABLE
-from tests.language.interpreter import Generated
 
 ROUTINES = ("r1", "r2")
 

@@ -1,9 +1,20 @@
-"""Work on long arrays in pieces: what a piece needs stays in the cache."""
+"""Arrays by their type, and work on long ones: in chunks, in spans."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from typing import Protocol, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Bools = NDArray[np.bool_]
+Signs = NDArray[np.int8]  # -1, 0, +1
+Bytes = NDArray[np.uint8]
+
+# Work on long arrays in pieces: what a piece needs stays in the cache.
 
 K = TypeVar("K")
 T = TypeVar("T")
@@ -29,3 +40,16 @@ def in_pieces(work: Callable[[slice], T], n: int, size: int = PIECE) -> list[T]:
 def pieces(n: int, size: int = PIECE) -> Iterator[slice]:
     """Cut n rows into slices."""
     return (slice(a, min(a + size, n)) for a in range(0, n, size))
+
+
+# Many short stretches of a long array, as one list of places.
+
+
+def spans(begin: Ints, count: Ints) -> Ints:
+    """List begin, begin + 1, .., begin + count - 1 of every span.
+
+    >>> spans(np.array([3, 10]), np.array([2, 3])).tolist()
+    [3, 4, 10, 11, 12]
+    """
+    offset = np.cumsum(count) - count
+    return np.repeat(begin - offset, count) + np.arange(int(count.sum()))
