@@ -13,8 +13,8 @@ from postproc.arrays import Bools, Floats, Ints
 from postproc.motion.planner import Plan
 from postproc.motion.rounds import NEAR, rounds
 from postproc.motion.targets import Targets
-from postproc.pose import MM
 from postproc.reasons import Reasons
+from postproc.robot.pose import MM
 
 CURE = "move VIA, or use LINEAR"
 LINE = f"the three points of the arc that begins here lie on one line: {CURE}"

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from postproc.arrays import Floats, Ints, Signs
 from postproc.exceptions import ProgramError
 from postproc.language.visits import Visits
-from postproc.pose import MM
 from postproc.report import Decisions, Status
+from postproc.robot.pose import MM
 from postproc.sidecar import file_sha256, read_without_edits, sidecar_path
 
 DIGIT = "0123456789"  # status of a visit

@@ -23,9 +23,9 @@ from postproc.accuracy.registration import Registration, register
 from postproc.accuracy.schema import Method
 from postproc.accuracy.tool_groups import find_groups
 from postproc.accuracy.tool_shift import ToolShift
-from postproc.pose import MM
 from postproc.robot.arm import Arm
 from postproc.robot.cell import Cell
+from postproc.robot.pose import MM
 
 Frame = Literal["base", "tracker"]
 

@@ -32,8 +32,8 @@ from postproc.calibrate import (
 from postproc.console import Column, table_text
 from postproc.files import write_all
 from postproc.joining import join_program
-from postproc.pose import MM
 from postproc.robot.cell import Cell, load_cell
+from postproc.robot.pose import MM
 from postproc.robot.state import States
 
 COLUMNS = (

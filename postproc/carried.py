@@ -17,9 +17,9 @@ from postproc.language.visits import Visits
 from postproc.motion.again import IS_STEP
 from postproc.motion.targets import Kind
 from postproc.planning import Planned
-from postproc.pose import MM
 from postproc.resolve import moved_targets
 from postproc.robot.cell import Cell
+from postproc.robot.pose import MM
 
 
 def strayed_along(

@@ -22,8 +22,8 @@ from postproc.arrays import Floats
 from postproc.calibrate import read_surveys, several_points
 from postproc.console import Column, table_text
 from postproc.joining import join_program
-from postproc.pose import inverse
 from postproc.robot.cell import Cell, load_cell
+from postproc.robot.pose import inverse
 
 HISTORY = (
     Column("model", "left"),

@@ -18,10 +18,10 @@ from postproc.language.visits import ELSEWHERE, START, Visits
 from postproc.listing import arrows, print_listing, status_colour
 from postproc.options import Options
 from postproc.planning import Planned, plan_visits, read_program, with_measured_play
-from postproc.pose import MM
 from postproc.report import Outcome, Status
 from postproc.report_json import target_row
 from postproc.robot.cell import Cell, load_cell
+from postproc.robot.pose import MM
 
 STATUS = "status, why"
 FEW = 3  # places of origin that a row names

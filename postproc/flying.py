@@ -8,7 +8,7 @@ from postproc.arrays import Floats, Ints
 from postproc.language.diagnostic import Diagnostic
 from postproc.language.visits import FlyTrajectory, FlyType, Motion, Visits
 from postproc.motion.targets import Fly
-from postproc.pose import MM
+from postproc.robot.pose import MM
 
 USUAL_DISTANCE = 5.0  # [mm] where $FLY_DIST is not set, as simulation systems take it
 USUAL_OVERLAP = 100.0  # [%] where $FLY_PER is not set

@@ -12,8 +12,8 @@ from postproc.accuracy.reading import DETECT, Reading
 from postproc.exceptions import MeasurementError
 from postproc.jobs import read_files
 from postproc.planning import plan_visits, read_program, states_of
-from postproc.pose import MM
 from postproc.robot.cell import Cell
+from postproc.robot.pose import MM
 
 
 def join_program(

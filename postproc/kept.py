@@ -12,9 +12,9 @@ from postproc.arrays import Bools, Floats, Ints
 from postproc.language.edits import Replacements
 from postproc.language.visits import Visits
 from postproc.planning import Planned
-from postproc.pose import MM
 from postproc.report import Decisions
 from postproc.robot.cell import Cell
+from postproc.robot.pose import MM
 from postproc.robot.state import States
 from postproc.settling import Corrected
 from postproc.strings import overruled

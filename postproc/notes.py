@@ -7,9 +7,9 @@ import numpy as np
 from postproc.arrays import Bools, Floats, in_pieces
 from postproc.language.diagnostic import Diagnostic
 from postproc.language.visits import NO_VALUE, Target, Visits
-from postproc.pose import MM
 from postproc.robot.arm import Arm
 from postproc.robot.cell import Cell
+from postproc.robot.pose import MM
 
 SURE = 0.9  # part of its play from its middle at which a joint rests on a flank
 LISTED = 0.01  # [mm] and [deg], the last decimal of the controller's own listing

@@ -15,7 +15,7 @@ from postproc.accuracy.diagnosis.locate import Profile, periodogram, profile
 from postproc.accuracy.diagnosis.projection import Projection
 from postproc.arrays import Floats
 from postproc.exceptions import OutputError
-from postproc.pose import MM
+from postproc.robot.pose import MM
 
 BEFORE, AFTER = "#d55e00", "#0072b2"  # told apart by all kinds of colour vision
 SPAN = "#767676"

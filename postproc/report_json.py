@@ -23,8 +23,8 @@ from postproc.byte_columns import (
     whole,
 )
 from postproc.language.visits import Motion
-from postproc.pose import MM
 from postproc.report import Outcome, Status
+from postproc.robot.pose import MM
 
 AT_ONCE = 5_000  # visits
 

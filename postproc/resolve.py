@@ -16,7 +16,9 @@ from postproc.flying import rounding_of
 from postproc.language.visits import Target, Visits
 from postproc.motion.rounds import from_every_start
 from postproc.motion.targets import Kind, Targets
-from postproc.pose import (
+from postproc.reasons import Reasons
+from postproc.robot.cell import Cell
+from postproc.robot.pose import (
     MM,
     inverse,
     is_unknown,
@@ -25,8 +27,6 @@ from postproc.pose import (
     rotation_from_vector,
     times,
 )
-from postproc.reasons import Reasons
-from postproc.robot.cell import Cell
 
 FLAG = re.compile(r"([SEW])|T([123])\s*:\s*([+-]?\d+)", re.IGNORECASE)
 JOINTS = (Target.JOINTS, Target.HOME, Target.CALIBRATION)

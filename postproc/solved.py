@@ -16,8 +16,8 @@ from postproc.accuracy.orientation import (
 from postproc.accuracy.solve import solve
 from postproc.arrays import Bools, Floats, Ints
 from postproc.planning import Planned
-from postproc.pose import has_unknown, is_unknown, rotation_vector
 from postproc.robot.cell import Cell
+from postproc.robot.pose import has_unknown, is_unknown, rotation_vector
 from postproc.robot.state import States
 
 

@@ -10,8 +10,8 @@ from postproc.accuracy.survey import design_survey
 from postproc.arrays import Floats, Ints
 from postproc.exceptions import PostprocError
 from postproc.files import write_all
-from postproc.pose import MM
 from postproc.robot.cell import Cell, load_cell
+from postproc.robot.pose import MM
 
 BACK = np.deg2rad(2.0)  # how far to the side every approach starts [rad]
 SETTLE_MS = 1500  # pause before the tracker reads

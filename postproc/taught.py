@@ -15,8 +15,8 @@ from postproc.arrays import Floats
 from postproc.exceptions import CellError
 from postproc.language.visits import Target, Visits
 from postproc.planning import Planned
-from postproc.pose import MM, inverse, pose_from_record
 from postproc.robot.cell import Cell
+from postproc.robot.pose import MM, inverse, pose_from_record
 from postproc.robot.state import make_states
 
 APART_MM, APART_DEG = 1.0, 0.1  # a frame of three points may differ by rounding only

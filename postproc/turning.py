@@ -21,8 +21,8 @@ from postproc.arrays import Bools, Floats, Ints
 from postproc.language.visits import OrntType, Visits
 from postproc.motion.planner import Plan
 from postproc.motion.targets import Move, Targets
-from postproc.pose import inverse, pose_from_record, rotation_vector
 from postproc.reasons import Reasons
+from postproc.robot.pose import inverse, pose_from_record, rotation_vector
 
 PLAY = np.deg2rad(0.01)  # [rad] what a joint may be off without another side
 LEAST = 3e-4  # sine below which e is 0 or 180 deg

@@ -7,7 +7,8 @@ import numpy as np
 from postproc.arrays import Floats, Ints
 from postproc.language.visits import Target, Visits
 from postproc.motion.planner import Plan
-from postproc.pose import (
+from postproc.resolve import few_frames
+from postproc.robot.pose import (
     MM,
     angles_near,
     inverse,
@@ -15,7 +16,6 @@ from postproc.pose import (
     rotation_from_vector,
     rotation_from_zyz,
 )
-from postproc.resolve import few_frames
 from postproc.solved import Solved
 
 

@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from postproc.pose import pose_from_record
+from postproc.robot.pose import pose_from_record
 from tests.written import cli
 
 CELL = """

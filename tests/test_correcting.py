@@ -21,8 +21,8 @@ from postproc.compensate import compensate
 from postproc.language import windows as cuts
 from postproc.language.windows import windows
 from postproc.planning import read_program
-from postproc.pose import MM
 from postproc.report import Outcome, Status
+from postproc.robot.pose import MM
 from tests.bench import made
 
 LEAST = 60

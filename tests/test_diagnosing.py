@@ -24,8 +24,8 @@ from postproc.diagnosing import (
 )
 from postproc.exceptions import OutputError
 from postproc.plots import plot_diagnosis
-from postproc.pose import pose_from_record
 from postproc.robot.cell import load_cell
+from postproc.robot.pose import pose_from_record
 from tests.accuracy.planted import campaign
 
 CELL = """

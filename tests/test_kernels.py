@@ -10,7 +10,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from postproc import kernels, pose
+from postproc import kernels
 from postproc.accuracy.backlash import Backlash
 from postproc.accuracy.backlash_profile import BacklashProfile
 from postproc.accuracy.batch import Batch
@@ -21,13 +21,11 @@ from postproc.accuracy.variance import parameter_variance
 from postproc.compensate import compensate
 from postproc.motion import corner, paths, rounding, sampling, zone
 from postproc.motion.pull import Pull
-from postproc.pose import rotation_from_vector
-from postproc.robot import direction, walks
-from postproc.robot.chains import Edges, chained
-from postproc.robot.closed_form import ClosedForm
-from postproc.robot.dh import DH
-from postproc.robot.past import NOTHING
-from postproc.robot.play import Clamps, passing, prefix
+from postproc.robot import direction, play, pose
+from postproc.robot.arm import DH
+from postproc.robot.inverse import ClosedForm
+from postproc.robot.play import NOTHING, Clamps, Edges, chained, passing, prefix
+from postproc.robot.pose import rotation_from_vector
 from postproc.robot.state import make_states
 
 ROOT = Path(__file__).parent.parent
@@ -169,7 +167,7 @@ def test_walks_with_turning_values(random, by_numpy):
     uneven = np.flatnonzero(random.random(len(values)) < 0.1)
     edges = Edges(np.empty(0), source, values, start, uneven)
     given = random.normal(size=(20, 6)), source, values, edges
-    found, meant = walks._refined(*given), by_numpy(walks._refined, *given)
+    found, meant = play._refined(*given), by_numpy(play._refined, *given)
     assert np.array_equal(found.start, meant.start)
     assert len(found.values) > len(values)  # some joint did turn
     assert np.allclose(found.values, meant.values, **CLOSE)

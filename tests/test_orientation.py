@@ -14,8 +14,8 @@ from postproc.exceptions import ModelError
 from postproc.language.visits import Visits
 from postproc.options import Options
 from postproc.planning import read_program
-from postproc.pose import MM, angles_near, rotation_from_zyz, rotation_vector
 from postproc.report import Status
+from postproc.robot.pose import MM, angles_near, rotation_from_zyz, rotation_vector
 from postproc.robot.state import make_states
 from postproc.simulate import setup_of
 from postproc.virtual import run_program, virtual_arm

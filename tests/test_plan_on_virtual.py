@@ -10,9 +10,9 @@ import pytest
 
 from postproc.language.visits import Motion, Target, Visits
 from postproc.motion.planner import plan
-from postproc.pose import pose_from_record, record_from_pose
 from postproc.resolve import targets_from_visits
 from postproc.robot.cell import Cell, load_cell
+from postproc.robot.pose import pose_from_record, record_from_pose
 from postproc.virtual.drawing import virtual_arm
 from postproc.virtual.program import run_program
 from postproc.virtual.setup import Setup

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from postproc.pose import (
+from postproc.robot.pose import (
     cross,
     has_unknown,
     inverse,

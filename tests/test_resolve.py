@@ -9,9 +9,9 @@ from scipy.spatial.transform import Rotation
 
 from postproc.language.visits import Target
 from postproc.motion.targets import Kind
-from postproc.pose import inverse, pose_from_record
 from postproc.resolve import configurations, targets_from_visits
 from postproc.robot.cell import Cell, load_cell
+from postproc.robot.pose import inverse, pose_from_record
 from tests.made_visits import FRAMES, visits
 
 

@@ -8,9 +8,9 @@ import pytest
 from postproc.compensate import compensate
 from postproc.exceptions import CellError
 from postproc.planning import read_program
-from postproc.pose import pose_from_record, record_from_pose
 from postproc.report import Status
 from postproc.robot.cell import load_cell
+from postproc.robot.pose import pose_from_record, record_from_pose
 from postproc.simulate import setup_of
 from postproc.taught import frame_of_points
 from postproc.virtual import land, make_arrivals, virtual_arm

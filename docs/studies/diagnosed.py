@@ -21,8 +21,8 @@ from postproc.accuracy.library import BASE_EFFECTS
 from postproc.accuracy.measurement import Measurements, read_measurements
 from postproc.accuracy.model import Model
 from postproc.calibrate import into_base_frame
-from postproc.pose import MM
 from postproc.robot.arm import Arm, load_arm
+from postproc.robot.pose import MM
 
 OUT = Path(__file__).parents[1] / "blind.md"
 UR10_BASE = ("geometry", "backlash")

@@ -12,8 +12,7 @@ from postproc.accuracy.chain import NOMINAL, Deviation, walk
 from postproc.accuracy.comparison import MethodRow, compare_on
 from postproc.accuracy.hidden_layer import HiddenLayer
 from postproc.accuracy.measurement import Measurements
-from postproc.robot.arm import load_arm
-from postproc.robot.dh import DH
+from postproc.robot.arm import DH, load_arm
 from postproc.robot.state import make_states
 from postproc.virtual import sample_survey, stream, virtual_arm
 

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from postproc.accuracy.chain import NOMINAL, Deviation, Walk, tcp, walk
 from postproc.arrays import Floats
-from postproc.pose import cross
 from postproc.robot.arm import Arm
+from postproc.robot.pose import cross
 from postproc.robot.state import States
 
 T = TypeVar("T")

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from postproc.arrays import Floats
-from postproc.robot.dh import DH
+from postproc.robot.arm import DH
 
 
 @dataclass(frozen=True)

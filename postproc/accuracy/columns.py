@@ -11,9 +11,9 @@ from scipy.spatial.transform import Rotation
 from postproc.accuracy.table import Table
 from postproc.arrays import Bools, Floats
 from postproc.exceptions import MeasurementError
-from postproc.pose import MM
 from postproc.robot.arm import Arm
 from postproc.robot.direction import arrivals_of_rows
+from postproc.robot.pose import MM
 
 SIDES = tuple(f"lambda{j}" for j in range(1, 7))
 TRAVELS = tuple(f"travel{j}_deg" for j in range(1, 7))

@@ -14,7 +14,7 @@ from postproc.accuracy.chain import NOMINAL, Deviation
 from postproc.accuracy.effect import Effect, JointEffect, Parameter
 from postproc.accuracy.geometry import Geometry
 from postproc.arrays import Floats
-from postproc.pose import rotation_vector
+from postproc.robot.pose import rotation_vector
 
 
 @dataclass(frozen=True)

@@ -13,8 +13,8 @@ from postproc.accuracy.measurement import Measurements
 from postproc.accuracy.methods import fit_method
 from postproc.accuracy.schema import Method
 from postproc.arrays import Floats
-from postproc.pose import MM
 from postproc.robot.arm import Arm
+from postproc.robot.pose import MM
 
 Rows = NDArray[np.int64]
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from postproc.arrays import Floats
-from postproc.pose import MM
+from postproc.robot.pose import MM
 
 
 @dataclass(frozen=True)

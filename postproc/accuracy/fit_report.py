@@ -14,8 +14,8 @@ from postproc.accuracy.measurement import DroppedRow, Measurements
 from postproc.accuracy.model import Model
 from postproc.accuracy.observability import Unseen, observe
 from postproc.arrays import Floats
-from postproc.pose import MM
 from postproc.robot.arm import Arm
+from postproc.robot.pose import MM
 
 CORRELATED = 0.9
 SHOWN_UNITS = {"m": ("mm", 1e3), "rad": ("mrad", 1e3), "rad/(N m)": ("urad/(N m)", 1e6)}

@@ -17,8 +17,8 @@ from postproc.accuracy.ranges import Ranges
 from postproc.accuracy.selection import fit_best
 from postproc.accuracy.turns import Turns
 from postproc.arrays import Floats
-from postproc.pose import MM
 from postproc.robot.arm import Arm
+from postproc.robot.pose import MM
 
 
 def fit_survey(

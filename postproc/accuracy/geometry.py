@@ -11,8 +11,8 @@ from postproc.accuracy.batch import Batch
 from postproc.accuracy.chain import Deviation
 from postproc.accuracy.effect import Effect, Parameter
 from postproc.arrays import Floats
-from postproc.pose import cross
 from postproc.robot.arm import Arm
+from postproc.robot.pose import cross
 from postproc.robot.state import States
 
 AXES = ("x", "y", "z")

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from postproc.arrays import Floats, Ints
-from postproc.pose import MM, has_unknown, lengths
 from postproc.reasons import Reasons
 from postproc.robot.arm import Arm
 from postproc.robot.cell import LimitSection
+from postproc.robot.pose import MM, has_unknown, lengths
 
 TURNED = 0.5  # change of a side by which a joint has turned
 SOLVED = 1e-6  # [m] model against wanted pose

@@ -21,8 +21,8 @@ from postproc.accuracy.reading import DETECT, Reading
 from postproc.accuracy.table import Table
 from postproc.arrays import Bools, Floats
 from postproc.exceptions import MeasurementError
-from postproc.pose import MM
 from postproc.robot.arm import Arm
+from postproc.robot.pose import MM
 from postproc.robot.state import States, make_states
 
 POSITION = ("x_mm", "y_mm", "z_mm")

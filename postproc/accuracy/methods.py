@@ -25,8 +25,8 @@ from postproc.accuracy.noise import Noise
 from postproc.accuracy.ranges import Ranges
 from postproc.accuracy.schema import Method
 from postproc.arrays import Floats
-from postproc.pose import MM
 from postproc.robot.arm import Arm
+from postproc.robot.pose import MM
 
 Trained = tuple[tuple[Effect, ...], Floats]
 Trainer = Callable[[Batch, Floats, int], Trained]

@@ -28,8 +28,8 @@ from postproc.accuracy.variance import parameter_variance, side_variance
 from postproc.arrays import Bools, Floats, in_pieces, pieces
 from postproc.exceptions import ModelError
 from postproc.files import write_all
-from postproc.pose import MM
 from postproc.robot.arm import Arm
+from postproc.robot.pose import MM
 from postproc.robot.state import States
 
 CHUNK = 5000  # states evaluated together: the columns stay in the cache

@@ -11,8 +11,8 @@ from postproc.accuracy.mistakes import CLOSE, likely_cure
 from postproc.accuracy.observability import observe
 from postproc.accuracy.tool_groups import find_groups
 from postproc.exceptions import MeasurementError
-from postproc.pose import MM
 from postproc.robot.arm import Arm
+from postproc.robot.pose import MM
 from postproc.robot.state import States, make_states
 
 FAR = 0.05  # [m] no arm that works is off by more

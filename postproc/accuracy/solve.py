@@ -10,8 +10,14 @@ from numpy.typing import NDArray
 from postproc.accuracy.model import Model
 from postproc.accuracy.orientation import turn
 from postproc.arrays import Floats
-from postproc.pose import inverse, lengths, rotation_from_vector, rotation_vector, times
 from postproc.robot.arm import Arm
+from postproc.robot.pose import (
+    inverse,
+    lengths,
+    rotation_from_vector,
+    rotation_vector,
+    times,
+)
 from postproc.robot.state import States
 
 CLOSE = 2e-7  # [m] where iterating stops

@@ -13,7 +13,7 @@ import numpy as np
 from scipy.cluster.vq import kmeans2
 
 from postproc.arrays import Floats, Ints
-from postproc.pose import MM
+from postproc.robot.pose import MM
 
 APART = 4.0  # distance of heaps over the typical distance within one; noise has 1.3
 FEWEST = 0.05  # share of the rows that a heap must have

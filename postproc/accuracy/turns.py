@@ -18,7 +18,7 @@ from postproc.accuracy.combination import Combination
 from postproc.accuracy.evidence import Normal
 from postproc.accuracy.outliers import DROPPED, limit_of, student_weights
 from postproc.arrays import Floats
-from postproc.pose import rotation_vector
+from postproc.robot.pose import rotation_vector
 
 TYPICAL = 1e-3  # [rad] scatter to begin with: that of an arm not yet calibrated
 SMALLEST = 1e-7  # [rad]

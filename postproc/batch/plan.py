@@ -10,7 +10,7 @@ from pathlib import Path
 from postproc.batch.setup import Setup, open_setup
 from postproc.exceptions import CellError, PostprocError
 from postproc.options import Options
-from postproc.robot.schema import Strict, read_toml
+from postproc.robot.arm_file import Strict, read_toml
 
 
 class RuleSection(Strict):

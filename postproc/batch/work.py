@@ -13,8 +13,8 @@ from postproc import __version__
 from postproc.batch.setup import Setup
 from postproc.batch.task import Result, Task, Unit, failed
 from postproc.exceptions import PostprocError
-from postproc.pose import MM
 from postproc.report import Outcome
+from postproc.robot.pose import MM
 from postproc.sidecar import SUFFIX
 from postproc.together import Given, compensate_together
 

@@ -10,8 +10,8 @@ import numpy as np
 
 from postproc.arrays import Floats, Ints
 from postproc.language.visits import Motion
-from postproc.pose import MM
 from postproc.report import Outcome
+from postproc.robot.pose import MM
 
 MOVES = (*(m.name for m in Motion), "VIA")
 VIA = len(Motion)

@@ -13,8 +13,8 @@ from postproc.accuracy.measurement import Measurements
 from postproc.accuracy.model import Model
 from postproc.arrays import Floats
 from postproc.html.summary import finite
-from postproc.pose import MM
 from postproc.robot.arm import Arm
+from postproc.robot.pose import MM
 
 
 def fit_evidence(

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from postproc.pose import inverse, pose_from_record, record_from_pose
+from postproc.robot.pose import inverse, pose_from_record, record_from_pose
 
 Numbers = tuple[float | None, ...]
 

@@ -12,7 +12,7 @@ from functools import cached_property
 import numpy as np
 
 from postproc.arrays import Bools, Floats, Ints
-from postproc.pose import rotation_from_vector, rotation_vector
+from postproc.robot.pose import rotation_from_vector, rotation_vector
 
 STEP = 5e-3  # [m] between samples
 TURN = np.deg2rad(1.0)  # [rad] between samples

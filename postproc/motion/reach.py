@@ -13,7 +13,7 @@ from postproc.motion.targets import Targets
 from postproc.motion.trace import Trace, trace
 from postproc.robot.arm import Arm
 from postproc.robot.direction import Passages, Sides, passages, sides
-from postproc.robot.past import NOTHING, Past
+from postproc.robot.play import NOTHING, Past
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ from postproc.motion.pull import Pull
 from postproc.motion.targets import Targets
 from postproc.motion.trace import Trace
 from postproc.robot.arm import Arm
-from postproc.robot.chains import Edges
+from postproc.robot.play import Edges
 
 SAMPLES = 4  # on each side of the nearest point of a corner that is not flat
 ONE_SAMPLE = [[0], [0], [1]]  # of the three pieces: where the next corner is passed

@@ -13,7 +13,7 @@ import numpy as np
 from postproc.arrays import Bools, Floats, Ints
 from postproc.motion.path import Segments, arcs
 from postproc.motion.targets import Move, Targets
-from postproc.pose import inverse
+from postproc.robot.pose import inverse
 
 NEAR = 1e-4  # [m] points nearer than this do not tell where their circle goes
 BETWEEN = (0.25, 0.5, 0.75)  # fractions of both parts of an arc that are looked at

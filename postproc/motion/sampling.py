@@ -10,7 +10,7 @@ from postproc.arrays import Bools, Floats, Ints
 from postproc.kernels import native
 from postproc.motion.path import Segments, arcs, joined, lines
 from postproc.motion.targets import Move, Targets
-from postproc.pose import inverse
+from postproc.robot.pose import inverse
 
 LEAST = 4  # intervals of a path between stops, however short
 BLIND = 32  # intervals of a path whose length is not known beforehand

@@ -8,7 +8,7 @@ import numpy as np
 
 from postproc.arrays import Floats, Ints
 from postproc.motion.workspace import Known
-from postproc.robot.past import NOTHING, Past
+from postproc.robot.play import NOTHING, Past
 
 
 @dataclass(frozen=True)

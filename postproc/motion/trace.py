@@ -25,9 +25,9 @@ from postproc.motion.reasons import (
 )
 from postproc.motion.targets import Kind, Move, Targets
 from postproc.motion.workspace import Known, Workspace
-from postproc.pose import is_unknown
 from postproc.robot.arm import Arm
-from postproc.robot.chains import Edges
+from postproc.robot.play import Edges
+from postproc.robot.pose import is_unknown
 
 AGREE = 1e-6  # [rad] several predecessors lead to the same joint angles
 SLACK = 1e-9  # [rad] rounding at a joint limit

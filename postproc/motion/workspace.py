@@ -10,8 +10,8 @@ from postproc.arrays import Bools, Floats, Ints, pieces
 from postproc.motion.sampling import sample
 from postproc.motion.targets import Kind, Move, Targets
 from postproc.motion.ways import OnDemand, Solved, Ways
-from postproc.pose import inverse, is_unknown
 from postproc.robot.arm import Arm
+from postproc.robot.pose import inverse, is_unknown
 
 STRAIGHT = 1e-3  # [rad] at axis 5, below this the two wrist branches are one
 CHUNK = 50_000  # poses solved at a time; solving needs room for copies

@@ -12,9 +12,9 @@ from pydantic import Field, NonNegativeFloat, PositiveFloat, model_validator
 
 from postproc.arrays import Floats
 from postproc.exceptions import CellError
-from postproc.pose import MM, pose_from_record, rotation_from_zyz
 from postproc.robot.arm import Arm, load_arm
-from postproc.robot.schema import Sextuple, Strict, Triple, read_toml
+from postproc.robot.arm_file import Sextuple, Strict, Triple, read_toml
+from postproc.robot.pose import MM, pose_from_record, rotation_from_zyz
 
 Source = Literal["cad", "tracker", "taught"]
 Effect = Literal["still", "moves", "sets-frames"]

@@ -19,11 +19,19 @@ import numpy as np
 from postproc.arrays import Floats, Ints
 from postproc.kernels import native
 from postproc.robot.arm import Arm
-from postproc.robot.chains import Chains, Edges, chained
-from postproc.robot.past import NOTHING, Past
-from postproc.robot.play import Clamps, identity, passing, prefix
-from postproc.robot.travel import last_reversals
-from postproc.robot.walks import walks
+from postproc.robot.play import (
+    NOTHING,
+    Chains,
+    Clamps,
+    Edges,
+    Past,
+    chained,
+    identity,
+    last_reversals,
+    passing,
+    prefix,
+    walks,
+)
 
 WIDTH_IN_PLAYS = 4.0
 LAST = np.array([-1])  # copied, so that the others need not be kept

@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from postproc.planning import read_program
-from postproc.pose import MM
 from postproc.report import Outcome
 from postproc.robot.cell import Cell
+from postproc.robot.pose import MM
 from postproc.simulate import setup_of
 from postproc.virtual import virtual_arm
 from postproc.virtual.program import Run, run_program

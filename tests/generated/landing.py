@@ -11,9 +11,9 @@ from postproc.accuracy.model import Model
 from postproc.compensate import compensate
 from postproc.notes import SURE
 from postproc.options import Options
-from postproc.pose import MM
 from postproc.report import Outcome, Status
 from postproc.robot.cell import Cell
+from postproc.robot.pose import MM
 from tests.fuzz.case import check_bytes, records_of
 from tests.generated.execution import Ran, executed
 from tests.generated.found import ALONG, CLONED, FIRST, KNOWN, ROUNDED, UNSURE, Found

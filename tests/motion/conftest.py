@@ -3,8 +3,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from postproc.pose import pose_from_record
 from postproc.robot.arm import Arm, load_arm
+from postproc.robot.pose import pose_from_record
 
 
 @pytest.fixture(scope="session")

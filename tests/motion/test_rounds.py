@@ -8,7 +8,7 @@ import pytest
 from postproc.motion.path import arcs
 from postproc.motion.rounds import Rounds, rounds
 from postproc.motion.targets import Kind, make_targets
-from postproc.pose import pose_from_record
+from postproc.robot.pose import pose_from_record
 
 
 def of(*points: tuple[float, float, float]) -> Rounds:

@@ -5,8 +5,8 @@ import pinocchio as pin
 import pytest
 
 from postproc.exceptions import ArmError
-from postproc.pose import record_from_pose
 from postproc.robot.arm import GRAVITY, load_arm
+from postproc.robot.pose import record_from_pose
 
 TOOL = np.array([0.08, -0.04, 0.15])
 

@@ -10,7 +10,6 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from postproc.robot.arm import Arm, load_arm
-from postproc.robot.chains import Edges
 from postproc.robot.direction import (
     WIDTH_IN_PLAYS,
     Arrivals,
@@ -19,8 +18,14 @@ from postproc.robot.direction import (
     chain,
     directions_of_rows,
 )
-from postproc.robot.past import NOTHING
-from postproc.robot.play import Clamps, passing, prefix, with_turning_values
+from postproc.robot.play import (
+    NOTHING,
+    Clamps,
+    Edges,
+    passing,
+    prefix,
+    with_turning_values,
+)
 
 
 @pytest.fixture(scope="module")

@@ -23,8 +23,8 @@ from postproc.accuracy.full import model_of
 from postproc.accuracy.measurement import Measurements
 from postproc.accuracy.model import Model
 from postproc.arrays import Floats
-from postproc.pose import MM
 from postproc.robot.arm import Arm
+from postproc.robot.pose import MM
 
 PLACES = 5
 

@@ -14,7 +14,7 @@ from postproc.accuracy.diagnosis.diagnose import Extension
 from postproc.accuracy.diagnosis.locate import Profile, profile
 from postproc.accuracy.diagnosis.projection import Projection
 from postproc.arrays import Floats
-from postproc.pose import MM
+from postproc.robot.pose import MM
 
 LISTED = 25  # candidates
 SHOWN = 3000  # rows: more say nothing more

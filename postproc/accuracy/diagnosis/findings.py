@@ -12,7 +12,7 @@ from postproc.accuracy.diagnosis.search import Addition, Search
 from postproc.accuracy.effect import Effect
 from postproc.accuracy.fit_report import SHOWN_UNITS
 from postproc.arrays import Floats
-from postproc.pose import MM
+from postproc.robot.pose import MM
 
 SPOT = 9  # bumps: more are a map of the whole joint, with no one place
 

@@ -13,7 +13,7 @@ from postproc.accuracy.diagnosis.projection import Projection
 from postproc.accuracy.effect import Effect
 from postproc.accuracy.fitted import Fit
 from postproc.arrays import Floats
-from postproc.pose import MM
+from postproc.robot.pose import MM
 
 LARGEST_ORDER = 60
 OVERSAMPLED = 4  # orders tried per resolvable one
