@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from typing import Protocol, TypeVar
+from typing import Any, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
+Indices = NDArray[np.signedinteger[Any]]  # Ints, or smaller ones
 Bools = NDArray[np.bool_]
 Signs = NDArray[np.int8]  # -1, 0, +1
 Bytes = NDArray[np.uint8]

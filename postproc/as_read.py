@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from postproc.arrays import Bools, Floats, Ints
-from postproc.language.edits import Replacements
+from postproc.language.source import Replacements
 from postproc.language.visits import Literals, Visits
 
 

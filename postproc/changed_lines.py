@@ -11,8 +11,7 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
 from postproc.arrays import Bools, Floats, Ints, pieces
-from postproc.language.lexis import BLANKS
-from postproc.language.masking import Masked, mask_lines
+from postproc.language.scan import BLANKS, Masked, mask_lines
 from postproc.number_pairs import Pairs, pair_numbers
 from postproc.rows import Rows, joined_rows
 from postproc.side_by_side import in_turns

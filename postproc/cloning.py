@@ -10,15 +10,10 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from postproc.arrays import Ints
-from postproc.language.clones import clone, free_name
-from postproc.language.diagnostic import Diagnostic
-from postproc.language.edits import Edit
-from postproc.language.layout import CloneError
-from postproc.language.named import Named, named_at
-from postproc.language.program import Program
-from postproc.language.source import Source, apply
-from postproc.language.structure import parse
-from postproc.language.visits import Visits
+from postproc.language.pdl2.clones import Named, clone, free_name, named_at
+from postproc.language.pdl2.program import Program, parse
+from postproc.language.source import CloneError, Edit, Source, apply
+from postproc.language.visits import Diagnostic, Visits
 from postproc.planning import VARIABLES, Reading, read_program
 from postproc.proposal import Proposal
 from postproc.report import Status

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from postproc.arrays import Floats, Ints
-from postproc.language.diagnostic import Diagnostic
-from postproc.language.visits import FlyTrajectory, FlyType, Motion, Visits
+from postproc.language.visits import Diagnostic, FlyTrajectory, FlyType, Motion, Visits
 from postproc.motion.targets import Fly
 from postproc.robot.pose import MM
 

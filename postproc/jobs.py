@@ -19,7 +19,7 @@ from postproc.files import (
     read_stream,
     write_all,
 )
-from postproc.language.diagnostic import Diagnostic
+from postproc.language.visits import Diagnostic
 from postproc.options import Options
 from postproc.page_files import Pages, find_pages
 from postproc.planning import VARIABLES

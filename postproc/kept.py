@@ -9,7 +9,7 @@ import numpy as np
 
 from postproc.accuracy.model import Model
 from postproc.arrays import Bools, Floats, Ints
-from postproc.language.edits import Replacements
+from postproc.language.source import Replacements
 from postproc.language.visits import Visits
 from postproc.planning import Planned
 from postproc.report import Decisions

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from postproc.arrays import Bools, Floats, in_pieces
-from postproc.language.diagnostic import Diagnostic
-from postproc.language.visits import NO_VALUE, Target, Visits
+from postproc.language.visits import NO_VALUE, Diagnostic, Target, Visits
 from postproc.robot.arm import Arm
 from postproc.robot.cell import Cell
 from postproc.robot.pose import MM

@@ -15,11 +15,13 @@ from typing import Self
 import numpy as np
 
 from postproc.arrays import Bools, Bytes, Floats, Ints
-from postproc.language.masking import in_code, line_of, quotes_and_comments
-from postproc.language.plain_numbers import (
+from postproc.language.scan import (
     Plain,
+    in_code,
+    line_of,
     numeric_bytes,
     plain_numbers,
+    quotes_and_comments,
     runs_of,
     values,
     with_signs,

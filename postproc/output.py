@@ -7,9 +7,8 @@ from dataclasses import dataclass, replace
 
 from postproc import __version__
 from postproc.arrays import Floats, Ints
-from postproc.language.edits import Edit, Replacements, Span
 from postproc.language.rewrite import edits as number_edits
-from postproc.language.source import Source, apply, compose
+from postproc.language.source import Edit, Replacements, Source, Span, apply, compose
 from postproc.language.stamp import stamp_line
 from postproc.planning import Reading
 from postproc.sidecar import FileRecord, Sidecar, block_checksums, sha256

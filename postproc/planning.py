@@ -12,17 +12,14 @@ from postproc.accuracy.model import Model
 from postproc.arcs import mark_arcs
 from postproc.arrays import Each, Floats, Ints
 from postproc.exceptions import ProgramError
-from postproc.language.diagnostic import Diagnostic
-from postproc.language.edits import Edit
-from postproc.language.flow import resolve
-from postproc.language.lsv import Variables, read_variables
-from postproc.language.program import Program
-from postproc.language.reached import never_reached
-from postproc.language.skeleton import Skeleton
-from postproc.language.source import Source, source_from_bytes
-from postproc.language.structure import parse
-from postproc.language.visits import Visits
-from postproc.language.world import Start, base_name
+from postproc.language.pdl2.effects import never_reached
+from postproc.language.pdl2.interpreter import resolve
+from postproc.language.pdl2.job import Start, base_name
+from postproc.language.pdl2.program import Program, parse
+from postproc.language.pdl2.variable_file import VariableFile, read_variables
+from postproc.language.rewrite import Skeleton
+from postproc.language.source import Edit, Source, source_from_bytes
+from postproc.language.visits import Diagnostic, Visits
 from postproc.motion.planner import Plan, plan
 from postproc.motion.standing import NOWHERE, Standing
 from postproc.motion.targets import Targets
@@ -153,7 +150,7 @@ def read_program(
         problem, cure = "the file holds no BEGIN .. END", "Give a PDL2 program"
         raise ProgramError(sources[0].name, problem, cure)
     pages: list[Program] = []
-    variables: Variables | None = None
+    variables: VariableFile | None = None
     texts = [Skeleton.of(program.lines)]
     for source in sources[1:]:
         if source.name.lower().endswith(VARIABLES):

@@ -10,9 +10,8 @@ import numpy as np
 
 from postproc.accuracy.error_statistics import ErrorStatistics
 from postproc.arrays import Floats, Ints, Signs
-from postproc.language.diagnostic import Diagnostic
-from postproc.language.reached import NEVER_REACHED
-from postproc.language.visits import Visits
+from postproc.language.pdl2.effects import NEVER_REACHED
+from postproc.language.visits import Diagnostic, Visits
 from postproc.sidecar import Sidecar
 
 DONE, NOT_ALL, FAILED = 0, 1, 2  # exit codes

@@ -8,8 +8,7 @@ from dataclasses import fields, replace
 import numpy as np
 
 from postproc.arrays import Ints
-from postproc.language.edits import Edit
-from postproc.language.source import Source
+from postproc.language.source import Edit, Source
 from postproc.language.visits import Visits
 from postproc.planning import Reading
 

@@ -13,8 +13,8 @@ from postproc.arrays import Bools, Floats
 from postproc.as_read import numbers_as_read
 from postproc.clock import Clock
 from postproc.courses import Courses
-from postproc.language.edits import Replacements
 from postproc.language.rewrite import edits as number_edits
+from postproc.language.source import Replacements
 from postproc.motion.reach import Reached
 from postproc.motion.standing import NOWHERE, Standing
 from postproc.options import Options

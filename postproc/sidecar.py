@@ -17,8 +17,7 @@ from postproc.arrays import Each
 from postproc.byte_columns import joined, shortest, whole
 from postproc.exceptions import ProgramError
 from postproc.files import read_input
-from postproc.language.edits import Replacements, as_bytes
-from postproc.language.source import Source
+from postproc.language.source import Replacements, Source, as_bytes
 
 SUFFIX = ".postproc.json"
 EDITS, TARGETS = b'"edits": [', b'], "targets": {'

@@ -9,10 +9,8 @@ import numpy as np
 from postproc.arrays import Floats, Ints, pieces
 from postproc.as_read import edited_numbers
 from postproc.exceptions import PostprocError
-from postproc.language.edits import Replacements
-from postproc.language.rewrite import compare
-from postproc.language.skeleton import Skeleton
-from postproc.language.source import UTF8_MARK, Source
+from postproc.language.rewrite import Skeleton, compare
+from postproc.language.source import UTF8_MARK, Replacements, Source
 from postproc.language.stamp import stamp_length
 from postproc.language.visits import Visits
 from postproc.output import Output

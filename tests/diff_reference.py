@@ -10,7 +10,7 @@ from typing import TextIO
 
 from postproc.changed_lines import target_name
 from postproc.console import Column
-from postproc.language.lexis import mask_line, number_value
+from postproc.language.scan import mask_line, number_value
 from postproc.listing import arrows, print_listing, status_colour
 from postproc.rows import Row
 

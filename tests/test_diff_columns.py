@@ -15,7 +15,7 @@ from postproc.changed_lines import changed_rows
 from postproc.diff import Difference, diff
 from postproc.diff_json import difference_pieces
 from postproc.diff_listing import print_difference
-from postproc.language.lexis import mask_line, number_value
+from postproc.language.scan import mask_line, number_value
 from postproc.number_pairs import pair_numbers
 from postproc.report import Status
 from postproc.rows import Row, Rows, joined_rows

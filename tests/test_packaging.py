@@ -19,7 +19,7 @@ ROOT = Path(__file__).parent.parent
 PROBE = """
 from pathlib import Path
 import postproc
-from postproc.language.parser import grammar
+from postproc.language.pdl2.parser import grammar
 print(Path(postproc.__file__).resolve())
 print(grammar("pdl2").strip().splitlines()[0])
 """

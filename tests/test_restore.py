@@ -3,7 +3,7 @@
 import pytest
 
 from postproc.exceptions import ProgramError
-from postproc.language.edits import Edit, Replacements, Span
+from postproc.language.source import Edit, Replacements, Span
 from postproc.restore import restore, restore_file
 from postproc.sidecar import (
     FileRecord,

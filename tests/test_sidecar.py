@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from postproc.exceptions import ProgramError
-from postproc.language.edits import Replacements
+from postproc.language.source import Replacements
 from postproc.sidecar import FileRecord, Sidecar, read_sidecar, read_without_edits
 
 NASTY = (b'], "targets": {', b'"edits": [', b"\\", b'"', b'\\"edits": [', b"1.5", b"}")

@@ -10,7 +10,7 @@ from postproc import side_by_side, verify
 from postproc.compensate import compensate
 from postproc.exceptions import ProgramError
 from postproc.forked import in_child
-from postproc.language import edits, lines
+from postproc.language import lines, source
 from postproc.language.source import source_from_bytes
 from postproc.report import Outcome
 from postproc.report_json import report_pieces
@@ -39,7 +39,7 @@ def children(monkeypatch) -> list[object]:
     monkeypatch.setattr(side_by_side, "LONG", 2)
     monkeypatch.setattr(lines, "_PIECE", 4_000)
     monkeypatch.setattr(verify, "WORTH", 1)
-    monkeypatch.setattr(edits, "AT_ONCE", 100)
+    monkeypatch.setattr(source, "AT_ONCE", 100)
     monkeypatch.setattr("postproc.report_json.AT_ONCE", 100)
     return begun
 

@@ -19,7 +19,7 @@ from tests.written import FIRST, POSE, program
 def window(request, monkeypatch):
     """Check as many rows at a time."""
     monkeypatch.setattr("postproc.verify.ROWS", request.param)
-    monkeypatch.setattr("postproc.language.skeleton.AT_ONCE", request.param)
+    monkeypatch.setattr("postproc.language.rewrite.AT_ONCE", request.param)
 
 
 SHIFTED = (

@@ -5,9 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from postproc.language.edits import Replacements
-from postproc.language.skeleton import Skeleton, differences
-from postproc.language.source import Source
+from postproc.language.rewrite import Skeleton, differences
+from postproc.language.source import Replacements, Source
 from postproc.output import write_numbers
 from postproc.planning import read_program
 from postproc.robot.cell import load_cell

@@ -10,7 +10,7 @@ import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from postproc.language.world import base_name
+from postproc.language.pdl2.job import base_name
 
 HEAD = 1 << 18  # bytes: declarations stand before BEGIN, far from the end of a file
 

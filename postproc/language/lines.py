@@ -8,18 +8,206 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from postproc.arrays import Each, Floats
+from postproc.arrays import Bools, Each, Floats, Indices
 from postproc.exceptions import ProgramError
-from postproc.language.continued import Names, join, stripped
-from postproc.language.divided import Rows, divided
-from postproc.language.masking import mark_lines
-from postproc.language.sequences import Numbers
-from postproc.language.shapes import Shapes, find_shapes
+from postproc.language.scan import NAME_MARK, NUMBER_MARK, WHOLE, mark_lines, mask_of
+from postproc.language.shapes import Numbers, Shapes, alike, find_shapes, in_order
 from postproc.language.source import Source
 
-Ints = NDArray[np.signedinteger[Any]]
+# Statements over several lines: one that ends with a comma goes on with clauses.
+
+_OPENS = re.compile(rb" *(?:\w+ *:: *)?(?:MOVE|MOVEFLY|OPEN)\b[^\n]*, *\Z", re.I)
+_CLAUSE = re.compile(
+    rb" *(?:WITH|ADVANCE|TIL|VIA|SYNCMOVE|SYNCMOVEFLY|CONDITION|\$)", re.I
+)
+_WITH = re.compile(rb" *(?:WITH|SYNCMOVE|SYNCMOVEFLY)\b", re.I)
+_COMMA = re.compile(rb"[^\n]*,\s*\Z")
+_CLOSES = re.compile(rb" *(?:ENDMOVE|ENDOPEN)\b", re.I)
+
+
+@dataclass(frozen=True)
+class Names:
+    """The names that are taken out of lines.
+
+    Attributes:
+        at: Index into `name` of the first name of every line, (n,).
+        name: Index into `names`.
+        names: The distinct ones.
+    """
+
+    at: Indices
+    name: Indices
+    names: Sequence[str]
+
+
+@dataclass(frozen=True)
+class Joined:
+    """Lines of code, those of a statement in one.
+
+    Attributes:
+        masks: Their distinct masks, stripped.
+        shape: Index into `masks`, (k,).
+        rows: The first line of each, (k,).
+    """
+
+    masks: tuple[bytes, ...]
+    shape: Indices
+    rows: Indices
+
+
+def stripped(mask: bytes) -> bytes:
+    """Drop the blanks around the mask of a line, see `Marked`."""
+    if mask[:1] == WHOLE:
+        own = mask.strip()
+        return WHOLE + own if own else own
+    return mask.strip()
+
+
+def join(masks: Sequence[bytes], shape: Indices, names: Names) -> Joined:
+    """Join the lines of every statement.
+
+    Args:
+        masks: The distinct masks of lines.
+        shape: Index into `masks` of every line that holds code, (n,).
+        names: What is taken out of the masks.
+    """
+    own = [stripped(mask) for mask in masks]
+    bare = [mask.removeprefix(WHOLE) for mask in own]
+    opens = np.array(
+        [mask.endswith(b",") and bool(_OPENS.match(mask)) for mask in bare], dtype=bool
+    )
+    starts = np.flatnonzero(opens[shape])
+    length = _lengths(tuple(bare), shape, starts)
+    starts, length = starts[length > 1], length[length > 1]
+    kind = alike(shape, starts, starts + length)
+    shape, keep = shape.copy(), np.ones(len(shape), dtype=bool)
+    inner = np.repeat(starts - np.cumsum(length - 1) + length, length - 1)
+    keep[inner + np.arange(len(inner))] = False
+    number: dict[bytes, int] = {}
+    parts, of_kind = shape.tolist() if len(starts) else [], []
+    for k in in_order(kind)[1].tolist():
+        some = [own[part] for part in parts[starts[k] : starts[k] + length[k]]]
+        if any(mask[:1] == WHOLE for mask in some):
+            of_kind.append(-1)  # a row at a time: their names are filled in again
+        else:
+            of_kind.append(number.setdefault(b" ".join(some), len(number)))
+    found = np.array(of_kind, dtype=np.int64)[kind]
+    for k in np.flatnonzero(found < 0).tolist():
+        a, b = int(starts[k]), int(starts[k] + length[k])
+        text = _whole([own[part] for part in parts[a:b]], a, names)
+        found[k] = number.setdefault(text, len(number))
+    shape[starts] = len(masks) + found
+    rows = np.flatnonzero(keep)
+    return Joined((*own, *number), shape[rows], rows)
+
+
+def _whole(parts: Sequence[bytes], row: int, names: Names) -> bytes:
+    """Join lines some of which hold their names, from a row on: now all do."""
+    texts = []
+    for at, part in zip(names.at[row : row + len(parts)].tolist(), parts, strict=True):
+        count = 0 if part[:1] == WHOLE else part.count(NAME_MARK.encode())
+        words = [names.names[k] for k in names.name[at : at + count].tolist()]
+        mask = part.removeprefix(WHOLE).decode("latin-1")
+        texts.append(mask_of(mask, tuple(words)) if words else mask)
+    return WHOLE + " ".join(texts).encode("latin-1")
+
+
+def _lengths(masks: tuple[bytes, ...], shape: Indices, starts: Indices) -> Indices:
+    """Count the lines of the statements that start at some lines of code, (k,).
+
+    All statements grow by one line at a time, for as long as the next one belongs.
+    """
+    length = np.ones(len(starts), dtype=np.int64)
+    growing = np.arange(len(starts))
+    while len(growing := growing[(starts + length)[growing] < len(shape)]):
+        following = shape[(starts + length)[growing]]
+        closes = _which(masks, following, _CLOSES)
+        comma = _which(masks, shape[(starts + length - 1)[growing]], _COMMA)
+        clause = _which(masks, following, _CLAUSE)
+        more = ~closes & np.where(comma, clause, _which(masks, following, _WITH))
+        length[growing[closes | more]] += 1
+        growing = growing[more]
+    return length
+
+
+def _which(
+    masks: tuple[bytes, ...], shape: Indices, pattern: re.Pattern[bytes]
+) -> Bools:
+    """Tell which of some lines match a pattern."""
+    used, at = np.unique(shape, return_inverse=True)
+    found = [bool(pattern.match(masks[k])) for k in used.tolist()]
+    return np.array(found, dtype=bool)[at]
+
+
+# Lines that divide a block and open another one: each of both gets a row.
+#
+# ``CASE (1): IF a THEN`` belongs to two blocks, which end in different lines.
+
+_NUMBER, _NAME = NUMBER_MARK.encode(), NAME_MARK.encode()
+_IN_PARENTHESES = rb"\((?:'[^']*'|[^'()]|\([^()]*\))*\)"
+_DIVIDED = re.compile(
+    rb"(CASE *" + _IN_PARENTHESES + rb" *:|ELSE *:) *"
+    rb"((?:IF|SELECT|FOR|WHILE|CONDITION)\b.*|REPEAT *;?)",
+    re.I | re.S,
+)
+_CLOSED = re.compile(rb"\bEND(?:IF|SELECT|FOR|WHILE|CONDITION)\b", re.I)
+
+
+@dataclass(frozen=True)
+class Rows:
+    """Logical lines.
+
+    Attributes:
+        masks: The distinct masks, stripped, see `Marked`.
+        shape: Index into `masks`, (n,).
+        line: Physical line, (n,).
+        first: CSR offsets into the numbers, (n + 1,).
+        name: Index of the first name that is taken out of the line, (n,).
+    """
+
+    masks: tuple[bytes, ...]
+    shape: Indices
+    line: Indices
+    first: Indices
+    name: Indices
+
+
+def divided(rows: Rows) -> Rows:
+    """Give the block that opens behind CASE or ELSE a row of its own."""
+    found = {
+        k: parts.groups()
+        for k, mask in enumerate(rows.masks)
+        if (parts := _DIVIDED.fullmatch(mask.removeprefix(WHOLE)))
+        and not _CLOSED.search(parts[2])
+    }
+    if not found:
+        return rows
+    m = len(rows.masks)
+    head, tail = np.arange(m), np.arange(m)
+    numbers, names = np.zeros(m, dtype=np.int64), np.zeros(m, dtype=np.int64)
+    masks = list(rows.masks)
+    for k, (before, behind) in found.items():
+        head[k], tail[k] = len(masks), len(masks) + 1
+        numbers[k], names[k] = before.count(_NUMBER), before.count(_NAME)
+        kind = WHOLE if rows.masks[k][:1] == WHOLE else b""
+        masks += [kind + before, kind + behind]
+    times = np.where(head[rows.shape] != rows.shape, 2, 1)
+    row = np.repeat(np.arange(len(times)), times)
+    second = np.append(False, row[1:] == row[:-1])
+    shape = rows.shape[row]
+    first = rows.first[row] + np.where(second, numbers[shape], 0)
+    return Rows(
+        tuple(masks),
+        np.where(second, tail[shape], head[shape]).astype(rows.shape.dtype),
+        rows.line[row],
+        np.append(first, rows.first[-1]).astype(rows.first.dtype),
+        rows.name[row] + np.where(second, names[shape], 0),
+    )
+
+
+# Logical lines of a file: shapes and numbers as arrays, no object per line.
+
 """Whole numbers, as short as the length of the file allows: there are millions."""
 
 _PIECE = 1 << 18  # bytes masked at once: array passes that fit the cache
@@ -42,13 +230,13 @@ class Lines:
 
     source: Source
     shapes: Shapes
-    shape: Ints
-    line: Ints
-    first: Ints
-    start: Ints
-    end: Ints
+    shape: Indices
+    line: Indices
+    first: Indices
+    start: Indices
+    end: Indices
     value: Floats
-    comment: Ints
+    comment: Indices
 
     def __len__(self) -> int:
         """Return the number of logical lines."""
@@ -139,19 +327,19 @@ class _Piece:
     """
 
     masks: tuple[bytes, ...]
-    shape: Ints
-    comment: Ints
-    first: Ints
-    start: Ints
-    end: Ints
+    shape: Indices
+    comment: Indices
+    first: Indices
+    start: Indices
+    end: Indices
     value: Floats
     names: Sequence[str]
-    name: Ints
-    name_first: Ints
+    name: Indices
+    name_first: Indices
     unterminated: tuple[int, ...]
 
 
-def _read(data: bytes, starts: Ints, lines: slice, place: slice) -> _Piece:
+def _read(data: bytes, starts: Indices, lines: slice, place: slice) -> _Piece:
     """Read a piece of a text; offsets are counted from the beginning of the text."""
     marked = mark_lines(data[place], starts[lines] - place.start)
     piece, at = marked.masked, place.start
@@ -192,7 +380,7 @@ def _merged(pieces: list[_Piece]) -> _Piece:
     )
 
 
-def _offsets(parts: list[Ints]) -> Ints:
+def _offsets(parts: list[Indices]) -> Indices:
     """Put CSR offsets one behind the other."""
     begin = np.cumsum([0, *(int(part[-1]) for part in parts)])
     moved = [part[:-1] + own for part, own in zip(parts, begin, strict=False)]

@@ -3,18 +3,212 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from postproc.arrays import Floats, Ints, pieces
+from postproc.arrays import Bools, Bytes, Floats, Indices, Ints, pieces
 from postproc.exceptions import ProgramError
-from postproc.language import digits
-from postproc.language.edits import Replacements, as_bytes
-from postproc.language.lexis import number_value
-from postproc.language.skeleton import Skeleton, differences
-from postproc.language.source import Source, apply
+from postproc.language.lines import Lines, read_lines
+from postproc.language.scan import number_value
+from postproc.language.shapes import Shapes
+from postproc.language.source import Replacements, Source, apply, as_bytes
 from postproc.language.visits import Literals
+
+# What new numbers must leave alone: the shapes of lines and where numbers stand.
+
+AT_ONCE = 200_000  # numbers compared: what that takes is small beside two texts
+
+
+@dataclass(frozen=True)
+class Skeleton:
+    """A text as it was read: n lines of code with m numbers.
+
+    It is kept while a program is worked on.
+
+    Attributes:
+        source: The text.
+        shapes: The distinct masks of its lines.
+        shape: Index into `shapes`, (n,).
+        line: 1-based physical lines, (n,).
+        start, end: Byte offsets of the numbers, (m,).
+    """
+
+    source: Source
+    shapes: Shapes
+    shape: Indices
+    line: Indices
+    start: Indices
+    end: Indices
+
+    @classmethod
+    def of(cls, lines: Lines) -> Skeleton:
+        """Take over what the lines of a text tell."""
+        return cls(
+            lines.source, lines.shapes, lines.shape, lines.line, lines.start, lines.end
+        )
+
+    @classmethod
+    def read(cls, source: Source) -> Skeleton:
+        """Read a text.
+
+        Raises:
+            ProgramError: A string does not end on its line.
+        """
+        return cls.of(read_lines(source))
+
+
+def differences(
+    before: Skeleton, after: Skeleton, allowed: Replacements, stamp: int
+) -> tuple[str, ...]:
+    """Check what was read of a rewritten text against the edits that were meant.
+
+    Every line must have the shape it had, every edit must replace one whole number,
+    and every number must stand where the edits move it to.
+
+    Args:
+        before: The original.
+        after: The rewritten text, read by itself.
+        allowed: The edits of numbers that were meant.
+        stamp: Bytes of the rewritten text before the first line of the original.
+
+    Returns:
+        What is wrong, empty where all is well.
+    """
+    if len(before.shape) != len(after.shape) or len(before.start) != len(after.start):
+        return ("the rewritten text has other lines or numbers than the original",)
+    if before.shapes != after.shapes or (before.shape != after.shape).any():
+        row = int(np.flatnonzero(before.shape != after.shape)[:1].sum())
+        return (f"line {before.line[row]}: the rewritten line has another shape",)
+    for rows in pieces(len(allowed), AT_ONCE):
+        some = allowed[rows]
+        at = np.searchsorted(before.start, some.start)
+        whole = at < len(before.start)
+        at[~whole] = 0
+        if len(before.start):
+            whole &= before.start[at] == some.start
+            whole &= before.end[at] == some.end
+        if not whole.all():
+            line = before.source.line_of(int(some.start[~whole][0]))
+            return (f"line {line}: an edit does not replace one whole number",)
+    growth = np.char.str_len(allowed.new) - (allowed.end - allowed.start)
+    shift = stamp + np.cumsum(np.append(0, growth))
+    for rows in pieces(len(before.start), AT_ONCE):
+        start, end = before.start[rows], before.end[rows]
+        edits = np.searchsorted(allowed.start, start)  # before the number
+        wrong = after.start[rows] != start + shift[edits]
+        edits = np.searchsorted(allowed.start, start, side="right")  # and its own
+        wrong |= after.end[rows] != end + shift[edits]
+        if wrong.any():
+            line = before.source.line_of(int(start[wrong][0]))
+            return (f"line {line}: a number stands elsewhere than it should",)
+    return ()
+
+
+# Numbers as text, a million at a time: fixed-width rows of bytes instead of strings.
+#
+# Only plain decimal numbers are treated here, and only values that round without doubt;
+# the functions tell which. The others are for `lexis` and Python's own formatting, one
+# by one, which define what all of it means.
+
+WIDEST = 24  # bytes of a number that is read here
+MOST_DIGITS = 15  # of a number that is written here: exact as a float
+TIE = 1e-4  # nearer to halfway than this the last digit is not sure
+_TENS = 10.0 ** np.arange(MOST_DIGITS + 1)
+_DOT, _MINUS, _ZERO = 46, 45, 48
+
+
+def cut(data: bytes, start: Ints, end: Ints) -> tuple[Texts, Bools]:
+    """Cut numbers out of a text.
+
+    Args:
+        data: The text.
+        start: Offsets at which numbers begin, (m,).
+        end: Offsets at which they end, (m,).
+
+    Returns:
+        The texts, (m,), and which of them are plain: digits with or without a dot,
+        after a minus or nothing.
+    """
+    a = np.frombuffer(data, dtype=np.uint8)
+    length = end - start
+    width = int(min(length.max(initial=1), WIDEST))
+    rows = np.zeros((len(start), width), dtype=np.uint8)
+    plain, dots = length <= width, np.zeros(len(start), dtype=np.int64)
+    for k in range(width):
+        inside = k < length
+        byte = np.where(inside, a[np.minimum(start + k, len(a) - 1)], 0)
+        digit = (byte >= _ZERO) & (byte < _ZERO + 10)
+        dot = byte == _DOT
+        dots += dot
+        plain &= digit | dot | ~inside | ((byte == _MINUS) & (k == 0))
+        rows[:, k] = byte
+    digits = length - dots - (rows[:, 0] == _MINUS)
+    plain &= (dots <= 1) & (digits > 0)
+    return _as_texts(rows), plain
+
+
+def decimals(texts: Texts) -> Ints:
+    """Count the decimals of plain numbers, (m,)."""
+    dot = np.char.find(texts, b".")
+    return np.where(dot < 0, 0, np.char.str_len(texts) - dot - 1)
+
+
+def fixed(values: Floats, decimals: Ints) -> tuple[Texts, Bools]:
+    """Write numbers with so many decimals each; a zero carries no sign.
+
+    Args:
+        values: (m,).
+        decimals: (m,).
+
+    Returns:
+        The texts, (m,), and which of them are sure.
+
+    >>> fixed(np.array([12.34567, -0.00001]), np.array([3, 4]))[0].tolist()
+    [b'12.346', b'0.0000']
+    """
+    scaled = np.abs(values) * _TENS[np.minimum(decimals, MOST_DIGITS)]
+    sure = (scaled < _TENS[-1] / 10) & (decimals < MOST_DIGITS)
+    scaled[~sure] = 0.0
+    whole = np.rint(scaled).astype(np.int64)
+    sure &= np.abs(scaled - np.floor(scaled) - 0.5) > TIE
+    negative = (values < 0) & (whole > 0)
+    count = np.searchsorted(_TENS, whole, side="right")
+    before = np.maximum(count - decimals, 1)
+    rows = np.zeros((len(values), 2 * MOST_DIGITS), dtype=np.uint8)
+    layout = (decimals * 32 + before) * 2 + negative
+    for key in np.unique(layout[sure]).tolist():
+        mine = np.flatnonzero(sure & (layout == key))
+        rest, sign = divmod(key, 2)
+        after, ahead = divmod(rest, 32)
+        rows[mine] = _written(whole[mine], ahead, after, bool(sign), rows.shape[1])
+    return _as_texts(rows), sure
+
+
+def _written(whole: Ints, ahead: int, after: int, sign: bool, width: int) -> Bytes:
+    """Write scaled numbers that have one layout, (g, width)."""
+    rows = np.zeros((len(whole), width), dtype=np.uint8)
+    at = sign + ahead + after + (after > 0)
+    for k in range(ahead + after):
+        if k == after and after > 0:
+            at -= 1
+            rows[:, at] = _DOT
+        at -= 1
+        whole, digit = np.divmod(whole, 10)
+        rows[:, at] = digit + _ZERO
+    if sign:
+        rows[:, 0] = _MINUS
+    return rows
+
+
+def _as_texts(rows: Bytes) -> Texts:
+    """See rows of bytes as texts."""
+    texts: Texts = np.ascontiguousarray(rows).view(f"S{rows.shape[1]}")[:, 0]
+    return texts
+
+
+# New numbers into old text: edits of the numbers of targets, and nothing else.
 
 Texts = NDArray[np.bytes_]
 
@@ -97,9 +291,9 @@ def _edits_of(
     source: Source, start: Ints, end: Ints, values: Floats, least: Ints
 ) -> Replacements:
     """Return the edits of one file's numbers, which are in ascending order."""
-    old, plain = digits.cut(source.data, start, end)
+    old, plain = cut(source.data, start, end)
     had, before = np.zeros(len(old), dtype=np.int64), np.empty(len(old))
-    had[plain], before[plain] = digits.decimals(old[plain]), old[plain].astype(float)
+    had[plain], before[plain] = decimals(old[plain]), old[plain].astype(float)
     for row in np.flatnonzero(~plain).tolist():
         text = source.text[start[row] : end[row]]
         had[row], before[row] = decimals_of(text), number_value(text)
@@ -122,7 +316,7 @@ def _with_plus(new: Texts, old: Texts) -> Texts:
 
 def _texts(values: Floats, decimals: Ints, least: Ints) -> NDArray[np.bytes_]:
     """Write numbers with the decimals they had and at least `least`, (m,)."""
-    new, sure = digits.fixed(values, np.maximum(decimals, least))
+    new, sure = fixed(values, np.maximum(decimals, least))
     rest = np.flatnonzero(~sure)
     triples = zip(values[rest], decimals[rest], least[rest], strict=True)
     texts = [number_text(v, d, few).encode("ascii") for v, d, few in triples]

@@ -1,17 +1,102 @@
-"""The shapes of the lines of a file: few forms, with many names filled in."""
+"""Lines that differ in numbers or numbered names only are parsed once."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
-from typing import Any, overload
+import re
+from collections import defaultdict
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
+from itertools import count
+from operator import itemgetter
+from typing import Any, Generic, TypeVar, overload
 
 import numpy as np
 from numpy.typing import NDArray
 
-from postproc.arrays import Ints
-from postproc.language.numbered import NAME_MARK, WHOLE, form_of, mask_of
-from postproc.language.sequences import Numbers, alike, in_order
+from postproc.arrays import Bools, Ints
+from postproc.language.scan import NAME_MARK, WHOLE, form_of, mask_of
+
+# Rows that are alike, numbered in the order in which they appear.
+
+Text = TypeVar("Text", bytes, str)
+
+_SHORT = 12  # longer sequences are told apart in Python
+
+
+class Numbers(defaultdict[Text, int]):
+    """Numbers of texts, in the order in which they are asked for first."""
+
+    def __init__(self) -> None:
+        """Begin at 0."""
+        super().__init__(count().__next__)
+
+    def of(self, texts: Sequence[Text]) -> Ints:
+        """Return the numbers of texts, (n,)."""
+        return np.fromiter(map(self.__getitem__, texts), np.int64, len(texts))
+
+
+def alike(values: AnyInts, first: AnyInts, last: AnyInts) -> Ints:
+    """Number sequences of whole numbers so that equal ones have the same number, (k,).
+
+    Args:
+        values: The numbers, (m,).
+        first: Every sequence is values[first:last], (k,).
+        last: See there.
+
+    >>> alike(np.array([7, 8, 7, 8, 9]), np.array([0, 2, 2]), np.array([2, 4, 5]))
+    array([0, 0, 1])
+    """
+    length = last - first
+    if int(length.max(initial=0)) <= _SHORT:
+        return _by_columns(values, first, length)
+    data = np.ascontiguousarray(values, dtype=np.int32).tobytes()
+    ends = zip((4 * first).tolist(), (4 * last).tolist(), strict=True)
+    return Numbers[bytes]().of([data[a:b] for a, b in ends])
+
+
+def _by_columns(values: AnyInts, first: AnyInts, length: AnyInts) -> Ints:
+    """Number sequences: first by their lengths, then by one value after the other."""
+    kind, rows = in_order(length)[0], np.arange(len(first))
+    size = int(values.max(initial=0)) + 1
+    for at in range(int(length.max(initial=0))):
+        rows = rows[length[rows] > at]
+        others = int(kind.max()) + 1
+        pairs = kind[rows] * size + values[first[rows] + at]
+        kind[rows] = others + in_order(pairs)[0]
+    return in_order(kind)[0]
+
+
+def in_order(keys: AnyInts) -> tuple[Ints, Ints]:
+    """Number keys in the order in which they appear.
+
+    Args:
+        keys: Whole numbers from 0 on, (n,).
+
+    Returns:
+        The number of every row, (n,), and the first row of every number.
+
+    >>> in_order(np.array([5, 2, 5]))
+    (array([0, 1, 0]), array([0, 1]))
+    """
+    if len(keys) == 0:
+        none = np.zeros(0, dtype=np.int64)
+        return none, none
+    if int(keys.max()) <= 2 * len(keys) + 1000:
+        rows = np.arange(len(keys))[::-1]
+        at = np.full(int(keys.max()) + 1, -1)
+        at[keys[::-1]] = rows  # the last one that is written stays: the first row
+        first = np.sort(at[at >= 0])
+        rank = np.empty_like(at)
+        rank[keys[first]] = np.arange(len(first))
+        return rank[keys], first
+    _, example, which = np.unique(keys, return_index=True, return_inverse=True)
+    order = np.argsort(example)
+    ranks = np.empty(len(order), dtype=np.int64)
+    ranks[order] = np.arange(len(order))
+    return ranks[which.ravel()], example[order]
+
+
+# The shapes of the lines of a file: few forms, with many names filled in.
 
 AnyInts = NDArray[np.signedinteger[Any]]
 
@@ -141,3 +226,166 @@ def _numbered(
     said[one] = 1 + name[begin[one]]
     said[many] = 1 + names + alike(name, begin[many], (begin + count)[many])
     return in_order(form * (int(said.max()) + 1) + said)
+
+
+# Forms of lines: what differs in numbered names only is parsed once.
+#
+# Programs name points ``p1`` to ``p3000``: every line has a shape of its own, but all
+# have one form. What a form says is built once, with its names left open; what a line
+# says is that with the line's names filled in, when somebody asks.
+
+T = TypeVar("T")
+Filler = Callable[[Sequence[str]], object]
+
+OPEN = "\x01"  # no program text holds it
+_WORD = re.compile(r"[A-Za-z_]\w*")
+_PLACE = re.compile(rf"{OPEN}(aa|aA|AA)(\d+){OPEN}", re.ASCII)
+
+
+def open_name(index: int) -> str:
+    """Return what stands for the name of an index until it is filled in.
+
+    Its letters remember whether a rule has made the name lower or upper case.
+    """
+    return f"{OPEN}aA{index}{OPEN}"
+
+
+def name_index(text: str) -> int:
+    """Return which name a text stands for, -1 where it is no open name.
+
+    >>> name_index(open_name(2).lower()), name_index("weld")
+    (2, -1)
+    """
+    found = _PLACE.fullmatch(text)
+    return int(found[2]) if found else -1
+
+
+def filled(part: object, names: Sequence[str]) -> object:
+    """Fill names into a part of what a form says.
+
+    >>> filled(("move", open_name(0).lower()), ["Weld_1"])
+    ('move', 'weld_1')
+    """
+    fill = filler(part)
+    return fill(names) if fill is not None else part
+
+
+def filler(part: object) -> Filler | None:
+    """Return what fills names into a part, None where none is open in it."""
+    if isinstance(part, str):
+        return _text_filler(part)
+    if isinstance(part, tuple):
+        at = [name_index(one) if isinstance(one, str) else -1 for one in part]
+        if len(part) > 1 and part == tuple(map(open_name, at)):
+            return itemgetter(*at)  # a list of names, as they are written
+        return _all_filler(tuple, part)
+    own = getattr(part, "__match_args__", None)
+    if own is None:
+        return None
+    made = type(part)
+    return _all_filler(lambda parts: made(*parts), [getattr(part, n) for n in own])
+
+
+def _all_filler(
+    made: Callable[[list[object]], object], parts: Sequence[object]
+) -> Filler | None:
+    """Return what fills names into some parts and makes something of them."""
+    pairs = [(filler(part), part) for part in parts]
+    if all(fill is None for fill, _ in pairs):
+        return None
+    return lambda names: made(
+        [part if fill is None else fill(names) for fill, part in pairs]
+    )
+
+
+def _text_filler(part: str) -> Filler | None:
+    if part[:1] == OPEN == part[-1:] and part.count(OPEN) == 2:
+        index, letters = int(part[3:-1]), part[1:3]
+        return lambda names: _cased(names[index], letters)
+    if _PLACE.search(part) is None:
+        return None
+    return lambda names: _PLACE.sub(lambda at: _cased(names[int(at[2])], at[1]), part)
+
+
+def _cased(name: str, letters: str) -> str:
+    if letters == "aa":
+        return name.lower()
+    return name.upper() if letters == "AA" else name
+
+
+@dataclass(frozen=True, eq=False)
+class Formed(Sequence[T], Generic[T]):
+    """What each of k shapes says, made from its form when it is asked for.
+
+    Attributes:
+        said: What each form says, its names open.
+        shapes: The shapes.
+    """
+
+    said: tuple[T, ...]
+    shapes: Shapes
+    _made: dict[int, T] = field(default_factory=dict)
+    _fillers: dict[int, Filler | None] = field(default_factory=dict)
+
+    def __len__(self) -> int:
+        """Return the number of shapes."""
+        return len(self.shapes)
+
+    @overload
+    def __getitem__(self, shape: int) -> T: ...
+    @overload
+    def __getitem__(self, shape: slice) -> Sequence[T]: ...
+    def __getitem__(self, shape: int | slice) -> T | Sequence[T]:
+        """Return what a shape says."""
+        if isinstance(shape, slice):
+            return [self[k] for k in range(*shape.indices(len(self)))]
+        made = self._made.get(shape)
+        if made is None:
+            form, names = int(self.form[shape]), self.shapes.names_of(shape)
+            made = self.said[form]
+            if names:
+                if form not in self._fillers:
+                    self._fillers[form] = filler(made)
+                fill = self._fillers[form]
+                made = made if fill is None else fill(names)  # type: ignore[assignment]
+            self._made[shape] = made
+        return made
+
+    def __iter__(self) -> Iterator[T]:
+        """Go through the shapes."""
+        return (self[k] for k in range(len(self)))
+
+    @property
+    def form(self) -> Ints:
+        """Return the form of every shape, as an index into `said`, (k,)."""
+        return self.shapes.form
+
+    def words(self) -> frozenset[str]:
+        """Return all words in the shapes, in lower case; a name is one word."""
+        words = _WORD.findall("\n".join(self.shapes.texts).lower())
+        return frozenset((*words, *lower(self.shapes.names)))
+
+    def which(self, test: Callable[[T], bool]) -> Bools:
+        """Tell which shapes pass a test that no name in them decides, (k,)."""
+        passed = np.array([test(one) for one in self.said], dtype=bool)
+        found: Bools = passed[self.form]
+        return found
+
+
+def formed(shapes: Shapes, parse: Callable[[str], T]) -> Formed[T]:
+    """Parse the form of every shape.
+
+    Args:
+        shapes: Masks of lines.
+        parse: Says what a form says.
+    """
+    return Formed(tuple(map(parse, shapes.texts)), shapes)
+
+
+def lower(names: Sequence[str]) -> list[str]:
+    """Return names in lower case, all at once.
+
+    >>> lower(["WP_1", "p2"])
+    ['wp_1', 'p2']
+    """
+    return "\n".join(names).lower().split("\n") if names else []

@@ -1,4 +1,7 @@
-"""Visits: every arrival at a target, and the literals that hold the numbers."""
+"""Visits: every arrival at a target, and the literals that hold the numbers.
+
+What a language hands to everything else; nothing after it knows how a program is spelt.
+"""
 
 from __future__ import annotations
 
@@ -11,6 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from postproc.arrays import Bools, Floats, Ints
+
+# Visits: every arrival at a target, and the literals that hold the numbers.
 
 START = -1  # predecessor: wherever the arm stands when the program starts
 NO_VALUE = "it has no value in the program or its variable file"  # ends a reason
@@ -248,3 +253,23 @@ class Visits:
         first = self.pred[np.minimum(self.pred_start[:-1], len(self.pred) - 1)]
         before = np.where(single & (first >= 0), first, -1)
         return np.where((before >= 0) & self.fly[before], before, -1)
+
+
+# What a user's program can contain is no exception: it is collected and reported.
+
+
+@dataclass(frozen=True, order=True)
+class Diagnostic:
+    """One finding about a program.
+
+    Attributes:
+        file: File name the line belongs to.
+        line: 1-based line.
+        code: Short stable name, for instance ``unknown-statement``.
+        message: What was found, what it means and what the user can do.
+    """
+
+    file: str
+    line: int
+    code: str
+    message: str

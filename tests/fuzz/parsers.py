@@ -7,12 +7,11 @@ import contextlib
 import numpy as np
 
 from postproc.exceptions import PostprocError
-from postproc.language.edits import Replacements
 from postproc.language.lines import Lines, read_lines
-from postproc.language.lsv import read_variables
+from postproc.language.pdl2.program import parse
+from postproc.language.pdl2.variable_file import read_variables
 from postproc.language.rewrite import compare
-from postproc.language.source import Source, apply, source_from_bytes
-from postproc.language.structure import parse
+from postproc.language.source import Replacements, Source, apply, source_from_bytes
 
 
 def program(data: bytes) -> None:

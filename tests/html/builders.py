@@ -7,8 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from postproc.accuracy.error_statistics import ErrorStatistics
-from postproc.language.diagnostic import Diagnostic
-from postproc.language.visits import Literals, Visits
+from postproc.language.visits import Diagnostic, Literals, Visits
 from postproc.report import Decisions, Outcome, Status
 from postproc.sidecar import Sidecar
 

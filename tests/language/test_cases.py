@@ -5,10 +5,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from postproc.language.flow import resolve
+from postproc.language.pdl2.interpreter import resolve
+from postproc.language.pdl2.program import parse
 from postproc.language.rewrite import compare, edits
 from postproc.language.source import Source, apply, source_from_bytes
-from postproc.language.structure import parse
 
 CASES = sorted((Path(__file__).parents[1] / "cases").glob("*.pdl"))
 

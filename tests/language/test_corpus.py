@@ -4,13 +4,13 @@ from pathlib import Path
 
 import pytest
 
-from postproc.language.flow import Resolved, resolve
-from postproc.language.lsv import read_variables
+from postproc.language.pdl2.interpreter import Resolved, resolve
+from postproc.language.pdl2.job import Start
+from postproc.language.pdl2.program import parse
+from postproc.language.pdl2.variable_file import read_variables
 from postproc.language.rewrite import edits
 from postproc.language.source import apply, source_from_bytes
-from postproc.language.structure import parse
 from postproc.language.visits import ELSEWHERE, START, Motion, Target
-from postproc.language.world import Start
 
 CORPUS = Path(__file__).parents[1] / "corpus"
 CELL = Start(

@@ -4,10 +4,15 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from postproc.language.digits import cut, decimals, fixed
-from postproc.language.edits import Edit, Replacements, Span
-from postproc.language.rewrite import _texts, decimals_of, number_text
-from postproc.language.source import apply
+from postproc.language.rewrite import (
+    _texts,
+    cut,
+    decimals,
+    decimals_of,
+    fixed,
+    number_text,
+)
+from postproc.language.source import Edit, Replacements, Span, apply
 
 VALUES = st.floats(-1e9, 1e9) | st.integers(-10_000, 10_000).map(lambda k: k / 2000)
 

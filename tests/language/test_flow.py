@@ -2,12 +2,11 @@
 
 import pytest
 
-from postproc.language.flow import Resolved, resolve
-from postproc.language.program import Program
+from postproc.language.pdl2.interpreter import Resolved, resolve
+from postproc.language.pdl2.job import Start
+from postproc.language.pdl2.program import Program, parse
 from postproc.language.source import source_from_bytes
-from postproc.language.structure import parse
 from postproc.language.visits import START, FlyTrajectory, FlyType, OrntType, Switch
-from postproc.language.world import Start
 
 
 def program(text: str, name: str = "job") -> Program:

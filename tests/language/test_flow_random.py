@@ -5,9 +5,9 @@ import random
 import numpy as np
 import pytest
 
-from postproc.language.flow import resolve
+from postproc.language.pdl2.interpreter import resolve
+from postproc.language.pdl2.program import parse
 from postproc.language.source import source_from_bytes
-from postproc.language.structure import parse
 from postproc.language.visits import ELSEWHERE, START, Target, Visits
 from tests.language.executed import PAGE, Executed, Generated
 from tests.language.interpreter import Interpreter

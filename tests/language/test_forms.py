@@ -2,11 +2,11 @@
 
 import pytest
 
-from postproc.language import pdl2 as ast
-from postproc.language.forms import formed
 from postproc.language.lines import read_lines
-from postproc.language.numbered import form_of
-from postproc.language.parser import parse_line, parse_value_form
+from postproc.language.pdl2 import syntax as ast
+from postproc.language.pdl2.parser import parse_line, parse_value_form
+from postproc.language.scan import form_of
+from postproc.language.shapes import formed
 from postproc.language.source import source_from_bytes
 
 

@@ -5,9 +5,9 @@ import time
 import pytest
 
 from postproc.exceptions import PostprocError
-from postproc.language.flow import resolve
+from postproc.language.pdl2.interpreter import resolve
+from postproc.language.pdl2.program import parse
 from postproc.language.source import source_from_bytes
-from postproc.language.structure import parse
 from tests.fuzz import parsers
 from tests.fuzz.case import compensated, rewrite
 from tests.fuzz.originals import damaged

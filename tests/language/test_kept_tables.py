@@ -8,8 +8,8 @@ from pathlib import Path
 import lark
 import pytest
 
-from postproc.language import kept_tables, parser
 from postproc.language.lines import read_lines
+from postproc.language.pdl2 import parser
 from postproc.language.source import source_from_bytes
 
 ROOT = Path(__file__).parents[2]
@@ -86,13 +86,13 @@ def test_a_damaged_file_is_made_anew(cache, made, keep):
     file.write_bytes(whole[:keep])
     assert read(again(), "A: \0") == read(again(), "A: \0")
     assert len(made) == 2
-    assert file.read_bytes()[kept_tables.SIZE :] != b""
+    assert file.read_bytes()[parser.SIZE :] != b""
 
 
 def test_what_is_no_table_is_made_anew(cache, made):
     again()
     (file,) = cache.iterdir()
-    kept_tables.keep(file.name, b"whole, but no table")
+    parser.keep(file.name, b"whole, but no table")
     again()
     again()
     assert len(made) == 2
@@ -141,7 +141,7 @@ def test_no_folder_is_no_error(tmp_path, monkeypatch, made):
     assert len(made) == 2
     monkeypatch.delenv("XDG_CACHE_HOME")
     monkeypatch.setattr(Path, "home", no_home)
-    assert kept_tables.folder() is None
+    assert parser.folder() is None
     again()
     assert len(made) == 3
 
@@ -163,7 +163,7 @@ def full(*_: object) -> None:
 def test_a_relative_folder_is_none_of_ours(monkeypatch, tmp_path):
     monkeypatch.setenv("XDG_CACHE_HOME", "relative")
     monkeypatch.setenv("HOME", str(tmp_path))
-    assert kept_tables.folder() == tmp_path / ".cache" / "postproc"
+    assert parser.folder() == tmp_path / ".cache" / "postproc"
     for home in ("relative", str(tmp_path / "not there")):
         monkeypatch.setenv("HOME", home)
-        assert kept_tables.folder() is None
+        assert parser.folder() is None

@@ -2,11 +2,11 @@
 
 import pytest
 
-from postproc.language.flow import Resolved, resolve
-from postproc.language.machine import Machine
+from postproc.language.pdl2.interpreter import Resolved, resolve
+from postproc.language.pdl2.machine import Machine
+from postproc.language.pdl2.program import parse
+from postproc.language.pdl2.store import MOST_ORIGINS
 from postproc.language.source import source_from_bytes
-from postproc.language.store import MOST_ORIGINS
-from postproc.language.structure import parse
 from postproc.language.visits import ELSEWHERE, START
 
 MAYBE = "IF $DIN[1] THEN\nMOVE LINEAR TO POS({0},2,3,4,5,6,'')\nENDIF\n"

@@ -8,9 +8,8 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from postproc.exceptions import ProgramError
-from postproc.language.lexis import mask_line, number_value
 from postproc.language.lines import read_lines
-from postproc.language.masking import mask_lines
+from postproc.language.scan import mask_line, mask_lines, number_value
 from postproc.language.source import Source, source_from_bytes
 
 PIECES = (

@@ -3,14 +3,13 @@
 import numpy as np
 import pytest
 
-from postproc.language.entries import copied_entry
-from postproc.language.flow import Resolved, resolve
-from postproc.language.layout import CloneError
-from postproc.language.lsv import Variables, read_variables
+from postproc.language.pdl2.clones import copied_entry
+from postproc.language.pdl2.interpreter import Resolved, resolve
+from postproc.language.pdl2.job import Start
+from postproc.language.pdl2.program import parse
+from postproc.language.pdl2.variable_file import VariableFile, read_variables
 from postproc.language.rewrite import edits
-from postproc.language.source import apply, source_from_bytes
-from postproc.language.structure import parse
-from postproc.language.world import Start
+from postproc.language.source import CloneError, apply, source_from_bytes
 
 HEAD = """PROGRAM job
 VAR pth, other : PATH OF nd
@@ -40,7 +39,7 @@ def path(*nodes: str, head: str = "pth PATH nd Priv") -> str:
     return "".join([f"{head}\n", *parts])
 
 
-def read(text: str) -> Variables:
+def read(text: str) -> VariableFile:
     return read_variables(source_from_bytes("job.lsv", text.encode("latin-1")))
 
 
@@ -59,7 +58,7 @@ def known(found: Resolved) -> list[float | int]:
             for i in range(len(v))]  # fmt: skip
 
 
-def first_numbers(variables: Variables) -> dict[str, float | None]:
+def first_numbers(variables: VariableFile) -> dict[str, float | None]:
     return {name: entry.numbers[0] for name, entry in variables.entries.items()}
 
 

@@ -5,10 +5,15 @@ import random
 import numpy as np
 import pytest
 
-from postproc.language.lexis import mask_line
 from postproc.language.lines import Lines, read_lines
-from postproc.language.masking import mark_lines
-from postproc.language.numbered import NAME_MARK, WHOLE, form_of, mask_of
+from postproc.language.scan import (
+    NAME_MARK,
+    WHOLE,
+    form_of,
+    mark_lines,
+    mask_line,
+    mask_of,
+)
 from postproc.language.source import Source, source_from_bytes
 
 PIECES = (

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from postproc.language.flow import resolve
-from postproc.language.reached import NEVER_REACHED, never_reached
+from postproc.language.pdl2.effects import NEVER_REACHED, never_reached
+from postproc.language.pdl2.interpreter import resolve
+from postproc.language.pdl2.program import parse
 from postproc.language.source import Source
-from postproc.language.structure import parse
 
 POINT = "MOVE LINEAR TO POS(1, 2, 3, 0, 180, 0, '')"
 

@@ -5,11 +5,17 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from postproc.language.edits import Edit, Replacements, Span
-from postproc.language.flow import resolve
+from postproc.language.pdl2.interpreter import resolve
+from postproc.language.pdl2.program import parse
 from postproc.language.rewrite import compare, decimals_of, edits, number_text
-from postproc.language.source import Source, apply, source_from_bytes
-from postproc.language.structure import parse
+from postproc.language.source import (
+    Edit,
+    Replacements,
+    Source,
+    Span,
+    apply,
+    source_from_bytes,
+)
 
 PROGRAM = (
     "PROGRAM a -- caf\xe9\r\n"

@@ -8,9 +8,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from postproc.exceptions import FileError, ProgramError
-from postproc.language.edits import Edit, Replacements, Span
 from postproc.language.source import (
+    Edit,
+    Replacements,
     Source,
+    Span,
     apply,
     compose,
     read_source,
@@ -136,5 +138,5 @@ def test_edits_in_pieces_do_what_single_edits_do(data, wanted, woven) -> None:
     new = [text for _, text in wanted]
     spans = map(Span, places[0::2], places[1::2])
     found = list(map(Edit, spans, new))
-    with mock.patch("postproc.language.edits.WOVEN", woven):
+    with mock.patch("postproc.language.source.WOVEN", woven):
         assert apply(data, Replacements.of(found)) == apply(data, found)

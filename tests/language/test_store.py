@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from postproc.language.store import Store
-from postproc.language.values import Nothing
+from postproc.language.pdl2.store import Store
+from postproc.language.pdl2.values import Nothing
 
 ARRAYS = [f"job/t{k}" for k in range(60)]  # shelves go through them in any order
 

@@ -5,13 +5,13 @@ import random
 import numpy as np
 import pytest
 
-from postproc.language.flow import resolve
-from postproc.language.lsv import read_variables
+from postproc.language.pdl2.interpreter import resolve
+from postproc.language.pdl2.job import Start
+from postproc.language.pdl2.program import parse
+from postproc.language.pdl2.stretches import Stretches
+from postproc.language.pdl2.variable_file import read_variables
 from postproc.language.source import source_from_bytes
-from postproc.language.stretches import Stretches
-from postproc.language.structure import parse
 from postproc.language.visits import Visits
-from postproc.language.world import Start
 
 PROGRAMS = 120
 START = Start(

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from postproc.language.flow import Resolved, resolve
+from postproc.language.pdl2.interpreter import Resolved, resolve
+from postproc.language.pdl2.program import parse
 from postproc.language.source import Source
-from postproc.language.structure import parse
 from postproc.language.visits import ELSEWHERE, Target
 
 AT = "POS(1, 2, 3, 0, 180, 0, '')"

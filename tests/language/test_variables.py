@@ -1,7 +1,7 @@
 """Declared variables by name, list by list."""
 
-from postproc.language import pdl2 as ast
-from postproc.language.variables import Variable, Variables
+from postproc.language.pdl2 import syntax as ast
+from postproc.language.pdl2.program import Variable, Variables
 
 
 def declared() -> Variables:

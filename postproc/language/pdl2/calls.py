@@ -1,0 +1,390 @@
+"""Calls and assignments: what they leave of variables, frames and places."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from postproc.language.pdl2 import syntax as ast
+from postproc.language.pdl2.effects import (
+    CHANGING,
+    FRAMES,
+    HANDS_OVER,
+    PURE,
+    Reach,
+    changed_arguments,
+    reach_of,
+)
+from postproc.language.pdl2.evaluate import (
+    FRAME_NAMES,
+    bare,
+    component_index,
+    copied,
+    fill,
+    forget_key,
+    owned,
+    parts_of,
+)
+from postproc.language.pdl2.job import Place, Record
+from postproc.language.pdl2.machine import (
+    Here,
+    Machine,
+    forget,
+    forget_names,
+    pin_names,
+)
+from postproc.language.pdl2.moves import move
+from postproc.language.pdl2.store import Store
+from postproc.language.pdl2.values import (
+    Alias,
+    Nothing,
+    Position,
+    Target,
+    Value,
+    Written,
+)
+from postproc.language.visits import ELSEWHERE
+
+# Routines that cannot be followed: their moves are listed, what they change forgotten.
+#
+# A function that is called in an expression runs in the middle of a statement, and a
+# routine that calls itself may run at any depth: neither is run by the analysis.
+
+_UNFOLLOWED = -4  # in a context: the body is not run, its moves are listed
+
+
+def leave_out(
+    machine: Machine,
+    here: Here,
+    name: str,
+    reach: Reach,
+    arguments: tuple[ast.Expression | None, ...] = (),
+) -> None:
+    """Take in what a call may do without following it; list the moves it may make."""
+    for argument in changed_arguments(arguments):
+        here.world.pin(here.value(argument), f"{name} may move to it")
+        forget(here, argument, f"{name} may change it")
+    for part in reach.parts:
+        within = Here(here.world, part.place, here.row, here.store, here.volatile)
+        pin_names(within, part.effects.read, f"{name} may compute with it")
+        forget_names(within, part.effects.assigned, f"{name} may change it")
+        _list_moves(machine, here, part.place, name)
+    if reach.frames:
+        why = f"a routine that {name} calls sets it"
+        here.store.set(**{frame: Nothing(why) for frame in FRAMES})
+    if reach.moves:
+        here.store.last = frozenset({ELSEWHERE})
+
+
+def _list_moves(machine: Machine, here: Here, place: Place, name: str) -> None:
+    """List the moves of a body once, from nowhere and with nothing known."""
+    program, body = place.program, place.body
+    context = ((machine.position(program, body.first), _UNFOLLOWED),)
+    if context in machine.places or id(body) in machine.recursive:
+        return
+    machine.enter(context, place)
+    why = f"{name}, which is not followed, runs this move"
+    nothing = Nothing(why)
+    for row in range(body.first + 1, body.last):
+        statement = program.statement(row)
+        if isinstance(statement, ast.Move):
+            store = Store(lambda key: nothing, last=frozenset({ELSEWHERE}))
+            store.set(**dict.fromkeys(FRAMES, nothing))
+            at = Here(here.world, place, row, store, here.volatile, context, why)
+            move(machine, at, statement)
+
+
+# Calls: routines of the job are run, others are taken at their word.
+
+
+def call_statement(machine: Machine, here: Here, call: ast.Call) -> bool:
+    """Run a call; tell whether control went into a routine of the job."""
+    find = here.world.find_program if call.program else here.world.find_routine
+    inside = find(here.place.program, call.name)
+    if inside is None:
+        outside(here, call.name, call.arguments)
+        return False
+    if inside.body in machine.calls_in(here.context):
+        running = machine.calls_in(here.context)
+        machine.recursive |= {id(b) for b in running[running.index(inside.body) :]}
+        _refuse_recursion(machine, here, inside)
+        return False
+    _bind(here, inside, call.arguments)
+    machine.call(here, inside)
+    return True
+
+
+def calls_in_expressions(
+    machine: Machine, here: Here, statement: ast.Statement
+) -> None:
+    """Let the function calls inside of a statement have their effects."""
+    for call in machine.called(here.place, statement):
+        inside = here.world.find_routine(here.place.program, call.name)
+        if inside is None:
+            outside(here, call.name, call.arguments)
+        else:
+            _summarised(machine, here, inside, call.arguments)
+
+
+def _summarised(
+    machine: Machine,
+    here: Here,
+    inside: Place,
+    arguments: tuple[ast.Expression | None, ...],
+) -> None:
+    """Take a function's effects from its text instead of running it."""
+    name, reach = inside.body.name, reach_of(here.world, inside)
+    leave_out(machine, here, name, reach, arguments)
+    if reach.moves:
+        here.world.report_once(
+            here.place.program,
+            here.row,
+            "call-not-followed",
+            name,
+            f"{name} may move the arm where it is called in an expression: the next "
+            "move is taken to come from an unknown place; call it as a statement",
+        )
+
+
+def _refuse_recursion(machine: Machine, here: Here, inside: Place) -> None:
+    name = inside.body.name or inside.program.name
+    here.world.report_once(
+        here.place.program,
+        here.row,
+        "recursion",
+        name,
+        f"{name} calls itself: what it does is not followed; moves after it are taken "
+        "to come from an unknown place",
+    )
+    leave_out(machine, here, name, reach_of(here.world, inside))
+    here.store.last = frozenset({ELSEWHERE})
+
+
+def _bind(
+    here: Here, inside: Place, arguments: tuple[ast.Expression | None, ...]
+) -> None:
+    """Give the parameters their values; variables go by reference."""
+    prefix = f"{inside.program.name}:{inside.body.name}/"
+    for at, parameter in enumerate(inside.body.parameters):
+        argument = arguments[at] if at < len(arguments) else None
+        key = prefix + parameter.name
+        if isinstance(argument, ast.Reference) and not argument.name.startswith("$"):
+            target = here.locate(argument)
+            if target.component == ():
+                here.store.write(key, Alias(target.keys, target.exact))
+                continue
+            for aliased in target.keys:
+                forget_key(here, aliased, f"{inside.body.name} may change it")
+        if argument is None:
+            here.store.write(key, Nothing("the argument is not given"))
+            continue
+        given = bare(argument)
+        if given is not None and (parts := parts_of(here, given)):
+            fill(here, key, parameter.name, given.name, parts)
+            continue
+        value = here.value(argument)
+        if isinstance(value, Position) and not value.name:
+            value = replace(value, name=f"{inside.body.name}.{parameter.name}")
+        here.store.write(key, value)
+
+
+def outside(
+    here: Here, name: str, arguments: tuple[ast.Expression | None, ...]
+) -> None:
+    """Take in what a routine that the job does not hold is said, or assumed, to do."""
+    start = here.world.start
+    built_in = name in CHANGING or name in PURE
+    why = f"{name.upper()} computes with it" if built_in else f"{name} is given it"
+    for given in arguments:
+        here.world.pin(here.value(given), why)
+    named = frozenset(r.name for r in map(bare, arguments) if r is not None)
+    pin_names(here, named, why)
+    for argument in changed_arguments(arguments):
+        forget(here, argument, f"{name} may change it (arguments go by reference)")
+    if built_in:
+        return
+    said = start.routines.get(name)
+    if name in start.frame_tables:
+        _frames_from_table(here, name, arguments)
+    elif name.startswith(HANDS_OVER):
+        here.store.last = frozenset({ELSEWHERE})
+        _say(here, "position-unknown", name, "hands the arm over to a sensor or an "
+             "outside stream: the next move comes from an unknown place")  # fmt: skip
+    elif said is None:
+        _say(here, "assumed-still", name, "is not in the files at hand: assumed "
+             "neither to move the arm nor to set frames; if it does, say so under "
+             f"[routines] or [frames.routines.{name}] in the cell file")  # fmt: skip
+    if said == "moves":
+        here.store.last = frozenset({ELSEWHERE})
+    elif said == "sets-frames" and name not in start.frame_tables:
+        _unknown_frames(here, f"{name} sets it; give its table under "
+                        f"[frames.routines.{name}] in the cell file")  # fmt: skip
+
+
+def _say(here: Here, code: str, name: str, text: str) -> None:
+    here.world.report_once(here.place.program, here.row, code, name, f"{name} {text}")
+
+
+def _unknown_frames(here: Here, why: str) -> None:
+    here.store.set(**{frame: Nothing(why) for frame in FRAMES})
+
+
+def _frames_from_table(
+    here: Here, name: str, arguments: tuple[ast.Expression | None, ...]
+) -> None:
+    table = here.world.start.frame_tables[name]
+    values = [here.value(a) for a in arguments]
+    key = ",".join(
+        f"{v:g}" if isinstance(v, float) else str(v)
+        for v in values
+        if isinstance(v, float | str) and not isinstance(v, bool)
+    )
+    rows = {k.replace(" ", ""): v for k, v in table.items()}
+    if len(key.split(",")) != max(len(values), 1) or key not in rows:
+        _unknown_frames(
+            here,
+            f'{name}({key}) sets it and the cell file has no "{key}" under '
+            f"[frames.routines.{name}]",
+        )
+        return
+    for frame, record in rows[key].items():
+        here.store.set(**{frame: frame_value(record, f"{name}({key}) sets it")})
+
+
+def frame_value(record: Record, why: str) -> Position | Nothing:
+    """Return a frame of the cell file as a value."""
+    if record is None:
+        return Nothing(why)
+    numbers = tuple(float(n) for n in record)
+    return Position(False, numbers, derived="it stands in the cell file")
+
+
+# Assignments: what a variable, a component or a setting holds afterwards.
+
+
+def assign(here: Here, statement: ast.Assign, taught: bool) -> None:
+    """Let an assignment have its effect; `taught` marks the literal in it."""
+    new = statement.value
+    if statement.operator != ":=":
+        new = ast.Binary(statement.operator[0], statement.target, statement.value)
+    if _assigns_component(here, statement.target):
+        _assign_component(here, statement.target, here.written(new))
+        return
+    if not statement.target.name.startswith("$") and copied(
+        here, new, statement.target
+    ):
+        return
+    value = here.value(new)
+    if taught and isinstance(value, Position):
+        value = replace(value, taught=True)
+    if statement.target.name.startswith("$"):
+        part = here.frame_part(statement.target)
+        if part is None:
+            _setting(here, statement.target, value)
+        else:
+            _frame_part(here, *part, value, taught)
+        return
+    target = here.locate(statement.target)
+    if not target.exact:
+        for key in target.keys:
+            forget_key(here, key, "an element known only at run time is assigned")
+        return
+    held = _new_value(here, statement, target, value)
+    if isinstance(held, Position):
+        held = owned(here, statement.target.name, target.key, held)
+    if isinstance(held, Nothing) and target.component == ():
+        here.store.forget(target.key, held.why)
+    else:
+        here.store.write(target.key, held)
+
+
+def _assigns_component(here: Here, reference: ast.Reference) -> bool:
+    """Tell whether a reference means one of a position's six numbers."""
+    if reference.name.startswith("$"):
+        return False
+    target = here.locate(reference)
+    return target.exact and component_index(target) >= 0
+
+
+def _assign_component(here: Here, reference: ast.Reference, new: Written) -> None:
+    """Replace one of the six numbers of a position."""
+    target = here.locate(reference)
+    held = here.store.read(target.key)
+    if not isinstance(held, Position):
+        held = _blank(here, reference.name, held)
+    held = held.with_component(component_index(target), new)
+    here.store.write(target.key, owned(here, reference.name, target.key, held))
+
+
+def _setting(here: Here, reference: ast.Reference, value: Value) -> None:
+    """Change a frame or motion variable of our arm."""
+    name = here.setting_name(reference)
+    if name is None:
+        if reference.name[1:] in FRAME_NAMES:
+            why = f"a part of {reference.name.upper()} is assigned"
+            here.store.set(**{reference.name[1:]: Nothing(why)})
+        elif reference.name == "$arm_data" and _whose(here, reference) is None:
+            field = str((*reference.steps, "")[1]).lstrip("$")
+            here.store.set(**{field: Nothing("it is set for an arm known at run time")})
+        return
+    here.world.pin(value, f"${name.upper()} is set to it")
+    if f"${name}" in here.volatile:
+        value = Nothing("a condition handler changes it")
+    here.store.set(**{name: value})
+
+
+def _frame_part(here: Here, name: str, at: int, value: Value, taught: bool) -> None:
+    """Change one of the six numbers of a frame of our arm.
+
+    The cell may say of its own frames that they were taught: what comes of one whose
+    numbers change is not known then.
+    """
+    held = here.store.settings.get(name)
+    if not isinstance(held, Position):
+        held = Position()
+    number = value if isinstance(value, float) else None
+    new: Value = replace(
+        held.with_component(at, Written(number)), taught=held.taught or taught
+    )
+    if any(held.numbers) and held.numbers in here.world.start.records:
+        new = Nothing(f"a part of ${name.upper()}, which the cell gives, is assigned")
+    if f"${name}" in here.volatile:
+        new = Nothing("a condition handler changes it")
+    here.store.set(**{name: new})
+
+
+def _whose(here: Here, reference: ast.Reference) -> int | None:
+    """Return the arm that ``$ARM_DATA[n]`` names, None where it is not known."""
+    first = reference.steps[0] if reference.steps else None
+    if isinstance(first, ast.Index) and not isinstance(first.subscripts[0], tuple):
+        return here.integer(first.subscripts[0])
+    return 0
+
+
+def _new_value(
+    here: Here, statement: ast.Assign, target: Target, value: Value
+) -> Value:
+    if target.component == ():
+        return value
+    held = here.store.read(target.key)
+    if not isinstance(held, Position):
+        held = _blank(here, statement.target.name, held)
+    number = value if isinstance(value, float) else None
+    match target.component:
+        case ("pos", _):
+            if not isinstance(value, Position):
+                why = value.why if isinstance(value, Nothing) else "it is no position"
+                return Nothing(why)
+            return replace(value, aux=held.aux, taught=value.taught or held.taught)
+        case ("aux", axis):
+            return held.with_aux(axis, number)
+        case ("joint", axis):
+            return held.with_aux(axis - 6, number)
+    return Nothing("a part of it known only at run time is assigned")
+
+
+def _blank(here: Here, name: str, held: Value) -> Position:
+    """Return a position of which nothing is known yet."""
+    type_ = here.world.type_of(here.place, name)
+    joints = type_ is not None and type_.name == "jointpos"
+    never = isinstance(held, Nothing) and held.why.startswith("it has no value")
+    return Position(joints, aux=() if never else None)

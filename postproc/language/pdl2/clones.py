@@ -1,0 +1,324 @@
+"""Clone a variable: another name with its own value, laid out as the file is."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from postproc.language.lines import read_lines
+from postproc.language.pdl2 import syntax as ast
+from postproc.language.pdl2.entries import is_nested, last_head
+from postproc.language.pdl2.parser import parse_value_form
+from postproc.language.pdl2.program import Body, Program, Variable
+from postproc.language.shapes import formed
+from postproc.language.source import (
+    CloneError,
+    Edit,
+    Source,
+    Span,
+    check_length,
+    inserted_after,
+)
+from postproc.language.visits import Literals
+
+# The variable that a move names as where it goes, as far as it can be cloned.
+
+_POINTS = frozenset({"position", "xtndpos", "jointpos"})
+_STRING = re.compile(r"'(?:\\.|[^'\\])*'|'[^']*'|\"[^\"]*\"")
+
+
+@dataclass(frozen=True)
+class Named:
+    """A variable that a move names as its destination.
+
+    Attributes:
+        file: Index of its file.
+        scope: Name of the routine that declares it, "" for the program.
+        variable: Its declaration.
+        span: Where the move names it.
+    """
+
+    file: int
+    scope: str
+    variable: Variable
+    span: Span
+
+    @property
+    def key(self) -> str:
+        """Return a text that tells variables apart."""
+        return f"{self.file}:{self.scope}/{self.variable.name.lower()}"
+
+
+def named_at(
+    programs: Sequence[Program], file: int, line: int, via: bool, name: str
+) -> Named:
+    """Find the variable that a move goes to, as far as it can be cloned.
+
+    Args:
+        programs: The program files of a job.
+        file: Where the move stands.
+        line: Its line there.
+        via: Its VIA point is meant, not its end.
+        name: Owner of the value that it goes to.
+
+    Raises:
+        CloneError: The move names no variable that can be.
+    """
+    program = programs[file]
+    row = int(np.searchsorted(program.lines.line, line))
+    move = _unwrapped(program.statement(row))
+    where = None
+    if isinstance(move, ast.Move) and move.how == "TO":
+        where = move.via if via else move.where[0]
+    if not isinstance(where, ast.Reference):
+        raise CloneError("the numbers stand in the move itself, or are computed")
+    if where.steps:
+        raise CloneError("elements of arrays, records and paths are not cloned")
+    body = body_at(program, row)
+    if any(p.name == where.name for p in body.parameters):
+        raise CloneError(f"{where.name} is a parameter")
+    own = body.variables.get(where.name)
+    variable = own or program.variables.get(where.name)
+    if variable is None or variable.type is None:
+        raise CloneError(f"{where.name} is not declared as a variable in this file")
+    if variable.type.name not in _POINTS or variable.type.array or variable.type.path:
+        raise CloneError(f"{variable.name} is no single point")
+    if variable.exported not in ("", program.name):
+        raise CloneError(f"{variable.name} belongs to {variable.exported}")
+    if variable.name.lower() != name.lower():
+        raise CloneError(f"{variable.name} holds a copy of {name}")
+    span = _destination(program, row, "VIA" if via else "TO", variable.name)
+    return Named(file, body.name if own else "", variable, span)
+
+
+def _unwrapped(statement: ast.Statement) -> ast.Statement | None:
+    inner = (ast.Label, ast.Case, ast.Else, ast.When)
+    return statement.then if isinstance(statement, inner) else statement
+
+
+def body_at(program: Program, row: int) -> Body:
+    """Return the body that a row stands in.
+
+    Raises:
+        CloneError: It stands in none.
+    """
+    for body in (program.main, *program.routines.values()):
+        if body is not None and body.first < row < body.last:
+            return body
+    raise CloneError("the move stands outside of any body")
+
+
+def _destination(program: Program, row: int, word: str, name: str) -> Span:
+    """Find the name after TO or VIA in a statement."""
+    lines = program.lines
+    first = int(lines.line[row])
+    after = len(lines.source.line_starts) + 1
+    last = int(lines.line[row + 1]) if row + 1 < len(lines) else after
+    pattern = re.compile(rf"\b{word}\s+({re.escape(name)})\b(?!\s*[\[.(:])", re.I)
+    found = []
+    for line in range(first, last):
+        start = int(lines.source.line_starts[line - 1])
+        code = code_of(program, line)
+        code = _STRING.sub(lambda s: " " * len(s.group()), code)
+        found += [
+            (start + f.start(1), start + f.end(1)) for f in pattern.finditer(code)
+        ]
+    if len(found) != 1:
+        raise CloneError(f"{word} {name} stands {len(found)} times in the statement")
+    return Span(*found[0])
+
+
+def code_of(program: Program, line: int) -> str:
+    """Return a physical line without its comment and line ending."""
+    lines = program.lines
+    text = lines.source.line_text(line)
+    comment = int(lines.comment[line - 1])
+    if comment < 0:
+        return text
+    return text[: comment - int(lines.source.line_starts[line - 1])]
+
+
+# Copy an entry of a variable file under another name.
+
+_XPORT = re.compile(r"\bXport\b(?P<other>\s+from\b)?", re.I)
+
+
+def copied_entry(
+    values: Source, line: int, old: str, name: str, starts: list[int]
+) -> Edit:
+    """Enter the value of a variable once more, behind its entry.
+
+    Args:
+        values: The variable file.
+        line: A line of the entry.
+        old: The name that it has.
+        name: That of the copy.
+        starts: Offsets of its numbers.
+
+    Raises:
+        CloneError: The entry is not one of this variable alone.
+    """
+    lines = read_lines(values)
+    said = formed(lines.shapes, parse_value_form)
+    heads = last_head(lines, said)
+    row = int(np.searchsorted(lines.line, line, side="right")) - 1
+    at = int(heads[row]) if row >= 0 else -1
+    head = said[int(lines.shape[at])] if at >= 0 else None
+    if head is None or head.name.lower() != old.lower() or head.element:
+        raise CloneError(f"line {line} of {values.name} is no entry of {old}")
+    if is_nested(head):
+        raise CloneError(f"{old} is a record or a path: its parts are not cloned")
+    after = int(np.searchsorted(heads, at, side="right"))
+    first, last = int(lines.line[at]), int(lines.line[after - 1])
+    end = [*values.line_starts.tolist(), len(values.data)][last]
+    begin = int(values.line_starts[first - 1])
+    if not all(begin <= start < end for start in starts):
+        raise CloneError(f"the entry of {old} in {values.name} is cut")
+    text = values.text[begin:end].rstrip("\r\n")
+    renamed = re.sub(
+        rf"\A(\s*){re.escape(old)}\b", rf"\g<1>{name}", text, count=1, flags=re.I
+    )
+    title, rest = re.split(r"(?=[\r\n]|\Z)", renamed, maxsplit=1)
+    if renamed == text:
+        raise CloneError(f"the entry of {old} in {values.name} is not understood")
+    return inserted_after(values, last, _own(title, old) + rest)
+
+
+def _own(title: str, old: str) -> str:
+    """Let a copy be the program's own, where the original is exported."""
+    found = _XPORT.search(title)
+    if found is None:
+        return title
+    if found["other"]:
+        raise CloneError(f"{old} belongs to another program")
+    return title[: found.start()] + "Priv" + title[found.end() :]
+
+
+# Clone a variable: another name with its own value, laid out as the file is.
+
+LONGEST_NAME = 32  # characters of an identifier (likely)
+_EXPORTED = re.compile(r"\s+EXPORTED\s+FROM\s+\w+", re.I)
+
+
+def free_name(old: str, taken: set[str]) -> str:
+    """Find a name for a clone that nothing in the files has.
+
+    Args:
+        old: The original's name.
+        taken: All words of the files in lower case; the new one is added.
+
+    Raises:
+        CloneError: It would be too long.
+
+    >>> free_name("Weld", {"weld", "WELD__2".lower()})
+    'Weld__3'
+    """
+    number = 2
+    while f"{old}__{number}".lower() in taken:
+        number += 1
+    name = f"{old}__{number}"
+    if len(name) > LONGEST_NAME:
+        raise CloneError(f"{name} would be longer than {LONGEST_NAME} characters")
+    taken.add(name.lower())
+    return name
+
+
+def clone(
+    programs: Sequence[Program],
+    values: Source | None,
+    literals: Literals,
+    named: Sequence[Named],
+    rows: Sequence[int],
+    name: str,
+) -> list[tuple[int, Edit]]:
+    """Give some moves a variable of their own with the value of the one they share.
+
+    The new variable is declared behind the old one; wherever the old one is given one
+    of the values, the new one is given it next. Until a move that the old one reaches
+    with that value, the new one therefore holds the same.
+
+    Args:
+        programs: The program files of a job.
+        values: Its variable file, whose index follows those of the programs.
+        literals: Where the values stand.
+        named: Where the moves name the old variable; all mean the same one.
+        rows: Literals that it may hold there.
+        name: The new name.
+
+    Returns:
+        Edits with the index of their file.
+
+    Raises:
+        CloneError: A value stands where it cannot be given twice.
+    """
+    first = named[0]
+    program, variable = programs[first.file], first.variable
+    at = int(program.lines.line[variable.row])
+    found = [(first.file, _declared(program, at, variable.name, name))]
+    for row in rows:
+        file, line = int(literals.file[row]), int(literals.line[row])
+        starts = literals.start[row].tolist()
+        if file == len(programs) and values is not None and first.file == 0:
+            entry = copied_entry(values, line, variable.name, name, starts)
+            found.append((file, entry))
+        elif file != first.file:
+            raise CloneError("its value stands in another file")
+        elif line != at:
+            found.append((file, _assigned(program, first, line, name, starts)))
+    for one in named:
+        source = program.lines.source
+        length = len(source.line_text(source.line_of(one.span.start)))
+        check_length(source, length + len(name) - len(variable.name))
+        found.append((one.file, Edit(one.span, name.encode("latin-1"))))
+    return found
+
+
+def _means(program: Program, row: int, named: Named) -> bool:
+    """Tell whether a name in a row means the variable, and no other of its name."""
+    body, name = body_at(program, row), named.variable.name.lower()
+    if named.scope:
+        return body.name == named.scope
+    hidden = name in body.variables or any(p.name == name for p in body.parameters)
+    return not hidden
+
+
+def _declared(program: Program, line: int, old: str, name: str) -> Edit:
+    """Declare the new name in a line behind the old one's."""
+    code = code_of(program, line).rstrip()
+    head = re.match(r"(\s*)(VAR\b\s*)?([\w\s,]*?)(\s*:.*)\Z", code, re.I)
+    if head is None or old.lower() not in re.split(r"[\s,]+", head[3].lower()):
+        raise CloneError("its declaration is not understood")
+    indent = head[1] + ("  " if head[2] else "")
+    return inserted_after(
+        program.lines.source, line, indent + name + _EXPORTED.sub("", head[4])
+    )
+
+
+def _assigned(
+    program: Program, named: Named, line: int, name: str, starts: list[int]
+) -> Edit:
+    """Assign a value to the new name behind the line that gives it to the old one."""
+    row = int(np.searchsorted(program.lines.line, line))
+    statement = program.statement(row)
+    old = named.variable.name
+    own = (
+        isinstance(statement, ast.Assign)
+        and statement.operator == ":="
+        and statement.target == ast.Reference(old.lower())
+        and isinstance(statement.value, ast.Aggregate | ast.Invoke)
+    )
+    if not own or not _means(program, row, named):
+        raise CloneError(f"line {line} is no plain assignment of its value")
+    code = code_of(program, line).rstrip()
+    begin = int(program.lines.source.line_starts[line - 1])
+    if not all(begin <= start < begin + len(code) for start in starts):
+        raise CloneError("its numbers are assigned one by one")
+    head = re.match(rf"(\s*){re.escape(old)}\b", code, re.I)
+    if head is None:
+        raise CloneError(f"line {line} is not understood")
+    return inserted_after(
+        program.lines.source, line, head[1] + name + code[head.end() :]
+    )

@@ -1,0 +1,299 @@
+"""What a statement, a routine or a call may do, read off the text."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+
+from postproc.language.pdl2 import syntax as ast
+from postproc.language.pdl2.job import Place, World
+from postproc.language.pdl2.program import Body, Program
+from postproc.language.visits import Diagnostic, Visits
+
+# What a statement or a routine may do, read off its text.
+
+PURE = frozenset(
+    "pos vec jnt pos_shift pos_inv pos_frame pos_mir pos_xtrt jntp_to_pos arm_pos "
+    "arm_jntp arm_xtnd pos_comp_idl pos_idl_comp abs sqrt sin cos tan asin acos atan2 "
+    "ln exp round trunc ord chr str_len str_loc str_sub str_coding clock date "
+    "var_uninit bit_test array_dim1 array_dim2 path_len sys_call dv_cntrl".split()
+)
+"""Built-in functions: they change no argument and move nothing."""
+
+CHANGING = frozenset(
+    "pos_to_jntp pos_set_loc pos_set_rpy pos_set_norm pos_set_ornt pos_set_appr "
+    "pos_set_cnfg pos_get_loc pos_get_rpy pos_get_norm pos_get_ornt pos_get_appr "
+    "pos_get_cnfg str_cat str_ins str_del str_ovs str_xtrt bit_set bit_clear "
+    "bit_assign node_app node_del node_ins err_trap_on err_trap_off".split()
+)
+"""Built-in routines: they may change their arguments, nothing else."""
+
+
+@dataclass(frozen=True)
+class Effects:
+    """What running a routine, and all it calls in its file, may do.
+
+    Attributes:
+        moves: It holds a move, or text that is not understood.
+        assigned: Names of variables and settings (with ``$``) it may change.
+        read: Names of variables and settings that occur in it.
+        calls: Names it calls that its file does not hold.
+    """
+
+    moves: bool
+    assigned: frozenset[str]
+    read: frozenset[str]
+    calls: frozenset[str]
+
+
+def invocations(node: object) -> Iterator[ast.Invoke]:
+    """Yield the function calls in a statement or expression, inner ones first."""
+    return (part for part in _parts(node) if isinstance(part, ast.Invoke))
+
+
+def references(node: object) -> Iterator[ast.Reference]:
+    """Yield the variables in a statement or expression."""
+    return (part for part in _parts(node) if isinstance(part, ast.Reference))
+
+
+def _parts(node: object) -> Iterator[object]:
+    if isinstance(node, tuple):
+        for part in node:
+            yield from _parts(part)
+    elif isinstance(node, ast.Statement | ast.Expression | ast.Index):
+        for name in node.__slots__:
+            yield from _parts(getattr(node, name))
+        yield node
+
+
+def changed_arguments(
+    arguments: tuple[ast.Expression | None, ...],
+) -> list[ast.Reference]:
+    """Return the arguments that go by reference: variables by themselves."""
+    return [a for a in arguments if isinstance(a, ast.Reference)]
+
+
+def body_effects(program: Program, body: Body) -> Effects:
+    """Return what a body may do, with all routines of its file that it reaches."""
+    return rows_effects(program, body.first, body.last)
+
+
+def rows_effects(program: Program, first: int, last: int) -> Effects:
+    """Return what the statements of rows first to last - 1 may do."""
+    own, names = _reach(program, _shapes(program, first, last))
+    return Effects(
+        any(e.moves for e in own),
+        frozenset().union(*(e.assigned for e in own)),
+        frozenset().union(*(e.read for e in own)),
+        frozenset(n for n in names if n not in program.routines),
+    )
+
+
+def _shapes(program: Program, first: int, last: int) -> tuple[int, ...]:
+    return tuple(np.unique(program.lines.shape[first:last]).tolist())
+
+
+def _reach(
+    program: Program, shapes: tuple[int, ...]
+) -> tuple[list[Effects], frozenset[str]]:
+    found = [_direct(program.statements[s]) for s in shapes]
+    waiting = [n for e in found for n in e.calls | e.read]
+    done: set[str] = set()
+    while waiting:
+        name = waiting.pop()
+        if name in done:
+            continue
+        done.add(name)
+        body = program.routines.get(name)
+        if body is not None:
+            for shape in _shapes(program, body.first, body.last):
+                effects = _direct(program.statements[shape])
+                found.append(effects)
+                waiting += effects.calls | effects.read
+    named = frozenset().union(*(e.calls for e in found))
+    return found, frozenset(done) & named
+
+
+@lru_cache(maxsize=8192)
+def _direct(statement: ast.Statement) -> Effects:
+    assigned: set[str] = set()
+    calls = {i.name for i in invocations(statement)}
+    moves = False
+    match statement:
+        case ast.Label(_, then) | ast.Case(_, then) | ast.Else(then) | ast.When(then):
+            if then is not None:
+                inner = _direct(then)
+                moves, assigned = inner.moves, set(inner.assigned)
+                calls |= inner.calls
+        case ast.Move() | ast.Unknown():
+            moves = True
+        case ast.Assign(target):
+            assigned.add(_assigned_name(target))
+        case ast.For(name):
+            assigned.add(name)
+        case ast.Transfer(word, operands) if word != "WRITE":
+            assigned |= {_assigned_name(o) for o in changed_arguments(operands)}
+        case ast.Call(name, arguments):
+            calls.add(name)
+            assigned |= {_assigned_name(a) for a in changed_arguments(arguments)}
+    for call in invocations(statement):
+        if call.name not in PURE:
+            changed = changed_arguments(call.arguments)
+            assigned |= {_assigned_name(a) for a in changed}
+    read = frozenset(reference.name for reference in references(statement))
+    called = frozenset(calls - PURE - CHANGING)
+    return Effects(moves, frozenset(assigned), read, called)
+
+
+def _assigned_name(reference: ast.Reference) -> str:
+    if reference.name == "$arm_data" and len(reference.steps) >= 2:
+        return f"${str(reference.steps[1]).lstrip('$')}"
+    return reference.name
+
+
+# What a call or a handler may do, through all files of the job.
+
+HANDS_OVER = ("sensor_", "c5gopen", "c4gopen", "open_controller", "opencontrol")
+FRAMES = ("tool", "base", "uframe")
+
+
+@dataclass(frozen=True)
+class Reached:
+    """Rows that may run: those of one body, or some of them.
+
+    Attributes:
+        place: Where they stand.
+        effects: What they may do.
+    """
+
+    place: Place
+    effects: Effects
+
+
+@dataclass(frozen=True)
+class Reach:
+    """All that may run because something runs.
+
+    Attributes:
+        parts: What runs first, then what it calls, in any file of the job.
+        moves: It may move the arm, itself or by a routine that the job does not hold.
+        frames: A routine that the job does not hold may set frames.
+    """
+
+    parts: tuple[Reached, ...]
+    moves: bool
+    frames: bool
+
+    @property
+    def assigned(self) -> frozenset[str]:
+        """Names of variables and settings (with ``$``) that may change."""
+        names = frozenset().union(*(part.effects.assigned for part in self.parts))
+        return names | {f"${frame}" for frame in FRAMES if self.frames}
+
+
+def reach_of(world: World, place: Place) -> Reach:
+    """Follow a body into all that it calls; remembered for each body."""
+    key = id(place.body)
+    if key not in world.reached:
+        world.reached[key] = reach_rows(world, place, place.body.first, place.body.last)
+    found = world.reached[key]
+    assert isinstance(found, Reach)
+    return found
+
+
+def reach_rows(world: World, place: Place, first: int, last: int) -> Reach:
+    """Follow rows first to last - 1 of a body into all that they call."""
+    parts = [Reached(place, rows_effects(place.program, first, last))]
+    done, waiting = {id(place.body)}, list(_called(world, place, first, last))
+    if (first, last) != (place.body.first, place.body.last):
+        done.clear()  # the rest of the body may be called from these rows
+    while waiting:
+        one = waiting.pop()
+        if id(one.body) not in done:
+            done.add(id(one.body))
+            rows = (one.body.first, one.body.last)
+            parts.append(Reached(one, rows_effects(one.program, *rows)))
+            waiting += _called(world, one, *rows)
+    outside = frozenset().union(*(part.effects.calls for part in parts))
+    said = {world.start.routines.get(name) for name in outside}
+    return Reach(
+        tuple(parts),
+        any(part.effects.moves for part in parts)
+        or "moves" in said
+        or any(name.startswith(HANDS_OVER) for name in outside),
+        "sets-frames" in said or not outside.isdisjoint(world.start.frame_tables),
+    )
+
+
+def _called(world: World, place: Place, first: int, last: int) -> Iterator[Place]:
+    """Yield the bodies that rows name, as calls or in expressions."""
+    lines = place.program.lines
+    for shape in np.unique(lines.shape[first:last]).tolist():
+        for name, whole in _names(place.program.statements[shape]):
+            find = world.find_program if whole else world.find_routine
+            found = find(place.program, name)
+            if found is not None:
+                yield found
+
+
+def _names(statement: ast.Statement) -> Iterator[tuple[str, bool]]:
+    """Yield names that may be called, and whether each is that of a program."""
+    match statement:
+        case ast.Label(_, then) | ast.Case(_, then) | ast.Else(then) | ast.When(then):
+            if then is not None:
+                yield from _names(then)
+        case ast.Call(name, _, program):
+            yield name, program
+    for call in invocations(statement):
+        yield call.name, False
+    for reference in references(statement):
+        if not reference.steps:
+            yield reference.name, False
+
+
+# Moves that a program never comes to: their targets keep their values.
+
+NEVER_REACHED = "never-reached"
+
+
+def never_reached(programs: Sequence[Program], visits: Visits) -> list[Diagnostic]:
+    """List the files with moves to targets that no way from the start leads to.
+
+    Such a move stands in a routine that nobody calls, or behind a jump. From where it
+    is reached cannot be known, so that it is not compensated; a program that calls
+    the routine from elsewhere would run it uncompensated.
+
+    Args:
+        programs: The files of a job.
+        visits: Every arrival in them.
+    """
+    found = []
+    for program in programs:
+        name = program.lines.source.name
+        moves = program.statements.which(_has_target)
+        lines = program.lines.line[moves[program.lines.shape]]
+        own = visits.file == visits.files.index(name)
+        missed = lines[~np.isin(lines, visits.line[own])]
+        if len(missed):
+            text = (
+                f"{len(missed)} moves, the first here, are never reached from the "
+                "start: they are not compensated. Give the program that calls them, "
+                "or remove them"
+            )
+            found.append(Diagnostic(name, int(missed[0]), NEVER_REACHED, text))
+    return found
+
+
+def _has_target(statement: ast.Statement) -> bool:
+    """Tell whether a line moves to a target, and not to a system variable.
+
+    A move that names its arm may be one of another arm, and does not count.
+    """
+    move = ast.action(statement)
+    if not isinstance(move, ast.Move) or move.how != "TO" or move.arm:
+        return False
+    where = move.where[0] if move.where else None
+    return not (isinstance(where, ast.Reference) and where.name.startswith("$"))

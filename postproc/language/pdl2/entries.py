@@ -1,0 +1,436 @@
+"""The entries of a variable file as columns; one of each layout is read."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from postproc.arrays import Bools, Floats, Ints
+from postproc.language.lines import Lines
+from postproc.language.pdl2.parser import Entered
+from postproc.language.shapes import Formed, alike, in_order, name_index
+
+# The entries of a variable file as columns; single ones are made when asked for.
+
+POSITIONS = ("POS", "XTND", "JNTP")
+NESTED = ("REC", "NODE", "PATH")
+_KINDS = {"POS": "POS", "JNT": "JNTP", "JNTP": "JNTP", "XTN": "XTND", "XTND": "XTND"}
+
+
+def kind_of(code: str) -> tuple[str, bool]:
+    """Read the type code of a head: the kind of its values, and whether it is an array.
+
+    >>> kind_of("XTN"), kind_of("APOS"), kind_of("AINT")
+    (('XTND', False), ('POS', True), ('INT', True))
+    """
+    code = code.upper()
+    array = code.startswith("A") and code != "ARM"
+    code = code[1:] if array else code
+    return _KINDS.get(code, code), array
+
+
+@dataclass(frozen=True)
+class Entry:
+    """One variable or array element with its value.
+
+    Attributes:
+        name: As it is written, array elements as ``tab[3]``.
+        kind: POS, JNTP, XTND, or another type's code, of which only a scalar is kept.
+        line: 1-based line of its head.
+        numbers: Six numbers of a position (or the one number of a scalar), None where
+            uninitialised or missing.
+        slots: Index of each number in the file, -1 for none.
+        aux: (axis, value) of auxiliary axes.
+        config: Configuration string or None.
+        shared: Other programs see it (Xport).
+        arm: Arm number, 0 where it is not said.
+    """
+
+    name: str
+    kind: str
+    line: int
+    numbers: tuple[float | None, ...]
+    slots: tuple[int, ...]
+    aux: tuple[tuple[int, float | None], ...]
+    config: str | None
+    shared: bool
+    arm: int
+
+
+@dataclass(frozen=True)
+class Layout:
+    """What entries that are written alike have in common.
+
+    Attributes:
+        kind, shared, config: See `Entry`.
+        axes: Auxiliary axes, ascending.
+        seen: How many values are written, ``****`` counted.
+    """
+
+    kind: str
+    shared: bool
+    config: str | None
+    axes: tuple[int, ...]
+    seen: int
+
+
+@dataclass(frozen=True, eq=False)
+class Entries(Mapping[str, Entry]):
+    """k entries, and those of them that have a name of their own by that.
+
+    Attributes:
+        row: Row of each lower-case name; names with two entries are missing.
+        name: Names as they are written, k strings.
+        line: 1-based line of each head, (k,).
+        layout: Index into `layouts`, (k,).
+        layouts: How they are written.
+        numbers: Six numbers each, (k, 6), NaN where uninitialised or missing.
+        slots: Index of each number in the file, (k, 6), -1 for none.
+        aux: Values of the auxiliary axes of their layout, (k, a), NaN likewise.
+        arm: Arm number, (k,), 0 where it is not said.
+    """
+
+    row: Mapping[str, int]
+    name: Sequence[str]
+    line: Ints
+    layout: Ints
+    layouts: tuple[Layout, ...]
+    numbers: Floats
+    slots: Ints
+    aux: Floats
+    arm: Ints
+
+    @cached_property
+    def parts(self) -> list[str]:
+        """List the lower-case names of elements and fields."""
+        if not any(mark in "\n".join(self.name) for mark in "[."):
+            return []
+        return [name for name in self.row if "[" in name or "." in name]
+
+    def __len__(self) -> int:
+        """Return how many names have one entry."""
+        return len(self.row)
+
+    def __iter__(self) -> Iterator[str]:
+        """Go through the names in the order of the file."""
+        return iter(self.row)
+
+    def __getitem__(self, name: str) -> Entry:
+        """Return the entry of a lower-case name."""
+        return self.entry(self.row[name])
+
+    def entry(self, row: int) -> Entry:
+        """Return the entry of a row."""
+        layout = self.layouts[int(self.layout[row])]
+        return Entry(
+            self.name[row],
+            layout.kind,
+            int(self.line[row]),
+            _known(self.numbers[row]),
+            tuple(self.slots[row].tolist()),
+            tuple(zip(layout.axes, _known(self.aux[row]), strict=False)),
+            layout.config,
+            layout.shared,
+            int(self.arm[row]),
+        )
+
+
+def _known(values: Floats) -> tuple[float | None, ...]:
+    return tuple(None if value != value else value for value in values.tolist())
+
+
+# From the lines of a variable file to its entries: one of each layout is read.
+#
+# An entry is a head, or the index of an array's element, with the lines up to the next.
+# Files hold many thousands that are written alike; what one says of its numbers holds
+# for all of its layout.
+
+MOST = 2.0**53  # beyond it a number does not tell which whole one it is
+_LETTERS = "XYZAER"
+_NONE = (0, -1)  # the place of a value that is not written
+
+Place = tuple[int, int]
+"""Where a value stands: which line of the entry, and which number of that line."""
+
+
+@dataclass(frozen=True)
+class Records:
+    """The k entries of a file, in order, as far as their lines tell.
+
+    Attributes:
+        head: Row of the head that each belongs to, (k,).
+        first, closed: Their rows, `closed` is that at which the next begins, (k,).
+        element: Its own index stands in its first line, (k,).
+    """
+
+    head: Ints
+    first: Ints
+    closed: Ints
+    element: Bools
+
+
+def find_records(lines: Lines, said: Formed[Entered | None], head: Ints) -> Records:
+    """Find where the entries of a file begin and end.
+
+    The fields of records and of path nodes, and lines that are not understood, end an
+    entry and begin none.
+
+    Args:
+        lines: The file.
+        said: What its shapes of lines say.
+        head: Row of the last variable's head up to every row, (n,).
+    """
+    n, shape = len(lines), lines.shape
+    own = head == np.arange(n)
+    other = (said.which(_is_head) | said.which(is_no_value))[shape] & ~own
+    elements = said.which(lambda e: e is not None and bool(e.element))[shape]
+    elements &= (head >= 0) & ~other
+    arrays = said.which(lambda e: e is not None and kind_of(e.type)[1])[shape]
+    # a line may hold a head, then an element: two places on an axis of half lines
+    half = [2 * np.flatnonzero(own | other), 2 * np.flatnonzero(elements) + 1]
+    place = np.sort(np.concatenate(half))
+    after = np.append(place[1:], 2 * n)
+    begins = (place % 2 == 1) | (own & ~arrays)[place // 2]
+    first, closed = place[begins] // 2, after[begins] // 2
+    return Records(head[first], first, closed, place[begins] % 2 == 1)
+
+
+def last_head(lines: Lines, said: Formed[Entered | None]) -> Ints:
+    """Return the row of the last variable's head up to every row, (n,), -1: none.
+
+    A head below that of a record or path which does not say whose variable it is heads
+    a field, not a variable.
+    """
+    rows = np.flatnonzero(said.which(_is_head)[lines.shape])
+    shapes = lines.shape[rows]
+    nested = said.which(is_nested)[shapes]
+    heads = _heads(rows, said.which(_may_be_field)[shapes], nested)
+    last = np.full(len(lines), -1, dtype=np.int64)
+    last[heads] = heads
+    return np.asarray(np.maximum.accumulate(last))
+
+
+def _heads(rows: Ints, fields: Bools, nested: Bools) -> Ints:
+    """Return which rows of heads are those of variables."""
+    if not nested.any():
+        return rows
+    heads, within = [], False
+    columns = (rows.tolist(), fields.tolist(), nested.tolist())
+    for row, is_field, has_fields in zip(*columns, strict=True):
+        if not (within and is_field):
+            heads.append(row)
+            within = has_fields
+    return np.array(heads, dtype=np.int64)
+
+
+def is_nested(entered: Entered | None) -> bool:
+    """Tell whether a line heads a record or a path, whose fields have heads too."""
+    return entered is not None and kind_of(entered.type)[0] in NESTED
+
+
+def _is_head(entered: Entered | None) -> bool:
+    return entered is not None and bool(entered.name)
+
+
+def is_no_value(entered: Entered | None) -> bool:
+    """Tell whether a line is not understood, or names a node: no variable has any."""
+    return entered is None or entered.node >= 0
+
+
+def _may_be_field(entered: Entered | None) -> bool:
+    if entered is None:
+        return False
+    return entered.name.startswith("$") or not entered.variable
+
+
+@dataclass
+class _Read:
+    """One entry of a layout, read for all of them: places instead of numbers."""
+
+    kind: str
+    places: list[Place] = field(default_factory=lambda: [_NONE] * 6)
+    aux: dict[int, Place] = field(default_factory=dict)
+    config: str | None = None
+    seen: int = 0
+
+    def put(self, at: int, place: Place) -> None:
+        self.seen += 1
+        if at < 6:
+            self.places[at] = place
+
+    def take(self, row: int, entered: Entered, axes: Iterator[int]) -> None:
+        """Take in a line; `axes` are the numbers of the axes in it."""
+        for letter, slot in entered.components:
+            self.put(_LETTERS.index(letter.upper()), (row, slot))
+        for _, slot in entered.axes:
+            axis = next(axes)
+            joint = self.kind == "JNTP"
+            if joint and 1 <= axis <= 6:
+                self.put(axis - 1, (row, slot))
+            elif axis >= 1:
+                self.aux[axis - 6 if joint else axis] = (row, slot)
+        for slot in entered.plain:
+            self.put(self.seen, (row, slot))
+        if entered.config is not None:
+            self.config = entered.config
+
+
+def read_records(
+    lines: Lines, said: Formed[Entered | None], records: Records
+) -> Entries:
+    """Read the entries of a file, layout by layout; no name is told yet to be twice."""
+    k = len(records.first)
+    form = said.form[lines.shape]
+    numbers = np.full((k, 6), np.nan)
+    slots = np.full((k, 6), -1, dtype=np.int64)
+    layout = np.zeros(k, dtype=np.int64)
+    layouts: list[Layout] = []
+    aux: list[tuple[Ints, Floats]] = []
+    arm = np.zeros(k, dtype=np.int64)
+    for mine in _alike(form, records):
+        a, b = int(records.first[mine[0]]), int(records.closed[mine[0]])
+        parts = [said.said[f] for f in form[a:b].tolist()]
+        head = said.said[int(form[records.head[mine[0]]])]
+        assert head is not None
+        if head.arm >= 0:
+            arm[mine] = _whole(_values(lines, records.head[mine], head.arm))
+        for some, axes in _by_axes(lines, records.first, mine, parts):
+            read = _Read(kind_of(head.type)[0])
+            numbered = iter(axes)
+            for row, entered in enumerate(parts):
+                if entered is not None:
+                    read.take(row, entered, numbered)
+            first = records.first[some]
+            for at, (row, slot) in enumerate(read.places):
+                if slot >= 0:
+                    numbers[some, at] = _values(lines, first + row, slot)
+                    slots[some, at] = lines.first[first + row] + slot
+            own = sorted(read.aux.items())
+            aux.append((some, _columns(lines, first, [place for _, place in own])))
+            layout[some] = len(layouts)
+            layouts.append(
+                Layout(
+                    read.kind,
+                    head.shared,
+                    read.config,
+                    tuple(axis for axis, _ in own),
+                    read.seen,
+                )
+            )
+    return Entries(
+        {},
+        _names(lines, said, records),
+        lines.line[records.first],
+        layout,
+        tuple(layouts),
+        numbers,
+        slots,
+        _stacked(aux, k),
+        arm,
+    )
+
+
+def _alike(form: Ints, records: Records) -> Iterator[Ints]:
+    """Group the entries whose lines have the same forms."""
+    if len(records.first) == 0:
+        return iter(())
+    own = alike(form, records.first, records.closed)
+    heads = form[records.head]
+    kind, first = in_order(own * (int(heads.max()) + 1) + heads)
+    ends = np.cumsum(np.bincount(kind, minlength=len(first)))
+    return iter(np.split(np.argsort(kind, kind="stable"), ends[:-1]))
+
+
+def _by_axes(
+    lines: Lines, first: Ints, mine: Ints, parts: Sequence[Entered | None]
+) -> Iterator[tuple[Ints, list[int]]]:
+    """Split entries that are written alike by the axes that they give values of."""
+    places = [
+        (row, axis)
+        for row, entered in enumerate(parts)
+        if entered is not None
+        for axis, _ in entered.axes
+    ]
+    if not places:
+        yield mine, []
+        return
+    axes = _whole(_columns(lines, first[mine], places))
+    distinct, which = np.unique(axes, axis=0, return_inverse=True)
+    for number, one in enumerate(distinct.tolist()):
+        yield mine[which.ravel() == number], one
+
+
+def _columns(lines: Lines, first: Ints, places: Sequence[Place]) -> Floats:
+    """Return the values at some places of entries that begin at some rows, (k, p)."""
+    found = np.full((len(first), len(places)), np.nan)
+    for column, (row, slot) in enumerate(places):
+        if slot >= 0:
+            found[:, column] = _values(lines, first + row, slot)
+    return found
+
+
+def _values(lines: Lines, rows: Ints, slot: int) -> Floats:
+    """Return a number of every row, NaN where it cannot be read."""
+    value = lines.value[lines.first[rows] + slot]
+    return np.where(np.isfinite(value), value, np.nan)
+
+
+def _whole(values: Floats) -> Ints:
+    """Cut numbers down to whole ones, 0 where not known or beyond all bounds."""
+    sound = np.abs(values) < MOST  # NaN is not
+    return np.trunc(np.where(sound, values, 0.0)).astype(np.int64)
+
+
+def _stacked(parts: Sequence[tuple[Ints, Floats]], k: int) -> Floats:
+    most = max((values.shape[1] for _, values in parts), default=0)
+    stacked = np.full((k, most), np.nan)
+    for rows, values in parts:
+        stacked[rows, : values.shape[1]] = values
+    return stacked
+
+
+def _names(lines: Lines, said: Formed[Entered | None], records: Records) -> list[str]:
+    """Name every entry: as its head does, elements with their index."""
+    heads, at = np.unique(records.head, return_inverse=True)
+    names = _head_names(said, lines.shape[heads])[at]
+    index = _indices(lines, said, records)
+    if not index:
+        return [*names.tolist()]
+    return [name + index.get(row, "") for row, name in enumerate(names.tolist())]
+
+
+def _indices(
+    lines: Lines, said: Formed[Entered | None], records: Records
+) -> dict[int, str]:
+    """Write the indices of the entries that are elements of an array."""
+    elements = np.flatnonzero(records.element)
+    form = said.form[lines.shape[records.first[elements]]]
+    found = {}
+    for one in np.unique(form).tolist():
+        mine = elements[form == one]
+        entered = said.said[one]
+        assert entered is not None
+        places = [(0, slot) for slot in entered.element]
+        numbers = _whole(_columns(lines, records.first[mine], places)).tolist()
+        for row, index in zip(mine.tolist(), numbers, strict=True):
+            found[row] = f"[{','.join(map(str, index))}]"
+    return found
+
+
+def _head_names(said: Formed[Entered | None], shapes: Ints) -> NDArray[np.object_]:
+    """Return the names in some heads, (m,)."""
+    found = np.empty(len(shapes), dtype=object)
+    texts = np.array(said.shapes.names, dtype=object)
+    form = said.form[shapes]
+    for one in np.unique(form).tolist():
+        mine, head = np.flatnonzero(form == one), said.said[one]
+        assert head is not None
+        at = name_index(head.name)
+        found[mine] = head.name
+        if at >= 0:
+            found[mine] = texts[said.shapes.names_at(shapes[mine])[:, at]]
+    return found

@@ -1,0 +1,423 @@
+"""Evaluate expressions as far as the program text tells."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+from postproc.language.pdl2 import syntax as ast
+from postproc.language.pdl2.job import Place, World, base_variable
+from postproc.language.pdl2.store import Store
+from postproc.language.pdl2.values import (
+    COMPONENTS,
+    FARTHEST,
+    RUN_TIME,
+    Alias,
+    Nothing,
+    Position,
+    Target,
+    Value,
+    Vector,
+    Written,
+    binary,
+    function,
+    inverted,
+    part_of,
+    shifted,
+    unary,
+    unsure,
+)
+
+# Evaluate expressions as far as the program text tells.
+
+FRAME_NAMES = ("tool", "base", "uframe")
+_TRUTH = {"true": True, "on": True, "false": False, "off": False}
+_WORDS = frozenset(
+    "joint linear circular seg_via fly_norm fly_cart fly_auto fly_pass fly_tol "
+    "fly_from nosettle coarse fine jnt_coarse jnt_fine rs_world rs_traj eul_world "
+    "rpy_world wrist_jnt".split()
+)
+_POSITION_TYPES = frozenset({"position", "xtndpos", "jointpos", "vector"})
+_FIELDS = frozenset({*COMPONENTS, "pos", "aux"})
+
+
+@dataclass
+class Point:
+    """A place in the execution: where, and what is known there."""
+
+    world: World
+    place: Place
+    row: int
+    store: Store
+    volatile: frozenset[str] = frozenset()
+
+    # ---- numbers and places ---------------------------------------------------------
+    def number(self, slot: int) -> float:
+        """Return the value of a number of this line."""
+        lines = self.place.program.lines
+        return float(lines.value[lines.first[self.row] + slot])
+
+    def global_slot(self, slot: int) -> int:
+        """Return the job-wide index of a number of this line."""
+        lines = self.place.program.lines
+        base = self.world.slot_base[lines.source.name]
+        return int(base + lines.first[self.row] + slot)
+
+    def integer(self, expression: ast.Expression) -> int | None:
+        """Return a whole number, None where it is not known."""
+        value = self.value(expression)
+        if isinstance(value, float) and value.is_integer():
+            return int(value)
+        return None
+
+    def locate(self, reference: ast.Reference) -> Target:
+        """Find what a reference means, as far as its indices are known."""
+        root = self.world.root(self.place, reference.name)
+        held = self.store.values.get(root)
+        keys, exact = frozenset({root}), True
+        if isinstance(held, Alias):
+            keys, exact = held.keys, held.exact
+        type_ = self.world.type_of(self.place, reference.name)
+        plain = type_ is not None and type_.name in _POSITION_TYPES and not type_.path
+        array = type_ is not None and type_.array
+        for at, step in enumerate(reference.steps):
+            rest = reference.steps[at:]
+            if (plain and not array) or (
+                not plain and at > 0 and isinstance(step, str) and step in _FIELDS
+            ):
+                return Target(keys, exact, self._component(rest))
+            if isinstance(step, str):
+                keys = frozenset(f"{key}.{step}" for key in keys)
+                continue
+            array = False
+            if not plain and self._is_joints(keys):
+                return Target(keys, exact, self._component(rest))
+            index = [
+                None if isinstance(s, tuple) else self.integer(s)
+                for s in step.subscripts
+            ]
+            if None in index:
+                return Target(keys, False)
+            text = ",".join(map(str, index))
+            keys = frozenset(f"{key}[{text}]" for key in keys)
+        return Target(keys, exact and len(keys) == 1)
+
+    def _is_joints(self, keys: frozenset[str]) -> bool:
+        held = self.store.read(next(iter(keys)))
+        return isinstance(held, Position) and held.joints
+
+    def _component(self, steps: tuple[str | ast.Index, ...]) -> tuple[str, int] | None:
+        match steps:
+            case (str(name),) if name in COMPONENTS:
+                return (name, 0)
+            case ("pos",):
+                return ("pos", 0)
+            case ("pos", str(name)) if name in COMPONENTS:
+                return (name, 0)
+            case ("aux", ast.Index((index,))) if not isinstance(index, tuple):
+                axis = self.integer(index)
+                return None if axis is None else ("aux", axis)
+            case (ast.Index((index,)),) if not isinstance(index, tuple):
+                axis = self.integer(index)
+                return None if axis is None else ("joint", axis)
+        return None
+
+    # ---- reading --------------------------------------------------------------------
+    def value(self, expression: ast.Expression | None) -> Value:
+        """Return what an expression is worth."""
+        match expression:
+            case ast.Number(slot):
+                number = self.number(slot)
+                return (
+                    Nothing("the number cannot be read") if number != number else number
+                )
+            case ast.Text(text):
+                return text
+            case ast.Reference():
+                return self.read(expression)
+            case ast.Unary("()", operand):
+                return self.value(operand)
+            case ast.Unary(sign, operand):
+                return unary(sign, self.value(operand))
+            case ast.Binary(sign, left, right):
+                return self._binary(sign, self.value(left), self.value(right))
+            case ast.Aggregate(items):
+                return self._joints(items)
+            case ast.Invoke(name, arguments):
+                return self._invoke(name, arguments)
+        return RUN_TIME
+
+    def read(self, reference: ast.Reference) -> Value:
+        """Return what a variable holds."""
+        name = reference.name
+        if name.startswith("$"):
+            return self._system(reference)
+        if not reference.steps and self.world.type_of(self.place, name) is None:
+            if name in _TRUTH:
+                return _TRUTH[name]
+            if name in _WORDS:
+                return name
+        if self.world.is_function(self.place, name):
+            return Nothing(f"it comes from {name.upper()}, known only at run time")
+        target = self.locate(reference)
+        if not target.exact:
+            for key in target.keys:
+                self.world.loosen(key, "only the run tells which element a move uses")
+            return Nothing("its index is known only at run time")
+        if self._unsteady(target):
+            changed = Nothing("a condition handler changes it")
+            return unsure(changed, self.store.read(target.key))
+        held = self.store.read(target.key)
+        if target.component == ():
+            return held
+        at = component_index(target)
+        if at >= 0:
+            self.world.pin(held, "the program computes with a part of it", (at,))
+        return part_of(held, target.component)
+
+    def _unsteady(self, target: Target) -> bool:
+        """Tell whether a handler may change a variable, whatever name it has here."""
+        names = {base_variable(key.rpartition("/")[2]) for key in target.keys}
+        return not names.isdisjoint(self.volatile)
+
+    def _system(self, reference: ast.Reference) -> Value:
+        part = self.frame_part(reference)
+        name = self.setting_name(reference) if part is None else part[0]
+        if name is None or f"${name}" in self.volatile:
+            return RUN_TIME
+        held = self.store.settings.get(name, RUN_TIME)
+        if part is None:
+            return held
+        number = held.numbers[part[1]] if isinstance(held, Position) else None
+        return RUN_TIME if number is None else number
+
+    def frame_part(self, reference: ast.Reference) -> tuple[str, int] | None:
+        """Return our arm's frame and which of its six numbers is meant, else None."""
+        match reference:
+            case ast.Reference("$arm_data", (of, str(name), str(part))):
+                whole = ast.Reference("$arm_data", (of, name))
+            case ast.Reference(name, (str(part),)):
+                whole = ast.Reference(name, ())
+            case _:
+                return None
+        frame = self.setting_name(whole)
+        known = frame in FRAME_NAMES and part in COMPONENTS
+        return (frame, COMPONENTS[part]) if frame and known else None
+
+    def setting_name(self, reference: ast.Reference) -> str | None:
+        """Return the name of our arm's setting, None for another arm's or none."""
+        match reference:
+            case ast.Reference("$arm_data", (ast.Index((index,)), str(name))):
+                if (
+                    not isinstance(index, tuple)
+                    and self.integer(index) == self.world.arm
+                ):
+                    return name.lstrip("$")
+                return None
+            case ast.Reference(name, ()):
+                return name.lstrip("$")
+        return None
+
+    def _binary(self, sign: str, left: Value, right: Value) -> Value:
+        if sign == ":":
+            for frame in (left, right):
+                self.world.pin(frame, "the program composes it with a frame (`:`)")
+        return binary(sign, left, right)
+
+    def _joints(self, items: tuple[ast.Expression, ...]) -> Value:
+        if len(items) < 6:
+            return Nothing("it has fewer than six joint values")
+        aux = tuple((i, self.real(item)) for i, item in enumerate(items[6:], start=1))
+        return replace(self._components(items[:6]), joints=True, aux=aux)
+
+    def _components(self, items: tuple[ast.Expression | None, ...]) -> Position:
+        parts = [self.written(item) for item in items]
+        return Position(
+            numbers=tuple(part.number for part in parts),
+            slots=tuple(part.slot for part in parts),
+            along=frozenset(at for at, part in enumerate(parts) if part.along),
+        )
+
+    def written(self, expression: ast.Expression | None) -> Written:
+        """Return a number, and where in the text it is written or comes from."""
+        match expression:
+            case ast.Number(slot):
+                return Written(self.real(expression), self.global_slot(slot))
+            case ast.Unary("()", operand):
+                return self.written(operand)
+            case ast.Reference():
+                return self._part(expression) or Written(self.real(expression))
+            case ast.Binary("+" | "-" as sign, ast.Reference() as left, right):
+                part = self._part(left)
+                if part is not None:
+                    return _moved(part, self.real(right), sign)
+        return Written(self.real(expression))
+
+    def _part(self, reference: ast.Reference) -> Written | None:
+        """Return a component that stands in the text, None for anything else."""
+        if reference.name.startswith("$"):
+            return None
+        target = self.locate(reference)
+        at = component_index(target)
+        if at < 0 or not target.exact or self._unsteady(target):
+            return None
+        held = self.store.read(target.key)
+        if not isinstance(held, Position) or held.slots[at] < 0:
+            return None
+        return Written(held.numbers[at], held.slots[at], along=True)
+
+    def real(self, expression: ast.Expression | None) -> float | None:
+        """Return a real number, None where it is not known."""
+        value = self.value(expression)
+        return value if isinstance(value, float) and math.isfinite(value) else None
+
+    def _invoke(self, name: str, arguments: tuple[ast.Expression | None, ...]) -> Value:
+        if name == "pos":
+            return self._position(arguments)
+        values = [self.value(a) for a in arguments]
+        if name not in ("vec", "pos_shift"):
+            for value in values:
+                self.world.pin(value, f"{name.upper()} computes with it")
+        match name, values:
+            case "vec", [_, _, _]:
+                x, y, z = (self.real(a) for a in arguments)
+                return Vector((x, y, z))
+            case "pos_shift", [Position() as p, Vector() as by]:
+                return shifted(p, by)
+            case "pos_inv", [Position() as p]:
+                return inverted(p)
+            case (
+                ("abs" | "sqrt" | "sin" | "cos" | "tan" | "round" | "trunc"),
+                [float(x)],
+            ):
+                return function(name, x)
+        return Nothing(f"it comes from {name.upper()}, known only at run time")
+
+    def _position(self, arguments: tuple[ast.Expression | None, ...]) -> Value:
+        config = None
+        if len(arguments) == 7:
+            text = self.value(arguments[6])
+            if not isinstance(text, str):
+                return Nothing("its configuration is known only at run time")
+            config = text
+        elif len(arguments) == 1 and self.real(arguments[0]) == 0.0:
+            return Position(
+                numbers=(0.0,) * 6, derived="its numbers are not written one by one"
+            )
+        elif len(arguments) != 6:
+            return Nothing("POS has not six numbers")
+        return replace(self._components(arguments[:6]), config=config)
+
+
+def component_index(target: Target) -> int:
+    """Return which of the six numbers a reference means, -1 for anything else."""
+    match target.component:
+        case ("joint", axis) if 1 <= axis <= 6:
+            return axis - 1
+        case (str(name), _) if name in COMPONENTS:
+            return COMPONENTS[name]
+    return -1
+
+
+def _moved(part: Written, by: float | None, sign: str) -> Written:
+    if part.number is None or by is None or abs(by) > FARTHEST:
+        return replace(part, number=None)
+    return replace(part, number=part.number + (by if sign == "+" else -by))
+
+
+# Whole records, arrays and nodes: what they hold is copied part by part.
+
+SINGLE = frozenset(
+    "integer real boolean string vector position jointpos xtndpos semaphore".split()
+)
+
+
+def copied(here: Point, value: ast.Expression, target: ast.Reference) -> bool:
+    """Let a variable hold the parts of another one; tell whether it has parts."""
+    origin = bare(value)
+    if origin is None or not _may_have_parts(here, origin):
+        return False
+    parts = parts_of(here, origin)
+    place, source = here.locate(target), here.locate(origin)
+    if not parts or place.component != () or source.component != ():
+        return False
+    if place.exact and source.exact and origin.name not in here.volatile:
+        fill(here, place.key, target.name, origin.name, parts)
+        return True
+    for part in parts.values():
+        here.world.pin(part, f"{origin.name} is copied, to where only the run tells")
+    for key in place.keys:
+        forget_key(here, key, f"a copy of {origin.name} is assigned")
+    return True
+
+
+def bare(value: ast.Expression | None) -> ast.Reference | None:
+    """Return the variable that an expression is, with or without parentheses."""
+    if isinstance(value, ast.Unary) and value.operator == "()":
+        value = value.operand
+    named = isinstance(value, ast.Reference) and not value.name.startswith("$")
+    return value if named and isinstance(value, ast.Reference) else None
+
+
+def _may_have_parts(here: Point, origin: ast.Reference) -> bool:
+    type_ = here.world.type_of(here.place, origin.name)
+    if type_ is None or type_.array or type_.path:
+        return True
+    return type_.name not in SINGLE
+
+
+def parts_of(here: Point, origin: ast.Reference) -> dict[str, Value]:
+    """Return what is known of the elements and fields of a variable.
+
+    Standard fields of nodes count too where what they hold is not known.
+
+    Returns:
+        Values by what follows the variable's own key: ``[2]``, ``.place``.
+    """
+    found: dict[str, Value] = {}
+    for key in sorted(here.locate(origin).keys):
+        for part in parts_under(here, key):
+            value = here.store.read(part)
+            if not isinstance(value, Nothing) or is_standard(part):
+                found[part[len(key) :]] = value
+    return found
+
+
+def parts_under(here: Point, key: str) -> list[str]:
+    """Return the keys of elements and fields that a key has or ever had."""
+    return here.world.first_parts(key) + here.store.parts(key)
+
+
+def is_standard(key: str) -> bool:
+    """Tell whether a key is that of a standard field of a node: ``n.$main_pos``."""
+    return key.rpartition(".")[2].startswith("$")
+
+
+def forget_key(here: Point, key: str, why: str) -> None:
+    """Forget what a key and its parts hold: any of it may still be there."""
+    if key in here.store.compound or here.world.first_parts(key):
+        here.world.loosen(key, why)
+    here.store.forget(key, why)
+
+
+def fill(
+    here: Point, key: str, name: str, origin: str, parts: dict[str, Value]
+) -> None:
+    """Let a key hold parts, and nothing else."""
+    here.store.forget(key, f"{origin}, of which it is a copy, has no value for it")
+    for suffix, value in parts.items():
+        if isinstance(value, Position):
+            value = owned(here, name, key + suffix, value)
+        if isinstance(value, Nothing):
+            value = unsure(value, here.store.read(key + suffix))
+        here.store.write(key + suffix, value)
+
+
+def owned(here: Point, name: str, key: str, value: Position) -> Position:
+    """Say which variable a literal is the value of."""
+    declared = here.world.declared(here.place, name)
+    shared = value.shared or bool(declared and declared.exported)
+    taught = value.taught or bool(declared and declared.taught)
+    owner = value.name or here.world.written(key)
+    here.world.hold(key, value)
+    return replace(value, name=owner, shared=shared, taught=taught)

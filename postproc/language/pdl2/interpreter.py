@@ -1,0 +1,574 @@
+"""From a parsed program to its visits: what it moves to, and from where."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from postproc.language.pdl2 import syntax as ast
+from postproc.language.pdl2.calls import (
+    assign,
+    call_statement,
+    calls_in_expressions,
+    frame_value,
+)
+from postproc.language.pdl2.collect import collect
+from postproc.language.pdl2.effects import changed_arguments, reach_rows, rows_effects
+from postproc.language.pdl2.entries import POSITIONS, Entries, Entry
+from postproc.language.pdl2.evaluate import Point
+from postproc.language.pdl2.job import Place, Points, Start, World, base_variable
+from postproc.language.pdl2.machine import (
+    HANDLED,
+    MAX_ROWS,
+    Arrival,
+    Here,
+    Machine,
+    forget,
+    forget_names,
+    pin_names,
+)
+from postproc.language.pdl2.moves import move
+from postproc.language.pdl2.program import Program, Variable, Variables, recovered
+from postproc.language.pdl2.store import Store, root_of
+from postproc.language.pdl2.stretches import Stretches
+from postproc.language.pdl2.values import Nothing, Position, Value, Vector
+from postproc.language.pdl2.variable_file import VariableFile
+from postproc.language.pdl2.variable_file import VariableFile as ValueFile
+from postproc.language.shapes import lower
+from postproc.language.visits import (
+    ELSEWHERE,
+    START,
+    Diagnostic,
+    Motion,
+    Target,
+    Visits,
+)
+
+# FOR loops: round by round where the bounds are constant, else over and over.
+
+
+def start_loop(machine: Machine, here: Here, statement: ast.For) -> None:
+    """Go into the first round, past the loop, or both where that is not known."""
+    row, end = here.row, here.place.body.blocks.end[here.row]
+    start, stop = here.value(statement.start), here.value(statement.stop)
+    by = here.value(statement.step) if statement.step is not None else 1.0
+    rounds = None
+    if isinstance(start, float) and isinstance(stop, float) and isinstance(by, float):
+        by = -by if statement.down and by > 0 else by
+        if by and math.isfinite((stop - start) / by):
+            rounds = max(int((stop - start) / by + 1e-9) + 1, 0)
+            rounds = 0 if (stop - start) / by < 0 else rounds
+    if rounds == 0:
+        machine.go_on(here.context, end + 1, here.store)
+        return
+    loop = (here.context, row)
+    if rounds is not None and _unrolled(machine, here, statement, rounds, end):
+        plan = (float(start), float(by), rounds)  # type: ignore[arg-type]
+        if machine.ranges.setdefault(loop, plan) == plan:
+            _round(machine, here, here.context, row, 0)
+            return
+    machine.widened.add(loop)
+    forget(here, ast.Reference(statement.name), "it counts a loop")
+    if rounds is None:
+        machine.go_on(here.context, end + 1, here.store)
+    machine.push(here.context, row + 1, here.store)
+
+
+def _unrolled(
+    machine: Machine, here: Here, statement: ast.For, rounds: int, end: int
+) -> bool:
+    """Tell whether a loop is followed round by round."""
+    loop = (here.context, here.row)
+    if loop in machine.widened:
+        return False
+    if loop in machine.ranges:
+        return True
+    program = here.place.program
+    changed = rows_effects(program, here.row + 1, end).assigned | here.volatile
+    if statement.name in changed:
+        return False
+    machine.rows += rounds * (end - here.row)
+    if machine.rows <= MAX_ROWS:
+        return True
+    machine.rows -= rounds * (end - here.row)
+    here.world.report_once(
+        program,
+        here.row,
+        "loop-not-unrolled",
+        str(here.row),
+        f"the loop runs {rounds} times: too often to be followed round by round; "
+        "targets that depend on its counter are not compensated",
+    )
+    return False
+
+
+def _round(
+    machine: Machine,
+    here: Here,
+    context: tuple[tuple[int, int], ...],
+    row: int,
+    number: int,
+) -> None:
+    """Start a round of a constant loop."""
+    first, by, _ = machine.ranges[(context, row)]
+    program = here.place.program
+    statement = recovered(program.statement(row))
+    if isinstance(statement, ast.Label) and statement.then is not None:
+        statement = statement.then
+    inner = (*context, (machine.position(program, row), number))
+    machine.enter(inner, here.place)
+    if isinstance(statement, ast.For):
+        key = here.locate(ast.Reference(statement.name)).key
+        here.store.write(key, first + number * by)
+    machine.go_on(inner, row + 1, here.store)
+
+
+def end_round(machine: Machine, here: Here) -> None:
+    """Go into the next round, out of the loop, or both where that is not known."""
+    row = here.place.body.blocks.opener[here.row]
+    at = machine.position(here.place.program, row)
+    statement = recovered(here.place.program.statement(row))
+    if isinstance(statement, ast.Label) and statement.then is not None:
+        statement = statement.then
+    name = statement.name if isinstance(statement, ast.For) else ""
+    last = here.context[-1] if here.context else None
+    if last is not None and last[0] == at and last[1] >= 0:
+        outer = here.context[:-1]
+        if last[1] + 1 < machine.ranges[(outer, row)][2]:
+            _round(machine, here, outer, row, last[1] + 1)
+            return
+    else:
+        forget(here, ast.Reference(name), "it counts a loop")
+        machine.push(here.context, row + 1, here.store)
+    forget(here, ast.Reference(name), "it counted a loop that has ended")
+    machine.go_on(here.context, here.row + 1, here.store)
+
+
+# What each statement does to the store, and which way the program goes on.
+
+_WORD = re.compile(r"\$?[A-Za-z_]\w*")
+_CANNOT_MOVE = re.compile(
+    r"(?:IF|ELSE|ENDIF|SELECT|CASE|ENDSELECT|FOR|ENDFOR|WHILE|ENDWHILE|REPEAT|UNTIL|"
+    r"WAIT|SIGNAL|DELAY|PULSE|WRITE|READ|ENCODE|DECODE|OPEN|CLOSE|ENABLE|DISABLE|"
+    r"\$?\w+(?:\[[^\]]*\]|\.\$?\w+)*\s*:=)",
+    re.I,
+)
+_MOVES = re.compile(r".*\b(?:MOVE|MOVEFLY|SYNCMOVE|SYNCMOVEFLY)\b", re.I)
+
+
+def step(machine: Machine, here: Here, statement: ast.Statement) -> bool:
+    """Run one statement; tell whether the next row follows."""
+    statement = recovered(statement)
+    if not isinstance(statement, ast.Label | ast.Else | ast.When):
+        calls_in_expressions(machine, here, statement)
+    match statement:
+        case ast.Move():
+            move(machine, here, statement)
+        case ast.Assign():
+            line = int(here.place.program.lines.line[here.row])
+            taught = (
+                line in here.world.taught_lines[here.place.program.lines.source.name]
+            )
+            assign(here, statement, taught)
+        case ast.Call():
+            return not call_statement(machine, here, statement)
+        case ast.Label(_, then) | ast.Case(_, then) | ast.Else(then) | ast.When(then):
+            return then is None or step(machine, here, then)
+        case ast.Transfer("WRITE", operands):
+            for operand in operands:
+                here.world.pin(here.value(operand), "the program writes it out")
+        case ast.Transfer(word, operands):
+            for operand in changed_arguments(operands):
+                forget(here, operand, f"{word} changes it")
+        case ast.Unknown():
+            _unknown(machine, here, statement)
+        case _:
+            return _control(machine, here, statement)
+    return True
+
+
+def _control(machine: Machine, here: Here, statement: ast.Statement) -> bool:
+    blocks, row = here.place.body.blocks, here.row
+    match statement:
+        case ast.If(condition):
+            inner = blocks.inner[row]
+            otherwise = inner[0] if inner else blocks.end[row]
+            return _branch(machine, here, condition, row + 1, otherwise, True)
+        case ast.While(condition):
+            return _branch(machine, here, condition, row + 1, blocks.end[row] + 1)
+        case ast.Until(condition):
+            return _branch(machine, here, condition, row + 1, blocks.opener[row])
+        case ast.EndWhile():
+            machine.push(here.context, blocks.opener[row], here.store)
+        case ast.Select(value):
+            _select(machine, here, here.value(value))
+        case ast.For():
+            start_loop(machine, here, statement)
+        case ast.EndFor():
+            end_round(machine, here)
+        case ast.Goto(label):
+            machine.push(here.context, blocks.labels[label], here.store)
+        case ast.ExitCycle() if blocks.cycle >= 0:
+            machine.push(here.context, blocks.cycle, here.store)
+        case ast.Return():
+            machine.leave(here, by_return=True)
+        case ast.Condition():
+            machine.go_on(here.context, blocks.end[row] + 1, here.store)
+        case ast.EndCondition():
+            pass
+        case _:
+            return True
+    return False
+
+
+def _branch(
+    machine: Machine,
+    here: Here,
+    condition: ast.Expression | None,
+    then: int,
+    otherwise: int,
+    enters: bool = False,
+) -> bool:
+    """Go both ways, or the one that is known; `otherwise` may enter an ELSE."""
+    truth = here.value(condition) if condition is not None else None
+    if truth is not True:
+        go = machine.push if enters else machine.go_on
+        go(here.context, otherwise, here.store)
+    if truth is not False:
+        machine.go_on(here.context, then, here.store)
+    return False
+
+
+def _select(machine: Machine, here: Here, value: Value) -> None:
+    """Go to every CASE that may be meant."""
+    blocks = here.place.body.blocks
+    for row in blocks.inner[here.row]:
+        statement = here.place.program.statement(row)
+        if isinstance(statement, ast.Case):
+            fits = _fits(here, row, statement, value)
+            if fits is not False:
+                machine.push(here.context, row, here.store)
+            if fits is True:
+                return
+        else:
+            machine.push(here.context, row, here.store)
+            return
+    machine.push(here.context, blocks.end[here.row], here.store)
+
+
+def _fits(here: Here, row: int, case: ast.Case, value: Value) -> bool | None:
+    """Tell whether a CASE means a value, None where it is not known."""
+    at = Here(here.world, here.place, row, here.store, here.volatile, here.context)
+    found: bool | None = not case.choices and None
+    for choice in case.choices:
+        low, high = choice if isinstance(choice, tuple) else (choice, choice)
+        a, b = at.value(low), at.value(high)
+        known = type(a) is type(value) and type(b) is type(value)
+        if not known or not isinstance(value, float | str):
+            found = None
+        elif a <= value <= b:  # type: ignore[operator]
+            return True
+    return found
+
+
+def _unknown(machine: Machine, here: Here, statement: ast.Unknown) -> None:
+    """Forget all that unknown text could influence."""
+    line = int(here.place.program.lines.line[here.row])
+    why = f"line {line}, which is not understood, may change it"
+    names = frozenset(word.lower() for word in _WORD.findall(statement.text))
+    forget_names(here, names, why)
+    if _MOVES.match(statement.text):
+        arrival = Arrival(
+            here.place,
+            here.row,
+            machine.predecessors(here),
+            here.store.settings,
+            Motion.JOINT,
+            Target.UNKNOWN,
+            reason="the move statement is not understood",
+        )
+        here.store.last = frozenset({machine.record(here, 1, arrival), ELSEWHERE})
+    elif not _CANNOT_MOVE.match(statement.text):
+        here.store.last |= {ELSEWHERE}
+
+
+def run_broken(machine: Machine, here: Here) -> None:
+    """List the moves of a body whose blocks do not close; follow none of them."""
+    body = here.place.body
+    program = here.place.program
+    why = f"the block structure is broken (line {body.blocks.broken})"
+    here.reason = why
+    for row in range(body.first + 1, body.last):
+        said = ast.action(program.statement(row))
+        if isinstance(said, ast.Move):
+            here.row = row
+            here.store.last = frozenset({ELSEWHERE})
+            move(machine, here, said)
+    effects = rows_effects(program, body.first, body.last)
+    pin_names(here, effects.read, f"{why}: it may be used in a computation")
+    forget_names(here, effects.assigned, why)
+    here.store.set(tool=Nothing(why), base=Nothing(why), uframe=Nothing(why))
+    here.store.last = frozenset({ELSEWHERE})
+    machine.leave(here)
+
+
+# What variables hold before a program assigns them.
+
+
+def fill_initial(world: World) -> None:
+    """Enter declared initial values, constants and the variable file's values."""
+    for place, seen in world.declarations():
+        _declared(world, place, seen)
+    if world.variables is not None and world.main.main is not None:
+        place = Place(world.main, world.main.main)
+        _enter_all(world, place, world.variables)
+        _report_drift(world, place, world.variables)
+
+
+def _report_drift(world: World, place: Place, file: ValueFile) -> None:
+    """Say where a program and its variable file have drifted apart."""
+    for found in file.diagnostics:
+        world.diagnostics[found] = None
+    words, declared = place.program.statements.words(), place.program.variables.names
+    names = _bases(file.entries)
+    unused = [written for name, written in names.items() if name not in words]
+    undeclared = [
+        written
+        for name, written in names.items()
+        if name in words and name not in declared
+    ]
+    if names and len(unused) == len(names):
+        _say(world, file, "lsv-other-program", "none of its variables is used by "
+             f"{place.program.name}: is it the file of another program?")  # fmt: skip
+    elif unused:
+        _say(world, file, "lsv-unused", f"never used: {_some(unused)}")
+    if undeclared:
+        text = f"used by the program, but not declared there: {_some(undeclared)}"
+        _say(world, file, "lsv-undeclared", text)
+
+
+def _bases(entries: Entries) -> dict[str, str]:
+    """Return how variables of a file are written, by name, without their parts."""
+    written = [entries.name[row] for row in entries.row.values()]
+    names = dict(zip(lower(written), written, strict=True))
+    if entries.parts:
+        return {base_variable(name): name.partition(".")[0] for name in written}
+    return names
+
+
+def _say(world: World, file: ValueFile, code: str, text: str) -> None:
+    world.diagnostics[Diagnostic(file.source.name, 1, code, text)] = None
+
+
+def _some(names: list[str]) -> str:
+    rest = f" and {len(names) - 10} more" if len(names) > 10 else ""
+    return ", ".join(names[:10]) + rest
+
+
+def _declared(world: World, place: Place, seen: Variables) -> None:
+    """Enter the initial values of declarations, one by one: most have none."""
+    store = Store(world.initial.find)
+    for variable in (*_with_value(seen), *_with_value(place.body.variables)):
+        key = world.root(place, variable.name.lower())
+        if variable.initial is None or key in world.initial:
+            continue
+        value = Point(world, place, variable.row, store).value(variable.initial)
+        if isinstance(value, Position) and not value.name:
+            value = replace(
+                value,
+                name=variable.name,
+                taught=variable.taught,
+                shared=bool(variable.exported),
+            )
+        world.initial[key] = value
+
+
+def _with_value(seen: Variables) -> list[Variable]:
+    return [seen[name] for name in seen.which(lambda said: said.initial is not None)]
+
+
+def _enter_all(world: World, place: Place, file: ValueFile) -> None:
+    """Enter what a variable file says: points as columns, the rest one by one."""
+    entries, base = file.entries, world.slot_base[file.source.name]
+    places = [layout.kind in POSITIONS for layout in entries.layouts]
+    known = np.array(places, dtype=bool)[entries.layout]
+    known &= np.isfinite(entries.numbers).all(axis=1)
+    known &= np.isin(entries.arm, (0, world.arm))
+    shared = np.array([layout.shared for layout in entries.layouts], dtype=bool)
+    shared, taught = shared[entries.layout], np.zeros(len(known), dtype=bool)
+    named = np.fromiter(entries.row.values(), np.int64, len(entries.row))
+    own, other = known.copy(), {}
+    for row in _told_by_declaration(place.program, entries):
+        name = entries.name[row].lower()
+        root = root_of(name)
+        declared = place.program.variables[root]
+        taught[row], shared[row] = (
+            declared.taught,
+            shared[row] | bool(declared.exported),
+        )
+        if known[row] and declared.exported:
+            own[row] = False
+            other[world.root(place, root) + name[len(root) :]] = row
+    for row in named[~known[named]].tolist():
+        name = entries.name[row].lower()
+        root = root_of(name)
+        key = world.root(place, root) + name[len(root) :]
+        _enter(world, file, entries.entry(row), key)
+    prefix = f"{place.program.name}/"
+    world.initial.points = Points(prefix, own, other, entries, base, shared, taught)
+
+
+def _told_by_declaration(program: Program, entries: Entries) -> list[int]:
+    """List the rows of variables that are exported, or marked as taught."""
+    marked = {*program.variables.which(lambda v: v.taught or bool(v.exported))}
+    if not marked:
+        return []
+    return [row for name, row in entries.row.items() if root_of(name) in marked]
+
+
+def _enter(world: World, file: ValueFile, entry: Entry, key: str) -> None:
+    """Enter a value that is no known point, where there is any."""
+    value: Value | None = entry.numbers[0] if entry.numbers else None
+    if entry.kind in POSITIONS:
+        value = Nothing(f"its value is not initialised in {file.source.name}")
+    if entry.kind == "VEC":
+        x, y, z = entry.numbers[:3]
+        value = Vector((x, y, z))
+    if value is None and "." in entry.name:  # that it is there counts, see `nodes`
+        value = Nothing(f"its value in {file.source.name} is no number")
+    if entry.arm not in (0, world.arm):
+        value = Nothing(f"its value is one of arm {entry.arm}")
+    if value is not None:
+        world.initial[key] = value
+
+
+# From a parsed program to its visits: what it moves to, and from where.
+
+
+@dataclass(frozen=True)
+class Resolved:
+    """What a program does.
+
+    Attributes:
+        visits: Its arrivals.
+        diagnostics: What was found, sorted by file and line.
+    """
+
+    visits: Visits
+    diagnostics: tuple[Diagnostic, ...]
+
+
+def resolve(
+    program: Program,
+    start: Start | None = None,
+    variables: VariableFile | None = None,
+    others: Mapping[str, Program] | None = None,
+) -> Resolved:
+    """Follow a program from its start and list every arrival with its origins.
+
+    Every way that the program may take is followed, with what is known of variables,
+    frames and motion settings; whatever cannot be known is said on the visits that
+    depend on it and never guessed.
+
+    Args:
+        program: The parsed program.
+        start: What the cell says, by default identity frames and nothing else.
+        variables: The program's variable file.
+        others: Programs named by IMPORT, CALL or EXPORTED FROM, by lower-case name.
+    """
+    world = World(program, dict(others or {}), start or Start(), variables)
+    fill_initial(world)
+    machine = Machine(world)
+    stretches = Stretches(machine)
+    _start(machine)
+    while (here := machine.next()) is not None:
+        _run(machine, here, stretches)
+    if machine.exhausted:
+        world.report_once(
+            program, 0, "too-complex", "", "the program has too many ways to be "
+            "followed to the end: nothing in it is compensated",
+        )  # fmt: skip
+    world.pin_loose()
+    return Resolved(collect(machine), tuple(sorted(world.diagnostics)))
+
+
+def _start(machine: Machine) -> None:
+    world = machine.world
+    program, start = world.main, world.start
+    store = Store(world.initial.find, last=frozenset({START}))
+    why = "the cell file does not say what it is"
+    store.set(
+        tool=frame_value(start.tool, why),
+        base=frame_value(start.base, why),
+        uframe=frame_value(start.uframe, why),
+    )
+    _handlers(machine, store)
+    if program.main is not None:
+        machine.enter((), Place(program, program.main))
+        machine.push((), program.main.first + 1, store)
+
+
+def _handlers(machine: Machine, store: Store) -> None:
+    """Condition handlers run at any time: nothing they change is ever known."""
+    world = machine.world
+    nothing = Nothing("a condition handler runs at any time")
+    unknown = Store(lambda key: nothing, last=frozenset({ELSEWHERE}))
+    unknown.set(tool=nothing, base=nothing, uframe=nothing)
+    for program in world.programs():
+        for body in (program.main, *program.routines.values()):
+            for first, last in body.blocks.handlers if body else ():
+                assert body is not None
+                place = Place(program, body)
+                reach = reach_rows(world, place, first, last)
+                machine.volatile |= reach.assigned
+                for part in reach.parts:
+                    for name in part.effects.read:
+                        root = world.root(part.place, name)
+                        world.loosen(root, "a condition handler may use it")
+                if reach.moves:
+                    _moving_handler(machine, place, first, unknown)
+    for name in machine.volatile:
+        if name.startswith("$"):
+            store.set(**{name[1:]: Nothing("a condition handler changes it")})
+
+
+def _moving_handler(machine: Machine, place: Place, row: int, store: Store) -> None:
+    machine.interrupted = True
+    machine.world.report_once(
+        place.program,
+        row,
+        "handler-moves",
+        str(row),
+        "this condition handler may move the arm at any time: no move's origin is sure",
+    )
+    context = ((machine.position(place.program, row), HANDLED),)
+    machine.enter(context, place)
+    machine.push(context, row + 1, store)
+
+
+def _run(machine: Machine, here: Here, stretches: Stretches) -> None:
+    """Run statements one after the other until ways part or meet."""
+    program, body = here.place.program, here.place.body
+    joins = body.blocks.joins
+    if body.blocks.broken:
+        run_broken(machine, here)
+        return
+    first = True
+    while here.row < body.last:
+        if not first and here.row in joins:
+            machine.push(here.context, here.row, here.store)
+            return
+        if not stretches.run(here):
+            statement = program.statement(here.row)
+            if not first and isinstance(statement, ast.Case | ast.Else):
+                machine.push(here.context, body.blocks.end[here.row], here.store)
+                return
+            if not step(machine, here, statement):
+                return
+            here.row += 1
+        first = False
+    machine.leave(here)

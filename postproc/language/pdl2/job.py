@@ -1,0 +1,418 @@
+"""All files of one job: names, initial values, and the place of every number."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from itertools import chain, repeat
+
+import numpy as np
+
+from postproc.arrays import Bools, Ints
+from postproc.language.pdl2 import syntax as ast
+from postproc.language.pdl2.entries import Entries
+from postproc.language.pdl2.program import Body, Program, Variable, Variables
+from postproc.language.pdl2.store import root_of, wholes
+from postproc.language.pdl2.values import Nothing, Position, Value
+from postproc.language.pdl2.variable_file import VariableFile as ValueFile
+from postproc.language.visits import Diagnostic
+
+# What variables hold when a program starts, by key.
+
+
+@dataclass(frozen=True)
+class Points:
+    """Points whose six numbers a variable file tells.
+
+    Attributes:
+        prefix: What keys of the program's own variables begin with, before their names.
+        own: Which rows of `entries` are points of such variables.
+        other: Rows of points of variables of other programs, by key.
+        entries: The entries of the file.
+        base: Global index of the file's first number.
+        shared: Another program may read it too, by row of `entries`.
+        taught: Marked as taught where it is declared, likewise.
+    """
+
+    prefix: str
+    own: Bools
+    other: Mapping[str, int]
+    entries: Entries
+    base: int
+    shared: Bools
+    taught: Bools
+
+    def row(self, key: str) -> int:
+        """Return the row of a key, -1 where it is no point."""
+        if key.startswith(self.prefix):
+            row = self.entries.row.get(key[len(self.prefix) :], -1)
+            if row >= 0 and self.own[row]:
+                return row
+        return self.other.get(key, -1)
+
+    def rows(self, names: Sequence[str]) -> Ints:
+        """Return the rows of the program's own variables, (m,), -1 for no points.
+
+        Args:
+            names: Their names, in lower case.
+        """
+        found = map(self.entries.row.get, names, repeat(-1))
+        rows = np.fromiter(found, np.int64, len(names))
+        rows[rows >= 0] = np.where(self.own[rows[rows >= 0]], rows[rows >= 0], -1)
+        return rows
+
+    def keys(self) -> Iterator[str]:
+        """Go through the keys, in the order of the file."""
+        elsewhere = {row: key for key, row in self.other.items()}
+        for name, row in self.entries.row.items():
+            if self.own[row]:
+                yield self.prefix + name
+            elif row in elsewhere:
+                yield elsewhere[row]
+
+    def parts(self) -> Iterator[str]:
+        """Go through the keys that may be elements or fields."""
+        if self.entries.parts or self.other or any(c in self.prefix for c in "[."):
+            yield from self.keys()
+
+    def position(self, row: int) -> Position:
+        """Return the value of a point."""
+        entry = self.entries.entry(row)
+        return Position(
+            entry.kind == "JNTP",
+            entry.numbers,
+            tuple(self.base + slot if slot >= 0 else -1 for slot in entry.slots),
+            entry.config,
+            entry.aux,
+            entry.name,
+            taught=bool(self.taught[row]),
+            shared=bool(self.shared[row]),
+        )
+
+
+@dataclass
+class InitialValues:
+    """Values by key; those of points are made when they are asked for."""
+
+    other: dict[str, Value] = field(default_factory=dict)
+    points: Points | None = None
+
+    def point(self, key: str) -> int:
+        """Return the row of a point that the variable file tells, -1 for all else."""
+        return -1 if self.points is None else self.points.row(key)
+
+    def rows(self, prefix: str, names: Sequence[str]) -> Ints:
+        """Return the rows of points of a program's own variables, (m,), -1 for others.
+
+        Args:
+            prefix: What the keys of its variables begin with.
+            names: Names of its variables, in lower case.
+        """
+        if self.points is None or prefix != self.points.prefix:
+            return np.full(len(names), -1)
+        return self.points.rows(names)
+
+    def find(self, key: str) -> Value | None:
+        """Return what a key holds, None where it holds nothing."""
+        row = self.point(key)
+        if row >= 0 and self.points is not None:
+            return self.points.position(row)
+        return self.other.get(key)
+
+    def __contains__(self, key: str) -> bool:
+        """Tell whether a key holds anything."""
+        return self.point(key) >= 0 or key in self.other
+
+    def __setitem__(self, key: str, value: Value) -> None:
+        """Let a key hold a value, unless the variable file says another."""
+        self.other[key] = value
+
+    def parts(self) -> Iterator[str]:
+        """Go through the keys, but for most of those that are no parts of others."""
+        own = self.points.parts() if self.points is not None else ()
+        return chain(own, (key for key in self.other if self.point(key) < 0))
+
+    def __iter__(self) -> Iterator[str]:
+        """Go through the keys."""
+        own = self.points.keys() if self.points is not None else ()
+        return chain(own, (key for key in self.other if self.point(key) < 0))
+
+
+# All files of one job: names, initial values, and the place of every number.
+
+Record = tuple[float, ...] | None
+
+
+@dataclass(frozen=True)
+class Start:
+    """What the cell says about the moment at which the program starts.
+
+    Attributes:
+        tool, base, uframe: Position records (6,) [mm, deg], None where unknown.
+        routines: Outside routine to ``still``, ``moves`` or ``sets-frames``.
+        frame_tables: Outside routine to arguments (``"1,2"``) to the records of the
+            frames (``tool``, ``base``, ``uframe``) that it sets.
+        aux: Auxiliary axis to ``gun``, ``track`` or ``positioner``.
+        taught: Names of points that were taught with the robot.
+        arm: Number of our arm, 0 to take the program's ``PROG_ARM`` (else 1).
+    """
+
+    tool: Record = (0.0,) * 6
+    base: Record = (0.0,) * 6
+    uframe: Record = (0.0,) * 6
+    routines: Mapping[str, str] = field(default_factory=dict)
+    frame_tables: Mapping[str, Mapping[str, Mapping[str, Record]]] = field(
+        default_factory=dict
+    )
+    aux: Mapping[int, str] = field(default_factory=dict)
+    taught: Collection[str] = frozenset()
+    arm: int = 0
+
+    def __post_init__(self) -> None:
+        """PDL2 does not tell cases apart: keep names in lower case."""
+        lower = {name.lower(): said for name, said in self.routines.items()}
+        object.__setattr__(self, "routines", lower)
+        tables = {name.lower(): table for name, table in self.frame_tables.items()}
+        object.__setattr__(self, "frame_tables", tables)
+        taught = frozenset(name.lower() for name in self.taught)
+        object.__setattr__(self, "taught", taught)
+
+    @property
+    def records(self) -> frozenset[Record]:
+        """Return all frames that the cell gives."""
+        tables = [e for table in self.frame_tables.values() for e in table.values()]
+        given = [record for entry in tables for record in entry.values()]
+        return frozenset([self.tool, self.base, self.uframe, *given])
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where a statement stands: its program and its body."""
+
+    program: Program
+    body: Body
+
+
+@dataclass
+class World:
+    """The programs of a job and what was found about them.
+
+    Attributes:
+        main: The program that is compensated.
+        others: Other programs, by lower-case program and file name.
+        start: What the cell says.
+        slot_base: First global number index of each file, by file name.
+        initial: What variables hold before the program assigns them, by key.
+        taught_lines: Lines marked ``-- TAUGHT``, by file name.
+        diagnostics: What was found; a message is kept once.
+        loose: Variables, by key, that are used where it is not known what they hold,
+            and how.
+        held: Numbers of the positions that variables, or their parts, ever hold.
+        pinned: Numbers (by their index in the job) that say more than where a move
+            goes, and what else they are used for: they must stay as they are.
+    """
+
+    main: Program
+    others: Mapping[str, Program]
+    start: Start
+    variables: ValueFile | None
+    slot_base: dict[str, int] = field(default_factory=dict)
+    files: list[str] = field(default_factory=list)
+    initial: InitialValues = field(default_factory=InitialValues)
+    diagnostics: dict[Diagnostic, None] = field(default_factory=dict)
+    loose: dict[str, str] = field(default_factory=dict)
+    held: dict[str, set[tuple[int, ...]]] = field(default_factory=dict)
+    pinned: dict[int, str] = field(default_factory=dict)
+    taught_lines: dict[str, frozenset[int]] = field(default_factory=dict)
+    reached: dict[int, object] = field(default_factory=dict)
+    _said: set[tuple[str, str]] = field(default_factory=set)
+    _kept: set[frozenset[int]] = field(default_factory=set)
+    _first: dict[str, list[str]] | None = None
+
+    def __post_init__(self) -> None:
+        base = 0
+        for program in self.programs():
+            self.slot_base[program.lines.source.name] = base
+            self.files.append(program.lines.source.name)
+            base += len(program.lines.start)
+            self.taught_lines[program.lines.source.name] = frozenset(
+                line for line, _ in program.lines.marks("TAUGHT")
+            )
+            self.diagnostics |= dict.fromkeys(program.diagnostics)
+        if self.variables is not None:
+            self.slot_base[self.variables.source.name] = base
+            self.files.append(self.variables.source.name)
+
+    @property
+    def arm(self) -> int:
+        """Return the number of our arm."""
+        return self.start.arm or self.main.arm or 1
+
+    def programs(self) -> list[Program]:
+        """Return the programs, the main one first, each once."""
+        found = {id(self.main): self.main}
+        for program in self.others.values():
+            found.setdefault(id(program), program)
+        return list(found.values())
+
+    def report(self, program: Program, row: int, code: str, message: str) -> None:
+        """Collect a finding at a logical line."""
+        lines = program.lines
+        line = int(lines.line[row]) if 0 <= row < len(lines) else 1
+        self.diagnostics[Diagnostic(lines.source.name, line, code, message)] = None
+
+    def report_once(
+        self, program: Program, row: int, code: str, what: str, message: str
+    ) -> None:
+        """Collect a finding about something the first time only."""
+        if (code, what) not in self._said:
+            self._said.add((code, what))
+            self.report(program, row, code, message)
+
+    def pin(self, value: Value, why: str, components: Iterable[int] = range(6)) -> None:
+        """Keep the numbers of a position because something else depends on them."""
+        if isinstance(value, Position):
+            for at in components:
+                if value.slots[at] >= 0:
+                    self.pinned.setdefault(value.slots[at], why)
+        elif isinstance(value, Nothing) and value.of not in self._kept:
+            self._kept.add(value.of)
+            for slot in value.of:
+                self.pinned.setdefault(slot, why)
+
+    def hold(self, key: str, value: Position) -> None:
+        """Note that a variable, or a part of it, holds a position at some time."""
+        self.held.setdefault(root_of(key), set()).add(value.slots)
+
+    def first_parts(self, key: str) -> list[str]:
+        """Return the elements and fields that a key has when the job starts."""
+        if self._first is None:
+            self._first = {}
+            for part in self.initial.parts():
+                if "[" in part or "." in part:
+                    for whole in wholes(part):
+                        self._first.setdefault(whole, []).append(part)
+        return self._first.get(key, [])
+
+    def loosen(self, key: str, why: str) -> None:
+        """Note that some part of a variable is used, which only the run tells."""
+        self.loose.setdefault(root_of(key), why)
+
+    def pin_loose(self) -> None:
+        """Keep the numbers of all that a loose variable holds at some time."""
+        for root, why in self.loose.items():
+            for key in (root, *self.first_parts(root)):
+                value = self.initial.find(key)
+                if isinstance(value, Position):
+                    self.hold(key, value)
+            for slots in self.held.get(root, ()):
+                self.pin(Position(slots=slots), why)
+
+    def declared(self, place: Place, name: str) -> Variable | None:
+        """Return the declaration that a name means."""
+        return place.body.variables.get(name) or place.program.variables.get(name)
+
+    def root(self, place: Place, name: str) -> str:
+        """Return the key of a variable: its routine's own, or its program's."""
+        program, body = place.program, place.body
+        if name in body.own_names:
+            return f"{program.name}:{body.name}/{name}"
+        declared = program.variables.get(name)
+        if declared is not None and declared.exported:
+            return f"{declared.exported}/{name}"
+        return f"{program.name}/{name}"
+
+    def declarations(self) -> Iterator[tuple[Place, Variables]]:
+        """Yield every body, with what its program declares that is new there.
+
+        What a body does not hide means what it means in the first one.
+        """
+        for program in self.programs():
+            bodies = [b for b in (program.main, *program.routines.values()) if b]
+            for body in bodies:
+                seen = program.variables
+                if body is not bodies[0]:
+                    seen = seen.some(bodies[0].own_names | body.own_names)
+                yield Place(program, body), seen
+
+    @cached_property
+    def spelling(self) -> Mapping[str, str]:
+        """Return how variables are written, by key: as where they come first."""
+        found: dict[str, str] = {}
+        for place, seen in self.declarations():
+            own = [variable.name for variable in place.body.variables.values()]
+            for name in (*seen.written(), *own):
+                found.setdefault(self.root(place, name.lower()), name)
+        if self.variables is not None and self.main.main is not None:
+            place, entries = Place(self.main, self.main.main), self.variables.entries
+            for name, row in entries.row.items():
+                root = root_of(name)
+                key = self.root(place, root) + name[len(root) :]
+                if key in self.initial:
+                    found.setdefault(key, entries.name[row])
+        return found
+
+    def written(self, key: str) -> str:
+        """Return how a variable or element is written."""
+        if key in self.spelling:
+            return self.spelling[key]
+        root = base_variable(key)
+        written = self.spelling.get(root, root.split("/", 1)[-1])
+        return written + key[len(root) :]
+
+    def type_of(self, place: Place, name: str) -> ast.Type | None:
+        """Return the declared type of a name."""
+        for parameter in place.body.parameters:
+            if parameter.name == name:
+                return parameter.type
+        declared = self.declared(place, name)
+        return declared.type if declared else None
+
+    def is_function(self, place: Place, name: str) -> bool:
+        """Tell whether a name by itself calls a routine."""
+        program = place.program
+        known = name in program.routines or name in program.outside
+        return known and self.type_of(place, name) is None
+
+    def find_routine(self, program: Program, name: str) -> Place | None:
+        """Return the routine with a body that a name means, if the job holds it."""
+        if name in program.routines:
+            return Place(program, program.routines[name])
+        exporter = program.outside.get(name)
+        files = [exporter] if exporter else map(base_name, program.imports)
+        for file in files:
+            other = self._file(file)
+            if other is not None and name in other.routines:
+                return Place(other, other.routines[name])
+        return None
+
+    def find_program(self, program: Program, name: str) -> Place | None:
+        """Return the main part of a program of the job; `program` calls it."""
+        found = self._file(name)
+        if found is None or found.main is None:
+            return None
+        return Place(found, found.main)
+
+    def _file(self, name: str) -> Program | None:
+        """Return the program that a name or a file's name means."""
+        own = {self.main.name, base_name(self.main.lines.source.name)}
+        return self.others.get(name) or (self.main if name in own else None)
+
+
+def base_variable(name: str) -> str:
+    """Return a variable's name without indices and fields, in lower case.
+
+    >>> base_variable("Tab[3].place")
+    'tab'
+    """
+    return root_of(name.lower())
+
+
+def base_name(file: str) -> str:
+    r"""Return a file's name without folders and suffix, in lower case.
+
+    >>> base_name(r"UD:\\USR\\Page2.cod")
+    'page2'
+    """
+    return file.replace("\\", "/").rsplit("/", 1)[-1].rsplit(".", 1)[0].lower()

@@ -1,0 +1,342 @@
+"""Run a program over what is known: every way it may take, with a list of work."""
+
+from __future__ import annotations
+
+import heapq
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from postproc.arrays import Ints
+from postproc.language.pdl2 import syntax as ast
+from postproc.language.pdl2.effects import PURE, invocations, references
+from postproc.language.pdl2.evaluate import Point, forget_key, parts_under
+from postproc.language.pdl2.job import Place, World
+from postproc.language.pdl2.program import Body, Program
+from postproc.language.pdl2.store import MANY, MOST_ORIGINS, Settings, Store
+from postproc.language.pdl2.syntax import Move
+from postproc.language.pdl2.values import Nothing, Position, Value
+from postproc.language.visits import ELSEWHERE, Motion, Target
+
+# What the analysis records of each arrival, before it becomes arrays.
+
+Numbers = tuple[float | None, ...]
+_NO_NUMBERS: Numbers = (None,) * 6
+
+WRITTEN, HELD = -1, -2  # instead of a row of the variable file
+
+
+@dataclass(frozen=True, slots=True)
+class Arrival:
+    """One visit.
+
+    Attributes:
+        place, row: Where the move stands.
+        predecessors: Visits it may come from.
+        settings: Frames and motion variables that hold.
+        motion: Trajectory.
+        target: What the numbers mean.
+        numbers: Six numbers, None where not known.
+        position: The position value where there is one.
+        fly: MOVEFLY.
+        via: The VIA point of an arc.
+        distance: For NEAR [mm].
+        reason: Why it cannot be compensated, "" where it can.
+    """
+
+    place: Place
+    row: int
+    predecessors: frozenset[int]
+    settings: Settings
+    motion: Motion
+    target: Target
+    numbers: Numbers = _NO_NUMBERS
+    position: Position | None = None
+    fly: bool = False
+    via: bool = False
+    distance: float | None = None
+    reason: str = ""
+
+    def __len__(self) -> int:
+        """Return the number of visits."""
+        return 1
+
+
+@dataclass(frozen=True, slots=True)
+class Run:
+    """Moves that follow each other, each from the one before.
+
+    Attributes:
+        place: Where they stand.
+        rows: Their rows, (k,).
+        variant: Which lines differ in numbers and points only, (k,).
+        moves: What each variant says.
+        ways: Trajectory of each variant, and why that is not known.
+        predecessors: Visits the first of them may come from.
+        settings: Frames and motion variables that hold, but for those of WITH.
+        point: Row of the variable file that each goes to, (k,); WRITTEN where the
+            numbers stand in the move, HELD where a variable holds something else.
+        held: What that is, by the index of the move.
+        reason: Why none of them can be compensated, "" where they can.
+    """
+
+    place: Place
+    rows: Ints
+    variant: Ints
+    moves: Mapping[int, Move]
+    ways: Mapping[int, tuple[Motion, str]]
+    predecessors: frozenset[int]
+    settings: Settings
+    point: Ints
+    held: Mapping[int, Value]
+    reason: str = ""
+
+    def __len__(self) -> int:
+        """Return the number of visits."""
+        return len(self.rows)
+
+
+# Run a program over what is known: every way it may take, with a list of work.
+#
+# A *configuration* is a place in the program with the calls and the rounds of constant
+# FOR loops that led there. Each has one store, in which all ways that lead there are
+# merged; a configuration is run again when its store has changed, until nothing
+# changes. Work is done in program order, so that most configurations are run once.
+
+Context = tuple[tuple[int, int], ...]
+"""Calls (row, CALLED) and loop rounds (row, round), outermost first."""
+
+CALLED, HANDLED, HERE = -1, -3, -2
+MAX_ROWS = 20_000  # rows of unrolled loops and of calls, each time they are run
+MAX_STEPS = 2_000_000  # times a configuration is run again, all in all
+
+Key = tuple[Context, int, int]
+
+
+@dataclass
+class Here(Point):
+    """A point of the execution with the way that led to it."""
+
+    context: Context = ()
+    reason: str = ""  # why nothing here may be compensated
+
+
+@dataclass
+class Machine:
+    """The work in hand and what came out of it.
+
+    Attributes:
+        world: The files of the job.
+        arrivals: Visits and runs of visits, by place; the last analysis of a place
+            holds.
+        ids: First visit id of each.
+        places: Program and body of each context.
+        entries: The store of each configuration.
+        ranges: (first, step, rounds) of constant loops, by context and row.
+        widened: Loops that are not unrolled.
+        recursive: Bodies (by id) that call themselves, directly or not.
+        interrupted: A condition handler may move the arm at any time.
+        exhausted: The program is too complex to be followed to the end.
+    """
+
+    world: World
+    arrivals: dict[Key, Arrival | Run] = field(default_factory=dict)
+    ids: dict[Key, int] = field(default_factory=dict)
+    places: dict[Context, Place] = field(default_factory=dict)
+    entries: dict[tuple[Context, int], Store] = field(default_factory=dict)
+    ranges: dict[tuple[Context, int], tuple[float, float, int]] = field(
+        default_factory=dict
+    )
+    widened: set[tuple[Context, int]] = field(default_factory=set)
+    volatile: frozenset[str] = frozenset()
+    recursive: set[int] = field(default_factory=set)
+    interrupted: bool = False
+    exhausted: bool = False
+    rows: int = 0
+    _heap: list[tuple[Context, tuple[Context, int]]] = field(default_factory=list)
+    _queued: set[tuple[Context, int]] = field(default_factory=set)
+    _called: dict[int, tuple[ast.Invoke, ...]] = field(default_factory=dict)
+    _offsets: dict[int, int] = field(default_factory=dict)
+    next_id: int = 0
+
+    def __post_init__(self) -> None:
+        offset = 0
+        for program in self.world.programs():
+            self._offsets[id(program)] = offset
+            offset += len(program.lines) + 1
+
+    # ---- places ---------------------------------------------------------------------
+    def position(self, program: Program, row: int) -> int:
+        """Return the job-wide index of a row."""
+        return self._offsets[id(program)] + row
+
+    def enter(self, context: Context, place: Place) -> None:
+        """Say where a context is."""
+        self.places[context] = place
+
+    def visit_id(self, key: Key, count: int = 1) -> int:
+        """Return the first id of the visits of a place."""
+        if key not in self.ids:
+            self.ids[key] = self.next_id
+            self.next_id += count
+        return self.ids[key]
+
+    def record(self, here: Here, sub: int, arrival: Arrival | Run) -> int:
+        """Keep a visit; return its (first) id."""
+        key = (here.context, self.position(here.place.program, here.row), sub)
+        self.arrivals[key] = arrival
+        if MANY in arrival.predecessors:
+            self._report_many(here)
+        return self.visit_id(key, len(arrival))
+
+    def _report_many(self, here: Here) -> None:
+        here.world.report_once(
+            here.place.program, here.row, "many-origins", str(here.row),
+            f"more than {MOST_ORIGINS} arrivals may come before this move: they are "
+            "not told apart, and from which side it arrives is not known",
+        )  # fmt: skip
+
+    def predecessors(self, here: Here) -> frozenset[int]:
+        """Return where the arm may come from."""
+        last = here.store.last
+        return last | {ELSEWHERE} if self.interrupted else last
+
+    # ---- work -----------------------------------------------------------------------
+    def push(self, context: Context, row: int, store: Store) -> None:
+        """A way leads to a row with what is known there."""
+        context = self._inside(context, row)
+        config = (context, row)
+        known = self.entries.get(config)
+        if known is None:
+            self.entries[config] = store.copy()
+        elif not known.merge(store):
+            return
+        if config not in self._queued:
+            self._queued.add(config)
+            at = self.position(self.places[context].program, row)
+            heapq.heappush(self._heap, ((*context, (at, HERE)), config))
+
+    def go_on(self, context: Context, row: int, store: Store) -> None:
+        """Go on with a row as the one after the last: ELSE and CASE end a branch."""
+        place = self.places[context]
+        if row < place.body.last:
+            statement = place.program.statement(row)
+            if isinstance(statement, ast.Case | ast.Else):
+                row = place.body.blocks.end.get(row, row)
+        self.push(context, row, store)
+
+    def _inside(self, context: Context, row: int) -> Context:
+        """Drop the rounds of loops that a jump to a row leaves."""
+        place = self.places[context]
+        while context and context[-1][1] >= 0:
+            start = context[-1][0] - self._offsets[id(place.program)]
+            if start < row <= place.body.blocks.end[start]:
+                break
+            context = context[:-1]
+        return context
+
+    def next(self) -> Here | None:
+        """Take the first piece of work, None when all is done."""
+        if not self._heap:
+            return None
+        _, config = heapq.heappop(self._heap)
+        self._queued.discard(config)
+        context, row = config
+        self.rows += 1
+        if self.rows > MAX_STEPS:
+            self.exhausted = True
+            return None
+        store = self.entries[config].copy()
+        return Here(
+            self.world, self.places[context], row, store, self.volatile, context
+        )
+
+    def called(self, place: Place, statement: ast.Statement) -> tuple[ast.Invoke, ...]:
+        """Return the calls in a statement's expressions that may have effects.
+
+        A function without arguments is called by its name alone.
+        """
+        known = self._called.get(id(statement))
+        if known is None:
+            found = [c for c in invocations(statement) if c.name not in PURE]
+            names = {r.name for r in references(statement) if not r.steps}
+            alone = [n for n in names if self.world.is_function(place, n)]
+            found += [ast.Invoke(name, ()) for name in sorted(alone)]
+            known = self._called[id(statement)] = tuple(found)
+        return known
+
+    # ---- calls ----------------------------------------------------------------------
+    def calls_in(self, context: Context) -> list[Body]:
+        """Return the bodies that are running.
+
+        Below a handler of a file without a main body there is none.
+        """
+        ways = [
+            context[:i]
+            for i in range(len(context) + 1)
+            if i == 0 or context[i - 1][1] < 0
+        ]
+        return [self.places[way].body for way in ways if way in self.places]
+
+    def leave(self, here: Here, by_return: bool = False) -> None:
+        """The body ends: go back to the caller, or into the next cycle."""
+        context = here.context
+        while context and context[-1][1] >= 0:
+            context = context[:-1]
+        blocks = here.place.body.blocks
+        if not by_return and blocks.cycle >= 0 and not here.place.body.name:
+            self.push(context, blocks.cycle, here.store)
+        elif context and context[-1][1] == CALLED:
+            _forget_locals(here)
+            caller = self.places[context[:-1]]
+            row = context[-1][0] - self._offsets[id(caller.program)]
+            self.go_on(context[:-1], row + 1, here.store)
+
+    def call(self, here: Here, place: Place) -> None:
+        """Go into a routine; it comes back to the row after this one."""
+        at = self.position(here.place.program, here.row)
+        context = (*here.context, (at, CALLED))
+        self.enter(context, place)
+        self.rows += 1
+        self.push(context, place.body.first + 1, here.store)
+
+
+def _forget_locals(here: Here) -> None:
+    body = here.place.body
+    for name in body.own_names:
+        here.store.drop(here.world.root(here.place, name))
+
+
+# What is no longer known, and what must stay because something may depend on it.
+
+
+def forget_names(here: Here, names: frozenset[str], why: str) -> None:
+    """Forget variables and settings (with ``$``) by name."""
+    for name in names:
+        if name.startswith("$"):
+            here.store.set(**{name[1:]: Nothing(why)})
+        elif name:
+            forget(here, ast.Reference(name), why)
+
+
+def pin_names(here: Here, names: frozenset[str], why: str) -> None:
+    """Keep the numbers of variables that something not followed may depend on."""
+    for name in sorted(names):
+        if not name.startswith("$"):
+            for key in here.locate(ast.Reference(name)).keys:
+                for part in (key, *parts_under(here, key)):
+                    here.world.pin(here.store.read(part), why)
+
+
+def forget(here: Here, reference: ast.Reference, why: str) -> None:
+    """Forget what a variable holds, unless it is a constant."""
+    declared = here.world.declared(here.place, reference.name)
+    if declared is not None and declared.constant:
+        return
+    if reference.name.startswith("$"):
+        part = here.frame_part(reference)
+        name = here.setting_name(reference) if part is None else part[0]
+        if name in here.store.settings:
+            here.store.set(**{str(name): Nothing(why)})
+        return
+    for key in here.locate(reference).keys:
+        forget_key(here, key, why)

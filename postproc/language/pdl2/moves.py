@@ -1,0 +1,401 @@
+"""What one move statement means at a point of the execution."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+from postproc.language.pdl2 import syntax as ast
+from postproc.language.pdl2.effects import references
+from postproc.language.pdl2.evaluate import SINGLE, parts_under
+from postproc.language.pdl2.machine import Arrival, Here, Machine, pin_names
+from postproc.language.pdl2.store import Settings
+from postproc.language.pdl2.values import Nothing, Position, Value, Vector, unsure
+from postproc.language.visits import ELSEWHERE, NO_TARGET, Motion, Target
+
+# Nodes of paths as destinations: where the one position of a node stands.
+
+MAIN = ("$main_pos", "$main_jntp", "$main_xtnd")
+
+
+def may_be_node(here: Here, reference: ast.Reference) -> bool:
+    """Tell whether a reference may mean a node of a path, or what is in one."""
+    type_ = here.world.type_of(here.place, reference.name)
+    if type_ is None:
+        return reference.steps[:1] == ("node",)
+    return type_.path or type_.name not in SINGLE
+
+
+def destination(here: Here, reference: ast.Reference) -> Value:
+    """Return where a move to what may be a node goes: to the one position in it.
+
+    What other standard fields (``$LIN_SPD``, ``$SEG_TOOL_IDX``) of a node do in a move
+    to it no public source tells: such a node is not known, and keeps its numbers.
+    """
+    whole = here.value(reference)
+    target = here.locate(reference)
+    if not isinstance(whole, Nothing) or not target.exact or target.component != ():
+        return whole
+    (key,) = target.keys
+    under = len(key) + 1
+    names = {part[under:] for part in parts_under(here, key)}
+    found = {name for name in names if name[:1] == "$" and "." not in name}
+    standard = sorted(found | _declared(here, reference))
+    fields = [
+        here.value(ast.Reference(reference.name, (*reference.steps, name)))
+        for name in standard
+        if name in MAIN
+    ]
+    if not fields:
+        return whole
+    if _unread(here, key):
+        return unsure(Nothing("its values in the variable file are not read"), *fields)
+    if len(fields) == 1 == len(standard):
+        return fields[0]
+    several = len(fields) > 1
+    why = "it has several positions" if several else "it has settings of its own"
+    return unsure(Nothing(f"{why} ({', '.join(standard).upper()})"), *fields)
+
+
+def _declared(here: Here, reference: ast.Reference) -> frozenset[str]:
+    """Return the standard fields that the type of a node declares."""
+    type_ = here.world.type_of(here.place, reference.name)
+    steps = [step for step in reference.steps if isinstance(step, str)]
+    if type_ is None or steps not in ([], ["node"]):
+        return frozenset()
+    found = [one.nodes.get(type_.name) for one in here.world.programs()]
+    return frozenset().union(*filter(None, found))
+
+
+def _unread(here: Here, key: str) -> bool:
+    """Tell whether the variable file may say more of a node than what was read."""
+    file, name = here.world.variables, key.rpartition("/")[2]
+    unread = file.unread if file is not None else ()
+    return any(f"{name}.".startswith((f"{one}.", f"{one}[")) for one in unread)
+
+
+# What the destination of a move means: where the arm goes, as far as it is told.
+
+_FRAME = {
+    "TOOL": Target.RELATIVE_TOOL,
+    "BASE": Target.RELATIVE_BASE,
+    "UFRAME": Target.RELATIVE_UFRAME,
+}
+UNSURE = "a move whose target is not sure may go to it"
+_PLACES = {"home": Target.HOME, "cal_sys": Target.CALIBRATION}
+
+
+@dataclass(frozen=True)
+class Goal:
+    """What a destination means.
+
+    Attributes:
+        target: What the numbers mean.
+        numbers: Six numbers, None where not known.
+        position: The position value where there is one.
+        distance: For NEAR and FOR [mm].
+        reason: Why it cannot be compensated, "" where it can.
+    """
+
+    target: Target
+    numbers: tuple[float | None, ...] = (None,) * 6
+    position: Position | None = None
+    distance: float | None = None
+    reason: str = ""
+
+
+def goal_of(here: Here, statement: ast.Move, motion: Motion) -> Goal:
+    """Tell where a move goes."""
+    where = statement.where
+    match statement.how:
+        case "TO":
+            return absolute(here, where[0])
+        case "RELATIVE":
+            return _relative(here, where[0], statement.frame)
+        case "AWAY":
+            distance = here.real(where[0])
+            return _no_target(Target.AWAY, (distance, *(None,) * 5), "AWAY")
+        case "NEAR":
+            goal = absolute(here, where[0])
+            distance = here.real(where[1])
+            if goal.target is Target.POSE and distance is not None:
+                near = goal.position and replace(goal.position, name="", derived="NEAR")
+                return Goal(Target.NEAR, goal.numbers, near, distance, _why("NEAR"))
+        case "FOR":
+            return _towards(here, where, motion)
+        case "ALONG":
+            return _along(here, where[0])
+        case "ABOUT":
+            return _about(here, where, statement.frame)
+        case "BY":
+            by = here.value(where[0])
+            here.world.pin(by, "MOVE BY goes on by it")
+            if isinstance(by, Position) and by.joints:
+                return _no_target(Target.BY, by.numbers, "BY")
+    return Goal(Target.UNKNOWN, reason=_why(statement.how))
+
+
+def _why(word: str) -> str:
+    return f"{NO_TARGET} ({word})"
+
+
+def _no_target(target: Target, numbers: tuple[float | None, ...], word: str) -> Goal:
+    """Return a goal that can be planned only where all its numbers are known."""
+    needed = {Target.AWAY: 1, Target.BY: 6, Target.ABOUT: 5}.get(target, 3)
+    if None in numbers[:needed]:
+        return Goal(Target.UNKNOWN, reason=_why(word))
+    return Goal(target, numbers, reason=_why(word))
+
+
+def _relative(here: Here, vector: ast.Expression, frame: str) -> Goal:
+    value = here.value(vector)
+    if not isinstance(value, Vector) or frame not in _FRAME:
+        return Goal(Target.UNKNOWN, reason=_why("RELATIVE"))
+    return _no_target(_FRAME[frame], (*value.numbers, None, None, None), "RELATIVE")
+
+
+def _about(here: Here, where: tuple[ast.Expression, ...], frame: str) -> Goal:
+    axis, angle = here.value(where[0]), here.real(where[1])
+    if not isinstance(axis, Vector) or frame not in _FRAME:
+        return Goal(Target.UNKNOWN, reason=_why("ABOUT"))
+    numbers = (*axis.numbers, angle, float(_FRAME[frame]), None)
+    return _no_target(Target.ABOUT, numbers, "ABOUT")
+
+
+def _towards(here: Here, where: tuple[ast.Expression, ...], motion: Motion) -> Goal:
+    """Go a distance towards a pose: a place of its own on a straight line only."""
+    goal, distance = absolute(here, where[1]), here.real(where[0])
+    known = goal.target is Target.POSE and distance is not None and distance >= 0.0
+    if not known or motion is not Motion.LINEAR:
+        return Goal(Target.UNKNOWN, reason=_why("FOR"))
+    towards = goal.position and replace(goal.position, name="", derived="FOR")
+    return Goal(Target.FOR, goal.numbers, towards, distance, _why("FOR"))
+
+
+def _along(here: Here, path: ast.Expression) -> Goal:
+    """Go along a path: its nodes must stay, for the arm goes to them from elsewhere."""
+    name = path.name if isinstance(path, ast.Reference) else ""
+    why = f"MOVE ALONG {name} goes to it too"
+    pin_names(here, frozenset({name}), why)
+    reason = (
+        f"the nodes of a path are not followed (MOVE ALONG {name}): the next move is "
+        "taken to come from an unknown place"
+    )
+    return Goal(Target.UNKNOWN, reason=reason)
+
+
+def absolute(here: Here, expression: ast.Expression) -> Goal:
+    """Tell what a place means that does not depend on where the arm is."""
+    if isinstance(expression, ast.Reference) and expression.name.startswith("$"):
+        return _system(here, expression)
+    if isinstance(expression, ast.Reference):
+        _check_declared(here, expression.name)
+    if isinstance(expression, ast.Reference) and may_be_node(here, expression):
+        value = destination(here, expression)
+    else:
+        value = here.value(expression)
+    if isinstance(value, Nothing):
+        here.world.pin(value, UNSURE)
+    return from_value(value)
+
+
+def _system(here: Here, reference: ast.Reference) -> Goal:
+    """Tell where a place of the controller is; it belongs to no target."""
+    name = here.setting_name(reference)
+    if name is None:
+        last = reference.steps[-1] if reference.steps else reference.name
+        said = str(last).lstrip("$").upper() if isinstance(last, str) else "it"
+        why = f"${said} belongs to another arm, or only the run tells to which"
+        return from_value(Nothing(why))
+    held = here.store.settings.get(name)
+    if name not in _PLACES:
+        unknown = Nothing(f"${name.upper()} is a system variable")
+        return from_value(held or unknown, True)
+    if held is None:
+        return Goal(_PLACES[name], reason=_why(f"${name.upper()}"))
+    return replace(from_value(held), reason=_why(f"${name.upper()}"))
+
+
+def _check_declared(here: Here, name: str) -> None:
+    if here.world.type_of(here.place, name) is None:
+        if here.world.declared(here.place, name) is not None:
+            return
+        here.world.report_once(
+            here.place.program,
+            here.row,
+            "undeclared-variable",
+            name,
+            f"{name} is used and not declared",
+        )
+
+
+def from_value(value: Value, system: bool = False) -> Goal:
+    """Tell what a move to a value means; `system`: to that of a system variable."""
+    if isinstance(value, Nothing):
+        return Goal(Target.UNKNOWN, reason=f"the target is not known: {value.why}")
+    if not isinstance(value, Position):
+        return Goal(Target.UNKNOWN, reason="the target is no position")
+    if not value.complete:
+        reason = "the target is known only in part before the program runs"
+        return Goal(Target.UNKNOWN, position=value, reason=reason)
+    reason = value.derived
+    if reason:
+        reason = f"the target is computed: {reason}"
+    elif system:
+        reason = "the target is a system variable"
+    elif not value.editable:
+        reason = "a number of the target is computed, not written"
+    target = Target.JOINTS if value.joints else Target.POSE
+    return Goal(target, value.numbers, value, reason=reason)
+
+
+# What one move statement means at a point of the execution.
+
+_MOTIONS = {
+    "joint": Motion.JOINT,
+    "linear": Motion.LINEAR,
+    "circular": Motion.CIRCULAR,
+}
+_FROM_HERE = frozenset(
+    {Target.RELATIVE_TOOL, Target.RELATIVE_BASE, Target.RELATIVE_UFRAME, Target.AWAY,
+     Target.ABOUT, Target.BY, Target.FOR}
+)  # fmt: skip
+_VIA, _END = 0, 1
+
+
+def move(machine: Machine, here: Here, statement: ast.Move) -> None:
+    """Record the visits of a move and let the arm stand at its end."""
+    _beside(machine, here, statement)
+    store = here.store
+    whose = _arm(here, statement.arm)
+    if whose is False:
+        _keep(here, statement)
+        return
+    settings = _with(here, statement)
+    motion, reason = motion_of(here, statement, settings)
+    if whose is None:
+        reason = "the arm that moves (ARM[..]) is known only at run time"
+    reason = here.reason or reason
+    predecessors = machine.predecessors(here)
+    several = len(predecessors) > 1
+    if statement.via is not None:
+        goal = absolute(here, statement.via)
+        via = _arrival(here, statement, predecessors, settings, motion, goal, reason)
+        predecessors = frozenset({machine.record(here, _VIA, _as_via(via))})
+        if several or machine.interrupted:  # the arc depends on where it starts
+            predecessors |= {ELSEWHERE}
+    goal = goal_of(here, statement, motion)
+    end = _arrival(here, statement, predecessors, settings, motion, goal, reason)
+    arrived = machine.record(here, _END, end)
+    store.last = frozenset({arrived})
+    if several and goal.target in _FROM_HERE:
+        store.last |= {ELSEWHERE}
+    if statement.til or whose is None:
+        store.last |= {ELSEWHERE} if statement.til else predecessors
+
+
+def _beside(machine: Machine, here: Here, statement: ast.Move) -> None:
+    """Let the moves of SYNCMOVE clauses happen: ours runs along with another arm's."""
+    for along in statement.sync:
+        ours = along.arm is not None and _arm(here, along.arm) is not False
+        if ours and _arm(here, statement.arm) is False:
+            reason = here.reason
+            here.reason = reason or "it runs along with another arm's move (SYNCMOVE)"
+            move(machine, here, along)
+            here.reason = reason
+        else:
+            _keep(here, along)
+
+
+def _keep(here: Here, statement: ast.Move) -> None:
+    """Keep the numbers of what another arm goes to."""
+    names = frozenset(r.name for r in references((statement.where, statement.via)))
+    pin_names(here, names, "another arm goes to it too")
+
+
+def _as_via(arrival: Arrival) -> Arrival:
+    return Arrival(
+        arrival.place,
+        arrival.row,
+        arrival.predecessors,
+        arrival.settings,
+        arrival.motion,
+        arrival.target,
+        arrival.numbers,
+        arrival.position,
+        fly=True,
+        via=True,
+        distance=None,
+        reason=arrival.reason,
+    )
+
+
+def _arrival(
+    here: Here,
+    statement: ast.Move,
+    predecessors: frozenset[int],
+    settings: Settings,
+    motion: Motion,
+    goal: Goal,
+    reason: str,
+) -> Arrival:
+    return Arrival(
+        here.place,
+        here.row,
+        predecessors,
+        settings,
+        motion,
+        goal.target,
+        goal.numbers,
+        goal.position,
+        fly=statement.fly,
+        distance=goal.distance,
+        reason=goal.reason or reason,
+    )
+
+
+def _arm(here: Here, arm: ast.Expression | None) -> bool | None:
+    """Tell whether our arm moves, None where it is not known."""
+    if arm is None:
+        return True
+    number = here.integer(arm)
+    return None if number is None else number == here.world.arm
+
+
+def _with(here: Here, statement: ast.Move) -> Settings:
+    """Return the settings that hold during this move."""
+    changes: dict[str, Value] = {}
+    for reference, expression in statement.settings:
+        part = here.frame_part(reference)
+        if part is not None:
+            changes[part[0]] = Nothing("a part of it is set for this move alone")
+        name = here.setting_name(reference)
+        if name is not None:
+            changes[name] = here.value(expression)
+            here.world.pin(changes[name], f"${name.upper()} is set to it")
+    return {**here.store.settings, **changes} if changes else here.store.settings
+
+
+def motion_of(
+    here: Here, statement: ast.Move, settings: Settings
+) -> tuple[Motion, str]:
+    """Return the trajectory of a move, and why it is not known or not followed."""
+    said: Value | None = statement.trajectory.lower() or settings.get("move_type")
+    with_ = any(r.name == "$move_type" for r, _ in statement.settings)
+    if with_:
+        said = settings.get("move_type")
+    if said is None:
+        here.world.report_once(
+            here.place.program,
+            here.row,
+            "assumed-joint",
+            "move_type",
+            "the move names no trajectory and $MOVE_TYPE is not set: taken as JOINT",
+        )
+        return Motion.JOINT, ""
+    motion = _MOTIONS.get(said) if isinstance(said, str) else None
+    if motion is None:
+        what = said.upper() if isinstance(said, str) else "its trajectory ($MOVE_TYPE)"
+        return Motion.JOINT, f"{what} is not followed or known only at run time"
+    if motion is Motion.CIRCULAR and statement.via is None:
+        return motion, "the arc has no VIA point in this statement"
+    return motion, ""

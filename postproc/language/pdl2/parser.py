@@ -1,0 +1,581 @@
+"""The one place where lark is used: grammars in, statements of a line out."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import re
+import stat
+import sys
+import tempfile
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from functools import cache, lru_cache
+from io import BytesIO
+from itertools import count
+from pathlib import Path
+from typing import Any, cast
+
+import lark
+
+from postproc.language.pdl2 import syntax as ast
+from postproc.language.pdl2.syntax import Number
+from postproc.language.scan import NAME_MARK, UNREADABLE, form_of
+from postproc.language.shapes import filled, open_name
+
+# Parts of a line on their way from tree to statement, told apart by type.
+
+
+class Mark(str):
+    """A token: text with the name of its terminal."""
+
+    kind: str
+
+    def __new__(cls, text: str, kind: str) -> Mark:
+        """Remember the terminal beside the text."""
+        mark = super().__new__(cls, text)
+        mark.kind = kind
+        return mark
+
+
+class NamesPart(tuple[str, ...]):
+    """Declared names."""
+
+
+class ExportedPart(str):
+    """The program after EXPORTED FROM."""
+
+
+class ArmPart(tuple[Any, ...]):
+    """The index of ARM[n]."""
+
+
+class SettingPart(tuple[Any, ...]):
+    """One WITH item that sets a variable."""
+
+
+class BesidePart(tuple[Any, ...]):
+    """One WITH item that names a condition handler."""
+
+
+class TilPart:
+    """A TIL clause."""
+
+
+class SyncPart(tuple[Any, ...]):
+    """The move of a SYNCMOVE clause."""
+
+
+class DestinationPart(tuple[Any, ...]):
+    """(how, operands, via, frame)."""
+
+
+# Turn the grammar's trees into the statements of `pdl2`, rule by rule.
+#
+# Every function here is named after a rule of ``grammars/pdl2.lark`` and takes the
+# rule's children: tokens (strings that know their type) and what other rules gave.
+
+Children = Sequence[Any]
+Rule = Callable[[Children], Any]
+
+
+def _name(mark: str) -> str:
+    return str(mark).lower()
+
+
+def _of(children: Children, kind: type) -> tuple[Any, ...]:
+    return tuple(c for c in children if isinstance(c, kind) and type(c) is not Mark)
+
+
+def _statement(children: Children) -> ast.Statement | None:
+    found = _of(children, ast.Statement)
+    return found[0] if found else None
+
+
+def _unquoted(mark: str) -> str:
+    return str(mark)[1:-1]
+
+
+def _declared(children: Children, first: int) -> tuple[str, tuple[str, ...]]:
+    """Return the exporting program and the other attributes."""
+    rest = children[first:]
+    exported = [str(c) for c in rest if isinstance(c, ExportedPart)]
+    words = tuple(_name(c) for c in rest if type(c) is Mark)
+    return (exported[0] if exported else ""), words
+
+
+def _program_attribute(c: Children) -> int:
+    """Return the slot of ``PROG_ARM=n``, -1 for any other attribute."""
+    arm = len(c) == 2 and _name(c[0]) == "prog_arm" and isinstance(c[1], ast.Number)
+    return c[1].slot if arm else -1
+
+
+def _routine(c: Children) -> ast.Routine:
+    parameters = _of(c, list)
+    exported, _ = _declared(c, 1)
+    return ast.Routine(
+        _name(c[0]), tuple(parameters[0]) if parameters else (), exported
+    )
+
+
+def _variables(c: Children) -> ast.Declare:
+    initial = c[2] if len(c) > 2 and isinstance(c[2], ast.Expression) else None
+    exported, words = _declared(c, 2)
+    return ast.Declare(tuple(c[0]), c[1], initial, exported, words)
+
+
+def _node_fields(c: Children) -> ast.NodeFields:
+    names = (str(part).lower() for part in c if isinstance(part, str))
+    return ast.NodeFields(tuple(name for name in names if name.startswith("$")))
+
+
+def _parameters(c: Children) -> list[ast.Parameter]:
+    return [p for group in c for p in group]
+
+
+def _motion(c: Children) -> ast.Move:
+    return _move(c[0].kind == "MOVEFLY", c[1:])
+
+
+def _move(fly: bool, c: Children) -> ast.Move:
+    arm = _of(c, ArmPart)
+    how, where, via, frame = _of(c, DestinationPart)[0]
+    trajectory = [str(m).upper() for m in c if type(m) is Mark]
+    return ast.Move(
+        fly=fly,
+        arm=arm[0][0] if arm else None,
+        trajectory=trajectory[0] if trajectory else "",
+        how=how,
+        where=where,
+        via=via,
+        frame=frame,
+        settings=tuple((s[0], s[1]) for s in _of(c, SettingPart)),
+        conditions=tuple(b[0] for b in _of(c, BesidePart)),
+        til=bool(_of(c, TilPart)),
+        sync=tuple(replace(s[0], fly=fly) for s in _of(c, SyncPart)),
+    )
+
+
+def _absolute(c: Children) -> DestinationPart:
+    to: list[Any] = []
+    via = None
+    for word, place in zip(c[0::2], c[1::2], strict=True):
+        if word.kind == "VIA":
+            via = place
+        else:
+            to.append(place)
+    return DestinationPart(("TO", tuple(to), via, ""))
+
+
+def _destination(c: Children) -> DestinationPart:
+    frame = str(c[-1]).upper() if type(c[-1]) is Mark else ""
+    where = tuple(x for x in c[1:] if type(x) is not Mark)
+    return DestinationPart((c[0].kind, where, None, frame))
+
+
+def _clause(c: Children) -> Any:
+    return TilPart() if c and isinstance(c[0], ast.Still) else None
+
+
+def _reference(c: Children) -> ast.Reference:
+    steps = tuple(_name(s) if isinstance(s, str) else s for s in c[1:])
+    return ast.Reference(_name(c[0]), steps)
+
+
+def _one_or_pair(c: Children) -> Any:
+    return c[0] if len(c) == 1 else tuple(c)
+
+
+def _for(c: Children) -> ast.For:
+    step = c[4] if len(c) > 4 else None
+    return ast.For(_name(c[0]), c[1], c[3], step, c[2].kind == "DOWNTO")
+
+
+def _beside(c: Children) -> BesidePart:
+    inside = c[0] if len(c) == 1 else ast.Invoke(_name(c[0]), c[1])
+    return BesidePart((inside,))
+
+
+def _io(c: Children) -> ast.Transfer:
+    return ast.Transfer(str(c[0]).upper(), tuple(c[1:]))
+
+
+def _case(c: Children) -> ast.Case:
+    choices = tuple(x for x in c if not isinstance(x, ast.Statement))
+    return ast.Case(choices, _statement(c))
+
+
+def _call(c: Children) -> ast.Call:
+    return ast.Call(_name(c[0]), c[1] if len(c) > 1 else ())
+
+
+RULES: dict[str, Rule] = {
+    "line": _statement,
+    "labelled": lambda c: ast.Label(_name(c[0]).rstrip(": "), _statement(c)),
+    "program": lambda c: ast.Program(_name(c[0]), max([-1, *_of(c, int)])),
+    "program_attribute": _program_attribute,
+    "import": lambda c: ast.Import(_unquoted(c[0])),
+    "section": lambda c: ast.Section(_statement(c)),
+    "begin": lambda c: ast.Begin(),
+    "end": lambda c: ast.End(_name(c[0]) if c else ""),
+    "routine": _routine,
+    "parameters": _parameters,
+    "parameter": lambda c: [ast.Parameter(n.lower(), c[1]) for n in c[0]],
+    "variables": _variables,
+    "constant": lambda c: ast.Constant(_name(c[0]), c[1]),
+    "structure": lambda c: ast.Structure(_name(c[0])),
+    "node_fields": _node_fields,
+    "end_structure": lambda c: ast.EndStructure(),
+    "names": lambda c: NamesPart(str(n) for n in c),
+    "exported": lambda c: ExportedPart(_name(c[0])),
+    "attribute": lambda c: c[0],
+    "simple_type": lambda c: ast.Type(_name(c[0])),
+    "array_type": lambda c: ast.Type(c[-1].name, array=True),
+    "path_type": lambda c: ast.Type(_name(c[0]), path=True),
+    "dimensions": lambda c: None,
+    "dimension": lambda c: None,
+    "if": lambda c: ast.If(c[0]),
+    "else": lambda c: ast.Else(_statement(c)),
+    "endif": lambda c: ast.EndIf(),
+    "select": lambda c: ast.Select(c[0]),
+    "case": _case,
+    "choice": _one_or_pair,
+    "endselect": lambda c: ast.EndSelect(),
+    "for": _for,
+    "endfor": lambda c: ast.EndFor(),
+    "while": lambda c: ast.While(c[0]),
+    "endwhile": lambda c: ast.EndWhile(),
+    "repeat": lambda c: ast.Repeat(),
+    "until": lambda c: ast.Until(c[0]),
+    "cycle": lambda c: ast.Cycle(),
+    "exit_cycle": lambda c: ast.ExitCycle(),
+    "goto": lambda c: ast.Goto(_name(c[0])),
+    "return": lambda c: ast.Return(c[0] if c else None),
+    "condition": lambda c: ast.Condition(),
+    "when": lambda c: ast.When(_statement(c[1:])),
+    "endcondition": lambda c: ast.EndCondition(),
+    "motion": _motion,
+    "arm": lambda c: ArmPart((c[0].subscripts[0],)),
+    "absolute": _absolute,
+    "destination": _destination,
+    "clause": _clause,
+    "with": lambda c: c[0],
+    "sync": lambda c: SyncPart((_move(False, c),)),
+    "item": SettingPart,
+    "item_condition": _beside,
+    "assign": lambda c: ast.Assign(c[0], str(c[1]), c[2]),
+    "call": _call,
+    "call_program": lambda c: ast.Call(_name(c[0]), c[1] if len(c) > 1 else (), True),
+    "io": _io,
+    "format": lambda c: c[0],
+    "open": lambda c: ast.Still("OPEN"),
+    "open_clause": lambda c: None,
+    "still": lambda c: ast.Still(c[0]),
+    "still_word": lambda c: "",
+    "soup": lambda c: ast.Still("soup"),
+    "soup_word": lambda c: None,
+    "group": lambda c: None,
+    "binary": lambda c: ast.Binary(str(c[1]).upper(), c[0], c[2]),
+    "unary": lambda c: ast.Unary(str(c[0]).upper(), c[1]),
+    "parenthesised": lambda c: (
+        ast.Unary("()", c[0]) if isinstance(c[0], ast.Reference) else c[0]
+    ),
+    "number": lambda c: c[0],
+    "string": lambda c: ast.Text(_unquoted(c[0])),
+    "aggregate": lambda c: ast.Aggregate(tuple(c)),
+    "invoke": lambda c: ast.Invoke(_name(c[0]), c[1]),
+    "arguments": tuple,
+    "argument": lambda c: c[0] if c else None,
+    "reference": _reference,
+    "step": lambda c: c[0],
+    "field": lambda c: _name(c[0]),
+    "index": lambda c: ast.Index(tuple(c)),
+    "subscript": _one_or_pair,
+}
+
+# Parser tables kept between runs, in the user's cache folder.
+#
+# Making the tables of PDL2 takes most of a second, reading them back a tenth of that.
+# They are kept under a key of all that they are made from, so none is ever out of date.
+# Where a file cannot be read, written or trusted, tables are made anew and nothing is
+# said: a cache that fails costs time, never a program.
+
+OTHERS_WRITE = 0o022  # permission bits of group and others
+SIZE = hashlib.sha256().digest_size  # of the digest that a file begins with
+
+
+def folder() -> Path | None:
+    """Return the folder for what is kept, None where the user has none."""
+    given = os.environ.get("XDG_CACHE_HOME", "")
+    if os.path.isabs(given):
+        return Path(given) / "postproc"
+    with suppress(RuntimeError):  # no home
+        home = Path.home()
+        if home.is_absolute() and home.is_dir():
+            return home / ".cache" / "postproc"
+    return None
+
+
+def key_of(*parts: str) -> str:
+    """Name what is made from some texts.
+
+    >>> key_of("a", "bc") == key_of("ab", "c")
+    False
+    """
+    return hashlib.sha256("\0".join(parts).encode()).hexdigest()[:32]
+
+
+def kept(key: str) -> bytes | None:
+    """Return what was kept under a key; None where nothing whole of ours is there."""
+    place = folder()
+    if place is None:
+        return None
+    try:
+        if not _is_ours(place.stat()):
+            return None
+        with open(place / key, "rb", opener=_open_file) as file:
+            status = os.fstat(file.fileno())
+            if not stat.S_ISREG(status.st_mode) or not _is_ours(status):
+                return None
+            digest, data = file.read(SIZE), file.read()
+    except OSError:
+        return None
+    return data if hashlib.sha256(data).digest() == digest else None
+
+
+def _open_file(path: str, flags: int) -> int:
+    """Open what stands there itself, and never wait for it, as for a FIFO."""
+    flags |= getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_NOFOLLOW", 0)
+    return os.open(path, flags)
+
+
+def _is_ours(status: os.stat_result) -> bool:
+    """Tell whether nobody but this user can write to a file or a folder."""
+    if not hasattr(os, "geteuid"):  # Windows: the folder is the user's own
+        return True
+    return status.st_uid == os.geteuid() and not status.st_mode & OTHERS_WRITE
+
+
+def keep(key: str, data: bytes) -> None:
+    """Keep something under a key, if that is possible.
+
+    It is renamed into place: processes that start at once never see half of it.
+    """
+    place = folder()
+    if place is None:
+        return
+    with suppress(OSError):
+        place.mkdir(mode=0o700, parents=True, exist_ok=True)
+        handle, temporary = tempfile.mkstemp(dir=place)
+        try:
+            with os.fdopen(handle, "wb") as file:
+                file.write(hashlib.sha256(data).digest() + data)
+            os.replace(temporary, place / key)
+        except BaseException:  # Ctrl-C too
+            os.unlink(temporary)
+            raise
+
+
+# What one line of a variable file says; rule by rule like `build`.
+
+_ACCESS = frozenset({"priv", "xport", "local"})
+
+
+@dataclass(frozen=True)
+class Entered:
+    """The parts of a line; slots are numbers of the line, -1 for ``****``.
+
+    Attributes:
+        name, type: Of the head, "" where the line has none.
+        arm: Slot of the arm number, -1 where there is none.
+        shared: The head says Xport.
+        variable: The head says whose variable it is (Priv, Xport, Local): fields of
+            records and of path nodes do not.
+        element: Slots of an element's index.
+        node: Slot of the number of a path's node, -1 where the line names none.
+        components: (letter, slot) pairs.
+        axes: (axis slot, value slot) pairs.
+        plain: Slots of numbers by themselves.
+        config: Configuration string.
+    """
+
+    name: str = ""
+    type: str = ""
+    arm: int = -1
+    shared: bool = False
+    variable: bool = False
+    element: tuple[int, ...] = ()
+    node: int = -1
+    components: tuple[tuple[str, int], ...] = ()
+    axes: tuple[tuple[int, int], ...] = ()
+    plain: tuple[int, ...] = ()
+    config: str | None = None
+
+    @property
+    def says_value(self) -> bool:
+        """Tell whether a number or a configuration stands in the line."""
+        numbers = self.components or self.axes or self.plain
+        return bool(numbers) or self.config is not None
+
+
+class _Value(int):
+    """Slot of a value."""
+
+
+class _Arm(int):
+    """Slot of the arm number."""
+
+
+class _Element(tuple[int, ...]):
+    """Slots of an index."""
+
+
+class _Node(int):
+    """Slot of the number of a node."""
+
+
+class _Word(str):
+    """A word of a head."""
+
+
+def _line(c: Sequence[Any]) -> Entered:
+    line = Entered()
+    for part in c:
+        match part:
+            case Entered():
+                line = part
+            case _Element():
+                line = replace(line, element=tuple(part))
+            case _Node():
+                line = replace(line, node=int(part))
+            case ("component", letter, slot):
+                line = replace(line, components=(*line.components, (letter, slot)))
+            case ("axis", axis, slot):
+                line = replace(line, axes=(*line.axes, (axis, slot)))
+            case ("config", text):
+                line = replace(line, config=text)
+            case ("plain", slot):
+                line = replace(line, plain=(*line.plain, slot))
+    return line
+
+
+def _head(c: Sequence[Any]) -> Entered:
+    arms = [int(x) for x in c if isinstance(x, _Arm)]
+    words = {str(x).lower() for x in c if isinstance(x, _Word)}
+    return Entered(
+        str(c[0]), str(c[1]), max([-1, *arms]), "xport" in words, bool(words & _ACCESS)
+    )
+
+
+def _plain(c: Sequence[Any]) -> tuple[str, int] | None:
+    return ("plain", int(c[0])) if c and isinstance(c[0], _Value) else None
+
+
+VALUE_RULES: Mapping[str, Rule] = {
+    "line": _line,
+    "head": _head,
+    "dimensions": lambda c: None,
+    "arm": lambda c: _Arm(c[1].slot),
+    "counted": lambda c: None,
+    "word": lambda c: _Word(c[0]),
+    "element": lambda c: _Element(n.slot for n in c if isinstance(n, Number)),
+    "node": lambda c: _Node(c[1].slot),
+    "component": lambda c: ("component", str(c[0]), int(c[1])),
+    "axis": lambda c: ("axis", c[0].slot, int(c[1])),
+    "config": lambda c: ("config", str(c[1])[1:-1] if len(c) > 1 else ""),
+    "plain": _plain,
+    "number": lambda c: _Value(c[0].slot),
+    "uninitialised": lambda c: _Value(-1),
+}
+
+# The one place where lark is used: grammars in, statements of a line out.
+
+_PACKAGE = Path(__file__).resolve().parents[2]
+_FAILED = object()
+_OPTIONS = {"parser": "lalr", "lexer": "contextual", "maybe_placeholders": False}
+
+
+def grammar(name: str) -> str:
+    """Return the text of a grammar, from the package or from beside it.
+
+    A wheel carries the grammars inside of the package; an editable install reads them
+    where they are kept.
+    """
+    for folder in (_PACKAGE / "grammars", _PACKAGE.parent / "grammars"):
+        path = folder / f"{name}.lark"
+        if path.is_file():
+            return path.read_text(encoding="utf-8")
+    raise FileNotFoundError(f"grammar {name}.lark is not installed")
+
+
+@cache
+def line_parser(name: str, start: str) -> lark.Lark:
+    """Return the LALR parser of a grammar, its tables from an earlier run if kept."""
+    text = grammar(name)
+    key = key_of(text, start, repr(_OPTIONS), lark.__version__, sys.version)
+    data = kept(key)
+    if data is not None:
+        with suppress(Exception):  # whatever is wrong with it, it can be made
+            return lark.Lark.load(BytesIO(data))
+    made = lark.Lark(text, start=start, **_OPTIONS)
+    tables = BytesIO()
+    made.save(tables)
+    keep(key, tables.getvalue())
+    return made
+
+
+@lru_cache(maxsize=8192)
+def parse_form(form: str) -> ast.Statement:
+    """Parse the form of a logical line of PDL2, `Unknown` where the grammar cannot."""
+    found = _parse("pdl2", form, RULES)
+    if found is _FAILED:
+        numbered = count()
+        text = re.sub(NAME_MARK, lambda _: open_name(next(numbered)), form)
+        return ast.Unknown(text if form[:2] != UNREADABLE else form[2:])
+    return found if isinstance(found, ast.Statement) else ast.Statement()
+
+
+@lru_cache(maxsize=8192)
+def parse_value_form(form: str) -> Entered | None:
+    """Parse the form of a line of a variable file, None where the grammar cannot."""
+    found = _parse("lsv", form, VALUE_RULES)
+    return found if isinstance(found, Entered) else None
+
+
+def parse_line(mask: str) -> ast.Statement:
+    """Parse the mask of one logical line of PDL2.
+
+    Returns:
+        Its statement, or `Unknown` where the grammar knows none.
+    """
+    form, names = form_of(mask)
+    said = parse_form(form)
+    return cast(ast.Statement, filled(said, names)) if names else said
+
+
+def _parse(name: str, form: str, rules: Mapping[str, Rule]) -> object:
+    """Parse a form and build what it says, _FAILED where the grammar has no rule."""
+    if form.startswith(UNREADABLE):
+        return _FAILED
+    try:
+        return _build(line_parser(name, "line").parse(form), rules)
+    except lark.exceptions.LarkError:
+        return _FAILED
+    except RecursionError:  # hundreds of nested parentheses: no program has them
+        return _FAILED
+
+
+def _build(tree: lark.Tree[lark.Token], rules: Mapping[str, Rule]) -> object:
+    """Build what a tree says, counting its names and its numbers."""
+    names, slots = count(), count()
+
+    def walk(node: lark.Tree[lark.Token] | lark.Token) -> object:
+        if isinstance(node, lark.Token):
+            if node.type == "NUMBER":
+                return ast.Number(next(slots))
+            text = open_name(next(names)) if node == NAME_MARK else str(node)
+            return Mark(text, node.type)
+        return rules[str(node.data)]([walk(child) for child in node.children])
+
+    return walk(tree)

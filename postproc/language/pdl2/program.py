@@ -1,0 +1,595 @@
+"""A parsed program: declarations, routines, blocks, and where each jump leads."""
+
+from __future__ import annotations
+
+import re
+from bisect import bisect_right
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence, Set
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from itertools import repeat
+
+import numpy as np
+
+from postproc.arrays import Bools, Each, Ints
+from postproc.language.lines import Lines, read_lines
+from postproc.language.pdl2 import syntax as ast
+from postproc.language.pdl2.parser import parse_form
+from postproc.language.shapes import Formed, formed, lower
+from postproc.language.source import Source
+from postproc.language.visits import Diagnostic
+
+# Block structure of one body: which line closes which, and where jumps lead.
+
+_CLOSED_BY: dict[type, type] = {
+    ast.If: ast.EndIf,
+    ast.Select: ast.EndSelect,
+    ast.For: ast.EndFor,
+    ast.While: ast.EndWhile,
+    ast.Repeat: ast.Until,
+    ast.Condition: ast.EndCondition,
+}
+_INNER = (ast.Else, ast.Case)
+_UNKNOWN_OPENERS: tuple[tuple[str, ast.Statement], ...] = (
+    (r"IF\b(?!.*\bENDIF\b)", ast.If(None)),
+    (r"SELECT\b(?!.*\bENDSELECT\b)", ast.Select(None)),
+    (r"FOR\b(?!.*\bENDFOR\b)", ast.For("", None, None)),
+    (r"WHILE\b(?!.*\bENDWHILE\b)", ast.While(None)),
+    (r"UNTIL\b", ast.Until(None)),
+    (r"CASE\b", ast.Case(())),
+    (r"CONDITION\b(?!.*\bENDCONDITION\b)", ast.Condition()),
+)
+
+
+@dataclass(frozen=True)
+class Blocks:
+    """Where the jumps of a body lead, by row.
+
+    Attributes:
+        end: Row that closes the block which a row opens or divides.
+        opener: Row that opens the block which a row closes.
+        inner: Rows of ELSE and CASE in a block, by the row that opens it.
+        labels: Row of each label.
+        cycle: Row of CYCLE, -1 where there is none.
+        joins: Rows at which several ways meet.
+        loops: (opener, end) rows of the FOR loops.
+        handlers: (opener, end) rows of the condition handlers.
+        broken: First line whose block structure is wrong, 0 where all is well.
+    """
+
+    end: Mapping[int, int]
+    opener: Mapping[int, int]
+    inner: Mapping[int, tuple[int, ...]]
+    labels: Mapping[str, int]
+    cycle: int
+    joins: frozenset[int]
+    loops: tuple[tuple[int, int], ...]
+    handlers: tuple[tuple[int, int], ...]
+    broken: int
+
+
+def recovered(statement: ast.Statement) -> ast.Statement:
+    """Return the block that an unknown line opens, or the statement itself."""
+    if isinstance(statement, ast.Unknown):
+        for pattern, opener in _UNKNOWN_OPENERS:
+            if re.match(pattern, statement.text, re.I):
+                return opener
+    return statement
+
+
+def build_blocks(
+    lines: Lines, statements: Formed[ast.Statement], first: int, last: int
+) -> tuple[Blocks, list[tuple[int, str]]]:
+    """Match the blocks of rows first to last - 1; also return (row, problem)."""
+    end: dict[int, int] = {}
+    opener: dict[int, int] = {}
+    inner: dict[int, list[int]] = {}
+    labels: dict[str, int] = {}
+    problems: list[tuple[int, str]] = []
+    cycle, gotos = -1, []
+    stack: list[tuple[int, ast.Statement]] = []
+    structural = statements.which(lambda said: not isinstance(said, _PLAIN))
+    rows = first + np.flatnonzero(structural[lines.shape[first:last]])
+    for row in rows.tolist():
+        statement = recovered(statements[int(lines.shape[row])])
+        if isinstance(statement, ast.Label):
+            labels[statement.name] = row
+            statement = statement.then or ast.Statement()
+        kind = type(statement)
+        behind = _behind(statement)
+        if type(behind) in (*_CLOSED_BY, *_CLOSED_BY.values()):
+            text = f"this {_word(behind)} stands behind {_word(statement)}"
+            problems.append((row, f"{text}: put it on a line of its own"))
+        elif isinstance(behind, ast.Goto):
+            gotos.append((row, behind.label))
+        if kind in _CLOSED_BY:
+            stack.append((row, statement))
+            inner[row] = []
+        elif kind in _CLOSED_BY.values():
+            if stack and _CLOSED_BY[type(stack[-1][1])] is kind:
+                start, _ = stack.pop()
+                for part in (start, *inner[start]):
+                    end[part] = row
+                opener[row] = start
+            else:
+                problems.append((row, _unmatched(statement, stack, lines)))
+        elif kind in _INNER:
+            wanted = (ast.If, ast.Select) if kind is ast.Else else (ast.Select,)
+            if stack and isinstance(stack[-1][1], wanted):
+                inner[stack[-1][0]].append(row)
+            else:
+                problems.append((row, _unmatched(statement, stack, lines)))
+        elif kind is ast.Cycle:
+            cycle = row
+        elif isinstance(statement, ast.Goto):
+            gotos.append((row, statement.label))
+    for row, statement in stack:
+        problems.append((row, f"this {_word(statement)} is never closed"))
+    problems += [
+        (row, f"label {label} does not exist")
+        for row, label in gotos
+        if label not in labels
+    ]
+    return (
+        _blocks(lines, statements, end, opener, inner, labels, cycle, problems),
+        problems,
+    )
+
+
+def _behind(statement: ast.Statement) -> ast.Statement:
+    """Return what a division of a block, or an event, has on its line."""
+    match statement:
+        case ast.Else(then) | ast.Case(_, then) | ast.When(then) if then is not None:
+            return then
+    return ast.Statement()
+
+
+def _blocks(
+    lines: Lines,
+    statements: Formed[ast.Statement],
+    end: dict[int, int],
+    opener: dict[int, int],
+    inner: dict[int, list[int]],
+    labels: dict[str, int],
+    cycle: int,
+    problems: list[tuple[int, str]],
+) -> Blocks:
+    joins = {*labels.values(), *opener}
+    loops, handlers = [], []
+    for row, start in opener.items():
+        kind = recovered(statements[int(lines.shape[start])])
+        if isinstance(kind, ast.Label) and kind.then is not None:
+            kind = kind.then
+        if isinstance(kind, ast.For):
+            loops.append((start, row))
+            joins.add(row + 1)
+        elif isinstance(kind, ast.While):
+            joins |= {start, row + 1}
+        elif isinstance(kind, ast.Repeat):
+            joins.add(start)
+        elif isinstance(kind, ast.Condition):
+            handlers.append((start, row))
+            joins.add(row + 1)
+    if cycle >= 0:
+        joins.add(cycle)
+    return Blocks(
+        end,
+        opener,
+        {row: tuple(parts) for row, parts in inner.items()},
+        labels,
+        cycle,
+        frozenset(joins),
+        tuple(sorted(loops)),
+        tuple(sorted(handlers)),
+        min((int(lines.line[row]) for row, _ in problems), default=0),
+    )
+
+
+def _word(statement: ast.Statement) -> str:
+    return type(statement).__name__.upper()
+
+
+def _unmatched(
+    statement: ast.Statement, stack: list[tuple[int, ast.Statement]], lines: Lines
+) -> str:
+    text = f"this {_word(statement)} closes or divides no block"
+    if stack:
+        row, open_one = stack[-1]
+        text += f" (line {lines.line[row]} opens {_word(open_one)})"
+    return text
+
+
+# Declared variables: a list of names is one declaration, whatever its length.
+
+
+@dataclass(frozen=True)
+class Variable:
+    """A declared variable or constant.
+
+    Attributes:
+        name: As it is written.
+        row: Logical line of its declaration.
+        type: Its type, None for a constant.
+        initial: Its initial value or None.
+        exported: The program it is exported from, or "".
+        constant: Declared in a CONST section.
+        taught: Marked ``-- TAUGHT``.
+    """
+
+    name: str
+    row: int
+    type: ast.Type | None = None
+    initial: ast.Expression | None = None
+    exported: str = ""
+    constant: bool = False
+    taught: bool = False
+
+
+class Variables(Mapping[str, Variable]):
+    """Variables by lower-case name; each is made when it is asked for.
+
+    A name that is declared again means what the last declaration says.
+    """
+
+    def __init__(self) -> None:
+        """Begin without any."""
+        self._at: dict[str, int] = {}  # index into the names, by lower-case name
+        self._names: list[str] = []
+        self._begins: list[int] = []  # the first name of every declaration
+        self._said: list[Variable] = []  # what holds for all names of a declaration
+        self._made: dict[str, Variable] = {}
+
+    def declare(self, names: Sequence[str], said: Variable) -> None:
+        """Enter the names of one declaration.
+
+        Args:
+            names: As they are written.
+            said: What holds for all of them, under any name.
+        """
+        begin = len(self._names)
+        own = lower(names)
+        if self._made:
+            for name in own:
+                self._made.pop(name, None)
+        self._at.update(zip(own, range(begin, begin + len(own)), strict=True))
+        self._names += names
+        self._begins.append(begin)
+        self._said.append(said)
+
+    def declare_all(self, others: Variables) -> None:
+        """Enter all variables of others behind the own ones."""
+        for variable in others.values():
+            self.declare([variable.name], variable)
+
+    def some(self, names: Iterable[str]) -> Variables:
+        """Return those of some lower-case names that there are."""
+        found = Variables()
+        for name in names:
+            if name in self._at:
+                found.declare([self[name].name], self[name])
+        return found
+
+    def __len__(self) -> int:
+        """Return the number of names."""
+        return len(self._at)
+
+    def __iter__(self) -> Iterator[str]:
+        """Go through the lower-case names."""
+        return iter(self._at)
+
+    def __contains__(self, name: object) -> bool:
+        """Tell whether a lower-case name is declared."""
+        return name in self._at
+
+    def __getitem__(self, name: str) -> Variable:
+        """Return the variable of a lower-case name."""
+        made = self._made.get(name)
+        if made is None:
+            at = self._at[name]
+            said = self._said[bisect_right(self._begins, at) - 1]
+            made = self._made[name] = replace(said, name=self._names[at])
+        return made
+
+    def get(self, name: str, default: object = None) -> Variable | None:  # type: ignore[override]
+        """Return the variable of a lower-case name, None where there is none."""
+        return self[name] if name in self._at else None
+
+    @property
+    def names(self) -> Set[str]:
+        """Return the lower-case names."""
+        return self._at.keys()
+
+    def written(self) -> list[str]:
+        """Return the names as they are written, in order."""
+        return [self._names[at] for at in self._at.values()]
+
+    def which(self, test: Callable[[Variable], bool]) -> list[str]:
+        """List the lower-case names whose declaration passes a test, in order.
+
+        Args:
+            test: What no name decides.
+        """
+        passed = self._passed(test)
+        if not passed.any():
+            return []
+        index = np.fromiter(self._at.values(), np.int64, len(self._at))
+        names = [*self._at]
+        return [names[k] for k in np.flatnonzero(passed[self._declaration(index)])]
+
+    def passing(self, names: Sequence[str], test: Callable[[Variable], bool]) -> Bools:
+        """Tell which lower-case names are declared, and so that it passes a test."""
+        index = np.fromiter(map(self._at.get, names, repeat(-1)), np.int64, len(names))
+        found = index >= 0
+        own = [bisect_right(self._begins, at) - 1 for at in index[found].tolist()]
+        passed = {k: test(self._said[k]) for k in set(own)}
+        found[found] = [passed[k] for k in own]
+        return found
+
+    def _passed(self, test: Callable[[Variable], bool]) -> Bools:
+        return np.array([test(said) for said in self._said], dtype=bool)
+
+    def _declaration(self, index: Ints) -> Ints:
+        begins = np.array(self._begins, dtype=np.int64)
+        found: Ints = np.searchsorted(begins, index, side="right") - 1
+        return found
+
+
+# A parsed program: declarations, routines and where each jump leads.
+
+
+@dataclass(frozen=True)
+class Body:
+    """A routine or the main part of a program.
+
+    Attributes:
+        name: Routine name in lower case, "" for the main part.
+        first, last: Rows of its BEGIN and of its END.
+        parameters: Formal parameters.
+        variables: Its own variables, by lower-case name; the main part has none.
+        blocks: Where its jumps lead.
+    """
+
+    name: str
+    first: int
+    last: int
+    parameters: tuple[ast.Parameter, ...]
+    variables: Variables
+    blocks: Blocks
+
+    @cached_property
+    def own_names(self) -> frozenset[str]:
+        """Return the names that mean something else here than around it."""
+        return frozenset(self.variables) | {p.name for p in self.parameters}
+
+
+@dataclass(frozen=True)
+class Program:
+    """A parsed program file.
+
+    Attributes:
+        name: Program name in lower case.
+        lines: Its logical lines.
+        statements: What each shape says; parallel to `lines.shapes`.
+        main: Its main part, None where it has none.
+        routines: Routines with a body, by lower-case name.
+        outside: Routines exported from other programs: name to program.
+        variables: Declared variables, by lower-case name.
+        imports: Files named by IMPORT.
+        arm: ``PROG_ARM``, 0 where it is not said.
+        diagnostics: What was found while reading.
+        nodes: Standard fields that types of nodes declare, all in lower case.
+    """
+
+    name: str
+    lines: Lines
+    statements: Formed[ast.Statement]
+    main: Body | None
+    routines: Mapping[str, Body]
+    outside: Mapping[str, str]
+    variables: Variables
+    imports: tuple[str, ...]
+    arm: int
+    diagnostics: tuple[Diagnostic, ...]
+    nodes: Mapping[str, frozenset[str]]
+
+    def statement(self, row: int) -> ast.Statement:
+        """Return what a logical line says."""
+        return self.statements[int(self.lines.shape[row])]
+
+
+# Programs from lines: declarations, routines, blocks, and where each jump leads.
+
+_PLAIN = (ast.Move, ast.Assign, ast.Call, ast.Transfer, ast.Still)
+
+
+@dataclass
+class _Scope:
+    """What is being read: a program's or a routine's declarations."""
+
+    routine: ast.Routine | None = None
+    begin: int = -1
+    variables: Variables = field(default_factory=Variables)
+
+
+@dataclass
+class _Reader:
+    """Collects the parts of a program, one structural line after the other."""
+
+    lines: Lines
+    statements: Formed[ast.Statement]
+    taught: frozenset[int]
+    name: str = ""
+    arm: int = 0
+    main: Body | None = None
+    routines: dict[str, Body] = field(default_factory=dict)
+    outside: dict[str, str] = field(default_factory=dict)
+    imports: list[str] = field(default_factory=list)
+    diagnostics: list[Diagnostic] = field(default_factory=list)
+    scopes: list[_Scope] = field(default_factory=lambda: [_Scope()])
+    structure: str = ""  # its name, between RECORD and ENDRECORD
+    nodes: dict[str, frozenset[str]] = field(default_factory=dict)
+
+    def report(self, row: int, code: str, message: str) -> None:
+        name = self.lines.source.name
+        line = int(self.lines.line[row])
+        self.diagnostics.append(Diagnostic(name, line, code, message))
+
+    def take(self, row: int, statement: ast.Statement) -> None:
+        scope = self.scopes[-1]
+        match statement:
+            case ast.Section(then) if then is not None:
+                self.take(row, then)
+            case ast.Program(name, slot):
+                self.name = name
+                if slot >= 0:
+                    self.arm = int(self.lines.value[self.lines.first[row] + slot])
+            case ast.Import(file):
+                self.imports.append(file)
+            case ast.Structure(name):
+                self.structure = name
+            case ast.NodeFields(names) if self.structure:
+                known = self.nodes.get(self.structure, frozenset())
+                self.nodes[self.structure] = known.union(names)
+            case ast.EndStructure():
+                self.structure = ""
+            case ast.Declare() | ast.Constant() if scope.begin < 0:
+                self._declare(row, statement)
+            case ast.Routine(name, _, exported):
+                if exported and exported != self.name:
+                    self.outside[name] = exported
+                else:
+                    self._before_next(row)
+                    self.scopes.append(_Scope(statement))
+            case ast.Begin():
+                if scope.begin >= 0:
+                    self._before_next(row)
+                if self.scopes[-1].begin < 0:
+                    self.scopes[-1].begin = row
+            case ast.End(name) if scope.begin >= 0:
+                if scope.routine and name == self.name != scope.routine.name:
+                    self._drop_declared()
+                self.close(row)
+            case _:
+                pass
+
+    def _declare(self, row: int, statement: ast.Declare | ast.Constant) -> None:
+        if self.structure:
+            return
+        variables = self.scopes[-1].variables
+        if isinstance(statement, ast.Constant):
+            name, value = statement.name, statement.value
+            constant = Variable(name, row, initial=value, constant=True)
+            variables.declare([name], constant)
+            return
+        said = Variable(
+            "",
+            row,
+            statement.type,
+            statement.initial,
+            statement.exported,
+            "const" in statement.attributes,
+            int(self.lines.line[row]) in self.taught,
+        )
+        variables.declare(statement.names, said)
+
+    def _before_next(self, row: int) -> None:
+        """End or drop a routine because the next body or routine begins."""
+        scope = self.scopes[-1]
+        if scope.routine is None:
+            return
+        if scope.begin < 0:
+            self._drop_declared()
+        else:
+            name = scope.routine.name
+            self.report(row, "end-missing", f"END {name} is missing before this line")
+            self.close(row)
+
+    def _drop_declared(self) -> None:
+        """Take a routine that turns out to have no body of its own as declared."""
+        scope = self.scopes.pop()
+        self.scopes[-1].begin = scope.begin
+        self.scopes[-1].variables.declare_all(scope.variables)
+
+    def close(self, last: int) -> None:
+        """End the innermost routine, or the program."""
+        scope = self.scopes[-1]
+        routine = scope.routine
+        blocks, problems = build_blocks(
+            self.lines, self.statements, scope.begin + 1, last
+        )
+        for row, message in problems:
+            self.report(row, "block-structure", message)
+        name = routine.name if routine else ""
+        parameters = routine.parameters if routine else ()
+        own = scope.variables if routine else Variables()
+        body = Body(name, scope.begin, last, parameters, own, blocks)
+        if routine:
+            self.routines[name] = body
+            self.scopes.pop()
+        else:
+            self.main = body
+            self.scopes[-1] = _Scope(variables=scope.variables)
+
+
+def parse(source: Source, each: Each = map) -> Program:
+    """Parse a PDL2 program: every distinct shape of line once.
+
+    Lines that the grammar does not know are kept and listed.
+
+    Args:
+        source: The program.
+        each: As in `read_lines`.
+
+    Raises:
+        ProgramError: A string does not end on its line.
+    """
+    lines = read_lines(source, each)
+    statements = formed(lines.shapes, parse_form)
+    taught = frozenset(line for line, _ in lines.marks("TAUGHT"))
+    reader = _Reader(lines, statements, taught)
+    structural = statements.which(lambda said: not isinstance(said, _PLAIN))
+    for row in np.flatnonzero(structural[lines.shape]).tolist():
+        statement = statements[int(lines.shape[row])]
+        if isinstance(statement, ast.Unknown):
+            _report_unknown(reader, row)
+        reader.take(row, statement)
+    _close_open(reader)
+    return Program(
+        reader.name,
+        lines,
+        statements,
+        reader.main,
+        reader.routines,
+        reader.outside,
+        reader.scopes[0].variables,
+        tuple(reader.imports),
+        reader.arm,
+        tuple(reader.diagnostics),
+        reader.nodes,
+    )
+
+
+def _report_unknown(reader: _Reader, row: int) -> None:
+    line = int(reader.lines.line[row])
+    text = reader.lines.source.line_text(line).strip()
+    reader.report(
+        row,
+        "unknown-statement",
+        f"this statement is not understood and is kept as it is: {text[:60]!r}; "
+        "moves that it may influence are not compensated",
+    )
+
+
+def _close_open(reader: _Reader) -> None:
+    """Report what is missing at the end of the file and close what is open."""
+    while reader.scopes[-1].begin >= 0 or len(reader.scopes) > 1:
+        scope = reader.scopes[-1]
+        last = len(reader.lines) - 1
+        name = scope.routine.name if scope.routine else reader.name
+        reader.report(last, "end-missing", f"END {name} is missing at the end")
+        if scope.begin < 0:
+            reader.scopes.pop()
+        else:
+            reader.close(last + 1)
+    if reader.main is None and not reader.routines and len(reader.lines):
+        reader.report(0, "no-program", "the file holds no BEGIN .. END")

@@ -1,0 +1,470 @@
+"""Blocks of moves to known places, run a thousand at a time."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from itertools import islice
+
+import numpy as np
+
+from postproc.arrays import Bools, Ints
+from postproc.language.lines import Lines
+from postproc.language.pdl2 import syntax as ast
+from postproc.language.pdl2.calls import call_statement, calls_in_expressions
+from postproc.language.pdl2.effects import (
+    CHANGING,
+    HANDS_OVER,
+    PURE,
+    invocations,
+    references,
+)
+from postproc.language.pdl2.job import Place, World
+from postproc.language.pdl2.machine import HELD, WRITTEN, Here, Machine, Run
+from postproc.language.pdl2.moves import motion_of
+from postproc.language.pdl2.values import Nothing, Value
+from postproc.language.shapes import alike, in_order, lower, name_index
+from postproc.language.visits import Motion
+
+# Lines that are run a thousand at a time: moves to known places, idle calls.
+#
+# Such a line changes the store, if at all, in the same way however often it is run, and
+# reads nothing that another one changes: running one line of every variant runs them
+# all. Whether a line is quiet is told by the text alone, so that a stretch of them is
+# the same stretch each time that the analysis comes to it.
+
+_POINTS = ("position", "xtndpos", "jointpos")
+_NOT_WITH = ("$move_type", "$tool", "$base", "$uframe")
+
+
+@dataclass(frozen=True)
+class Point:
+    """A variable that moves go to.
+
+    Attributes:
+        key: Where it is stored; of an array's elements the beginning.
+        index: Number slots of an element's index.
+    """
+
+    key: str
+    index: tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class Quiet:
+    """The quiet lines of a body.
+
+    Attributes:
+        first: Row of the first line that `variant` tells of.
+        variant: Index into `statements` of every row, (n,), -1 where it is not quiet.
+        statements: What the lines of each variant say, but for numbers and points.
+        calls: Which of them call something.
+        named: Which of them are moves to points.
+        points: The point that lines of a shape go to, unless `name` tells it.
+        prefix: What keys of the program's own variables begin with.
+        names: Names, in lower case, of the program's own variables that lines go to.
+        rows: Their rows in the variable file, -1 where it tells none.
+        name: Index into `names` for every shape, -1 for none.
+        ends: Rows at which stretches end, ascending.
+    """
+
+    first: int
+    variant: Ints
+    statements: tuple[ast.Statement, ...]
+    calls: tuple[bool, ...]
+    named: tuple[bool, ...]
+    points: Mapping[int, Point]
+    prefix: str
+    names: Sequence[str]
+    rows: Ints
+    name: Ints
+    ends: Ints
+
+    def end(self, row: int) -> int:
+        """Return the row after the stretch of a move, the row itself if none."""
+        at = self.variant[row - self.first] if self.first <= row else -1
+        if at < 0 or not isinstance(self.statements[at], ast.Move):
+            return row
+        return int(self.ends[np.searchsorted(self.ends, row, side="right")])
+
+
+def find_quiet(world: World, place: Place, volatile: frozenset[str]) -> Quiet:
+    """Find the quiet lines of a body.
+
+    Args:
+        world: The files of the job.
+        place: The body.
+        volatile: Names that condition handlers change.
+    """
+    program, body = place.program, place.body
+    first = body.first + 1
+    rows = program.lines.shape[first : body.last]
+    may_be = program.statements.which(_may_be_quiet)
+    variants = _Variants(world, place, volatile)
+    of_shape = np.full(len(program.lines.shapes), -1, dtype=np.int64)
+    shapes = np.unique(rows[may_be[rows]])
+    forms = program.statements.form[shapes]
+    used, begins = np.unique(np.sort(forms), return_index=True)
+    groups = np.split(shapes[np.argsort(forms, kind="stable")], begins[1:])
+    for form, mine in zip(used.tolist(), groups, strict=False):
+        of_shape[mine] = variants.add(form, mine)
+    variant = of_shape[rows]
+    joins = np.array(sorted(body.blocks.joins), dtype=np.int64)
+    ends = np.concatenate([first + np.flatnonzero(variant < 0), joins, [body.last]])
+    return Quiet(
+        first,
+        variant,
+        tuple(variants.statements),
+        tuple(any(_calls(world, place, s)) for s in variants.statements),
+        tuple(_goes_to_point(s) for s in variants.statements),
+        variants.points,
+        variants.prefix,
+        variants.names,
+        world.initial.rows(variants.prefix, variants.names),
+        variants.name,
+        np.unique(ends),
+    )
+
+
+def _may_be_quiet(said: ast.Statement) -> bool:
+    if isinstance(said, ast.Call):
+        return not said.program
+    return isinstance(said, ast.Move) and _is_plain(said)
+
+
+def _is_plain(move: ast.Move) -> bool:
+    """Tell whether a move goes to numbers or a variable; WITH may set numbers."""
+    if move.how != "TO" or move.trajectory not in ("JOINT", "LINEAR", ""):
+        return False
+    if move.arm or move.via or move.til or move.sync:
+        return False
+    for reference, value in move.settings:
+        plain = reference.name.startswith("$") and not reference.steps
+        if not (plain and isinstance(value, ast.Number)) or reference.name in _NOT_WITH:
+            return False
+    match move.where[0]:
+        case ast.Invoke("pos", (*items, ast.Text(_))) | ast.Aggregate(items):
+            return _six_numbers(items)
+        case ast.Invoke("pos", items):
+            return _six_numbers(items)
+        case ast.Reference(name, () | (ast.Index(_),)):
+            return not name.startswith("$")
+    return False
+
+
+def _goes_to_point(said: ast.Statement) -> bool:
+    return isinstance(said, ast.Move) and isinstance(said.where[0], ast.Reference)
+
+
+def _six_numbers(items: object) -> bool:
+    assert isinstance(items, tuple | list)
+    return len(items) == 6 and all(isinstance(i, ast.Number) for i in items)
+
+
+@dataclass
+class _Variants:
+    """The variants of quiet lines of a body, as they are found."""
+
+    world: World
+    place: Place
+    volatile: frozenset[str]
+
+    def __post_init__(self) -> None:
+        self.statements: list[ast.Statement] = []
+        self.points: dict[int, Point] = {}
+        self._known: dict[tuple[int, tuple[str, ...]], int] = {}
+        self._parameters = {p.name for p in self.place.body.parameters}
+        self.prefix = f"{self.place.program.name}/"
+        self.names: list[str] = []
+        self.name = np.full(len(self.place.program.lines.shapes), -1, dtype=np.int64)
+
+    def add(self, form: int, shapes: Ints) -> Ints:
+        """Return the variants of shapes of one form, -1 where one is not quiet."""
+        said = self.place.program.statements
+        one = said.said[form]
+        where = one.where[0] if isinstance(one, ast.Move) else None
+        if len(shapes) == 1:
+            return np.array([self._add_one(int(shapes[0]), where)])
+        names = said.shapes.names_at(shapes)
+        if not isinstance(where, ast.Reference):
+            return self._variants(shapes, names)
+        index, at = _number_slots(where.steps), name_index(where.name)
+        variants = np.full(len(shapes), -1)
+        if index is None:
+            return variants
+        goal, which = [where.name], np.zeros(len(shapes), dtype=np.int64)
+        if at >= 0:
+            used, which = np.unique(names[:, at], return_inverse=True)
+            goal = lower([said.shapes.names[k] for k in used.tolist()])
+            names = np.delete(names, at, axis=1)
+        quiet = self._points(shapes, goal, which, index, array=bool(where.steps))
+        variants[quiet] = self._variants(shapes[quiet], names[quiet])
+        return variants
+
+    def _add_one(self, shape: int, where: ast.Expression | None) -> int:
+        """Return the variant of the one shape of a form: not worth an array pass."""
+        names = self.place.program.lines.shapes.names_of(shape)
+        if isinstance(where, ast.Reference):
+            index, at = _number_slots(where.steps), name_index(where.name)
+            name = names[at].lower() if at >= 0 else where.name
+            if index is None or not self._is_point(name, array=bool(where.steps)):
+                return -1
+            self.points[shape] = Point(self.world.root(self.place, name), index)
+            names = names[:at] + names[at + 1 :] if at >= 0 else names
+        return self._variant(shape, names)
+
+    def _points(
+        self,
+        shapes: Ints,
+        goal: list[str],
+        which: Ints,
+        index: tuple[int, ...],
+        array: bool,
+    ) -> Bools:
+        """Enter where shapes go, and tell which of them go to a point, (m,).
+
+        Args:
+            shapes: Shapes of one form, (m,).
+            goal: Names that they go to.
+            which: The one of each, (m,).
+            index: Number slots of an element's index.
+            array: Whether there is any.
+        """
+        place = self.place
+        declared = place.program.variables
+        points = declared.passing(goal, lambda said: _is_point(said.type, array))
+        alone = ~declared.passing(goal, lambda said: bool(said.exported))
+        alone &= not array and not any(mark in self.prefix for mark in "[.")
+        hidden = place.body.own_names | self.volatile
+        for k in np.flatnonzero([name in hidden for name in goal]).tolist():
+            points[k], alone[k] = self._is_point(goal[k], array), False
+        own = np.flatnonzero((points & alone)[which])
+        self.name[shapes[own]] = len(self.names) + which[own]
+        self.names += goal
+        for k in np.flatnonzero((points & ~alone)[which]).tolist():
+            key = self.world.root(place, goal[which[k]])
+            self.points[int(shapes[k])] = Point(key, index)
+        found: Bools = points[which]
+        return found
+
+    def _variants(self, shapes: Ints, names: Ints) -> Ints:
+        """Return the variants of shapes of one form with some names, (m,)."""
+        ends = names.shape[1] * np.arange(1, len(shapes) + 1)
+        kind = alike(names.ravel(), ends - names.shape[1], ends)
+        texts = self.place.program.lines.shapes.names
+        found = [
+            self._variant(int(shapes[k]), tuple([texts[i] for i in names[k].tolist()]))
+            for k in in_order(kind)[1].tolist()
+        ]
+        return np.array(found, dtype=np.int64)[kind]
+
+    def _variant(self, shape: int, names: tuple[str, ...]) -> int:
+        """Return the variant of a shape, which its form and some names tell."""
+        said = self.place.program.statements
+        key = int(said.form[shape]), names
+        variant = self._known.get(key)
+        if variant is None:
+            variant = -1
+            if self._is_quiet(said[shape]):
+                variant = len(self.statements)
+                self.statements.append(said[shape])
+            self._known[key] = variant
+        return variant
+
+    def _is_point(self, name: str, array: bool) -> bool:
+        """Tell whether a name is a variable whose value no call changes unseen."""
+        if name in self._parameters or name in self.volatile:
+            return False
+        return _is_point(self.world.type_of(self.place, name), array)
+
+    def _is_quiet(self, said: ast.Statement) -> bool:
+        return all(self._does_nothing(c) for c in _calls(self.world, self.place, said))
+
+    def _does_nothing(self, call: ast.Invoke) -> bool:
+        """Tell whether a call neither moves the arm nor sets what moves depend on."""
+        start, name = self.world.start, call.name
+        if self.world.find_routine(self.place.program, name) is not None:
+            return False
+        if name in start.frame_tables or name.startswith(HANDS_OVER):
+            return False
+        if start.routines.get(name) not in (None, "still"):
+            return False
+        bare = name not in CHANGING and name not in PURE
+        return all(self._keeps(a, bare) for a in call.arguments)
+
+    def _keeps(self, argument: ast.Expression | None, bare: bool) -> bool:
+        """Tell whether nothing that moves depend on is known by an argument's name."""
+        match argument:
+            case None | ast.Number() | ast.Text() | ast.Unary(_, ast.Number()):
+                return True
+            case ast.Reference(name, ()):
+                type_ = self.world.type_of(self.place, name)
+                safe = type_ is None or (
+                    type_.name not in _POINTS and not type_.array and not type_.path
+                )
+                known = name.startswith("$") or name in self._parameters
+                return bare and safe and not known
+        return False
+
+
+def _is_point(type_: ast.Type | None, array: bool) -> bool:
+    """Tell whether a type is that of a point, or of an array of them."""
+    if type_ is None or type_.name not in _POINTS or type_.path:
+        return False
+    return type_.array == array
+
+
+def _number_slots(steps: tuple[str | ast.Index, ...]) -> tuple[int, ...] | None:
+    """Return the slots of an index that is written in numbers, None for any other."""
+    index = [
+        i for step in steps if isinstance(step, ast.Index) for i in step.subscripts
+    ]
+    slots = tuple(i.slot for i in index if isinstance(i, ast.Number))
+    return slots if len(slots) == len(index) else None
+
+
+def _calls(world: World, place: Place, said: ast.Statement) -> list[ast.Invoke]:
+    """List the calls in a line, those by a function's name alone too."""
+    found = [c for c in invocations(said) if c.name not in PURE]
+    names = {r.name for r in references(said) if not r.steps}
+    found += [ast.Invoke(n, ()) for n in names if world.is_function(place, n)]
+    if isinstance(said, ast.Call):
+        found.append(ast.Invoke(said.name, said.arguments))
+    return found
+
+
+# Run a stretch of quiet lines at once.
+
+_NO_INDEX = Nothing("its index is known only at run time")
+
+
+@dataclass
+class Stretches:
+    """The stretches of quiet lines of a job, found when a body is first come to."""
+
+    machine: Machine
+    quiet: dict[int, Quiet] = field(default_factory=dict)
+
+    def run(self, here: Here) -> bool:
+        """Run the stretch that begins at a row; tell whether there is one.
+
+        Where a condition handler may move the arm at any time there is none: every
+        move may then come from elsewhere.
+        """
+        if self.machine.interrupted:
+            return False
+        quiet = self._quiet(here)
+        end = quiet.end(here.row)
+        if end == here.row:
+            return False
+        rows = np.arange(here.row, end)
+        variant = quiet.variant[rows - quiet.first]
+        ways = self._run_one_of_each(here, quiet, rows, variant)
+        moves = np.isin(variant, np.array([*ways], dtype=np.int64))
+        self._record(here, quiet, rows[moves], variant[moves], ways)
+        here.row = end
+        return True
+
+    def _quiet(self, here: Here) -> Quiet:
+        body = here.place.body
+        if id(body) not in self.quiet:
+            self.quiet[id(body)] = find_quiet(here.world, here.place, here.volatile)
+        return self.quiet[id(body)]
+
+    def _run_one_of_each(
+        self, here: Here, quiet: Quiet, rows: Ints, variant: Ints
+    ) -> dict[int, tuple[Motion, str]]:
+        """Let the first line of every variant have its effects.
+
+        Returns:
+            The trajectory of every variant of a move, and why it is not known.
+        """
+        found, first = np.unique(variant, return_index=True)
+        ways = {}
+        for at in np.argsort(first).tolist():
+            here.row = int(rows[first[at]])
+            number = int(found[at])
+            statement = quiet.statements[number]
+            if quiet.calls[number]:
+                calls_in_expressions(self.machine, here, statement)
+            if isinstance(statement, ast.Call):
+                call_statement(self.machine, here, statement)
+            elif isinstance(statement, ast.Move):
+                ways[number] = motion_of(here, statement, here.store.settings)
+        return ways
+
+    def _record(
+        self,
+        here: Here,
+        quiet: Quiet,
+        rows: Ints,
+        variant: Ints,
+        ways: dict[int, tuple[Motion, str]],
+    ) -> None:
+        """Record the moves and let the arm stand at the end of the last."""
+        here.row = int(rows[0])
+        point, held = _points(here, quiet, rows, variant)
+        moves = {k: quiet.statements[k] for k in ways}
+        run = Run(
+            here.place,
+            rows,
+            variant,
+            {k: move for k, move in moves.items() if isinstance(move, ast.Move)},
+            ways,
+            self.machine.predecessors(here),
+            here.store.settings,
+            point,
+            held,
+            here.reason,
+        )
+        base = self.machine.record(here, 0, run)
+        here.store.last = frozenset({base + len(rows) - 1})
+
+
+def _points(
+    here: Here, quiet: Quiet, rows: Ints, variant: Ints
+) -> tuple[Ints, dict[int, Value]]:
+    """Look up the variables that moves go to, see `Run`."""
+    program, initial = here.place.program, here.world.initial
+    point = np.full(len(rows), WRITTEN, dtype=np.int64)
+    held: dict[int, Value] = {}
+    named = np.flatnonzero(np.array(quiet.named, dtype=bool)[variant])
+    shapes = program.lines.shape[rows[named]]
+    own = quiet.name[shapes]
+    point[named] = HELD
+    point[named[own >= 0]] = quiet.rows[own[own >= 0]]
+    asked = (point[named] < 0) | _assigned(here, quiet, own)
+    some = (named[asked], shapes[asked], own[asked])
+    for at, shape, name in zip(*(column.tolist() for column in some), strict=True):
+        if name >= 0:
+            key = quiet.prefix + quiet.names[name]
+        else:
+            key = _key(program.lines, quiet.points[shape], int(rows[at]))
+        value = here.store.assigned(key) if key else _NO_INDEX
+        point[at] = initial.point(key) if value is None else HELD
+        if point[at] < 0:
+            point[at], held[at] = HELD, value or here.store.read(key)
+    return point, held
+
+
+def _assigned(here: Here, quiet: Quiet, names: Ints) -> Bools:
+    """Tell which of the program's own variables it has given a value itself, (m,)."""
+    values, found = here.store.values, np.zeros(len(names), dtype=bool)
+    own = np.flatnonzero(names >= 0)
+    keys = [quiet.prefix + quiet.names[name] for name in names[own].tolist()]
+    given = {*islice(values, len(keys))}
+    if len(given) < len(keys):  # all that there are
+        found[own] = [key in given for key in keys]
+    else:
+        found[own] = [values.get(key) is not None for key in keys]
+    return found
+
+
+def _key(lines: Lines, point: Point, row: int) -> str:
+    """Return where the point of a move is stored, "" where its index is not known."""
+    if not point.index:
+        return point.key
+    index = [float(lines.value[lines.first[row] + slot]) for slot in point.index]
+    if not all(number.is_integer() for number in index):
+        return ""
+    return f"{point.key}[{','.join(str(int(number)) for number in index)}]"

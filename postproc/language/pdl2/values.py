@@ -1,0 +1,351 @@
+"""What the analysis knows of a value, and what operators make of it."""
+
+from __future__ import annotations
+
+import math
+import operator
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from postproc.robot.pose import inverse, pose_from_record, record_from_pose
+
+# What the analysis knows of a value: a number, a text, a position, or why nothing.
+
+Numbers = tuple[float | None, ...]
+
+FARTHEST = 1e6  # [mm] and [deg]: beyond, rounding would hide what is added
+COMPONENTS = {"x": 0, "y": 1, "z": 2, "a": 3, "e": 4, "r": 5}
+
+
+@dataclass(frozen=True, slots=True)
+class Nothing:
+    """A value that the program text does not tell, and why.
+
+    Attributes:
+        why: Ends a message.
+        of: Numbers (by their index in the job) of positions that it may be.
+    """
+
+    why: str
+    of: frozenset[int] = frozenset()
+
+    def __eq__(self, other: object) -> bool:
+        """Unknown is unknown, whatever the reason."""
+        return isinstance(other, Nothing) and self.of == other.of
+
+    def __hash__(self) -> int:
+        """Hash like every other unknown."""
+        return hash(Nothing)
+
+
+@dataclass(frozen=True, slots=True)
+class Alias:
+    """A parameter stands for the caller's variables.
+
+    Attributes:
+        keys: Where they are stored; one key where it is known which.
+        exact: False where only the array or record is known.
+    """
+
+    keys: frozenset[str]
+    exact: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Vector:
+    """A VECTOR, [mm] where it is a place."""
+
+    numbers: tuple[float | None, float | None, float | None]
+
+
+@dataclass(frozen=True, slots=True)
+class Written:
+    """A number and where it stands.
+
+    Attributes:
+        number: Its value, None where unknown.
+        slot: Global index of the number in the text, -1 for none.
+        along: It is that number plus a constant.
+    """
+
+    number: float | None
+    slot: int = -1
+    along: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Position:
+    """A POSITION, XTNDPOS or JOINTPOS.
+
+    Attributes:
+        joints: The numbers are joint angles [deg], not x, y, z [mm], a, e, r [deg].
+        numbers: Six numbers, None where unknown.
+        slots: Global index of the number that holds each component, or that it moves
+            along with; -1 for none.
+        config: Configuration string, None where none was written.
+        aux: (axis, value) of auxiliary axes; None where they are not known.
+        name: Variable or array element, "" for an inline literal.
+        taught: Marked as taught with the robot.
+        shared: Another program may read it too.
+        derived: Why the numbers cannot be edited, "" where they can.
+        along: Components that are the number of their slot plus a constant.
+    """
+
+    joints: bool = False
+    numbers: Numbers = (None,) * 6
+    slots: tuple[int, ...] = (-1,) * 6
+    config: str | None = None
+    aux: tuple[tuple[int, float | None], ...] | None = ()
+    name: str = ""
+    taught: bool = False
+    shared: bool = False
+    derived: str = ""
+    along: frozenset[int] = frozenset()
+
+    @property
+    def complete(self) -> bool:
+        """Tell whether all six numbers are known."""
+        return None not in self.numbers
+
+    @property
+    def editable(self) -> bool:
+        """Tell whether every number stands in a text by itself."""
+        return not (self.derived or self.along) and -1 not in self.slots
+
+    def with_component(self, at: int, new: Written) -> Position:
+        """Return a copy with one component replaced."""
+        numbers, slots = list(self.numbers), list(self.slots)
+        numbers[at], slots[at] = new.number, new.slot
+        along = self.along | {at} if new.along else self.along - {at}
+        return replace(self, numbers=tuple(numbers), slots=tuple(slots), along=along)
+
+    def with_aux(self, axis: int, value: float | None) -> Position:
+        """Return a copy with one auxiliary axis set."""
+        if self.aux is None:
+            return self
+        rest = tuple(entry for entry in self.aux if entry[0] != axis)
+        return replace(self, aux=tuple(sorted((*rest, (axis, value)))))
+
+
+Value = float | bool | str | Position | Vector | Alias | Nothing
+
+
+def join(a: Value, b: Value) -> Value:
+    """Return what holds when one of two values holds."""
+    if a is b or (type(a) is type(b) and a == b):
+        return a
+    if isinstance(a, Nothing):
+        return unsure(a, b)
+    if isinstance(b, Nothing):
+        return unsure(b, a)
+    if isinstance(a, Alias) and isinstance(b, Alias):
+        return Alias(a.keys | b.keys, False)
+    if isinstance(a, Position) and isinstance(b, Position):
+        return _join_positions(a, b)
+    return unsure(Nothing("it may hold different values here"), a, b)
+
+
+def may_be(value: Value | None) -> frozenset[int]:
+    """Return the numbers of the positions that a value is, or may be."""
+    if isinstance(value, Nothing):
+        return value.of
+    if isinstance(value, Position):
+        return frozenset(slot for slot in value.slots if slot >= 0)
+    return frozenset()
+
+
+def unsure(unknown: Nothing, *others: Value | None) -> Nothing:
+    """Return an unknown value that may be others too."""
+    of = unknown.of
+    for other in map(may_be, others):
+        if not other <= of:
+            of = of | other if of else other
+    return unknown if of is unknown.of else replace(unknown, of=of)
+
+
+def _join_positions(a: Position, b: Position) -> Value:
+    same = (a.joints, a.numbers, a.slots, a.along, a.config) == (
+        b.joints,
+        b.numbers,
+        b.slots,
+        b.along,
+        b.config,
+    )
+    if not same:
+        return Nothing("it may hold different values here", may_be(a) | may_be(b))
+    return replace(
+        a,
+        aux=a.aux if a.aux == b.aux else None,
+        name=a.name if a.name == b.name else min(a.name, b.name),
+        taught=a.taught or b.taught,
+        shared=a.shared or b.shared,
+        derived=a.derived or b.derived,
+    )
+
+
+def composed(a: Position, b: Position) -> Value:
+    """Return the composition a : b of two frames."""
+    if a.joints or b.joints or not (a.complete and b.complete):
+        return Nothing("a frame in `:` is not known")
+    pose = pose_from_record(_array(a)) @ pose_from_record(_array(b))
+    return _derived(pose, b.config, "it is composed of two frames (`:`)", b.aux)
+
+
+def inverted(a: Position) -> Value:
+    """Return the inverse frame (POS_INV)."""
+    if a.joints or not a.complete:
+        return Nothing("the argument of POS_INV is not known")
+    return _derived(inverse(pose_from_record(_array(a))), a.config, "it is POS_INV", ())
+
+
+def shifted(a: Position, by: Vector) -> Value:
+    """Return a position moved along its reference frame's axes (POS_SHIFT)."""
+    if a.joints or not a.complete or None in by.numbers:
+        return Nothing("an argument of POS_SHIFT is not known")
+    moved = tuple(
+        n + d  # type: ignore[operator]
+        for n, d in zip(a.numbers[:3], by.numbers, strict=True)
+    )
+    if max(map(abs, moved)) > FARTHEST:
+        return Nothing("POS_SHIFT takes it out of any reach")
+    return replace(
+        a,
+        numbers=moved + a.numbers[3:],
+        along=a.along | {0, 1, 2},
+        derived="it is shifted by the program (POS_SHIFT)",
+    )
+
+
+def _array(position: Position) -> np.ndarray:
+    return np.array(position.numbers, dtype=float)
+
+
+def _derived(
+    pose: np.ndarray,
+    config: str | None,
+    why: str,
+    aux: tuple[tuple[int, float | None], ...] | None,
+) -> Position:
+    numbers = tuple(record_from_pose(pose).tolist())
+    return Position(False, numbers, config=config, aux=aux, derived=why)
+
+
+# Operators and functions on values as far as they are known.
+
+RUN_TIME = Nothing("it is known only at run time")
+
+FUNCTIONS = frozenset("abs sqrt sin cos tan round trunc".split())
+_ARITHMETIC: dict[str, Callable[[float, float], float]] = {
+    "+": operator.add,
+    "-": operator.sub,
+    "*": operator.mul,
+    "/": operator.truediv,
+    "DIV": lambda a, b: float(math.trunc(a / b)),
+    "MOD": math.fmod,
+}
+_COMPARE: dict[str, Callable[[float, float], bool]] = {
+    "=": operator.eq,
+    "<>": operator.ne,
+    "<": operator.lt,
+    "<=": operator.le,
+    ">": operator.gt,
+    ">=": operator.ge,
+}
+
+
+def part_of(held: Value, component: tuple[str, int] | tuple[()] | None) -> Value:
+    """Return a component of a position or vector."""
+    if not isinstance(held, Position | Vector):
+        return held if isinstance(held, Nothing) else RUN_TIME
+    number: float | None = None
+    match component:
+        case ("pos", _) if isinstance(held, Position):
+            return replace(held, aux=())
+        case ("aux", axis) if isinstance(held, Position) and held.aux is not None:
+            number = dict(held.aux).get(axis)
+        case ("joint", axis) if 1 <= axis <= len(held.numbers):
+            number = held.numbers[axis - 1]
+        case (str(name), _) if COMPONENTS.get(name, 9) < len(held.numbers):
+            number = held.numbers[COMPONENTS[name]]
+    return RUN_TIME if number is None else number
+
+
+def unary(sign: str, value: Value) -> Value:
+    """Return what an operator makes of its operand."""
+    if sign == "NOT" and isinstance(value, bool):
+        return not value
+    if isinstance(value, float):
+        return -value if sign == "-" else value
+    if isinstance(value, Vector) and sign == "-" and None not in value.numbers:
+        x, y, z = (-n for n in value.numbers if n is not None)
+        return Vector((x, y, z))
+    return value if isinstance(value, Nothing) else RUN_TIME
+
+
+def binary(sign: str, a: Value, b: Value) -> Value:
+    """Return what an operator makes of its operands."""
+    if sign in ("AND", "OR"):
+        decisive = sign == "OR"
+        if a is decisive or b is decisive:
+            return decisive
+        if isinstance(a, bool) and isinstance(b, bool):
+            return not decisive
+    if isinstance(a, Position) and isinstance(b, Position) and sign == ":":
+        return composed(a, b)
+    if isinstance(a, Vector) and isinstance(b, Vector) and sign in "+-":
+        return _add(a, b, sign)
+    if sign in _COMPARE and type(a) is type(b) and isinstance(a, float | str | bool):
+        return _COMPARE[sign](a, b)  # type: ignore[arg-type]
+    if isinstance(a, float) and isinstance(b, float) and sign in _ARITHMETIC:
+        try:
+            return _ARITHMETIC[sign](a, b)
+        except (ArithmeticError, ValueError):
+            return Nothing("the arithmetic has no result")
+    return next((v for v in (a, b) if isinstance(v, Nothing)), RUN_TIME)
+
+
+def _add(a: Vector, b: Vector, sign: str) -> Value:
+    if None in a.numbers or None in b.numbers:
+        return RUN_TIME
+    x, y, z = (
+        _ARITHMETIC[sign](m, n)  # type: ignore[arg-type]
+        for m, n in zip(a.numbers, b.numbers, strict=True)
+    )
+    return Vector((x, y, z))
+
+
+def function(name: str, x: float) -> Value:
+    """Return what a built-in function of one number gives (angles in degrees)."""
+    if name in ("sin", "cos", "tan"):
+        return float(getattr(math, name)(math.radians(x)))
+    if name == "sqrt":
+        return math.sqrt(x) if x >= 0 else Nothing("the root of a negative number")
+    if name == "round":
+        return float(math.floor(x + 0.5))
+    return abs(x) if name == "abs" else float(math.trunc(x))
+
+
+# Where a reference leads.
+
+
+@dataclass(frozen=True)
+class Target:
+    """Where a reference leads: a key and the component of the value there.
+
+    Attributes:
+        keys: Keys it may mean.
+        exact: It means the one key, not some element of it.
+        component: Component of a position: x .. r, pos, ``aux`` and joint indices as
+            (``aux``, i) and (``joint``, i); () for the whole value, None if unknown.
+    """
+
+    keys: frozenset[str]
+    exact: bool
+    component: tuple[str, int] | tuple[()] | None = ()
+
+    @property
+    def key(self) -> str:
+        """Return the one key."""
+        return next(iter(self.keys))

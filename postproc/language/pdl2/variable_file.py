@@ -1,0 +1,163 @@
+"""Variable files: the values that a program's points have on the controller."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from postproc.arrays import Each, Ints
+from postproc.language.lines import Lines, read_lines
+from postproc.language.pdl2.entries import (
+    NESTED,
+    POSITIONS,
+    Entries,
+    Records,
+    find_records,
+    is_nested,
+    is_no_value,
+    last_head,
+    read_records,
+)
+from postproc.language.pdl2.nested import completed, find_fields, with_fields
+from postproc.language.pdl2.parser import Entered, parse_value_form
+from postproc.language.pdl2.store import root_of
+from postproc.language.shapes import Formed, formed, lower
+from postproc.language.source import Source
+from postproc.language.visits import Diagnostic
+
+Finding = tuple[int, Diagnostic]
+"""What was found, and the row at which that shows."""
+
+
+@dataclass(frozen=True)
+class VariableFile:
+    """A variable file.
+
+    Attributes:
+        lines: The text.
+        entries: Entries by lower-case name; a name with two entries has none.
+        diagnostics: What was found while reading.
+        unread: As in `Fields`.
+    """
+
+    lines: Lines
+    entries: Entries
+    diagnostics: tuple[Diagnostic, ...]
+    unread: frozenset[str] = frozenset()
+
+    @property
+    def source(self) -> Source:
+        """Return the text."""
+        return self.lines.source
+
+    @property
+    def start(self) -> Ints:
+        """Return the byte offsets of every number, its sign included, (m,)."""
+        return self.lines.start
+
+    @property
+    def end(self) -> Ints:
+        """Return the byte offsets at which they end, (m,)."""
+        return self.lines.end
+
+
+def read_variables(source: Source, each: Each = map) -> VariableFile:
+    """Read a variable file; what is wrong in it is reported, not fatal.
+
+    Args:
+        source: The file.
+        each: As in `read_lines`.
+
+    Raises:
+        ProgramError: A string does not end on its line.
+    """
+    lines = read_lines(source, each)
+    said = formed(lines.shapes, parse_value_form)
+    head = last_head(lines, said)
+    fields = find_fields(lines, said, head)
+    records = with_fields(find_records(lines, said, head), fields)
+    read = completed(read_records(lines, said, records), fields)
+    entries, twice = _told_apart(read, fields.twice)
+    found = [
+        *_named_twice(source, entries, records, twice),
+        *_incomplete(source, entries, records, {*twice}),
+        *_not_understood(lines, said, head),
+        *fields.findings,
+    ]
+    found.sort(key=lambda finding: finding[0])
+    told = tuple(diagnostic for _, diagnostic in found)
+    return VariableFile(lines, entries, told, fields.unread)
+
+
+def _told_apart(
+    entries: Entries, ambiguous: frozenset[str]
+) -> tuple[Entries, list[int]]:
+    """Name the entries; also return those whose name an earlier one has.
+
+    Args:
+        entries: All of a file.
+        ambiguous: Names that records or paths have too.
+    """
+    nested = [layout.kind in NESTED for layout in entries.layouts]
+    written = lower(entries.name)
+    if not any(nested) and not ambiguous:
+        single = dict(zip(written, range(len(written)), strict=True))
+        if len(single) == len(written):
+            return replace(entries, row=single), []
+    names = [
+        (row, name)
+        for row, name in enumerate(written)
+        if not nested[entries.layout[row]]
+    ]
+    if ambiguous:
+        names = [(k, name) for k, name in names if root_of(name) not in ambiguous]
+    count = Counter(name for _, name in names)
+    single = {name: row for row, name in names if count[name] == 1}
+    first = {name: row for row, name in reversed(names)}
+    twice = [row for row, name in names if first[name] != row]
+    return replace(entries, row=single), twice
+
+
+def _not_understood(
+    lines: Lines, said: Formed[Entered | None], head: Ints
+) -> Iterator[Finding]:
+    """Report lines that the grammar does not know, but for those of nested values."""
+    nested = said.which(is_nested)[lines.shape]
+    for row in np.flatnonzero(said.which(is_no_value)[lines.shape]).tolist():
+        if head[row] < 0 or not nested[head[row]]:
+            line = int(lines.line[row])
+            text = lines.source.line_text(line).strip()[:60]
+            message = f"not understood, kept: {text!r}"
+            yield row, Diagnostic(lines.source.name, line, "lsv-line", message)
+
+
+def _named_twice(
+    source: Source, entries: Entries, records: Records, twice: list[int]
+) -> Iterator[Finding]:
+    for row in twice:
+        text = f"{entries.name[row]} has two entries: it is not compensated; delete one"
+        found = Diagnostic(source.name, int(entries.line[row]), "lsv-twice", text)
+        yield int(records.closed[row]), found
+
+
+def _incomplete(
+    source: Source, entries: Entries, records: Records, twice: set[int]
+) -> Iterator[Finding]:
+    """Report positions without six known values."""
+    places = np.array([one.kind in POSITIONS for one in entries.layouts], dtype=bool)
+    unknown = np.isnan(entries.numbers).any(axis=1) & places[entries.layout]
+    for row in np.flatnonzero(unknown).tolist():
+        if row in twice:
+            continue
+        name, seen = entries.name[row], entries.layouts[entries.layout[row]].seen
+        code, text = "lsv-uninitialised", f"{name} is not initialised (*)"
+        if seen < 6:
+            code = "lsv-incomplete"
+            text = f"{name} has {seen} of 6 values: is the file cut?"
+        elif seen > 6:
+            code, text = "lsv-too-many", f"{name} has {seen} values in place of 6"
+        found = Diagnostic(source.name, int(entries.line[row]), code, text)
+        yield int(records.closed[row]), found
