@@ -10,8 +10,8 @@ from __future__ import annotations
 import numpy as np
 
 from postproc.arrays import Bools, Floats, Ints
+from postproc.motion.path import NEAR, rounds
 from postproc.motion.planner import Plan
-from postproc.motion.rounds import NEAR, rounds
 from postproc.motion.targets import Targets
 from postproc.reasons import Reasons
 from postproc.robot.pose import MM

@@ -14,7 +14,7 @@ import numpy as np
 from postproc.arcs import strayed
 from postproc.arrays import Bools, Floats, Ints
 from postproc.language.visits import Visits
-from postproc.motion.again import IS_STEP
+from postproc.motion.replan import IS_STEP
 from postproc.motion.targets import Kind
 from postproc.planning import Planned
 from postproc.resolve import moved_targets

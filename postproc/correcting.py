@@ -12,7 +12,7 @@ from postproc.kept import Kept, joined, keep
 from postproc.language import windows as cuts
 from postproc.language.visits import Visits
 from postproc.language.windows import Window, run_up, windows
-from postproc.motion.standing import NOWHERE, Standing
+from postproc.motion.trace import NOWHERE, Standing
 from postproc.options import Options
 from postproc.planning import Reading, plan_visits, states_of
 from postproc.proposal import Proposal

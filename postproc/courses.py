@@ -8,10 +8,9 @@ import numpy as np
 
 from postproc.arrays import Floats
 from postproc.language.visits import Visits
-from postproc.motion.again import reach_again
-from postproc.motion.reach import Course, reach
-from postproc.motion.standing import NOWHERE, Standing
+from postproc.motion.replan import Course, reach, reach_again
 from postproc.motion.targets import Targets
+from postproc.motion.trace import NOWHERE, Standing
 from postproc.resolve import moved_targets
 from postproc.robot.cell import Cell
 

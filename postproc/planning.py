@@ -21,8 +21,8 @@ from postproc.language.rewrite import Skeleton
 from postproc.language.source import Edit, Source, source_from_bytes
 from postproc.language.visits import Diagnostic, Visits
 from postproc.motion.planner import Plan, plan
-from postproc.motion.standing import NOWHERE, Standing
 from postproc.motion.targets import Targets
+from postproc.motion.trace import NOWHERE, Standing
 from postproc.reasons import Reasons
 from postproc.resolve import targets_from_visits
 from postproc.robot.cell import Cell

@@ -14,7 +14,7 @@ import numpy as np
 from postproc.arrays import Bools, Floats, Ints
 from postproc.flying import rounding_of
 from postproc.language.visits import Target, Visits
-from postproc.motion.rounds import from_every_start
+from postproc.motion.path import from_every_start
 from postproc.motion.targets import Kind, Targets
 from postproc.reasons import Reasons
 from postproc.robot.cell import Cell

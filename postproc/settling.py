@@ -15,8 +15,8 @@ from postproc.clock import Clock
 from postproc.courses import Courses
 from postproc.language.rewrite import edits as number_edits
 from postproc.language.source import Replacements
-from postproc.motion.reach import Reached
-from postproc.motion.standing import NOWHERE, Standing
+from postproc.motion.replan import Reached
+from postproc.motion.trace import NOWHERE, Standing
 from postproc.options import Options
 from postproc.planning import Planned, Reading
 from postproc.proposal import Proposal

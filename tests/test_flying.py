@@ -7,7 +7,7 @@ import pytest
 
 from postproc.flying import rounding_of
 from postproc.language.visits import FlyTrajectory, FlyType
-from postproc.motion.pull import Pull
+from postproc.motion.path import Pull
 from postproc.motion.targets import Fly
 from tests.made_visits import visits
 

@@ -19,8 +19,8 @@ from postproc.accuracy.compliance import Compliance
 from postproc.accuracy.geometry import Geometry
 from postproc.accuracy.variance import parameter_variance
 from postproc.compensate import compensate
-from postproc.motion import corner, paths, rounding, sampling, zone
-from postproc.motion.pull import Pull
+from postproc.motion import blending, path
+from postproc.motion.path import Pull
 from postproc.robot import direction, play, pose
 from postproc.robot.arm import DH
 from postproc.robot.inverse import ClosedForm
@@ -222,18 +222,18 @@ def test_places_on_edges(random, by_numpy):
     traced = SimpleNamespace(edges=edges, q=random.normal(size=(20, 6)))
     edge, u = random.integers(0, 40, 500), random.uniform(0, 1, 500)
     u[:2] = 0.0, 1.0
-    meant = by_numpy(paths.along, traced, edge, u)
-    assert np.allclose(paths.along(traced, edge, u), meant, **CLOSE)
+    meant = by_numpy(blending.along, traced, edge, u)
+    assert np.allclose(blending.along(traced, edge, u), meant, **CLOSE)
     u[::9] = np.nan
-    found = paths.along(traced, edge, u)
+    found = blending.along(traced, edge, u)
     assert np.isnan(found).all(axis=1).tolist() == np.isnan(u).tolist()
     traced.q = np.asfortranarray(traced.q)
     with pytest.raises(ValueError, match="behind the other"):
-        paths.along(traced, edge, u)
+        blending.along(traced, edge, u)
     traced.q = np.ascontiguousarray(traced.q)
     edges.source[:] = -1
     with pytest.raises(IndexError, match="nowhere"):
-        paths.along(traced, edge, u)
+        blending.along(traced, edge, u)
 
 
 @native
@@ -246,13 +246,15 @@ def test_straight_ways(bench_cell, random, by_numpy):
     tool = np.repeat(bench_cell.arm.flange(np.ones((1, 6))), 300, axis=0)
     targets = SimpleNamespace(tool=tool)
     asked = targets, flange, np.arange(299), np.arange(1, 300)
-    found, meant = sampling._lines(*asked), by_numpy(sampling._lines, *asked)
+    found, meant = path._lines(*asked), by_numpy(path._lines, *asked)
     for field in fields(found):
         one, other = (getattr(s, field.name) for s in (found, meant))
         assert np.allclose(one, other, **CLOSE), field.name
-    assert np.allclose(zone._chords(*asked), by_numpy(zone._chords, *asked), **CLOSE)
+    assert np.allclose(
+        blending._chords(*asked), by_numpy(blending._chords, *asked), **CLOSE
+    )
     with pytest.raises(IndexError, match="not there"):
-        zone._chords(targets, flange, np.array([-1]), np.array([0]))
+        blending._chords(targets, flange, np.array([-1]), np.array([0]))
 
 
 @native
@@ -355,8 +357,8 @@ def test_corners_of_a_program(bench_cell, bench_model, by_numpy, monkeypatch):
         for one, other in zip(found, meant, strict=True):
             assert np.allclose(one, other, **CLOSE)
 
-    compared(corner, "_passed", same_corners)
-    compared(rounding, "_samples", same)
+    compared(blending, "_passed", same_corners)
+    compared(blending, "_samples", same)
     source = (PROGRAMS / "milling.pdl").read_bytes()
     compensate(source, bench_cell, bench_model)
     assert {"_passed", "_samples"} <= set(seen)

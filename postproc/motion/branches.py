@@ -1,13 +1,90 @@
-"""Which of the eight solutions, on which turn: from the string, or by continuity."""
+"""Branches, turns and continuity of joint angles along a segment."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 
 from postproc.arrays import Bools, Floats, Ints
-from postproc.motion.ways import Ways
+from postproc.robot.arm import Arm
+
+# The solutions at the samples of a path: all branches, or only those asked for.
+
+
+class Ways(Protocol):
+    """Solutions of the inverse kinematics at k samples."""
+
+    def __len__(self) -> int:
+        """Return the number of samples."""
+        ...
+
+    def all(self, i: int) -> Floats:
+        """Return all branches at sample i, (8, 6) [rad], NaN where none."""
+        ...
+
+    def on(self, slot: int, first: int, most: int) -> Floats:
+        """Return one branch at samples from `first` on, (.., 6) [rad], on any turn.
+
+        Args:
+            slot: The branch.
+            first: The first sample.
+            most: How many are enough for the moment: a path that breaks off again and
+                again must not be looked through to its end every time.
+        """
+        ...
+
+
+@dataclass(frozen=True)
+class Solved:
+    """Ways of samples that were solved beforehand, (k, 8, 6) [rad]."""
+
+    branches: Floats
+
+    def __len__(self) -> int:
+        """Return the number of samples."""
+        return len(self.branches)
+
+    def all(self, i: int) -> Floats:
+        """Look all branches up."""
+        branches: Floats = self.branches[i]
+        return branches
+
+    def on(self, slot: int, first: int, most: int) -> Floats:
+        """Look one branch up."""
+        branch: Floats = self.branches[first : first + most, slot]
+        return branch
+
+
+@dataclass(frozen=True)
+class OnDemand:
+    """Ways of a long path, which keeps to one branch: the others are hardly needed.
+
+    Attributes:
+        arm: The arm.
+        flange: Flange poses, (k, 4, 4) [m].
+    """
+
+    arm: Arm
+    flange: Floats
+
+    def __len__(self) -> int:
+        """Return the number of samples."""
+        return len(self.flange)
+
+    def all(self, i: int) -> Floats:
+        """Solve for all branches at one sample."""
+        branches: Floats = self.arm.inverse(self.flange[i : i + 1]).q[0]
+        return branches
+
+    def on(self, slot: int, first: int, most: int) -> Floats:
+        """Solve for one branch."""
+        ahead = self.flange[first : first + most]
+        return self.arm.on_branch(ahead, np.full(len(ahead), slot))
+
+
+# Which of the eight solutions, on which turn: from the string, or by continuity.
 
 FULL = 2 * np.pi
 SUSPICIOUS = 0.3  # [rad] a step between samples that another branch might shorten
@@ -113,3 +190,44 @@ def follow(begin: Floats, ways: Ways) -> Followed:
         done, last = done + count, path[count]
         slot, ahead = (slot if good.all() else -1), MORE * ahead
     return Followed(q, slots, True)
+
+
+# Lines whose wrist axes are interpolated instead of the orientation (WRIST_JNT).
+
+ROUNDS = 20
+CLOSE = 1e-9  # [m]
+
+
+def wrist_interpolated(
+    arm: Arm, begin: Floats, end: Floats, tool: Floats, k: int
+) -> Floats:
+    """Move the TCP along a line while axes 4 to 6 turn in proportion.
+
+    Axes 1 to 3 follow by Newton's method on the TCP's position, from the straight line
+    in joint space.
+
+    Args:
+        arm: The arm.
+        begin: Joint angles at the start, (6,) [rad].
+        end: Joint angles at the end, (6,) [rad].
+        tool: TCP in the flange frame, (4, 4) [m].
+        k: Number of samples, the end included.
+
+    Returns:
+        (k, 6) [rad]; empty where the line cannot be followed.
+    """
+    u = (np.arange(1, k + 1) / k)[:, None]
+    q = begin + u * (end - begin)
+    ends = arm.flange(np.vstack([begin, end])) @ tool
+    wanted = ends[0, :3, 3] + u * (ends[1, :3, 3] - ends[0, :3, 3])
+    for _ in range(ROUNDS):
+        missing = wanted - (arm.flange(q) @ tool)[:, :3, 3]
+        if np.isnan(missing).any():
+            break
+        if np.abs(missing).max() < CLOSE:
+            return q
+        J = arm.jacobian(q, tool[:3, 3])[:, :3, :3]
+        if np.abs(np.linalg.det(J)).min() < CLOSE:
+            break
+        q[:, :3] += np.linalg.solve(J, missing[:, :, None])[:, :, 0]
+    return np.empty((0, 6))

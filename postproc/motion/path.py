@@ -1,18 +1,21 @@
-"""Cartesian paths: straight lines and arcs of the TCP, sampled.
-
-Orientation turns about one fixed axis at a constant rate from start to end (on an arc,
-from start to VIA to end), as $ORNT_TYPE RS_WORLD does.
-"""
+"""Cartesian paths: lines and arcs of the TCP, sampled; how fly points pull on them."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from functools import cached_property
 
 import numpy as np
 
 from postproc.arrays import Bools, Floats, Ints
-from postproc.robot.pose import rotation_from_vector, rotation_vector
+from postproc.kernels import floats, native
+from postproc.motion.targets import Move, Targets
+from postproc.robot.pose import inverse, rotation_from_vector, rotation_vector
+
+# Cartesian paths: straight lines and arcs of the TCP, sampled.
+#
+# Orientation turns about one fixed axis at a constant rate from start to end (on an
+# arc, from start to VIA to end), as $ORNT_TYPE RS_WORLD does.
 
 STEP = 5e-3  # [m] between samples
 TURN = np.deg2rad(1.0)  # [rad] between samples
@@ -147,3 +150,366 @@ def joined(parts: list[Segments]) -> Segments:
     return Segments(
         *(np.concatenate([getattr(p, name) for p in parts]) for name in names)
     )
+
+
+# Samples of the Cartesian paths whose both ends are known before joint angles are.
+
+LEAST = 4  # intervals of a path between stops, however short
+BLIND = 32  # intervals of a path whose length is not known beforehand
+
+
+@dataclass(frozen=True)
+class Samples:
+    """Where the samples of e edges (predecessor to move) stand.
+
+    Attributes:
+        visit: Move an edge leads to, (e,).
+        source: Where it comes from, (e,), negative where that is not known.
+        cartesian: The TCP's path is a line or an arc, (e,).
+        ready: The poses of the samples are known, (e,).
+        broken: The three points of an arc make no circle, (e,).
+        begins: On both parts of an arc, the edge from its start to VIA, (e,); else -1.
+        start: Samples start[i] .. start[i + 1] - 1 are those of edge i, the last of
+            them the move's own target, (e + 1,).
+        length: Length of the TCP's path, (e,) [m], 0 where it is not ready.
+        turning: Reorientation on it, (e,) [rad], 0 where it is not ready.
+        inner: Samples of ready edges that are no targets, (k,).
+        flange: Their flange poses, (k, 4, 4) [m].
+    """
+
+    visit: Ints
+    source: Ints
+    cartesian: Bools
+    ready: Bools
+    broken: Bools
+    begins: Ints
+    start: Ints
+    length: Floats
+    turning: Floats
+    inner: Ints
+    flange: Floats
+
+    def count(self, edge: int) -> int:
+        """Return the number of samples of an edge."""
+        return int(self.start[edge + 1] - self.start[edge])
+
+
+def sample(targets: Targets, flange: Floats) -> Samples:
+    """Place samples on all Cartesian paths between known flange poses.
+
+    Args:
+        targets: The moves.
+        flange: Flange poses at the targets, (n, 4, 4) [m], NaN where not known yet.
+    """
+    visit = np.repeat(np.arange(len(targets)), np.diff(targets.pred_start))
+    source = np.array(targets.pred)
+    at = np.maximum(source, 0)  # no visit: looked up, and never used
+    cartesian = targets.move[visit] != Move.JOINT
+    known = ~np.isnan(flange[:, 0, 0])
+    tool_known = ~np.isnan(targets.tool[:, 0, 0])
+    ready = cartesian & (source >= 0) & known[visit] & tool_known[visit]
+    ready &= known[at] & ~targets.wrist_joint[visit]
+    straight = np.flatnonzero(ready & (targets.move[visit] == Move.LINEAR))
+    begins = _begins(targets, visit, source)
+    segments = _lines(targets, flange, source[straight], visit[straight])
+    edge = straight
+    if (begins >= 0).any():
+        round_, arc = _arcs(targets, flange, visit, source, ready, begins)
+        segments, edge = joined([segments, arc]), np.append(straight, round_)
+    broken = np.zeros(len(visit), dtype=bool)
+    broken[edge] = ~segments.valid
+    ready = np.zeros(len(visit), dtype=bool)
+    ready[edge] = segments.valid
+    passing = targets.fly | targets.via
+    free = passing[visit] | ((source >= 0) & passing[at])
+    count = np.where(cartesian & (source >= 0) & ~ready & ~broken, BLIND, 1)
+    count[edge] = segments.intervals(np.where(free[edge], 1, LEAST))
+    count[broken] = 1
+    start = np.concatenate([[0], np.cumsum(count)])
+    return _inner(
+        targets, segments, edge, visit, source, cartesian, broken, begins, start
+    )
+
+
+def _inner(
+    targets: Targets,
+    segments: Segments,
+    edge: Ints,
+    visit: Ints,
+    source: Ints,
+    cartesian: Bools,
+    broken: Bools,
+    begins: Ints,
+    start: Ints,
+) -> Samples:
+    """Place the inner samples of the segments that belong to edges."""
+    ready = np.zeros(len(visit), dtype=bool)
+    ready[edge] = segments.valid
+    intervals = np.diff(start)[edge]
+    path = np.repeat(np.arange(len(edge)), np.where(segments.valid, intervals - 1, 0))
+    first = np.concatenate([[0], np.cumsum(np.bincount(path, minlength=len(edge)))])
+    nth = np.arange(len(path)) - first[path]
+    tcp = segments.poses(path, (nth + 1) / intervals[path])
+    tool = targets.tool.take(visit[edge[path]], axis=0)
+    length, turning = np.zeros(len(visit)), np.zeros(len(visit))
+    length[edge], turning[edge] = segments.length, segments.turning
+    return Samples(
+        visit, source, cartesian, ready, broken, begins, start, length, turning,
+        inner=start[edge[path]] + nth, flange=tcp @ inverse(tool),
+    )  # fmt: skip
+
+
+def _lines(targets: Targets, flange: Floats, begin: Ints, end: Ints) -> Segments:
+    """Build the straight paths from targets (m,) to others."""
+    if native is not None:
+        m, nothing = len(end), np.zeros((len(end), 3))
+        rotation, turn, centre, chord = native.lines(flange, targets.tool, begin, end)
+        return Segments(
+            rotation, turn, centre, nothing, nothing, chord,
+            angle=np.zeros(m), valid=np.ones(m, dtype=bool),
+        )  # fmt: skip
+    tool = targets.tool.take(end, axis=0)
+    return lines(flange.take(begin, axis=0) @ tool, flange.take(end, axis=0) @ tool)
+
+
+def _begins(targets: Targets, visit: Ints, source: Ints) -> Ints:
+    """Find the edge on which the arc of every edge begins, (e,), -1 without one.
+
+    The edges from VIA to the end are as many as those to VIA, and in their order.
+    """
+    n, begins = len(targets), np.full(len(visit), -1)
+    arc = targets.move[visit] == Move.CIRCULAR
+    first = np.flatnonzero(arc & targets.via[visit] & (visit + 1 < n))
+    begins[first] = first
+    at = np.maximum(source, 0)
+    second = np.flatnonzero(
+        arc & ~targets.via[visit] & (source == visit - 1) & targets.via[at]
+    )
+    via = source[second]
+    starts = np.diff(targets.pred_start)
+    same = np.bincount(via, minlength=n)[via] == starts[via]
+    nth = np.arange(len(second)) - np.searchsorted(via, via)
+    begins[second[same]] = (targets.pred_start[via] + nth)[same]
+    return begins
+
+
+def _arcs(
+    targets: Targets,
+    flange: Floats,
+    visit: Ints,
+    source: Ints,
+    ready: Bools,
+    begins: Ints,
+) -> tuple[Ints, Segments]:
+    """Build both parts of every arc: edges (m,) and their segments."""
+    n = len(targets)
+    to_via = ready & (begins == np.arange(len(visit)))
+    to_via &= ~np.isnan(flange[np.minimum(visit + 1, n - 1), 0, 0])
+    first = np.flatnonzero(to_via)
+    tool = targets.tool[visit[first]]
+    to, after = arcs(
+        flange[source[first]] @ tool,
+        flange[visit[first]] @ tool,
+        flange[visit[first] + 1] @ tool,
+    )
+    row = np.full(len(visit) + 1, -1)  # the last one is that of no edge
+    row[first] = np.arange(len(first))
+    second = np.flatnonzero(ready & ~targets.via[visit] & (row[begins] >= 0))
+    used = row[begins[second]]
+    picked = Segments(
+        *(getattr(after, name)[used] for name in Segments.__dataclass_fields__)
+    )
+    return np.append(first, second), joined([to, picked])
+
+
+# Arcs as a whole: their three points, and how far a correction bends them between.
+#
+# Three points make a circle, and where they lie badly for that, moving one of them by a
+# millimetre makes quite another one.
+
+NEAR = 1e-4  # [m] points nearer than this do not tell where their circle goes
+BETWEEN = (0.25, 0.5, 0.75)  # fractions of both parts of an arc that are looked at
+
+
+@dataclass(frozen=True)
+class Rounds:
+    """k arcs: one for every place from which a CIRCULAR move may begin.
+
+    Attributes:
+        visit: Their start, VIA and end, (k, 3).
+        points: The TCP there, in the frame of the arm's base, (k, 3, 3) [m]; NaN where
+            not known.
+    """
+
+    visit: Ints
+    points: Floats
+
+    def __len__(self) -> int:
+        """Return the number of arcs."""
+        return len(self.visit)
+
+    @property
+    def on_a_line(self) -> Bools:
+        """Tell which make no circle at all, (k,)."""
+        known = ~np.isnan(self.points).any(axis=(1, 2))
+        return np.asarray(known & ~_parts(self.points)[0].valid)
+
+    @property
+    def too_near(self) -> Bools:
+        """Tell where two of the three points are nearly one, (k,)."""
+        gap = self.points - np.roll(self.points, 1, axis=1)
+        return np.asarray((np.linalg.norm(gap, axis=2) < NEAR).any(axis=1))
+
+    def strays(self, shift: Floats) -> Floats:
+        """Tell how much farther the path moves between its points than these do.
+
+        Args:
+            shift: What the points move by, (k, 3, 3) [m].
+
+        Returns:
+            (k,) [m]; infinite where no circle is left, NaN where nothing is known.
+        """
+        before, after = _parts(self.points), _parts(self.points + shift)
+        moved = np.array([
+            np.linalg.norm(_place(new, u) - _place(old, u), axis=1)
+            for old, new in zip(before, after, strict=True)
+            for u in BETWEEN
+        ])  # fmt: skip
+        extra = moved.max(axis=0) - np.linalg.norm(shift, axis=2).max(axis=1)
+        known = ~np.isnan(self.points + shift).any(axis=(1, 2))
+        return np.where(known & ~after[0].valid, np.inf, extra)
+
+
+def rounds(targets: Targets, tcp: Floats, aside: Floats) -> Rounds:
+    """Find the arcs of a program.
+
+    Args:
+        targets: Its n moves.
+        tcp: TCP poses where the path passes them, each with its own tool,
+            (n, 4, 4) [m].
+        aside: From the targets to there, (n, 3) [m].
+    """
+    if not targets.via.any():
+        return Rounds(np.empty((0, 3), dtype=np.int64), np.empty((0, 3, 3)))
+    visit = np.repeat(np.arange(len(targets)), np.diff(targets.pred_start))
+    source = targets.pred
+    arc = (targets.move[visit] == Move.CIRCULAR) & targets.via[visit]
+    arc &= (source >= 0) & (visit + 1 < len(targets))
+    start, via = source[arc], visit[arc]
+    own = tcp[start] @ inverse(targets.tool[start]) @ targets.tool[via]
+    points = np.stack([own, tcp[via], tcp[via + 1]], axis=1)[:, :, :3, 3]
+    arcs_at = np.stack([start, via, via + 1], axis=1)
+    return Rounds(arcs_at, points - aside[arcs_at])
+
+
+def from_every_start(
+    move: Ints, via: Bools, pred_start: Ints, pred: Ints
+) -> tuple[Ints, Ints]:
+    """Let the end of an arc have VIA as its predecessor once for every start of it.
+
+    From another start the same VIA and end make another circle.
+
+    Args:
+        move: `Move` of n moves, (n,).
+        via: True at the point on the way of an arc, (n,).
+        pred_start: Predecessors of move v are pred[pred_start[v] : pred_start[v + 1]].
+        pred: Predecessors; negative for a place that is not known.
+
+    Returns:
+        `pred_start` and `pred` with the repetitions.
+    """
+    visit = np.repeat(np.arange(len(move)), np.diff(pred_start))
+    ends = (move[visit] == Move.CIRCULAR) & ~via[visit]
+    at = np.maximum(pred, 0)  # no move: looked up, and never used
+    ends &= (pred >= 0) & (pred == visit - 1) & via[at]
+    starts = np.diff(pred_start)[at]
+    times = np.where(ends, np.maximum(starts, 1), 1)
+    if (times == 1).all():
+        return pred_start, pred
+    before = np.concatenate([[0], np.cumsum(times)])
+    return before[pred_start], np.repeat(pred, times)
+
+
+def _parts(points: Floats) -> tuple[Segments, Segments]:
+    """Build both parts of arcs through points (k, 3, 3) [m]."""
+    poses = np.tile(np.eye(4), (*points.shape[:2], 1, 1))
+    poses[:, :, :3, 3] = points
+    return arcs(poses[:, 0], poses[:, 1], poses[:, 2])
+
+
+def _place(part: Segments, u: float) -> Floats:
+    """Place the TCP at a fraction of every arc, (k, 3) [m]."""
+    k = len(part.angle)
+    return part.poses(np.arange(k), np.full(k, u))[:, :3, 3]
+
+
+# How the path at a sharp fly point moves with the points next to it.
+#
+# The corner superposes two moves, so that the place where the path passes a point moves
+# by the share 1 - v - w of what the point moves, and by the shares v and w of what the
+# points before and behind it move; see `corner`. Exact for straight moves of the TCP.
+
+ROUNDS = 12  # of Jacobi's method; v + w is 1/4 at most, each gains a factor of two
+
+
+def _no_points() -> Ints:
+    return np.empty(0, dtype=np.int64)
+
+
+def _no_shares() -> Floats:
+    return np.empty(0)
+
+
+@dataclass(frozen=True)
+class Pull:
+    """c rounded fly points where the path really bends.
+
+    Attributes:
+        visit: The point, (c,).
+        before, behind: The targets next to it, (c,).
+        v, w: Their shares, (c,).
+    """
+
+    visit: Ints = field(default_factory=_no_points)
+    before: Ints = field(default_factory=_no_points)
+    behind: Ints = field(default_factory=_no_points)
+    v: Floats = field(default_factory=_no_shares)
+    w: Floats = field(default_factory=_no_shares)
+
+    def on(self, moved: Floats) -> Floats:
+        """Tell how much farther than their targets points move, (n, 3).
+
+        Args:
+            moved: What all n targets move by, (n, 3).
+        """
+        here = moved.take(self.visit, axis=0)
+        pulled = self.v[:, None] * (moved.take(self.before, axis=0) - here)
+        pulled += self.w[:, None] * (moved.take(self.behind, axis=0) - here)
+        out = np.zeros_like(moved)
+        out[self.visit] = pulled
+        return out
+
+    def to_move(self, wanted: Floats) -> Floats:
+        """Move targets so that the path moves as wanted where it passes, (n, 3)."""
+        n, c = len(wanted), len(self.visit)
+        if c == 0:
+            return np.array(wanted)
+        if native is not None:
+            corners, shares = (self.visit, self.before, self.behind), (self.v, self.w)
+            found: Floats = native.to_move(floats(wanted), corners, shares, ROUNDS)
+            return found
+        others = np.ones(n, dtype=bool)
+        others[self.visit] = False
+        order = np.concatenate([self.visit, np.flatnonzero(others)])
+        place = np.empty(n, dtype=np.int64)
+        place[order] = np.arange(n)
+        before, behind = place.take(self.before), place.take(self.behind)
+        moved = np.array(wanted.take(order, axis=0).T, order="C")  # the points first
+        here, aim = moved[:, :c], np.array(moved[:, :c])
+        for _ in range(ROUNDS):
+            pulled = self.v * (moved.take(before, axis=1) - here)
+            pulled += self.w * (moved.take(behind, axis=1) - here)
+            here[:] = aim - pulled
+        out = np.empty_like(wanted)
+        out[order] = moved.T
+        return out

@@ -7,14 +7,12 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from postproc.arrays import Bools, Floats, Ints
-from postproc.motion.clock import no_time, tell_time
-from postproc.motion.pull import Pull
-from postproc.motion.reach import points, where_passed
-from postproc.motion.reasons import CODE, REASONS, WRIST
-from postproc.motion.rounding import rounded
-from postproc.motion.standing import NOWHERE, Standing
-from postproc.motion.targets import Targets
-from postproc.motion.trace import Trace, trace
+from postproc.motion.blending import rounded
+from postproc.motion.path import Pull
+from postproc.motion.replan import points, where_passed
+from postproc.motion.targets import CODE, REASONS, WRIST, Targets
+from postproc.motion.timing import no_time, tell_time
+from postproc.motion.trace import NOWHERE, Standing, Trace, trace
 from postproc.robot.arm import Arm
 from postproc.robot.direction import arrivals
 

@@ -2,32 +2,559 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from postproc.arrays import Bools, Floats, Ints
-from postproc.motion.arrival import Arrival
-from postproc.motion.arrive import arrive, choose
-from postproc.motion.at_once import at_once
-from postproc.motion.branches import follow, on_other_turns, on_written_turns
-from postproc.motion.pull import Pull
-from postproc.motion.reasons import (
+from postproc.arrays import Bools, Floats, Ints, pieces, spans
+from postproc.motion.branches import (
+    LOST,
+    SUSPICIOUS,
+    OnDemand,
+    Solved,
+    Ways,
+    follow,
+    nearest_slot,
+    nearest_slots,
+    nearest_turns,
+    on_other_turns,
+    on_written_turns,
+    wrist_interpolated,
+)
+from postproc.motion.path import Pull, Segments, arcs, lines, sample
+from postproc.motion.targets import (
     AMBIGUOUS,
+    ARC_END,
     CODE,
     LIMITS,
     NO_BRANCH,
+    NO_CIRCLE,
     NO_START,
     NO_TARGET,
+    OTHER_BRANCH,
     OUT_OF_REACH,
     PATH_JUMP,
     PATH_LIMITS,
+    PATH_REACH,
+    Kind,
+    Move,
+    Targets,
 )
-from postproc.motion.targets import Kind, Move, Targets
-from postproc.motion.workspace import Known, Workspace
 from postproc.robot.arm import Arm
-from postproc.robot.play import Edges
-from postproc.robot.pose import is_unknown
+from postproc.robot.play import NOTHING, Edges, Past
+from postproc.robot.pose import inverse, is_unknown
+
+# Where one move leads to from one place.
+
+
+@dataclass(frozen=True)
+class Arrival:
+    """Where one edge leads to.
+
+    Attributes:
+        q: (6,) [rad], NaN where not known.
+        flange: (4, 4) [m].
+        slot: Branch, -1 where unknown.
+        path: Joint angles along the edge, the target included, (k, 6); empty where the
+            path is not known.
+        reason: Index into `REASONS`.
+    """
+
+    q: Floats
+    flange: Floats
+    slot: int
+    path: Floats
+    reason: int
+
+
+NO_PATH = np.empty((0, 6))
+
+# The arrays that a trace fills in program order.
+
+STRAIGHT = 1e-3  # [rad] at axis 5, below this the two wrist branches are one
+CHUNK = 50_000  # poses solved at a time; solving needs room for copies
+SAME_POSE = 1e-7  # [m] and sines; poses that several predecessors agree on
+LONG = 256  # targets on one path from which on one branch is cheaper than all of them
+
+
+@dataclass(frozen=True)
+class Known:
+    """What is known beforehand of k targets, whatever leads to them.
+
+    Attributes:
+        rows: The targets, (k,).
+        q: Their joint angles, (k, 6) [rad].
+        flange: Their flange poses, (k, 4, 4) [m].
+        slot: Their branches, (k,).
+    """
+
+    rows: Ints
+    q: Floats
+    flange: Floats
+    slot: Ints
+
+
+class Workspace:
+    """What is known so far of n targets, e edges and s samples on them.
+
+    Attributes:
+        q: Joint angles at the targets, (n, 6) [rad], NaN where not known yet.
+        flange: Flange poses at the targets, (n, 4, 4) [m], NaN where not known yet.
+        slot: Branch taken, (n,), -1 where unknown.
+        reason: Index into `REASONS`, (n,).
+        samples: Where the samples stand.
+        source: Predecessor of each edge, (e,); becomes -1 where a path stays unknown.
+        path: Joint angles at the samples, (s, 6) [rad], NaN where not known yet.
+        placed: Flange poses known beforehand that joint angles must be found for, (n,).
+        told: Targets that are known whatever leads to them, (n,).
+        long: Targets of long stretches of single Cartesian paths, (n,); these are
+            followed on one branch, and the others are not looked for.
+    """
+
+    def __init__(self, arm: Arm, targets: Targets, known: Known | None = None) -> None:
+        """Place what does not depend on joint angles and solve for it in one batch."""
+        self.arm, self.targets = arm, targets
+        n = len(targets)
+        self.tool_inverse = inverse(targets.tool)
+        self.q = np.full((n, 6), np.nan)
+        self.slot = np.full(n, -1, dtype=np.int64)
+        self.reason = np.zeros(n, dtype=np.int64)
+        self._place()
+        self.given = np.zeros(n, dtype=bool)
+        if known is not None:
+            self._give(known)
+        self._settle_steps()
+        self.samples = sample(targets, self.flange)
+        self.source = np.array(self.samples.source)
+        self.path = np.full((int(self.samples.start[-1]), 6), np.nan)
+        self._inner = np.full(len(self.path), -1)
+        self._inner[self.samples.inner] = np.arange(len(self.samples.inner))
+        placed = ~is_unknown(self.flange)
+        self.placed = placed & (targets.kind != Kind.JOINTS) & ~self.given
+        self.told = np.zeros(n, dtype=bool)
+        self.by_string = self._by_string()
+        self.single = self._single_lines()
+        self.long = self.single & (_run_lengths(self.single) >= LONG)
+
+    def _place(self) -> None:
+        """Place the flange at poses and joint angles."""
+        targets = self.targets
+        self.flange = targets.tcp @ self.tool_inverse
+        self.flange[targets.kind != Kind.POSE] = np.nan
+        joints = np.flatnonzero(targets.kind == Kind.JOINTS)
+        self.q[joints] = targets.joints[joints]
+        known = joints[~np.isnan(self.q[joints]).any(axis=1)]
+        self.flange[known] = self.arm.flange(self.q[known])
+
+    def _settle_steps(self) -> None:
+        """Place the flange after steps from places that are known already."""
+        kind = self.targets.kind
+        steps = (kind == Kind.TOOL_STEP) | (kind == Kind.BASE_STEP)
+        for v in np.flatnonzero(steps).tolist():
+            sources = self.targets.pred[
+                self.targets.pred_start[v] : self.targets.pred_start[v + 1]
+            ]
+            if len(sources) and (sources >= 0).all():
+                after = [self.after_step(v, self.flange[s]) for s in sources]
+                if np.ptp(after, axis=0).max() < SAME_POSE:
+                    self.flange[v] = after[0]
+
+    def after_step(self, v: int, flange: Floats) -> Floats:
+        """Place the flange after step `v` from a flange pose, (4, 4) [m]."""
+        step, tcp = self.targets.tcp[v], flange @ self.targets.tool[v]
+        if self.targets.kind[v] == Kind.TOOL_STEP:
+            tcp = tcp @ step
+        else:
+            tcp = tcp.copy()
+            tcp[:3, :3] = step[:3, :3] @ tcp[:3, :3]
+            tcp[:3, 3] += step[:3, 3]
+        moved: Floats = tcp @ self.tool_inverse[v]
+        return moved
+
+    def _give(self, known: Known) -> None:
+        """Take over what is known of some targets."""
+        self.q[known.rows], self.slot[known.rows] = known.q, known.slot
+        self.flange[known.rows] = known.flange
+        self.given[known.rows] = True
+
+    def _by_string(self) -> Bools:
+        """Tell which targets need nothing but their configuration string."""
+        t = self.targets
+        told = (t.kind == Kind.POSE) & (t.slot >= 0) & ~t.nearest_turn
+        return np.asarray(told & (t.move == Move.JOINT) & self.placed)
+
+    def _single_lines(self) -> Bools:
+        """Tell which targets continue a Cartesian path from the one before alone."""
+        samples, out = self.samples, np.zeros(len(self.q), dtype=bool)
+        single = np.flatnonzero(np.diff(self.targets.pred_start) == 1)
+        edge = self.targets.pred_start[single]
+        out[single] = samples.ready[edge] & (samples.source[edge] == single - 1)
+        return np.asarray(out & self.placed)
+
+    def solve(self, settled: Bools) -> None:
+        """Solve for all branches where there is no long stretch, in one batch.
+
+        Args:
+            settled: Targets that are settled, with the ways to them, (n,).
+        """
+        samples, start = self.samples, self.samples.start
+        poses = np.flatnonzero(self.placed & ~settled & ~self.long)
+        edge = np.searchsorted(start, samples.inner, side="right") - 1
+        visit = samples.visit[edge]
+        inner = np.flatnonzero(~self.long[visit] & ~settled[visit])
+        asked = np.concatenate([self.flange[poses], samples.flange[inner]])
+        self.branches = np.empty((len(asked), 8, 6))
+        for rows in pieces(len(asked), CHUNK):
+            self.branches[rows] = self.arm.inverse(asked[rows]).q
+        self.solved = np.full(len(self.q), -1)
+        self.solved[poses] = np.arange(len(poses))
+        self.row = np.full(int(start[-1]), -1)
+        self.row[samples.inner[inner]] = len(poses) + np.arange(len(inner))
+        self.row[start[1:] - 1] = self.solved[samples.visit]
+
+    def solutions(self, v: int, flange: Floats) -> Floats:
+        """Return all branches at target v with its flange pose, (8, 6) [rad]."""
+        if self.solved[v] >= 0:
+            known: Floats = self.branches[self.solved[v]]
+            return known
+        found: Floats = self.arm.inverse(flange[None]).q[0]
+        return found
+
+    def all_solutions(self, rows: Ints) -> Floats:
+        """Return all branches at placed targets, (k, 8, 6) [rad]."""
+        found = np.empty((len(rows), 8, 6))
+        known = self.solved[rows] >= 0
+        found[known] = self.branches[self.solved[rows[known]]]
+        found[~known] = self.arm.inverse(self.flange[rows[~known]]).q
+        return found
+
+    def ways(self, span: slice) -> Ways:
+        """Return the solutions at some samples of ready edges."""
+        rows = self.row[span]
+        if len(rows) and (rows >= 0).all():
+            return Solved(self.branches[rows])
+        return OnDemand(self.arm, self.flange_at(np.arange(span.start, span.stop)))
+
+    def flange_at(self, at: Ints) -> Floats:
+        """Look up the flange poses at samples of ready edges, (k, 4, 4) [m]."""
+        samples, inner = self.samples, self._inner[at]
+        last, inside = np.flatnonzero(inner < 0), np.flatnonzero(inner >= 0)
+        edge = np.searchsorted(samples.start, at[last], side="right") - 1
+        out = np.empty((len(at), 4, 4))
+        out[last] = self.flange.take(samples.visit[edge], axis=0)
+        out[inside] = samples.flange.take(inner[inside], axis=0)
+        return out
+
+    def is_known(self, v: int) -> bool:
+        """Tell whether the joint angles at a target are known already."""
+        return v >= 0 and not np.isnan(self.q[v, 0])
+
+    def is_known_before(self, v: int, source: int) -> bool:
+        """Tell whether a place is known when v is come to, in the program's order."""
+        return self.is_known(source) and (source < v or bool(self.told[source]))
+
+    def branch_at(self, v: int) -> int:
+        """Return the branch at a target, -1 where it is not known or not one alone."""
+        return int(self.branches_at(np.array([v]))[0])
+
+    def branches_at(self, rows: Ints) -> Ints:
+        """Return the branches at targets, (k,), likewise."""
+        straight = np.abs(self.q[rows, 4]) < STRAIGHT
+        return np.where(straight, -1, self.slot[rows])
+
+    def span(self, edge: int) -> slice:
+        """Return the samples of an edge."""
+        return slice(int(self.samples.start[edge]), int(self.samples.start[edge + 1]))
+
+
+def _run_lengths(inside: Bools) -> Ints:
+    """Return the length of the run of True that each place lies in, (n,); else 0."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], inside, [0]])))
+    begin, end = edges[::2], edges[1::2]
+    out = np.zeros(len(inside), dtype=np.int64)
+    out[inside] = np.repeat(end - begin, end - begin)
+    return out
+
+
+# One arrival over a Cartesian path: a line, or a part of an arc.
+
+
+def along_line(
+    work: Workspace, v: int, edge: int, flange: Floats, end: Arrival
+) -> Arrival:
+    """Follow a Cartesian path; where that fails, keep the end and say why."""
+    joints = work.targets.kind[v] == Kind.JOINTS
+    if work.samples.ready[edge]:
+        span = work.span(edge)
+        ways = work.ways(slice(span.start, span.stop - joints))
+    else:
+        tool = work.targets.tool[v]
+        line = lines(
+            (work.flange[work.source[edge]] @ tool)[None], (flange @ tool)[None]
+        )
+        ways = _ways(work, v, edge, line, not joints)
+    return _followed(work, v, edge, flange, end, ways)
+
+
+def along_late_arc(
+    work: Workspace, v: int, edge: int, flange: Floats, end: Arrival
+) -> Arrival:
+    """Follow a part of an arc whose points were not all known beforehand."""
+    t, begins = work.targets, int(work.samples.begins[edge])
+    unknown = Arrival(end.q, flange, end.slot, NO_PATH, end.reason)
+    if begins < 0 or t.wrist_joint[v] or work.source[begins] < 0:
+        return unknown
+    via, start = v if t.via[v] else v - 1, work.source[begins]
+    places = np.array(work.flange[[start, via, via + 1]])
+    places[1 + v - via] = flange
+    if np.isnan(places[0]).any():
+        return unknown
+    if np.isnan(places).any():
+        return replace(unknown, reason=end.reason or CODE[ARC_END])
+    parts = arcs(*(places @ t.tool[v])[:, None])
+    part = parts[0 if t.via[v] else 1]
+    if not part.valid[0]:
+        return replace(unknown, reason=CODE[NO_CIRCLE])
+    ways = _ways(work, v, edge, part, t.kind[v] != Kind.JOINTS)
+    return _followed(work, v, edge, flange, end, ways)
+
+
+def _followed(
+    work: Workspace, v: int, edge: int, flange: Floats, end: Arrival, ways: Ways
+) -> Arrival:
+    """Follow a Cartesian path through solutions; see `along_line`."""
+    near = work.q[work.source[edge]]
+    joints = work.targets.kind[v] == Kind.JOINTS
+    done = follow(near, ways)
+    if len(done.q) < len(ways):
+        lost = OUT_OF_REACH if len(end.path) == 0 else PATH_REACH
+        reason = CODE[PATH_JUMP if done.reached else lost]
+        return Arrival(end.q, flange, end.slot, NO_PATH, reason)
+    if not joints:
+        before = work.branch_at(int(work.source[edge]))
+        single = (done.slot == (done.slot[0] if before < 0 else before)).all()
+        reason = 0 if single else CODE[PATH_JUMP]
+        return Arrival(done.q[-1], flange, int(done.slot[-1]), done.q, reason)
+    last = done.q[-1] if len(done.q) else near
+    if np.abs(last - end.q).max() > LOST:
+        return Arrival(end.q, flange, -1, NO_PATH, CODE[OTHER_BRANCH])
+    return Arrival(end.q, flange, -1, np.vstack([done.q, end.q]), 0)
+
+
+def _ways(work: Workspace, v: int, edge: int, path: Segments, target: bool) -> Ways:
+    """Solve along one path to v, with or without the target itself."""
+    k = work.samples.count(edge)
+    u = np.arange(1, k + (1 if target else 0)) / k
+    tcp = path.poses(np.zeros(len(u), dtype=np.int64), u)
+    return Solved(work.arm.inverse(tcp @ work.tool_inverse[v]).q)
+
+
+# One arrival: from known joint angles over one edge to a target.
+
+
+def arrive(work: Workspace, v: int, edge: int) -> Arrival:
+    """Go over an edge whose source has known joint angles."""
+    targets, source = work.targets, int(work.source[edge])
+    kind, near = targets.kind[v], work.q[source]
+    if kind == Kind.JOINT_STEP:
+        q = near + targets.joints[v]
+        return Arrival(q, work.arm.flange(q[None])[0], -1, q[None], 0)
+    flange = work.flange[v]
+    if kind == Kind.TOWARDS:
+        flange = part_way(work, v, work.flange[source])
+        if np.isnan(flange).any():
+            return Arrival(np.full(6, np.nan), flange, -1, NO_PATH, CODE[NO_TARGET])
+    elif np.isnan(flange).any():
+        flange = work.after_step(v, work.flange[source])
+    if kind == Kind.JOINTS:
+        end = Arrival(work.q[v], flange, -1, work.q[v][None], 0)
+    else:
+        end = choose(work, v, flange, near)
+    if targets.move[v] == Move.JOINT or np.isnan(flange).any():
+        return end
+    if work.samples.broken[edge]:
+        return Arrival(end.q, flange, end.slot, NO_PATH, CODE[NO_CIRCLE])
+    if np.isnan(targets.tool[v]).any():
+        return Arrival(end.q, flange, end.slot, NO_PATH, end.reason)
+    if targets.move[v] == Move.CIRCULAR and not work.samples.ready[edge]:
+        return along_late_arc(work, v, edge, flange, end)
+    if targets.wrist_joint[v]:
+        path = wrist_interpolated(
+            work.arm, near, end.q, targets.tool[v], work.samples.count(edge)
+        )
+        reason = end.reason if len(path) else end.reason or CODE[PATH_REACH]
+        return Arrival(end.q, flange, end.slot, path, reason)
+    return along_line(work, v, edge, flange, end)
+
+
+def part_way(work: Workspace, v: int, flange: Floats) -> Floats:
+    """Place the flange after going a distance towards a pose, (4, 4) [m].
+
+    The tool turns in proportion; NaN where the pose is nearer than the distance, for
+    what the arm does then is not known.
+    """
+    targets = work.targets
+    line = lines((flange @ targets.tool[v])[None], targets.tcp[v][None])
+    distance, length = float(targets.distance[v]), float(line.length[0])
+    if not distance <= length:
+        return np.full((4, 4), np.nan)
+    share = np.array([distance / length if length > 0.0 else 0.0])
+    tcp = line.poses(np.zeros(1, dtype=np.int64), share)[0]
+    reached: Floats = tcp @ work.tool_inverse[v]
+    return reached
+
+
+def choose(work: Workspace, v: int, flange: Floats, near: Floats | None) -> Arrival:
+    """Choose a solution by configuration string, else the nearest one.
+
+    Args:
+        work: The workspace.
+        v: The target.
+        flange: Its flange pose, (4, 4) [m].
+        near: Joint angles before, (6,) [rad], or None where they are not known.
+    """
+    arm, targets = work.arm, work.targets
+    unknown = np.full(6, np.nan)
+    if np.isnan(flange).any():
+        return Arrival(unknown, flange, -1, NO_PATH, CODE[OUT_OF_REACH])
+    branches = work.solutions(v, flange)
+    if np.isnan(branches).any(axis=1).all():
+        return Arrival(unknown, flange, -1, NO_PATH, CODE[OUT_OF_REACH])
+    slot = int(targets.slot[v])
+    if slot < 0 and near is None:
+        return Arrival(unknown, flange, -1, NO_PATH, CODE[NO_START])
+    if slot < 0 and near is not None:
+        slot = nearest_slot(branches, near)
+    q = branches[slot]
+    if np.isnan(q).any():
+        return Arrival(unknown, flange, slot, NO_PATH, CODE[NO_BRANCH])
+    if near is None or (targets.slot[v] >= 0 and not targets.nearest_turn[v]):
+        q = on_written_turns(q[None], targets.turns[v][None])[0]
+    else:
+        q = _nearest_allowed(arm, q, near)
+    return Arrival(q, flange, slot, q[None], 0)
+
+
+def _nearest_allowed(arm: Arm, q: Floats, near: Floats) -> Floats:
+    """Take the nearest turn of every axis that has it in its range."""
+    turned = nearest_turns(q, near)
+    return np.where((turned >= arm.lower) & (turned <= arm.upper), turned, q)
+
+
+# Stretches that begin behind a known target, followed all together.
+#
+# Each keeps to the branch nearest to where it begins, as long as every step along it is
+# a small one. Where one is not, the stretch is left to be followed on its own.
+
+
+@dataclass(frozen=True)
+class _Stretches:
+    """r stretches of targets, each the only way on from the one before.
+
+    Attributes:
+        first: First target, (r,).
+        count: Number of targets, (r,).
+        begin: First sample, (r,).
+        size: Number of samples, (r,).
+    """
+
+    first: Ints
+    count: Ints
+    begin: Ints
+    size: Ints
+
+    def __getitem__(self, rows: Bools) -> _Stretches:
+        """Return some of them."""
+        return _Stretches(
+            self.first[rows], self.count[rows], self.begin[rows], self.size[rows]
+        )
+
+    @property
+    def targets(self) -> Ints:
+        """List all targets."""
+        return spans(self.first, self.count)
+
+    @property
+    def samples(self) -> Ints:
+        """List all samples."""
+        return spans(self.begin, self.size)
+
+
+def at_once(work: Workspace, smooth: Bools, most: int) -> Bools:
+    """Follow what goes on from known targets; tell which targets that settles, (n,).
+
+    Args:
+        work: The workspace.
+        smooth: Targets that continue a Cartesian path from the one before, (n,).
+        most: Targets of a stretch that are followed.
+    """
+    settled = np.zeros(len(smooth), dtype=bool)
+    some = _stretches(work, smooth, most)
+    if len(some.first) == 0:
+        return settled
+    flange = work.flange_at(some.samples)
+    near, head = work.q[some.first - 1], np.cumsum(some.size) - some.size
+    slot = nearest_slots(work.arm.inverse(flange[head]).q, near)
+    q = work.arm.on_branch(flange, np.repeat(slot, some.size))
+    short = np.repeat(~work.long[some.first], some.size)
+    q[short] = work.arm.into_range(q[short])
+    q = _unwrapped(q, near, head, some.size)
+    good = _small_steps(q, near, head) & (slot >= 0)
+    _settle(work, some[good], q[np.repeat(good, some.size)], slot[good])
+    settled[some[good].targets] = True
+    return settled
+
+
+def _stretches(work: Workspace, smooth: Bools, most: int) -> _Stretches:
+    """Find the stretches."""
+    ends = np.flatnonzero(np.diff(np.concatenate([[0], smooth, [0]])))
+    first, count = ends[::2], np.minimum(ends[1::2] - ends[::2], most)
+    known = ~np.isnan(work.q[first - 1, 0])
+    first, count = first[known], count[known]
+    edge, start = work.targets.pred_start[first], work.samples.start
+    return _Stretches(first, count, start[edge], start[edge + count] - start[edge])
+
+
+def _steps(q: Floats, near: Floats, head: Ints) -> Floats:
+    """Measure what every joint turns by from sample to sample, (s, 6) [rad]."""
+    step = np.empty_like(q)
+    step[1:] = q[1:] - q[:-1]
+    step[head] = q[head] - near
+    return np.abs(step, out=step)
+
+
+def _unwrapped(q: Floats, near: Floats, head: Ints, size: Ints) -> Floats:
+    """Put samples on the turns that continue their stretches, (s, 6) [rad]."""
+    wraps = (_steps(q, near, head) >= np.pi).any(axis=1)
+    for i in np.flatnonzero(np.logical_or.reduceat(wraps, head)).tolist():
+        rows = slice(head[i], head[i] + size[i])
+        q[rows] = np.unwrap(np.vstack([near[i], q[rows]]), axis=0)[1:]
+    return q
+
+
+def _small_steps(q: Floats, near: Floats, head: Ints) -> Bools:
+    """Tell which stretches take none but small steps, (r,); their first may be larger.
+
+    As in `follow`: no other branch makes it shorter.
+    """
+    step = _steps(q, near, head).max(axis=1)
+    large = ~(step <= SUSPICIOUS)
+    large[head] = ~(step[head] <= LOST)
+    return ~np.logical_or.reduceat(large, head)
+
+
+def _settle(work: Workspace, some: _Stretches, q: Floats, slot: Ints) -> None:
+    """Write down where stretches lead."""
+    v = some.first
+    before = work.branches_at(v - 1)
+    work.reason[v[(before >= 0) & (before != slot)]] = CODE[PATH_JUMP]
+    work.path[some.samples] = q
+    edge = spans(work.targets.pred_start[v], some.count)
+    work.q[some.targets] = work.path[work.samples.start[edge + 1] - 1]
+    work.slot[some.targets] = np.repeat(slot, some.count)
+
+
+# The geometric path of a whole program in joint space.
 
 AGREE = 1e-6  # [rad] several predecessors lead to the same joint angles
 SLACK = 1e-9  # [rad] rounding at a joint limit
@@ -255,3 +782,42 @@ def _limits(work: Workspace, edge_of: Ints) -> None:
         rows = np.flatnonzero(over.any(axis=1))
         for row in rows[work.reason[visit[rows]] == 0][::-1]:
             work.reason[visit[row]] = CODE[text[int(np.argmax(over[row]))]]
+
+
+# Where the arm stands at a stop, and what its joints remember: enough to go on.
+
+
+@dataclass(frozen=True)
+class Standing:
+    """One stop, or none: arrays of k = 1 or 0 rows.
+
+    Attributes:
+        q: Joint angles, (k, 6) [rad].
+        flange: (k, 4, 4) [m].
+        slot: Branch, (k,).
+        past: What the joints remember.
+    """
+
+    q: Floats
+    flange: Floats
+    slot: Ints
+    past: Past
+
+    def __len__(self) -> int:
+        """Return 1 at a stop, 0 where nothing is known."""
+        return len(self.q)
+
+    @classmethod
+    def at_end(cls, q: Floats, flange: Floats, slot: Ints, past: Past) -> Standing:
+        """Keep the last of n targets, none of the others."""
+        return cls(np.array(q[-1:]), np.array(flange[-1:]), np.array(slot[-1:]), past)
+
+    @property
+    def known(self) -> Known:
+        """Return it as the first targets of a program, whatever leads to them."""
+        return Known(np.arange(len(self)), self.q, self.flange, self.slot)
+
+
+NOWHERE = Standing(
+    np.empty((0, 6)), np.empty((0, 4, 4)), np.empty(0, dtype=np.int64), NOTHING
+)

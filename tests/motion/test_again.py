@@ -7,9 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from postproc.motion import again
-from postproc.motion.again import reach_again
-from postproc.motion.reach import Course, reach
+from postproc.motion import replan
+from postproc.motion.replan import Course, reach, reach_again
 from postproc.motion.targets import Kind, Move, Targets
 from postproc.planning import read_program
 from postproc.resolve import targets_from_visits
@@ -135,14 +134,14 @@ def test_the_ends_of_a_program(cell: Cell, row: int) -> None:
 def test_only_what_moved_is_traced(cell: Cell, monkeypatch) -> None:
     targets = read(cell, milling(1500).source)
     course, traced = reach(cell.arm, targets), []
-    original = again.trace
+    original = replan.trace
 
     def counting(arm, part, known=None):
         traced.append(len(part))
         return original(arm, part, known)
 
-    monkeypatch.setattr(again, "trace", counting)
-    monkeypatch.setattr(again, "reach", lambda *_: pytest.fail("all was traced anew"))
+    monkeypatch.setattr(replan, "trace", counting)
+    monkeypatch.setattr(replan, "reach", lambda *_: pytest.fail("all was traced anew"))
     moved = np.zeros(len(targets), dtype=bool)
     moved[[100, 103, 900]] = True
     reach_again(cell.arm, course, shifted(targets, moved, 1), moved)

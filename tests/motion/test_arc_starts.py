@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from postproc.motion.reach import reach
-from postproc.motion.reasons import ARC_END, CODE
-from postproc.motion.rounds import from_every_start
-from postproc.motion.targets import Kind, Move, Targets, make_targets
+from postproc.motion.path import from_every_start
+from postproc.motion.replan import reach
+from postproc.motion.targets import ARC_END, CODE, Kind, Move, Targets, make_targets
 from postproc.motion.trace import trace
 from postproc.robot.arm import Arm
 

@@ -3,8 +3,7 @@
 import numpy as np
 
 from postproc.motion.planner import plan
-from postproc.motion.reasons import CODE, NO_START, NO_TARGET
-from postproc.motion.targets import Kind, Move, make_targets
+from postproc.motion.targets import CODE, NO_START, NO_TARGET, Kind, Move, make_targets
 from postproc.robot.arm import Arm
 
 

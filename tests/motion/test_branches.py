@@ -3,8 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from postproc.motion.branches import follow, on_written_turns
-from postproc.motion.ways import OnDemand, Solved, Ways
+from postproc.motion.branches import OnDemand, Solved, Ways, follow, on_written_turns
 from postproc.robot.arm import Arm
 
 

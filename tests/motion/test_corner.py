@@ -7,11 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from postproc.motion import rounding
-from postproc.motion.corner import corners, nearest_on_parabola, parabolas
+from postproc.motion import blending
+from postproc.motion.blending import corners, nearest_on_parabola, parabolas, rounded
 from postproc.motion.planner import plan
-from postproc.motion.reach import reach
-from postproc.motion.rounding import rounded
+from postproc.motion.replan import reach
 from postproc.motion.targets import Fly, Kind, Move, Targets, make_targets
 from postproc.motion.trace import trace
 from postproc.robot.arm import Arm
@@ -169,7 +168,7 @@ def test_few_samples_tell_the_sides_that_many_do(
     turns = rng.uniform(-8, 8, (60, 6))
     targets = joint_run(turns, overlap=rng.uniform(0.2, 1.0, 61))
     few = reach(arm, targets)
-    monkeypatch.setattr(rounding, "SAMPLES", 200)
+    monkeypatch.setattr(blending, "SAMPLES", 200)
     many = reach(arm, targets)
     np.testing.assert_allclose(few.side, many.side, atol=0.01)
     np.testing.assert_array_equal(few.aside, many.aside)

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from postproc.motion.path import arcs
-from postproc.motion.rounds import Rounds, rounds
+from postproc.motion.path import Rounds, arcs, rounds
 from postproc.motion.targets import Kind, make_targets
 from postproc.robot.pose import pose_from_record
 

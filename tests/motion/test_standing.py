@@ -9,10 +9,9 @@ import pytest
 
 from postproc.language.visits import Visits
 from postproc.language.windows import Window, quiet_stops
-from postproc.motion.again import reach_again
 from postproc.motion.planner import plan
-from postproc.motion.reach import reach
-from postproc.motion.standing import NOWHERE
+from postproc.motion.replan import reach, reach_again
+from postproc.motion.trace import NOWHERE
 from postproc.planning import read_program
 from postproc.resolve import targets_from_visits
 from postproc.robot.cell import Cell

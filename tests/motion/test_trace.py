@@ -6,8 +6,8 @@ from scipy.spatial.transform import Rotation
 
 from postproc.motion import trace as trace_module
 from postproc.motion.planner import plan
-from postproc.motion.reach import reach
-from postproc.motion.reasons import (
+from postproc.motion.replan import reach
+from postproc.motion.targets import (
     AMBIGUOUS,
     LIMITS,
     NO_BRANCH,
@@ -19,10 +19,12 @@ from postproc.motion.reasons import (
     PATH_JUMP,
     PATH_REACH,
     REASONS,
+    Kind,
+    Move,
+    Targets,
+    make_targets,
 )
-from postproc.motion.targets import Kind, Move, Targets, make_targets
-from postproc.motion.trace import Trace, trace
-from postproc.motion.workspace import Workspace
+from postproc.motion.trace import Trace, Workspace, trace
 from postproc.robot.arm import Arm
 
 

@@ -1,0 +1,631 @@
+"""Fly points: how large corners are, where the path passes, and what is left of it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, fields, replace
+
+import numpy as np
+
+from postproc.arrays import Bools, Floats, Ints, in_pieces
+from postproc.kernels import floats, native
+from postproc.motion.path import Pull
+from postproc.motion.targets import Fly, Move, Targets
+from postproc.motion.trace import Trace
+from postproc.robot.arm import Arm
+from postproc.robot.play import Edges
+
+# Which fly points are rounded, and how much of the neighbouring moves that takes.
+#
+# Two laws, as far as they are public:
+#
+# - FLY_CART between Cartesian moves: the zone begins at $FLY_DIST before the point and
+# ends as far behind it ($FLY_TRAJ FLY_FROM), or is so large that the path passes within
+# $FLY_DIST (FLY_TOL). - FLY_NORM, and every corner next to a JOINT move: the next move
+# starts while the last   one brakes. With constant braking from the cruising speed over
+# the time T, and the   last $FLY_PER % of it overlapped, the zone holds (FLY_PER /
+# 100)^2 of the braking way.
+#
+# A zone never exceeds half of a neighbouring move: it ends before the next one begins.
+
+HALF = 0.5  # of a move that a zone may take
+NOTHING = 1e-9  # [m], [rad] a move that goes nowhere has no corner
+
+
+@dataclass(frozen=True)
+class Zones:
+    """c corners.
+
+    Attributes:
+        visit: The fly point, (c,).
+        into, out: The edges before and behind it, (c,).
+        before, behind: Fractions of these edges that belong to the zone, (c,).
+    """
+
+    visit: Ints
+    into: Ints
+    out: Ints
+    before: Floats
+    behind: Floats
+
+    def __getitem__(self, rows: Bools | Ints | slice) -> Zones:
+        """Return some of the corners."""
+        return Zones(
+            self.visit[rows], self.into[rows], self.out[rows],
+            self.before[rows], self.behind[rows],
+        )  # fmt: skip
+
+
+def zones(arm: Arm, targets: Targets, traced: Trace) -> Zones:
+    """Find the corners with one way in and one way out, and their largest zones."""
+    visit, into, out = _corners(targets, traced)
+    to = np.repeat(np.arange(len(targets)), np.diff(targets.pred_start))
+    cartesian = targets.move != Move.JOINT
+    both = cartesian[visit] & cartesian[to[out]]
+    by_distance = both & (targets.rounding[visit] != Fly.OVERLAP)
+    edge = np.stack([into, out])
+    length, share = _lengths(targets, traced, to, edge), np.empty(edge.shape)
+    near, rest = np.flatnonzero(by_distance), np.flatnonzero(~by_distance)
+    share[:, near] = _by_distance(targets, visit[near], length[:, near])
+    ways = [
+        _Ways.on(traced, to, way[rest], long[rest])
+        for way, long in zip(edge, length, strict=True)
+    ]
+    share[:, rest] = _by_overlap(arm, targets, visit[rest], ways)
+    found = Zones(visit, into, out, share[0], share[1])
+    return found[np.asarray((share > 0).all(axis=0))]
+
+
+def _corners(targets: Targets, traced: Trace) -> tuple[Ints, Ints, Ints]:
+    """Pair the only edge into every rounded fly point with the only one out of it."""
+    n, source = len(targets), traced.edges.source
+    to = np.repeat(np.arange(n), np.diff(targets.pred_start))
+    told = np.flatnonzero(targets.pred >= 0)
+    ways_out = np.bincount(targets.pred[told], minlength=n)
+    out = np.full(n, -1)
+    out[targets.pred[told]] = told
+    known = (source >= 0) & ~np.isnan(traced.q[to, 0])
+    known &= ~np.isnan(traced.q[np.maximum(source, 0), 0])
+    round_ = targets.fly & ~targets.via & (targets.rounding != Fly.EXACT)
+    single = (np.diff(targets.pred_start) == 1) & (ways_out == 1)
+    visit = np.flatnonzero(round_ & single)
+    into = targets.pred_start[visit]
+    good = known[into] & known[out[visit]] & (to[out[visit]] != visit)
+    visit = visit[good]
+    return visit, targets.pred_start[visit], out[visit]
+
+
+def _lengths(targets: Targets, traced: Trace, to: Ints, edge: Ints) -> Floats:
+    """Measure the TCP's ways on edges (2, c) [m], chords where they are no lines."""
+    used = np.zeros(len(to), dtype=bool)
+    used[edge] = True
+    at = np.flatnonzero(used)
+    chords = _chords(targets, traced.flange, traced.edges.source[at], to[at])
+    length = np.zeros(len(to))
+    length[at] = np.fmax(traced.length[at], chords)
+    return length[edge]
+
+
+def _chords(targets: Targets, flange: Floats, begin: Ints, end: Ints) -> Floats:
+    """Measure the straight ways of the TCP from targets to others, (m,) [m]."""
+    if native is not None:
+        lengths: Floats = native.chords(flange, targets.tool, begin, end)
+        return lengths
+    tool = targets.tool.take(end, axis=0)[:, :3, 3]
+    chord = np.zeros((len(end), 3))
+    for sign, visit in ((1, end), (-1, begin)):
+        at = flange.take(visit, axis=0)
+        place = np.einsum("nij,nj->ni", at[:, :3, :3], tool) + at[:, :3, 3]
+        chord += sign * place
+    return np.asarray(np.sqrt(np.einsum("ni,ni->n", chord, chord)))
+
+
+def _by_distance(targets: Targets, visit: Ints, length: Floats) -> Floats:
+    """Take the same length of both moves, all there is where only WITHIN bounds it.
+
+    Args:
+        targets: The moves.
+        visit: The fly points, (c,).
+        length: Lengths of the moves before and behind, (2, c) [m].
+    """
+    distance = targets.fly_distance[visit]
+    begin = np.where(targets.rounding[visit] == Fly.WITHIN, np.inf, distance)
+    shortest = length.min(axis=0)
+    zone = np.minimum(begin, HALF * shortest)
+    share: Floats = np.where(length > NOTHING, zone / np.maximum(length, NOTHING), 0.0)
+    return np.where(shortest > NOTHING, share, 0.0)
+
+
+@dataclass(frozen=True)
+class _Ways:
+    """The moves on c edges.
+
+    Attributes:
+        to: Target that they lead to, (c,).
+        length: Length of the TCP's way, (c,) [m].
+        turned: What the joints turn by, (c, 6) [rad].
+    """
+
+    to: Ints
+    length: Floats
+    turned: Floats
+
+    @classmethod
+    def on(cls, traced: Trace, to: Ints, edge: Ints, length: Floats) -> _Ways:
+        """Describe the moves on edges of known lengths."""
+        end, begin = to[edge], traced.edges.source[edge]
+        return cls(end, length, np.abs(traced.q[end] - traced.q[begin]))
+
+
+def _by_overlap(arm: Arm, targets: Targets, visit: Ints, ways: list[_Ways]) -> Floats:
+    """Let the moves overlap while the first brakes and the second starts, (2, c).
+
+    At full override: a path that changes with the override knob could not be proved.
+    """
+    ramps = [_ramp(arm, targets, way) for way in ways]
+    time = targets.overlap[visit] * np.minimum(ramps[0][1], ramps[1][1])
+    return np.stack([push * time**2 / 2 for push, _ in ramps])
+
+
+def _ramp(arm: Arm, targets: Targets, way: _Ways) -> tuple[Floats, Floats]:
+    """Give the acceleration of u [1/s^2] along moves, and how long it lasts [s], (c,).
+
+    u goes from 0 to 1; the joints' limits are the bounds, and the programmed speed.
+    """
+    turned = np.maximum(way.turned, NOTHING)
+    push = (arm.acceleration / turned).min(axis=1)
+    speed = (arm.velocity / turned).min(axis=1)
+    length = np.maximum(way.length, NOTHING)
+    joint = targets.move[way.to] == Move.JOINT
+    programmed = np.where(joint, np.inf, targets.linear_speed[way.to] / length)
+    speed = np.fmin(speed, programmed)
+    moves = (turned > NOTHING).any(axis=1)
+    push = np.where(moves, push, 0.0)
+    with np.errstate(divide="ignore"):
+        lasts = np.minimum(speed / push, np.sqrt(1.0 / push))
+    return push, np.where(moves, lasts, 0.0)
+
+
+# Places on the sampled paths of edges, between their samples.
+
+
+def along(traced: Trace, edge: Ints, u: Floats) -> Floats:
+    """Interpolate joint angles on edges (m,) at fractions u (m,): (m, 6) [rad].
+
+    Parabolas through the three nearest of the equidistant samples, the place where the
+    edge comes from being the first one; straight where an edge has but one sample.
+    """
+    if native is not None:
+        out: Floats = native.along(traced.edges, traced.q, edge, u)
+        return out
+    return between(traced, edge)(u)
+
+
+def between(traced: Trace, edge: Ints) -> Callable[[Floats], Floats]:
+    """Prepare to interpolate on edges again and again, as `along` does once."""
+    start = traced.edges.start
+    count = start.take(edge + 1) - start.take(edge)
+    if (count == 1).all():
+        return _straight(traced, edge)
+    one = count == 1
+    straight = _straight(traced, edge[one])
+
+    def at(u: Floats) -> Floats:
+        out = np.empty((len(edge), 6))
+        out[one] = straight(u[one])
+        out[~one] = _curved(traced, edge[~one], u[~one], count[~one])
+        return out
+
+    return at
+
+
+def _straight(traced: Trace, edge: Ints) -> Callable[[Floats], Floats]:
+    """Interpolate on edges with one sample."""
+    edges = traced.edges
+    end = edges.path.take(edges.start.take(edge), axis=0)
+    way = end - traced.q.take(edges.source.take(edge), axis=0)
+
+    def at(u: Floats) -> Floats:
+        out: Floats = end + (u - 1)[:, None] * way
+        return out
+
+    return at
+
+
+def _curved(traced: Trace, edge: Ints, u: Floats, count: Ints) -> Floats:
+    """Interpolate on edges with more samples."""
+    x = u * count
+    middle = np.clip(np.rint(x), 1, np.maximum(count - 1, 1)).astype(np.int64)
+    t = (x - middle)[:, None]
+    here, after = _node(traced, edge, middle), _node(traced, edge, middle + 1)
+    before = _node(traced, edge, middle - 1)
+    bend, slope = after - 2 * here + before, (after - before) / 2
+    out: Floats = here + t * slope + t**2 / 2 * bend
+    return out
+
+
+def _node(traced: Trace, edge: Ints, i: Ints) -> Floats:
+    """Return sample i of each edge, counted from 1; 0 is where the edge comes from."""
+    edges, first = traced.edges, np.flatnonzero(i == 0)
+    sample = np.maximum(edges.start.take(edge) + i - 1, 0)
+    out: Floats = edges.path.take(sample, axis=0)
+    out[first] = traced.q[edges.source[edge[first]]]
+    return out
+
+
+# How the path runs round a fly point.
+#
+# Within the zone two moves are superposed: what the first still has to go is braked to
+# zero while the second starts. With the share a of the edge before, b of the edge
+# behind and s from 0 to 1,
+#
+#     q(s) = q_before(1 - a (1 - s)^2) + q_behind(b s^2) - q_point,
+#
+# joint by joint: between straight moves a parabola that leaves the first and joins the
+# second tangentially, the linear segments with parabolic blends of R. H. Taylor
+# (Planning and Execution of Straight Line Manipulator Trajectories, IBM Journal of
+# Research and Development 23, 1979). That FLY_CART superposes in space and not in the
+# joints changes the way by the square of the zone over the size of the arm: 1 um for 1
+# mm.
+
+GRID = np.linspace(0.0, 1.0, 9)  # where the search for the nearest point begins
+ROUNDS = 5  # of Newton's method
+FLAT = 4e-5  # [rad] bend below which a corner's moves are as good as straight
+REFINED, STEP = 2, 0.02  # rounds, and step in s, for the others
+
+
+@dataclass(frozen=True)
+class Corners:
+    """c rounded corners.
+
+    Attributes:
+        zones: What they take of the neighbouring moves.
+        nearest: Where on the corner the TCP passes closest to the point, (c,) in s.
+        q: Joint angles there, (c, 6) [rad].
+        aside: From the point to there, (c, 3) [m].
+        bend: What the parabola bends by, half of its second derivative, (c, 6) [rad].
+    """
+
+    zones: Zones
+    nearest: Floats
+    q: Floats
+    aside: Floats
+    bend: Floats
+
+    @property
+    def flat(self) -> Bools:
+        """Tell where the nearest point alone tells of the corner, (c,)."""
+        return _is_flat(self.bend)
+
+
+def corners(arm: Arm, targets: Targets, traced: Trace) -> Corners:
+    """Find all corners and where the path passes them."""
+    found = zones(arm, targets, traced)
+    parts = in_pieces(
+        lambda rows: _passed(arm, targets, traced, found[rows]), len(found.visit)
+    )
+    return _joined(parts)
+
+
+def _passed(arm: Arm, targets: Targets, traced: Trace, found: Zones) -> Corners:
+    """Find where the path passes some corners, and keep to their tolerances."""
+    tool = targets.tool.take(found.visit, axis=0)[:, :3, 3]
+    point = _tcp(traced.flange.take(found.visit, axis=0), tool)
+    within = targets.rounding[found.visit] == Fly.WITHIN
+    wanted = np.where(within, targets.fly_distance[found.visit], np.inf)
+    if native is not None:
+        return _passed_natively(arm, traced, found, tool, point, wanted)
+    first, last, nearest, miss = _passing(arm, traced, found, tool, point)
+    too_far = miss > wanted
+    if too_far.any():
+        shrink = np.where(too_far, wanted / np.maximum(miss, 1e-12), 1.0)
+        found = Zones(found.visit, found.into, found.out, found.before * shrink,
+                      found.behind * shrink)  # fmt: skip
+        first, last, nearest, _ = _passing(arm, traced, found, tool, point)
+    bend = first + last - 2 * traced.q.take(found.visit, axis=0)
+    sharp = np.flatnonzero(~_is_flat(bend))
+    nearest[sharp] = _refined(
+        arm, traced, found[sharp], nearest[sharp], tool[sharp], point[sharp]
+    )
+    q = parabolas(traced, found)(nearest)
+    return Corners(found, nearest, q, arm.tcp(q, tool) - point, bend)
+
+
+def _passed_natively(
+    arm: Arm, traced: Trace, found: Zones, tool: Floats, point: Floats, wanted: Floats
+) -> Corners:
+    """Do as `_passed` with the native kernel."""
+    before, behind, nearest, q, aside, bend = native.passed(
+        arm.dh.packed(), traced.edges, traced.q, found, floats(tool), point, wanted,
+    )  # fmt: skip
+    found = replace(found, before=before, behind=behind)
+    return Corners(found, nearest, q, aside, bend)
+
+
+def _is_flat(bend: Floats) -> Bools:
+    """Tell which corners are as good as straight, (c,)."""
+    return np.asarray((np.abs(bend) < FLAT).all(axis=1))
+
+
+def _tcp(flange: Floats, tool: Floats) -> Floats:
+    """Place tools (c, 3) [m] at flange poses (c, 4, 4): (c, 3) [m]."""
+    turned: Floats = np.einsum("nij,nj->ni", flange[:, :3, :3], tool)
+    return turned + flange[:, :3, 3]
+
+
+def _joined(parts: list[Corners]) -> Corners:
+    """Put corners one after the other."""
+    if not parts:
+        none = np.empty(0, dtype=np.int64)
+        zone = Zones(none, none, none, np.empty(0), np.empty(0))
+        q, aside = np.empty((0, 6)), np.empty((0, 3))
+        return Corners(zone, np.empty(0), q, aside, q)
+    zone = Zones(
+        *(
+            np.concatenate([getattr(part.zones, f.name) for part in parts])
+            for f in fields(Zones)
+        )
+    )
+    names = ("nearest", "q", "aside", "bend")
+    return Corners(
+        zone, *(np.concatenate([getattr(p, name) for p in parts]) for name in names)
+    )
+
+
+def parabolas(traced: Trace, found: Zones) -> Callable[[Floats], Floats]:
+    """Prepare to follow c corners by the formula above: s (c,) to (c, 6) [rad]."""
+    into, out = between(traced, found.into), between(traced, found.out)
+    point = traced.q.take(found.visit, axis=0)
+
+    def at(s: Floats) -> Floats:
+        before = into(1 - found.before * (1 - s) ** 2)
+        behind = out(found.behind * s**2)
+        return before + behind - point
+
+    return at
+
+
+def _passing(
+    arm: Arm, traced: Trace, found: Zones, tool: Floats, point: Floats
+) -> tuple[Floats, Floats, Floats, Floats]:
+    """Find where corners begin and end, where they pass closest, and how far off.
+
+    Args:
+        arm: The arm.
+        traced: The path without corners.
+        found: The corners' zones.
+        tool: TCP in the flange frame, (c, 3) [m].
+        point: The fly points, (c, 3) [m].
+
+    Returns:
+        Joint angles at begin and end (c, 6) [rad], s (c,), distance (c,) [m].
+    """
+    first = along(traced, found.into, 1 - found.before)
+    last = along(traced, found.out, found.behind)
+    ends = [arm.tcp(q, tool) - point for q in (first, last)]
+    nearest = nearest_on_parabola(ends[0], ends[1])
+    s = nearest[:, None]
+    off = ends[0] * (1 - s) ** 2 + ends[1] * s**2
+    return first, last, nearest, np.sqrt(np.einsum("ni,ni->n", off, off))
+
+
+def _refined(
+    arm: Arm, traced: Trace, found: Zones, s: Floats, tool: Floats, point: Floats
+) -> Floats:
+    """Improve the nearest points of corners whose moves are not straight."""
+    q = parabolas(traced, found)
+    for _ in range(REFINED):
+        s = np.clip(s, STEP, 1 - STEP)
+        before, x, after = (
+            arm.tcp(q(at), tool) - point for at in (s - STEP, s, s + STEP)
+        )
+        slope, curve = (after - before) / 2, after - 2 * x + before
+        down, curved = (x * slope).sum(axis=1), (slope**2 + x * curve).sum(axis=1)
+        s = s - STEP * np.where(curved > 0, down / np.where(curved > 0, curved, 1), 0)
+    return np.clip(s, 0.0, 1.0)
+
+
+def nearest_on_parabola(begin: Floats, end: Floats) -> Floats:
+    """Find the s at which begin (1 - s)^2 + end s^2 is shortest, (c,).
+
+    Args:
+        begin: Where the zones begin, seen from the point, (c, 3) [m].
+        end: Where they end, likewise.
+    """
+    b, e = np.ascontiguousarray(begin.T), np.ascontiguousarray(end.T)
+    away = [((b * (1 - s) ** 2 + e * s**2) ** 2).sum(axis=0) for s in GRID]
+    s = GRID[np.argmin(np.sqrt(away), axis=0)]
+    bend = 2 * (b + e)
+    for _ in range(ROUNDS):
+        x = b * (1 - s) ** 2 + e * s**2
+        slope = 2 * (e * s - b * (1 - s))
+        down = (x * slope).sum(axis=0)
+        curved = (slope * slope + x * bend).sum(axis=0)
+        step = np.where(curved > 0, down / np.where(curved > 0, curved, 1.0), 0.0)
+        s = np.clip(s - step, 0.0, 1.0)
+    return np.asarray(s)
+
+
+# Paths whose fly points are rounded: new samples, and where each point is passed.
+
+SAMPLES = 4  # on each side of the nearest point of a corner that is not flat
+ONE_SAMPLE = [[0], [0], [1]]  # of the three pieces: where the next corner is passed
+EMPTY = 1e-9  # part of a move between two zones that is nothing
+
+
+@dataclass(frozen=True)
+class _Pieces:
+    """What e edges are made of: the end of a corner, a middle, the begin of a corner.
+
+    Attributes:
+        corner: Corner at both ends, (2, e), -1 where there is none.
+        begin, end: Where the middle begins and ends, (e,) in u.
+        count: Samples of the three pieces, (3, e).
+    """
+
+    corner: Ints
+    begin: Floats
+    end: Floats
+    count: Ints
+
+
+def rounded(arm: Arm, targets: Targets, traced: Trace, timed: bool = True) -> Trace:
+    """Round the fly points of a trace.
+
+    Its joint angles at rounded points become those of the point of the path that lies
+    nearest to the target; that is also where an edge ends and the next one begins. Its
+    flange poses remain those of the targets. Edges without a corner stay as they are.
+
+    Args:
+        arm: The arm.
+        targets: The moves.
+        traced: Their paths without corners.
+        timed: Sample the edges for a time law; else where no joint turns there are
+            only the ends of the way, which is all that the joints' play sees of it.
+    """
+    found = corners(arm, targets, traced)
+    visit = found.zones.visit
+    if len(visit) == 0:
+        return traced
+    q, aside = np.array(traced.q), np.array(traced.aside)
+    q[visit], aside[visit] = found.q, found.aside
+    pieces = _pieces(traced, found)
+    if not timed:
+        pieces.count[:, _one_way(arm, traced, found)] = ONE_SAMPLE
+    edges, share = _resampled(traced, found, pieces)
+    pull = _pull(targets, traced, found)
+    return replace(traced, q=q, aside=aside, edges=edges, share=share, pull=pull)
+
+
+def _pull(targets: Targets, traced: Trace, found: Corners) -> Pull:
+    """Tell how sharp corners move with the targets next to them.
+
+    On a flat one the corrections of neighbours are alike but where a joint turns, and
+    to sharpen that step would make the joint turn elsewhere.
+    """
+    to = np.repeat(np.arange(len(targets)), np.diff(targets.pred_start))
+    zones, s = found.zones[~found.flat], found.nearest[~found.flat]
+    return Pull(
+        zones.visit, traced.edges.source[zones.into], to[zones.out],
+        zones.before * (1 - s) ** 2, zones.behind * s**2,
+    )  # fmt: skip
+
+
+def _one_way(arm: Arm, traced: Trace, found: Corners) -> Bools:
+    """Tell on which edges no joint's drive turns back, (e,).
+
+    Straight ones into a corner, if at both ends every drive goes on as it goes here:
+    so it does on the parabolas between straight moves.
+    """
+    zones, edges = found.zones, traced.edges
+    one = np.diff(edges.start) == 1
+    here = traced.q.take(zones.visit, axis=0)
+    into = here - traced.q.take(edges.source[zones.into], axis=0)
+    out = edges.path.take(edges.start[zones.out], axis=0) - here
+    back = (into @ arm.coupling.T) * (out @ arm.coupling.T) < 0
+    goes_on = one[zones.into] & one[zones.out] & ~back.any(axis=1)
+    before, behind = np.ones_like(one), np.zeros_like(one)
+    before[zones.out], behind[zones.into] = goes_on, goes_on
+    return np.asarray(before & behind)
+
+
+def _pieces(traced: Trace, found: Corners) -> _Pieces:
+    """Cut the edges at the ends of the zones."""
+    e, zones = len(traced.edges.source), found.zones
+    rows = np.arange(len(zones.visit))
+    corner = np.full((2, e), -1)
+    corner[0, zones.out], corner[1, zones.into] = rows, rows
+    begin, end = np.zeros(e), np.ones(e)
+    begin[zones.out], end[zones.into] = zones.behind, 1 - zones.before
+    flat = found.flat
+    count = np.zeros((3, e), dtype=np.int64)
+    count[0, zones.out] = np.where(flat, 0, SAMPLES)
+    count[2, zones.into] = np.where(flat, 1, SAMPLES)
+    before = np.diff(traced.edges.start)
+    inner = np.ceil(before * (end - begin) - EMPTY).astype(np.int64)
+    count[1] = np.where(end - begin > EMPTY, np.minimum(inner, before), 0)
+    return _Pieces(corner, begin, end, count)
+
+
+def _resampled(traced: Trace, found: Corners, pieces: _Pieces) -> tuple[Edges, Floats]:
+    """Sample all edges anew; return them and their samples' share of the way."""
+    touched = np.asarray((pieces.corner >= 0).any(axis=0))
+    start = np.concatenate([[0], np.cumsum(pieces.count.sum(axis=0))])
+    path, share = _samples(traced, found, pieces, touched, start)
+    uneven = _uneven(pieces, touched, start)
+    return replace(traced.edges, path=path, start=start, uneven=uneven), share
+
+
+def _samples(
+    traced: Trace, found: Corners, pieces: _Pieces, touched: Bools, start: Ints
+) -> tuple[Floats, Floats]:
+    """Place the samples, (s, 6) [rad], and give their shares of the way, (s,)."""
+    old = traced.edges
+    if native is not None:
+        placed: tuple[Floats, Floats] = native.resampled(
+            old, traced.share, traced.q, found, pieces
+        )
+        return placed
+    edge = np.repeat(np.arange(len(old.source)), np.diff(start))
+    nth = np.arange(len(edge)) - start[edge] + 1
+    path, share = np.empty((len(edge), 6)), np.empty(len(edge))
+    kept = ~touched[edge]
+    same = old.start[edge[kept]] + nth[kept] - 1
+    path[kept], share[kept] = old.path[same], traced.share[same]
+    split = np.cumsum(pieces.count, axis=0)[:, edge]
+    end_of_zone = ~kept & (nth <= split[0])
+    middle = ~kept & (nth > split[0]) & (nth <= split[1])
+    begin_of_zone = ~kept & (nth > split[1])
+    rows = np.flatnonzero(middle)
+    at, part = edge[rows], (nth - split[0])[rows]
+    long = (pieces.end - pieces.begin)[at] / pieces.count[1, at]
+    path[rows] = along(traced, at, pieces.begin[at] + part * long)
+    share[rows] = long
+    for side, chosen in ((0, end_of_zone), (1, begin_of_zone)):
+        rows = np.flatnonzero(chosen)
+        corner, count = (
+            pieces.corner[side, edge[rows]],
+            pieces.count[2 * side][edge[rows]],
+        )
+        part = nth[rows] - (0 if side == 0 else split[1][rows])
+        s, step = _places(found, corner, part, count, side)
+        path[rows] = found.q.take(corner, axis=0)
+        others = np.flatnonzero(s != found.nearest[corner])
+        path[rows[others]] = _on_corners(traced, found, corner[others], s[others])
+        size = (found.zones.behind, found.zones.before)[side][corner]
+        share[rows] = 2 * size * step
+    return path, share
+
+
+def _on_corners(traced: Trace, found: Corners, corner: Ints, s: Floats) -> Floats:
+    """Place samples on corners, (m, 6) [rad]."""
+    parts = in_pieces(
+        lambda rows: parabolas(traced, found.zones[corner[rows]])(s[rows]), len(s)
+    )
+    return np.concatenate([np.empty((0, 6)), *parts])
+
+
+def _places(
+    found: Corners, corner: Ints, part: Ints, count: Ints, side: int
+) -> tuple[Floats, Floats]:
+    """Give s of samples behind (side 0) or before the nearest point, and its step."""
+    nearest = found.nearest[corner]
+    step = (1 - nearest if side == 0 else nearest) / count
+    return (nearest if side == 0 else 0.0) + part * step, step
+
+
+def _uneven(pieces: _Pieces, touched: Bools, start: Ints) -> Ints:
+    """List the samples whose neighbours are not equally far along the path.
+
+    The last one of a piece, and the first one where its piece does not begin at a
+    sample because the corner before is flat.
+    """
+    first, middle, _ = pieces.count
+    flat = (pieces.corner[0] >= 0) & (first == 0)
+    ends = [start[:-1] + first, start[:-1] + first + middle]
+    joints = [ends[0][touched & (first > 0)], ends[1][touched & (middle > 0)]]
+    after = start[:-1][touched & flat] + 1
+    uneven = np.zeros(start[-1] + 1, dtype=bool)
+    for samples in (*joints, after):
+        uneven[samples - 1] = True
+    return np.flatnonzero(uneven)
