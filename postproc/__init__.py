@@ -15,9 +15,9 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from postproc.accuracy.model import Model, load_model
     from postproc.compensate import compensate
     from postproc.exceptions import PostprocError
+    from postproc.model.model import Model, load_model
     from postproc.options import Options
     from postproc.report import Outcome
     from postproc.robot.cell import Cell, load_cell
@@ -37,12 +37,12 @@ __all__ = [
 
 _PLACES = {
     "Cell": "postproc.robot.cell",
-    "Model": "postproc.accuracy.model",
+    "Model": "postproc.model.model",
     "Options": "postproc.options",
     "Outcome": "postproc.report",
     "PostprocError": "postproc.exceptions",
     "load_cell": "postproc.robot.cell",
-    "load_model": "postproc.accuracy.model",
+    "load_model": "postproc.model.model",
 }
 
 

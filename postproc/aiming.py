@@ -7,9 +7,9 @@ from itertools import pairwise
 
 import numpy as np
 
-from postproc.accuracy.model import Model
 from postproc.arrays import Bools, Floats
 from postproc.clock import Clock
+from postproc.model.model import Model
 from postproc.motion.planner import Plan
 from postproc.options import Options
 from postproc.planning import Planned, Reading

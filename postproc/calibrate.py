@@ -9,20 +9,19 @@ from typing import Literal
 
 import numpy as np
 
-from postproc.accuracy.combination import Combination
 from postproc.accuracy.fit_report import FitReport, report_fit, report_method
 from postproc.accuracy.fitted import Fit
 from postproc.accuracy.full import fit_survey, model_of
 from postproc.accuracy.measurement import Measurements, concatenate, read_measurements
 from postproc.accuracy.methods import fit_method
-from postproc.accuracy.model import Model
 from postproc.accuracy.mounting import check_orientations
 from postproc.accuracy.plausibility import check_registered, check_survey
 from postproc.accuracy.reading import DETECT, Reading
-from postproc.accuracy.registration import Registration, register
-from postproc.accuracy.schema import Method
 from postproc.accuracy.tool_groups import find_groups
-from postproc.accuracy.tool_shift import ToolShift
+from postproc.calibration.registration import Registration, register
+from postproc.model.combination import Combination
+from postproc.model.effects.tool_shift import ToolShift
+from postproc.model.model import Method, Model
 from postproc.robot.arm import Arm
 from postproc.robot.cell import Cell
 from postproc.robot.pose import MM

@@ -13,10 +13,8 @@ from typing import Any
 import numpy as np
 
 from postproc.accuracy.comparison import Comparison, compare
-from postproc.accuracy.error_statistics import ErrorStatistics
 from postproc.accuracy.fit_report import FitReport
 from postproc.accuracy.measurement import concatenate, from_table
-from postproc.accuracy.model import Model, load_model
 from postproc.accuracy.plausibility import check_survey
 from postproc.accuracy.reading import DETECT, Reading
 from postproc.accuracy.table import Table as Cells
@@ -32,6 +30,8 @@ from postproc.calibrate import (
 from postproc.console import Column, table_text
 from postproc.files import write_all
 from postproc.joining import join_program
+from postproc.model.model import Model, load_model
+from postproc.model.statistics import ErrorStatistics
 from postproc.robot.cell import Cell, load_cell
 from postproc.robot.pose import MM
 from postproc.robot.state import States

@@ -7,8 +7,6 @@ from collections.abc import Mapping
 from dataclasses import asdict
 from types import MappingProxyType, ModuleType
 
-from postproc.accuracy.error_statistics import ErrorStatistics
-from postproc.accuracy.model import Model
 from postproc.arrivals import tell_arrivals
 from postproc.clock import Clock, Progress, silent
 from postproc.correcting import correct
@@ -17,6 +15,8 @@ from postproc.flying import rounded_points
 from postproc.kept import Kept
 from postproc.language.source import Source
 from postproc.language.stamp import is_stamped
+from postproc.model.model import Model
+from postproc.model.statistics import ErrorStatistics
 from postproc.notes import (
     assumed_off,
     followed_pages,

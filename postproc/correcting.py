@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from postproc.accuracy.model import Model
 from postproc.ahead import in_processes, steady
 from postproc.clock import Clock, silent
 from postproc.cloning import give_own_points
@@ -12,6 +11,7 @@ from postproc.kept import Kept, joined, keep
 from postproc.language import windows as cuts
 from postproc.language.visits import Visits
 from postproc.language.windows import Window, run_up, windows
+from postproc.model.model import Model
 from postproc.motion.trace import NOWHERE, Standing
 from postproc.options import Options
 from postproc.planning import Reading, plan_visits, states_of

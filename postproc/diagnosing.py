@@ -14,14 +14,14 @@ from postproc.accuracy.diagnosis.diagnose import Extension, diagnose
 from postproc.accuracy.diagnosis.result import Diagnosis
 from postproc.accuracy.diagnosis.search import Progress
 from postproc.accuracy.diagnosis.tracing import REMAINS, silent
-from postproc.accuracy.error_statistics import ErrorStatistics
 from postproc.accuracy.measurement import Measurements, concatenate
-from postproc.accuracy.model import Model, load_model
-from postproc.accuracy.registration import register
 from postproc.arrays import Floats
 from postproc.calibrate import read_surveys, several_points
+from postproc.calibration.registration import register
 from postproc.console import Column, table_text
 from postproc.joining import join_program
+from postproc.model.model import Model, load_model
+from postproc.model.statistics import ErrorStatistics
 from postproc.robot.cell import Cell, load_cell
 from postproc.robot.pose import inverse
 

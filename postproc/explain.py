@@ -8,7 +8,6 @@ from pathlib import Path
 
 import numpy as np
 
-from postproc.accuracy.model import Model, load_model
 from postproc.compensate import compensate
 from postproc.console import Column
 from postproc.exceptions import ProgramError, printable
@@ -16,6 +15,7 @@ from postproc.files import VARIABLES, suffix_of
 from postproc.jobs import read_files
 from postproc.language.visits import ELSEWHERE, START, Visits
 from postproc.listing import arrows, print_listing, status_colour
+from postproc.model.model import Model, load_model
 from postproc.options import Options
 from postproc.planning import Planned, plan_visits, read_program, with_measured_play
 from postproc.report import Outcome, Status

@@ -7,7 +7,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from postproc.accuracy.model import Model, load_model
 from postproc.arrays import Each
 from postproc.clock import Progress, silent
 from postproc.compensate import compensate, name_files
@@ -20,6 +19,7 @@ from postproc.files import (
     write_all,
 )
 from postproc.language.visits import Diagnostic
+from postproc.model.model import Model, load_model
 from postproc.options import Options
 from postproc.page_files import Pages, find_pages
 from postproc.planning import VARIABLES

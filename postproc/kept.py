@@ -7,10 +7,10 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from postproc.accuracy.model import Model
 from postproc.arrays import Bools, Floats, Ints
 from postproc.language.source import Replacements
 from postproc.language.visits import Visits
+from postproc.model.model import Model
 from postproc.planning import Planned
 from postproc.report import Decisions
 from postproc.robot.cell import Cell

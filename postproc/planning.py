@@ -7,8 +7,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from postproc.accuracy.lost_motion import measured_play
-from postproc.accuracy.model import Model
 from postproc.arcs import mark_arcs
 from postproc.arrays import Each, Floats, Ints
 from postproc.exceptions import ProgramError
@@ -20,6 +18,8 @@ from postproc.language.pdl2.variable_file import VariableFile, read_variables
 from postproc.language.rewrite import Skeleton
 from postproc.language.source import Edit, Source, source_from_bytes
 from postproc.language.visits import Diagnostic, Visits
+from postproc.model.model import Model
+from postproc.model.play import measured_play
 from postproc.motion.planner import Plan, plan
 from postproc.motion.targets import Targets
 from postproc.motion.trace import NOWHERE, Standing

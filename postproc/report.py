@@ -8,10 +8,10 @@ from enum import IntEnum
 
 import numpy as np
 
-from postproc.accuracy.error_statistics import ErrorStatistics
 from postproc.arrays import Floats, Ints, Signs
 from postproc.language.pdl2.effects import NEVER_REACHED
 from postproc.language.visits import Diagnostic, Visits
+from postproc.model.statistics import ErrorStatistics
 from postproc.sidecar import Sidecar
 
 DONE, NOT_ALL, FAILED = 0, 1, 2  # exit codes

@@ -7,7 +7,6 @@ from itertools import count
 
 import numpy as np
 
-from postproc.accuracy.model import Model
 from postproc.aiming import Aim, Aiming
 from postproc.arrays import Bools, Floats
 from postproc.as_read import numbers_as_read
@@ -15,6 +14,7 @@ from postproc.clock import Clock
 from postproc.courses import Courses
 from postproc.language.rewrite import edits as number_edits
 from postproc.language.source import Replacements
+from postproc.model.model import Model
 from postproc.motion.replan import Reached
 from postproc.motion.trace import NOWHERE, Standing
 from postproc.options import Options

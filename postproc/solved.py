@@ -7,7 +7,6 @@ from functools import cached_property
 
 import numpy as np
 
-from postproc.accuracy.model import UNSURE, Model
 from postproc.accuracy.orientation import (
     UNSURE_TURN,
     refuse_unknown_rotations,
@@ -15,6 +14,7 @@ from postproc.accuracy.orientation import (
 )
 from postproc.accuracy.solve import solve
 from postproc.arrays import Bools, Floats, Ints
+from postproc.model.model import UNSURE, Model
 from postproc.planning import Planned
 from postproc.robot.cell import Cell
 from postproc.robot.pose import has_unknown, is_unknown, rotation_vector

@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from postproc.accuracy.library import BASE_EFFECTS
-from postproc.accuracy.model import Model, load_model
 from postproc.calibrate import fit
+from postproc.model.effects import BASE_EFFECTS
+from postproc.model.model import Model, load_model
 from postproc.robot.cell import Cell, load_cell
 from postproc.virtual import (
     measure_rows,
@@ -94,7 +94,7 @@ def job_cell(job_folder):
 @pytest.fixture(scope="session")
 def job_model(job_folder):
     """The model of the job folder."""
-    from postproc.accuracy.model import load_model
+    from postproc.model.model import load_model
 
     return load_model(job_folder / "model.json")
 

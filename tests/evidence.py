@@ -9,12 +9,12 @@ from pathlib import Path
 import numpy as np
 
 from postproc.accuracy.full import fit_survey, model_of
-from postproc.accuracy.library import BASE_EFFECTS
 from postproc.accuracy.measurement import Measurements
-from postproc.accuracy.model import Model
 from postproc.calibrate import fit
 from postproc.compensate import compensate
 from postproc.language.visits import Target
+from postproc.model.effects import BASE_EFFECTS
+from postproc.model.model import Model
 from postproc.planning import plan_visits, read_program, with_measured_play
 from postproc.planning import states_of as planned_states
 from postproc.report import Status

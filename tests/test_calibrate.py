@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from postproc.accuracy.library import BASE_EFFECTS
-from postproc.accuracy.model import load_model
 from postproc.calibrate import fit
 from postproc.exceptions import MeasurementError, PostprocError
+from postproc.model.effects import BASE_EFFECTS
+from postproc.model.model import load_model
 from postproc.robot.cell import Cell, load_cell
 from tests.accuracy.simulator import NJ, PLATE, TOOL, random_arm, random_states
 from tests.written import cli

@@ -8,13 +8,13 @@ from dataclasses import replace
 import pytest
 from typer.testing import CliRunner
 
-from postproc.accuracy.model import load_model
 from postproc.batch.plan import make_plan
 from postproc.batch.run import Order, batch, default_log
 from postproc.check import check
 from postproc.cli import app
 from postproc.exceptions import ProgramError
 from postproc.files import TEMPORARY
+from postproc.model.model import load_model
 from postproc.options import AS_USUAL
 from postproc.report import Status
 from tests.inline import InlineCrew

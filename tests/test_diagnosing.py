@@ -10,8 +10,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from postproc.accuracy.library import BASE_EFFECTS
-from postproc.accuracy.model import load_model
 from postproc.calibrate import fit, read_surveys
 from postproc.diagnosing import (
     diagnose_files,
@@ -23,6 +21,8 @@ from postproc.diagnosing import (
     tell,
 )
 from postproc.exceptions import OutputError
+from postproc.model.effects import BASE_EFFECTS
+from postproc.model.model import load_model
 from postproc.plots import plot_diagnosis
 from postproc.robot.cell import load_cell
 from postproc.robot.pose import pose_from_record

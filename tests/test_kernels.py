@@ -11,15 +11,16 @@ import numpy as np
 import pytest
 
 from postproc import kernels
-from postproc.accuracy.backlash import Backlash
-from postproc.accuracy.backlash_profile import BacklashProfile
-from postproc.accuracy.batch import Batch
-from postproc.accuracy.combination import Combination
-from postproc.accuracy.compliance import Compliance
-from postproc.accuracy.geometry import Geometry
-from postproc.accuracy.variance import parameter_variance
 from postproc.compensate import compensate
-from postproc.motion import blending, path
+from postproc.model.combination import Combination
+from postproc.model.effects.backlash import Backlash
+from postproc.model.effects.backlash_profile import BacklashProfile
+from postproc.model.effects.compliance import Compliance
+from postproc.model.effects.geometry import Geometry
+from postproc.model.kinematics import Batch
+from postproc.model.model import parameter_variance
+from postproc.motion import blending
+from postproc.motion import path as cartesian
 from postproc.motion.path import Pull
 from postproc.robot import direction, play, pose
 from postproc.robot.arm import DH
@@ -246,7 +247,7 @@ def test_straight_ways(bench_cell, random, by_numpy):
     tool = np.repeat(bench_cell.arm.flange(np.ones((1, 6))), 300, axis=0)
     targets = SimpleNamespace(tool=tool)
     asked = targets, flange, np.arange(299), np.arange(1, 300)
-    found, meant = path._lines(*asked), by_numpy(path._lines, *asked)
+    found, meant = cartesian._lines(*asked), by_numpy(cartesian._lines, *asked)
     for field in fields(found):
         one, other = (getattr(s, field.name) for s in (found, meant))
         assert np.allclose(one, other, **CLOSE), field.name

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from postproc.accuracy.model import load_model
 from postproc.compensate import compensate
+from postproc.model.model import load_model
 from postproc.planning import read_program
 from postproc.report import Outcome
 from postproc.robot.cell import load_cell

@@ -8,13 +8,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from postproc.accuracy.batch import Batch
-from postproc.accuracy.combination import Combination
 from postproc.accuracy.diagnosis.tracing import trace
-from postproc.accuracy.effect import Effect, Parameter
 from postproc.accuracy.fit import fit_effects
 from postproc.accuracy.fitted import Fit
-from postproc.accuracy.library import BASE_EFFECTS, propose
+from postproc.model.combination import Combination
+from postproc.model.effects import BASE_EFFECTS, propose
+from postproc.model.effects.effect import Effect, Parameter
+from postproc.model.kinematics import Batch
 from postproc.virtual import Arrivals, VirtualArm, virtual_arm
 from tests.accuracy.planted import (
     ARM,

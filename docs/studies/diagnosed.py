@@ -12,15 +12,15 @@ from pathlib import Path
 import numpy as np
 from measured import BLIND_TOOL, FLANGE, SETUP, _registered
 
-from postproc.accuracy.batch import Batch
-from postproc.accuracy.combination import Combination
 from postproc.accuracy.diagnosis.diagnose import Extension, diagnose
 from postproc.accuracy.diagnosis.result import Finding
 from postproc.accuracy.full import fit_survey, model_of
-from postproc.accuracy.library import BASE_EFFECTS
 from postproc.accuracy.measurement import Measurements, read_measurements
-from postproc.accuracy.model import Model
 from postproc.calibrate import into_base_frame
+from postproc.model.combination import Combination
+from postproc.model.effects import BASE_EFFECTS
+from postproc.model.kinematics import Batch
+from postproc.model.model import Model
 from postproc.robot.arm import Arm, load_arm
 from postproc.robot.pose import MM
 

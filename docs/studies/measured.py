@@ -6,14 +6,14 @@ from pathlib import Path
 
 import numpy as np
 
-from postproc.accuracy.batch import Batch
-from postproc.accuracy.combination import Combination
 from postproc.accuracy.full import fit_survey, model_of
-from postproc.accuracy.library import BASE_EFFECTS
 from postproc.accuracy.measurement import Measurements, read_measurements
-from postproc.accuracy.model import Model
-from postproc.accuracy.registration import register
 from postproc.calibrate import into_base_frame
+from postproc.calibration.registration import register
+from postproc.model.combination import Combination
+from postproc.model.effects import BASE_EFFECTS
+from postproc.model.kinematics import Batch
+from postproc.model.model import Model
 from postproc.robot.arm import Arm, load_arm
 
 MM = 1e-3

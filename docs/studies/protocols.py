@@ -7,11 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import qmc
 
-from postproc.accuracy import elm_map
-from postproc.accuracy.chain import NOMINAL, Deviation, walk
 from postproc.accuracy.comparison import MethodRow, compare_on
-from postproc.accuracy.hidden_layer import HiddenLayer
 from postproc.accuracy.measurement import Measurements
+from postproc.model.effects import elm
+from postproc.model.effects.elm import HiddenLayer
+from postproc.model.kinematics import NOMINAL, Deviation, walk
 from postproc.robot.arm import DH, load_arm
 from postproc.robot.state import make_states
 from postproc.virtual import sample_survey, stream, virtual_arm
@@ -61,7 +61,7 @@ def simulation(lengths: str, unit: str, span: str, seeds: int) -> Simulated:
         error = walk(dh, q, tool, real).tcp - walk(dh, q, tool, NOMINAL).tcp
         train, test = make_states(q[:TRAIN]), make_states(q[TRAIN:])
         layer = HiddenLayer.draw(train, NEURONS, seed, directions=True)
-        beta = elm_map.train(layer, train, error[:TRAIN]).reshape(3, -1)
+        beta = elm.train(layer, train, error[:TRAIN]).reshape(3, -1)
         left = error[TRAIN:] - layer(test) @ beta.T
         before.append(np.linalg.norm(error[TRAIN:], axis=1) / MM)
         after.append(np.linalg.norm(left, axis=1) / MM)

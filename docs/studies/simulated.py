@@ -6,12 +6,12 @@ import time
 
 import numpy as np
 
-from postproc.accuracy.batch import Batch
 from postproc.accuracy.full import fit_survey, model_of
-from postproc.accuracy.library import BASE_EFFECTS
 from postproc.accuracy.methods import fit_method
-from postproc.accuracy.model import Model
 from postproc.accuracy.survey import design_survey
+from postproc.model.effects import BASE_EFFECTS
+from postproc.model.kinematics import Batch
+from postproc.model.model import Model
 from postproc.robot.state import States, make_states
 from tests.accuracy.simulator import (
     NJ,

@@ -10,22 +10,22 @@ from matplotlib import rc_context
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from postproc.accuracy.backlash import Backlash
-from postproc.accuracy.backlash_profile import BacklashProfile
-from postproc.accuracy.batch import Batch
-from postproc.accuracy.compliance import Compliance
-from postproc.accuracy.counterbalance import Counterbalance
-from postproc.accuracy.coupling import Coupling
-from postproc.accuracy.effect import Effect, JointEffect
-from postproc.accuracy.geometry import Geometry
-from postproc.accuracy.joint_map import JointMap
-from postproc.accuracy.lag import Lag
-from postproc.accuracy.load_backlash import LoadBacklash
-from postproc.accuracy.scale import Scale
-from postproc.accuracy.thermal import Thermal
-from postproc.accuracy.tool_shift import ToolShift
-from postproc.accuracy.transmission import Transmission
-from postproc.accuracy.windup import Windup
+from postproc.model.effects.backlash import Backlash
+from postproc.model.effects.backlash_profile import BacklashProfile
+from postproc.model.effects.compliance import Compliance
+from postproc.model.effects.counterbalance import Counterbalance
+from postproc.model.effects.coupling import Coupling
+from postproc.model.effects.effect import Effect, JointEffect
+from postproc.model.effects.geometry import Geometry
+from postproc.model.effects.joint_map import JointMap
+from postproc.model.effects.lag import Lag
+from postproc.model.effects.load_backlash import LoadBacklash
+from postproc.model.effects.scale import Scale
+from postproc.model.effects.thermal import Thermal
+from postproc.model.effects.tool_shift import ToolShift
+from postproc.model.effects.transmission import Transmission
+from postproc.model.effects.windup import Windup
+from postproc.model.kinematics import Batch
 from postproc.robot.arm import Arm, load_arm
 from postproc.robot.state import States, make_states
 

@@ -7,12 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from postproc.accuracy.batch import Batch
 from postproc.accuracy.full import fit_survey, model_of
 from postproc.accuracy.measurement import Measurements
 from postproc.accuracy.methods import fit_method
-from postproc.accuracy.schema import Method
 from postproc.arrays import Floats
+from postproc.model.kinematics import Batch
+from postproc.model.model import Method
 from postproc.robot.arm import Arm
 from postproc.robot.pose import MM
 

@@ -11,15 +11,15 @@ from dataclasses import replace
 
 import numpy as np
 
-from postproc.accuracy.batch import Batch
-from postproc.accuracy.combination import Combination
-from postproc.accuracy.effect import Effect
 from postproc.accuracy.evidence import maximise
 from postproc.accuracy.fitted import Fit
-from postproc.accuracy.noise import Noise, Whitener
 from postproc.accuracy.outliers import RowWeights, judge, student_weights
 from postproc.accuracy.turns import Turns
 from postproc.arrays import Floats
+from postproc.model.combination import Combination
+from postproc.model.effects.effect import Effect
+from postproc.model.kinematics import Batch
+from postproc.model.noise import Noise, Whitener
 
 PASSES = 30
 HEAVY_TAILED = 4  # first passes that a gross outlier must not lead astray

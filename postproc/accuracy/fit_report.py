@@ -7,13 +7,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from postproc.accuracy.batch import Batch
-from postproc.accuracy.error_statistics import ErrorStatistics
 from postproc.accuracy.fitted import Fit
 from postproc.accuracy.measurement import DroppedRow, Measurements
-from postproc.accuracy.model import Model
 from postproc.accuracy.observability import Unseen, observe
 from postproc.arrays import Floats
+from postproc.model.kinematics import Batch
+from postproc.model.model import Model
+from postproc.model.statistics import ErrorStatistics
 from postproc.robot.arm import Arm
 from postproc.robot.pose import MM
 

@@ -8,13 +8,13 @@ from functools import cached_property
 import numpy as np
 from scipy.linalg import qr
 
-from postproc.accuracy.batch import Batch
-from postproc.accuracy.combination import Combination
 from postproc.accuracy.evidence import Normal, Posterior, widened
-from postproc.accuracy.noise import Noise, Whitener
 from postproc.accuracy.outliers import RowWeights
 from postproc.accuracy.turns import Turns
 from postproc.arrays import Floats, Ints
+from postproc.model.combination import Combination
+from postproc.model.kinematics import Batch
+from postproc.model.noise import Noise, Whitener
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,17 +6,16 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from postproc.accuracy.batch import Batch
 from postproc.accuracy.fit import fit_effects
 from postproc.accuracy.fitted import Fit
-from postproc.accuracy.library import propose
 from postproc.accuracy.measurement import Measurements
-from postproc.accuracy.model import COMPENSATED, Model
-from postproc.accuracy.probe_turn import ProbeTurn
-from postproc.accuracy.ranges import Ranges
 from postproc.accuracy.selection import fit_best
 from postproc.accuracy.turns import Turns
 from postproc.arrays import Floats
+from postproc.model.effects import propose
+from postproc.model.effects.probe_turn import ProbeTurn
+from postproc.model.kinematics import Batch
+from postproc.model.model import COMPENSATED, Model, Ranges
 from postproc.robot.arm import Arm
 from postproc.robot.pose import MM
 

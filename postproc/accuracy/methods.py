@@ -11,20 +11,18 @@ from dataclasses import replace
 
 import numpy as np
 
-from postproc.accuracy import elm_map, kriging
-from postproc.accuracy.batch import Batch
-from postproc.accuracy.combination import Combination
-from postproc.accuracy.effect import Effect
 from postproc.accuracy.fit import fit_effects
-from postproc.accuracy.geometry import Geometry
-from postproc.accuracy.hidden_layer import HiddenLayer
-from postproc.accuracy.interpolation import Interpolation
 from postproc.accuracy.measurement import Measurements
-from postproc.accuracy.model import Model
-from postproc.accuracy.noise import Noise
-from postproc.accuracy.ranges import Ranges
-from postproc.accuracy.schema import Method
 from postproc.arrays import Floats
+from postproc.model.combination import Combination
+from postproc.model.effects import elm, maps
+from postproc.model.effects.effect import Effect
+from postproc.model.effects.elm import HiddenLayer
+from postproc.model.effects.geometry import Geometry
+from postproc.model.effects.maps import Interpolation
+from postproc.model.kinematics import Batch
+from postproc.model.model import Method, Model, Ranges
+from postproc.model.noise import Noise
 from postproc.robot.arm import Arm
 from postproc.robot.pose import MM
 
@@ -41,7 +39,7 @@ def _elm(directions: bool) -> Trainer:
     def train(batch: Batch, error: Floats, seed: int) -> Trained:
         """Fit the output weights by the pseudo-inverse."""
         layer = HiddenLayer.draw(batch.states, NEURONS, seed, directions)
-        return (elm_map.ElmMap(layer),), elm_map.train(layer, batch.states, error)
+        return (elm.ElmMap(layer),), elm.train(layer, batch.states, error)
 
     return train
 
@@ -61,7 +59,7 @@ def _kinematic_elm(batch: Batch, error: Floats, seed: int) -> Trained:
 
 def _kriging(batch: Batch, error: Floats, seed: int) -> Trained:
     """Fit a Gaussian process in the modified joint space."""
-    effect, values = kriging.train(batch.states, error, seed)
+    effect, values = maps.train(batch.states, error, seed)
     return (effect,), values
 
 

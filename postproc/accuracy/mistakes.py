@@ -7,10 +7,10 @@ from itertools import combinations
 
 import numpy as np
 
-from postproc.accuracy.combination import Combination
 from postproc.accuracy.measurement import Measurements
-from postproc.accuracy.registration import register
 from postproc.arrays import Floats
+from postproc.calibration.registration import register
+from postproc.model.combination import Combination
 from postproc.robot.arm import Arm
 from postproc.robot.state import States
 

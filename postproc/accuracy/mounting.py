@@ -6,10 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from postproc.accuracy.batch import Batch
 from postproc.accuracy.measurement import Measurements
 from postproc.accuracy.turns import Turns
 from postproc.exceptions import MeasurementError
+from postproc.model.kinematics import Batch
 from postproc.robot.arm import Arm
 
 TURNED = np.deg2rad(1.0)  # no flange that works is off by more

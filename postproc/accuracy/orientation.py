@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from postproc.accuracy.batch import Batch
-from postproc.accuracy.model import Model
 from postproc.arrays import Bools, Floats
 from postproc.exceptions import ModelError
+from postproc.model.kinematics import Batch
+from postproc.model.model import Model
 from postproc.robot.arm import Arm
 from postproc.robot.state import States
 

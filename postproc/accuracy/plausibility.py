@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from postproc.accuracy.batch import Batch
-from postproc.accuracy.geometry import Geometry
 from postproc.accuracy.measurement import Measurements
 from postproc.accuracy.mistakes import CLOSE, likely_cure
 from postproc.accuracy.observability import observe
 from postproc.accuracy.tool_groups import find_groups
 from postproc.exceptions import MeasurementError
+from postproc.model.effects.geometry import Geometry
+from postproc.model.kinematics import Batch
 from postproc.robot.arm import Arm
 from postproc.robot.pose import MM
 from postproc.robot.state import States, make_states

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from postproc.accuracy.batch import Batch
 from postproc.arrays import Bools, Floats
+from postproc.model.kinematics import Batch
 from postproc.robot.arm import Arm
 from postproc.robot.state import make_states
 

@@ -11,16 +11,16 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from postproc.accuracy.batch import Batch
-from postproc.accuracy.effect import Effect
 from postproc.accuracy.evidence import LOG_SPREAD, Normal, maximise
 from postproc.accuracy.fit import fit_effects
 from postproc.accuracy.fitted import Fit
-from postproc.accuracy.library import BASE_EFFECTS, propose
 from postproc.accuracy.tool_groups import find_groups
-from postproc.accuracy.tool_shift import ToolShift
 from postproc.accuracy.turns import Turns
 from postproc.arrays import Bools, Floats
+from postproc.model.effects import BASE_EFFECTS, propose
+from postproc.model.effects.effect import Effect
+from postproc.model.effects.tool_shift import ToolShift
+from postproc.model.kinematics import Batch
 from postproc.robot.arm import Arm
 from postproc.robot.state import States
 

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from postproc.accuracy.model import Model
 from postproc.accuracy.orientation import turn
 from postproc.arrays import Floats
+from postproc.model.model import Model
 from postproc.robot.arm import Arm
 from postproc.robot.pose import (
     inverse,

@@ -7,14 +7,14 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import qmc
 
-from postproc.accuracy.batch import Batch
-from postproc.accuracy.combination import Combination
 from postproc.accuracy.exchange import choose, gain_d, gain_i
-from postproc.accuracy.library import BASE_EFFECTS, propose
 from postproc.accuracy.observability import Observability, observe
 from postproc.accuracy.reachability import joint_box, usable
 from postproc.arrays import Floats, Ints
 from postproc.exceptions import PostprocError
+from postproc.model.combination import Combination
+from postproc.model.effects import BASE_EFFECTS, propose
+from postproc.model.kinematics import Batch
 from postproc.robot.arm import Arm
 from postproc.robot.state import States, make_states
 

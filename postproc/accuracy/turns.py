@@ -13,11 +13,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from postproc.accuracy.batch import Batch
-from postproc.accuracy.combination import Combination
 from postproc.accuracy.evidence import Normal
 from postproc.accuracy.outliers import DROPPED, limit_of, student_weights
 from postproc.arrays import Floats
+from postproc.model.combination import Combination
+from postproc.model.kinematics import Batch
 from postproc.robot.pose import rotation_vector
 
 TYPICAL = 1e-3  # [rad] scatter to begin with: that of an arm not yet calibrated

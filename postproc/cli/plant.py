@@ -168,7 +168,7 @@ def _current_model(model: Path | None, plan: Path | None) -> Current:
         which = made.setup_of
         return lambda place: None if (i := which(place)) is None else ids[i]
     if model is not None:
-        from postproc.accuracy.model import load_model
+        from postproc.model.model import load_model
 
         current = load_model(model).id
         return lambda place: current

@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from postproc.accuracy.batch import Batch
 from postproc.accuracy.fit_report import FitReport
 from postproc.accuracy.measurement import Measurements
-from postproc.accuracy.model import Model
 from postproc.arrays import Floats
 from postproc.html.summary import finite
+from postproc.model.kinematics import Batch
+from postproc.model.model import Model
 from postproc.robot.arm import Arm
 from postproc.robot.pose import MM
 

@@ -6,11 +6,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from postproc.accuracy.batch import Batch
 from postproc.accuracy.diagnosis.projection import Projection
 from postproc.accuracy.fit import fit_effects
 from postproc.accuracy.fitted import Fit
-from postproc.accuracy.library import BASE_EFFECTS, propose
+from postproc.model.effects import BASE_EFFECTS, propose
+from postproc.model.kinematics import Batch
 from postproc.robot.arm import load_arm
 from postproc.robot.state import States, make_states
 from postproc.virtual import (

@@ -9,9 +9,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from postproc.accuracy.batch import Batch
-from postproc.accuracy.covariate import covariate, loops, unit
-from postproc.accuracy.curve import Curve
 from postproc.accuracy.diagnosis.diagnose import Extension, diagnose
 from postproc.accuracy.diagnosis.evidence import dumped, evidence_of
 from postproc.accuracy.diagnosis.floor import (
@@ -25,12 +22,15 @@ from postproc.accuracy.diagnosis.omnibus import leftovers
 from postproc.accuracy.diagnosis.planning import poses_that_sharpen
 from postproc.accuracy.diagnosis.projection import Projection
 from postproc.accuracy.full import fit_survey, model_of
-from postproc.accuracy.library import BASE_EFFECTS
 from postproc.accuracy.measurement import Measurements
-from postproc.accuracy.model import Model, load_model
 from postproc.diagnosing import tell
 from postproc.exceptions import ModelError, PostprocError
 from postproc.html import diagnosis_report
+from postproc.model.covariate import covariate, loops, unit
+from postproc.model.effects import BASE_EFFECTS
+from postproc.model.effects.curve import Curve
+from postproc.model.kinematics import Batch
+from postproc.model.model import Model, load_model
 from postproc.plots import plot_diagnosis
 from postproc.robot.arm import load_arm
 from postproc.robot.state import States, make_states

@@ -7,7 +7,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from postproc.accuracy.batch import Batch
 from postproc.accuracy.diagnosis import groups, names_first, search
 from postproc.accuracy.diagnosis.bootstrap import Null, bootstrap
 from postproc.accuracy.diagnosis.candidate import FREE, NAMED, Candidate, Family
@@ -21,7 +20,8 @@ from postproc.accuracy.diagnosis.search import Search
 from postproc.accuracy.diagnosis.tracing import silent
 from postproc.accuracy.fit import fit_effects
 from postproc.accuracy.fitted import Fit
-from postproc.accuracy.scale import Scale
+from postproc.model.effects.scale import Scale
+from postproc.model.kinematics import Batch
 from tests.accuracy.planted import ARM, TRACKER, Campaign, campaign
 
 

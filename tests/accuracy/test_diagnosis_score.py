@@ -19,7 +19,7 @@ from postproc.accuracy.diagnosis.score import (
     rank,
     score_p_value,
 )
-from postproc.accuracy.scale import Scale
+from postproc.model.effects.scale import Scale
 from tests.accuracy.planted import campaign
 
 

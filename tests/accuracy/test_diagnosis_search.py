@@ -8,10 +8,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from postproc.accuracy.base_shift import rigid_columns
-from postproc.accuracy.batch import Batch
-from postproc.accuracy.combination import Combination
 from postproc.accuracy.diagnosis.tracing import trace
+from postproc.model.combination import Combination
+from postproc.model.effects.base_shift import rigid_columns
+from postproc.model.kinematics import Batch
 from tests.accuracy.planted import ARM, campaign, states_of, survey
 from tests.undeclared_score import close, ok
 from tests.undeclared_trial import run

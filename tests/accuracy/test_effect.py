@@ -7,11 +7,11 @@ import json
 import numpy as np
 import pytest
 
-from postproc.accuracy.batch import Batch
-from postproc.accuracy.combination import Combination
-from postproc.accuracy.effect import Effect, JointEffect, fade, fade_turns
-from postproc.accuracy.library import EFFECTS, propose, restore
 from postproc.exceptions import PostprocError
+from postproc.model.combination import Combination
+from postproc.model.effects import EFFECTS, propose, restore
+from postproc.model.effects.effect import Effect, JointEffect, fade, fade_turns
+from postproc.model.kinematics import Batch
 from tests.accuracy.simulator import NJ, PLATE, covariates, random_states
 
 RNG = np.random.default_rng(5)

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from scipy.linalg import qr
 
-from postproc.accuracy.batch import Batch
-from postproc.accuracy.combination import Combination
 from postproc.accuracy.fitted import Fit
 from postproc.accuracy.full import fit_survey
-from postproc.accuracy.geometry import Geometry
-from postproc.accuracy.library import BASE_EFFECTS
+from postproc.model.combination import Combination
+from postproc.model.effects import BASE_EFFECTS
+from postproc.model.effects.geometry import Geometry
+from postproc.model.kinematics import Batch
 from postproc.robot.state import States
 from tests.accuracy.simulator import (
     NJ,

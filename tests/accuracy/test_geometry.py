@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from postproc.accuracy.batch import Batch
-from postproc.accuracy.chain import NOMINAL
-from postproc.accuracy.geometry import Geometry
+from postproc.model.effects.geometry import Geometry
+from postproc.model.kinematics import NOMINAL, Batch
 from tests.accuracy.simulator import NJ, TOOL, Simulated, random_states
 
 

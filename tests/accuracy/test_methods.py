@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from postproc.accuracy.comparison import ORDER, compare, random_split
-from postproc.accuracy.hidden_layer import HiddenLayer
 from postproc.accuracy.methods import TRAINERS, fit_method
-from postproc.accuracy.model import load_model
+from postproc.model.effects.elm import HiddenLayer
+from postproc.model.model import load_model
 from postproc.robot.state import make_states
 from tests.accuracy.simulator import NJ, random_arm, random_states, survey_of
 

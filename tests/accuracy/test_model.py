@@ -12,13 +12,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from postproc.accuracy.batch import Batch
 from postproc.accuracy.fit import fit_effects
 from postproc.accuracy.full import fit_survey, model_of
-from postproc.accuracy.library import BASE_EFFECTS, EFFECTS, propose
-from postproc.accuracy.model import Model, load_model
-from postproc.accuracy.schema import content_id
 from postproc.exceptions import ModelError, OutputError
+from postproc.model.effects import BASE_EFFECTS, EFFECTS, propose
+from postproc.model.kinematics import Batch
+from postproc.model.model import Model, content_id, load_model
 from postproc.robot.state import make_states
 from tests.accuracy.simulator import (
     NJ,

@@ -3,8 +3,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from postproc.accuracy.batch import Batch
-from postproc.accuracy.noise import Noise, Whitener
+from postproc.model.kinematics import Batch
+from postproc.model.noise import Noise, Whitener
 from tests.accuracy.simulator import NJ, random_states
 
 

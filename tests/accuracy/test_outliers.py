@@ -2,11 +2,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from postproc.accuracy.batch import Batch
 from postproc.accuracy.diagnosis.tracing import trace
 from postproc.accuracy.fit import fit_effects
-from postproc.accuracy.library import BASE_EFFECTS, propose
 from postproc.accuracy.outliers import judge, student_weights
+from postproc.model.effects import BASE_EFFECTS, propose
+from postproc.model.kinematics import Batch
 from postproc.virtual import Planted, stream, virtual_arm
 from tests.accuracy.planted import ARM, BASE, TRACKER, states_of, survey
 from tests.accuracy.simulator import NJ, random_states

@@ -7,17 +7,17 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from postproc.accuracy.batch import Batch
-from postproc.accuracy.combination import Combination
 from postproc.accuracy.formats import read_column_map
 from postproc.accuracy.full import fit_survey, model_of
-from postproc.accuracy.library import BASE_EFFECTS
 from postproc.accuracy.measurement import read_measurements
 from postproc.accuracy.points import read_points
 from postproc.accuracy.reading import Reading
-from postproc.accuracy.registration import register
 from postproc.calibrate import into_base_frame
+from postproc.calibration.registration import register
 from postproc.exceptions import MeasurementError
+from postproc.model.combination import Combination
+from postproc.model.effects import BASE_EFFECTS
+from postproc.model.kinematics import Batch
 from postproc.robot.arm import load_arm
 from tests.accuracy.simulator import NJ, PLATE, random_arm, random_states, survey_of
 

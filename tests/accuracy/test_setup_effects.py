@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from postproc.accuracy.batch import Batch
-from postproc.accuracy.combination import Combination
-from postproc.accuracy.effect import Effect
 from postproc.accuracy.fit import fit_effects
 from postproc.accuracy.full import model_of
-from postproc.accuracy.library import BASE_EFFECTS, EFFECTS, propose
+from postproc.model.combination import Combination
+from postproc.model.effects import BASE_EFFECTS, EFFECTS, propose
+from postproc.model.effects.effect import Effect
+from postproc.model.kinematics import Batch
 from postproc.robot.state import States
 from tests.accuracy.simulator import (
     NJ,

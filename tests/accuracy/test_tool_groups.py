@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from postproc.accuracy.batch import Batch
 from postproc.accuracy.plausibility import check_survey
 from postproc.accuracy.tool_groups import ToolGroups, find_groups
 from postproc.calibrate import fit_measurements
 from postproc.exceptions import MeasurementError
+from postproc.model.kinematics import Batch
 from postproc.robot.cell import Cell, load_cell
 from tests.accuracy.simulator import NJ, random_arm, random_states, survey_of
 

@@ -8,15 +8,15 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from postproc.accuracy.batch import Batch
 from postproc.accuracy.fit_report import weighed_down
 from postproc.accuracy.full import fit_survey, model_of
-from postproc.accuracy.library import BASE_EFFECTS
 from postproc.accuracy.measurement import Measurements, read_measurements
-from postproc.accuracy.model import Model
 from postproc.accuracy.mounting import check_orientations
 from postproc.calibrate import into_base_frame
 from postproc.exceptions import MeasurementError
+from postproc.model.effects import BASE_EFFECTS
+from postproc.model.kinematics import Batch
+from postproc.model.model import Model
 from tests.accuracy.simulator import (
     NJ,
     TOOL,

@@ -17,7 +17,7 @@ from collections import Counter
 from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
-from postproc.accuracy.model import Model, load_model
+from postproc.model.model import Model, load_model
 from postproc.robot.cell import Cell, load_cell
 from tests.conftest import make_job
 from tests.fuzz.case import HangError, compensated, rewrite

@@ -10,10 +10,10 @@ from typing import Any
 
 import numpy as np
 
-from postproc.accuracy.model import Model
 from postproc.compensate import compensate
 from postproc.exceptions import PostprocError
 from postproc.language.visits import Visits
+from postproc.model.model import Model
 from postproc.output import write_numbers
 from postproc.planning import read_program
 from postproc.restore import restore

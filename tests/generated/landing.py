@@ -7,8 +7,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from postproc.accuracy.model import Model
 from postproc.compensate import compensate
+from postproc.model.model import Model
 from postproc.notes import SURE
 from postproc.options import Options
 from postproc.report import Outcome, Status

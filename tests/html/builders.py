@@ -6,8 +6,8 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from postproc.accuracy.error_statistics import ErrorStatistics
 from postproc.language.visits import Diagnostic, Literals, Visits
+from postproc.model.statistics import ErrorStatistics
 from postproc.report import Decisions, Outcome, Status
 from postproc.sidecar import Sidecar
 

@@ -7,10 +7,10 @@ from functools import cached_property
 
 import numpy as np
 
-from postproc.accuracy.batch import Batch
-from postproc.accuracy.covariate import covariate
-from postproc.accuracy.effect import Effect
 from postproc.arrays import Floats
+from postproc.model.covariate import covariate
+from postproc.model.effects.effect import Effect
+from postproc.model.kinematics import Batch
 
 NAMED, FREE = 0, 1
 

@@ -6,13 +6,13 @@ from itertools import combinations
 
 import numpy as np
 
-from postproc.accuracy.batch import Batch
-from postproc.accuracy.covariate import covariate
-from postproc.accuracy.curve import Curve
 from postproc.accuracy.diagnosis.candidate import FREE, Candidate, Family, shared
 from postproc.accuracy.diagnosis.named import JOINTS, carrying, known
-from postproc.accuracy.effect import Effect
-from postproc.accuracy.joint_map import JointMap
+from postproc.model.covariate import covariate
+from postproc.model.effects.curve import Curve
+from postproc.model.effects.effect import Effect
+from postproc.model.effects.joint_map import JointMap
+from postproc.model.kinematics import Batch
 
 KNOTS = (12, 24, 48)  # bumps of a joint's map
 ROWS_PER_KNOT = 12

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Any
 
-from postproc.accuracy.batch import Batch
 from postproc.accuracy.diagnosis.choice import ranking
 from postproc.accuracy.diagnosis.floor import multi_directional, noise_floor
 from postproc.accuracy.diagnosis.groups import NEAR
@@ -17,12 +16,13 @@ from postproc.accuracy.diagnosis.result import Diagnosis, Place, statistics
 from postproc.accuracy.diagnosis.revision import Revision, fold_back
 from postproc.accuracy.diagnosis.search import Progress, Search
 from postproc.accuracy.diagnosis.tracing import Trace, silent, trace
-from postproc.accuracy.error_statistics import ErrorStatistics
 from postproc.accuracy.fit_report import weighed_down
 from postproc.accuracy.full import model_of
 from postproc.accuracy.measurement import Measurements
-from postproc.accuracy.model import Model
 from postproc.arrays import Floats
+from postproc.model.kinematics import Batch
+from postproc.model.model import Model
+from postproc.model.statistics import ErrorStatistics
 from postproc.robot.arm import Arm
 from postproc.robot.pose import MM
 

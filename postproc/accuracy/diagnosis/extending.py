@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from postproc.accuracy.diagnosis.candidate import Candidate
-from postproc.accuracy.effect import Effect
 from postproc.accuracy.fit import fit_effects
 from postproc.accuracy.fitted import Fit
+from postproc.model.effects.effect import Effect
 
 
 def extend(fit: Fit, candidate: Candidate, instead_of: int | None = None) -> Fit:

@@ -9,9 +9,9 @@ import numpy as np
 from postproc.accuracy.diagnosis.groups import Standing
 from postproc.accuracy.diagnosis.result import Finding
 from postproc.accuracy.diagnosis.search import Addition, Search
-from postproc.accuracy.effect import Effect
 from postproc.accuracy.fit_report import SHOWN_UNITS
 from postproc.arrays import Floats
+from postproc.model.effects.effect import Effect
 from postproc.robot.pose import MM
 
 SPOT = 9  # bumps: more are a map of the whole joint, with no one place

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from postproc.accuracy.batch import Batch
 from postproc.accuracy.fitted import Fit
-from postproc.accuracy.noise import Noise
 from postproc.arrays import Floats
+from postproc.model.kinematics import Batch
+from postproc.model.noise import Noise
 
 SAME_POSE = 1e-5  # [rad] joint angles that are one pose
 ENOUGH = 5  # repeats beyond the first that give an estimate

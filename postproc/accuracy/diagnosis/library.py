@@ -8,14 +8,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from postproc.accuracy.batch import Batch
 from postproc.accuracy.diagnosis.candidate import Candidate
 from postproc.accuracy.diagnosis.curves import free_candidates
 from postproc.accuracy.diagnosis.named import named_candidates
 from postproc.accuracy.diagnosis.projection import Blocks, Projection, reduce_columns
 from postproc.accuracy.fitted import Fit
-from postproc.accuracy.noise import Whitener
 from postproc.arrays import Floats
+from postproc.model.kinematics import Batch
+from postproc.model.noise import Whitener
 
 KEPT = 60_000_000  # numbers of columns that are kept rather than made again
 CHUNK = 5_000_000  # numbers of columns held at once while they are made

@@ -6,13 +6,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from postproc.accuracy.batch import Batch
-from postproc.accuracy.covariate import covariate, unit
 from postproc.accuracy.diagnosis.candidate import Candidate
 from postproc.accuracy.diagnosis.projection import Projection
-from postproc.accuracy.effect import Effect
 from postproc.accuracy.fitted import Fit
 from postproc.arrays import Floats
+from postproc.model.covariate import covariate, unit
+from postproc.model.effects.effect import Effect
+from postproc.model.kinematics import Batch
 from postproc.robot.pose import MM
 
 LARGEST_ORDER = 60

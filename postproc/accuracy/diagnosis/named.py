@@ -6,26 +6,26 @@ from dataclasses import replace
 
 import numpy as np
 
-from postproc.accuracy.backlash import Backlash
-from postproc.accuracy.backlash_profile import BacklashProfile
-from postproc.accuracy.base_shift import BaseShift
-from postproc.accuracy.batch import Batch
-from postproc.accuracy.compliance import Compliance
-from postproc.accuracy.counterbalance import Counterbalance
-from postproc.accuracy.coupling import Coupling
 from postproc.accuracy.diagnosis.candidate import NAMED, Candidate, Family, shared
-from postproc.accuracy.effect import Effect
-from postproc.accuracy.joint_map import JointMap
-from postproc.accuracy.lag import Lag
-from postproc.accuracy.load_backlash import LoadBacklash
-from postproc.accuracy.payload import Payload
-from postproc.accuracy.scale import Scale
-from postproc.accuracy.thermal import Thermal, growing
-from postproc.accuracy.tool_shift import ToolShift
-from postproc.accuracy.tracker_drift import TrackerDrift
-from postproc.accuracy.transmission import Transmission
-from postproc.accuracy.windup import Windup
 from postproc.arrays import Floats
+from postproc.model.effects.backlash import Backlash
+from postproc.model.effects.backlash_profile import BacklashProfile
+from postproc.model.effects.base_shift import BaseShift
+from postproc.model.effects.compliance import Compliance
+from postproc.model.effects.counterbalance import Counterbalance
+from postproc.model.effects.coupling import Coupling
+from postproc.model.effects.effect import Effect
+from postproc.model.effects.joint_map import JointMap
+from postproc.model.effects.lag import Lag
+from postproc.model.effects.load_backlash import LoadBacklash
+from postproc.model.effects.payload import Payload
+from postproc.model.effects.scale import Scale
+from postproc.model.effects.thermal import Thermal, growing
+from postproc.model.effects.tool_shift import ToolShift
+from postproc.model.effects.tracker_drift import TrackerDrift
+from postproc.model.effects.transmission import Transmission
+from postproc.model.effects.windup import Windup
+from postproc.model.kinematics import Batch
 
 JOINTS = (1, 2, 3, 4, 5, 6)
 CARRYING = 0.02  # of the largest torque: a joint that carries less cannot yield

@@ -11,14 +11,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from postproc.accuracy.batch import Batch
-from postproc.accuracy.combination import Combination
 from postproc.accuracy.diagnosis.folds import deal
 from postproc.accuracy.diagnosis.search import Progress, Search
 from postproc.accuracy.diagnosis.withdrawal import investigate
 from postproc.accuracy.fit import fit_effects
 from postproc.accuracy.fitted import Fit
 from postproc.arrays import Floats
+from postproc.model.combination import Combination
+from postproc.model.kinematics import Batch
 
 PARTS = 5
 RUN = 8  # consecutive rows that are held out together

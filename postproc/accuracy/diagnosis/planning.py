@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from postproc.accuracy.batch import Batch
 from postproc.accuracy.diagnosis.extending import extend
 from postproc.accuracy.diagnosis.score import Score
 from postproc.accuracy.fitted import Fit
 from postproc.arrays import Floats
+from postproc.model.kinematics import Batch
 from postproc.robot.state import make_states
 
 TRIED = 400  # random poses

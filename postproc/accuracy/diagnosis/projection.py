@@ -13,10 +13,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from postproc.accuracy.batch import Batch
 from postproc.accuracy.diagnosis.candidate import Candidate
 from postproc.accuracy.fitted import Fit
 from postproc.arrays import Floats
+from postproc.model.kinematics import Batch
 
 
 @dataclass(frozen=True, eq=False)

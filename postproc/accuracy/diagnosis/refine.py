@@ -7,21 +7,21 @@ from dataclasses import replace
 
 import numpy as np
 
-from postproc.accuracy.base_shift import BaseShift
-from postproc.accuracy.batch import Batch
-from postproc.accuracy.counterbalance import Counterbalance
 from postproc.accuracy.diagnosis.library import reduce_some
 from postproc.accuracy.diagnosis.named import LAST_FREE, LONGEST_WINDUP, STEPS
 from postproc.accuracy.diagnosis.projection import Projection
 from postproc.accuracy.diagnosis.score import Score, rank
-from postproc.accuracy.effect import Effect
-from postproc.accuracy.joint_map import SPACING, JointMap
-from postproc.accuracy.load_backlash import LoadBacklash
-from postproc.accuracy.thermal import Thermal
-from postproc.accuracy.tool_shift import ToolShift
-from postproc.accuracy.transmission import Transmission
-from postproc.accuracy.windup import Windup
 from postproc.arrays import Floats
+from postproc.model.effects.base_shift import BaseShift
+from postproc.model.effects.counterbalance import Counterbalance
+from postproc.model.effects.effect import Effect
+from postproc.model.effects.joint_map import SPACING, JointMap
+from postproc.model.effects.load_backlash import LoadBacklash
+from postproc.model.effects.thermal import Thermal
+from postproc.model.effects.tool_shift import ToolShift
+from postproc.model.effects.transmission import Transmission
+from postproc.model.effects.windup import Windup
+from postproc.model.kinematics import Batch
 
 HARDLY = 2.0  # nats
 OFFSETS = np.linspace(-1.0, 1.0, 9)

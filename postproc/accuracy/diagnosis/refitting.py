@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from postproc.accuracy.batch import Batch
 from postproc.accuracy.diagnosis.revision import few, only_arm, revise
 from postproc.accuracy.fit import fit_effects
 from postproc.accuracy.fitted import Fit
-from postproc.accuracy.library import propose
 from postproc.accuracy.measurement import Measurements
-from postproc.accuracy.model import Model
 from postproc.arrays import Floats
 from postproc.exceptions import PostprocError
+from postproc.model.effects import propose
+from postproc.model.kinematics import Batch
+from postproc.model.model import Model
 from postproc.robot.arm import Arm
 
 FEWEST = 12  # rows

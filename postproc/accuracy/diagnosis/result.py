@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 from postproc.accuracy.diagnosis.omnibus import Leftover
-from postproc.accuracy.error_statistics import ErrorStatistics
 from postproc.accuracy.measurement import DroppedRow
 from postproc.arrays import Floats
+from postproc.model.statistics import ErrorStatistics
 
 Verdict = Literal["effect", "noise", "unexplained"]
 

@@ -12,14 +12,14 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from postproc.accuracy.batch import Batch
-from postproc.accuracy.combination import Combination
-from postproc.accuracy.effect import Effect, Parameter
 from postproc.accuracy.fit import fit_effects
 from postproc.accuracy.fitted import Fit
 from postproc.accuracy.measurement import Measurements
-from postproc.accuracy.model import Model
 from postproc.arrays import Floats
+from postproc.model.combination import Combination
+from postproc.model.effects.effect import Effect, Parameter
+from postproc.model.kinematics import Batch
+from postproc.model.model import Model
 
 ROWS_PER_PARAMETER = 2  # rows from which a model is refitted rather than revised
 NOTHING = 1e-6  # share of the largest variance below which a direction is known

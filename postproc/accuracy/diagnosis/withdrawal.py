@@ -11,8 +11,8 @@ from postproc.accuracy.diagnosis.choice import ranking
 from postproc.accuracy.diagnosis.library import Library
 from postproc.accuracy.diagnosis.projection import Projection
 from postproc.accuracy.diagnosis.search import Progress, Search, put_instead, search
-from postproc.accuracy.effect import JointEffect
 from postproc.accuracy.fitted import Fit
+from postproc.model.effects.effect import JointEffect
 
 UNSTEADY = 1e-4  # level at which scatter that follows a law takes its name away
 STANDS_IN = 0.9  # share of the name's evidence that a free form must have

@@ -1,1 +1,0 @@
-"""Error: effects, models, fitting and solving."""

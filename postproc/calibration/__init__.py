@@ -1,0 +1,1 @@
+"""Calibration: measurements in, a model out; and what a model still lacks."""

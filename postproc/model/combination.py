@@ -1,0 +1,132 @@
+"""The sum of effects: one vector of parameters, exact where geometry enters exactly."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from postproc.arrays import Floats
+from postproc.model.effects.effect import Effect, JointEffect, Parameter
+from postproc.model.effects.geometry import Geometry
+from postproc.model.kinematics import NOMINAL, Batch, Deviation
+from postproc.robot.pose import rotation_vector
+
+
+@dataclass(frozen=True)
+class Combination:
+    """Effects whose errors add up; their parameters are laid end to end.
+
+    Geometry and joint errors go through the full kinematics together, so their
+    products are right; other effects are added to the position.
+    """
+
+    effects: tuple[Effect, ...]
+
+    @cached_property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """All parameters, in column order."""
+        return tuple(p for e in self.effects for p in e.parameters())
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        """Names ``effect.parameter`` of all parameters."""
+        return tuple(f"{e.name}.{p.name}" for e in self.effects for p in e.parameters())
+
+    @cached_property
+    def groups(self) -> tuple[str, ...]:
+        """Names ``effect.group`` of the prior group of every parameter."""
+        return tuple(
+            f"{e.name}.{p.group}" for e in self.effects for p in e.parameters()
+        )
+
+    @cached_property
+    def scales(self) -> Floats:
+        """Prior scales before the data rescale them, (p,)."""
+        return np.array([p.scale for p in self.parameters], dtype=float)
+
+    @cached_property
+    def slices(self) -> tuple[slice, ...]:
+        """Columns of every effect."""
+        ends = np.cumsum([0, *(len(e.parameters()) for e in self.effects)])
+        return tuple(slice(int(a), int(b)) for a, b in pairwise(ends))
+
+    def where(self, *origins: str) -> NDArray[np.bool_]:
+        """Tell which parameters belong to effects of the given origins, (p,)."""
+        return np.array(
+            [e.belongs_to() in origins for e in self.effects for _ in e.parameters()],
+            dtype=bool,
+        )
+
+    def shift(self, batch: Batch, p: Floats) -> Floats:
+        """Sum the joint errors of all joint effects, (n, 6) [rad]."""
+        total = np.zeros((len(batch), 6))
+        for effect, part in zip(self.effects, self.slices, strict=True):
+            if isinstance(effect, JointEffect):
+                total += effect.angles(batch, p[part])
+        return total
+
+    def deviation(self, p: Floats) -> Deviation:
+        """Read the geometry's parameters as deviations of the chain."""
+        for effect, part in zip(self.effects, self.slices, strict=True):
+            if isinstance(effect, Geometry):
+                return effect.deviation(p[part])
+        return NOMINAL
+
+    def at(self, batch: Batch, p: Floats) -> Batch:
+        """Return the batch with its kinematics taken at parameters p."""
+        return batch.moved(self.deviation(p), self.shift(batch, p))
+
+    def error(self, batch: Batch, p: Floats) -> Floats:
+        """Sum the errors: actual minus nominal TCP position, (n, 3) [m].
+
+        Args:
+            batch: States with nominal kinematics.
+            p: All parameters, (p,).
+        """
+        return self.error_at(self.at(batch, p), batch, p)
+
+    def error_at(self, at: Batch, batch: Batch, p: Floats) -> Floats:
+        """Sum the errors where the kinematics at parameters p are known already."""
+        error: Floats = at.tcp - batch.tcp
+        for effect, part in zip(self.effects, self.slices, strict=True):
+            if not isinstance(effect, Geometry | JointEffect):
+                error = error + effect.displacement(batch, p[part])
+        return error
+
+    def columns(self, batch: Batch) -> Floats:
+        """Differentiate the error at the batch's kinematics, (n, 3, p)."""
+        if not self.effects:
+            return np.zeros((len(batch), 3, 0))
+        return np.concatenate([e.columns(batch) for e in self.effects], axis=2)
+
+    def turn(self, batch: Batch, p: Floats) -> Floats:
+        """Turn the tool: its rotation from nominal to actual, (n, 3) [rad]."""
+        at = self.at(batch, p).walk.flange
+        turn = rotation_vector(at @ np.swapaxes(batch.walk.flange, 1, 2))
+        for effect, part in zip(self.effects, self.slices, strict=True):
+            if isinstance(effect, Geometry | JointEffect):
+                continue
+            if (columns := effect.rotation_columns(batch)) is not None:
+                turn = turn + columns @ p[part]
+        return turn
+
+    def rotation_columns(self, batch: Batch) -> Floats:
+        """Differentiate the tool's rotation at the batch's kinematics, (n, 3, p)."""
+        out = np.zeros((len(batch), 3, len(self.parameters)))
+        for effect, part in zip(self.effects, self.slices, strict=True):
+            columns = effect.rotation_columns(batch)
+            if columns is not None:
+                out[:, :, part] = columns
+        return out
+
+    def direction_slopes(self, batch: Batch, p: Floats) -> Floats:
+        """Give each joint's position error per unit of direction, (n, 3, 6) [m]."""
+        ones = np.ones_like(batch.states.q)
+        forward = self.shift(batch.arriving(ones), p)
+        backward = self.shift(batch.arriving(-ones), p)
+        slopes: Floats = batch.jacobian * ((forward - backward) / 2)[:, None, :]
+        return slopes

@@ -1,0 +1,89 @@
+"""What an error may depend on: every quantity recorded or planned, by name."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from postproc.arrays import Floats
+from postproc.model.kinematics import Batch
+
+JOINT_KINDS = ("joint", "lambda", "before", "travel", "loop", "torque")
+SHORTEST = 1e-4  # [rad] of a way whose logarithm is taken
+PLAIN = ("speed", "payload", "temperature", "time", "order")
+
+
+def covariate(batch: Batch, name: str) -> Floats:
+    """Look up a covariate by its name, (n,), NaN where it is not known.
+
+    Names are ``joint 5`` (its angle [rad]), ``lambda 5`` (its direction), ``before 5``
+    (its direction at the visit before), ``travel 5`` (since its last reversal
+    [log rad]), ``loop 5`` (between its last two reversals [log rad]), ``torque 5`` (of
+    gravity about it [N m]), ``speed``, ``payload``, ``temperature``, ``time`` and
+    ``order`` (SI units).
+
+    Raises:
+        ValueError: There is no such covariate.
+    """
+    kind, _, number = name.partition(" ")
+    if kind in PLAIN and not number:
+        return np.asarray(getattr(batch.states, kind), dtype=float)
+    if kind in JOINT_KINDS and number in set("123456"):
+        j = int(number) - 1
+        if kind == "joint":
+            return np.asarray(batch.states.q[:, j])
+        if kind == "travel":
+            return np.log(np.maximum(batch.states.travel[:, j], SHORTEST))
+        if kind == "lambda":
+            return np.asarray(batch.states.direction[:, j])
+        if kind == "before":
+            return sides_before(batch, j)
+        if kind == "loop":
+            return np.log(np.maximum(loops(batch, j), SHORTEST))
+        return np.asarray((batch.loads.gravity + batch.loads.payload)[:, j])
+    raise ValueError(f"there is no covariate {name!r}")
+
+
+def unit(name: str) -> str:
+    """Name the unit of a covariate in SI."""
+    kind = name.partition(" ")[0]
+    return {
+        "joint": "rad", "lambda": "1", "before": "1", "travel": "log rad",
+        "loop": "log rad", "torque": "N m", "speed": "m/s",
+        "payload": "kg", "temperature": "deg C", "time": "s", "order": "rows",
+    }[kind]  # fmt: skip
+
+
+def loops(batch: Batch, joint: int) -> Floats:
+    """Measure the way of a joint (from 0) between its last two reversals, (n,) [rad].
+
+    It follows from this visit and the one before it in the visit order; NaN where that
+    one is missing, or a direction or a travel is not known.
+    """
+    s = batch.states
+    order = np.argsort(s.order, kind="stable")
+    q, side = s.q[order, joint], s.direction[order, joint]
+    turn = q - side * s.travel[order, joint]
+    before = np.full(len(q), np.nan)
+    follows = np.diff(s.order[order]) == 1
+    same = side[1:] == side[:-1]
+    before[1:] = np.where(same, q[:-1], turn[:-1])
+    before[1:][~follows | (side[1:] == 0) | (side[:-1] == 0)] = np.nan
+    loop = np.abs(turn - before)
+    still = np.zeros(len(q), dtype=bool)  # on the way that the visit before was on
+    still[1:] = same & follows & (np.abs(turn[1:] - turn[:-1]) < SHORTEST)
+    begun = np.maximum.accumulate(np.where(still, 0, np.arange(len(q))))
+    out = np.empty(len(q))
+    out[order] = loop[begun]
+    return out
+
+
+def sides_before(batch: Batch, joint: int) -> Floats:
+    """Return the direction of a joint (from 0) at the visit before, NaN if missing."""
+    s = batch.states
+    order = np.argsort(s.order, kind="stable")
+    before = np.full(len(order), np.nan)
+    follows = np.diff(s.order[order]) == 1
+    before[1:] = np.where(follows, s.direction[order, joint][:-1], np.nan)
+    out = np.empty(len(order))
+    out[order] = before
+    return out

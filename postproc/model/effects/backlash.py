@@ -1,0 +1,31 @@
+"""Backlash: a joint stands on one flank of its gear or on the other."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from postproc.arrays import Floats
+from postproc.model.effects.effect import JointEffect, Parameter
+from postproc.model.kinematics import Batch
+
+SCALE = 1e-4  # [rad] prior scale of half a backlash
+
+
+@dataclass(frozen=True)
+class Backlash(JointEffect):
+    """Joint error lambda * b: half the gap, on the side that the joint comes from."""
+
+    name: ClassVar[str] = "backlash"
+    direct: ClassVar[bool] = True
+
+    joints: tuple[int, ...] = (1, 2, 3, 4, 5, 6)
+
+    def parameters(self) -> tuple[Parameter, ...]:
+        """Name one b per joint."""
+        return tuple(Parameter(f"b{j}", "rad", SCALE, "b", j) for j in self.joints)
+
+    def basis(self, batch: Batch) -> Floats:
+        """Evaluate lambda, (n, p)."""
+        side: Floats = batch.states.direction[:, self.acts_on()]
+        return side

@@ -1,0 +1,116 @@
+"""Backlash that varies along the gear: lambda * (b0 + Fourier(theta))."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from postproc.arrays import Floats
+from postproc.kernels import native
+from postproc.model.effects.effect import FAR, JointEffect, Parameter, fade_turns
+from postproc.model.kinematics import Batch
+from postproc.robot.arm import Arm
+from postproc.robot.state import States
+
+SCALE = 5e-5  # [rad]
+
+
+@dataclass(frozen=True)
+class BacklashProfile(JointEffect):
+    """Joint error lambda * (b0 + sum_k s_k sin(k theta) + c_k cos(k theta)).
+
+    Attributes:
+        joints: Joints that have a profile.
+        orders: Orders k.
+        constant: Whether b0 belongs to it; not where `backlash` holds it already.
+        lower, upper: Surveyed range of every joint [rad]; the profile fades outside.
+    """
+
+    name: ClassVar[str] = "backlash_profile"
+    direct: ClassVar[bool] = True
+
+    joints: tuple[int, ...] = (1, 2, 3, 4, 5, 6)
+    orders: tuple[int, ...] = (1, 2, 3)
+    constant: bool = False
+    lower: tuple[float, ...] = (-FAR,) * 6
+    upper: tuple[float, ...] = (FAR,) * 6
+
+    @classmethod
+    def propose(cls, arm: Arm, states: States) -> Self:
+        """Remember the surveyed range."""
+        low, high = states.q.min(axis=0), states.q.max(axis=0)
+        return cls(lower=tuple(map(float, low)), upper=tuple(map(float, high)))
+
+    def parameters(self) -> tuple[Parameter, ...]:
+        """Name b0 and the harmonics of every joint."""
+        out = []
+        for j in self.joints:
+            if self.constant:
+                out.append(Parameter(f"b{j}_0", "rad", 2 * SCALE, "order 0", j))
+            for k in self.orders:
+                for wave in ("sin", "cos"):
+                    name = f"b{j}_{wave}{k}"
+                    out.append(Parameter(name, "rad", SCALE, f"order {k}", j))
+        return tuple(out)
+
+    def basis(self, batch: Batch) -> Floats:
+        """Evaluate lambda times the harmonics, (n, p)."""
+        joint, waves = self.acts_on(), batch.once(self, self._waves)
+        flat = waves.reshape(len(joint), len(batch))
+        turned: Floats = batch.states.direction.T[joint] * flat
+        return turned.T
+
+    def angles(self, batch: Batch, p: Floats) -> Floats:
+        """Return the joint errors (n, 6) [rad], summed joint by joint."""
+        if native is not None and self.joints and self._is_ordered:
+            sizes = p.reshape(len(self.joints), -1)
+            states = batch.states.q, batch.states.direction
+            found: Floats = native.profile(
+                tuple(map(np.ascontiguousarray, states)), self._turned.tolist(),
+                self.orders, self.constant, sizes, (self.lower, self.upper),
+            )  # fmt: skip
+            return found
+        waves = batch.once(self, self._waves)
+        sizes = p.reshape(*waves.shape[:2], 1)
+        profile = np.zeros((len(self.joints), len(batch)))
+        for k in range(waves.shape[1]):
+            profile += sizes[:, k] * waves[:, k]
+        out = np.zeros((len(batch), 6))
+        out[:, self._turned] = profile.T
+        return out * batch.states.direction
+
+    @property
+    def _turned(self) -> NDArray[np.int64]:
+        """Return the 0-based joints that have a profile, (j,)."""
+        return np.array(self.joints, dtype=int) - 1
+
+    @property
+    def _is_ordered(self) -> bool:
+        """Tell whether every order is a harmonic, and named once."""
+        return (
+            len(set(self.orders)) == len(self.orders)
+            and min(self.orders, default=1) > 0
+        )
+
+    def _waves(self, q: Floats) -> Floats:
+        """Evaluate b0 and the harmonics of every joint, (j, m, n), as far as surveyed.
+
+        Sine and cosine of k theta come from those of (k - 1) theta, which takes a
+        quarter of the time and is as good but for the last digit.
+        """
+        angle = np.ascontiguousarray(q[:, self._turned].T)
+        waves = np.ones((len(angle), self.constant + 2 * len(self.orders), len(q)))
+        sin, cos = np.sin(angle), np.cos(angle)
+        s, c = np.zeros_like(sin), np.ones_like(cos)
+        for k in range(1, max(self.orders, default=0) + 1):
+            s, c = s * cos + c * sin, c * cos - s * sin
+            if k in self.orders:
+                at = self.constant + 2 * self.orders.index(k)
+                waves[:, at], waves[:, at + 1] = s, c
+        within = fade_turns(q, np.array(self.lower), np.array(self.upper))
+        if (within != 1.0).any():
+            waves[:, int(self.constant) :] *= within.T[self._turned, None]
+        return waves

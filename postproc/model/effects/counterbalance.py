@@ -1,0 +1,50 @@
+"""Counterbalance: axis 2 yields to its balancing spring."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from postproc.arrays import Floats
+from postproc.model.effects.effect import JointEffect, Parameter
+from postproc.model.kinematics import Batch
+
+SCALE = 2e-4  # [rad] at the spring's largest torque
+
+
+@dataclass(frozen=True)
+class Counterbalance(JointEffect):
+    """Axis 2 yields to a spring between a fixed pin and one that turns with axis 2.
+
+    With r the moving pin's radius over the fixed pin's, u the angle from where both
+    pins align, and length L(u) = sqrt(1 + r^2 - 2 r cos u), the torque follows
+    (L - (1 - r) + preload) r sin(u) / L: spring travel times lever.
+
+    Attributes:
+        ratio: r.
+        upright: Angle of axis 2 where the pins align [rad].
+        preload: Travel of the spring at its shortest, in units of the fixed radius.
+    """
+
+    name: ClassVar[str] = "counterbalance"
+
+    ratio: float = 0.4
+    upright: float = 0.0
+    preload: float = 0.2
+
+    def parameters(self) -> tuple[Parameter, ...]:
+        """Name the size, at u = 90 deg."""
+        return (Parameter("c2", "rad", SCALE, "2", 2),)
+
+    def basis(self, batch: Batch) -> Floats:
+        """Evaluate the spring's torque, 1 at u = 90 deg, (n, 1)."""
+        u = batch.states.q[:, 1] - self.upright
+        return np.asarray((self._torque(u) / self._torque(np.pi / 2))[:, None])
+
+    def _torque(self, u: Floats | float) -> Floats:
+        """Give the torque at angles u [rad], in units of the spring."""
+        r = self.ratio
+        length = np.sqrt(1 + r**2 - 2 * r * np.cos(u))
+        return np.asarray((length - (1 - r) + self.preload) * r * np.sin(u) / length)

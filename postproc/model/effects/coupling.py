@@ -1,0 +1,40 @@
+"""Coupling: a joint is dragged along by another one."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from postproc.arrays import Floats
+from postproc.model.effects.effect import JointEffect, Parameter
+from postproc.model.kinematics import Batch
+
+SCALE = 5e-5  # [rad/rad]
+
+
+@dataclass(frozen=True)
+class Coupling(JointEffect):
+    """Error of one joint c * theta of another, as through a hollow wrist's gears.
+
+    Attributes:
+        pairs: (receiving joint, driving joint) of every coupling.
+    """
+
+    name: ClassVar[str] = "coupling"
+
+    pairs: tuple[tuple[int, int], ...] = ((3, 2), (5, 4), (6, 4), (6, 5))
+
+    def parameters(self) -> tuple[Parameter, ...]:
+        """Name one factor per pair: c<receiving>_<driving>."""
+        return tuple(
+            Parameter(f"c{j}_{k}", "rad/rad", SCALE, f"{j} by {k}", j)
+            for j, k in self.pairs
+        )
+
+    def basis(self, batch: Batch) -> Floats:
+        """Evaluate the driving angles, (n, p)."""
+        driving = np.array([k - 1 for _, k in self.pairs], dtype=int)
+        theta: Floats = batch.states.q[:, driving]
+        return theta

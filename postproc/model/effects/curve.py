@@ -1,0 +1,125 @@
+"""Curve: a free smooth function of any covariates, in any one direction."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import product
+from typing import ClassVar
+
+import numpy as np
+
+from postproc.arrays import Floats
+from postproc.model.covariate import covariate
+from postproc.model.effects.effect import Effect, Origin, Parameter, fade
+from postproc.model.kinematics import Batch
+
+TURN, SHIFT = 1e-4, 1e-4  # [rad], [m]
+TERMS_ALONE, TERMS_OF_TWO, TERMS_OF_WHOLE = 8, 3, 5
+
+
+@dataclass(frozen=True)
+class Curve(Effect):
+    """Error along one direction, a penalised curve of one or two covariates.
+
+    The curve is a sum of Legendre polynomials over the covariate's range, whose prior
+    falls with the square of their degree, as a penalty on curvature makes it.
+    Of two covariates only what is no sum of two curves belongs to it, unless it is
+    whole.
+
+    Attributes:
+        direction: "joint 3" turns joint 3; "base x" and "tool x" shift the TCP along
+            an axis.
+        source: Names of one or two covariates.
+        lower, upper: Their ranges; outside, the curve fades to zero.
+        signed: Whether it is multiplied by the joint's arrival direction.
+        whole: Whether functions of each of two covariates alone belong to it.
+    """
+
+    name: ClassVar[str] = "curve"
+    origin: ClassVar[Origin] = "arm"
+
+    direction: str = "joint 1"
+    source: tuple[str, ...] = ("joint 1",)
+    lower: tuple[float, ...] = (-np.pi,)
+    upper: tuple[float, ...] = (np.pi,)
+    signed: bool = False
+    whole: bool = False
+
+    def belongs_to(self) -> Origin:
+        """Follow the covariate: what only a survey has is never compensated."""
+        if any(name in ("time", "order") for name in self.source):
+            return "setup"
+        states = any(name in ("temperature", "payload") for name in self.source)
+        return "state" if states else "arm"
+
+    def requires(self) -> tuple[str, ...]:
+        """Need the covariates that a program does not tell."""
+        told = ("temperature", "payload", "speed")
+        return tuple(name for name in self.source if name in told)
+
+    def _orders(self) -> list[tuple[int, ...]]:
+        """List the degrees of every term."""
+        if len(self.source) == 1:
+            return [(k,) for k in range(1, TERMS_ALONE + 1)]
+        if not self.whole:
+            return list(product(range(1, TERMS_OF_TWO + 1), repeat=2))
+        pairs = product(range(TERMS_OF_WHOLE + 1), repeat=2)
+        return [k for k in pairs if 0 < sum(k) <= TERMS_OF_WHOLE]
+
+    def parameters(self) -> tuple[Parameter, ...]:
+        """Name the terms by their degrees."""
+        kind, _, which = self.direction.partition(" ")
+        turns = kind == "joint"
+        scale, unit = (TURN, "rad") if turns else (SHIFT, "m")
+        what = f"{self.direction} by {' x '.join(self.source)}"
+        what += " signed" if self.signed else ""
+        return tuple(
+            Parameter(
+                f"{what} {'.'.join(map(str, k))}", unit,
+                scale / sum(i * i for i in k), what, int(which) if turns else None,
+            )
+            for k in self._orders()
+        )  # fmt: skip
+
+    def shape(self, batch: Batch) -> Floats:
+        """Evaluate the terms without their direction in space, (n, p)."""
+        from scipy.special import eval_legendre  # slow to load, and seldom wanted
+
+        value, inside = np.ones((len(batch), len(self._orders()))), np.ones(len(batch))
+        order = np.array(self._orders())
+        for k, name in enumerate(self.source):
+            low, high = self.lower[k], self.upper[k]
+            x = covariate(batch, name)
+            inside *= np.nan_to_num(fade(x, np.array(low), np.array(high)))
+            u = np.clip((np.nan_to_num(x) - low) / max(high - low, 1e-12), 0, 1)
+            value *= eval_legendre(order[:, k], 2.0 * u[:, None] - 1.0)
+        return np.asarray(value * inside[:, None])
+
+    def columns(self, batch: Batch) -> Floats:
+        """Differentiate the TCP position, (n, 3, p)."""
+        return self._along(batch, self._axis(batch))
+
+    def rotation_columns(self, batch: Batch) -> Floats | None:
+        """Differentiate the tool's rotation, (n, 3, p)."""
+        kind, _, which = self.direction.partition(" ")
+        if kind != "joint":
+            return None
+        return self._along(batch, batch.angular[:, :, int(which) - 1])
+
+    def _along(self, batch: Batch, axis: Floats) -> Floats:
+        """Multiply a direction per unit (n, 3) by the terms, (n, 3, p)."""
+        if self.signed:
+            joint = int(self.direction.split()[1]) - 1
+            axis = axis * batch.states.direction[:, joint : joint + 1]
+        columns: Floats = axis[:, :, None] * self.shape(batch)[:, None, :]
+        return columns
+
+    def _axis(self, batch: Batch) -> Floats:
+        """Return the direction's displacement per unit, (n, 3)."""
+        kind, _, which = self.direction.partition(" ")
+        if kind == "joint":
+            return np.asarray(batch.jacobian[:, :, int(which) - 1])
+        k = "xyz".index(which)
+        if kind == "tool":
+            return np.asarray(batch.walk.flange[:, :, k])
+        return np.tile(np.eye(3)[k], (len(batch), 1))

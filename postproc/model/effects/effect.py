@@ -1,0 +1,176 @@
+"""What an effect is: a named cause of error, linear in named parameters.
+
+The error of an arm is a sum of effects, error(state) = sum_k X_k(state) p_k, measured
+as actual minus nominal TCP position for the commanded joints, in the base frame.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass, fields
+from functools import cached_property
+from typing import Any, ClassVar, Literal, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from postproc.arrays import Floats
+from postproc.model.kinematics import Batch
+from postproc.robot.arm import Arm
+from postproc.robot.state import States
+
+Origin = Literal["arm", "state", "setup"]
+
+FAR = 1e3  # [rad] a joint angle that no arm reaches: no range is known
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One unknown of an effect.
+
+    Attributes:
+        name: Unique within its effect, for instance ``theta4``.
+        unit: SI unit.
+        scale: Prior standard deviation in that unit, before the data rescale it.
+        group: Parameters of a group share one data-driven factor on their scales.
+        joint: Joint number 1 to 6 that it acts on, or None.
+    """
+
+    name: str
+    unit: str
+    scale: float
+    group: str
+    joint: int | None = None
+
+
+@dataclass(frozen=True)
+class Effect(ABC):
+    """One cause of error. Subclasses are frozen dataclasses of plain settings.
+
+    Class attributes:
+        name: Name in model files and reports.
+        origin: "arm" is compensated; "state" is compensated for the state that the cell
+            declares; "setup" is fitted and never compensated.
+        needs: Covariates of `States` without which the effect cannot be evaluated.
+        direct: True where the effect is odd in the arrival direction.
+    """
+
+    name: ClassVar[str]
+    origin: ClassVar[Origin] = "arm"
+    needs: ClassVar[tuple[str, ...]] = ()
+    direct: ClassVar[bool] = False
+
+    @classmethod
+    def propose(cls, arm: Arm, states: States) -> Self:
+        """Make the effect with the settings that fit an arm and a survey."""
+        return cls()
+
+    def belongs_to(self) -> Origin:
+        """Say what it is of, where that depends on the settings."""
+        return self.origin
+
+    def requires(self) -> tuple[str, ...]:
+        """List what it needs, where that depends on the settings."""
+        return self.needs
+
+    @abstractmethod
+    def parameters(self) -> tuple[Parameter, ...]:
+        """Name the p parameters, in the order of the columns."""
+
+    @abstractmethod
+    def columns(self, batch: Batch) -> Floats:
+        """Differentiate the TCP position: (n, 3, p) [m per unit], base frame."""
+
+    def rotation_columns(self, batch: Batch) -> Floats | None:
+        """Differentiate the tool's rotation: (n, 3, p) [rad per unit], None if 0."""
+        return None
+
+    def displacement(self, batch: Batch, p: Floats) -> Floats:
+        """Move the TCP: (n, 3) [m] for parameters p."""
+        moved: Floats = self.columns(batch) @ p
+        return moved
+
+    def settings(self) -> dict[str, Any]:
+        """Return the settings as plain data, for a model file."""
+        return {f.name: getattr(self, f.name) for f in fields(self)}
+
+
+@dataclass(frozen=True)
+class JointEffect(Effect):
+    """An effect that turns joints: columns are J_j(q) phi(covariate)."""
+
+    @abstractmethod
+    def basis(self, batch: Batch) -> Floats:
+        """Evaluate phi: the angle of each parameter's joint, (n, p) [rad per unit]."""
+
+    def acts_on(self) -> NDArray[np.int64]:
+        """Return the 0-based joint that each parameter turns, (p,)."""
+        return self._acts_on
+
+    @cached_property
+    def _acts_on(self) -> NDArray[np.int64]:
+        """Find them once: a program asks some hundred times."""
+        return np.array([(p.joint or 1) - 1 for p in self.parameters()], dtype=int)
+
+    def columns(self, batch: Batch) -> Floats:
+        """Differentiate the TCP position: (n, 3, p) [m per unit]."""
+        return self._about(batch.jacobian, batch)
+
+    def rotation_columns(self, batch: Batch) -> Floats:
+        """Differentiate the tool's rotation: (n, 3, p) [rad per unit]."""
+        return self._about(batch.angular, batch)
+
+    def _about(self, joints: Floats, batch: Batch) -> Floats:
+        """Turn the joints, (n, 3, 6) per unit, by each parameter, (n, 3, p)."""
+        columns: Floats = joints.T[self.acts_on()] * self.basis(batch).T[:, None]
+        return columns.T
+
+    def angles(self, batch: Batch, p: Floats) -> Floats:
+        """Return the joint errors (n, 6) [rad] for parameters p."""
+        out = np.zeros((len(batch), 6))
+        turned = self.basis(batch) * p
+        for joints, columns in self._layers:
+            out[:, joints] += turned[:, columns]
+        return out
+
+    @cached_property
+    def _layers(self) -> list[tuple[NDArray[np.int64], NDArray[np.int64]]]:
+        """Name the first parameter of every joint, then the second ones, .."""
+        acts_on = self.acts_on()
+        nth = np.array(
+            [np.count_nonzero(acts_on[:k] == j) for k, j in enumerate(acts_on)]
+        )
+        columns = [np.flatnonzero(nth == k) for k in range(nth.max(initial=-1) + 1)]
+        return [(acts_on[c], c) for c in columns]
+
+
+def fade(x: Floats, lower: Floats, upper: Floats) -> Floats:
+    """Return 1 inside [lower, upper], falling smoothly to 0 a tenth outside.
+
+    Free-form parts are multiplied by it: outside the training range they know nothing.
+
+    >>> fade(np.array([0.5, 1.05, 2.0]), np.array(0.0), np.array(1.0)).tolist()
+    [1.0, 0.5, 0.0]
+    """
+    width = np.maximum(0.1 * (upper - lower), 1e-9)
+    out = np.maximum(np.maximum(lower - x, x - upper), 0.0) / width
+    t = np.clip(out, 0.0, 1.0)
+    faded: Floats = np.round(1.0 - t * t * (3.0 - 2.0 * t), 12)
+    return faded
+
+
+def fade_turns(q: Floats, lower: Floats, upper: Floats) -> Floats:
+    """Fade what repeats with every turn: an angle counts as its nearest turn's.
+
+    >>> fade_turns(np.array([0.1 + 2 * np.pi]), np.array(0.0), np.array(1.0)).tolist()
+    [1.0]
+    """
+    out = np.ones(np.broadcast_shapes(q.shape, lower.shape))
+    odd = ~((q >= lower) & (q <= upper))  # most are inside as they are
+    if odd.any():
+        x, low, high = (np.broadcast_to(a, odd.shape)[odd] for a in (q, lower, upper))
+        middle = (low + high) / 2
+        near = middle + np.mod(x - middle + np.pi, 2 * np.pi) - np.pi
+        whole = high - low > 0.95 * 2 * np.pi
+        out[odd] = np.where(whole, 1.0, fade(near, low, high))
+    return out

@@ -1,0 +1,122 @@
+"""Geometry: the placement errors of base, joints and tool."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar, Self
+
+import numpy as np
+
+from postproc.arrays import Floats
+from postproc.model.effects.effect import Effect, Parameter
+from postproc.model.kinematics import Batch, Deviation
+from postproc.robot.arm import Arm
+from postproc.robot.pose import cross
+from postproc.robot.state import States
+
+AXES = ("x", "y", "z")
+KINDS = ("a", "d", "alpha", "theta", "beta")
+LENGTH, ANGLE = 1e-3, 1e-3  # [m], [rad] prior scales of a new arm
+
+
+@dataclass(frozen=True)
+class Geometry(Effect):
+    """D-H errors of every joint, Hayati's beta where D-H is incomplete, base and tool.
+
+    The set is complete and not minimal: what the data cannot tell apart is shared
+    according to the prior scales. Base and joint 1, tool and joint 6 are such gauges.
+
+    Attributes:
+        beta: Joints (1 to 6) that have a beta: those whose next axis is nearly
+            parallel, and the last, so that the flange may turn about every axis.
+        base: Whether the base may be misplaced. Where the base frame is only known
+            through the arm itself, base, d1 and theta1 are nothing by definition.
+    """
+
+    name: ClassVar[str] = "geometry"
+
+    beta: tuple[int, ...] = (2, 6)
+    base: bool = True
+
+    @classmethod
+    def propose(cls, arm: Arm, states: States) -> Self:
+        """Give a beta to the joints whose next axis is parallel, and to the last."""
+        parallel = np.abs(np.sin(arm.dh.alpha)) < 0.2
+        parallel[5] = True
+        return cls(beta=tuple(int(j) + 1 for j in np.flatnonzero(parallel)))
+
+    @property
+    def links(self) -> list[tuple[int, int]]:
+        """List (joint, kind) of the link parameters."""
+        return [
+            (j, k)
+            for j in range(6)
+            for k in range(5)
+            if (k < 4 or (j + 1) in self.beta)
+            and (self.base or j > 0 or KINDS[k] not in ("d", "theta"))
+        ]
+
+    def parameters(self) -> tuple[Parameter, ...]:
+        """Name base, link and tool parameters."""
+        base = [Parameter(f"base_{a}", "m", LENGTH, "base shift") for a in AXES]
+        base += [Parameter(f"base_r{a}", "rad", ANGLE, "base turn") for a in AXES]
+        links = [
+            Parameter(f"{KINDS[k]}{j + 1}", "m", LENGTH, "length", j + 1)
+            if k < 2
+            else Parameter(f"{KINDS[k]}{j + 1}", "rad", ANGLE, "angle", j + 1)
+            for j, k in self.links
+        ]
+        tool = [Parameter(f"tool_{a}", "m", LENGTH, "tool") for a in AXES]
+        return (*(base if self.base else []), *links, *tool)
+
+    def deviation(self, p: Floats) -> Deviation:
+        """Read parameters (p,) as deviations of the chain."""
+        p = np.asarray(p, dtype=float)
+        base = p[:6] if self.base else np.zeros(6)
+        rest = p[6:] if self.base else p
+        link = np.zeros((6, 5))
+        for value, (j, k) in zip(rest, self.links, strict=False):
+            link[j, k] = value
+        return Deviation(np.array(base), link, np.array(rest[-3:]))
+
+    def _kind(
+        self, batch: Batch, kind: int, joint: int
+    ) -> tuple[Floats, Floats | None]:
+        """Return the axis (n, 3) of a link motion and, if it is a turn, its point."""
+        w = batch.walk
+        axis = (w.link, w.turn, w.link, w.turn, w.bend)[kind][:, joint]
+        point = (None, None, w.corner, w.pivot, w.corner)[kind]
+        return axis, None if point is None else point[:, joint]
+
+    def columns(self, batch: Batch) -> Floats:
+        """Differentiate the TCP position at the batch's deviation, (n, 3, p)."""
+        w, n = batch.walk, len(batch)
+        columns = []
+        if self.base:
+            columns += [np.tile(np.eye(3)[k], (n, 1)) for k in range(3)]
+            lever = w.tcp - w.base_point
+            columns += [cross(w.base_axes[k], lever) for k in range(3)]
+        for j, k in self.links:
+            axis, point = self._kind(batch, k, j)
+            columns.append(axis if point is None else cross(axis, w.tcp - point))
+        columns += [w.flange[:, :, k] for k in range(3)]
+        return np.stack([column.T for column in columns]).T
+
+    def rotation_columns(self, batch: Batch) -> Floats:
+        """Differentiate the tool's rotation, (n, 3, p) [rad per unit]."""
+        w, n = batch.walk, len(batch)
+        still = np.zeros((n, 3))
+        columns = []
+        if self.base:
+            columns += [still] * 3
+            columns += [np.tile(w.base_axes[k], (n, 1)) for k in range(3)]
+        for j, k in self.links:
+            axis, point = self._kind(batch, k, j)
+            columns.append(still if point is None else axis)
+        columns += [still] * 3
+        return np.stack(columns, axis=-1)
+
+    def displacement(self, batch: Batch, p: Floats) -> Floats:
+        """Move the TCP exactly: full kinematics with deviations against without."""
+        moved: Floats = batch.moved(self.deviation(p), batch.shift).walk.tcp
+        return moved - batch.walk.tcp

@@ -1,0 +1,85 @@
+"""Joint spline: the whole error of a joint along its angle, for long surveys.
+
+Where `joint_map` finds a place, this resolves every gear and encoder wave that the rows
+can show, without naming them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar, Self
+
+import numpy as np
+
+from postproc.arrays import Floats
+from postproc.model.effects.effect import JointEffect, Parameter, fade
+from postproc.model.effects.smooth import smooth_columns, smooth_count
+from postproc.model.kinematics import Batch
+from postproc.robot.arm import Arm
+from postproc.robot.state import States
+
+SCALE = 1e-4  # [rad]
+LONG = np.deg2rad(60.0)
+SHORTEST = np.deg2rad(5.0)
+ROWS_A_LENGTH = 20.0  # rows that the shortest length must see
+LEAST_RANGE = np.deg2rad(10.0)
+
+
+@dataclass(frozen=True)
+class JointSpline(JointEffect):
+    """Joint error f(theta), a sum of smooth functions at a long and a short length.
+
+    Attributes:
+        joints: Joints that have one.
+        lower, upper: Surveyed range of every joint [rad]; outside, f fades to zero.
+        lengths: Correlation lengths [rad]; the data share f among them.
+    """
+
+    name: ClassVar[str] = "joint_spline"
+
+    joints: tuple[int, ...] = (1, 2, 3, 4, 5, 6)
+    lower: tuple[float, ...] = (-np.pi,) * 6
+    upper: tuple[float, ...] = (np.pi,) * 6
+    lengths: tuple[float, ...] = (LONG, 3 * SHORTEST)
+
+    @classmethod
+    def propose(cls, arm: Arm, states: States) -> Self:
+        """Resolve as much as the number of rows allows, on every joint that moved."""
+        low, high = states.q.min(axis=0), states.q.max(axis=0)
+        span = high - low
+        short = ROWS_A_LENGTH * float(span.max()) / max(len(states), 1)
+        short = float(np.clip(short, SHORTEST, LONG / 2))
+        return cls(
+            joints=tuple(int(j) + 1 for j in np.flatnonzero(span > LEAST_RANGE)),
+            lower=tuple(map(float, low)),
+            upper=tuple(map(float, high)),
+            lengths=(LONG, short),
+        )
+
+    def _parts(self) -> list[tuple[int, float]]:
+        """List joints (from 0) with lengths."""
+        return [(j - 1, length) for j in self.joints for length in self.lengths]
+
+    def parameters(self) -> tuple[Parameter, ...]:
+        """Name the columns of every joint and length."""
+        out = []
+        for j, length in self._parts():
+            count = smooth_count(self.lower[j], self.upper[j], length)
+            wide = f"{np.rad2deg(length):.1f} deg"
+            for k in range(count):
+                name = f"f{j + 1} {wide} {k + 1}"
+                out.append(
+                    Parameter(name, "rad", SCALE, f"joint {j + 1} {wide}", j + 1)
+                )
+        return tuple(out)
+
+    def basis(self, batch: Batch) -> Floats:
+        """Evaluate the functions, (n, p)."""
+        q = batch.states.q
+        inside = fade(q, np.array(self.lower), np.array(self.upper))
+        columns = [
+            smooth_columns(q[:, j], self.lower[j], self.upper[j], length)
+            * inside[:, j, None]
+            for j, length in self._parts()
+        ]
+        return np.concatenate(columns, axis=1)

@@ -1,0 +1,40 @@
+"""Lag: a joint trails its command in proportion to the speed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from postproc.arrays import Floats
+from postproc.model.effects.effect import JointEffect, Parameter
+from postproc.model.kinematics import Batch
+
+SCALE = 2e-4  # [rad s/m]
+
+
+@dataclass(frozen=True)
+class Lag(JointEffect):
+    """Joint error lambda * k * speed of the TCP on arrival; 0 where it is not known.
+
+    Attributes:
+        joints: Joints that lag.
+    """
+
+    name: ClassVar[str] = "lag"
+    direct: ClassVar[bool] = True
+    needs: ClassVar[tuple[str, ...]] = ("speed",)
+
+    joints: tuple[int, ...] = (1, 2, 3, 4, 5, 6)
+
+    def parameters(self) -> tuple[Parameter, ...]:
+        """Name one k per joint."""
+        return tuple(
+            Parameter(f"k{j}", "rad s/m", SCALE, f"{j}", j) for j in self.joints
+        )
+
+    def basis(self, batch: Batch) -> Floats:
+        """Evaluate lambda * speed [m/s], (n, p)."""
+        speed = np.nan_to_num(batch.states.speed)[:, None]
+        return np.asarray(batch.states.direction[:, self.acts_on()] * speed)

@@ -1,0 +1,72 @@
+"""Load-dependent backlash: lost motion that follows the load on the teeth."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar, Literal, Self
+
+import numpy as np
+
+from postproc.arrays import Floats
+from postproc.model.effects.effect import JointEffect, Parameter
+from postproc.model.kinematics import Batch
+from postproc.robot.arm import Arm
+from postproc.robot.state import States
+
+SCALE = 1e-4  # [rad] at the threshold torque
+UNSURE = 0.2  # of the power of the load, and of torque against t0
+
+
+@dataclass(frozen=True)
+class LoadBacklash(JointEffect):
+    """Lost motion that grows with the gravity torque, or a flank that it chooses.
+
+    Attributes:
+        joints: Joints that have it.
+        form: "load": lambda * b * |torque / t0|, with a column for a power other
+            than 1. "signed": lambda * b * tanh(torque / t0), a gap that a load one
+            way opens and a load the other way closes. "gravity_side": b *
+            tanh(torque / t0), the flank that a preloaded gear rests on whatever the
+            direction. The last two have a column for an offset of the torque.
+        t0: Torque [N m].
+    """
+
+    name: ClassVar[str] = "load_backlash"
+    direct: ClassVar[bool] = True
+
+    joints: tuple[int, ...] = (2, 3, 5)
+    form: Literal["load", "signed", "gravity_side"] = "load"
+    t0: float = 1000.0
+
+    @classmethod
+    def propose(cls, arm: Arm, states: States) -> Self:
+        """Take the typical torque of the joints that carry weight."""
+        torque = np.abs(arm.gravity_torque(states.q)[:, [1, 2, 4]])
+        return cls(t0=max(float(np.median(torque)), 1.0))
+
+    def parameters(self) -> tuple[Parameter, ...]:
+        """Name size and correction of the law, joint by joint."""
+        second = "power" if self.form == "load" else "offset"
+        out = []
+        for j in self.joints:
+            group = f"{j} {self.form} {self.t0:.4g}"
+            out.append(Parameter(f"b{j}_{self.form}", "rad", SCALE, group, j))
+            name = f"b{j}_{second}"
+            name += "" if self.form == "load" else f"_{self.form}"
+            out.append(Parameter(name, "rad", UNSURE * SCALE, group, j))
+        return tuple(out)
+
+    def basis(self, batch: Batch) -> Floats:
+        """Evaluate the laws and their corrections, (n, p)."""
+        joint = np.array(self.joints) - 1
+        torque = (batch.loads.gravity + batch.loads.payload)[:, joint] / self.t0
+        side = batch.states.direction[:, joint]
+        if self.form == "load":
+            size = np.abs(torque)
+            law = side * size
+            second = law * np.log(np.maximum(size, 1e-6))
+        else:
+            sign = side if self.form == "signed" else np.ones_like(side)
+            law = np.tanh(torque)
+            law, second = sign * law, sign * (1.0 - law**2)
+        return np.stack([law, second], axis=2).reshape(len(batch), 2 * len(joint))

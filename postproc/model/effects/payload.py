@@ -1,0 +1,64 @@
+"""Payload: a joint yields to the payload, beyond what its own weight does."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from postproc.arrays import Floats
+from postproc.model.effects.compliance import AXES, SCALE, UNSURE_PAYLOAD
+from postproc.model.effects.effect import JointEffect, Origin, Parameter
+from postproc.model.kinematics import Batch
+
+UNSURE_LEVER = 0.5  # [m] along the links of an arm of this size
+
+
+@dataclass(frozen=True)
+class Payload(JointEffect):
+    """Joint error payload torque / stiffness, with levers that the data may correct.
+
+    A structure that bends under a load does not turn its joints quite as the torque
+    about them says, so levers along the joint's own link and the next one are columns
+    too, besides the payload's centre of mass.
+
+    Attributes:
+        joints: Joints that yield.
+    """
+
+    name: ClassVar[str] = "payload"
+    origin: ClassVar[Origin] = "state"
+    needs: ClassVar[tuple[str, ...]] = ("payload",)
+
+    joints: tuple[int, ...] = (2, 3, 5)
+
+    def _places(self, joint: int) -> list[tuple[str, int, float]]:
+        """List name, link and standard deviation [m] of a joint's levers."""
+        links = range(joint, min(joint + 2, 6))
+        own = [(f"lever{link}", link, UNSURE_LEVER) for link in links]
+        return [*own, ("com", 6, UNSURE_PAYLOAD)]
+
+    def parameters(self) -> tuple[Parameter, ...]:
+        """Name softness, and softness times the change of every lever."""
+        out = []
+        for j in self.joints:
+            out.append(Parameter(f"k{j}", "rad/(N m)", SCALE, f"{j}", j))
+            out += [
+                Parameter(f"k{j}_{name}_{a}", "rad/N", SCALE * spread, f"{j}", j)
+                for name, _, spread in self._places(j)
+                for a in AXES
+            ]
+        return tuple(out)
+
+    def basis(self, batch: Batch) -> Floats:
+        """Evaluate the payload's torque, and that per metre of every lever, (n, p)."""
+        unit = batch.loads.basis.reshape(len(batch), 6, 6, 4)
+        mass = np.nan_to_num(batch.states.payload)[:, None]
+        columns = []
+        for j in self.joints:
+            columns.append(batch.loads.payload[:, j - 1 : j])
+            columns += [
+                mass * unit[:, j - 1, link - 1, 1:] for _, link, _ in self._places(j)
+            ]
+        return np.concatenate(columns, axis=1)

@@ -1,0 +1,64 @@
+"""What a registration is off by: tracker and probe points.
+
+Both are found from the same rows as the model, coarsely before the fit, then finely
+as this effect of the set-up beside the arm's own.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from postproc.arrays import Floats
+from postproc.model.effects.base_shift import rigid_columns, rigid_rotations
+from postproc.model.effects.effect import Effect, Origin, Parameter
+from postproc.model.kinematics import Batch
+from postproc.robot.arm import Arm
+from postproc.robot.state import States
+
+SHIFT, TURN = 3e-3, 3e-3  # [m], [rad] how far off the coarse registration may be
+
+
+@dataclass(frozen=True)
+class Placement(Effect):
+    """What the coarse registration is still off by: tracker and probe points.
+
+    It belongs to the set-up: the base frame is only known through the arm itself.
+
+    Attributes:
+        tools: The `tool_id` of the probe points.
+    """
+
+    name: ClassVar[str] = "registration"
+    origin: ClassVar[Origin] = "setup"
+
+    tools: tuple[int, ...] = (0,)
+
+    @classmethod
+    def propose(cls, arm: Arm, states: States) -> Placement:
+        """List the survey's probe points."""
+        return cls(tuple(int(t) for t in np.unique(states.tool_id)))
+
+    def parameters(self) -> tuple[Parameter, ...]:
+        """Name shift and turn of the tracker, then the shift of every point."""
+        out = [Parameter(f"tracker_{a}", "m", SHIFT, "tracker") for a in "xyz"]
+        out += [Parameter(f"tracker_r{a}", "rad", TURN, "tracker") for a in "xyz"]
+        out += [
+            Parameter(f"probe{t}_{a}", "m", SHIFT, "probe")
+            for t in self.tools
+            for a in "xyz"
+        ]
+        return tuple(out)
+
+    def columns(self, batch: Batch) -> Floats:
+        """Differentiate the measured position, (n, 3, 6 + 3 k)."""
+        flange, which = batch.walk.flange, batch.states.tool_id
+        points = [flange * (which == t)[:, None, None] for t in self.tools]
+        return np.concatenate([rigid_columns(batch), *points], axis=2)
+
+    def rotation_columns(self, batch: Batch) -> Floats:
+        """Differentiate the measured orientation, (n, 3, 6 + 3 k)."""
+        still = np.zeros((len(batch), 3, 3 * len(self.tools)))
+        return np.concatenate([rigid_rotations(batch), still], axis=2)

@@ -1,0 +1,47 @@
+"""Probe: every nest of a survey's probe plate sits a little off its nominal place."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar, Self
+
+import numpy as np
+
+from postproc.arrays import Floats
+from postproc.model.effects.effect import Effect, Origin, Parameter
+from postproc.model.kinematics import Batch
+from postproc.robot.arm import Arm
+from postproc.robot.state import States
+
+SCALE = 5e-5  # [m]
+
+
+@dataclass(frozen=True)
+class Probe(Effect):
+    """Shift of every probe point in the flange frame, besides the tool's own.
+
+    Attributes:
+        tools: The `tool_id` of the points.
+    """
+
+    name: ClassVar[str] = "probe"
+    origin: ClassVar[Origin] = "setup"
+
+    tools: tuple[int, ...] = (0,)
+
+    @classmethod
+    def propose(cls, arm: Arm, states: States) -> Self:
+        """List the survey's probe points."""
+        return cls(tuple(int(t) for t in np.unique(states.tool_id)))
+
+    def parameters(self) -> tuple[Parameter, ...]:
+        """Name three shifts per point."""
+        return tuple(
+            Parameter(f"{a}_{t}", "m", SCALE, "nest") for t in self.tools for a in "xyz"
+        )
+
+    def columns(self, batch: Batch) -> Floats:
+        """Shift the point that a row measures, (n, 3, p)."""
+        R = batch.walk.flange
+        parts = [R * (batch.states.tool_id == t)[:, None, None] for t in self.tools]
+        return np.concatenate(parts, axis=2)

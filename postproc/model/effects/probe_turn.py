@@ -1,0 +1,55 @@
+"""Probe turn: a 6D probe does not sit on the flange quite as declared."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar, Self
+
+import numpy as np
+
+from postproc.arrays import Floats
+from postproc.model.effects.effect import Effect, Origin, Parameter
+from postproc.model.kinematics import Batch
+from postproc.robot.arm import Arm
+from postproc.robot.state import States
+
+SCALE = 1e-4  # [rad] of a mounting that was measured
+
+
+@dataclass(frozen=True)
+class ProbeTurn(Effect):
+    """Turn of a 6D probe in the flange frame. It moves no point, only orientations.
+
+    A turn of the flange about the TCP and a turn of the probe look the same: the
+    flange is seen as well as the probe's mounting is known.
+
+    Attributes:
+        tools: The `tool_id` of the probe's points.
+    """
+
+    name: ClassVar[str] = "probe_turn"
+    origin: ClassVar[Origin] = "setup"
+    tools: tuple[int, ...] = (0,)
+
+    @classmethod
+    def propose(cls, arm: Arm, states: States) -> Self:
+        """List the survey's probe points."""
+        return cls(tuple(int(t) for t in np.unique(states.tool_id)))
+
+    def parameters(self) -> tuple[Parameter, ...]:
+        """Name three turns per point."""
+        return tuple(
+            Parameter(f"r{a}_{t}", "rad", SCALE, "mounting")
+            for t in self.tools
+            for a in "xyz"
+        )
+
+    def columns(self, batch: Batch) -> Floats:
+        """Move nothing, (n, 3, p)."""
+        return np.zeros((len(batch), 3, 3 * len(self.tools)))
+
+    def rotation_columns(self, batch: Batch) -> Floats:
+        """Turn the probe that a row measures, (n, 3, p)."""
+        R = batch.walk.flange
+        parts = [R * (batch.states.tool_id == t)[:, None, None] for t in self.tools]
+        return np.concatenate(parts, axis=2)

@@ -1,0 +1,36 @@
+"""Scale: an encoder or a gear ratio that is slightly wrong."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from postproc.arrays import Floats
+from postproc.model.effects.effect import JointEffect, Parameter
+from postproc.model.kinematics import Batch
+
+SCALE = 5e-5  # [rad/rad]
+
+
+@dataclass(frozen=True)
+class Scale(JointEffect):
+    """Joint error gain * theta.
+
+    Attributes:
+        joints: Joints with a gain.
+    """
+
+    name: ClassVar[str] = "scale"
+
+    joints: tuple[int, ...] = (1, 2, 3, 4, 5, 6)
+
+    def parameters(self) -> tuple[Parameter, ...]:
+        """Name one gain per joint."""
+        return tuple(
+            Parameter(f"gain{j}", "rad/rad", SCALE, f"{j}", j) for j in self.joints
+        )
+
+    def basis(self, batch: Batch) -> Floats:
+        """Evaluate theta, (n, p)."""
+        theta: Floats = batch.states.q[:, self.acts_on()]
+        return theta

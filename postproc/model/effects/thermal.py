@@ -1,0 +1,103 @@
+"""Thermal growth: warm links are longer."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar, Literal, Self
+
+import numpy as np
+
+from postproc.arrays import Floats
+from postproc.model.effects.effect import Effect, Origin, Parameter
+from postproc.model.kinematics import Batch
+from postproc.robot.arm import Arm
+from postproc.robot.state import States
+
+STEEL = 12e-6  # [1/K] linear expansion
+WARM_UP = 10.0  # [K] usual rise inside an arm that starts cold
+UNSURE = 0.7  # share by which a length differs from the common growth
+SHORT = 1e-3  # [m] what has no length does not grow
+
+
+@dataclass(frozen=True)
+class Thermal(Effect):
+    """Every link grows in proportion to its lengths, with the temperature or in time.
+
+    Attributes:
+        lengths: Names a1 .. d6 of the D-H lengths that grow.
+        form: "temperature": growth alpha * (T - reference). "time": growth
+            g * (1 - exp(-(t - start) / time_constant)) - g, 0 when the arm is warm.
+        reference: [deg C].
+        time_constant: [s].
+        start: When the arm was cold [s].
+    """
+
+    name: ClassVar[str] = "thermal"
+    origin: ClassVar[Origin] = "state"
+
+    lengths: tuple[str, ...] = ("a1", "d1", "a2", "a3", "d4", "d6")
+    form: Literal["temperature", "time"] = "temperature"
+    reference: float = 20.0
+    time_constant: float = 3600.0
+    start: float = 0.0
+
+    @classmethod
+    def propose(cls, arm: Arm, states: States) -> Self:
+        """Grow with the recorded temperature, or else in time."""
+        lengths = growing(arm)
+        if not np.isnan(states.temperature).all():
+            return cls(lengths, reference=float(np.nanmean(states.temperature)))
+        time = states.time[~np.isnan(states.time)]
+        if len(time) == 0:
+            return cls(lengths, form="time")
+        span = max(float(np.ptp(time)), 1.0)
+        return cls(
+            lengths, form="time", time_constant=span / 4, start=float(time.min())
+        )
+
+    def requires(self) -> tuple[str, ...]:
+        """Need the temperature; a warm-up of unknown time is over."""
+        return ("temperature",) if self.form == "temperature" else ()
+
+    def parameters(self) -> tuple[Parameter, ...]:
+        """Name the common growth and every length's deviation from it."""
+        if self.form == "temperature":
+            name, unit, scale = "alpha", "1/K", STEEL
+        else:
+            name, unit, scale = "growth", "m/m", STEEL * WARM_UP
+        group = "expansion" if name == "alpha" else f"over {self.time_constant:.4g}"
+        each = [
+            Parameter(f"{name}_{length}", unit, UNSURE * scale, group)
+            for length in self.lengths
+        ]
+        return (Parameter(name, unit, scale, group), *each)
+
+    def warmth(self, batch: Batch) -> Floats:
+        """Return temperature above the reference [K], or share of the warm-up, (n,)."""
+        if self.form == "temperature":
+            return np.nan_to_num(batch.states.temperature - self.reference)
+        since = np.maximum(batch.states.time - self.start, 0.0)
+        warm = -np.exp(-since / self.time_constant)
+        return np.nan_to_num(warm)
+
+    def columns(self, batch: Batch) -> Floats:
+        """Differentiate the TCP position, (n, 3, p)."""
+        each = np.stack([self._length(batch, name) for name in self.lengths], axis=2)
+        every = each.sum(axis=2, keepdims=True)
+        warmth = self.warmth(batch)[:, None, None]
+        return np.concatenate([every, each], axis=2) * warmth
+
+    def _length(self, batch: Batch, name: str) -> Floats:
+        """Differentiate the TCP position by the growth of one length, (n, 3) [m]."""
+        kind, joint = name[0], int(name[1]) - 1
+        if kind == "a":
+            return np.asarray(batch.arm.dh.a[joint] * batch.walk.link[:, joint])
+        return np.asarray(batch.arm.dh.d[joint] * batch.walk.turn[:, joint])
+
+
+def growing(arm: Arm) -> tuple[str, ...]:
+    """Name the D-H lengths that are long enough to grow."""
+    sizes = {"a": np.abs(arm.dh.a), "d": np.abs(arm.dh.d)}
+    return tuple(
+        f"{kind}{j + 1}" for j in range(6) for kind in "ad" if sizes[kind][j] > SHORT
+    )

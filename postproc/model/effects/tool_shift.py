@@ -1,0 +1,56 @@
+"""Tool shift: the tool slips in its holder, or a nest is moved, at one moment."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from postproc.arrays import Floats
+from postproc.model.effects.effect import Effect, Origin, Parameter
+from postproc.model.kinematics import Batch
+
+SHIFT, TURN = 1e-4, 2e-4  # [m], [rad]
+AXES = "xyz"
+
+
+@dataclass(frozen=True)
+class ToolShift(Effect):
+    """A step of the tool in the flange frame at one row.
+
+    It moves the rows before the step, see `BaseShift`.
+
+    Attributes:
+        row: Place in the visit order of the first row after the step.
+        turns: Whether the tool may also turn, which several probe points show.
+    """
+
+    name: ClassVar[str] = "tool_shift"
+    origin: ClassVar[Origin] = "setup"
+
+    row: float = 0.0
+    turns: bool = False
+
+    def parameters(self) -> tuple[Parameter, ...]:
+        """Name shift and turn, from before to after, in the flange frame."""
+        group = f"row {self.row:g}"
+        shift = [Parameter(f"{a}_row{self.row:g}", "m", SHIFT, group) for a in AXES]
+        turn = [Parameter(f"r{a}_row{self.row:g}", "rad", TURN, group) for a in AXES]
+        return (*shift, *(turn if self.turns else ()))
+
+    def columns(self, batch: Batch) -> Floats:
+        """Differentiate the TCP position, (n, 3, p)."""
+        axes, before = batch.walk.flange, (batch.states.order < self.row)
+        if self.turns:
+            arms = np.cross(np.eye(3)[None], batch.states.tool[:, None, :])
+            axes = np.concatenate([axes, axes @ np.swapaxes(arms, 1, 2)], axis=2)
+        return np.where(before[:, None, None], -axes, 0.0)
+
+    def rotation_columns(self, batch: Batch) -> Floats | None:
+        """Differentiate the tool's rotation, (n, 3, p)."""
+        if not self.turns:
+            return None
+        axes, before = batch.walk.flange, (batch.states.order < self.row)
+        axes = np.concatenate([np.zeros_like(axes), axes], axis=2)
+        return np.where(before[:, None, None], -axes, 0.0)

@@ -1,0 +1,77 @@
+"""Tracker drift: the tracker's stand moves slowly while it measures."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar, Literal, Self
+
+import numpy as np
+
+from postproc.arrays import Floats
+from postproc.model.effects.base_shift import AXES, rigid_columns, rigid_rotations
+from postproc.model.effects.effect import Effect, Origin, Parameter
+from postproc.model.kinematics import Batch
+from postproc.robot.arm import Arm
+from postproc.robot.state import States
+
+SHIFT, TURN = 3e-5, 1e-5  # [m], [rad]
+TERMS = 3
+
+
+@dataclass(frozen=True)
+class TrackerDrift(Effect):
+    """A slow rigid motion of the tracker's frame, 0 when it was registered.
+
+    Motion is a polynomial in the share u of the campaign that has passed, u and
+    u (1 - u) and so on, later terms expected to be smaller.
+
+    Attributes:
+        start: When the tracker was registered, [s] or rows.
+        duration: Length of the campaign, [s] or rows.
+        clock: "time", or "order" where no time was recorded.
+    """
+
+    name: ClassVar[str] = "tracker_drift"
+    origin: ClassVar[Origin] = "setup"
+
+    start: float = 0.0
+    duration: float = 1.0
+    clock: Literal["time", "order"] = "time"
+
+    @classmethod
+    def propose(cls, arm: Arm, states: States) -> Self:
+        """Take the recorded time, or else the visit order."""
+        clock: Literal["time", "order"] = (
+            "order" if np.isnan(states.time).any() else "time"
+        )
+        passed = getattr(states, clock)
+        if len(passed) == 0:
+            return cls()
+        return cls(float(passed.min()), max(float(np.ptp(passed)), 1e-9), clock)
+
+    def parameters(self) -> tuple[Parameter, ...]:
+        """Name shift and turn of every term."""
+        out = []
+        for term in range(TERMS):
+            part = 0.5**term
+            for a in AXES:
+                out.append(Parameter(f"{a}_{term + 1}", "m", SHIFT * part, "drift"))
+            for a in AXES:
+                out.append(Parameter(f"r{a}_{term + 1}", "rad", TURN * part, "drift"))
+        return tuple(out)
+
+    def columns(self, batch: Batch) -> Floats:
+        """Differentiate the TCP position, (n, 3, p)."""
+        return self._in_time(batch, rigid_columns(batch))
+
+    def rotation_columns(self, batch: Batch) -> Floats:
+        """Differentiate the tool's rotation, (n, 3, p)."""
+        return self._in_time(batch, rigid_rotations(batch))
+
+    def _in_time(self, batch: Batch, moved: Floats) -> Floats:
+        """Multiply six motions (n, 3, 6) by every term, (n, 3, p)."""
+        u = (getattr(batch.states, self.clock) - self.start) / self.duration
+        u = np.clip(np.nan_to_num(u), 0.0, 1.0)
+        bow = 4.0 * u * (1.0 - u)
+        terms = (u, bow, bow * (1.0 - 2.0 * u) * 1.5)
+        return np.concatenate([moved * t[:, None, None] for t in terms], axis=2)
