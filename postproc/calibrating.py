@@ -12,21 +12,20 @@ from typing import Any
 
 import numpy as np
 
-from postproc.accuracy.comparison import Comparison, compare
-from postproc.accuracy.fit_report import FitReport
-from postproc.accuracy.measurement import concatenate, from_table
-from postproc.accuracy.plausibility import check_survey
-from postproc.accuracy.reading import DETECT, Reading
-from postproc.accuracy.table import Table as Cells
-from postproc.accuracy.table import read_table
 from postproc.arrays import Floats
-from postproc.calibrate import (
+from postproc.calibration.fit import (
     Calibration,
     fit,
     fit_measurements,
     into_base_frame,
     read_surveys,
 )
+from postproc.calibration.measurements import concatenate, from_table
+from postproc.calibration.plausibility import check_survey
+from postproc.calibration.published import Comparison, compare
+from postproc.calibration.report import FitReport
+from postproc.calibration.tables import DETECT, Reading, read_table
+from postproc.calibration.tables import Table as Cells
 from postproc.console import Column, table_text
 from postproc.files import write_all
 from postproc.joining import join_program
@@ -77,7 +76,7 @@ def fit_files(
         program: The survey program, for files that hold ids and positions only.
         html: A page about the fit to write.
         reading: What the user knows of the measurement files.
-        how: Arguments of `postproc.calibrate.fit`; None stands for the default.
+        how: Arguments of `postproc.calibration.fit.fit`; None stands for the default.
 
     Returns:
         The report of the fit, in words.

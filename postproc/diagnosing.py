@@ -10,13 +10,13 @@ from typing import Any
 
 import numpy as np
 
-from postproc.accuracy.diagnosis.diagnose import Extension, diagnose
-from postproc.accuracy.diagnosis.result import Diagnosis
-from postproc.accuracy.diagnosis.search import Progress
-from postproc.accuracy.diagnosis.tracing import REMAINS, silent
-from postproc.accuracy.measurement import Measurements, concatenate
 from postproc.arrays import Floats
-from postproc.calibrate import read_surveys, several_points
+from postproc.calibration.diagnosis.diagnose import Extension, diagnose
+from postproc.calibration.diagnosis.result import Diagnosis
+from postproc.calibration.diagnosis.search import Progress
+from postproc.calibration.diagnosis.trace import REMAINS, silent
+from postproc.calibration.fit import read_surveys, several_points
+from postproc.calibration.measurements import Measurements, concatenate
 from postproc.calibration.registration import register
 from postproc.console import Column, table_text
 from postproc.joining import join_program

@@ -6,9 +6,13 @@ from pathlib import Path
 
 import numpy as np
 
-from postproc.accuracy.measurement import COVARIATES, POSITION, Measurements
-from postproc.accuracy.points import read_points
-from postproc.accuracy.reading import DETECT, Reading
+from postproc.calibration.measurements import (
+    COVARIATES,
+    POSITION,
+    Measurements,
+    read_points,
+)
+from postproc.calibration.tables import DETECT, Reading
 from postproc.exceptions import MeasurementError
 from postproc.jobs import read_files
 from postproc.planning import plan_visits, read_program, states_of

@@ -9,11 +9,11 @@ import numpy as np
 from matplotlib import rc_context
 from matplotlib.figure import Figure
 
-from postproc.accuracy.comparison import Comparison
-from postproc.accuracy.diagnosis.diagnose import Extension
-from postproc.accuracy.diagnosis.locate import Profile, periodogram, profile
-from postproc.accuracy.diagnosis.projection import Projection
 from postproc.arrays import Floats
+from postproc.calibration.diagnosis.diagnose import Extension
+from postproc.calibration.diagnosis.library import Projection
+from postproc.calibration.diagnosis.result import Profile, periodogram, profile
+from postproc.calibration.published import Comparison
 from postproc.exceptions import OutputError
 from postproc.robot.pose import MM
 

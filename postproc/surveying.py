@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
-from postproc.accuracy.survey import design_survey
 from postproc.arrays import Floats, Ints
+from postproc.calibration.survey import design_survey
 from postproc.exceptions import PostprocError
 from postproc.files import write_all
 from postproc.robot.cell import Cell, load_cell

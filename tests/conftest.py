@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from postproc.calibrate import fit
+from postproc.calibration.fit import fit
 from postproc.model.effects import BASE_EFFECTS
 from postproc.model.model import Model, load_model
 from postproc.robot.cell import Cell, load_cell

@@ -8,9 +8,9 @@ from pathlib import Path
 
 import numpy as np
 
-from postproc.accuracy.full import fit_survey, model_of
-from postproc.accuracy.measurement import Measurements
-from postproc.calibrate import fit
+from postproc.calibration.fit import fit
+from postproc.calibration.measurements import Measurements
+from postproc.calibration.selection import fit_survey, model_of
 from postproc.compensate import compensate
 from postproc.language.visits import Target
 from postproc.model.effects import BASE_EFFECTS

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from postproc.calibrate import fit
+from postproc.calibration.fit import fit
 from postproc.exceptions import MeasurementError, PostprocError
 from postproc.model.effects import BASE_EFFECTS
 from postproc.model.model import load_model

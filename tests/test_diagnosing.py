@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from postproc.calibrate import fit, read_surveys
+from postproc.calibration.fit import fit, read_surveys
 from postproc.diagnosing import (
     diagnose_files,
     extended_path,

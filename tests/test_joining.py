@@ -7,7 +7,7 @@ import csv
 import numpy as np
 import pytest
 
-from postproc.accuracy.reading import Reading
+from postproc.calibration.tables import Reading
 from postproc.exceptions import MeasurementError
 from postproc.joining import join_program
 from postproc.planning import plan_visits, read_program

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from postproc.accuracy.comparison import Comparison, MethodRow
+from postproc.calibration.published import Comparison, MethodRow
 from postproc.exceptions import OutputError
 from postproc.plots import plot_comparison
 

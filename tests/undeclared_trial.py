@@ -8,9 +8,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from postproc.accuracy.diagnosis.tracing import trace
-from postproc.accuracy.fit import fit_effects
-from postproc.accuracy.fitted import Fit
+from postproc.calibration.diagnosis.trace import trace
+from postproc.calibration.regression import Fit, fit_effects
 from postproc.model.combination import Combination
 from postproc.model.effects import BASE_EFFECTS, propose
 from postproc.model.effects.effect import Effect, Parameter

@@ -12,11 +12,11 @@ from pathlib import Path
 import numpy as np
 from measured import BLIND_TOOL, FLANGE, SETUP, _registered
 
-from postproc.accuracy.diagnosis.diagnose import Extension, diagnose
-from postproc.accuracy.diagnosis.result import Finding
-from postproc.accuracy.full import fit_survey, model_of
-from postproc.accuracy.measurement import Measurements, read_measurements
-from postproc.calibrate import into_base_frame
+from postproc.calibration.diagnosis.diagnose import Extension, diagnose
+from postproc.calibration.diagnosis.result import Finding
+from postproc.calibration.fit import into_base_frame
+from postproc.calibration.measurements import Measurements, read_measurements
+from postproc.calibration.selection import fit_survey, model_of
 from postproc.model.combination import Combination
 from postproc.model.effects import BASE_EFFECTS
 from postproc.model.kinematics import Batch

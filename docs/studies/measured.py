@@ -6,10 +6,10 @@ from pathlib import Path
 
 import numpy as np
 
-from postproc.accuracy.full import fit_survey, model_of
-from postproc.accuracy.measurement import Measurements, read_measurements
-from postproc.calibrate import into_base_frame
+from postproc.calibration.fit import into_base_frame
+from postproc.calibration.measurements import Measurements, read_measurements
 from postproc.calibration.registration import register
+from postproc.calibration.selection import fit_survey, model_of
 from postproc.model.combination import Combination
 from postproc.model.effects import BASE_EFFECTS
 from postproc.model.kinematics import Batch

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import qmc
 
-from postproc.accuracy.comparison import MethodRow, compare_on
-from postproc.accuracy.measurement import Measurements
+from postproc.calibration.measurements import Measurements
+from postproc.calibration.published import MethodRow, compare_on
 from postproc.model.effects import elm
 from postproc.model.effects.elm import HiddenLayer
 from postproc.model.kinematics import NOMINAL, Deviation, walk

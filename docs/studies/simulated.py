@@ -6,9 +6,9 @@ import time
 
 import numpy as np
 
-from postproc.accuracy.full import fit_survey, model_of
-from postproc.accuracy.methods import fit_method
-from postproc.accuracy.survey import design_survey
+from postproc.calibration.published import fit_method
+from postproc.calibration.selection import fit_survey, model_of
+from postproc.calibration.survey import design_survey
 from postproc.model.effects import BASE_EFFECTS
 from postproc.model.kinematics import Batch
 from postproc.model.model import Model

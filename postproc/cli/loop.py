@@ -56,7 +56,7 @@ def diagnose(
 ) -> None:
     """Find what the model lacks, trace it to an effect, and add that effect."""
     from postproc import diagnosing
-    from postproc.accuracy.diagnosis.evidence import dumped, evidence_of
+    from postproc.calibration.diagnosis.diagnose import dumped, evidence_of
     from postproc.console import stage_bar
 
     with explained():

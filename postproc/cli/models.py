@@ -139,7 +139,7 @@ def fit(
 ) -> None:
     """Fit a model of the arm's error to laser-tracker measurements."""
     from postproc import calibrating
-    from postproc.accuracy.reading import Reading
+    from postproc.calibration.tables import Reading
 
     names = None if effects is None else split_names(effects)
     with explained():
@@ -197,7 +197,7 @@ def compare(
 ) -> None:
     """Fit every method to the same rows, and test it on the same others."""
     from postproc import calibrating
-    from postproc.accuracy.reading import Reading
+    from postproc.calibration.tables import Reading
 
     with explained():
         check_places([as_path(json), html, plot], [*data, cell, columns])

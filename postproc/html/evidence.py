@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from postproc.accuracy.fit_report import FitReport
-from postproc.accuracy.measurement import Measurements
 from postproc.arrays import Floats
+from postproc.calibration.measurements import Measurements
+from postproc.calibration.report import FitReport
 from postproc.html.summary import finite
 from postproc.model.kinematics import Batch
 from postproc.model.model import Model

@@ -6,9 +6,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from postproc.accuracy.diagnosis.projection import Projection
-from postproc.accuracy.fit import fit_effects
-from postproc.accuracy.fitted import Fit
+from postproc.calibration.diagnosis.library import Projection
+from postproc.calibration.regression import Fit, fit_effects
 from postproc.model.effects import BASE_EFFECTS, propose
 from postproc.model.kinematics import Batch
 from postproc.robot.arm import load_arm

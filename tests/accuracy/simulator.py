@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from postproc.accuracy.measurement import Measurements
+from postproc.calibration.measurements import Measurements
 from postproc.robot.arm import Arm, load_arm
 from postproc.robot.state import States, make_states
 

@@ -9,20 +9,24 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from postproc.accuracy.diagnosis.diagnose import Extension, diagnose
-from postproc.accuracy.diagnosis.evidence import dumped, evidence_of
-from postproc.accuracy.diagnosis.floor import (
+from postproc.calibration.diagnosis.diagnose import (
+    Extension,
+    diagnose,
+    dumped,
+    evidence_of,
+)
+from postproc.calibration.diagnosis.held_out import (
     multi_directional,
     noise_floor,
     repeats,
     sides,
 )
-from postproc.accuracy.diagnosis.locate import periodogram, profile
-from postproc.accuracy.diagnosis.omnibus import leftovers
-from postproc.accuracy.diagnosis.planning import poses_that_sharpen
-from postproc.accuracy.diagnosis.projection import Projection
-from postproc.accuracy.full import fit_survey, model_of
-from postproc.accuracy.measurement import Measurements
+from postproc.calibration.diagnosis.library import Projection
+from postproc.calibration.diagnosis.next_poses import poses_that_sharpen
+from postproc.calibration.diagnosis.result import periodogram, profile
+from postproc.calibration.diagnosis.score import leftovers
+from postproc.calibration.measurements import Measurements
+from postproc.calibration.selection import fit_survey, model_of
 from postproc.diagnosing import tell
 from postproc.exceptions import ModelError, PostprocError
 from postproc.html import diagnosis_report

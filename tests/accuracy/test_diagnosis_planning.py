@@ -7,11 +7,11 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 
-from postproc.accuracy.diagnosis.groups import NEAR, Standing
-from postproc.accuracy.diagnosis.planning import poses_that_separate
-from postproc.accuracy.diagnosis.score import Score
-from postproc.accuracy.diagnosis.tracing import Trace, trace
-from postproc.accuracy.fit import fit_effects
+from postproc.calibration.diagnosis.next_poses import poses_that_separate
+from postproc.calibration.diagnosis.score import Score
+from postproc.calibration.diagnosis.search import NEAR, Standing
+from postproc.calibration.diagnosis.trace import Trace, trace
+from postproc.calibration.regression import fit_effects
 from postproc.model.kinematics import Batch
 from postproc.virtual import Arrivals, stream
 from tests.accuracy.planted import ARM, TRACKER, Campaign, campaign, states_of, survey

@@ -7,19 +7,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from postproc.accuracy.diagnosis import groups, names_first, search
-from postproc.accuracy.diagnosis.bootstrap import Null, bootstrap
-from postproc.accuracy.diagnosis.candidate import FREE, NAMED, Candidate, Family
-from postproc.accuracy.diagnosis.choice import choose, ranking
-from postproc.accuracy.diagnosis.folds import RUN, Gain, deal, held_out_gain
-from postproc.accuracy.diagnosis.groups import NEAR, stand
-from postproc.accuracy.diagnosis.library import Library
-from postproc.accuracy.diagnosis.projection import Projection
-from postproc.accuracy.diagnosis.score import Score
-from postproc.accuracy.diagnosis.search import Search
-from postproc.accuracy.diagnosis.tracing import silent
-from postproc.accuracy.fit import fit_effects
-from postproc.accuracy.fitted import Fit
+from postproc.calibration.diagnosis import search
+from postproc.calibration.diagnosis.candidates import FREE, NAMED, Candidate, Family
+from postproc.calibration.diagnosis.held_out import RUN, Gain, deal, held_out_gain
+from postproc.calibration.diagnosis.library import Library, Projection
+from postproc.calibration.diagnosis.score import Null, Score, bootstrap
+from postproc.calibration.diagnosis.search import NEAR, Search, choose, ranking, stand
+from postproc.calibration.diagnosis.trace import silent
+from postproc.calibration.regression import Fit, fit_effects
 from postproc.model.effects.scale import Scale
 from postproc.model.kinematics import Batch
 from tests.accuracy.planted import ARM, TRACKER, Campaign, campaign
@@ -137,10 +132,10 @@ def test_groups_hold_what_is_within_three_nats_and_never_more_than_three(
         score(own.effect, own.joint, 48.5), score("payload", 5, near),
         score("thermal", None, near), score("compliance", 2, far),
     ]  # fmt: skip
-    monkeypatch.setattr(groups, "ranking", lambda *_: ranked)
+    monkeypatch.setattr(search, "ranking", lambda *_: ranked)
     rivals = stand(found, 0).confusable
     assert [s.family.effect for s in rivals] == ["curve", "payload"]
-    monkeypatch.setattr(groups, "ranking", lambda *_: [here, *ranked[-1:]])
+    monkeypatch.setattr(search, "ranking", lambda *_: [here, *ranked[-1:]])
     assert stand(found, 0).confusable == ()
 
 
@@ -162,15 +157,15 @@ def test_two_names_stand_for_the_free_form_that_one_cannot_reach(
     first, second = score("compliance", 3, 70.0), score("coupling", 3, 25.0)
     elsewhere = score("scale", 1, 80.0)
     start = [free, elsewhere, first, second]
-    monkeypatch.setattr(names_first, "extend", lambda fit, _: fit)
+    monkeypatch.setattr(search, "extend", lambda fit, _: fit)
 
     def after(*left: float) -> Score | None:
         rankings = iter(
             [replace(free, evidence=e), elsewhere, replace(second, evidence=25.0)]
             for e in left
         )
-        monkeypatch.setattr(names_first, "ranking", lambda *_: next(rankings))
-        return names_first.names_instead(found.base, found.library, null, 0.01, start)
+        monkeypatch.setattr(search, "ranking", lambda *_: next(rankings))
+        return search.names_instead(found.base, found.library, null, 0.01, start)
 
     assert after(28.0, 3.0) is first
     assert after(60.0, 55.0, 50.0) is None

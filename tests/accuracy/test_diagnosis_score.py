@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
 
-from postproc.accuracy.diagnosis.bootstrap import Null, bootstrap
-from postproc.accuracy.diagnosis.candidate import NAMED, Candidate, Family
-from postproc.accuracy.diagnosis.folds import deal, held_out_errors
-from postproc.accuracy.diagnosis.library import Library
-from postproc.accuracy.diagnosis.projection import Blocks, Projection
-from postproc.accuracy.diagnosis.score import (
+from postproc.calibration.diagnosis.candidates import NAMED, Candidate, Family
+from postproc.calibration.diagnosis.held_out import deal, held_out_errors
+from postproc.calibration.diagnosis.library import Blocks, Library, Projection
+from postproc.calibration.diagnosis.score import (
     SIGNALS,
+    Null,
     Score,
+    bootstrap,
     explained,
     log_evidence,
     rank,
@@ -126,7 +126,7 @@ def test_library_gives_the_same_blocks_for_kept_and_for_new_columns(
         return rank(reduced, float(base.rest @ base.rest), base.rows)
 
     kept = scores(Library.of(base.fit))
-    monkeypatch.setattr("postproc.accuracy.diagnosis.library.KEPT", 0)
+    monkeypatch.setattr("postproc.calibration.diagnosis.library.KEPT", 0)
     library = Library.of(base.fit)
     assert all(shelf.columns is None for shelf in library.shelves)
     again = scores(library)

@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from postproc.accuracy.diagnosis.tracing import trace
+from postproc.calibration.diagnosis.trace import trace
 from postproc.model.combination import Combination
 from postproc.model.effects.base_shift import rigid_columns
 from postproc.model.kinematics import Batch

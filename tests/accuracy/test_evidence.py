@@ -7,7 +7,7 @@ import pytest
 from scipy.optimize import approx_fprime
 from scipy.stats import multivariate_normal
 
-from postproc.accuracy.evidence import Normal, maximise, posterior
+from postproc.calibration.evidence import Normal, maximise, posterior
 
 
 def problem(seed: int = 0) -> tuple[np.ndarray, np.ndarray, np.ndarray, Normal]:

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from scipy.linalg import qr
 
-from postproc.accuracy.fitted import Fit
-from postproc.accuracy.full import fit_survey
+from postproc.calibration.regression import Fit
+from postproc.calibration.selection import fit_survey
 from postproc.model.combination import Combination
 from postproc.model.effects import BASE_EFFECTS
 from postproc.model.effects.geometry import Geometry

@@ -65,7 +65,7 @@ def test_the_tcp_alone_is_that_of_the_walk() -> None:
 
 def test_the_parameters_are_complete() -> None:
     # 27 directions show at one probe point; 30 with three, plus none that are spurious.
-    from postproc.accuracy.observability import observe
+    from postproc.calibration.regression import observe
     from tests.accuracy.simulator import PLATE
 
     rng = np.random.default_rng(0)

@@ -5,8 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from postproc.accuracy.measurement import concatenate, read_measurements
-from postproc.accuracy.plausibility import check_survey
+from postproc.calibration.measurements import concatenate, read_measurements
+from postproc.calibration.plausibility import check_survey
 from postproc.exceptions import MeasurementError
 from tests.accuracy.simulator import NJ, PLATE, TOOL, random_states
 

@@ -7,8 +7,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from postproc.accuracy.comparison import ORDER, compare, random_split
-from postproc.accuracy.methods import TRAINERS, fit_method
+from postproc.calibration.published import (
+    ORDER,
+    TRAINERS,
+    compare,
+    fit_method,
+    random_split,
+)
 from postproc.model.effects.elm import HiddenLayer
 from postproc.model.model import load_model
 from postproc.robot.state import make_states

@@ -12,8 +12,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from postproc.accuracy.fit import fit_effects
-from postproc.accuracy.full import fit_survey, model_of
+from postproc.calibration.regression import fit_effects
+from postproc.calibration.selection import fit_survey, model_of
 from postproc.exceptions import ModelError, OutputError
 from postproc.model.effects import BASE_EFFECTS, EFFECTS, propose
 from postproc.model.kinematics import Batch

@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from postproc.accuracy.observability import observe
+from postproc.calibration.regression import observe
 
 
 def test_redundant_columns_are_named_with_their_partners() -> None:

@@ -2,9 +2,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from postproc.accuracy.diagnosis.tracing import trace
-from postproc.accuracy.fit import fit_effects
-from postproc.accuracy.outliers import judge, student_weights
+from postproc.calibration.diagnosis.trace import trace
+from postproc.calibration.orientations import judge, student_weights
+from postproc.calibration.regression import fit_effects
 from postproc.model.effects import BASE_EFFECTS, propose
 from postproc.model.kinematics import Batch
 from postproc.virtual import Planted, stream, virtual_arm

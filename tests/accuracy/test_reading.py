@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from postproc.accuracy.measurement import Measurements, read_measurements
-from postproc.accuracy.reading import Reading
+from postproc.calibration.measurements import Measurements, read_measurements
+from postproc.calibration.tables import Reading
 from postproc.exceptions import MeasurementError, PostprocError
 from tests.accuracy.simulator import NJ, PLATE, TOOL, random_arm, random_states
 

@@ -7,13 +7,11 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from postproc.accuracy.formats import read_column_map
-from postproc.accuracy.full import fit_survey, model_of
-from postproc.accuracy.measurement import read_measurements
-from postproc.accuracy.points import read_points
-from postproc.accuracy.reading import Reading
-from postproc.calibrate import into_base_frame
+from postproc.calibration.fit import into_base_frame
+from postproc.calibration.measurements import read_measurements, read_points
 from postproc.calibration.registration import register
+from postproc.calibration.selection import fit_survey, model_of
+from postproc.calibration.tables import Reading, read_column_map
 from postproc.exceptions import MeasurementError
 from postproc.model.combination import Combination
 from postproc.model.effects import BASE_EFFECTS

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from postproc.accuracy.selection import candidates, fit_best
+from postproc.calibration.selection import candidates, fit_best
 from postproc.model.effects import BASE_EFFECTS
 from postproc.model.kinematics import Batch
 from tests.accuracy.simulator import NJ, covariates, random_arm, random_states

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from postproc.accuracy.fit import fit_effects
-from postproc.accuracy.full import model_of
+from postproc.calibration.regression import fit_effects
+from postproc.calibration.selection import model_of
 from postproc.model.combination import Combination
 from postproc.model.effects import BASE_EFFECTS, EFFECTS, propose
 from postproc.model.effects.effect import Effect

@@ -3,8 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from postproc.accuracy.reachability import joint_box, usable
-from postproc.accuracy.survey import design_survey
+from postproc.calibration.survey import design_survey, joint_box, usable
 from postproc.exceptions import PostprocError
 from tests.accuracy.simulator import NJ, PLATE, TOOL
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from postproc.accuracy.plausibility import check_survey
-from postproc.accuracy.tool_groups import ToolGroups, find_groups
-from postproc.calibrate import fit_measurements
+from postproc.calibration.fit import fit_measurements
+from postproc.calibration.plausibility import check_survey
+from postproc.calibration.tool_groups import ToolGroups, find_groups
 from postproc.exceptions import MeasurementError
 from postproc.model.kinematics import Batch
 from postproc.robot.cell import Cell, load_cell

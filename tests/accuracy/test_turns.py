@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from postproc.accuracy.fit_report import weighed_down
-from postproc.accuracy.full import fit_survey, model_of
-from postproc.accuracy.measurement import Measurements, read_measurements
-from postproc.accuracy.mounting import check_orientations
-from postproc.calibrate import into_base_frame
+from postproc.calibration.fit import into_base_frame
+from postproc.calibration.measurements import Measurements, read_measurements
+from postproc.calibration.plausibility import check_orientations
+from postproc.calibration.report import weighed_down
+from postproc.calibration.selection import fit_survey, model_of
 from postproc.exceptions import MeasurementError
 from postproc.model.effects import BASE_EFFECTS
 from postproc.model.kinematics import Batch

@@ -1,0 +1,365 @@
+"""Close the loop: what a model leaves of fresh measurements, and why."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from postproc.arrays import Floats
+from postproc.calibration.diagnosis.held_out import deal, multi_directional, noise_floor
+from postproc.calibration.diagnosis.library import Projection
+from postproc.calibration.diagnosis.next_poses import (
+    poses_that_separate,
+    poses_that_sharpen,
+)
+from postproc.calibration.diagnosis.refit import Revision, fold_back, refit
+from postproc.calibration.diagnosis.result import (
+    Diagnosis,
+    Place,
+    Profile,
+    profile,
+    statistics,
+)
+from postproc.calibration.diagnosis.search import NEAR, Progress, Search, ranking
+from postproc.calibration.diagnosis.trace import Trace, investigate, silent, trace
+from postproc.calibration.measurements import Measurements
+from postproc.calibration.regression import Fit, fit_effects
+from postproc.calibration.report import weighed_down
+from postproc.calibration.selection import model_of
+from postproc.model.combination import Combination
+from postproc.model.kinematics import Batch
+from postproc.model.model import Model
+from postproc.model.statistics import ErrorStatistics
+from postproc.robot.arm import Arm
+from postproc.robot.pose import MM
+
+# Before and after, on rows that took no part in choosing or fitting.
+#
+# The whole search is repeated without each part of the rows; the errors on that part
+# are then errors on rows that no fit has seen and that chose nothing.
+
+PARTS = 5
+RUN = 8  # consecutive rows that are held out together
+MANY = 2000  # rows from which one part is enough
+
+
+@dataclass(frozen=True, eq=False)
+class HeldOut:
+    """Errors on held-out rows.
+
+    Attributes:
+        rows: The rows, (m,).
+        fitted: Rows that each of them was predicted from, typically.
+        before, after: Errors that the given and the extended model leave, (m, 3) [m].
+    """
+
+    rows: NDArray[np.int64]
+    fitted: int
+    before: Floats
+    after: Floats
+
+
+def hold_out(
+    found: Search, seed: int, progress: Progress, given: Floats | None = None
+) -> HeldOut:
+    """Repeat the search without each part of the rows.
+
+    Args:
+        found: The search on all rows: its first fit, its library, its threshold.
+        seed: Of the parts.
+        progress: Told what is being done.
+        given: Errors that the given model leaves as it is, (n, 3) [m], where it has
+            not seen the rows; else its effects are refitted without each part.
+    """
+    base = found.base
+    used = base.rows.weight > 0
+    part = deal(base.batch.states.order, PARTS, seed, RUN)
+    count = PARTS if len(base.batch) < MANY else 1
+    rows, before, after, fitted = [], [], [], 0
+    for k in range(count):
+        progress(f"held-out rows, part {k + 1} of {count}", 0.6 + 0.4 * k / count)
+        out = np.flatnonzero((part == k) & used)
+        inside = np.flatnonzero(part != k)
+        if len(out) == 0:
+            continue
+        less = _fit_of(base, inside)
+        library = found.library.at_rows(inside)
+        more = investigate(less, library, found.null, lambda *_: None).fit
+        rows.append(out)
+        before.append(
+            left_by(less, base, out) if given is None else np.asarray(given[out])
+        )
+        after.append(left_by(more, base, out))
+        fitted = len(inside)
+    return HeldOut(
+        np.concatenate(rows), fitted, np.concatenate(before), np.concatenate(after)
+    )
+
+
+def _fit_of(base: Fit, rows: NDArray[np.int64]) -> Fit:
+    """Fit the effects of a fit to some of its rows only."""
+    batch = Batch(base.batch.arm, base.batch.states[rows])
+    position = base.error[rows] + batch.walk.tcp
+    return fit_effects(batch, position, base.combination.effects, base.noise.origin)
+
+
+def left_by(fit: Fit, every: Fit, rows: NDArray[np.int64]) -> Floats:
+    """Return what a fit leaves of the errors of other rows, (m, 3) [m]."""
+    batch = Batch(every.batch.arm, every.batch.states[rows])
+    predicted = Combination(fit.combination.effects).error(batch, fit.values)
+    left: Floats = every.error[rows] - predicted
+    return left
+
+
+# Close the loop: what a model leaves of fresh measurements, and why.
+
+PLACES = 5
+
+
+@dataclass(frozen=True, eq=False)
+class Extension:
+    """A diagnosis with the model that follows from it.
+
+    Attributes:
+        diagnosis: What was found.
+        model: The given model, refitted to the rows, with what was found.
+        search: The search, for plots and further tests.
+        held_out: Errors on held-out rows.
+    """
+
+    diagnosis: Diagnosis
+    model: Model
+    search: Search
+    held_out: HeldOut
+
+
+def diagnose(
+    survey: Measurements,
+    arm: Arm,
+    model: Model,
+    *,
+    tracker: Floats | None = None,
+    setup: tuple[str, ...] = (),
+    seed: int = 0,
+    progress: Progress = silent,
+) -> Extension:
+    """Find what a model lacks, and add it.
+
+    All parameters of the given model are refitted to the rows, so a model of another
+    day or another set-up may be given; where the rows are too few for that, its own
+    covariance says how far they may move.
+
+    Args:
+        survey: Fresh measurements in the base frame, or those of the model itself.
+        arm: The arm.
+        model: The model, made by the full method.
+        tracker: Tracker position in the base frame, (3,) [m], if known.
+        setup: Names of effects of these measurements' set-up, fitted besides.
+        seed: Of the bootstrap, the folds and the poses proposed.
+        progress: Told what is being done.
+
+    Raises:
+        PostprocError: A model that cannot be refitted.
+        ModelError: A model of another arm.
+    """
+    base = refit(survey, arm, model, tracker, setup)
+    traced = trace(base, seed, progress)
+    given = None
+    if model.data_sha256 != survey.sha256:
+        given = survey.position - base.batch.walk.tcp - model.error(arm, survey.states)
+    held_out = hold_out(traced.search, seed, progress, given)
+    diagnosis = _conclude(survey, traced, held_out, tracker, seed)
+    extended = _extended(model, survey, traced.search, diagnosis)
+    return Extension(diagnosis, extended, traced.search, held_out)
+
+
+def _conclude(
+    survey: Measurements,
+    traced: Trace,
+    held_out: HeldOut,
+    tracker: Floats | None,
+    seed: int,
+) -> Diagnosis:
+    """Put everything together."""
+    found = traced.search
+    floor = noise_floor(found.fit, tracker is not None)
+    batch = Batch(found.fit.batch.arm, found.fit.batch.states[held_out.rows])
+    before = multi_directional(batch, held_out.before)
+    after = multi_directional(batch, held_out.after)
+    why, poses = _next(traced, seed)
+    return Diagnosis(
+        verdict=traced.verdict,
+        noise_floor_mm=floor.size / MM,
+        noise_floor_source=floor.source,
+        n_fit=held_out.fitted,
+        n_held_out=len(held_out.rows),
+        before=ErrorStatistics.of(held_out.before),
+        after=ErrorStatistics.of(held_out.after),
+        vap_mm=None if before is None or after is None else (before / MM, after / MM),
+        findings=traced.findings,
+        leftovers=traced.leftovers,
+        places=_places(found),
+        next_measurements=poses,
+        why_next=why,
+        dropped=weighed_down(found.fit, survey),
+    )
+
+
+def _places(found: Search) -> tuple[Place, ...]:
+    """Say where what is left lives, from the candidates that come closest."""
+    out = []
+    for score in ranking(Projection.of(found.fit), found.library)[:PLACES]:
+        family = score.family
+        joint = f"joint {family.joint}"
+        direction = family.effect if family.joint is None else joint
+        driver = family.driver or score.best.source
+        if family.effect == "curve" and family.joint is None:
+            driver, _, direction = driver.partition(" along ")
+        p_value = found.null.p_value(score.evidence)
+        out.append(Place(direction, driver, score.evidence, p_value))
+    return tuple(out)
+
+
+def _next(traced: Trace, seed: int) -> tuple[str, Floats]:
+    """Propose poses that separate the closest rivals, or sharpen the model."""
+    found = traced.search
+    for number, standing in enumerate(traced.standings):
+        if standing.confusable:
+            rival = standing.confusable[0]
+            own = found.additions[number].candidate.family
+            nats, poses = poses_that_separate(
+                found.fit, found.place(number), rival, seed
+            )
+            worth = (
+                f"a round is worth about {nats:.1f} nats, {NEAR:.0f} tell them apart"
+            )
+            return f"tell {own} from {rival.family} ({worth})", poses
+    name, poses = poses_that_sharpen(found.fit, seed)
+    if name.startswith(Revision.name):
+        name = "the given model"
+    return f"sharpen {name}, known worst for what it moves", poses
+
+
+def _extended(
+    model: Model, survey: Measurements, found: Search, diagnosis: Diagnosis
+) -> Model:
+    """Write the extended model with the record of how it came about."""
+    record: dict[str, Any] = {
+        "parent": model.id,
+        "data_sha256": survey.sha256,
+        "added": [
+            {"effect": f.effect, "joint": f.joint, "source": f.source,
+             "p_value": f.p_value, "share": f.share}
+            for f in diagnosis.findings
+        ],
+        "verdict": diagnosis.verdict,
+        "n_fit": diagnosis.n_fit,
+        "n_held_out": diagnosis.n_held_out,
+        "before": statistics(diagnosis.before),
+        "after": statistics(diagnosis.after),
+    }  # fmt: skip
+    fit = found.fit
+    revised = any(isinstance(e, Revision) for e in fit.combination.effects)
+    fitted = model_of(fold_back(fit) if revised else fit, survey)
+    return replace(fitted, parent=model.id, history=(*model.history, record))
+
+
+# What a reader needs to judge a diagnosis: residuals, rivals, rows, the chain.
+
+LISTED = 25  # candidates
+SHOWN = 3000  # rows: more say nothing more
+
+
+def evidence_of(found: Extension) -> dict[str, Any]:
+    """Write a diagnosis with all that it rests on, as plain data.
+
+    To the report come, of every effect, ``evidence``: its residual against its
+    covariate, with and without it; ``candidates``: what the given model's residual
+    calls for, best first; ``rows``: error vectors of held-out rows; ``history``: the
+    chain of models.
+    """
+    report = found.diagnosis.to_dict()
+    search = found.search
+    effects = [
+        effect | {"evidence": _seen(profile(search.fit, search.place(k), a.candidate))}
+        for k, (effect, a) in enumerate(
+            zip(report["effects"], search.additions, strict=True)
+        )
+    ]
+    return report | {
+        "effects": effects,
+        "candidates": _candidates(found),
+        "rows": _rows(found),
+        "history": [dict(record) for record in found.model.history],
+    }
+
+
+def dumped(report: Mapping[str, Any]) -> str:
+    """Write a report as JSON text, a key a line, rows in one."""
+    keys = [f" {json.dumps(k)}: {json.dumps(v)}" for k, v in report.items()]
+    return "{\n" + ",\n".join(keys) + "\n}\n"
+
+
+def _seen(shown: Profile) -> Mapping[str, Any]:
+    """Write a profile, in millimetres of the TCP."""
+    some = thinned(len(shown.values))
+    before, after = (
+        (values * shown.lever)[some] for values in (shown.before, shown.after)
+    )
+    return {
+        "covariate": shown.label,
+        "unit": shown.unit,
+        "direction": shown.direction.partition(" [")[0],
+        "x": _plain(shown.values[some]),
+        "before_mm": _plain(before),
+        "after_mm": _plain(after),
+    }
+
+
+def _candidates(found: Extension) -> list[dict[str, Any]]:
+    """List what the residual of the given model calls for."""
+    search = found.search
+    scores = ranking(Projection.of(search.base), search.library)[:LISTED]
+    return [
+        {
+            "effect": s.family.effect,
+            "joint": s.family.joint,
+            "source": s.best.source,
+            "p_value": search.null.p_value(s.evidence),
+            "evidence_nats": round(s.evidence, 3),
+        }
+        for s in scores
+    ]
+
+
+def _rows(found: Extension) -> dict[str, list[Any]]:
+    """List error vectors of held-out rows [mm]."""
+    rows = found.held_out
+    some = thinned(len(rows.rows))
+    return {
+        "before_mm": _plain(rows.before[some] / MM),
+        "after_mm": _plain(rows.after[some] / MM),
+    }
+
+
+def thinned(count: int) -> NDArray[np.int64]:
+    """Choose at most so many rows, evenly.
+
+    >>> len(thinned(10)), len(thinned(100_000))
+    (10, 3000)
+    """
+    places = np.linspace(0, count - 1, min(count, SHOWN))
+    return np.unique(places.astype(np.int64))
+
+
+def _plain(values: Floats) -> list[Any]:
+    """Write numbers as short as they deserve, unknown ones as none."""
+    listed = np.round(values, 5).astype(object)
+    listed[~np.isfinite(values)] = None
+    plain: list[Any] = listed.tolist()
+    return plain

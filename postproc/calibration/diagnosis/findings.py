@@ -1,0 +1,119 @@
+"""Putting what a search added into words and numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from postproc.arrays import Floats
+from postproc.calibration.diagnosis.result import Finding
+from postproc.calibration.diagnosis.search import Addition, Search, Standing
+from postproc.calibration.report import SHOWN_UNITS
+from postproc.model.effects.effect import Effect
+from postproc.robot.pose import MM
+
+SPOT = 9  # bumps: more are a map of the whole joint, with no one place
+
+
+def describe(found: Search, standings: Sequence[Standing]) -> tuple[Finding, ...]:
+    """Describe every addition of a search."""
+    shares = _shares(found)
+    return tuple(
+        _describe(found, number, addition, standing, float(shares[number]))
+        for number, (addition, standing) in enumerate(
+            zip(found.additions, standings, strict=True)
+        )
+    )
+
+
+def _describe(
+    found: Search, number: int, addition: Addition, standing: Standing, share: float
+) -> Finding:
+    """Describe one addition."""
+    fit, family = found.fit, addition.candidate.family
+    effect = fit.combination.effects[found.place(number)]
+    part = fit.combination.slices[found.place(number)]
+    moved = np.linalg.norm(fit.columns[:, :, part] @ fit.values[part], axis=1)
+    confusable = tuple((s.family.effect, s.family.joint) for s in standing.confusable)
+    return Finding(
+        effect=family.effect,
+        joint=family.joint,
+        source=addition.candidate.source,
+        p_value=standing.p_value,
+        evidence=standing.evidence,
+        share=share,
+        peak_mm=float(moved.max(initial=0.0) / MM),
+        parameters=_parameters(effect, fit.values[part], fit.std[part]),
+        confusable_with=confusable,
+        settings=effect.settings(),
+        held_out_gain=(addition.gain.mean, addition.gain.std_error),
+    )
+
+
+def _parameters(
+    effect: Effect, values: Floats, std: Floats
+) -> dict[str, tuple[float, float, str]]:
+    """List value, standard error and unit of every parameter."""
+    out = {}
+    for p, value, error in zip(effect.parameters(), values, std, strict=True):
+        unit, factor = SHOWN_UNITS.get(p.unit, (p.unit, 1.0))
+        out[p.name] = (float(value * factor), float(error * factor), unit)
+    for name, (number, unit) in nonlinear(effect).items():
+        out[name] = (number, 0.0, unit)
+    return out
+
+
+def nonlinear(effect: Effect) -> dict[str, tuple[float, str]]:
+    """List what is not linear in an effect, in the units of people."""
+    settings = effect.settings()
+    known = {
+        "row": ("row", 1.0, "rows"),
+        "d0": ("d0", float(np.degrees(1.0)), "deg"),
+        "t0": ("t0", 1.0, "N m"),
+        "time_constant": ("time_constant", 1.0, "s"),
+        "ratio": ("pin_ratio", 1.0, "1"),
+        "upright": ("upright", float(np.degrees(1.0)), "deg"),
+    }
+    out = {
+        name: (float(settings[key]) * factor, unit)
+        for key, (name, factor, unit) in known.items()
+        if key in settings
+    }
+    if "waves" in settings:
+        out["order"] = (float(settings["waves"][0][1]), "1/turn")
+    if 0 < len(settings.get("bumps", ())) <= SPOT:
+        places = np.degrees([centre for _, centre in settings["bumps"]])
+        out["centre"] = (float(places.mean()), "deg")
+        out["width"] = (float(np.degrees(settings["width"])), "deg")
+        if len(places) > 1:
+            out["reach"] = (float(np.ptp(places)), "deg")
+    if settings.get("form") == "temperature":
+        out.pop("time_constant", None)
+    return out
+
+
+def _shares(found: Search) -> Floats:
+    """Part of the given model's residual variance that each addition explains."""
+    fit = found.fit
+    first = found.place(0)
+    start = fit.combination.slices[first].start if found.additions else 0
+    keep = slice(start, None)
+    base = _without_last(fit.whiten(fit.columns) * fit.prior_std, start)
+    target = fit.whiten(fit.residual + fit.columns[:, :, keep] @ fit.values[keep])
+    left = target - base @ (base.T @ target)
+    total = max(float(left @ left), 1e-300)
+    out = []
+    for number in range(len(found.additions)):
+        part = fit.combination.slices[found.place(number)]
+        moved = fit.whiten(fit.columns[:, :, part] @ fit.values[part])
+        out.append(float(left @ (moved - base @ (base.T @ moved))) / total)
+    shares: Floats = np.clip(np.array(out), 0.0, 1.0)
+    return shares
+
+
+def _without_last(X: Floats, count: int) -> Floats:
+    """Give an orthonormal basis of the first columns, (rows, rank)."""
+    basis, size, _ = np.linalg.svd(X[:, :count], full_matrices=False)
+    kept: Floats = basis[:, size > 1.0]
+    return kept

@@ -1,0 +1,195 @@
+"""Whether a candidate predicts rows that did not fit it, and how well one could."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import cho_factor, cho_solve
+
+from postproc.arrays import Floats
+from postproc.calibration.diagnosis.candidates import Candidate
+from postproc.calibration.regression import Fit
+from postproc.model.kinematics import Batch
+from postproc.model.noise import Noise
+
+# Whether a candidate predicts rows that did not fit it.
+#
+# Rows are cut into short runs along what the question is about: along the visit order
+# for what passes with time, along the candidate's own covariate for what a joint does.
+# Runs are dealt to folds, so that a fold's rows have neighbours on both sides only at a
+# distance.
+
+FOLDS = 10
+RUN = 4  # rows of a run
+
+
+def deal(values: Floats, folds: int, seed: int, run: int = RUN) -> NDArray[np.int64]:
+    """Cut rows into runs along a covariate and deal these to folds.
+
+    Args:
+        values: The covariate, (n,).
+        folds: Number of folds.
+        seed: Of the dealing.
+        run: Rows of a run.
+
+    Returns:
+        Fold of every row, (n,).
+    """
+    place = np.argsort(np.argsort(values, kind="stable"), kind="stable")
+    runs = place // run
+    count = int(runs.max(initial=0)) + 1
+    rng = np.random.default_rng(seed)
+    hands = np.concatenate(
+        [rng.permutation(folds) for _ in range(-(-count // folds))]
+    )  # every fold once a round
+    return np.asarray(hands[runs], dtype=np.int64)
+
+
+@dataclass(frozen=True)
+class Gain:
+    """Fall of the squared held-out error that a candidate brings, per row.
+
+    Attributes:
+        mean: In units of the noise variance.
+        std_error: Of the mean, over the rows.
+    """
+
+    mean: float
+    std_error: float
+
+    @property
+    def sure(self) -> bool:
+        """Whether it is larger than its standard error."""
+        return self.mean > self.std_error
+
+
+def held_out_gain(fit: Fit, number: int, candidate: Candidate) -> Gain:
+    """Compare held-out errors with and without one effect of a fit.
+
+    Args:
+        fit: A fit with the effect in it; its noise and prior scales are kept.
+        number: Place of the effect in the fit.
+        candidate: The candidate that the effect was.
+    """
+    known = fit.whiten(fit.columns) * fit.prior_std
+    target = fit.whiten(fit.residual + fit.columns @ fit.values)
+    fold = deal(candidate.driver(fit.batch), FOLDS, seed=0)
+    after = held_out_errors(known, target, fold)
+    less = np.delete(known, fit.combination.slices[number], axis=1)
+    before = held_out_errors(less, target, fold)
+    used = fit.rows.weight > 0
+    fall = (before**2 - after**2).reshape(-1, 3).sum(axis=1)[used]
+    error = float(fall.std() / np.sqrt(max(len(fall), 1)))
+    return Gain(float(fall.mean()), error)
+
+
+def held_out_errors(X: Floats, y: Floats, fold: NDArray[np.int64]) -> Floats:
+    """Predict every row from the other folds, prior N(0, I); return y - prediction.
+
+    Args:
+        X: Whitened columns times prior standard deviations, (3 n, p).
+        y: Whitened target, (3 n,).
+        fold: Fold of every row of three, (n,).
+    """
+    gram, moment = X.T @ X, X.T @ y
+    errors = np.empty(len(y))
+    for k in range(int(fold.max(initial=0)) + 1):
+        out = np.repeat(fold == k, 3)
+        if not out.any():
+            continue
+        rest = gram - X[out].T @ X[out] + np.eye(X.shape[1])
+        p = cho_solve(cho_factor(rest), moment - X[out].T @ y[out])
+        errors[out] = y[out] - X[out] @ p
+    return errors
+
+
+# The noise floor: how large the error of one measured row is at best.
+
+SAME_POSE = 1e-5  # [rad] joint angles that are one pose
+ENOUGH = 5  # repeats beyond the first that give an estimate
+LENGTH = float(np.sqrt(8 / (3 * np.pi)))  # mean length over its root mean square
+ISO_RP = 3.615  # RP of ISO 9283 over the standard deviation per axis, round scatter
+
+
+@dataclass(frozen=True)
+class NoiseFloor:
+    """Mean length of the error that measuring and arriving make by themselves [m]."""
+
+    size: float
+    source: str
+
+
+def noise_floor(fit: Fit, tracker_known: bool) -> NoiseFloor:
+    """Take the noise floor from repeats, else from data sheets, else from the fit.
+
+    Args:
+        fit: A fit of the rows.
+        tracker_known: Whether the cell says where the tracker stands.
+    """
+    same = repeats(fit.batch)
+    count = sum(len(rows) - 1 for rows in same)
+    if count >= ENOUGH:
+        square = sum(
+            float(((fit.error[r] - fit.error[r].mean(axis=0)) ** 2).sum()) for r in same
+        )
+        size = LENGTH * float(np.sqrt(square / count))
+        return NoiseFloor(size, f"repeated poses ({count} repeats)")
+    if tracker_known:
+        sheet = Noise(1.0, 0.0, fit.noise.origin)
+        tracker = sheet.tracker_std(fit.batch.walk.tcp + fit.error)
+        arrival = fit.batch.arm.repeatability / ISO_RP
+        size = LENGTH * float(np.sqrt(3 * (arrival**2 + (tracker**2).mean())))
+        return NoiseFloor(size, "tracker and repeatability of the data sheets")
+    variance = fit.whitener.variance(fit.noise).sum(axis=1).mean()
+    return NoiseFloor(LENGTH * float(np.sqrt(variance)), "estimated from the rows")
+
+
+def repeats(batch: Batch) -> list[NDArray[np.int64]]:
+    """Group the rows that went to one pose in the same way."""
+    s = batch.states
+    key = np.column_stack(
+        [np.round(s.q / SAME_POSE), s.direction, s.tool_id, np.nan_to_num(s.payload)]
+    )
+    _, label = np.unique(key, axis=0, return_inverse=True)
+    return _several(label)
+
+
+def sides(batch: Batch) -> list[list[NDArray[np.int64]]]:
+    """Group the rows of one pose by the side that they came from, if several."""
+    s = batch.states
+    pose = np.column_stack([np.round(s.q / SAME_POSE), s.tool_id])
+    _, label = np.unique(pose, axis=0, return_inverse=True)
+    out = []
+    for rows in _several(label):
+        _, side = np.unique(s.direction[rows], axis=0, return_inverse=True)
+        side = side.reshape(-1)
+        if side.max() > 0:
+            out.append([rows[side == k] for k in range(int(side.max()) + 1)])
+    return out
+
+
+def _several(label: NDArray[np.int64]) -> list[NDArray[np.int64]]:
+    """List the rows of every label that has more than one."""
+    label = label.reshape(-1)
+    order = np.argsort(label, kind="stable")
+    cuts = np.flatnonzero(np.diff(label[order])) + 1
+    return [rows for rows in np.split(order, cuts) if len(rows) > 1]
+
+
+def multi_directional(batch: Batch, error: Floats) -> float | None:
+    """Compute vAP, the multi-directional pose accuracy variation of ISO 9283 [m].
+
+    At every pose that is visited from several sides: the largest distance between the
+    mean positions of two sides. Returns the mean over the poses, or None.
+    """
+    poses = sides(batch)
+    if not poses:
+        return None
+    apart = []
+    for pose in poses:
+        centres = np.array([error[rows].mean(axis=0) for rows in pose])
+        gaps = np.linalg.norm(centres[:, None] - centres[None], axis=2)
+        apart.append(float(gaps.max()))
+    return float(np.mean(apart))

@@ -1,0 +1,276 @@
+"""What a diagnosis says, and where a residual lives."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+
+from postproc.arrays import Floats
+from postproc.calibration.diagnosis.candidates import Candidate
+from postproc.calibration.diagnosis.library import Projection
+from postproc.calibration.diagnosis.score import Leftover
+from postproc.calibration.measurements import DroppedRow
+from postproc.calibration.regression import Fit
+from postproc.model.covariate import covariate, unit
+from postproc.model.effects.effect import Effect
+from postproc.model.kinematics import Batch
+from postproc.model.statistics import ErrorStatistics
+from postproc.robot.pose import MM
+
+# What a diagnosis says.
+
+Verdict = Literal["effect", "noise", "unexplained"]
+
+
+@dataclass(frozen=True)
+class Finding:
+    """An effect that the given model lacked.
+
+    Attributes:
+        effect: Name.
+        joint: Joint 1 to 6, or None.
+        source: Joint or covariate that drives it, or None.
+        p_value: Probability that noise alone looks like it anywhere in the library.
+        evidence: Log marginal likelihood ratio with and without it [nats].
+        share: Part of the residual's variance that it explains.
+        peak_mm: Largest displacement over the rows.
+        parameters: Value, standard error and unit by name, units people use.
+        confusable_with: (effect, joint) that explain the same within a few nats.
+        settings: What is not linear: order, row, time constant and the like.
+        held_out_gain: Fall of the squared held-out error per row, in noise variances,
+            and its standard error.
+    """
+
+    effect: str
+    joint: int | None
+    source: str | None
+    p_value: float
+    evidence: float
+    share: float
+    peak_mm: float
+    parameters: dict[str, tuple[float, float, str]]
+    confusable_with: tuple[tuple[str, int | None], ...]
+    settings: dict[str, Any]
+    held_out_gain: tuple[float, float]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the finding as plain data."""
+        return {
+            "effect": self.effect,
+            "joint": self.joint,
+            "source": self.source,
+            "p_value": self.p_value,
+            "share": self.share,
+            "peak_mm": self.peak_mm,
+            "parameters": {k: list(v) for k, v in self.parameters.items()},
+            "confusable_with": [
+                {"effect": effect, "joint": joint}
+                for effect, joint in self.confusable_with
+            ],
+            "kept": True,
+        }
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where a residual lives: one direction, one covariate, and how clearly.
+
+    Attributes:
+        direction: ``joint 3``, ``base x``, ``tool z``, or the name of an effect.
+        driver: The covariate.
+        evidence: [nats].
+        p_value: Probability that noise alone reaches that anywhere.
+    """
+
+    direction: str
+    driver: str
+    evidence: float
+    p_value: float
+
+
+@dataclass(frozen=True, eq=False)
+class Diagnosis:
+    """The answer to "what is left, and why".
+
+    Attributes:
+        verdict: "effect", "noise", or "unexplained": structure that no name explains.
+        noise_floor_mm: Mean length of one row's error at best.
+        noise_floor_source: Where that comes from.
+        n_fit: Rows that each held-out row was predicted from.
+        n_held_out: Rows held out, each once.
+        before, after: Errors on held-out rows of the given and the extended model.
+        vap_mm: Multi-directional pose accuracy variation before and after, if known.
+        findings: Effects added, in that order.
+        leftovers: What the final residual still shows, the most telling first.
+        places: Where what is left lives, best first.
+        next_measurements: Poses to measure next, (k, 6) [rad].
+        why_next: What they are for.
+        dropped: Rows that count less than fully, and why.
+    """
+
+    verdict: Verdict
+    noise_floor_mm: float
+    noise_floor_source: str
+    n_fit: int
+    n_held_out: int
+    before: ErrorStatistics
+    after: ErrorStatistics
+    vap_mm: tuple[float, float] | None
+    findings: tuple[Finding, ...]
+    leftovers: tuple[Leftover, ...]
+    places: tuple[Place, ...]
+    next_measurements: Floats
+    why_next: str
+    dropped: tuple[DroppedRow, ...]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the content of the JSON report."""
+        degrees = (self.next_measurements * 57.29577951308232).round(4)
+        vap = None
+        if self.vap_mm is not None:
+            vap = {"before": self.vap_mm[0], "after": self.vap_mm[1]}
+        return {
+            "verdict": self.verdict,
+            "noise_floor_mm": self.noise_floor_mm,
+            "noise_floor_source": self.noise_floor_source,
+            "n_fit": self.n_fit,
+            "n_held_out": self.n_held_out,
+            "before": statistics(self.before),
+            "after": statistics(self.after),
+            "vap_mm": vap,
+            "effects": [f.to_dict() for f in self.findings],
+            "leftover": [
+                {"what": x.what, "p_value": x.p_value} for x in self.leftovers[:3]
+            ],
+            "where": [
+                {
+                    "direction": p.direction,
+                    "covariate": p.driver,
+                    "evidence_nats": p.evidence,
+                    "p_value": p.p_value,
+                }
+                for p in self.places
+            ],
+            "next_measurements": degrees.tolist(),
+            "next_measurements_why": self.why_next,
+            "rows_weighed_down": [
+                {"id": d.id, "line": d.line, "why": d.why} for d in self.dropped
+            ],
+        }
+
+
+def statistics(spread: ErrorStatistics) -> dict[str, float]:
+    """Return mean, standard deviation, 95th percentile and maximum [mm]."""
+    return {
+        "mean_mm": spread.mean_mm,
+        "std_mm": spread.std_mm,
+        "p95_mm": spread.p95_mm,
+        "max_mm": spread.max_mm,
+    }
+
+
+# Residuals seen from where they may live: a joint, a covariate, an order per turn.
+
+LARGEST_ORDER = 60
+OVERSAMPLED = 4  # orders tried per resolvable one
+
+
+@dataclass(frozen=True, eq=False)
+class Profile:
+    """A residual along one direction against one covariate, before and after.
+
+    Attributes:
+        label, unit: The covariate; angles in degrees.
+        values: (n,).
+        direction: What the residual is read as, with its unit.
+        before, after: Residual without and with the effect, (n,).
+        lever: Millimetres of the TCP per unit of that residual, (n,).
+    """
+
+    label: str
+    unit: str
+    values: Floats
+    direction: str
+    before: Floats
+    after: Floats
+    lever: Floats
+
+
+def profile(fit: Fit, place: int, candidate: Candidate) -> Profile:
+    """Show an effect of a fit as its residual, with and without it.
+
+    Args:
+        fit: The fit with the effect.
+        place: Place of the effect.
+        candidate: The candidate that it was.
+    """
+    part = fit.combination.slices[place]
+    moved = fit.columns[:, :, part] @ fit.values[part]
+    joint = candidate.family.joint
+    if joint is None:
+        axis = moved / np.maximum(np.linalg.norm(moved, axis=1, keepdims=True), 1e-12)
+        direction, scale = "along the effect [mm]", 1.0 / MM
+        weight = np.ones(len(axis))
+    else:
+        axis = fit.batch.jacobian[:, :, joint - 1]
+        direction, scale = f"joint {joint} [mrad]", 1e3
+        weight = np.maximum((axis**2).sum(axis=1), 1e-9)
+    effect = fit.combination.effects[place]
+    if joint is not None and odd(effect, fit.batch):
+        axis = axis * fit.batch.states.direction[:, joint - 1, None]
+        direction = f"lambda x {direction}"
+    seen = [
+        scale * np.einsum("ni,ni->n", axis, r) / weight
+        for r in (fit.residual + moved, fit.residual)
+    ]
+    name = candidate.source.split(" x ")[0]
+    values, what = covariate(fit.batch, name), unit(name)
+    if what == "rad":
+        values, what = np.degrees(values), "deg"
+    if what == "log rad":
+        values, what = np.degrees(np.exp(values)), "deg"
+    lever = np.sqrt(weight) / (scale * MM)
+    return Profile(name, what, values, direction, seen[0], seen[1], lever)
+
+
+def odd(effect: Effect, batch: Batch) -> bool:
+    """Tell whether an effect turns round with the direction of arrival."""
+    turned = batch.states.with_(direction=-batch.states.direction)
+    there, back = effect.columns(batch), effect.columns(Batch(batch.arm, turned))
+    return bool(np.allclose(there, -back) and np.any(there))
+
+
+@dataclass(frozen=True, eq=False)
+class Periodogram:
+    """How much of a residual waves of one joint's angle would explain.
+
+    Attributes:
+        joint: Joint 1 to 6.
+        orders: Waves per turn, (k,).
+        power: Half of the fall of chi-square that a wave brings, (k,): about 1 where
+            there is nothing.
+    """
+
+    joint: int
+    orders: Floats
+    power: Floats
+
+
+def periodogram(projection: Projection, joint: int) -> Periodogram:
+    """Compute the periodogram of a filtered residual in one joint's direction."""
+    at = projection.at
+    q = at.states.q[:, joint - 1]
+    step = 2 * np.pi / max(float(np.ptp(q)), 0.1) / OVERSAMPLED
+    orders = np.arange(1.0, LARGEST_ORDER, max(step, 0.05))
+    axis = at.jacobian[:, :, joint - 1]
+    waves = np.stack([np.sin(np.outer(q, orders)), np.cos(np.outer(q, orders))], axis=2)
+    raw = axis[:, :, None] * waves.reshape(len(q), 1, -1)
+    B = projection.filter(projection.fit.whiten(raw))
+    B = B.reshape(len(B), len(orders), 2)
+    gram = np.einsum("rok,rol->okl", B, B)
+    along = np.einsum("rok,r->ok", B, projection.rest)
+    size = np.trace(gram, axis1=1, axis2=2)[:, None, None]
+    solved = np.linalg.solve(gram + 1e-6 * size * np.eye(2), along[:, :, None])[:, :, 0]
+    return Periodogram(joint, orders, 0.5 * (along * solved).sum(axis=1))

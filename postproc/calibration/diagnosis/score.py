@@ -1,0 +1,345 @@
+"""How strongly candidates are called for, and how strongly by chance alone."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import f as fisher
+
+from postproc.arrays import Floats
+from postproc.calibration.diagnosis.candidates import Candidate, Family
+from postproc.calibration.diagnosis.library import Blocks, Library, Projection
+
+# How strongly a candidate's block of columns is called for.
+#
+# The evidence of a block is the ratio of marginal likelihoods with and without it, one
+# prior scale for the block at its best value and the level of the noise integrated out:
+#
+#     log E(s) = -1/2 sum_i log(1 + s^2 g_i) - N/2 log(Q(s) / Q(0)),
+#     Q(s) = |z|^2 - sum_i s^2 a_i^2 / (1 + s^2 g_i),
+#
+# g the eigenvalues of its Gram matrix, a its columns times the filtered residual z in
+# that eigenbasis, N the number of rows. It charges for columns, so that a spline does
+# not beat a sine that fits as well.
+
+SIGNALS = np.exp(np.linspace(-1.0, 14.0, 31))  # s^2 g that are tried
+SMALL = 1e-9  # Gram eigenvalues below this share of the largest are no direction
+NOTHING_LEFT = 1e-2  # Gram of a block that the model takes up altogether
+
+
+def log_evidence(blocks: Blocks, square: Floats, rows: int) -> Floats:
+    """Compute the evidence of every block against every draw, (c, draws) [nats].
+
+    Args:
+        blocks: Reduced candidates.
+        square: |z|^2 of every draw, (draws,).
+        rows: Number of scalar rows N.
+    """
+    gain, along2 = blocks.gain, blocks.along**2
+    largest = np.maximum(gain.max(axis=1, keepdims=True), 1e-300)
+    best = np.zeros(along2.shape[::2])
+    for signal in SIGNALS:
+        s2 = signal / largest
+        shrunk = 1.0 + s2 * gain
+        cost = 0.5 * np.log(shrunk).sum(axis=1)
+        taken = np.einsum("ck,ckd->cd", s2 / shrunk, along2)
+        left = np.maximum(1.0 - taken / square, 1e-12)
+        np.maximum(best, -0.5 * rows * np.log(left) - cost[:, None], out=best)
+    best[largest[:, 0] < NOTHING_LEFT] = 0.0
+    return best
+
+
+def explained(blocks: Blocks) -> tuple[Floats, Floats]:
+    """Return the squares that blocks explain by least squares, and their ranks.
+
+    Returns:
+        (c, draws) and (c,).
+    """
+    gain = blocks.gain
+    kept = gain > SMALL * np.maximum(gain.max(axis=1, keepdims=True), NOTHING_LEFT)
+    inverse = np.where(kept, 1.0 / np.where(kept, gain, 1.0), 0.0)
+    return np.einsum("ck,ckd->cd", inverse, blocks.along**2), kept.sum(axis=1)
+
+
+def score_p_value(blocks: Blocks, square: float, rows: int) -> Floats:
+    """Compute the score (F) test of every block against the first draw, (c,)."""
+    squares, rank = explained(blocks)
+    top = squares[:, 0] / np.maximum(rank, 1)
+    under = np.maximum(square - squares[:, 0], 1e-12) / np.maximum(rows - rank, 1)
+    return np.asarray(fisher.sf(top / under, np.maximum(rank, 1), rows - rank))
+
+
+@dataclass(frozen=True)
+class Score:
+    """What speaks for a family.
+
+    Attributes:
+        family: The family.
+        evidence: Log evidence averaged over the family's settings [nats].
+        best: Its best candidate.
+        best_evidence: Log evidence of that one alone.
+        p_value: Of the score test of the best one alone.
+    """
+
+    family: Family
+    evidence: float
+    best: Candidate
+    best_evidence: float
+    p_value: float
+
+
+def rank(
+    reduced: tuple[Blocks, ...],
+    square: float,
+    rows: int,
+    without: frozenset[str] = frozenset(),
+) -> list[Score]:
+    """Score families against the first draw, the best first.
+
+    Args:
+        reduced: Reduced candidates.
+        square: |z|^2.
+        rows: Number of scalar rows.
+        without: Names of parameters whose candidates are left out.
+    """
+    found: dict[Family, list[tuple[float, float, Candidate]]] = {}
+    for blocks in reduced:
+        first = Blocks(blocks.candidates, blocks.gain, blocks.along[:, :, :1])
+        each = log_evidence(first, np.array([square]), rows)[:, 0]
+        p = score_p_value(first, square, rows)
+        for candidate, e, p_one in zip(blocks.candidates, each, p, strict=True):
+            if without and not without.isdisjoint(candidate.names):
+                continue
+            found.setdefault(candidate.family, []).append((e, float(p_one), candidate))
+    out = []
+    for family, members in found.items():
+        e = np.array([m[0] for m in members])
+        log_prior = np.array([m[2].log_prior for m in members])
+        top = members[int(np.argmax(e + log_prior))]
+        weighed = e + log_prior
+        total = float(weighed.max() + np.log(np.exp(weighed - weighed.max()).sum()))
+        out.append(Score(family, total, top[2], float(top[0]), top[1]))
+    return sorted(out, key=lambda s: -s.evidence)
+
+
+def family_maxima(reduced: tuple[Blocks, ...], square: Floats, rows: int) -> Floats:
+    """Return the largest evidence of any family, for every draw, (draws,)."""
+    total: dict[Family, Floats] = {}
+    for blocks in reduced:
+        each = log_evidence(blocks, square, rows)
+        for candidate, e in zip(blocks.candidates, each, strict=True):
+            value = e + candidate.log_prior
+            before = total.get(candidate.family)
+            total[candidate.family] = (
+                value if before is None else np.logaddexp(before, value)
+            )
+    return np.asarray(np.max(np.stack(list(total.values())), axis=0))
+
+
+# How large the largest evidence gets when there is nothing to find.
+
+BOOTSTRAP_DRAWS = 300
+LEAST = 1e-300  # p-values below this are all the same to anybody
+TAIL = 0.2  # share of the draws that the tail is taken from
+
+
+@dataclass(frozen=True, eq=False)
+class Null:
+    """Distribution of the largest evidence of the whole library under the model.
+
+    Attributes:
+        maxima: Sorted maxima of the draws, (draws,) [nats].
+    """
+
+    maxima: Floats
+
+    @property
+    def _tail(self) -> tuple[float, float]:
+        """Where the tail begins, and its mean excess."""
+        start = float(np.quantile(self.maxima, 1.0 - TAIL))
+        excess = self.maxima[self.maxima > start] - start
+        return start, max(float(excess.mean()) if len(excess) else 1.0, 1e-3)
+
+    def p_value(self, evidence: float) -> float:
+        """Give the probability that noise alone reaches an evidence anywhere.
+
+        Beyond the start of the tail the draws are continued by an exponential.
+        """
+        start, scale = self._tail
+        if evidence <= start:
+            reached = (self.maxima >= evidence).sum()
+            return float((reached + 1) / (len(self.maxima) + 1))
+        return max(float(TAIL * np.exp(-(evidence - start) / scale)), LEAST)
+
+    def threshold(self, level: float) -> float:
+        """Give the evidence that noise reaches with a probability [nats]."""
+        start, scale = self._tail
+        if level >= TAIL:
+            return float(np.quantile(self.maxima, 1.0 - level))
+        return start + scale * float(np.log(TAIL / level))
+
+
+def bootstrap(projection: Projection, library: Library, seed: int) -> Null:
+    """Draw from the current model and score the whole library against each draw.
+
+    The filter turns draws from the model into plain noise, so no draw needs a fit.
+    """
+    rng = np.random.default_rng(seed)
+    used = np.repeat(projection.fit.rows.weight > 0, 3)
+    rows = rng.standard_normal((len(projection.rest), BOOTSTRAP_DRAWS)) * used[:, None]
+    reduced = library.reduce(projection, rows)
+    square = (rows**2).sum(axis=0)
+    return Null(np.sort(family_maxima(reduced, square, projection.rows)))
+
+
+# Whether anything is left: tests that ask for no particular effect.
+#
+# Three questions, each against rows whose signs or places are drawn anew: do poses that
+# are alike in two joint angles err alike (random smooth maps of pairs of joints, at two
+# length scales); do rows that follow each other err alike (serial correlation); does
+# the scatter of a joint change with the way since its last reversal, which no mean
+# shows.
+
+MAPS = 36
+FEATURES = 10
+LENGTHS = (0.5, 0.2)  # of the ranges of both joints
+LAGS = 3
+OMNIBUS_DRAWS = 400
+WAYS = np.radians([2.0, 8.0])  # over which scatter may fade after a reversal
+MAPPED_ROWS = 4000  # more rows than this are thinned for the maps
+
+
+@dataclass(frozen=True)
+class Leftover:
+    """One statistic of what is left.
+
+    Attributes:
+        what: What it shows, in words.
+        statistic: Standardised: 0 on average and of unit scale under noise.
+        p_value: Against the same rows without order, all questions counted.
+    """
+
+    what: str
+    statistic: float
+    p_value: float
+
+
+def leftovers(projection: Projection, seed: int) -> tuple[Leftover, ...]:
+    """Ask all questions of a filtered residual, the most telling first."""
+    rng = np.random.default_rng(seed)
+    rest = projection.rest.reshape(-1, 3) * (projection.fit.rows.weight > 0)[:, None]
+    flipped, shuffled = _draws(rest, rng)
+    found: list[tuple[str, Floats]] = [
+        *_maps(projection, flipped, rng),
+        *_serial(projection, flipped),
+        *_scatter(projection, shuffled),
+    ]
+    spread = np.array([_standardised(values) for _, values in found])
+    worst = spread[:, 1:].max(axis=0)
+    out = []
+    for (what, _), values in zip(found, spread, strict=True):
+        reached = float((worst >= values[0]).sum() + 1) / (OMNIBUS_DRAWS + 1)
+        out.append(
+            Leftover(what, float(values[0]), min(reached, _tail(worst, values[0])))
+        )
+    return tuple(sorted(out, key=lambda x: x.p_value))
+
+
+def _draws(rest: Floats, rng: np.random.Generator) -> tuple[Floats, Floats]:
+    """Make draws of plain noise from the rows themselves, the rows as they are first.
+
+    Rows (n, 3) with signs drawn anew keep how large and how round the scatter of every
+    row is, which a model of the noise need not know; rows dealt anew to the poses keep
+    it on the whole.
+
+    Returns:
+        Flipped and shuffled rows, (3 n, 1 + DRAWS) each.
+    """
+    n = len(rest)
+    signs = rng.choice([-1.0, 1.0], (n, OMNIBUS_DRAWS))
+    flipped = (rest[:, :, None] * signs[:, None, :]).reshape(3 * n, OMNIBUS_DRAWS)
+    dealt = np.stack(
+        [rest[rng.permutation(n)].reshape(-1) for _ in range(OMNIBUS_DRAWS)]
+    )
+    first = rest.reshape(-1)
+    return np.column_stack([first, flipped]), np.column_stack([first, dealt.T])
+
+
+def _standardised(values: Floats) -> Floats:
+    """Give values the scale of their draws (all but the first)."""
+    draws = values[1:]
+    return np.asarray((values - draws.mean()) / max(float(draws.std()), 1e-300))
+
+
+def _tail(worst: Floats, value: float) -> float:
+    """Continue the draws by an exponential beyond their top fifth."""
+    start = float(np.quantile(worst, 0.8))
+    scale = float((worst[worst > start] - start).mean())
+    return float(0.2 * np.exp(-(value - start) / scale)) if value > start else 1.0
+
+
+def _maps(
+    projection: Projection, rows: Floats, rng: np.random.Generator
+) -> list[tuple[str, Floats]]:
+    """Explain joint errors by random smooth functions of two angles."""
+    at = projection.at
+    q = at.states.q
+    place = (q - q.min(axis=0)) / np.maximum(np.ptp(q, axis=0), 1e-9)
+    whitened = projection.fit.whiten(at.jacobian).reshape(len(q), 3, 6)
+    keep = _thinned(len(q), rng)
+    out = []
+    for k in range(MAPS):
+        a, b = rng.choice(6, 2, replace=False)
+        j, length = k % 6, LENGTHS[(k // 6) % 2]
+        waves = rng.standard_normal((2, FEATURES)) / length
+        phase = rng.uniform(0, 2 * np.pi, FEATURES)
+        feature = np.cos(place[:, [a, b]] @ waves + phase) * keep[:, None]
+        columns = whitened[:, :, j, None] * feature[:, None, :]
+        columns = projection.filter(columns.reshape(-1, FEATURES))
+        basis, size, _ = np.linalg.svd(columns, full_matrices=False)
+        kept = basis[:, size > 1e-6 * max(float(size.max(initial=0.0)), 1e-9)]
+        share = ((kept.T @ rows) ** 2).sum(axis=0) / (rows**2).sum(axis=0)
+        what = f"joint {j + 1} errs alike where joints {min(a, b) + 1} and "
+        out.append((what + f"{max(a, b) + 1} are alike", share))
+    return out
+
+
+def _thinned(n: int, rng: np.random.Generator) -> Floats:
+    """Mark the rows that the maps use, (n,)."""
+    keep = np.ones(n)
+    if n > MAPPED_ROWS:
+        keep[rng.permutation(n)[MAPPED_ROWS:]] = 0.0
+    return keep
+
+
+def _serial(projection: Projection, rows: Floats) -> list[tuple[str, Floats]]:
+    """Correlate rows with those that follow, in the base frame and in the tool's."""
+    fit = projection.fit
+    n, draws = len(fit.batch), rows.shape[1]
+    turned = np.swapaxes(fit.whitener.turn, 1, 2) @ rows.reshape(n, 3, draws)
+    turned = turned[np.argsort(fit.batch.states.order, kind="stable")]
+    total = (turned**2).sum(axis=(0, 1))
+    along = sum(
+        (turned[lag:] * turned[:-lag]).sum(axis=(0, 1)) for lag in range(1, LAGS + 1)
+    )
+    return [("rows that follow each other err alike", np.asarray(along / total))]
+
+
+def _scatter(projection: Projection, rows: Floats) -> list[tuple[str, Floats]]:
+    """Compare the scatter of every joint soon and late after a reversal."""
+    fit = projection.fit
+    travel = fit.batch.states.travel
+    out = []
+    for j in range(6):
+        if np.isnan(travel[:, j]).any() or np.ptp(travel[:, j]) < 1e-9:
+            continue
+        axis = fit.whiten(projection.at.jacobian[:, :, j]).reshape(-1, 3)
+        axis /= np.maximum(np.linalg.norm(axis, axis=1, keepdims=True), 1e-12)
+        square = np.einsum("nk,nkd->nd", axis, rows.reshape(len(axis), 3, -1)) ** 2
+        for way in WAYS:
+            soon = np.exp(-travel[:, j] / way)
+            soon = soon - soon.mean()
+            what = f"joint {j + 1} scatters with the way since its last reversal"
+            out.append((what, np.asarray(soon @ square / square.mean(axis=0))))
+    return out

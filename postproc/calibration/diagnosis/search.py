@@ -1,0 +1,501 @@
+"""The search: add the effect that is called for most, refit everything, look again."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from postproc.arrays import Floats
+from postproc.calibration.diagnosis.candidates import (
+    FREE,
+    LAST_FREE,
+    LONGEST_WINDUP,
+    NAMED,
+    STEPS,
+    Candidate,
+)
+from postproc.calibration.diagnosis.held_out import Gain, held_out_gain
+from postproc.calibration.diagnosis.library import Library, Projection, reduce_some
+from postproc.calibration.diagnosis.score import Null, Score, rank
+from postproc.calibration.regression import Fit, fit_effects
+from postproc.model.effects.base_shift import BaseShift
+from postproc.model.effects.counterbalance import Counterbalance
+from postproc.model.effects.effect import Effect
+from postproc.model.effects.joint_map import SPACING, JointMap
+from postproc.model.effects.load_backlash import LoadBacklash
+from postproc.model.effects.thermal import Thermal
+from postproc.model.effects.tool_shift import ToolShift
+from postproc.model.effects.transmission import Transmission
+from postproc.model.effects.windup import Windup
+from postproc.model.kinematics import Batch
+
+# Finer settings around a candidate that a grid found.
+
+HARDLY = 2.0  # nats
+OFFSETS = np.linspace(-1.0, 1.0, 9)
+LEVELS = tuple(0.5**k for k in range(9))  # widths tried, in steps of the grid
+SETTLED = 0.3  # nats: finer settings no longer matter
+
+
+def finer(effect: Effect, width: float, batch: Batch) -> list[Effect]:
+    """Vary the settings of an effect.
+
+    Args:
+        effect: The effect.
+        width: How far, in steps of the grid that it comes from.
+        batch: The states, for ranges.
+    """
+    for kind, vary in REFINEMENTS.items():
+        if isinstance(effect, kind):
+            return [effect, *vary(effect, width * OFFSETS, batch)]
+    return [effect]
+
+
+def refine(projection: Projection, score: Score) -> Score:
+    """Improve the settings of a score's best candidate by its evidence.
+
+    The evidence of the family becomes that of the finer points, averaged over the part
+    of the grid that they stand for: a sharp peak between two points of the grid counts,
+    but only as much of the prior as it covers.
+    """
+    square = float(projection.rest @ projection.rest)
+    share = score.best.log_prior
+    for width in LEVELS:
+        effects = finer(score.best.effect, width, projection.at)
+        if len(effects) == 1:
+            return score
+        tries = [replace(score.best, effect=e, log_prior=0.0) for e in effects]
+        blocks = reduce_some(projection, tries, projection.rest[:, None])
+        found = rank(blocks, square, projection.rows)[0]
+        gained = found.best_evidence - score.best_evidence
+        if gained > 0.0:
+            covered = share + float(np.log(2.0 * width / len(tries)))
+            best = replace(found.best, log_prior=share)
+            evidence = max(score.evidence, found.evidence + covered)
+            score = replace(found, best=best, evidence=evidence)
+        if gained < SETTLED and width < 1.0:
+            break
+    return _plainer(projection, score)
+
+
+def _plainer(projection: Projection, score: Score) -> Score:
+    """Take a whole order of a gear where it does hardly worse than a broken one."""
+    effect = score.best.effect
+    if not isinstance(effect, Transmission):
+        return score
+    ((joint, order),) = effect.waves
+    whole = replace(score.best, effect=Transmission(((joint, float(round(order))),)))
+    square = float(projection.rest @ projection.rest)
+    blocks = reduce_some(projection, [whole], projection.rest[:, None])
+    found = rank(blocks, square, projection.rows)[0]
+    if found.best_evidence < score.best_evidence - HARDLY:
+        return score
+    return replace(found, evidence=score.evidence)
+
+
+def _waves(effect: Effect, offsets: Floats, batch: Batch) -> list[Effect]:
+    assert isinstance(effect, Transmission)
+    ((joint, order),) = effect.waves
+    if order <= 2:
+        return []  # the orders of eccentricity are what they are
+    step = np.pi / max(float(np.ptp(batch.states.q[:, joint - 1])), 0.1)
+    tries = np.unique(np.clip(order + step * offsets, 2.5, LAST_FREE))
+    return [Transmission(((joint, float(k)),)) for k in tries]
+
+
+def _rows(effect: Effect, offsets: Floats, batch: Batch) -> list[Effect]:
+    assert isinstance(effect, BaseShift | ToolShift)
+    order = np.sort(batch.states.order)
+    half = max(len(order) / STEPS, 1.0)
+    near = np.searchsorted(order, effect.row) + np.round(half * offsets).astype(int)
+    rows = order[np.unique(np.clip(near, 1, len(order) - 1))]
+    return [replace(effect, row=float(r)) for r in rows]
+
+
+def _way(effect: Effect, offsets: Floats, batch: Batch) -> list[Effect]:
+    assert isinstance(effect, Windup)
+    ways = np.unique(np.minimum(effect.d0 * 2.0**offsets, LONGEST_WINDUP))
+    return [replace(effect, d0=float(way)) for way in ways]
+
+
+def _threshold(effect: Effect, offsets: Floats, batch: Batch) -> list[Effect]:
+    assert isinstance(effect, LoadBacklash)
+    if effect.form == "load":
+        return []
+    return [replace(effect, t0=float(effect.t0 * 3.0**x)) for x in offsets]
+
+
+def _time_constant(effect: Effect, offsets: Floats, batch: Batch) -> list[Effect]:
+    assert isinstance(effect, Thermal)
+    if effect.form == "temperature":
+        return []
+    each = [float(effect.time_constant * 2.0**x) for x in offsets]
+    return [replace(effect, time_constant=c) for c in each]
+
+
+def _spring(effect: Effect, offsets: Floats, batch: Batch) -> list[Effect]:
+    assert isinstance(effect, Counterbalance)
+    turned = [replace(effect, upright=float(effect.upright + 0.1 * x)) for x in offsets]
+    ratio = [replace(effect, ratio=float(effect.ratio * 1.5**x)) for x in offsets]
+    ratio = [e for e in ratio if 0.1 < e.ratio < 0.9]
+    loaded = [replace(effect, preload=float(effect.preload * 3.0**x)) for x in offsets]
+    return [*turned, *ratio, *loaded]
+
+
+def _bump(effect: Effect, offsets: Floats, batch: Batch) -> list[Effect]:
+    assert isinstance(effect, JointMap)
+    if len(effect.bumps) > 1:
+        return []
+    ((joint, centre),) = effect.bumps
+    each = effect.width * 2.0 ** np.array([-0.5, -0.25, 0.0, 0.25, 0.5])
+    moved = centre + effect.width * offsets
+    single: list[Effect] = [
+        JointMap(((joint, float(c)),), float(w)) for c in moved for w in each
+    ]
+    narrow = [_local_map(joint, centre, effect.width, half) for half in (2, 4)]
+    return [*single, *narrow]
+
+
+def _local_map(joint: int, centre: float, width: float, half: int) -> JointMap:
+    """Give a spot a shape of its own: narrower bumps over the same place."""
+    reach = 2.0 * width
+    places = centre + reach * np.arange(-half, half + 1) / half
+    bumps = tuple((joint, float(c)) for c in places)
+    return JointMap(bumps, float(reach / half / SPACING))
+
+
+REFINEMENTS: dict[type[Effect], Callable[[Effect, Floats, Batch], list[Effect]]] = {
+    Transmission: _waves,
+    BaseShift: _rows,
+    ToolShift: _rows,
+    Windup: _way,
+    LoadBacklash: _threshold,
+    Thermal: _time_constant,
+    Counterbalance: _spring,
+    JointMap: _bump,
+}
+
+# Which candidate to take: families ranked, names before free forms.
+
+CLEARLY = (8.0, 0.1)  # nats, and share of the name's evidence, that a free form
+#                       must be ahead by
+LOOKED_AT = 4  # families whose settings are refined before the best is taken
+FORERUNNER = "backlash"  # what these are variations of, where the model lacks it
+VARIATIONS = ("backlash_profile", "load_backlash", "windup")
+
+
+def ranking(projection: Projection, library: Library) -> list[Score]:
+    """Score the library, the settings of the leading families refined."""
+    square = float(projection.rest @ projection.rest)
+    reduced = library.reduce(projection, projection.rest[:, None])
+    known = frozenset(projection.names)
+    scores = rank(reduced, square, projection.rows, without=known)
+    leading: list[Score] = []
+    for tier in (NAMED, FREE):
+        leading += [s for s in scores if s.family.tier == tier][:LOOKED_AT]
+    refined = [refine(projection, s) for s in leading]
+    rest = [s for s in scores if s not in leading]
+    return sorted([*refined, *rest], key=lambda s: -s.evidence)
+
+
+def choose(scores: list[Score]) -> Score:
+    """Take the best name, unless a free form is clearly ahead of it."""
+    name = next(s for s in scores if s.family.tier == NAMED)
+    free = next((s for s in scores if s.family.tier == FREE), name)
+    lead = free.evidence - name.evidence
+    return _forerunner(free if lead > ahead(name.evidence) else name, scores)
+
+
+def ahead(evidence: float) -> float:
+    """Return by how much a free form must be ahead of so much evidence [nats]."""
+    return max(CLEARLY[0], CLEARLY[1] * evidence)
+
+
+def _forerunner(best: Score, scores: list[Score]) -> Score:
+    """Take plain backlash before what varies it, where the joint has none yet."""
+    if best.family.effect not in VARIATIONS:
+        return best
+    plain = (FORERUNNER, best.family.joint)
+    for s in scores:
+        if (s.family.effect, s.family.joint) == plain and s.evidence > CLEARLY[0]:
+            return s
+    return best
+
+
+# A fit with other effects, refitted to the same rows.
+
+
+def extend(fit: Fit, candidate: Candidate, instead_of: int | None = None) -> Fit:
+    """Refit everything with a candidate added, or in the place of an effect."""
+    effects = list(fit.combination.effects)
+    if instead_of is None:
+        effects.append(candidate.effect)
+    else:
+        effects[instead_of] = candidate.effect
+    return with_effects(fit, effects)
+
+
+def without(fit: Fit, place: int) -> Fit:
+    """Refit everything without one effect."""
+    effects = list(fit.combination.effects)
+    del effects[place]
+    return with_effects(fit, effects)
+
+
+def with_effects(fit: Fit, effects: Sequence[Effect]) -> Fit:
+    """Fit other effects to the rows of a fit, beginning where it ended."""
+    position = fit.error + fit.batch.walk.tcp
+    return fit_effects(fit.batch, position, tuple(effects), fit.noise.origin, fit)
+
+
+# A free form must not stand for causes that have names.
+#
+# One name need not reach what two causes do together, gravity on two joints for
+# instance, while a free form of something that goes along with both does. Before a free
+# form is taken, names are therefore added for trial, one after the other: where they
+# leave it nothing to explain, they are what the rows call for.
+
+CHAIN = 3  # names that together may stand for a free form
+
+
+def names_instead(
+    fit: Fit, library: Library, null: Null, level: float, scores: list[Score]
+) -> Score | None:
+    """Find the name to take before a free form, or None where names do not do.
+
+    Args:
+        fit: The fit that lacks something.
+        library: All candidates.
+        null: Distribution of the largest evidence when there is nothing.
+        level: Largest p-value of a name that is tried.
+        scores: The ranking under the fit; its first is the free form.
+    """
+    free, first = scores[0], None
+    for _ in range(CHAIN):
+        name = _best_name(scores, free.family.joint)
+        if name is None or null.p_value(name.evidence) > level:
+            return None
+        first = first or name
+        fit = extend(fit, name.best)
+        scores = ranking(Projection.of(fit), library)
+        left = next((s.evidence for s in scores if s.family == free.family), 0.0)
+        if left < ahead(free.evidence):
+            return first
+    return None
+
+
+def _best_name(scores: list[Score], joint: int | None) -> Score | None:
+    """Find the best name, of a joint if one is given."""
+    for s in scores:
+        if s.family.tier == NAMED and joint in (None, s.family.joint):
+            return s
+    return None
+
+
+# The search: add the effect that is called for most, refit everything, look again.
+
+MOST = 12  # additions
+LEVEL = 0.01  # probability of a false addition, whole library
+ALONE = 0.01  # level of the score test of the candidate itself
+BETTER = 1.0  # nats that replace one family by another
+RECENT = 2  # additions looked at again after each further one
+
+Progress = Callable[[str, float], None]  # what is done, and how far everything is
+
+
+@dataclass(frozen=True)
+class Addition:
+    """An effect that was added.
+
+    Attributes:
+        score: Evidence when it was chosen, settings refined.
+        p_value: Probability that noise alone reaches the evidence anywhere.
+        gain: What it brings on held-out rows.
+    """
+
+    score: Score
+    p_value: float
+    gain: Gain
+
+    @property
+    def candidate(self) -> Candidate:
+        """The candidate."""
+        return self.score.best
+
+
+@dataclass(frozen=True, eq=False)
+class Search:
+    """What a search found.
+
+    Attributes:
+        base: Fit of the model that was given.
+        fit: Fit with all additions.
+        library: All candidates.
+        additions: In the order of addition; they are the last effects of `fit`.
+        null: Distribution of the largest evidence when there is nothing.
+        refused: The candidate that the search stopped at, if there was one.
+    """
+
+    base: Fit
+    fit: Fit
+    library: Library
+    additions: tuple[Addition, ...]
+    null: Null
+    refused: Addition | None
+
+    def place(self, number: int) -> int:
+        """Return the place of an addition among the effects of the fit."""
+        count = len(self.fit.combination.effects)
+        return count - len(self.additions) + number
+
+
+def search(base: Fit, library: Library, null: Null, progress: Progress) -> Search:
+    """Search for effects that a fit lacks.
+
+    Args:
+        base: The fit.
+        library: All candidates.
+        null: Distribution of the largest evidence under the fit.
+        progress: Told what is being done.
+    """
+    found = Search(base, base, library, (), null, None)
+    for number in range(MOST):
+        progress(f"looking for effect {number + 1}", 0.1 + 0.4 * number / MOST)
+        grown = _grow(found)
+        if grown.fit is found.fit:
+            found = grown
+            break
+        found = _settle(grown, len(grown.additions) - RECENT)
+    return _settle(found, 0) if len(found.additions) > RECENT else found
+
+
+def _grow(found: Search) -> Search:
+    """Add the best candidate, or say which one was refused."""
+    best = _best(found, ranking(Projection.of(found.fit), found.library))
+    p_value = found.null.p_value(best.evidence)
+    if p_value > LEVEL or best.p_value > ALONE:
+        return replace(found, refused=None)
+    fit = extend(found.fit, best.best)
+    gain = held_out_gain(fit, len(fit.combination.effects) - 1, best.best)
+    added = Addition(best, p_value, gain)
+    if not gain.sure:
+        return replace(found, refused=added)
+    return replace(found, fit=fit, additions=(*found.additions, added))
+
+
+def _best(found: Search, scores: list[Score]) -> Score:
+    """Choose among scores under the fit of a search, names before free forms."""
+    best = choose(scores)
+    if best.family.tier == NAMED:
+        return best
+    rivals = [best, *(s for s in scores if s != best)]
+    name = names_instead(found.fit, found.library, found.null, LEVEL, rivals)
+    return name or best
+
+
+def _settle(found: Search, first: int) -> Search:
+    """Look again at additions from some number on, now that the others are in."""
+    number = max(first, 0)
+    while number < len(found.additions):
+        again = _again(found, number)
+        number += len(again.additions) == len(found.additions)
+        found = again
+    return found
+
+
+def _again(found: Search, number: int) -> Search:
+    """Keep an addition, replace it by what now fits better, or drop it."""
+    place = found.place(number)
+    old = found.additions[number].candidate
+    scores = ranking(Projection.of(found.fit, without=place), found.library)
+    best = choose(scores)
+    if found.null.p_value(best.evidence) > LEVEL:
+        return _drop(found, number)
+    if best.family.tier == FREE and old.family.tier == NAMED:
+        best = _best(_drop(found, number), scores)
+    present = next((s for s in scores if s.family == old.family), best)
+    if best.evidence < present.evidence + BETTER:
+        best = present
+    other = found
+    if best.best.effect != old.effect:
+        other = put_instead(found, number, best)
+    return _confirmed(found, number) if other is found else other
+
+
+def put_instead(found: Search, number: int, best: Score) -> Search:
+    """Put another candidate in the place of an addition, if it predicts held-out rows.
+
+    Returns:
+        The search as it was where the candidate's gain is not sure.
+    """
+    place = found.place(number)
+    fit = extend(found.fit, best.best, instead_of=place)
+    gain = held_out_gain(fit, place, best.best)
+    if not gain.sure:
+        return found
+    additions = list(found.additions)
+    additions[number] = Addition(best, found.null.p_value(best.evidence), gain)
+    return replace(found, fit=fit, additions=tuple(additions))
+
+
+def _confirmed(found: Search, number: int) -> Search:
+    """Keep an addition if it still predicts held-out rows with all others in."""
+    addition = found.additions[number]
+    gain = held_out_gain(found.fit, found.place(number), addition.candidate)
+    if not gain.sure:
+        return _drop(found, number)
+    additions = list(found.additions)
+    additions[number] = replace(addition, gain=gain)
+    return replace(found, additions=tuple(additions))
+
+
+def _drop(found: Search, number: int) -> Search:
+    """Take an addition out that is not called for any more."""
+    fit = without(found.fit, found.place(number))
+    additions = (*found.additions[:number], *found.additions[number + 1 :])
+    return replace(found, fit=fit, additions=additions)
+
+
+# Which other causes would explain the same rows just as well.
+#
+# A name is preferred to a free form that is not clearly ahead of it, but that does not
+# make the rows speak for the name: such a free form is told with it.
+
+NEAR = 3.0  # nats: odds of 20 to 1
+MOST_OTHERS = 2
+
+
+@dataclass(frozen=True)
+class Standing:
+    """An addition judged with everything else in the model.
+
+    Attributes:
+        evidence: What speaks for it [nats].
+        p_value: Probability that noise alone reaches that anywhere in the library.
+        confusable: Families that explain the same within a few nats, best first.
+    """
+
+    evidence: float
+    p_value: float
+    confusable: tuple[Score, ...]
+
+
+def stand(found: Search, number: int) -> Standing:
+    """Judge one addition of a search against all that could take its place."""
+    own = found.additions[number].candidate
+    projection = Projection.of(found.fit, without=found.place(number))
+    scores = ranking(projection, found.library)
+    here = next((s for s in scores if s.family == own.family), None)
+    if here is None:
+        here = found.additions[number].score
+    rivals = []
+    names = {(own.family.effect, own.family.joint)}
+    for s in scores:
+        name = (s.family.effect, s.family.joint)
+        if s.evidence >= here.evidence - NEAR and name not in names:
+            rivals.append(s)
+            names.add(name)
+    p_value = found.null.p_value(here.evidence)
+    return Standing(here.evidence, p_value, tuple(rivals[:MOST_OTHERS]))

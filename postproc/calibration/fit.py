@@ -1,0 +1,180 @@
+"""The second sentence: measurements become a model."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+from postproc.calibration.measurements import (
+    Measurements,
+    concatenate,
+    read_measurements,
+)
+from postproc.calibration.plausibility import (
+    check_orientations,
+    check_registered,
+    check_survey,
+)
+from postproc.calibration.published import fit_method
+from postproc.calibration.registration import Registration, register
+from postproc.calibration.regression import Fit
+from postproc.calibration.report import FitReport, report_fit, report_method
+from postproc.calibration.selection import fit_survey, model_of
+from postproc.calibration.tables import DETECT, Reading
+from postproc.calibration.tool_groups import find_groups
+from postproc.model.combination import Combination
+from postproc.model.effects.tool_shift import ToolShift
+from postproc.model.model import Method, Model
+from postproc.robot.arm import Arm
+from postproc.robot.cell import Cell
+from postproc.robot.pose import MM
+
+Frame = Literal["base", "tracker"]
+
+
+@dataclass(frozen=True, eq=False)
+class Calibration:
+    """A model, what the fit found, and the rows in the base frame."""
+
+    model: Model
+    report: FitReport
+    survey: Measurements
+
+
+def fit(
+    files: Sequence[str | Path],
+    cell: Cell,
+    *,
+    method: Method = "full",
+    effects: Sequence[str] | None = None,
+    frame: Frame = "base",
+    seed: int = 0,
+    reading: Reading = DETECT,
+) -> Calibration:
+    """Fit a model to measurement files.
+
+    Args:
+        files: Measurement files, in visit order.
+        cell: The cell: arm, probe points, tracker.
+        method: "full" or one of the source's methods.
+        effects: Names of the effects that "full" fits; None: geometry and backlash,
+            and whatever else the survey gives evidence for.
+        frame: Frame of the measured positions. In the tracker's, the tracker's place
+            and the probe points are fitted too.
+        seed: Of random layers, for methods that have one.
+        reading: What the user knows of the files.
+
+    Raises:
+        MeasurementError: A file that cannot be read or cannot determine the geometry.
+        PostprocError: An unknown effect, or one whose covariate was not recorded.
+    """
+    survey = read_surveys(files, cell, reading)
+    return fit_measurements(
+        survey, cell, method=method, effects=effects, frame=frame, seed=seed
+    )
+
+
+def fit_measurements(
+    survey: Measurements,
+    cell: Cell,
+    *,
+    method: Method = "full",
+    effects: Sequence[str] | None = None,
+    frame: Frame = "base",
+    seed: int = 0,
+) -> Calibration:
+    """Fit a model to measurements, see `fit`."""
+    tracker, setup = cell.tracker, several_points(survey)
+    if frame == "tracker":
+        survey, placed = into_base_frame(survey, cell.arm)
+        tracker, setup = placed.tracker, ("registration",)
+    check_survey(survey, cell.arm)
+    survey = check_orientations(survey, cell.arm)
+    if method != "full":
+        model = fit_method(method, survey, cell.arm, seed)
+        return Calibration(model, report_method(model, survey, cell.arm), survey)
+    fitted = fit_survey(survey, cell.arm, effects, tracker, setup)
+    survey = replace(survey, warnings=(*survey.warnings, *moved_tools(fitted, survey)))
+    return Calibration(model_of(fitted, survey), report_fit(fitted, survey), survey)
+
+
+def moved_tools(fitted: Fit, survey: Measurements) -> tuple[str, ...]:
+    """Tell of rows that look as if the tool, or the nest, had moved between them."""
+    told = [
+        f"the tool or its nest slipped {_at(survey, effect.row)}: fitted as "
+        "tool_shift, not compensated"
+        for effect in fitted.combination.effects
+        if isinstance(effect, ToolShift)
+    ]
+    found = find_groups(fitted.residual, fitted.batch.walk.flange)
+    if found is None:
+        return tuple(told)
+    far = f"{found.describe()} in the flange frame"
+    if found.step is not None:
+        where = _at(survey, float(survey.states.order[found.step]))
+        cure = "run postproc diagnose, or fit without --effects"
+        return (*told, f"the tool or its nest has moved by {far} {where}: {cure}")
+    return (
+        *told,
+        f"the rows look like several tools, the others at {far} from the first: if "
+        "they are, add tool_id; if not, run postproc diagnose",
+    )
+
+
+def _at(survey: Measurements, order: float) -> str:
+    """Name the first row from a place in the visit order."""
+    return f"at row {survey.ids[int(np.argmax(survey.states.order >= order))]}"
+
+
+def several_points(survey: Measurements) -> tuple[str, ...]:
+    """Name the effect of a probe plate's nests, where there are several."""
+    return ("probe",) if len(np.unique(survey.states.tool_id)) > 1 else ()
+
+
+def into_base_frame(
+    survey: Measurements, arm: Arm
+) -> tuple[Measurements, Registration]:
+    """Register a survey in the tracker's frame with the nominal arm.
+
+    Raises:
+        MeasurementError: The positions fit the arm in no frame.
+    """
+    nothing = Combination(())
+    found = register(arm, survey.states, survey.position, nothing, np.zeros(0))
+    ids, which = np.unique(survey.states.tool_id, return_inverse=True)
+    xyz = ", ".join(f"{v / MM:.1f}" for v in found.tracker)
+    notes = [f"tracker at {xyz} mm in the base frame"]
+    for k, name in enumerate(ids):
+        xyz = ", ".join(f"{v / MM:.2f}" for v in found.probes[k])
+        notes.append(f"probe point {name} at {xyz} mm in the flange frame")
+    turned = None
+    if survey.rotation is not None:
+        turned = found.base_from_tracker[:3, :3] @ survey.rotation
+    registered = replace(
+        survey,
+        states=survey.states.with_(tool=found.probes[which]),
+        position=found.to_base(survey.position),
+        rotation=turned,
+        warnings=(*survey.warnings, *notes),
+    )
+    check_registered(survey, registered, arm, found.typical)
+    return registered, found
+
+
+def read_surveys(
+    files: Sequence[str | Path], cell: Cell, reading: Reading = DETECT
+) -> Measurements:
+    """Read measurement files as one survey, with what the cell knows of the load."""
+    parts = [
+        read_measurements(path, cell.arm, cell.probes, reading=reading)
+        for path in files
+    ]
+    survey = replace(concatenate(parts), mounting=cell.mounting)
+    if cell.file.payload is None:
+        return survey
+    com = np.tile(cell.payload_com, (len(survey), 1))
+    return survey.with_states(survey.states.with_(payload_com=com))

@@ -1,0 +1,262 @@
+"""Measurements of where the tool really landed."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from postproc.arrays import Bools, Floats
+from postproc.calibration.tables import (
+    DETECT,
+    JOINTS,
+    NUMBER,
+    Format,
+    Reading,
+    Table,
+    read_directions,
+    read_foreign,
+    read_headed,
+    read_rotation,
+    read_tools,
+    translate,
+    unique_ids,
+)
+from postproc.exceptions import MeasurementError
+from postproc.robot.arm import Arm
+from postproc.robot.pose import MM
+from postproc.robot.state import States, make_states
+
+# Measurements of where the tool really landed.
+
+POSITION = ("x_mm", "y_mm", "z_mm")
+COVARIATES = {  # column: field of States, SI units per unit of the column
+    "time_s": ("time", 1.0),
+    "temperature_c": ("temperature", 1.0),
+    "payload_kg": ("payload", 1.0),
+    "speed_mm_s": ("speed", MM),
+}
+NOWHERE = 1e-6  # [m] a position this close to zero is a lost beam
+
+
+@dataclass(frozen=True)
+class DroppedRow:
+    """A row that was not used, and why."""
+
+    id: str
+    line: int
+    why: str
+
+
+@dataclass(frozen=True, eq=False)
+class Measurements:
+    """Measured positions with the states they were taken in, in visit order.
+
+    Attributes:
+        path: The file (the first of several).
+        states: n states.
+        position: Measured TCP, (n, 3) [m], NaN where the file has no positions.
+        ids: Row ids.
+        line: 1-based line of every row, (n,).
+        inferred: True where the direction was inferred from the row order, (n,).
+        sha256: Hash of the file(s).
+        dropped: Rows left out.
+        warnings: What a reader of the fit should know.
+        rotation: Measured orientation of the tool or 6D probe, (n, 3, 3), or None; in
+            the frame of the positions.
+        mounting: Orientation of the tool or probe in the flange frame, (3, 3), or None
+            where it is not known.
+    """
+
+    path: Path
+    states: States
+    position: Floats
+    ids: tuple[str, ...]
+    line: NDArray[np.int64]
+    inferred: Bools
+    sha256: str
+    dropped: tuple[DroppedRow, ...] = ()
+    warnings: tuple[str, ...] = ()
+    rotation: Floats | None = field(default=None, repr=False)
+    mounting: Floats | None = field(default=None, repr=False)
+
+    def __len__(self) -> int:
+        """Return the number of rows."""
+        return len(self.states)
+
+    def with_states(self, states: States) -> Measurements:
+        """Return a copy with other states of the same rows."""
+        return replace(self, states=states)
+
+    def __getitem__(self, rows: NDArray[np.int64] | Bools) -> Measurements:
+        """Return some of the rows."""
+        index = np.arange(len(self))[rows]
+        return replace(
+            self,
+            states=self.states[index],
+            position=self.position[index],
+            ids=tuple(self.ids[i] for i in index),
+            line=self.line[index],
+            inferred=self.inferred[index],
+            rotation=None if self.rotation is None else self.rotation[index],
+        )
+
+
+def read_measurements(
+    path: str | Path,
+    arm: Arm,
+    tools: Floats | Mapping[int, Floats],
+    *,
+    positions: bool = True,
+    reading: Reading = DETECT,
+) -> Measurements:
+    """Read a measurement file.
+
+    Args:
+        path: CSV with the columns of the documentation; rows in visit order.
+        arm: The arm, for directions that must be inferred.
+        tools: Probe points in the flange frame, (k, 3) [m] or by `tool_id`. Columns
+            tool_x_mm, tool_y_mm, tool_z_mm override them.
+        positions: Whether the file must have measured positions.
+        reading: What the user knows of the file.
+
+    Raises:
+        MeasurementError: Naming file, line, problem and cure.
+    """
+    table = read_foreign(path, reading)
+    return from_table(table, arm, tools, positions=positions)
+
+
+def from_table(
+    table: Table,
+    arm: Arm,
+    tools: Floats | Mapping[int, Floats],
+    *,
+    positions: bool = True,
+) -> Measurements:
+    """Interpret a table with the columns of the documentation."""
+    table.require("id", *JOINTS, *(POSITION if positions else ()))
+    ids = unique_ids(table)
+    q = np.deg2rad(table.block(JOINTS))
+    side, travel, inferred, warnings = read_directions(table, arm, q)
+    covariates = {
+        name: scale * table.numbers(column, empty=True)
+        for column, (name, scale) in COVARIATES.items()
+        if table.has(column)
+    }
+    tool, tool_id = read_tools(table, tools)
+    states = make_states(q, side, tool, tool_id=tool_id, travel=travel, **covariates)
+    read = table.has(*POSITION)
+    position = table.block(POSITION) * MM if read else np.full((len(q), 3), np.nan)
+    found = Measurements(
+        table.path, states, position, ids, table.line, inferred, table.sha256,
+        warnings=warnings, rotation=read_rotation(table),
+    )  # fmt: skip
+    return drop_lost_beams(found)
+
+
+def drop_lost_beams(measured: Measurements) -> Measurements:
+    """Leave out rows whose position is zero: the tracker had lost the beam."""
+    lost: Bools = np.asarray((np.abs(measured.position) < NOWHERE).all(axis=1))
+    gone = tuple(
+        DroppedRow(
+            measured.ids[i], int(measured.line[i]), "position 0, 0, 0: beam lost"
+        )
+        for i in np.flatnonzero(lost)
+    )
+    return replace(measured[~lost], dropped=measured.dropped + gone)
+
+
+def concatenate(parts: Sequence[Measurements]) -> Measurements:
+    """Put several files one after the other.
+
+    Raises:
+        MeasurementError: An id appears in two files.
+    """
+    first = parts[0]
+    if len(parts) == 1:
+        return first
+    seen: dict[str, Path] = {}
+    for part in parts:
+        for name, line in zip(part.ids, part.line, strict=True):
+            if name in seen and seen[name] != part.path:
+                cure = "Give every row its own id"
+                problem = f"id {name!r} is also in {seen[name]}"
+                raise MeasurementError(part.path, problem, cure, line=int(line))
+            seen[name] = part.path
+    joined = {
+        name: np.concatenate([getattr(p.states, name) for p in parts])
+        for name in first.states.__dataclass_fields__
+        if name != "order"
+    }
+    order = np.arange(sum(map(len, parts)), dtype=float)
+    rotations = [p.rotation for p in parts if p.rotation is not None]
+    return Measurements(
+        path=first.path,
+        states=States(order=order, **joined),
+        position=np.concatenate([p.position for p in parts]),
+        ids=tuple(i for p in parts for i in p.ids),
+        line=np.concatenate([p.line for p in parts]),
+        inferred=np.concatenate([p.inferred for p in parts]),
+        sha256="+".join(p.sha256 for p in parts),
+        dropped=tuple(d for p in parts for d in p.dropped),
+        warnings=tuple(w for p in parts for w in p.warnings),
+        rotation=np.concatenate(rotations) if len(rotations) == len(parts) else None,
+    )
+
+
+# Lists of measured points that carry names but no joint angles.
+#
+# SpatialAnalyzer writes `//` header lines and `name, x, y, z` without units; Leica
+# software writes Latin-1 text, times with apostrophes, and any order of columns. They
+# are joined with the program that was measured.
+
+NAMES = ("id", "name", "point", "point name", "point id", "target")
+AXIS = {a: re.compile(rf"^{a}(\s*[\[(]?\s*mm\s*[\])]?|_mm)?$", re.I) for a in "xyz"}
+
+
+def read_points(path: str | Path, reading: Reading = DETECT) -> Table:
+    """Read names and positions as columns id, x_mm, y_mm, z_mm.
+
+    A file that has these columns keeps its others, too.
+
+    Raises:
+        MeasurementError: No names or coordinates are found.
+    """
+    table = read_headed(path, comment="//", **reading.given)
+    if table.has("id", *POSITION):
+        return table
+    name, axes = _columns(table)
+    scaled = {ours: (axis, reading.mm_per_unit)
+              for ours, axis in zip(POSITION, axes, strict=True)}  # fmt: skip
+    return translate(table, Format({"id": (name, 1.0), **scaled}))
+
+
+def _columns(table: Table) -> tuple[str, tuple[str, str, str]]:
+    """Find the columns of name and coordinates.
+
+    Raises:
+        MeasurementError: They are not there.
+    """
+    if table.columns[0] == "1":  # no header: name first, then the first three numbers
+        row = [bool(NUMBER.match(str(cell))) for cell in table.cells[0]]
+        numbers = [k for k, is_number in enumerate(row) if is_number and k > 0][:3]
+        if len(numbers) == 3:
+            x, y, z = (table.columns[k] for k in numbers)
+            return table.columns[0], (x, y, z)
+    name = next((c for c in table.columns if c.lower() in NAMES), None)
+    axes = [next((c for c in table.columns if AXIS[a].match(c)), None) for a in "xyz"]
+    if name is None or None in axes:
+        raise MeasurementError(
+            table.path,
+            "no columns for a name and x, y, z",
+            f"The header has: {', '.join(table.columns)}. Name them id, x_mm, y_mm, "
+            "z_mm",
+            line=1,
+        )
+    x, y, z = (str(axis) for axis in axes)
+    return name, (x, y, z)

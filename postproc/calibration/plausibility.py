@@ -1,0 +1,252 @@
+"""Refusing surveys that cannot be what they say, with the likely reason."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from itertools import combinations
+
+import numpy as np
+
+from postproc.arrays import Floats
+from postproc.calibration.measurements import Measurements
+from postproc.calibration.orientations import Turns
+from postproc.calibration.registration import register
+from postproc.calibration.regression import observe
+from postproc.calibration.tool_groups import find_groups
+from postproc.exceptions import MeasurementError
+from postproc.model.combination import Combination
+from postproc.model.effects.geometry import Geometry
+from postproc.model.kinematics import Batch
+from postproc.robot.arm import Arm
+from postproc.robot.pose import MM
+from postproc.robot.state import States, make_states
+
+# Which mistake in a measurement file would explain its positions.
+
+CLOSE = 0.01  # [m] a mended survey agrees at least so well
+TRIED = 60  # rows that a guess is tried on
+NOTHING = Combination(())
+
+
+def likely_cure(survey: Measurements, arm: Arm) -> str:
+    """Name the mistake that would explain the positions, if one does."""
+    few = survey[np.unique(np.linspace(0, len(survey) - 1, TRIED).astype(np.int64))]
+    for cure, states, position in _guesses(few.states, few.position):
+        if register(arm, states, position, NOTHING, np.zeros(0)).typical < CLOSE:
+            return cure
+    return "Check units, joint order and signs, the tool and the frame (--frame)"
+
+
+def _guesses(states: States, position: Floats) -> Iterator[tuple[str, States, Floats]]:
+    """List mistakes that people make, most frequent first, each undone."""
+    q = states.q
+
+    def turned(angles: Floats) -> States:
+        return states.with_(q=angles)
+
+    yield (
+        "The positions look like the tracker's frame: use --frame tracker",
+        states,
+        (position),
+    )
+    yield "The positions look like metres: write millimetres", states, position * 1e3
+    yield (
+        "The joint angles look like radians: write degrees",
+        turned(np.rad2deg(q)),
+        (position),
+    )
+    for j in range(6):
+        sign = np.where(np.arange(6) == j, -1.0, 1.0)
+        yield (
+            f"Joint {j + 1} looks like it has the other sign",
+            turned(q * sign),
+            (position),
+        )
+    for i, j in combinations(range(6), 2):
+        order = np.arange(6)
+        order[[i, j]] = j, i
+        cure = f"Joints {i + 1} and {j + 1} look swapped: correct the columns"
+        yield cure, turned(q[:, order]), position
+
+
+# Refusing surveys that cannot be what they say, with the likely reason.
+
+FAR = 0.05  # [m] no arm that works is off by more
+APART = 10.0  # rows this many times farther off than the typical one are another kind
+MANY = 0.1  # share of such rows from which the file is at fault, not the rows
+PROBES = 400  # random poses that show what could be determined at best
+ENOUGH = 0.75  # share of the determinable directions that a survey must show
+OTHER_UNIT = 50.0  # no arm's positions differ so much in size
+SOME = 0.02  # share of rows in another unit that is no accident
+TOOL_APART = 1e-3  # [m] tools that differ by less are told by the fit, not refused
+
+
+def check_survey(survey: Measurements, arm: Arm) -> None:
+    """Check units, frame, tools and number of rows of a survey in the base frame.
+
+    Raises:
+        MeasurementError: With the likely reason and the cure.
+    """
+    check_rows(survey, arm)
+    check_units(survey)
+    check_tools(survey, arm)
+    gap = survey.position - Batch(arm, survey.states).walk.tcp
+    size = np.linalg.norm(gap, axis=1)
+    typical = float(np.median(size))
+    if typical > FAR:
+        problem = f"measured and nominal positions differ by {typical / MM:.0f} mm"
+        raise MeasurementError(survey.path, problem, likely_cure(survey, arm))
+    apart = size > max(APART * typical, CLOSE)
+    if apart.mean() > MANY:
+        line = int(survey.line[np.argmax(apart)])
+        problem = (
+            f"{int(apart.sum())} of {len(survey)} rows are more than "
+            f"{max(APART * typical, CLOSE) / MM:.0f} mm off, the others are not"
+        )
+        cure = "Two tools or two units in one file? Add tool_id, or split the file"
+        raise MeasurementError(survey.path, problem, cure, line=line)
+
+
+def check_units(survey: Measurements) -> None:
+    """Refuse rows in metres among rows in millimetres.
+
+    Raises:
+        MeasurementError: Naming the first such row.
+    """
+    size = np.linalg.norm(survey.position, axis=1)
+    typical = float(np.median(size))
+    other = (size * OTHER_UNIT < typical) | (size > OTHER_UNIT * typical)
+    if other.mean() > SOME:
+        metres = size < np.sqrt(float(size.max()) * float(size.min()))
+        line = int(survey.line[np.argmax(metres)])
+        problem = f"{int(metres.sum())} of {len(survey)} rows look like metres"
+        cure = "The others are in millimetres: write all of them so"
+        raise MeasurementError(survey.path, problem, cure, line=line)
+
+
+def check_tools(survey: Measurements, arm: Arm) -> None:
+    """Refuse rows of several tools that have no tool_id of their own.
+
+    Raises:
+        MeasurementError: Saying how the tools lie to each other, and a row of each.
+    """
+    batch = Batch(arm, survey.states)
+    left = survey.position - batch.walk.tcp
+    X = Geometry.propose(arm, survey.states).columns(batch)
+    X = X.reshape(-1, X.shape[2])
+    scale = np.maximum(np.linalg.norm(X, axis=0), 1e-300)
+    fitted = np.linalg.lstsq(X / scale, left.reshape(-1), rcond=1e-6)[0]
+    left = left - (X / scale @ fitted).reshape(-1, 3)
+    for tool in np.unique(survey.states.tool_id):
+        rows = np.flatnonzero(survey.states.tool_id == tool)
+        found = find_groups(left[rows], batch.walk.flange[rows])
+        if found is not None and found.apart > TOOL_APART:
+            first = sorted(rows[np.argmax(found.which == k)] for k in found.kinds)
+            raise MeasurementError(
+                survey.path,
+                f"the rows were measured with {len(first)} tools (first seen in rows "
+                f"{', '.join(survey.ids[i] for i in first)}); from the first one the "
+                f"others are at {found.describe()} in the flange frame",
+                "Add a column tool_id and the points to [survey] in the cell file, or "
+                "columns tool_x_mm, tool_y_mm, tool_z_mm, or split the file",
+                line=int(survey.line[first[1]]),
+            )
+
+
+def check_registered(
+    survey: Measurements, registered: Measurements, arm: Arm, typical: float
+) -> None:
+    """Check a survey in the tracker's frame by what its registration leaves.
+
+    Args:
+        survey: The measurements, tracker frame.
+        registered: The same in the base frame, as far as they could be placed.
+        arm: The arm.
+        typical: Median distance that the registration leaves [m].
+
+    Raises:
+        MeasurementError: With the likely reason and the cure.
+    """
+    check_rows(survey, arm)
+    check_units(survey)
+    if typical > CLOSE:
+        check_tools(registered, arm)
+        problem = f"the registration leaves {typical / MM:.0f} mm"
+        raise MeasurementError(survey.path, problem, likely_cure(survey, arm))
+
+
+def check_rows(survey: Measurements, arm: Arm) -> None:
+    """Check that the rows can determine the geometry.
+
+    Raises:
+        MeasurementError: Too few different poses.
+    """
+    possible = determinable(arm, survey)
+    seen = _rank(arm, survey.states) if len(survey) else 0
+    if seen < ENOUGH * possible:
+        poses = len(np.unique(np.round(survey.states.q, 4), axis=0))
+        raise MeasurementError(
+            survey.path,
+            f"{len(survey)} rows at {poses} poses determine {seen} of {possible} "
+            "directions of the geometry",
+            "Measure more poses, spread over the workspace, all joints moving",
+        )
+
+
+def determinable(arm: Arm, survey: Measurements) -> int:
+    """Count the directions of the geometry that any survey with its tools can show."""
+    rng = np.random.default_rng(0)
+    low, high = np.maximum(arm.lower, -np.pi), np.minimum(arm.upper, np.pi)
+    tools = np.unique(np.concatenate([np.zeros((0, 3)), survey.states.tool]), axis=0)
+    tools = tools if len(tools) else np.zeros((1, 3))
+    tool = tools[np.arange(PROBES) % len(tools)]
+    return _rank(arm, make_states(rng.uniform(low, high, (PROBES, 6)), tool=tool))
+
+
+def _rank(arm: Arm, states: States) -> int:
+    """Count the directions of the geometry that states show."""
+    geometry = Geometry.propose(arm, states)
+    names = tuple(p.name for p in geometry.parameters())
+    scales = np.array([p.scale for p in geometry.parameters()])
+    X = geometry.columns(Batch(arm, states)).reshape(-1, len(names)) * scales
+    return observe(X, names).rank
+
+
+# Whether the orientations of a 6D probe can be used.
+
+TURNED = np.deg2rad(1.0)  # no flange that works is off by more
+
+
+def check_orientations(survey: Measurements, arm: Arm) -> Measurements:
+    """Check measured orientations, base frame; what cannot be used is left out.
+
+    Without the probe's mounting they tell nothing of the flange that one point does
+    not, so that only their own errors would enter.
+
+    Raises:
+        MeasurementError: The declared mounting of the probe is not the measured one.
+    """
+    if survey.rotation is None or len(survey) == 0:
+        return survey
+    batch = Batch(arm, survey.states)
+    apart = Turns.of(batch, survey.rotation, None).typical
+    if apart > TURNED:
+        why = (
+            f"they scatter by {np.rad2deg(apart):.1f} deg about the arm's: not "
+            "R = Rx Ry Rz of a probe on the flange"
+        )
+    elif survey.mounting is None:
+        why = (
+            "the cell does not say how the probe is mounted: write euler_zyz_deg in "
+            "[survey]"
+        )
+    else:
+        apart = Turns.of(batch, survey.rotation, survey.mounting).typical
+        if apart > TURNED:
+            problem = f"the probe is mounted {np.rad2deg(apart):.1f} deg off"
+            cure = "Correct [survey] euler_zyz_deg in the cell file, or leave it out"
+            raise MeasurementError(survey.path, problem, cure)
+        return survey
+    told = f"measured orientations are not used: {why}"
+    return replace(survey, rotation=None, warnings=(*survey.warnings, told))

@@ -1,0 +1,220 @@
+"""The five published methods, on the same rows as ours."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from postproc.arrays import Floats
+from postproc.calibration.measurements import Measurements
+from postproc.calibration.regression import fit_effects
+from postproc.calibration.selection import fit_survey, model_of
+from postproc.model.combination import Combination
+from postproc.model.effects import elm, maps
+from postproc.model.effects.effect import Effect
+from postproc.model.effects.elm import HiddenLayer
+from postproc.model.effects.geometry import Geometry
+from postproc.model.effects.maps import Interpolation
+from postproc.model.kinematics import Batch
+from postproc.model.model import Method, Model, Ranges
+from postproc.model.noise import Noise
+from postproc.robot.arm import Arm
+from postproc.robot.pose import MM
+
+# The methods of the source, as models that predict like ours.
+#
+# They know nothing of noise, covariance or geometry; their standard error is what ten
+# folds of cross-validation leave.
+
+Trained = tuple[tuple[Effect, ...], Floats]
+Trainer = Callable[[Batch, Floats, int], Trained]
+
+NEURONS = 40
+FOLDS = 10
+
+
+def _elm(directions: bool) -> Trainer:
+    """Make the trainer of an ELM with or without arrival directions."""
+
+    def train(batch: Batch, error: Floats, seed: int) -> Trained:
+        """Fit the output weights by the pseudo-inverse."""
+        layer = HiddenLayer.draw(batch.states, NEURONS, seed, directions)
+        return (elm.ElmMap(layer),), elm.train(layer, batch.states, error)
+
+    return train
+
+
+def _interpolation(batch: Batch, error: Floats, seed: int) -> Trained:
+    """Keep the measured errors at their nominal places."""
+    return (Interpolation.through(batch.walk.tcp),), error.reshape(-1)
+
+
+def _kinematic_elm(batch: Batch, error: Floats, seed: int) -> Trained:
+    """Fit the geometry, then an ELM of the joint angles to what is left."""
+    geometry = Geometry.propose(batch.arm, batch.states)
+    fitted = fit_effects(batch, batch.walk.tcp + error, (geometry,))
+    effects, weights = _elm(directions=False)(batch, fitted.residual, seed)
+    return (geometry, *effects), np.concatenate([fitted.values, weights])
+
+
+def _kriging(batch: Batch, error: Floats, seed: int) -> Trained:
+    """Fit a Gaussian process in the modified joint space."""
+    effect, values = maps.train(batch.states, error, seed)
+    return (effect,), values
+
+
+TRAINERS: dict[Method, Trainer] = {
+    "eja-elm": _elm(directions=True),
+    "elm": _elm(directions=False),
+    "interpolation": _interpolation,
+    "kinematic-elm": _kinematic_elm,
+    "kriging": _kriging,
+}
+
+
+def fit_method(method: Method, survey: Measurements, arm: Arm, seed: int) -> Model:
+    """Fit a method of the source to a survey in the base frame."""
+    batch = Batch(arm, survey.states)
+    error = survey.position - batch.walk.tcp
+    effects, values = TRAINERS[method](batch, error, seed)
+    combination = Combination(effects)
+    left = np.linalg.norm(error - combination.error(batch, values), axis=1) / MM
+    model = Model(
+        method=method,
+        arm_name=arm.name,
+        arm_id=arm.id,
+        effects=combination,
+        values=values,
+        covariance=np.zeros((0, 0)),
+        prior_std=np.zeros(len(values)),
+        noise=Noise(0.0, 0.0),
+        ranges=Ranges.of(survey.states),
+        rows=len(survey),
+        data_sha256=survey.sha256,
+        statistics={
+            "residual_mean_mm": float(left.mean()),
+            "residual_max_mm": float(left.max()),
+        },
+    )
+    return replace(model, spread=_spread(method, batch, error, seed))
+
+
+def _spread(
+    method: Method, batch: Batch, error: Floats, seed: int
+) -> tuple[float, float, float]:
+    """Root mean square per axis of what cross-validation leaves [m]."""
+    n = len(batch)
+    fold = np.random.default_rng(seed).permutation(np.arange(n) % min(FOLDS, n))
+    left = np.zeros((n, 3))
+    for k in range(min(FOLDS, n)):
+        inside = np.flatnonzero(fold != k)
+        outside = np.flatnonzero(fold == k)
+        if len(inside) == 0:
+            return (np.inf, np.inf, np.inf)
+        train = Batch(batch.arm, batch.states[inside])
+        effects, values = TRAINERS[method](train, error[inside], seed)
+        test = Batch(batch.arm, batch.states[outside])
+        left[outside] = error[outside] - Combination(effects).error(test, values)
+    x, y, z = np.sqrt((left**2).mean(axis=0))
+    return float(x), float(y), float(z)
+
+
+# The source's five rows and ours, on the same data and split.
+
+Rows = NDArray[np.int64]
+
+TRAIN_SHARE = 2 / 3  # 300 of 450, as the source
+ORDER: tuple[Method, ...] = (
+    "eja-elm",
+    "elm",
+    "interpolation",
+    "kinematic-elm",
+    "kriging",
+    "full",
+)
+
+
+@dataclass(frozen=True)
+class MethodRow:
+    """Errors that one method leaves on rows it has not seen [mm]."""
+
+    method: str
+    min_mm: float
+    max_mm: float
+    mean_mm: float
+    std_mm: float
+    n: int
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """All methods on one split."""
+
+    rows: tuple[MethodRow, ...]
+    split: str
+
+
+def random_split(n: int, seed: int, share: float = TRAIN_SHARE) -> tuple[Rows, Rows]:
+    """Split n rows at random into training and test rows, each in visit order."""
+    order = np.random.default_rng(seed).permutation(n)
+    cut = round(share * n)
+    return np.sort(order[:cut]), np.sort(order[cut:])
+
+
+def compare(
+    survey: Measurements, arm: Arm, tracker: Floats | None = None, seed: int = 0
+) -> Comparison:
+    """Fit every method to a random part of a survey and test it on the rest.
+
+    Args:
+        survey: Measurements in the base frame.
+        arm: The arm.
+        tracker: Tracker position in the base frame, (3,) [m], or None.
+        seed: Of the split and of the random layers.
+    """
+    train, test = random_split(len(survey), seed)
+    split = (
+        f"{len(train)} rows to fit, {len(test)} to test, drawn at random (seed {seed})"
+    )
+    rows = compare_on(survey[train], survey[test], arm, tracker, seed)
+    return Comparison(rows, split)
+
+
+def compare_on(
+    train: Measurements,
+    test: Measurements,
+    arm: Arm,
+    tracker: Floats | None,
+    seed: int,
+    truth: Floats | None = None,
+) -> tuple[MethodRow, ...]:
+    """Fit every method to one survey and test it on another.
+
+    Args:
+        train: Rows to fit.
+        test: Rows to test on.
+        arm: The arm.
+        tracker: Tracker position in the base frame, or None.
+        seed: Of the random layers.
+        truth: True positions of the test rows where they are known, (n, 3) [m].
+    """
+    position = test.position if truth is None else truth
+    error = position - Batch(arm, test.states).walk.tcp
+    rows = [_row("no compensation", error)]
+    for method in ORDER:
+        if method == "full":
+            model = model_of(fit_survey(train, arm, None, tracker), train)
+        else:
+            model = fit_method(method, train, arm, seed)
+        rows.append(_row(method, error - model.measured_error(arm, test.states)))
+    return tuple(rows)
+
+
+def _row(method: str, error: Floats) -> MethodRow:
+    """Summarise errors (n, 3) [m]."""
+    e = np.linalg.norm(error, axis=1) / MM
+    low, high = float(e.min()), float(e.max())
+    return MethodRow(method, low, high, float(e.mean()), float(e.std()), len(e))

@@ -1,0 +1,347 @@
+"""The Bayesian, robust fit of effects to rows, and what they cannot see."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from scipy.linalg import qr, solve_triangular
+
+from postproc.arrays import Floats, Ints
+from postproc.calibration.evidence import Normal, Posterior, maximise, widened
+from postproc.calibration.orientations import RowWeights, Turns, judge, student_weights
+from postproc.model.combination import Combination
+from postproc.model.effects.effect import Effect
+from postproc.model.kinematics import Batch
+from postproc.model.noise import Noise, Whitener
+
+# What a fit has found, with all that tests of further effects need.
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """Fitted effects.
+
+    Attributes:
+        batch: The survey's states, nominal kinematics.
+        combination: The effects.
+        error: Measured minus nominal position, (n, 3) [m].
+        values: Parameters, (p,) [SI].
+        covariance: Of the parameters, (p, p).
+        log_scale: Log factor that the data put on each group's prior scale, (g,).
+        groups: Names of the prior groups, in the order of `log_scale`.
+        noise: Estimated noise components.
+        rows: Weight of every row.
+        residual: Error that the effects leave, (n, 3) [m].
+        columns: Derivatives at the solution, (n, 3, p).
+        whitener: Rotations and variances of the rows.
+        log_evidence: Log marginal likelihood of the whitened rows.
+        effective: Effective number of parameters.
+        turns: Measured orientations, where the survey has them.
+    """
+
+    batch: Batch
+    combination: Combination
+    error: Floats
+    values: Floats
+    covariance: Floats
+    log_scale: Floats
+    groups: tuple[str, ...]
+    noise: Noise
+    rows: RowWeights
+    residual: Floats
+    columns: Floats
+    whitener: Whitener
+    log_evidence: float
+    effective: float
+    turns: Turns | None = None
+
+    @property
+    def std(self) -> Floats:
+        """Standard errors of the parameters, (p,)."""
+        return np.sqrt(np.diag(self.covariance))
+
+    @property
+    def prior_std(self) -> Floats:
+        """Prior standard deviations that the data chose, (p,)."""
+        std: Floats = self.combination.scales * np.exp(self.log_scale)[self.group]
+        return std
+
+    @cached_property
+    def group(self) -> Ints:
+        """Index into `groups` of every parameter, (p,)."""
+        index = {g: i for i, g in enumerate(self.groups)}
+        return np.array([index[g] for g in self.combination.groups], dtype=np.int64)
+
+    @cached_property
+    def row_scale(self) -> Floats:
+        """What whitening multiplies the rotated components with, (n, 3) [1/m]."""
+        v = self.whitener.variance(self.noise)
+        scale: Floats = np.sqrt(self.rows.weight[:, None] / v)
+        return scale
+
+    def whiten(self, rows: Floats) -> Floats:
+        """Whiten (n, 3) or (n, 3, k): the noise of the result has unit variance.
+
+        Returns:
+            (3 n,) or (3 n, k).
+        """
+        turned = self.whitener.rotate(rows)
+        if rows.ndim == 2:
+            return (turned * self.row_scale).reshape(-1)
+        return (turned * self.row_scale[:, :, None]).reshape(-1, rows.shape[2])
+
+    @cached_property
+    def basis(self) -> Floats:
+        """Orthonormal basis of the whitened columns, (3 n, rank)."""
+        X = self.whiten(self.columns) * self.prior_std
+        Q, R, _ = qr(X, mode="economic", pivoting=True)
+        size = np.abs(np.diag(R))
+        known = size > max(1e-9 * float(size.max(initial=0.0)), 1e-3)
+        return np.asarray(Q[:, : int(known.sum())])
+
+    def project_out(self, whitened: Floats) -> Floats:
+        """Remove from whitened rows what the fitted effects can take up."""
+        left: Floats = whitened - self.basis @ (self.basis.T @ whitened)
+        return left
+
+    def normal(self) -> Normal:
+        """Write the regression, linearised at the present values, as its normal sums.
+
+        Columns are scaled by the prior scales before the data rescale them.
+        """
+        X = self.whiten(self.columns) * self.combination.scales
+        y = self.whiten(self.residual + self.columns @ self.values)
+        v = self.whitener.variance(self.noise)
+        used = self.rows.weight > 0
+        normal = Normal(
+            X.T @ X, X.T @ y, float(y @ y),
+            float(np.log(v[used]).sum()), 3.0 * float(used.sum()),
+        )  # fmt: skip
+        if self.turns is None:
+            return normal
+        return normal + self.turns.normal(self.values, self.combination.scales)
+
+    def stacked(self) -> Floats:
+        """Stack all whitened columns, those of orientations too, (rows, p)."""
+        X = self.whiten(self.columns)
+        return X if self.turns is None else np.vstack([X, self.turns.whitened()])
+
+    @cached_property
+    def stated(self) -> Floats:
+        """Covariance that knows how unsure the prior scales are themselves, (p, p)."""
+        scales = self.combination.scales
+        at = Posterior(
+            self.values / scales, self.covariance / np.outer(scales, scales),
+            self.log_scale, self.log_evidence, self.effective,
+        )  # fmt: skip
+        return widened(self.normal(), self.group, at) * np.outer(scales, scales)
+
+
+# Fitting effects to a survey: Bayesian, robust, with geometry taken exactly.
+#
+# One pass linearises the arm at the present parameters (Gauss-Newton), solves the
+# Bayesian linear regression with prior scales by marginal likelihood, re-estimates the
+# two components of the noise and re-weighs the rows; passes repeat until nothing moves.
+
+PASSES = 30
+HEAVY_TAILED = 4  # first passes that a gross outlier must not lead astray
+SETTLED = 5e-8  # [m] change of any predicted error that ends the passes
+SETTLED_NOISE = 5e-3  # relative change of the noise that ends the passes
+
+
+def fit_effects(
+    batch: Batch,
+    position: Floats,
+    effects: tuple[Effect, ...],
+    origin: tuple[float, float, float] | None = None,
+    start: Fit | None = None,
+    turns: Turns | None = None,
+) -> Fit:
+    """Fit effects to measured positions, and to orientations where there are any.
+
+    Args:
+        batch: States of the survey.
+        position: Measured TCP positions in the base frame, (n, 3) [m].
+        effects: What may cause the errors.
+        origin: Tracker position in the base frame, where it is known.
+        start: A fit of some of these effects to the same rows, to begin with.
+        turns: Measured orientations of the same rows; those of `start` if None.
+    """
+    combination = Combination(effects)
+    state = _begin(batch, position, combination, origin, start)
+    if turns is not None:
+        state = replace(state, turns=turns)
+    heavy = HEAVY_TAILED if start is None else 0
+    for number in range(PASSES):
+        following = _pass(state, heavy=number < heavy)
+        if _settled(state, following) and number >= heavy:
+            return following
+        state = following
+    return state
+
+
+def _begin(
+    batch: Batch,
+    position: Floats,
+    combination: Combination,
+    origin: tuple[float, float, float] | None,
+    start: Fit | None,
+) -> Fit:
+    """Make the state before the first pass."""
+    n, p = len(batch), len(combination.parameters)
+    error = position - batch.walk.tcp
+    groups = tuple(dict.fromkeys(combination.groups))
+    values, log_scale = np.zeros(p), np.zeros(len(groups))
+    lever = float(np.sqrt((batch.jacobian**2).sum(axis=(1, 2)).mean() / 3))
+    noise = Noise(1.0, batch.arm.repeatability / (3.0 * lever), origin)
+    if start is not None:
+        noise = start.noise
+        known = dict(zip(start.combination.names, start.values, strict=True))
+        values = np.array([known.get(k, 0.0) for k in combination.names])
+        scale = dict(zip(start.groups, start.log_scale, strict=True))
+        log_scale = np.array([scale.get(g, 0.0) for g in groups])
+    whitener = Whitener.build(batch, position, origin)
+    ones = RowWeights(np.ones(n), np.zeros(n), np.zeros(n, dtype=bool))
+    turns = None if start is None else start.turns
+    return Fit(
+        batch, combination, error, values, np.eye(p), log_scale, groups, noise,
+        ones if start is None else start.rows, error, np.zeros((n, 3, p)), whitener,
+        -np.inf, 0.0, turns,
+    )  # fmt: skip
+
+
+def _pass(state: Fit, heavy: bool) -> Fit:
+    """Do one pass: linearise, solve, estimate the noise, weigh the rows."""
+    state = _linearised(state)
+    c, batch = state.combination, state.batch
+    solved = maximise(state.normal(), state.group, state.log_scale)
+    values = c.scales * solved.mean
+    covariance = solved.covariance * np.outer(c.scales, c.scales)
+    residual = state.error - c.error(batch, values)
+    spread = _spread(state, covariance)
+    turned = state.whitener.rotate(residual)
+    distance = np.sqrt((turned**2 / state.whitener.variance(state.noise)).sum(axis=1))
+    if heavy:
+        weight = student_weights(distance)
+        rows = replace(state.rows, weight=weight, distance=distance)
+    else:
+        rows = judge(distance, residual, batch.states.q, batch.jacobian)
+    noise = state.whitener.estimate(turned**2 + spread, rows.weight, state.noise)
+    turns = state.turns
+    if turns is not None:
+        turns = turns.left(c, batch, values).judged(covariance, rows.weight, heavy)
+    return replace(
+        state, values=values, covariance=covariance, log_scale=solved.log_scale,
+        noise=noise, rows=rows, residual=residual, turns=turns,
+        whitener=_with_unknown_sides(state, values),
+        log_evidence=solved.log_evidence, effective=solved.effective,
+    )  # fmt: skip
+
+
+def _linearised(state: Fit) -> Fit:
+    """Take columns and residuals at the present values."""
+    c, batch = state.combination, state.batch
+    at = c.at(batch, state.values)
+    residual = state.error - c.error(batch, state.values)
+    turns = state.turns
+    if turns is not None:
+        turns = turns.left(c, batch, state.values).linearised(c, at)
+    return replace(state, columns=c.columns(at), residual=residual, turns=turns)
+
+
+def _spread(state: Fit, covariance: Floats) -> Floats:
+    """Posterior variance of every rotated prediction, (n, 3) [m^2]."""
+    turned = state.whitener.rotate(state.columns)
+    spread: Floats = np.maximum(((turned @ covariance) * turned).sum(axis=2), 0.0)
+    return spread
+
+
+def _with_unknown_sides(state: Fit, values: Floats) -> Whitener:
+    """Add the backlash to the variance of rows whose direction is not known."""
+    unknown = (state.batch.states.direction == 0).astype(float)
+    if not unknown.any():
+        return state.whitener
+    slopes = state.combination.direction_slopes(state.batch, values)
+    square = np.einsum("nij,nj->n", slopes**2, unknown) / 3.0
+    return replace(state.whitener, extra=np.repeat(square[:, None], 3, axis=1))
+
+
+def _settled(before: Fit, after: Fit) -> bool:
+    """Tell whether a pass changed nothing that matters."""
+    moved = np.abs(after.residual - before.residual).max(initial=0.0)
+    ratio = after.whitener.variance(after.noise) / before.whitener.variance(
+        before.noise
+    )
+    quiet = np.abs(np.log(ratio)).max() < SETTLED_NOISE
+    if before.turns is not None and after.turns is not None:
+        change = np.log(after.turns.std / before.turns.std)
+        quiet = quiet and abs(change) < SETTLED_NOISE
+    return bool(moved < SETTLED and quiet)
+
+
+# What a survey can see, and the names of what it cannot.
+
+EXACT = 1e-8  # relative size below which a direction is no direction at all
+PARTNER = 0.2  # coefficient from which a parameter is named as a partner
+
+
+@dataclass(frozen=True)
+class Unseen:
+    """A parameter whose effect others already have, and those others."""
+
+    name: str
+    partners: tuple[str, ...]
+
+    def __str__(self) -> str:
+        return (
+            f"{self.name} with {', '.join(self.partners)}"
+            if self.partners
+            else (f"{self.name} (too small to see)")
+        )
+
+
+@dataclass(frozen=True)
+class Observability:
+    """Rank of a design and its condition.
+
+    Attributes:
+        rank: Number of directions that the rows determine.
+        unseen: Directions that they do not; the fit leaves them at their prior.
+        condition: Ratio of the largest to the smallest determined singular value.
+        o1: Observability index O1 of Borm and Menq (1991): geometric mean of the
+            singular values over the square root of the number of rows.
+    """
+
+    rank: int
+    unseen: tuple[Unseen, ...]
+    condition: float
+    o1: float
+
+
+def observe(X: Floats, names: tuple[str, ...], floor: float = 0.0) -> Observability:
+    """Find the rank of scaled columns by pivoted QR and name what is redundant.
+
+    Args:
+        X: Columns times their prior scales, (rows, p).
+        names: Names of the columns.
+        floor: Size below which a direction counts as unseen. With whitened rows, 1
+            means that the data say less than the prior.
+    """
+    if X.shape[1] == 0:
+        return Observability(0, (), 1.0, 0.0)
+    _, R, pivot = qr(X, mode="economic", pivoting=True)
+    size = np.abs(np.diag(R))
+    rank = int((size > max(floor, EXACT * float(size.max(initial=0.0)))).sum())
+    unseen = []
+    if rank:
+        mix = np.asarray(solve_triangular(R[:rank, :rank], R[:rank, rank:])).T
+        for k, share in enumerate(mix):
+            order = np.argsort(-np.abs(share))[:4]
+            keep = order[np.abs(share[order]) > PARTNER]
+            partners = tuple(names[pivot[i]] for i in keep)
+            unseen.append(Unseen(names[pivot[rank + k]], partners))
+    values = np.linalg.svd(R[:rank, :], compute_uv=False) if rank else np.ones(1)
+    o1 = float(np.exp(np.log(values).mean()) / np.sqrt(len(X)))
+    return Observability(rank, tuple(unseen), float(values[0] / values[-1]), o1)

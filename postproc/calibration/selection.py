@@ -1,0 +1,228 @@
+"""Which effects earn their place in the default model."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from postproc.arrays import Bools, Floats
+from postproc.calibration.evidence import LOG_SPREAD, Normal, maximise
+from postproc.calibration.measurements import Measurements
+from postproc.calibration.orientations import Turns
+from postproc.calibration.regression import Fit, fit_effects
+from postproc.calibration.tool_groups import find_groups
+from postproc.model.effects import BASE_EFFECTS, propose
+from postproc.model.effects.effect import Effect
+from postproc.model.effects.probe_turn import ProbeTurn
+from postproc.model.effects.tool_shift import ToolShift
+from postproc.model.kinematics import Batch
+from postproc.model.model import COMPENSATED, Model, Ranges
+from postproc.robot.arm import Arm
+from postproc.robot.pose import MM
+from postproc.robot.state import States
+
+# Which effects a survey gives evidence for.
+#
+# An effect stays only if the marginal likelihood falls without it, all prior scales
+# being chosen anew. Named effects are weighed first; free forms must then explain what
+# is left.
+
+ENOUGH = 3.0  # nats that an effect must be worth: 20 to 1
+NAMED = (
+    "compliance",
+    "load_backlash",
+    "counterbalance",
+    "transmission",
+    "scale",
+    "coupling",
+    "windup",
+    "tracker_drift",
+)
+STEPS = 12  # of the search for prior scales, which start near their best
+LONG = 600  # rows from which a joint spline resolves more than a joint map
+VARIES = {"thermal": ("temperature", 1.0), "payload": ("payload", 1.0)}  # [K], [kg]
+FASTER = 0.05  # [m/s] speeds must differ by so much to show a lag
+
+
+def candidates(states: States) -> tuple[str, ...]:
+    """Name the effects whose covariates vary in a survey."""
+    names = list(NAMED)
+    for name, (covariate, least) in VARIES.items():
+        if _span(getattr(states, covariate)) > least:
+            names.append(name)
+    if _span(states.speed) > FASTER:
+        names.append("lag")
+    return tuple(names)
+
+
+def fit_best(
+    arm: Arm,
+    states: States,
+    position: Floats,
+    origin: tuple[float, float, float] | None,
+    setup: tuple[str, ...] = (),
+    turns: Turns | None = None,
+) -> Fit:
+    """Fit the base effects and all others that a survey gives evidence for.
+
+    Args:
+        arm: The arm.
+        states: States of the rows.
+        position: Measured positions in the base frame, (n, 3) [m].
+        origin: Tracker position, where it is known.
+        setup: Effects of the set-up that are always fitted.
+        turns: Measured orientations, where the survey has them.
+    """
+    batch = Batch(arm, states)
+    base = propose((*BASE_EFFECTS, *setup), arm, states)
+    free = ("joint_spline",) if len(states) >= LONG else ("joint_map", "elm")
+    kept = base
+    fitted = fit_effects(batch, position, base, origin, turns=turns)
+    for names in (candidates(states), *((name,) for name in free)):
+        tried = (*kept, *propose(names, arm, states), *slipped(fitted))
+        fitted = fit_effects(batch, position, tried, origin, fitted)
+        kept = keep_needed(fitted, always=base)
+    if kept != fitted.combination.effects:
+        fitted = fit_effects(batch, position, kept, origin, fitted)
+    return fitted
+
+
+def slipped(fitted: Fit) -> tuple[Effect, ...]:
+    """Propose a step of the tool where what is left falls in two heaps in its order."""
+    found = find_groups(fitted.residual, fitted.batch.walk.flange)
+    if found is None or found.step is None:
+        return ()
+    return (ToolShift(row=float(fitted.batch.states.order[found.step])),)
+
+
+def keep_needed(fitted: Fit, always: tuple[Effect, ...]) -> tuple[Effect, ...]:
+    """Drop effects one after the other until each that is left is needed.
+
+    Args:
+        fitted: A fit of all effects in question.
+        always: Effects that are not in question.
+    """
+    kept = list(fitted.combination.effects)
+    normal, group = fitted.normal(), fitted.group
+    present = np.ones(len(fitted.values), dtype=bool)
+    now = _evidence(fitted, normal, group, present)
+    while True:
+        found = [
+            (_evidence(fitted, normal, group, present & ~columns), effect, columns)
+            for effect, columns in _in_question(fitted, kept, always)
+        ]
+        if not found:
+            break
+        best, effect, columns = max(found, key=lambda trial: trial[0])
+        if now - best > ENOUGH:
+            break
+        kept.remove(effect)
+        present &= ~columns
+        now = best
+    return tuple(kept)
+
+
+def _in_question(
+    fitted: Fit, kept: list[Effect], always: tuple[Effect, ...]
+) -> Iterator[tuple[Effect, Bools]]:
+    """List effects that may go, with their columns."""
+    c = fitted.combination
+    for effect, part in zip(c.effects, c.slices, strict=True):
+        if effect in kept and effect not in always:
+            columns = np.zeros(len(fitted.values), dtype=bool)
+            columns[part] = True
+            yield effect, columns
+
+
+def _evidence(
+    fitted: Fit, normal: Normal, group: NDArray[np.int64], present: Bools
+) -> float:
+    """Log evidence of some of the columns, prior scales chosen anew."""
+    part = Normal(
+        normal.gram[np.ix_(present, present)],
+        normal.moment[present],
+        normal.square,
+        normal.log_noise,
+        normal.rows,
+    )
+    used, group = np.unique(group[present], return_inverse=True)
+    start = fitted.log_scale[used]
+    best = maximise(part, group, start, STEPS)
+    return best.log_evidence - 0.5 * float((best.log_scale**2).sum()) / LOG_SPREAD**2
+
+
+def _span(values: Floats) -> float:
+    """Range of the known values."""
+    known = values[~np.isnan(values)]
+    return float(np.ptp(known)) if len(known) else 0.0
+
+
+# The product's own method: a survey becomes a fit of named effects, and a model.
+
+
+def fit_survey(
+    survey: Measurements,
+    arm: Arm,
+    effects: Sequence[str] | None,
+    tracker: Floats | None,
+    setup: tuple[str, ...] = (),
+) -> Fit:
+    """Fit effects to a survey in the base frame.
+
+    Args:
+        survey: The measurements.
+        arm: The arm.
+        effects: Names of effects; None: those that the survey gives evidence for.
+        tracker: Tracker position in the base frame, (3,) [m], or None.
+        setup: Names of effects of the set-up, fitted besides.
+
+    Raises:
+        PostprocError: An unknown effect, or one whose covariate was not recorded.
+    """
+    origin = None if tracker is None else (tracker[0], tracker[1], tracker[2])
+    states, position, batch = survey.states, survey.position, Batch(arm, survey.states)
+    turns = None
+    if survey.rotation is not None and survey.mounting is not None:
+        turns = Turns.of(batch, survey.rotation, survey.mounting)
+        setup = (*setup, ProbeTurn.name)
+    if effects is None:
+        return fit_best(arm, states, position, origin, setup, turns)
+    chosen = propose((*effects, *setup), arm, states)
+    return fit_effects(batch, position, chosen, origin, turns=turns)
+
+
+def model_of(fitted: Fit, survey: Measurements) -> Model:
+    """Keep what a fit found as a model."""
+    used = fitted.rows.weight > 0
+    left = np.linalg.norm(fitted.residual[used], axis=1) / MM
+    covariance = fitted.stated
+    told = fitted.combination.where(*COMPENSATED)
+    X = fitted.columns[:, :, told]  # of predictions: the set-up is no part of them
+    known = np.sqrt(np.einsum("nip,nip->ni", X @ covariance[np.ix_(told, told)], X))
+    arm = fitted.batch.arm
+    statistics = {
+        "residual_mean_mm": float(left.mean()),
+        "residual_max_mm": float(left.max()),
+        "worst_std_mm": float(known.max(initial=0.0) / MM),
+        "effective_parameters": fitted.effective,
+        "log_evidence": fitted.log_evidence,
+        "rows_dropped": float((~used).sum() + len(survey.dropped)),
+    }
+    if fitted.turns is not None:
+        statistics["orientation_std_mrad"] = fitted.turns.std * 1e3
+    return Model(
+        method="full",
+        arm_name=arm.name,
+        arm_id=arm.id,
+        effects=fitted.combination,
+        values=fitted.values,
+        covariance=covariance,
+        prior_std=fitted.prior_std,
+        noise=fitted.noise,
+        ranges=Ranges.of(survey.states[used], fitted.turns is not None),
+        rows=int(used.sum()),
+        data_sha256=survey.sha256,
+        statistics=statistics,
+    )

@@ -1,0 +1,584 @@
+"""Measurement files of every layout: tables to columns to measurements."""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import re
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from postproc.arrays import Bools, Floats
+from postproc.exceptions import MeasurementError, PostprocError
+from postproc.robot.arm import Arm
+from postproc.robot.direction import arrivals_of_rows
+from postproc.robot.pose import MM
+
+# Reading a table of numbers as people export them.
+#
+# Comma, semicolon or tab; decimal point or comma; UTF-8, UTF-16 or Latin-1.
+
+MAX_BYTES = 500_000_000
+NUMBER = re.compile(r"^\s*[-+]?\d+([.,]\d+)?([eE][-+]?\d+)?\s*$")
+FEW_NUMBERS = 3  # a first line with as many numbers is no header
+DECIMAL_COMMA = re.compile(r"^\s*[-+]?\d*,\d+([eE][-+]?\d+)?\s*$")
+
+
+@dataclass(frozen=True, eq=False)
+class Table:
+    """Text cells with their place in the file.
+
+    Attributes:
+        path: The file.
+        columns: Header names, stripped.
+        cells: Text of all cells, (n, k).
+        line: 1-based line of every row, (n,).
+        decimal: "." or ",".
+        sha256: Hash of the file's bytes.
+    """
+
+    path: Path
+    columns: tuple[str, ...]
+    cells: NDArray[np.object_]
+    line: NDArray[np.int64]
+    decimal: str
+    sha256: str
+
+    def __len__(self) -> int:
+        """Return the number of rows."""
+        return len(self.line)
+
+    def has(self, *names: str) -> bool:
+        """Tell whether all columns are there."""
+        return all(name in self.columns for name in names)
+
+    def text(self, name: str) -> list[str]:
+        """Return a column as stripped text.
+
+        Raises:
+            MeasurementError: There is no such column.
+        """
+        self.require(name)
+        return [str(v).strip() for v in self.cells[:, self.columns.index(name)]]
+
+    def numbers(self, name: str, empty: bool = False) -> Floats:
+        """Return a column as numbers, (n,).
+
+        Args:
+            name: Header name.
+            empty: Whether an empty cell is allowed; it becomes NaN.
+
+        Raises:
+            MeasurementError: A cell is no finite number; line and column are named.
+        """
+        out = np.empty(len(self))
+        for i, text in enumerate(self.text(name)):
+            out[i] = self._number(i, name, text, empty)
+        return out
+
+    def block(self, names: tuple[str, ...]) -> Floats:
+        """Return several columns as numbers, (n, k)."""
+        return np.stack([self.numbers(name) for name in names], axis=1)
+
+    def require(self, *names: str) -> None:
+        """Check that columns are there.
+
+        Raises:
+            MeasurementError: Naming the missing columns and those that are there.
+        """
+        missing = [name for name in names if name not in self.columns]
+        if missing:
+            raise MeasurementError(
+                self.path,
+                f"column {', '.join(missing)} is missing",
+                f"The header has: {', '.join(self.columns)}",
+                line=1,
+            )
+
+    def _number(self, row: int, name: str, text: str, empty: bool) -> float:
+        """Convert one cell."""
+        if empty and text == "":
+            return float("nan")
+        plain = text.replace(",", ".") if self.decimal == "," else text
+        try:
+            value = float(plain)
+        except ValueError:
+            value = float("nan")
+        if not np.isfinite(value):
+            raise MeasurementError(
+                self.path,
+                f"{text!r} in column {name} is not a number",
+                "Correct the cell or remove the row",
+                line=int(self.line[row]),
+            )
+        return value
+
+
+def read_table(
+    path: str | Path,
+    encoding: str | None = None,
+    delimiter: str | None = None,
+    decimal: str | None = None,
+    comment: str | None = None,
+    header: bool = True,
+) -> Table:
+    """Read a table; what is not given is detected.
+
+    Args:
+        path: The file.
+        encoding: Name of a Python codec.
+        delimiter: Between cells.
+        decimal: "." or ",".
+        comment: Lines that begin with it are no data.
+        header: Whether the first line names the columns; else they are 0, 1, ..
+
+    Raises:
+        MeasurementError: The file cannot be read, is empty, or its lines differ.
+    """
+    path = Path(path)
+    raw = _read(path)
+    lines = _decode(raw, encoding, path).splitlines()
+    kept = [
+        (i + 1, text)
+        for i, text in enumerate(lines)
+        if text.strip() and not (comment and text.lstrip().startswith(comment))
+    ]
+    if len(kept) < 1 + header:
+        cure = "Expected a header and one row per measurement"
+        raise MeasurementError(path, "has no measurements", cure)
+    split = delimiter or _delimiter(kept[0][1])
+    cells = _cells(path, [text for _, text in kept], split)
+    names = [str(c).strip() for c in cells[0]] if header else _numbered(cells)
+    if len(set(names)) < len(names):
+        twice = next(n for n in names if names.count(n) > 1)
+        raise MeasurementError(path, f"column {twice!r} appears twice", line=kept[0][0])
+    body = cells[1:] if header else cells
+    line = np.array([i for i, _ in kept][int(header) :], dtype=np.int64)
+    sign = decimal or _decimal(body, split)
+    digest = hashlib.sha256(raw).hexdigest()
+    return Table(path, tuple(names), body, line, sign, digest)
+
+
+def read_headed(path: str | Path, **options: Any) -> Table:
+    """Read a table that may have no header; its columns are then 1, 2, ..
+
+    Raises:
+        MeasurementError: See `read_table`.
+    """
+    table = read_table(path, header=False, **options)
+    numbers = sum(bool(NUMBER.match(str(cell))) for cell in table.cells[0])
+    if numbers >= FEW_NUMBERS and len(table.cells):
+        return table
+    return read_table(path, **options)
+
+
+def _read(path: Path) -> bytes:
+    """Read the bytes of a file."""
+    try:
+        raw = path.read_bytes()
+    except OSError as exc:
+        problem = f"cannot be read ({exc.strerror})"
+        raise MeasurementError(path, problem, "Check the path") from None
+    if len(raw) > MAX_BYTES:
+        raise MeasurementError(path, "is too large for a survey", "Check the path")
+    return raw
+
+
+def _decode(raw: bytes, encoding: str | None, path: Path) -> str:
+    """Decode bytes: the given codec, UTF-16 by its mark, UTF-8, else Latin-1."""
+    marks = (b"\xff\xfe", b"\xfe\xff")
+    if encoding is None and b"\0" in raw and not raw.startswith(marks):
+        cure = "Export the measurements as CSV text"
+        raise MeasurementError(path, "is not a text file", cure)
+    for codec in [encoding or ("utf-16" if raw.startswith(marks) else "utf-8-sig")]:
+        try:
+            return raw.decode(codec)
+        except (UnicodeDecodeError, LookupError):
+            if encoding is not None:
+                problem = f"cannot be decoded as {encoding}"
+                raise MeasurementError(path, problem, "Try another") from None
+    return raw.decode("latin-1")
+
+
+def _delimiter(header: str) -> str:
+    """Take the separator that cuts the header into most cells."""
+    best = max((";", "\t", ","), key=header.count)
+    return best if header.count(best) else r"\s+"
+
+
+def _cells(path: Path, lines: list[str], split: str) -> NDArray[np.object_]:
+    """Cut lines into cells."""
+    try:
+        frame = pd.read_csv(
+            io.StringIO("\n".join(lines)),
+            sep=split, header=None, dtype=str, keep_default_na=False,
+            skipinitialspace=True, engine="python" if len(split) > 1 else "c",
+        )  # fmt: skip
+    except (pd.errors.ParserError, pd.errors.EmptyDataError, ValueError) as exc:
+        problem = f"is not a regular table ({str(exc).strip()})"
+        cure = "Every row needs as many cells as the header"
+        raise MeasurementError(path, problem, cure) from None
+    return np.asarray(frame.to_numpy(dtype=object, na_value=""))
+
+
+def _decimal(cells: NDArray[np.object_], split: str) -> str:
+    """Tell a decimal comma from a decimal point by the cells."""
+    if split == "," or len(cells) == 0:
+        return "."
+    comma = sum(bool(DECIMAL_COMMA.match(str(v))) for v in cells[:20].reshape(-1))
+    return "," if comma else "."
+
+
+def _numbered(cells: NDArray[np.object_]) -> list[str]:
+    """Name columns by their number, from 1."""
+    return [str(k + 1) for k in range(cells.shape[1])]
+
+
+# Single columns of a measurement file: ids, directions, probe points.
+
+SIDES = tuple(f"lambda{j}" for j in range(1, 7))
+TRAVELS = tuple(f"travel{j}_deg" for j in range(1, 7))
+ROTATION = ("rx_deg", "ry_deg", "rz_deg")
+JOINTS = tuple(f"q{j}_deg" for j in range(1, 7))
+MANY = 20  # rows that are in order of a column by no accident
+TOOL = ("tool_x_mm", "tool_y_mm", "tool_z_mm")
+
+
+def unique_ids(table: Table) -> tuple[str, ...]:
+    """Read the ids and refuse duplicates.
+
+    Raises:
+        MeasurementError: An id appears twice.
+    """
+    ids = table.text("id")
+    first: dict[str, int] = {}
+    for i, name in enumerate(ids):
+        if name in first:
+            raise MeasurementError(
+                table.path,
+                f"id {name!r} appears twice (first in line {table.line[first[name]]})",
+                "Give every row its own id",
+                line=int(table.line[i]),
+            )
+        first[name] = i
+    return tuple(ids)
+
+
+def read_directions(
+    table: Table, arm: Arm, q: Floats
+) -> tuple[Floats, Floats, Bools, tuple[str, ...]]:
+    """Read the arrival directions and travels, or infer them from the row order."""
+    arrived = arrivals_of_rows(arm, q)
+    travel = arrived.travel
+    if table.has(*TRAVELS):
+        travel = np.deg2rad(table.block(TRAVELS))
+    if not table.has(*SIDES):
+        warnings = (
+            f"{table.path}: no lambda columns; directions inferred from the order of "
+            f"the rows, as JOINT moves. {_sorted(table)}",
+        )
+        return arrived.direction, travel, np.ones(len(q), dtype=bool), warnings
+    side = table.block(SIDES)
+    wrong = ~np.isin(side, (-1.0, 0.0, 1.0)).all(axis=1)
+    if wrong.any():
+        line = int(table.line[np.argmax(wrong)])
+        cure = "lambda is 1 (positive direction), -1, or 0 where not known"
+        raise MeasurementError(table.path, "wrong lambda", cure, line=line)
+    return side, travel, np.zeros(len(q), dtype=bool), ()
+
+
+def read_tools(
+    table: Table, tools: Floats | Mapping[int, Floats]
+) -> tuple[Floats, NDArray[np.int64]]:
+    """Look up every row's tool.
+
+    Raises:
+        MeasurementError: A tool_id that no probe point is known for.
+    """
+    n = len(table)
+    known = (
+        tools if isinstance(tools, Mapping) else dict(enumerate(np.atleast_2d(tools)))
+    )
+    numbers = table.numbers("tool_id") if table.has("tool_id") else np.zeros(n)
+    tool_id = np.asarray(np.round(numbers), dtype=np.int64)
+    if table.has(*TOOL):
+        return table.block(TOOL) * MM, tool_id
+    if min(tool_id, default=0) > 0 and 0 in known and max(tool_id) == len(known):
+        tool_id = tool_id - 1  # numbered from 1
+    for i, one in enumerate(tool_id):
+        if int(one) not in known:
+            raise MeasurementError(
+                table.path,
+                f"tool_id {int(numbers[i])} is not one of the cell's probe points",
+                "Add the point to the cell file, or columns tool_x_mm, tool_y_mm, "
+                "tool_z_mm",
+                line=int(table.line[i]),
+            )
+    return np.stack([np.asarray(known[int(one)], float) for one in tool_id]), tool_id
+
+
+def read_rotation(table: Table) -> Floats | None:
+    """Read measured orientations, (n, 3, 3): R = Rx Ry Rz (intrinsic x, y', z'')."""
+    if not table.has(*ROTATION):
+        return None
+    angles = table.block(ROTATION)
+    return np.asarray(Rotation.from_euler("XYZ", angles, degrees=True).as_matrix())
+
+
+def _sorted(table: Table) -> str:
+    """Say whether the rows still are in the order in which they were measured."""
+    for name in (*JOINTS, "x_mm", "y_mm", "z_mm"):
+        step = np.diff(table.numbers(name)) if table.has(name) else np.zeros(0)
+        if len(step) > MANY and ((step >= 0).all() or (step <= 0).all()):
+            return (
+                f"The rows are sorted by {name}: the order of visits is lost, and "
+                "backlash with it. Use the file as it was measured"
+            )
+    return "Wrong if the rows were sorted"
+
+
+# The table that RoboDK's calibration project saves (SaveTable): 18 columns.
+#
+# Joints 1 to 6 [deg]; measured x, y, z [mm] and w, p, r; the TCP's x, y, z [mm] and w,
+# p, r. Turns are R = Rx(w) Ry(p) Rz(r), in radians or in degrees. The layout is that of
+# the vendor's own macro for these files (RoboDK API examples: extracting the poses of a
+# calibration project), which reads them by position; so do we, whatever the header.
+
+WIDTH = 18
+MEASURED = ("x_mm", "y_mm", "z_mm")
+TURNS = ("rx_deg", "ry_deg", "rz_deg")
+TCP = ("tool_x_mm", "tool_y_mm", "tool_z_mm")
+FULL_TURN = 2 * np.pi + 1e-3  # angles all below it are radians
+
+
+def is_robodk(table: Table) -> bool:
+    """Tell whether a table has 18 columns, all of numbers."""
+    if table.cells.shape[1] != WIDTH or table.has("id"):
+        return False
+    cells = "\n".join(str(c) for c in table.cells.reshape(-1)).replace(",", ".")
+    try:
+        return bool(np.isfinite([float(c) for c in cells.split("\n")]).all())
+    except ValueError:
+        return False
+
+
+def from_robodk(table: Table) -> Table:
+    """Name the columns as ours. Every TCP becomes a tool; ids are the row numbers."""
+    values = table.block(table.columns)
+    turns = values[:, 9:12]
+    small = np.abs(values[:, [9, 10, 11, 15, 16, 17]]).max() < FULL_TURN
+    tcps, which = np.unique(values[:, 12:15].round(4), axis=0, return_inverse=True)
+    columns = {
+        "id": np.arange(1, len(values) + 1),
+        **dict(zip(JOINTS, values[:, :6].T, strict=True)),
+        **dict(zip(MEASURED, values[:, 6:9].T, strict=True)),
+        **dict(zip(TCP, values[:, 12:15].T, strict=True)),
+    }
+    if len(tcps) > 1:
+        columns["tool_id"] = which.reshape(-1) + 1
+    if np.abs(turns).max() > 0:  # else only points were measured
+        degrees = np.rad2deg(turns) if small else turns
+        columns |= dict(zip(TURNS, degrees.T, strict=True))
+    cells = np.array([[str(v) for v in c.tolist()] for c in columns.values()], object).T
+    return replace(table, columns=tuple(columns), cells=cells, decimal=".")
+
+
+# How to read a measurement file, where what is detected would be wrong.
+
+UNITS = {"mm": 1.0, "m": 1000.0, "inch": 25.4}  # mm per unit
+NAMED = {"tab": "\t", "space": r"\s+", "comma": ",", "semicolon": ";"}
+
+
+@dataclass(frozen=True)
+class Reading:
+    """What a user knows of a file; None is detected.
+
+    Attributes:
+        columns: A column-map file, see `postproc.calibration.tables`.
+        delimiter: Between cells, itself or by name (tab, space, comma, semicolon).
+        decimal: "." or ",".
+        encoding: Name of a Python codec.
+        unit: Of coordinates in files that do not say it: mm, m or inch.
+    """
+
+    columns: Path | None = None
+    delimiter: str | None = None
+    decimal: str | None = None
+    encoding: str | None = None
+    unit: str = "mm"
+
+    def __post_init__(self) -> None:
+        if self.decimal not in (None, ".", ","):
+            raise PostprocError(f"decimal {self.decimal!r}: write . or ,")
+        if self.unit not in UNITS:
+            raise PostprocError(f"unit {self.unit!r}: write {', '.join(UNITS)}")
+
+    @property
+    def given(self) -> dict[str, str]:
+        """Options of `read_table` that a user has given."""
+        delimiter = self.delimiter and NAMED.get(self.delimiter, self.delimiter)
+        options = {
+            "delimiter": delimiter,
+            "decimal": self.decimal,
+            "encoding": self.encoding,
+        }
+        return {name: value for name, value in options.items() if value}
+
+    @property
+    def mm_per_unit(self) -> float:
+        """Millimetres per unit of coordinates."""
+        return UNITS[self.unit]
+
+
+DETECT = Reading()
+
+# Measurement files as other tools write them, turned into our columns.
+#
+# A format is a map from our columns to the file's, with the factor between the units.
+# The formats that are known by their header are detected; any other file needs a map:
+#
+#     [columns]
+#     q1_deg = "A1"                                 # the same unit
+#     x_mm = { column = "X measured", factor = 1000.0 }
+#     [file]
+#     delimiter = ";"                               # optional, as are the next three
+#     decimal = ","
+#     encoding = "latin-1"
+#     comment = "//"
+
+DEGREES = float(np.rad2deg(1.0))  # per radian
+MAP_KEYS = ("columns", "file")
+FILE_KEYS = ("delimiter", "decimal", "encoding", "comment")
+
+
+@dataclass(frozen=True)
+class Format:
+    """How a foreign file's columns become ours.
+
+    Attributes:
+        columns: Our column: (the file's column, factor).
+        reading: Options of `read_table`.
+    """
+
+    columns: Mapping[str, tuple[str, float]]
+    reading: Mapping[str, str] = field(default_factory=dict)
+
+    def fits(self, table: Table) -> bool:
+        """Tell whether a table has all columns of the format."""
+        return table.has(*(name for name, _ in self.columns.values()))
+
+
+UR_JOINTS = (
+    "shoulder_pan_joint",
+    "shoulder_lift_joint",
+    "elbow_joint",
+    "wrist_1_joint",
+    "wrist_2_joint",
+    "wrist_3_joint",
+)
+IPA = Format(  # Fraunhofer IPA, UR10 series: joints in rad, T-Mac positions in mm
+    {
+        **{f"q{j + 1}_deg": (name, DEGREES) for j, name in enumerate(UR_JOINTS)},
+        **{f"{a}_mm": (f"measurement_{a}", 1.0) for a in "xyz"},
+        **{f"r{a}_deg": (f"measurement_r{a}", 1.0) for a in "xyz"},
+        "temperature_c": ("measurement_temperature", 1.0),
+    }
+)
+KNOWN = (IPA,)
+
+
+def read_foreign(path: str | Path, reading: Reading = DETECT) -> Table:
+    """Read a measurement file in our columns, whatever tool wrote it.
+
+    Args:
+        path: The file.
+        reading: What the user knows of it.
+
+    Raises:
+        MeasurementError: The file or the column map cannot be used.
+    """
+    if reading.columns is not None:
+        form = read_column_map(reading.columns)
+        table = read_table(path, **{**form.reading, **reading.given})  # type: ignore[arg-type]
+        table.require(*(name for name, _ in form.columns.values()))
+        return translate(table, form)
+    table = read_headed(path, **reading.given)
+    for form in KNOWN:
+        if form.fits(table):
+            return translate(table, form)
+    return from_robodk(table) if is_robodk(table) else table
+
+
+def translate(table: Table, form: Format) -> Table:
+    """Rename and scale columns; a file without ids gets its line numbers."""
+    cells = []
+    for column, (source, factor) in form.columns.items():
+        if column == "id":
+            cells.append([text.strip("'\" ") for text in table.text(source)])
+        else:
+            values = table.numbers(source) * factor
+            cells.append([repr(float(v)) for v in values])
+    names = tuple(form.columns)
+    if "id" not in names:
+        names = ("id", *names)
+        cells.insert(0, [str(line) for line in table.line])
+    block = np.array(cells, dtype=object).T
+    return replace(table, columns=names, cells=block, decimal=".")
+
+
+def read_column_map(path: str | Path) -> Format:
+    """Read a column-map file.
+
+    Raises:
+        MeasurementError: It cannot be read, or a key or value is wrong.
+    """
+    try:
+        data = tomllib.loads(Path(path).read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as exc:
+        problem = f"cannot be read as TOML ({exc})"
+        raise MeasurementError(path, problem, "Correct the column map") from None
+    _refuse_unknown(path, data, MAP_KEYS, "$")
+    reading = data.get("file", {})
+    _refuse_unknown(path, reading, FILE_KEYS, "$.file")
+    columns = {
+        ours: _source(path, ours, given)
+        for ours, given in data.get("columns", {}).items()
+    }
+    if not columns:
+        cure = 'Write [columns] with lines as q1_deg = "A1"'
+        raise MeasurementError(path, "maps no column", cure, place="$.columns")
+    return Format(columns, reading)
+
+
+def _source(path: str | Path, ours: str, given: Any) -> tuple[str, float]:
+    """Read one entry of a map."""
+    if isinstance(given, str):
+        return given, 1.0
+    if isinstance(given, dict) and isinstance(given.get("column"), str):
+        factor = given.get("factor", 1.0)
+        if set(given) <= {"column", "factor"} and isinstance(factor, int | float):
+            return given["column"], float(factor)
+    raise MeasurementError(
+        path,
+        "neither a column name nor { column = .., factor = .. }",
+        "Correct the entry",
+        place=f"$.columns.{ours}",
+    )
+
+
+def _refuse_unknown(
+    path: str | Path, data: Any, known: tuple[str, ...], place: str
+) -> None:
+    """Refuse keys that mean nothing."""
+    for key in data if isinstance(data, dict) else ():
+        if key not in known:
+            cure = f"Known here: {', '.join(known)}"
+            raise MeasurementError(path, "unknown key", cure, place=f"{place}.{key}")
