@@ -15,11 +15,11 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from postproc.compensate import compensate
+    from postproc.compensation.compensate import compensate
+    from postproc.compensation.options import Options
+    from postproc.compensation.outcome import Outcome
     from postproc.exceptions import PostprocError
     from postproc.model.model import Model, load_model
-    from postproc.options import Options
-    from postproc.report import Outcome
     from postproc.robot.cell import Cell, load_cell
 
 __version__ = "0.1.0"
@@ -38,9 +38,10 @@ __all__ = [
 _PLACES = {
     "Cell": "postproc.robot.cell",
     "Model": "postproc.model.model",
-    "Options": "postproc.options",
-    "Outcome": "postproc.report",
+    "Options": "postproc.compensation.options",
+    "Outcome": "postproc.compensation.outcome",
     "PostprocError": "postproc.exceptions",
+    "compensate": "postproc.compensation.compensate",
     "load_cell": "postproc.robot.cell",
     "load_model": "postproc.model.model",
 }
@@ -48,8 +49,6 @@ _PLACES = {
 
 def __getattr__(name: str) -> Any:
     """Load a public name when it is first asked for."""
-    if name == "compensate":
-        return import_module("postproc.compensate")  # a module that can be called
     if name not in _PLACES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     return getattr(import_module(_PLACES[name]), name)

@@ -11,10 +11,10 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
 from postproc.arrays import Bools, Floats, Ints, pieces
+from postproc.compensation.parallel import in_turns
 from postproc.language.scan import BLANKS, Masked, mask_lines
 from postproc.number_pairs import Pairs, pair_numbers
 from postproc.rows import Rows, joined_rows
-from postproc.side_by_side import in_turns
 
 PIECE = 5_000  # lines that are masked at a time
 WIDEST = 64  # bytes of beginnings that are compared; wider: line by line

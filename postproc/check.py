@@ -8,7 +8,14 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from postproc.arrivals import LEFT_ALONE
+from postproc.compensation.outcome import LEFT_ALONE
+from postproc.compensation.record import (
+    FileRecord,
+    Sidecar,
+    read_sidecar,
+    sha256,
+    sidecar_path,
+)
 from postproc.exceptions import ProgramError
 from postproc.files import (
     COMPILED,
@@ -20,7 +27,6 @@ from postproc.files import (
     suffix_of,
 )
 from postproc.language.stamp import read_stamp
-from postproc.sidecar import FileRecord, Sidecar, read_sidecar, sha256, sidecar_path
 
 LEFT = "left-alone"  # code of targets that kept their value
 NAMED = 5  # lines of such targets that a message names

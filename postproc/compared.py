@@ -12,12 +12,11 @@ import numpy as np
 from postproc.arrays import Ints
 from postproc.changed_lines import changed_rows, shapes, target_name
 from postproc.exceptions import ProgramError
+from postproc.files import VARIABLES
 from postproc.language.pdl2.names import entry_names
 from postproc.language.stamp import read_stamp
 from postproc.rows import Rows, joined_rows
 from postproc.text_lines import TextLines
-
-VARIABLES = ".lsv"
 
 
 @dataclass(frozen=True)

@@ -9,11 +9,11 @@ from pathlib import Path
 
 import numpy as np
 
-from postproc.arrivals import LEFT_ALONE, Arrivals, read_arrivals
-from postproc.compared import VARIABLES, Compared, compare_files
-from postproc.report import Status
+from postproc.compared import Compared, compare_files
+from postproc.compensation.outcome import LEFT_ALONE, Arrivals, Status, read_arrivals
+from postproc.compensation.parallel import meanwhile
+from postproc.files import VARIABLES
 from postproc.rows import Row, Rows
-from postproc.side_by_side import meanwhile
 
 LONG = 10_000_000  # bytes of a file whose record is read beside it
 

@@ -17,10 +17,10 @@ from postproc.byte_columns import (
     shortest,
     whole,
 )
+from postproc.compensation.parallel import in_turns
 from postproc.diff import Difference
 from postproc.row_columns import blocks_of, number_places, strung
 from postproc.rows import STATUSES, Rows
-from postproc.side_by_side import in_turns
 
 END = b"\x01"  # behind a row; no JSON text holds it
 SIGNS = tuple(map(str, range(-1, 3)))

@@ -13,14 +13,14 @@ from numpy.typing import NDArray
 from postproc.arrays import Ints
 from postproc.byte_columns import Column as Bytes
 from postproc.byte_columns import blanked, fixed, named, repeated, whole
-from postproc.compared import VARIABLES
+from postproc.compensation.parallel import in_turns
 from postproc.console import Column
 from postproc.diff import Difference
+from postproc.files import VARIABLES
 from postproc.listing import ARROWS, arrows, is_coloured, paint, status_colour
 from postproc.listing_columns import Block, print_blocks
 from postproc.row_columns import blocks_of, number_places, strung
 from postproc.rows import STATUSES, Row, Rows
-from postproc.side_by_side import in_turns
 
 DECIMALS = 4
 HERE = 4  # every fourth block is made where all of them are laid out

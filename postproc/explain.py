@@ -8,7 +8,15 @@ from pathlib import Path
 
 import numpy as np
 
-from postproc.compensate import compensate
+from postproc.compensation.compensate import compensate
+from postproc.compensation.options import Options
+from postproc.compensation.outcome import Outcome, Status
+from postproc.compensation.program import (
+    Planned,
+    plan_visits,
+    read_program,
+    with_measured_play,
+)
 from postproc.console import Column
 from postproc.exceptions import ProgramError, printable
 from postproc.files import VARIABLES, suffix_of
@@ -16,9 +24,6 @@ from postproc.jobs import read_files
 from postproc.language.visits import ELSEWHERE, START, Visits
 from postproc.listing import arrows, print_listing, status_colour
 from postproc.model.model import Model, load_model
-from postproc.options import Options
-from postproc.planning import Planned, plan_visits, read_program, with_measured_play
-from postproc.report import Outcome, Status
 from postproc.report_json import target_row
 from postproc.robot.cell import Cell, load_cell
 from postproc.robot.pose import MM

@@ -8,10 +8,14 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from postproc.arrays import Each
-from postproc.clock import Progress, silent
-from postproc.compensate import compensate, name_files
+from postproc.compensation.compensate import compensate, name_files
+from postproc.compensation.options import Options, Progress, silent
+from postproc.compensation.outcome import Outcome
+from postproc.compensation.parallel import sharing
+from postproc.compensation.record import sidecar_path
 from postproc.files import (
     STREAM,
+    VARIABLES,
     Content,
     check_places,
     read_input,
@@ -20,14 +24,9 @@ from postproc.files import (
 )
 from postproc.language.visits import Diagnostic
 from postproc.model.model import Model, load_model
-from postproc.options import Options
 from postproc.page_files import Pages, find_pages
-from postproc.planning import VARIABLES
-from postproc.report import Outcome
 from postproc.report_json import report_pieces
 from postproc.robot.cell import Cell, load_cell
-from postproc.side_by_side import sharing
-from postproc.sidecar import sidecar_path
 
 
 @dataclass(frozen=True)

@@ -13,9 +13,9 @@ from postproc.calibration.measurements import (
     read_points,
 )
 from postproc.calibration.tables import DETECT, Reading
+from postproc.compensation.program import plan_visits, read_program, states_of
 from postproc.exceptions import MeasurementError
 from postproc.jobs import read_files
-from postproc.planning import plan_visits, read_program, states_of
 from postproc.robot.cell import Cell
 from postproc.robot.pose import MM
 

@@ -6,10 +6,10 @@ import re
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
+from postproc.compensation.outcome import Outcome
 from postproc.exceptions import FileError, printable
 from postproc.language.source import Source
 from postproc.language.visits import Visits
-from postproc.report import Outcome
 
 WIDTH = 96  # characters of a line that are shown
 LEAD = 30  # of them before the caret, where the line is longer

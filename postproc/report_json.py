@@ -22,11 +22,16 @@ from postproc.byte_columns import (
     shortest,
     whole,
 )
+from postproc.compensation.outcome import Outcome, Status
 from postproc.language.visits import Motion
-from postproc.report import Outcome, Status
 from postproc.robot.pose import MM
 
 AT_ONCE = 5_000  # visits
+
+
+def report_text(outcome: Outcome) -> str:
+    """Write the whole report."""
+    return "".join(report_pieces(outcome))
 
 
 def report_pieces(outcome: Outcome, each: Each = map) -> Iterator[str]:

@@ -9,8 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from postproc.arrays import Bools, Floats, Ints
-from postproc.arrivals import Arrivals
-from postproc.report import Status
+from postproc.compensation.outcome import Arrivals, Status
 
 STATUSES = tuple(Status(k).name.lower() for k in range(len(Status)))
 
@@ -27,7 +26,7 @@ class Row(NamedTuple):
             a position; None for joint angles and text.
         text: The line's two texts where more than numbers differ, else "".
         status, why: What came of the line's target, "" where no record tells.
-        direction: In which every joint arrives, see `postproc.arrivals`; or ().
+        direction: In which every joint arrives, see `compensation.outcome`; or ().
         correction_mm: How far the TCP is moved there, or None.
         visits: Visits of the line by status where they have several, the most urgent
             first; else empty.

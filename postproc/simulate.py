@@ -8,10 +8,10 @@ from pathlib import Path
 
 import numpy as np
 
+from postproc.compensation.program import read_program
 from postproc.jobs import read_files
 from postproc.language.visits import Visits
 from postproc.model.statistics import ErrorStatistics
-from postproc.planning import read_program
 from postproc.report_json import finite
 from postproc.robot.cell import Cell, load_cell
 from postproc.virtual import (

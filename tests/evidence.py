@@ -11,18 +11,18 @@ import numpy as np
 from postproc.calibration.fit import fit
 from postproc.calibration.measurements import Measurements
 from postproc.calibration.selection import fit_survey, model_of
-from postproc.compensate import compensate
+from postproc.compensation.command import new_numbers, solve_visits
+from postproc.compensation.compensate import compensate
+from postproc.compensation.outcome import Status
+from postproc.compensation.program import plan_visits, read_program, with_measured_play
+from postproc.compensation.program import states_of as planned_states
 from postproc.language.visits import Target
 from postproc.model.effects import BASE_EFFECTS
 from postproc.model.model import Model
-from postproc.planning import plan_visits, read_program, with_measured_play
-from postproc.planning import states_of as planned_states
-from postproc.report import Status
 from postproc.robot.arm import load_arm
 from postproc.robot.cell import Cell, load_cell
 from postproc.robot.state import States, make_states
 from postproc.simulate import setup_of, simulate_file, visits_of
-from postproc.solved import solve_visits
 from postproc.surveying import write_survey
 from postproc.virtual import (
     Arrivals,
@@ -32,7 +32,6 @@ from postproc.virtual import (
     stream,
     virtual_arm,
 )
-from postproc.written import new_numbers
 
 ROOT = Path(__file__).parents[1]
 CELL = ROOT / "programs" / "cell.toml"

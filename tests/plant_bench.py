@@ -19,7 +19,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from postproc.restore import restore_file
+from postproc.compensation.record import restore_file
 from tests.chaos import Plant
 from tests.conftest import ROOT, make_job
 from tests.dask_cluster import Cluster

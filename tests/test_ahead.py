@@ -10,13 +10,14 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from postproc import ahead, correcting
-from postproc.ahead import in_processes, is_same, shared_out
-from postproc.clock import Clock, silent
-from postproc.compensate import compensate
+from postproc.compensation import compensate as compensate_module
+from postproc.compensation import parallel
+from postproc.compensation import windows as cuts
+from postproc.compensation.compensate import compensate
+from postproc.compensation.options import Clock, silent
+from postproc.compensation.outcome import Outcome
+from postproc.compensation.parallel import in_processes, is_same, shared_out
 from postproc.exceptions import PostprocError
-from postproc.language import windows as cuts
-from postproc.report import Outcome
 from tests.bench import made
 
 LEAST, RUN_UP = 60, 150
@@ -80,7 +81,7 @@ def test_the_first_failure_is_told_from_where_the_work_really_stood(window) -> N
 
 
 def test_one_process_does_it_where_there_is_no_fork(monkeypatch) -> None:
-    monkeypatch.setattr(ahead, "can_fork", lambda: False)
+    monkeypatch.setattr(parallel, "can_fork", lambda: False)
     assert {who for _, who in run(Sum(NUMBERS), 3)} == {os.getpid()}
 
 
@@ -101,7 +102,7 @@ def test_shares_are_all_windows_in_their_order() -> None:
 
 
 def test_the_last_bit_counts() -> None:
-    stop = correcting.Stop()
+    stop = compensate_module.Stop()
     places = np.full((1, 6), 0.1)
     one = replace(stop, planned=replace(stop.planned, q=places))
     other = replace(stop, planned=replace(stop.planned, q=np.nextafter(places, 1.0)))
@@ -111,11 +112,11 @@ def test_the_last_bit_counts() -> None:
 
 
 def test_rounding_leaves_the_rest_of_a_stop_alone() -> None:
-    stop = correcting.Stop(doubtful=True)
+    stop = compensate_module.Stop(doubtful=True)
     stop = replace(stop, planned=replace(stop.planned, q=np.full((1, 6), 1 / 3)))
-    found = ahead.steady(stop)
+    found = parallel.steady(stop)
     assert found.doubtful and len(found.corrected.wanted) == 0
-    assert 0 < np.abs(found.planned.q - 1 / 3).max() <= 0.5 * 10.0**-ahead.DIGITS
+    assert 0 < np.abs(found.planned.q - 1 / 3).max() <= 0.5 * 10.0**-parallel.DIGITS
 
 
 @pytest.fixture
@@ -153,17 +154,18 @@ def test_programs_come_out_as_from_one_process(job, monkeypatch, kind: str) -> N
 
     def watched(foretold, stop) -> bool:
         same = is_same(foretold, stop)
-        if isinstance(stop, correcting.Stop):
+        if isinstance(stop, compensate_module.Stop):
             right.append(same)
         return same
 
     alone = job(kind, 1)
-    monkeypatch.setattr(ahead, "is_same", watched)
+    monkeypatch.setattr(parallel, "is_same", watched)
     assert_alike(job(kind, 3), alone)
     assert right == [True, True]
 
 
 def test_and_where_the_wrong_place_was_foretold(job, monkeypatch) -> None:
     alone = job("drilling", 1)
-    monkeypatch.setattr(correcting._Work, "foretell", lambda *_: correcting.Stop())
+    nowhere = compensate_module.Stop()
+    monkeypatch.setattr(compensate_module._Work, "foretell", lambda *_: nowhere)
     assert_alike(job("drilling", 3), alone)

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import pytest
 
-from postproc.compensate import compensate
-from postproc.language.windows import quiet_stops
-from postproc.planning import read_program
-from postproc.report import Status
+from postproc.compensation.compensate import compensate
+from postproc.compensation.outcome import Status
+from postproc.compensation.program import read_program
+from postproc.compensation.windows import quiet_stops
 
 START = (300.0, 100.0, 200.0)
 

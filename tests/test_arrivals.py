@@ -7,8 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from postproc.arrivals import BOTH, Arrivals, tell_arrivals
-from postproc.report import Status
+from postproc.compensation.outcome import BOTH, Arrivals, Status, tell_arrivals
 from tests.html.builders import FIRST_LINE, decisions_of, visits_of
 
 

@@ -7,11 +7,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from postproc.as_read import numbers_as_read
-from postproc.output import write_numbers
-from postproc.planning import Reading, read_program
+from postproc.compensation.program import Reading, read_program
+from postproc.compensation.rewrite import (
+    VerificationError,
+    check_numbers,
+    numbers_as_read,
+    write_numbers,
+)
 from postproc.robot.cell import Cell
-from postproc.verify import VerificationError, check_numbers
 from tests.language.reachable import reachable
 
 

@@ -13,10 +13,10 @@ from postproc.batch.guard import check_room, locked
 from postproc.batch.local import LocalCrew
 from postproc.batch.plan import make_plan
 from postproc.batch.run import Order, batch, default_log
+from postproc.compensation.options import AS_USUAL
+from postproc.compensation.record import restore_file
 from postproc.exceptions import CellError, DiskFullError, OutputError, PostprocError
 from postproc.language.stamp import read_stamp
-from postproc.options import AS_USUAL
-from postproc.restore import restore_file
 from tests.inline import InlineCrew
 from tests.plant import contents, grow, pages, program
 

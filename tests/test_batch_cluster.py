@@ -10,8 +10,8 @@ import pytest
 from postproc.batch.cluster import ClusterCrew
 from postproc.batch.plan import make_plan
 from postproc.batch.run import Order, batch, default_log
+from postproc.compensation.options import AS_USUAL
 from postproc.exceptions import PostprocError
-from postproc.options import AS_USUAL
 from tests.dask_cluster import Cluster
 from tests.inline import InlineCrew
 from tests.plant import contents, grow, pages

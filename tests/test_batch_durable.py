@@ -16,9 +16,9 @@ from postproc.batch.guard import locked
 from postproc.batch.local import LocalCrew
 from postproc.batch.plan import make_plan
 from postproc.batch.run import default_log
+from postproc.compensation.options import AS_USUAL
 from postproc.exceptions import OutputError
 from postproc.files import TEMPORARY
-from postproc.options import AS_USUAL
 from tests.chaos import Plant, build, chaos, descendants, gone
 from tests.plant import contents, grow
 

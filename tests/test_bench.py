@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from postproc.accuracy.solve import solve
-from postproc.planning import plan_visits, read_program, states_of
+from postproc.compensation.command import solve
+from postproc.compensation.program import plan_visits, read_program, states_of
 from postproc.robot.cell import load_cell
 from tests.bench.__main__ import CELL
 from tests.bench.beside import _one

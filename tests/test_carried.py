@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from postproc.carried import with_carried, with_movers
-from postproc.planning import plan_visits, read_program
+from postproc.compensation.decide import with_carried, with_movers
+from postproc.compensation.program import plan_visits, read_program
 from tests.written import FIRST, program
 
 LINES = (

@@ -12,11 +12,11 @@ from postproc.batch.plan import make_plan
 from postproc.batch.run import Order, batch, default_log
 from postproc.check import check
 from postproc.cli import app
+from postproc.compensation.options import AS_USUAL
+from postproc.compensation.outcome import Status
 from postproc.exceptions import ProgramError
 from postproc.files import TEMPORARY
 from postproc.model.model import load_model
-from postproc.options import AS_USUAL
-from postproc.report import Status
 from tests.inline import InlineCrew
 from tests.plant import grow, program
 

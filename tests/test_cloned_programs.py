@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from postproc.compensate import compensate
+from postproc.compensation.compensate import compensate
+from postproc.compensation.options import Options
 from postproc.language.visits import Motion, Target, Visits
-from postproc.options import Options
 from postproc.simulate import setup_of
 from postproc.virtual import land, virtual_arm
 from tests.conftest import SEED

@@ -13,10 +13,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from postproc.cloning import give_own_points
-from postproc.planning import Reading, read_program
-from postproc.proposal import Proposal
-from postproc.report import Decisions, Status
+from postproc.compensation.clones import give_own_points
+from postproc.compensation.decide import Proposal
+from postproc.compensation.outcome import Decisions, Status
+from postproc.compensation.program import Reading, read_program
 from tests.language.executed import Generated
 from tests.language.generator import Generator
 from tests.language.interpreter import Interpreter

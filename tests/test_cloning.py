@@ -7,12 +7,11 @@ import json
 import numpy as np
 import pytest
 
-from postproc.compensate import compensate
-from postproc.options import Options
-from postproc.planning import read_program
-from postproc.report import Status
-from postproc.restore import restore
-from postproc.sidecar import FileRecord
+from postproc.compensation.compensate import compensate
+from postproc.compensation.options import Options
+from postproc.compensation.outcome import Status
+from postproc.compensation.program import read_program
+from postproc.compensation.record import FileRecord, restore
 from postproc.simulate import setup_of
 from postproc.virtual import land, virtual_arm
 from tests.conftest import SEED

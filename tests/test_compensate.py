@@ -9,13 +9,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from postproc.compensate import compensate
+from postproc.compensation.compensate import compensate
+from postproc.compensation.outcome import Status
+from postproc.compensation.program import read_program
+from postproc.compensation.record import FileRecord, restore
 from postproc.exceptions import CellError, ModelError, ProgramError
-from postproc.planning import read_program
-from postproc.report import Status
-from postproc.restore import restore
+from postproc.report_json import report_text
 from postproc.robot.cell import load_cell
-from postproc.sidecar import FileRecord
 from postproc.simulate import setup_of
 from postproc.virtual import land, virtual_arm
 from tests.conftest import CELL, SEED
@@ -200,7 +200,7 @@ def test_direction_is_that_of_the_approach(run):
 
 
 def test_report_has_the_agreed_keys(run):
-    report = json.loads(run(JOINTS, POSE, "MOVE TO $HOME").to_json())
+    report = json.loads(report_text(run(JOINTS, POSE, "MOVE TO $HOME")))
     assert set(report) >= {"program", "model", "targets", "predicted", "diagnostics"}
     row = report["targets"][1]
     assert set(row) >= {

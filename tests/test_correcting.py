@@ -15,13 +15,13 @@ import weakref
 import numpy as np
 import pytest
 
-from postproc import correcting
-from postproc.aiming import CLOSE
-from postproc.compensate import compensate
-from postproc.language import windows as cuts
-from postproc.language.windows import windows
-from postproc.planning import read_program
-from postproc.report import Outcome, Status
+from postproc.compensation import compensate as compensate_module
+from postproc.compensation import windows as cuts
+from postproc.compensation.compensate import compensate
+from postproc.compensation.iterate import CLOSE
+from postproc.compensation.outcome import Outcome, Status
+from postproc.compensation.program import read_program
+from postproc.compensation.windows import windows
 from postproc.robot.pose import MM
 from tests.bench import made
 
@@ -105,7 +105,7 @@ def test_doubt_about_a_branch_goes_on_behind_a_cut(job) -> None:
 
 
 def test_one_window_is_in_memory_at_a_time(job, monkeypatch) -> None:
-    original, plans, alive = correcting.plan_visits, [], []
+    original, plans, alive = compensate_module.plan_visits, [], []
 
     def watched(*given):
         gc.collect()
@@ -114,7 +114,7 @@ def test_one_window_is_in_memory_at_a_time(job, monkeypatch) -> None:
         plans.extend(map(weakref.ref, (planned, planned.plan, planned.targets)))
         return planned
 
-    monkeypatch.setattr(correcting, "plan_visits", watched)
+    monkeypatch.setattr(compensate_module, "plan_visits", watched)
     many(job(made.drilling(400)))
     assert len(alive) > 4 and not any(alive)
 

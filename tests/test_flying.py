@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from postproc.flying import rounding_of
+from postproc.compensation.targets import rounding_of
 from postproc.language.visits import FlyTrajectory, FlyType
 from postproc.motion.path import Pull
 from postproc.motion.targets import Fly

@@ -7,9 +7,9 @@ import re
 import numpy as np
 import pytest
 
-from postproc.compensate import compensate
-from postproc.planning import plan_visits, read_program
-from postproc.report import Status
+from postproc.compensation.compensate import compensate
+from postproc.compensation.outcome import Status
+from postproc.compensation.program import plan_visits, read_program
 from tests.written import FIRST, program
 
 SET = "p := POS(100.0, 200.0, 150.0, 0.0, 175.0, 0.0, '')"

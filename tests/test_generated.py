@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from postproc.compensate import compensate
+from postproc.compensation.compensate import compensate
 from postproc.language.visits import Target
 from tests.generated.found import (
     ALL,

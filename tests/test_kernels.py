@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from postproc import kernels
-from postproc.compensate import compensate
+from postproc.compensation.compensate import compensate
 from postproc.model.combination import Combination
 from postproc.model.effects.backlash import Backlash
 from postproc.model.effects.backlash_profile import BacklashProfile

@@ -8,13 +8,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from postproc.accuracy.orientation import turn, turn_std
-from postproc.compensate import compensate
+from postproc.compensation.command import turn, turn_std
+from postproc.compensation.compensate import compensate
+from postproc.compensation.options import Options
+from postproc.compensation.outcome import Status
+from postproc.compensation.program import read_program
 from postproc.exceptions import ModelError
 from postproc.language.visits import Visits
-from postproc.options import Options
-from postproc.planning import read_program
-from postproc.report import Status
 from postproc.robot.pose import MM, angles_near, rotation_from_zyz, rotation_vector
 from postproc.robot.state import make_states
 from postproc.simulate import setup_of

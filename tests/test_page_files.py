@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
+from postproc.compensation.program import read_program
 from postproc.exceptions import ProgramError
 from postproc.page_files import find_pages
-from postproc.planning import read_program
 from tests.plant import contents, pages
 from tests.written import cli
 

@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from postproc.compensation.targets import targets_from_visits
 from postproc.language.visits import Motion, Target, Visits
 from postproc.motion.planner import plan
-from postproc.resolve import targets_from_visits
 from postproc.robot.cell import Cell, load_cell
 from postproc.robot.pose import pose_from_record, record_from_pose
 from postproc.virtual.drawing import virtual_arm

@@ -12,10 +12,11 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from postproc.compensate import compensate
+from postproc.compensation.compensate import compensate
+from postproc.compensation.outcome import Outcome
+from postproc.compensation.program import read_program
 from postproc.model.model import load_model
-from postproc.planning import read_program
-from postproc.report import Outcome
+from postproc.report_json import report_text
 from postproc.robot.cell import load_cell
 from postproc.simulate import setup_of
 from postproc.virtual import land, run_program, virtual_arm
@@ -126,7 +127,7 @@ def test_the_correction_steps_where_the_arm_does(milling) -> None:
 
 
 def test_the_correction_is_continuous_where_no_joint_turns(milling) -> None:
-    rows = json.loads(milling.outcome.to_json())["targets"]
+    rows = json.loads(report_text(milling.outcome))["targets"]
     side = np.array([row["side"] for row in rows])
     kept = (np.abs(np.diff(side, axis=0)) < 0.01).all(axis=1)
     steps = [row["step_mm"] for row in rows[1:]]

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from postproc.reconcile import agree
+from postproc.compensation.decide import agree
 
 
 def test_groups_by_literal():

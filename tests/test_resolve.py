@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from postproc.compensation.targets import configurations, targets_from_visits
 from postproc.language.visits import Target
 from postproc.motion.targets import Kind
-from postproc.resolve import configurations, targets_from_visits
 from postproc.robot.cell import Cell, load_cell
 from postproc.robot.pose import inverse, pose_from_record
 from tests.made_visits import FRAMES, visits

@@ -2,17 +2,18 @@
 
 import pytest
 
-from postproc.exceptions import ProgramError
-from postproc.language.source import Edit, Replacements, Span
-from postproc.restore import restore, restore_file
-from postproc.sidecar import (
+from postproc.compensation.record import (
     FileRecord,
     Sidecar,
     block_checksums,
     read_sidecar,
+    restore,
+    restore_file,
     sha256,
     sidecar_path,
 )
+from postproc.exceptions import ProgramError
+from postproc.language.source import Edit, Replacements, Span
 
 SOURCE = b"PROGRAM x\r\nMOVE TO {1.0, \xe4 2}\r\nEND x"
 OUTPUT = b"-- stamp\r\nPROGRAM x\r\nMOVE TO {1.25, \xe4 2}\r\nEND x"

@@ -8,12 +8,11 @@ from pathlib import Path
 
 import pytest
 
-from postproc.compensate import compensate
+from postproc.compensation.compensate import compensate
+from postproc.compensation.options import Options
+from postproc.compensation.record import FileRecord, restore
 from postproc.exceptions import PostprocError
-from postproc.options import Options
-from postproc.restore import restore
 from postproc.robot.cell import load_cell
-from postproc.sidecar import FileRecord
 from tests.fuzz.originals import case_programs
 from tests.generated.landing import program
 from tests.language.generator import Generator

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from postproc.sharing import Arrivals, Stop, connected, regroup
+from postproc.compensation.clones import Arrivals, Stop, connected, regroup
 
 LIMIT = 0.5
 

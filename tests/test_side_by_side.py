@@ -11,9 +11,9 @@ from pathlib import Path
 
 import pytest
 
-from postproc import side_by_side
+from postproc.compensation import parallel
+from postproc.compensation.parallel import LONG, in_turns, meanwhile
 from postproc.exceptions import PostprocError
-from postproc.side_by_side import LONG, in_turns, meanwhile
 from tests.bench.made import milling
 
 LINES = 20_000
@@ -44,7 +44,7 @@ def cores(monkeypatch):
     """Let there be so many cores."""
 
     def let(number: int) -> None:
-        monkeypatch.setattr(side_by_side, "available", lambda: number)
+        monkeypatch.setattr(parallel, "available", lambda: number)
 
     return let
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from postproc.side_search import SideSearch
+from postproc.compensation.iterate import SideSearch
 
 
 def searched(gain: float, middle: float, rounds: int = 8) -> tuple[float, float]:

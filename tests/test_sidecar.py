@@ -8,9 +8,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from postproc.compensation.record import (
+    FileRecord,
+    Sidecar,
+    read_sidecar,
+    read_without_edits,
+)
 from postproc.exceptions import ProgramError
 from postproc.language.source import Replacements
-from postproc.sidecar import FileRecord, Sidecar, read_sidecar, read_without_edits
 
 NASTY = (b'], "targets": {', b'"edits": [', b"\\", b'"', b'\\"edits": [', b"1.5", b"}")
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from postproc.planning import plan_visits, read_program, states_of
-from postproc.solved import solve_again, solve_visits, std_errors
+from postproc.compensation.command import solve_again, solve_visits, std_errors
+from postproc.compensation.program import plan_visits, read_program, states_of
 from tests.written import FIRST, program
 
 POINTS = [

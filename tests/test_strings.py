@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from postproc.notes import overruled_strings
-from postproc.planning import Planned, Reading, plan_visits, read_program
+from postproc.compensation.eligibility import overruled
+from postproc.compensation.notes import overruled_strings
+from postproc.compensation.program import Planned, Reading, plan_visits, read_program
 from postproc.robot.cell import Cell, load_cell
 from postproc.robot.pose import record_from_pose
-from postproc.strings import overruled
 
 HERE, THERE = [0.0, 0.0, -90.0, 0.0, 45.0, 0.0], [5.0, 5.0, -95.0, 10.0, 40.0, 8.0]
 START = "MOVE JOINT TO {0, 0, -90, 0, 45, 0}"

@@ -7,7 +7,7 @@ import re
 import numpy as np
 import pytest
 
-from postproc.planning import plan_visits, read_program
+from postproc.compensation.program import plan_visits, read_program
 from postproc.surveying import BACK, write_survey
 from tests.written import cli
 

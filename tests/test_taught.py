@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from postproc.compensate import compensate
+from postproc.compensation.compensate import compensate
+from postproc.compensation.frames import frame_of_points
+from postproc.compensation.outcome import Status
+from postproc.compensation.program import read_program
 from postproc.exceptions import CellError
-from postproc.planning import read_program
-from postproc.report import Status
 from postproc.robot.cell import load_cell
 from postproc.robot.pose import pose_from_record, record_from_pose
 from postproc.simulate import setup_of
-from postproc.taught import frame_of_points
 from postproc.virtual import land, make_arrivals, virtual_arm
 from tests.conftest import CELL, SEED
 from tests.shared_points import SWEEP

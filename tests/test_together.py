@@ -8,12 +8,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from postproc import settling, together
-from postproc.compensate import compensate
+from postproc.compensation import iterate, together
+from postproc.compensation.compensate import compensate
+from postproc.compensation.options import AS_USUAL, Options
+from postproc.compensation.together import Given, compensate_together
 from postproc.exceptions import CellError, ModelError, PostprocError, ProgramError
-from postproc.options import AS_USUAL, Options
+from postproc.report_json import report_text
 from postproc.robot.cell import load_cell
-from postproc.together import Given, compensate_together
 from tests.bench.made import KINDS
 from tests.conftest import ROOT
 from tests.generated.landing import program as generated
@@ -41,7 +42,7 @@ def said(outcome):
     """Tell everything that comes of a program, but for the time that it took."""
     if isinstance(outcome, Exception):
         return repr(outcome)
-    report = json.loads(outcome.to_json())
+    report = json.loads(report_text(outcome))
     del report["stages_s"]
     return outcome.outputs, outcome.sidecar, outcome.summary(), report
 
@@ -152,14 +153,14 @@ def test_nothing_at_all(job_cell, job_model):
 def test_what_changes_sides_as_it_is_written_is_corrected_alone(
     job_cell, job_model, monkeypatch
 ):
-    monkeypatch.setattr(settling, "OTHER", 0.006)  # so that rounding is enough
-    begins, write = [], settling.write
+    monkeypatch.setattr(iterate, "OTHER", 0.006)  # so that rounding is enough
+    begins, write = [], iterate.write
 
     def watched(reading, *given):
         begins.append(len(reading.begins))
         return write(reading, *given)
 
-    monkeypatch.setattr(settling, "write", watched)
+    monkeypatch.setattr(iterate, "write", watched)
     programs = [given(f"p{k}.pdl", crowded(f"p{k}", k)) for k in range(6)]
     for one in programs:
         alone(one, job_cell, job_model, AS_USUAL)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from postproc.planning import plan_visits, read_program
+from postproc.compensation.program import plan_visits, read_program
 from postproc.robot.cell import Cell, load_cell
 
 

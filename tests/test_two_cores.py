@@ -6,16 +6,15 @@ import sys
 
 import pytest
 
-from postproc import side_by_side, verify
-from postproc.compensate import compensate
+from postproc.compensation import parallel, rewrite
+from postproc.compensation.compensate import compensate
+from postproc.compensation.outcome import Outcome
+from postproc.compensation.parallel import in_child, sharing
+from postproc.compensation.rewrite import VerificationError
 from postproc.exceptions import ProgramError
-from postproc.forked import in_child
 from postproc.language import lines, source
 from postproc.language.source import source_from_bytes
-from postproc.report import Outcome
 from postproc.report_json import report_pieces
-from postproc.side_by_side import sharing
-from postproc.verify import VerificationError
 from tests.bench.made import KINDS
 
 pytestmark = pytest.mark.skipif(
@@ -34,11 +33,11 @@ def children(monkeypatch) -> list[object]:
         begun.append(work)
         return in_child(work, *more)
 
-    monkeypatch.setattr(side_by_side, "in_child", watched)
-    monkeypatch.setattr(side_by_side, "available", lambda: 2)
-    monkeypatch.setattr(side_by_side, "LONG", 2)
+    monkeypatch.setattr(parallel, "in_child", watched)
+    monkeypatch.setattr(parallel, "available", lambda: 2)
+    monkeypatch.setattr(parallel, "LONG", 2)
     monkeypatch.setattr(lines, "_PIECE", 4_000)
-    monkeypatch.setattr(verify, "WORTH", 1)
+    monkeypatch.setattr(rewrite, "WORTH", 1)
     monkeypatch.setattr(source, "AT_ONCE", 100)
     monkeypatch.setattr("postproc.report_json.AT_ONCE", 100)
     return begun
@@ -78,10 +77,10 @@ def test_two_cores_give_what_one_gives(job, children, kind: str) -> None:
 def test_what_is_wrong_with_a_text_is_told_before_what_is_wrong_with_visits(
     job, children, monkeypatch
 ) -> None:
-    monkeypatch.setattr(verify, "_in_visits", lambda *given: "b.pdl: visits")
+    monkeypatch.setattr(rewrite, "_in_visits", lambda *given: "b.pdl: visits")
     with pytest.raises(VerificationError, match=r"^b\.pdl: visits$"):
         job("milling", 2)
-    monkeypatch.setattr(verify, "_differences", lambda *given: ("texts",))
+    monkeypatch.setattr(rewrite, "_differences", lambda *given: ("texts",))
     for processes in (1, 2):
         with pytest.raises(VerificationError, match="texts; nothing is written"):
             job("milling", processes)

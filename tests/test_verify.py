@@ -8,17 +8,21 @@ import numpy as np
 import pytest
 
 from postproc import cli as command_line
-from postproc.output import Output, write_numbers
-from postproc.planning import Reading, read_program
+from postproc.compensation.program import Reading, read_program
+from postproc.compensation.rewrite import (
+    Output,
+    VerificationError,
+    check_output,
+    write_numbers,
+)
 from postproc.robot.cell import Cell
-from postproc.verify import VerificationError, check_output
 from tests.written import FIRST, POSE, program
 
 
 @pytest.fixture(params=[1, 50_000], autouse=True)
 def window(request, monkeypatch):
     """Check as many rows at a time."""
-    monkeypatch.setattr("postproc.verify.ROWS", request.param)
+    monkeypatch.setattr("postproc.compensation.rewrite.ROWS", request.param)
     monkeypatch.setattr("postproc.language.rewrite.AT_ONCE", request.param)
 
 
@@ -88,7 +92,7 @@ def test_no_defect_of_ours_shows_a_trace(desk, monkeypatch, capsys, error) -> No
     def fail(*_: object) -> None:
         raise error("job.pdl: another byte differs; nothing is written")
 
-    monkeypatch.setattr("postproc.compensate.check_output", fail)
+    monkeypatch.setattr("postproc.compensation.compensate.check_output", fail)
     source, out = desk.put("job.pdl", program(FIRST, POSE)), desk.folder / "out.pdl"
     if error is VerificationError:
         found = desk.compensate(source, "-o", out)

@@ -5,12 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from postproc.compensation.program import read_program
+from postproc.compensation.rewrite import VerificationError, check_output, write_numbers
 from postproc.language.rewrite import Skeleton, differences
 from postproc.language.source import Replacements, Source
-from postproc.output import write_numbers
-from postproc.planning import read_program
 from postproc.robot.cell import load_cell
-from postproc.verify import VerificationError, check_output
 from tests.bench.__main__ import CELL
 from tests.bench.made import spot
 

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from postproc.batch.setup import Setup, open_setup
+from postproc.compensation.options import Options
 from postproc.exceptions import CellError, PostprocError
-from postproc.options import Options
 from postproc.robot.arm_file import Strict, read_toml
 
 

@@ -15,8 +15,8 @@ from postproc.batch.summary import Summary
 from postproc.batch.target import Target, places_of
 from postproc.batch.task import Result, Task, digest_of
 from postproc.batch.tree import Tree, refuse_overlap, scan
+from postproc.compensation.record import SUFFIX
 from postproc.exceptions import DiskFullError, OutputError
-from postproc.sidecar import SUFFIX
 
 STATUS = ("done", "left", "failed")  # by exit code
 

@@ -9,9 +9,9 @@ from functools import cached_property
 from pathlib import Path
 
 from postproc import __version__
+from postproc.compensation.options import Options
 from postproc.exceptions import CellError
 from postproc.model.model import Model, load_model
-from postproc.options import Options
 from postproc.robot.cell import Cell, load_cell
 
 

@@ -9,9 +9,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from postproc.batch.task import Unit
+from postproc.compensation.record import SUFFIX, file_sha256, sha256
 from postproc.exceptions import OutputError
 from postproc.files import disk_error, replace_file, write_all
-from postproc.sidecar import SUFFIX, file_sha256, sha256
 
 
 @dataclass(frozen=True)

@@ -11,6 +11,7 @@ from pathlib import Path
 from postproc.batch.pages import group_pages, named_programs, read_head
 from postproc.batch.plan import Plan
 from postproc.batch.task import Unit
+from postproc.compensation.record import SUFFIX
 from postproc.exceptions import OutputError, ProgramError
 from postproc.files import (
     COMPILED,
@@ -22,7 +23,6 @@ from postproc.files import (
     holds_targets,
     suffix_of,
 )
-from postproc.sidecar import SUFFIX
 
 _STALE = "is compiled from the uncompensated program: translate it anew"
 

@@ -12,11 +12,11 @@ import numpy as np
 from postproc import __version__
 from postproc.batch.setup import Setup
 from postproc.batch.task import Result, Task, Unit, failed
+from postproc.compensation.outcome import Outcome
+from postproc.compensation.record import SUFFIX
+from postproc.compensation.together import Given, compensate_together
 from postproc.exceptions import PostprocError
-from postproc.report import Outcome
 from postproc.robot.pose import MM
-from postproc.sidecar import SUFFIX
-from postproc.together import Given, compensate_together
 
 LISTED = 50  # findings of a program that the log lists; the rest is counted
 

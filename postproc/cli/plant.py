@@ -22,8 +22,8 @@ from postproc.cli.common import (
     say,
     write_text,
 )
+from postproc.compensation.options import AS_USUAL
 from postproc.files import check_places
-from postproc.options import AS_USUAL
 
 CellFile = Annotated[
     Path | None, typer.Option("--cell", help="Cell of programs that no rule fits.")
@@ -72,8 +72,8 @@ def batch(
             start_server()
         from postproc.batch import run
         from postproc.batch.plan import make_plan
+        from postproc.compensation.options import Options
         from postproc.console import progress_bar
-        from postproc.options import Options
 
         options = Options(clone, temperature=temperature, orientation=orientation)
         made = make_plan(plan, cell, model, options)

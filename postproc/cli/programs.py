@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from itertools import zip_longest
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
@@ -25,11 +25,9 @@ from postproc.cli.common import (
     say,
     write_text,
 )
+from postproc.compensation.outcome import Outcome
 from postproc.exceptions import PostprocError
 from postproc.files import STREAM, check_places
-
-if TYPE_CHECKING:
-    from postproc.report import Outcome
 
 CROWD = 8  # processes, each with a window of its own in memory
 SHOWN = 20  # targets left alone whose source lines are shown
@@ -65,8 +63,10 @@ def compensate(
     processes: ProcessesOption = 0,
 ) -> None:
     """Rewrite a program so that the tool lands where its targets say."""
-    from postproc import forked, jobs
-    from postproc.options import Options
+    from postproc import jobs
+    from postproc.compensation import parallel
+    from postproc.compensation.options import Options
+    from postproc.report_json import report_text
     from postproc.stages import stages
 
     given = None if program == STREAM else Path(program)
@@ -76,7 +76,7 @@ def compensate(
             raise PostprocError("--report -: stdout holds the program. Name a file")
         check_places([output, report, html], [given, lsv, cell, model])
         job = jobs.Job.open(program, cell, model, lsv)
-        crowd = processes or min(forked.available(), CROWD)
+        crowd = processes or min(parallel.available(), CROWD)
         with stages() as progress:
             outcome = job.run(options, progress, crowd)
         if strict and outcome.exit_code:
@@ -88,7 +88,7 @@ def compensate(
         written = job.write(outcome, output, report, html, crowd)
         _print_outcome(outcome)
         if report == Path(STREAM):
-            write_text(STREAM, outcome.to_json())
+            write_text(STREAM, report_text(outcome))
         for path in written:
             say(f"written {path}")
     raise typer.Exit(outcome.exit_code)
@@ -139,7 +139,7 @@ def restore(
     ] = None,
 ) -> None:
     """Give back the original program, byte for byte, from the sidecar record."""
-    from postproc.restore import restore_file
+    from postproc.compensation.record import restore_file
 
     with explained():
         for path in restore_file(compensated, output):

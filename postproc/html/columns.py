@@ -9,8 +9,8 @@ from typing import Any, Self
 import numpy as np
 
 from postproc.arrays import Floats, Ints
+from postproc.compensation.outcome import Outcome
 from postproc.language.visits import Motion
-from postproc.report import Outcome
 from postproc.robot.pose import MM
 
 MOVES = (*(m.name for m in Motion), "VIA")
@@ -28,7 +28,7 @@ class Columns:
         literal_file, literal_line: Where its numbers stand, (n,), -1 where nowhere.
         name: Index into `names`, (n,).
         move: Index into `MOVES`, (n,).
-        status: `postproc.report.Status`, (n,).
+        status: `postproc.compensation.outcome.Status`, (n,).
         why: Index into `reasons`, (n,).
         direction: Of every joint's arrival: -1, 0 (not known), 1, (n, 6).
         q_deg: Joint angles, (n, 6).

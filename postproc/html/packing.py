@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 
 from postproc.arrays import Floats, Ints
+from postproc.compensation.outcome import Status
 from postproc.html.columns import MOVES, Columns
 from postproc.html.text import visible
-from postproc.report import Status
 
 MOST = 100_000  # visits that a page carries
 LARGEST = 2_000  # of the largest corrections, carried whatever is left out

@@ -8,13 +8,13 @@ from typing import Any
 
 import numpy as np
 
-from postproc.html.columns import Columns, Program, columns_of
+from postproc.compensation.outcome import Outcome, Status
+from postproc.html.columns import Program, columns_of
 from postproc.html.listing import listing
 from postproc.html.packing import choose, pack
 from postproc.html.page import render
 from postproc.html.rows import columns_from
 from postproc.html.summary import (
-    Group,
     finite,
     histogram,
     left_alone,
@@ -22,7 +22,6 @@ from postproc.html.summary import (
     tell_counts,
     uncertainty,
 )
-from postproc.report import Outcome, Status
 
 SCRIPTS = ("page.js", "columns.js", "view.js", "table.js", "source.js", "program.js")
 
@@ -95,6 +94,3 @@ def _page(program: Program) -> str:
         shown=len(carried),
         placed=bool(np.isfinite(columns.position_mm).all(axis=1).any()),
     )
-
-
-__all__ = ["Columns", "Group", "program_report", "program_report_from_json"]

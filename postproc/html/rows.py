@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from postproc.arrays import Floats
+from postproc.compensation.outcome import Status
 from postproc.html.columns import MOVES, Columns
-from postproc.report import Status
 
 
 class Texts:

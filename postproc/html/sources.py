@@ -6,11 +6,10 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
+from postproc.compensation.record import FileRecord, read_sidecar, restore, sidecar_path
 from postproc.exceptions import ProgramError
 from postproc.language.source import Source
 from postproc.language.stamp import is_stamped
-from postproc.restore import restore
-from postproc.sidecar import FileRecord, read_sidecar, sidecar_path
 
 
 def find_sources(report: Mapping[str, Any], folder: Path) -> dict[str, bytes]:

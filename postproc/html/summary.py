@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from postproc.compensation.outcome import Status
 from postproc.html.columns import Columns
-from postproc.report import Status
 
 BINS = 40
 EXAMPLES = 12  # visits named in a group

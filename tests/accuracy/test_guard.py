@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from postproc.accuracy.guard import guard_size, guard_solutions, guard_steps
-from postproc.reasons import Reasons
+from postproc.compensation.decide import guard_size, guard_solutions, guard_steps
+from postproc.compensation.eligibility import Reasons
 from postproc.robot.arm import load_arm
 from postproc.robot.cell import LimitSection
 

@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from postproc.accuracy.solve import solve
+from postproc.compensation.command import solve
 from postproc.robot.state import make_states
 from tests.accuracy.simulator import NJ, TOOL, random_arm, random_states
 from tests.accuracy.test_model import model

@@ -14,7 +14,7 @@ import time
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
-from postproc.planning import read_program
+from postproc.compensation.program import read_program
 from postproc.robot.cell import Cell, load_cell
 
 ROOT = Path(__file__).parents[2]

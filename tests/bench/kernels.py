@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from toppra.algorithm import TOPPRA
 from toppra.constraint import JointAccelerationConstraint, JointVelocityConstraint
 
-from postproc.compensate import name_files
+from postproc.compensation.compensate import name_files
+from postproc.compensation.program import plan_visits, read_program
 from postproc.motion.ruckig import JointMoves
-from postproc.planning import plan_visits, read_program
 from postproc.robot.arm import Arm
 from postproc.robot.cell import load_cell
 from tests.bench.made import Made

@@ -8,9 +8,9 @@ import time
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from postproc import forked
+from postproc.compensation import parallel
+from postproc.compensation.options import AS_USUAL
 from postproc.jobs import Job
-from postproc.options import AS_USUAL
 from tests.bench.kernels import planned, ruckig_alone, toppra_alone
 from tests.bench.made import KINDS
 
@@ -35,7 +35,7 @@ def measure(kind: str, n: int, cell: Path, model: Path) -> dict[str, float]:
         start = time.perf_counter()
         job = Job.open(str(place), cell, model)
         read = time.perf_counter() - start
-        crowd = forked.available()  # as the command line does
+        crowd = parallel.available()  # as the command line does
         outcome = job.run(AS_USUAL, processes=crowd)
         pipeline = time.perf_counter() - start
         begin = time.perf_counter()

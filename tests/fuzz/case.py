@@ -10,16 +10,14 @@ from typing import Any
 
 import numpy as np
 
-from postproc.compensate import compensate
+from postproc.compensation.compensate import compensate
+from postproc.compensation.program import read_program
+from postproc.compensation.record import FileRecord, Sidecar, restore
+from postproc.compensation.rewrite import check_output, write_numbers
 from postproc.exceptions import PostprocError
 from postproc.language.visits import Visits
 from postproc.model.model import Model
-from postproc.output import write_numbers
-from postproc.planning import read_program
-from postproc.restore import restore
 from postproc.robot.cell import Cell
-from postproc.sidecar import FileRecord, Sidecar
-from postproc.verify import check_output
 
 LIMIT = 2.0  # [s] of processor time, for files of up to
 SIZE = 100_000  # bytes

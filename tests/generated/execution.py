@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from postproc.planning import read_program
-from postproc.report import Outcome
+from postproc.compensation.outcome import Outcome
+from postproc.compensation.program import read_program
 from postproc.robot.cell import Cell
 from postproc.robot.pose import MM
 from postproc.simulate import setup_of

@@ -7,11 +7,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from postproc.compensate import compensate
+from postproc.compensation.compensate import compensate
+from postproc.compensation.notes import SURE
+from postproc.compensation.options import Options
+from postproc.compensation.outcome import Outcome, Status
 from postproc.model.model import Model
-from postproc.notes import SURE
-from postproc.options import Options
-from postproc.report import Outcome, Status
 from postproc.robot.cell import Cell
 from postproc.robot.pose import MM
 from tests.fuzz.case import check_bytes, records_of

@@ -8,8 +8,8 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from postproc.notes import SURE
-from postproc.report import Outcome, Status
+from postproc.compensation.notes import SURE
+from postproc.compensation.outcome import Outcome, Status
 from tests.generated.found import DONE, Found
 from tests.language.executed import Executed
 

@@ -6,10 +6,10 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from postproc.compensation.outcome import Decisions, Outcome, Status
+from postproc.compensation.record import Sidecar
 from postproc.language.visits import Diagnostic, Literals, Visits
 from postproc.model.statistics import ErrorStatistics
-from postproc.report import Decisions, Outcome, Status
-from postproc.sidecar import Sidecar
 
 REASONS = (
     "",

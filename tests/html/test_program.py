@@ -10,12 +10,13 @@ from typing import Any
 import numpy as np
 import pytest
 
+from postproc.compensation.outcome import Status
 from postproc.html import packing, program_report, program_report_from_json
 from postproc.html.columns import columns_of
 from postproc.html.listing import listing, stretches
 from postproc.html.rows import columns_from
 from postproc.html.summary import histogram, left_alone
-from postproc.report import Status
+from postproc.report_json import report_text
 from tests.html.builders import FIRST_LINE, outcome_of
 
 NASTY = '<script>alert("x")</script>\'\x1b[31m\u202e'
@@ -110,7 +111,7 @@ def test_nothing_left_alone_is_said() -> None:
 def test_a_written_report_gives_the_same_columns() -> None:
     outcome = outcome_of(90, names=("", "p1", "p2"))
     a = columns_of(outcome)
-    b = columns_from(json.loads(outcome.to_json())["targets"])
+    b = columns_from(json.loads(report_text(outcome))["targets"])
     for key in ("visit", "line", "literal_line", "move", "status", "direction"):
         np.testing.assert_array_equal(getattr(a, key), getattr(b, key))
     for key in ("q_deg", "original", "corrected", "position_mm", "correction_mm"):
@@ -122,7 +123,7 @@ def test_a_written_report_gives_the_same_columns() -> None:
 
 def test_a_written_report_makes_a_page() -> None:
     outcome = outcome_of(40)
-    data = json.loads(outcome.to_json())
+    data = json.loads(report_text(outcome))
     page = Elements(program_report_from_json(data, outcome.sources)).payload()
     assert page["listing"]["panel.pdl"]["line"] == [1, 44]
     bare = Elements(program_report_from_json(data)).payload()
@@ -130,7 +131,7 @@ def test_a_written_report_makes_a_page() -> None:
 
 
 def test_a_report_without_positions_has_no_view() -> None:
-    data = json.loads(outcome_of(20).to_json())
+    data = json.loads(report_text(outcome_of(20)))
     for target in data["targets"]:
         del target["position_mm"]
     text = program_report_from_json(data)

@@ -19,6 +19,7 @@ from postproc.html.diagnosis import distinct, running_mean
 from postproc.html.figure import distribution, in_space, magnification
 from postproc.html.history import steps
 from postproc.html.iso9283 import pose_figures
+from postproc.report_json import report_text
 from tests.html.builders import outcome_of, program_text
 from tests.html.test_program import NASTY, Elements
 
@@ -273,7 +274,7 @@ def test_iso_figures_need_repetition() -> None:
         (model_file(), "Calibration of nj"),
         (diagnosis(), "Diagnosis: effect"),
         (comparison(), "Methods compared"),
-        (json.loads(outcome_of(20).to_json()), "panel.pdl"),
+        (json.loads(report_text(outcome_of(20))), "panel.pdl"),
     ],
     ids=["model", "diagnosis", "comparison", "program"],
 )
@@ -288,7 +289,7 @@ def test_the_file_tells_which_page_it_wants(
 
 def test_source_lines_are_found_beside_the_report(tmp_path: Path) -> None:
     (tmp_path / "panel.pdl").write_bytes(program_text(20))
-    (tmp_path / "in.json").write_text(outcome_of(20).to_json())
+    (tmp_path / "in.json").write_text(report_text(outcome_of(20)))
     report_file(tmp_path / "in.json", tmp_path / "out.html")
     text = (tmp_path / "out.html").read_text(encoding="utf-8")
     assert Elements(text).payload()["listing"]["panel.pdl"]["line"] == [1, 24]

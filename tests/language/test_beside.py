@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from postproc.language.beside import begins, beside
+from postproc.compensation.program import read_program
+from postproc.compensation.windows import begins, beside
 from postproc.language.visits import Visits
-from postproc.planning import read_program
 from tests.generated.landing import program
 
 SEEDS = range(40)

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 
 import pytest
 
-from postproc.planning import read_program
+from postproc.compensation.program import read_program
 from tests.bench.growth import KINDS
 
 SMALL = 150

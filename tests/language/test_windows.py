@@ -8,12 +8,12 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from postproc.language import windows as cuts
+from postproc.compensation import windows as cuts
+from postproc.compensation.windows import SHARED, quiet_stops, run_up, windows
 from postproc.language.pdl2.interpreter import resolve
 from postproc.language.pdl2.program import parse
 from postproc.language.source import source_from_bytes
 from postproc.language.visits import Visits
-from postproc.language.windows import SHARED, quiet_stops, run_up, windows
 from tests.bench.made import drilling, milling
 from tests.language.reachable import reachable
 

@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from postproc.compensation.program import read_program
+from postproc.compensation.targets import targets_from_visits
 from postproc.motion import replan
 from postproc.motion.replan import Course, reach, reach_again
 from postproc.motion.targets import Kind, Move, Targets
-from postproc.planning import read_program
-from postproc.resolve import targets_from_visits
 from postproc.robot.cell import Cell, load_cell
 from tests.bench.made import drilling, handling, milling
 from tests.conftest import ROOT

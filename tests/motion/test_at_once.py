@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from postproc.compensation.program import read_program
+from postproc.compensation.targets import targets_from_visits
 from postproc.motion import trace as module
 from postproc.motion.targets import Kind, Move, Targets, make_targets
 from postproc.motion.trace import Trace, trace
-from postproc.planning import read_program
-from postproc.resolve import targets_from_visits
 from postproc.robot.arm import Arm
 from postproc.robot.cell import load_cell
 from tests.bench.made import drilling, handling, milling

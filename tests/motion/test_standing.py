@@ -7,13 +7,13 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from postproc.compensation.program import read_program
+from postproc.compensation.targets import targets_from_visits
+from postproc.compensation.windows import Window, quiet_stops
 from postproc.language.visits import Visits
-from postproc.language.windows import Window, quiet_stops
 from postproc.motion.planner import plan
 from postproc.motion.replan import reach, reach_again
 from postproc.motion.trace import NOWHERE
-from postproc.planning import read_program
-from postproc.resolve import targets_from_visits
 from postproc.robot.cell import Cell
 from tests.bench import made
 from tests.motion.test_again import arcs, cell, picked, shifted

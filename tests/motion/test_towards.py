@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from postproc.planning import plan_visits, read_program
+from postproc.compensation.program import plan_visits, read_program
 
 POINT = "POS(150, 150, 250, 0, 170, 0, '')"
 

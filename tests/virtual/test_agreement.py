@@ -4,9 +4,9 @@ from pathlib import Path
 
 import numpy as np
 
+from postproc.compensation.targets import targets_from_visits
 from postproc.language.visits import Motion
 from postproc.motion.planner import plan
-from postproc.resolve import targets_from_visits
 from postproc.robot.arm import load_arm
 from postproc.robot.cell import load_cell
 from postproc.robot.state import make_states

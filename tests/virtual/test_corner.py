@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from postproc.compensation.targets import targets_from_visits
 from postproc.language.visits import FlyTrajectory, FlyType, Motion, Visits
 from postproc.motion.planner import plan
-from postproc.resolve import targets_from_visits
 from postproc.robot.cell import load_cell
 from postproc.virtual import NJ220, Setup, run_program, virtual_arm
 from tests.virtual.builders import Program

@@ -11,10 +11,10 @@ from dataclasses import replace
 import numpy as np
 
 from postproc.arrays import Floats
+from postproc.compensation.program import Planned
 from postproc.exceptions import CellError
 from postproc.language.visits import Target, Visits
 from postproc.model.model import Model
-from postproc.planning import Planned
 from postproc.robot.cell import Cell
 from postproc.robot.pose import MM, inverse, pose_from_record
 from postproc.robot.state import make_states

@@ -14,15 +14,12 @@ from typing import ParamSpec, TypeVar
 
 import numpy as np
 
-from postproc.clock import Clock, silent
-from postproc.compensate import finish, name_files, refuse
-from postproc.correcting import correct
-from postproc.kept import Kept
-from postproc.language.beside import begins, beside, offsets
+from postproc.compensation.compensate import Kept, correct, finish, name_files, refuse
+from postproc.compensation.options import Clock, Options, silent
+from postproc.compensation.outcome import Outcome
+from postproc.compensation.program import Reading, read_program, with_measured_play
+from postproc.compensation.windows import begins, beside, offsets
 from postproc.model.model import Model
-from postproc.options import Options
-from postproc.planning import Reading, read_program, with_measured_play
-from postproc.report import Outcome
 from postproc.robot.cell import Cell
 
 T = TypeVar("T")

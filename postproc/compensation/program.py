@@ -7,9 +7,16 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from postproc.arcs import mark_arcs
 from postproc.arrays import Each, Floats, Ints
+from postproc.compensation.eligibility import (
+    Reasons,
+    mark_arcs,
+    mark_strings,
+    mark_turning,
+)
+from postproc.compensation.targets import targets_from_visits
 from postproc.exceptions import ProgramError
+from postproc.files import VARIABLES
 from postproc.language.pdl2.effects import never_reached
 from postproc.language.pdl2.interpreter import resolve
 from postproc.language.pdl2.job import Start, base_name
@@ -23,14 +30,8 @@ from postproc.model.play import measured_play
 from postproc.motion.planner import Plan, plan
 from postproc.motion.targets import Targets
 from postproc.motion.trace import NOWHERE, Standing
-from postproc.reasons import Reasons
-from postproc.resolve import targets_from_visits
 from postproc.robot.cell import Cell
 from postproc.robot.state import States, make_states
-from postproc.strings import mark_strings
-from postproc.turning import mark_turning
-
-VARIABLES = ".lsv"  # suffix of variable files
 
 
 @dataclass(frozen=True)

@@ -16,8 +16,10 @@ import numpy as np
 from postproc.arrays import Each
 from postproc.byte_columns import joined, shortest, whole
 from postproc.exceptions import ProgramError
-from postproc.files import read_input
-from postproc.language.source import Replacements, Source, as_bytes
+from postproc.files import read_input, write_all
+from postproc.language.source import Replacements, Source, apply, as_bytes
+
+# The record beside an output that gives the source back, byte for byte.
 
 SUFFIX = ".postproc.json"
 EDITS, TARGETS = b'"edits": [', b'], "targets": {'
@@ -67,7 +69,7 @@ class FileRecord:
         checksums: CRC-32 of every `BLOCK` lines of the output.
         edits: What the output's bytes were before, ascending: in a file start, end and
             the original as Latin-1 text. The stamp is the first of them.
-        targets: What came of the targets in it, see `postproc.arrivals`; empty in
+        targets: What came of the targets in it, see `compensation.outcome`; empty in
             records of older versions. Columns are arrays before they are written.
     """
 
@@ -206,3 +208,83 @@ def _record(path: Path, text: bytes) -> Sidecar:
         return Sidecar(version, model, files, data.get("options", {}))
     except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
         raise ProgramError(path, "is not a record of postproc", CURE) from None
+
+
+# Give a compensated program back as it was.
+
+BESIDE = "Put it beside its record"
+
+
+def restore(data: bytes, record: FileRecord, name: str) -> bytes:
+    """Undo the edits of one file.
+
+    Args:
+        data: The compensated file.
+        record: How it differs from its source.
+        name: Name for messages.
+
+    Raises:
+        ProgramError: The file was changed since it was compensated, or the record does
+            not belong to it.
+    """
+    if sha256(data) != record.output_sha256:
+        raise ProgramError(
+            name,
+            f"was changed after it was compensated ({_where(data, record)})",
+            "Undo that change, or take the source from your archive",
+            line=_first_changed_line(data, record),
+        )
+    source = apply(data, record.edits)
+    if sha256(source) != record.source_sha256:
+        raise ProgramError(
+            name, "the record does not give its source back", "It belongs elsewhere"
+        )
+    return source
+
+
+def _first_changed_line(data: bytes, record: FileRecord) -> int:
+    """Return the first line of the first block that differs, 1-based."""
+    now = block_checksums(data)
+    pairs = zip(now, record.checksums, strict=False)
+    block = next((i for i, (a, b) in enumerate(pairs) if a != b), None)
+    if block is None:
+        block = min(len(now), len(record.checksums))
+    return block * BLOCK + 1
+
+
+def _where(data: bytes, record: FileRecord) -> str:
+    """Say between which lines the first change lies."""
+    first = _first_changed_line(data, record)
+    return f"between lines {first} and {first + BLOCK - 1}"
+
+
+def restore_file(compensated: Path, output: Path | None = None) -> list[Path]:
+    """Restore a program, and the variable file written with it, over itself.
+
+    Args:
+        compensated: The compensated program.
+        output: Where to put the program instead; variable files go beside it.
+
+    Returns:
+        The files written.
+
+    Raises:
+        ProgramError: No record, or a file was changed since.
+        OutputError: A file cannot be written; nothing is changed then.
+    """
+    record = read_sidecar(sidecar_path(compensated))
+    target = output or compensated
+    restored: dict[Path, bytes] = {}
+    if output is not None and compensated.name not in record.files:
+        restored[output] = read_input(
+            compensated, BESIDE
+        )  # only its values were changed
+    for name, file in record.files.items():
+        source = compensated.with_name(Path(name).name)
+        place = source
+        if output is not None:
+            place = target.with_name(target.stem + source.suffix)
+            place = target if source == compensated else place
+        restored[place] = restore(read_input(source, BESIDE), file, str(source))
+    write_all(restored)
+    return list(restored)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from postproc.arrays import Bools, Floats, in_pieces
+from postproc.files import VARIABLES
 from postproc.language.visits import NO_VALUE, Diagnostic, Target, Visits
 from postproc.robot.arm import Arm
 from postproc.robot.cell import Cell
@@ -12,7 +13,7 @@ from postproc.robot.pose import MM
 
 SURE = 0.9  # part of its play from its middle at which a joint rests on a flank
 LISTED = 0.01  # [mm] and [deg], the last decimal of the controller's own listing
-VARIABLES = ".lsv"  # suffix of variable files
+
 SINGLY = 20  # findings of one kind that are listed line by line
 
 

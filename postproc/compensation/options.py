@@ -1,10 +1,35 @@
-"""Seconds spent in every stage."""
+"""What the user asked for, and the seconds spent in every stage."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import dataclass
 from time import perf_counter
+
+# What the user asked for.
+
+
+@dataclass(frozen=True)
+class Options:
+    """What the user asked for.
+
+    Attributes:
+        clone: Give moves whose arrivals at one variable disagree one each.
+        shared: Edit variables that other programs may read too.
+        orientation: Correct the orientation of targets as well as their position.
+        temperature: Arm temperature [deg C]; default: the cell's.
+    """
+
+    clone: bool = False
+    shared: bool = False
+    temperature: float | None = None
+    orientation: bool = False
+
+
+AS_USUAL = Options()
+
+# Seconds spent in every stage.
 
 Progress = Callable[[str], None]
 

@@ -1,0 +1,1 @@
+"""Compensation: a program in, the same program out with corrected targets."""

@@ -1,0 +1,419 @@
+"""Points of their own for moves that cannot share one, and the proof that they fit."""
+
+from __future__ import annotations
+
+import re
+from collections import defaultdict
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, fields, replace
+
+import numpy as np
+
+from postproc.arrays import Floats, Ints
+from postproc.compensation.decide import Proposal
+from postproc.compensation.outcome import Status
+from postproc.compensation.program import Reading, read_program
+from postproc.files import VARIABLES
+from postproc.language.pdl2.clones import Named, clone, free_name, named_at
+from postproc.language.pdl2.program import Program, parse
+from postproc.language.source import CloneError, Edit, Source, apply
+from postproc.language.visits import Diagnostic, Visits
+from postproc.robot.cell import Cell
+
+# Which moves can go on sharing a point, and which need one of their own.
+
+Box = Mapping[int, tuple[Floats, Floats]]
+
+
+@dataclass(frozen=True)
+class Stop:
+    """One place in a move statement that names where to go.
+
+    Attributes:
+        file, line: Where the statement stands.
+        via: It is the VIA point of an arc.
+    """
+
+    file: int
+    line: int
+    via: bool
+
+
+@dataclass(frozen=True)
+class Arrivals:
+    """All arrivals at one stop.
+
+    Attributes:
+        stop: Where.
+        variable: What it can be separated from by another name, "" for nothing.
+        changes: The changes that the arrivals need, one row each [mm], by literal.
+        usable: Every arrival can be corrected.
+    """
+
+    stop: Stop
+    variable: str
+    changes: Mapping[int, Floats]
+    usable: bool
+
+    def box(self) -> Box:
+        """Return the bounds of the changes at every literal."""
+        return {k: (c.min(axis=0), c.max(axis=0)) for k, c in self.changes.items()}
+
+    def agree(self, agree_mm: float) -> bool:
+        """Tell whether the arrivals at this one stop agree."""
+        return _size(self.box()) <= agree_mm
+
+
+@dataclass
+class Group:
+    """Stops that can share one point.
+
+    Attributes:
+        variable: Its name, "" where stops of several variables share the literal.
+        stops: The stops.
+        bounds: Bounds of the changes at every literal.
+    """
+
+    variable: str
+    stops: list[Stop] = field(default_factory=list)
+    bounds: dict[int, tuple[Floats, Floats]] = field(default_factory=dict)
+
+    def take(self, arrivals: Arrivals, agree_mm: float) -> bool:
+        """Take in a stop that agrees with those at hand; tell whether it does."""
+        box = _union(self.bounds, arrivals.box())
+        if _size(box) > agree_mm:
+            return False
+        self.bounds = box
+        self.stops.append(arrivals.stop)
+        return True
+
+
+def regroup(
+    members: Sequence[Arrivals], stays: bool, agree_mm: float
+) -> tuple[Group, ...]:
+    """Divide the stops that share literals into groups whose arrivals agree.
+
+    The first group keeps the original: it holds what cannot be separated from it, and
+    where something needs the original as it is, nobody else.
+
+    Args:
+        members: All stops at some literals, in program order.
+        stays: The literals must keep their values.
+        agree_mm: Largest distance of changes that agree.
+
+    Returns:
+        The group that keeps the original, then those that need a point of their own.
+    """
+    original = Group("")
+    free: list[Arrivals] = []
+    for member in members:
+        if member.variable and member.usable and member.agree(agree_mm):
+            free.append(member)
+        elif not (member.usable and original.take(member, agree_mm)):
+            stays = True
+            original.stops.append(member.stop)
+    groups: list[Group] = []
+    for member in free:
+        mine = [g for g in groups if g.variable == member.variable]
+        choices = mine if stays else [original, *mine]
+        if not any(group.take(member, agree_mm) for group in choices):
+            group = Group(member.variable)
+            group.take(member, agree_mm)
+            groups.append(group)
+    return (original, *groups)
+
+
+def _union(a: Box, b: Box) -> dict[int, tuple[Floats, Floats]]:
+    box = dict(a)
+    for key, (low, high) in b.items():
+        if key in box:
+            low, high = np.minimum(low, box[key][0]), np.maximum(high, box[key][1])
+        box[key] = (low, high)
+    return box
+
+
+def _size(box: Box) -> float:
+    return max(
+        (float(np.linalg.norm(high - low)) for low, high in box.values()), default=0.0
+    )
+
+
+def connected(sets: Iterable[frozenset[int]]) -> list[frozenset[int]]:
+    """Unite the sets that overlap, in order of their smallest members.
+
+    >>> [sorted(s) for s in connected([frozenset({1, 2}), frozenset({3}),
+    ...                                frozenset({2, 5})])]
+    [[1, 2, 5], [3]]
+    """
+    owner: dict[int, frozenset[int]] = {}
+    for one in sets:
+        whole = one.union(*(owner[k] for k in one if k in owner))
+        owner |= dict.fromkeys(whole, whole)
+    return sorted({*owner.values()}, key=min)
+
+
+# Two readings of one program: do both make the same moves to the same values?
+
+_APART = frozenset(
+    "line config configs literal literals follows name names reason reasons".split()
+)
+"""Columns that are numbered anew, or speak of lines: they are compared by meaning."""
+
+
+def same_moves(
+    before: Reading,
+    after: Reading,
+    edits: Sequence[Sequence[Edit]],
+    names: Mapping[int, str],
+) -> Visits | None:
+    """Compare a program with itself after clones.
+
+    Every visit must be there, in the same order, with the same predecessors, numbers,
+    frames and settings, from the same line; its numbers must stand in a literal of its
+    own exactly where it goes to a clone.
+
+    Args:
+        before: The program.
+        after: The program with clones, read anew.
+        edits: The edits between them, file by file.
+        names: The clone that each separated visit goes to.
+
+    Returns:
+        The visits after it, with the lines of the program before; None where they
+        differ.
+    """
+    v, w = before.visits, after.visits
+    columns = [f.name for f in fields(Visits) if f.name not in _APART]
+    if len(v) != len(w) or any(_differ(getattr(v, n), getattr(w, n)) for n in columns):
+        return None
+    if _configs(v) != _configs(w) or ((v.reason > 0) != (w.reason > 0)).any():
+        return None
+    if _origin(before.sources, after.sources, edits, w) != v.line.tolist():
+        return None
+    wanted = [names.get(i, v.names[k]) for i, k in enumerate(v.name.tolist())]
+    if wanted != [w.names[k] for k in w.name.tolist()]:
+        return None
+    pairs = _pairs(v, w, names)
+    if pairs is None:
+        return None
+    line = np.zeros(len(w.literals), dtype=np.int64)
+    line[pairs[1]] = v.literals.line[pairs[0]]
+    return replace(w, line=v.line, literals=replace(w.literals, line=line))
+
+
+def _configs(visits: Visits) -> list[str]:
+    return [visits.configs[k] for k in visits.config.tolist()]
+
+
+def _differ(a: object, b: object) -> bool:
+    if isinstance(a, np.ndarray) and isinstance(b, np.ndarray):
+        return not np.array_equal(a, b, equal_nan=a.dtype.kind == "f")
+    return a != b
+
+
+def _origin(
+    before: Sequence[Source],
+    after: Sequence[Source],
+    edits: Sequence[Sequence[Edit]],
+    visits: Visits,
+) -> list[int]:
+    """Give the lines of visits as they were before the edits."""
+    lines = np.array(visits.line)
+    for file, (old, new, own) in enumerate(zip(before, after, edits, strict=True)):
+        mine = visits.file == file
+        start = new.line_starts[visits.line[mine] - 1]
+        shift = np.zeros(len(start), dtype=np.int64)
+        moved = 0
+        for (begin, end), text in sorted(own, key=lambda edit: edit.span):
+            behind = start >= begin + moved + len(text)
+            moved += len(text) - (end - begin)
+            shift[behind] = moved
+        lines[mine] = np.searchsorted(old.line_starts, start - shift, side="right")
+    return [int(line) for line in lines]
+
+
+def _pairs(v: Visits, w: Visits, names: Mapping[int, str]) -> tuple[Ints, Ints] | None:
+    """Match literals: one before and after for every visit that has one.
+
+    Returns:
+        Literals before and after, visit by visit; None where visits share a literal
+        after the clones that they did not share before, or no longer do.
+    """
+    has = np.flatnonzero(v.literal >= 0)
+    if not np.array_equal(has, np.flatnonzero(w.literal >= 0)):
+        return None
+    old = [(int(v.literal[i]), names.get(i, "")) for i in has.tolist()]
+    new = w.literal[has].tolist()
+    both = set(zip(old, new, strict=True))
+    if not len(both) == len(set(old)) == len(set(new)):
+        return None
+    return v.literal[has], w.literal[has]
+
+
+# Points of their own for moves that cannot share one, and the proof that they fit.
+
+_WORD = re.compile(rb"[A-Za-z_]\w*")
+
+
+def give_own_points(reading: Reading, proposal: Proposal, cell: Cell) -> Reading:
+    """Clone variables for moves whose arrivals at them disagree.
+
+    Returns:
+        The program with clones, proven to make the same moves to the same values, its
+        lines counted as before; or as it was, where nothing can be cloned. What was
+        cloned, and what was not, is among the diagnostics.
+    """
+    work = _Work.of(reading, proposal)
+    for literals in _disputed(work):
+        work.separate(literals, cell.limits.agree_mm)
+    notes = (*reading.diagnostics, *work.notes)
+    if not work.edits:
+        return replace(reading, diagnostics=notes)
+    cloned = tuple(
+        tuple(edit for file, edit in work.edits if file == number)
+        for number in range(len(reading.sources))
+    )
+    sources = tuple(
+        Source(source.name, apply(source.data, edits))
+        for source, edits in zip(reading.sources, cloned, strict=True)
+    )
+    again = read_program({s.name: s.data for s in sources}, cell)
+    visits = same_moves(reading, again, cloned, work.names)
+    if visits is None:
+        text = "clones would change what the program does: nothing is cloned"
+        found = Diagnostic(reading.sources[0].name, 1, "not-cloned", text)
+        return replace(reading, diagnostics=(*reading.diagnostics, found))
+    return Reading(again.texts, visits, notes, cloned, reading.sources)
+
+
+def _stops(visits: Visits) -> dict[Stop, Ints]:
+    """Group visits by the places that name where to go."""
+    rows: dict[Stop, list[int]] = {}
+    columns = (visits.file.tolist(), visits.line.tolist(), visits.via.tolist())
+    for row, place in enumerate(zip(*columns, strict=True)):
+        rows.setdefault(Stop(*place), []).append(row)
+    return {stop: np.array(found) for stop, found in rows.items()}
+
+
+def _disputed(work: _Work) -> list[frozenset[int]]:
+    """List the literals that arrivals disagree on, with all that share their moves."""
+    visits = work.reading.visits
+    unsafe = work.proposal.decisions.status == Status.UNSAFE
+    disputed = set(visits.literal[unsafe & (visits.literal >= 0)].tolist())
+    found = (visits.literal[rows] for rows in work.stops.values())
+    sets = [frozenset(literal[literal >= 0].tolist()) for literal in found]
+    together = connected(s for s in sets if len(s) > 1)
+    joined = frozenset().union(*together)
+    together += [frozenset({row}) for row in disputed - joined]
+    return sorted((s for s in together if not disputed.isdisjoint(s)), key=min)
+
+
+@dataclass
+class _Work:
+    """The edits of a job, clone by clone.
+
+    Attributes:
+        reading: The program.
+        proposal: What its arrivals need.
+        programs: Its program files, parsed.
+        values: Its variable file, or None.
+        taken: All words of its files, in lower case.
+        stops: The visits at every place that names where to go.
+        stops_at: The places that go to each literal.
+        edits: Edits with the index of their file.
+        names: The clone that every separated visit goes to.
+        notes: What was cloned, and what was not.
+    """
+
+    reading: Reading
+    proposal: Proposal
+    programs: list[Program]
+    values: Source | None
+    taken: set[str]
+    stops: dict[Stop, Ints]
+    stops_at: dict[int, set[Stop]]
+    edits: list[tuple[int, Edit]] = field(default_factory=list)
+    names: dict[int, str] = field(default_factory=dict)
+    notes: list[Diagnostic] = field(default_factory=list)
+
+    @classmethod
+    def of(cls, reading: Reading, proposal: Proposal) -> _Work:
+        """Parse the files of a program."""
+        sources = reading.sources
+        own = [s for s in sources if not s.name.lower().endswith(VARIABLES)]
+        values = next((s for s in sources if s not in own), None)
+        taken = {
+            word.decode("ascii").lower()
+            for source in sources
+            for word in _WORD.findall(source.data)
+        }
+        programs, visits = [parse(s) for s in own], reading.visits
+        stops, at = _stops(visits), defaultdict(set)
+        for stop, rows in stops.items():
+            for literal in visits.literal[rows].tolist():
+                at[literal].add(stop)
+        return cls(reading, proposal, programs, values, taken, stops, at)
+
+    def separate(self, literals: frozenset[int], agree_mm: float) -> None:
+        """Give the moves to some literals points of their own where they need them."""
+        named: dict[Stop, Named] = {}
+        members = list(self._members(literals, named, agree_mm))
+        stays = not literals.isdisjoint(self.proposal.fixed.tolist())
+        for group in regroup(members, stays, agree_mm)[1:]:
+            self._clone([named[stop] for stop in group.stops], group)
+
+    def _members(
+        self, literals: frozenset[int], named: dict[Stop, Named], agree_mm: float
+    ) -> Iterator[Arrivals]:
+        """Yield all stops at some literals; also say which variable each names."""
+        visits = self.reading.visits
+        stops = {stop for literal in literals for stop in self.stops_at[literal]}
+        for stop in sorted(stops, key=lambda stop: int(self.stops[stop][0])):
+            rows = self.stops[stop]
+            usable = bool(self.proposal.usable[rows].all())
+            name = visits.names[visits.name[rows[0]]]
+            changes = {
+                literal: self.proposal.change_mm[rows[visits.literal[rows] == literal]]
+                for literal in np.unique(visits.literal[rows]).tolist()
+            }
+            found = Arrivals(stop, "", changes, usable)
+            try:
+                one = named_at(self.programs, stop.file, stop.line, stop.via, name)
+                if usable and not found.agree(agree_mm):
+                    raise CloneError("this one move arrives in ways that disagree")
+            except CloneError as problem:
+                if usable:
+                    self._note(stop.file, stop.line, "not-cloned", str(problem))
+            else:
+                named[stop] = one
+                found = replace(found, variable=one.key)
+            yield found
+
+    def _clone(self, named: list[Named], group: Group) -> None:
+        """Clone one variable, or say why not."""
+        visits, variable = self.reading.visits, named[0].variable
+        file = group.stops[0].file
+        declared = int(self.programs[file].lines.line[variable.row])
+        lines = ", ".join(str(stop.line) for stop in group.stops)
+        try:
+            name = free_name(variable.name, self.taken)
+            self.edits += clone(
+                self.programs,
+                self.values,
+                visits.literals,
+                named,
+                sorted(group.bounds),
+                name,
+            )
+        except CloneError as problem:
+            text = f"{variable.name} keeps its moves (lines {lines}): {problem}"
+            self._note(file, declared, "not-cloned", text)
+            return
+        text = f"{variable.name}: the moves of lines {lines} go to {name} now"
+        self._note(file, declared, "cloned", text)
+        rows = np.concatenate([self.stops[stop] for stop in group.stops])
+        self.names |= dict.fromkeys(rows.tolist(), name)
+
+    def _note(self, file: int, line: int, code: str, text: str) -> None:
+        name = self.reading.sources[file].name
+        self.notes.append(Diagnostic(name, line, code, text))

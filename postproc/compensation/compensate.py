@@ -1,0 +1,425 @@
+"""The first sentence: a program goes in, the same program lands where it says."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, fields, replace
+from types import MappingProxyType
+
+import numpy as np
+
+from postproc.arrays import Bools, Floats, Ints
+from postproc.compensation import windows as cuts
+from postproc.compensation.clones import give_own_points
+from postproc.compensation.decide import Proposal
+from postproc.compensation.eligibility import overruled
+from postproc.compensation.frames import correct_taught
+from postproc.compensation.iterate import AT_START, Corrected, Left, settle
+from postproc.compensation.notes import (
+    assumed_off,
+    followed_pages,
+    listing_cost,
+    missing_file,
+    overruled_strings,
+    unsure_sides,
+    untimed_runs,
+)
+from postproc.compensation.options import AS_USUAL, Clock, Options, Progress, silent
+from postproc.compensation.outcome import Decisions, Outcome, tell_arrivals
+from postproc.compensation.parallel import in_processes, sharing, steady
+from postproc.compensation.program import (
+    Planned,
+    Reading,
+    plan_visits,
+    read_program,
+    states_of,
+    with_measured_play,
+)
+from postproc.compensation.rewrite import (
+    Output,
+    check_numbers,
+    check_output,
+    write_edits,
+)
+from postproc.compensation.targets import rounded_points
+from postproc.compensation.windows import Window, run_up, windows
+from postproc.exceptions import CellError, ProgramError
+from postproc.language.source import Replacements, Source
+from postproc.language.stamp import is_stamped
+from postproc.language.visits import Visits
+from postproc.model.model import Model
+from postproc.model.statistics import ErrorStatistics
+from postproc.motion.trace import NOWHERE, Standing
+from postproc.robot.cell import Cell
+from postproc.robot.pose import MM
+from postproc.robot.state import States
+
+# What is kept of a program, or of a window of it, once its targets are corrected.
+
+
+@dataclass(frozen=True)
+class Kept:
+    """A corrected program without poses, paths and plans (structure of arrays).
+
+    Attributes:
+        edited: Literals that get new numbers, (m,).
+        edits: The edits of these, file by file.
+        decisions: What was decided for n visits.
+        corrected: Visits whose target moves, (n,).
+        before, after: Size of the predicted error of the k visits that move, (k,) [m].
+        position: Where the program wants the TCP, (n, 3) [m], base frame.
+        away: How far the path passes it, (n,) [mm].
+        overruled: The path does not follow the configuration string, and nobody said
+            that it must, (n,).
+        untimed: No time law was found, (n,).
+    """
+
+    edited: Ints
+    edits: tuple[Replacements, ...]
+    decisions: Decisions
+    corrected: Bools
+    before: Floats
+    after: Floats
+    position: Floats
+    away: Floats
+    overruled: Bools
+    untimed: Bools
+
+
+def keep(
+    visits: Visits,
+    planned: Planned,
+    states: States,
+    found: Corrected,
+    cell: Cell,
+    model: Model,
+    seeds: int = 0,
+) -> Kept:
+    """Keep what a report says of corrected visits, but for the first `seeds`."""
+    proposal, done, plan = found.proposal, found.reached, planned.plan
+    moved = proposal.corrected
+    new = states.with_(q=np.array(done.q), direction=np.array(done.side))[moved]
+    wanted = plan.tcp[:, :3, 3] + planned.shift
+    before = model.error(cell.arm, states[moved]) - planned.shift[moved]
+    after = done.tcp[moved, :3, 3] + model.error(cell.arm, new) - wanted[moved]
+    return Kept(
+        edited=proposal.edited,
+        edits=found.edits,
+        decisions=proposal.decisions.part(slice(seeds, None)),
+        corrected=moved[seeds:],
+        before=np.linalg.norm(before, axis=1),
+        after=np.linalg.norm(after, axis=1),
+        position=(wanted - plan.aside)[seeds:],
+        away=np.linalg.norm(np.nan_to_num(plan.aside), axis=1)[seeds:] / MM,
+        overruled=overruled(planned.targets, plan).unchecked(visits)[seeds:],
+        untimed=plan.untimed[seeds:],
+    )
+
+
+def joined(parts: Sequence[Kept]) -> Kept:
+    """Put the windows of a program one after the other."""
+    if len(parts) == 1:
+        return parts[0]
+    arrays = {
+        f.name: np.concatenate([getattr(part, f.name) for part in parts])
+        for f in fields(Kept)
+        if f.name not in ("edits", "decisions")
+    }
+    edits = zip(*(part.edits for part in parts), strict=True)
+    return Kept(
+        edits=tuple(Replacements.merged(own) for own in edits),
+        decisions=_one_after_another([part.decisions for part in parts]),
+        **arrays,
+    )
+
+
+def _one_after_another(parts: Sequence[Decisions]) -> Decisions:
+    """Join decisions, and their reasons."""
+    arrays = {
+        f.name: np.concatenate([getattr(part, f.name) for part in parts])
+        for f in fields(Decisions)
+        if f.name not in ("why", "reasons")
+    }
+    codes: dict[str, int] = {"": 0}
+    why = []
+    for part in parts:
+        new = np.zeros(len(part.reasons), dtype=np.int64)
+        for k in np.unique(part.why).tolist():
+            new[k] = codes.setdefault(part.reasons[k], len(codes))
+        why.append(new[part.why])
+    return Decisions(why=np.concatenate(why), reasons=tuple(codes), **arrays)
+
+
+# A program corrected window by window, so that only one is in memory at a time.
+
+
+@dataclass(frozen=True)
+class Stop:
+    """How a window leaves the program as it was, and as it is corrected."""
+
+    planned: Standing = NOWHERE
+    doubtful: bool = False
+    corrected: Left = AT_START
+
+
+def correct(
+    reading: Reading,
+    cell: Cell,
+    model: Model,
+    options: Options,
+    clock: Clock,
+    processes: int = 1,
+) -> tuple[Reading, Kept]:
+    """Plan a program, and correct it until its sides are those corrected for.
+
+    Moves can only be given points of their own when all arrivals are at hand: with
+    --clone a program is one window, however long; so is one fly run.
+
+    A window is settled before the next one begins, while a whole program settles at
+    once: fly points may differ by what `CLOSE` allows, and the first targets behind a
+    cut within the play of joints that hardly move there.
+
+    Args:
+        reading: The program.
+        cell: The robot's surroundings.
+        model: The arm's error.
+        options: What the user asked for.
+        clock: Times the stages.
+        processes: How many may work at once; the result is the same.
+
+    Returns:
+        The program, with clones where they were asked for, and what came of it.
+    """
+    work = _Work(reading, cell, model, options)
+    if not options.clone:
+        cut = windows(reading.visits, cuts.LEAST)
+        return reading, joined(list(in_processes(work, cut, Stop(), clock, processes)))
+    kept, proposal = work.whole(clock)
+    with clock("clone"):
+        reading = give_own_points(reading, proposal, cell)
+    if reading.cloned:
+        kept, _ = replace(work, reading=reading).whole(clock)
+    return reading, kept
+
+
+@dataclass(frozen=True)
+class _Work:
+    """What it takes to correct any window of a program."""
+
+    reading: Reading
+    cell: Cell
+    model: Model
+    options: Options
+
+    def whole(self, clock: Clock) -> tuple[Kept, Proposal]:
+        """Correct the program as one window; return all of its proposal."""
+        kept, proposal, _ = self._correct(self.reading.visits, 0, Stop(), clock)
+        return kept, proposal
+
+    def correct(self, window: Window, begin: Stop, clock: Clock) -> tuple[Kept, Stop]:
+        """Correct a window; return what is kept of it, and how it ends."""
+        visits = window.of(self.reading.visits)
+        kept, _, end = self._correct(visits, window.seeds, begin, clock)
+        return kept, end
+
+    def foretell(self, window: Window) -> Stop | None:
+        """Tell how the windows before will end, by the last targets there alone.
+
+        Right where the joints have lost their memory of what was before these. That the
+        program begins there is an invention: what fails of it tells nothing.
+        """
+        visits = run_up(self.reading.visits, window)
+        if visits is None:
+            return None
+        try:
+            _, _, end = self._correct(visits, 1, Stop(), Clock(silent))
+        except Exception:
+            return None
+        return end
+
+    def _correct(
+        self, visits: Visits, seeds: int, begin: Stop, clock: Clock
+    ) -> tuple[Kept, Proposal, Stop]:
+        """Correct some visits, the first `seeds` of which are only where they begin."""
+        cell, model, options = self.cell, self.model, self.options
+        part, timed = replace(self.reading, visits=visits), "speed" in model.needs
+        with clock("plan"):
+            planned = plan_visits(visits, cell, timed, begin.planned, begin.doubtful)
+            planned = correct_taught(planned, visits, cell, model)
+        given = options.temperature
+        temperature = cell.temperature if given is None else given
+        states = states_of(planned.plan, cell, temperature)
+        left = begin.corrected
+        found = settle(part, planned, states, cell, model, options, clock, left)
+        with clock("report"):
+            kept = keep(visits, planned, states, found, cell, model, seeds)
+        end = steady(Stop(planned.plan.end, planned.doubtful, found.left))
+        return kept, found.proposal, end
+
+
+# The first sentence: a program goes in, the same program lands where it says.
+
+NO_PAGES: Mapping[str, bytes] = MappingProxyType({})
+
+
+def compensate(
+    source: bytes,
+    cell: Cell,
+    model: Model,
+    *,
+    name: str = "program.pdl",
+    variables: bytes | None = None,
+    pages: Mapping[str, bytes] = NO_PAGES,
+    options: Options = AS_USUAL,
+    progress: Progress = silent,
+    processes: int = 1,
+) -> Outcome:
+    """Move every target of a program against the error the arm would make there.
+
+    Args:
+        source: The program.
+        cell: The robot's surroundings.
+        model: The arm's error.
+        name: File name of the program; its variable file is ``name.lsv``.
+        variables: The variable file, where there is one.
+        pages: Programs that it imports and that nobody else uses, by file name; they
+            are followed and rewritten with it.
+        options: What the user asked for.
+        progress: Told the name of every stage as it begins.
+        processes: How many may work at once on a long program; the result is the same.
+
+    Raises:
+        ProgramError: The source is no program text, or is compensated already.
+        CellError: The controller compensates on its own.
+        ModelError: The model was made for another arm.
+    """
+    clock = Clock(progress)
+    files = name_files(name, source, variables, pages)
+    refuse(files, cell, model)
+    cell = with_measured_play(cell, model)
+    with clock("parse"):
+        reading = read_program(files, cell, each=sharing(processes))
+    reading, kept = correct(reading, cell, model, options, clock, processes)
+    return finish(name, reading, kept, cell, model, options, clock, processes)
+
+
+def name_files(
+    name: str,
+    source: bytes,
+    variables: bytes | None,
+    pages: Mapping[str, bytes] = NO_PAGES,
+) -> dict[str, bytes]:
+    """Name a program, its pages and its variable file, the program first."""
+    files = {name: source, **pages}
+    if variables is not None:
+        files[name.rpartition(".")[0] + ".lsv"] = variables
+    return files
+
+
+def refuse(files: Mapping[str, bytes], cell: Cell, model: Model) -> None:
+    """Refuse what must not be compensated at all.
+
+    Raises:
+        ProgramError: A file is stamped.
+        CellError: The controller's absolute accuracy is on.
+        ModelError: The model was made for another arm.
+    """
+    for name, data in files.items():
+        if is_stamped(Source(name, data)):
+            raise ProgramError(
+                name,
+                "is compensated already",
+                "Take the source, or give it back with postproc restore",
+                line=1,
+            )
+    if cell.file.robot.absolute_accuracy:
+        raise CellError(
+            cell.path,
+            "the controller compensates on its own: this would do it twice",
+            "Switch that option off on the controller, then here",
+            place="$.robot.absolute_accuracy",
+        )
+    model.check_arm(cell.arm)
+
+
+def finish(
+    name: str,
+    reading: Reading,
+    kept: Kept,
+    cell: Cell,
+    model: Model,
+    options: Options,
+    clock: Clock,
+    processes: int = 1,
+) -> Outcome:
+    """Write what was corrected, verify it, and say what came of it.
+
+    Raises:
+        VerificationError: The output is not what was meant.
+    """
+    output = write_and_verify(reading, kept, cell, model, clock, processes)
+    with clock("report"):
+        return report(name, reading, kept, output, cell, model, options, clock)
+
+
+def write_and_verify(
+    reading: Reading,
+    kept: Kept,
+    cell: Cell,
+    model: Model,
+    clock: Clock,
+    processes: int = 1,
+) -> Output:
+    """Write the numbers, and read what was written.
+
+    Raises:
+        VerificationError: The output is not what was meant.
+    """
+    with clock("rewrite"):
+        output = write_edits(reading, kept.edits, model.id)
+    with clock("verify"):
+        each = sharing(processes)
+        again = read_program(output.files, cell, reading.programs, each)
+        check_output(reading, again, output, kept.edited, processes)
+        check_numbers(reading.visits, kept.decisions.corrected, again.visits)
+    return output
+
+
+def report(
+    name: str,
+    reading: Reading,
+    kept: Kept,
+    output: Output,
+    cell: Cell,
+    model: Model,
+    options: Options,
+    clock: Clock,
+) -> Outcome:
+    """Say what came of every visit, and what error the model expects now."""
+    d, rows, visits = kept.decisions, kept.corrected, reading.visits
+    return Outcome(
+        program=name,
+        model=model.id,
+        outputs=output.changed,
+        record=output.sidecar(
+            model.id, asdict(options), tell_arrivals(visits, d, tuple(output.records))
+        ),
+        visits=visits,
+        decisions=d,
+        before=ErrorStatistics.of_sizes(kept.before),
+        after=ErrorStatistics.of_sizes(kept.after),
+        diagnostics=(
+            *reading.diagnostics,
+            *followed_pages(visits),
+            *missing_file(visits),
+            *overruled_strings(visits, kept.overruled),
+            *untimed_runs(visits, kept.untimed),
+            *rounded_points(visits, kept.away),
+            *unsure_sides(visits, rows, d.side, d.std_error),
+            *listing_cost(visits, rows, d.q, cell.arm),
+            assumed_off(name, cell),
+        ),
+        stages=clock.stages,
+        position=kept.position,
+        sources={source.name: source.data for source, _ in reading.originals},
+    )

@@ -1,0 +1,574 @@
+"""Which targets move, where to, and why the others do not."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from postproc.arrays import Bools, Floats, Ints
+from postproc.compensation.command import Solved, change_mm, new_numbers, turns_in_file
+from postproc.compensation.eligibility import STRAYS, Reasons, strayed
+from postproc.compensation.options import Options
+from postproc.compensation.outcome import Decisions, Status
+from postproc.compensation.program import Planned, Reading
+from postproc.compensation.targets import moved_targets
+from postproc.language.visits import NO_TARGET, Target, Visits
+from postproc.motion.replan import IS_STEP
+from postproc.motion.targets import Kind
+from postproc.robot.arm import Arm
+from postproc.robot.cell import Cell, LimitSection
+from postproc.robot.pose import MM, has_unknown, lengths
+
+# One literal, several arrivals: do their corrections agree?
+
+
+@dataclass(frozen=True)
+class Agreement:
+    """What the arrivals at m literals have in common.
+
+    Attributes:
+        literal: The literals that are visited, (m,), ascending.
+        group: Index into `literal` of every visit, (n,), -1 where it has none.
+        usable: Every arrival can be corrected, (m,).
+        spread_mm: Largest distance between two arrivals' corrections, (m,) [mm],
+            bounded from above by the diagonal of their bounding box.
+        values: The mean of the arrivals' corrected numbers, (m, 6).
+        change_mm: The mean of what must agree, (m, 3) [mm].
+        arrivals: Number of arrivals, (m,).
+    """
+
+    literal: Ints
+    group: Ints
+    usable: Bools
+    spread_mm: Floats
+    values: Floats
+    change_mm: Floats
+    arrivals: Ints
+
+
+def agree(
+    literal: Ints, usable: Bools, corrected: Floats, correction_mm: Floats
+) -> Agreement:
+    """Compare the corrections of all arrivals at every literal.
+
+    Args:
+        literal: Literal of every visit, (n,), -1 where it has none.
+        usable: The visit can be corrected, (n,).
+        corrected: Numbers that this visit would write, (n, 6) in the file's units.
+        correction_mm: What must agree: the change of the target in its own frame,
+            (n, k) [mm], of which the first three are that of its place.
+    """
+    rows = np.flatnonzero(literal >= 0)
+    names, inverse, count = _counted(literal[rows])
+    group = np.full(len(literal), -1, dtype=np.int64)
+    group[rows] = inverse
+    m = len(names)
+    if m == len(rows):  # every literal has one arrival: nothing to compare
+        order = np.empty(m, dtype=np.int64)
+        order[inverse] = rows
+        mean, change = corrected.take(order, axis=0), correction_mm.take(order, axis=0)
+        spread = 0.0 * np.einsum("nk->n", np.abs(change))  # NaN where one is not known
+        mean += 0.0  # no -0.0, as in a mean
+        change = change[:, :3] + 0.0
+        return Agreement(names, group, usable[order], spread, mean, change, count)
+    all_usable = np.ones(m, dtype=bool)
+    np.logical_and.at(all_usable, inverse, usable[rows])
+    width = (m, correction_mm.shape[1])
+    low, high = np.full(width, np.inf), np.full(width, -np.inf)
+    np.minimum.at(low, inverse, correction_mm[rows])
+    np.maximum.at(high, inverse, correction_mm[rows])
+    total, moved = np.zeros((m, 6)), np.zeros((m, 3))
+    np.add.at(total, inverse, corrected[rows])
+    np.add.at(moved, inverse, correction_mm[rows, :3])
+    spread = np.linalg.norm(high - low, axis=1)
+    mean, change = total / count[:, None], moved / count[:, None]
+    return Agreement(names, group, all_usable, spread, mean, change, count)
+
+
+def _counted(literals: Ints) -> tuple[Ints, Ints, Ints]:
+    """Return what differs, ascending, where it stands, and how often it does."""
+    if (np.diff(literals) > 0).all():  # in the order of the program, each once
+        once = np.ones(len(literals), dtype=np.int64)
+        return literals, np.arange(len(literals)), once
+    return np.unique(literals, return_inverse=True, return_counts=True)
+
+
+# Targets that the program computes from others: they move along with them.
+
+
+def followers(visits: Visits, agreement: Agreement) -> tuple[Ints, Ints]:
+    """Find the visits that move along with a literal, and its row in the agreement."""
+    rows = np.flatnonzero(visits.follows >= 0)
+    return rows, np.searchsorted(agreement.literal, visits.follows[rows])
+
+
+def worsened(
+    visits: Visits,
+    agreement: Agreement,
+    change_mm: Floats,
+    trusted: Bools,
+    agree_mm: float,
+) -> Bools:
+    """Tell which literals would carry a computed target farther off, (m,).
+
+    A target such as ``POS_SHIFT(p, ..)`` or ``NEAR p BY d`` needs a change of its own
+    and gets that of ``p``. What it is then off must be no more than what it is off now.
+    ``FOR d TO p`` only takes its direction from ``p``: it is a part of the way there.
+
+    Args:
+        visits: n arrivals.
+        agreement: What the m literals would change by.
+        change_mm: The change that every visit needs, (n, 3) [mm].
+        trusted: The model can say what a visit needs, (n,).
+        agree_mm: Changes that differ less are the same.
+    """
+    rows, at = followers(visits, agreement)
+    whole = visits.target[rows] != Target.FOR
+    rows, at = rows[whole], at[whole]
+    needed = change_mm[rows]
+    left = np.linalg.norm(agreement.change_mm[at] - needed, axis=1)
+    allowed = np.maximum(np.linalg.norm(needed, axis=1), agree_mm)
+    worse = ~(trusted[rows] & (left <= allowed))
+    found = np.zeros(len(agreement.literal), dtype=bool)
+    found[at[worse]] = True
+    return found
+
+
+def carry_along(
+    visits: Visits, agreement: Agreement, chosen: Bools, values: Floats
+) -> None:
+    """Move the computed targets along with the literals that change, in place.
+
+    Args:
+        visits: n arrivals.
+        agreement: What the m literals change by.
+        chosen: Literals that do change, (m,).
+        values: Numbers of every visit, (n, 6).
+    """
+    rows, at = followers(visits, agreement)
+    rows, at = rows[chosen[at]], at[chosen[at]]
+    if len(rows) == 0:
+        return
+    direct = np.flatnonzero(visits.literal >= 0)
+    written = np.zeros((len(visits.literals), 6))
+    written[visits.literal[direct]] = visits.values[direct]
+    values[rows] += agreement.values[at] - written[agreement.literal[at]]
+
+
+# Why targets stay where they are, whatever the model says of them.
+
+
+def must_stay(
+    visits: Visits, agreement: Agreement, change: Floats, trusted: Bools, cell: Cell
+) -> dict[str, Bools]:
+    """Find literals that must keep their values for what else depends on them.
+
+    Returns:
+        The reasons, and which of the m literals of the agreement have each, (m,).
+    """
+    hurt = worsened(visits, agreement, change, trusted, cell.limits.agree_mm)
+    found = {f"{why}: give the move a point of its own (see --clone)": rows
+             for why, pins in visits.literals.pins.items()
+             if (rows := np.isin(agreement.literal, pins)).any()}  # fmt: skip
+    text = "a target computed from it would land farther off (see --clone)"
+    return found | {text: hurt}
+
+
+def mark_display(visits: Visits, planned: Planned, reasons: Reasons) -> Bools:
+    """Mark targets whose value is known only at run time, (n,)."""
+    holds = ~without_target(visits)
+    display = holds & ((visits.reason > 0) | (visits.literal < 0))
+    reasons.adopt(visits.reason, visits.reasons)
+    reasons.mark(display, "its numbers are not written in the program")
+    return display
+
+
+def without_target(visits: Visits) -> Bools:
+    """Tell which moves go where no target of theirs says, (n,): $HOME, RELATIVE, .."""
+    none = np.array([text.startswith(NO_TARGET) for text in visits.reasons])
+    named = np.isin(
+        visits.target, (Target.POSE, Target.JOINTS, Target.NEAR, Target.UNKNOWN)
+    )
+    return np.asarray(~named | none[visits.reason])
+
+
+def mark_unchanged(visits: Visits, reasons: Reasons, options: Options) -> Bools:
+    """Mark moves without a target, taught points and shared variables, (n,)."""
+    empty = without_target(visits)
+    reasons.mark(empty, "this move holds no target")
+    has = visits.literal >= 0
+    literal = np.where(has, visits.literal, 0)
+    if len(visits.literals) == 0:
+        return empty
+    taught = has & visits.literals.taught[literal]
+    reasons.mark(taught, "a taught point already contains the arm's error")
+    if not options.shared:
+        shared = has & visits.literals.shared[literal]
+        reasons.mark(shared, "other programs may read this variable too (see --shared)")
+    return np.asarray(empty | taught)
+
+
+def mark_disagreement(
+    visits: Visits,
+    agreement: Agreement,
+    stay: Mapping[str, Bools],
+    cell: Cell,
+    reasons: Reasons,
+) -> tuple[Bools, Bools]:
+    """Mark the visits of literals whose arrivals disagree, or that must stay.
+
+    Returns:
+        The literals that agree, (m,), and the visits that would be corrected if the
+        others at their literal agreed, (n,).
+    """
+    limit = cell.limits.agree_mm
+    has = agreement.group >= 0
+    apart = ~(agreement.spread_mm <= limit)
+    stays = np.any([apart, *stay.values()], axis=0)
+    together = agreement.usable & ~stays
+    if len(together) == 0:
+        return together, np.zeros(len(visits), dtype=bool)
+    at = np.where(has, agreement.group, 0)
+    unsafe = reasons.none & has & ~together[at]
+    text = (
+        f"its arrivals differ by more than agree_mm = {limit:g}: give each move a "
+        "point of its own (see --clone)"
+    )
+    reasons.mark(unsafe & agreement.usable[at] & apart[at], text)
+    for why, literals in stay.items():
+        reasons.mark(unsafe & literals[at], why)
+    reasons.mark(unsafe, "another arrival at the same point cannot be corrected")
+    return together, unsafe
+
+
+# Targets that move although no number of theirs is written anew.
+#
+# A computed target moves along with the literal that it is computed from, a step
+# (RELATIVE, AWAY, ..) with the place that it begins at.
+
+
+def strayed_along(
+    visits: Visits, planned: Planned, cell: Cell, values: Floats, shift: Floats
+) -> Bools:
+    """Tell which targets must stay for every arc to stay what it is, (n,).
+
+    Args are those of `with_carried`.
+    """
+    if not planned.targets.via.any():
+        return np.zeros(len(visits), dtype=bool)
+    moves = with_carried(visits, planned, cell, values, shift)
+    step = cell.limits.step_mm * MM
+    away = strayed(planned.targets, planned.plan, moves, step)
+    return with_movers(visits, planned, away)
+
+
+def with_carried(
+    visits: Visits, planned: Planned, cell: Cell, values: Floats, shift: Floats
+) -> Floats:
+    """Tell what all targets move by, (n, 3) [m], base frame.
+
+    Args:
+        visits: n arrivals.
+        planned: Their plan.
+        cell: The robot's surroundings.
+        values: Numbers of every visit after the correction, (n, 6).
+        shift: What those with numbers of their own move by, (n, 3) [m]; else 0.
+    """
+    t, moves = planned.targets, np.array(shift)
+    rows = np.flatnonzero((visits.follows >= 0) & (values != visits.values).any(axis=1))
+    if len(rows):
+        moves[rows] = _followed(visits, planned, cell, values, rows)
+    for v, sources in _steps(planned):
+        source = sources[np.argmax(np.linalg.norm(moves[sources], axis=1))]
+        towards = np.zeros(3)
+        if t.kind[v] == Kind.TOWARDS:
+            way = t.tcp[v, :3, 3] - planned.plan.tcp[source, :3, 3]
+            towards = _turned(way, t.distance[v], moves[v] - moves[source])
+        moves[v] = moves[source] + towards
+    return moves
+
+
+def with_movers(visits: Visits, planned: Planned, found: Bools) -> Bools:
+    """Add to some targets, (n,), those along with which they move."""
+    found = np.array(found)
+    for v, sources in reversed([*_steps(planned)]):
+        found[sources] |= found[v]
+    literals = visits.follows[found & (visits.follows >= 0)]
+    return np.asarray(found | np.isin(visits.literal, literals))
+
+
+def _followed(
+    visits: Visits, planned: Planned, cell: Cell, values: Floats, rows: Ints
+) -> Floats:
+    """Tell what computed targets move by, (m, 3) [m]."""
+    now = moved_targets(
+        planned.targets, replace(visits, values=values), cell, rows
+    ).tcp[rows]
+    return np.nan_to_num((now - planned.targets.tcp[rows])[:, :3, 3])
+
+
+def _turned(way: Floats, distance: float, by: Floats) -> Floats:
+    """Tell what a place at a distance on a way moves by as the end of the way does."""
+    length = np.linalg.norm(way)
+    if not 0.0 < distance <= length:  # so short a way is not known either
+        return np.zeros(3)
+    u = way / length
+    turned: Floats = (by - (by @ u) * u) * (distance / length)
+    return turned
+
+
+def _steps(planned: Planned) -> Iterator[tuple[int, Ints]]:
+    """Yield the moves by a step, in the program's order, and where they begin."""
+    t = planned.targets
+    for v in np.flatnonzero(IS_STEP[t.kind]).tolist():
+        sources = t.pred[t.pred_start[v] : t.pred_start[v + 1]]
+        sources = sources[sources >= 0]
+        if len(sources):
+            yield v, sources
+
+
+# When a correction is not trusted.
+
+TURNED = 0.5  # change of a side by which a joint has turned
+SOLVED = 1e-6  # [m] model against wanted pose
+
+
+def guard_solutions(
+    reasons: Reasons, arm: Arm, limits: LimitSection, q: Floats, solved: Floats
+) -> None:
+    """Mark corrected commands that the arm cannot or should not be given.
+
+    Args:
+        reasons: Collects the first reason of every visit.
+        arm: The arm.
+        limits: The cell's guards.
+        q: Joint angles of the original command, (n, 6) [rad].
+        solved: Joint angles of the corrected command, (n, 6) [rad], NaN where the
+            corrected pose has no solution.
+    """
+    with np.errstate(invalid="ignore"):
+        unsolved = has_unknown(solved)
+        lost = np.asarray(unsolved & ~has_unknown(q))
+        reasons.mark(lost, "the corrected pose is out of reach on its branch")
+        over = ~arm.within_limits(solved) & ~unsolved
+        reasons.mark(over, "the corrected pose is beyond a joint limit")
+        wrist = np.abs(q[:, 4]) < np.deg2rad(limits.wrist_deg)
+        wrist |= np.abs(solved[:, 4]) < np.deg2rad(limits.wrist_deg)
+        text = f"within {limits.wrist_deg:g} deg of the wrist singularity"
+        reasons.mark(wrist, text)
+        flipped = np.sign(q[:, 4]) != np.sign(solved[:, 4])
+        reasons.mark(flipped & ~lost, "the correction would flip the wrist")
+
+
+def guard_size(
+    reasons: Reasons, limits: LimitSection, correction: Floats, residual: Floats
+) -> None:
+    """Mark corrections that are too large or did not converge.
+
+    Args:
+        reasons: Collects the first reason of every visit.
+        limits: The cell's guards.
+        correction: Change of the commanded TCP, (n, 3) [m].
+        residual: Predicted landing against the wanted position, (n,) [m].
+    """
+    with np.errstate(invalid="ignore"):
+        size = lengths(correction) / MM
+        text = f"the correction exceeds correction_mm = {limits.correction_mm:g}"
+        reasons.mark(size > limits.correction_mm, text)
+        reasons.mark(~(residual <= SOLVED), "the correction did not converge to 1 um")
+
+
+def guard_turn(reasons: Reasons, limits: LimitSection, turn: Floats) -> None:
+    """Mark corrections that turn the tool too far.
+
+    Args:
+        reasons: Collects the first reason of every visit.
+        limits: The cell's guards.
+        turn: Rotation of the commanded tool, (n, 3) [rad].
+    """
+    with np.errstate(invalid="ignore"):
+        angle = np.rad2deg(lengths(turn))
+        text = f"the correction exceeds correction_deg = {limits.correction_deg:g}"
+        reasons.mark(angle > limits.correction_deg, text)
+
+
+def guard_steps(
+    reasons: Reasons,
+    limits: LimitSection,
+    correction: Floats,
+    direction: Floats,
+    before: Ints,
+) -> None:
+    """Mark jumps of the correction between neighbours of a fly run.
+
+    A step is allowed where a joint really turns.
+
+    Args:
+        reasons: Collects the first reason of every visit.
+        limits: The cell's guards.
+        correction: Change of the commanded TCP, (n, 3) [m].
+        direction: Arrival direction, (n, 6).
+        before: The visit before within the same fly run, (n,), -1 where there is none.
+    """
+    inside = before >= 0
+    last = np.where(inside, before, 0)
+    with np.errstate(invalid="ignore"):
+        step = lengths(correction - correction[last]) / MM
+        jump = inside & (step > limits.step_mm)
+    rows = np.flatnonzero(jump)
+    turned = np.abs(direction[rows] - direction[last[rows]])
+    jump[rows] = (turned < TURNED).all(axis=1)
+    text = (
+        f"the correction steps by more than step_mm = {limits.step_mm:g} in a fly run"
+    )
+    reasons.mark(jump, text)
+
+
+# Which targets move, where to, and why the others do not.
+
+LEVER_MM = 100.0  # from the TCP, by which turns count where arrivals must agree
+NONE = np.empty((0, 3))
+KNOWN = 0.5  # part of its play that a joint must have left behind to be on a side
+HELD = "its direction of arrival would change with the correction"
+
+
+@dataclass(frozen=True)
+class Proposal:
+    """Corrected numbers for the literals of a program.
+
+    Attributes:
+        edited: Literals that get new numbers, (m,).
+        values: Their numbers, (m, 6) in the file's units.
+        corrected: Visits whose target moves, (n,).
+        decisions: What was decided for every visit.
+        usable: Visits that could be corrected if they had their points alone, (n,).
+        change_mm: What they would be corrected by, as arrivals at one point compare
+            it, (n, k) [mm].
+        fixed: Literals that must keep their values for what else depends on them, (k,).
+    """
+
+    edited: Ints
+    values: Floats
+    corrected: Bools
+    decisions: Decisions
+    usable: Bools
+    change_mm: Floats
+    fixed: Ints
+
+
+def propose(
+    reading: Reading,
+    planned: Planned,
+    solved: Solved,
+    aside: Floats,
+    held: Bools,
+    cell: Cell,
+    options: Options,
+) -> Proposal:
+    """Decide what moves, until no arc becomes quite another one by it.
+
+    Args and returns are those of `decide`: every round leaves more points alone.
+    """
+    strays, arcs = np.zeros(len(held), dtype=bool), planned.targets.via.any()
+    while True:
+        found = decide(
+            reading, planned, solved, aside, held, strays, cell, options
+        )  # fmt: skip
+        if not arcs:
+            return found
+        shift = solved.command[:, :3, 3] - planned.plan.tcp[:, :3, 3]
+        shift -= aside - planned.plan.aside
+        moves = np.where(found.corrected[:, None], shift, 0.0)
+        values = found.decisions.corrected
+        more = strayed_along(reading.visits, planned, cell, values, moves) & ~strays
+        if not more.any():
+            return found
+        strays = strays | more
+
+
+def decide(
+    reading: Reading,
+    planned: Planned,
+    solved: Solved,
+    aside: Floats,
+    held: Bools,
+    strays: Bools,
+    cell: Cell,
+    options: Options,
+) -> Proposal:
+    """Guard every solved visit, and compare the arrivals at every literal.
+
+    Args:
+        reading: The program.
+        planned: Its plan.
+        solved: The corrected command of every visit.
+        aside: From targets to where the corrected path passes them, (n, 3) [m].
+        held: Visits that must be left alone, (n,).
+        strays: Visits whose correction would make another arc, (n,).
+        cell: Guards and frames.
+        options: What the user asked for.
+    """
+    visits, plan, side = reading.visits, planned.plan, solved.direction
+    correction = solved.command[:, :3, 3] - plan.tcp[:, :3, 3]
+    reasons = Reasons(len(visits))
+    display = mark_display(visits, planned, reasons)
+    unchanged = mark_unchanged(visits, reasons, options)
+    reasons.adopt(planned.reasons.index, planned.reasons.texts)
+    for text, outside in solved.outside.items():
+        reasons.mark(outside, text)
+    guard_solutions(reasons, cell.arm, cell.limits, plan.q, solved.q)
+    guard_turn(reasons, cell.limits, solved.turn)
+    guard_size(reasons, cell.limits, correction, solved.residual)
+    # A fly point also moves for what the corner at it is rounded by.
+    moved = correction - (aside - plan.aside)
+    guard_size(reasons, cell.limits, moved, solved.residual)
+    guard_steps(reasons, cell.limits, correction, side, visits.run_mates)
+    reasons.mark(held, HELD)
+    reasons.mark(strays, STRAYS)
+    numbers = new_numbers(visits, plan, solved, aside)
+    change = change_mm(visits, numbers, correction)
+    both = change
+    if len(solved.turned):
+        turn = turns_in_file(visits, solved)
+        both = np.concatenate([change, turn * LEVER_MM], axis=1)
+    agreement = agree(visits.literal, reasons.none, numbers, both)
+    trusted = ~np.any([held, *solved.outside.values()], axis=0)
+    usable = reasons.none
+    stay = must_stay(visits, agreement, change, trusted, cell)
+    chosen, unsafe = mark_disagreement(visits, agreement, stay, cell, reasons)
+    status = np.where(reasons.none, Status.SAFE, Status.GUARDED)
+    for rows, value in (
+        (unsafe, Status.UNSAFE),
+        (display, Status.DISPLAY),
+        (unchanged, Status.UNCHANGED),
+    ):
+        status[rows] = value
+    corrected = status == Status.SAFE
+    values = np.array(visits.values)
+    values[corrected] = agreement.values[agreement.group[corrected]]
+    carry_along(visits, agreement, chosen, values)
+    decisions = Decisions(
+        status=status.astype(np.int64),
+        why=reasons.index,
+        reasons=reasons.texts,
+        q=plan.q,
+        direction=(side >= KNOWN).astype(np.int8) - (side <= -KNOWN),
+        side=side,
+        corrected=values,
+        correction=np.where(corrected[:, None], correction, 0.0),
+        std_error=np.full_like(correction, np.nan),  # when it is settled
+        turn=np.where(corrected[:, None], solved.turn, 0.0)
+        if options.orientation
+        else NONE,
+    )
+    return Proposal(
+        agreement.literal[chosen],
+        agreement.values[chosen],
+        corrected,
+        decisions,
+        usable,
+        both,
+        agreement.literal[np.any([*stay.values()], axis=0)],
+    )

@@ -1,0 +1,413 @@
+"""Which targets must stay, whatever the model says: flags, orientation, arcs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from postproc.arrays import Bools, Floats, Ints
+from postproc.language.visits import OrntType, Switch, Visits
+from postproc.motion.branches import OTHER_TURN, nearest_turns, on_other_turns
+from postproc.motion.path import NEAR, rounds
+from postproc.motion.planner import Plan
+from postproc.motion.targets import Kind, Move, Targets
+from postproc.robot.arm import Arm
+from postproc.robot.pose import MM, inverse, pose_from_record, rotation_vector
+
+# Why something did not happen, for many visits at once.
+
+
+class Reasons:
+    """The first reason given for each of n visits.
+
+    >>> reasons = Reasons(3)
+    >>> reasons.mark(np.array([True, False, False]), "out of reach")
+    >>> reasons.mark(np.array([True, True, False]), "joint limit")
+    >>> [reasons.texts[k] for k in reasons.index]
+    ['out of reach', 'joint limit', '']
+    """
+
+    def __init__(self, n: int) -> None:
+        """Start with no reason for n visits."""
+        self.index: Ints = np.zeros(n, dtype=np.int64)
+        self._codes: dict[str, int] = {"": 0}
+
+    @property
+    def texts(self) -> tuple[str, ...]:
+        """Return the texts; index 0 is "" (no reason)."""
+        return tuple(self._codes)
+
+    @property
+    def none(self) -> Bools:
+        """Tell which visits have no reason yet, (n,)."""
+        return np.asarray(self.index == 0)
+
+    def mark(self, rows: Bools, text: str) -> None:
+        """Give visits a reason, unless they have one already.
+
+        Args:
+            rows: Which visits, (n,).
+            text: The reason.
+        """
+        rows = rows & self.none
+        if rows.any():
+            self.index[rows] = self._codes.setdefault(text, len(self._codes))
+
+    def adopt(self, index: Ints, texts: tuple[str, ...]) -> None:
+        """Take over reasons found elsewhere, (n,) indices into texts."""
+        for code in np.flatnonzero(np.bincount(index)).tolist():
+            if texts[code]:
+                self.mark(index == code, texts[code])
+
+    def __getitem__(self, visit: int) -> str:
+        """Return the reason of one visit."""
+        return self.texts[int(self.index[visit])]
+
+
+# How far configuration strings count: $CNFG_CARE, $TURN_CARE and $JNT_MTURN.
+#
+# On a line or an arc the path decides where the arm arrives, and the string is checked
+# (likely): where it is and says otherwise, the controller stops. A JOINT move takes
+# branch and turns from the string; whether it still does where the checks are off is
+# not sure, so that it is compensated only where both readings lead to the same place.
+
+CNFG, TURN, MULTI = 0, 1, 2  # columns of `Visits.care`
+SAID = {
+    Switch.UNSET: "not set",
+    Switch.ON: "TRUE",
+    Switch.OFF: "FALSE",
+    Switch.UNKNOWN: "not known",
+}
+STOPS = (
+    "${} is TRUE, and the path arrives on another {} than the configuration string "
+    "says: the controller stops here"
+)
+MAY_STOP = (
+    "${} is not known here, and the path arrives on another {} than the configuration "
+    "string says"
+)
+BRANCH = (
+    "the configuration string says another branch than the arm is on: whether it "
+    "counts is not sure with $CNFG_CARE {}"
+)
+NEAREST = (
+    "the configuration string says another turn than the nearest: which of them counts "
+    "is not sure with $TURN_CARE {} and $JNT_MTURN {}"
+)
+WRIST = (
+    "the configuration string says another branch or turn than the nearest: whether a "
+    "line with $ORNT_TYPE WRIST_JNT leads there is not sure"
+)
+AFTER = "it comes from a move whose branch or turn is not sure"
+
+
+@dataclass(frozen=True)
+class Overruled:
+    """Where a Cartesian path arrives otherwise than its configuration string says.
+
+    Attributes:
+        branch: On another branch, (n,).
+        turn: On another turn, (n,).
+    """
+
+    branch: Bools
+    turn: Bools
+
+    def unchecked(self, visits: Visits) -> Bools:
+        """Tell where the program leaves open whether the string is checked, (n,)."""
+        unset = visits.care == Switch.UNSET
+        found: Bools = (self.branch & unset[:, CNFG]) | (self.turn & unset[:, TURN])
+        return found
+
+
+def overruled(targets: Targets, plan: Plan) -> Overruled:
+    """Compare where Cartesian paths arrive with their configuration strings."""
+    path = plan.overruled & ~targets.via
+    return Overruled(
+        path & (plan.slot != targets.slot),
+        path & on_other_turns(plan.q, targets.turns) & ~targets.nearest_turn,
+    )
+
+
+def mark_strings(
+    visits: Visits,
+    targets: Targets,
+    plan: Plan,
+    arm: Arm,
+    reasons: Reasons,
+    begun: bool = False,
+) -> bool:
+    """Leave alone what configuration strings make doubtful.
+
+    Args:
+        visits: What the program says.
+        targets: Its n moves.
+        plan: Where they lead.
+        arm: The arm.
+        reasons: Why visits must not be compensated; more are added.
+        begun: The first visit is a place that makes what comes from there doubtful.
+
+    Returns:
+        Whether what comes from the last visit is doubtful.
+    """
+    _mark_stops(visits, overruled(targets, plan), reasons)
+    doubtful = _mark_either_way(visits, targets, plan, arm, reasons)
+    doubtful[:1] |= begun
+    if not doubtful.any():
+        return False
+    reached, on = _followers(visits, targets, doubtful)
+    reasons.mark(reached, AFTER)
+    return bool(on[-1])
+
+
+def _mark_stops(visits: Visits, path: Overruled, reasons: Reasons) -> None:
+    """Leave alone where the controller checks a string that the path contradicts."""
+    for rows, name, what, column in (
+        (path.branch, "CNFG_CARE", "branch", CNFG),
+        (path.turn, "TURN_CARE", "turn", TURN),
+    ):
+        care = visits.care[:, column]
+        reasons.mark(rows & (care == Switch.ON), STOPS.format(name, what))
+        reasons.mark(rows & (care == Switch.UNKNOWN), MAY_STOP.format(name, what))
+
+
+def _mark_either_way(
+    visits: Visits, targets: Targets, plan: Plan, arm: Arm, reasons: Reasons
+) -> Bools:
+    """Leave moves alone that two readings of their string lead elsewhere."""
+    placed = (targets.kind == Kind.POSE) & (targets.slot >= 0)
+    placed &= ~np.isnan(plan.q[:, 0])
+    joint = placed & (targets.move == Move.JOINT)
+    wrist = placed & ~joint & targets.wrist_joint
+    branch = wrist | (joint & _doubted(visits.care[:, CNFG]))
+    turn = wrist | (joint & _turns_doubted(visits, targets))
+    if branch.any():
+        branch &= _from_other_branch(visits, targets, plan, arm, branch)
+    if turn.any():
+        turn &= _other_turn(visits, targets, plan, arm)
+    reasons.mark(wrist & (branch | turn), WRIST)
+    for value in Switch:
+        rows = branch & (visits.care[:, CNFG] == value)
+        reasons.mark(rows, BRANCH.format(SAID[value]))
+    for pair in np.unique(visits.care[turn][:, [TURN, MULTI]], axis=0):
+        rows = turn & (visits.care[:, [TURN, MULTI]] == pair).all(axis=1)
+        reasons.mark(rows, NEAREST.format(*(SAID[Switch(v)] for v in pair)))
+    return np.asarray(branch | turn)
+
+
+def _doubted(switch: Ints) -> Bools:
+    return np.asarray((switch == Switch.OFF) | (switch == Switch.UNKNOWN))
+
+
+def _turns_doubted(visits: Visits, targets: Targets) -> Bools:
+    """Tell where written turns and the nearest ones may both be meant, (n,)."""
+    checked, multi = visits.care[:, TURN], visits.care[:, MULTI]
+    nearest = (checked == Switch.ON) | (checked == Switch.UNKNOWN)
+    written = _doubted(checked) | (multi == Switch.UNKNOWN)
+    return np.asarray(np.where(targets.nearest_turn, nearest, written))
+
+
+def _from_other_branch(
+    visits: Visits, targets: Targets, plan: Plan, arm: Arm, rows: Bools
+) -> Bools:
+    """Tell which of some visits are reached from another branch than theirs, (n,)."""
+    edge, source = _edges(visits, plan, rows)
+    other = arm.branch(plan.q[source]) != targets.slot[edge]
+    return _seen(len(visits), edge[other])
+
+
+def _other_turn(visits: Visits, targets: Targets, plan: Plan, arm: Arm) -> Bools:
+    """Tell where written turns and the nearest ones differ, (n,)."""
+    edge, source = _edges(visits, plan, np.ones(len(visits), dtype=bool))
+    turned = nearest_turns(plan.q[edge], plan.q[source])
+    allowed = (turned >= arm.lower) & (turned <= arm.upper)
+    other = allowed & (np.abs(turned - plan.q[edge]) > OTHER_TURN)
+    far = _seen(len(visits), edge[other.any(axis=1)])
+    return np.where(targets.nearest_turn, on_other_turns(plan.q, targets.turns), far)
+
+
+def _edges(visits: Visits, plan: Plan, rows: Bools) -> tuple[Ints, Ints]:
+    """List the known origins of some visits: visits (e,) and where from (e,)."""
+    edge = np.repeat(np.arange(len(visits)), np.diff(visits.pred_start))
+    known = rows[edge] & (visits.pred >= 0)
+    known &= ~np.isnan(plan.q[visits.pred, 0])
+    return edge[known], visits.pred[known]
+
+
+def _seen(n: int, rows: Ints) -> Bools:
+    """Tell which of n rows are listed, (n,)."""
+    found = np.zeros(n, dtype=bool)
+    found[rows] = True
+    return found
+
+
+def _followers(
+    visits: Visits, targets: Targets, doubtful: Bools
+) -> tuple[Bools, Bools]:
+    """Find what comes from doubtful places, up to the next ones that are sure, (n,).
+
+    A sure place is among them itself: the side that it is reached from is not sure.
+
+    Returns:
+        What comes from doubtful places, and which places make others doubtful.
+    """
+    sure = (targets.move == Move.JOINT) & (
+        (targets.kind == Kind.JOINTS)
+        | ((targets.kind == Kind.POSE) & (targets.slot >= 0) & ~targets.nearest_turn)
+    )
+    edge = np.repeat(np.arange(len(visits)), np.diff(visits.pred_start))
+    order = np.argsort(visits.pred, kind="stable")
+    after, source = edge[order], visits.pred[order]
+    reached, waiting = np.array(doubtful), np.flatnonzero(doubtful).tolist()
+    while waiting:
+        v = waiting.pop()
+        first, last = np.searchsorted(source, [v, v + 1])
+        for w in after[first:last].tolist():
+            if not (reached[w] or sure[w]):
+                waiting.append(w)
+            reached[w] = True
+    return reached & ~doubtful, doubtful | (reached & ~sure)
+
+
+# How the tool turns on its way: $ORNT_TYPE, as far as it matters.
+#
+# Lines and arcs are planned with the tool turning about one fixed axis (RS_WORLD),
+# lines also with the wrist axes in proportion (WRIST_JNT): on arcs that is not planned,
+# so that the sides from which they arrive are not known. EUL_WORLD and RPY_WORLD let
+# three angles run in proportion instead (likely), RS_TRAJ takes the tool along an arc.
+# The ends are the same, the way between is not: where it may be off by more than a
+# joint's play, a joint may arrive from another side, and the target is left alone.
+#
+# Euler angles in proportion turn the tool at w = a' z + e' y(a) + r' z(a, e), and |w'|
+# <= turn^2 / sin(e), so that it is off by at most turn^2 / (8 sin(e)), and by no more
+# than the turn. Where e is 0 or 180 deg at both ends they turn it about the z axis, as
+# RS_WORLD does.
+
+PLAY = np.deg2rad(0.01)  # [rad] what a joint may be off without another side
+LEAST = 3e-4  # sine below which e is 0 or 180 deg
+UNKNOWN = "$ORNT_TYPE is not known here: how the tool turns on the way is not sure"
+ANGLES = (
+    "with $ORNT_TYPE {} how the tool turns on the way is not sure: use RS_WORLD, or "
+    "turn it in smaller steps"
+)
+ARC = "with $ORNT_TYPE {} how the tool turns on this arc is not sure: use RS_WORLD"
+
+
+def mark_turning(
+    visits: Visits, targets: Targets, plan: Plan, reasons: Reasons
+) -> None:
+    """Leave alone where another way of turning may matter.
+
+    Args:
+        visits: What the program says.
+        targets: Its n moves.
+        plan: Where they lead.
+        reasons: Why visits must not be compensated; more are added.
+    """
+    kind, cartesian = visits.ornt_type, targets.move != Move.JOINT
+    reasons.mark(cartesian & (kind == OrntType.UNKNOWN), UNKNOWN)
+    arc = targets.move == Move.CIRCULAR
+    reasons.mark(arc & targets.wrist_joint, ARC.format("WRIST_JNT"))
+    for rows, text in (
+        (arc & (kind == OrntType.RS_TRAJ), ARC.format("RS_TRAJ")),
+        (cartesian & (kind == OrntType.EUL_WORLD), ANGLES.format("EUL_WORLD")),
+        (cartesian & (kind == OrntType.RPY_WORLD), ANGLES.format("RPY_WORLD")),
+    ):
+        if rows.any():
+            reasons.mark(_may_be_off(visits, targets, plan, rows), text)
+
+
+def _may_be_off(visits: Visits, targets: Targets, plan: Plan, rows: Bools) -> Bools:
+    """Tell which of some moves may turn the tool otherwise than planned, (n,)."""
+    edge = np.repeat(np.arange(len(visits)), np.diff(visits.pred_start))
+    source = visits.pred
+    known = rows[edge] & (source >= 0)
+    known &= ~np.isnan(plan.tcp[source, 0, 0] + plan.tcp[edge, 0, 0])
+    edge, source = edge[known], source[known]
+    found = np.zeros(len(visits), dtype=bool)
+    if len(edge) == 0:
+        return found
+    to_flange = inverse(targets.tool[source])
+    begin = (plan.tcp[source] @ to_flange @ targets.tool[edge])[:, :3, :3]
+    end = plan.tcp[edge][:, :3, :3]
+    turn = np.linalg.norm(rotation_vector(np.swapaxes(begin, 1, 2) @ end), axis=1)
+    kind = visits.ornt_type[edge]
+    world = pose_from_record(visits.frames)[visits.base[edge]][:, :3, :3]
+    sine = np.minimum(_sine(world @ begin, kind), _sine(world @ end, kind))
+    off = np.minimum(turn**2 / (8.0 * np.maximum(sine, LEAST)), turn)
+    both = np.maximum(_sine(world @ begin, kind), _sine(world @ end, kind))
+    same = (both < LEAST) & (kind == OrntType.EUL_WORLD)
+    off = np.where(kind == OrntType.RS_TRAJ, turn, np.where(same, 0.0, off))
+    found[edge[off > PLAY]] = True
+    return found
+
+
+def _sine(R: Floats, kind: Ints) -> Floats:
+    """Tell how far from where three angles stop telling orientations apart, (k,).
+
+    Sine of the Euler angle e, or cosine of the pitch, of orientations (k, 3, 3).
+    """
+    euler, pitch = np.hypot(R[:, 0, 2], R[:, 1, 2]), np.hypot(R[:, 0, 0], R[:, 1, 0])
+    return np.asarray(np.where(kind == OrntType.RPY_WORLD, pitch, euler))
+
+
+# Arcs whose circle hangs by a hair: their points are left alone.
+#
+# A correction moves start, VIA and end of an arc by slightly different amounts. That
+# does no harm where they lie well apart; where they do not, the arm would run along
+# another circle than the program says, or along none.
+
+CURE = "move VIA, or use LINEAR"
+LINE = f"the three points of the arc that begins here lie on one line: {CURE}"
+TOO_NEAR = (
+    f"two of the three points of an arc are nearer than {NEAR / MM:g} mm, so that its "
+    f"circle is not sure: {CURE}"
+)
+STRAYS = (
+    "corrected, the three points of an arc would make quite another circle: move VIA "
+    "to its middle, or divide it"
+)
+
+
+def mark_arcs(targets: Targets, plan: Plan, reasons: Reasons) -> None:
+    """Leave the points of arcs alone that make no sure circle, the start included.
+
+    Args:
+        targets: The n moves of a program.
+        plan: Where they lead.
+        reasons: Why visits must not be compensated; more are added.
+    """
+    arcs = rounds(targets, plan.tcp, plan.aside)
+    near = arcs.too_near
+    for rows, text in ((near, TOO_NEAR), (arcs.on_a_line & ~near, LINE)):
+        reasons.mark(_among(arcs.visit[rows], len(targets)), text)
+
+
+def strayed(targets: Targets, plan: Plan, shift: Floats, step: float) -> Bools:
+    """Tell which targets move so that an arc at them becomes quite another one, (n,).
+
+    It does where the path between its points moves more than twice as far as they do:
+    it would then miss by more than it does without any correction.
+
+    Args:
+        targets: The n moves of a program.
+        plan: Where they lead.
+        shift: What the targets move by, (n, 3) [m], base frame.
+        step: How much farther than its points the path may move in any case [m].
+    """
+    arcs = rounds(targets, plan.tcp, plan.aside)
+    if len(arcs) == 0:
+        return np.zeros(len(targets), dtype=bool)
+    own = shift[arcs.visit]
+    size = np.linalg.norm(own, axis=2).max(axis=1)
+    with np.errstate(invalid="ignore"):
+        far = (size > 0.0) & (arcs.strays(own) > np.maximum(size, step))
+    return _among(arcs.visit[far], len(targets))
+
+
+def _among(visits: Ints, n: int) -> Bools:
+    """Tell which of n visits are among some, (n,)."""
+    found = np.zeros(n, dtype=bool)
+    found[visits] = True
+    return found

@@ -1,0 +1,375 @@
+"""Correct and plan again, until the sides are those corrected for."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from itertools import count, pairwise
+
+import numpy as np
+
+from postproc.arrays import Bools, Floats
+from postproc.compensation.command import Solved, solve_again, solve_visits, std_errors
+from postproc.compensation.decide import Proposal, propose
+from postproc.compensation.options import Clock, Options
+from postproc.compensation.program import Planned, Reading
+from postproc.compensation.rewrite import numbers_as_read
+from postproc.compensation.targets import moved_targets
+from postproc.language.rewrite import edits as number_edits
+from postproc.language.source import Replacements
+from postproc.language.visits import Visits
+from postproc.model.model import Model
+from postproc.motion.planner import Plan
+from postproc.motion.replan import Course, Reached, reach, reach_again
+from postproc.motion.targets import Targets
+from postproc.motion.trace import NOWHERE, Standing
+from postproc.robot.cell import Cell
+from postproc.robot.state import States
+
+# The side at which aim and arrival agree, searched joint by joint.
+
+LEAST_SHIFT = 1e-3  # change of an aim that tells how the arrival follows it
+FOLLOWS = 0.75  # gain above which the arrival runs away with the aim
+SECANTS = 4  # rounds of secant steps, before steps of half the way
+
+
+class SideSearch:
+    """Search, joint by joint, for the side at which aim and arrival agree.
+
+    A correction of a joint is as large as its play, so aiming where it was found last
+    may swing or creep. Secant steps settle that; where the arrival follows the aim so
+    closely that there is nothing to settle on, the joint is taken to its flank, but
+    only once. Neighbours in a fly run move each other, so that later steps go half the
+    way.
+    """
+
+    def __init__(self) -> None:
+        """Start without a history."""
+        self._aim: Floats | None = None
+        self._found: Floats | None = None
+        self._rounds = 0
+        self._flanked: Bools = np.zeros((1, 1), dtype=bool)
+
+    def next_aim(self, aim: Floats, found: Floats) -> Floats:
+        """Give the sides to aim for next, (n, 6).
+
+        Args:
+            aim: Sides that the targets are corrected for, (n, 6).
+            found: Sides that joints then arrive at, (n, 6).
+        """
+        step = found - aim
+        if self._rounds >= SECANTS:
+            step = step / 2
+        elif self._aim is not None and self._found is not None:
+            step = self._secant(step, aim - self._aim, found - self._found)
+        self._aim, self._found = np.array(aim), np.array(found)
+        self._rounds += 1
+        return np.clip(aim + step, -1.0, 1.0)
+
+    def _secant(self, step: Floats, shift: Floats, answer: Floats) -> Floats:
+        """Scale steps by how arrivals answered the last shift of their aims."""
+        known = np.abs(shift) > LEAST_SHIFT
+        gain = answer / np.where(known, shift, np.inf)
+        follows = gain > FOLLOWS
+        to_flank = follows & ~self._flanked
+        self._flanked = self._flanked | to_flank
+        scaled = step / np.where(follows, 2.0, 1.0 - gain)
+        return np.where(to_flank, 2.0 * np.sign(step), scaled)
+
+
+# What the targets of a window are corrected for, from round to round.
+
+CLOSE = 5e-6  # [m] how well rounded fly points are hit
+
+
+@dataclass(frozen=True)
+class Aim:
+    """What n targets are corrected for in a round.
+
+    Attributes:
+        solved: The commands.
+        bent: What rounded points are moved by beyond what is foretold, (n, 3) [m].
+        held: Targets that keep their values, (n,).
+        settled: Targets whose sides changed till the last round, and may, (n,).
+    """
+
+    solved: Solved
+    bent: Floats
+    held: Bools
+    settled: Bools
+
+    def turned(self, proposal: Proposal, side: Floats, most: float) -> Bools:
+        """Tell which corrected targets are reached from other sides than these, (n,).
+
+        Args:
+            proposal: Tells which are corrected.
+            side: From where they are reached, (n, 6).
+            most: How far that may be off.
+        """
+        off = np.abs(side - self.solved.direction)
+        far = np.zeros(len(off), dtype=bool)
+        rows = np.unique(np.flatnonzero(off > most) // off.shape[1])  # few
+        far[rows] = off[rows].max(axis=1) > most  # NaN is not far
+        return np.asarray(proposal.corrected & ~self.settled & far)
+
+
+@dataclass(frozen=True)
+class Aiming:
+    """What does not change from round to round.
+
+    Attributes:
+        reading: The visits.
+        planned, states: Their plan.
+        cell, model, options, clock: As everywhere.
+        given: What the first targets move by, for they are others' last, (k, 3) [m].
+    """
+
+    reading: Reading
+    planned: Planned
+    states: States
+    cell: Cell
+    model: Model
+    options: Options
+    clock: Clock
+    given: Floats
+
+    def first_aim(self) -> Aim:
+        """Correct for the sides that were planned."""
+        orientation = self.options.orientation
+        with self.clock("solve"):
+            solved = solve_visits(
+                self.model, self.cell, self.planned, self.states, orientation
+            )
+        none = np.zeros(len(self.states), dtype=bool)
+        return Aim(solved, np.zeros_like(self.planned.plan.aside), none, none)
+
+    def next_aim(
+        self, aim: Aim, moved: Bools, found: Floats, search: SideSearch
+    ) -> Aim:
+        """Correct some targets for other sides, by those that were found."""
+        orientation = self.options.orientation
+        with self.clock("solve"):
+            sides = search.next_aim(aim.solved.direction, found)
+            states = self.states.with_(direction=sides)
+            solved = solve_again(
+                aim.solved, moved, self.model, self.cell, self.planned, states,
+                orientation,
+            )  # fmt: skip
+        return replace(aim, solved=solved)
+
+    def propose(self, aim: Aim) -> tuple[Proposal, Floats]:
+        """Decide on numbers; return too where the path is to pass its targets."""
+        with self.clock("decide"):
+            plan = self.planned.plan
+            aside = aside_after(plan, self.wanted(aim)) + aim.bent
+            proposal = propose(
+                self.reading, self.planned, aim.solved, aside, aim.held, self.cell,
+                self.options,
+            )  # fmt: skip
+        return proposal, aside
+
+    def wanted(self, aim: Aim) -> Floats:
+        """Say what the path should move by at every target, (n, 3) [m]."""
+        before = self.planned.plan.tcp[:, :3, 3]
+        wanted = np.nan_to_num(aim.solved.command[:, :3, 3] - before)
+        wanted[aim.held] = 0.0
+        wanted[: len(self.given)] = self.given
+        return wanted
+
+    def missed(self, proposal: Proposal, aside: Floats, meant: Floats) -> Floats:
+        """Say by what programs with a point that is not hit miss theirs, (n, 3) [m].
+
+        Args:
+            proposal: Tells which targets can make up for it.
+            aside: From targets to where the path passes them, (n, 3) [m].
+            meant: .. to where it should.
+        """
+        missed, sharp = np.zeros_like(aside), self.planned.plan.pull.visit
+        missed[sharp] = (aside - meant)[sharp]
+        missed[~proposal.corrected] = 0.0
+        for first, end in pairwise((*self.reading.begins, len(missed))):
+            far = np.abs(missed[first:end]).max(initial=0.0) > CLOSE
+            if not far:  # nor where it is not known
+                missed[first:end] = 0.0
+        return missed
+
+
+def aside_after(plan: Plan, wanted: Floats) -> Floats:
+    """Foretell where the path passes its fly points once targets have moved, (n, 3)."""
+    return plan.aside + plan.pull.on(plan.pull.to_move(wanted))
+
+
+# Where the numbers of one program lead, as they change from round to round.
+
+
+class Courses:
+    """The last course of a program, and the way to the next one."""
+
+    def __init__(self, visits: Visits, targets: Targets, cell: Cell) -> None:
+        """Begin with the program as it is.
+
+        Args:
+            visits: Its visits.
+            targets: Where they go.
+            cell: The arm and its surroundings.
+        """
+        self._visits, self._targets, self._cell = visits, targets, cell
+        self._last: Course | None = None
+
+    @property
+    def end(self) -> Standing:
+        """Return where the last course leaves the arm; nowhere before the first."""
+        return NOWHERE if self._last is None else self._last.end
+
+    def after(self, values: Floats, begin: Standing) -> Course:
+        """Find where the program leads with other numbers.
+
+        Args:
+            values: The numbers, (n, 6) in the program's units.
+            begin: Where the arm stands at the first visit, if that is known beforehand.
+        """
+        new = replace(self._visits, values=values)
+        old = self._visits.values
+        moved = ((values != old) & ~(np.isnan(values) & np.isnan(old))).any(axis=1)
+        rows = np.flatnonzero(moved)
+        targets = moved_targets(self._targets, new, self._cell, rows)
+        arm, last = self._cell.arm, self._last
+        if last is None or last.begin is not begin:
+            self._last = reach(arm, targets, begin)
+        else:
+            self._last = reach_again(arm, last, targets, moved)
+        self._visits, self._targets = new, targets
+        return self._last
+
+
+# Correct and plan again, until the sides are those corrected for.
+
+ROUNDS = 8  # of correcting for changed sides, before targets are settled for
+SAME = 0.01  # sides closer than this are the same
+OTHER = 1.0  # sides farther apart than this are different ones
+CORNERS = 3  # rounds for what is curved there
+
+
+@dataclass(frozen=True)
+class Left:
+    """How the last target of some visits is left, for what comes after it.
+
+    Attributes:
+        looked: Where the arm stands with its number as it was corrected.
+        written: .. with its number as it is written, which has less digits.
+        wanted: What it moves by, (k, 3) [m]; k is 1, or 0 where nothing was before.
+    """
+
+    looked: Standing
+    written: Standing
+    wanted: Floats
+
+
+AT_START = Left(NOWHERE, NOWHERE, np.empty((0, 3)))
+
+
+class NotTogetherError(Exception):
+    """A program goes on by rounds that others beside it did not take."""
+
+
+@dataclass(frozen=True)
+class Corrected:
+    """A proposal, the edits that write it, and where the written numbers lead."""
+
+    proposal: Proposal
+    edits: tuple[Replacements, ...]
+    reached: Reached
+    left: Left
+
+
+def settle(
+    reading: Reading,
+    planned: Planned,
+    states: States,
+    cell: Cell,
+    model: Model,
+    options: Options,
+    clock: Clock,
+    before: Left = AT_START,
+) -> Corrected:
+    """Correct and plan again, until the sides are those corrected for.
+
+    The corrected program makes slightly other moves than the original, so a joint may
+    come from the other side, or lie elsewhere in its play: the correction is computed
+    anew for that. Where joints still change sides at the end, the target is corrected
+    for the middle between both, and listed: to leave it alone would bend a fly run by
+    the whole correction, and move its neighbours' sides with it.
+
+    A rounded fly point also moves with its neighbours' corrections, which its own makes
+    up for. The last look is at the numbers as they will be read from the output.
+
+    Programs side by side do not wait for each other: what has come to rest in one stays
+    as it is while others go on. Only what the last look finds would come rounds later
+    than in a program alone, and how targets are settled depends on the round.
+
+    Raises:
+        NotTogetherError: The last look found something in programs side by side.
+    """
+    aiming = Aiming(
+        reading, planned, states, cell, model, options, clock, before.wanted
+    )
+    courses, search = Courses(reading.visits, planned.targets, cell), SideSearch()
+    aim = aiming.first_aim()
+    for number in count():  # ends: from round ROUNDS on, `settled` or `held` grows
+        proposal, meant = aiming.propose(aim)
+        with clock("plan again"):
+            looked = courses.after(proposal.decisions.corrected, before.looked)
+        most = SAME if number < ROUNDS else OTHER
+        moved = aim.turned(proposal, looked.side, most)
+        missed = aiming.missed(proposal, looked.aside, meant)
+        bend_on = number < CORNERS and bool(missed.any())
+        if not moved.any() and not bend_on:
+            found, flipped = _written(aiming, aim, proposal, courses, before)
+            if found is not None:
+                return found
+            aim = replace(aim, held=aim.held | flipped)
+            continue
+        bent = aim.bent + missed if bend_on else aim.bent
+        settled = aim.settled | moved if number >= ROUNDS else aim.settled
+        aim = replace(aim, bent=bent, settled=settled)
+        aim = aiming.next_aim(aim, moved, looked.side, search)
+    raise AssertionError("unreachable")
+
+
+def _written(
+    aiming: Aiming, aim: Aim, proposal: Proposal, courses: Courses, before: Left
+) -> tuple[Corrected | None, Bools]:
+    """Write the numbers, and look at them as they will be read.
+
+    Returns:
+        What came of it, None where targets now come from another side; and those.
+
+    Raises:
+        NotTogetherError: There are some, in programs side by side.
+    """
+    looked = courses.end
+    edits, proposal = write(aiming.reading, proposal, aiming.clock)
+    with aiming.clock("plan again"):
+        last = courses.after(proposal.decisions.corrected, before.written)
+    flipped = aim.turned(proposal, last.side, OTHER)
+    if flipped.any():
+        if len(aiming.reading.begins) > 1:
+            raise NotTogetherError
+        return None, flipped
+    left = Left(looked, last.end, aiming.wanted(aim)[-1:].copy())
+    with aiming.clock("solve"):
+        std_error = std_errors(aiming.model, aiming.cell, aiming.states, aim.solved)
+    decided = replace(proposal.decisions, std_error=std_error)
+    proposal = replace(proposal, decisions=decided)
+    return Corrected(proposal, edits, last.reached, left), flipped
+
+
+def write(
+    reading: Reading, proposal: Proposal, clock: Clock
+) -> tuple[tuple[Replacements, ...], Proposal]:
+    """Write the numbers; return the edits, and the proposal as it will be read."""
+    with clock("rewrite"):
+        literals, edited = reading.visits.literals, proposal.edited
+        edits = number_edits(literals, reading.sources, edited, proposal.values)
+        values = numbers_as_read(reading.visits, edited, edits)
+    decisions = replace(proposal.decisions, corrected=values)
+    return edits, replace(proposal, decisions=decisions)
