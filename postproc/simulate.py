@@ -14,7 +14,7 @@ from postproc.language.visits import Visits
 from postproc.model.statistics import ErrorStatistics
 from postproc.report_json import finite
 from postproc.robot.cell import Cell, load_cell
-from postproc.virtual import (
+from postproc.simulation import (
     DEFAULT,
     Campaign,
     Planted,

@@ -11,7 +11,7 @@ from postproc.calibration.fit import fit
 from postproc.model.effects import BASE_EFFECTS
 from postproc.model.model import Model, load_model
 from postproc.robot.cell import Cell, load_cell
-from postproc.virtual import (
+from postproc.simulation import (
     measure_rows,
     read_rows,
     sample_survey,

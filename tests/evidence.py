@@ -23,8 +23,7 @@ from postproc.robot.arm import load_arm
 from postproc.robot.cell import Cell, load_cell
 from postproc.robot.state import States, make_states
 from postproc.simulate import setup_of, simulate_file, visits_of
-from postproc.surveying import write_survey
-from postproc.virtual import (
+from postproc.simulation import (
     Arrivals,
     campaign_length,
     land,
@@ -32,6 +31,7 @@ from postproc.virtual import (
     stream,
     virtual_arm,
 )
+from postproc.surveying import write_survey
 
 ROOT = Path(__file__).parents[1]
 CELL = ROOT / "programs" / "cell.toml"

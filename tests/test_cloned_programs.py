@@ -9,7 +9,7 @@ from postproc.compensation.compensate import compensate
 from postproc.compensation.options import Options
 from postproc.language.visits import Motion, Target, Visits
 from postproc.simulate import setup_of
-from postproc.virtual import land, virtual_arm
+from postproc.simulation import land, virtual_arm
 from tests.conftest import SEED
 from tests.made_visits import visits
 from tests.running import Executed, Runner

@@ -13,7 +13,7 @@ from postproc.compensation.outcome import Status
 from postproc.compensation.program import read_program
 from postproc.compensation.record import FileRecord, restore
 from postproc.simulate import setup_of
-from postproc.virtual import land, virtual_arm
+from postproc.simulation import land, virtual_arm
 from tests.conftest import SEED
 from tests.written import LISTED, entry
 

@@ -17,7 +17,7 @@ from postproc.exceptions import CellError, ModelError, ProgramError
 from postproc.report_json import report_text
 from postproc.robot.cell import load_cell
 from postproc.simulate import setup_of
-from postproc.virtual import land, virtual_arm
+from postproc.simulation import land, virtual_arm
 from tests.conftest import CELL, SEED
 
 HEAD = (

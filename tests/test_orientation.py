@@ -18,7 +18,7 @@ from postproc.language.visits import Visits
 from postproc.robot.pose import MM, angles_near, rotation_from_zyz, rotation_vector
 from postproc.robot.state import make_states
 from postproc.simulate import setup_of
-from postproc.virtual import run_program, virtual_arm
+from postproc.simulation import run_program, virtual_arm
 from tests.conftest import SEED
 from tests.plant import program
 from tests.written import FIRST, cli, entry
@@ -140,7 +140,7 @@ def test_the_standard_error_of_the_rotation_covers_it(job_cell, job_model):
     low, high = [-40, -20, -110, -80, 25, -80], [40, 20, -80, 80, 70, 80]
     q = np.deg2rad(rng.uniform(low, high, (200, 6)))
     tool = job_cell.tool.pose
-    from postproc.virtual.arrivals import make_arrivals
+    from postproc.simulation.state import make_arrivals
 
     side = rng.choice([-1.0, 1.0], q.shape)
     usual = setup_of(job_cell)

@@ -13,9 +13,9 @@ from postproc.language.visits import Motion, Target, Visits
 from postproc.motion.planner import plan
 from postproc.robot.cell import Cell, load_cell
 from postproc.robot.pose import pose_from_record, record_from_pose
-from postproc.virtual.drawing import virtual_arm
-from postproc.virtual.program import run_program
-from postproc.virtual.setup import Setup
+from postproc.simulation.controller import Setup
+from postproc.simulation.draw import virtual_arm
+from postproc.simulation.program import run_program
 from tests.made_visits import FRAMES, visits
 
 HOME_DEG = [0.0, 0.0, -90.0, 0.0, 45.0, 0.0]

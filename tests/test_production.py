@@ -19,7 +19,7 @@ from postproc.model.model import load_model
 from postproc.report_json import report_text
 from postproc.robot.cell import load_cell
 from postproc.simulate import setup_of
-from postproc.virtual import land, run_program, virtual_arm
+from postproc.simulation import land, run_program, virtual_arm
 from tests.conftest import ROOT, SEED, make_job
 
 PROGRAMS = ROOT / "programs"

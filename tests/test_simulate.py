@@ -10,7 +10,7 @@ import pytest
 
 from postproc.robot.cell import load_cell
 from postproc.simulate import setup_of, simulate_file
-from postproc.virtual import land, virtual_arm
+from postproc.simulation import land, virtual_arm
 from tests.conftest import SEED
 from tests.written import FIRST, NEXT, POSE, cli, program
 

@@ -13,7 +13,7 @@ from postproc.exceptions import CellError
 from postproc.robot.cell import load_cell
 from postproc.robot.pose import pose_from_record, record_from_pose
 from postproc.simulate import setup_of
-from postproc.virtual import land, make_arrivals, virtual_arm
+from postproc.simulation import land, make_arrivals, virtual_arm
 from tests.conftest import CELL, SEED
 from tests.shared_points import SWEEP
 from tests.written import FIRST, POSE, program

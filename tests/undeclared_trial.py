@@ -14,7 +14,7 @@ from postproc.model.combination import Combination
 from postproc.model.effects import BASE_EFFECTS, propose
 from postproc.model.effects.effect import Effect, Parameter
 from postproc.model.kinematics import Batch
-from postproc.virtual import Arrivals, VirtualArm, virtual_arm
+from postproc.simulation import Arrivals, VirtualArm, virtual_arm
 from tests.accuracy.planted import (
     ARM,
     BASE,

@@ -14,7 +14,7 @@ from postproc.model.effects.elm import HiddenLayer
 from postproc.model.kinematics import NOMINAL, Deviation, walk
 from postproc.robot.arm import DH, load_arm
 from postproc.robot.state import make_states
-from postproc.virtual import sample_survey, stream, virtual_arm
+from postproc.simulation import sample_survey, stream, virtual_arm
 
 MM = 1e-3
 NEURONS, TRAIN, TEST = 40, 300, 200

@@ -12,7 +12,7 @@ from postproc.model.effects import BASE_EFFECTS, propose
 from postproc.model.kinematics import Batch
 from postproc.robot.arm import load_arm
 from postproc.robot.state import States, make_states
-from postproc.virtual import (
+from postproc.simulation import (
     Arrivals,
     Planted,
     VirtualArm,
@@ -20,7 +20,7 @@ from postproc.virtual import (
     stream,
     virtual_arm,
 )
-from postproc.virtual.law import Law
+from postproc.simulation.laws import Law
 
 ARM = load_arm("nj220-2.7")
 TRACKER = np.array([3.0, -2.0, 1.5])  # [m]

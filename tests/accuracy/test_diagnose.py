@@ -38,7 +38,7 @@ from postproc.model.model import Model, load_model
 from postproc.plots import plot_diagnosis
 from postproc.robot.arm import load_arm
 from postproc.robot.state import States, make_states
-from postproc.virtual import Planted, stream, virtual_arm
+from postproc.simulation import Planted, stream, virtual_arm
 from tests.accuracy.planted import ARM, BASE, TRACKER, campaign, states_of, survey
 
 

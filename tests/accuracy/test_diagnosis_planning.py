@@ -13,7 +13,7 @@ from postproc.calibration.diagnosis.search import NEAR, Standing
 from postproc.calibration.diagnosis.trace import Trace, trace
 from postproc.calibration.regression import fit_effects
 from postproc.model.kinematics import Batch
-from postproc.virtual import Arrivals, stream
+from postproc.simulation import Arrivals, stream
 from tests.accuracy.planted import ARM, TRACKER, Campaign, campaign, states_of, survey
 
 ROWS = 90

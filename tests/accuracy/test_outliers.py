@@ -7,7 +7,7 @@ from postproc.calibration.orientations import judge, student_weights
 from postproc.calibration.regression import fit_effects
 from postproc.model.effects import BASE_EFFECTS, propose
 from postproc.model.kinematics import Batch
-from postproc.virtual import Planted, stream, virtual_arm
+from postproc.simulation import Planted, stream, virtual_arm
 from tests.accuracy.planted import ARM, BASE, TRACKER, states_of, survey
 from tests.accuracy.simulator import NJ, random_states
 

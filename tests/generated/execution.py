@@ -15,8 +15,8 @@ from postproc.compensation.program import read_program
 from postproc.robot.cell import Cell
 from postproc.robot.pose import MM
 from postproc.simulate import setup_of
-from postproc.virtual import virtual_arm
-from postproc.virtual.program import Run, run_program
+from postproc.simulation import virtual_arm
+from postproc.simulation.program import Run, run_program
 from tests.conftest import SEED
 from tests.language.executed import Executed, Generated
 from tests.language.interpreter import Interpreter

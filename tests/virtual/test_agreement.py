@@ -10,10 +10,20 @@ from postproc.motion.planner import plan
 from postproc.robot.arm import load_arm
 from postproc.robot.cell import load_cell
 from postproc.robot.state import make_states
-from postproc.virtual import NJ220, Setup, arrivals_of_states, run_program, virtual_arm
-from postproc.virtual.gravity import Body, link_torque, payload_torque
-from postproc.virtual.inverse import solve_branch
-from postproc.virtual.reference import working_angles
+from postproc.simulation import (
+    NJ220,
+    Setup,
+    arrivals_of_states,
+    run_program,
+    virtual_arm,
+)
+from postproc.simulation.kinematics import (
+    Body,
+    link_torque,
+    payload_torque,
+    solve_branch,
+)
+from postproc.simulation.reference import working_angles
 from tests.virtual.builders import Program
 
 ARM = load_arm("nj220-2.7")

@@ -1,7 +1,7 @@
 import pytest
 
 from postproc.exceptions import PostprocError
-from postproc.virtual import NAMES, Planted, parse_effects
+from postproc.simulation import NAMES, Planted, parse_effects
 
 
 def test_names_joints_and_sizes() -> None:

@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 
 from postproc.exceptions import PlanError
-from postproc.virtual.controller import joints_along, joints_of_pose
-from postproc.virtual.kinematics import NJ220
-from postproc.virtual.path import straight
+from postproc.simulation.controller import joints_along, joints_of_pose, straight
+from postproc.simulation.kinematics import NJ220
 
 Q = np.radians([20.0, 10.0, -100.0, 40.0, 50.0, -60.0])
 FLANGE = NJ220.flange(Q[None])[0]

@@ -11,7 +11,7 @@ from postproc.compensation.targets import targets_from_visits
 from postproc.language.visits import FlyTrajectory, FlyType, Motion, Visits
 from postproc.motion.planner import plan
 from postproc.robot.cell import load_cell
-from postproc.virtual import NJ220, Setup, run_program, virtual_arm
+from postproc.simulation import NJ220, Setup, run_program, virtual_arm
 from tests.virtual.builders import Program
 
 HOME = np.radians([0.0, 0.0, -90.0, 0.0, 45.0, 0.0])

@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from postproc.virtual import sample_survey, stream, virtual_arm
-from postproc.virtual.law import Where
+from postproc.simulation import sample_survey, stream, virtual_arm
+from postproc.simulation.laws import Where
 
 TRACKER = np.array([4.0, -3.0, 1.5])
 

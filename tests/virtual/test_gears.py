@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from postproc.virtual.gears import Gears, at_start, move, turning_points
+from postproc.simulation.arm import Gears, at_start, move, turning_points
 
 GAP = 1e-4
 GEARS = Gears(np.full(6, GAP), np.eye(6))

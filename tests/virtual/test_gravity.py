@@ -2,9 +2,8 @@
 
 import numpy as np
 
-from postproc.virtual.gravity import Body, link_torque, payload_torque
-from postproc.virtual.kinematics import NJ220
-from postproc.virtual.reference import working_angles
+from postproc.simulation.kinematics import NJ220, Body, link_torque, payload_torque
+from postproc.simulation.reference import working_angles
 
 G = 9.80665
 Q = working_angles(np.random.default_rng(0), 20)

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 from postproc.exceptions import PlanError
-from postproc.virtual.inverse import (
+from postproc.simulation.kinematics import (
+    NJ220,
     branch_of,
     nearest_turns,
     require_closed_form,
     solve_branch,
 )
-from postproc.virtual.kinematics import NJ220
 
 
 def sample(n: int = 400) -> np.ndarray:

@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from postproc.virtual.kinematics import NJ220
-from postproc.virtual.rotation import pose_of_record
+from postproc.simulation.kinematics import NJ220, pose_of_record
 
 
 def test_flange_points_forward_in_the_calibration_pose() -> None:

@@ -5,7 +5,7 @@ import pytest
 
 from postproc.exceptions import PostprocError
 from postproc.language.visits import Motion
-from postproc.virtual import Setup, land, run_program, virtual_arm
+from postproc.simulation import Setup, land, run_program, virtual_arm
 from tests.virtual.builders import Program
 
 ARM = virtual_arm(2)

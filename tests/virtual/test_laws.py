@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 
 from postproc.exceptions import PostprocError
-from postproc.virtual import NAMES, Planted, VirtualArm, make_arrivals, virtual_arm
-from postproc.virtual.catalogue import AS_BUILT, KINDS
-from postproc.virtual.law import Where
-from postproc.virtual.reference import PROBE, reference_arrivals
+from postproc.simulation import NAMES, Planted, VirtualArm, make_arrivals, virtual_arm
+from postproc.simulation.laws import AS_BUILT, KINDS, Where
+from postproc.simulation.reference import PROBE, reference_arrivals
 
 REFERENCE = reference_arrivals(400)
 

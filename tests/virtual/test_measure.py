@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from postproc.exceptions import MeasurementError, OutputError, PostprocError
-from postproc.virtual import (
+from postproc.simulation import (
     Setup,
     campaign_length,
     in_tracker_frame,
@@ -18,7 +18,7 @@ from postproc.virtual import (
     virtual_arm,
     write_measurements,
 )
-from postproc.virtual.rotation import pose
+from postproc.simulation.kinematics import pose
 from tests.virtual.builders import Program
 
 ARM = virtual_arm(1, "geometry,tool,backlash,windup")

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from postproc.exceptions import PlanError
-from postproc.virtual.path import STEP, TURN_STEP, arc, straight
-from postproc.virtual.rotation import exponential, logarithm, pose
+from postproc.simulation.controller import STEP, TURN_STEP, arc, straight
+from postproc.simulation.kinematics import exponential, logarithm, pose
 
 
 def make_pose(x: float, y: float, z: float, *turn: float) -> np.ndarray:

@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 
 from postproc.language.visits import ELSEWHERE, START, Motion, Target
-from postproc.virtual import Setup, run_program, virtual_arm
-from postproc.virtual.kinematics import NJ220
-from postproc.virtual.rotation import pose_of_record, undo
+from postproc.simulation import Setup, run_program, virtual_arm
+from postproc.simulation.kinematics import NJ220, pose_of_record, undo
 from tests.virtual.builders import Program
 
 ARM = virtual_arm(1)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from postproc.virtual.rotation import (
+from postproc.simulation.kinematics import (
     exponential,
     logarithm,
     pose_of_record,

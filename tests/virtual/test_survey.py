@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from postproc.robot.state import make_states
-from postproc.virtual import (
+from postproc.simulation import (
     arrivals_of_states,
     follow_rows,
     make_arrivals,

@@ -5,9 +5,9 @@ import pytest
 
 from postproc.exceptions import PlanError
 from postproc.language.visits import Motion
-from postproc.virtual import NJ220, Setup, run_program, virtual_arm
-from postproc.virtual.rotation import pose
-from postproc.virtual.wrist import joints_with_wrist
+from postproc.simulation import NJ220, Setup, run_program, virtual_arm
+from postproc.simulation.controller import joints_with_wrist
+from postproc.simulation.kinematics import pose
 from tests.virtual.builders import Program
 
 TOOL = pose(np.eye(3), np.array([0.08, -0.04, 0.15]))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from postproc.arrays import Floats
-from postproc.virtual.arrivals import Arrivals, make_arrivals
+from postproc.simulation.state import Arrivals, make_arrivals
 
 # Angles between which each joint works in a usual campaign, (6, 2) [rad].
 WORKING_RANGE = np.radians(

@@ -10,16 +10,20 @@ import numpy as np
 
 from postproc.arrays import Floats
 from postproc.exceptions import PostprocError
-from postproc.virtual.arm import VirtualArm
-from postproc.virtual.arrivals import Arrivals
-from postproc.virtual.as_built import AsBuilt, draw_as_built, draw_body
-from postproc.virtual.catalogue import AS_BUILT, DEFAULT, KINDS, Planted, parse_effects
-from postproc.virtual.direction_laws import backlash
-from postproc.virtual.gears import Gears
-from postproc.virtual.gravity import Body
-from postproc.virtual.kinematics import NJ220, Chain
-from postproc.virtual.law import Draw, Law
-from postproc.virtual.reference import reference_arrivals
+from postproc.simulation.arm import AsBuilt, Gears, VirtualArm, draw_as_built, draw_body
+from postproc.simulation.kinematics import NJ220, Body, Chain
+from postproc.simulation.laws import (
+    AS_BUILT,
+    DEFAULT,
+    KINDS,
+    Draw,
+    Law,
+    Planted,
+    backlash,
+    parse_effects,
+)
+from postproc.simulation.reference import reference_arrivals
+from postproc.simulation.state import Arrivals
 
 TRACKER_NOISE = (0.01e-3, 5e-6)  # [m], [m/m] per axis
 SMALL = 1e-6  # a size at which every law is linear

@@ -1,4 +1,4 @@
-"""Run a program on the virtual arm."""
+"""Run a program on the virtual arm, and see where the tool lands."""
 
 from __future__ import annotations
 
@@ -7,15 +7,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from postproc.arrays import Floats, Ints
+from postproc.exceptions import PostprocError
 from postproc.language.visits import Motion, Visits
-from postproc.virtual.arm import VirtualArm
-from postproc.virtual.arrivals import USUAL_SPEED, Arrivals, make_arrivals
-from postproc.virtual.drawing import stream
-from postproc.virtual.drive import Drive, plan_drives
-from postproc.virtual.gears import GearState, at_start, move
-from postproc.virtual.moves import Way
-from postproc.virtual.rotation import pose_of_record
-from postproc.virtual.setup import Setup
+from postproc.simulation.arm import GearState, VirtualArm, at_start, move
+from postproc.simulation.controller import Drive, Setup, Way, plan_drives
+from postproc.simulation.draw import stream
+from postproc.simulation.kinematics import pose_of_record
+from postproc.simulation.state import USUAL_SPEED, Arrivals, make_arrivals
+
+# Run a program on the virtual arm.
 
 SETTLE = 0.3  # [s] to start and stop a move
 # Where the arm stands when the cell names no home: its upright pose, wrist bent.
@@ -143,3 +143,56 @@ def _tool_numbers(setup: Setup, used: list[int], poses: Floats) -> dict[int, int
     if min(probes, default=-1) < 0:
         probes = list(range(len(frames)))
     return dict(zip(frames, probes, strict=True))
+
+
+# Where the tool really lands when a program runs, against what was wanted.
+
+
+@dataclass(frozen=True)
+class Landing:
+    """The landing of an executed program at the visits that both programs reach.
+
+    Attributes:
+        visit: Index of the visit, (k,).
+        wanted: TCP that the original program asks for, (k, 3) [m] in the arm base.
+        landed: TCP where the executed program really lands, (k, 3), without noise.
+    """
+
+    visit: Ints
+    wanted: Floats
+    landed: Floats
+
+    @property
+    def error(self) -> Floats:
+        """Landed minus wanted, (k, 3) [m]."""
+        return np.asarray(self.landed - self.wanted)
+
+
+def land(
+    arm: VirtualArm, setup: Setup, original: Visits, executed: Visits | None = None
+) -> Landing:
+    """Run a program and compare it with what the original asks for, visit by visit.
+
+    Args:
+        arm: The arm that runs it.
+        setup: Its cell.
+        original: The program as it came from the drawing.
+        executed: The compensated program; default the original itself.
+
+    Raises:
+        PostprocError: The two programs do not have the same visits.
+    """
+    asked = run_program(arm, setup, original)
+    if executed is None or executed is original:
+        done = asked
+    else:
+        if len(executed) != len(original):
+            raise PostprocError(
+                f"the executed program makes {len(executed)} visits, the original "
+                f"{len(original)}: they are not two versions of one program"
+            )
+        done = run_program(arm, setup, executed)
+    visit, here, there = np.intersect1d(asked.visit, done.visit, return_indices=True)
+    wanted = arm.nominal_tcp(asked.arrivals)[here]
+    landed = arm.tcp(done.arrivals)[there]
+    return Landing(visit, wanted, landed)

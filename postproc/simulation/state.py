@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from postproc.arrays import Floats
-from postproc.virtual.rotation import pose
+from postproc.simulation.kinematics import pose
 
 LONG_TRAVEL = 1.0  # [rad] travel since a reversal that nobody recorded
 REST_TEMPERATURE = 20.0  # [deg C] where the arm has its nominal lengths (ISO 1)

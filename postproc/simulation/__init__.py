@@ -1,0 +1,57 @@
+"""A simulated arm to test against, with its own kinematics and its own errors.
+
+It imports nothing of `robot`, `motion` or `model`: a wrong effect or a wrong
+kinematic chain there cannot hide behind the same mistake here.
+"""
+
+from __future__ import annotations
+
+from postproc.simulation.arm import VirtualArm
+from postproc.simulation.controller import Setup
+from postproc.simulation.draw import stream, virtual_arm
+from postproc.simulation.kinematics import NJ220, Chain
+from postproc.simulation.laws import DEFAULT, NAMES, Planted, parse_effects
+from postproc.simulation.program import Landing, Run, land, run_program
+from postproc.simulation.state import Arrivals, arrivals_of_states, make_arrivals
+from postproc.simulation.tracker import (
+    Campaign,
+    Rows,
+    campaign_length,
+    follow_rows,
+    in_tracker_frame,
+    measure_program,
+    measure_rows,
+    read_rows,
+    sample_survey,
+    write_measurements,
+)
+
+__all__ = [
+    "DEFAULT",
+    "NAMES",
+    "NJ220",
+    "Arrivals",
+    "Campaign",
+    "Chain",
+    "Landing",
+    "Planted",
+    "Rows",
+    "Run",
+    "Setup",
+    "VirtualArm",
+    "arrivals_of_states",
+    "campaign_length",
+    "follow_rows",
+    "in_tracker_frame",
+    "land",
+    "make_arrivals",
+    "measure_program",
+    "measure_rows",
+    "parse_effects",
+    "read_rows",
+    "run_program",
+    "sample_survey",
+    "stream",
+    "virtual_arm",
+    "write_measurements",
+]

@@ -1,0 +1,277 @@
+"""The virtual arm: where the tool really goes, and what a laser tracker reads there."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from postproc.arrays import Floats
+from postproc.simulation.kinematics import Body, Chain, small_motion
+from postproc.simulation.laws import Law, Where, total
+from postproc.simulation.state import LONG_TRAVEL, Arrivals
+
+# The arm as it was really built: numbers of the chain that differ from the drawing.
+
+
+@dataclass(frozen=True)
+class AsBuilt:
+    """Geometry of one arm.
+
+    Attributes:
+        chain: The chain with its D-H errors.
+        base: Twist of the arm on its foundation, (6,) [m, rad].
+        mount: Twist of the mounting plate on the flange, (6,) [m, rad]. It belongs to
+            the arm: every tool that is put on stands on the same plate.
+    """
+
+    chain: Chain
+    base: Floats
+    mount: Floats
+
+
+def draw_as_built(
+    rng: np.random.Generator, nominal: Chain, geometry: bool, tool: bool
+) -> AsBuilt:
+    """Draw the errors of one arm.
+
+    Lengths are off by 0.1 to 0.6 mm, angles by 0.1 to 0.6 mrad, the mounting plate by
+    0.3 to 1 mm along each axis: 1 to 3 mm at the TCP, as arms come from the factory.
+
+    Args:
+        rng: Random numbers of the geometry alone.
+        nominal: The arm of the drawing.
+        geometry: Whether the chain and the base are off.
+        tool: Whether the mounting plate is off.
+    """
+    length, angle = _off(rng, 0.1e-3, 0.6e-3, (2, 6)), _off(rng, 1e-4, 6e-4, (2, 6))
+    beta = np.zeros(6)
+    beta[1] = _off(rng, 1e-4, 6e-4, ())  # axes 2 and 3 should be parallel
+    base = _twist(rng, (0.1e-3, 0.4e-3), (0.5e-4, 2e-4))
+    mount = _twist(rng, (0.3e-3, 1e-3), (2e-4, 6e-4))
+    if not geometry:
+        length, angle, beta, base = 0 * length, 0 * angle, 0 * beta, 0 * base
+    chain = replace(
+        nominal,
+        a=nominal.a + length[0],
+        d=nominal.d + length[1],
+        alpha=nominal.alpha + angle[0],
+        offset=nominal.offset + angle[1],
+        beta=nominal.beta + beta,
+    )
+    return AsBuilt(chain, base, mount if tool else 0 * mount)
+
+
+def draw_body(rng: np.random.Generator, chain: Chain) -> Body:
+    """Draw the weights of one arm: 10 % and 20 mm off the estimates."""
+    mass = chain.mass * rng.uniform(0.9, 1.1, 6)
+    centre = chain.centre + rng.uniform(-0.02, 0.02, (6, 3))
+    return Body(chain, mass, centre)
+
+
+def _off(
+    rng: np.random.Generator, low: float, high: float, shape: tuple[int, ...]
+) -> Floats:
+    """Draw sizes between low and high with either sign."""
+    size = rng.uniform(low, high, shape)
+    return np.asarray(size * rng.choice([-1.0, 1.0], shape))
+
+
+def _twist(
+    rng: np.random.Generator, shift: tuple[float, float], turn: tuple[float, float]
+) -> Floats:
+    return np.concatenate([_off(rng, *shift, (3,)), _off(rng, *turn, (3,))])
+
+
+# The gap in every gear, followed along the motion.
+#
+# A gear with a gap of 2 g [rad] moves its link only when a flank touches: its place in
+# the gap is s = clip(s + dq / g, -1, 1). A joint that stands keeps its flank. The side
+# s is thus a physical state, not a sign computed from two targets.
+
+STILL = 1e-12  # [rad] below the rounding of the inverse kinematics
+
+
+@dataclass(frozen=True)
+class Gears:
+    """The gears of an arm.
+
+    Attributes:
+        gap: Half the gap of every gear, (6,) [rad] on the joint side.
+        coupling: (6, 6), motor-side angles = coupling @ joint angles.
+    """
+
+    gap: Floats
+    coupling: Floats
+
+
+@dataclass(frozen=True)
+class GearState:
+    """Where the gears are; all (6,), angles on the motor side [rad].
+
+    Attributes:
+        angle: Present angle.
+        side: Place in the gap, -1 .. 1.
+        heading: Direction of the last motion that was more than the gap, +1 or -1.
+        extreme: Furthest angle reached since the last reversal.
+        turn: Where the last reversal was.
+        turn_before: Where the reversal before it was.
+    """
+
+    angle: Floats
+    side: Floats
+    heading: Floats
+    extreme: Floats
+    turn: Floats
+    turn_before: Floats
+
+    @property
+    def travel(self) -> Floats:
+        """Way since the last reversal, (6,) [rad]."""
+        return np.abs(self.angle - self.turn)
+
+    @property
+    def loop(self) -> Floats:
+        """Way between the last two reversals, (6,) [rad]."""
+        return np.abs(self.turn - self.turn_before)
+
+
+def at_start(gears: Gears, q: Floats, side: Floats) -> GearState:
+    """Return the state of an arm that stands at q (6,) with the given sides (6,)."""
+    angle = gears.coupling @ q
+    turn = angle - side * LONG_TRAVEL
+    return GearState(angle, side, side, angle, turn, turn + side * LONG_TRAVEL)
+
+
+def move(gears: Gears, state: GearState, path: Floats) -> GearState:
+    """Follow a joint path.
+
+    Args:
+        gears: Gaps and coupling.
+        state: The state before.
+        path: Joint angles, (m, 6) [rad]; between two of them every joint moves one way.
+    """
+    for angle in turning_points(np.vstack([state.angle, path @ gears.coupling.T])):
+        state = _step(gears.gap, state, angle)
+    return state
+
+
+def turning_points(path: Floats) -> Floats:
+    """Return the points (k, 6) of a path (m, 6) where a joint turns, and its end."""
+    steps = np.diff(path, axis=0)
+    steps[np.abs(steps) < STILL] = 0.0
+    before, after = steps[:-1], steps[1:]
+    turns = (before * after <= 0) & ((before != 0) | (after != 0))
+    keep = np.append(turns.any(axis=1), True)
+    return np.asarray(path[1:][keep])
+
+
+def _step(gap: Floats, state: GearState, angle: Floats) -> GearState:
+    """Move every motor one way to the given angles (6,)."""
+    side = np.clip(state.side + (angle - state.angle) / gap, -1.0, 1.0)
+    advance = state.heading * (angle - state.extreme)
+    reversed_ = advance < -gap
+    return GearState(
+        angle=angle,
+        side=side,
+        heading=np.where(reversed_, -state.heading, state.heading),
+        extreme=np.where(reversed_ | (advance > 0), angle, state.extreme),
+        turn=np.where(reversed_, state.extreme, state.turn),
+        turn_before=np.where(reversed_, state.turn, state.turn_before),
+    )
+
+
+# The virtual arm: where the tool really goes, and what a laser tracker reads there.
+
+
+@dataclass(frozen=True)
+class VirtualArm:
+    """One arm with its own errors; all lengths in metres, in the arm base frame.
+
+    Attributes:
+        seed: What it was drawn from.
+        nominal: The arm that its controller believes in.
+        as_built: The arm that it is.
+        laws: Its further imperfections, with sizes: the truth to score against.
+        gears: Gaps that the direction comes from.
+        joint_noise: Repeatability of every joint, (6,) [rad].
+        tracker_noise: Constant [m] and per metre of range, one axis.
+        warming: Rise [K] and time constant [s] of the arm's own temperature.
+    """
+
+    seed: int
+    nominal: Chain
+    as_built: AsBuilt
+    laws: tuple[Law, ...]
+    gears: Gears
+    joint_noise: Floats
+    tracker_noise: tuple[float, float]
+    warming: tuple[float, float]
+
+    def nominal_pose(self, arrivals: Arrivals) -> Floats:
+        """Return where the drawing puts the tool, (n, 4, 4)."""
+        return np.asarray(self.nominal.flange(arrivals.q) @ arrivals.tool)
+
+    def nominal_tcp(self, arrivals: Arrivals) -> Floats:
+        """Return where the drawing puts the TCP, (n, 3)."""
+        return np.asarray(self.nominal_pose(arrivals)[:, :3, 3])
+
+    def tcp(self, arrivals: Arrivals, joint_noise: Floats | float = 0.0) -> Floats:
+        """Return where the TCP really is, (n, 3), without noise unless some is given.
+
+        Args:
+            arrivals: Commanded joints and all they depend on.
+            joint_noise: Added to the joints, (n, 6) [rad].
+        """
+        return np.asarray(self.pose(arrivals, joint_noise)[:, :3, 3])
+
+    def pose(self, arrivals: Arrivals, joint_noise: Floats | float = 0.0) -> Floats:
+        """Return where the tool really is, (n, 4, 4).
+
+        Args:
+            arrivals: Commanded joints and all they depend on.
+            joint_noise: Added to the joints, (n, 6) [rad].
+        """
+        angles = arrivals.q + total(self.laws, Where.JOINTS, arrivals) + joint_noise
+        growth = total(self.laws, Where.LENGTHS, arrivals)
+        base = self.as_built.base + total(self.laws, Where.BASE, arrivals)
+        mount = self.as_built.mount + total(self.laws, Where.TOOL, arrivals)
+        flange = self.as_built.chain.bent(growth).flange(angles)
+        return np.asarray(
+            small_motion(base) @ flange @ small_motion(mount) @ arrivals.tool
+        )
+
+    def error(self, arrivals: Arrivals) -> Floats:
+        """Return the true error, actual minus nominal TCP, (n, 3), without noise."""
+        return self.tcp(arrivals) - self.nominal_tcp(arrivals)
+
+    def seen(self, arrivals: Arrivals, tcp: Floats) -> Floats:
+        """Return what a tracker whose stand moves would read at TCPs (n, 3)."""
+        motion = small_motion(total(self.laws, Where.TRACKER, arrivals))
+        turned = np.einsum("nij,nj->ni", motion[:, :3, :3], tcp)
+        return np.asarray(turned + motion[:, :3, 3])
+
+    def measure(
+        self, arrivals: Arrivals, tracker: Floats, rng: np.random.Generator
+    ) -> Floats:
+        """Return noisy tracker readings (n, 3) in the arm base frame.
+
+        Args:
+            arrivals: What is measured.
+            tracker: Where the tracker stands, (3,).
+            rng: Random numbers of this campaign.
+        """
+        joints = rng.normal(size=arrivals.q.shape) * self.joint_noise
+        readings = self.seen(arrivals, self.tcp(arrivals, joints))
+        span = np.linalg.norm(readings - tracker, axis=1)
+        sigma = self.tracker_noise[0] + self.tracker_noise[1] * span
+        return np.asarray(readings + rng.normal(size=readings.shape) * sigma[:, None])
+
+    def temperature(self, time: Floats, start: float) -> Floats:
+        """Return the arm's temperature (n,) [deg C] at times (n,) [s]."""
+        rise, constant = self.warming
+        return np.asarray(start + rise * (1 - np.exp(-time / constant)))
+
+    def without_noise(self) -> VirtualArm:
+        """Return the same arm with perfect repeatability and a perfect tracker."""
+        return replace(self, joint_noise=np.zeros(6), tracker_noise=(0.0, 0.0))
