@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from postproc.arrays import Bools, Floats, Ints
 
-Column = NDArray[np.uint8]
+ByteColumn = NDArray[np.uint8]
 T = TypeVar("T")
 
 TIE = 1e-4  # nearer to halfway than this the last digit is left to Python
@@ -28,26 +28,26 @@ _FULL = np.strings.zfill(_NUMBERS.astype("S4"), 4).view(np.uint32)
 _MORE = np.where(_NUMBERS > 0, _BARE, np.uint32(0))  # 0: nothing
 
 
-def joined(columns: Sequence[Column | bytes]) -> bytes:
+def joined(columns: Sequence[ByteColumn | bytes]) -> bytes:
     """Return the rows one after the other; bytes are the same text in every row."""
     return beside(columns).tobytes().translate(None, b"\0")
 
 
-def beside(columns: Sequence[Column | bytes]) -> Column:
+def beside(columns: Sequence[ByteColumn | bytes]) -> ByteColumn:
     """Put columns side by side; bytes are the same text in every row."""
     rows = max(len(c) for c in columns if isinstance(c, np.ndarray))
     parts = [repeated(c, rows) if isinstance(c, bytes) else c for c in columns]
     return np.concatenate(parts, axis=1)
 
 
-def repeated(text: bytes, rows: int) -> Column:
+def repeated(text: bytes, rows: int) -> ByteColumn:
     """Return a text as a column."""
     return np.broadcast_to(np.frombuffer(text, dtype=np.uint8), (rows, len(text)))
 
 
 def named(
     texts: Sequence[T], index: NDArray[np.integer], text: Callable[[T], str]
-) -> Column:
+) -> ByteColumn:
     """Write one of some texts for every row, as UTF-8.
 
     Args:
@@ -60,11 +60,11 @@ def named(
     wanted = (np.flatnonzero(used) + least).tolist()
     table = np.array([text(texts[k]).encode() for k in wanted], dtype="S")
     at = (np.cumsum(used) - 1)[index - least]
-    rows: Column = table.view(np.uint8).reshape(len(wanted), -1)[at]
+    rows: ByteColumn = table.view(np.uint8).reshape(len(wanted), -1)[at]
     return rows
 
 
-def blanked(column: Column, rows: Bools, text: bytes) -> Column:
+def blanked(column: ByteColumn, rows: Bools, text: bytes) -> ByteColumn:
     """Put a text in the place of some rows."""
     if not rows.any():
         return column
@@ -75,20 +75,20 @@ def blanked(column: Column, rows: Bools, text: bytes) -> Column:
     return out
 
 
-def listed(columns: Sequence[Column]) -> Column:
+def listed(columns: Sequence[ByteColumn]) -> ByteColumn:
     """Return a column of lists in square brackets."""
-    parts: list[Column | bytes] = [b"["]
+    parts: list[ByteColumn | bytes] = [b"["]
     for number, column in enumerate(columns):
         parts += [b", ", column] if number else [column]
     return beside([*parts, b"]"])
 
 
-def whole(values: Ints) -> Column:
+def whole(values: Ints) -> ByteColumn:
     """Write whole numbers from 0 on."""
     return fixed(values.astype(float), 0)
 
 
-def fixed(values: Floats, decimals: int) -> Column:
+def fixed(values: Floats, decimals: int) -> ByteColumn:
     """Write numbers as ``%.3f`` does for 3 decimals; NaN becomes ``null``.
 
     Args:
@@ -116,7 +116,7 @@ def short(value: float) -> str:
 
 def shortest(
     values: Floats, decimals: int = 5, text: Callable[[float], str] = short
-) -> Column:
+) -> ByteColumn:
     """Write numbers as Python does, rounded to 9 decimals; NaN becomes ``null``.
 
     Numbers of few decimals are exact in that many, and what is shorter is the same
@@ -146,7 +146,7 @@ def shortest(
     return _by_python(rows, values, ~(sure | np.isnan(values)), text)
 
 
-def _written(scaled: Ints, decimals: int, negative: Bools) -> Column:
+def _written(scaled: Ints, decimals: int, negative: Bools) -> ByteColumn:
     """Write numbers that are whole when scaled, with their sign."""
     before = scaled // 10**decimals
     after = scaled - before * 10**decimals
@@ -174,14 +174,14 @@ def _written(scaled: Ints, decimals: int, negative: Bools) -> Column:
     return np.concatenate(parts, axis=1)
 
 
-def _bytes(four: NDArray[np.uint32]) -> Column:
+def _bytes(four: NDArray[np.uint32]) -> ByteColumn:
     """Return texts of four digits as a column."""
     return four.view(np.uint8).reshape(-1, 4)
 
 
 def _by_python(
-    rows: Column, values: Floats, some: Bools, text: Callable[[float], str]
-) -> Column:
+    rows: ByteColumn, values: Floats, some: Bools, text: Callable[[float], str]
+) -> ByteColumn:
     """Write some numbers one by one."""
     if not some.any():
         return rows

@@ -26,11 +26,11 @@ from postproc.calibration.published import Comparison, compare
 from postproc.calibration.report import FitReport
 from postproc.calibration.tables import DETECT, Reading, read_table
 from postproc.calibration.tables import Table as Cells
-from postproc.console import Column, table_text
 from postproc.files import write_all
 from postproc.joining import join_program
 from postproc.model.model import Model, load_model
 from postproc.model.statistics import ErrorStatistics
+from postproc.report.terminal import Column, table_text
 from postproc.robot.cell import Cell, load_cell
 from postproc.robot.pose import MM
 from postproc.robot.state import States
@@ -104,8 +104,8 @@ def write_page(path: Path, found: Calibration, cell: Cell) -> None:
     Raises:
         OutputError: The place cannot be written to.
     """
-    from postproc.html import calibration_report
-    from postproc.html.evidence import fit_evidence
+    from postproc.report.html import calibration_report
+    from postproc.report.html.model import fit_evidence
 
     rows = fit_evidence(found.report, found.model, found.survey, cell.arm)
     page = calibration_report(found.model.to_dict(), rows)

@@ -18,10 +18,10 @@ from postproc.calibration.diagnosis.trace import REMAINS, silent
 from postproc.calibration.fit import read_surveys, several_points
 from postproc.calibration.measurements import Measurements, concatenate
 from postproc.calibration.registration import register
-from postproc.console import Column, table_text
 from postproc.joining import join_program
 from postproc.model.model import Model, load_model
 from postproc.model.statistics import ErrorStatistics
+from postproc.report.terminal import Column, table_text
 from postproc.robot.cell import Cell, load_cell
 from postproc.robot.pose import inverse
 

@@ -17,14 +17,13 @@ from postproc.compensation.program import (
     read_program,
     with_measured_play,
 )
-from postproc.console import Column
 from postproc.exceptions import ProgramError, printable
 from postproc.files import VARIABLES, suffix_of
 from postproc.jobs import read_files
 from postproc.language.visits import ELSEWHERE, START, Visits
-from postproc.listing import arrows, print_listing, status_colour
 from postproc.model.model import Model, load_model
-from postproc.report_json import target_row
+from postproc.report.json import target_row
+from postproc.report.terminal import Column, arrows, print_listing, status_colour
 from postproc.robot.cell import Cell, load_cell
 from postproc.robot.pose import MM
 

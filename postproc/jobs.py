@@ -25,7 +25,7 @@ from postproc.files import (
 from postproc.language.visits import Diagnostic
 from postproc.model.model import Model, load_model
 from postproc.page_files import Pages, find_pages
-from postproc.report_json import report_pieces
+from postproc.report.json import report_pieces
 from postproc.robot.cell import Cell, load_cell
 
 
@@ -140,7 +140,7 @@ class Job:
         if report is not None and report != Path(STREAM):
             files[report] = map(str.encode, report_pieces(outcome, each))
         if html is not None:
-            from postproc.html import program_report
+            from postproc.report.html import program_report
 
             files[html] = program_report(outcome).encode()
         piped = self.path is None and output is None

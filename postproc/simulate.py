@@ -12,7 +12,7 @@ from postproc.compensation.program import read_program
 from postproc.jobs import read_files
 from postproc.language.visits import Visits
 from postproc.model.statistics import ErrorStatistics
-from postproc.report_json import finite
+from postproc.report.json import finite
 from postproc.robot.cell import Cell, load_cell
 from postproc.simulation import (
     DEFAULT,

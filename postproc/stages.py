@@ -53,7 +53,9 @@ class _Told:
 
     def show(self) -> None:
         """Begin to show it."""
-        from postproc.console import show_status  # slow to load, and seldom wanted
+        from postproc.report.terminal import (
+            show_status,  # slow to load, and seldom wanted
+        )
 
         self._update, self.hide = show_status(self._out, self._stage)
         self._update(self._stage)  # another one may have been told just now

@@ -8,11 +8,9 @@ import re
 from collections.abc import Sequence
 from typing import TextIO
 
-from postproc.changed_lines import target_name
-from postproc.console import Column
 from postproc.language.scan import mask_line, number_value
-from postproc.listing import arrows, print_listing, status_colour
-from postproc.rows import Row
+from postproc.report.diff import Row, target_name
+from postproc.report.terminal import Column, arrows, print_listing, status_colour
 
 ASSIGNED = re.compile(r"\s*([A-Za-z_$][\w$.\[\]]*)\s*(?::=|:)")
 LED = re.compile(r"(?:ELSE\s*:|CASE\s*\([^()]*\)\s*:|\w+\s*::)(.*)", re.S)

@@ -14,7 +14,7 @@ from postproc.compensation.outcome import Status
 from postproc.compensation.program import read_program
 from postproc.compensation.record import FileRecord, restore
 from postproc.exceptions import CellError, ModelError, ProgramError
-from postproc.report_json import report_text
+from postproc.report.json import report_text
 from postproc.robot.cell import load_cell
 from postproc.simulate import setup_of
 from postproc.simulation import land, virtual_arm

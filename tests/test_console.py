@@ -5,7 +5,8 @@ from __future__ import annotations
 import io
 import threading
 
-from postproc.console import (
+from postproc.exceptions import printable
+from postproc.report.terminal import (
     Column,
     print_table,
     progress_bar,
@@ -13,7 +14,6 @@ from postproc.console import (
     stage_bar,
     table_text,
 )
-from postproc.exceptions import printable
 from postproc.stages import stages
 
 
@@ -71,7 +71,7 @@ def test_what_lasts_is_shown_on_a_terminal(monkeypatch):
         return update, hide
 
     monkeypatch.setattr("postproc.stages.PATIENCE", 0.0)
-    monkeypatch.setattr("postproc.console.show_status", show)
+    monkeypatch.setattr("postproc.report.terminal.show_status", show)
     with stages(screen) as told:
         told("plan [1]")
         assert shown.wait(60)

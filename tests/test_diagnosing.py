@@ -23,7 +23,7 @@ from postproc.diagnosing import (
 from postproc.exceptions import OutputError
 from postproc.model.effects import BASE_EFFECTS
 from postproc.model.model import load_model
-from postproc.plots import plot_diagnosis
+from postproc.report.plots import plot_diagnosis
 from postproc.robot.cell import load_cell
 from postproc.robot.pose import pose_from_record
 from tests.accuracy.planted import campaign

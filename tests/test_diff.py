@@ -6,8 +6,7 @@ import json
 
 import pytest
 
-from postproc.changed_lines import changed_rows, target_name
-from postproc.diff import diff
+from postproc.report.diff import changed_rows, diff, target_name
 from tests.written import FIRST, LISTED, NEXT, POSE, cli, entry, program
 
 

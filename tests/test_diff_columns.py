@@ -10,14 +10,18 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from postproc.changed_lines import changed_rows
 from postproc.compensation.outcome import Arrivals, Status
-from postproc.diff import Difference, diff
-from postproc.diff_json import difference_pieces
-from postproc.diff_listing import print_difference
 from postproc.language.scan import mask_line, number_value
-from postproc.number_pairs import pair_numbers
-from postproc.rows import Row, Rows, joined_rows
+from postproc.report.diff import (
+    Difference,
+    Row,
+    Rows,
+    changed_rows,
+    diff,
+    joined_rows,
+    pair_numbers,
+)
+from postproc.report.diff_output import difference_pieces, print_difference
 from tests.diff_reference import json_of, list_rows, rows_of
 
 LINES = (

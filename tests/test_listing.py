@@ -7,8 +7,13 @@ from itertools import islice
 
 import pytest
 
-from postproc.console import Column
-from postproc.listing import MEASURED, arrows, print_listing, status_colour
+from postproc.report.terminal import (
+    MEASURED,
+    Column,
+    arrows,
+    print_listing,
+    status_colour,
+)
 
 COLUMNS = (Column("n"), Column("name", "left"), Column("status", "left"))
 COLOURS = {"status": status_colour}

@@ -6,8 +6,8 @@ import re
 
 import pytest
 
-from postproc.changed_lines import target_name
 from postproc.language.pdl2.names import entry_names
+from postproc.report.diff import target_name
 from tests.written import FIRST, LISTED, cli, program
 
 NUMBERS = " Y: 200.00  Z: 150.00  A: 0.000  E: 175.000  R: 0.000"

@@ -6,7 +6,7 @@ import pytest
 
 from postproc.calibration.published import Comparison, MethodRow
 from postproc.exceptions import OutputError
-from postproc.plots import plot_comparison
+from postproc.report.plots import plot_comparison
 
 
 def comparison():

@@ -16,7 +16,7 @@ from postproc.compensation.compensate import compensate
 from postproc.compensation.outcome import Outcome
 from postproc.compensation.program import read_program
 from postproc.model.model import load_model
-from postproc.report_json import report_text
+from postproc.report.json import report_text
 from postproc.robot.cell import load_cell
 from postproc.simulate import setup_of
 from postproc.simulation import land, run_program, virtual_arm

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import pytest
 
-from postproc import text_lines
-from postproc.text_lines import TextLines
+from postproc.report import diff
+from postproc.report.diff import TextLines
 
 
 @pytest.mark.parametrize("data", [b"", b"\n", b"one", b"a\nbc\n\nd\n", b"\n\n\nlast"])
 @pytest.mark.parametrize("at_once", [2, 1_000_000])
 def test_lines_are_those_of_a_split(monkeypatch, data: bytes, at_once: int) -> None:
-    monkeypatch.setattr(text_lines, "AT_ONCE", at_once)
+    monkeypatch.setattr(diff, "AT_ONCE", at_once)
     wanted = data.split(b"\n")
     lines = TextLines.of(data)
     assert len(lines) == len(wanted) and list(lines) == wanted

@@ -13,7 +13,7 @@ from postproc.compensation.compensate import compensate
 from postproc.compensation.options import AS_USUAL, Options
 from postproc.compensation.together import Given, compensate_together
 from postproc.exceptions import CellError, ModelError, PostprocError, ProgramError
-from postproc.report_json import report_text
+from postproc.report.json import report_text
 from postproc.robot.cell import load_cell
 from tests.bench.made import KINDS
 from tests.conftest import ROOT

@@ -14,7 +14,7 @@ from postproc.compensation.rewrite import VerificationError
 from postproc.exceptions import ProgramError
 from postproc.language import lines, source
 from postproc.language.source import source_from_bytes
-from postproc.report_json import report_pieces
+from postproc.report.json import report_pieces
 from tests.bench.made import KINDS
 
 pytestmark = pytest.mark.skipif(
@@ -39,7 +39,7 @@ def children(monkeypatch) -> list[object]:
     monkeypatch.setattr(lines, "_PIECE", 4_000)
     monkeypatch.setattr(rewrite, "WORTH", 1)
     monkeypatch.setattr(source, "AT_ONCE", 100)
-    monkeypatch.setattr("postproc.report_json.AT_ONCE", 100)
+    monkeypatch.setattr("postproc.report.json.AT_ONCE", 100)
     return begun
 
 

@@ -57,7 +57,7 @@ def diagnose(
     """Find what the model lacks, trace it to an effect, and add that effect."""
     from postproc import diagnosing
     from postproc.calibration.diagnosis.diagnose import dumped, evidence_of
-    from postproc.console import stage_bar
+    from postproc.report.terminal import stage_bar
 
     with explained():
         check_places([output, as_path(json), html, plot], [*data, cell, model, program])
@@ -75,11 +75,11 @@ def diagnose(
         if json:
             write_text(json, dumped(evidence_of(found)))
         if html is not None:
-            from postproc.html import diagnosis_report
+            from postproc.report.html import diagnosis_report
 
             write_text(str(html), diagnosis_report(evidence_of(found)))
         if plot is not None:
-            from postproc.plots import plot_diagnosis
+            from postproc.report.plots import plot_diagnosis
 
             for path in plot_diagnosis(found, plot):
                 say(f"plot {path}")
@@ -108,7 +108,7 @@ def report(
     output: Annotated[Path, typer.Option("-o", "--output", help="REPORT.html")],
 ) -> None:
     """Make one self-contained page (HTML) of a report, model or diagnosis."""
-    from postproc.html import report_file
+    from postproc.report.html import report_file
 
     with explained():
         check_places([output], [source])

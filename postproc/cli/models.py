@@ -207,11 +207,11 @@ def compare(
         if json:
             write_text(json, calibrating.comparison_json(found))
         if html is not None:
-            from postproc.html import comparison_report
+            from postproc.report.html import comparison_report
 
             write_text(str(html), comparison_report(asdict(found)))
         if plot is not None:
-            from postproc.plots import plot_comparison
+            from postproc.report.plots import plot_comparison
 
             say(f"plot {plot_comparison(found, plot)}")
         if json != "-":

@@ -73,7 +73,7 @@ def batch(
         from postproc.batch import run
         from postproc.batch.plan import make_plan
         from postproc.compensation.options import Options
-        from postproc.console import progress_bar
+        from postproc.report.terminal import progress_bar
 
         options = Options(clone, temperature=temperature, orientation=orientation)
         made = make_plan(plan, cell, model, options)
@@ -105,7 +105,7 @@ def _workers(jobs: int, scheduler: str | None, tls: Path | None) -> Gather:
 def _print_summary(summary: Summary) -> None:
     """Print the table, and what a person must look at."""
     from postproc.batch.summary import TITLES
-    from postproc.console import Column, print_table
+    from postproc.report.terminal import Column, print_table
 
     columns = [Column(t, "left" if t == TITLES[0] else "right") for t in TITLES]
     print_table(columns, summary.rows())
@@ -116,7 +116,7 @@ def _print_summary(summary: Summary) -> None:
 def _write_page(html: Path, title: str, log: Path) -> None:
     """Write the page of a batch from its log, which holds what earlier runs did too."""
     from postproc.batch.journal import read_entries
-    from postproc.html import batch_report
+    from postproc.report.html import batch_report
 
     entries = read_entries(log).values()
     found = ((entry.place, entry.status, entry.facts) for entry in entries)

@@ -66,7 +66,7 @@ def compensate(
     from postproc import jobs
     from postproc.compensation import parallel
     from postproc.compensation.options import Options
-    from postproc.report_json import report_text
+    from postproc.report.json import report_text
     from postproc.stages import stages
 
     given = None if program == STREAM else Path(program)
@@ -116,9 +116,8 @@ def diff(
     json: JsonOption = None,
 ) -> None:
     """Compare the targets of two programs: exit 0 same, 1 different, 2 trouble."""
-    from postproc import diff as differ
-    from postproc.diff_json import difference_pieces
-    from postproc.diff_listing import print_difference
+    from postproc.report import diff as differ
+    from postproc.report.diff_output import difference_pieces, print_difference
 
     with explained():
         check_places([as_path(json)], [original, compensated])

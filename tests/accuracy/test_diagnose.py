@@ -29,13 +29,13 @@ from postproc.calibration.measurements import Measurements
 from postproc.calibration.selection import fit_survey, model_of
 from postproc.diagnosing import tell
 from postproc.exceptions import ModelError, PostprocError
-from postproc.html import diagnosis_report
 from postproc.model.covariate import covariate, loops, unit
 from postproc.model.effects import BASE_EFFECTS
 from postproc.model.effects.curve import Curve
 from postproc.model.kinematics import Batch
 from postproc.model.model import Model, load_model
-from postproc.plots import plot_diagnosis
+from postproc.report.html import diagnosis_report
+from postproc.report.plots import plot_diagnosis
 from postproc.robot.arm import load_arm
 from postproc.robot.state import States, make_states
 from postproc.simulation import Planted, stream, virtual_arm

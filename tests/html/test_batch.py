@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from postproc.html import batch_report
+from postproc.report.html import batch_report
 from tests.html.test_program import NASTY, Elements
 
 FIGURES = {"mean": 1.2, "std": 0.1, "p95": 1.4, "max": 1.5}

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from postproc.html import (
+from postproc.report.html import (
     calibration_report,
     comparison_report,
     diagnosis_report,

@@ -7,8 +7,8 @@ import json
 import numpy as np
 import pytest
 
-from postproc.html import page
-from postproc.html.text import short, visible
+from postproc.report.html import page
+from postproc.report.html.page import short, visible
 
 NASTY = "</script><script>alert(1)</script>\x00\x1b[2J\u2028\u202e'\"&"
 

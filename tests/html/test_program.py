@@ -11,12 +11,16 @@ import numpy as np
 import pytest
 
 from postproc.compensation.outcome import Status
-from postproc.html import packing, program_report, program_report_from_json
-from postproc.html.columns import columns_of
-from postproc.html.listing import listing, stretches
-from postproc.html.rows import columns_from
-from postproc.html.summary import histogram, left_alone
-from postproc.report_json import report_text
+from postproc.report.html import program, program_report, program_report_from_json
+from postproc.report.html.program import (
+    columns_from,
+    columns_of,
+    histogram,
+    left_alone,
+    listing,
+    stretches,
+)
+from postproc.report.json import report_text
 from tests.html.builders import FIRST_LINE, outcome_of
 
 NASTY = '<script>alert("x")</script>\'\x1b[31m\u202e'
@@ -145,7 +149,7 @@ def test_an_empty_program_makes_a_page() -> None:
 
 def test_numbers_survive_packing() -> None:
     columns = columns_of(outcome_of(50))
-    packed = packing.pack(columns)
+    packed = program.pack(columns)
     for key in ("position_mm", "correction_mm", "std_mm", "q_deg", "original"):
         step = packed["numbers"][key]["step"]
         values = np.array(packed["numbers"][key]["values"], dtype=float) * step
@@ -164,7 +168,7 @@ def test_the_histogram_counts_every_correction() -> None:
 
 def test_a_page_of_a_huge_program_keeps_what_matters() -> None:
     columns = columns_of(outcome_of(5000))
-    rows = packing.choose(columns, most=1000)
+    rows = program.choose(columns, most=1000)
     assert len(rows) == 1000 and (np.diff(rows) > 0).all()
     left = np.isin(columns.status, (Status.UNSAFE, Status.GUARDED, Status.DISPLAY))
     assert np.isin(np.flatnonzero(left), rows).all()
@@ -175,7 +179,7 @@ def test_a_page_of_a_huge_program_keeps_what_matters() -> None:
 
 def test_too_many_left_alone_leave_room_for_others() -> None:
     columns = columns_of(outcome_of(5000))
-    rows = packing.choose(columns, most=200)
+    rows = program.choose(columns, most=200)
     assert len(rows) == 200
     assert (columns.status[rows] == Status.SAFE).sum() >= 80
 
@@ -188,7 +192,7 @@ def test_source_lines_are_those_of_the_file() -> None:
 
 
 def test_of_long_files_only_the_named_lines_are_carried(monkeypatch: Any) -> None:
-    monkeypatch.setattr("postproc.html.listing.WHOLE", 20)
+    monkeypatch.setattr("postproc.report.html.program.WHOLE", 20)
     outcome = outcome_of(60)
     columns = columns_of(outcome)[np.array([0, 1, 7])]
     shown = listing(outcome.sources, columns)["panel.pdl"]

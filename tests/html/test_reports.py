@@ -8,18 +8,21 @@ import numpy as np
 import pytest
 
 from postproc.exceptions import OutputError, ProgramError
-from postproc.html import (
+from postproc.report.html import (
     calibration_report,
     comparison_report,
     diagnosis_report,
     report_file,
 )
-from postproc.html.calibration import correlated
-from postproc.html.diagnosis import distinct, running_mean
-from postproc.html.figure import distribution, in_space, magnification
-from postproc.html.history import steps
-from postproc.html.iso9283 import pose_figures
-from postproc.report_json import report_text
+from postproc.report.html.diagnosis import distinct, running_mean
+from postproc.report.html.figure import (
+    distribution,
+    in_space,
+    magnification,
+    pose_figures,
+)
+from postproc.report.html.model import correlated, steps
+from postproc.report.json import report_text
 from tests.html.builders import outcome_of, program_text
 from tests.html.test_program import NASTY, Elements
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from postproc.html.figure import (
+from postproc.report.html.figure import (
     AFTER,
     OTHER,
     Figure,
@@ -18,8 +18,8 @@ from postproc.html.figure import (
     rounded,
     thin,
 )
-from postproc.html.history import name_of, steps
-from postproc.html.page import render
+from postproc.report.html.model import name_of, steps
+from postproc.report.html.page import render
 
 SCRIPTS = ("page.js", "figures.js")
 VERDICTS = {

@@ -6,6 +6,7 @@ import base64
 import gzip
 import hashlib
 import json
+import re
 from collections.abc import Mapping, Sequence
 from functools import cache
 from importlib.resources import files
@@ -16,7 +17,47 @@ import plotly.offline
 from markupsafe import Markup
 
 from postproc import __version__
-from postproc.html.text import visible
+
+# Text from files, made safe to look at.
+
+# Controls, marks that reorder or hide text, and halves of surrogate pairs: whoever
+# reads the page must see them, and no viewer may act on them.
+_HIDDEN = re.compile(
+    "[\x00-\x08\x0a-\x1f\x7f-\x9f\xad\u061c\u180e\u200b-\u200f\u2028-\u202e"
+    "\u2060-\u206f\ud800-\udfff\ufeff\ufff9-\ufffb]"
+)
+TAB = 4  # columns
+
+
+def visible(text: str) -> str:
+    r"""Show control characters and reordering marks as escapes.
+
+    >>> visible("p\x1b[31m1")
+    'p\\x1b[31m1'
+    >>> visible("a\u202eb")
+    'a\\u202eb'
+    """
+    if text.isascii() and text.isprintable():
+        return text
+    return _HIDDEN.sub(_escape, text.expandtabs(TAB))
+
+
+def _escape(found: re.Match[str]) -> str:
+    """Write one character as an escape."""
+    code = ord(found.group())
+    return f"\\x{code:02x}" if code < 0x100 else f"\\u{code:04x}"
+
+
+def short(text: str, limit: int) -> str:
+    """Cut a text that is too long to show.
+
+    >>> short("MOVE TO p1", 6)
+    'MOVE …'
+    """
+    return text if len(text) <= limit else text[: limit - 1] + "…"
+
+
+# One self-contained page: template, style, scripts and data in one text.
 
 PLAIN_BYTES = 3_000_000  # data up to this size stay readable in the file
 PLAIN, PACKED = "application/json", "application/gzip"
@@ -99,7 +140,11 @@ def _digest(text: str) -> str:
 @cache
 def asset(name: str) -> str:
     """Read a file of ``assets/``."""
-    return files("postproc.html").joinpath("assets", name).read_text(encoding="utf-8")
+    return (
+        files("postproc.report.html")
+        .joinpath("assets", name)
+        .read_text(encoding="utf-8")
+    )
 
 
 @cache
@@ -112,7 +157,7 @@ def plotly_js() -> str:
 def _environment() -> jinja2.Environment:
     """Make the environment: everything is escaped, nothing undefined passes."""
     return jinja2.Environment(
-        loader=jinja2.PackageLoader("postproc.html"),
+        loader=jinja2.PackageLoader("postproc.report.html"),
         autoescape=True,
         undefined=jinja2.StrictUndefined,
         finalize=lambda value: visible(value) if type(value) is str else value,

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from postproc.html.figure import BINS, Figure, bars, figure
-from postproc.html.page import render
+from postproc.report.html.figure import BINS, Figure, bars, figure
+from postproc.report.html.page import render
 
 SCRIPTS = ("page.js", "figures.js")
 Entry = tuple[str, str, Mapping[str, Any]]  # path, status and facts of a file

@@ -1,29 +1,75 @@
-"""The page of a model: what was fitted, how well, and what the rows could not see."""
+"""The page of a model: what was fitted, how well, and what rows could not see."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
 
 from postproc.arrays import Floats
-from postproc.html.figure import (
+from postproc.calibration.measurements import Measurements
+from postproc.calibration.report import FitReport
+from postproc.model.kinematics import Batch
+from postproc.model.model import Model
+from postproc.report.html.figure import (
     AFTER,
     OTHER,
     Figure,
+    PoseFigures,
     along_axes,
     distribution,
     figure,
     in_space,
     log_axis,
     points,
+    pose_figures,
     rounded,
     thin,
 )
-from postproc.html.history import steps
-from postproc.html.iso9283 import PoseFigures, pose_figures
-from postproc.html.page import render
+from postproc.report.html.page import render
+from postproc.report.html.program import finite
+from postproc.robot.arm import Arm
+from postproc.robot.pose import MM
+
+# The steps in which a model came about, as rows of a page.
+
+
+def name_of(effect: Mapping[str, Any]) -> str:
+    """Name an effect with its joint and what drives it.
+
+    >>> name_of({"effect": "coupling", "joint": 6, "source": "joint 5"})
+    'coupling of joint 6 by joint 5'
+    """
+    joint, source = effect.get("joint"), effect.get("source")
+    name = str(effect["effect"])
+    name += "" if joint is None else f" of joint {joint}"
+    own = source is None or source == f"joint {joint}"
+    return name if own else f"{name} by {source}"
+
+
+def steps(history: Sequence[Mapping[str, Any]] | None) -> list[dict[str, Any]]:
+    """Take what the table of steps shows; what a step does not tell stays empty."""
+    return [_step(entry) for entry in history or ()]
+
+
+def _step(entry: Mapping[str, Any]) -> dict[str, Any]:
+    """Take one step."""
+    added = entry.get("added") or ([entry] if "effect" in entry else [])
+    means = {
+        when: (entry.get(when) or {}).get("mean_mm") for when in ("before", "after")
+    }
+    return {
+        "parent": str(entry.get("parent") or ""),
+        "verdict": str(entry.get("verdict") or ""),
+        "added": [name_of(effect) for effect in added],
+        "rows": entry.get("n_held_out", ""),
+        **means,
+    }
+
+
+# The page of a model: what was fitted, how well, and what the rows could not see.
 
 SCRIPTS = ("page.js", "figures.js")
 SHOWN_UNITS = {"m": ("mm", 1e3), "rad": ("mrad", 1e3), "rad/(N m)": ("urad/(N m)", 1e6)}
@@ -39,7 +85,7 @@ def calibration_report(
 
     Args:
         model: The model file.
-        fit: The report of the fit with its rows, see `postproc.html.evidence`;
+        fit: The report of the fit with its rows, see `postproc.report.html.model`;
             default: what stands under ``fit`` in the file, or nothing. Without it the
             page has no residuals.
 
@@ -176,3 +222,87 @@ def correlated(model: Mapping[str, Any]) -> list[tuple[str, str, float]]:
     rows = np.flatnonzero((i < j) & (np.abs(r) > CORRELATED))
     rows = rows[np.argsort(-np.abs(r[rows]), kind="stable")]
     return [(names[i[k]], names[j[k]], float(r[k])) for k in rows]
+
+
+# What a calibration page shows beyond the model file: the rows and the report.
+
+
+def fit_evidence(
+    report: FitReport, model: Model, survey: Measurements, arm: Arm
+) -> dict[str, Any]:
+    """Put the report of a fit and its rows into JSON values.
+
+    Returns:
+        The fields of the report, ``unseen`` in words, and ``rows``: lists of ``id``,
+        ``q_deg``, ``lambda``, ``position_mm``, ``before_mm`` (measured error) and
+        ``after_mm`` (what the model leaves of it), in visit order, base frame.
+    """
+    states = survey.states
+    before = survey.position - Batch(arm, states).walk.tcp
+    after = before - model.measured_error(arm, states)
+    told = asdict(report) | {"unseen": [str(u) for u in report.unseen]}
+    rows = {
+        "id": list(survey.ids),
+        "q_deg": _lists(np.rad2deg(states.q), 6),
+        "lambda": np.asarray(states.direction, dtype=int).tolist(),
+        "position_mm": _lists(survey.position / MM, 4),
+        "before_mm": _lists(before / MM, 5),
+        "after_mm": _lists(after / MM, 5),
+    }
+    evidence: dict[str, Any] = finite(told | {"rows": rows})
+    return evidence
+
+
+def _lists(values: Floats, digits: int) -> list[list[float]]:
+    """Round, as nested lists."""
+    lists: list[list[float]] = np.round(values, digits).tolist()
+    return lists
+
+
+# The page of a comparison: every method on the same rows.
+
+
+def comparison_report(comparison: Mapping[str, Any]) -> str:
+    """Make the page of what ``compare --json`` wrote.
+
+    Raises:
+        KeyError, ValueError, TypeError: It is no such report.
+    """
+    rows = sorted(comparison["rows"], key=lambda row: -float(row["mean_mm"]))
+    return render(
+        "comparison.html.j2",
+        "Methods compared",
+        {"figures": {"methods": methods(rows)}},
+        SCRIPTS,
+        rows=rows,
+        split=comparison["split"],
+    )
+
+
+def methods(rows: Sequence[Mapping[str, Any]]) -> Figure:
+    """Show mean, standard deviation and range of every method."""
+    names = [row["method"] for row in rows]
+    ranges: dict[str, list[Any]] = {"x": [], "y": []}
+    for row in rows:
+        ranges["x"] += [row["min_mm"], row["max_mm"], None]
+        ranges["y"] += [row["method"]] * 2 + [None]
+    spans = {
+        **ranges,
+        "type": "scatter",
+        "mode": "lines+markers",
+        "name": "min to max",
+        "line": {"color": OTHER, "width": 1},
+        "marker": {"symbol": "line-ns-open", "size": 10, "color": OTHER},
+    }
+    means = {
+        "type": "scatter",
+        "mode": "markers",
+        "name": "mean ± std",
+        "x": [row["mean_mm"] for row in rows],
+        "y": names,
+        "marker": {"symbol": "diamond", "size": 11, "color": AFTER},
+        "error_x": {"array": [row["std_mm"] for row in rows], "color": AFTER},
+    }
+    axis = {"autorange": "reversed", "type": "category", "automargin": True}
+    zero = {"rangemode": "tozero"}
+    return figure([spans, means], "error [mm]", "", yaxis=axis, xaxis=zero)

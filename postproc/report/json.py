@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from postproc.arrays import Each, Floats, Ints, pieces
 from postproc.byte_columns import (
-    Column,
+    ByteColumn,
     beside,
     blanked,
     fixed,
@@ -67,15 +67,15 @@ def target_row(outcome: Outcome, i: int) -> dict[str, object]:
     return row
 
 
-def _objects(columns: Mapping[str, Column]) -> str:
+def _objects(columns: Mapping[str, ByteColumn]) -> str:
     """Write visits as JSON objects of the given keys, each with a comma behind it."""
-    parts: list[Column | bytes] = []
+    parts: list[ByteColumn | bytes] = []
     for number, (key, column) in enumerate(columns.items()):
         parts += [f'{", " if number else "{"}"{key}": '.encode(), column]
     return joined([*parts, b"},\n"]).decode("ascii")
 
 
-def _columns(outcome: Outcome, rows: Ints) -> dict[str, Column]:
+def _columns(outcome: Outcome, rows: Ints) -> dict[str, ByteColumn]:
     """Write the values of every key as JSON, for some visits."""
     v, d = outcome.visits, outcome.decisions
     move = np.where(v.via[rows], len(Motion), v.motion[rows])
@@ -107,14 +107,14 @@ def _columns(outcome: Outcome, rows: Ints) -> dict[str, Column]:
     }
 
 
-def _steps(outcome: Outcome, rows: Ints) -> Column:
+def _steps(outcome: Outcome, rows: Ints) -> ByteColumn:
     """Write how far the correction moves from the fly point before, null without."""
     before, correction = outcome.visits.run_mates[rows], outcome.decisions.correction
     step = np.linalg.norm(correction[rows] - correction[before], axis=1) / MM
     return fixed(np.where(before < 0, np.nan, step), 5)
 
 
-def _literals(outcome: Outcome, rows: Ints) -> Column:
+def _literals(outcome: Outcome, rows: Ints) -> ByteColumn:
     """Write where the numbers of every visit stand."""
     v = outcome.visits
     literal = v.literal[rows]
@@ -128,18 +128,18 @@ def _literals(outcome: Outcome, rows: Ints) -> Column:
     return blanked(told, v.literal[rows] < 0, b"null")
 
 
-def _rounded(values: Floats, decimals: int) -> Column:
+def _rounded(values: Floats, decimals: int) -> ByteColumn:
     """Write rows of numbers (k, p) for a person; what is not known becomes null."""
     return listed([fixed(values[:, k], decimals) for k in range(values.shape[1])])
 
 
-def _signs(values: NDArray[np.int8]) -> Column:
+def _signs(values: NDArray[np.int8]) -> ByteColumn:
     """Write rows of -1, 0 and 1 (k, p)."""
     signs = values.astype(np.int64) + 1
     return listed([named(["-1", "0", "1"], column, str) for column in signs.T])
 
 
-def _as_written(values: Floats, written: NDArray[np.bool_]) -> Column:
+def _as_written(values: Floats, written: NDArray[np.bool_]) -> ByteColumn:
     """Write the numbers of the file (k, 6); nothing where the file holds none."""
     told = listed([shortest(values[:, k]) for k in range(values.shape[1])])
     return blanked(told, ~written, b"[]")

@@ -1,0 +1,1 @@
+"""Reports: what differs, what came out, as text, JSON, pages and pictures."""

@@ -1,0 +1,761 @@
+"""What differs between two programs: the numbers of targets, or more."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from difflib import SequenceMatcher
+from functools import cached_property, partial
+from itertools import compress, islice
+from operator import ne
+from pathlib import Path
+from typing import NamedTuple, Self
+
+import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
+
+from postproc.arrays import Bools, Bytes, Floats, Ints, pieces
+from postproc.compensation.outcome import LEFT_ALONE, Arrivals, Status, read_arrivals
+from postproc.compensation.parallel import in_turns, meanwhile
+from postproc.exceptions import ProgramError
+from postproc.files import VARIABLES
+from postproc.language.pdl2.names import entry_names
+from postproc.language.scan import (
+    BLANKS,
+    Masked,
+    Plain,
+    in_code,
+    line_of,
+    mask_lines,
+    numeric_bytes,
+    plain_numbers,
+    quotes_and_comments,
+    runs_of,
+    values,
+    with_signs,
+)
+from postproc.language.stamp import read_stamp
+
+# Rows of `diff` as columns: no object a line, whatever the length of a program.
+
+STATUSES = tuple(Status(k).name.lower() for k in range(len(Status)))
+
+
+class Row(NamedTuple):
+    """One line that differs, or whose target was left alone.
+
+    Attributes:
+        file: Name of the original file.
+        line: 1-based line in the original; 0 for a line that it does not have.
+        target: What the numbers belong to: a variable, or the statement's first word.
+        original, compensated: The numbers on the line; empty where the text differs.
+        change_mm: Length of the change of the first three of six numbers or more, for
+            a position; None for joint angles and text.
+        text: The line's two texts where more than numbers differ, else "".
+        status, why: What came of the line's target, "" where no record tells.
+        direction: In which every joint arrives, see `compensation.outcome`; or ().
+        correction_mm: How far the TCP is moved there, or None.
+        visits: Visits of the line by status where they have several, the most urgent
+            first; else empty.
+    """
+
+    file: str
+    line: int
+    target: str
+    original: tuple[float, ...]
+    compensated: tuple[float, ...]
+    change_mm: float | None
+    text: str = ""
+    status: str = ""
+    why: str = ""
+    direction: tuple[int, ...] = ()
+    correction_mm: float | None = None
+    visits: dict[str, int] = {}  # noqa: RUF012
+
+
+@dataclass(frozen=True, eq=False)
+class Rows(Sequence[Row]):
+    """The rows of one file (structure of arrays); as a sequence it makes them.
+
+    Attributes:
+        file: Name of the original file.
+        line: See `Row`, (k,).
+        targets: Names of what numbers belong to.
+        target: Index into them, (k,).
+        first: CSR offsets into the numbers, (k + 1,).
+        original, compensated: The numbers, (m,).
+        change_mm: See `Row`, NaN where there is none, (k,).
+        has_change: Where there is one, (k,).
+        texts: The texts of those rows that have one, by row.
+        told: What the record says of the file's targets, where there is one.
+        entry: Index into it, -1 where it says nothing, (k,).
+    """
+
+    file: str
+    line: Ints
+    targets: Sequence[str]
+    target: Ints
+    first: Ints
+    original: Floats
+    compensated: Floats
+    change_mm: Floats
+    has_change: Bools
+    texts: Mapping[int, str] = field(default_factory=dict)
+    told: Arrivals | None = None
+    entry: Ints = field(default_factory=lambda: np.empty(0, dtype=np.int64))
+
+    @classmethod
+    def bare(cls, file: str, line: Ints, targets: Sequence[str]) -> Rows:
+        """Make rows without numbers, each with a target of its own."""
+        k = len(line)
+        ints, none = np.zeros(k + 1, dtype=np.int64), np.empty(0)
+        nan, no = np.full(k, np.nan), np.zeros(k, dtype=bool)
+        return cls(file, line, targets, np.arange(k), ints, none, none, nan, no)
+
+    def with_told(self, told: Arrivals | None) -> Rows:
+        """Add what a record says."""
+        if told is None:
+            return self
+        return replace(self, told=told, entry=told.find(self.line))
+
+    def __len__(self) -> int:
+        """Count the rows."""
+        return len(self.line)
+
+    def __iter__(self) -> Iterator[Row]:
+        """Make all rows, in order."""
+        return map(self.row, range(len(self)))
+
+    def __getitem__(self, k):  # type: ignore[no-untyped-def]
+        """Make the k-th row, or those of a slice."""
+        rows = range(len(self))[k]
+        return self.row(rows) if isinstance(rows, int) else [*map(self.row, rows)]
+
+    def row(self, k: int) -> Row:
+        """Make the k-th row."""
+        own = slice(*self.first[k : k + 2].tolist())
+        row = Row(
+            self.file,
+            int(self.line[k]),
+            self.targets[self.target[k]],
+            tuple(self.original[own].tolist()),
+            tuple(self.compensated[own].tolist()),
+            float(self.change_mm[k]) if self.has_change[k] else None,
+            self.texts.get(k, ""),
+        )
+        told, at = self.told, int(self.entry[k]) if self.told else -1
+        if told is None or at < 0:
+            return row
+        return row._replace(
+            status=STATUSES[told.status[at]],
+            why=told.reasons[told.why[at]],
+            direction=tuple(told.direction[at].tolist()),
+            correction_mm=float(told.correction_mm[at]),
+            visits=dict(told.mixed.get(at, {})),
+        )
+
+
+def joined_rows(file: str, parts: Sequence[Rows]) -> Rows:
+    """Put rows of one file one after the other, before a record tells of them."""
+    if not parts:
+        return Rows.bare(file, np.empty(0, dtype=np.int64), ())
+    named = np.cumsum([0, *(len(p.targets) for p in parts)]).tolist()
+    rows = np.cumsum([0, *(len(p) for p in parts)]).tolist()
+    counts = [np.diff(p.first) for p in parts]
+    return Rows(
+        file,
+        np.concatenate([p.line for p in parts]),
+        [name for p in parts for name in p.targets],
+        np.concatenate([p.target + n for p, n in zip(parts, named, strict=False)]),
+        np.cumsum(np.concatenate([[0], *counts])),
+        np.concatenate([p.original for p in parts]),
+        np.concatenate([p.compensated for p in parts]),
+        np.concatenate([p.change_mm for p in parts]),
+        np.concatenate([p.has_change for p in parts]),
+        {
+            n + k: text
+            for p, n in zip(parts, rows, strict=False)
+            for k, text in p.texts.items()
+        },
+    )
+
+
+# Pairs of lines whose numbers stand at the same places: read without their shapes.
+#
+# What is not a digit or a dot is compared as it is; then every run of digits of one
+# line has its partner in the other, and strings, comments and signs have to be looked
+# for in one of both only. Lines with other blanks or signs, or with anything that
+# `masking` leaves to `lexis`, are not told alike here, which does not say that they are
+# not.
+
+LONGEST = 24  # digits outside of numbers that are compared; longer: not told alike
+
+
+@dataclass(frozen=True)
+class Pairs:
+    """Pairs of lines and the numbers on those that are alike (structure of arrays).
+
+    Attributes:
+        alike: Lines that are known to differ in nothing but numbers, (n,).
+        owner: Line of every number, ascending, (m,).
+        old, new: The numbers, (m,).
+        place: Where they start in the first line of their pair, (m,).
+    """
+
+    alike: Bools
+    owner: Ints
+    old: Floats
+    new: Floats
+    place: Ints
+
+    def with_more(self, rows: Ints, more: Pairs) -> Pairs:
+        """Add what a closer look has found on some lines that are not alike here."""
+        alike = self.alike.copy()
+        alike[rows] = more.alike
+        owner = np.concatenate([self.owner, rows[more.owner]])
+        order = np.argsort(owner, kind="stable")
+        columns = ("old", "new", "place")
+        both = [np.append(getattr(self, c), getattr(more, c))[order] for c in columns]
+        return Pairs(alike, owner[order], *both)
+
+
+@dataclass(frozen=True)
+class _Text:
+    """Lines as one text, and its runs of digits and dots.
+
+    Attributes:
+        a: The bytes; every line ends with a line feed.
+        line: Where its lines begin, (n,).
+        start, end: Its runs, (r,).
+        rest: The bytes with one NUL in the place of every run.
+    """
+
+    a: Bytes
+    line: Ints
+    start: Ints
+    end: Ints
+    rest: Bytes
+
+    @classmethod
+    def of(cls, lines: Sequence[bytes]) -> Self:
+        """Join lines."""
+        a = np.frombuffer(b"\n".join([*lines, b""]), dtype=np.uint8)
+        line = np.append(0, np.flatnonzero(a == 10)[:-1] + 1)
+        numeric = numeric_bytes(a)
+        start, end = runs_of(numeric)
+        rest = a.copy()
+        rest[start] = 0
+        numeric[start] = False
+        return cls(a, line, start, end, rest[~numeric])
+
+    @property
+    def marked(self) -> bool:
+        """Tell whether every NUL in what is left of it stands for a run."""
+        return bool((self.a != 0).all())
+
+    def on(self, lines: Bools) -> Self:
+        """Return the runs on some lines only."""
+        mine = lines[line_of(self.line, self.start)]
+        return replace(self, start=self.start[mine], end=self.end[mine])
+
+
+def pair_numbers(before: Sequence[bytes], after: Sequence[bytes]) -> Pairs:
+    """Read the numbers of pairs of lines.
+
+    Args:
+        before: Lines without their endings, at least one.
+        after: As many.
+    """
+    a, b = _Text.of(before), _Text.of(after)
+    if not (a.marked and b.marked):
+        none, ints = np.empty(0), np.empty(0, dtype=np.int64)
+        return Pairs(np.zeros(len(before), dtype=bool), ints, none, none, ints)
+    if np.array_equal(a.rest, b.rest):
+        return _read(a, b, np.ones(len(before), dtype=bool))
+    same = _same_lines(a.rest, b.rest)
+    return _read(a.on(same), b.on(same), same)
+
+
+def _same_lines(a: Bytes, b: Bytes) -> Bools:
+    """Tell which of equally many lines, each with its line feed, are the same."""
+    lengths = [np.diff(np.flatnonzero(text == 10), prepend=-1) for text in (a, b)]
+    same: Bools = lengths[0] == lengths[1]
+    if not same.all():
+        both = zip((a, b), lengths, strict=True)
+        a, b = (text[np.repeat(same, length)] for text, length in both)
+    lines, ends = np.flatnonzero(same), np.cumsum(lengths[0][same])
+    same[lines[np.searchsorted(ends, np.flatnonzero(a != b), side="right")]] = False
+    return same
+
+
+def _read(a: _Text, b: _Text, alike: Bools) -> Pairs:
+    """Read the numbers on lines whose runs have partners."""
+    quotes, comment, odd = quotes_and_comments(a.a, a.line)
+    odd |= ~alike
+    code = np.flatnonzero(in_code(a.start, quotes, comment, a.line))
+    runs = plain_numbers(a.a, a.start[code], a.end[code])
+    others = plain_numbers(b.a, b.start[code], b.end[code])
+    unsure = runs.odd | others.odd | (runs.number != others.number)
+    odd[line_of(a.line, runs.first[unsure])] = True
+    bare = np.ones(len(a.start), dtype=bool)
+    bare[code[runs.number]] = False
+    other = np.flatnonzero(bare)
+    changed = other[~_same_runs(a, b, other)]
+    odd[line_of(a.line, a.start[changed])] = True
+    runs, others = runs.take(runs.number), others.take(runs.number)
+    start, far = with_signs(a.a, runs.first)
+    odd[line_of(a.line, far)] = True
+    return _numbers(a, b, runs, others, start, odd)
+
+
+def _numbers(
+    a: _Text, b: _Text, runs: Plain, others: Plain, start: Ints, odd: Bools
+) -> Pairs:
+    """Read the numbers on lines that are not odd."""
+    owner = line_of(a.line, start)
+    plain = ~odd[owner]
+    if not plain.all():
+        runs, others = runs.take(plain), others.take(plain)
+        start, owner = start[plain], owner[plain]
+    partner = others.first - (runs.first - start)  # the same sign, as far before it
+    old, new = values(a.a, runs, start), values(b.a, others, partner)
+    return Pairs(~odd, owner, old, new, start - a.line[owner])
+
+
+def _same_runs(a: _Text, b: _Text, some: Ints) -> Bools:
+    """Tell which of some runs are the same bytes in both texts."""
+    start, other = a.start[some], b.start[some]
+    length = a.end[some] - start
+    same: Bools = (length == b.end[some] - other) & (length <= LONGEST)
+    for k in range(int(length[same].max(initial=0))):
+        at = np.flatnonzero(same & (k < length))
+        same[at] = a.a[start[at] + k] == b.a[other[at] + k]
+    return same
+
+
+# Lines of the same two places in two files: which numbers differ, or what more.
+
+PIECE = 5_000  # lines that are masked at a time
+WIDEST = 64  # bytes of beginnings that are compared; wider: line by line
+
+_ASSIGNED = re.compile(r"\s*([A-Za-z_$][\w$.\[\]]*)\s*(?::=|:)")
+_TWO_WORDS = re.compile(r"\s*([A-Za-z_]+)\s+([A-Za-z_]+)")
+_WORD = re.compile(r"[A-Za-z_]+")
+_LEAD = re.compile(
+    r"\s*(?:ELSE\s*:|CASE\s*\(.*?\)\s*:|WHEN\b.*?\bDO\b|[A-Za-z_]\w*\s*::)"
+    r"(?=\s*[A-Za-z_$])",
+    re.I,
+)  # what may stand before a statement on its line
+_LED = re.compile(r"\s*(?:ELSE\s*:|CASE\s*\(|WHEN\b|[A-Za-z_]\w*\s*::)", re.I)
+_AS_BLANKS = bytes(32 if chr(c) in BLANKS else c for c in range(256))
+
+
+def changed_rows(
+    file: str, lines: Sequence[int], before: Sequence[bytes], after: Sequence[bytes]
+) -> Rows:
+    """Describe those of equally many lines that differ.
+
+    Args:
+        file: Name of the original.
+        lines: Numbers of its lines.
+        before: Its lines, without their endings.
+        after: Those of the other file.
+    """
+
+    def compare(some: slice) -> Rows:
+        old, new = before[some], after[some]
+        differ = np.fromiter(map(ne, old, new), bool, len(old))
+        numbers = np.array(lines[some], dtype=np.int64)[differ]
+        if not differ.all():
+            old, new = (list(compress(texts, differ)) for texts in (old, new))
+        return _compare(file, numbers, old, new)
+
+    tasks = list(pieces(len(before), PIECE))
+    return joined_rows(file, list(in_turns(compare, tasks)))
+
+
+def _compare(
+    file: str, lines: Ints, before: Sequence[bytes], after: Sequence[bytes]
+) -> Rows:
+    """Describe how pairs of lines differ."""
+    if not len(lines):
+        return joined_rows(file, ())
+    pairs = pair_numbers(before, after)
+    rest = np.flatnonzero(~pairs.alike)
+    if len(rest):
+        own = [[texts[k] for k in rest.tolist()] for texts in (before, after)]
+        pairs = pairs.with_more(rest, _by_shapes(*own))
+    differ = pairs.owner[pairs.old != pairs.new]
+    moved = np.bincount(differ, minlength=len(lines)) > 0
+    mine = moved[pairs.owner]
+    owner, old, new = pairs.owner[mine], pairs.old[mine], pairs.new[mine]
+    first = np.append(np.searchsorted(owner, np.arange(len(lines))), len(owner))
+    has, change = _changes(first, old, new, before)
+    begins = np.full(len(lines), -1)
+    begins[moved] = pairs.place[mine][first[:-1][moved]]
+    names, target = _targets(before, begins)
+    texts = {
+        k: f"{before[k].decode('latin-1')} -> {after[k].decode('latin-1')}"
+        for k in np.flatnonzero(~moved).tolist()
+    }
+    return Rows(file, lines, names, target, first, old, new, change, has, texts)
+
+
+def _by_shapes(before: Sequence[bytes], after: Sequence[bytes]) -> Pairs:
+    """Read the numbers of pairs of lines that have the same shape."""
+    a, b = _masked(before), _masked(after)
+    count = np.diff(a.first)
+    alike = _only_numbers(before, after, a, b) & (count == np.diff(b.first))
+    mine, own = (np.repeat(alike, np.diff(m.first)) for m in (a, b))
+    owner = np.repeat(np.arange(len(before)), count)[mine]
+    place = a.start[mine] - _starts(before)[owner]
+    return Pairs(alike, owner, a.value[mine], b.value[own], place)
+
+
+def _only_numbers(
+    before: Sequence[bytes], after: Sequence[bytes], a: Masked, b: Masked
+) -> Bools:
+    """Tell which pairs of lines differ in nothing but numbers."""
+    same = np.array([x == y for x, y in zip(a.masks, b.masks, strict=True)])
+    if (a.comment >= 0).any() or (b.comment >= 0).any():
+        comments = zip(_comments(before, a), _comments(after, b), strict=True)
+        same &= np.array([x == y for x, y in comments])
+    same[[*a.unterminated, *b.unterminated]] = False
+    return same
+
+
+def _comments(lines: Sequence[bytes], masked: Masked) -> list[bytes]:
+    """Return the comment of every line, b"" where it has none."""
+    places = zip(lines, masked.comment - _starts(lines), masked.comment, strict=True)
+    return [line[own:] if at >= 0 else b"" for line, own, at in places]
+
+
+def _changes(
+    first: Ints, old: Floats, new: Floats, before: Sequence[bytes]
+) -> tuple[Bools, Floats]:
+    """Return which lines hold a position, and how far it moved, NaN elsewhere."""
+    has = np.diff(first) >= 3
+    text = np.frombuffer(b"\n".join(before), dtype=np.uint8)
+    braces = np.flatnonzero(text == ord("{"))
+    has[np.searchsorted(_starts(before), braces, side="right") - 1] = False
+    at = first[:-1][has, None] + np.arange(3)
+    change = np.full(len(has), np.nan)
+    with np.errstate(invalid="ignore"):  # numbers too long for a float are infinite
+        change[has] = np.linalg.norm(new[at] - old[at], axis=1)
+    return has, change
+
+
+def _targets(before: Sequence[bytes], begins: Ints) -> tuple[list[str], Ints]:
+    """Name what the numbers of lines belong to, once for lines that begin alike.
+
+    Args:
+        before: The lines.
+        begins: Where their first number starts, -1 for a line without a name.
+
+    Returns:
+        Names, and the index of each line's, (n,).
+    """
+    lead = np.flatnonzero(~_begin_as_before(before, begins))
+    known: dict[bytes, str | None] = {}
+    told: list[str | None] = []
+    for k, length in zip(lead.tolist(), begins[lead].tolist(), strict=True):
+        begin = before[k][: max(length, 0)]
+        if begin not in known:
+            known[begin] = _told_by(begin.translate(_AS_BLANKS).decode("latin-1"))
+        told.append(known[begin] if length >= 0 else "")
+    names: dict[str, int] = {}
+    code = [-1 if t is None else names.setdefault(t, len(names)) for t in told]
+    index = np.repeat(code, np.diff(lead, append=len(before)))
+    for k in np.flatnonzero(index < 0).tolist():
+        name = target_name(before[k].decode("latin-1"))
+        index[k] = names.setdefault(name, len(names))
+    return list(names), index
+
+
+def _begin_as_before(lines: Sequence[bytes], length: Ints) -> Bools:
+    """Tell which lines begin with the same so many bytes as the one before them."""
+    same: Bools = np.diff(length, prepend=-2) == 0
+    width = int(length.max(initial=0))
+    if width > WIDEST:
+        return np.zeros_like(same)
+    if not width:
+        return same
+    text = np.frombuffer(b"\n".join([*lines, bytes(width)]), dtype=np.uint8)
+    begin = sliding_window_view(text, width)[_starts(lines)]
+    other = (begin[1:] != begin[:-1]) & (np.arange(width) < length[1:, None])
+    same[1:] &= ~other.any(axis=1)
+    return same
+
+
+def _told_by(begin: str) -> str | None:
+    """Name what numbers belong to by what is before the first, None if not told."""
+    if _LED.match(begin):
+        return None
+    words, assigned = _TWO_WORDS.match(begin), _ASSIGNED.match(begin)
+    if words:
+        return f"{words[1]} {words[2]}"
+    return assigned[1] if assigned else None
+
+
+def target_name(line: str) -> str:
+    """Name what a line's numbers belong to.
+
+    >>> target_name("CASE (2): MOVE LINEAR TO POS(1, 2, 3, 4, 5, 6, '')")
+    'MOVE LINEAR'
+    """
+    while lead := _LEAD.match(line):
+        line = line[lead.end() :]
+    assigned = _ASSIGNED.match(line)
+    if assigned:
+        return assigned.group(1)
+    return " ".join(found.group() for found in islice(_WORD.finditer(line), 2))
+
+
+def _starts(lines: Sequence[bytes]) -> Ints:
+    """Return where lines begin once they are joined."""
+    return np.cumsum([0, *map(len, lines[:-1])]) + np.arange(len(lines))
+
+
+def _masked(lines: Sequence[bytes]) -> Masked:
+    """Mask lines without their endings; at least one."""
+    return mask_lines(b"\n".join([*lines, b""]), _starts(lines))
+
+
+def shapes(lines: Sequence[bytes]) -> list[bytes]:
+    """Return the masks of all lines."""
+    return _masked(lines).masks if lines else []
+
+
+# The lines of a long file, cut out of its bytes where they are asked for.
+
+AT_ONCE = 1_000_000  # bytes in which line feeds are looked for
+
+
+@dataclass(frozen=True, eq=False)
+class TextLines(Sequence[bytes]):
+    r"""Lines without their endings, as ``data.split(b"\n")`` gives them.
+
+    A million lines as objects of their own take as long to make as to compare, and
+    half as much memory again; where a process is forked, they are not shared.
+
+    Attributes:
+        data: The file.
+        first: Where its lines begin, and one more behind the last one, (n + 1,).
+    """
+
+    data: bytes
+    first: Ints
+
+    @classmethod
+    def of(cls, data: bytes, skipped: int = 0) -> Self:
+        r"""Find the lines of a file, but for some in front.
+
+        >>> list(TextLines.of(b"a\n\nb\n", 1))
+        [b'', b'b', b'']
+        """
+        a = np.frombuffer(data, dtype=np.uint8)
+        found = (
+            np.flatnonzero(a[some] == 10) + some.start
+            for some in pieces(len(a), AT_ONCE)
+        )
+        ends = np.concatenate([*found, np.array([len(a)])])
+        return cls(data, np.append(0, ends + 1)[skipped:])
+
+    def __len__(self) -> int:
+        """Count the lines."""
+        return len(self.first) - 1
+
+    def __iter__(self) -> Iterator[bytes]:
+        """Cut out all lines."""
+        return iter(self[:])
+
+    def __getitem__(self, k):  # type: ignore[no-untyped-def]
+        """Cut out the k-th line, or a list of those of a slice."""
+        rows = range(len(self))[k]
+        if isinstance(rows, int):
+            return self.data[self.first[rows] : self.first[rows + 1] - 1]
+        if rows.step != 1:
+            return [self[row] for row in rows]
+        begin, end = self.first[[rows.start, rows.stop]] if rows else (0, 0)
+        return self.data[begin : end - 1].split(b"\n") if rows else []
+
+
+# Two files line by line: which numbers differ, or what more.
+
+
+@dataclass(frozen=True)
+class Compared:
+    """Two files, and how they differ.
+
+    Attributes:
+        original, compensated: The files.
+        lines: Those of the original, without their endings.
+        rows: Lines that differ.
+        stamped: The second file carries a stamp.
+    """
+
+    original: Path
+    compensated: Path
+    lines: Sequence[bytes]
+    rows: Rows
+    stamped: bool
+
+    def targets(self, lines: Ints) -> list[str]:
+        """Name what the numbers on lines of the original, ascending, belong to."""
+        if self.original.suffix.lower() == VARIABLES:
+            return list(entry_names(self.lines, lines.tolist()))
+        texts = (self.lines[line - 1].decode("latin-1") for line in lines.tolist())
+        return [target_name(text) for text in texts]
+
+
+def _read_lines(path: Path) -> tuple[TextLines, bool]:
+    """Read a file's lines without their endings; the stamp line is dropped."""
+    try:
+        data = path.read_bytes()
+    except OSError as exc:
+        problem = f"cannot be read ({exc.strerror})"
+        raise ProgramError(path, problem, "Check the path") from None
+    stamped = read_stamp(data) is not None
+    if b"\r" in data:
+        data = data.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
+    return TextLines.of(data, stamped), stamped
+
+
+def compare_files(original: Path, compensated: Path) -> Compared:
+    """Compare two files line by line.
+
+    Raises:
+        ProgramError: A file cannot be read.
+    """
+    before, _ = _read_lines(original)
+    after, stamped = _read_lines(compensated)
+    rows = joined_rows(original.name, list(_rows(original.name, before, after)))
+    if original.suffix.lower() == VARIABLES:
+        rows = _named_by_entries(rows, before)
+    return Compared(original, compensated, before, rows, stamped)
+
+
+def _rows(file: str, before: Sequence[bytes], after: Sequence[bytes]) -> Iterator[Rows]:
+    """Describe the lines that differ, in order."""
+    if len(before) == len(after):
+        yield changed_rows(file, range(1, len(before) + 1), before, after)
+        return
+    masks = shapes(before), shapes(after)
+    matcher = SequenceMatcher(None, *masks, autojunk=False)
+    for kind, a0, a1, b0, b1 in matcher.get_opcodes():
+        if kind == "equal":
+            lines = range(a0 + 1, a1 + 1)
+            yield changed_rows(file, lines, before[a0:a1], after[b0:b1])
+            continue
+        gone = np.arange(a0 + 1, a1 + 1)
+        yield _text_rows(file, gone, "- ", before[a0:a1])
+        yield _text_rows(file, np.zeros(b1 - b0, dtype=int), "+ ", after[b0:b1])
+
+
+def _text_rows(file: str, lines: Ints, sign: str, texts: Sequence[bytes]) -> Rows:
+    """Describe lines that only one of the files has."""
+    told = {k: f"{sign}{text.decode('latin-1')}" for k, text in enumerate(texts)}
+    return replace(Rows.bare(file, lines, [""] * len(lines)), texts=told)
+
+
+def _named_by_entries(rows: Rows, lines: Sequence[bytes]) -> Rows:
+    """Name rows of a variable file by their variables."""
+    own = (rows.targets[k] for k in rows.target.tolist())
+    entries = entry_names(lines, rows.line.tolist())
+    names = [name or target for name, target in zip(entries, own, strict=True)]
+    return replace(rows, targets=names, target=np.arange(len(names)))
+
+
+# What differs between two programs: the numbers of targets, or more.
+
+LONG = 10_000_000  # bytes of a file whose record is read beside it
+
+
+@dataclass(frozen=True)
+class Difference:
+    """All rows in which two programs (and their variable files) differ.
+
+    Attributes:
+        differing: Lines that differ, file by file.
+        stamped: The second program carries a stamp.
+        untouched: Lines of targets that were left alone on purpose, where a record
+            tells, file by file.
+        counts: Visits by status, likewise; else empty.
+    """
+
+    differing: tuple[Rows, ...]
+    stamped: bool
+    untouched: tuple[Rows, ...] = ()
+    counts: Mapping[str, int] = field(default_factory=dict)
+
+    @cached_property
+    def rows(self) -> tuple[Row, ...]:
+        """All lines that differ, one object each: for programs of some lines."""
+        return tuple(row for part in self.differing for row in part)
+
+    @cached_property
+    def left(self) -> tuple[Row, ...]:
+        """All lines that were left alone, likewise."""
+        return tuple(row for part in self.untouched for row in part)
+
+    def __bool__(self) -> bool:
+        """Tell whether a line differs."""
+        return any(len(part) > 0 for part in self.differing)
+
+    def summary(self) -> str:
+        """Say in one line what differs, and what came of the targets."""
+        said = self._said() if self else "the targets are the same"
+        counts = ", ".join(f"{n} {status}" for status, n in self.counts.items() if n)
+        return f"{said}; visits: {counts}" if counts else said
+
+    def _said(self) -> str:
+        """Count the rows and their sizes."""
+        sizes = np.concatenate([r.change_mm[r.has_change] for r in self.differing])
+        texts = sum(len(r.texts) for r in self.differing)
+        numbers = sum(len(r) for r in self.differing) - texts
+        said = f"{numbers} lines with other numbers"
+        if len(sizes):
+            said += f", change mean {np.mean(sizes):.3f} mm, max {max(sizes):.3f} mm"
+        return said + (f"; {texts} lines with other text" if texts else "")
+
+
+def diff(original: Path, compensated: Path) -> Difference:
+    """Compare two programs, and the variable files beside them.
+
+    Raises:
+        ProgramError: A file cannot be read.
+    """
+    pairs = [(original, compensated)]
+    values = original.with_suffix(VARIABLES), compensated.with_suffix(VARIABLES)
+    if original.suffix.lower() != VARIABLES and all(v.is_file() for v in values):
+        pairs.append(values)
+    told_by = partial(read_arrivals, compensated, pairs)
+    with meanwhile(told_by, worth=_long(pairs)) as ask:
+        files = [compare_files(*pair) for pair in pairs]
+        told = ask()
+    found = [(f, told.get(f.original.name)) for f in files]
+    rows = tuple(f.rows.with_told(own) for f, own in found)
+    left = tuple(_left(f, own) for f, own in found if own is not None)
+    return Difference(rows, files[0].stamped, left, _counts(told))
+
+
+def _long(pairs: Iterable[tuple[Path, Path]]) -> bool:
+    """Tell whether reading the record takes long."""
+    return any(old.is_file() and old.stat().st_size > LONG for old, _ in pairs)
+
+
+def _left(file: Compared, told: Arrivals) -> Rows:
+    """List the targets that were left alone."""
+    alone = told.line[np.isin(told.status, LEFT_ALONE)]
+    lines = alone[~np.isin(alone, file.rows.line)]
+    return Rows.bare(file.original.name, lines, file.targets(lines)).with_told(told)
+
+
+def _counts(told: Mapping[str, Arrivals]) -> dict[str, int]:
+    """Add up the visits of every status."""
+    return {
+        s.name.lower(): sum(a.counts[s.name.lower()] for a in told.values())
+        for s in Status
+        if told
+    }

@@ -1,0 +1,548 @@
+"""The page of a compensated program: what moved, by how much, and what did not."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import asdict, dataclass, fields
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from postproc.arrays import Floats, Ints
+from postproc.compensation.outcome import Outcome, Status
+from postproc.language.source import Source
+from postproc.language.visits import Motion
+from postproc.report.html.page import render, short, visible
+from postproc.robot.pose import MM
+
+# What the program page knows of every visit, as columns.
+
+MOVES = (*(m.name for m in Motion), "VIA")
+VIA = len(Motion)
+
+
+@dataclass(frozen=True)
+class Columns:
+    """n visits in program order (structure of arrays), units as people read them.
+
+    Attributes:
+        files, names, reasons: Texts that the indices point into.
+        visit: 1-based number of the visit, (n,).
+        file, line: Where the move stands, (n,), line 1-based.
+        literal_file, literal_line: Where its numbers stand, (n,), -1 where nowhere.
+        name: Index into `names`, (n,).
+        move: Index into `MOVES`, (n,).
+        status: `postproc.compensation.outcome.Status`, (n,).
+        why: Index into `reasons`, (n,).
+        direction: Of every joint's arrival: -1, 0 (not known), 1, (n, 6).
+        q_deg: Joint angles, (n, 6).
+        original, corrected: Numbers of the target in its file, (n, 6).
+        position_mm: Where the target lies, base frame, (n, 3).
+        correction_mm: Change of the commanded TCP, base frame, (n, 3).
+        std_mm: Standard error of the correction, per axis, (n, 3).
+    """
+
+    files: tuple[str, ...]
+    names: tuple[str, ...]
+    reasons: tuple[str, ...]
+    visit: Ints
+    file: Ints
+    line: Ints
+    literal_file: Ints
+    literal_line: Ints
+    name: Ints
+    move: Ints
+    status: Ints
+    why: Ints
+    direction: Ints
+    q_deg: Floats
+    original: Floats
+    corrected: Floats
+    position_mm: Floats
+    correction_mm: Floats
+    std_mm: Floats
+
+    def __len__(self) -> int:
+        """Return the number of visits."""
+        return len(self.visit)
+
+    def __getitem__(self, rows: Ints) -> Self:
+        """Take some of the visits."""
+        values = {f.name: getattr(self, f.name) for f in fields(self)}
+        taken: dict[str, Any] = {
+            name: value[rows] if isinstance(value, np.ndarray) else value
+            for name, value in values.items()
+        }
+        return type(self)(**taken)
+
+    @property
+    def size_mm(self) -> Floats:
+        """Length of every correction, (n,)."""
+        return np.asarray(np.linalg.norm(self.correction_mm, axis=1))
+
+
+@dataclass(frozen=True)
+class Program:
+    """Everything that the program page shows.
+
+    Attributes:
+        name: Of the program.
+        model: Id of the model.
+        columns: All visits.
+        predicted: Error statistics by "before" and "after", then by name.
+        diagnostics: Rows of file, line, code and message.
+        stages: Seconds by stage.
+        sources: Bytes by file name; empty where they are not at hand.
+    """
+
+    name: str
+    model: str
+    columns: Columns
+    predicted: Mapping[str, Mapping[str, float | None]]
+    diagnostics: tuple[Mapping[str, object], ...]
+    stages: Mapping[str, float]
+    sources: Mapping[str, bytes]
+
+
+def columns_of(outcome: Outcome) -> Columns:
+    """Take the columns out of an outcome."""
+    v, d = outcome.visits, outcome.decisions
+    n, has = len(v), v.literal >= 0
+    literal = np.where(has, v.literal, 0)
+    nowhere = np.full(n, -1)
+    empty = len(v.literals) == 0
+    place = (nowhere, nowhere) if empty else (v.literals.file, v.literals.line)
+    known = len(outcome.position) == n
+    position = outcome.position / MM if known else np.full((n, 3), np.nan)
+    blank = np.where(has, 0.0, np.nan)[:, None]
+    return Columns(
+        files=v.files,
+        names=v.names,
+        reasons=d.reasons,
+        visit=np.arange(1, n + 1),
+        file=v.file,
+        line=v.line,
+        literal_file=nowhere if empty else np.where(has, place[0][literal], -1),
+        literal_line=nowhere if empty else np.where(has, place[1][literal], -1),
+        name=v.name,
+        move=np.where(v.via, VIA, v.motion),
+        status=d.status,
+        why=d.why,
+        direction=np.asarray(d.direction, dtype=np.int64),
+        q_deg=np.rad2deg(d.q),
+        original=v.values + blank,
+        corrected=d.corrected + blank,
+        position_mm=position,
+        correction_mm=d.correction / MM,
+        std_mm=d.std_error / MM,
+    )
+
+
+# The columns of the program page out of a written report.
+
+
+class Texts:
+    """Distinct texts in order of appearance; number 0 is "".
+
+    >>> texts = Texts()
+    >>> texts.index(["a", None, "b", "a"]).tolist(), texts.all
+    ([1, 0, 2, 1], ('', 'a', 'b'))
+    """
+
+    def __init__(self) -> None:
+        """Start with no text but "" ."""
+        self._number: dict[str, int] = {"": 0}
+
+    def index(self, texts: Sequence[object]) -> NDArray[np.int64]:
+        """Number texts; None is ""."""
+        put = self._number.setdefault
+        told = ("" if t is None else str(t) for t in texts)
+        return np.array([put(t, len(self._number)) for t in told], dtype=np.int64)
+
+    @property
+    def all(self) -> tuple[str, ...]:
+        """Return the texts by number."""
+        return tuple(self._number)
+
+
+def columns_from(targets: Sequence[Mapping[str, Any]]) -> Columns:
+    """Take the columns out of the targets of a report.
+
+    Raises:
+        KeyError, ValueError, TypeError: They are not the targets of a report.
+    """
+    files, names, reasons = Texts(), Texts(), Texts()
+    literals = [t["literal"] or {"file": "", "line": -1} for t in targets]
+    place = files.index([p["file"] for p in literals])
+    statuses = {s.name.lower(): int(s) for s in Status}
+    moves = {name: k for k, name in enumerate(MOVES)}
+    return Columns(
+        visit=np.arange(1, len(targets) + 1),
+        file=files.index([t["file"] for t in targets]),
+        line=np.array([t["line"] for t in targets], dtype=np.int64),
+        literal_file=np.where(place > 0, place, -1),
+        literal_line=np.array([p["line"] for p in literals], dtype=np.int64),
+        name=names.index([t["name"] for t in targets]),
+        move=np.array([moves[t["move"]] for t in targets], dtype=np.int64),
+        status=np.array([statuses[t["status"]] for t in targets], dtype=np.int64),
+        why=reasons.index([t["why"] for t in targets]),
+        direction=_numbers(targets, "lambda", 6).astype(np.int64),
+        q_deg=_numbers(targets, "q_deg", 6),
+        original=_numbers(targets, "original", 6),
+        corrected=_numbers(targets, "corrected", 6),
+        position_mm=_numbers(targets, "position_mm", 3),
+        correction_mm=_numbers(targets, "correction_mm", 3),
+        std_mm=_numbers(targets, "std_error_mm", 3),
+        files=files.all,
+        names=names.all,
+        reasons=reasons.all,
+    )
+
+
+def _numbers(targets: Sequence[Mapping[str, Any]], key: str, width: int) -> Floats:
+    """Stack the lists under a key, (n, width); NaN where there is none."""
+    blank = [None] * width
+    lists = [t.get(key) or blank for t in targets]
+    return np.array(lists, dtype=np.float64).reshape(len(targets), width)
+
+
+# Columns as JSON that is small enough for a page.
+
+MOST = 100_000  # visits that a page carries
+LARGEST = 2_000  # of the largest corrections, carried whatever is left out
+# Steps in which numbers are stored: finer than anybody reads, coarser than the digits
+# of a double.
+STEPS = {
+    "q_deg": 1e-3,
+    "original": 1e-5,
+    "change": 1e-5,
+    "position_mm": 1e-2,
+    "correction_mm": 1e-4,
+    "std_mm": 1e-4,
+}
+
+
+def choose(columns: Columns, most: int = MOST) -> Ints:
+    """Choose the visits that a page carries.
+
+    Of a program with more than `most`, these are the visits left alone (at most half of
+    the page), the largest corrections, and of the others every k-th.
+
+    Returns:
+        Indices, ascending.
+    """
+    n = len(columns)
+    if n <= most:
+        return np.arange(n)
+    left = np.flatnonzero(
+        np.isin(columns.status, (Status.UNSAFE, Status.GUARDED, Status.DISPLAY))
+    )
+    left = _evenly(left, most // 2)
+    size = np.nan_to_num(columns.size_mm)
+    largest = np.argsort(-size, kind="stable")[: min(LARGEST, most // 4)]
+    first = np.union1d(left, largest)
+    rest = np.setdiff1d(np.arange(n), first, assume_unique=True)
+    return np.union1d(first, _evenly(rest, most - len(first)))
+
+
+def _evenly(rows: Ints, most: int) -> Ints:
+    """Take at most so many rows, evenly."""
+    if len(rows) <= most:
+        return rows
+    return rows[np.arange(most) * len(rows) // most]
+
+
+def pack(columns: Columns) -> dict[str, Any]:
+    """Write columns as lists of integers, with the size of a step beside them."""
+    width = {"original": 6, "change": 6, "q_deg": 6}
+    numbers = {
+        "original": columns.original,
+        "change": columns.corrected - columns.original,
+        "q_deg": columns.q_deg,
+        "position_mm": columns.position_mm,
+        "correction_mm": columns.correction_mm,
+        "std_mm": columns.std_mm,
+    }
+    packed = {
+        key: {
+            "step": STEPS[key],
+            "width": width.get(key, 3),
+            "values": integers(values, STEPS[key]),
+        }
+        for key, values in numbers.items()
+    }
+    indices = ("visit", "file", "line", "literal_file", "literal_line", "name", "move")
+    return {
+        "files": [visible(t) for t in columns.files],
+        "names": [visible(t) for t in columns.names],
+        "reasons": [visible(t) for t in columns.reasons],
+        "moves": list(MOVES),
+        "statuses": [s.name.lower() for s in Status],
+        "index": {k: getattr(columns, k).tolist() for k in (*indices, "status", "why")},
+        "direction": _signs(columns.direction),
+        "numbers": packed,
+    }
+
+
+def integers(values: Floats, step: float) -> list[int | None]:
+    """Round to multiples of a step; what is not known becomes None.
+
+    >>> integers(np.array([0.12345, np.nan]), 1e-4)
+    [1234, None]
+    """
+    flat = np.asarray(values, dtype=np.float64).ravel() / step
+    known = np.isfinite(flat)
+    out: list[int | None] = np.rint(np.where(known, flat, 0.0)).astype(int).tolist()
+    for k in np.flatnonzero(~known).tolist():
+        out[k] = None
+    return out
+
+
+def _signs(direction: Ints) -> str:
+    """Write directions as one text, a character each: ``-``, ``0`` or ``+``."""
+    return "".join(np.array(["-", "0", "+"])[np.sign(direction).ravel() + 1].tolist())
+
+
+# Source lines for a page: all of a small program, the moves of a large one.
+
+WHOLE = 150_000  # lines of all files together, up to which the page carries them all
+LONGEST = 500  # characters of a line
+
+Listing = dict[str, dict[str, list[int] | list[str]]]
+
+
+def listing(sources: Mapping[str, bytes], columns: Columns) -> Listing:
+    """Choose the lines that a page shows.
+
+    Args:
+        sources: Bytes by file name, perhaps none.
+        columns: The visits on the page.
+
+    Returns:
+        By file name ``line``, the first line of every stretch and how many there are,
+        alternating, and ``text``, the lines.
+    """
+    given = {name: Source(name, data) for name, data in sources.items()}
+    total = sum(len(source.line_starts) for source in given.values())
+    out: Listing = {}
+    for name, source in given.items():
+        last = len(source.line_starts)
+        wanted = np.arange(1, last + 1) if total <= WHOLE else _used(columns, name)
+        wanted = wanted[(wanted >= 1) & (wanted <= last)]
+        out[visible(name)] = {"line": stretches(wanted), "text": _texts(source, wanted)}
+    return out
+
+
+def _used(columns: Columns, name: str) -> NDArray[np.int64]:
+    """Return the lines of a file that the visits name, ascending."""
+    pairs = (
+        (columns.file, columns.line),
+        (columns.literal_file, columns.literal_line),
+    )
+    number = [k for k, file in enumerate(columns.files) if file == name]
+    lines = [line[np.isin(file, number)] for file, line in pairs]
+    return np.unique(np.concatenate(lines))
+
+
+def stretches(lines: NDArray[np.int64]) -> list[int]:
+    """Pack ascending line numbers.
+
+    >>> stretches(np.array([3, 4, 5, 9]))
+    [3, 3, 9, 1]
+    """
+    if len(lines) == 0:
+        return []
+    first = np.flatnonzero(np.diff(lines, prepend=lines[0] - 2) != 1)
+    count = np.diff(np.append(first, len(lines)))
+    return [int(v) for v in np.column_stack([lines[first], count]).ravel()]
+
+
+def _texts(source: Source, lines: Iterable[int]) -> list[str]:
+    """Take lines out of a file, fit to look at."""
+    starts = np.append(source.line_starts, len(source.data)).tolist()
+    text = source.text
+    return [
+        short(visible(text[starts[k - 1] : starts[k]].rstrip("\r\n")), LONGEST)
+        for k in np.asarray(lines).tolist()
+    ]
+
+
+# The figures and lists that stand on a page before any script runs.
+
+BINS = 40
+EXAMPLES = 12  # visits named in a group
+LEFT_ALONE = (Status.UNSAFE, Status.GUARDED, Status.DISPLAY)  # most urgent first
+
+
+@dataclass(frozen=True)
+class Group:
+    """Visits that were left alone for the same reason.
+
+    Attributes:
+        status: Name of the status.
+        why: The reason.
+        count: How many visits.
+        examples: Number, file and line, name of the first ones.
+    """
+
+    status: str
+    why: str
+    count: int
+    examples: tuple[tuple[int, str, int, str], ...]
+
+
+@dataclass(frozen=True)
+class Stage:
+    """Seconds spent in a stage and their share of the whole."""
+
+    name: str
+    seconds: float
+    share: float
+
+
+def left_alone(columns: Columns) -> tuple[Group, ...]:
+    """Group what was not corrected by status and reason, the largest group first."""
+    groups = []
+    for status in LEFT_ALONE:
+        mine = columns.status == status
+        codes, counts = np.unique(columns.why[mine], return_counts=True)
+        for k in np.argsort(-counts, kind="stable"):
+            rows = np.flatnonzero(mine & (columns.why == codes[k]))
+            groups.append(
+                Group(
+                    status.name.lower(),
+                    columns.reasons[codes[k]],
+                    int(counts[k]),
+                    tuple(_place(columns, int(i)) for i in rows[:EXAMPLES]),
+                )
+            )
+    return tuple(groups)
+
+
+def _place(columns: Columns, i: int) -> tuple[int, str, int, str]:
+    """Say which visit, and where its move stands."""
+    return (
+        int(columns.visit[i]),
+        columns.files[columns.file[i]],
+        int(columns.line[i]),
+        columns.names[columns.name[i]],
+    )
+
+
+def tell_counts(columns: Columns) -> dict[str, int]:
+    """Count the visits of every status."""
+    return {s.name.lower(): int((columns.status == s).sum()) for s in Status}
+
+
+def histogram(columns: Columns) -> dict[str, Any]:
+    """Count the lengths of the corrections that were made."""
+    size = columns.size_mm[columns.status == Status.SAFE]
+    size = size[np.isfinite(size)]
+    if len(size) == 0:
+        return {"edges_mm": [], "counts": []}
+    top = max(float(size.max()), 1e-6)
+    counts, edges = np.histogram(size, bins=BINS, range=(0.0, top))
+    return {"edges_mm": edges.round(6).tolist(), "counts": counts.tolist()}
+
+
+def uncertainty(columns: Columns) -> dict[str, float | None]:
+    """Summarise the standard errors at the corrected targets, over the axes [mm]."""
+    rows = columns.status == Status.SAFE
+    size = np.linalg.norm(columns.std_mm[rows], axis=1)
+    size = size[np.isfinite(size)]
+    if len(size) == 0:
+        return {"median": None, "max": None}
+    return {"median": float(np.median(size)), "max": float(size.max())}
+
+
+def seconds(stages: Mapping[str, float]) -> tuple[Stage, ...]:
+    """List stages in their order, with shares."""
+    total = sum(stages.values()) or 1.0
+    return tuple(Stage(name, s, s / total) for name, s in stages.items())
+
+
+def finite(value: Any) -> Any:
+    """Replace NaN, which JSON does not have, by None, all the way down."""
+    if isinstance(value, Mapping):
+        return {k: finite(v) for k, v in value.items()}
+    if isinstance(value, list | tuple):
+        return [finite(v) for v in value]
+    if isinstance(value, float) and not np.isfinite(value):
+        return None
+    return value
+
+
+# The page of a compensated program: what moved, by how much, and what did not.
+
+SCRIPTS = ("page.js", "columns.js", "view.js", "table.js", "source.js", "program.js")
+
+
+def program_report(outcome: Outcome, sources: Mapping[str, bytes] | None = None) -> str:
+    """Make the page of an outcome.
+
+    Args:
+        outcome: What came of a program.
+        sources: Bytes of the source files by name; default: those of the outcome.
+    """
+    program = Program(
+        name=outcome.program,
+        model=outcome.model,
+        columns=columns_of(outcome),
+        predicted={"before": asdict(outcome.before), "after": asdict(outcome.after)},
+        diagnostics=tuple(asdict(d) for d in outcome.diagnostics),
+        stages=outcome.stages,
+        sources=outcome.sources if sources is None else sources,
+    )
+    return _page(program)
+
+
+def program_report_from_json(
+    data: Mapping[str, Any], sources: Mapping[str, bytes] | None = None
+) -> str:
+    """Make the page of a written report.
+
+    Args:
+        data: What ``compensate --report`` wrote.
+        sources: Bytes of the source files by name, where they are at hand.
+
+    Raises:
+        KeyError, ValueError, TypeError: It is no such report.
+    """
+    program = Program(
+        name=str(data["program"]),
+        model=str(data["model"]),
+        columns=columns_from(data["targets"]),
+        predicted={when: data["predicted"][when] for when in ("before", "after")},
+        diagnostics=tuple(data.get("diagnostics", ())),
+        stages=data.get("stages_s", {}),
+        sources=sources or {},
+    )
+    return _page(program)
+
+
+def _page(program: Program) -> str:
+    """Choose what the page carries and render it."""
+    columns = program.columns
+    carried = columns[choose(columns)]
+    payload = {
+        "columns": pack(carried),
+        "listing": listing(program.sources, carried),
+        "histogram": histogram(columns),
+        "predicted": finite(program.predicted),
+    }
+    return render(
+        "program.html.j2",
+        program.name,
+        payload,
+        SCRIPTS,
+        program=program,
+        counts=tell_counts(columns),
+        corrected=int((columns.status == Status.SAFE).sum()),
+        groups=left_alone(columns),
+        predicted=finite(program.predicted),
+        sigma=uncertainty(columns),
+        stages=seconds(program.stages),
+        shown=len(carried),
+        placed=bool(np.isfinite(columns.position_mm).all(axis=1).any()),
+    )
