@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from postproc.batch.pages import group_pages, named_programs, read_head
+from postproc.batch.tree import group_pages, named_programs, read_head
 from postproc.files import PROGRAM, VARIABLES, base_of, suffix_of
 from postproc.language.stamp import read_stamp
 

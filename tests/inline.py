@@ -5,7 +5,7 @@ from __future__ import annotations
 from concurrent.futures import Future
 
 from postproc import __version__
-from postproc.batch.work import run_tasks
+from postproc.batch.workers import run_tasks
 
 
 class InlineCrew:

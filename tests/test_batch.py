@@ -9,10 +9,9 @@ import sys
 
 import pytest
 
-from postproc.batch.guard import check_room, locked
-from postproc.batch.local import LocalCrew
 from postproc.batch.plan import make_plan
-from postproc.batch.run import Order, batch, default_log
+from postproc.batch.run import Order, batch, check_room, default_log, locked
+from postproc.batch.workers import LocalCrew
 from postproc.compensation.options import AS_USUAL
 from postproc.compensation.record import restore_file
 from postproc.exceptions import CellError, DiskFullError, OutputError, PostprocError
@@ -145,7 +144,7 @@ def test_resume_redoes_all_with_another_release(tmp_path, run, job_folder, monke
     run()
     files = (job_folder / "cell.toml", job_folder / "model.json")
     assert not run(resume=True, plan=make_plan(None, *files, AS_USUAL)).tasks
-    monkeypatch.setattr("postproc.batch.setup.__version__", "99.0.0")
+    monkeypatch.setattr("postproc.batch.plan.__version__", "99.0.0")
     assert len(run(resume=True, plan=make_plan(None, *files, AS_USUAL)).tasks) == 2
 
 

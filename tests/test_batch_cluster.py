@@ -29,8 +29,8 @@ def cluster(tmp_path):
 def test_same_bytes_as_here_although_a_worker_is_killed(
     tmp_path, job_folder, cluster, monkeypatch
 ):
-    monkeypatch.setattr("postproc.batch.pace.FIRST", 1)  # many chunks
-    monkeypatch.setattr("postproc.batch.pace.LASTING", 0.05)
+    monkeypatch.setattr("postproc.batch.workers.FIRST", 1)  # many chunks
+    monkeypatch.setattr("postproc.batch.workers.LASTING", 0.05)
     source = grow(tmp_path / "src", 24, 2)
     pages(source / "pages", 2, 2)
     (source / "bad.pdl").write_bytes(b"\0")

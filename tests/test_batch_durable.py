@@ -12,10 +12,9 @@ import time
 
 import pytest
 
-from postproc.batch.guard import locked
-from postproc.batch.local import LocalCrew
 from postproc.batch.plan import make_plan
-from postproc.batch.run import default_log
+from postproc.batch.run import default_log, locked
+from postproc.batch.workers import LocalCrew
 from postproc.compensation.options import AS_USUAL
 from postproc.exceptions import OutputError
 from postproc.files import TEMPORARY
@@ -130,7 +129,7 @@ def test_a_place_that_cannot_be_written_fails_alone(plant):
 def test_ctrl_c_does_not_reach_the_process_that_workers_are_forked_from():
     code = (
         "from multiprocessing import forkserver\n"
-        "from postproc.batch.server import start_server\n"
+        "from postproc.batch.workers import start_server\n"
         "start_server()\n"
         "pid = forkserver._forkserver._forkserver_pid\n"
         "print(open(f'/proc/{pid}/status').read())\n"

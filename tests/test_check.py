@@ -8,9 +8,9 @@ from dataclasses import replace
 import pytest
 from typer.testing import CliRunner
 
+from postproc.batch.check import check
 from postproc.batch.plan import make_plan
 from postproc.batch.run import Order, batch, default_log
-from postproc.check import check
 from postproc.cli import app
 from postproc.compensation.options import AS_USUAL
 from postproc.compensation.outcome import Status

@@ -14,11 +14,8 @@ from time import monotonic
 from typing import Any
 
 from postproc import __version__
-from postproc.batch.crew import Working
-from postproc.batch.pace import Chunk
-from postproc.batch.setup import Setup
-from postproc.batch.task import Result
-from postproc.batch.work import run_tasks
+from postproc.batch.plan import Result, Setup
+from postproc.batch.workers import Chunk, Working, run_tasks
 from postproc.exceptions import PostprocError
 
 CONNECT = 30.0  # [s] in which the scheduler and a first worker must answer

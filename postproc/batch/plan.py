@@ -1,16 +1,72 @@
-"""The plan file: which programs of a tree belong to which arm."""
+"""The plan of a run: which programs belong to which arm, and what goes to a worker."""
 
 from __future__ import annotations
 
+import hashlib
+import json
 import re
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
+from typing import Any
 
-from postproc.batch.setup import Setup, open_setup
+from postproc import __version__
 from postproc.compensation.options import Options
 from postproc.exceptions import CellError, PostprocError
+from postproc.model.model import Model, load_model
 from postproc.robot.arm_file import Strict, read_toml
+from postproc.robot.cell import Cell, load_cell
+
+# Which cell and which model a program is compensated with.
+
+
+@dataclass(frozen=True)
+class Setup:
+    """A cell, a model and what the user asked for: all but the program itself."""
+
+    cell: Cell
+    model: Model
+    options: Options
+
+    @cached_property
+    def digest(self) -> str:
+        """Hash all that decides, beside the sources, what comes out.
+
+        Contents count, places do not: a copy of the same cell file is the same cell.
+        """
+        parts = {
+            "version": __version__,
+            "cell": self.cell.file.model_dump(mode="json"),
+            "arm": self.cell.arm.file.model_dump(mode="json"),
+            "model": self.model.id,
+            "options": asdict(self.options),
+        }
+        text = json.dumps(parts, sort_keys=True)
+        return hashlib.sha256(text.encode()).hexdigest()
+
+
+def open_setup(cell: Path, model: Path, options: Options) -> Setup:
+    """Load a cell and a model, and refuse a pair that does not belong together.
+
+    Raises:
+        CellError: The cell cannot be used, or its controller compensates on its own.
+        ModelError: The model cannot be used, or was made for another arm.
+    """
+    loaded, fitted = load_cell(cell), load_model(model)
+    fitted.check_arm(loaded.arm, model)
+    if loaded.file.robot.absolute_accuracy:
+        raise CellError(
+            cell,
+            "the controller compensates on its own: this would do it twice",
+            "Switch that option off on the controller, then here",
+            place="$.robot.absolute_accuracy",
+        )
+    # Only the name: messages must not depend on where a run was started.
+    return Setup(replace(loaded, path=Path(cell.name)), fitted, options)
+
+
+# The plan file: which programs of a tree belong to which arm.
 
 
 class RuleSection(Strict):
@@ -113,3 +169,91 @@ def _open_rules(rules: Sequence[tuple[str, Path, Path]], options: Options) -> Pl
         tuple(pairs.index((cell, model)) for _, cell, model in rules),
         setups,
     )
+
+
+# What travels to a worker and what comes back: bytes, never paths of a disk.
+
+
+@dataclass(frozen=True)
+class Unit:
+    """Files that are compensated together, by their paths below the source tree.
+
+    Attributes:
+        program: The main program.
+        pages: Programs that it imports and nobody else does, in order.
+        variables: Its variable file, or None.
+        setup: Index of its cell and model in the plan.
+    """
+
+    program: str
+    pages: tuple[str, ...]
+    variables: str | None
+    setup: int
+
+    @property
+    def programs(self) -> tuple[str, ...]:
+        """Return the main program and its pages."""
+        return (self.program, *self.pages)
+
+    @property
+    def files(self) -> tuple[str, ...]:
+        """Return all files, the main program first."""
+        own = () if self.variables is None else (self.variables,)
+        return (*self.programs, *own)
+
+
+@dataclass(frozen=True)
+class Task:
+    """A unit with its bytes, for a worker anywhere.
+
+    Attributes:
+        unit: What it is.
+        sources: The bytes of its files, in their order.
+    """
+
+    unit: Unit
+    sources: tuple[bytes, ...]
+
+    @property
+    def files(self) -> dict[str, bytes]:
+        """Return the bytes of its files by path."""
+        return dict(zip(self.unit.files, self.sources, strict=True))
+
+    @property
+    def size(self) -> int:
+        """Return the number of bytes, the measure of how long it takes."""
+        return sum(map(len, self.sources))
+
+
+@dataclass(frozen=True)
+class Result:
+    """What came of a task.
+
+    Attributes:
+        unit: What it is.
+        exit_code: 0 done, 1 a target was left, 2 nothing came out.
+        outputs: New bytes by path below the target tree; none where it failed.
+        facts: For the log: counts, figures, findings; or ``error``.
+        seconds: How long it took.
+    """
+
+    unit: Unit
+    exit_code: int
+    outputs: Mapping[str, bytes] = field(default_factory=dict)
+    facts: Mapping[str, Any] = field(default_factory=dict)
+    seconds: float = 0.0
+
+
+def failed(unit: Unit, problem: str, seconds: float = 0.0) -> Result:
+    """Return the result of a unit of which nothing came."""
+    return Result(unit, 2, {}, {"error": problem}, seconds)
+
+
+def digest_of(names: tuple[str, ...], sources: tuple[bytes, ...], setup: str) -> str:
+    """Hash what decides an output: the sources, their names, and the setup's digest."""
+    sha = hashlib.sha256(setup.encode())
+    for name, data in zip(names, sources, strict=True):
+        base = name.rpartition("/")[2].encode("utf-8", "surrogateescape")
+        sha.update(b"%d:%s:%d:" % (len(base), base, len(data)))
+        sha.update(data)
+    return sha.hexdigest()

@@ -2,21 +2,233 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from contextlib import closing
+import fcntl
+import os
+import shutil
+import signal
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import closing, contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
+from types import FrameType
 
-from postproc.batch.crew import Crew, work_through
-from postproc.batch.guard import check_room, locked, stoppable, sweep
-from postproc.batch.journal import Entry, Journal, read_entries
-from postproc.batch.plan import Plan
-from postproc.batch.summary import Summary
-from postproc.batch.target import Target, places_of
-from postproc.batch.task import Result, Task, digest_of
+from postproc.batch.journal import Entry, Journal, Summary, read_entries
+from postproc.batch.plan import Plan, Result, Task, Unit, digest_of
 from postproc.batch.tree import Tree, refuse_overlap, scan
-from postproc.compensation.record import SUFFIX
+from postproc.batch.workers import Crew, work_through
+from postproc.compensation.record import SUFFIX, file_sha256, sha256
 from postproc.exceptions import DiskFullError, OutputError
+from postproc.files import TEMPORARY, disk_error, replace_file, write_all
+
+# Conditions of a run: alone on its tree, with room, and stopped in good order.
+
+ROOM = 2.5  # bytes written for a byte of source: the program and its record
+SPARE = 16_000_000  # bytes left over for the log and for others
+
+
+@contextmanager
+def locked(folder: Path) -> Iterator[None]:
+    """Hold a folder for this run alone; create it where it is missing.
+
+    The lock lies on the folder itself: nothing is left behind, and it is gone with
+    this process, however that ends.
+
+    Raises:
+        OutputError: Another run holds it, or it cannot be created or written to.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        handle = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
+    except OSError as exc:
+        raise disk_error(exc, folder) from None
+    if not os.access(folder, os.W_OK):
+        os.close(handle)
+        cure = "Give a folder that may be written to"
+        raise OutputError(folder, "the folder is read-only", cure)
+    try:
+        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError:
+        os.close(handle)
+        problem = "another run is writing to it"
+        raise OutputError(folder, problem, "Wait for its end, or stop it") from None
+    try:
+        yield
+    finally:
+        os.close(handle)
+
+
+def sweep(folder: Path) -> int:
+    """Remove temporary files that a killed run has left, under the lock.
+
+    Returns:
+        Bytes of all other files in the tree.
+    """
+    size = 0
+    for parent, _, names in os.walk(folder):
+        for name in names:
+            path = os.path.join(parent, name)
+            if name.startswith(".") and name.endswith(TEMPORARY):
+                os.unlink(path)
+            else:
+                size += os.lstat(path).st_size
+    return size
+
+
+def check_room(folder: Path, sources: int, present: int) -> None:
+    """Refuse to begin where the disk cannot hold the result.
+
+    Args:
+        folder: The target tree.
+        sources: Bytes of the source tree.
+        present: Bytes that lie in the target tree already.
+
+    Raises:
+        DiskFullError: There is too little room.
+    """
+    free = shutil.disk_usage(folder).free
+    need = max(int(ROOM * sources) - present, 0) + SPARE
+    if free < need:
+        raise DiskFullError(
+            folder,
+            f"{free / 1e6:.0f} MB are free, about {need / 1e6:.0f} MB are needed",
+            "Make room, or give a folder on another disk",
+        )
+
+
+class Stop:
+    """Whether the user wants to stop: Ctrl-C or SIGTERM.
+
+    The first one lets the file in hand be finished; a second one ends at once, which
+    leaves no half-written file either.
+    """
+
+    def __init__(self) -> None:
+        """Nobody has asked yet."""
+        self.asked = False
+
+    def __call__(self) -> bool:
+        """Tell whether to stop."""
+        return self.asked
+
+    def _ask(self, number: int, frame: FrameType | None) -> None:
+        if self.asked:
+            raise KeyboardInterrupt
+        self.asked = True
+
+
+@contextmanager
+def stoppable() -> Iterator[Stop]:
+    """Listen to Ctrl-C and SIGTERM while the block runs."""
+    stop = Stop()
+    signals = (signal.SIGINT, signal.SIGTERM)
+    before = [signal.signal(number, stop._ask) for number in signals]
+    try:
+        yield stop
+    finally:
+        for number, handler in zip(signals, before, strict=True):
+            signal.signal(number, handler)
+
+
+# The target tree: what is written to it, and what must not stay in it.
+
+
+@dataclass(frozen=True)
+class Target:
+    """A tree that mirrors a source tree; paths below it are written with ``/``."""
+
+    root: Path
+
+    def write(self, outputs: Mapping[str, bytes]) -> dict[str, str]:
+        """Write files, none before all are on the disk.
+
+        Returns:
+            Their SHA-256 by path.
+
+        Raises:
+            OutputError: They cannot be written.
+        """
+        for place in outputs:
+            self._make_folder(place)
+        write_all({self.root / place: data for place, data in outputs.items()})
+        return {place: sha256(data) for place, data in outputs.items()}
+
+    def copy(self, source: Path, place: str) -> dict[str, str]:
+        """Copy a file with its times and rights.
+
+        Returns:
+            Its SHA-256 by path.
+
+        Raises:
+            OutputError: It cannot be read or written.
+        """
+        self._make_folder(place)
+        try:
+            with source.open("rb") as data, replace_file(self.root / place) as out:
+                shutil.copyfileobj(data, out, 1 << 20)
+            shutil.copystat(source, self.root / place)
+        except OSError as exc:
+            read = exc.filename == str(source)
+            raise disk_error(exc, source if read else self.root / place) from None
+        return {place: file_hash(self.root / place)}
+
+    def holds(self, outputs: Mapping[str, str]) -> bool:
+        """Tell whether files lie in the tree with the contents that they had."""
+        try:
+            return bool(outputs) and all(
+                file_hash(self.root / place) == digest
+                for place, digest in outputs.items()
+            )
+        except OSError:
+            return False
+
+    def remove(self, places: Iterable[str]) -> list[str]:
+        """Remove files, and return those that were there.
+
+        Raises:
+            OutputError: One cannot be removed.
+        """
+        removed = []
+        for place in places:
+            try:
+                (self.root / place).unlink()
+            except (FileNotFoundError, NotADirectoryError):
+                continue
+            except OSError as exc:
+                problem = f"cannot be removed ({exc.strerror})"
+                cure = "Remove it: it is no output of this run"
+                raise OutputError(self.root / place, problem, cure) from None
+            removed.append(place)
+        return removed
+
+    def remove_untouched(self, outputs: Mapping[str, str]) -> list[str]:
+        """Remove files of an earlier run that nobody has changed since."""
+        same = {p: d for p, d in outputs.items() if self.holds({p: d})}
+        return self.remove(same)
+
+    def _make_folder(self, place: str) -> None:
+        try:
+            (self.root / place).parent.mkdir(parents=True, exist_ok=True)
+        except OSError as exc:
+            raise disk_error(exc, (self.root / place).parent) from None
+
+
+def places_of(unit: Unit) -> tuple[str, ...]:
+    """Name all that a unit may have in the target tree."""
+    return (*unit.files, *(program + SUFFIX for program in unit.programs))
+
+
+def file_hash(path: str | Path) -> str:
+    """Hash a file's content.
+
+    Raises:
+        OSError: It cannot be read, or is no regular file.
+    """
+    if os.path.islink(path):
+        raise OSError(f"{path} is a symbolic link")
+    return file_sha256(path)
+
+
+# A tree of programs in, the same tree compensated out.
 
 STATUS = ("done", "left", "failed")  # by exit code
 

@@ -8,9 +8,9 @@ from typing import Annotated
 
 import typer
 
+from postproc.batch.check import Current
+from postproc.batch.journal import Summary
 from postproc.batch.run import Gather
-from postproc.batch.summary import Summary
-from postproc.check import Current
 from postproc.cli.common import (
     CloneOption,
     HtmlOption,
@@ -67,7 +67,7 @@ def batch(
     """Compensate a tree of programs; what could not be compensated is not in DST."""
     with explained():
         if scheduler is None:
-            from postproc.batch.server import start_server
+            from postproc.batch.workers import start_server
 
             start_server()
         from postproc.batch import run
@@ -93,7 +93,7 @@ def batch(
 def _workers(jobs: int, scheduler: str | None, tls: Path | None) -> Gather:
     """Choose who does the work."""
     if scheduler is None:
-        from postproc.batch.local import LocalCrew
+        from postproc.batch.workers import LocalCrew
 
         count = jobs or os.cpu_count() or 1
         return lambda plan: LocalCrew(plan.setups, count)
@@ -104,7 +104,7 @@ def _workers(jobs: int, scheduler: str | None, tls: Path | None) -> Gather:
 
 def _print_summary(summary: Summary) -> None:
     """Print the table, and what a person must look at."""
-    from postproc.batch.summary import TITLES
+    from postproc.batch.journal import TITLES
     from postproc.report.terminal import Column, print_table
 
     columns = [Column(t, "left" if t == TITLES[0] else "right") for t in TITLES]
@@ -144,7 +144,7 @@ def check(
     Every program must be compensated, with all its targets, with the current model,
     from the source as it is now, and unchanged since.
     """
-    from postproc.check import check as look
+    from postproc.batch.check import check as look
 
     with explained():
         found = look(folder, _current_model(model, plan), source)
