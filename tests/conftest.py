@@ -73,7 +73,7 @@ def make_job(folder: Path, text: str = CELL) -> Path:
         for i, (q, side) in enumerate(zip(targets.q, targets.side, strict=True)):
             cells = [*np.degrees(q), *np.sign(side), i % 3]
             out.write(f"{i + 1}," + ",".join(f"{c:.5f}" for c in cells) + "\n")
-    from postproc.simulate import setup_of
+    from postproc.cli.simulate import setup_of
 
     arm = virtual_arm(SEED)
     campaign = measure_rows(arm, setup_of(cell), read_rows(rows))

@@ -11,6 +11,8 @@ import numpy as np
 from postproc.calibration.fit import fit
 from postproc.calibration.measurements import Measurements
 from postproc.calibration.selection import fit_survey, model_of
+from postproc.cli.simulate import setup_of, simulate_file, visits_of
+from postproc.cli.survey import write_survey
 from postproc.compensation.command import new_numbers, solve_visits
 from postproc.compensation.compensate import compensate
 from postproc.compensation.outcome import Status
@@ -22,7 +24,6 @@ from postproc.model.model import Model
 from postproc.robot.arm import load_arm
 from postproc.robot.cell import Cell, load_cell
 from postproc.robot.state import States, make_states
-from postproc.simulate import setup_of, simulate_file, visits_of
 from postproc.simulation import (
     Arrivals,
     campaign_length,
@@ -31,7 +32,6 @@ from postproc.simulation import (
     stream,
     virtual_arm,
 )
-from postproc.surveying import write_survey
 
 ROOT = Path(__file__).parents[1]
 CELL = ROOT / "programs" / "cell.toml"

@@ -11,7 +11,7 @@ import pytest
 import typer
 
 from postproc.cli import app
-from postproc.cli.examples import EXAMPLES
+from postproc.cli.common import EXAMPLES
 from tests.test_cli import COMMANDS
 from tests.written import cli
 
@@ -94,7 +94,7 @@ def test_help_loads_nothing_heavy():
 
 def test_compensating_loads_nothing_that_it_may_not_need():
     code = (
-        "import sys, postproc.jobs, postproc.stages\n"
+        "import sys, postproc.cli.jobs, postproc.cli.common\n"
         "print(sorted({'matplotlib', 'pinocchio', 'rich', 'scipy'} & set(sys.modules)))"
     )
     done = subprocess.run(

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from postproc.cli.simulate import setup_of
 from postproc.compensation.compensate import compensate
 from postproc.compensation.options import Options
 from postproc.language.visits import Motion, Target, Visits
-from postproc.simulate import setup_of
 from postproc.simulation import land, virtual_arm
 from tests.conftest import SEED
 from tests.made_visits import visits

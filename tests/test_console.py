@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import threading
 
+from postproc.cli.common import stages
 from postproc.exceptions import printable
 from postproc.report.terminal import (
     Column,
@@ -14,7 +15,6 @@ from postproc.report.terminal import (
     stage_bar,
     table_text,
 )
-from postproc.stages import stages
 
 
 class Screen(io.StringIO):
@@ -70,13 +70,13 @@ def test_what_lasts_is_shown_on_a_terminal(monkeypatch):
         shown.set()
         return update, hide
 
-    monkeypatch.setattr("postproc.stages.PATIENCE", 0.0)
+    monkeypatch.setattr("postproc.cli.common.PATIENCE", 0.0)
     monkeypatch.setattr("postproc.report.terminal.show_status", show)
     with stages(screen) as told:
         told("plan [1]")
         assert shown.wait(60)
     assert screen.getvalue()
-    monkeypatch.setattr("postproc.stages.PATIENCE", 60.0)
+    monkeypatch.setattr("postproc.cli.common.PATIENCE", 60.0)
     quick = Screen()
     with stages(quick) as told:
         told("plan")

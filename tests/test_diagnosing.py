@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from postproc.calibration.fit import fit, read_surveys
-from postproc.diagnosing import (
+from postproc.cli.diagnose import (
     diagnose_files,
     extended_path,
     from_tracker_frame,

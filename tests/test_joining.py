@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from postproc.calibration.tables import Reading
+from postproc.cli.diagnose import join_program
 from postproc.compensation.program import plan_visits, read_program
 from postproc.exceptions import MeasurementError
-from postproc.joining import join_program
 from tests.written import FIRST, NEXT, POSE, cli, program
 
 ASSIGNED = "p := POS(120.0, 200.0, 150.0, 0.0, 175.0, 0.0, '')"

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from postproc.cli.simulate import setup_of
 from postproc.compensation.command import turn, turn_std
 from postproc.compensation.compensate import compensate
 from postproc.compensation.options import Options
@@ -17,7 +18,6 @@ from postproc.exceptions import ModelError
 from postproc.language.visits import Visits
 from postproc.robot.pose import MM, angles_near, rotation_from_zyz, rotation_vector
 from postproc.robot.state import make_states
-from postproc.simulate import setup_of
 from postproc.simulation import run_program, virtual_arm
 from tests.conftest import SEED
 from tests.plant import program

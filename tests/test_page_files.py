@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
+from postproc.cli.jobs import find_pages
 from postproc.compensation.program import read_program
 from postproc.exceptions import ProgramError
-from postproc.page_files import find_pages
 from tests.plant import contents, pages
 from tests.written import cli
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
+from postproc.cli.carets import WIDTH, excerpt, point_at
 from postproc.exceptions import CellError, MeasurementError, ProgramError
-from postproc.pointing import WIDTH, excerpt, point_at
 from tests.written import FIRST, POSE, cli, program
 
 FAR = "MOVE LINEAR TO POS(9000.0, 0.0, 0.0, 0.0, 175.0, 0.0, '')"

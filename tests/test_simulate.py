@@ -8,8 +8,8 @@ import json
 import numpy as np
 import pytest
 
+from postproc.cli.simulate import setup_of, simulate_file
 from postproc.robot.cell import load_cell
-from postproc.simulate import setup_of, simulate_file
 from postproc.simulation import land, virtual_arm
 from tests.conftest import SEED
 from tests.written import FIRST, NEXT, POSE, cli, program
@@ -49,7 +49,7 @@ def test_readings_are_the_landing_with_a_trackers_noise(desk, job_cell):
     out = desk.folder / "m.csv"
     found = simulate_file(source, desk.cell, SEED, wanted=source)
     found.write(out)
-    from postproc.simulate import visits_of
+    from postproc.cli.simulate import visits_of
 
     landed = land(
         virtual_arm(SEED, tool=job_cell.tool.pose),

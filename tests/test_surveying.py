@@ -7,8 +7,8 @@ import re
 import numpy as np
 import pytest
 
+from postproc.cli.survey import BACK, write_survey
 from postproc.compensation.program import plan_visits, read_program
-from postproc.surveying import BACK, write_survey
 from tests.written import cli
 
 POSES = 24

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from postproc.cli.simulate import setup_of
 from postproc.compensation.compensate import compensate
 from postproc.compensation.frames import frame_of_points
 from postproc.compensation.outcome import Status
@@ -12,7 +13,6 @@ from postproc.compensation.program import read_program
 from postproc.exceptions import CellError
 from postproc.robot.cell import load_cell
 from postproc.robot.pose import pose_from_record, record_from_pose
-from postproc.simulate import setup_of
 from postproc.simulation import land, make_arrivals, virtual_arm
 from tests.conftest import CELL, SEED
 from tests.shared_points import SWEEP

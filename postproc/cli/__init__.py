@@ -11,8 +11,7 @@ import typer
 
 from postproc import __version__
 from postproc.cli import loop, models, plant, programs
-from postproc.cli.common import app, say
-from postproc.cli.examples import epilog
+from postproc.cli.common import app, epilog, say
 
 NAME = "__name__"  # a command is called like its function
 

@@ -1,16 +1,19 @@
-"""What all commands share: options, messages, and how errors end."""
+"""What all commands share: options, messages, progress, and how errors end."""
 
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterable, Iterator
+import threading
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, TextIO
 
 import typer
 
 from postproc.exceptions import FileError, PostprocError, printable
+
+# What all commands share: options, messages, and how errors end.
 
 app = typer.Typer(
     no_args_is_help=True,
@@ -68,7 +71,7 @@ def explained(*files: Path | None) -> Iterator[None]:
     except PostprocError as exc:
         say(f"postproc: {exc}")
         if isinstance(exc, FileError):
-            from postproc.pointing import point_at
+            from postproc.cli.carets import point_at
 
             if shown := point_at(exc, files):
                 say(shown)
@@ -93,8 +96,6 @@ def split_names(text: str) -> list[str]:
 @contextmanager
 def busy(doing: str) -> Iterator[None]:
     """Show on a terminal what is being done, where it lasts."""
-    from postproc.stages import stages
-
     with stages() as told:
         told(doing)
         yield
@@ -119,3 +120,124 @@ def write_text(target: str, text: str | Iterable[str]) -> None:
         sys.stdout.writelines(text)
     else:
         write_all({Path(target): map(str.encode, text)})
+
+
+# What every command looks like in use; its --help shows them.
+
+KEEP = "\b"  # begins a paragraph whose lines are not wrapped
+
+EXAMPLES: dict[str, tuple[str, ...]] = {
+    "compensate": (
+        "postproc compensate job.pdl --cell cell.toml --model model.json",
+        "postproc compensate job.pdl --cell cell.toml --model model.json"
+        " -o out/job.pdl --html job.html",
+        "cat job.pdl | postproc compensate - --cell cell.toml --model model.json > out",
+    ),
+    "diff": (
+        "postproc diff job.pdl out/job.pdl | less -S",
+        "postproc diff job.pdl out/job.pdl --json -",
+    ),
+    "restore": (
+        "postproc restore out/job.pdl",
+        "postproc restore out/job.pdl -o original.pdl",
+    ),
+    "explain": (
+        "postproc explain job.pdl --cell cell.toml",
+        "postproc explain job.pdl --cell cell.toml --model model.json --line 42",
+    ),
+    "survey": ("postproc survey --cell cell.toml --poses 300 -o survey.pdl",),
+    "simulate": (
+        "postproc simulate survey.pdl --cell cell.toml -o measured.csv",
+        "postproc simulate out/job.pdl --cell cell.toml --wanted job.pdl",
+    ),
+    "fit": (
+        "postproc fit measured.csv --cell cell.toml -o model.json --html model.html",
+        "postproc fit measured.csv --cell cell.toml -o model.json --frame tracker",
+    ),
+    "predict": (
+        "postproc predict states.csv --cell cell.toml --model model.json -o errors.csv",
+    ),
+    "compare": (
+        "postproc compare measured.csv --cell cell.toml --html methods.html",
+        "postproc compare measured.csv --cell cell.toml --plot methods.svg",
+    ),
+    "diagnose": (
+        "postproc diagnose fresh.csv --cell cell.toml --model model.json"
+        " -o better.json --html diagnosis.html",
+        "postproc diagnose points.csv --program job.pdl --cell cell.toml"
+        " --model model.json",
+    ),
+    "history": ("postproc history better.json",),
+    "report": (
+        "postproc report model.json -o model.html",
+        "postproc report diagnosis.json -o diagnosis.html",
+    ),
+    "batch": (
+        "postproc batch nominal compensated --cell cell.toml --model model.json"
+        " --jobs 8",
+        "postproc batch nominal compensated --plan batch.toml --resume",
+    ),
+    "check": ("postproc check compensated --model model.json --source nominal",),
+}
+
+
+def epilog(command: str) -> str | None:
+    """Write the examples of a command for the end of its help."""
+    lines = EXAMPLES.get(command)
+    return None if lines is None else "\n".join([KEEP, "Examples:", *_indented(lines)])
+
+
+def _indented(lines: tuple[str, ...]) -> list[str]:
+    """Indent the lines."""
+    return [f"  {line}" for line in lines]
+
+
+# What is being done, told to a person who waits; others load nothing for it.
+
+PATIENCE = 2.0  # [s] before a person is shown what is being done
+
+
+@contextmanager
+def stages(out: TextIO | None = None) -> Iterator[Callable[[str], None]]:
+    """Show what is being done when it lasts, on a terminal only.
+
+    Args:
+        out: Where to; default: stderr.
+
+    Yields:
+        A function to be told the name of every stage.
+    """
+    out = out or sys.stderr
+    if not out.isatty():
+        yield lambda stage: None
+        return
+    told = _Told(out)
+    timer = threading.Timer(PATIENCE, told.show)
+    timer.daemon = True
+    timer.start()
+    try:
+        yield told
+    finally:
+        timer.cancel()
+        timer.join()  # it may be about to show something
+        told.hide()
+
+
+class _Told:
+    """The stage that was told last, shown from some time on."""
+
+    def __init__(self, out: TextIO) -> None:
+        self._out, self._stage = out, "starting"
+        self._update: Callable[[str], None] = lambda stage: None
+        self.hide: Callable[[], None] = lambda: None
+
+    def __call__(self, stage: str) -> None:
+        self._stage = printable(stage)
+        self._update(self._stage)
+
+    def show(self) -> None:
+        """Begin to show it."""
+        from postproc.report.terminal import show_status
+
+        self._update, self.hide = show_status(self._out, self._stage)
+        self._update(self._stage)  # another one may have been told just now

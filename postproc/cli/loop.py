@@ -55,14 +55,14 @@ def diagnose(
     seed: SeedOption = 0,
 ) -> None:
     """Find what the model lacks, trace it to an effect, and add that effect."""
-    from postproc import diagnosing
     from postproc.calibration.diagnosis.diagnose import dumped, evidence_of
+    from postproc.cli import diagnose
     from postproc.report.terminal import stage_bar
 
     with explained():
         check_places([output, as_path(json), html, plot], [*data, cell, model, program])
         with stage_bar() as progress:
-            found = diagnosing.diagnose_files(
+            found = diagnose.diagnose_files(
                 data,
                 cell,
                 model,
@@ -84,20 +84,20 @@ def diagnose(
             for path in plot_diagnosis(found, plot):
                 say(f"plot {path}")
         if json != "-":
-            typer.echo(diagnosing.tell(found.diagnosis))
+            typer.echo(diagnose.tell(found.diagnosis))
 
 
 @app.command()
 def history(model: Path, json: JsonOption = None) -> None:
     """Print what was added to a model and its parents, with before and after."""
-    from postproc import diagnosing
+    from postproc.cli import diagnose
 
     with explained():
         check_places([as_path(json)], [model])
         if json:
-            write_text(json, diagnosing.history_json(model))
+            write_text(json, diagnose.history_json(model))
         if json != "-":
-            typer.echo(diagnosing.history_text(model))
+            typer.echo(diagnose.history_text(model))
 
 
 @app.command()

@@ -74,7 +74,7 @@ def survey(
     seed: SeedOption = 0,
 ) -> None:
     """Write a measurement program; every pose is approached from both sides."""
-    from postproc.surveying import write_survey
+    from postproc.cli.survey import write_survey
 
     with explained():
         check_places([output], [cell])
@@ -101,7 +101,7 @@ def simulate(
     json: JsonOption = None,
 ) -> None:
     """Let the virtual arm run a program or a survey, and measure it."""
-    from postproc.simulate import simulate_file
+    from postproc.cli.simulate import simulate_file
 
     with explained():
         check_places([output, as_path(json)], [program, cell, wanted])
@@ -138,15 +138,15 @@ def fit(
     unit: UnitOption = "mm",
 ) -> None:
     """Fit a model of the arm's error to laser-tracker measurements."""
-    from postproc import calibrating
     from postproc.calibration.tables import Reading
+    from postproc.cli import fit
 
     names = None if effects is None else split_names(effects)
     with explained():
         check_places([output, html], [*data, cell, program, columns])
         reading = Reading(columns, delimiter, decimal, encoding, unit)
         with busy("fit"):
-            found = calibrating.fit_files(
+            found = fit.fit_files(
                 data,
                 cell,
                 output,
@@ -169,12 +169,12 @@ def predict(
     output: Annotated[Path | None, typer.Option("-o", "--output")] = None,
 ) -> None:
     """Add the predicted error of every row; with positions, also the residual."""
-    from postproc import calibrating
+    from postproc.cli import fit
 
     with explained():
         check_places([output], [states, cell, model])
         with busy("predict"):
-            text, summary = calibrating.predict_file(states, cell, model)
+            text, summary = fit.predict_file(states, cell, model)
         write_text("-" if output is None else str(output), text)
         say(summary)
 
@@ -196,16 +196,16 @@ def compare(
     encoding: EncodingOption = None,
 ) -> None:
     """Fit every method to the same rows, and test it on the same others."""
-    from postproc import calibrating
     from postproc.calibration.tables import Reading
+    from postproc.cli import fit
 
     with explained():
         check_places([as_path(json), html, plot], [*data, cell, columns])
         reading = Reading(columns, delimiter, decimal, encoding)
         with busy("fit every method"):
-            found = calibrating.compare_files(data, cell, frame.value, seed, reading)
+            found = fit.compare_files(data, cell, frame.value, seed, reading)
         if json:
-            write_text(json, calibrating.comparison_json(found))
+            write_text(json, fit.comparison_json(found))
         if html is not None:
             from postproc.report.html import comparison_report
 
@@ -215,4 +215,4 @@ def compare(
 
             say(f"plot {plot_comparison(found, plot)}")
         if json != "-":
-            typer.echo(calibrating.tell_comparison(found))
+            typer.echo(fit.tell_comparison(found))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from itertools import zip_longest
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -25,9 +25,11 @@ from postproc.cli.common import (
     say,
     write_text,
 )
-from postproc.compensation.outcome import Outcome
 from postproc.exceptions import PostprocError
 from postproc.files import STREAM, check_places
+
+if TYPE_CHECKING:
+    from postproc.compensation.outcome import Outcome
 
 CROWD = 8  # processes, each with a window of its own in memory
 SHOWN = 20  # targets left alone whose source lines are shown
@@ -63,11 +65,11 @@ def compensate(
     processes: ProcessesOption = 0,
 ) -> None:
     """Rewrite a program so that the tool lands where its targets say."""
-    from postproc import jobs
+    from postproc.cli import jobs
+    from postproc.cli.common import stages
     from postproc.compensation import parallel
     from postproc.compensation.options import Options
     from postproc.report.json import report_text
-    from postproc.stages import stages
 
     given = None if program == STREAM else Path(program)
     with explained(given, lsv):
@@ -96,7 +98,7 @@ def compensate(
 
 def _print_outcome(outcome: Outcome) -> None:
     """Print what a person needs to know, on stderr."""
-    from postproc.pointing import point_at_visits
+    from postproc.cli.carets import point_at_visits
 
     for finding in outcome.diagnostics:
         place = f"{finding.file}:{finding.line}"
@@ -160,7 +162,7 @@ def explain(
     json: JsonOption = None,
 ) -> None:
     """Show why every target moves: from where it is reached, and what that costs."""
-    from postproc.explain import explain_file
+    from postproc.cli.explain import explain_file
 
     with explained(program, lsv):
         check_places([as_path(json)], [program, cell, model, lsv])

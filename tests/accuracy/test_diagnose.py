@@ -27,7 +27,7 @@ from postproc.calibration.diagnosis.result import periodogram, profile
 from postproc.calibration.diagnosis.score import leftovers
 from postproc.calibration.measurements import Measurements
 from postproc.calibration.selection import fit_survey, model_of
-from postproc.diagnosing import tell
+from postproc.cli.diagnose import tell
 from postproc.exceptions import ModelError, PostprocError
 from postproc.model.covariate import covariate, loops, unit
 from postproc.model.effects import BASE_EFFECTS

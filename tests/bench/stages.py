@@ -8,9 +8,9 @@ import time
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+from postproc.cli.jobs import Job
 from postproc.compensation import parallel
 from postproc.compensation.options import AS_USUAL
-from postproc.jobs import Job
 from tests.bench.kernels import planned, ruckig_alone, toppra_alone
 from tests.bench.made import KINDS
 

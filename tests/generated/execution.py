@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from postproc.cli.simulate import setup_of
 from postproc.compensation.outcome import Outcome
 from postproc.compensation.program import read_program
 from postproc.robot.cell import Cell
 from postproc.robot.pose import MM
-from postproc.simulate import setup_of
 from postproc.simulation import virtual_arm
 from postproc.simulation.program import Run, run_program
 from tests.conftest import SEED

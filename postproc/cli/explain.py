@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from postproc.cli.jobs import read_files
 from postproc.compensation.compensate import compensate
 from postproc.compensation.options import Options
 from postproc.compensation.outcome import Outcome, Status
@@ -19,7 +20,6 @@ from postproc.compensation.program import (
 )
 from postproc.exceptions import ProgramError, printable
 from postproc.files import VARIABLES, suffix_of
-from postproc.jobs import read_files
 from postproc.language.visits import ELSEWHERE, START, Visits
 from postproc.model.model import Model, load_model
 from postproc.report.json import target_row

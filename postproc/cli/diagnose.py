@@ -1,4 +1,4 @@
-"""Diagnosing files: what is read, written and told."""
+"""Diagnosing files: what is read, written and told; measured points of a program."""
 
 from __future__ import annotations
 
@@ -16,14 +16,105 @@ from postproc.calibration.diagnosis.result import Diagnosis
 from postproc.calibration.diagnosis.search import Progress
 from postproc.calibration.diagnosis.trace import REMAINS, silent
 from postproc.calibration.fit import read_surveys, several_points
-from postproc.calibration.measurements import Measurements, concatenate
+from postproc.calibration.measurements import (
+    COVARIATES,
+    POSITION,
+    Measurements,
+    concatenate,
+    read_points,
+)
 from postproc.calibration.registration import register
-from postproc.joining import join_program
+from postproc.calibration.tables import DETECT, Reading
+from postproc.cli.jobs import read_files
+from postproc.compensation.program import plan_visits, read_program, states_of
+from postproc.exceptions import MeasurementError
 from postproc.model.model import Model, load_model
 from postproc.model.statistics import ErrorStatistics
 from postproc.report.terminal import Column, table_text
 from postproc.robot.cell import Cell, load_cell
-from postproc.robot.pose import inverse
+from postproc.robot.pose import MM, inverse
+
+# Measured points of a program: which visit each of them belongs to.
+
+
+def join_program(
+    data: Path, program: Path, cell: Cell, reading: Reading = DETECT
+) -> Measurements:
+    """Give measured points the planned states of the visits they were taken at.
+
+    A row belongs to the visit with its id in a MEASURE comment, else to the only visit
+    of the variable with that name.
+
+    Args:
+        data: Columns id, x_mm, y_mm, z_mm and any recorded covariate, or a list of
+            points as SpatialAnalyzer and Leica software write it.
+        program: The program that ran.
+        cell: Its cell.
+        reading: What the user knows of the file.
+
+    Raises:
+        MeasurementError: An id that the program does not have, or has several times.
+        ProgramError: The program cannot be read.
+    """
+    table = read_points(data, reading)
+    visits = read_program(read_files(program), cell).visits
+    planned = plan_visits(visits, cell)
+    places = _places(visits.measure_id, [visits.names[k] for k in visits.name])
+    ids = table.text("id")
+    rows = np.array([_visit_of(places, i, table.path, line) for i, line in zip(
+        ids, table.line.tolist(), strict=True)], dtype=np.int64)  # fmt: skip
+    order = np.argsort(rows, kind="stable")
+    states = states_of(planned.plan, cell, cell.temperature)[rows[order]]
+    recorded = {
+        name: scale * table.numbers(column, empty=True)[order]
+        for column, (name, scale) in COVARIATES.items()
+        if table.has(column)
+    }
+    lost = np.isnan(states.q).any(axis=1)
+    if lost.any():
+        first = int(np.flatnonzero(lost)[0])
+        raise MeasurementError(
+            data,
+            f"the program's visit {ids[order[first]]} cannot be planned: "
+            f"{planned.reasons[int(rows[order][first])]}",
+            "Mend the program or leave the row out",
+            line=int(table.line[order][first]),
+        )
+    return Measurements(
+        path=table.path,
+        states=states.with_(**recorded),
+        position=table.block(POSITION)[order] * MM,
+        ids=tuple(ids[k] for k in order),
+        line=table.line[order],
+        inferred=np.zeros(len(rows), dtype=bool),
+        sha256=table.sha256,
+    )
+
+
+def _places(measured: tuple[str, ...], names: list[str]) -> dict[str, list[int]]:
+    """List the visits of every id, and of every variable name."""
+    places: dict[str, list[int]] = {}
+    for visit, (mark, name) in enumerate(zip(measured, names, strict=True)):
+        for key in {mark.lower(), name.lower()} - {""}:
+            places.setdefault(key, []).append(visit)
+    return places
+
+
+def _visit_of(places: dict[str, list[int]], key: str, path: Path, line: int) -> int:
+    """Find the visit of an id."""
+    found = places.get(key.lower(), [])
+    if len(found) == 1:
+        return found[0]
+    problem = "has no visit" if not found else f"has {len(found)} visits"
+    raise MeasurementError(
+        path,
+        f"id {key} {problem} in the program",
+        "Mark the move with a comment -- MEASURE <id>",
+        line=line,
+    )
+
+
+# Diagnosing files: what is read, written and told.
 
 HISTORY = (
     Column("model", "left"),
@@ -127,7 +218,9 @@ def tell(found: Diagnosis) -> str:
     """Write a diagnosis for a terminal."""
     lines = [f"verdict: {found.verdict}"]
     if found.findings:
-        lines.append(table_text(FINDINGS, (_row(found, k) for k in _numbers(found))))
+        lines.append(
+            table_text(FINDINGS, (_finding_row(found, k) for k in _numbers(found)))
+        )
     lines += [_constants(found, k) for k in _numbers(found)]
     lines += [
         f"before {_spread(found.before)}",
@@ -152,7 +245,7 @@ def _numbers(found: Diagnosis) -> range:
     return range(len(found.findings))
 
 
-def _row(found: Diagnosis, number: int) -> tuple[str, ...]:
+def _finding_row(found: Diagnosis, number: int) -> tuple[str, ...]:
     f = found.findings[number]
     others = ", ".join(
         effect + (f" {joint}" if joint else "") for effect, joint in f.confusable_with

@@ -26,8 +26,8 @@ from postproc.calibration.published import Comparison, compare
 from postproc.calibration.report import FitReport
 from postproc.calibration.tables import DETECT, Reading, read_table
 from postproc.calibration.tables import Table as Cells
+from postproc.cli.diagnose import join_program
 from postproc.files import write_all
-from postproc.joining import join_program
 from postproc.model.model import Model, load_model
 from postproc.model.statistics import ErrorStatistics
 from postproc.report.terminal import Column, table_text

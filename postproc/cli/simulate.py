@@ -8,8 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
+from postproc.cli.jobs import read_files
 from postproc.compensation.program import read_program
-from postproc.jobs import read_files
 from postproc.language.visits import Visits
 from postproc.model.statistics import ErrorStatistics
 from postproc.report.json import finite
