@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from typing import TextIO
 
 from postproc.language.scan import mask_line, number_value
-from postproc.report.diff import Row, target_name
+from postproc.report.diff import DiffRow, target_name
 from postproc.report.terminal import Column, arrows, print_listing, status_colour
 
 ASSIGNED = re.compile(r"\s*([A-Za-z_$][\w$.\[\]]*)\s*(?::=|:)")
@@ -17,13 +17,13 @@ LED = re.compile(r"(?:ELSE\s*:|CASE\s*\([^()]*\)\s*:|\w+\s*::)(.*)", re.S)
 TWO_WORDS = re.compile(r"\s*([A-Za-z_]+)\s+([A-Za-z_]+)")
 
 
-def rows_of(file: str, before: Sequence[str], after: Sequence[str]) -> list[Row]:
+def rows_of(file: str, before: Sequence[str], after: Sequence[str]) -> list[DiffRow]:
     """Describe those of equally many lines that differ."""
     pairs = enumerate(zip(before, after, strict=True), 1)
     return [row_of(file, line, old, new) for line, (old, new) in pairs if old != new]
 
 
-def row_of(file: str, line: int, old: str, new: str) -> Row:
+def row_of(file: str, line: int, old: str, new: str) -> DiffRow:
     """Describe one pair of lines."""
     a, b = mask_line(old), mask_line(new)
     numbers = [
@@ -35,12 +35,12 @@ def row_of(file: str, line: int, old: str, new: str) -> Row:
     ]
     bare = a.unterminated or b.unterminated or a.mask != b.mask
     if bare or comments[0] != comments[1] or numbers[0] == numbers[1]:
-        return Row(file, line, "", (), (), None, f"{old} -> {new}")
+        return DiffRow(file, line, "", (), (), None, f"{old} -> {new}")
     change = None
     if len(numbers[0]) >= 3 and "{" not in old:
         moved = [n - o for o, n in zip(*numbers, strict=True)]
         change = math.sqrt(sum(m * m for m in moved[:3]))
-    return Row(file, line, name_of(a.mask, old), *numbers, change)
+    return DiffRow(file, line, name_of(a.mask, old), *numbers, change)
 
 
 def name_of(mask: str, line: str) -> str:
@@ -56,14 +56,17 @@ def name_of(mask: str, line: str) -> str:
 
 
 def json_of(
-    stamped: bool, counts: dict[str, int], rows: Sequence[Row], left: Sequence[Row]
+    stamped: bool,
+    counts: dict[str, int],
+    rows: Sequence[DiffRow],
+    left: Sequence[DiffRow],
 ) -> str:
     """Write all of it as JSON."""
     told = {"rows": [r._asdict() for r in rows], "left": [r._asdict() for r in left]}
     return json.dumps({"stamped": stamped, "counts": counts, **told}, indent=1) + "\n"
 
 
-def list_rows(rows: Sequence[Row], skip: int, told: bool, out: TextIO) -> None:
+def list_rows(rows: Sequence[DiffRow], skip: int, told: bool, out: TextIO) -> None:
     """List rows that differ, one by one."""
     titles = ["file", "line", "target", "original", "", "compensated"]
     titles += ["|c| mm", "J1-6", "status"] if told else ["change mm"]
@@ -73,7 +76,7 @@ def list_rows(rows: Sequence[Row], skip: int, told: bool, out: TextIO) -> None:
     print_listing(columns[skip:], cells, {"status": status_colour}, out)
 
 
-def cells_of(row: Row, told: bool) -> list[str]:
+def cells_of(row: DiffRow, told: bool) -> list[str]:
     """Write the cells of a row."""
     size = row.correction_mm if told and row.status else row.change_mm
     old, new = row.text, ""

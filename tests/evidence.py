@@ -18,14 +18,14 @@ from postproc.compensation.compensate import compensate
 from postproc.compensation.outcome import Status
 from postproc.compensation.program import plan_visits, read_program, with_measured_play
 from postproc.compensation.program import states_of as planned_states
-from postproc.language.visits import Target
+from postproc.language.visits import Meaning
 from postproc.model.effects import BASE_EFFECTS
 from postproc.model.model import Model
 from postproc.robot.arm import load_arm
 from postproc.robot.cell import Cell, load_cell
 from postproc.robot.state import States, make_states
 from postproc.simulation import (
-    Arrivals,
+    VirtualArrivals,
     campaign_length,
     land,
     sample_survey,
@@ -39,7 +39,7 @@ TRACKER = np.array([3.15, -2.48, 1.12])  # [m]
 ARMS, ROWS, HELD_OUT = range(1001, 1051), 300, 200
 
 
-def states_of(a: Arrivals) -> States:
+def states_of(a: VirtualArrivals) -> States:
     """Describe what the virtual arm did as the model sees it."""
     known = {
         name: getattr(a, name)
@@ -135,7 +135,7 @@ def solved_and_written(cell: Cell, model: Model) -> tuple[np.ndarray, np.ndarray
     at = planned_states(planned.plan, cell, cell.temperature)
     at = at.with_(direction=done.decisions.side)
     exact = solve_visits(model, cell, planned, at)
-    rows = (done.decisions.status == Status.SAFE) & (done.visits.target == Target.POSE)
+    rows = (done.decisions.status == Status.SAFE) & (done.visits.target == Meaning.POSE)
     shift = done.decisions.corrected - new_numbers(
         reading.visits, planned.plan, exact, planned.plan.aside
     )

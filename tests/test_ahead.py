@@ -102,7 +102,7 @@ def test_shares_are_all_windows_in_their_order() -> None:
 
 
 def test_the_last_bit_counts() -> None:
-    stop = compensate_module.Stop()
+    stop = compensate_module.WindowState()
     places = np.full((1, 6), 0.1)
     one = replace(stop, planned=replace(stop.planned, q=places))
     other = replace(stop, planned=replace(stop.planned, q=np.nextafter(places, 1.0)))
@@ -112,7 +112,7 @@ def test_the_last_bit_counts() -> None:
 
 
 def test_rounding_leaves_the_rest_of_a_stop_alone() -> None:
-    stop = compensate_module.Stop(doubtful=True)
+    stop = compensate_module.WindowState(doubtful=True)
     stop = replace(stop, planned=replace(stop.planned, q=np.full((1, 6), 1 / 3)))
     found = parallel.steady(stop)
     assert found.doubtful and len(found.corrected.wanted) == 0
@@ -154,7 +154,7 @@ def test_programs_come_out_as_from_one_process(job, monkeypatch, kind: str) -> N
 
     def watched(foretold, stop) -> bool:
         same = is_same(foretold, stop)
-        if isinstance(stop, compensate_module.Stop):
+        if isinstance(stop, compensate_module.WindowState):
             right.append(same)
         return same
 
@@ -166,6 +166,6 @@ def test_programs_come_out_as_from_one_process(job, monkeypatch, kind: str) -> N
 
 def test_and_where_the_wrong_place_was_foretold(job, monkeypatch) -> None:
     alone = job("drilling", 1)
-    nowhere = compensate_module.Stop()
-    monkeypatch.setattr(compensate_module._Work, "foretell", lambda *_: nowhere)
+    nowhere = compensate_module.WindowState()
+    monkeypatch.setattr(compensate_module._WindowWork, "foretell", lambda *_: nowhere)
     assert_alike(job("drilling", 3), alone)

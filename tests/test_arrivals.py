@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from postproc.compensation.outcome import BOTH, Arrivals, Status, tell_arrivals
+from postproc.compensation.outcome import BOTH, LineOutcomes, Status, tell_arrivals
 from tests.html.builders import FIRST_LINE, decisions_of, visits_of
 
 
@@ -15,7 +15,7 @@ def test_every_line_comes_back():
     visits = visits_of(60, "job.pdl", ("",))
     decisions = decisions_of(visits, 1)
     (told,) = tell_arrivals(visits, decisions, ("job.pdl",)).values()
-    found = Arrivals.read(told)
+    found = LineOutcomes.read(told)
     assert found.line.tolist() == list(range(FIRST_LINE, FIRST_LINE + 60))
     assert found.status.tolist() == decisions.status.tolist()
     assert np.array_equal(found.direction, decisions.direction)
@@ -36,7 +36,7 @@ def test_visits_of_one_line_are_told_together():
         "why": [0, 1, 0],
         "reasons": ["", "too near"],
     }
-    found = Arrivals.read(told)
+    found = LineOutcomes.read(told)
     assert found.line.tolist() == [3, 7]
     assert found.status.tolist() == [Status.GUARDED, Status.SAFE]
     assert found.direction[1].tolist() == [1, BOTH, BOTH, BOTH, BOTH, 1]
@@ -48,7 +48,7 @@ def test_visits_of_one_line_are_told_together():
 def test_the_most_urgent_status_of_a_line_counts():
     told = {"line": [1] * 3, "correction_mm": [0] * 3, "direction": "0" * 18}
     for status, wanted in (("401", 1), ("403", 3), ("402", 2), ("440", 0)):
-        found = Arrivals.read(told | {"status": status, "why": [0, 1, 2],
+        found = LineOutcomes.read(told | {"status": status, "why": [0, 1, 2],
                                       "reasons": ["a", "b", "c"]})  # fmt: skip
         assert found.status.tolist() == [wanted]
         assert found.why.tolist() == [status.index(str(wanted))]
@@ -65,7 +65,7 @@ def test_lines_whose_visits_have_several_statuses_are_counted():
         "why": [0] * 6,
         "reasons": [""],
     }
-    found = Arrivals.read(told)
+    found = LineOutcomes.read(told)
     assert found.line.tolist() == [3, 7, 9]
     assert found.mixed == {2: {"guarded": 1, "unchanged": 1}}
 
@@ -84,5 +84,5 @@ def test_numbers_in_a_file_that_is_not_written_belong_to_their_move():
 def test_no_visits():
     visits = visits_of(0, "job.pdl", ("",))
     (told,) = tell_arrivals(visits, decisions_of(visits, 1), ("job.pdl",)).values()
-    found = Arrivals.read(told)
+    found = LineOutcomes.read(told)
     assert len(found.line) == 0 and found.find([1]).tolist() == [-1]

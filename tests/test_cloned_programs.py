@@ -8,7 +8,8 @@ import pytest
 from postproc.cli.simulate import setup_of
 from postproc.compensation.compensate import compensate
 from postproc.compensation.options import Options
-from postproc.language.visits import Motion, Target, Visits
+from postproc.language.visits import Meaning, Visits
+from postproc.robot.trajectory import Motion
 from postproc.simulation import land, virtual_arm
 from tests.conftest import SEED
 from tests.made_visits import visits
@@ -23,7 +24,7 @@ def visits_of(moves: list[Executed], cell) -> Visits:
     """Make visits of a sequence of moves, in the cell's frames."""
     frames = np.array([cell.tool.record, cell.base.record, cell.uframe.record])
     return visits(
-        [int(Target.JOINTS if m.joints else Target.POSE) for m in moves],
+        [int(Meaning.JOINTS if m.joints else Meaning.POSE) for m in moves],
         [list(m.numbers) for m in moves],
         motion=np.array([int(Motion[m.motion]) for m in moves]),
         configs=("",),

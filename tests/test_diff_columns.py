@@ -10,12 +10,12 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from postproc.compensation.outcome import Arrivals, Status
+from postproc.compensation.outcome import LineOutcomes, Status
 from postproc.language.scan import mask_line, number_value
 from postproc.report.diff import (
     Difference,
-    Row,
-    Rows,
+    DiffRow,
+    DiffRows,
     changed_rows,
     diff,
     joined_rows,
@@ -72,10 +72,10 @@ def as_bytes(lines: list[str]) -> list[bytes]:
     return [line.encode("latin-1") for line in lines]
 
 
-def told_of(rng: np.random.Generator, lines: int) -> Arrivals:
+def told_of(rng: np.random.Generator, lines: int) -> LineOutcomes:
     """Tell something of most lines."""
     line = np.flatnonzero(rng.random(lines) < 0.8) + 1
-    return Arrivals(
+    return LineOutcomes(
         line,
         rng.integers(0, len(Status), len(line)),
         rng.integers(0, 3, len(line)),
@@ -87,7 +87,7 @@ def told_of(rng: np.random.Generator, lines: int) -> Arrivals:
     )
 
 
-def with_told(row: Row, told: Arrivals) -> Row:
+def with_told(row: DiffRow, told: LineOutcomes) -> DiffRow:
     """Add what is told of a row's line."""
     at = np.flatnonzero(told.line == row.line)
     if not len(at):
@@ -109,7 +109,7 @@ def said(found: Difference) -> tuple[str, str]:
     return listing, "".join(difference_pieces(found))
 
 
-def same(rows: list[Row], wanted: list[Row]) -> bool:
+def same(rows: list[DiffRow], wanted: list[DiffRow]) -> bool:
     """Compare rows; NaN equals NaN."""
     return list(map(repr, rows)) == list(map(repr, wanted))
 
@@ -148,10 +148,10 @@ def test_listing_and_json_are_those_made_row_by_row(seed: int, told: bool) -> No
 
 def test_what_was_left_alone_is_in_the_json_too() -> None:
     told = told_of(np.random.default_rng(3), 90)
-    left = Rows.bare("a.pdl", told.line[::2], ["MOVE TO"] * len(told.line[::2]))
+    left = DiffRows.bare("a.pdl", told.line[::2], ["MOVE TO"] * len(told.line[::2]))
     found = Difference((), False, (left.with_told(told),), dict(told.counts))
     wanted = [
-        with_told(Row("a.pdl", line, "MOVE TO", (), (), None), told)
+        with_told(DiffRow("a.pdl", line, "MOVE TO", (), (), None), told)
         for line in told.line[::2].tolist()
     ]
     assert said(found)[1] == json_of(False, dict(told.counts), [], wanted)

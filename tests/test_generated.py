@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from postproc.compensation.compensate import compensate
-from postproc.language.visits import Target
+from postproc.language.visits import Meaning
 from tests.generated.found import (
     ALL,
     ALONG,
@@ -83,7 +83,7 @@ def test_no_point_moves_farther_than_a_correction_may(job_cell, job_model):
         made.files["job.pdl"], job_cell, job_model, pages=pages, options=options
     )
     moved = (done.decisions.corrected - done.visits.values)[:, :3]
-    poses = done.visits.target == Target.POSE
+    poses = done.visits.target == Meaning.POSE
     way = np.linalg.norm(np.nan_to_num(moved[poses]), axis=1)
     assert 0 < way.max() <= job_cell.limits.correction_mm
 

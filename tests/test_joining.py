@@ -7,7 +7,7 @@ import csv
 import numpy as np
 import pytest
 
-from postproc.calibration.tables import Reading
+from postproc.calibration.tables import TableFormat
 from postproc.cli.diagnose import join_program
 from postproc.compensation.program import plan_visits, read_program
 from postproc.exceptions import MeasurementError
@@ -94,5 +94,5 @@ def test_lists_of_points_of_other_tools_are_joined(desk, job_cell):
     np.testing.assert_allclose(found.position[0], [4e-3, 5e-3, 6e-3])
     found = join_program(leica, source, job_cell)
     np.testing.assert_allclose(found.position[0], [1.5e-3, 2e-3, 3e-3])
-    metres = join_program(sa, source, job_cell, Reading(unit="m"))
+    metres = join_program(sa, source, job_cell, TableFormat(unit="m"))
     np.testing.assert_allclose(metres.position[0], [4.0, 5.0, 6.0])

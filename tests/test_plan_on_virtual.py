@@ -9,11 +9,12 @@ import numpy as np
 import pytest
 
 from postproc.compensation.targets import targets_from_visits
-from postproc.language.visits import Motion, Target, Visits
+from postproc.language.visits import Meaning, Visits
 from postproc.motion.planner import plan
 from postproc.robot.cell import Cell, load_cell
 from postproc.robot.pose import pose_from_record, record_from_pose
-from postproc.simulation.controller import Setup
+from postproc.robot.trajectory import Motion
+from postproc.simulation.controller import VirtualCell
 from postproc.simulation.draw import virtual_arm
 from postproc.simulation.program import run_program
 from tests.made_visits import FRAMES, visits
@@ -36,7 +37,7 @@ def program(cell: Cell, rng: np.random.Generator) -> Visits:
     tool, base, uframe = pose_from_record(FRAMES)
     to_user = np.linalg.inv(uframe) @ base
     target, values, motion, via, branch = (
-        [int(Target.HOME)],
+        [int(Meaning.HOME)],
         [[np.nan] * 6],
         [0],
         [0],
@@ -58,7 +59,7 @@ def program(cell: Cell, rng: np.random.Generator) -> Visits:
             (hole, Motion.LINEAR, 0), (aside, Motion.CIRCULAR, 1),
             (over, Motion.CIRCULAR, 0),
         ):  # fmt: skip
-            target.append(int(Target.POSE))
+            target.append(int(Meaning.POSE))
             values.append(record_from_pose(to_user @ T).tolist())
             motion.append(int(kind))
             via.append(on_way)
@@ -77,17 +78,17 @@ def with_steps(cell: Cell, rng: np.random.Generator) -> Visits:
     for _ in range(HOLES):
         q = rng.uniform([-40, -20, -110, -80, 25, -80], [40, 20, -80, 80, 70, 80])
         xyz = rng.uniform(-80, 80, 3).tolist()
-        steps: list[tuple[Target, list[float]]] = [
-            (Target.RELATIVE_TOOL, [*xyz, nan, nan, nan]),
-            (Target.RELATIVE_BASE, [*xyz, nan, nan, nan]),
-            (Target.RELATIVE_UFRAME, [*xyz, nan, nan, nan]),
-            (Target.AWAY, [90.0, nan, nan, nan, nan, nan]),
-            (Target.ABOUT, [*xyz, 15.0, float(rng.integers(4, 7)), nan]),
-            (Target.BY, [2.0, -1.0, 3.0, -4.0, 5.0, 6.0]),
+        steps: list[tuple[Meaning, list[float]]] = [
+            (Meaning.RELATIVE_TOOL, [*xyz, nan, nan, nan]),
+            (Meaning.RELATIVE_BASE, [*xyz, nan, nan, nan]),
+            (Meaning.RELATIVE_UFRAME, [*xyz, nan, nan, nan]),
+            (Meaning.AWAY, [90.0, nan, nan, nan, nan, nan]),
+            (Meaning.ABOUT, [*xyz, 15.0, float(rng.integers(4, 7)), nan]),
+            (Meaning.BY, [2.0, -1.0, 3.0, -4.0, 5.0, 6.0]),
         ]
         chosen = [steps[k] for k in rng.permutation(6)[:3]]
-        for kind, numbers in [(Target.JOINTS, q.tolist()), *chosen]:
-            joints = kind in (Target.JOINTS, Target.BY)
+        for kind, numbers in [(Meaning.JOINTS, q.tolist()), *chosen]:
+            joints = kind in (Meaning.JOINTS, Meaning.BY)
             target.append(int(kind))
             values.append(numbers)
             motion.append(int(Motion.JOINT if joints else Motion.LINEAR))
@@ -101,16 +102,16 @@ def with_parts(cell: Cell, rng: np.random.Generator) -> Visits:
     target, values, distance = [], [], []
     for _ in range(HOLES):
         q = rng.uniform([-40, -20, -110, -80, 25, -80], [40, 20, -80, 80, 70, 80])
-        target.append(int(Target.JOINTS))
+        target.append(int(Meaning.JOINTS))
         values.append(q.tolist())
         distance.append(np.nan)
         for _ in range(2):
             there = np.deg2rad(q + rng.uniform(3.0, 8.0, 6) * rng.choice([-1, 1], 6))
             T = (cell.arm.flange(there[None]) @ tool)[0]
-            target.append(int(Target.FOR))
+            target.append(int(Meaning.FOR))
             values.append(record_from_pose(to_user @ T).tolist())
             distance.append(rng.uniform(0.0, 40.0))
-    joints = np.array(target) == Target.JOINTS
+    joints = np.array(target) == Meaning.JOINTS
     motion = np.where(joints, Motion.JOINT, Motion.LINEAR)
     return visits(target, values, motion=motion, distance_mm=np.array(distance))
 
@@ -123,7 +124,7 @@ def test_joint_angles_and_directions_agree(
     made = write(cell, np.random.default_rng(seed))
     targets, _ = targets_from_visits(made, cell)
     planned = plan(cell.arm, targets, np.deg2rad(cell.limits.wrist_deg))
-    setup = Setup(home=cell.home)
+    setup = VirtualCell(home=cell.home)
     ran = run_program(virtual_arm(seed, effects="backlash"), setup, made)
     assert len(ran.visit) > 0.9 * len(made)
     same = ran.visit[planned.reason[ran.visit] == 0]

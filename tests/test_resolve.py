@@ -8,8 +8,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from postproc.compensation.targets import configurations, targets_from_visits
-from postproc.language.visits import Target
-from postproc.motion.targets import Kind
+from postproc.language.visits import Meaning
+from postproc.motion.targets import TargetKind
 from postproc.robot.cell import Cell, load_cell
 from postproc.robot.pose import inverse, pose_from_record
 from tests.made_visits import FRAMES, visits
@@ -29,7 +29,7 @@ POSE = [100.0, 200.0, 300.0, 10.0, 80.0, -20.0]
 
 
 def test_world_base_flange_tool_is_uframe_pose(cell: Cell) -> None:
-    targets, reasons = targets_from_visits(visits([Target.POSE], [POSE]), cell)
+    targets, reasons = targets_from_visits(visits([Meaning.POSE], [POSE]), cell)
     tool, base, uframe = pose_from_record(FRAMES)
     expected = uframe @ pose_from_record(np.array(POSE))
     np.testing.assert_allclose(base @ targets.tcp[0], expected, atol=1e-12)
@@ -41,11 +41,16 @@ def test_world_base_flange_tool_is_uframe_pose(cell: Cell) -> None:
 def test_joints_and_home(cell: Cell) -> None:
     nothing = [np.nan] * 6
     given = visits(
-        [Target.JOINTS, Target.HOME, Target.CALIBRATION, Target.BY],
+        [Meaning.JOINTS, Meaning.HOME, Meaning.CALIBRATION, Meaning.BY],
         [[10, 20, -90, 0, 30, 0], nothing, nothing, [1, 0, 0, 0, 0, -5]],
     )
     targets, reasons = targets_from_visits(given, cell)
-    kinds = [Kind.JOINTS, Kind.JOINTS, Kind.UNKNOWN, Kind.JOINT_STEP]
+    kinds = [
+        TargetKind.JOINTS,
+        TargetKind.JOINTS,
+        TargetKind.UNKNOWN,
+        TargetKind.JOINT_STEP,
+    ]
     assert targets.kind.tolist() == kinds
     np.testing.assert_allclose(targets.joints[1], cell.home)
     np.testing.assert_allclose(np.rad2deg(targets.joints[3]), [1, 0, 0, 0, 0, -5])
@@ -55,23 +60,23 @@ def test_joints_and_home(cell: Cell) -> None:
 
 def test_the_calibration_position_is_the_cells(cell: Cell) -> None:
     angles = np.deg2rad([0.0, 0.0, -90.0, 0.0, 90.0, 0.0])
-    given = visits([Target.CALIBRATION, Target.HOME], [[np.nan] * 6] * 2)
+    given = visits([Meaning.CALIBRATION, Meaning.HOME], [[np.nan] * 6] * 2)
     known = replace(cell, calibration=angles, home=None)
     targets, _ = targets_from_visits(given, known)
-    assert targets.kind.tolist() == [Kind.JOINTS, Kind.UNKNOWN]
+    assert targets.kind.tolist() == [TargetKind.JOINTS, TargetKind.UNKNOWN]
     np.testing.assert_allclose(targets.joints[0], angles)
 
 
 def test_steps_along_the_frames(cell: Cell) -> None:
     nan = np.nan
     given = visits(
-        [Target.RELATIVE_TOOL, Target.RELATIVE_BASE, Target.RELATIVE_UFRAME,
-         Target.AWAY, Target.ABOUT],
+        [Meaning.RELATIVE_TOOL, Meaning.RELATIVE_BASE, Meaning.RELATIVE_UFRAME,
+         Meaning.AWAY, Meaning.ABOUT],
         [[1, 2, 3, nan, nan, nan], [1, 2, 3, nan, nan, nan], [1, 2, 3, nan, nan, nan],
          [50, nan, nan, nan, nan, nan], [0, 0, 2, 30, 6, nan]],
     )  # fmt: skip
     targets, _ = targets_from_visits(given, cell)
-    tool, base = Kind.TOOL_STEP, Kind.BASE_STEP
+    tool, base = TargetKind.TOOL_STEP, TargetKind.BASE_STEP
     assert targets.kind.tolist() == [tool, base, base, tool, base]
     _, base_pose, uframe = pose_from_record(FRAMES)
     R = (inverse(base_pose) @ uframe)[:3, :3]
@@ -85,7 +90,7 @@ def test_steps_along_the_frames(cell: Cell) -> None:
 
 
 def test_near_stops_short_along_the_approach(cell: Cell) -> None:
-    given = visits([Target.POSE, Target.NEAR], [POSE, POSE],
+    given = visits([Meaning.POSE, Meaning.NEAR], [POSE, POSE],
                    distance_mm=np.array([np.nan, 40.0]))  # fmt: skip
     targets, _ = targets_from_visits(given, cell)
     at, short = targets.tcp
@@ -95,10 +100,10 @@ def test_near_stops_short_along_the_approach(cell: Cell) -> None:
 
 @pytest.mark.parametrize("frame", ["tool", "base", "uframe"])
 def test_an_unknown_frame_is_a_reason_and_no_guess(cell: Cell, frame: str) -> None:
-    given = visits([Target.POSE, Target.JOINTS], [POSE, [0, 0, -90, 0, 30, 0]],
+    given = visits([Meaning.POSE, Meaning.JOINTS], [POSE, [0, 0, -90, 0, 30, 0]],
                    **{frame: np.array([-1, -1])})  # fmt: skip
     targets, reasons = targets_from_visits(given, cell)
-    assert targets.kind.tolist() == [Kind.UNKNOWN, Kind.JOINTS]
+    assert targets.kind.tolist() == [TargetKind.UNKNOWN, TargetKind.JOINTS]
     assert f"${frame.upper()} is not known" in reasons[0]
     assert (reasons[1] != "") == (frame == "tool")
 
@@ -107,23 +112,28 @@ def test_auxiliary_axes(cell: Cell) -> None:
     nan = np.nan
     aux = np.array([[90, nan, nan], [nan, 100, nan], [nan, nan, 5], [nan, nan, nan]])
     targets, reasons = targets_from_visits(
-        visits([Target.POSE] * 4, [POSE] * 4, aux=aux), cell
+        visits([Meaning.POSE] * 4, [POSE] * 4, aux=aux), cell
     )
-    assert targets.kind.tolist() == [Kind.POSE, Kind.UNKNOWN, Kind.UNKNOWN, Kind.POSE]
+    assert targets.kind.tolist() == [
+        TargetKind.POSE,
+        TargetKind.UNKNOWN,
+        TargetKind.UNKNOWN,
+        TargetKind.POSE,
+    ]
     assert "track" in reasons[1] and "[aux]" in reasons[2]
     assert reasons[0] == reasons[3] == ""
 
 
 def test_a_remote_tool_is_not_guessed(cell: Cell) -> None:
-    given = visits([Target.POSE], [POSE], tool_remote=np.array([True]))
+    given = visits([Meaning.POSE], [POSE], tool_remote=np.array([True]))
     targets, reasons = targets_from_visits(given, cell)
-    assert targets.kind[0] == Kind.UNKNOWN and "$TOOL_RMT" in reasons[0]
+    assert targets.kind[0] == TargetKind.UNKNOWN and "$TOOL_RMT" in reasons[0]
 
 
 def test_a_value_known_at_run_time_only(cell: Cell) -> None:
-    given = visits([Target.POSE, Target.UNKNOWN], [[*POSE[:5], np.nan], [np.nan] * 6])
+    given = visits([Meaning.POSE, Meaning.UNKNOWN], [[*POSE[:5], np.nan], [np.nan] * 6])
     targets, reasons = targets_from_visits(given, cell)
-    assert targets.kind.tolist() == [Kind.UNKNOWN] * 2
+    assert targets.kind.tolist() == [TargetKind.UNKNOWN] * 2
     assert reasons[0] == "a value is not known"
 
 

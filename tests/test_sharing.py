@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from postproc.compensation.clones import Arrivals, Stop, connected, regroup
+from postproc.compensation.clones import MoveSlot, SlotArrivals, connected, regroup
 
 LIMIT = 0.5
 
 
-def drawn(rng: np.random.Generator) -> list[Arrivals]:
+def drawn(rng: np.random.Generator) -> list[SlotArrivals]:
     """Draw stops of two variables at two literals, some fixed, some unusable."""
     members = []
     for line in range(int(rng.integers(1, 9))):
@@ -24,7 +24,9 @@ def drawn(rng: np.random.Generator) -> list[Arrivals]:
             changes[literals[0]] = rng.uniform(-3, 3, (3, 3))
         variable = str(rng.choice(["", "p", "q"], p=[0.2, 0.5, 0.3]))
         members.append(
-            Arrivals(Stop(0, line, False), variable, changes, rng.random() < 0.9)
+            SlotArrivals(
+                MoveSlot(0, line, False), variable, changes, rng.random() < 0.9
+            )
         )
     return members
 
@@ -59,7 +61,7 @@ def test_groups_hold_every_stop_once_and_agree(seed: int) -> None:
 
 def test_all_that_agree_share() -> None:
     change = {0: np.zeros((1, 3))}
-    members = [Arrivals(Stop(0, k, False), "p", change, True) for k in range(5)]
+    members = [SlotArrivals(MoveSlot(0, k, False), "p", change, True) for k in range(5)]
     (only,) = regroup(members, False, LIMIT)
     assert len(only.stops) == 5
     original, one = regroup(members, True, LIMIT)

@@ -14,7 +14,7 @@ from postproc.model.combination import Combination
 from postproc.model.effects import BASE_EFFECTS, propose
 from postproc.model.effects.effect import Effect, Parameter
 from postproc.model.kinematics import Batch
-from postproc.simulation import Arrivals, VirtualArm, virtual_arm
+from postproc.simulation import VirtualArm, VirtualArrivals, virtual_arm
 from tests.accuracy.planted import (
     ARM,
     BASE,
@@ -176,7 +176,7 @@ def _true_errors(
     return out[0], out[1], out[2]
 
 
-def _fresh(arm: VirtualArm, seed: int, rows: int) -> Arrivals:
+def _fresh(arm: VirtualArm, seed: int, rows: int) -> VirtualArrivals:
     """Other poses, visited after the survey."""
     fresh = survey(arm, seed + 10**6, FRESH)
     later = 14.0 * rows + fresh.time
@@ -188,7 +188,7 @@ def _fresh(arm: VirtualArm, seed: int, rows: int) -> Arrivals:
     )
 
 
-def _informed(c: Campaign, seed: int, fresh: Arrivals, truth: np.ndarray) -> Fit:
+def _informed(c: Campaign, seed: int, fresh: VirtualArrivals, truth: np.ndarray) -> Fit:
     """Fit the base and exactly the planted effects, sizes unknown."""
     rows = len(c.states)
     clean = virtual_arm(seed, BASE, rows=rows)

@@ -35,7 +35,7 @@ Current = Callable[[str], str | None]  # program -> id of the model it should ha
 
 
 @dataclass(frozen=True, order=True)
-class Finding:
+class CheckFinding:
     """Why a file must not be uploaded as it is.
 
     Attributes:
@@ -59,7 +59,7 @@ class Checked:
     """
 
     programs: int
-    findings: tuple[Finding, ...]
+    findings: tuple[CheckFinding, ...]
 
     @property
     def exit_code(self) -> int:
@@ -118,10 +118,12 @@ def _places(root: Path) -> Iterator[str]:
             yield (Path(parent) / name).relative_to(root).as_posix()
 
 
-def _absent(source: Path, places: set[str]) -> list[Finding]:
+def _absent(source: Path, places: set[str]) -> list[CheckFinding]:
     """Find programs of which there is no output."""
     return [
-        Finding(place, "absent", "is in the source tree only: it was not compensated")
+        CheckFinding(
+            place, "absent", "is in the source tree only: it was not compensated"
+        )
         for place in _places(source)
         if suffix_of(place) == PROGRAM and place not in places
     ]
@@ -143,16 +145,18 @@ class _Look:
     current: Current
     places: Mapping[str, str]
 
-    def at(self, place: str) -> Iterator[Finding]:
+    def at(self, place: str) -> Iterator[CheckFinding]:
         """Find what is wrong with a file."""
         suffix = suffix_of(place)
         if place.endswith(TEMPORARY):
-            yield Finding(place, "unfinished", "was left by a run that was killed")
+            yield CheckFinding(place, "unfinished", "was left by a run that was killed")
         elif suffix == PROGRAM:
             yield from self._program(place)
         elif suffix == VARIABLES and not self._beside(place, PROGRAM):
             if holds_targets(read_input(self.root / place)):
-                yield Finding(place, "uncompensated", "its program is not beside it")
+                yield CheckFinding(
+                    place, "uncompensated", "its program is not beside it"
+                )
         elif suffix in COMPILED and self._beside(place, PROGRAM):
             yield from self._compiled(place)
 
@@ -160,72 +164,78 @@ class _Look:
         """Return the file of another kind with the same base name."""
         return self.places.get(os.path.splitext(place)[0].lower() + suffix)
 
-    def _program(self, place: str) -> Iterator[Finding]:
+    def _program(self, place: str) -> Iterator[CheckFinding]:
         """Check a program and the variable file that was written with it."""
         data = read_input(self.root / place)
         stamp = read_stamp(data)
         record_path = sidecar_path(self.root / place)
         if not record_path.exists():
             if stamp is None:
-                yield Finding(place, "uncompensated", "carries no stamp and no record")
+                yield CheckFinding(
+                    place, "uncompensated", "carries no stamp and no record"
+                )
             else:
                 text = "its record is missing: it cannot be checked or restored"
-                yield Finding(place, "no-record", text)
+                yield CheckFinding(place, "no-record", text)
             return
         try:
             sidecar = read_sidecar(record_path)
         except ProgramError as exc:
-            yield Finding(place, "no-record", str(exc))
+            yield CheckFinding(place, "no-record", str(exc))
             return
         yield from self._model(place, sidecar)
         yield from self._content(place, data, sidecar)
         if values := self._beside(place, VARIABLES):
             yield from self._content(values, read_input(self.root / values), sidecar)
 
-    def _model(self, place: str, sidecar: Sidecar) -> Iterator[Finding]:
+    def _model(self, place: str, sidecar: Sidecar) -> Iterator[CheckFinding]:
         """Check that a program was made with the model it should be made with."""
         wanted = self.current(place)
         if wanted is not None and sidecar.model != wanted:
             text = f"was made with model {sidecar.model}, the current one is {wanted}"
-            yield Finding(place, "older-model", f"{text}: compensate it again")
+            yield CheckFinding(place, "older-model", f"{text}: compensate it again")
 
-    def _content(self, place: str, data: bytes, sidecar: Sidecar) -> Iterator[Finding]:
+    def _content(
+        self, place: str, data: bytes, sidecar: Sidecar
+    ) -> Iterator[CheckFinding]:
         """Check a file against its record, and the record against the source."""
         record = sidecar.files.get(place.rpartition("/")[2])
         stamp = read_stamp(data)
         if record is None:
             if stamp is not None:
                 text = "is stamped, and its record does not know it"
-                yield Finding(place, "no-record", text)
+                yield CheckFinding(place, "no-record", text)
             yield from self._source(place, sha256(data))
             return
         if sha256(data) != record.output_sha256:
-            yield Finding(place, "changed", "was changed after it was compensated")
+            yield CheckFinding(place, "changed", "was changed after it was compensated")
         elif stamp is None or not _agree(stamp.source, stamp.model, record, sidecar):
-            yield Finding(place, "no-record", "its stamp is not that of its record")
+            yield CheckFinding(
+                place, "no-record", "its stamp is not that of its record"
+            )
         yield from _left_alone(place, record)
         yield from self._source(place, record.source_sha256)
 
-    def _source(self, place: str, digest: str) -> Iterator[Finding]:
+    def _source(self, place: str, digest: str) -> Iterator[CheckFinding]:
         """Check that a file was made from what is in the source tree now."""
         if self.source is None:
             return
         path = self.source / place
         if not path.is_file():
-            yield Finding(place, "no-source", "is not in the source tree")
+            yield CheckFinding(place, "no-source", "is not in the source tree")
         elif sha256(read_input(path)) != digest:
             text = "its source has changed since: compensate it again"
-            yield Finding(place, "source-changed", text)
+            yield CheckFinding(place, "source-changed", text)
 
-    def _compiled(self, place: str) -> Iterator[Finding]:
+    def _compiled(self, place: str) -> Iterator[CheckFinding]:
         """Check that a compiled file is not that of the uncompensated program."""
         if self.source is not None and (self.source / place).is_file():
             if read_input(self.source / place) == read_input(self.root / place):
                 text = "is compiled from the uncompensated program: translate it anew"
-                yield Finding(place, "uncompensated", text)
+                yield CheckFinding(place, "uncompensated", text)
 
 
-def _left_alone(place: str, record: FileRecord) -> Iterator[Finding]:
+def _left_alone(place: str, record: FileRecord) -> Iterator[CheckFinding]:
     """Find targets that could have been compensated and kept their value."""
     told = record.targets
     codes = "".join(str(int(status)) for status in LEFT_ALONE)
@@ -235,7 +245,7 @@ def _left_alone(place: str, record: FileRecord) -> Iterator[Finding]:
         more = " .." if len(lines) > NAMED else ""
         text = f"{len(lines)} visits were left alone, lines {', '.join(lines[:NAMED])}"
         cure = "look at them, then pass --accept-left"
-        yield Finding(place, LEFT, f"{text}{more} of the source: {cure}")
+        yield CheckFinding(place, LEFT, f"{text}{more} of the source: {cure}")
 
 
 def _agree(source: str, model: str, record: FileRecord, sidecar: Sidecar) -> bool:

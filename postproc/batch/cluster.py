@@ -14,7 +14,7 @@ from time import monotonic
 from typing import Any
 
 from postproc import __version__
-from postproc.batch.plan import Result, Setup
+from postproc.batch.plan import JobSetup, Result
 from postproc.batch.workers import Chunk, Working, run_tasks
 from postproc.exceptions import PostprocError
 
@@ -30,7 +30,7 @@ class ClusterCrew:
     losses: tuple[type[BaseException], ...]
 
     def __init__(
-        self, setups: Sequence[Setup], address: str, tls: Path | None = None
+        self, setups: Sequence[JobSetup], address: str, tls: Path | None = None
     ) -> None:
         """Connect to a scheduler.
 
@@ -119,12 +119,12 @@ def _connect(address: str, tls: Path | None) -> Any:
     return client
 
 
-def _keep(setup: Setup) -> Setup:
+def _keep(setup: JobSetup) -> JobSetup:
     """Have a setup at hand in a worker."""
     return setup
 
 
-def _run(chunk: Chunk, setup: Setup, version: str) -> list[Result]:
+def _run(chunk: Chunk, setup: JobSetup, version: str) -> list[Result]:
     """Do a chunk in a worker: one at a time in a process, whatever its threads."""
     with _one_at_a_time:
         return run_tasks(chunk, setup, version)

@@ -17,7 +17,7 @@ FORMAT = 1
 
 
 @dataclass(frozen=True)
-class Entry:
+class JournalEntry:
     """What came of one unit, or of one other file.
 
     Attributes:
@@ -50,7 +50,7 @@ class Entry:
 _OWN = ("file", "status", "exit", "digest", "outputs")
 
 
-def entry_from(data: Mapping[str, Any]) -> Entry:
+def entry_from(data: Mapping[str, Any]) -> JournalEntry:
     """Take a line of the log apart.
 
     Raises:
@@ -58,7 +58,7 @@ def entry_from(data: Mapping[str, Any]) -> Entry:
     """
     outputs = {str(k): str(v) for k, v in data.get("outputs", {}).items()}
     facts = {k: v for k, v in data.items() if k not in _OWN}
-    return Entry(
+    return JournalEntry(
         str(data["file"]),
         str(data["status"]),
         int(data["exit"]),
@@ -68,9 +68,9 @@ def entry_from(data: Mapping[str, Any]) -> Entry:
     )
 
 
-def read_entries(path: Path) -> dict[str, Entry]:
+def read_entries(path: Path) -> dict[str, JournalEntry]:
     """Read the last entry of every file; a torn or foreign line does not count."""
-    entries: dict[str, Entry] = {}
+    entries: dict[str, JournalEntry] = {}
     try:
         lines = path.read_bytes().splitlines()
     except OSError:
@@ -91,7 +91,7 @@ class Journal:
     forgotten when this one is cut short.
     """
 
-    def __init__(self, path: Path, known: Iterable[Entry]) -> None:
+    def __init__(self, path: Path, known: Iterable[JournalEntry]) -> None:
         """Replace the log of the run before.
 
         Raises:
@@ -102,7 +102,7 @@ class Journal:
         write_all({path: (head + "".join(e.line() for e in known)).encode()})
         self._file: IO[bytes] = path.open("ab")
 
-    def add(self, entry: Entry) -> None:
+    def add(self, entry: JournalEntry) -> None:
         """Write an entry; it is in the hands of the system when this returns.
 
         Raises:
@@ -165,7 +165,7 @@ class Summary:
     stopped: bool = False
     worst: int = 0
 
-    def add(self, entry: Entry) -> None:
+    def add(self, entry: JournalEntry) -> None:
         """Take in what came of a unit or a file."""
         count = self.counts.setdefault(entry.status, Count())
         count.files += 1

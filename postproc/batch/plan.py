@@ -22,7 +22,7 @@ from postproc.robot.cell import Cell, load_cell
 
 
 @dataclass(frozen=True)
-class Setup:
+class JobSetup:
     """A cell, a model and what the user asked for: all but the program itself."""
 
     cell: Cell
@@ -46,7 +46,7 @@ class Setup:
         return hashlib.sha256(text.encode()).hexdigest()
 
 
-def open_setup(cell: Path, model: Path, options: Options) -> Setup:
+def open_setup(cell: Path, model: Path, options: Options) -> JobSetup:
     """Load a cell and a model, and refuse a pair that does not belong together.
 
     Raises:
@@ -63,7 +63,7 @@ def open_setup(cell: Path, model: Path, options: Options) -> Setup:
             place="$.robot.absolute_accuracy",
         )
     # Only the name: messages must not depend on where a run was started.
-    return Setup(replace(loaded, path=Path(cell.name)), fitted, options)
+    return JobSetup(replace(loaded, path=Path(cell.name)), fitted, options)
 
 
 # The plan file: which programs of a tree belong to which arm.
@@ -84,7 +84,7 @@ class PlanFile(Strict):
 
 
 @dataclass(frozen=True)
-class Plan:
+class BatchPlan:
     """Patterns and what they stand for; the first that fits a program counts.
 
     Attributes:
@@ -95,7 +95,7 @@ class Plan:
 
     patterns: tuple[re.Pattern[str], ...]
     which: tuple[int, ...]
-    setups: tuple[Setup, ...]
+    setups: tuple[JobSetup, ...]
 
     def setup_of(self, program: str) -> int | None:
         """Return the index of a program's setup, None where no pattern fits.
@@ -125,7 +125,7 @@ def pattern_from_glob(glob: str) -> re.Pattern[str]:
 
 def make_plan(
     plan: Path | None, cell: Path | None, model: Path | None, options: Options
-) -> Plan:
+) -> BatchPlan:
     """Load every cell and model that a run needs.
 
     Args:
@@ -160,11 +160,11 @@ def _read_rules(path: Path) -> list[tuple[str, Path, Path]]:
     return [(r.pattern, here / r.cell, here / r.model) for r in file.rule]
 
 
-def _open_rules(rules: Sequence[tuple[str, Path, Path]], options: Options) -> Plan:
+def _open_rules(rules: Sequence[tuple[str, Path, Path]], options: Options) -> BatchPlan:
     """Open each distinct pair of files once."""
     pairs = list(dict.fromkeys((cell, model) for _, cell, model in rules))
     setups = tuple(open_setup(cell, model, options) for cell, model in pairs)
-    return Plan(
+    return BatchPlan(
         tuple(pattern_from_glob(pattern) for pattern, _, _ in rules),
         tuple(pairs.index((cell, model)) for _, cell, model in rules),
         setups,

@@ -12,8 +12,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from types import FrameType
 
-from postproc.batch.journal import Entry, Journal, Summary, read_entries
-from postproc.batch.plan import Plan, Result, Task, Unit, digest_of
+from postproc.batch.journal import Journal, JournalEntry, Summary, read_entries
+from postproc.batch.plan import BatchPlan, Result, Task, Unit, digest_of
 from postproc.batch.tree import Tree, refuse_overlap, scan
 from postproc.batch.workers import Crew, work_through
 from postproc.compensation.record import SUFFIX, file_sha256, sha256
@@ -95,7 +95,7 @@ def check_room(folder: Path, sources: int, present: int) -> None:
         )
 
 
-class Stop:
+class StopRequest:
     """Whether the user wants to stop: Ctrl-C or SIGTERM.
 
     The first one lets the file in hand be finished; a second one ends at once, which
@@ -117,9 +117,9 @@ class Stop:
 
 
 @contextmanager
-def stoppable() -> Iterator[Stop]:
+def stoppable() -> Iterator[StopRequest]:
     """Listen to Ctrl-C and SIGTERM while the block runs."""
-    stop = Stop()
+    stop = StopRequest()
     signals = (signal.SIGINT, signal.SIGTERM)
     before = [signal.signal(number, stop._ask) for number in signals]
     try:
@@ -133,7 +133,7 @@ def stoppable() -> Iterator[Stop]:
 
 
 @dataclass(frozen=True)
-class Target:
+class TargetTree:
     """A tree that mirrors a source tree; paths below it are written with ``/``."""
 
     root: Path
@@ -233,7 +233,7 @@ def file_hash(path: str | Path) -> str:
 STATUS = ("done", "left", "failed")  # by exit code
 
 Told = Callable[[int, int], None]  # how many files are done, of how many
-Gather = Callable[[Plan], Crew]
+Gather = Callable[[BatchPlan], Crew]
 
 
 @dataclass(frozen=True)
@@ -250,7 +250,7 @@ class Order:
 
     source: Path
     target: Path
-    plan: Plan
+    plan: BatchPlan
     log: Path
     resume: bool
 
@@ -282,7 +282,7 @@ def batch(order: Order, gather: Gather, told: Told = lambda done, of: None) -> S
         present = sweep(order.target)
         tree = scan(order.source, order.plan)
         check_room(order.target, tree.size, present)
-        run = Run(order, tree, told)
+        run = BatchRun(order, tree, told)
         with closing(run.journal):
             run.refuse()
             run.copy(stop)
@@ -293,7 +293,7 @@ def batch(order: Order, gather: Gather, told: Told = lambda done, of: None) -> S
         return run.summary
 
 
-class Run:
+class BatchRun:
     """One run: what earlier ones did, what this one has done so far."""
 
     def __init__(self, order: Order, tree: Tree, told: Told) -> None:
@@ -303,17 +303,17 @@ class Run:
             OutputError: The log cannot be written.
         """
         self.order, self.tree, self.told = order, tree, told
-        self.target = Target(order.target)
+        self.target = TargetTree(order.target)
         self.earlier = read_entries(order.log)
         before = [e for e in self.earlier.values() if e.outputs]
-        known = [Entry(e.place, "known", outputs=e.outputs) for e in before]
+        known = [JournalEntry(e.place, "known", outputs=e.outputs) for e in before]
         self.journal = Journal(order.log, before if order.resume else known)
         self.summary = Summary()
         self.outputs: set[str] = set()  # all that belongs into the target tree
         self.digests: dict[str, str] = {}  # of the programs in work
         self.total = len(tree.units) + len(tree.copies) + len(tree.refused)
 
-    def add(self, entry: Entry) -> None:
+    def add(self, entry: JournalEntry) -> None:
         """Log what came of a unit or a file, and tell about it."""
         if not entry.skipped:
             self.journal.add(entry)
@@ -325,14 +325,14 @@ class Run:
         """List what cannot be compensated, and see to it that it is not there."""
         for place, why in self.tree.refused.items():
             self.target.remove([place, place + SUFFIX])
-            self.add(Entry(place, "failed", 2, facts={"error": why}))
+            self.add(JournalEntry(place, "failed", 2, facts={"error": why}))
 
     def copy(self, stop: Callable[[], bool]) -> None:
         """Copy everything that is no program."""
         for place in self.tree.copies:
             if stop():
                 return
-            entry = Entry(place, "copied")
+            entry = JournalEntry(place, "copied")
             try:
                 before = self.earlier.get(place)
                 if self.order.resume and before and self._same(place, before):
@@ -343,13 +343,13 @@ class Run:
             except DiskFullError:
                 raise
             except OutputError as exc:
-                entry = Entry(place, "failed", 2, facts={"error": str(exc)})
+                entry = JournalEntry(place, "failed", 2, facts={"error": str(exc)})
             self.add(entry)
 
-    def _same(self, place: str, before: Entry) -> bool:
+    def _same(self, place: str, before: JournalEntry) -> bool:
         """Tell whether a copied file is on both sides what it was."""
         digest = before.outputs.get(place, "")
-        source = Target(self.tree.root)
+        source = TargetTree(self.tree.root)
         return source.holds({place: digest}) and self.target.holds({place: digest})
 
     def work(self, gather: Gather, stop: Callable[[], bool]) -> None:
@@ -399,14 +399,14 @@ class Run:
         if len(unit.files) > 1:
             facts["with"] = unit.files[1:]
         status = STATUS[exit_code]
-        self.add(Entry(unit.program, status, exit_code, digest, outputs, facts))
+        self.add(JournalEntry(unit.program, status, exit_code, digest, outputs, facts))
 
     def tidy(self) -> None:
         """Remove what earlier runs wrote and this one did not, unless changed since."""
         for entry in self.earlier.values():
             old = {p: d for p, d in entry.outputs.items() if p not in self.outputs}
             for place in self.target.remove_untouched(old):
-                self.journal.add(Entry(place, "removed"))
+                self.journal.add(JournalEntry(place, "removed"))
                 self.summary.removed.append(place)
 
 

@@ -9,7 +9,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from postproc.batch.plan import Plan, Unit
+from postproc.batch.plan import BatchPlan, Unit
 from postproc.compensation.record import SUFFIX
 from postproc.exceptions import OutputError, ProgramError
 from postproc.files import (
@@ -153,7 +153,7 @@ class Tree:
     size: int
 
 
-def scan(root: Path, plan: Plan) -> Tree:
+def scan(root: Path, plan: BatchPlan) -> Tree:
     """List a source tree.
 
     Raises:
@@ -222,7 +222,7 @@ class _Folder:
     notes: list[tuple[str, str]]
 
 
-def _sort(root: Path, places: Sequence[str], plan: Plan) -> _Folder:
+def _sort(root: Path, places: Sequence[str], plan: BatchPlan) -> _Folder:
     """Sort the files of one folder into programs, what belongs to them, and others."""
     part = _Folder([], [], {}, [])
     programs = _by_base(places, PROGRAM, part)
@@ -277,7 +277,7 @@ def _add_unit(
     program: str,
     pages: Sequence[str],
     variables: Mapping[str, str],
-    plan: Plan,
+    plan: BatchPlan,
     part: _Folder,
 ) -> None:
     """Add a program, or refuse it where no rule of the plan fits."""

@@ -24,7 +24,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from postproc import __version__
-from postproc.batch.plan import Result, Setup, Task, Unit, failed
+from postproc.batch.plan import JobSetup, Result, Task, Unit, failed
 from postproc.compensation.outcome import Outcome
 from postproc.compensation.record import SUFFIX
 from postproc.compensation.together import Given, compensate_together
@@ -226,7 +226,7 @@ def start_server() -> ForkServerContext:
 LISTED = 50  # findings of a program that the log lists; the rest is counted
 
 
-def run_tasks(tasks: Sequence[Task], setup: Setup, version: str) -> list[Result]:
+def run_tasks(tasks: Sequence[Task], setup: JobSetup, version: str) -> list[Result]:
     """Compensate programs; one that fails stops no other.
 
     Args:
@@ -244,7 +244,7 @@ def run_tasks(tasks: Sequence[Task], setup: Setup, version: str) -> list[Result]
     return [replace(result, seconds=seconds) for result in results]
 
 
-def _compensated(tasks: Sequence[Task], setup: Setup) -> list[Outcome | Exception]:
+def _compensated(tasks: Sequence[Task], setup: JobSetup) -> list[Outcome | Exception]:
     """Compensate the programs of tasks; what fails for all of them is told of each."""
     given = [_given(task) for task in tasks]
     try:
@@ -349,7 +349,7 @@ def _file_name(place: str) -> str:
 
 # Workers on this machine: processes that are given every cell and model once.
 
-_setups: Sequence[Setup] = ()
+_setups: Sequence[JobSetup] = ()
 
 
 class LocalCrew:
@@ -361,7 +361,7 @@ class LocalCrew:
 
     losses: tuple[type[BaseException], ...] = (BrokenProcessPool,)
 
-    def __init__(self, setups: Sequence[Setup], jobs: int) -> None:
+    def __init__(self, setups: Sequence[JobSetup], jobs: int) -> None:
         """Start workers.
 
         Args:
@@ -407,7 +407,7 @@ class LocalCrew:
         ending.join()
 
 
-def _begin(setups: Sequence[Setup]) -> None:
+def _begin(setups: Sequence[JobSetup]) -> None:
     """Make a new process a worker."""
     global _setups
     _setups = setups

@@ -24,7 +24,7 @@ from postproc.calibration.registration import Registration, register
 from postproc.calibration.regression import Fit
 from postproc.calibration.report import FitReport, report_fit, report_method
 from postproc.calibration.selection import fit_survey, model_of
-from postproc.calibration.tables import DETECT, Reading
+from postproc.calibration.tables import DETECT, TableFormat
 from postproc.calibration.tool_groups import find_groups
 from postproc.model.combination import Combination
 from postproc.model.effects.tool_shift import ToolShift
@@ -53,7 +53,7 @@ def fit(
     effects: Sequence[str] | None = None,
     frame: Frame = "base",
     seed: int = 0,
-    reading: Reading = DETECT,
+    reading: TableFormat = DETECT,
 ) -> Calibration:
     """Fit a model to measurement files.
 
@@ -166,7 +166,7 @@ def into_base_frame(
 
 
 def read_surveys(
-    files: Sequence[str | Path], cell: Cell, reading: Reading = DETECT
+    files: Sequence[str | Path], cell: Cell, reading: TableFormat = DETECT
 ) -> Measurements:
     """Read measurement files as one survey, with what the cell knows of the load."""
     parts = [

@@ -16,8 +16,8 @@ from postproc.calibration.tables import (
     JOINTS,
     NUMBER,
     Format,
-    Reading,
-    Table,
+    TableFormat,
+    TextTable,
     read_directions,
     read_foreign,
     read_headed,
@@ -112,7 +112,7 @@ def read_measurements(
     tools: Floats | Mapping[int, Floats],
     *,
     positions: bool = True,
-    reading: Reading = DETECT,
+    reading: TableFormat = DETECT,
 ) -> Measurements:
     """Read a measurement file.
 
@@ -132,7 +132,7 @@ def read_measurements(
 
 
 def from_table(
-    table: Table,
+    table: TextTable,
     arm: Arm,
     tools: Floats | Mapping[int, Floats],
     *,
@@ -219,7 +219,7 @@ NAMES = ("id", "name", "point", "point name", "point id", "target")
 AXIS = {a: re.compile(rf"^{a}(\s*[\[(]?\s*mm\s*[\])]?|_mm)?$", re.I) for a in "xyz"}
 
 
-def read_points(path: str | Path, reading: Reading = DETECT) -> Table:
+def read_points(path: str | Path, reading: TableFormat = DETECT) -> TextTable:
     """Read names and positions as columns id, x_mm, y_mm, z_mm.
 
     A file that has these columns keeps its others, too.
@@ -236,7 +236,7 @@ def read_points(path: str | Path, reading: Reading = DETECT) -> Table:
     return translate(table, Format({"id": (name, 1.0), **scaled}))
 
 
-def _columns(table: Table) -> tuple[str, tuple[str, str, str]]:
+def _columns(table: TextTable) -> tuple[str, tuple[str, str, str]]:
     """Find the columns of name and coordinates.
 
     Raises:

@@ -33,7 +33,7 @@ DECIMAL_COMMA = re.compile(r"^\s*[-+]?\d*,\d+([eE][-+]?\d+)?\s*$")
 
 
 @dataclass(frozen=True, eq=False)
-class Table:
+class TextTable:
     """Text cells with their place in the file.
 
     Attributes:
@@ -129,7 +129,7 @@ def read_table(
     decimal: str | None = None,
     comment: str | None = None,
     header: bool = True,
-) -> Table:
+) -> TextTable:
     """Read a table; what is not given is detected.
 
     Args:
@@ -164,10 +164,10 @@ def read_table(
     line = np.array([i for i, _ in kept][int(header) :], dtype=np.int64)
     sign = decimal or _decimal(body, split)
     digest = hashlib.sha256(raw).hexdigest()
-    return Table(path, tuple(names), body, line, sign, digest)
+    return TextTable(path, tuple(names), body, line, sign, digest)
 
 
-def read_headed(path: str | Path, **options: Any) -> Table:
+def read_headed(path: str | Path, **options: Any) -> TextTable:
     """Read a table that may have no header; its columns are then 1, 2, ..
 
     Raises:
@@ -252,7 +252,7 @@ MANY = 20  # rows that are in order of a column by no accident
 TOOL = ("tool_x_mm", "tool_y_mm", "tool_z_mm")
 
 
-def unique_ids(table: Table) -> tuple[str, ...]:
+def unique_ids(table: TextTable) -> tuple[str, ...]:
     """Read the ids and refuse duplicates.
 
     Raises:
@@ -273,7 +273,7 @@ def unique_ids(table: Table) -> tuple[str, ...]:
 
 
 def read_directions(
-    table: Table, arm: Arm, q: Floats
+    table: TextTable, arm: Arm, q: Floats
 ) -> tuple[Floats, Floats, Bools, tuple[str, ...]]:
     """Read the arrival directions and travels, or infer them from the row order."""
     arrived = arrivals_of_rows(arm, q)
@@ -296,7 +296,7 @@ def read_directions(
 
 
 def read_tools(
-    table: Table, tools: Floats | Mapping[int, Floats]
+    table: TextTable, tools: Floats | Mapping[int, Floats]
 ) -> tuple[Floats, NDArray[np.int64]]:
     """Look up every row's tool.
 
@@ -325,7 +325,7 @@ def read_tools(
     return np.stack([np.asarray(known[int(one)], float) for one in tool_id]), tool_id
 
 
-def read_rotation(table: Table) -> Floats | None:
+def read_rotation(table: TextTable) -> Floats | None:
     """Read measured orientations, (n, 3, 3): R = Rx Ry Rz (intrinsic x, y', z'')."""
     if not table.has(*ROTATION):
         return None
@@ -333,7 +333,7 @@ def read_rotation(table: Table) -> Floats | None:
     return np.asarray(Rotation.from_euler("XYZ", angles, degrees=True).as_matrix())
 
 
-def _sorted(table: Table) -> str:
+def _sorted(table: TextTable) -> str:
     """Say whether the rows still are in the order in which they were measured."""
     for name in (*JOINTS, "x_mm", "y_mm", "z_mm"):
         step = np.diff(table.numbers(name)) if table.has(name) else np.zeros(0)
@@ -359,7 +359,7 @@ TCP = ("tool_x_mm", "tool_y_mm", "tool_z_mm")
 FULL_TURN = 2 * np.pi + 1e-3  # angles all below it are radians
 
 
-def is_robodk(table: Table) -> bool:
+def is_robodk(table: TextTable) -> bool:
     """Tell whether a table has 18 columns, all of numbers."""
     if table.cells.shape[1] != WIDTH or table.has("id"):
         return False
@@ -370,7 +370,7 @@ def is_robodk(table: Table) -> bool:
         return False
 
 
-def from_robodk(table: Table) -> Table:
+def from_robodk(table: TextTable) -> TextTable:
     """Name the columns as ours. Every TCP becomes a tool; ids are the row numbers."""
     values = table.block(table.columns)
     turns = values[:, 9:12]
@@ -398,7 +398,7 @@ NAMED = {"tab": "\t", "space": r"\s+", "comma": ",", "semicolon": ";"}
 
 
 @dataclass(frozen=True)
-class Reading:
+class TableFormat:
     """What a user knows of a file; None is detected.
 
     Attributes:
@@ -438,7 +438,7 @@ class Reading:
         return UNITS[self.unit]
 
 
-DETECT = Reading()
+DETECT = TableFormat()
 
 # Measurement files as other tools write them, turned into our columns.
 #
@@ -471,7 +471,7 @@ class Format:
     columns: Mapping[str, tuple[str, float]]
     reading: Mapping[str, str] = field(default_factory=dict)
 
-    def fits(self, table: Table) -> bool:
+    def fits(self, table: TextTable) -> bool:
         """Tell whether a table has all columns of the format."""
         return table.has(*(name for name, _ in self.columns.values()))
 
@@ -495,7 +495,7 @@ IPA = Format(  # Fraunhofer IPA, UR10 series: joints in rad, T-Mac positions in 
 KNOWN = (IPA,)
 
 
-def read_foreign(path: str | Path, reading: Reading = DETECT) -> Table:
+def read_foreign(path: str | Path, reading: TableFormat = DETECT) -> TextTable:
     """Read a measurement file in our columns, whatever tool wrote it.
 
     Args:
@@ -517,7 +517,7 @@ def read_foreign(path: str | Path, reading: Reading = DETECT) -> Table:
     return from_robodk(table) if is_robodk(table) else table
 
 
-def translate(table: Table, form: Format) -> Table:
+def translate(table: TextTable, form: Format) -> TextTable:
     """Rename and scale columns; a file without ids gets its line numbers."""
     cells = []
     for column, (source, factor) in form.columns.items():

@@ -24,7 +24,7 @@ from postproc.calibration.measurements import (
     read_points,
 )
 from postproc.calibration.registration import register
-from postproc.calibration.tables import DETECT, Reading
+from postproc.calibration.tables import DETECT, TableFormat
 from postproc.cli.jobs import read_files
 from postproc.compensation.program import plan_visits, read_program, states_of
 from postproc.exceptions import MeasurementError
@@ -38,7 +38,7 @@ from postproc.robot.pose import MM, inverse
 
 
 def join_program(
-    data: Path, program: Path, cell: Cell, reading: Reading = DETECT
+    data: Path, program: Path, cell: Cell, reading: TableFormat = DETECT
 ) -> Measurements:
     """Give measured points the planned states of the visits they were taken at.
 

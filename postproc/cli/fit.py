@@ -24,8 +24,8 @@ from postproc.calibration.measurements import concatenate, from_table
 from postproc.calibration.plausibility import check_survey
 from postproc.calibration.published import Comparison, compare
 from postproc.calibration.report import FitReport
-from postproc.calibration.tables import DETECT, Reading, read_table
-from postproc.calibration.tables import Table as Cells
+from postproc.calibration.tables import DETECT, TableFormat, read_table
+from postproc.calibration.tables import TextTable as Cells
 from postproc.cli.diagnose import join_program
 from postproc.files import write_all
 from postproc.model.model import Model, load_model
@@ -64,7 +64,7 @@ def fit_files(
     output: Path,
     program: Path | None = None,
     html: Path | None = None,
-    reading: Reading = DETECT,
+    reading: TableFormat = DETECT,
     **how: Any,
 ) -> str:
     """Fit measurement files and write the model.
@@ -160,7 +160,7 @@ def compare_files(
     cell_path: Path,
     frame: str,
     seed: int,
-    reading: Reading = DETECT,
+    reading: TableFormat = DETECT,
 ) -> Comparison:
     """Fit and test every method on measurement files.
 

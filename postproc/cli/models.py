@@ -138,13 +138,13 @@ def fit(
     unit: UnitOption = "mm",
 ) -> None:
     """Fit a model of the arm's error to laser-tracker measurements."""
-    from postproc.calibration.tables import Reading
+    from postproc.calibration.tables import TableFormat
     from postproc.cli import fit
 
     names = None if effects is None else split_names(effects)
     with explained():
         check_places([output, html], [*data, cell, program, columns])
-        reading = Reading(columns, delimiter, decimal, encoding, unit)
+        reading = TableFormat(columns, delimiter, decimal, encoding, unit)
         with busy("fit"):
             found = fit.fit_files(
                 data,
@@ -196,12 +196,12 @@ def compare(
     encoding: EncodingOption = None,
 ) -> None:
     """Fit every method to the same rows, and test it on the same others."""
-    from postproc.calibration.tables import Reading
+    from postproc.calibration.tables import TableFormat
     from postproc.cli import fit
 
     with explained():
         check_places([as_path(json), html, plot], [*data, cell, columns])
-        reading = Reading(columns, delimiter, decimal, encoding)
+        reading = TableFormat(columns, delimiter, decimal, encoding)
         with busy("fit every method"):
             found = fit.compare_files(data, cell, frame.value, seed, reading)
         if json:

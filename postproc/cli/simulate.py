@@ -18,8 +18,8 @@ from postproc.simulation import (
     DEFAULT,
     Campaign,
     Planted,
-    Setup,
     VirtualArm,
+    VirtualCell,
     campaign_length,
     land,
     measure_program,
@@ -71,13 +71,13 @@ class Simulation:
         )
 
 
-def setup_of(cell: Cell) -> Setup:
+def setup_of(cell: Cell) -> VirtualCell:
     """Tell the virtual arm about its cell in plain values."""
     probes = np.tile(np.eye(4), (len(cell.probes), 1, 1))
     probes[:, :3, 3] = cell.probes
-    usual = Setup()
+    usual = VirtualCell()
     warm = cell.temperature
-    return Setup(
+    return VirtualCell(
         coupling=cell.arm.coupling,
         tool=cell.tool.pose,
         base=cell.base.pose,
@@ -139,7 +139,7 @@ def visits_of(program: Path, cell: Cell) -> Visits:
 
 
 def true_error(
-    arm: VirtualArm, setup: Setup, executed: Visits, wanted: Path, cell: Cell
+    arm: VirtualArm, setup: VirtualCell, executed: Visits, wanted: Path, cell: Cell
 ) -> ErrorStatistics:
     """Compare where the tool landed with where the wanted program says."""
     original = visits_of(wanted, cell)

@@ -26,7 +26,7 @@ Box = Mapping[int, tuple[Floats, Floats]]
 
 
 @dataclass(frozen=True)
-class Stop:
+class MoveSlot:
     """One place in a move statement that names where to go.
 
     Attributes:
@@ -40,7 +40,7 @@ class Stop:
 
 
 @dataclass(frozen=True)
-class Arrivals:
+class SlotArrivals:
     """All arrivals at one stop.
 
     Attributes:
@@ -50,7 +50,7 @@ class Arrivals:
         usable: Every arrival can be corrected.
     """
 
-    stop: Stop
+    stop: MoveSlot
     variable: str
     changes: Mapping[int, Floats]
     usable: bool
@@ -65,7 +65,7 @@ class Arrivals:
 
 
 @dataclass
-class Group:
+class SharedPoint:
     """Stops that can share one point.
 
     Attributes:
@@ -75,10 +75,10 @@ class Group:
     """
 
     variable: str
-    stops: list[Stop] = field(default_factory=list)
+    stops: list[MoveSlot] = field(default_factory=list)
     bounds: dict[int, tuple[Floats, Floats]] = field(default_factory=dict)
 
-    def take(self, arrivals: Arrivals, agree_mm: float) -> bool:
+    def take(self, arrivals: SlotArrivals, agree_mm: float) -> bool:
         """Take in a stop that agrees with those at hand; tell whether it does."""
         box = _union(self.bounds, arrivals.box())
         if _size(box) > agree_mm:
@@ -89,8 +89,8 @@ class Group:
 
 
 def regroup(
-    members: Sequence[Arrivals], stays: bool, agree_mm: float
-) -> tuple[Group, ...]:
+    members: Sequence[SlotArrivals], stays: bool, agree_mm: float
+) -> tuple[SharedPoint, ...]:
     """Divide the stops that share literals into groups whose arrivals agree.
 
     The first group keeps the original: it holds what cannot be separated from it, and
@@ -104,20 +104,20 @@ def regroup(
     Returns:
         The group that keeps the original, then those that need a point of their own.
     """
-    original = Group("")
-    free: list[Arrivals] = []
+    original = SharedPoint("")
+    free: list[SlotArrivals] = []
     for member in members:
         if member.variable and member.usable and member.agree(agree_mm):
             free.append(member)
         elif not (member.usable and original.take(member, agree_mm)):
             stays = True
             original.stops.append(member.stop)
-    groups: list[Group] = []
+    groups: list[SharedPoint] = []
     for member in free:
         mine = [g for g in groups if g.variable == member.variable]
         choices = mine if stays else [original, *mine]
         if not any(group.take(member, agree_mm) for group in choices):
-            group = Group(member.variable)
+            group = SharedPoint(member.variable)
             group.take(member, agree_mm)
             groups.append(group)
     return (original, *groups)
@@ -263,7 +263,7 @@ def give_own_points(reading: Reading, proposal: Proposal, cell: Cell) -> Reading
         lines counted as before; or as it was, where nothing can be cloned. What was
         cloned, and what was not, is among the diagnostics.
     """
-    work = _Work.of(reading, proposal)
+    work = _CloneWork.of(reading, proposal)
     for literals in _disputed(work):
         work.separate(literals, cell.limits.agree_mm)
     notes = (*reading.diagnostics, *work.notes)
@@ -286,16 +286,16 @@ def give_own_points(reading: Reading, proposal: Proposal, cell: Cell) -> Reading
     return Reading(again.texts, visits, notes, cloned, reading.sources)
 
 
-def _stops(visits: Visits) -> dict[Stop, Ints]:
+def _stops(visits: Visits) -> dict[MoveSlot, Ints]:
     """Group visits by the places that name where to go."""
-    rows: dict[Stop, list[int]] = {}
+    rows: dict[MoveSlot, list[int]] = {}
     columns = (visits.file.tolist(), visits.line.tolist(), visits.via.tolist())
     for row, place in enumerate(zip(*columns, strict=True)):
-        rows.setdefault(Stop(*place), []).append(row)
+        rows.setdefault(MoveSlot(*place), []).append(row)
     return {stop: np.array(found) for stop, found in rows.items()}
 
 
-def _disputed(work: _Work) -> list[frozenset[int]]:
+def _disputed(work: _CloneWork) -> list[frozenset[int]]:
     """List the literals that arrivals disagree on, with all that share their moves."""
     visits = work.reading.visits
     unsafe = work.proposal.decisions.status == Status.UNSAFE
@@ -309,7 +309,7 @@ def _disputed(work: _Work) -> list[frozenset[int]]:
 
 
 @dataclass
-class _Work:
+class _CloneWork:
     """The edits of a job, clone by clone.
 
     Attributes:
@@ -330,14 +330,14 @@ class _Work:
     programs: list[Program]
     values: Source | None
     taken: set[str]
-    stops: dict[Stop, Ints]
-    stops_at: dict[int, set[Stop]]
+    stops: dict[MoveSlot, Ints]
+    stops_at: dict[int, set[MoveSlot]]
     edits: list[tuple[int, Edit]] = field(default_factory=list)
     names: dict[int, str] = field(default_factory=dict)
     notes: list[Diagnostic] = field(default_factory=list)
 
     @classmethod
-    def of(cls, reading: Reading, proposal: Proposal) -> _Work:
+    def of(cls, reading: Reading, proposal: Proposal) -> _CloneWork:
         """Parse the files of a program."""
         sources = reading.sources
         own = [s for s in sources if not s.name.lower().endswith(VARIABLES)]
@@ -356,15 +356,15 @@ class _Work:
 
     def separate(self, literals: frozenset[int], agree_mm: float) -> None:
         """Give the moves to some literals points of their own where they need them."""
-        named: dict[Stop, Named] = {}
+        named: dict[MoveSlot, Named] = {}
         members = list(self._members(literals, named, agree_mm))
         stays = not literals.isdisjoint(self.proposal.fixed.tolist())
         for group in regroup(members, stays, agree_mm)[1:]:
             self._clone([named[stop] for stop in group.stops], group)
 
     def _members(
-        self, literals: frozenset[int], named: dict[Stop, Named], agree_mm: float
-    ) -> Iterator[Arrivals]:
+        self, literals: frozenset[int], named: dict[MoveSlot, Named], agree_mm: float
+    ) -> Iterator[SlotArrivals]:
         """Yield all stops at some literals; also say which variable each names."""
         visits = self.reading.visits
         stops = {stop for literal in literals for stop in self.stops_at[literal]}
@@ -376,7 +376,7 @@ class _Work:
                 literal: self.proposal.change_mm[rows[visits.literal[rows] == literal]]
                 for literal in np.unique(visits.literal[rows]).tolist()
             }
-            found = Arrivals(stop, "", changes, usable)
+            found = SlotArrivals(stop, "", changes, usable)
             try:
                 one = named_at(self.programs, stop.file, stop.line, stop.via, name)
                 if usable and not found.agree(agree_mm):
@@ -389,7 +389,7 @@ class _Work:
                 found = replace(found, variable=one.key)
             yield found
 
-    def _clone(self, named: list[Named], group: Group) -> None:
+    def _clone(self, named: list[Named], group: SharedPoint) -> None:
         """Clone one variable, or say why not."""
         visits, variable = self.reading.visits, named[0].variable
         file = group.stops[0].file

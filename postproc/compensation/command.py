@@ -12,7 +12,7 @@ from postproc.arrays import Bools, Floats, Ints
 from postproc.compensation.program import Planned
 from postproc.compensation.targets import few_frames
 from postproc.exceptions import ModelError
-from postproc.language.visits import Target, Visits
+from postproc.language.visits import Meaning, Visits
 from postproc.model.kinematics import Batch
 from postproc.model.model import UNSURE, Model
 from postproc.motion.planner import Plan
@@ -193,7 +193,7 @@ def _nearest(
 
 
 @dataclass(frozen=True)
-class Solved:
+class Commands:
     """Corrected commands of n visits, NaN where pose or joint angles are not known.
 
     Attributes:
@@ -230,7 +230,7 @@ def solve_visits(
     planned: Planned,
     states: States,
     orientation: bool = False,
-) -> Solved:
+) -> Commands:
     """Solve every visit whose pose and joint angles are known.
 
     Args:
@@ -247,7 +247,7 @@ def solve_visits(
         refuse_unknown_rotations(model)
     n, plan = len(states), planned.plan
     known = ~(has_unknown(plan.q) | is_unknown(plan.tcp))
-    empty = Solved(
+    empty = Commands(
         known=known,
         direction=np.array(states.direction),
         q=np.full((n, 6), np.nan),
@@ -262,14 +262,14 @@ def solve_visits(
 
 
 def solve_again(
-    solved: Solved,
+    solved: Commands,
     rows: Bools,
     model: Model,
     cell: Cell,
     planned: Planned,
     states: States,
     orientation: bool = False,
-) -> Solved:
+) -> Commands:
     """Solve some visits anew, for the directions of `states`; keep the others.
 
     Args:
@@ -306,7 +306,7 @@ def solve_again(
     return out
 
 
-def std_errors(model: Model, cell: Cell, states: States, solved: Solved) -> Floats:
+def std_errors(model: Model, cell: Cell, states: States, solved: Commands) -> Floats:
     """Standard errors of the errors that visits are corrected for, per axis.
 
     They are many times as costly as the errors: what solving has asked for is kept, the
@@ -354,22 +354,22 @@ def _mark(
 # Commands in the numbers of the file, and how far those change.
 
 
-def new_numbers(visits: Visits, plan: Plan, solved: Solved, aside: Floats) -> Floats:
+def new_numbers(visits: Visits, plan: Plan, solved: Commands, aside: Floats) -> Floats:
     """Express commands in the numbers of the file, (n, 6).
 
     P = inverse(UFRAME) . BASE . command. A fly point is moved so that the path passes
     it where it should. An orientation that does not change keeps its written angles.
     """
     numbers = np.array(visits.values)
-    joints = visits.target == Target.JOINTS
+    joints = visits.target == Meaning.JOINTS
     numbers[joints] += np.rad2deg(solved.q[joints] - plan.q[joints])
-    poses = np.flatnonzero(visits.target == Target.POSE)
+    poses = np.flatnonzero(visits.target == Meaning.POSE)
     placed = base_in_uframe(visits, poses)
     command = np.array(solved.command[poses, :, 3])
     command[:, :3] -= aside[poses]
     point = np.einsum("nij,nj->ni", placed, command)
     numbers[poses, :3] = point[:, :3] / MM
-    rows = solved.turned[visits.target[solved.turned] == Target.POSE]
+    rows = solved.turned[visits.target[solved.turned] == Meaning.POSE]
     if len(rows) == 0:
         return numbers
     by = rotation_from_vector(turns_in_file(visits, solved)[rows])
@@ -386,10 +386,10 @@ def base_in_uframe(visits: Visits, rows: Ints) -> Floats:
     return products(inverse(frames), frames, visits.uframe[rows], visits.base[rows])
 
 
-def turns_in_file(visits: Visits, solved: Solved) -> Floats:
+def turns_in_file(visits: Visits, solved: Commands) -> Floats:
     """Give the commands' rotations in the frame of the numbers, (n, 3) [rad]."""
     out = np.array(solved.turn)
-    poses = solved.turned[visits.target[solved.turned] == Target.POSE]
+    poses = solved.turned[visits.target[solved.turned] == Meaning.POSE]
     axes = base_in_uframe(visits, poses)[:, :3, :3]
     out[poses] = np.einsum("nij,nj->ni", axes, out[poses])
     return out
@@ -401,9 +401,9 @@ def change_mm(visits: Visits, numbers: Floats, correction: Floats) -> Floats:
     For a pose it is that of its numbers (the same literal may be reached in two user
     frames), for joint angles that of the TCP.
     """
-    poses = (visits.target == Target.POSE)[:, None]
+    poses = (visits.target == Meaning.POSE)[:, None]
     moved = numbers[:, :3] - visits.values[:, :3]
-    near = np.flatnonzero(visits.target == Target.NEAR)
+    near = np.flatnonzero(visits.target == Meaning.NEAR)
     axes = base_in_uframe(visits, near)[:, :3, :3]
     change = np.where(poses, moved, correction / MM)
     change[near] = np.einsum("nij,nj->ni", axes, correction[near]) / MM

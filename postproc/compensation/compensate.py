@@ -49,7 +49,7 @@ from postproc.language.stamp import is_stamped
 from postproc.language.visits import Visits
 from postproc.model.model import Model
 from postproc.model.statistics import ErrorStatistics
-from postproc.motion.trace import NOWHERE, Standing
+from postproc.motion.trace import NOWHERE, StartState
 from postproc.robot.cell import Cell
 from postproc.robot.pose import MM
 from postproc.robot.state import States
@@ -154,10 +154,10 @@ def _one_after_another(parts: Sequence[Decisions]) -> Decisions:
 
 
 @dataclass(frozen=True)
-class Stop:
+class WindowState:
     """How a window leaves the program as it was, and as it is corrected."""
 
-    planned: Standing = NOWHERE
+    planned: StartState = NOWHERE
     doubtful: bool = False
     corrected: Left = AT_START
 
@@ -190,10 +190,12 @@ def correct(
     Returns:
         The program, with clones where they were asked for, and what came of it.
     """
-    work = _Work(reading, cell, model, options)
+    work = _WindowWork(reading, cell, model, options)
     if not options.clone:
         cut = windows(reading.visits, cuts.LEAST)
-        return reading, joined(list(in_processes(work, cut, Stop(), clock, processes)))
+        return reading, joined(
+            list(in_processes(work, cut, WindowState(), clock, processes))
+        )
     kept, proposal = work.whole(clock)
     with clock("clone"):
         reading = give_own_points(reading, proposal, cell)
@@ -203,7 +205,7 @@ def correct(
 
 
 @dataclass(frozen=True)
-class _Work:
+class _WindowWork:
     """What it takes to correct any window of a program."""
 
     reading: Reading
@@ -213,16 +215,18 @@ class _Work:
 
     def whole(self, clock: Clock) -> tuple[Kept, Proposal]:
         """Correct the program as one window; return all of its proposal."""
-        kept, proposal, _ = self._correct(self.reading.visits, 0, Stop(), clock)
+        kept, proposal, _ = self._correct(self.reading.visits, 0, WindowState(), clock)
         return kept, proposal
 
-    def correct(self, window: Window, begin: Stop, clock: Clock) -> tuple[Kept, Stop]:
+    def correct(
+        self, window: Window, begin: WindowState, clock: Clock
+    ) -> tuple[Kept, WindowState]:
         """Correct a window; return what is kept of it, and how it ends."""
         visits = window.of(self.reading.visits)
         kept, _, end = self._correct(visits, window.seeds, begin, clock)
         return kept, end
 
-    def foretell(self, window: Window) -> Stop | None:
+    def foretell(self, window: Window) -> WindowState | None:
         """Tell how the windows before will end, by the last targets there alone.
 
         Right where the joints have lost their memory of what was before these. That the
@@ -232,14 +236,14 @@ class _Work:
         if visits is None:
             return None
         try:
-            _, _, end = self._correct(visits, 1, Stop(), Clock(silent))
+            _, _, end = self._correct(visits, 1, WindowState(), Clock(silent))
         except Exception:
             return None
         return end
 
     def _correct(
-        self, visits: Visits, seeds: int, begin: Stop, clock: Clock
-    ) -> tuple[Kept, Proposal, Stop]:
+        self, visits: Visits, seeds: int, begin: WindowState, clock: Clock
+    ) -> tuple[Kept, Proposal, WindowState]:
         """Correct some visits, the first `seeds` of which are only where they begin."""
         cell, model, options = self.cell, self.model, self.options
         part, timed = replace(self.reading, visits=visits), "speed" in model.needs
@@ -253,7 +257,7 @@ class _Work:
         found = settle(part, planned, states, cell, model, options, clock, left)
         with clock("report"):
             kept = keep(visits, planned, states, found, cell, model, seeds)
-        end = steady(Stop(planned.plan.end, planned.doubtful, found.left))
+        end = steady(WindowState(planned.plan.end, planned.doubtful, found.left))
         return kept, found.proposal, end
 
 

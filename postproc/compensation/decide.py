@@ -8,15 +8,20 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from postproc.arrays import Bools, Floats, Ints
-from postproc.compensation.command import Solved, change_mm, new_numbers, turns_in_file
+from postproc.compensation.command import (
+    Commands,
+    change_mm,
+    new_numbers,
+    turns_in_file,
+)
 from postproc.compensation.eligibility import STRAYS, Reasons, strayed
 from postproc.compensation.options import Options
 from postproc.compensation.outcome import Decisions, Status
 from postproc.compensation.program import Planned, Reading
 from postproc.compensation.targets import moved_targets
-from postproc.language.visits import NO_TARGET, Target, Visits
+from postproc.language.visits import NO_TARGET, Meaning, Visits
 from postproc.motion.replan import IS_STEP
-from postproc.motion.targets import Kind
+from postproc.motion.targets import TargetKind
 from postproc.robot.arm import Arm
 from postproc.robot.cell import Cell, LimitSection
 from postproc.robot.pose import MM, has_unknown, lengths
@@ -125,7 +130,7 @@ def worsened(
         agree_mm: Changes that differ less are the same.
     """
     rows, at = followers(visits, agreement)
-    whole = visits.target[rows] != Target.FOR
+    whole = visits.target[rows] != Meaning.FOR
     rows, at = rows[whole], at[whole]
     needed = change_mm[rows]
     left = np.linalg.norm(agreement.change_mm[at] - needed, axis=1)
@@ -189,7 +194,7 @@ def without_target(visits: Visits) -> Bools:
     """Tell which moves go where no target of theirs says, (n,): $HOME, RELATIVE, .."""
     none = np.array([text.startswith(NO_TARGET) for text in visits.reasons])
     named = np.isin(
-        visits.target, (Target.POSE, Target.JOINTS, Target.NEAR, Target.UNKNOWN)
+        visits.target, (Meaning.POSE, Meaning.JOINTS, Meaning.NEAR, Meaning.UNKNOWN)
     )
     return np.asarray(~named | none[visits.reason])
 
@@ -283,7 +288,7 @@ def with_carried(
     for v, sources in _steps(planned):
         source = sources[np.argmax(np.linalg.norm(moves[sources], axis=1))]
         towards = np.zeros(3)
-        if t.kind[v] == Kind.TOWARDS:
+        if t.kind[v] == TargetKind.TOWARDS:
             way = t.tcp[v, :3, 3] - planned.plan.tcp[source, :3, 3]
             towards = _turned(way, t.distance[v], moves[v] - moves[source])
         moves[v] = moves[source] + towards
@@ -461,7 +466,7 @@ class Proposal:
 def propose(
     reading: Reading,
     planned: Planned,
-    solved: Solved,
+    solved: Commands,
     aside: Floats,
     held: Bools,
     cell: Cell,
@@ -491,7 +496,7 @@ def propose(
 def decide(
     reading: Reading,
     planned: Planned,
-    solved: Solved,
+    solved: Commands,
     aside: Floats,
     held: Bools,
     strays: Bools,

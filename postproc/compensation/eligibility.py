@@ -11,9 +11,10 @@ from postproc.language.visits import OrntType, Switch, Visits
 from postproc.motion.branches import OTHER_TURN, nearest_turns, on_other_turns
 from postproc.motion.path import NEAR, rounds
 from postproc.motion.planner import Plan
-from postproc.motion.targets import Kind, Move, Targets
+from postproc.motion.targets import TargetKind, Targets
 from postproc.robot.arm import Arm
 from postproc.robot.pose import MM, inverse, pose_from_record, rotation_vector
+from postproc.robot.trajectory import Motion
 
 # Why something did not happen, for many visits at once.
 
@@ -176,9 +177,9 @@ def _mark_either_way(
     visits: Visits, targets: Targets, plan: Plan, arm: Arm, reasons: Reasons
 ) -> Bools:
     """Leave moves alone that two readings of their string lead elsewhere."""
-    placed = (targets.kind == Kind.POSE) & (targets.slot >= 0)
+    placed = (targets.kind == TargetKind.POSE) & (targets.slot >= 0)
     placed &= ~np.isnan(plan.q[:, 0])
-    joint = placed & (targets.move == Move.JOINT)
+    joint = placed & (targets.move == Motion.JOINT)
     wrist = placed & ~joint & targets.wrist_joint
     branch = wrist | (joint & _doubted(visits.care[:, CNFG]))
     turn = wrist | (joint & _turns_doubted(visits, targets))
@@ -252,9 +253,13 @@ def _followers(
     Returns:
         What comes from doubtful places, and which places make others doubtful.
     """
-    sure = (targets.move == Move.JOINT) & (
-        (targets.kind == Kind.JOINTS)
-        | ((targets.kind == Kind.POSE) & (targets.slot >= 0) & ~targets.nearest_turn)
+    sure = (targets.move == Motion.JOINT) & (
+        (targets.kind == TargetKind.JOINTS)
+        | (
+            (targets.kind == TargetKind.POSE)
+            & (targets.slot >= 0)
+            & ~targets.nearest_turn
+        )
     )
     edge = np.repeat(np.arange(len(visits)), np.diff(visits.pred_start))
     order = np.argsort(visits.pred, kind="stable")
@@ -305,9 +310,9 @@ def mark_turning(
         plan: Where they lead.
         reasons: Why visits must not be compensated; more are added.
     """
-    kind, cartesian = visits.ornt_type, targets.move != Move.JOINT
+    kind, cartesian = visits.ornt_type, targets.move != Motion.JOINT
     reasons.mark(cartesian & (kind == OrntType.UNKNOWN), UNKNOWN)
-    arc = targets.move == Move.CIRCULAR
+    arc = targets.move == Motion.CIRCULAR
     reasons.mark(arc & targets.wrist_joint, ARC.format("WRIST_JNT"))
     for rows, text in (
         (arc & (kind == OrntType.RS_TRAJ), ARC.format("RS_TRAJ")),

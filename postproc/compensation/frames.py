@@ -13,7 +13,7 @@ import numpy as np
 from postproc.arrays import Floats
 from postproc.compensation.program import Planned
 from postproc.exceptions import CellError
-from postproc.language.visits import Target, Visits
+from postproc.language.visits import Meaning, Visits
 from postproc.model.model import Model
 from postproc.robot.cell import Cell
 from postproc.robot.pose import MM, inverse, pose_from_record
@@ -47,7 +47,7 @@ def correct_taught(
     taught = np.flatnonzero(listed | visits.frame_taught)
     if len(taught) == 0:
         return planned
-    poses = np.isin(visits.target, (Target.POSE, Target.NEAR))
+    poses = np.isin(visits.target, (Meaning.POSE, Meaning.NEAR))
     shift = np.array(planned.shift)
     for frame in taught.tolist():
         for column, name in ((visits.tool, "tool"), (visits.base, "base")):

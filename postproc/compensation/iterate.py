@@ -8,7 +8,12 @@ from itertools import count, pairwise
 import numpy as np
 
 from postproc.arrays import Bools, Floats
-from postproc.compensation.command import Solved, solve_again, solve_visits, std_errors
+from postproc.compensation.command import (
+    Commands,
+    solve_again,
+    solve_visits,
+    std_errors,
+)
 from postproc.compensation.decide import Proposal, propose
 from postproc.compensation.options import Clock, Options
 from postproc.compensation.program import Planned, Reading
@@ -21,7 +26,7 @@ from postproc.model.model import Model
 from postproc.motion.planner import Plan
 from postproc.motion.replan import Course, Reached, reach, reach_again
 from postproc.motion.targets import Targets
-from postproc.motion.trace import NOWHERE, Standing
+from postproc.motion.trace import NOWHERE, StartState
 from postproc.robot.cell import Cell
 from postproc.robot.state import States
 
@@ -92,7 +97,7 @@ class Aim:
         settled: Targets whose sides changed till the last round, and may, (n,).
     """
 
-    solved: Solved
+    solved: Commands
     bent: Floats
     held: Bools
     settled: Bools
@@ -216,11 +221,11 @@ class Courses:
         self._last: Course | None = None
 
     @property
-    def end(self) -> Standing:
+    def end(self) -> StartState:
         """Return where the last course leaves the arm; nowhere before the first."""
         return NOWHERE if self._last is None else self._last.end
 
-    def after(self, values: Floats, begin: Standing) -> Course:
+    def after(self, values: Floats, begin: StartState) -> Course:
         """Find where the program leads with other numbers.
 
         Args:
@@ -259,8 +264,8 @@ class Left:
         wanted: What it moves by, (k, 3) [m]; k is 1, or 0 where nothing was before.
     """
 
-    looked: Standing
-    written: Standing
+    looked: StartState
+    written: StartState
     wanted: Floats
 
 

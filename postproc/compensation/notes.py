@@ -6,7 +6,7 @@ import numpy as np
 
 from postproc.arrays import Bools, Floats, in_pieces
 from postproc.files import VARIABLES
-from postproc.language.visits import NO_VALUE, Diagnostic, Target, Visits
+from postproc.language.visits import NO_VALUE, Diagnostic, Meaning, Visits
 from postproc.robot.arm import Arm
 from postproc.robot.cell import Cell
 from postproc.robot.pose import MM
@@ -84,7 +84,7 @@ def listing_cost(
     files = np.array([name.lower().endswith(VARIABLES) for name in visits.files])
     rows = corrected & files[visits.literals.file[visits.literal]]
     found = []
-    poses = rows & (visits.target != Target.JOINTS)
+    poses = rows & (visits.target != Meaning.JOINTS)
     if poses.any():
         lever = np.linalg.norm(_tool(visits, poses), axis=1).max() / MM
         lost = np.sqrt(3) * LISTED / 2
@@ -92,7 +92,7 @@ def listing_cost(
             f"up to {lost:.4f} mm of position and, in orientation, {LISTED / 2:g} deg "
             f"an angle: {np.deg2rad(LISTED / 2) * lever:.3f} mm over the tool's length"
         )
-    joints = rows & (visits.target == Target.JOINTS)
+    joints = rows & (visits.target == Meaning.JOINTS)
     if joints.any():
         at, tool = q[joints], _tool(visits, joints)
         reach = in_pieces(lambda some: _reach(arm, at[some], tool[some]), len(at))

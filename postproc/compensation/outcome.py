@@ -169,7 +169,7 @@ DIGITS = 4  # of a correction [mm]
 
 
 @dataclass(frozen=True)
-class Arrivals:
+class LineOutcomes:
     """What came of the targets on k lines of one file (structure of arrays).
 
     Attributes:
@@ -317,7 +317,7 @@ def tell_arrivals(
 
 def read_arrivals(
     compensated: Path, pairs: Iterable[tuple[Path, Path]]
-) -> dict[str, Arrivals]:
+) -> dict[str, LineOutcomes]:
     """Read what the record beside an output says of files that are still as it says.
 
     Args:
@@ -343,9 +343,9 @@ def read_arrivals(
     return {name: arrivals for name, arrivals in told.items() if arrivals is not None}
 
 
-def _read(told: Mapping[str, Any]) -> Arrivals | None:
+def _read(told: Mapping[str, Any]) -> LineOutcomes | None:
     """Take what a record says, None where it is damaged."""
     try:
-        return Arrivals.read(told)
+        return LineOutcomes.read(told)
     except (KeyError, ValueError, TypeError):
         return None

@@ -29,7 +29,7 @@ from postproc.model.model import Model
 from postproc.model.play import measured_play
 from postproc.motion.planner import Plan, plan
 from postproc.motion.targets import Targets
-from postproc.motion.trace import NOWHERE, Standing
+from postproc.motion.trace import NOWHERE, StartState
 from postproc.robot.cell import Cell
 from postproc.robot.state import States, make_states
 
@@ -208,7 +208,7 @@ def plan_visits(
     visits: Visits,
     cell: Cell,
     timed: bool = True,
-    begin: Standing = NOWHERE,
+    begin: StartState = NOWHERE,
     doubtful: bool = False,
 ) -> Planned:
     """Plan every move of a program, with the time that it takes or without.

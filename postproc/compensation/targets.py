@@ -9,16 +9,9 @@ import numpy as np
 
 from postproc.arrays import Bools, Floats, Ints
 from postproc.compensation.eligibility import Reasons
-from postproc.language.visits import (
-    Diagnostic,
-    FlyTrajectory,
-    FlyType,
-    Motion,
-    Target,
-    Visits,
-)
+from postproc.language.visits import Diagnostic, FlyTrajectory, FlyType, Meaning, Visits
 from postproc.motion.path import from_every_start
-from postproc.motion.targets import Fly, Kind, Targets
+from postproc.motion.targets import Fly, TargetKind, Targets
 from postproc.robot.cell import Cell
 from postproc.robot.pose import (
     MM,
@@ -29,6 +22,7 @@ from postproc.robot.pose import (
     rotation_from_vector,
     times,
 )
+from postproc.robot.trajectory import Motion
 
 # What a program says of its fly points, and what it leaves to be assumed.
 
@@ -99,12 +93,17 @@ def _note(visits: Visits, row: int, code: str, text: str) -> Diagnostic:
 # inverse(BASE) . UFRAME . P.
 
 FLAG = re.compile(r"([SEW])|T([123])\s*:\s*([+-]?\d+)", re.IGNORECASE)
-JOINTS = (Target.JOINTS, Target.HOME, Target.CALIBRATION)
-PLACED = (Kind.POSE, Kind.TOOL_STEP, Kind.BASE_STEP, Kind.TOWARDS)
+JOINTS = (Meaning.JOINTS, Meaning.HOME, Meaning.CALIBRATION)
+PLACED = (
+    TargetKind.POSE,
+    TargetKind.TOOL_STEP,
+    TargetKind.BASE_STEP,
+    TargetKind.TOWARDS,
+)
 STEPS_IN = {
-    Target.RELATIVE_TOOL: "tool",
-    Target.RELATIVE_BASE: "base",
-    Target.RELATIVE_UFRAME: "uframe",
+    Meaning.RELATIVE_TOOL: "tool",
+    Meaning.RELATIVE_BASE: "base",
+    Meaning.RELATIVE_UFRAME: "uframe",
 }
 
 
@@ -139,13 +138,15 @@ def targets_from_visits(visits: Visits, cell: Cell) -> tuple[Targets, Reasons]:
     frames, reasons = _frames(visits), Reasons(len(visits))
     values = _values(visits, cell)
     kind, tcp, joints = _places(visits, frames.user, values)
-    poses = np.isin(visits.target, (Target.POSE, Target.NEAR))
+    poses = np.isin(visits.target, (Meaning.POSE, Meaning.NEAR))
     outside = _auxiliary(visits, cell, reasons)
     _explain(visits, values, poses, reasons)
-    lost = (outside | visits.tool_remote) & (kind != Kind.JOINTS)
+    lost = (outside | visits.tool_remote) & (kind != TargetKind.JOINTS)
     placed = np.isin(kind, PLACED)
     lost |= placed & (is_unknown(tcp) | is_unknown(frames.tool))
-    lost |= np.isnan(joints).any(axis=1) & np.isin(kind, (Kind.JOINTS, Kind.JOINT_STEP))
+    lost |= np.isnan(joints).any(axis=1) & np.isin(
+        kind, (TargetKind.JOINTS, TargetKind.JOINT_STEP)
+    )
     slot, turns = configurations(visits.configs)
     rounding, distance, overlap = rounding_of(visits)
     pred_start, pred = from_every_start(
@@ -153,10 +154,12 @@ def targets_from_visits(visits: Visits, cell: Cell) -> tuple[Targets, Reasons]:
     )
     targets = Targets(
         move=visits.motion,
-        kind=np.where(lost, Kind.UNKNOWN, kind),
+        kind=np.where(lost, TargetKind.UNKNOWN, kind),
         via=visits.via,
         tcp=tcp,
-        distance=np.where(visits.target == Target.FOR, visits.distance_mm * MM, np.nan),
+        distance=np.where(
+            visits.target == Meaning.FOR, visits.distance_mm * MM, np.nan
+        ),
         joints=joints,
         tool=frames.tool,
         slot=np.where(visits.config_given & poses, slot[visits.config], -1),
@@ -233,8 +236,8 @@ def _values(visits: Visits, cell: Cell, rows: Rows = ALL) -> Floats:
     values, goal = np.array(visits.values[rows]), visits.target[rows]
     untold = np.isnan(values).any(axis=1)
     for target, joints in (
-        (Target.HOME, cell.home),
-        (Target.CALIBRATION, cell.calibration),
+        (Meaning.HOME, cell.home),
+        (Meaning.CALIBRATION, cell.calibration),
     ):
         if joints is not None:
             values[untold & (goal == target)] = np.rad2deg(joints)
@@ -247,23 +250,28 @@ def _places(
     """Turn numbers into kinds, TCP poses (m, 4, 4) [m] and joints (m, 6) [rad]."""
     target = visits.target[rows]
     n = len(target)
-    if (target == Target.POSE).all():  # most programs are nothing else
+    if (target == Meaning.POSE).all():  # most programs are nothing else
         tcp = times(user, pose_from_record(values))
-        return np.full(n, int(Kind.POSE)), tcp, np.full((n, 6), np.nan)
-    kind = np.full(n, int(Kind.UNKNOWN))
+        return np.full(n, int(TargetKind.POSE)), tcp, np.full((n, 6), np.nan)
+    kind = np.full(n, int(TargetKind.UNKNOWN))
     tcp, joints = np.full((n, 4, 4), np.nan), np.full((n, 6), np.nan)
     in_joints = np.isin(target, JOINTS)
-    kind[in_joints], kind[target == Target.BY] = Kind.JOINTS, Kind.JOINT_STEP
-    in_joints |= target == Target.BY
+    kind[in_joints], kind[target == Meaning.BY] = (
+        TargetKind.JOINTS,
+        TargetKind.JOINT_STEP,
+    )
+    in_joints |= target == Meaning.BY
     joints[in_joints] = np.deg2rad(values[in_joints])
-    poses = np.isin(target, (Target.POSE, Target.NEAR, Target.FOR))
-    kind[poses] = np.where(target[poses] == Target.FOR, Kind.TOWARDS, Kind.POSE)
+    poses = np.isin(target, (Meaning.POSE, Meaning.NEAR, Meaning.FOR))
+    kind[poses] = np.where(
+        target[poses] == Meaning.FOR, TargetKind.TOWARDS, TargetKind.POSE
+    )
     tcp[poses] = times(user[poses], pose_from_record(values[poses]))
-    near = target == Target.NEAR
+    near = target == Meaning.NEAR
     tcp[near] = tcp[near] @ _along_approach(-visits.distance_mm[rows][near])
-    away = target == Target.AWAY
-    kind[away], tcp[away] = Kind.TOOL_STEP, _along_approach(-values[away, 0])
-    steps = np.isin(target, (*STEPS_IN, Target.ABOUT))
+    away = target == Meaning.AWAY
+    kind[away], tcp[away] = TargetKind.TOOL_STEP, _along_approach(-values[away, 0])
+    steps = np.isin(target, (*STEPS_IN, Meaning.ABOUT))
     for v in np.flatnonzero(steps).tolist():
         kind[v], tcp[v] = _step(target[v], values[v], user[v])
     return kind, tcp, joints
@@ -276,23 +284,23 @@ def _along_approach(distance_mm: Floats) -> Floats:
     return T
 
 
-def _step(target: int, value: Floats, user: Floats) -> tuple[Kind, Floats]:
+def _step(target: int, value: Floats, user: Floats) -> tuple[TargetKind, Floats]:
     """Turn one RELATIVE or ABOUT into a step of the tool or along the base axes."""
-    about = target == Target.ABOUT
-    frame = STEPS_IN.get(Target(int(value[4])) if about else Target(int(target)), "")
+    about = target == Meaning.ABOUT
+    frame = STEPS_IN.get(Meaning(int(value[4])) if about else Meaning(int(target)), "")
     axes = np.eye(3)
     if frame == "uframe":
         axes = user[:3, :3]
     step = np.eye(4)
     vector = axes @ value[:3]
     if np.isnan(vector).any() or (about and not np.linalg.norm(vector) > 0):
-        return Kind.UNKNOWN, np.full((4, 4), np.nan)
+        return TargetKind.UNKNOWN, np.full((4, 4), np.nan)
     if about:
         turn = np.deg2rad(value[3]) * vector / np.linalg.norm(vector)
         step[:3, :3] = rotation_from_vector(turn)
     else:
         step[:3, 3] = vector * MM
-    return (Kind.TOOL_STEP if frame == "tool" else Kind.BASE_STEP), step
+    return (TargetKind.TOOL_STEP if frame == "tool" else TargetKind.BASE_STEP), step
 
 
 def _auxiliary(visits: Visits, cell: Cell, reasons: Reasons) -> Bools:

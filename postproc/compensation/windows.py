@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from postproc.arrays import Bools, Ints
-from postproc.language.visits import Literals, Target, Visits
+from postproc.language.visits import Literals, Meaning, Visits
 
 # The visits of several programs side by side, as if they were one program's.
 #
@@ -127,8 +127,8 @@ def _literals(programs: Sequence[Visits]) -> Literals:
 LEAST = 20_000  # visits of a window; shorter programs are one
 RUN_UP = 2_000  # visits that tell how the arm comes to a window
 STEPS = (
-    Target.RELATIVE_TOOL, Target.RELATIVE_BASE, Target.RELATIVE_UFRAME, Target.AWAY,
-    Target.ABOUT, Target.BY, Target.FOR,
+    Meaning.RELATIVE_TOOL, Meaning.RELATIVE_BASE, Meaning.RELATIVE_UFRAME, Meaning.AWAY,
+    Meaning.ABOUT, Meaning.BY, Meaning.FOR,
 )  # fmt: skip
 SHARED = {
     "files", "configs", "names", "frames", "frame_taught", "reasons", "pred_start",

@@ -155,7 +155,7 @@ _CLOSED = re.compile(rb"\bEND(?:IF|SELECT|FOR|WHILE|CONDITION)\b", re.I)
 
 
 @dataclass(frozen=True)
-class Rows:
+class LogicalRows:
     """Logical lines.
 
     Attributes:
@@ -173,7 +173,7 @@ class Rows:
     name: Indices
 
 
-def divided(rows: Rows) -> Rows:
+def divided(rows: LogicalRows) -> LogicalRows:
     """Give the block that opens behind CASE or ELSE a row of its own."""
     found = {
         k: parts.groups()
@@ -197,7 +197,7 @@ def divided(rows: Rows) -> Rows:
     second = np.append(False, row[1:] == row[:-1])
     shape = rows.shape[row]
     first = rows.first[row] + np.where(second, numbers[shape], 0)
-    return Rows(
+    return LogicalRows(
         tuple(masks),
         np.where(second, tail[shape], head[shape]).astype(rows.shape.dtype),
         rows.line[row],
@@ -397,7 +397,9 @@ def _logical(
     joined = join(masks, found.shape[rows], Names(at, found.name, tuple(names)))
     kept, short = rows[joined.rows], found.start.dtype
     first = np.append(found.first[kept], len(found.start)).astype(short)
-    lines = divided(Rows(joined.masks, joined.shape, kept + 1, first, at[joined.rows]))
+    lines = divided(
+        LogicalRows(joined.masks, joined.shape, kept + 1, first, at[joined.rows])
+    )
     shapes, shape = find_shapes(lines.masks, lines.shape, lines.name, found.name, names)
     return Lines(
         source,

@@ -15,23 +15,13 @@ from numpy.typing import NDArray
 
 from postproc.arrays import Bools, Floats, Ints
 
-# Visits: every arrival at a target, and the literals that hold the numbers.
-
 START = -1  # predecessor: wherever the arm stands when the program starts
 NO_VALUE = "it has no value in the program or its variable file"  # ends a reason
 NO_TARGET = "the move holds no target of its own"  # begins such a visit's reason
 ELSEWHERE = -2  # predecessor: a place that the program text does not tell
 
 
-class Motion(IntEnum):
-    """The trajectory word of a move."""
-
-    JOINT = 0
-    LINEAR = 1
-    CIRCULAR = 2
-
-
-class Target(IntEnum):
+class Meaning(IntEnum):
     """What the six numbers of a visit mean."""
 
     POSE = 0  # x, y, z [mm], a, e, r [deg] of the tool in the user frame
@@ -154,7 +144,7 @@ class Visits:
         files: Names of the files; index 0 is the program itself.
         file, line: Where the move statement stands, (n,), line 1-based.
         motion: `Motion`, (n,).
-        target: `Target`, (n,).
+        target: `Meaning`, (n,).
         via: True at the VIA point of an arc, (n,).
         values: The six numbers, (n, 6), NaN where not known.
         distance_mm: For NEAR and FOR, (n,).

@@ -236,27 +236,27 @@ MAX_BYTES = 200_000_000
 Method = Literal["full", "eja-elm", "elm", "interpolation", "kinematic-elm", "kriging"]
 
 
-class Section(BaseModel):
+class ModelSection(BaseModel):
     """A part of the file: unknown keys and non-finite numbers are errors."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
 
-class ArmSection(Section):
+class ArmSection(ModelSection):
     """The arm that the model was made for."""
 
     name: str
     id: str
 
 
-class EffectSection(Section):
+class EffectSection(ModelSection):
     """An effect and its settings."""
 
     name: str
     settings: dict[str, Any]
 
 
-class ParameterSection(Section):
+class ParameterSection(ModelSection):
     """One parameter, SI units."""
 
     name: str
@@ -266,7 +266,7 @@ class ParameterSection(Section):
     prior_std: NonNegativeFloat
 
 
-class NoiseSection(Section):
+class NoiseSection(ModelSection):
     """The noise components of `postproc.model.noise.Noise`."""
 
     tracker: NonNegativeFloat
@@ -274,7 +274,7 @@ class NoiseSection(Section):
     origin: tuple[float, float, float] | None
 
 
-class RangesSection(Section):
+class RangesSection(ModelSection):
     """The ranges of `postproc.model.model.Ranges`."""
 
     lower: tuple[float, ...] = Field(min_length=6, max_length=6)
@@ -286,7 +286,7 @@ class RangesSection(Section):
     oriented: bool = False
 
 
-class ModelFile(Section):
+class ModelFile(ModelSection):
     """A whole model file."""
 
     format: Literal[1]

@@ -10,10 +10,11 @@ import numpy as np
 from postproc.arrays import Bools, Floats, Ints, in_pieces
 from postproc.kernels import floats, native
 from postproc.motion.path import Pull
-from postproc.motion.targets import Fly, Move, Targets
+from postproc.motion.targets import Fly, Targets
 from postproc.motion.trace import Trace
 from postproc.robot.arm import Arm
 from postproc.robot.play import Edges
+from postproc.robot.trajectory import Motion
 
 # Which fly points are rounded, and how much of the neighbouring moves that takes.
 #
@@ -60,7 +61,7 @@ def zones(arm: Arm, targets: Targets, traced: Trace) -> Zones:
     """Find the corners with one way in and one way out, and their largest zones."""
     visit, into, out = _corners(targets, traced)
     to = np.repeat(np.arange(len(targets)), np.diff(targets.pred_start))
-    cartesian = targets.move != Move.JOINT
+    cartesian = targets.move != Motion.JOINT
     both = cartesian[visit] & cartesian[to[out]]
     by_distance = both & (targets.rounding[visit] != Fly.OVERLAP)
     edge = np.stack([into, out])
@@ -176,7 +177,7 @@ def _ramp(arm: Arm, targets: Targets, way: _Ways) -> tuple[Floats, Floats]:
     push = (arm.acceleration / turned).min(axis=1)
     speed = (arm.velocity / turned).min(axis=1)
     length = np.maximum(way.length, NOTHING)
-    joint = targets.move[way.to] == Move.JOINT
+    joint = targets.move[way.to] == Motion.JOINT
     programmed = np.where(joint, np.inf, targets.linear_speed[way.to] / length)
     speed = np.fmin(speed, programmed)
     moves = (turned > NOTHING).any(axis=1)

@@ -37,7 +37,7 @@ class Ways(Protocol):
 
 
 @dataclass(frozen=True)
-class Solved:
+class SolvedBranches:
     """Ways of samples that were solved beforehand, (k, 8, 6) [rad]."""
 
     branches: Floats

@@ -9,8 +9,9 @@ import numpy as np
 
 from postproc.arrays import Bools, Floats, Ints
 from postproc.kernels import floats, native
-from postproc.motion.targets import Move, Targets
+from postproc.motion.targets import Targets
 from postproc.robot.pose import inverse, rotation_from_vector, rotation_vector
+from postproc.robot.trajectory import Motion
 
 # Cartesian paths: straight lines and arcs of the TCP, sampled.
 #
@@ -204,12 +205,12 @@ def sample(targets: Targets, flange: Floats) -> Samples:
     visit = np.repeat(np.arange(len(targets)), np.diff(targets.pred_start))
     source = np.array(targets.pred)
     at = np.maximum(source, 0)  # no visit: looked up, and never used
-    cartesian = targets.move[visit] != Move.JOINT
+    cartesian = targets.move[visit] != Motion.JOINT
     known = ~np.isnan(flange[:, 0, 0])
     tool_known = ~np.isnan(targets.tool[:, 0, 0])
     ready = cartesian & (source >= 0) & known[visit] & tool_known[visit]
     ready &= known[at] & ~targets.wrist_joint[visit]
-    straight = np.flatnonzero(ready & (targets.move[visit] == Move.LINEAR))
+    straight = np.flatnonzero(ready & (targets.move[visit] == Motion.LINEAR))
     begins = _begins(targets, visit, source)
     segments = _lines(targets, flange, source[straight], visit[straight])
     edge = straight
@@ -278,7 +279,7 @@ def _begins(targets: Targets, visit: Ints, source: Ints) -> Ints:
     The edges from VIA to the end are as many as those to VIA, and in their order.
     """
     n, begins = len(targets), np.full(len(visit), -1)
-    arc = targets.move[visit] == Move.CIRCULAR
+    arc = targets.move[visit] == Motion.CIRCULAR
     first = np.flatnonzero(arc & targets.via[visit] & (visit + 1 < n))
     begins[first] = first
     at = np.maximum(source, 0)
@@ -393,7 +394,7 @@ def rounds(targets: Targets, tcp: Floats, aside: Floats) -> Rounds:
         return Rounds(np.empty((0, 3), dtype=np.int64), np.empty((0, 3, 3)))
     visit = np.repeat(np.arange(len(targets)), np.diff(targets.pred_start))
     source = targets.pred
-    arc = (targets.move[visit] == Move.CIRCULAR) & targets.via[visit]
+    arc = (targets.move[visit] == Motion.CIRCULAR) & targets.via[visit]
     arc &= (source >= 0) & (visit + 1 < len(targets))
     start, via = source[arc], visit[arc]
     own = tcp[start] @ inverse(targets.tool[start]) @ targets.tool[via]
@@ -410,7 +411,7 @@ def from_every_start(
     From another start the same VIA and end make another circle.
 
     Args:
-        move: `Move` of n moves, (n,).
+        move: `Motion` of n moves, (n,).
         via: True at the point on the way of an arc, (n,).
         pred_start: Predecessors of move v are pred[pred_start[v] : pred_start[v + 1]].
         pred: Predecessors; negative for a place that is not known.
@@ -419,7 +420,7 @@ def from_every_start(
         `pred_start` and `pred` with the repetitions.
     """
     visit = np.repeat(np.arange(len(move)), np.diff(pred_start))
-    ends = (move[visit] == Move.CIRCULAR) & ~via[visit]
+    ends = (move[visit] == Motion.CIRCULAR) & ~via[visit]
     at = np.maximum(pred, 0)  # no move: looked up, and never used
     ends &= (pred >= 0) & (pred == visit - 1) & via[at]
     starts = np.diff(pred_start)[at]

@@ -12,7 +12,7 @@ from postproc.motion.path import Pull
 from postproc.motion.replan import points, where_passed
 from postproc.motion.targets import CODE, REASONS, WRIST, Targets
 from postproc.motion.timing import no_time, tell_time
-from postproc.motion.trace import NOWHERE, Standing, Trace, trace
+from postproc.motion.trace import NOWHERE, StartState, Trace, trace
 from postproc.robot.arm import Arm
 from postproc.robot.direction import arrivals
 
@@ -57,7 +57,7 @@ class Plan:
     overruled: Bools
     untimed: Bools
     pull: Pull
-    end: Standing
+    end: StartState
 
     def __post_init__(self) -> None:
         for f in fields(self):
@@ -85,7 +85,7 @@ def plan(
     targets: Targets,
     wrist: float,
     timed: bool = True,
-    begin: Standing = NOWHERE,
+    begin: StartState = NOWHERE,
 ) -> Plan:
     """Plan every move the way the controller moves.
 
@@ -102,7 +102,7 @@ def plan(
     exact = trace(arm, targets, begin.known)
     traced = rounded(arm, targets, exact, timed)
     arrived = arrivals(arm, traced.q, traced.edges, begin.past)
-    end = Standing.at_end(exact.q, exact.flange, exact.slot, arrived.past)
+    end = StartState.at_end(exact.q, exact.flange, exact.slot, arrived.past)
     clock = tell_time(arm, targets, traced) if timed else no_time(len(targets))
     tool = targets.tool
     tcp = where_passed(arm, points(exact), traced.q) @ tool

@@ -8,8 +8,8 @@ import numpy as np
 
 from postproc.arrays import Bools, Floats, Ints, spans
 from postproc.motion.blending import rounded
-from postproc.motion.targets import Kind, Targets
-from postproc.motion.trace import NOWHERE, Known, Standing, Trace, trace
+from postproc.motion.targets import TargetKind, Targets
+from postproc.motion.trace import NOWHERE, Known, StartState, Trace, trace
 from postproc.robot.arm import Arm
 from postproc.robot.direction import Passages, Sides, passages, sides
 from postproc.robot.play import NOTHING, Clamps, Past
@@ -35,7 +35,7 @@ class Reached:
 
 
 @dataclass(frozen=True)
-class Points:
+class PlannedPoints:
     """The n targets themselves.
 
     Attributes:
@@ -66,13 +66,13 @@ class Course:
 
     arm: Arm
     targets: Targets
-    exact: Points
+    exact: PlannedPoints
     passed: Floats
     aside: Floats
     slot: Ints
     passages: Passages
     sides: Sides
-    begin: Standing = NOWHERE
+    begin: StartState = NOWHERE
 
     @property
     def side(self) -> Floats:
@@ -80,10 +80,10 @@ class Course:
         return self.sides.side
 
     @property
-    def end(self) -> Standing:
+    def end(self) -> StartState:
         """Return where the arm stands at the last target; reversals are not kept."""
         past = Past(self.sides.play, NOTHING.turned)
-        return Standing.at_end(self.exact.q, self.exact.flange, self.slot, past)
+        return StartState.at_end(self.exact.q, self.exact.flange, self.slot, past)
 
     @property
     def reached(self) -> Reached:
@@ -93,7 +93,7 @@ class Course:
         return Reached(self.passed, tcp, self.aside, self.side)
 
 
-def reach(arm: Arm, targets: Targets, begin: Standing = NOWHERE) -> Course:
+def reach(arm: Arm, targets: Targets, begin: StartState = NOWHERE) -> Course:
     """Find joint angles and sides only.
 
     For targets that a correction has moved: their speeds are those of the plan.
@@ -116,12 +116,12 @@ def reach(arm: Arm, targets: Targets, begin: Standing = NOWHERE) -> Course:
     )  # fmt: skip
 
 
-def points(traced: Trace) -> Points:
+def points(traced: Trace) -> PlannedPoints:
     """Return the targets of a trace."""
-    return Points(traced.q, traced.flange)
+    return PlannedPoints(traced.q, traced.flange)
 
 
-def where_passed(arm: Arm, exact: Points, q: Floats) -> Floats:
+def where_passed(arm: Arm, exact: PlannedPoints, q: Floats) -> Floats:
     """Place the flange where the path passes targets, (n, 4, 4) [m].
 
     Args:
@@ -147,8 +147,13 @@ CHANGED = 2  # targets on each side of a moved one whose passing may change
 TRACED = 3  # targets on each side that must be traced for that
 SAME = 1e-9  # [rad] arriving on the same branch and turn
 MOST = 0.85  # of all targets; if more have to be traced, all are
-STEPS = (Kind.TOOL_STEP, Kind.BASE_STEP, Kind.JOINT_STEP, Kind.TOWARDS)
-IS_STEP = np.isin(np.arange(max(Kind) + 1), STEPS)
+STEPS = (
+    TargetKind.TOOL_STEP,
+    TargetKind.BASE_STEP,
+    TargetKind.JOINT_STEP,
+    TargetKind.TOWARDS,
+)
+IS_STEP = np.isin(np.arange(max(TargetKind) + 1), STEPS)
 
 
 @dataclass(frozen=True)
@@ -202,7 +207,7 @@ def reach_again(arm: Arm, before: Course, targets: Targets, moved: Bools) -> Cou
     slot = np.array(before.slot)
     slot[part.rows[part.kept]] = exact.slot[part.kept]
     passed = _patched(before.passed, part, traced.q)
-    at_targets = Points(
+    at_targets = PlannedPoints(
         _patched(before.exact.q, part, exact.q),
         _patched(before.exact.flange, part, exact.flange),
     )

@@ -9,16 +9,6 @@ import numpy as np
 
 from postproc.arrays import Bools, Floats, Ints
 
-# What a plan is made from: where every move goes, in the arm's base frame.
-
-
-class Move(IntEnum):
-    """How the arm moves between two targets."""
-
-    JOINT = 0
-    LINEAR = 1
-    CIRCULAR = 2
-
 
 class Fly(IntEnum):
     """How a fly point is rounded."""
@@ -29,7 +19,7 @@ class Fly(IntEnum):
     EXACT = 3  # the path passes through the point (FLY_PASS, negative $FLY_DIST)
 
 
-class Kind(IntEnum):
+class TargetKind(IntEnum):
     """What a target tells."""
 
     POSE = 0  # the TCP's pose in the base frame
@@ -48,8 +38,8 @@ class Targets:
     A CIRCULAR move makes two: the point on the way (`via`), then the end.
 
     Attributes:
-        move: `Move`, (n,).
-        kind: `Kind`, (n,).
+        move: `Motion`, (n,).
+        kind: `TargetKind`, (n,).
         via: True at the point on the way of an arc, (n,).
         tcp: Wanted TCP pose in the base frame, or a step, (n, 4, 4); else NaN.
         distance: Of TOWARDS, (n,) [m]; else NaN.

@@ -9,9 +9,10 @@ import numpy as np
 from postproc.arrays import Bools, Floats, Ints
 from postproc.exceptions import PlanError
 from postproc.motion.ruckig import JointMoves
-from postproc.motion.targets import Move, Targets
+from postproc.motion.targets import Targets
 from postproc.motion.trace import Trace
 from postproc.robot.arm import Arm
+from postproc.robot.trajectory import Motion
 
 # Sampled runs of moves between stops, as a time law wants them.
 
@@ -89,7 +90,7 @@ def waypoints(
     # A run needs a waypoint between its stops.
     alone = np.zeros(n, dtype=bool)
     alone[first] = end - first == 1
-    straight = (sampled == 1) & ((targets.move == Move.JOINT) | alone)
+    straight = (sampled == 1) & ((targets.move == Motion.JOINT) | alone)
     intervals = np.where(straight, JOINT_INTERVALS, sampled)
     count = np.where(run_of >= 0, intervals + begins, 0)
     start = np.concatenate([[0], np.cumsum(count)])
@@ -144,7 +145,7 @@ def _programmed(targets: Targets, traced: Trace, edge: Ints) -> Floats:
     line = traced.length[edge] / targets.linear_speed
     turn = traced.turning[edge] / targets.rotary_speed
     slowest = np.fmax(np.nan_to_num(line), np.nan_to_num(turn))
-    cartesian = (targets.move != Move.JOINT) & (edge >= 0)
+    cartesian = (targets.move != Motion.JOINT) & (edge >= 0)
     return np.where(cartesian, slowest / targets.override, 0.0)
 
 
@@ -154,7 +155,7 @@ BATCH = 20_000  # waypoints solved at a time, if one run does not need more
 
 
 @dataclass(frozen=True)
-class Clock:
+class ArrivalTimes:
     """Times of n arrivals.
 
     Attributes:
@@ -169,17 +170,17 @@ class Clock:
     untimed: Bools
 
 
-def no_time(n: int) -> Clock:
+def no_time(n: int) -> ArrivalTimes:
     """Leave the times of n arrivals unknown."""
     unknown = np.full(n, np.nan)
-    return Clock(unknown, unknown, np.zeros(n, dtype=bool))
+    return ArrivalTimes(unknown, unknown, np.zeros(n, dtype=bool))
 
 
-def tell_time(arm: Arm, targets: Targets, traced: Trace) -> Clock:
+def tell_time(arm: Arm, targets: Targets, traced: Trace) -> ArrivalTimes:
     """Time all moves: JOINT moves between stops with ruckig, other runs with toppra."""
     edge, source = main_edges(targets, traced)
     first, end = runs(targets, source)
-    lone = (end - first == 1) & (targets.move[first] == Move.JOINT)
+    lone = (end - first == 1) & (targets.move[first] == Motion.JOINT)
     points = waypoints(arm, targets, traced, edge, source, first[~lone], end[~lone])
     since, velocity, failed = _run_times(arm, points)
     inside = points.at >= 0
@@ -201,7 +202,7 @@ def tell_time(arm: Arm, targets: Targets, traced: Trace) -> Clock:
             full = np.abs(traced.q[v] - begin) / arm.velocity
             duration[v], untimed[v] = full.max() / override, True
     speed = _speeds(arm, targets, traced, joint_velocity)
-    return Clock(_times(targets, duration), speed, untimed)
+    return ArrivalTimes(_times(targets, duration), speed, untimed)
 
 
 def main_edges(targets: Targets, traced: Trace) -> tuple[Ints, Ints]:

@@ -11,7 +11,7 @@ from postproc.motion.branches import (
     LOST,
     SUSPICIOUS,
     OnDemand,
-    Solved,
+    SolvedBranches,
     Ways,
     follow,
     nearest_slot,
@@ -36,19 +36,19 @@ from postproc.motion.targets import (
     PATH_JUMP,
     PATH_LIMITS,
     PATH_REACH,
-    Kind,
-    Move,
+    TargetKind,
     Targets,
 )
 from postproc.robot.arm import Arm
 from postproc.robot.play import NOTHING, Edges, Past
 from postproc.robot.pose import inverse, is_unknown
+from postproc.robot.trajectory import Motion
 
 # Where one move leads to from one place.
 
 
 @dataclass(frozen=True)
-class Arrival:
+class EdgeEnd:
     """Where one edge leads to.
 
     Attributes:
@@ -130,7 +130,7 @@ class Workspace:
         self._inner = np.full(len(self.path), -1)
         self._inner[self.samples.inner] = np.arange(len(self.samples.inner))
         placed = ~is_unknown(self.flange)
-        self.placed = placed & (targets.kind != Kind.JOINTS) & ~self.given
+        self.placed = placed & (targets.kind != TargetKind.JOINTS) & ~self.given
         self.told = np.zeros(n, dtype=bool)
         self.by_string = self._by_string()
         self.single = self._single_lines()
@@ -140,8 +140,8 @@ class Workspace:
         """Place the flange at poses and joint angles."""
         targets = self.targets
         self.flange = targets.tcp @ self.tool_inverse
-        self.flange[targets.kind != Kind.POSE] = np.nan
-        joints = np.flatnonzero(targets.kind == Kind.JOINTS)
+        self.flange[targets.kind != TargetKind.POSE] = np.nan
+        joints = np.flatnonzero(targets.kind == TargetKind.JOINTS)
         self.q[joints] = targets.joints[joints]
         known = joints[~np.isnan(self.q[joints]).any(axis=1)]
         self.flange[known] = self.arm.flange(self.q[known])
@@ -149,7 +149,7 @@ class Workspace:
     def _settle_steps(self) -> None:
         """Place the flange after steps from places that are known already."""
         kind = self.targets.kind
-        steps = (kind == Kind.TOOL_STEP) | (kind == Kind.BASE_STEP)
+        steps = (kind == TargetKind.TOOL_STEP) | (kind == TargetKind.BASE_STEP)
         for v in np.flatnonzero(steps).tolist():
             sources = self.targets.pred[
                 self.targets.pred_start[v] : self.targets.pred_start[v + 1]
@@ -162,7 +162,7 @@ class Workspace:
     def after_step(self, v: int, flange: Floats) -> Floats:
         """Place the flange after step `v` from a flange pose, (4, 4) [m]."""
         step, tcp = self.targets.tcp[v], flange @ self.targets.tool[v]
-        if self.targets.kind[v] == Kind.TOOL_STEP:
+        if self.targets.kind[v] == TargetKind.TOOL_STEP:
             tcp = tcp @ step
         else:
             tcp = tcp.copy()
@@ -180,8 +180,8 @@ class Workspace:
     def _by_string(self) -> Bools:
         """Tell which targets need nothing but their configuration string."""
         t = self.targets
-        told = (t.kind == Kind.POSE) & (t.slot >= 0) & ~t.nearest_turn
-        return np.asarray(told & (t.move == Move.JOINT) & self.placed)
+        told = (t.kind == TargetKind.POSE) & (t.slot >= 0) & ~t.nearest_turn
+        return np.asarray(told & (t.move == Motion.JOINT) & self.placed)
 
     def _single_lines(self) -> Bools:
         """Tell which targets continue a Cartesian path from the one before alone."""
@@ -232,7 +232,7 @@ class Workspace:
         """Return the solutions at some samples of ready edges."""
         rows = self.row[span]
         if len(rows) and (rows >= 0).all():
-            return Solved(self.branches[rows])
+            return SolvedBranches(self.branches[rows])
         return OnDemand(self.arm, self.flange_at(np.arange(span.start, span.stop)))
 
     def flange_at(self, at: Ints) -> Floats:
@@ -280,10 +280,10 @@ def _run_lengths(inside: Bools) -> Ints:
 
 
 def along_line(
-    work: Workspace, v: int, edge: int, flange: Floats, end: Arrival
-) -> Arrival:
+    work: Workspace, v: int, edge: int, flange: Floats, end: EdgeEnd
+) -> EdgeEnd:
     """Follow a Cartesian path; where that fails, keep the end and say why."""
-    joints = work.targets.kind[v] == Kind.JOINTS
+    joints = work.targets.kind[v] == TargetKind.JOINTS
     if work.samples.ready[edge]:
         span = work.span(edge)
         ways = work.ways(slice(span.start, span.stop - joints))
@@ -297,11 +297,11 @@ def along_line(
 
 
 def along_late_arc(
-    work: Workspace, v: int, edge: int, flange: Floats, end: Arrival
-) -> Arrival:
+    work: Workspace, v: int, edge: int, flange: Floats, end: EdgeEnd
+) -> EdgeEnd:
     """Follow a part of an arc whose points were not all known beforehand."""
     t, begins = work.targets, int(work.samples.begins[edge])
-    unknown = Arrival(end.q, flange, end.slot, NO_PATH, end.reason)
+    unknown = EdgeEnd(end.q, flange, end.slot, NO_PATH, end.reason)
     if begins < 0 or t.wrist_joint[v] or work.source[begins] < 0:
         return unknown
     via, start = v if t.via[v] else v - 1, work.source[begins]
@@ -315,30 +315,30 @@ def along_late_arc(
     part = parts[0 if t.via[v] else 1]
     if not part.valid[0]:
         return replace(unknown, reason=CODE[NO_CIRCLE])
-    ways = _ways(work, v, edge, part, t.kind[v] != Kind.JOINTS)
+    ways = _ways(work, v, edge, part, t.kind[v] != TargetKind.JOINTS)
     return _followed(work, v, edge, flange, end, ways)
 
 
 def _followed(
-    work: Workspace, v: int, edge: int, flange: Floats, end: Arrival, ways: Ways
-) -> Arrival:
+    work: Workspace, v: int, edge: int, flange: Floats, end: EdgeEnd, ways: Ways
+) -> EdgeEnd:
     """Follow a Cartesian path through solutions; see `along_line`."""
     near = work.q[work.source[edge]]
-    joints = work.targets.kind[v] == Kind.JOINTS
+    joints = work.targets.kind[v] == TargetKind.JOINTS
     done = follow(near, ways)
     if len(done.q) < len(ways):
         lost = OUT_OF_REACH if len(end.path) == 0 else PATH_REACH
         reason = CODE[PATH_JUMP if done.reached else lost]
-        return Arrival(end.q, flange, end.slot, NO_PATH, reason)
+        return EdgeEnd(end.q, flange, end.slot, NO_PATH, reason)
     if not joints:
         before = work.branch_at(int(work.source[edge]))
         single = (done.slot == (done.slot[0] if before < 0 else before)).all()
         reason = 0 if single else CODE[PATH_JUMP]
-        return Arrival(done.q[-1], flange, int(done.slot[-1]), done.q, reason)
+        return EdgeEnd(done.q[-1], flange, int(done.slot[-1]), done.q, reason)
     last = done.q[-1] if len(done.q) else near
     if np.abs(last - end.q).max() > LOST:
-        return Arrival(end.q, flange, -1, NO_PATH, CODE[OTHER_BRANCH])
-    return Arrival(end.q, flange, -1, np.vstack([done.q, end.q]), 0)
+        return EdgeEnd(end.q, flange, -1, NO_PATH, CODE[OTHER_BRANCH])
+    return EdgeEnd(end.q, flange, -1, np.vstack([done.q, end.q]), 0)
 
 
 def _ways(work: Workspace, v: int, edge: int, path: Segments, target: bool) -> Ways:
@@ -346,44 +346,44 @@ def _ways(work: Workspace, v: int, edge: int, path: Segments, target: bool) -> W
     k = work.samples.count(edge)
     u = np.arange(1, k + (1 if target else 0)) / k
     tcp = path.poses(np.zeros(len(u), dtype=np.int64), u)
-    return Solved(work.arm.inverse(tcp @ work.tool_inverse[v]).q)
+    return SolvedBranches(work.arm.inverse(tcp @ work.tool_inverse[v]).q)
 
 
 # One arrival: from known joint angles over one edge to a target.
 
 
-def arrive(work: Workspace, v: int, edge: int) -> Arrival:
+def arrive(work: Workspace, v: int, edge: int) -> EdgeEnd:
     """Go over an edge whose source has known joint angles."""
     targets, source = work.targets, int(work.source[edge])
     kind, near = targets.kind[v], work.q[source]
-    if kind == Kind.JOINT_STEP:
+    if kind == TargetKind.JOINT_STEP:
         q = near + targets.joints[v]
-        return Arrival(q, work.arm.flange(q[None])[0], -1, q[None], 0)
+        return EdgeEnd(q, work.arm.flange(q[None])[0], -1, q[None], 0)
     flange = work.flange[v]
-    if kind == Kind.TOWARDS:
+    if kind == TargetKind.TOWARDS:
         flange = part_way(work, v, work.flange[source])
         if np.isnan(flange).any():
-            return Arrival(np.full(6, np.nan), flange, -1, NO_PATH, CODE[NO_TARGET])
+            return EdgeEnd(np.full(6, np.nan), flange, -1, NO_PATH, CODE[NO_TARGET])
     elif np.isnan(flange).any():
         flange = work.after_step(v, work.flange[source])
-    if kind == Kind.JOINTS:
-        end = Arrival(work.q[v], flange, -1, work.q[v][None], 0)
+    if kind == TargetKind.JOINTS:
+        end = EdgeEnd(work.q[v], flange, -1, work.q[v][None], 0)
     else:
         end = choose(work, v, flange, near)
-    if targets.move[v] == Move.JOINT or np.isnan(flange).any():
+    if targets.move[v] == Motion.JOINT or np.isnan(flange).any():
         return end
     if work.samples.broken[edge]:
-        return Arrival(end.q, flange, end.slot, NO_PATH, CODE[NO_CIRCLE])
+        return EdgeEnd(end.q, flange, end.slot, NO_PATH, CODE[NO_CIRCLE])
     if np.isnan(targets.tool[v]).any():
-        return Arrival(end.q, flange, end.slot, NO_PATH, end.reason)
-    if targets.move[v] == Move.CIRCULAR and not work.samples.ready[edge]:
+        return EdgeEnd(end.q, flange, end.slot, NO_PATH, end.reason)
+    if targets.move[v] == Motion.CIRCULAR and not work.samples.ready[edge]:
         return along_late_arc(work, v, edge, flange, end)
     if targets.wrist_joint[v]:
         path = wrist_interpolated(
             work.arm, near, end.q, targets.tool[v], work.samples.count(edge)
         )
         reason = end.reason if len(path) else end.reason or CODE[PATH_REACH]
-        return Arrival(end.q, flange, end.slot, path, reason)
+        return EdgeEnd(end.q, flange, end.slot, path, reason)
     return along_line(work, v, edge, flange, end)
 
 
@@ -404,7 +404,7 @@ def part_way(work: Workspace, v: int, flange: Floats) -> Floats:
     return reached
 
 
-def choose(work: Workspace, v: int, flange: Floats, near: Floats | None) -> Arrival:
+def choose(work: Workspace, v: int, flange: Floats, near: Floats | None) -> EdgeEnd:
     """Choose a solution by configuration string, else the nearest one.
 
     Args:
@@ -416,23 +416,23 @@ def choose(work: Workspace, v: int, flange: Floats, near: Floats | None) -> Arri
     arm, targets = work.arm, work.targets
     unknown = np.full(6, np.nan)
     if np.isnan(flange).any():
-        return Arrival(unknown, flange, -1, NO_PATH, CODE[OUT_OF_REACH])
+        return EdgeEnd(unknown, flange, -1, NO_PATH, CODE[OUT_OF_REACH])
     branches = work.solutions(v, flange)
     if np.isnan(branches).any(axis=1).all():
-        return Arrival(unknown, flange, -1, NO_PATH, CODE[OUT_OF_REACH])
+        return EdgeEnd(unknown, flange, -1, NO_PATH, CODE[OUT_OF_REACH])
     slot = int(targets.slot[v])
     if slot < 0 and near is None:
-        return Arrival(unknown, flange, -1, NO_PATH, CODE[NO_START])
+        return EdgeEnd(unknown, flange, -1, NO_PATH, CODE[NO_START])
     if slot < 0 and near is not None:
         slot = nearest_slot(branches, near)
     q = branches[slot]
     if np.isnan(q).any():
-        return Arrival(unknown, flange, slot, NO_PATH, CODE[NO_BRANCH])
+        return EdgeEnd(unknown, flange, slot, NO_PATH, CODE[NO_BRANCH])
     if near is None or (targets.slot[v] >= 0 and not targets.nearest_turn[v]):
         q = on_written_turns(q[None], targets.turns[v][None])[0]
     else:
         q = _nearest_allowed(arm, q, near)
-    return Arrival(q, flange, slot, q[None], 0)
+    return EdgeEnd(q, flange, slot, q[None], 0)
 
 
 def _nearest_allowed(arm: Arm, q: Floats, near: Floats) -> Floats:
@@ -617,7 +617,7 @@ def trace(arm: Arm, targets: Targets, known: Known | None = None) -> Trace:
 def _from_strings(work: Workspace) -> Bools:
     """Settle what does not depend on where the arm comes from; tell which."""
     t, rows = work.targets, np.flatnonzero(work.by_string)
-    work.reason[t.kind == Kind.UNKNOWN] = CODE[NO_TARGET]
+    work.reason[t.kind == TargetKind.UNKNOWN] = CODE[NO_TARGET]
     slot = t.slot[rows]
     q = work.arm.into_range(work.arm.on_branch(work.flange[rows], slot))
     work.q[rows] = on_written_turns(q, t.turns[rows])
@@ -626,14 +626,14 @@ def _from_strings(work: Workspace) -> Bools:
     work.reason[missing] = CODE[NO_BRANCH]
     nowhere = np.isnan(work.arm.inverse(work.flange[missing]).q[..., 0]).all(axis=1)
     work.reason[missing[nowhere]] = CODE[OUT_OF_REACH]
-    joints = (t.move == Move.JOINT) & (t.kind == Kind.JOINTS)
-    return np.asarray(work.by_string | (t.kind == Kind.UNKNOWN) | joints)
+    joints = (t.move == Motion.JOINT) & (t.kind == TargetKind.JOINTS)
+    return np.asarray(work.by_string | (t.kind == TargetKind.UNKNOWN) | joints)
 
 
 def _in_order(work: Workspace, visits: Ints, smooth: Bools) -> None:
     """Go through targets in program order, smooth stretches at once."""
     late: list[int] = []
-    poses = smooth & (work.targets.kind == Kind.POSE)
+    poses = smooth & (work.targets.kind == TargetKind.POSE)
     i = 0
     while i < len(visits):
         v = int(visits[i])
@@ -707,18 +707,18 @@ def _one(work: Workspace, v: int) -> list[int]:
     return later
 
 
-def _without_past(work: Workspace, v: int) -> Arrival:
+def _without_past(work: Workspace, v: int) -> EdgeEnd:
     """Arrive from an unknown place."""
     t = work.targets
     nothing = np.empty((0, 6))
-    if t.kind[v] == Kind.JOINTS:
-        return Arrival(work.q[v], work.flange[v], -1, nothing, 0)
-    if t.kind[v] != Kind.POSE:
-        return Arrival(np.full(6, np.nan), work.flange[v], -1, nothing, CODE[NO_TARGET])
+    if t.kind[v] == TargetKind.JOINTS:
+        return EdgeEnd(work.q[v], work.flange[v], -1, nothing, 0)
+    if t.kind[v] != TargetKind.POSE:
+        return EdgeEnd(np.full(6, np.nan), work.flange[v], -1, nothing, CODE[NO_TARGET])
     return choose(work, v, work.flange[v], None)
 
 
-def _record(work: Workspace, edge: int, arrival: Arrival) -> None:
+def _record(work: Workspace, edge: int, arrival: EdgeEnd) -> None:
     """Write the path of an edge, or forget where the edge comes from."""
     if len(arrival.path) == len(work.path[work.span(edge)]):
         work.path[work.span(edge)] = arrival.path
@@ -726,7 +726,7 @@ def _record(work: Workspace, edge: int, arrival: Arrival) -> None:
         work.source[edge] = -1
 
 
-def _merge(work: Workspace, v: int, arrivals: list[Arrival]) -> None:
+def _merge(work: Workspace, v: int, arrivals: list[EdgeEnd]) -> None:
     """Keep what all arrivals agree on."""
     first = arrivals[0]
     reason = next((a.reason for a in arrivals if a.reason), 0)
@@ -759,7 +759,7 @@ def _finished(work: Workspace) -> Trace:
     work.source[edge_of[holes]] = -1
     work.path[holes] = work.q[samples.visit[edge_of[holes]]]
     _limits(work, edge_of)
-    written = (t.slot >= 0) & (t.move != Move.JOINT) & (work.slot >= 0)
+    written = (t.slot >= 0) & (t.move != Motion.JOINT) & (work.slot >= 0)
     turned = on_other_turns(work.q, t.turns)
     other = (work.slot != t.slot) | (turned & ~t.nearest_turn)
     edges = Edges(t.pred_start, work.source, work.path, samples.start)
@@ -788,7 +788,7 @@ def _limits(work: Workspace, edge_of: Ints) -> None:
 
 
 @dataclass(frozen=True)
-class Standing:
+class StartState:
     """One stop, or none: arrays of k = 1 or 0 rows.
 
     Attributes:
@@ -808,7 +808,7 @@ class Standing:
         return len(self.q)
 
     @classmethod
-    def at_end(cls, q: Floats, flange: Floats, slot: Ints, past: Past) -> Standing:
+    def at_end(cls, q: Floats, flange: Floats, slot: Ints, past: Past) -> StartState:
         """Keep the last of n targets, none of the others."""
         return cls(np.array(q[-1:]), np.array(flange[-1:]), np.array(slot[-1:]), past)
 
@@ -818,6 +818,6 @@ class Standing:
         return Known(np.arange(len(self)), self.q, self.flange, self.slot)
 
 
-NOWHERE = Standing(
+NOWHERE = StartState(
     np.empty((0, 6)), np.empty((0, 4, 4)), np.empty(0, dtype=np.int64), NOTHING
 )

@@ -16,7 +16,12 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
 from postproc.arrays import Bools, Bytes, Floats, Ints, pieces
-from postproc.compensation.outcome import LEFT_ALONE, Arrivals, Status, read_arrivals
+from postproc.compensation.outcome import (
+    LEFT_ALONE,
+    LineOutcomes,
+    Status,
+    read_arrivals,
+)
 from postproc.compensation.parallel import in_turns, meanwhile
 from postproc.exceptions import ProgramError
 from postproc.files import VARIABLES
@@ -42,7 +47,7 @@ from postproc.language.stamp import read_stamp
 STATUSES = tuple(Status(k).name.lower() for k in range(len(Status)))
 
 
-class Row(NamedTuple):
+class DiffRow(NamedTuple):
     """One line that differs, or whose target was left alone.
 
     Attributes:
@@ -75,17 +80,17 @@ class Row(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Rows(Sequence[Row]):
+class DiffRows(Sequence[DiffRow]):
     """The rows of one file (structure of arrays); as a sequence it makes them.
 
     Attributes:
         file: Name of the original file.
-        line: See `Row`, (k,).
+        line: See `DiffRow`, (k,).
         targets: Names of what numbers belong to.
         target: Index into them, (k,).
         first: CSR offsets into the numbers, (k + 1,).
         original, compensated: The numbers, (m,).
-        change_mm: See `Row`, NaN where there is none, (k,).
+        change_mm: See `DiffRow`, NaN where there is none, (k,).
         has_change: Where there is one, (k,).
         texts: The texts of those rows that have one, by row.
         told: What the record says of the file's targets, where there is one.
@@ -102,18 +107,18 @@ class Rows(Sequence[Row]):
     change_mm: Floats
     has_change: Bools
     texts: Mapping[int, str] = field(default_factory=dict)
-    told: Arrivals | None = None
+    told: LineOutcomes | None = None
     entry: Ints = field(default_factory=lambda: np.empty(0, dtype=np.int64))
 
     @classmethod
-    def bare(cls, file: str, line: Ints, targets: Sequence[str]) -> Rows:
+    def bare(cls, file: str, line: Ints, targets: Sequence[str]) -> DiffRows:
         """Make rows without numbers, each with a target of its own."""
         k = len(line)
         ints, none = np.zeros(k + 1, dtype=np.int64), np.empty(0)
         nan, no = np.full(k, np.nan), np.zeros(k, dtype=bool)
         return cls(file, line, targets, np.arange(k), ints, none, none, nan, no)
 
-    def with_told(self, told: Arrivals | None) -> Rows:
+    def with_told(self, told: LineOutcomes | None) -> DiffRows:
         """Add what a record says."""
         if told is None:
             return self
@@ -123,7 +128,7 @@ class Rows(Sequence[Row]):
         """Count the rows."""
         return len(self.line)
 
-    def __iter__(self) -> Iterator[Row]:
+    def __iter__(self) -> Iterator[DiffRow]:
         """Make all rows, in order."""
         return map(self.row, range(len(self)))
 
@@ -132,10 +137,10 @@ class Rows(Sequence[Row]):
         rows = range(len(self))[k]
         return self.row(rows) if isinstance(rows, int) else [*map(self.row, rows)]
 
-    def row(self, k: int) -> Row:
+    def row(self, k: int) -> DiffRow:
         """Make the k-th row."""
         own = slice(*self.first[k : k + 2].tolist())
-        row = Row(
+        row = DiffRow(
             self.file,
             int(self.line[k]),
             self.targets[self.target[k]],
@@ -156,14 +161,14 @@ class Rows(Sequence[Row]):
         )
 
 
-def joined_rows(file: str, parts: Sequence[Rows]) -> Rows:
+def joined_rows(file: str, parts: Sequence[DiffRows]) -> DiffRows:
     """Put rows of one file one after the other, before a record tells of them."""
     if not parts:
-        return Rows.bare(file, np.empty(0, dtype=np.int64), ())
+        return DiffRows.bare(file, np.empty(0, dtype=np.int64), ())
     named = np.cumsum([0, *(len(p.targets) for p in parts)]).tolist()
     rows = np.cumsum([0, *(len(p) for p in parts)]).tolist()
     counts = [np.diff(p.first) for p in parts]
-    return Rows(
+    return DiffRows(
         file,
         np.concatenate([p.line for p in parts]),
         [name for p in parts for name in p.targets],
@@ -353,7 +358,7 @@ _AS_BLANKS = bytes(32 if chr(c) in BLANKS else c for c in range(256))
 
 def changed_rows(
     file: str, lines: Sequence[int], before: Sequence[bytes], after: Sequence[bytes]
-) -> Rows:
+) -> DiffRows:
     """Describe those of equally many lines that differ.
 
     Args:
@@ -363,7 +368,7 @@ def changed_rows(
         after: Those of the other file.
     """
 
-    def compare(some: slice) -> Rows:
+    def compare(some: slice) -> DiffRows:
         old, new = before[some], after[some]
         differ = np.fromiter(map(ne, old, new), bool, len(old))
         numbers = np.array(lines[some], dtype=np.int64)[differ]
@@ -377,7 +382,7 @@ def changed_rows(
 
 def _compare(
     file: str, lines: Ints, before: Sequence[bytes], after: Sequence[bytes]
-) -> Rows:
+) -> DiffRows:
     """Describe how pairs of lines differ."""
     if not len(lines):
         return joined_rows(file, ())
@@ -399,7 +404,7 @@ def _compare(
         k: f"{before[k].decode('latin-1')} -> {after[k].decode('latin-1')}"
         for k in np.flatnonzero(~moved).tolist()
     }
-    return Rows(file, lines, names, target, first, old, new, change, has, texts)
+    return DiffRows(file, lines, names, target, first, old, new, change, has, texts)
 
 
 def _by_shapes(before: Sequence[bytes], after: Sequence[bytes]) -> Pairs:
@@ -598,7 +603,7 @@ class Compared:
     original: Path
     compensated: Path
     lines: Sequence[bytes]
-    rows: Rows
+    rows: DiffRows
     stamped: bool
 
     def targets(self, lines: Ints) -> list[str]:
@@ -636,7 +641,9 @@ def compare_files(original: Path, compensated: Path) -> Compared:
     return Compared(original, compensated, before, rows, stamped)
 
 
-def _rows(file: str, before: Sequence[bytes], after: Sequence[bytes]) -> Iterator[Rows]:
+def _rows(
+    file: str, before: Sequence[bytes], after: Sequence[bytes]
+) -> Iterator[DiffRows]:
     """Describe the lines that differ, in order."""
     if len(before) == len(after):
         yield changed_rows(file, range(1, len(before) + 1), before, after)
@@ -653,13 +660,13 @@ def _rows(file: str, before: Sequence[bytes], after: Sequence[bytes]) -> Iterato
         yield _text_rows(file, np.zeros(b1 - b0, dtype=int), "+ ", after[b0:b1])
 
 
-def _text_rows(file: str, lines: Ints, sign: str, texts: Sequence[bytes]) -> Rows:
+def _text_rows(file: str, lines: Ints, sign: str, texts: Sequence[bytes]) -> DiffRows:
     """Describe lines that only one of the files has."""
     told = {k: f"{sign}{text.decode('latin-1')}" for k, text in enumerate(texts)}
-    return replace(Rows.bare(file, lines, [""] * len(lines)), texts=told)
+    return replace(DiffRows.bare(file, lines, [""] * len(lines)), texts=told)
 
 
-def _named_by_entries(rows: Rows, lines: Sequence[bytes]) -> Rows:
+def _named_by_entries(rows: DiffRows, lines: Sequence[bytes]) -> DiffRows:
     """Name rows of a variable file by their variables."""
     own = (rows.targets[k] for k in rows.target.tolist())
     entries = entry_names(lines, rows.line.tolist())
@@ -684,18 +691,18 @@ class Difference:
         counts: Visits by status, likewise; else empty.
     """
 
-    differing: tuple[Rows, ...]
+    differing: tuple[DiffRows, ...]
     stamped: bool
-    untouched: tuple[Rows, ...] = ()
+    untouched: tuple[DiffRows, ...] = ()
     counts: Mapping[str, int] = field(default_factory=dict)
 
     @cached_property
-    def rows(self) -> tuple[Row, ...]:
+    def rows(self) -> tuple[DiffRow, ...]:
         """All lines that differ, one object each: for programs of some lines."""
         return tuple(row for part in self.differing for row in part)
 
     @cached_property
-    def left(self) -> tuple[Row, ...]:
+    def left(self) -> tuple[DiffRow, ...]:
         """All lines that were left alone, likewise."""
         return tuple(row for part in self.untouched for row in part)
 
@@ -745,14 +752,14 @@ def _long(pairs: Iterable[tuple[Path, Path]]) -> bool:
     return any(old.is_file() and old.stat().st_size > LONG for old, _ in pairs)
 
 
-def _left(file: Compared, told: Arrivals) -> Rows:
+def _left(file: Compared, told: LineOutcomes) -> DiffRows:
     """List the targets that were left alone."""
     alone = told.line[np.isin(told.status, LEFT_ALONE)]
     lines = alone[~np.isin(alone, file.rows.line)]
-    return Rows.bare(file.original.name, lines, file.targets(lines)).with_told(told)
+    return DiffRows.bare(file.original.name, lines, file.targets(lines)).with_told(told)
 
 
-def _counts(told: Mapping[str, Arrivals]) -> dict[str, int]:
+def _counts(told: Mapping[str, LineOutcomes]) -> dict[str, int]:
     """Add up the visits of every status."""
     return {
         s.name.lower(): sum(a.counts[s.name.lower()] for a in told.values())

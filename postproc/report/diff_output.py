@@ -26,7 +26,7 @@ from postproc.byte_columns import (
 from postproc.byte_columns import ByteColumn as Bytes
 from postproc.compensation.parallel import in_turns
 from postproc.files import VARIABLES
-from postproc.report.diff import STATUSES, Difference, Row, Rows
+from postproc.report.diff import STATUSES, Difference, DiffRow, DiffRows
 from postproc.report.terminal import (
     ARROWS,
     Block,
@@ -41,14 +41,14 @@ from postproc.report.terminal import (
 # Numbers of the rows of `diff` as columns of bytes, some thousand at a time.
 #
 # Rows with text, with many numbers, with visits of several statuses or with names that
-# cannot be printed are few: whoever writes rows writes them one by one, as `Row`, and
-# asks here which they are.
+# cannot be printed are few: whoever writes rows writes them one by one, as `DiffRow`,
+# and asks here which they are.
 
 AT_ONCE = 5_000  # rows
 MOST = 12  # numbers of a row that is written with others
 
 
-def single_rows(rows: Rows) -> Ints:
+def single_rows(rows: DiffRows) -> Ints:
     """Return the rows that are written one by one."""
     count = np.diff(rows.first)
     many = count > MOST
@@ -64,7 +64,7 @@ def single_rows(rows: Rows) -> Ints:
     return np.flatnonzero(many)
 
 
-def blocks_of(rows: Rows) -> Iterator[tuple[Ints, Ints]]:
+def blocks_of(rows: DiffRows) -> Iterator[tuple[Ints, Ints]]:
     """Cut rows: yield the rows of each block, and those that are written one by one."""
     single = single_rows(rows)
     for some in pieces(len(rows), AT_ONCE):
@@ -125,7 +125,7 @@ def difference_pieces(found: Difference) -> Iterator[str]:
     yield "\n}\n"
 
 
-def _piece(rows: Rows, k: Ints, single: Ints) -> str:
+def _piece(rows: DiffRows, k: Ints, single: Ints) -> str:
     """Write some rows with commas between them."""
     begin = int(k[0])
     texts = np.empty(len(k), dtype=object)
@@ -138,7 +138,7 @@ def _piece(rows: Rows, k: Ints, single: Ints) -> str:
     return ",".join(texts.tolist())
 
 
-def _objects(rows: Rows, k: Ints) -> list[str]:
+def _objects(rows: DiffRows, k: Ints) -> list[str]:
     """Write some rows as JSON objects."""
     columns = {
         "file": json.dumps(rows.file).encode(),
@@ -158,7 +158,7 @@ def _objects(rows: Rows, k: Ints) -> list[str]:
     return joined([*parts, b"\n  }" + END]).decode("ascii").split(END.decode())[:-1]
 
 
-def _told(rows: Rows, k: Ints) -> dict[str, ByteColumn | bytes]:
+def _told(rows: DiffRows, k: Ints) -> dict[str, ByteColumn | bytes]:
     """Write what a record says of some rows."""
     told = rows.told
     none = {"status": b'""', "why": b'""', "direction": b"[]", "correction_mm": b"null"}
@@ -178,7 +178,7 @@ def _told(rows: Rows, k: Ints) -> dict[str, ByteColumn | bytes]:
     return {key: blanked(columns[key], entry < 0, none[key]) for key in columns}
 
 
-def _number_lists(rows: Rows, values: Floats, k: Ints) -> ByteColumn:
+def _number_lists(rows: DiffRows, values: Floats, k: Ints) -> ByteColumn:
     """Write the numbers of some rows as lists."""
     at, owner = number_places(rows.first, k)
     return _lists(shortest(values[at], text=repr), owner, len(k))
@@ -238,12 +238,16 @@ class _Writer:
     told: bool
     coloured: bool
 
-    def blocks(self, parts: Sequence[Rows], shown: Sequence[int]) -> Iterator[Block]:
+    def blocks(
+        self, parts: Sequence[DiffRows], shown: Sequence[int]
+    ) -> Iterator[Block]:
         """Write the rows of all files, some columns of them."""
         tasks = [(rows, *block) for rows in parts for block in blocks_of(rows)]
         return in_turns(lambda task: self._block(*task, shown), tasks, HERE)
 
-    def _block(self, rows: Rows, k: Ints, single: Ints, shown: Sequence[int]) -> Block:
+    def _block(
+        self, rows: DiffRows, k: Ints, single: Ints, shown: Sequence[int]
+    ) -> Block:
         """Write some rows."""
         plain = ~np.isin(k, single)
         cells = [
@@ -260,7 +264,7 @@ class _Writer:
             {at: [row[c] for c in shown] for at, row in texts.items()},
         )
 
-    def _size(self, rows: Rows, k: Ints) -> Bytes:
+    def _size(self, rows: DiffRows, k: Ints) -> Bytes:
         """Write how far the TCP is moved, or else by how much the numbers changed."""
         size, has = rows.change_mm[k], rows.has_change[k]
         if self.told and rows.told is not None and len(rows.told.line):
@@ -269,7 +273,7 @@ class _Writer:
             has = has | (entry >= 0)
         return blanked(fixed(np.where(has, size, 0.0), 3), ~has, b"")
 
-    def _told(self, rows: Rows, k: Ints) -> list[Bytes]:
+    def _told(self, rows: DiffRows, k: Ints) -> list[Bytes]:
         """Say how the targets are reached, and what came of them."""
         told = rows.told
         if told is None or not len(told.line):
@@ -284,7 +288,7 @@ class _Writer:
     def _painted(self, status: str) -> str:
         return paint(status, status_colour(status)) if self.coloured else status
 
-    def _texts(self, row: Row) -> list[str]:
+    def _texts(self, row: DiffRow) -> list[str]:
         """Write a row by itself."""
         size = row.correction_mm if self.told and row.status else row.change_mm
         old, new = _written(row)
@@ -303,7 +307,7 @@ def _said(status: str, why: str, visits: Mapping[str, int] | None = None) -> str
     return f"{status}: {why}" if why else status
 
 
-def _place(rows: Rows, k: Ints) -> list[Bytes]:
+def _place(rows: DiffRows, k: Ints) -> list[Bytes]:
     """Say where rows stand."""
     file = repeated(rows.file.encode(errors="replace"), len(k))
     line = rows.line[k]
@@ -311,7 +315,7 @@ def _place(rows: Rows, k: Ints) -> list[Bytes]:
     return [file, blanked(whole(line), line == 0, b""), names]
 
 
-def _number_changes(rows: Rows, k: Ints, plain: NDArray[np.bool_]) -> list[Bytes]:
+def _number_changes(rows: DiffRows, k: Ints, plain: NDArray[np.bool_]) -> list[Bytes]:
     """Write the numbers that changed."""
     at, owner = number_places(rows.first, k)
     old, new = rows.original[at], rows.compensated[at]
@@ -343,7 +347,7 @@ def _lengths(cells: Bytes) -> Ints:
     return lengths
 
 
-def _written(row: Row) -> tuple[str, str]:
+def _written(row: DiffRow) -> tuple[str, str]:
     """Write the numbers that changed, or the text."""
     if row.text or not row.original:
         return row.text, ""

@@ -23,8 +23,8 @@ from postproc.byte_columns import (
     whole,
 )
 from postproc.compensation.outcome import Outcome, Status
-from postproc.language.visits import Motion
 from postproc.robot.pose import MM
+from postproc.robot.trajectory import Motion
 
 AT_ONCE = 5_000  # visits
 

@@ -123,7 +123,7 @@ class DhSection(Strict):
         return self
 
 
-class JointSection(Strict):
+class ArmJointSection(Strict):
     """Limits, play and gears of the six joints."""
 
     lower_deg: Sextuple
@@ -138,7 +138,7 @@ class JointSection(Strict):
     ) = None
 
     @model_validator(mode="after")
-    def _ranges(self) -> JointSection:
+    def _ranges(self) -> ArmJointSection:
         for j in range(6):
             if self.lower_deg[j] >= self.upper_deg[j]:
                 raise ValueError(
@@ -182,7 +182,7 @@ class ArmFile(Strict):
     name: str
     repeatability_mm: PositiveFloat
     dh: DhSection
-    joints: JointSection
+    joints: ArmJointSection
     links: LinkSection | None = None
     opw: OpwSection | None = None
 

@@ -65,7 +65,7 @@ class RobotSection(Strict):
     absolute_accuracy: bool = False
 
 
-class JointSection(Strict):
+class JointPositionSection(Strict):
     """Where $HOME or $CAL_SYS is."""
 
     joints_deg: Sextuple
@@ -132,8 +132,8 @@ class CellFile(Strict):
     tool: FrameSection | None = None
     base: FrameSection | None = None
     uframe: FrameSection | None = None
-    home: JointSection | None = None
-    calibration: JointSection | None = None
+    home: JointPositionSection | None = None
+    calibration: JointPositionSection | None = None
     payload: PayloadSection | None = None
     environment: EnvironmentSection | None = None
     tracker: TrackerSection | None = None
@@ -262,7 +262,7 @@ def _taught_frames(file: CellFile) -> dict[tuple[float, ...], Floats | None]:
 
 
 def _angles(
-    section: JointSection | None, name: str, arm: Arm, path: Path
+    section: JointPositionSection | None, name: str, arm: Arm, path: Path
 ) -> Floats | None:
     """Convert and check $HOME or $CAL_SYS."""
     if section is None:

@@ -7,15 +7,15 @@ kinematic chain there cannot hide behind the same mistake here.
 from __future__ import annotations
 
 from postproc.simulation.arm import VirtualArm
-from postproc.simulation.controller import Setup
+from postproc.simulation.controller import VirtualCell
 from postproc.simulation.draw import stream, virtual_arm
 from postproc.simulation.kinematics import NJ220, Chain
 from postproc.simulation.laws import DEFAULT, NAMES, Planted, parse_effects
-from postproc.simulation.program import Landing, Run, land, run_program
-from postproc.simulation.state import Arrivals, arrivals_of_states, make_arrivals
+from postproc.simulation.program import Landing, ProgramRun, land, run_program
+from postproc.simulation.state import VirtualArrivals, arrivals_of_states, make_arrivals
 from postproc.simulation.tracker import (
     Campaign,
-    Rows,
+    JointTargets,
     campaign_length,
     follow_rows,
     in_tracker_frame,
@@ -30,15 +30,15 @@ __all__ = [
     "DEFAULT",
     "NAMES",
     "NJ220",
-    "Arrivals",
     "Campaign",
     "Chain",
+    "JointTargets",
     "Landing",
     "Planted",
-    "Rows",
-    "Run",
-    "Setup",
+    "ProgramRun",
     "VirtualArm",
+    "VirtualArrivals",
+    "VirtualCell",
     "arrivals_of_states",
     "campaign_length",
     "follow_rows",

@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from postproc.arrays import Floats
-from postproc.simulation.kinematics import Body, Chain, small_motion
+from postproc.simulation.kinematics import Chain, LinkMasses, small_motion
 from postproc.simulation.laws import Law, Where, total
-from postproc.simulation.state import LONG_TRAVEL, Arrivals
+from postproc.simulation.state import LONG_TRAVEL, VirtualArrivals
 
 # The arm as it was really built: numbers of the chain that differ from the drawing.
 
@@ -62,11 +62,11 @@ def draw_as_built(
     return AsBuilt(chain, base, mount if tool else 0 * mount)
 
 
-def draw_body(rng: np.random.Generator, chain: Chain) -> Body:
+def draw_body(rng: np.random.Generator, chain: Chain) -> LinkMasses:
     """Draw the weights of one arm: 10 % and 20 mm off the estimates."""
     mass = chain.mass * rng.uniform(0.9, 1.1, 6)
     centre = chain.centre + rng.uniform(-0.02, 0.02, (6, 3))
-    return Body(chain, mass, centre)
+    return LinkMasses(chain, mass, centre)
 
 
 def _off(
@@ -208,15 +208,17 @@ class VirtualArm:
     tracker_noise: tuple[float, float]
     warming: tuple[float, float]
 
-    def nominal_pose(self, arrivals: Arrivals) -> Floats:
+    def nominal_pose(self, arrivals: VirtualArrivals) -> Floats:
         """Return where the drawing puts the tool, (n, 4, 4)."""
         return np.asarray(self.nominal.flange(arrivals.q) @ arrivals.tool)
 
-    def nominal_tcp(self, arrivals: Arrivals) -> Floats:
+    def nominal_tcp(self, arrivals: VirtualArrivals) -> Floats:
         """Return where the drawing puts the TCP, (n, 3)."""
         return np.asarray(self.nominal_pose(arrivals)[:, :3, 3])
 
-    def tcp(self, arrivals: Arrivals, joint_noise: Floats | float = 0.0) -> Floats:
+    def tcp(
+        self, arrivals: VirtualArrivals, joint_noise: Floats | float = 0.0
+    ) -> Floats:
         """Return where the TCP really is, (n, 3), without noise unless some is given.
 
         Args:
@@ -225,7 +227,9 @@ class VirtualArm:
         """
         return np.asarray(self.pose(arrivals, joint_noise)[:, :3, 3])
 
-    def pose(self, arrivals: Arrivals, joint_noise: Floats | float = 0.0) -> Floats:
+    def pose(
+        self, arrivals: VirtualArrivals, joint_noise: Floats | float = 0.0
+    ) -> Floats:
         """Return where the tool really is, (n, 4, 4).
 
         Args:
@@ -241,18 +245,18 @@ class VirtualArm:
             small_motion(base) @ flange @ small_motion(mount) @ arrivals.tool
         )
 
-    def error(self, arrivals: Arrivals) -> Floats:
+    def error(self, arrivals: VirtualArrivals) -> Floats:
         """Return the true error, actual minus nominal TCP, (n, 3), without noise."""
         return self.tcp(arrivals) - self.nominal_tcp(arrivals)
 
-    def seen(self, arrivals: Arrivals, tcp: Floats) -> Floats:
+    def seen(self, arrivals: VirtualArrivals, tcp: Floats) -> Floats:
         """Return what a tracker whose stand moves would read at TCPs (n, 3)."""
         motion = small_motion(total(self.laws, Where.TRACKER, arrivals))
         turned = np.einsum("nij,nj->ni", motion[:, :3, :3], tcp)
         return np.asarray(turned + motion[:, :3, 3])
 
     def measure(
-        self, arrivals: Arrivals, tracker: Floats, rng: np.random.Generator
+        self, arrivals: VirtualArrivals, tracker: Floats, rng: np.random.Generator
     ) -> Floats:
         """Return noisy tracker readings (n, 3) in the arm base frame.
 

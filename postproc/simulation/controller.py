@@ -10,14 +10,8 @@ from numpy.typing import NDArray
 
 from postproc.arrays import Floats
 from postproc.exceptions import PlanError, PostprocError
-from postproc.language.visits import (
-    START,
-    FlyTrajectory,
-    FlyType,
-    Motion,
-    Target,
-    Visits,
-)
+from postproc.language.visits import START, FlyTrajectory, FlyType, Meaning, Visits
+from postproc.robot.trajectory import Motion
 from postproc.simulation.kinematics import (
     ELBOW,
     NJ220,
@@ -305,7 +299,7 @@ def _identity() -> Floats:
 
 
 @dataclass(frozen=True)
-class Setup:
+class VirtualCell:
     """What the cell tells: SI units, poses in the frames of the controller.
 
     Attributes:
@@ -385,7 +379,7 @@ class Way:
 
 
 @dataclass(frozen=True)
-class Frames:
+class MoveFrames:
     """The frames that hold at one visit, (4, 4) each."""
 
     tool: Floats
@@ -393,7 +387,7 @@ class Frames:
     uframe: Floats
 
 
-def frames_at(visits: Visits, i: int, poses: Floats) -> Frames:
+def frames_at(visits: Visits, i: int, poses: Floats) -> MoveFrames:
     """Return the frames of visit i.
 
     Args:
@@ -407,11 +401,16 @@ def frames_at(visits: Visits, i: int, poses: Floats) -> Frames:
     indices = [int(visits.tool[i]), int(visits.base[i]), int(visits.uframe[i])]
     if min(indices) < 0:
         raise PlanError("a frame is not known at this move")
-    return Frames(*(poses[k] for k in indices))
+    return MoveFrames(*(poses[k] for k in indices))
 
 
 def way_to(
-    setup: Setup, visits: Visits, i: int, frames: Frames, here: Floats, before: Floats
+    setup: VirtualCell,
+    visits: Visits,
+    i: int,
+    frames: MoveFrames,
+    here: Floats,
+    before: Floats,
 ) -> Way:
     """Find the way to visit i.
 
@@ -448,10 +447,10 @@ def way_to(
 
 
 def _arc_piece(
-    setup: Setup,
+    setup: VirtualCell,
     visits: Visits,
     i: int,
-    frames: Frames,
+    frames: MoveFrames,
     poses: tuple[Floats, Floats, Floats],
 ) -> Floats:
     """Sample the part of an arc that ends at visit i.
@@ -473,17 +472,17 @@ def _arc_piece(
 
 
 def _goal_joints(
-    setup: Setup, visits: Visits, i: int, frames: Frames, here: Floats
+    setup: VirtualCell, visits: Visits, i: int, frames: MoveFrames, here: Floats
 ) -> Floats:
-    kind, values = Target(visits.target[i]), visits.values[i]
-    if kind is Target.JOINTS:
+    kind, values = Meaning(visits.target[i]), visits.values[i]
+    if kind is Meaning.JOINTS:
         return _known(np.radians(values))
-    if kind is Target.BY:
+    if kind is Meaning.BY:
         return here + _known(np.radians(values))
-    if kind in (Target.HOME, Target.CALIBRATION):
+    if kind in (Meaning.HOME, Meaning.CALIBRATION):
         return _place_of(setup, kind)
     config = None
-    if kind in (Target.POSE, Target.NEAR) and visits.config_given[i]:
+    if kind in (Meaning.POSE, Meaning.NEAR) and visits.config_given[i]:
         config = visits.configs[visits.config[i]]
     goal = _goal_pose(setup, visits, i, frames, here)
     free = bool(visits.nearest_turn[i])
@@ -491,42 +490,42 @@ def _goal_joints(
 
 
 def _goal_pose(
-    setup: Setup, visits: Visits, i: int, frames: Frames, here: Floats
+    setup: VirtualCell, visits: Visits, i: int, frames: MoveFrames, here: Floats
 ) -> Floats:
     """Return the TCP pose in the arm base, (4, 4), that visit i asks for."""
-    kind, values = Target(visits.target[i]), visits.values[i]
+    kind, values = Meaning(visits.target[i]), visits.values[i]
     tool = frames.tool
-    if kind in (Target.JOINTS, Target.HOME, Target.CALIBRATION, Target.BY):
+    if kind in (Meaning.JOINTS, Meaning.HOME, Meaning.CALIBRATION, Meaning.BY):
         joints = _goal_joints(setup, visits, i, frames, here)
         return np.asarray(setup.chain.flange(joints[None])[0] @ tool)
     present = setup.chain.flange(here[None])[0] @ tool
-    if kind in (Target.POSE, Target.NEAR, Target.FOR):
+    if kind in (Meaning.POSE, Meaning.NEAR, Meaning.FOR):
         target = pose_of_record(_known(values))
-        if kind is Target.NEAR:
+        if kind is Meaning.NEAR:
             target = target @ _shift(0.0, 0.0, -visits.distance_mm[i])
         goal = flange_of(target, tool, frames.base, frames.uframe) @ tool
         distance = visits.distance_mm[i] * 1e-3
-        return goal if kind is not Target.FOR else _towards(present, goal, distance)
-    if kind is Target.AWAY:
+        return goal if kind is not Meaning.FOR else _towards(present, goal, distance)
+    if kind is Meaning.AWAY:
         return np.asarray(present @ _shift(0.0, 0.0, -_known(values[:1])[0]))
-    if kind is Target.RELATIVE_TOOL:
+    if kind is Meaning.RELATIVE_TOOL:
         return np.asarray(present @ _shift(*_known(values[:3])))
-    if kind in (Target.RELATIVE_BASE, Target.RELATIVE_UFRAME):
+    if kind in (Meaning.RELATIVE_BASE, Meaning.RELATIVE_UFRAME):
         axes = _axes(kind, frames)
         return _moved(present, axes @ _known(values[:3]) * 1e-3, np.zeros(3))
-    if kind is Target.ABOUT:
-        axes = _axes(Target(int(_known(values[4:5])[0])), frames, present)
+    if kind is Meaning.ABOUT:
+        axes = _axes(Meaning(int(_known(values[4:5])[0])), frames, present)
         axis = axes @ _known(values[:3])
         turn = axis / np.linalg.norm(axis) * np.radians(_known(values[3:4])[0])
         return _moved(present, np.zeros(3), turn)
     raise PlanError("the program does not tell where this move goes")
 
 
-def _axes(kind: Target, frames: Frames, present: Floats | None = None) -> Floats:
+def _axes(kind: Meaning, frames: MoveFrames, present: Floats | None = None) -> Floats:
     """Return the axes (3, 3) in the arm base of the frame that a step is given in."""
-    if kind is Target.RELATIVE_UFRAME:
+    if kind is Meaning.RELATIVE_UFRAME:
         return np.asarray((undo(frames.base) @ frames.uframe)[:3, :3])
-    if kind is Target.RELATIVE_TOOL and present is not None:
+    if kind is Meaning.RELATIVE_TOOL and present is not None:
         return np.asarray(present[:3, :3])
     return np.eye(3)
 
@@ -550,9 +549,9 @@ def _known(values: Floats) -> Floats:
     return np.asarray(values)
 
 
-def _place_of(setup: Setup, kind: Target) -> Floats:
+def _place_of(setup: VirtualCell, kind: Meaning) -> Floats:
     """Return the joints (6,) [rad] of a place that the controller holds."""
-    home = kind is Target.HOME
+    home = kind is Meaning.HOME
     joints = setup.home if home else setup.calibration
     if joints is None:
         name, key = ("$HOME", "home") if home else ("$CAL_SYS", "calibration")
@@ -770,7 +769,7 @@ class Drive:
 
 
 def plan_drives(
-    setup: Setup, visits: Visits, poses: Floats, start: Floats
+    setup: VirtualCell, visits: Visits, poses: Floats, start: Floats
 ) -> list[Drive]:
     """Find the way to every visit.
 
@@ -805,7 +804,7 @@ def _predecessor(visits: Visits, i: int) -> int:
 
 
 def _first_joints(
-    setup: Setup, visits: Visits, i: int, poses: Floats, start: Floats
+    setup: VirtualCell, visits: Visits, i: int, poses: Floats, start: Floats
 ) -> Floats:
     """Return the joints at the first target, for a cell without a home."""
     try:
@@ -817,7 +816,7 @@ def _first_joints(
 
 
 def _rounded(
-    setup: Setup, visits: Visits, poses: Floats, drives: list[Drive]
+    setup: VirtualCell, visits: Visits, poses: Floats, drives: list[Drive]
 ) -> list[Drive]:
     """Round the fly points that have one way in and one way out."""
     ways_out = np.bincount(visits.pred[visits.pred >= 0], minlength=len(visits))
@@ -839,7 +838,7 @@ def _rounded(
 
 
 def _corner(
-    setup: Setup,
+    setup: VirtualCell,
     visits: Visits,
     poses: Floats,
     moves: tuple[int, int],

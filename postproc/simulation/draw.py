@@ -11,7 +11,7 @@ import numpy as np
 from postproc.arrays import Floats
 from postproc.exceptions import PostprocError
 from postproc.simulation.arm import AsBuilt, Gears, VirtualArm, draw_as_built, draw_body
-from postproc.simulation.kinematics import NJ220, Body, Chain
+from postproc.simulation.kinematics import NJ220, Chain, LinkMasses
 from postproc.simulation.laws import (
     AS_BUILT,
     DEFAULT,
@@ -23,7 +23,7 @@ from postproc.simulation.laws import (
     parse_effects,
 )
 from postproc.simulation.reference import reference_arrivals
-from postproc.simulation.state import Arrivals
+from postproc.simulation.state import VirtualArrivals
 
 TRACKER_NOISE = (0.01e-3, 5e-6)  # [m], [m/m] per axis
 SMALL = 1e-6  # a size at which every law is linear
@@ -114,9 +114,9 @@ class _Planter:
     """
 
     seed: int
-    body: Body
+    body: LinkMasses
     rows: int
-    reference: Arrivals
+    reference: VirtualArrivals
     perfect: VirtualArm
 
     def law(self, item: Planted) -> Law:

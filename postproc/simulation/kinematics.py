@@ -303,7 +303,7 @@ GRAVITY = np.array([0.0, 0.0, -9.80665])  # [m/s^2]
 
 
 @dataclass(frozen=True)
-class Body:
+class LinkMasses:
     """What the arm weighs: link masses (6,) [kg], centres in link frames (6, 3) [m]."""
 
     chain: Chain
@@ -311,7 +311,7 @@ class Body:
     centre: Floats
 
 
-def link_torque(body: Body, q: Floats) -> Floats:
+def link_torque(body: LinkMasses, q: Floats) -> Floats:
     """Return the torque of the links' weight about every joint.
 
     tau_j = sense_j z_j . sum_{i >= j} (c_i - o_j) x m_i g, positive along positive

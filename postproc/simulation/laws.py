@@ -11,13 +11,13 @@ import numpy as np
 
 from postproc.arrays import Floats
 from postproc.exceptions import PostprocError
-from postproc.simulation.kinematics import Body, link_torque, payload_torque
+from postproc.simulation.kinematics import LinkMasses, link_torque, payload_torque
 from postproc.simulation.reference import DURATION, WORKING_RANGE
-from postproc.simulation.state import REST_TEMPERATURE, Arrivals
+from postproc.simulation.state import REST_TEMPERATURE, VirtualArrivals
 
 # A physical law of the virtual arm: what one imperfection does on every arrival.
 
-Shape = Callable[[Arrivals], Floats]
+Shape = Callable[[VirtualArrivals], Floats]
 
 
 class Where(Enum):
@@ -54,7 +54,7 @@ class Law:
     scale: float = 1.0
     peak_mm: float = float("nan")
 
-    def __call__(self, arrivals: Arrivals) -> Floats:
+    def __call__(self, arrivals: VirtualArrivals) -> Floats:
         """Return the change (n, 6) that the law makes on each arrival."""
         return np.asarray(self.scale * self.shape(arrivals))
 
@@ -75,7 +75,7 @@ class Draw:
     """
 
     rng: np.random.Generator
-    body: Body
+    body: LinkMasses
     joint: int
     rows: int
 
@@ -99,7 +99,7 @@ def on_joint(joint: int, values: Floats) -> Floats:
     return out
 
 
-def total(laws: Sequence[Law], where: Where, arrivals: Arrivals) -> Floats:
+def total(laws: Sequence[Law], where: Where, arrivals: VirtualArrivals) -> Floats:
     """Sum the changes (n, 6) of all laws that act at one place."""
     parts = [law(arrivals) for law in laws if law.where is where]
     return np.asarray(sum(parts, np.zeros((len(arrivals), 6))))
@@ -110,7 +110,7 @@ def total(laws: Sequence[Law], where: Where, arrivals: Arrivals) -> Floats:
 KILO = 1e3  # [N m] torques in the laws are counted in thousands
 
 
-def total_torque(draw: Draw, arrivals: Arrivals) -> Floats:
+def total_torque(draw: Draw, arrivals: VirtualArrivals) -> Floats:
     """Return the torque (n, 6) [N m] of links and payload about the joints."""
     payload = payload_torque(
         draw.body.chain, arrivals.q, arrivals.payload, arrivals.payload_com
@@ -129,7 +129,7 @@ def compliance(draw: Draw) -> Law:
     for joint in joints[1:]:
         softness[joint - 1] = draw.rng.uniform(0.4, 1.0)
 
-    def shape(arrivals: Arrivals) -> Floats:
+    def shape(arrivals: VirtualArrivals) -> Floats:
         return total_torque(draw, arrivals) / KILO * softness
 
     parameters = {f"softness_{j}": float(softness[j - 1]) for j in joints}
@@ -140,7 +140,7 @@ def payload(draw: Draw) -> Law:
     """A joint yields to the declared payload."""
     joint = draw.pick([2, 3, 5])
 
-    def shape(arrivals: Arrivals) -> Floats:
+    def shape(arrivals: VirtualArrivals) -> Floats:
         torque = payload_torque(
             draw.body.chain, arrivals.q, arrivals.payload, arrivals.payload_com
         )
@@ -156,7 +156,7 @@ def counterbalance(draw: Draw) -> Law:
     preload = draw.rng.uniform(0.0, 0.3)  # [m] of spring travel at the shortest length
     shortest = fixed - moving
 
-    def shape(arrivals: Arrivals) -> Floats:
+    def shape(arrivals: VirtualArrivals) -> Floats:
         angle = arrivals.q[:, 1] - upright
         length = np.sqrt(
             fixed**2 + moving**2 - 2 * fixed * moving * np.cos(angle)
@@ -182,7 +182,7 @@ def _wave(draw: Draw, order: int) -> Law:
     joint = draw.pick(range(1, 7))
     phase = draw.phase()
 
-    def shape(arrivals: Arrivals) -> Floats:
+    def shape(arrivals: VirtualArrivals) -> Floats:
         return on_joint(joint, np.cos(order * arrivals.q[:, joint - 1] + phase))
 
     parameters = {"order": float(order), "phase": phase}
@@ -193,7 +193,7 @@ def scale(draw: Draw) -> Law:
     """An encoder or gear ratio that is slightly wrong: gain * angle."""
     joint, sign = draw.pick(range(1, 7)), draw.sign()
 
-    def shape(arrivals: Arrivals) -> Floats:
+    def shape(arrivals: VirtualArrivals) -> Floats:
         return on_joint(joint, sign * arrivals.q[:, joint - 1])
 
     return Law("scale", Where.JOINTS, (joint,), 0, {}, shape)
@@ -205,7 +205,7 @@ def coupling(draw: Draw) -> Law:
     source = int(draw.rng.choice([4] if joint == 5 else [4, 5]))
     sign = draw.sign()
 
-    def shape(arrivals: Arrivals) -> Floats:
+    def shape(arrivals: VirtualArrivals) -> Floats:
         return on_joint(joint, sign * arrivals.q[:, source - 1])
 
     return Law("coupling", Where.JOINTS, (joint,), source, {}, shape)
@@ -218,7 +218,7 @@ def worn_spot(draw: Draw) -> Law:
     centre = draw.rng.uniform(low + 0.2 * (high - low), high - 0.2 * (high - low))
     width = np.radians(draw.rng.uniform(4.0, 9.0))
 
-    def shape(arrivals: Arrivals) -> Floats:
+    def shape(arrivals: VirtualArrivals) -> Floats:
         away = (arrivals.q[:, joint - 1] - centre) / width
         return on_joint(joint, sign * np.exp(-0.5 * away**2))
 
@@ -233,7 +233,7 @@ def joint_product(draw: Draw) -> Law:
     one, two = (int(j) for j in draw.rng.choice(others, 2, replace=False))
     middle, sign = WORKING_RANGE.mean(axis=1), draw.sign()
 
-    def shape(arrivals: Arrivals) -> Floats:
+    def shape(arrivals: VirtualArrivals) -> Floats:
         away = arrivals.q - middle
         return on_joint(joint, sign * away[:, one - 1] * away[:, two - 1])
 
@@ -256,7 +256,7 @@ def backlash(draw: Draw) -> Law:
     depth = draw.rng.uniform(0.0, 0.2, (2, 6))
     phase = draw.rng.uniform(0.0, 2 * np.pi, (2, 6))
 
-    def shape(arrivals: Arrivals) -> Floats:
+    def shape(arrivals: VirtualArrivals) -> Floats:
         wave = sum(depth[k - 1] * np.cos(k * arrivals.q + phase[k - 1]) for k in (1, 2))
         return np.asarray(-arrivals.side * half_gap * (1 + wave))
 
@@ -269,7 +269,7 @@ def load_backlash(draw: Draw) -> Law:
     """The lost motion of a joint grows with the load on its teeth."""
     joint, power = draw.pick([2, 3, 5]), draw.rng.uniform(0.8, 1.2)
 
-    def shape(arrivals: Arrivals) -> Floats:
+    def shape(arrivals: VirtualArrivals) -> Floats:
         load = np.abs(total_torque(draw, arrivals)[:, joint - 1] / KILO)
         return on_joint(joint, -arrivals.side[:, joint - 1] * load**power)
 
@@ -285,7 +285,7 @@ def gravity_side(draw: Draw) -> Law:
     threshold = draw.rng.uniform(0.1, 0.5)  # of what the joint usually carries
     usual = np.array([1.0, 5.0, 1.5, 0.1, 0.1, 0.01])[joint - 1]  # [kN m]
 
-    def shape(arrivals: Arrivals) -> Floats:
+    def shape(arrivals: VirtualArrivals) -> Floats:
         load = total_torque(draw, arrivals)[:, joint - 1] / KILO
         return on_joint(joint, np.tanh(load / (threshold * usual)))
 
@@ -298,7 +298,7 @@ def windup(draw: Draw) -> Law:
     joint = draw.pick(range(1, 6))
     way = np.radians(draw.rng.uniform(1.0, 6.0))
 
-    def shape(arrivals: Arrivals) -> Floats:
+    def shape(arrivals: VirtualArrivals) -> Floats:
         wound = 1 - 2 * np.exp(-arrivals.travel[:, joint - 1] / way)
         return on_joint(joint, -arrivals.side[:, joint - 1] * wound)
 
@@ -309,7 +309,7 @@ def lag(draw: Draw) -> Law:
     """A joint trails its command in proportion to the speed."""
     joint = draw.pick(range(1, 6))
 
-    def shape(arrivals: Arrivals) -> Floats:
+    def shape(arrivals: VirtualArrivals) -> Floats:
         return on_joint(joint, -arrivals.side[:, joint - 1] * arrivals.speed)
 
     return Law("lag", Where.JOINTS, (joint,), 0, {}, shape)
@@ -324,7 +324,7 @@ def hysteresis(draw: Draw) -> Law:
     joint = draw.pick(range(1, 6))
     way, loop = np.radians(draw.rng.uniform([5.0, 10.0], [15.0, 40.0]))
 
-    def shape(arrivals: Arrivals) -> Floats:
+    def shape(arrivals: VirtualArrivals) -> Floats:
         fresh = np.exp(-arrivals.travel[:, joint - 1] / way)
         short = 1 - np.exp(-arrivals.loop[:, joint - 1] / loop)
         return on_joint(joint, -arrivals.side[:, joint - 1] * fresh * short)
@@ -342,7 +342,7 @@ def thermal(draw: Draw) -> Law:
     """Every link grows with the temperature, cast iron and aluminium mixed."""
     expansion = STEEL * draw.rng.uniform(0.8, 1.6, 6)
 
-    def shape(arrivals: Arrivals) -> Floats:
+    def shape(arrivals: VirtualArrivals) -> Floats:
         return np.outer(arrivals.temperature - REST_TEMPERATURE, expansion)
 
     parameters = {f"alpha_{j + 1}": float(expansion[j]) for j in range(6)}
@@ -354,7 +354,7 @@ def warmup(draw: Draw) -> Law:
     expansion = STEEL * draw.rng.uniform(0.8, 1.6, 6)
     constant = DURATION * draw.rng.uniform(0.15, 0.5)
 
-    def shape(arrivals: Arrivals) -> Floats:
+    def shape(arrivals: VirtualArrivals) -> Floats:
         return np.outer(1 - np.exp(-arrivals.time / constant), expansion)
 
     return Law("thermal", Where.LENGTHS, (), 0, {"time_constant": constant}, shape)
@@ -376,7 +376,7 @@ def _step(draw: Draw, name: str, where: Where) -> Law:
     turn = draw.rng.normal(size=3) * 0.3  # [rad / m]: a third of a mrad for a mm
     twist = np.concatenate([shift, turn])
 
-    def shape(arrivals: Arrivals) -> Floats:
+    def shape(arrivals: VirtualArrivals) -> Floats:
         return np.outer(arrivals.order >= row, twist)
 
     return Law(name, where, (), 0, {"row": float(row)}, shape)
@@ -387,7 +387,7 @@ def tracker_drift(draw: Draw) -> Law:
     ends = draw.rng.normal(size=(2, 6)) * np.repeat([1.0, 0.3], 3)
     phase = draw.phase()
 
-    def shape(arrivals: Arrivals) -> Floats:
+    def shape(arrivals: VirtualArrivals) -> Floats:
         progress = arrivals.time / DURATION
         swing = np.sin(np.pi * progress + phase) - np.sin(phase)
         return np.outer(progress, ends[0]) + 0.5 * np.outer(swing, ends[1])
@@ -402,7 +402,7 @@ AS_BUILT = ("geometry", "tool")  # drawn as numbers of the chain, not as laws
 
 
 @dataclass(frozen=True)
-class Kind:
+class LawKind:
     """A law by name: how it is drawn, and its usual peak size on the TCP [mm]."""
 
     draw: Callable[[Draw], Law]
@@ -411,25 +411,25 @@ class Kind:
 
 
 KINDS = {
-    "compliance": Kind(compliance, 0.1, 1.0),
-    "payload": Kind(payload, 0.2, 2.0),
-    "counterbalance": Kind(counterbalance, 0.1, 0.5),
-    "transmission": Kind(transmission, 0.05, 0.3),
-    "transmission_free": Kind(transmission_free, 0.05, 0.3),
-    "scale": Kind(scale, 0.05, 0.3),
-    "coupling": Kind(coupling, 0.05, 0.3),
-    "load_backlash": Kind(load_backlash, 0.05, 0.3),
-    "gravity_side": Kind(gravity_side, 0.05, 0.3),
-    "thermal": Kind(thermal, 0.1, 1.0),
-    "warmup": Kind(warmup, 0.1, 1.0),
-    "windup": Kind(windup, 0.03, 0.15),
-    "lag": Kind(lag, 0.03, 0.25),
-    "base_shift": Kind(base_shift, 0.05, 0.5),
-    "tool_shift": Kind(tool_shift, 0.05, 0.5),
-    "tracker_drift": Kind(tracker_drift, 0.03, 0.1),
-    "worn_spot": Kind(worn_spot, 0.05, 0.5),
-    "joint_product": Kind(joint_product, 0.05, 0.3),
-    "hysteresis": Kind(hysteresis, 0.05, 0.3),
+    "compliance": LawKind(compliance, 0.1, 1.0),
+    "payload": LawKind(payload, 0.2, 2.0),
+    "counterbalance": LawKind(counterbalance, 0.1, 0.5),
+    "transmission": LawKind(transmission, 0.05, 0.3),
+    "transmission_free": LawKind(transmission_free, 0.05, 0.3),
+    "scale": LawKind(scale, 0.05, 0.3),
+    "coupling": LawKind(coupling, 0.05, 0.3),
+    "load_backlash": LawKind(load_backlash, 0.05, 0.3),
+    "gravity_side": LawKind(gravity_side, 0.05, 0.3),
+    "thermal": LawKind(thermal, 0.1, 1.0),
+    "warmup": LawKind(warmup, 0.1, 1.0),
+    "windup": LawKind(windup, 0.03, 0.15),
+    "lag": LawKind(lag, 0.03, 0.25),
+    "base_shift": LawKind(base_shift, 0.05, 0.5),
+    "tool_shift": LawKind(tool_shift, 0.05, 0.5),
+    "tracker_drift": LawKind(tracker_drift, 0.03, 0.1),
+    "worn_spot": LawKind(worn_spot, 0.05, 0.5),
+    "joint_product": LawKind(joint_product, 0.05, 0.3),
+    "hysteresis": LawKind(hysteresis, 0.05, 0.3),
 }
 NAMES = (*DEFAULT, *KINDS)
 

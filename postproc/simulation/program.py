@@ -8,12 +8,13 @@ import numpy as np
 
 from postproc.arrays import Floats, Ints
 from postproc.exceptions import PostprocError
-from postproc.language.visits import Motion, Visits
+from postproc.language.visits import Visits
+from postproc.robot.trajectory import Motion
 from postproc.simulation.arm import GearState, VirtualArm, at_start, move
-from postproc.simulation.controller import Drive, Setup, Way, plan_drives
+from postproc.simulation.controller import Drive, VirtualCell, Way, plan_drives
 from postproc.simulation.draw import stream
 from postproc.simulation.kinematics import pose_of_record
-from postproc.simulation.state import USUAL_SPEED, Arrivals, make_arrivals
+from postproc.simulation.state import USUAL_SPEED, VirtualArrivals, make_arrivals
 
 # Run a program on the virtual arm.
 
@@ -23,7 +24,7 @@ UPRIGHT = np.radians([0.0, 0.0, -90.0, 0.0, 90.0, 0.0])
 
 
 @dataclass(frozen=True)
-class Run:
+class ProgramRun:
     """What happened when a program ran.
 
     Attributes:
@@ -35,13 +36,13 @@ class Run:
     """
 
     visit: Ints
-    arrivals: Arrivals
+    arrivals: VirtualArrivals
     tool_id: Ints
     why: tuple[str, ...]
 
 
 @dataclass(frozen=True)
-class _Place:
+class _ProgramPlace:
     """The arm after one visit; `why` says why it was not reached."""
 
     joints: Floats
@@ -51,7 +52,7 @@ class _Place:
     why: str = ""
 
 
-def run_program(arm: VirtualArm, setup: Setup, visits: Visits) -> Run:
+def run_program(arm: VirtualArm, setup: VirtualCell, visits: Visits) -> ProgramRun:
     """Run every visit of a program once.
 
     Where a visit has several possible predecessors, the arm comes from the first of
@@ -67,31 +68,36 @@ def run_program(arm: VirtualArm, setup: Setup, visits: Visits) -> Run:
     poses = pose_of_record(visits.frames) if len(visits.frames) else np.eye(4)[None]
     start = _start(arm, setup)
     drives = plan_drives(setup, visits, poses, start.joints)
-    places: list[_Place] = []
+    places: list[_ProgramPlace] = []
     for i, drive in enumerate(drives):
         place = start if drive.came_from < 0 else places[drive.came_from]
         if drive.stands_there:
             gears = at_start(arm.gears, drive.begin, start.gears.side)
-            place = _Place(drive.begin, gears)
+            place = _ProgramPlace(drive.begin, gears)
         places.append(_go(arm, setup, visits, i, drive, place))
     return _collect(arm, setup, visits, poses, places)
 
 
-def _start(arm: VirtualArm, setup: Setup) -> _Place:
+def _start(arm: VirtualArm, setup: VirtualCell) -> _ProgramPlace:
     """Return the arm before the program starts."""
     joints = UPRIGHT if setup.home is None else setup.home
     side = stream(arm.seed, "start").choice([-1.0, 1.0], 6)
-    return _Place(joints, at_start(arm.gears, joints, side))
+    return _ProgramPlace(joints, at_start(arm.gears, joints, side))
 
 
 def _go(
-    arm: VirtualArm, setup: Setup, visits: Visits, i: int, drive: Drive, place: _Place
-) -> _Place:
+    arm: VirtualArm,
+    setup: VirtualCell,
+    visits: Visits,
+    i: int,
+    drive: Drive,
+    place: _ProgramPlace,
+) -> _ProgramPlace:
     """Run one move; an arm that cannot go stays where it is."""
     if drive.why:
         return replace(place, why=drive.why, lasted=0.0)
     lasted = _duration(setup, visits, i, drive.way)
-    return _Place(
+    return _ProgramPlace(
         joints=drive.path[-1],
         gears=move(arm.gears, place.gears, drive.path),
         speed=max(drive.way.length / lasted, 1e-6),
@@ -99,7 +105,7 @@ def _go(
     )
 
 
-def _duration(setup: Setup, visits: Visits, i: int, way: Way) -> float:
+def _duration(setup: VirtualCell, visits: Visits, i: int, way: Way) -> float:
     """Return how long a move takes, without ramps [s]."""
     override = float(np.nan_to_num(visits.override[i], nan=1.0)) or 1.0
     speed = setup.chain.speed * override
@@ -112,8 +118,12 @@ def _duration(setup: Setup, visits: Visits, i: int, way: Way) -> float:
 
 
 def _collect(
-    arm: VirtualArm, setup: Setup, visits: Visits, poses: Floats, places: list[_Place]
-) -> Run:
+    arm: VirtualArm,
+    setup: VirtualCell,
+    visits: Visits,
+    poses: Floats,
+    places: list[_ProgramPlace],
+) -> ProgramRun:
     """Gather the reached visits."""
     reached = [i for i, p in enumerate(places) if not p.why]
     visit = np.array(reached, dtype=np.int64)
@@ -133,10 +143,10 @@ def _collect(
         payload=setup.payload,
         payload_com=setup.payload_com,
     )
-    return Run(visit, arrivals, tool_id, tuple(p.why for p in places))
+    return ProgramRun(visit, arrivals, tool_id, tuple(p.why for p in places))
 
 
-def _tool_numbers(setup: Setup, used: list[int], poses: Floats) -> dict[int, int]:
+def _tool_numbers(setup: VirtualCell, used: list[int], poses: Floats) -> dict[int, int]:
     """Number the frames that serve as tools."""
     frames = list(dict.fromkeys(used))
     probes = [setup.number_of(poses[frame]) for frame in frames]
@@ -169,7 +179,10 @@ class Landing:
 
 
 def land(
-    arm: VirtualArm, setup: Setup, original: Visits, executed: Visits | None = None
+    arm: VirtualArm,
+    setup: VirtualCell,
+    original: Visits,
+    executed: Visits | None = None,
 ) -> Landing:
     """Run a program and compare it with what the original asks for, visit by visit.
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from postproc.arrays import Floats
-from postproc.simulation.state import Arrivals, make_arrivals
+from postproc.simulation.state import VirtualArrivals, make_arrivals
 
 # Angles between which each joint works in a usual campaign, (6, 2) [rad].
 WORKING_RANGE = np.radians(
@@ -36,7 +36,7 @@ def log_uniform(
     return np.asarray(np.exp(rng.uniform(np.log(ends[0]), np.log(ends[1]), size=shape)))
 
 
-def reference_arrivals(rows: int, tool: Floats | None = None) -> Arrivals:
+def reference_arrivals(rows: int, tool: Floats | None = None) -> VirtualArrivals:
     """Return one campaign, always the same, in which every covariate varies.
 
     Args:

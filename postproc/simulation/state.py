@@ -17,7 +17,7 @@ USUAL_SPEED = 0.1  # [m/s]
 
 
 @dataclass(frozen=True)
-class Arrivals:
+class VirtualArrivals:
     """n arrivals in the order they happen (structure of arrays, SI units).
 
     Attributes:
@@ -56,7 +56,7 @@ class Arrivals:
 
     def __getitem__(
         self, rows: NDArray[np.int64] | NDArray[np.bool_] | slice
-    ) -> Arrivals:
+    ) -> VirtualArrivals:
         """Return some of the arrivals."""
         return replace(
             self, **{f.name: getattr(self, f.name)[rows] for f in fields(self)}
@@ -80,17 +80,17 @@ def make_arrivals(
     side: Floats | float = 0.0,
     tool: Floats | None = None,
     **covariates: Floats | float,
-) -> Arrivals:
+) -> VirtualArrivals:
     """Build arrivals from joint angles; what is not given or NaN takes a default.
 
     Args:
         q: Joint angles, (n, 6) [rad].
         side: Arrival directions, (n, 6) or one value.
         tool: TCP (3,) or (n, 3), or tool pose (4, 4) or (n, 4, 4) [m]; default flange.
-        covariates: Any other field of `Arrivals`.
+        covariates: Any other field of `VirtualArrivals`.
 
     Raises:
-        TypeError: A covariate that `Arrivals` does not have.
+        TypeError: A covariate that `VirtualArrivals` does not have.
     """
     q = np.array(q, dtype=float).reshape(-1, 6)
     n = len(q)
@@ -102,7 +102,7 @@ def make_arrivals(
     for name, (default, shape) in _DEFAULTS.items():
         value = np.broadcast_to(given.get(name, default), (n, *shape)).astype(float)
         values[name] = np.where(np.isnan(value), default, value)
-    return Arrivals(q=q, order=order, tool=_tool_poses(tool, n), **values)
+    return VirtualArrivals(q=q, order=order, tool=_tool_poses(tool, n), **values)
 
 
 def _tool_poses(tool: Floats | None, n: int) -> Floats:
@@ -127,7 +127,7 @@ class StatesLike(Protocol):
     order: Floats
 
 
-def arrivals_of_states(states: StatesLike) -> Arrivals:
+def arrivals_of_states(states: StatesLike) -> VirtualArrivals:
     """Translate the model's states; what they do not know takes a default."""
     names = "travel speed time temperature payload payload_com order".split()
     covariates = {name: getattr(states, name) for name in names}

@@ -15,7 +15,7 @@ from postproc.exceptions import MeasurementError
 from postproc.files import write_all
 from postproc.language.visits import Visits
 from postproc.simulation.arm import VirtualArm, at_start, move
-from postproc.simulation.controller import Setup
+from postproc.simulation.controller import VirtualCell
 from postproc.simulation.draw import stream
 from postproc.simulation.kinematics import exponential
 from postproc.simulation.program import run_program
@@ -27,7 +27,7 @@ from postproc.simulation.reference import (
     log_uniform,
     working_angles,
 )
-from postproc.simulation.state import Arrivals, make_arrivals
+from postproc.simulation.state import VirtualArrivals, make_arrivals
 
 # Read the joint targets of a campaign from a CSV file.
 
@@ -35,7 +35,7 @@ TOOL = ("tool_x_mm", "tool_y_mm", "tool_z_mm")
 
 
 @dataclass(frozen=True)
-class Rows:
+class JointTargets:
     """n joint targets in visit order, SI units, NaN where a column is missing.
 
     Attributes:
@@ -63,7 +63,7 @@ class Rows:
     tool: Floats
 
 
-def read_rows(path: str | Path) -> Rows:
+def read_rows(path: str | Path) -> JointTargets:
     """Read a file with `q1_deg` .. `q6_deg` and any further measurement columns.
 
     Raises:
@@ -83,7 +83,7 @@ def read_rows(path: str | Path) -> Rows:
     has_side = all(f"lambda{j}" in table.header for j in joints)
     sides = table.block([f"lambda{j}" for j in joints])
     numbers = [str(k + 1) for k in range(len(table.cells))]
-    return Rows(
+    return JointTargets(
         ids=tuple(table.texts("id") or numbers),
         q=np.radians(q),
         side=np.nan_to_num(sides) if has_side else None,
@@ -156,7 +156,7 @@ def sample_survey(
     tool: Floats | None = None,
     payload: Floats | float = 0.0,
     payload_com: Floats | None = None,
-) -> Arrivals:
+) -> VirtualArrivals:
     """Send an arm to n joint sets, each from a drawn side and distance.
 
     Args:
@@ -195,7 +195,7 @@ def follow_rows(
     travel: Floats | None = None,
     tool: Floats | None = None,
     **covariates: Floats | float,
-) -> Arrivals:
+) -> VirtualArrivals:
     """Visit joint targets one after the other with JOINT moves.
 
     Args:
@@ -244,7 +244,7 @@ class Campaign:
     """
 
     ids: tuple[str, ...]
-    arrivals: Arrivals
+    arrivals: VirtualArrivals
     tool_id: Ints
     measured: Floats
     true: Floats
@@ -259,7 +259,7 @@ def campaign_length(visits: Visits) -> int:
     return sum(map(bool, visits.measure_id)) or len(visits)
 
 
-def measure_program(arm: VirtualArm, setup: Setup, visits: Visits) -> Campaign:
+def measure_program(arm: VirtualArm, setup: VirtualCell, visits: Visits) -> Campaign:
     """Run a program and measure it.
 
     The visits with a MEASURE comment are measured, under its id; without any such
@@ -277,7 +277,7 @@ def measure_program(arm: VirtualArm, setup: Setup, visits: Visits) -> Campaign:
     return _read(arm, setup, _distinct(ids), arrivals, run.tool_id[marked])
 
 
-def measure_rows(arm: VirtualArm, setup: Setup, rows: Rows) -> Campaign:
+def measure_rows(arm: VirtualArm, setup: VirtualCell, rows: JointTargets) -> Campaign:
     """Visit joint targets in order and measure each.
 
     Where the rows state the arrival directions, the arm approaches every row from
@@ -305,14 +305,16 @@ def measure_rows(arm: VirtualArm, setup: Setup, rows: Rows) -> Campaign:
     return _read(arm, setup, rows.ids, arrivals, rows.tool_id)
 
 
-def _tools(setup: Setup, rows: Rows) -> Floats:
+def _tools(setup: VirtualCell, rows: JointTargets) -> Floats:
     """Return the rows' own tools (n, 3), or those of the cell (n, 4, 4)."""
     if np.isnan(rows.tool).any():
         return setup.tool_of(rows.tool_id)
     return rows.tool
 
 
-def in_tracker_frame(campaign: Campaign, arm: VirtualArm, setup: Setup) -> Campaign:
+def in_tracker_frame(
+    campaign: Campaign, arm: VirtualArm, setup: VirtualCell
+) -> Campaign:
     """Express the readings in the frame of a tracker that stands as it was put down."""
     rng = stream(arm.seed, "tracker frame")
     turn = exponential(np.array([0.0, 0.0, rng.uniform(-np.pi, np.pi)]))
@@ -322,9 +324,9 @@ def in_tracker_frame(campaign: Campaign, arm: VirtualArm, setup: Setup) -> Campa
 
 def _read(
     arm: VirtualArm,
-    setup: Setup,
+    setup: VirtualCell,
     ids: Sequence[str],
-    arrivals: Arrivals,
+    arrivals: VirtualArrivals,
     tool_id: Ints,
 ) -> Campaign:
     rng = stream(arm.seed, "readings")
@@ -332,7 +334,7 @@ def _read(
     return Campaign(tuple(ids), arrivals, tool_id, measured, arm.tcp(arrivals))
 
 
-def _usual_times(setup: Setup, q: Floats) -> Floats:
+def _usual_times(setup: VirtualCell, q: Floats) -> Floats:
     """Return when each row is measured: the slowest joint's way, then ten seconds."""
     ways = np.abs(np.diff(q, axis=0, prepend=q[:1])) / setup.chain.speed
     return np.asarray(np.cumsum(ways.max(axis=1) + 10.0))

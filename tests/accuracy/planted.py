@@ -13,9 +13,9 @@ from postproc.model.kinematics import Batch
 from postproc.robot.arm import load_arm
 from postproc.robot.state import States, make_states
 from postproc.simulation import (
-    Arrivals,
     Planted,
     VirtualArm,
+    VirtualArrivals,
     sample_survey,
     stream,
     virtual_arm,
@@ -50,7 +50,7 @@ class Campaign:
 
     arm: VirtualArm
     planted: tuple[Planted, ...]
-    arrivals: Arrivals
+    arrivals: VirtualArrivals
     states: States
     position: np.ndarray
     sizes: tuple[float, ...]
@@ -89,13 +89,13 @@ def campaign(
     return Campaign(arm, planted, arrivals, states_of(arrivals), position, reached)
 
 
-def survey(arm: VirtualArm, seed: int, rows: int) -> Arrivals:
+def survey(arm: VirtualArm, seed: int, rows: int) -> VirtualArrivals:
     """Send an arm to random poses with three payloads."""
     payload = stream(seed, "payload").choice(PAYLOADS, rows)
     return sample_survey(arm, rows, seed=seed, payload=payload)
 
 
-def states_of(a: Arrivals) -> States:
+def states_of(a: VirtualArrivals) -> States:
     """Translate arrivals into what a measurement file tells the model."""
     return make_states(
         a.q, np.sign(a.side), a.tool[:, :3, 3], travel=a.travel, speed=a.speed,
@@ -104,13 +104,13 @@ def states_of(a: Arrivals) -> States:
     )  # fmt: skip
 
 
-def seen_error(arm: VirtualArm, arrivals: Arrivals) -> np.ndarray:
+def seen_error(arm: VirtualArm, arrivals: VirtualArrivals) -> np.ndarray:
     """What a perfect tracker on a stand that may move would read, less the nominal."""
     return arm.seen(arrivals, arm.tcp(arrivals)) - arm.nominal_tcp(arrivals)
 
 
 def displacement(
-    clean: VirtualArm, seed: int, planted: Planted, arrivals: Arrivals, rows: int
+    clean: VirtualArm, seed: int, planted: Planted, arrivals: VirtualArrivals, rows: int
 ) -> np.ndarray:
     """What one undeclared effect adds to the noise-free readings, (n, 3) [m]."""
     arm = virtual_arm(seed, (*map(Planted, BASE), planted), rows=rows)
@@ -157,7 +157,7 @@ def _peak(seed: int, planted: Planted, rows: int) -> float:
 
 
 def _size(
-    clean: VirtualArm, seed: int, planted: Planted, arrivals: Arrivals, rows: int
+    clean: VirtualArm, seed: int, planted: Planted, arrivals: VirtualArrivals, rows: int
 ) -> float:
     """rms of an effect after projection on the base model, in units of the noise."""
     fit = _clean_fit(clean, seed, arrivals)
@@ -166,7 +166,7 @@ def _size(
     return float(np.sqrt((left**2).mean()))
 
 
-def _clean_fit(clean: VirtualArm, seed: int, arrivals: Arrivals) -> Fit:
+def _clean_fit(clean: VirtualArm, seed: int, arrivals: VirtualArrivals) -> Fit:
     """Fit the base model to the arm without undeclared effects."""
     position = clean.measure(arrivals, TRACKER, stream(seed, "tracker"))
     effects = propose(BASE_EFFECTS, ARM, states_of(arrivals))

@@ -9,11 +9,11 @@ import pytest
 
 from postproc.calibration.diagnosis.next_poses import poses_that_separate
 from postproc.calibration.diagnosis.score import Score
-from postproc.calibration.diagnosis.search import NEAR, Standing
-from postproc.calibration.diagnosis.trace import Trace, trace
+from postproc.calibration.diagnosis.search import NEAR, JudgedAddition
+from postproc.calibration.diagnosis.trace import Investigation, trace
 from postproc.calibration.regression import fit_effects
 from postproc.model.kinematics import Batch
-from postproc.simulation import Arrivals, stream
+from postproc.simulation import VirtualArrivals, stream
 from tests.accuracy.planted import ARM, TRACKER, Campaign, campaign, states_of, survey
 
 ROWS = 90
@@ -21,21 +21,21 @@ POSES = 80
 
 
 @pytest.fixture(scope="module")
-def unsure() -> tuple[Campaign, Trace]:
+def unsure() -> tuple[Campaign, Investigation]:
     """A spring on joint 2 that these rows cannot tell from a wrong gear ratio."""
     c = campaign(3200, ("counterbalance",), 2.0, rows=ROWS)
     return c, trace(c.base_fit(), seed=0)
 
 
-def group(found: Trace) -> tuple[Score, Score]:
+def group(found: Investigation) -> tuple[Score, Score]:
     """Return the one addition and its closest rival."""
     (addition,) = found.search.additions
     (standing,) = found.standings
-    assert isinstance(standing, Standing)
+    assert isinstance(standing, JudgedAddition)
     return addition.score, standing.confusable[0]
 
 
-def lead(c: Campaign, found: Trace, more: Arrivals | None) -> float:
+def lead(c: Campaign, found: Investigation, more: VirtualArrivals | None) -> float:
     """Say how far the true cause is ahead of the other with more rows [nats]."""
     arrivals, position = c.arrivals, c.position
     if more is not None:
@@ -44,7 +44,10 @@ def lead(c: Campaign, found: Trace, more: Arrivals | None) -> float:
             for f in fields(arrivals)
         }
         fresh = c.arm.measure(more, TRACKER, stream(1, "next"))
-        arrivals, position = Arrivals(**joined), np.concatenate([position, fresh])
+        arrivals, position = (
+            VirtualArrivals(**joined),
+            np.concatenate([position, fresh]),
+        )
     batch = Batch(ARM, states_of(arrivals))
     evidence = {
         s.family.effect: fit_effects(
@@ -61,7 +64,7 @@ def lead(c: Campaign, found: Trace, more: Arrivals | None) -> float:
 
 
 def test_measuring_the_proposed_poses_separates_a_group(
-    unsure: tuple[Campaign, Trace],
+    unsure: tuple[Campaign, Investigation],
 ) -> None:
     c, found = unsure
     search = found.search
@@ -80,7 +83,7 @@ def test_measuring_the_proposed_poses_separates_a_group(
 
 
 def test_proposed_poses_lie_apart_within_the_surveyed_ranges(
-    unsure: tuple[Campaign, Trace],
+    unsure: tuple[Campaign, Investigation],
 ) -> None:
     c, found = unsure
     search = found.search

@@ -8,7 +8,11 @@ from scipy.stats import multivariate_normal
 
 from postproc.calibration.diagnosis.candidates import NAMED, Candidate, Family
 from postproc.calibration.diagnosis.held_out import deal, held_out_errors
-from postproc.calibration.diagnosis.library import Blocks, Library, Projection
+from postproc.calibration.diagnosis.library import (
+    Library,
+    Projection,
+    ReducedCandidates,
+)
 from postproc.calibration.diagnosis.score import (
     SIGNALS,
     Null,
@@ -28,9 +32,11 @@ def candidate(joint: int = 1) -> Candidate:
     return Candidate(family, Scale((joint,)), f"joint {joint}", 0.0)
 
 
-def blocks_of(B: np.ndarray, z: np.ndarray) -> Blocks:
+def blocks_of(B: np.ndarray, z: np.ndarray) -> ReducedCandidates:
     gain, turn = np.linalg.eigh(B.T @ B)
-    return Blocks((candidate(),), gain[None], (turn.T @ B.T @ z)[None, :, None])
+    return ReducedCandidates(
+        (candidate(),), gain[None], (turn.T @ B.T @ z)[None, :, None]
+    )
 
 
 @pytest.mark.parametrize("strength", [0.0, 0.3, 2.0])

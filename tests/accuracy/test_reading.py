@@ -9,7 +9,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from postproc.calibration.measurements import Measurements, read_measurements
-from postproc.calibration.tables import Reading
+from postproc.calibration.tables import TableFormat
 from postproc.exceptions import MeasurementError, PostprocError
 from tests.accuracy.simulator import NJ, PLATE, TOOL, random_arm, random_states
 
@@ -68,15 +68,15 @@ def plain(path: Path, text: str, encoding: str = "utf-8") -> Path:
 @pytest.mark.parametrize(
     ("written", "encoding", "said"),
     [
-        (";,", "utf-8", Reading(delimiter=";", decimal=",")),
-        ("|.", "utf-8", Reading(delimiter="|")),
-        ("\t,", "utf-8", Reading(delimiter="tab", decimal=",")),
-        (" .", "cp1250", Reading(delimiter="space", encoding="cp1250")),
-        (",.", "utf-16-le", Reading(encoding="utf-16-le")),
+        (";,", "utf-8", TableFormat(delimiter=";", decimal=",")),
+        ("|.", "utf-8", TableFormat(delimiter="|")),
+        ("\t,", "utf-8", TableFormat(delimiter="tab", decimal=",")),
+        (" .", "cp1250", TableFormat(delimiter="space", encoding="cp1250")),
+        (",.", "utf-16-le", TableFormat(encoding="utf-16-le")),
     ],
 )
 def test_what_the_user_says_of_a_file_holds(
-    tmp_path: Path, written: str, encoding: str, said: Reading
+    tmp_path: Path, written: str, encoding: str, said: TableFormat
 ) -> None:
     path = plain(tmp_path / "s.csv", written, encoding)
     found: Measurements = read_measurements(path, NJ, TOOL[None], reading=said)
@@ -88,11 +88,11 @@ def test_what_the_user_says_of_a_file_holds(
 def test_what_the_user_says_wins_over_what_is_detected(tmp_path: Path) -> None:
     path = plain(tmp_path / "s.csv", ";,")
     with pytest.raises(MeasurementError, match=r"s\.csv:2: '1,5' .* not a number"):
-        read_measurements(path, NJ, TOOL[None], reading=Reading(decimal="."))
+        read_measurements(path, NJ, TOOL[None], reading=TableFormat(decimal="."))
     latin = plain(tmp_path / "l.csv", ",.", "latin-1")
     with pytest.raises(MeasurementError, match="cannot be decoded as utf-8"):
-        read_measurements(latin, NJ, TOOL[None], reading=Reading(encoding="utf-8"))
+        read_measurements(latin, NJ, TOOL[None], reading=TableFormat(encoding="utf-8"))
     with pytest.raises(PostprocError, match=r"write \. or ,"):
-        Reading(decimal="x")
+        TableFormat(decimal="x")
     with pytest.raises(PostprocError, match="mm, m, inch"):
-        Reading(unit="feet")
+        TableFormat(unit="feet")

@@ -11,7 +11,7 @@ from postproc.calibration.fit import into_base_frame
 from postproc.calibration.measurements import read_measurements, read_points
 from postproc.calibration.registration import register
 from postproc.calibration.selection import fit_survey, model_of
-from postproc.calibration.tables import Reading, read_column_map
+from postproc.calibration.tables import TableFormat, read_column_map
 from postproc.exceptions import MeasurementError
 from postproc.model.combination import Combination
 from postproc.model.effects import BASE_EFFECTS
@@ -86,7 +86,7 @@ def test_other_tools_files_are_read(tmp_path: Path) -> None:
     assert points.text("id") == ["p1", "p2"] and points.line.tolist() == [3, 4]
     xyz = ("x_mm", "y_mm", "z_mm")
     assert points.block(xyz)[1].tolist() == [4.0, 5.0, 6.0]
-    inches = read_points(sa, Reading(unit="inch"))
+    inches = read_points(sa, TableFormat(unit="inch"))
     assert inches.block(xyz)[0].tolist() == [25.4, 50.8, pytest.approx(76.2)]
     leica = tmp_path / "leica.txt"
     text = "Point Id;X [mm];Y [mm];Z [mm];Time\n'a1';1,5;2;3;'12:30'\n"
@@ -109,7 +109,7 @@ def test_a_column_map_reads_the_rest(tmp_path: Path) -> None:
     )
     data = tmp_path / "d.txt"
     data.write_text("name|A1|A2|A3|A4|A5|A6|x|y|z\np|1|2|3|4|5|6|0.1|0.2|0.3\n")
-    found = read_measurements(data, NJ, PLATE[:1], reading=Reading(form))
+    found = read_measurements(data, NJ, PLATE[:1], reading=TableFormat(form))
     np.testing.assert_allclose(found.position[0], [0.1, 0.2, 0.3])
     assert found.ids == ("p",)
     form.write_text("[columns]\nx_mm = 3\n")

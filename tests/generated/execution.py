@@ -16,7 +16,7 @@ from postproc.compensation.program import read_program
 from postproc.robot.cell import Cell
 from postproc.robot.pose import MM
 from postproc.simulation import virtual_arm
-from postproc.simulation.program import Run, run_program
+from postproc.simulation.program import ProgramRun, run_program
 from tests.conftest import SEED
 from tests.language.executed import Executed, Generated
 from tests.language.interpreter import Interpreter
@@ -106,7 +106,7 @@ def started(made: Generated, cell: Cell) -> list[Executed]:
     return interpreter.run()
 
 
-def on_arm(made: Generated, steps: list[Executed], cell: Cell) -> Run:
+def on_arm(made: Generated, steps: list[Executed], cell: Cell) -> ProgramRun:
     """Let the virtual arm make some moves."""
     visits = read_program({"job.pdl": straight(made, steps)}, cell).visits
     return run_program(arm(SEED), setup_of(cell), visits)

@@ -10,7 +10,8 @@ from postproc.language.pdl2.program import parse
 from postproc.language.pdl2.variable_file import read_variables
 from postproc.language.rewrite import edits
 from postproc.language.source import apply, source_from_bytes
-from postproc.language.visits import ELSEWHERE, START, Motion, Target
+from postproc.language.visits import ELSEWHERE, START, Meaning
+from postproc.robot.trajectory import Motion
 
 CORPUS = Path(__file__).parents[1] / "corpus"
 CELL = Start(
@@ -52,7 +53,7 @@ def described(resolved: Resolved, *texts: str) -> str:
             literal += " taught" * bool(v.literals.taught[row])
         name = v.names[v.name[i]] or "-"
         parts = [
-            f"{v.line[i]} {word} {Target(v.target[i]).name} {name}",
+            f"{v.line[i]} {word} {Meaning(v.target[i]).name} {name}",
             f"from {'|'.join(before)}",
             f"numbers {literal}",
         ]

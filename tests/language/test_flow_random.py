@@ -8,7 +8,7 @@ import pytest
 from postproc.language.pdl2.interpreter import resolve
 from postproc.language.pdl2.program import parse
 from postproc.language.source import source_from_bytes
-from postproc.language.visits import ELSEWHERE, START, Target, Visits
+from postproc.language.visits import ELSEWHERE, START, Meaning, Visits
 from tests.language.executed import PAGE, Executed, Generated
 from tests.language.interpreter import Interpreter
 from tests.language.poses import matrix
@@ -17,7 +17,7 @@ from tests.language.whole_jobs import Job
 PROGRAMS = 150
 
 
-POSES = (Target.POSE, Target.NEAR, Target.FOR)
+POSES = (Meaning.POSE, Meaning.NEAR, Meaning.FOR)
 
 
 def generate(seed: int, exact: bool) -> tuple[Generated, Visits]:
@@ -42,7 +42,7 @@ def fits(visits: Visits, visit: int, executed: Executed) -> bool:
     for index, actual in frames:
         if index >= 0 and not np.allclose(visits.frames[index], actual):
             return False
-    if visits.target[visit] == Target.UNKNOWN or recursive(visits, visit):
+    if visits.target[visit] == Meaning.UNKNOWN or recursive(visits, visit):
         return True
     return executed.values is not None and same_goal(visits, visit, executed)
 
@@ -54,10 +54,10 @@ def recursive(visits: Visits, visit: int) -> bool:
 
 def same_goal(visits: Visits, visit: int, executed: Executed) -> bool:
     """Compare the kind of a move, and its numbers: angles by the rotation they say."""
-    target, held = Target(visits.target[visit]), executed.values or ()
+    target, held = Meaning(visits.target[visit]), executed.values or ()
     how = executed.how
-    if target == Target.ABOUT:
-        frame = Target(int(visits.values[visit][4])).name.removeprefix("RELATIVE")
+    if target == Meaning.ABOUT:
+        frame = Meaning(int(visits.values[visit][4])).name.removeprefix("RELATIVE")
         if how != f"ABOUT{frame}":
             return False
     elif target.name != how and how not in ("TO", "VIA"):
@@ -107,7 +107,7 @@ def test_constant_programs_are_followed_exactly(seed: int) -> None:
     followed = follow(visits, trace, made)
     assert all(len(now) == 1 for now in followed)
     for (visit,), executed in zip(followed, trace, strict=True):
-        known = visits.target[visit] != Target.UNKNOWN
+        known = visits.target[visit] != Meaning.UNKNOWN
         assert known or executed.values is None, f"line {executed.line}\n{made.whole}"
     if conditions_known:
         assert len(visits) == len(trace)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from postproc.language.pdl2.interpreter import Resolved, resolve
 from postproc.language.pdl2.program import parse
 from postproc.language.source import Source
-from postproc.language.visits import ELSEWHERE, Target
+from postproc.language.visits import ELSEWHERE, Meaning
 
 AT = "POS(1, 2, 3, 0, 180, 0, '')"
 ON = ["ENABLE CONDITION[1]"]
@@ -32,12 +32,12 @@ def codes(found: Resolved) -> set[str]:
     return {d.code for d in found.diagnostics}
 
 
-def last(found: Resolved, file: int = 0) -> tuple[Target, list[int], str]:
+def last(found: Resolved, file: int = 0) -> tuple[Meaning, list[int], str]:
     """Return target, origins and reason of the last visit in a file."""
     v = found.visits
     row = max(n for n in range(len(v)) if v.file[n] == file)
     reason = v.reasons[v.reason[row]]
-    return Target(v.target[row]), v.predecessors(row).tolist(), reason
+    return Meaning(v.target[row]), v.predecessors(row).tolist(), reason
 
 
 def test_a_handler_changes_what_a_parameter_stands_for():
@@ -47,14 +47,14 @@ def test_a_handler_changes_what_a_parameter_stands_for():
     ]
     body = [*handler("p.X := 9"), f"p := {AT}", "r(p)"]
     target, _, reason = last(resolved(program("job", head, body)))
-    assert target == Target.UNKNOWN and "handler changes it" in reason
+    assert target == Meaning.UNKNOWN and "handler changes it" in reason
 
 
 def test_a_handler_changes_a_component_that_is_copied():
     head = ["VAR p, q : POSITION"]
     copy = [f"q := {AT}", f"p := {AT}", "q.X := p.X", "MOVE LINEAR TO q"]
     body = [*handler("p.X := 9"), *copy]
-    assert last(resolved(program("job", head, body)))[0] == Target.UNKNOWN
+    assert last(resolved(program("job", head, body)))[0] == Meaning.UNKNOWN
 
 
 def test_a_handler_moves_by_a_routine_of_another_file():
@@ -72,7 +72,7 @@ def test_a_handler_changes_variables_by_a_routine_of_another_file():
     head = ["IMPORT 'page'", f"VAR {share}", "ROUTINE s EXPORTED FROM page"]
     body = [*handler("s"), f"g := {AT}", "MOVE LINEAR TO g"]
     found = resolved(program("job", head, body), page=page)
-    assert last(found)[0] == Target.UNKNOWN
+    assert last(found)[0] == Meaning.UNKNOWN
 
 
 def test_a_loop_whose_counter_a_handler_changes_has_any_number_of_rounds():
@@ -101,7 +101,7 @@ def test_recursion_through_another_file_forgets_what_that_file_changes():
     body = [f"g := {AT}", "r", "MOVE LINEAR TO g"]
     found = resolved(program("job", head, body), page=page)
     assert "recursion" in codes(found)
-    assert last(found)[0] == Target.UNKNOWN
+    assert last(found)[0] == Meaning.UNKNOWN
 
 
 def test_moves_that_a_function_may_make_are_listed_with_their_points():

@@ -9,10 +9,11 @@ import pytest
 
 from postproc.compensation.program import read_program
 from postproc.compensation.targets import targets_from_visits
-from postproc.motion import replan
+from postproc.motion import replan as replan_module
 from postproc.motion.replan import Course, reach, reach_again
-from postproc.motion.targets import Kind, Move, Targets
+from postproc.motion.targets import TargetKind, Targets
 from postproc.robot.cell import Cell, load_cell
+from postproc.robot.trajectory import Motion
 from tests.bench.made import drilling, handling, milling
 from tests.conftest import ROOT
 from tests.language.reachable import reachable
@@ -33,7 +34,7 @@ def shifted(targets: Targets, moved: np.ndarray, seed: int) -> Targets:
     """Shift the moved targets, joint targets by small angles."""
     rng, rows = np.random.default_rng(seed), np.flatnonzero(moved)
     tcp, joints = np.array(targets.tcp[rows]), np.array(targets.joints[rows])
-    pose = targets.kind[rows] == Kind.POSE
+    pose = targets.kind[rows] == TargetKind.POSE
     tcp[pose, :3, 3] += rng.uniform(-SHIFT, SHIFT, (int(pose.sum()), 3))
     joints += rng.uniform(-SHIFT, SHIFT, joints.shape)
     return targets.moved_to(rows, tcp, joints)
@@ -41,7 +42,7 @@ def shifted(targets: Targets, moved: np.ndarray, seed: int) -> Targets:
 
 def picked(targets: Targets, share: float, seed: int) -> np.ndarray:
     """Pick some of the targets that a correction may move."""
-    fixed = ~np.isin(targets.kind, (Kind.POSE, Kind.JOINTS))
+    fixed = ~np.isin(targets.kind, (TargetKind.POSE, TargetKind.JOINTS))
     rng = np.random.default_rng(seed)
     return np.asarray((rng.random(len(targets)) < share) & ~fixed)
 
@@ -134,14 +135,16 @@ def test_the_ends_of_a_program(cell: Cell, row: int) -> None:
 def test_only_what_moved_is_traced(cell: Cell, monkeypatch) -> None:
     targets = read(cell, milling(1500).source)
     course, traced = reach(cell.arm, targets), []
-    original = replan.trace
+    original = replan_module.trace
 
     def counting(arm, part, known=None):
         traced.append(len(part))
         return original(arm, part, known)
 
-    monkeypatch.setattr(replan, "trace", counting)
-    monkeypatch.setattr(replan, "reach", lambda *_: pytest.fail("all was traced anew"))
+    monkeypatch.setattr(replan_module, "trace", counting)
+    monkeypatch.setattr(
+        replan_module, "reach", lambda *_: pytest.fail("all was traced anew")
+    )
     moved = np.zeros(len(targets), dtype=bool)
     moved[[100, 103, 900]] = True
     reach_again(cell.arm, course, shifted(targets, moved, 1), moved)
@@ -168,7 +171,7 @@ def test_a_stretch_that_changes_its_branch_is_traced_anew(cell: Cell) -> None:
     # Without a string a JOINT move ends where it is nearest: on another turn of axis 6.
     row = 150
     move, kind = np.array(targets.move), np.array(targets.kind)
-    move[row], kind[row] = Move.JOINT, Kind.JOINTS
+    move[row], kind[row] = Motion.JOINT, TargetKind.JOINTS
     jointed = replace(targets, move=move, kind=kind)
     joints = np.array(course.exact.q[row])
     joints[5] += 2 * np.pi * (-1 if joints[5] > 0 else 1)

@@ -6,11 +6,12 @@ import numpy as np
 
 from postproc.motion.path import from_every_start
 from postproc.motion.replan import reach
-from postproc.motion.targets import ARC_END, CODE, Kind, Move, Targets, make_targets
+from postproc.motion.targets import ARC_END, CODE, TargetKind, Targets, make_targets
 from postproc.motion.trace import trace
 from postproc.robot.arm import Arm
+from postproc.robot.trajectory import Motion
 
-MOVE = np.array([Move.JOINT, Move.JOINT, Move.CIRCULAR, Move.CIRCULAR])
+MOVE = np.array([Motion.JOINT, Motion.JOINT, Motion.CIRCULAR, Motion.CIRCULAR])
 VIA = np.array([False, False, True, False])
 FROM = {
     "both": (np.array([0, 1, 2, 4, 5]), np.array([-1, -1, 0, 1, 2])),
@@ -31,7 +32,7 @@ def arc_from(
         "move": MOVE, "via": VIA, "tool": np.tile(tool, (4, 1, 1)),
         "slot": np.array([0, 0, -1, -1]), "pred_start": first, "pred": pred,
     }  # fmt: skip
-    kind = more.pop("kind", np.full(4, Kind.POSE))
+    kind = more.pop("kind", np.full(4, TargetKind.POSE))
     return make_targets(kind, tcp, **(given | more))
 
 
@@ -80,7 +81,9 @@ def test_an_arc_from_where_a_step_led_is_followed(
     step = np.array([0.02, -0.03, 0.01, 0.05, 0.02, -0.04])
     joints = np.full((4, 6), np.nan)
     joints[1] = step
-    kind = np.array([Kind.POSE, Kind.JOINT_STEP, Kind.POSE, Kind.POSE])
+    kind = np.array(
+        [TargetKind.POSE, TargetKind.JOINT_STEP, TargetKind.POSE, TargetKind.POSE]
+    )
     first, pred = np.array([0, 1, 2, 3, 4]), np.array([-1, 0, 1, 2])
     late = arc_from(
         "second", arm, tool, home, kind=kind, joints=joints, pred_start=first, pred=pred
@@ -89,7 +92,9 @@ def test_an_arc_from_where_a_step_led_is_followed(
     place = trace(arm, late).q[1]
     joints = np.full((4, 6), np.nan)
     joints[1] = place
-    kind = np.array([Kind.POSE, Kind.JOINTS, Kind.POSE, Kind.POSE])
+    kind = np.array(
+        [TargetKind.POSE, TargetKind.JOINTS, TargetKind.POSE, TargetKind.POSE]
+    )
     same = arc_from(
         "second", arm, tool, home, kind=kind, joints=joints, pred_start=first, pred=pred
     )
@@ -101,6 +106,8 @@ def test_an_arc_from_where_a_step_led_is_followed(
 def test_an_arc_to_nowhere_says_so(
     arm: Arm, tool: np.ndarray, home: np.ndarray
 ) -> None:
-    kind = np.array([Kind.POSE, Kind.POSE, Kind.POSE, Kind.UNKNOWN])
+    kind = np.array(
+        [TargetKind.POSE, TargetKind.POSE, TargetKind.POSE, TargetKind.UNKNOWN]
+    )
     found = trace(arm, arc_from("second", arm, tool, home, kind=kind))
     assert found.reason[2] == CODE[ARC_END]

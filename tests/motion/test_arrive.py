@@ -3,8 +3,9 @@
 import numpy as np
 
 from postproc.motion.planner import plan
-from postproc.motion.targets import CODE, NO_START, NO_TARGET, Kind, Move, make_targets
+from postproc.motion.targets import CODE, NO_START, NO_TARGET, TargetKind, make_targets
 from postproc.robot.arm import Arm
+from postproc.robot.trajectory import Motion
 
 
 def test_a_part_of_the_way_ends_on_the_line_and_turns_in_proportion(
@@ -15,11 +16,14 @@ def test_a_part_of_the_way_ends_on_the_line_and_turns_in_proportion(
     length = float(np.linalg.norm(goal[:3, 3] - begin[:3, 3]))
     tcp = np.full((4, 4, 4), np.nan)
     tcp[1], tcp[2], tcp[3] = goal, goal, goal
-    kind = np.array([Kind.JOINTS, Kind.TOWARDS, Kind.TOWARDS, Kind.POSE])
+    kind = np.array(
+        [TargetKind.JOINTS, TargetKind.TOWARDS, TargetKind.TOWARDS, TargetKind.POSE]
+    )
     joints = np.full((4, 6), np.nan)
     joints[0] = home
     targets = make_targets(
-        kind, tcp, joints, move=np.where(kind == Kind.JOINTS, Move.JOINT, Move.LINEAR),
+        kind, tcp, joints,
+        move=np.where(kind == TargetKind.JOINTS, Motion.JOINT, Motion.LINEAR),
         distance=np.array([np.nan, 0.25 * length, 0.25 * length, np.nan]),
         tool=np.tile(tool, (4, 1, 1)), slot=np.full(4, -1),
     )  # fmt: skip
@@ -42,12 +46,19 @@ def test_a_distance_beyond_the_pose_leads_to_an_unknown_place(
     tcp[1:] = goal
     tcp[3] = np.eye(4)
     kind = np.array(
-        [Kind.JOINTS, Kind.TOWARDS, Kind.POSE, Kind.BASE_STEP, Kind.TOWARDS]
+        [
+            TargetKind.JOINTS,
+            TargetKind.TOWARDS,
+            TargetKind.POSE,
+            TargetKind.BASE_STEP,
+            TargetKind.TOWARDS,
+        ]
     )
     joints = np.full((5, 6), np.nan)
     joints[0] = home
     targets = make_targets(
-        kind, tcp, joints, move=np.where(kind == Kind.JOINTS, Move.JOINT, Move.LINEAR),
+        kind, tcp, joints,
+        move=np.where(kind == TargetKind.JOINTS, Motion.JOINT, Motion.LINEAR),
         distance=np.array([np.nan, 50.0, np.nan, np.nan, 0.0]),
         tool=np.tile(tool, (5, 1, 1)), slot=np.array([-1, -1, -1, -1, -1]),
     )  # fmt: skip

@@ -8,10 +8,11 @@ import pytest
 from postproc.compensation.program import read_program
 from postproc.compensation.targets import targets_from_visits
 from postproc.motion import trace as module
-from postproc.motion.targets import Kind, Move, Targets, make_targets
+from postproc.motion.targets import TargetKind, Targets, make_targets
 from postproc.motion.trace import Trace, trace
 from postproc.robot.arm import Arm
 from postproc.robot.cell import load_cell
+from postproc.robot.trajectory import Motion
 from tests.bench.made import drilling, handling, milling
 from tests.conftest import ROOT
 from tests.language.reachable import reachable
@@ -82,8 +83,8 @@ def test_a_loop_is_entered_before_its_end_is_known(monkeypatch) -> None:
 def lines(arm: Arm, tool: np.ndarray, q: np.ndarray, starts: np.ndarray) -> Targets:
     """LINEAR moves through the places of joint angles; JOINT moves to starts."""
     n = len(q)
-    kind = np.where(starts, Kind.JOINTS, Kind.POSE)
-    move = np.where(starts, Move.JOINT, Move.LINEAR)
+    kind = np.where(starts, TargetKind.JOINTS, TargetKind.POSE)
+    move = np.where(starts, Motion.JOINT, Motion.LINEAR)
     tcp = arm.flange(q) @ tool
     tools = np.tile(tool, (n, 1, 1))
     return make_targets(kind, tcp, np.where(starts[:, None], q, np.nan), move=move,

@@ -3,7 +3,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from postproc.motion.branches import OnDemand, Solved, Ways, follow, on_written_turns
+from postproc.motion.branches import (
+    OnDemand,
+    SolvedBranches,
+    Ways,
+    follow,
+    on_written_turns,
+)
 from postproc.robot.arm import Arm
 
 
@@ -15,7 +21,7 @@ def ways(request):
         flange = arm.flange(q)
         if request.param == "on demand":
             return OnDemand(arm, flange)
-        return Solved(arm.inverse(flange).q)
+        return SolvedBranches(arm.inverse(flange).q)
 
     return solutions
 
@@ -50,7 +56,7 @@ def test_it_stops_where_there_is_no_solution(arm: Arm) -> None:
     q = np.tile(np.deg2rad([10.0, 0, -90, 20, 40, 0]), (5, 1))
     branches = arm.inverse(arm.flange(q)).q.copy()
     branches[3] = np.nan
-    found = follow(q[0], Solved(branches))
+    found = follow(q[0], SolvedBranches(branches))
     assert len(found.q) == 3 and not found.reached
 
 

@@ -6,7 +6,7 @@ import pytest
 from postproc.exceptions import PlanError
 from postproc.motion.planner import Plan, plan
 from postproc.motion.ruckig import JointMoves
-from postproc.motion.targets import Kind, make_targets
+from postproc.motion.targets import TargetKind, make_targets
 from postproc.robot.arm import Arm
 
 WRIST = np.deg2rad(3.0)
@@ -21,7 +21,7 @@ def milling(
     u = np.linspace(0, 2 * np.pi, n)
     tcp[:, 0, 3] += 0.1 * (1 - np.cos(u))
     tcp[:, 1, 3] += 0.2 * np.sin(u)
-    kind = np.full(n, int(Kind.POSE))
+    kind = np.full(n, int(TargetKind.POSE))
     fly = np.full(n, True)
     fly[[0, -1]] = False
     move = np.ones(n, dtype=int)
@@ -70,7 +70,7 @@ def test_joint_moves_add_up_along_first_predecessors(
 ) -> None:
     q = np.array([home, home + 0.2, home - 0.1, home + 0.3])
     targets = make_targets(
-        np.full(4, Kind.JOINTS), joints=q, pred=np.array([-1, 0, 0, 2])
+        np.full(4, TargetKind.JOINTS), joints=q, pred=np.array([-1, 0, 0, 2])
     )
     time = plan(arm, targets, WRIST).time
     moves = JointMoves(arm)
@@ -84,8 +84,10 @@ def test_joint_moves_add_up_along_first_predecessors(
 def test_joint_fly_runs_do_not_stop(arm: Arm, home: np.ndarray) -> None:
     q = home + np.linspace(0, 0.6, 4)[:, None] * np.array([1, 0.3, 0.2, 0.5, 0.1, 1])
     fly = np.array([False, True, True, False])
-    found = plan(arm, make_targets(np.full(4, Kind.JOINTS), joints=q, fly=fly), WRIST)
-    stop = plan(arm, make_targets(np.full(4, Kind.JOINTS), joints=q), WRIST)
+    found = plan(
+        arm, make_targets(np.full(4, TargetKind.JOINTS), joints=q, fly=fly), WRIST
+    )
+    stop = plan(arm, make_targets(np.full(4, TargetKind.JOINTS), joints=q), WRIST)
     assert (found.speed[1:3] > 0.1).all() and (stop.speed == 0).all()
     assert found.time[-1] < stop.time[-1]
 
@@ -141,7 +143,9 @@ def test_the_wrist_singularity_is_a_reason(
 ) -> None:
     q = home.copy()
     q[4] = np.deg2rad(deg)
-    found = plan(arm, make_targets(np.array([Kind.JOINTS]), joints=q[None]), WRIST)
+    found = plan(
+        arm, make_targets(np.array([TargetKind.JOINTS]), joints=q[None]), WRIST
+    )
     assert ("wrist singularity" in found.reasons[found.reason[0]]) == (deg < 3)
 
 

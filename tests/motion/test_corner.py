@@ -11,10 +11,11 @@ from postproc.motion import blending
 from postproc.motion.blending import corners, nearest_on_parabola, parabolas, rounded
 from postproc.motion.planner import plan
 from postproc.motion.replan import reach
-from postproc.motion.targets import Fly, Kind, Move, Targets, make_targets
+from postproc.motion.targets import Fly, TargetKind, Targets, make_targets
 from postproc.motion.trace import trace
 from postproc.robot.arm import Arm
 from postproc.robot.direction import arrivals
+from postproc.robot.trajectory import Motion
 
 MM = 1e-3
 
@@ -27,12 +28,12 @@ def run(
     first = (arm.flange(home[None]) @ tool)[0]
     tcp = np.tile(first, (n, 1, 1))
     tcp[1:, :3, 3] += points
-    kind = np.full(n, int(Kind.POSE))
-    kind[0] = Kind.JOINTS
+    kind = np.full(n, int(TargetKind.POSE))
+    kind[0] = TargetKind.JOINTS
     fly = np.full(n, True)
     fly[[0, -1]] = False
-    move = np.full(n, int(Move.LINEAR))
-    move[0] = Move.JOINT
+    move = np.full(n, int(Motion.LINEAR))
+    move[0] = Motion.JOINT
     made: dict[str, object] = {
         "move": move, "tool": np.tile(tool, (n, 1, 1)), "fly": fly,
         "linear_speed": np.full(n, 0.1), "rounding": np.full(n, int(Fly.FROM)),
@@ -54,7 +55,7 @@ def joint_run(turns_deg: np.ndarray, **given: object) -> Targets:
         "rounding": np.full(n, int(Fly.OVERLAP)),
         "overlap": np.ones(n),
     }
-    return make_targets(np.full(n, int(Kind.JOINTS)), None, q, **(made | given))
+    return make_targets(np.full(n, int(TargetKind.JOINTS)), None, q, **(made | given))
 
 
 SQUARE = np.array([[0, 0.1, 0], [0, 0.1, 0.1]])

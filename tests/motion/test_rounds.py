@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from postproc.motion.path import Rounds, arcs, rounds
-from postproc.motion.targets import Kind, make_targets
+from postproc.motion.targets import TargetKind, make_targets
 from postproc.robot.pose import pose_from_record
 
 
@@ -73,7 +73,7 @@ def test_every_start_of_an_arc_makes_one_with_the_tool_of_the_arc() -> None:
     tool[2:, 2, 3] = 0.3
     tcp = pose_from_record(np.array([[1000.0 * k, 0, 0, 0, 0, 0] for k in range(4)]))
     targets = make_targets(
-        np.full(4, Kind.POSE), tcp, tool=tool, move=np.array([0, 0, 2, 2]),
+        np.full(4, TargetKind.POSE), tcp, tool=tool, move=np.array([0, 0, 2, 2]),
         via=np.array([False, False, True, False]),
         pred_start=np.array([0, 0, 1, 3, 4]), pred=np.array([0, 0, 1, 2]),
     )  # fmt: skip

@@ -19,13 +19,13 @@ from postproc.motion.targets import (
     PATH_JUMP,
     PATH_REACH,
     REASONS,
-    Kind,
-    Move,
+    TargetKind,
     Targets,
     make_targets,
 )
 from postproc.motion.trace import Trace, Workspace, trace
 from postproc.robot.arm import Arm
+from postproc.robot.trajectory import Motion
 
 
 def shifted(T: np.ndarray, xyz: tuple[float, float, float]) -> np.ndarray:
@@ -46,8 +46,8 @@ def lines_from(
     joints = np.full((n, 6), np.nan)
     joints[0] = home
     tcp = np.concatenate([np.full((1, 4, 4), np.nan), np.array(poses)])
-    kind = np.array([Kind.JOINTS] + [Kind.POSE] * len(poses))
-    move = np.array([Move.JOINT] + [Move.LINEAR] * len(poses))
+    kind = np.array([TargetKind.JOINTS] + [TargetKind.POSE] * len(poses))
+    move = np.array([Motion.JOINT] + [Motion.LINEAR] * len(poses))
     given: dict[str, object] = {"move": move, "tool": np.tile(tool, (n, 1, 1))}
     return make_targets(kind, tcp, joints, **(given | more))
 
@@ -157,8 +157,9 @@ def test_without_turn_care_the_nearest_turn_is_taken(arm: Arm) -> None:
     q = np.deg2rad([[10.0, 0, -90, 30, 40, 350], [10, 0, -90, 30, 40, 370]])
     joints = np.array([q[0], np.full(6, np.nan)])
     targets = make_targets(
-        np.array([Kind.JOINTS, Kind.POSE]), np.array([np.full((4, 4), np.nan),
-        arm.flange(q)[1]]), joints, slot=np.array([-1, 0]),
+        np.array([TargetKind.JOINTS, TargetKind.POSE]),
+        np.array([np.full((4, 4), np.nan), arm.flange(q)[1]]), joints,
+        slot=np.array([-1, 0]),
         nearest_turn=np.array([False, True]),
     )  # fmt: skip
     np.testing.assert_allclose(trace(arm, targets).q[1], q[1], atol=1e-8)
@@ -210,7 +211,10 @@ def test_a_line_through_a_straight_wrist_is_reported(arm: Arm) -> None:
     tcp = np.full((2, 4, 4), np.nan)
     tcp[1] = arm.flange(q)[1]
     targets = make_targets(
-        np.array([Kind.JOINTS, Kind.POSE]), tcp, joints, move=np.array([0, 1])
+        np.array([TargetKind.JOINTS, TargetKind.POSE]),
+        tcp,
+        joints,
+        move=np.array([0, 1]),
     )
     found = trace(arm, targets)
     np.testing.assert_allclose(found.q[1], q[1], atol=1e-7)
@@ -244,7 +248,7 @@ def test_a_first_line_takes_its_string(arm: Arm, home: np.ndarray) -> None:
 def test_limits_are_reported(arm: Arm, home: np.ndarray) -> None:
     q = home.copy()
     q[1] = arm.upper[1] + 0.01
-    found = trace(arm, make_targets(np.array([Kind.JOINTS]), joints=q[None]))
+    found = trace(arm, make_targets(np.array([TargetKind.JOINTS]), joints=q[None]))
     assert reason(found, 0) == LIMITS[1]
 
 
@@ -255,11 +259,11 @@ def test_steps_move_the_arm(arm: Arm, tool: np.ndarray, home: np.ndarray) -> Non
     turned = np.eye(4)
     turned[:3, :3] = Rotation.from_rotvec([0, 0, 0.3]).as_matrix()
     kind = [
-        Kind.JOINTS,
-        Kind.TOOL_STEP,
-        Kind.BASE_STEP,
-        Kind.JOINT_STEP,
-        Kind.TOOL_STEP,
+        TargetKind.JOINTS,
+        TargetKind.TOOL_STEP,
+        TargetKind.BASE_STEP,
+        TargetKind.JOINT_STEP,
+        TargetKind.TOOL_STEP,
     ]
     joints = np.full((5, 6), np.nan)
     joints[0], joints[3] = home, [0.1, 0, 0, 0, 0, 0.2]
@@ -284,7 +288,7 @@ def test_after_an_unknown_move_a_joint_target_is_known_again(
     arm: Arm, home: np.ndarray
 ) -> None:
     joints = np.array([home, np.full(6, np.nan), home])
-    kind = np.array([Kind.JOINTS, Kind.UNKNOWN, Kind.JOINTS])
+    kind = np.array([TargetKind.JOINTS, TargetKind.UNKNOWN, TargetKind.JOINTS])
     targets = make_targets(kind, joints=joints)
     found = trace(arm, targets)
     assert reason(found, 1) == NO_TARGET and np.isnan(found.q[1]).all()
@@ -298,7 +302,7 @@ def test_predecessors_that_lead_to_different_turns(arm: Arm, home: np.ndarray) -
     joints = np.array([home, home + turn, np.full(6, np.nan)])
     tcp = np.full((3, 4, 4), np.nan)
     tcp[2] = shifted(arm.flange(home[None])[0], (0.05, 0, 0))
-    kind = np.array([Kind.JOINTS, Kind.JOINTS, Kind.POSE])
+    kind = np.array([TargetKind.JOINTS, TargetKind.JOINTS, TargetKind.POSE])
     either: dict[str, object] = {
         "move": np.array([0, 0, 1]), "pred_start": np.array([0, 1, 2, 4]),
         "pred": np.array([-1, 0, 0, 1]),
@@ -318,7 +322,7 @@ def test_a_loop_back_is_checked(arm: Arm, home: np.ndarray) -> None:
     tcp[1], tcp[2] = shifted(T0, (0.1, 0, 0)), shifted(T0, (0.2, 0.1, 0))
     joints = np.array([home, np.full(6, np.nan), np.full(6, np.nan)])
     targets = make_targets(
-        np.array([Kind.JOINTS, Kind.POSE, Kind.POSE]), tcp, joints,
+        np.array([TargetKind.JOINTS, TargetKind.POSE, TargetKind.POSE]), tcp, joints,
         move=np.array([0, 1, 1]), pred_start=np.array([0, 1, 3, 4]),
         pred=np.array([-1, 0, 2, 1]),
     )  # fmt: skip
@@ -335,7 +339,7 @@ def test_lines_to_joint_targets(arm: Arm, tool: np.ndarray, home: np.ndarray) ->
     other = arm.inverse(arm.flange(there[None])).q[0, 4]
     for end, expected in ((there, ""), (other, OTHER_BRANCH)):
         targets = make_targets(
-            np.full(2, Kind.JOINTS), joints=np.array([home, end]),
+            np.full(2, TargetKind.JOINTS), joints=np.array([home, end]),
             move=np.array([0, 1]), tool=np.tile(tool, (2, 1, 1)),
         )  # fmt: skip
         found = trace(arm, targets)
@@ -384,13 +388,13 @@ def test_windows_change_nothing(
     np.testing.assert_array_equal(whole.reason, cut.reason)
 
 
-@pytest.mark.parametrize("move", [Move.JOINT, Move.LINEAR])
+@pytest.mark.parametrize("move", [Motion.JOINT, Motion.LINEAR])
 @pytest.mark.parametrize("before", [-1, -2])
 def test_a_lone_move_from_anywhere(
-    arm: Arm, tool: np.ndarray, home: np.ndarray, move: Move, before: int
+    arm: Arm, tool: np.ndarray, home: np.ndarray, move: Motion, before: int
 ) -> None:
     targets = make_targets(
-        np.array([Kind.POSE]),
+        np.array([TargetKind.POSE]),
         move=np.array([move]),
         tcp=(arm.flange(home[None])[0] @ tool)[None],
         tool=tool[None],
@@ -408,13 +412,13 @@ def test_long_paths_with_arcs_are_followed_on_demand(
 ) -> None:
     # Lines and arcs in turns, more of them than are solved beforehand.
     T0, poses = at(arm, tool, home), []
-    move, via = [Move.JOINT], [False]
+    move, via = [Motion.JOINT], [False]
     for k in range(60):
         x = 0.004 * k
         for xyz, kind, on_way in (
-            ((x, 0.02, 0.0), Move.LINEAR, False),
-            ((x + 0.001, 0.03, 0.01), Move.CIRCULAR, True),
-            ((x + 0.002, 0.02, 0.02), Move.CIRCULAR, False),
+            ((x, 0.02, 0.0), Motion.LINEAR, False),
+            ((x + 0.001, 0.03, 0.01), Motion.CIRCULAR, True),
+            ((x + 0.002, 0.02, 0.02), Motion.CIRCULAR, False),
         ):
             poses.append(shifted(T0, xyz))
             move.append(kind)

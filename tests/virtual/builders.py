@@ -6,7 +6,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from postproc.language.visits import Literals, Motion, Target, Visits
+from postproc.language.visits import Literals, Meaning, Visits
+from postproc.robot.trajectory import Motion
 
 
 @dataclass
@@ -16,7 +17,7 @@ class Program:
     frames: list[list[float]] = field(default_factory=lambda: [[0.0] * 6])
     rows: list[dict] = field(default_factory=list)
 
-    def add(self, values, motion=Motion.JOINT, target=Target.POSE, **more) -> Program:
+    def add(self, values, motion=Motion.JOINT, target=Meaning.POSE, **more) -> Program:
         row = {
             "values": [*values, *[np.nan] * (6 - len(values))],
             "motion": motion,
@@ -43,7 +44,7 @@ class Program:
         return self
 
     def joints(self, *values, **more) -> Program:
-        return self.add(values, target=Target.JOINTS, **more)
+        return self.add(values, target=Meaning.JOINTS, **more)
 
     def visits(self) -> Visits:
         n = len(self.rows)

@@ -5,20 +5,20 @@ from pathlib import Path
 import numpy as np
 
 from postproc.compensation.targets import targets_from_visits
-from postproc.language.visits import Motion
 from postproc.motion.planner import plan
 from postproc.robot.arm import load_arm
 from postproc.robot.cell import load_cell
 from postproc.robot.state import make_states
+from postproc.robot.trajectory import Motion
 from postproc.simulation import (
     NJ220,
-    Setup,
+    VirtualCell,
     arrivals_of_states,
     run_program,
     virtual_arm,
 )
 from postproc.simulation.kinematics import (
-    Body,
+    LinkMasses,
     link_torque,
     payload_torque,
     solve_branch,
@@ -47,7 +47,7 @@ def test_inverse_kinematics_branch_by_branch() -> None:
 
 def test_gravity_torques() -> None:
     mass, com = np.full(50, 60.0), np.tile([0.02, 0.1, 0.2], (50, 1))
-    ours = link_torque(Body(NJ220, NJ220.mass, NJ220.centre), Q)
+    ours = link_torque(LinkMasses(NJ220, NJ220.mass, NJ220.centre), Q)
     ours = ours + payload_torque(NJ220, Q, mass, com)
     np.testing.assert_allclose(ours, ARM.gravity_torque(Q, mass, com), atol=0.5)
 
@@ -92,7 +92,7 @@ def test_joints_and_directions_of_a_program(tmp_path: Path) -> None:
     path.write_text(f'[robot]\narm = "nj220-2.7"\n{home}')
     cell = load_cell(path)
     visits = bent_panel().visits()
-    run = run_program(virtual_arm(1), Setup(home=cell.home), visits)
+    run = run_program(virtual_arm(1), VirtualCell(home=cell.home), visits)
     planned = plan(cell.arm, targets_from_visits(visits, cell)[0], np.radians(3.0))
     assert set(run.why) == {""}
     np.testing.assert_allclose(run.arrivals.q, planned.q, atol=1e-9)

@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 
 from postproc.compensation.targets import targets_from_visits
-from postproc.language.visits import FlyTrajectory, FlyType, Motion, Visits
+from postproc.language.visits import FlyTrajectory, FlyType, Visits
 from postproc.motion.planner import plan
 from postproc.robot.cell import load_cell
-from postproc.simulation import NJ220, Setup, run_program, virtual_arm
+from postproc.robot.trajectory import Motion
+from postproc.simulation import NJ220, VirtualCell, run_program, virtual_arm
 from tests.virtual.builders import Program
 
 HOME = np.radians([0.0, 0.0, -90.0, 0.0, 45.0, 0.0])
@@ -33,7 +34,7 @@ def square(**fly: object) -> Visits:
 
 def miss(visits: Visits) -> float:
     """Distance at which the commanded path passes the corner [mm]."""
-    run = run_program(virtual_arm(1, ""), Setup(home=HOME), visits)
+    run = run_program(virtual_arm(1, ""), VirtualCell(home=HOME), visits)
     at = NJ220.flange(run.arrivals.q[1:2])[0, :3, 3] * 1e3
     return float(np.linalg.norm(at - CORNER))
 
@@ -81,7 +82,7 @@ def test_planner_and_controller_agree(tmp_path: Path, kind: FlyType) -> None:
         fly = {"fly": k % 7 > 0, "fly_type": int(kind), "fly_dist": 8.0}
         program.add([*xyz, *turn], motion, fly_per=80.0, **fly)
     visits = program.visits()
-    run = run_program(virtual_arm(1), Setup(home=cell.home), visits)
+    run = run_program(virtual_arm(1), VirtualCell(home=cell.home), visits)
     planned = plan(cell.arm, targets_from_visits(visits, cell)[0], 0.01)
     assert len(run.visit) == 61
     aside = np.linalg.norm(planned.aside, axis=1)

@@ -2,7 +2,12 @@
 
 import numpy as np
 
-from postproc.simulation.kinematics import NJ220, Body, link_torque, payload_torque
+from postproc.simulation.kinematics import (
+    NJ220,
+    LinkMasses,
+    link_torque,
+    payload_torque,
+)
 from postproc.simulation.reference import working_angles
 
 G = 9.80665
@@ -18,7 +23,7 @@ def gradient(energy, q: np.ndarray, step: float = 1e-5) -> np.ndarray:
 
 
 def test_links_pull_down_the_gradient_of_their_energy() -> None:
-    body = Body(NJ220, NJ220.mass, NJ220.centre)
+    body = LinkMasses(NJ220, NJ220.mass, NJ220.centre)
 
     def energy(q: np.ndarray) -> np.ndarray:
         total = 0.0
@@ -42,7 +47,7 @@ def test_payload_pulls_down_the_gradient_of_its_energy() -> None:
 
 
 def test_the_upright_axis_carries_no_weight() -> None:
-    body = Body(NJ220, NJ220.mass, NJ220.centre)
+    body = LinkMasses(NJ220, NJ220.mass, NJ220.centre)
     np.testing.assert_allclose(link_torque(body, Q)[:, 0], 0.0, atol=1e-9)
 
 

@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 
 from postproc.exceptions import PostprocError
-from postproc.language.visits import Motion
-from postproc.simulation import Setup, land, run_program, virtual_arm
+from postproc.robot.trajectory import Motion
+from postproc.simulation import VirtualCell, land, run_program, virtual_arm
 from tests.virtual.builders import Program
 
 ARM = virtual_arm(2)
-SETUP = Setup(home=np.radians([0.0, 0.0, -90.0, 0.0, 45.0, 0.0]))
+SETUP = VirtualCell(home=np.radians([0.0, 0.0, -90.0, 0.0, 45.0, 0.0]))
 
 
 def grid(moved: np.ndarray | None = None) -> Program:

@@ -9,7 +9,7 @@ import pytest
 
 from postproc.exceptions import MeasurementError, OutputError, PostprocError
 from postproc.simulation import (
-    Setup,
+    VirtualCell,
     campaign_length,
     in_tracker_frame,
     measure_program,
@@ -23,7 +23,7 @@ from tests.virtual.builders import Program
 
 ARM = virtual_arm(1, "geometry,tool,backlash,windup")
 TOOLS = pose(np.eye(3), np.array([[0.08, -0.04, 0.15], [0.0, 0.1, 0.2]]))
-SETUP = Setup(tool=TOOLS[0], home=np.zeros(6), payload=40.0)
+SETUP = VirtualCell(tool=TOOLS[0], home=np.zeros(6), payload=40.0)
 HEADER = "id,q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg"
 
 

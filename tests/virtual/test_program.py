@@ -3,14 +3,15 @@
 import numpy as np
 import pytest
 
-from postproc.language.visits import ELSEWHERE, START, Motion, Target
-from postproc.simulation import Setup, run_program, virtual_arm
+from postproc.language.visits import ELSEWHERE, START, Meaning
+from postproc.robot.trajectory import Motion
+from postproc.simulation import VirtualCell, run_program, virtual_arm
 from postproc.simulation.kinematics import NJ220, pose_of_record, undo
 from tests.virtual.builders import Program
 
 ARM = virtual_arm(1)
 HOME = np.radians([0.0, 0.0, -90.0, 0.0, 45.0, 0.0])
-SETUP = Setup(home=HOME)
+SETUP = VirtualCell(home=HOME)
 DOWN = [1600.0, -300.0, 900.0, 0.0, 180.0, 0.0]
 
 
@@ -80,10 +81,10 @@ def test_an_arc_visits_its_via_point_and_its_end() -> None:
 @pytest.mark.parametrize(
     ("target", "values", "step"),
     [
-        (Target.RELATIVE_TOOL, [10, 20, 30], [-10, 20, -30]),
-        (Target.RELATIVE_BASE, [10, 20, 30], [10, 20, 30]),
-        (Target.AWAY, [50], [0, 0, 50]),
-        (Target.ABOUT, [0, 0, 1, 90, int(Target.RELATIVE_BASE)], [0, 0, 0]),
+        (Meaning.RELATIVE_TOOL, [10, 20, 30], [-10, 20, -30]),
+        (Meaning.RELATIVE_BASE, [10, 20, 30], [10, 20, 30]),
+        (Meaning.AWAY, [50], [0, 0, 50]),
+        (Meaning.ABOUT, [0, 0, 1, 90, int(Meaning.RELATIVE_BASE)], [0, 0, 0]),
     ],
 )
 def test_moves_without_a_target_move_the_arm(target, values, step) -> None:
@@ -92,14 +93,14 @@ def test_moves_without_a_target_move_the_arm(target, values, step) -> None:
     run = run_program(ARM, SETUP, program.visits())
     tcp = NJ220.flange(run.arrivals.q)[:, :3, 3] * 1e3
     np.testing.assert_allclose(tcp[1] - tcp[0], step, atol=1e-8)
-    if target == Target.ABOUT:
+    if target == Meaning.ABOUT:
         turned = run.arrivals.q[1] - run.arrivals.q[0]
         assert abs(turned).max() == pytest.approx(np.pi / 2, abs=1e-6)
 
 
 def test_near_by_and_home() -> None:
-    program = Program().add(DOWN, target=Target.NEAR, distance=100.0, config="")
-    program.add([1, 2, 3, 4, 5, 6], target=Target.BY).add([], target=Target.HOME)
+    program = Program().add(DOWN, target=Meaning.NEAR, distance=100.0, config="")
+    program.add([1, 2, 3, 4, 5, 6], target=Meaning.BY).add([], target=Meaning.HOME)
     run = run_program(ARM, SETUP, program.visits())
     tcp = NJ220.flange(run.arrivals.q)[0, :3, 3] * 1e3
     np.testing.assert_allclose(tcp, shifted(0, 0, 100)[:3], atol=1e-8)
@@ -128,7 +129,7 @@ def test_branches_are_run_from_their_first_predecessor() -> None:
 
 
 def test_a_cell_without_home_starts_at_the_first_target() -> None:
-    run = run_program(ARM, Setup(), Program().add(DOWN, config="").visits())
+    run = run_program(ARM, VirtualCell(), Program().add(DOWN, config="").visits())
     assert run.why == ("",)
     np.testing.assert_array_equal(np.abs(run.arrivals.side[0]), 1.0)
 

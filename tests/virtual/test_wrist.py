@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from postproc.exceptions import PlanError
-from postproc.language.visits import Motion
-from postproc.simulation import NJ220, Setup, run_program, virtual_arm
+from postproc.robot.trajectory import Motion
+from postproc.simulation import NJ220, VirtualCell, run_program, virtual_arm
 from postproc.simulation.controller import joints_with_wrist
 from postproc.simulation.kinematics import pose
 from tests.virtual.builders import Program
@@ -43,7 +43,7 @@ def test_programs_may_ask_for_it() -> None:
     goal[0] += 3.0
     program = Program().joints(*np.degrees(home))
     program.joints(*goal, motion=Motion.LINEAR, wrist=True)
-    run = run_program(virtual_arm(1), Setup(home=home), program.visits())
+    run = run_program(virtual_arm(1), VirtualCell(home=home), program.visits())
     assert run.why == ("", "")
     np.testing.assert_allclose(np.degrees(run.arrivals.q[1]), goal, atol=1e-6)
     assert run.arrivals.side[1, 4] == -1.0

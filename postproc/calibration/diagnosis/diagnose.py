@@ -20,13 +20,18 @@ from postproc.calibration.diagnosis.next_poses import (
 from postproc.calibration.diagnosis.refit import Revision, fold_back, refit
 from postproc.calibration.diagnosis.result import (
     Diagnosis,
-    Place,
     Profile,
+    ResidualPlace,
     profile,
     statistics,
 )
 from postproc.calibration.diagnosis.search import NEAR, Progress, Search, ranking
-from postproc.calibration.diagnosis.trace import Trace, investigate, silent, trace
+from postproc.calibration.diagnosis.trace import (
+    Investigation,
+    investigate,
+    silent,
+    trace,
+)
 from postproc.calibration.measurements import Measurements
 from postproc.calibration.regression import Fit, fit_effects
 from postproc.calibration.report import weighed_down
@@ -180,7 +185,7 @@ def diagnose(
 
 def _conclude(
     survey: Measurements,
-    traced: Trace,
+    traced: Investigation,
     held_out: HeldOut,
     tracker: Floats | None,
     seed: int,
@@ -210,7 +215,7 @@ def _conclude(
     )
 
 
-def _places(found: Search) -> tuple[Place, ...]:
+def _places(found: Search) -> tuple[ResidualPlace, ...]:
     """Say where what is left lives, from the candidates that come closest."""
     out = []
     for score in ranking(Projection.of(found.fit), found.library)[:PLACES]:
@@ -221,11 +226,11 @@ def _places(found: Search) -> tuple[Place, ...]:
         if family.effect == "curve" and family.joint is None:
             driver, _, direction = driver.partition(" along ")
         p_value = found.null.p_value(score.evidence)
-        out.append(Place(direction, driver, score.evidence, p_value))
+        out.append(ResidualPlace(direction, driver, score.evidence, p_value))
     return tuple(out)
 
 
-def _next(traced: Trace, seed: int) -> tuple[str, Floats]:
+def _next(traced: Investigation, seed: int) -> tuple[str, Floats]:
     """Propose poses that separate the closest rivals, or sharpen the model."""
     found = traced.search
     for number, standing in enumerate(traced.standings):

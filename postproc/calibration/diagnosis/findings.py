@@ -8,7 +8,7 @@ import numpy as np
 
 from postproc.arrays import Floats
 from postproc.calibration.diagnosis.result import Finding
-from postproc.calibration.diagnosis.search import Addition, Search, Standing
+from postproc.calibration.diagnosis.search import Addition, JudgedAddition, Search
 from postproc.calibration.report import SHOWN_UNITS
 from postproc.model.effects.effect import Effect
 from postproc.robot.pose import MM
@@ -16,7 +16,7 @@ from postproc.robot.pose import MM
 SPOT = 9  # bumps: more are a map of the whole joint, with no one place
 
 
-def describe(found: Search, standings: Sequence[Standing]) -> tuple[Finding, ...]:
+def describe(found: Search, standings: Sequence[JudgedAddition]) -> tuple[Finding, ...]:
     """Describe every addition of a search."""
     shares = _shares(found)
     return tuple(
@@ -28,7 +28,11 @@ def describe(found: Search, standings: Sequence[Standing]) -> tuple[Finding, ...
 
 
 def _describe(
-    found: Search, number: int, addition: Addition, standing: Standing, share: float
+    found: Search,
+    number: int,
+    addition: Addition,
+    standing: JudgedAddition,
+    share: float,
 ) -> Finding:
     """Describe one addition."""
     fit, family = found.fit, addition.candidate.family

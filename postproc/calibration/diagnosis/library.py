@@ -81,7 +81,7 @@ class Projection:
 
 
 @dataclass(frozen=True, eq=False)
-class Blocks:
+class ReducedCandidates:
     """Candidates reduced to what their evidence needs, in their own eigenbasis.
 
     Attributes:
@@ -100,7 +100,7 @@ def reduce_columns(
     candidates: Sequence[Candidate],
     columns: Floats,
     rows: Floats,
-) -> Blocks:
+) -> ReducedCandidates:
     """Reduce candidates of one width against rows.
 
     Args:
@@ -116,10 +116,10 @@ def reduce_columns(
     B = np.ascontiguousarray(B.T).reshape(count, width, -1)
     gram = B @ np.swapaxes(B, 1, 2)
     if width == 1:
-        return Blocks(tuple(candidates), gram[:, :, 0], along)
+        return ReducedCandidates(tuple(candidates), gram[:, :, 0], along)
     gain, turn = np.linalg.eigh(gram)
     along = np.swapaxes(turn, 1, 2) @ along
-    return Blocks(tuple(candidates), np.maximum(gain, 0.0), along)
+    return ReducedCandidates(tuple(candidates), np.maximum(gain, 0.0), along)
 
 
 # All candidates with their columns, ready to be filtered by any fit of the rows.
@@ -183,7 +183,9 @@ class Library:
         ]
         return Library(tuple(shelves))
 
-    def reduce(self, projection: Projection, rows: Floats) -> tuple[Blocks, ...]:
+    def reduce(
+        self, projection: Projection, rows: Floats
+    ) -> tuple[ReducedCandidates, ...]:
         """Filter all candidates and reduce them against rows (3 n, draws)."""
         whitener = projection.fit.whitener
         return tuple(
@@ -204,7 +206,7 @@ def by_width(candidates: Sequence[Candidate]) -> list[tuple[int, list[Candidate]
 
 def reduce_some(
     projection: Projection, candidates: Sequence[Candidate], rows: Floats
-) -> tuple[Blocks, ...]:
+) -> tuple[ReducedCandidates, ...]:
     """Filter a few candidates of any widths and reduce them against rows."""
     whitener = projection.fit.whitener
     return tuple(

@@ -74,7 +74,7 @@ class Finding:
 
 
 @dataclass(frozen=True)
-class Place:
+class ResidualPlace:
     """Where a residual lives: one direction, one covariate, and how clearly.
 
     Attributes:
@@ -120,7 +120,7 @@ class Diagnosis:
     vap_mm: tuple[float, float] | None
     findings: tuple[Finding, ...]
     leftovers: tuple[Leftover, ...]
-    places: tuple[Place, ...]
+    places: tuple[ResidualPlace, ...]
     next_measurements: Floats
     why_next: str
     dropped: tuple[DroppedRow, ...]

@@ -9,7 +9,11 @@ from scipy.stats import f as fisher
 
 from postproc.arrays import Floats
 from postproc.calibration.diagnosis.candidates import Candidate, Family
-from postproc.calibration.diagnosis.library import Blocks, Library, Projection
+from postproc.calibration.diagnosis.library import (
+    Library,
+    Projection,
+    ReducedCandidates,
+)
 
 # How strongly a candidate's block of columns is called for.
 #
@@ -28,7 +32,7 @@ SMALL = 1e-9  # Gram eigenvalues below this share of the largest are no directio
 NOTHING_LEFT = 1e-2  # Gram of a block that the model takes up altogether
 
 
-def log_evidence(blocks: Blocks, square: Floats, rows: int) -> Floats:
+def log_evidence(blocks: ReducedCandidates, square: Floats, rows: int) -> Floats:
     """Compute the evidence of every block against every draw, (c, draws) [nats].
 
     Args:
@@ -50,7 +54,7 @@ def log_evidence(blocks: Blocks, square: Floats, rows: int) -> Floats:
     return best
 
 
-def explained(blocks: Blocks) -> tuple[Floats, Floats]:
+def explained(blocks: ReducedCandidates) -> tuple[Floats, Floats]:
     """Return the squares that blocks explain by least squares, and their ranks.
 
     Returns:
@@ -62,7 +66,7 @@ def explained(blocks: Blocks) -> tuple[Floats, Floats]:
     return np.einsum("ck,ckd->cd", inverse, blocks.along**2), kept.sum(axis=1)
 
 
-def score_p_value(blocks: Blocks, square: float, rows: int) -> Floats:
+def score_p_value(blocks: ReducedCandidates, square: float, rows: int) -> Floats:
     """Compute the score (F) test of every block against the first draw, (c,)."""
     squares, rank = explained(blocks)
     top = squares[:, 0] / np.maximum(rank, 1)
@@ -90,7 +94,7 @@ class Score:
 
 
 def rank(
-    reduced: tuple[Blocks, ...],
+    reduced: tuple[ReducedCandidates, ...],
     square: float,
     rows: int,
     without: frozenset[str] = frozenset(),
@@ -105,7 +109,9 @@ def rank(
     """
     found: dict[Family, list[tuple[float, float, Candidate]]] = {}
     for blocks in reduced:
-        first = Blocks(blocks.candidates, blocks.gain, blocks.along[:, :, :1])
+        first = ReducedCandidates(
+            blocks.candidates, blocks.gain, blocks.along[:, :, :1]
+        )
         each = log_evidence(first, np.array([square]), rows)[:, 0]
         p = score_p_value(first, square, rows)
         for candidate, e, p_one in zip(blocks.candidates, each, p, strict=True):
@@ -123,7 +129,9 @@ def rank(
     return sorted(out, key=lambda s: -s.evidence)
 
 
-def family_maxima(reduced: tuple[Blocks, ...], square: Floats, rows: int) -> Floats:
+def family_maxima(
+    reduced: tuple[ReducedCandidates, ...], square: Floats, rows: int
+) -> Floats:
     """Return the largest evidence of any family, for every draw, (draws,)."""
     total: dict[Family, Floats] = {}
     for blocks in reduced:

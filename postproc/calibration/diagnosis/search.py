@@ -468,7 +468,7 @@ MOST_OTHERS = 2
 
 
 @dataclass(frozen=True)
-class Standing:
+class JudgedAddition:
     """An addition judged with everything else in the model.
 
     Attributes:
@@ -482,7 +482,7 @@ class Standing:
     confusable: tuple[Score, ...]
 
 
-def stand(found: Search, number: int) -> Standing:
+def stand(found: Search, number: int) -> JudgedAddition:
     """Judge one addition of a search against all that could take its place."""
     own = found.additions[number].candidate
     projection = Projection.of(found.fit, without=found.place(number))
@@ -498,4 +498,4 @@ def stand(found: Search, number: int) -> Standing:
             rivals.append(s)
             names.add(name)
     p_value = found.null.p_value(here.evidence)
-    return Standing(here.evidence, p_value, tuple(rivals[:MOST_OTHERS]))
+    return JudgedAddition(here.evidence, p_value, tuple(rivals[:MOST_OTHERS]))

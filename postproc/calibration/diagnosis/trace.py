@@ -13,9 +13,9 @@ from postproc.calibration.diagnosis.library import Library, Projection
 from postproc.calibration.diagnosis.result import Finding, Verdict
 from postproc.calibration.diagnosis.score import Leftover, Null, bootstrap, leftovers
 from postproc.calibration.diagnosis.search import (
+    JudgedAddition,
     Progress,
     Search,
-    Standing,
     put_instead,
     ranking,
     search,
@@ -90,7 +90,7 @@ def silent(stage: str, share: float) -> None:
 
 
 @dataclass(frozen=True, eq=False)
-class Trace:
+class Investigation:
     """What all the rows say.
 
     Attributes:
@@ -100,7 +100,7 @@ class Trace:
     """
 
     search: Search
-    standings: tuple[Standing, ...]
+    standings: tuple[JudgedAddition, ...]
     leftovers: tuple[Leftover, ...]
 
     @property
@@ -119,7 +119,7 @@ class Trace:
         return "unexplained" if nameless else "effect"
 
 
-def trace(base: Fit, seed: int, progress: Progress = silent) -> Trace:
+def trace(base: Fit, seed: int, progress: Progress = silent) -> Investigation:
     """Search a fit's rows for what it lacks, and judge what was found."""
     progress("candidates", 0.0)
     library = Library.of(base)
@@ -130,4 +130,4 @@ def trace(base: Fit, seed: int, progress: Progress = silent) -> Trace:
     standings = tuple(stand(found, k) for k in range(len(found.additions)))
     progress("what is left", 0.55)
     left = leftovers(Projection.of(found.fit), seed)
-    return Trace(found, standings, left)
+    return Investigation(found, standings, left)

@@ -10,7 +10,7 @@ from postproc.language.pdl2.effects import (
     FRAMES,
     HANDS_OVER,
     PURE,
-    Reach,
+    CallGraph,
     changed_arguments,
     reach_of,
 )
@@ -36,9 +36,9 @@ from postproc.language.pdl2.moves import move
 from postproc.language.pdl2.store import Store
 from postproc.language.pdl2.values import (
     Alias,
+    Location,
     Nothing,
     Position,
-    Target,
     Value,
     Written,
 )
@@ -56,7 +56,7 @@ def leave_out(
     machine: Machine,
     here: Here,
     name: str,
-    reach: Reach,
+    reach: CallGraph,
     arguments: tuple[ast.Expression | None, ...] = (),
 ) -> None:
     """Take in what a call may do without following it; list the moves it may make."""
@@ -361,7 +361,7 @@ def _whose(here: Here, reference: ast.Reference) -> int | None:
 
 
 def _new_value(
-    here: Here, statement: ast.Assign, target: Target, value: Value
+    here: Here, statement: ast.Assign, target: Location, value: Value
 ) -> Value:
     if target.component == ():
         return value

@@ -11,8 +11,8 @@ import numpy as np
 
 from postproc.arrays import Bools, Indices, Ints
 from postproc.language.pdl2 import syntax as ast
-from postproc.language.pdl2.job import Points, World, base_variable
-from postproc.language.pdl2.machine import HERE, Arrival, Key, Machine, Run
+from postproc.language.pdl2.job import FilePoints, World, base_variable
+from postproc.language.pdl2.machine import HERE, Key, Machine, MoveRun, Visit
 from postproc.language.pdl2.moves import UNSURE, from_value
 from postproc.language.pdl2.program import Program
 from postproc.language.pdl2.store import MANY, Settings
@@ -24,9 +24,9 @@ from postproc.language.visits import (
     FlyTrajectory,
     FlyType,
     Literals,
+    Meaning,
     OrntType,
     Switch,
-    Target,
     Visits,
     slim,
 )
@@ -36,7 +36,7 @@ from postproc.language.visits import (
 _FRAMES = ("tool", "base", "uframe")
 _CARE = ("cnfg_care", "turn_care", "jnt_mturn")
 _OVERRIDES = ("arm_spd_ovr", "prog_spd_ovr", "gen_ovr")
-_WITHOUT_UFRAME = (Target.JOINTS, Target.HOME, Target.CALIBRATION, Target.BY)
+_WITHOUT_UFRAME = (Meaning.JOINTS, Meaning.HOME, Meaning.CALIBRATION, Meaning.BY)
 
 
 class SettingColumns:
@@ -67,7 +67,7 @@ class SettingColumns:
         """Return the state of the settings of a row."""
         return self._kept[row]
 
-    def problem(self, row: int, target: Target) -> str:
+    def problem(self, row: int, target: Meaning) -> str:
         """Return why a visit cannot be compensated under these settings, or ""."""
         pose, joints = self._problems[row]
         return joints if target in _WITHOUT_UFRAME else pose
@@ -161,10 +161,10 @@ def _unknown(settings: Settings, names: tuple[str, ...]) -> str:
 
 # Columns of visits, filled record by record.
 
-_COMPUTED = (Target.POSE, Target.NEAR, Target.FOR)  # may move along with a literal
+_COMPUTED = (Meaning.POSE, Meaning.NEAR, Meaning.FOR)  # may move along with a literal
 
 
-class Table:
+class TextColumn:
     """Distinct texts in order of appearance; index 0 is ""."""
 
     def __init__(self) -> None:
@@ -185,7 +185,7 @@ class Table:
         return tuple(self._index)
 
 
-class Columns:
+class VisitColumns:
     """Columns of n visits, filled visit by visit or stretch by stretch."""
 
     def __init__(self, n: int, axes: int, slots: int) -> None:
@@ -223,14 +223,14 @@ class Collector:
     """Fills the columns; holds the tables that they index."""
 
     machine: Machine
-    columns: Columns
+    columns: VisitColumns
     settings: SettingColumns
-    configs: Table = field(default_factory=Table)
-    names: Table = field(default_factory=Table)
-    reasons: Table = field(default_factory=Table)
+    configs: TextColumn = field(default_factory=TextColumn)
+    names: TextColumn = field(default_factory=TextColumn)
+    reasons: TextColumn = field(default_factory=TextColumn)
     marks: dict[int, tuple[Ints, list[str]]] = field(default_factory=dict)
 
-    def arrival(self, at: int, arrival: Arrival) -> None:
+    def arrival(self, at: int, arrival: Visit) -> None:
         """Fill one visit."""
         c, program = self.columns, arrival.place.program
         c.file[at] = self.machine.world.files.index(program.lines.source.name)
@@ -252,7 +252,7 @@ class Collector:
             or ""
         )
 
-    def _position(self, at: int, arrival: Arrival) -> None:
+    def _position(self, at: int, arrival: Visit) -> None:
         c, position = self.columns, arrival.position
         if position is None:
             return
@@ -263,7 +263,7 @@ class Collector:
         for axis, value in position.aux or ():
             if 1 <= axis <= c.aux.shape[1] and value is not None:
                 c.aux[at, axis - 1] = value
-        if position.editable and arrival.target in (Target.POSE, Target.JOINTS):
+        if position.editable and arrival.target in (Meaning.POSE, Meaning.JOINTS):
             c.slots[at] = position.slots
         elif -1 not in position.slots and arrival.target in _COMPUTED:
             c.bases[at] = position.slots
@@ -275,7 +275,7 @@ class Collector:
         c.taught[at] = position.taught or inline or listed
         c.shared[at] = position.shared
 
-    def recursion(self, record: Arrival | Run) -> str:
+    def recursion(self, record: Visit | MoveRun) -> str:
         """Return why visits of a routine that calls itself stay, "" for others."""
         if id(record.place.body) not in self.machine.recursive:
             return ""
@@ -336,10 +336,10 @@ def _measured(program: Program) -> tuple[Ints, list[str]]:
 
 # Columns of the visits of a stretch of moves: a few array passes for each variant.
 
-KINDS = max(Target) + 1  # what a target can be is less
+KINDS = max(Meaning) + 1  # what a target can be is less
 
 
-def fill_run(collector: Collector, at: int, run: Run) -> None:
+def fill_run(collector: Collector, at: int, run: MoveRun) -> None:
     """Fill the visits of a stretch, the first of which is visit `at`."""
     c, lines = collector.columns, run.place.program.lines
     here = slice(at, at + len(run))
@@ -360,7 +360,9 @@ def fill_run(collector: Collector, at: int, run: Run) -> None:
     _marks(collector, at, run)
 
 
-def _settings(collector: Collector, run: Run, move: ast.Move, rows: Ints) -> Ints | int:
+def _settings(
+    collector: Collector, run: MoveRun, move: ast.Move, rows: Ints
+) -> Ints | int:
     """Return the settings at moves of one variant; WITH may set numbers for them."""
     if not move.settings:
         return collector.settings.index(run.settings)
@@ -384,7 +386,7 @@ def _set(names: list[str], numbers: list[float]) -> dict[str, Value]:
 
 
 def _written(
-    collector: Collector, mine: Ints, run: Run, variant: int, rows: Ints
+    collector: Collector, mine: Ints, run: MoveRun, variant: int, rows: Ints
 ) -> None:
     """Fill moves of one variant to six numbers that stand in them."""
     c, world = collector.columns, collector.machine.world
@@ -396,7 +398,7 @@ def _written(
     c.values[mine] = lines.value[numbers]
     c.slots[mine] = numbers + world.slot_base[lines.source.name]
     joints = isinstance(literal, ast.Aggregate)
-    c.target[mine] = Target.JOINTS if joints else Target.POSE
+    c.target[mine] = Meaning.JOINTS if joints else Meaning.POSE
     config = items[6] if len(items) > 6 else None
     if isinstance(config, ast.Text):
         c.config[mine] = collector.configs(config.value)
@@ -404,7 +406,7 @@ def _written(
     _reasons(collector, mine, run, variant, "")
     wrong = mine[~np.isfinite(c.values[mine]).all(axis=1)]
     if len(wrong):
-        c.target[wrong] = Target.UNKNOWN
+        c.target[wrong] = Meaning.UNKNOWN
         c.slots[wrong] = -1
         c.values[wrong] = np.nan
         c.reason[wrong] = collector.reasons("a number of the target cannot be read")
@@ -414,7 +416,7 @@ def _written(
 
 
 def _reasons(
-    collector: Collector, mine: Ints, run: Run, variant: int, otherwise: str
+    collector: Collector, mine: Ints, run: MoveRun, variant: int, otherwise: str
 ) -> None:
     """Say why moves of one variant must not be compensated."""
     c = collector.columns
@@ -423,14 +425,14 @@ def _reasons(
     distinct, which = np.unique(pairs, return_inverse=True)
     reason = [
         collector.reasons(
-            known or collector.settings.problem(setting, Target(target)) or otherwise
+            known or collector.settings.problem(setting, Meaning(target)) or otherwise
         )
         for setting, target in (divmod(pair, KINDS) for pair in distinct.tolist())
     ]
     c.reason[mine] = np.array(reason, dtype=np.int64)[which]
 
 
-def _points(collector: Collector, at: int, run: Run, points: Points) -> None:
+def _points(collector: Collector, at: int, run: MoveRun, points: FilePoints) -> None:
     """Fill moves to points that the variable file tells, layout by layout."""
     c, entries = collector.columns, points.entries
     some = np.flatnonzero(run.point >= 0)
@@ -449,7 +451,7 @@ def _points(collector: Collector, at: int, run: Run, points: Points) -> None:
         c.config[visits[mine]] = collector.configs(layout.config or "")
         c.config_given[visits[mine]] = layout.config is not None
         joints = layout.kind == "JNTP"
-        c.target[visits[mine]] = Target.JOINTS if joints else Target.POSE
+        c.target[visits[mine]] = Meaning.JOINTS if joints else Meaning.POSE
         for column, axis in enumerate(layout.axes):
             if 1 <= axis <= c.aux.shape[1]:
                 c.aux[visits[mine], axis - 1] = entries.aux[rows[mine], column]
@@ -460,13 +462,15 @@ def _points(collector: Collector, at: int, run: Run, points: Points) -> None:
             _reasons(collector, own, run, variant, otherwise)
 
 
-def _held(collector: Collector, visit: int, run: Run, k: int, value: Value) -> Arrival:
+def _held(
+    collector: Collector, visit: int, run: MoveRun, k: int, value: Value
+) -> Visit:
     """Return a move to a variable that holds something else than the file says."""
     variant = int(run.variant[k])
     if isinstance(value, Nothing):
         collector.machine.world.pin(value, UNSURE)
     goal, (motion, reason) = from_value(value), run.ways[variant]
-    return Arrival(
+    return Visit(
         run.place,
         int(run.rows[k]),
         run.predecessors,
@@ -480,7 +484,7 @@ def _held(collector: Collector, visit: int, run: Run, k: int, value: Value) -> A
     )
 
 
-def _marks(collector: Collector, at: int, run: Run) -> None:
+def _marks(collector: Collector, at: int, run: MoveRun) -> None:
     """Enter the ids of moves that are measured."""
     rows, ids = collector.measured(run.place.program)
     first, last = np.searchsorted(rows, [run.rows[0], run.rows[-1] + 1]).tolist()
@@ -613,7 +617,7 @@ def _literals(
         line=line,
         start=start,
         end=end,
-        joints=columns.target[visit] == Target.JOINTS,
+        joints=columns.target[visit] == Meaning.JOINTS,
         name=tuple(map(texts.__getitem__, columns.name[visit].tolist())),
         shared=_any(columns.shared, literal, len(slots)),
         taught=_any(columns.taught, literal, len(slots)),
@@ -687,10 +691,10 @@ def collect(machine: Machine) -> Visits:
     axes = max((_most_axes(record, machine.world) for _, record in ordered), default=0)
     settings = SettingColumns()
     numbering = Numbering.of(machine.world)
-    columns = Columns(int(offsets[-1]), axes, len(numbering.start))
+    columns = VisitColumns(int(offsets[-1]), axes, len(numbering.start))
     collector = Collector(machine, columns, settings)
     for at, (_, record) in zip(offsets.tolist(), ordered, strict=False):
-        if isinstance(record, Run):
+        if isinstance(record, MoveRun):
             fill_run(collector, at, record)
         else:
             collector.arrival(at, record)
@@ -744,9 +748,9 @@ def _order(key: Key) -> tuple[tuple[tuple[int, int], ...], int]:
     return (*context, (at, HERE)), sub
 
 
-def _most_axes(record: Arrival | Run, world: World) -> int:
+def _most_axes(record: Visit | MoveRun, world: World) -> int:
     """Return the last auxiliary axis that targets give a value of."""
-    if isinstance(record, Arrival):
+    if isinstance(record, Visit):
         return _last_axis([record.position])
     held = [value for value in record.held.values() if isinstance(value, Position)]
     points, rows = world.initial.points, record.point[record.point >= 0]
@@ -763,7 +767,7 @@ def _last_axis(positions: Iterable[Position | None]) -> int:
 
 
 def _predecessors(
-    machine: Machine, ordered: list[tuple[Key, Arrival | Run]], offsets: Ints
+    machine: Machine, ordered: list[tuple[Key, Visit | MoveRun]], offsets: Ints
 ) -> tuple[Ints, Ints]:
     """Translate predecessor ids to visits, in CSR form."""
     n = int(offsets[-1])

@@ -161,7 +161,7 @@ FRAMES = ("tool", "base", "uframe")
 
 
 @dataclass(frozen=True)
-class Reached:
+class LiveRows:
     """Rows that may run: those of one body, or some of them.
 
     Attributes:
@@ -174,7 +174,7 @@ class Reached:
 
 
 @dataclass(frozen=True)
-class Reach:
+class CallGraph:
     """All that may run because something runs.
 
     Attributes:
@@ -183,7 +183,7 @@ class Reach:
         frames: A routine that the job does not hold may set frames.
     """
 
-    parts: tuple[Reached, ...]
+    parts: tuple[LiveRows, ...]
     moves: bool
     frames: bool
 
@@ -194,19 +194,19 @@ class Reach:
         return names | {f"${frame}" for frame in FRAMES if self.frames}
 
 
-def reach_of(world: World, place: Place) -> Reach:
+def reach_of(world: World, place: Place) -> CallGraph:
     """Follow a body into all that it calls; remembered for each body."""
     key = id(place.body)
     if key not in world.reached:
         world.reached[key] = reach_rows(world, place, place.body.first, place.body.last)
     found = world.reached[key]
-    assert isinstance(found, Reach)
+    assert isinstance(found, CallGraph)
     return found
 
 
-def reach_rows(world: World, place: Place, first: int, last: int) -> Reach:
+def reach_rows(world: World, place: Place, first: int, last: int) -> CallGraph:
     """Follow rows first to last - 1 of a body into all that they call."""
-    parts = [Reached(place, rows_effects(place.program, first, last))]
+    parts = [LiveRows(place, rows_effects(place.program, first, last))]
     done, waiting = {id(place.body)}, list(_called(world, place, first, last))
     if (first, last) != (place.body.first, place.body.last):
         done.clear()  # the rest of the body may be called from these rows
@@ -215,11 +215,11 @@ def reach_rows(world: World, place: Place, first: int, last: int) -> Reach:
         if id(one.body) not in done:
             done.add(id(one.body))
             rows = (one.body.first, one.body.last)
-            parts.append(Reached(one, rows_effects(one.program, *rows)))
+            parts.append(LiveRows(one, rows_effects(one.program, *rows)))
             waiting += _called(world, one, *rows)
     outside = frozenset().union(*(part.effects.calls for part in parts))
     said = {world.start.routines.get(name) for name in outside}
-    return Reach(
+    return CallGraph(
         tuple(parts),
         any(part.effects.moves for part in parts)
         or "moves" in said

@@ -13,9 +13,9 @@ from postproc.language.pdl2.values import (
     FARTHEST,
     RUN_TIME,
     Alias,
+    Location,
     Nothing,
     Position,
-    Target,
     Value,
     Vector,
     Written,
@@ -42,7 +42,7 @@ _FIELDS = frozenset({*COMPONENTS, "pos", "aux"})
 
 
 @dataclass
-class Point:
+class ProgramPoint:
     """A place in the execution: where, and what is known there."""
 
     world: World
@@ -70,7 +70,7 @@ class Point:
             return int(value)
         return None
 
-    def locate(self, reference: ast.Reference) -> Target:
+    def locate(self, reference: ast.Reference) -> Location:
         """Find what a reference means, as far as its indices are known."""
         root = self.world.root(self.place, reference.name)
         held = self.store.values.get(root)
@@ -85,22 +85,22 @@ class Point:
             if (plain and not array) or (
                 not plain and at > 0 and isinstance(step, str) and step in _FIELDS
             ):
-                return Target(keys, exact, self._component(rest))
+                return Location(keys, exact, self._component(rest))
             if isinstance(step, str):
                 keys = frozenset(f"{key}.{step}" for key in keys)
                 continue
             array = False
             if not plain and self._is_joints(keys):
-                return Target(keys, exact, self._component(rest))
+                return Location(keys, exact, self._component(rest))
             index = [
                 None if isinstance(s, tuple) else self.integer(s)
                 for s in step.subscripts
             ]
             if None in index:
-                return Target(keys, False)
+                return Location(keys, False)
             text = ",".join(map(str, index))
             keys = frozenset(f"{key}[{text}]" for key in keys)
-        return Target(keys, exact and len(keys) == 1)
+        return Location(keys, exact and len(keys) == 1)
 
     def _is_joints(self, keys: frozenset[str]) -> bool:
         held = self.store.read(next(iter(keys)))
@@ -175,7 +175,7 @@ class Point:
             self.world.pin(held, "the program computes with a part of it", (at,))
         return part_of(held, target.component)
 
-    def _unsteady(self, target: Target) -> bool:
+    def _unsteady(self, target: Location) -> bool:
         """Tell whether a handler may change a variable, whatever name it has here."""
         names = {base_variable(key.rpartition("/")[2]) for key in target.keys}
         return not names.isdisjoint(self.volatile)
@@ -309,7 +309,7 @@ class Point:
         return replace(self._components(arguments[:6]), config=config)
 
 
-def component_index(target: Target) -> int:
+def component_index(target: Location) -> int:
     """Return which of the six numbers a reference means, -1 for anything else."""
     match target.component:
         case ("joint", axis) if 1 <= axis <= 6:
@@ -332,7 +332,7 @@ SINGLE = frozenset(
 )
 
 
-def copied(here: Point, value: ast.Expression, target: ast.Reference) -> bool:
+def copied(here: ProgramPoint, value: ast.Expression, target: ast.Reference) -> bool:
     """Let a variable hold the parts of another one; tell whether it has parts."""
     origin = bare(value)
     if origin is None or not _may_have_parts(here, origin):
@@ -359,14 +359,14 @@ def bare(value: ast.Expression | None) -> ast.Reference | None:
     return value if named and isinstance(value, ast.Reference) else None
 
 
-def _may_have_parts(here: Point, origin: ast.Reference) -> bool:
+def _may_have_parts(here: ProgramPoint, origin: ast.Reference) -> bool:
     type_ = here.world.type_of(here.place, origin.name)
     if type_ is None or type_.array or type_.path:
         return True
     return type_.name not in SINGLE
 
 
-def parts_of(here: Point, origin: ast.Reference) -> dict[str, Value]:
+def parts_of(here: ProgramPoint, origin: ast.Reference) -> dict[str, Value]:
     """Return what is known of the elements and fields of a variable.
 
     Standard fields of nodes count too where what they hold is not known.
@@ -383,7 +383,7 @@ def parts_of(here: Point, origin: ast.Reference) -> dict[str, Value]:
     return found
 
 
-def parts_under(here: Point, key: str) -> list[str]:
+def parts_under(here: ProgramPoint, key: str) -> list[str]:
     """Return the keys of elements and fields that a key has or ever had."""
     return here.world.first_parts(key) + here.store.parts(key)
 
@@ -393,7 +393,7 @@ def is_standard(key: str) -> bool:
     return key.rpartition(".")[2].startswith("$")
 
 
-def forget_key(here: Point, key: str, why: str) -> None:
+def forget_key(here: ProgramPoint, key: str, why: str) -> None:
     """Forget what a key and its parts hold: any of it may still be there."""
     if key in here.store.compound or here.world.first_parts(key):
         here.world.loosen(key, why)
@@ -401,7 +401,7 @@ def forget_key(here: Point, key: str, why: str) -> None:
 
 
 def fill(
-    here: Point, key: str, name: str, origin: str, parts: dict[str, Value]
+    here: ProgramPoint, key: str, name: str, origin: str, parts: dict[str, Value]
 ) -> None:
     """Let a key hold parts, and nothing else."""
     here.store.forget(key, f"{origin}, of which it is a copy, has no value for it")
@@ -413,7 +413,7 @@ def fill(
         here.store.write(key + suffix, value)
 
 
-def owned(here: Point, name: str, key: str, value: Position) -> Position:
+def owned(here: ProgramPoint, name: str, key: str, value: Position) -> Position:
     """Say which variable a literal is the value of."""
     declared = here.world.declared(here.place, name)
     shared = value.shared or bool(declared and declared.exported)

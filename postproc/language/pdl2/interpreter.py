@@ -19,14 +19,14 @@ from postproc.language.pdl2.calls import (
 from postproc.language.pdl2.collect import collect
 from postproc.language.pdl2.effects import changed_arguments, reach_rows, rows_effects
 from postproc.language.pdl2.entries import POSITIONS, Entries, Entry
-from postproc.language.pdl2.evaluate import Point
-from postproc.language.pdl2.job import Place, Points, Start, World, base_variable
+from postproc.language.pdl2.evaluate import ProgramPoint
+from postproc.language.pdl2.job import FilePoints, Place, Start, World, base_variable
 from postproc.language.pdl2.machine import (
     HANDLED,
     MAX_ROWS,
-    Arrival,
     Here,
     Machine,
+    Visit,
     forget,
     forget_names,
     pin_names,
@@ -39,14 +39,8 @@ from postproc.language.pdl2.values import Nothing, Position, Value, Vector
 from postproc.language.pdl2.variable_file import VariableFile
 from postproc.language.pdl2.variable_file import VariableFile as ValueFile
 from postproc.language.shapes import lower
-from postproc.language.visits import (
-    ELSEWHERE,
-    START,
-    Diagnostic,
-    Motion,
-    Target,
-    Visits,
-)
+from postproc.language.visits import ELSEWHERE, START, Diagnostic, Meaning, Visits
+from postproc.robot.trajectory import Motion
 
 # FOR loops: round by round where the bounds are constant, else over and over.
 
@@ -282,13 +276,13 @@ def _unknown(machine: Machine, here: Here, statement: ast.Unknown) -> None:
     names = frozenset(word.lower() for word in _WORD.findall(statement.text))
     forget_names(here, names, why)
     if _MOVES.match(statement.text):
-        arrival = Arrival(
+        arrival = Visit(
             here.place,
             here.row,
             machine.predecessors(here),
             here.store.settings,
             Motion.JOINT,
-            Target.UNKNOWN,
+            Meaning.UNKNOWN,
             reason="the move statement is not understood",
         )
         here.store.last = frozenset({machine.record(here, 1, arrival), ELSEWHERE})
@@ -376,7 +370,7 @@ def _declared(world: World, place: Place, seen: Variables) -> None:
         key = world.root(place, variable.name.lower())
         if variable.initial is None or key in world.initial:
             continue
-        value = Point(world, place, variable.row, store).value(variable.initial)
+        value = ProgramPoint(world, place, variable.row, store).value(variable.initial)
         if isinstance(value, Position) and not value.name:
             value = replace(
                 value,
@@ -419,7 +413,7 @@ def _enter_all(world: World, place: Place, file: ValueFile) -> None:
         key = world.root(place, root) + name[len(root) :]
         _enter(world, file, entries.entry(row), key)
     prefix = f"{place.program.name}/"
-    world.initial.points = Points(prefix, own, other, entries, base, shared, taught)
+    world.initial.points = FilePoints(prefix, own, other, entries, base, shared, taught)
 
 
 def _told_by_declaration(program: Program, entries: Entries) -> list[int]:

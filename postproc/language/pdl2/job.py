@@ -22,7 +22,7 @@ from postproc.language.visits import Diagnostic
 
 
 @dataclass(frozen=True)
-class Points:
+class FilePoints:
     """Points whose six numbers a variable file tells.
 
     Attributes:
@@ -96,7 +96,7 @@ class InitialValues:
     """Values by key; those of points are made when they are asked for."""
 
     other: dict[str, Value] = field(default_factory=dict)
-    points: Points | None = None
+    points: FilePoints | None = None
 
     def point(self, key: str) -> int:
         """Return the row of a point that the variable file tells, -1 for all else."""

@@ -9,13 +9,14 @@ from dataclasses import dataclass, field
 from postproc.arrays import Ints
 from postproc.language.pdl2 import syntax as ast
 from postproc.language.pdl2.effects import PURE, invocations, references
-from postproc.language.pdl2.evaluate import Point, forget_key, parts_under
+from postproc.language.pdl2.evaluate import ProgramPoint, forget_key, parts_under
 from postproc.language.pdl2.job import Place, World
 from postproc.language.pdl2.program import Body, Program
 from postproc.language.pdl2.store import MANY, MOST_ORIGINS, Settings, Store
 from postproc.language.pdl2.syntax import Move
 from postproc.language.pdl2.values import Nothing, Position, Value
-from postproc.language.visits import ELSEWHERE, Motion, Target
+from postproc.language.visits import ELSEWHERE, Meaning
+from postproc.robot.trajectory import Motion
 
 # What the analysis records of each arrival, before it becomes arrays.
 
@@ -26,7 +27,7 @@ WRITTEN, HELD = -1, -2  # instead of a row of the variable file
 
 
 @dataclass(frozen=True, slots=True)
-class Arrival:
+class Visit:
     """One visit.
 
     Attributes:
@@ -48,7 +49,7 @@ class Arrival:
     predecessors: frozenset[int]
     settings: Settings
     motion: Motion
-    target: Target
+    target: Meaning
     numbers: Numbers = _NO_NUMBERS
     position: Position | None = None
     fly: bool = False
@@ -62,7 +63,7 @@ class Arrival:
 
 
 @dataclass(frozen=True, slots=True)
-class Run:
+class MoveRun:
     """Moves that follow each other, each from the one before.
 
     Attributes:
@@ -113,7 +114,7 @@ Key = tuple[Context, int, int]
 
 
 @dataclass
-class Here(Point):
+class Here(ProgramPoint):
     """A point of the execution with the way that led to it."""
 
     context: Context = ()
@@ -139,7 +140,7 @@ class Machine:
     """
 
     world: World
-    arrivals: dict[Key, Arrival | Run] = field(default_factory=dict)
+    arrivals: dict[Key, Visit | MoveRun] = field(default_factory=dict)
     ids: dict[Key, int] = field(default_factory=dict)
     places: dict[Context, Place] = field(default_factory=dict)
     entries: dict[tuple[Context, int], Store] = field(default_factory=dict)
@@ -180,7 +181,7 @@ class Machine:
             self.next_id += count
         return self.ids[key]
 
-    def record(self, here: Here, sub: int, arrival: Arrival | Run) -> int:
+    def record(self, here: Here, sub: int, arrival: Visit | MoveRun) -> int:
         """Keep a visit; return its (first) id."""
         key = (here.context, self.position(here.place.program, here.row), sub)
         self.arrivals[key] = arrival

@@ -7,10 +7,11 @@ from dataclasses import dataclass, replace
 from postproc.language.pdl2 import syntax as ast
 from postproc.language.pdl2.effects import references
 from postproc.language.pdl2.evaluate import SINGLE, parts_under
-from postproc.language.pdl2.machine import Arrival, Here, Machine, pin_names
+from postproc.language.pdl2.machine import Here, Machine, Visit, pin_names
 from postproc.language.pdl2.store import Settings
 from postproc.language.pdl2.values import Nothing, Position, Value, Vector, unsure
-from postproc.language.visits import ELSEWHERE, NO_TARGET, Motion, Target
+from postproc.language.visits import ELSEWHERE, NO_TARGET, Meaning
+from postproc.robot.trajectory import Motion
 
 # Nodes of paths as destinations: where the one position of a node stands.
 
@@ -76,12 +77,12 @@ def _unread(here: Here, key: str) -> bool:
 # What the destination of a move means: where the arm goes, as far as it is told.
 
 _FRAME = {
-    "TOOL": Target.RELATIVE_TOOL,
-    "BASE": Target.RELATIVE_BASE,
-    "UFRAME": Target.RELATIVE_UFRAME,
+    "TOOL": Meaning.RELATIVE_TOOL,
+    "BASE": Meaning.RELATIVE_BASE,
+    "UFRAME": Meaning.RELATIVE_UFRAME,
 }
 UNSURE = "a move whose target is not sure may go to it"
-_PLACES = {"home": Target.HOME, "cal_sys": Target.CALIBRATION}
+_PLACES = {"home": Meaning.HOME, "cal_sys": Meaning.CALIBRATION}
 
 
 @dataclass(frozen=True)
@@ -96,7 +97,7 @@ class Goal:
         reason: Why it cannot be compensated, "" where it can.
     """
 
-    target: Target
+    target: Meaning
     numbers: tuple[float | None, ...] = (None,) * 6
     position: Position | None = None
     distance: float | None = None
@@ -113,13 +114,13 @@ def goal_of(here: Here, statement: ast.Move, motion: Motion) -> Goal:
             return _relative(here, where[0], statement.frame)
         case "AWAY":
             distance = here.real(where[0])
-            return _no_target(Target.AWAY, (distance, *(None,) * 5), "AWAY")
+            return _no_target(Meaning.AWAY, (distance, *(None,) * 5), "AWAY")
         case "NEAR":
             goal = absolute(here, where[0])
             distance = here.real(where[1])
-            if goal.target is Target.POSE and distance is not None:
+            if goal.target is Meaning.POSE and distance is not None:
                 near = goal.position and replace(goal.position, name="", derived="NEAR")
-                return Goal(Target.NEAR, goal.numbers, near, distance, _why("NEAR"))
+                return Goal(Meaning.NEAR, goal.numbers, near, distance, _why("NEAR"))
         case "FOR":
             return _towards(here, where, motion)
         case "ALONG":
@@ -130,45 +131,45 @@ def goal_of(here: Here, statement: ast.Move, motion: Motion) -> Goal:
             by = here.value(where[0])
             here.world.pin(by, "MOVE BY goes on by it")
             if isinstance(by, Position) and by.joints:
-                return _no_target(Target.BY, by.numbers, "BY")
-    return Goal(Target.UNKNOWN, reason=_why(statement.how))
+                return _no_target(Meaning.BY, by.numbers, "BY")
+    return Goal(Meaning.UNKNOWN, reason=_why(statement.how))
 
 
 def _why(word: str) -> str:
     return f"{NO_TARGET} ({word})"
 
 
-def _no_target(target: Target, numbers: tuple[float | None, ...], word: str) -> Goal:
+def _no_target(target: Meaning, numbers: tuple[float | None, ...], word: str) -> Goal:
     """Return a goal that can be planned only where all its numbers are known."""
-    needed = {Target.AWAY: 1, Target.BY: 6, Target.ABOUT: 5}.get(target, 3)
+    needed = {Meaning.AWAY: 1, Meaning.BY: 6, Meaning.ABOUT: 5}.get(target, 3)
     if None in numbers[:needed]:
-        return Goal(Target.UNKNOWN, reason=_why(word))
+        return Goal(Meaning.UNKNOWN, reason=_why(word))
     return Goal(target, numbers, reason=_why(word))
 
 
 def _relative(here: Here, vector: ast.Expression, frame: str) -> Goal:
     value = here.value(vector)
     if not isinstance(value, Vector) or frame not in _FRAME:
-        return Goal(Target.UNKNOWN, reason=_why("RELATIVE"))
+        return Goal(Meaning.UNKNOWN, reason=_why("RELATIVE"))
     return _no_target(_FRAME[frame], (*value.numbers, None, None, None), "RELATIVE")
 
 
 def _about(here: Here, where: tuple[ast.Expression, ...], frame: str) -> Goal:
     axis, angle = here.value(where[0]), here.real(where[1])
     if not isinstance(axis, Vector) or frame not in _FRAME:
-        return Goal(Target.UNKNOWN, reason=_why("ABOUT"))
+        return Goal(Meaning.UNKNOWN, reason=_why("ABOUT"))
     numbers = (*axis.numbers, angle, float(_FRAME[frame]), None)
-    return _no_target(Target.ABOUT, numbers, "ABOUT")
+    return _no_target(Meaning.ABOUT, numbers, "ABOUT")
 
 
 def _towards(here: Here, where: tuple[ast.Expression, ...], motion: Motion) -> Goal:
     """Go a distance towards a pose: a place of its own on a straight line only."""
     goal, distance = absolute(here, where[1]), here.real(where[0])
-    known = goal.target is Target.POSE and distance is not None and distance >= 0.0
+    known = goal.target is Meaning.POSE and distance is not None and distance >= 0.0
     if not known or motion is not Motion.LINEAR:
-        return Goal(Target.UNKNOWN, reason=_why("FOR"))
+        return Goal(Meaning.UNKNOWN, reason=_why("FOR"))
     towards = goal.position and replace(goal.position, name="", derived="FOR")
-    return Goal(Target.FOR, goal.numbers, towards, distance, _why("FOR"))
+    return Goal(Meaning.FOR, goal.numbers, towards, distance, _why("FOR"))
 
 
 def _along(here: Here, path: ast.Expression) -> Goal:
@@ -180,7 +181,7 @@ def _along(here: Here, path: ast.Expression) -> Goal:
         f"the nodes of a path are not followed (MOVE ALONG {name}): the next move is "
         "taken to come from an unknown place"
     )
-    return Goal(Target.UNKNOWN, reason=reason)
+    return Goal(Meaning.UNKNOWN, reason=reason)
 
 
 def absolute(here: Here, expression: ast.Expression) -> Goal:
@@ -231,12 +232,12 @@ def _check_declared(here: Here, name: str) -> None:
 def from_value(value: Value, system: bool = False) -> Goal:
     """Tell what a move to a value means; `system`: to that of a system variable."""
     if isinstance(value, Nothing):
-        return Goal(Target.UNKNOWN, reason=f"the target is not known: {value.why}")
+        return Goal(Meaning.UNKNOWN, reason=f"the target is not known: {value.why}")
     if not isinstance(value, Position):
-        return Goal(Target.UNKNOWN, reason="the target is no position")
+        return Goal(Meaning.UNKNOWN, reason="the target is no position")
     if not value.complete:
         reason = "the target is known only in part before the program runs"
-        return Goal(Target.UNKNOWN, position=value, reason=reason)
+        return Goal(Meaning.UNKNOWN, position=value, reason=reason)
     reason = value.derived
     if reason:
         reason = f"the target is computed: {reason}"
@@ -244,7 +245,7 @@ def from_value(value: Value, system: bool = False) -> Goal:
         reason = "the target is a system variable"
     elif not value.editable:
         reason = "a number of the target is computed, not written"
-    target = Target.JOINTS if value.joints else Target.POSE
+    target = Meaning.JOINTS if value.joints else Meaning.POSE
     return Goal(target, value.numbers, value, reason=reason)
 
 
@@ -256,8 +257,8 @@ _MOTIONS = {
     "circular": Motion.CIRCULAR,
 }
 _FROM_HERE = frozenset(
-    {Target.RELATIVE_TOOL, Target.RELATIVE_BASE, Target.RELATIVE_UFRAME, Target.AWAY,
-     Target.ABOUT, Target.BY, Target.FOR}
+    {Meaning.RELATIVE_TOOL, Meaning.RELATIVE_BASE, Meaning.RELATIVE_UFRAME,
+     Meaning.AWAY, Meaning.ABOUT, Meaning.BY, Meaning.FOR}
 )  # fmt: skip
 _VIA, _END = 0, 1
 
@@ -312,8 +313,8 @@ def _keep(here: Here, statement: ast.Move) -> None:
     pin_names(here, names, "another arm goes to it too")
 
 
-def _as_via(arrival: Arrival) -> Arrival:
-    return Arrival(
+def _as_via(arrival: Visit) -> Visit:
+    return Visit(
         arrival.place,
         arrival.row,
         arrival.predecessors,
@@ -337,8 +338,8 @@ def _arrival(
     motion: Motion,
     goal: Goal,
     reason: str,
-) -> Arrival:
-    return Arrival(
+) -> Visit:
+    return Visit(
         here.place,
         here.row,
         predecessors,

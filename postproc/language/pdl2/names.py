@@ -45,7 +45,7 @@ def _entry_name(line: bytes) -> str:
 
 def _with_parts(lines: Sequence[bytes], wanted: Sequence[int]) -> Iterator[str]:
     """Do it for a file with records or paths: name their parts too."""
-    place, seen = _Place(), 0
+    place, seen = _NamedPlace(), 0
     for line in wanted:
         if line == 0:
             yield _entry_name(lines[0]) if lines else ""
@@ -57,7 +57,7 @@ def _with_parts(lines: Sequence[bytes], wanted: Sequence[int]) -> Iterator[str]:
 
 
 @dataclass
-class _Place:
+class _NamedPlace:
     """Where in a file a line stands.
 
     Attributes:

@@ -130,7 +130,7 @@ def _node_fields(c: Children) -> ast.NodeFields:
     return ast.NodeFields(tuple(name for name in names if name.startswith("$")))
 
 
-def _parameters(c: Children) -> list[ast.Parameter]:
+def _parameters(c: Children) -> list[ast.FormalParameter]:
     return [p for group in c for p in group]
 
 
@@ -213,15 +213,15 @@ def _call(c: Children) -> ast.Call:
 RULES: dict[str, Rule] = {
     "line": _statement,
     "labelled": lambda c: ast.Label(_name(c[0]).rstrip(": "), _statement(c)),
-    "program": lambda c: ast.Program(_name(c[0]), max([-1, *_of(c, int)])),
+    "program": lambda c: ast.ProgramHead(_name(c[0]), max([-1, *_of(c, int)])),
     "program_attribute": _program_attribute,
     "import": lambda c: ast.Import(_unquoted(c[0])),
-    "section": lambda c: ast.Section(_statement(c)),
+    "section": lambda c: ast.DeclarationSection(_statement(c)),
     "begin": lambda c: ast.Begin(),
     "end": lambda c: ast.End(_name(c[0]) if c else ""),
     "routine": _routine,
     "parameters": _parameters,
-    "parameter": lambda c: [ast.Parameter(n.lower(), c[1]) for n in c[0]],
+    "parameter": lambda c: [ast.FormalParameter(n.lower(), c[1]) for n in c[0]],
     "variables": _variables,
     "constant": lambda c: ast.Constant(_name(c[0]), c[1]),
     "structure": lambda c: ast.Structure(_name(c[0])),

@@ -352,7 +352,7 @@ class Body:
     name: str
     first: int
     last: int
-    parameters: tuple[ast.Parameter, ...]
+    parameters: tuple[ast.FormalParameter, ...]
     variables: Variables
     blocks: Blocks
 
@@ -437,9 +437,9 @@ class _Reader:
     def take(self, row: int, statement: ast.Statement) -> None:
         scope = self.scopes[-1]
         match statement:
-            case ast.Section(then) if then is not None:
+            case ast.DeclarationSection(then) if then is not None:
                 self.take(row, then)
-            case ast.Program(name, slot):
+            case ast.ProgramHead(name, slot):
                 self.name = name
                 if slot >= 0:
                     self.arm = int(self.lines.value[self.lines.first[row] + slot])

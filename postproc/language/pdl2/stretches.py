@@ -20,11 +20,11 @@ from postproc.language.pdl2.effects import (
     references,
 )
 from postproc.language.pdl2.job import Place, World
-from postproc.language.pdl2.machine import HELD, WRITTEN, Here, Machine, Run
+from postproc.language.pdl2.machine import HELD, WRITTEN, Here, Machine, MoveRun
 from postproc.language.pdl2.moves import motion_of
 from postproc.language.pdl2.values import Nothing, Value
 from postproc.language.shapes import alike, in_order, lower, name_index
-from postproc.language.visits import Motion
+from postproc.robot.trajectory import Motion
 
 # Lines that are run a thousand at a time: moves to known places, idle calls.
 #
@@ -38,7 +38,7 @@ _NOT_WITH = ("$move_type", "$tool", "$base", "$uframe")
 
 
 @dataclass(frozen=True)
-class Point:
+class PointVariable:
     """A variable that moves go to.
 
     Attributes:
@@ -73,7 +73,7 @@ class Quiet:
     statements: tuple[ast.Statement, ...]
     calls: tuple[bool, ...]
     named: tuple[bool, ...]
-    points: Mapping[int, Point]
+    points: Mapping[int, PointVariable]
     prefix: str
     names: Sequence[str]
     rows: Ints
@@ -171,7 +171,7 @@ class _Variants:
 
     def __post_init__(self) -> None:
         self.statements: list[ast.Statement] = []
-        self.points: dict[int, Point] = {}
+        self.points: dict[int, PointVariable] = {}
         self._known: dict[tuple[int, tuple[str, ...]], int] = {}
         self._parameters = {p.name for p in self.place.body.parameters}
         self.prefix = f"{self.place.program.name}/"
@@ -209,7 +209,7 @@ class _Variants:
             name = names[at].lower() if at >= 0 else where.name
             if index is None or not self._is_point(name, array=bool(where.steps)):
                 return -1
-            self.points[shape] = Point(self.world.root(self.place, name), index)
+            self.points[shape] = PointVariable(self.world.root(self.place, name), index)
             names = names[:at] + names[at + 1 :] if at >= 0 else names
         return self._variant(shape, names)
 
@@ -243,7 +243,7 @@ class _Variants:
         self.names += goal
         for k in np.flatnonzero((points & ~alone)[which]).tolist():
             key = self.world.root(place, goal[which[k]])
-            self.points[int(shapes[k])] = Point(key, index)
+            self.points[int(shapes[k])] = PointVariable(key, index)
         found: Bools = points[which]
         return found
 
@@ -405,7 +405,7 @@ class Stretches:
         here.row = int(rows[0])
         point, held = _points(here, quiet, rows, variant)
         moves = {k: quiet.statements[k] for k in ways}
-        run = Run(
+        run = MoveRun(
             here.place,
             rows,
             variant,
@@ -424,7 +424,7 @@ class Stretches:
 def _points(
     here: Here, quiet: Quiet, rows: Ints, variant: Ints
 ) -> tuple[Ints, dict[int, Value]]:
-    """Look up the variables that moves go to, see `Run`."""
+    """Look up the variables that moves go to, see `MoveRun`."""
     program, initial = here.place.program, here.world.initial
     point = np.full(len(rows), WRITTEN, dtype=np.int64)
     held: dict[int, Value] = {}
@@ -460,7 +460,7 @@ def _assigned(here: Here, quiet: Quiet, names: Ints) -> Bools:
     return found
 
 
-def _key(lines: Lines, point: Point, row: int) -> str:
+def _key(lines: Lines, point: PointVariable, row: int) -> str:
     """Return where the point of a move is stored, "" where its index is not known."""
     if not point.index:
         return point.key

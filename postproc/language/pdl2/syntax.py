@@ -101,7 +101,7 @@ class Type:
 
 
 @dataclass(frozen=True, slots=True)
-class Program(Statement):
+class ProgramHead(Statement):
     """``PROGRAM name``; `arm` is the slot of ``PROG_ARM=n``, -1 where there is none."""
 
     name: str
@@ -116,14 +116,14 @@ class Import(Statement):
 
 
 @dataclass(frozen=True, slots=True)
-class Section(Statement):
+class DeclarationSection(Statement):
     """``VAR``, ``CONST``, ``TYPE``, alone or with a declaration."""
 
     then: Statement | None
 
 
 @dataclass(frozen=True, slots=True)
-class Parameter:
+class FormalParameter:
     """One formal parameter."""
 
     name: str
@@ -135,7 +135,7 @@ class Routine(Statement):
     """``ROUTINE name(..)``; `exported` names the program that holds it, or is ""."""
 
     name: str
-    parameters: tuple[Parameter, ...]
+    parameters: tuple[FormalParameter, ...]
     exported: str
 
 

@@ -331,7 +331,7 @@ def function(name: str, x: float) -> Value:
 
 
 @dataclass(frozen=True)
-class Target:
+class Location:
     """Where a reference leads: a key and the component of the value there.
 
     Attributes:

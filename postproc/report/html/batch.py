@@ -20,7 +20,7 @@ CLASS = {"done": "safe", "left": "guarded", "failed": "unsafe"}  # of the style 
 
 
 @dataclass(frozen=True)
-class Row:
+class BatchRow:
     """What the page says of a program; mm are None where nothing came of it.
 
     Attributes:
@@ -72,7 +72,7 @@ def batch_report(title: str, entries: Iterable[Entry]) -> str:
         entries: Path, status and facts of every file, as in the log of the batch.
     """
     found = list(entries)
-    rows = [Row(*entry) for entry in found if entry[1] in PROGRAM]
+    rows = [BatchRow(*entry) for entry in found if entry[1] in PROGRAM]
     worst = {"failed": 0, "left": 1, "done": 2}
     rows.sort(key=lambda row: (worst[row.status], row.place))
     largest = [mm for row in rows if (mm := row.mm("largest_mm")) is not None]

@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from postproc.arrays import Floats, Ints
 from postproc.compensation.outcome import Outcome, Status
 from postproc.language.source import Source
-from postproc.language.visits import Motion
 from postproc.report.html.page import render, short, visible
 from postproc.robot.pose import MM
+from postproc.robot.trajectory import Motion
 
 # What the program page knows of every visit, as columns.
 
@@ -23,7 +23,7 @@ VIA = len(Motion)
 
 
 @dataclass(frozen=True)
-class Columns:
+class PageColumns:
     """n visits in program order (structure of arrays), units as people read them.
 
     Attributes:
@@ -83,7 +83,7 @@ class Columns:
 
 
 @dataclass(frozen=True)
-class Program:
+class ProgramPage:
     """Everything that the program page shows.
 
     Attributes:
@@ -98,14 +98,14 @@ class Program:
 
     name: str
     model: str
-    columns: Columns
+    columns: PageColumns
     predicted: Mapping[str, Mapping[str, float | None]]
     diagnostics: tuple[Mapping[str, object], ...]
     stages: Mapping[str, float]
     sources: Mapping[str, bytes]
 
 
-def columns_of(outcome: Outcome) -> Columns:
+def columns_of(outcome: Outcome) -> PageColumns:
     """Take the columns out of an outcome."""
     v, d = outcome.visits, outcome.decisions
     n, has = len(v), v.literal >= 0
@@ -116,7 +116,7 @@ def columns_of(outcome: Outcome) -> Columns:
     known = len(outcome.position) == n
     position = outcome.position / MM if known else np.full((n, 3), np.nan)
     blank = np.where(has, 0.0, np.nan)[:, None]
-    return Columns(
+    return PageColumns(
         files=v.files,
         names=v.names,
         reasons=d.reasons,
@@ -166,7 +166,7 @@ class Texts:
         return tuple(self._number)
 
 
-def columns_from(targets: Sequence[Mapping[str, Any]]) -> Columns:
+def columns_from(targets: Sequence[Mapping[str, Any]]) -> PageColumns:
     """Take the columns out of the targets of a report.
 
     Raises:
@@ -177,7 +177,7 @@ def columns_from(targets: Sequence[Mapping[str, Any]]) -> Columns:
     place = files.index([p["file"] for p in literals])
     statuses = {s.name.lower(): int(s) for s in Status}
     moves = {name: k for k, name in enumerate(MOVES)}
-    return Columns(
+    return PageColumns(
         visit=np.arange(1, len(targets) + 1),
         file=files.index([t["file"] for t in targets]),
         line=np.array([t["line"] for t in targets], dtype=np.int64),
@@ -223,7 +223,7 @@ STEPS = {
 }
 
 
-def choose(columns: Columns, most: int = MOST) -> Ints:
+def choose(columns: PageColumns, most: int = MOST) -> Ints:
     """Choose the visits that a page carries.
 
     Of a program with more than `most`, these are the visits left alone (at most half of
@@ -253,7 +253,7 @@ def _evenly(rows: Ints, most: int) -> Ints:
     return rows[np.arange(most) * len(rows) // most]
 
 
-def pack(columns: Columns) -> dict[str, Any]:
+def pack(columns: PageColumns) -> dict[str, Any]:
     """Write columns as lists of integers, with the size of a step beside them."""
     width = {"original": 6, "change": 6, "q_deg": 6}
     numbers = {
@@ -312,7 +312,7 @@ LONGEST = 500  # characters of a line
 Listing = dict[str, dict[str, list[int] | list[str]]]
 
 
-def listing(sources: Mapping[str, bytes], columns: Columns) -> Listing:
+def listing(sources: Mapping[str, bytes], columns: PageColumns) -> Listing:
     """Choose the lines that a page shows.
 
     Args:
@@ -334,7 +334,7 @@ def listing(sources: Mapping[str, bytes], columns: Columns) -> Listing:
     return out
 
 
-def _used(columns: Columns, name: str) -> NDArray[np.int64]:
+def _used(columns: PageColumns, name: str) -> NDArray[np.int64]:
     """Return the lines of a file that the visits name, ascending."""
     pairs = (
         (columns.file, columns.line),
@@ -376,7 +376,7 @@ LEFT_ALONE = (Status.UNSAFE, Status.GUARDED, Status.DISPLAY)  # most urgent firs
 
 
 @dataclass(frozen=True)
-class Group:
+class LeftAlone:
     """Visits that were left alone for the same reason.
 
     Attributes:
@@ -401,7 +401,7 @@ class Stage:
     share: float
 
 
-def left_alone(columns: Columns) -> tuple[Group, ...]:
+def left_alone(columns: PageColumns) -> tuple[LeftAlone, ...]:
     """Group what was not corrected by status and reason, the largest group first."""
     groups = []
     for status in LEFT_ALONE:
@@ -410,7 +410,7 @@ def left_alone(columns: Columns) -> tuple[Group, ...]:
         for k in np.argsort(-counts, kind="stable"):
             rows = np.flatnonzero(mine & (columns.why == codes[k]))
             groups.append(
-                Group(
+                LeftAlone(
                     status.name.lower(),
                     columns.reasons[codes[k]],
                     int(counts[k]),
@@ -420,7 +420,7 @@ def left_alone(columns: Columns) -> tuple[Group, ...]:
     return tuple(groups)
 
 
-def _place(columns: Columns, i: int) -> tuple[int, str, int, str]:
+def _place(columns: PageColumns, i: int) -> tuple[int, str, int, str]:
     """Say which visit, and where its move stands."""
     return (
         int(columns.visit[i]),
@@ -430,12 +430,12 @@ def _place(columns: Columns, i: int) -> tuple[int, str, int, str]:
     )
 
 
-def tell_counts(columns: Columns) -> dict[str, int]:
+def tell_counts(columns: PageColumns) -> dict[str, int]:
     """Count the visits of every status."""
     return {s.name.lower(): int((columns.status == s).sum()) for s in Status}
 
 
-def histogram(columns: Columns) -> dict[str, Any]:
+def histogram(columns: PageColumns) -> dict[str, Any]:
     """Count the lengths of the corrections that were made."""
     size = columns.size_mm[columns.status == Status.SAFE]
     size = size[np.isfinite(size)]
@@ -446,7 +446,7 @@ def histogram(columns: Columns) -> dict[str, Any]:
     return {"edges_mm": edges.round(6).tolist(), "counts": counts.tolist()}
 
 
-def uncertainty(columns: Columns) -> dict[str, float | None]:
+def uncertainty(columns: PageColumns) -> dict[str, float | None]:
     """Summarise the standard errors at the corrected targets, over the axes [mm]."""
     rows = columns.status == Status.SAFE
     size = np.linalg.norm(columns.std_mm[rows], axis=1)
@@ -485,7 +485,7 @@ def program_report(outcome: Outcome, sources: Mapping[str, bytes] | None = None)
         outcome: What came of a program.
         sources: Bytes of the source files by name; default: those of the outcome.
     """
-    program = Program(
+    program = ProgramPage(
         name=outcome.program,
         model=outcome.model,
         columns=columns_of(outcome),
@@ -509,7 +509,7 @@ def program_report_from_json(
     Raises:
         KeyError, ValueError, TypeError: It is no such report.
     """
-    program = Program(
+    program = ProgramPage(
         name=str(data["program"]),
         model=str(data["model"]),
         columns=columns_from(data["targets"]),
@@ -521,7 +521,7 @@ def program_report_from_json(
     return _page(program)
 
 
-def _page(program: Program) -> str:
+def _page(program: ProgramPage) -> str:
     """Choose what the page carries and render it."""
     columns = program.columns
     carried = columns[choose(columns)]
