@@ -19,26 +19,26 @@ Bytes = NDArray[np.uint8]
 
 K = TypeVar("K")
 T = TypeVar("T")
-PIECE = 2048  # rows at a time
+CHUNK = 2048  # rows at a time
 
 
-class Each(Protocol):
+class Map(Protocol):
     """How something is made of every task, in order: by `map`, or on two cores."""
 
     def __call__(self, make: Callable[[K], T], tasks: Sequence[K], /) -> Iterator[T]:
         """Make something of every task."""
 
 
-def in_pieces(work: Callable[[slice], T], n: int, size: int = PIECE) -> list[T]:
+def in_chunks(work: Callable[[slice], T], n: int, size: int = CHUNK) -> list[T]:
     """Do the work on slices of n rows, one after the other.
 
     >>> in_pieces(lambda rows: (rows.start, rows.stop), 5, 2)
     [(0, 2), (2, 4), (4, 5)]
     """
-    return [work(rows) for rows in pieces(n, size)]
+    return [work(rows) for rows in chunks(n, size)]
 
 
-def pieces(n: int, size: int = PIECE) -> Iterator[slice]:
+def chunks(n: int, size: int = CHUNK) -> Iterator[slice]:
     """Cut n rows into slices."""
     return (slice(a, min(a + size, n)) for a in range(0, n, size))
 

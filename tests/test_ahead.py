@@ -16,7 +16,7 @@ from postproc.compensation import windows as cuts
 from postproc.compensation.compensate import compensate
 from postproc.compensation.options import Clock, silent
 from postproc.compensation.outcome import Outcome
-from postproc.compensation.parallel import in_processes, is_same, shared_out
+from postproc.compensation.parallel import identical, in_processes, parts_of
 from postproc.exceptions import PostprocError
 from tests.bench import made
 
@@ -94,7 +94,7 @@ def test_seconds_of_all_processes_are_added() -> None:
 def test_shares_are_all_windows_in_their_order() -> None:
     for n in range(1, 9):
         for processes in range(1, 11):
-            parts = shared_out(range(n), processes)
+            parts = parts_of(range(n), processes)
             assert [k for part in parts for k in part] == list(range(n))
             assert len(parts) == min(n, processes)
             sizes = [len(part) for part in parts]
@@ -106,15 +106,15 @@ def test_the_last_bit_counts() -> None:
     places = np.full((1, 6), 0.1)
     one = replace(stop, planned=replace(stop.planned, q=places))
     other = replace(stop, planned=replace(stop.planned, q=np.nextafter(places, 1.0)))
-    assert is_same(one, replace(stop, planned=replace(stop.planned, q=places.copy())))
+    assert identical(one, replace(stop, planned=replace(stop.planned, q=places.copy())))
     for unlike in (other, stop, None, replace(one, doubtful=True)):
-        assert not is_same(one, unlike)
+        assert not identical(one, unlike)
 
 
 def test_rounding_leaves_the_rest_of_a_stop_alone() -> None:
     stop = compensate_module.WindowState(doubtful=True)
     stop = replace(stop, planned=replace(stop.planned, q=np.full((1, 6), 1 / 3)))
-    found = parallel.steady(stop)
+    found = parallel.rounded(stop)
     assert found.doubtful and len(found.corrected.wanted) == 0
     assert 0 < np.abs(found.planned.q - 1 / 3).max() <= 0.5 * 10.0**-parallel.DIGITS
 
@@ -143,7 +143,7 @@ def job(bench_cell, bench_model, monkeypatch):
 def assert_alike(a: Outcome, b: Outcome) -> None:
     assert a.outputs == b.outputs
     assert "".join(a.record.to_json()) == "".join(b.record.to_json())
-    assert is_same(a.decisions, b.decisions)
+    assert identical(a.decisions, b.decisions)
     assert (a.before, a.after) == (b.before, b.after)
     assert list(map(str, a.diagnostics)) == list(map(str, b.diagnostics))
 
@@ -153,13 +153,13 @@ def test_programs_come_out_as_from_one_process(job, monkeypatch, kind: str) -> N
     right = []
 
     def watched(foretold, stop) -> bool:
-        same = is_same(foretold, stop)
+        same = identical(foretold, stop)
         if isinstance(stop, compensate_module.WindowState):
             right.append(same)
         return same
 
     alone = job(kind, 1)
-    monkeypatch.setattr(parallel, "is_same", watched)
+    monkeypatch.setattr(parallel, "identical", watched)
     assert_alike(job(kind, 3), alone)
     assert right == [True, True]
 

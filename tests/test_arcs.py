@@ -7,7 +7,7 @@ import pytest
 from postproc.compensation.compensate import compensate
 from postproc.compensation.outcome import Status
 from postproc.compensation.program import read_program
-from postproc.compensation.windows import quiet_stops
+from postproc.compensation.windows import cut_points
 
 START = (300.0, 100.0, 200.0)
 
@@ -63,13 +63,13 @@ def test_all_three_points_are_left_alone(run, via, end, reason):
 def test_a_program_is_not_cut_where_a_step_begins(job_cell, step):
     lines = [f"MOVE LINEAR TO {point(*START)}", f"MOVE LINEAR {step}", NEXT]
     visits = read_program({"job.pdl": job(*lines)}, job_cell).visits
-    assert quiet_stops(visits).tolist() == [True, False, True, True, False]
+    assert cut_points(visits).tolist() == [True, False, True, True, False]
 
 
 def test_a_program_is_not_cut_where_an_arc_begins(job_cell):
     source = program(point(350, 150, 200), point(300, 200, 200))
     visits = read_program({"job.pdl": source}, job_cell).visits
-    assert quiet_stops(visits).tolist() == [True, False, False, True, False]
+    assert cut_points(visits).tolist() == [True, False, False, True, False]
 
 
 NEXT = f"MOVE LINEAR TO {point(250, 50, 250)}"

@@ -11,7 +11,7 @@ from postproc.compensation.program import Reading, read_program
 from postproc.compensation.rewrite import (
     VerificationError,
     check_numbers,
-    numbers_as_read,
+    read_back,
     write_numbers,
 )
 from postproc.robot.cell import Cell
@@ -36,7 +36,7 @@ def test_they_are_those_of_the_output(job_cell: Cell, seed: int) -> None:
     reading = read_program({"job.pdl": text.encode("latin-1")}, job_cell)
     rows, values = changed(reading, seed)
     output = write_numbers(reading, rows, values, "0" * 12)
-    found = numbers_as_read(reading.visits, rows, output.edits)
+    found = read_back(reading.visits, rows, output.edits)
     again = read_program(output.files, job_cell).visits
     direct = again.follows < 0
     np.testing.assert_array_equal(found[direct], again.values[direct])

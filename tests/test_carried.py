@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from postproc.compensation.decide import with_carried, with_movers
+from postproc.compensation.decide import with_dependants, with_origins
 from postproc.compensation.program import plan_visits, read_program
 from tests.written import FIRST, program
 
@@ -39,7 +39,7 @@ def test_all_that_moves_along_is_foretold(job_cell, planned) -> None:
     after = plan_visits(replace(visits, values=values), job_cell)
     real = (after.plan.tcp - before.plan.tcp)[:, :3, 3]
     shift = np.where(np.arange(len(visits))[:, None] == P[0], real, 0.0)
-    found = with_carried(visits, before, job_cell, values, shift)
+    found = with_dependants(visits, before, job_cell, values, shift)
     assert np.linalg.norm(real[[2, 3, 4, 5, 7]], axis=1).min() > 1e-4
     assert np.abs(found - real).max() < 2e-5
 
@@ -47,5 +47,5 @@ def test_all_that_moves_along_is_foretold(job_cell, planned) -> None:
 def test_those_that_are_moved_along_with_are_found(planned) -> None:
     visits, before = planned
     for asked, wanted in ((5, {1, 3, 4, 5}), (7, {1, 6, 7}), (6, {6})):
-        found = with_movers(visits, before, np.arange(len(visits)) == asked)
+        found = with_origins(visits, before, np.arange(len(visits)) == asked)
         assert set(np.flatnonzero(found).tolist()) == wanted

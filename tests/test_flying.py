@@ -7,7 +7,7 @@ import pytest
 
 from postproc.compensation.targets import rounding_of
 from postproc.language.visits import FlyTrajectory, FlyType
-from postproc.motion.path import Pull
+from postproc.motion.path import BlendCoupling
 from postproc.motion.targets import Fly
 from tests.made_visits import visits
 
@@ -43,8 +43,8 @@ def test_targets_make_up_for_what_their_neighbours_pull() -> None:
     n = 40
     middle = np.arange(1, n - 1)
     v, w = rng.uniform(0, 0.125, (2, n - 2))
-    pull = Pull(middle, middle - 1, middle + 1, v, w)
+    pull = BlendCoupling(middle, middle - 1, middle + 1, v, w)
     wanted = rng.normal(size=(n, 3))
     moved = pull.to_move(wanted)
     np.testing.assert_allclose(moved + pull.on(moved), wanted, atol=2e-3)
-    np.testing.assert_array_equal(Pull().to_move(wanted), wanted)
+    np.testing.assert_array_equal(BlendCoupling().to_move(wanted), wanted)

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from postproc.compensation import parallel
-from postproc.compensation.parallel import available, in_child
+from postproc.compensation.parallel import available, in_worker
 from postproc.exceptions import PostprocError, ProgramError
 
 PATIENCE = 20.0  # [s] until a process must be gone or be there
@@ -71,7 +71,7 @@ def test_items_arrive_in_order_and_whole() -> None:
 
     parent = os.getpid()
     before = children()
-    with in_child(work) as items:
+    with in_worker(work) as items:
         first, *rest = items
     np.testing.assert_array_equal(first, big[::2])
     assert rest == list(range(100)) and seen
@@ -87,7 +87,7 @@ def test_child_works_ahead_as_far_as_it_may(tmp_path) -> None:
     def made() -> int:
         return len(list(tmp_path.iterdir()))
 
-    with in_child(work, ahead=5) as items:
+    with in_worker(work, ahead=5) as items:
         until(lambda: made() == 7)  # five wait, one is being sent, one is held
         time.sleep(0.1)
         assert made() == 7
@@ -108,7 +108,7 @@ def test_errors_arrive_with_all_they_carry(error) -> None:
         yield 1
         raise error
 
-    with in_child(work) as items:
+    with in_worker(work) as items:
         assert next(items) == 1
         with pytest.raises(type(error)) as caught:
             next(items)
@@ -125,12 +125,12 @@ def test_error_that_cannot_be_pickled_is_told_in_words() -> None:
         raise OwnError("of a kind that nobody else knows")
         yield
 
-    with in_child(work) as items, pytest.raises(RuntimeError, match="OwnError: of a"):
+    with in_worker(work) as items, pytest.raises(RuntimeError, match="OwnError: of a"):
         next(items)
 
 
 def test_item_that_cannot_be_pickled_is_an_error() -> None:
-    with in_child(lambda: iter([lambda: 0])) as items:
+    with in_worker(lambda: iter([lambda: 0])) as items:
         with pytest.raises(Exception, match="pickle"):
             next(items)
 
@@ -142,7 +142,7 @@ def test_child_that_is_killed_is_an_error_with_a_cure() -> None:
         yield 2
 
     before = children()
-    with in_child(work) as items, pytest.raises(PostprocError, match="memory"):
+    with in_worker(work) as items, pytest.raises(PostprocError, match="memory"):
         list(items)
     assert children() <= before
 
@@ -155,7 +155,7 @@ def test_child_ends_with_the_block(error) -> None:
             yield 0
 
     def leave() -> Iterator[int]:
-        with in_child(work) as items:
+        with in_worker(work) as items:
             yield next(items)
             if error:
                 raise error
@@ -190,7 +190,7 @@ def test_signals_to_all_are_left_to_the_parent(tmp_path) -> None:
         until((tmp_path / "sent").exists)
         yield from range(3)
 
-    with in_child(work) as items:
+    with in_worker(work) as items:
         child = next(items)
         os.kill(child, signal.SIGINT)
         os.kill(child, signal.SIGTERM)
@@ -204,7 +204,7 @@ def test_without_room_for_a_process_the_work_is_done_here(monkeypatch) -> None:
         raise BlockingIOError(11, "Resource temporarily unavailable")
 
     monkeypatch.setattr(os, "fork", refuse)
-    with in_child(lambda: iter([os.getpid()])) as items:
+    with in_worker(lambda: iter([os.getpid()])) as items:
         assert list(items) == [os.getpid()]
     assert not signal.pthread_sigmask(signal.SIG_BLOCK, ())
 

@@ -21,11 +21,11 @@ from postproc.model.kinematics import Batch
 from postproc.model.model import parameter_variance
 from postproc.motion import blending
 from postproc.motion import path as cartesian
-from postproc.motion.path import Pull
+from postproc.motion.path import BlendCoupling
 from postproc.robot import direction, play, pose
 from postproc.robot.arm import DH
 from postproc.robot.inverse import ClosedForm
-from postproc.robot.play import NOTHING, Clamps, Edges, chained, passing, prefix
+from postproc.robot.play import NOTHING, Clamps, Edges, chains_of, passing, prefix
 from postproc.robot.pose import rotation_from_vector
 from postproc.robot.state import make_states
 
@@ -189,7 +189,7 @@ def test_states_in_a_graph(given, random, by_numpy):
     source[odd] = random.integers(-1, n, odd.sum())
     q = np.cumsum(random.normal(size=(n, 6)), axis=0)
     q[random.random(n) < 0.03] = np.nan
-    chains, half = chained(q, np.eye(6), first, source), np.full(6, 0.8)
+    chains, half = chains_of(q, np.eye(6), first, source), np.full(6, 0.8)
     steps = passing(chains.angles[np.repeat(np.arange(n), count)], half)
     asked = chains, steps, half, given
     found, meant = direction._states(*asked), by_numpy(direction._states, *asked)
@@ -205,7 +205,7 @@ def test_states_in_a_graph(given, random, by_numpy):
 def test_states_that_are_no_numbers_end(alone, by_numpy):
     # Two visits that lead to each other, one of them from an unknown place.
     first, source = np.array([0, 1, 3]), np.array([1, 0, -1])
-    chains = chained(np.zeros((2, 6)), np.eye(6), first, source)
+    chains = chains_of(np.zeros((2, 6)), np.eye(6), first, source)
     steps = Clamps(np.full((3, 6), np.nan), np.full((3, 6), np.nan))
     asked = direction._states, chains, steps, np.ones(6), NOTHING.play
     found = asked[0](*asked[1:]) if alone else by_numpy(*asked)
@@ -288,7 +288,7 @@ def test_rotation_vectors(random, by_numpy):
 def test_corners_that_pull(random, by_numpy):
     visit = np.setdiff1d(np.arange(1, 299), random.integers(0, 299, 60))
     shares = random.uniform(0, 0.125, (2, len(visit)))
-    pull = Pull(visit, visit - 1, visit + 1, *shares)
+    pull = BlendCoupling(visit, visit - 1, visit + 1, *shares)
     wanted = random.normal(size=(300, 3))
     assert np.array_equal(pull.to_move(wanted), by_numpy(pull.to_move, wanted))
     with pytest.raises(ValueError, match="none"):

@@ -5,7 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from postproc.compensation.clones import MoveSlot, SlotArrivals, connected, regroup
+from postproc.compensation.clones import (
+    MoveSlot,
+    SlotArrivals,
+    connected,
+    group_arrivals,
+)
 
 LIMIT = 0.5
 
@@ -36,7 +41,7 @@ def test_groups_hold_every_stop_once_and_agree(seed: int) -> None:
     rng = np.random.default_rng(seed)
     members, stays = drawn(rng), bool(rng.random() < 0.2)
     by_stop = {m.stop: m for m in members}
-    original, *groups = regroup(members, stays, LIMIT)
+    original, *groups = group_arrivals(members, stays, LIMIT)
     found = [stop for group in (original, *groups) for stop in group.stops]
     assert sorted(found, key=lambda s: s.line) == [m.stop for m in members]
     for group in groups:
@@ -62,9 +67,9 @@ def test_groups_hold_every_stop_once_and_agree(seed: int) -> None:
 def test_all_that_agree_share() -> None:
     change = {0: np.zeros((1, 3))}
     members = [SlotArrivals(MoveSlot(0, k, False), "p", change, True) for k in range(5)]
-    (only,) = regroup(members, False, LIMIT)
+    (only,) = group_arrivals(members, False, LIMIT)
     assert len(only.stops) == 5
-    original, one = regroup(members, True, LIMIT)
+    original, one = group_arrivals(members, True, LIMIT)
     assert original.stops == [] and len(one.stops) == 5
 
 

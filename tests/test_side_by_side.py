@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from postproc.compensation import parallel
-from postproc.compensation.parallel import LONG, in_turns, meanwhile
+from postproc.compensation.parallel import LONG, in_background, parallel_map
 from postproc.exceptions import PostprocError
 from tests.bench.made import milling
 
@@ -57,7 +57,7 @@ def worker(task: int) -> tuple[int, int]:
 @pytest.mark.parametrize("every", [2, 3, 4])
 def test_results_are_in_order_whoever_makes_them(cores, every: int) -> None:
     cores(2)
-    made = list(in_turns(worker, range(100, 100 + LONG), every))
+    made = list(parallel_map(worker, range(100, 100 + LONG), every))
     assert [task for task, _ in made] == list(range(100, 100 + LONG))
     here = [task % every == 100 % every for task, by in made if by == os.getpid()]
     assert len({by for _, by in made}) == 2 and len(here) == -(-LONG // every)
@@ -66,7 +66,7 @@ def test_results_are_in_order_whoever_makes_them(cores, every: int) -> None:
 @pytest.mark.parametrize(("number", "tasks"), [(1, 5 * LONG), (2, LONG - 1), (2, 0)])
 def test_one_core_or_little_work_makes_no_process(cores, number, tasks) -> None:
     cores(number)
-    made = list(in_turns(worker, range(tasks)))
+    made = list(parallel_map(worker, range(tasks)))
     assert made == [(task, os.getpid()) for task in range(tasks)]
 
 
@@ -77,7 +77,7 @@ def test_an_error_comes_after_what_is_before_it(cores) -> None:
         return task
 
     cores(2)
-    made = in_turns(make, range(LONG))
+    made = parallel_map(make, range(LONG))
     assert [next(made) for _ in range(7)] == list(range(7))
     with pytest.raises(PostprocError, match="told"):
         next(made)
@@ -86,7 +86,7 @@ def test_an_error_comes_after_what_is_before_it(cores) -> None:
 def test_meanwhile_is_done_by_another_where_it_is_worth_it(cores) -> None:
     for number, worth, others in ((2, True, 1), (2, False, 0), (1, True, 0)):
         cores(number)
-        with meanwhile(os.getpid, worth=worth) as ask:
+        with in_background(os.getpid, worth=worth) as ask:
             assert (ask() != os.getpid()) == others
 
 
@@ -96,9 +96,9 @@ def test_an_error_meanwhile_is_raised_where_its_result_is_asked_for(cores) -> No
 
     for number in (1, 2):
         cores(number)
-        with meanwhile(work, worth=True):
+        with in_background(work, worth=True):
             pass
-        with meanwhile(work, worth=True) as ask, pytest.raises(PostprocError):
+        with in_background(work, worth=True) as ask, pytest.raises(PostprocError):
             ask()
 
 

@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from postproc.compensation.iterate import SideSearch
+from postproc.compensation.iterate import SecantSearch
 
 
 def searched(gain: float, middle: float, rounds: int = 8) -> tuple[float, float]:
     """Search where found = middle + gain (aim - middle), clipped to the flanks."""
-    search, aim = SideSearch(), np.array([[1.0]])
+    search, aim = SecantSearch(), np.array([[1.0]])
     found = aim
     for _ in range(rounds):
         found = np.clip(middle + gain * (aim - middle), -1.0, 1.0)

@@ -11,7 +11,7 @@ import pytest
 from postproc.compensation import iterate, together
 from postproc.compensation.compensate import compensate
 from postproc.compensation.options import AS_USUAL, Options
-from postproc.compensation.together import Given, compensate_together
+from postproc.compensation.together import Given, compensate_batch
 from postproc.exceptions import CellError, ModelError, PostprocError, ProgramError
 from postproc.report.json import report_text
 from postproc.robot.cell import load_cell
@@ -49,7 +49,7 @@ def said(outcome):
 
 def assert_as_alone(programs, cell, model, options=AS_USUAL):
     """Compare what comes of programs together with what comes of each alone."""
-    found = compensate_together(programs, cell, model, options)
+    found = compensate_batch(programs, cell, model, options)
     assert len(found) == len(programs)
     for one, outcome in zip(programs, found, strict=True):
         assert said(outcome) == said(alone(one, cell, model, options)), one.name
@@ -79,7 +79,7 @@ def test_mixed_programs(mixed, job_model):
     for size in (2, 5, 100):
         for first in range(0, len(mixed), size):
             some = mixed[first : first + size]
-            found = compensate_together(some, cell, job_model, AS_USUAL)
+            found = compensate_batch(some, cell, job_model, AS_USUAL)
             for k, outcome in enumerate(found, first):
                 assert said(outcome) == meant[k], (size, mixed[k].name)
 
@@ -92,13 +92,13 @@ def test_other_options(mixed, options, job_model):
 
 def test_small_programs_share_a_pass(job_cell, job_model, monkeypatch):
     sizes = []
-    correct = together.correct_together
+    correct = together.correct_batch
 
     def watched(readings, *given):
         sizes.append(len(readings))
         return correct(readings, *given)
 
-    monkeypatch.setattr(together, "correct_together", watched)
+    monkeypatch.setattr(together, "correct_batch", watched)
     monkeypatch.setattr(together, "PASS", 35)
     programs = [given(f"p{k}.pdl", program(f"p{k}", 10, k)) for k in range(7)]
     programs.insert(4, given("nothing.pdl", EMPTY))
@@ -128,7 +128,7 @@ def test_one_that_fails_later_leaves_the_others(job_cell, job_model, monkeypatch
 
     monkeypatch.setattr(together, "correct", fragile)
     programs = [given(f"p{k}.pdl", program(f"p{k}", 10, k)) for k in range(3)]
-    found = compensate_together(programs, job_cell, job_model, AS_USUAL)
+    found = compensate_batch(programs, job_cell, job_model, AS_USUAL)
     assert isinstance(found[1], MemoryError)
     for k in (0, 2):
         assert said(found[k]) == said(alone(programs[k], job_cell, job_model, AS_USUAL))
@@ -139,28 +139,28 @@ def test_a_wrong_cell_or_model_is_said_of_every_program(job_cell, job_model):
     robot = job_cell.file.robot.model_copy(update={"absolute_accuracy": True})
     file = job_cell.file.model_copy(update={"robot": robot})
     twice = replace(job_cell, file=file)
-    found = compensate_together(programs, twice, job_model, AS_USUAL)
+    found = compensate_batch(programs, twice, job_model, AS_USUAL)
     assert [type(one) for one in found] == [CellError, CellError]
     other = replace(job_model, arm_id="another")
-    found = compensate_together(programs, job_cell, other, AS_USUAL)
+    found = compensate_batch(programs, job_cell, other, AS_USUAL)
     assert [type(one) for one in found] == [ModelError, ModelError]
 
 
 def test_nothing_at_all(job_cell, job_model):
-    assert compensate_together([], job_cell, job_model, AS_USUAL) == []
+    assert compensate_batch([], job_cell, job_model, AS_USUAL) == []
 
 
 def test_what_changes_sides_as_it_is_written_is_corrected_alone(
     job_cell, job_model, monkeypatch
 ):
     monkeypatch.setattr(iterate, "OTHER", 0.006)  # so that rounding is enough
-    begins, write = [], iterate.write
+    begins, write = [], iterate.write_and_read_back
 
     def watched(reading, *given):
         begins.append(len(reading.begins))
         return write(reading, *given)
 
-    monkeypatch.setattr(iterate, "write", watched)
+    monkeypatch.setattr(iterate, "write_and_read_back", watched)
     programs = [given(f"p{k}.pdl", crowded(f"p{k}", k)) for k in range(6)]
     for one in programs:
         alone(one, job_cell, job_model, AS_USUAL)

@@ -9,7 +9,7 @@ import pytest
 from postproc.compensation import parallel, rewrite
 from postproc.compensation.compensate import compensate
 from postproc.compensation.outcome import Outcome
-from postproc.compensation.parallel import in_child, sharing
+from postproc.compensation.parallel import in_worker, map_with
 from postproc.compensation.rewrite import VerificationError
 from postproc.exceptions import ProgramError
 from postproc.language import lines, source
@@ -31,9 +31,9 @@ def children(monkeypatch) -> list[object]:
 
     def watched(work, *more):
         begun.append(work)
-        return in_child(work, *more)
+        return in_worker(work, *more)
 
-    monkeypatch.setattr(parallel, "in_child", watched)
+    monkeypatch.setattr(parallel, "in_worker", watched)
     monkeypatch.setattr(parallel, "available", lambda: 2)
     monkeypatch.setattr(parallel, "LONG", 2)
     monkeypatch.setattr(lines, "_PIECE", 4_000)
@@ -57,7 +57,7 @@ def job(bench_cell, bench_model):
 
 def told(outcome: Outcome, processes: int) -> list[str]:
     """Return record and report but for the stages."""
-    each = sharing(processes)
+    each = map_with(processes)
     report = "".join(report_pieces(outcome, each))
     return [*outcome.record.to_json(each), report.partition('"stages_s"')[0]]
 
@@ -91,5 +91,5 @@ def test_an_open_string_is_found_on_its_line(children, line: int) -> None:
     text = [b"  MOVE TO {1, 2, 3, 4, 5, 6} -- some more text"] * 200
     text[line - 1] = b"  WRITE ('hello"
     with pytest.raises(ProgramError, match=f"x:{line}: a string is not terminated"):
-        lines.read_lines(source_from_bytes("x", b"\n".join(text)), sharing(2))
+        lines.read_lines(source_from_bytes("x", b"\n".join(text)), map_with(2))
     assert len(children) == 1

@@ -27,7 +27,7 @@ from postproc import __version__
 from postproc.batch.plan import JobSetup, Result, Task, Unit, failed
 from postproc.compensation.outcome import Outcome
 from postproc.compensation.record import SUFFIX
-from postproc.compensation.together import Given, compensate_together
+from postproc.compensation.together import Given, compensate_batch
 from postproc.exceptions import PostprocError
 from postproc.robot.pose import MM
 
@@ -248,7 +248,7 @@ def _compensated(tasks: Sequence[Task], setup: JobSetup) -> list[Outcome | Excep
     """Compensate the programs of tasks; what fails for all of them is told of each."""
     given = [_given(task) for task in tasks]
     try:
-        return compensate_together(given, setup.cell, setup.model, setup.options)
+        return compensate_batch(given, setup.cell, setup.model, setup.options)
     except Exception as exc:
         return [exc for _ in tasks]
 

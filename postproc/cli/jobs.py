@@ -7,12 +7,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from postproc.arrays import Each
+from postproc.arrays import Map
 from postproc.batch.tree import group_pages, named_programs, read_head
 from postproc.compensation.compensate import compensate, name_files
 from postproc.compensation.options import Options, Progress, silent
 from postproc.compensation.outcome import Outcome
-from postproc.compensation.parallel import sharing
+from postproc.compensation.parallel import map_with
 from postproc.compensation.record import sidecar_path
 from postproc.files import (
     PROGRAM,
@@ -213,7 +213,7 @@ class Job:
             OutputError: The output is the input, or cannot be written.
         """
         check_places([output, report, html], self.inputs)
-        each = sharing(processes)
+        each = map_with(processes)
         files: dict[Path, Content] = {}
         if report is not None and report != Path(STREAM):
             files[report] = map(str.encode, report_pieces(outcome, each))
@@ -238,7 +238,7 @@ class Job:
         return self.path or Path(self.name)
 
     def _results(
-        self, outcome: Outcome, target: Path, piped: bool, each: Each
+        self, outcome: Outcome, target: Path, piped: bool, each: Map
     ) -> dict[Path, Content]:
         """Name what a compensation gives, the file that users wait for last.
 
@@ -265,7 +265,7 @@ class Job:
 
 
 def _with_record(
-    outcome: Outcome, places: Mapping[str, Path], main: Path, each: Each
+    outcome: Outcome, places: Mapping[str, Path], main: Path, each: Map
 ) -> dict[Path, Content]:
     """Name the files of one program, behind the record that undoes them."""
     if not places:

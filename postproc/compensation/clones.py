@@ -14,7 +14,7 @@ from postproc.compensation.decide import Proposal
 from postproc.compensation.outcome import Status
 from postproc.compensation.program import Reading, read_program
 from postproc.files import VARIABLES
-from postproc.language.pdl2.clones import Named, clone, free_name, named_at
+from postproc.language.pdl2.clones import CloneTarget, clone, free_name, named_at
 from postproc.language.pdl2.program import Program, parse
 from postproc.language.source import CloneError, Edit, Source, apply
 from postproc.language.visits import Diagnostic, Visits
@@ -88,7 +88,7 @@ class SharedPoint:
         return True
 
 
-def regroup(
+def group_arrivals(
     members: Sequence[SlotArrivals], stays: bool, agree_mm: float
 ) -> tuple[SharedPoint, ...]:
     """Divide the stops that share literals into groups whose arrivals agree.
@@ -356,14 +356,17 @@ class _CloneWork:
 
     def separate(self, literals: frozenset[int], agree_mm: float) -> None:
         """Give the moves to some literals points of their own where they need them."""
-        named: dict[MoveSlot, Named] = {}
+        named: dict[MoveSlot, CloneTarget] = {}
         members = list(self._members(literals, named, agree_mm))
         stays = not literals.isdisjoint(self.proposal.fixed.tolist())
-        for group in regroup(members, stays, agree_mm)[1:]:
+        for group in group_arrivals(members, stays, agree_mm)[1:]:
             self._clone([named[stop] for stop in group.stops], group)
 
     def _members(
-        self, literals: frozenset[int], named: dict[MoveSlot, Named], agree_mm: float
+        self,
+        literals: frozenset[int],
+        named: dict[MoveSlot, CloneTarget],
+        agree_mm: float,
     ) -> Iterator[SlotArrivals]:
         """Yield all stops at some literals; also say which variable each names."""
         visits = self.reading.visits
@@ -389,7 +392,7 @@ class _CloneWork:
                 found = replace(found, variable=one.key)
             yield found
 
-    def _clone(self, named: list[Named], group: SharedPoint) -> None:
+    def _clone(self, named: list[CloneTarget], group: SharedPoint) -> None:
         """Clone one variable, or say why not."""
         visits, variable = self.reading.visits, named[0].variable
         file = group.stops[0].file

@@ -14,7 +14,7 @@ from postproc.compensation.clones import give_own_points
 from postproc.compensation.decide import Proposal
 from postproc.compensation.eligibility import overruled
 from postproc.compensation.frames import correct_taught
-from postproc.compensation.iterate import AT_START, Corrected, Left, settle
+from postproc.compensation.iterate import AT_START, Converged, EndState, iterate
 from postproc.compensation.notes import (
     assumed_off,
     followed_pages,
@@ -26,7 +26,7 @@ from postproc.compensation.notes import (
 )
 from postproc.compensation.options import AS_USUAL, Clock, Options, Progress, silent
 from postproc.compensation.outcome import Decisions, Outcome, tell_arrivals
-from postproc.compensation.parallel import in_processes, sharing, steady
+from postproc.compensation.parallel import in_processes, map_with, rounded
 from postproc.compensation.program import (
     Planned,
     Reading,
@@ -42,7 +42,7 @@ from postproc.compensation.rewrite import (
     write_edits,
 )
 from postproc.compensation.targets import rounded_points
-from postproc.compensation.windows import Window, run_up, windows
+from postproc.compensation.windows import Window, lead_in, windows
 from postproc.exceptions import CellError, ProgramError
 from postproc.language.source import Replacements, Source
 from postproc.language.stamp import is_stamped
@@ -58,7 +58,7 @@ from postproc.robot.state import States
 
 
 @dataclass(frozen=True)
-class Kept:
+class Correction:
     """A corrected program without poses, paths and plans (structure of arrays).
 
     Attributes:
@@ -86,15 +86,15 @@ class Kept:
     untimed: Bools
 
 
-def keep(
+def correction_of(
     visits: Visits,
     planned: Planned,
     states: States,
-    found: Corrected,
+    found: Converged,
     cell: Cell,
     model: Model,
     seeds: int = 0,
-) -> Kept:
+) -> Correction:
     """Keep what a report says of corrected visits, but for the first `seeds`."""
     proposal, done, plan = found.proposal, found.reached, planned.plan
     moved = proposal.corrected
@@ -102,7 +102,7 @@ def keep(
     wanted = plan.tcp[:, :3, 3] + planned.shift
     before = model.error(cell.arm, states[moved]) - planned.shift[moved]
     after = done.tcp[moved, :3, 3] + model.error(cell.arm, new) - wanted[moved]
-    return Kept(
+    return Correction(
         edited=proposal.edited,
         edits=found.edits,
         decisions=proposal.decisions.part(slice(seeds, None)),
@@ -116,17 +116,17 @@ def keep(
     )
 
 
-def joined(parts: Sequence[Kept]) -> Kept:
+def joined(parts: Sequence[Correction]) -> Correction:
     """Put the windows of a program one after the other."""
     if len(parts) == 1:
         return parts[0]
     arrays = {
         f.name: np.concatenate([getattr(part, f.name) for part in parts])
-        for f in fields(Kept)
+        for f in fields(Correction)
         if f.name not in ("edits", "decisions")
     }
     edits = zip(*(part.edits for part in parts), strict=True)
-    return Kept(
+    return Correction(
         edits=tuple(Replacements.merged(own) for own in edits),
         decisions=_one_after_another([part.decisions for part in parts]),
         **arrays,
@@ -159,7 +159,7 @@ class WindowState:
 
     planned: StartState = NOWHERE
     doubtful: bool = False
-    corrected: Left = AT_START
+    corrected: EndState = AT_START
 
 
 def correct(
@@ -169,7 +169,7 @@ def correct(
     options: Options,
     clock: Clock,
     processes: int = 1,
-) -> tuple[Reading, Kept]:
+) -> tuple[Reading, Correction]:
     """Plan a program, and correct it until its sides are those corrected for.
 
     Moves can only be given points of their own when all arrivals are at hand: with
@@ -213,14 +213,14 @@ class _WindowWork:
     model: Model
     options: Options
 
-    def whole(self, clock: Clock) -> tuple[Kept, Proposal]:
+    def whole(self, clock: Clock) -> tuple[Correction, Proposal]:
         """Correct the program as one window; return all of its proposal."""
         kept, proposal, _ = self._correct(self.reading.visits, 0, WindowState(), clock)
         return kept, proposal
 
     def correct(
         self, window: Window, begin: WindowState, clock: Clock
-    ) -> tuple[Kept, WindowState]:
+    ) -> tuple[Correction, WindowState]:
         """Correct a window; return what is kept of it, and how it ends."""
         visits = window.of(self.reading.visits)
         kept, _, end = self._correct(visits, window.seeds, begin, clock)
@@ -232,7 +232,7 @@ class _WindowWork:
         Right where the joints have lost their memory of what was before these. That the
         program begins there is an invention: what fails of it tells nothing.
         """
-        visits = run_up(self.reading.visits, window)
+        visits = lead_in(self.reading.visits, window)
         if visits is None:
             return None
         try:
@@ -243,7 +243,7 @@ class _WindowWork:
 
     def _correct(
         self, visits: Visits, seeds: int, begin: WindowState, clock: Clock
-    ) -> tuple[Kept, Proposal, WindowState]:
+    ) -> tuple[Correction, Proposal, WindowState]:
         """Correct some visits, the first `seeds` of which are only where they begin."""
         cell, model, options = self.cell, self.model, self.options
         part, timed = replace(self.reading, visits=visits), "speed" in model.needs
@@ -254,10 +254,10 @@ class _WindowWork:
         temperature = cell.temperature if given is None else given
         states = states_of(planned.plan, cell, temperature)
         left = begin.corrected
-        found = settle(part, planned, states, cell, model, options, clock, left)
+        found = iterate(part, planned, states, cell, model, options, clock, left)
         with clock("report"):
-            kept = keep(visits, planned, states, found, cell, model, seeds)
-        end = steady(WindowState(planned.plan.end, planned.doubtful, found.left))
+            kept = correction_of(visits, planned, states, found, cell, model, seeds)
+        end = rounded(WindowState(planned.plan.end, planned.doubtful, found.left))
         return kept, found.proposal, end
 
 
@@ -302,7 +302,7 @@ def compensate(
     refuse(files, cell, model)
     cell = with_measured_play(cell, model)
     with clock("parse"):
-        reading = read_program(files, cell, each=sharing(processes))
+        reading = read_program(files, cell, each=map_with(processes))
     reading, kept = correct(reading, cell, model, options, clock, processes)
     return finish(name, reading, kept, cell, model, options, clock, processes)
 
@@ -349,7 +349,7 @@ def refuse(files: Mapping[str, bytes], cell: Cell, model: Model) -> None:
 def finish(
     name: str,
     reading: Reading,
-    kept: Kept,
+    kept: Correction,
     cell: Cell,
     model: Model,
     options: Options,
@@ -368,7 +368,7 @@ def finish(
 
 def write_and_verify(
     reading: Reading,
-    kept: Kept,
+    kept: Correction,
     cell: Cell,
     model: Model,
     clock: Clock,
@@ -382,7 +382,7 @@ def write_and_verify(
     with clock("rewrite"):
         output = write_edits(reading, kept.edits, model.id)
     with clock("verify"):
-        each = sharing(processes)
+        each = map_with(processes)
         again = read_program(output.files, cell, reading.programs, each)
         check_output(reading, again, output, kept.edited, processes)
         check_numbers(reading.visits, kept.decisions.corrected, again.visits)
@@ -392,7 +392,7 @@ def write_and_verify(
 def report(
     name: str,
     reading: Reading,
-    kept: Kept,
+    kept: Correction,
     output: Output,
     cell: Cell,
     model: Model,

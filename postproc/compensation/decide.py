@@ -103,7 +103,7 @@ def _counted(literals: Ints) -> tuple[Ints, Ints, Ints]:
 # Targets that the program computes from others: they move along with them.
 
 
-def followers(visits: Visits, agreement: Agreement) -> tuple[Ints, Ints]:
+def dependants(visits: Visits, agreement: Agreement) -> tuple[Ints, Ints]:
     """Find the visits that move along with a literal, and its row in the agreement."""
     rows = np.flatnonzero(visits.follows >= 0)
     return rows, np.searchsorted(agreement.literal, visits.follows[rows])
@@ -129,7 +129,7 @@ def worsened(
         trusted: The model can say what a visit needs, (n,).
         agree_mm: Changes that differ less are the same.
     """
-    rows, at = followers(visits, agreement)
+    rows, at = dependants(visits, agreement)
     whole = visits.target[rows] != Meaning.FOR
     rows, at = rows[whole], at[whole]
     needed = change_mm[rows]
@@ -141,7 +141,7 @@ def worsened(
     return found
 
 
-def carry_along(
+def move_dependants(
     visits: Visits, agreement: Agreement, chosen: Bools, values: Floats
 ) -> None:
     """Move the computed targets along with the literals that change, in place.
@@ -152,7 +152,7 @@ def carry_along(
         chosen: Literals that do change, (m,).
         values: Numbers of every visit, (n, 6).
     """
-    rows, at = followers(visits, agreement)
+    rows, at = dependants(visits, agreement)
     rows, at = rows[chosen[at]], at[chosen[at]]
     if len(rows) == 0:
         return
@@ -259,17 +259,17 @@ def strayed_along(
 ) -> Bools:
     """Tell which targets must stay for every arc to stay what it is, (n,).
 
-    Args are those of `with_carried`.
+    Args are those of `with_dependants`.
     """
     if not planned.targets.via.any():
         return np.zeros(len(visits), dtype=bool)
-    moves = with_carried(visits, planned, cell, values, shift)
+    moves = with_dependants(visits, planned, cell, values, shift)
     step = cell.limits.step_mm * MM
     away = strayed(planned.targets, planned.plan, moves, step)
-    return with_movers(visits, planned, away)
+    return with_origins(visits, planned, away)
 
 
-def with_carried(
+def with_dependants(
     visits: Visits, planned: Planned, cell: Cell, values: Floats, shift: Floats
 ) -> Floats:
     """Tell what all targets move by, (n, 3) [m], base frame.
@@ -284,7 +284,7 @@ def with_carried(
     t, moves = planned.targets, np.array(shift)
     rows = np.flatnonzero((visits.follows >= 0) & (values != visits.values).any(axis=1))
     if len(rows):
-        moves[rows] = _followed(visits, planned, cell, values, rows)
+        moves[rows] = _dependant_shift(visits, planned, cell, values, rows)
     for v, sources in _steps(planned):
         source = sources[np.argmax(np.linalg.norm(moves[sources], axis=1))]
         towards = np.zeros(3)
@@ -295,7 +295,7 @@ def with_carried(
     return moves
 
 
-def with_movers(visits: Visits, planned: Planned, found: Bools) -> Bools:
+def with_origins(visits: Visits, planned: Planned, found: Bools) -> Bools:
     """Add to some targets, (n,), those along with which they move."""
     found = np.array(found)
     for v, sources in reversed([*_steps(planned)]):
@@ -304,7 +304,7 @@ def with_movers(visits: Visits, planned: Planned, found: Bools) -> Bools:
     return np.asarray(found | np.isin(visits.literal, literals))
 
 
-def _followed(
+def _dependant_shift(
     visits: Visits, planned: Planned, cell: Cell, values: Floats, rows: Ints
 ) -> Floats:
     """Tell what computed targets move by, (m, 3) [m]."""
@@ -553,7 +553,7 @@ def decide(
     corrected = status == Status.SAFE
     values = np.array(visits.values)
     values[corrected] = agreement.values[agreement.group[corrected]]
-    carry_along(visits, agreement, chosen, values)
+    move_dependants(visits, agreement, chosen, values)
     decisions = Decisions(
         status=status.astype(np.int64),
         why=reasons.index,

@@ -9,7 +9,7 @@ import numpy as np
 from postproc.arrays import Bools, Floats, Ints
 from postproc.language.visits import OrntType, Switch, Visits
 from postproc.motion.branches import OTHER_TURN, nearest_turns, on_other_turns
-from postproc.motion.path import NEAR, rounds
+from postproc.motion.path import NEAR, arcs_of
 from postproc.motion.planner import Plan
 from postproc.motion.targets import TargetKind, Targets
 from postproc.robot.arm import Arm
@@ -131,7 +131,7 @@ def overruled(targets: Targets, plan: Plan) -> Overruled:
     )
 
 
-def mark_strings(
+def mark_configuration_flags(
     visits: Visits,
     targets: Targets,
     plan: Plan,
@@ -299,7 +299,7 @@ ANGLES = (
 ARC = "with $ORNT_TYPE {} how the tool turns on this arc is not sure: use RS_WORLD"
 
 
-def mark_turning(
+def mark_orientation_interpolation(
     visits: Visits, targets: Targets, plan: Plan, reasons: Reasons
 ) -> None:
     """Leave alone where another way of turning may matter.
@@ -383,7 +383,7 @@ def mark_arcs(targets: Targets, plan: Plan, reasons: Reasons) -> None:
         plan: Where they lead.
         reasons: Why visits must not be compensated; more are added.
     """
-    arcs = rounds(targets, plan.tcp, plan.aside)
+    arcs = arcs_of(targets, plan.tcp, plan.aside)
     near = arcs.too_near
     for rows, text in ((near, TOO_NEAR), (arcs.on_a_line & ~near, LINE)):
         reasons.mark(_among(arcs.visit[rows], len(targets)), text)
@@ -401,7 +401,7 @@ def strayed(targets: Targets, plan: Plan, shift: Floats, step: float) -> Bools:
         shift: What the targets move by, (n, 3) [m], base frame.
         step: How much farther than its points the path may move in any case [m].
     """
-    arcs = rounds(targets, plan.tcp, plan.aside)
+    arcs = arcs_of(targets, plan.tcp, plan.aside)
     if len(arcs) == 0:
         return np.zeros(len(targets), dtype=bool)
     own = shift[arcs.visit]

@@ -17,14 +17,14 @@ from postproc.compensation.command import (
 from postproc.compensation.decide import Proposal, propose
 from postproc.compensation.options import Clock, Options
 from postproc.compensation.program import Planned, Reading
-from postproc.compensation.rewrite import numbers_as_read
+from postproc.compensation.rewrite import read_back
 from postproc.compensation.targets import moved_targets
 from postproc.language.rewrite import edits as number_edits
 from postproc.language.source import Replacements
 from postproc.language.visits import Visits
 from postproc.model.model import Model
 from postproc.motion.planner import Plan
-from postproc.motion.replan import Course, Reached, reach, reach_again
+from postproc.motion.replan import Reached, Replanned, replan, replan_all
 from postproc.motion.targets import Targets
 from postproc.motion.trace import NOWHERE, StartState
 from postproc.robot.cell import Cell
@@ -37,7 +37,7 @@ FOLLOWS = 0.75  # gain above which the arrival runs away with the aim
 SECANTS = 4  # rounds of secant steps, before steps of half the way
 
 
-class SideSearch:
+class SecantSearch:
     """Search, joint by joint, for the side at which aim and arrival agree.
 
     A correction of a joint is as large as its play, so aiming where it was found last
@@ -87,7 +87,7 @@ CLOSE = 5e-6  # [m] how well rounded fly points are hit
 
 
 @dataclass(frozen=True)
-class Aim:
+class Iterate:
     """What n targets are corrected for in a round.
 
     Attributes:
@@ -118,7 +118,7 @@ class Aim:
 
 
 @dataclass(frozen=True)
-class Aiming:
+class Iteration:
     """What does not change from round to round.
 
     Attributes:
@@ -137,7 +137,7 @@ class Aiming:
     clock: Clock
     given: Floats
 
-    def first_aim(self) -> Aim:
+    def first_aim(self) -> Iterate:
         """Correct for the sides that were planned."""
         orientation = self.options.orientation
         with self.clock("solve"):
@@ -145,11 +145,11 @@ class Aiming:
                 self.model, self.cell, self.planned, self.states, orientation
             )
         none = np.zeros(len(self.states), dtype=bool)
-        return Aim(solved, np.zeros_like(self.planned.plan.aside), none, none)
+        return Iterate(solved, np.zeros_like(self.planned.plan.aside), none, none)
 
     def next_aim(
-        self, aim: Aim, moved: Bools, found: Floats, search: SideSearch
-    ) -> Aim:
+        self, aim: Iterate, moved: Bools, found: Floats, search: SecantSearch
+    ) -> Iterate:
         """Correct some targets for other sides, by those that were found."""
         orientation = self.options.orientation
         with self.clock("solve"):
@@ -161,18 +161,18 @@ class Aiming:
             )  # fmt: skip
         return replace(aim, solved=solved)
 
-    def propose(self, aim: Aim) -> tuple[Proposal, Floats]:
+    def propose(self, aim: Iterate) -> tuple[Proposal, Floats]:
         """Decide on numbers; return too where the path is to pass its targets."""
         with self.clock("decide"):
             plan = self.planned.plan
-            aside = aside_after(plan, self.wanted(aim)) + aim.bent
+            aside = passing_after(plan, self.wanted(aim)) + aim.bent
             proposal = propose(
                 self.reading, self.planned, aim.solved, aside, aim.held, self.cell,
                 self.options,
             )  # fmt: skip
         return proposal, aside
 
-    def wanted(self, aim: Aim) -> Floats:
+    def wanted(self, aim: Iterate) -> Floats:
         """Say what the path should move by at every target, (n, 3) [m]."""
         before = self.planned.plan.tcp[:, :3, 3]
         wanted = np.nan_to_num(aim.solved.command[:, :3, 3] - before)
@@ -198,7 +198,7 @@ class Aiming:
         return missed
 
 
-def aside_after(plan: Plan, wanted: Floats) -> Floats:
+def passing_after(plan: Plan, wanted: Floats) -> Floats:
     """Foretell where the path passes its fly points once targets have moved, (n, 3)."""
     return plan.aside + plan.pull.on(plan.pull.to_move(wanted))
 
@@ -206,7 +206,7 @@ def aside_after(plan: Plan, wanted: Floats) -> Floats:
 # Where the numbers of one program lead, as they change from round to round.
 
 
-class Courses:
+class Replanner:
     """The last course of a program, and the way to the next one."""
 
     def __init__(self, visits: Visits, targets: Targets, cell: Cell) -> None:
@@ -218,14 +218,14 @@ class Courses:
             cell: The arm and its surroundings.
         """
         self._visits, self._targets, self._cell = visits, targets, cell
-        self._last: Course | None = None
+        self._last: Replanned | None = None
 
     @property
     def end(self) -> StartState:
         """Return where the last course leaves the arm; nowhere before the first."""
         return NOWHERE if self._last is None else self._last.end
 
-    def after(self, values: Floats, begin: StartState) -> Course:
+    def after(self, values: Floats, begin: StartState) -> Replanned:
         """Find where the program leads with other numbers.
 
         Args:
@@ -239,9 +239,9 @@ class Courses:
         targets = moved_targets(self._targets, new, self._cell, rows)
         arm, last = self._cell.arm, self._last
         if last is None or last.begin is not begin:
-            self._last = reach(arm, targets, begin)
+            self._last = replan_all(arm, targets, begin)
         else:
-            self._last = reach_again(arm, last, targets, moved)
+            self._last = replan(arm, last, targets, moved)
         self._visits, self._targets = new, targets
         return self._last
 
@@ -255,7 +255,7 @@ CORNERS = 3  # rounds for what is curved there
 
 
 @dataclass(frozen=True)
-class Left:
+class EndState:
     """How the last target of some visits is left, for what comes after it.
 
     Attributes:
@@ -269,24 +269,24 @@ class Left:
     wanted: Floats
 
 
-AT_START = Left(NOWHERE, NOWHERE, np.empty((0, 3)))
+AT_START = EndState(NOWHERE, NOWHERE, np.empty((0, 3)))
 
 
-class NotTogetherError(Exception):
+class NotConcatenableError(Exception):
     """A program goes on by rounds that others beside it did not take."""
 
 
 @dataclass(frozen=True)
-class Corrected:
+class Converged:
     """A proposal, the edits that write it, and where the written numbers lead."""
 
     proposal: Proposal
     edits: tuple[Replacements, ...]
     reached: Reached
-    left: Left
+    left: EndState
 
 
-def settle(
+def iterate(
     reading: Reading,
     planned: Planned,
     states: States,
@@ -294,8 +294,8 @@ def settle(
     model: Model,
     options: Options,
     clock: Clock,
-    before: Left = AT_START,
-) -> Corrected:
+    before: EndState = AT_START,
+) -> Converged:
     """Correct and plan again, until the sides are those corrected for.
 
     The corrected program makes slightly other moves than the original, so a joint may
@@ -314,10 +314,10 @@ def settle(
     Raises:
         NotTogetherError: The last look found something in programs side by side.
     """
-    aiming = Aiming(
+    aiming = Iteration(
         reading, planned, states, cell, model, options, clock, before.wanted
     )
-    courses, search = Courses(reading.visits, planned.targets, cell), SideSearch()
+    courses, search = Replanner(reading.visits, planned.targets, cell), SecantSearch()
     aim = aiming.first_aim()
     for number in count():  # ends: from round ROUNDS on, `settled` or `held` grows
         proposal, meant = aiming.propose(aim)
@@ -328,7 +328,7 @@ def settle(
         missed = aiming.missed(proposal, looked.aside, meant)
         bend_on = number < CORNERS and bool(missed.any())
         if not moved.any() and not bend_on:
-            found, flipped = _written(aiming, aim, proposal, courses, before)
+            found, flipped = _read_back(aiming, aim, proposal, courses, before)
             if found is not None:
                 return found
             aim = replace(aim, held=aim.held | flipped)
@@ -340,9 +340,13 @@ def settle(
     raise AssertionError("unreachable")
 
 
-def _written(
-    aiming: Aiming, aim: Aim, proposal: Proposal, courses: Courses, before: Left
-) -> tuple[Corrected | None, Bools]:
+def _read_back(
+    aiming: Iteration,
+    aim: Iterate,
+    proposal: Proposal,
+    courses: Replanner,
+    before: EndState,
+) -> tuple[Converged | None, Bools]:
     """Write the numbers, and look at them as they will be read.
 
     Returns:
@@ -352,29 +356,29 @@ def _written(
         NotTogetherError: There are some, in programs side by side.
     """
     looked = courses.end
-    edits, proposal = write(aiming.reading, proposal, aiming.clock)
+    edits, proposal = write_and_read_back(aiming.reading, proposal, aiming.clock)
     with aiming.clock("plan again"):
         last = courses.after(proposal.decisions.corrected, before.written)
     flipped = aim.turned(proposal, last.side, OTHER)
     if flipped.any():
         if len(aiming.reading.begins) > 1:
-            raise NotTogetherError
+            raise NotConcatenableError
         return None, flipped
-    left = Left(looked, last.end, aiming.wanted(aim)[-1:].copy())
+    left = EndState(looked, last.end, aiming.wanted(aim)[-1:].copy())
     with aiming.clock("solve"):
         std_error = std_errors(aiming.model, aiming.cell, aiming.states, aim.solved)
     decided = replace(proposal.decisions, std_error=std_error)
     proposal = replace(proposal, decisions=decided)
-    return Corrected(proposal, edits, last.reached, left), flipped
+    return Converged(proposal, edits, last.reached, left), flipped
 
 
-def write(
+def write_and_read_back(
     reading: Reading, proposal: Proposal, clock: Clock
 ) -> tuple[tuple[Replacements, ...], Proposal]:
     """Write the numbers; return the edits, and the proposal as it will be read."""
     with clock("rewrite"):
         literals, edited = reading.visits.literals, proposal.edited
         edits = number_edits(literals, reading.sources, edited, proposal.values)
-        values = numbers_as_read(reading.visits, edited, edits)
+        values = read_back(reading.visits, edited, edits)
     decisions = replace(proposal.decisions, corrected=values)
     return edits, replace(proposal, decisions=decisions)

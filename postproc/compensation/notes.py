@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from postproc.arrays import Bools, Floats, in_pieces
+from postproc.arrays import Bools, Floats, in_chunks
 from postproc.files import VARIABLES
 from postproc.language.visits import NO_VALUE, Diagnostic, Meaning, Visits
 from postproc.robot.arm import Arm
@@ -95,7 +95,7 @@ def listing_cost(
     joints = rows & (visits.target == Meaning.JOINTS)
     if joints.any():
         at, tool = q[joints], _tool(visits, joints)
-        reach = in_pieces(lambda some: _reach(arm, at[some], tool[some]), len(at))
+        reach = in_chunks(lambda some: _reach(arm, at[some], tool[some]), len(at))
         lost = max(reach) * np.deg2rad(LISTED / 2)
         found.append(f"up to {lost / MM:.3f} mm at joint targets")
     first = np.flatnonzero(rows)[:1]

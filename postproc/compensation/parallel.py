@@ -21,7 +21,7 @@ from typing import IO, Any, NoReturn, Protocol, TypeVar, cast
 
 import numpy as np
 
-from postproc.arrays import Each
+from postproc.arrays import Map
 from postproc.compensation.options import Clock, silent
 from postproc.exceptions import PostprocError
 
@@ -56,7 +56,7 @@ def available() -> int:
 
 
 @contextmanager
-def in_child(
+def in_worker(
     work: Callable[[], Iterable[T]], ahead: int = AHEAD
 ) -> Iterator[Iterator[T]]:
     """Do work in a forked child that starts at once; yield what it makes, in order.
@@ -218,10 +218,12 @@ def in_processes(
     Raises:
         PostprocError: As the work does, for the first window that fails.
     """
-    own, *others = shared_out(windows, processes if can_fork() else 1)
+    own, *others = parts_of(windows, processes if can_fork() else 1)
     with ExitStack() as children:
         ahead = [
-            children.enter_context(in_child(partial(_ahead, work, part), len(part) + 1))
+            children.enter_context(
+                in_worker(partial(_speculate, work, part), len(part) + 1)
+            )
             for part in others
         ]
         stop = begin
@@ -229,7 +231,7 @@ def in_processes(
             kept, stop = work.correct(window, stop, clock)
             yield kept
         for part, found in zip(others, ahead, strict=True):
-            right = is_same(next(found), stop)
+            right = identical(next(found), stop)
             for window in part:
                 if right:
                     kept, stop, seconds = next(found)
@@ -239,7 +241,7 @@ def in_processes(
                 yield kept
 
 
-def shared_out(windows: Sequence[W], processes: int) -> list[Sequence[W]]:
+def parts_of(windows: Sequence[W], processes: int) -> list[Sequence[W]]:
     """Give every process its part, each one window at least.
 
     >>> shared_out("abcde", 2)
@@ -250,7 +252,7 @@ def shared_out(windows: Sequence[W], processes: int) -> list[Sequence[W]]:
     return [windows[a:b] for a, b in pairwise(ends)]
 
 
-def _ahead(work: Work[W, S, K], part: Sequence[W]) -> Iterator[Any]:
+def _speculate(work: Work[W, S, K], part: Sequence[W]) -> Iterator[Any]:
     """Foretell where some windows begin, and work through them; yield both.
 
     First the stop that was foretold, or None; then, for every window, its result, its
@@ -266,23 +268,23 @@ def _ahead(work: Work[W, S, K], part: Sequence[W]) -> Iterator[Any]:
         yield kept, stop, clock.stages
 
 
-def steady(stop: S) -> S:
+def rounded(stop: S) -> S:
     """Round a tree of dataclasses and arrays to `DIGITS`."""
     found: Any = stop
     if isinstance(found, np.ndarray):
         found = np.round(found, DIGITS)
     elif is_dataclass(found) and not isinstance(found, type):
-        own = {f.name: steady(getattr(found, f.name)) for f in fields(found)}
+        own = {f.name: rounded(getattr(found, f.name)) for f in fields(found)}
         found = replace(found, **own)
     return cast(S, found)
 
 
-def is_same(a: Any, b: Any) -> bool:
+def identical(a: Any, b: Any) -> bool:
     """Tell whether two trees of dataclasses and arrays agree, to the last bit."""
     if type(a) is not type(b):
         return False
     if is_dataclass(a) and is_dataclass(b):
-        return all(is_same(getattr(a, f.name), getattr(b, f.name)) for f in fields(a))
+        return all(identical(getattr(a, f.name), getattr(b, f.name)) for f in fields(a))
     if isinstance(a, np.ndarray):
         if a.dtype != b.dtype or a.shape != b.shape:
             return False
@@ -297,12 +299,14 @@ def is_same(a: Any, b: Any) -> bool:
 LONG = 20  # tasks from which on they are shared out
 
 
-def sharing(processes: int) -> Each:
+def map_with(processes: int) -> Map:
     """Return how to make something of every task with so many processes at most."""
-    return map if processes < 2 else in_turns
+    return map if processes < 2 else parallel_map
 
 
-def in_turns(make: Callable[[K], T], tasks: Sequence[K], every: int = 2) -> Iterator[T]:
+def parallel_map(
+    make: Callable[[K], T], tasks: Sequence[K], every: int = 2
+) -> Iterator[T]:
     """Make something of every task, in order.
 
     Both processes go through the tasks together, so that neither holds much of what
@@ -318,13 +322,13 @@ def in_turns(make: Callable[[K], T], tasks: Sequence[K], every: int = 2) -> Iter
         yield from map(make, tasks)
         return
     theirs = [task for number, task in enumerate(tasks) if number % every]
-    with in_child(lambda: map(make, theirs)) as made:
+    with in_worker(lambda: map(make, theirs)) as made:
         for number, task in enumerate(tasks):
             yield next(made) if number % every else make(task)
 
 
 @contextmanager
-def meanwhile(work: Callable[[], T], *, worth: bool) -> Iterator[Callable[[], T]]:
+def in_background(work: Callable[[], T], *, worth: bool) -> Iterator[Callable[[], T]]:
     """Begin work that nothing waits for yet; yield how to ask for its result, once.
 
     Args:
@@ -334,5 +338,5 @@ def meanwhile(work: Callable[[], T], *, worth: bool) -> Iterator[Callable[[], T]
     if not worth or available() < 2:
         yield work
         return
-    with in_child(lambda: [work()]) as made:
+    with in_worker(lambda: [work()]) as made:
         yield lambda: next(made)

@@ -7,17 +7,17 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from postproc.arrays import Each, Floats, Ints
+from postproc.arrays import Floats, Ints, Map
 from postproc.compensation.eligibility import (
     Reasons,
     mark_arcs,
-    mark_strings,
-    mark_turning,
+    mark_configuration_flags,
+    mark_orientation_interpolation,
 )
 from postproc.compensation.targets import targets_from_visits
 from postproc.exceptions import ProgramError
 from postproc.files import VARIABLES
-from postproc.language.pdl2.effects import never_reached
+from postproc.language.pdl2.effects import dead_moves
 from postproc.language.pdl2.interpreter import resolve
 from postproc.language.pdl2.job import Start, base_name
 from postproc.language.pdl2.program import Program, parse
@@ -131,7 +131,7 @@ def read_program(
     files: Mapping[str, bytes],
     cell: Cell,
     known: Sequence[Program] = (),
-    each: Each = map,
+    each: Map = map,
 ) -> Reading:
     """Parse a program and resolve its visits.
 
@@ -162,7 +162,7 @@ def read_program(
             texts.append(Skeleton.of(pages[-1].lines))
     others = _by_name(program, pages)
     resolved = resolve(program, start_of(cell), variables, others)
-    missed = never_reached([program, *pages], resolved.visits)
+    missed = dead_moves([program, *pages], resolved.visits)
     found = (*resolved.diagnostics, *missed)
     visits, parsed = resolved.visits, (program, *pages)
     corrected = {visits.files[k] for k in np.unique(visits.literals.file).tolist()}
@@ -170,7 +170,7 @@ def read_program(
     return Reading(tuple(texts), visits, found, programs=kept)
 
 
-def _parsed(source: Source, known: Sequence[Program], each: Each) -> Program:
+def _parsed(source: Source, known: Sequence[Program], each: Map) -> Program:
     """Parse a file, unless it was parsed before."""
     for program in known:
         if program.lines.source == source:
@@ -227,8 +227,8 @@ def plan_visits(
     wrist = np.deg2rad(cell.limits.wrist_deg)
     planned = plan(cell.arm, targets, wrist, timed, begin)
     reasons.adopt(planned.reason, planned.reasons)
-    on = mark_strings(visits, targets, planned, cell.arm, reasons, doubtful)
-    mark_turning(visits, targets, planned, reasons)
+    on = mark_configuration_flags(visits, targets, planned, cell.arm, reasons, doubtful)
+    mark_orientation_interpolation(visits, targets, planned, reasons)
     mark_arcs(targets, planned, reasons)
     return Planned(targets, planned, reasons, np.zeros((len(visits), 3)), on)
 

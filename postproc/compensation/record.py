@@ -13,7 +13,7 @@ from typing import Any, Self
 
 import numpy as np
 
-from postproc.arrays import Each
+from postproc.arrays import Map
 from postproc.byte_columns import joined, shortest, whole
 from postproc.exceptions import ProgramError
 from postproc.files import read_input, write_all
@@ -99,7 +99,7 @@ class FileRecord:
             dict(told.get("targets", {})),
         )
 
-    def to_json(self, each: Each = map) -> Iterator[str]:
+    def to_json(self, each: Map = map) -> Iterator[str]:
         """Write the record piece by piece: it is as long as the program."""
         told = {name: value for name, value in vars(self).items() if name != "edits"}
         targets = told.pop("targets")
@@ -143,7 +143,7 @@ class Sidecar:
     files: Mapping[str, FileRecord]
     options: Mapping[str, Any] = field(default_factory=dict)
 
-    def to_json(self, each: Each = map) -> Iterator[str]:
+    def to_json(self, each: Map = map) -> Iterator[str]:
         """Write the record as JSON text, piece by piece.
 
         Args:

@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from postproc import __version__
-from postproc.arrays import Bools, Floats, Ints, pieces
-from postproc.compensation.parallel import meanwhile
+from postproc.arrays import Bools, Floats, Ints, chunks
+from postproc.compensation.parallel import in_background
 from postproc.compensation.program import Reading
 from postproc.compensation.record import FileRecord, Sidecar, block_checksums, sha256
 from postproc.exceptions import PostprocError
@@ -123,9 +123,7 @@ def record(
 # The numbers of a corrected program as they will be read from its text.
 
 
-def numbers_as_read(
-    visits: Visits, edited: Ints, edits: Sequence[Replacements]
-) -> Floats:
+def read_back(visits: Visits, edited: Ints, edits: Sequence[Replacements]) -> Floats:
     """Give the numbers of all visits once the edits are made, (n, 6).
 
     Those of edited literals come out bit by bit, those of targets computed from them
@@ -215,7 +213,7 @@ def check_output(
         VerificationError: Another byte differs, or the program reads differently.
     """
     worth = processes > 1 and len(before.visits) > WORTH
-    with meanwhile(lambda: _in_texts(before, after, output), worth=worth) as ask:
+    with in_background(lambda: _in_texts(before, after, output), worth=worth) as ask:
         in_visits = _in_visits(before.visits, after.visits, output, edited)
         problem = ask() or in_visits
     if problem:
@@ -238,13 +236,13 @@ def _in_visits(v: Visits, w: Visits, output: Output, edited: Ints) -> str:
         return f"{name}: the output makes other moves"
     changes = np.append(np.zeros(len(v.literals), dtype=bool), False)  # none: -1
     changes[edited] = True
-    for rows in pieces(len(v), ROWS):
+    for rows in chunks(len(v), ROWS):
         kept = ~(changes[v.literal[rows]] | changes[v.follows[rows]])
         if not _same(v.values[rows][kept], w.values[rows][kept]):
             return f"{name}: a target changed that was to be kept"
     if not _move_along(v, w):
         return f"{name}: a computed target changed otherwise"
-    if not all(_as_meant(v, w, rows, output.edits) for rows in pieces(len(v), ROWS)):
+    if not all(_as_meant(v, w, rows, output.edits) for rows in chunks(len(v), ROWS)):
         return f"{name}: a number does not read as it was meant"
     for column in CONSTANT:
         if not _equal(getattr(v, column), getattr(w, column)):
@@ -286,7 +284,7 @@ def check_numbers(before: Visits, looked: Floats, after: Visits) -> None:
         VerificationError: A written number is not that one bit by bit, or a computed
             one differs by more than what adding constants rounds off.
     """
-    for rows in pieces(len(before), ROWS):
+    for rows in chunks(len(before), ROWS):
         wanted, read = looked[rows], after.values[rows]
         computed = before.follows[rows] >= 0
         if not _same(wanted[~computed], read[~computed]):
@@ -303,7 +301,7 @@ def _equal(a: Floats | tuple[str, ...], b: Floats | tuple[str, ...]) -> bool:
     if isinstance(a, tuple) or isinstance(b, tuple):
         return a == b
     return a.shape == b.shape and all(
-        _same(a[rows], b[rows]) for rows in pieces(len(a), ROWS)
+        _same(a[rows], b[rows]) for rows in chunks(len(a), ROWS)
     )
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from postproc.arrays import Bools, Floats, Ints
 from postproc.compensation.eligibility import Reasons
 from postproc.language.visits import Diagnostic, FlyTrajectory, FlyType, Meaning, Visits
-from postproc.motion.path import from_every_start
+from postproc.motion.path import arc_per_start
 from postproc.motion.targets import Fly, TargetKind, Targets
 from postproc.robot.cell import Cell
 from postproc.robot.pose import (
@@ -149,7 +149,7 @@ def targets_from_visits(visits: Visits, cell: Cell) -> tuple[Targets, Reasons]:
     )
     slot, turns = configurations(visits.configs)
     rounding, distance, overlap = rounding_of(visits)
-    pred_start, pred = from_every_start(
+    pred_start, pred = arc_per_start(
         visits.motion, visits.via, visits.pred_start, visits.pred
     )
     targets = Targets(

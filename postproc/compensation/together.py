@@ -14,11 +14,17 @@ from typing import ParamSpec, TypeVar
 
 import numpy as np
 
-from postproc.compensation.compensate import Kept, correct, finish, name_files, refuse
+from postproc.compensation.compensate import (
+    Correction,
+    correct,
+    finish,
+    name_files,
+    refuse,
+)
 from postproc.compensation.options import Clock, Options, silent
 from postproc.compensation.outcome import Outcome
 from postproc.compensation.program import Reading, read_program, with_measured_play
-from postproc.compensation.windows import begins, beside, offsets
+from postproc.compensation.windows import concatenate, first_visits, offsets
 from postproc.model.model import Model
 from postproc.robot.cell import Cell
 
@@ -38,7 +44,7 @@ class Given:
     pages: Mapping[str, bytes]
 
 
-def compensate_together(
+def compensate_batch(
     programs: Sequence[Given], cell: Cell, model: Model, options: Options
 ) -> list[Outcome | Exception]:
     """Compensate programs with the same cell and model.
@@ -53,7 +59,7 @@ def compensate_together(
         For every program what `compensate` returns, or else what it raises. `stages` is
         the time of all programs that were worked on.
     """
-    shop = _Shop(with_measured_play(cell, model), model, options, Clock(silent))
+    shop = _Setting(with_measured_play(cell, model), model, options, Clock(silent))
     readings = [_tried(shop.read, program) for program in programs]
     readable = [found for found in readings if isinstance(found, Reading)]
     corrected = chain.from_iterable(map(shop.corrected, _passes(readable)))
@@ -69,7 +75,7 @@ def compensate_together(
 
 
 @dataclass(frozen=True)
-class _Shop:
+class _Setting:
     """What all programs are worked on with."""
 
     cell: Cell
@@ -86,16 +92,16 @@ class _Shop:
 
     def corrected(
         self, readings: Sequence[Reading]
-    ) -> list[tuple[Reading, Kept] | Exception]:
+    ) -> list[tuple[Reading, Correction] | Exception]:
         """Correct the programs of a pass; one that fails leaves the others alone."""
         with_ = (self.cell, self.model, self.options, self.clock)
         if len(readings) > 1 and not self.options.clone:
-            found = _tried(correct_together, readings, *with_)
+            found = _tried(correct_batch, readings, *with_)
             if not isinstance(found, Exception):
                 return list(zip(readings, found, strict=True))
         return [_tried(correct, reading, *with_) for reading in readings]
 
-    def finished(self, given: Given, reading: Reading, kept: Kept) -> Outcome:
+    def finished(self, given: Given, reading: Reading, kept: Correction) -> Outcome:
         """Write a corrected program and verify it."""
         with_ = (self.cell, self.model, self.options, self.clock)
         return finish(given.name, reading, kept, *with_)
@@ -124,13 +130,13 @@ def _passes(readings: Sequence[Reading]) -> Iterator[list[Reading]]:
         yield waiting
 
 
-def correct_together(
+def correct_batch(
     readings: Sequence[Reading],
     cell: Cell,
     model: Model,
     options: Options,
     clock: Clock,
-) -> list[Kept]:
+) -> list[Correction]:
     """Plan and correct programs side by side; what fails for one fails for all.
 
     Args:
@@ -148,12 +154,12 @@ def correct_together(
     """
     own = [reading.visits for reading in readings]
     texts = tuple(text for reading in readings for text in reading.texts)
-    all_ = Reading(texts, beside(own), (), begins=begins(own))
+    all_ = Reading(texts, concatenate(own), (), begins=first_visits(own))
     _, kept = correct(all_, cell, model, options, clock)
-    return list(_apart(kept, readings))
+    return list(_split(kept, readings))
 
 
-def _apart(kept: Kept, readings: Sequence[Reading]) -> Iterator[Kept]:
+def _split(kept: Correction, readings: Sequence[Reading]) -> Iterator[Correction]:
     """Give every program what is its own."""
     moved = np.append(0, np.cumsum(kept.corrected))
     visits = offsets([len(reading.visits) for reading in readings])
@@ -163,7 +169,7 @@ def _apart(kept: Kept, readings: Sequence[Reading]) -> Iterator[Kept]:
     for k in range(len(readings)):
         rows = slice(*visits[k : k + 2])
         found = slice(*moved[visits[k : k + 2]])
-        yield Kept(
+        yield Correction(
             edited=kept.edited[slice(*edited[k : k + 2])] - literals[k],
             edits=kept.edits[slice(*files[k : k + 2])],
             decisions=kept.decisions.part(rows),

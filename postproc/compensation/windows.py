@@ -35,7 +35,7 @@ TABLES = {
 NOTHING_FIRST = ("names", "reasons")  # tables whose first row means that there is none
 
 
-def beside(programs: Sequence[Visits]) -> Visits:
+def concatenate(programs: Sequence[Visits]) -> Visits:
     """Put the visits of programs one after the other, each a program of its own."""
     columns = {
         f.name: _joined(f.name, programs)
@@ -50,7 +50,7 @@ def beside(programs: Sequence[Visits]) -> Visits:
     )
 
 
-def begins(programs: Sequence[Visits]) -> tuple[int, ...]:
+def first_visits(programs: Sequence[Visits]) -> tuple[int, ...]:
     """Return the first visit of each program where they are side by side."""
     return tuple(offsets(map(len, programs))[:-1])
 
@@ -98,7 +98,7 @@ def _aux(programs: Sequence[Visits]) -> NDArray[np.float64]:
     """Join auxiliary axes: each program has as many as it uses."""
     axes = max(program.aux.shape[1] for program in programs)
     out = np.full((sum(map(len, programs)), axes), np.nan)
-    for first, program in zip(begins(programs), programs, strict=True):
+    for first, program in zip(first_visits(programs), programs, strict=True):
         out[first : first + len(program), : program.aux.shape[1]] = program.aux
     return out
 
@@ -178,14 +178,14 @@ def windows(visits: Visits, least: int) -> list[Window]:
     if n < 2 * least:
         return [Window(0, n)]
     ends = [0]
-    for end in (np.flatnonzero(quiet_stops(visits)) + 1).tolist():
+    for end in (np.flatnonzero(cut_points(visits)) + 1).tolist():
         if end - ends[-1] >= least and n - end >= least:
             ends.append(end)
     ends.append(n)
     return [Window(a, b) for a, b in pairwise(ends)]
 
 
-def run_up(visits: Visits, window: Window) -> Visits | None:
+def lead_in(visits: Visits, window: Window) -> Visits | None:
     """Cut out what leads to a window, the first target reached from anywhere.
 
     Its first visit may be a fly point: a path on which the arm has not stopped, but
@@ -203,7 +203,7 @@ def run_up(visits: Visits, window: Window) -> Visits | None:
     return replace(before, pred_start=start, pred=np.append(-1, before.pred))
 
 
-def quiet_stops(visits: Visits) -> Bools:
+def cut_points(visits: Visits) -> Bools:
     """Tell behind which visits a program may be cut, (n,)."""
     return np.asarray(seams(visits) & ~visits.fly)
 

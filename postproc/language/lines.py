@@ -9,10 +9,16 @@ from typing import Any
 
 import numpy as np
 
-from postproc.arrays import Bools, Each, Floats, Indices
+from postproc.arrays import Bools, Floats, Indices, Map
 from postproc.exceptions import ProgramError
 from postproc.language.scan import NAME_MARK, NUMBER_MARK, WHOLE, mark_lines, mask_of
-from postproc.language.shapes import Numbers, Shapes, alike, find_shapes, in_order
+from postproc.language.shapes import (
+    Numbers,
+    Shapes,
+    alike,
+    find_shapes,
+    numbered_in_order,
+)
 from postproc.language.source import Source
 
 # Statements over several lines: one that ends with a comma goes on with clauses.
@@ -42,7 +48,7 @@ class Names:
 
 
 @dataclass(frozen=True)
-class Joined:
+class JoinedLines:
     """Lines of code, those of a statement in one.
 
     Attributes:
@@ -57,14 +63,14 @@ class Joined:
 
 
 def stripped(mask: bytes) -> bytes:
-    """Drop the blanks around the mask of a line, see `Marked`."""
+    """Drop the blanks around the mask of a line, see `MarkedLines`."""
     if mask[:1] == WHOLE:
         own = mask.strip()
         return WHOLE + own if own else own
     return mask.strip()
 
 
-def join(masks: Sequence[bytes], shape: Indices, names: Names) -> Joined:
+def join(masks: Sequence[bytes], shape: Indices, names: Names) -> JoinedLines:
     """Join the lines of every statement.
 
     Args:
@@ -86,7 +92,7 @@ def join(masks: Sequence[bytes], shape: Indices, names: Names) -> Joined:
     keep[inner + np.arange(len(inner))] = False
     number: dict[bytes, int] = {}
     parts, of_kind = shape.tolist() if len(starts) else [], []
-    for k in in_order(kind)[1].tolist():
+    for k in numbered_in_order(kind)[1].tolist():
         some = [own[part] for part in parts[starts[k] : starts[k] + length[k]]]
         if any(mask[:1] == WHOLE for mask in some):
             of_kind.append(-1)  # a row at a time: their names are filled in again
@@ -99,7 +105,7 @@ def join(masks: Sequence[bytes], shape: Indices, names: Names) -> Joined:
         found[k] = number.setdefault(text, len(number))
     shape[starts] = len(masks) + found
     rows = np.flatnonzero(keep)
-    return Joined((*own, *number), shape[rows], rows)
+    return JoinedLines((*own, *number), shape[rows], rows)
 
 
 def _whole(parts: Sequence[bytes], row: int, names: Names) -> bytes:
@@ -159,7 +165,7 @@ class LogicalRows:
     """Logical lines.
 
     Attributes:
-        masks: The distinct masks, stripped, see `Marked`.
+        masks: The distinct masks, stripped, see `MarkedLines`.
         shape: Index into `masks`, (n,).
         line: Physical line, (n,).
         first: CSR offsets into the numbers, (n + 1,).
@@ -173,7 +179,7 @@ class LogicalRows:
     name: Indices
 
 
-def divided(rows: LogicalRows) -> LogicalRows:
+def with_block_rows(rows: LogicalRows) -> LogicalRows:
     """Give the block that opens behind CASE or ELSE a row of its own."""
     found = {
         k: parts.groups()
@@ -256,7 +262,7 @@ class Lines:
                 yield row + 1, found.group(1).decode("latin-1")
 
 
-def read_lines(source: Source, each: Each = map) -> Lines:
+def read_lines(source: Source, each: Map = map) -> Lines:
     """Split a source into logical lines with masked numbers.
 
     Args:
@@ -313,7 +319,7 @@ class _Piece:
     """The n physical lines of a piece of a file, or of all of it.
 
     Attributes:
-        masks: Their distinct masks, see `Marked`.
+        masks: Their distinct masks, see `MarkedLines`.
         shape: Index into `masks`, (n,).
         comment: As in `Lines`.
         first: CSR offsets into the numbers, (n + 1,).
@@ -323,7 +329,7 @@ class _Piece:
         names: The names that are taken out of the masks, in order.
         name: Their numbers, the same for the same name, (p,).
         name_first: CSR offsets into them, (n + 1,).
-        unterminated: As in `Masked`.
+        unterminated: As in `MaskedLines`.
     """
 
     masks: tuple[bytes, ...]
@@ -397,7 +403,7 @@ def _logical(
     joined = join(masks, found.shape[rows], Names(at, found.name, tuple(names)))
     kept, short = rows[joined.rows], found.start.dtype
     first = np.append(found.first[kept], len(found.start)).astype(short)
-    lines = divided(
+    lines = with_block_rows(
         LogicalRows(joined.masks, joined.shape, kept + 1, first, at[joined.rows])
     )
     shapes, shape = find_shapes(lines.masks, lines.shape, lines.name, found.name, names)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from postproc.arrays import Bools, Bytes, Floats, Indices, Ints, pieces
+from postproc.arrays import Bools, Bytes, Floats, Indices, Ints, chunks
 from postproc.exceptions import ProgramError
 from postproc.language.lines import Lines, read_lines
 from postproc.language.scan import number_value
@@ -81,7 +81,7 @@ def differences(
     if before.shapes != after.shapes or (before.shape != after.shape).any():
         row = int(np.flatnonzero(before.shape != after.shape)[:1].sum())
         return (f"line {before.line[row]}: the rewritten line has another shape",)
-    for rows in pieces(len(allowed), AT_ONCE):
+    for rows in chunks(len(allowed), AT_ONCE):
         some = allowed[rows]
         at = np.searchsorted(before.start, some.start)
         whole = at < len(before.start)
@@ -94,7 +94,7 @@ def differences(
             return (f"line {line}: an edit does not replace one whole number",)
     growth = np.char.str_len(allowed.new) - (allowed.end - allowed.start)
     shift = stamp + np.cumsum(np.append(0, growth))
-    for rows in pieces(len(before.start), AT_ONCE):
+    for rows in chunks(len(before.start), AT_ONCE):
         start, end = before.start[rows], before.end[rows]
         edits = np.searchsorted(allowed.start, start)  # before the number
         wrong = after.start[rows] != start + shift[edits]
@@ -281,7 +281,7 @@ def edits(
         values, least = new_values[mine][written][order], least[written][order]
         parts = [
             _edits_of(source, start[some], end[some], values[some], least[some])
-            for some in pieces(len(start), _PIECE)
+            for some in chunks(len(start), _PIECE)
         ]
         found.append(Replacements.joined(parts))
     return tuple(found)

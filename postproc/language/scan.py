@@ -169,7 +169,7 @@ _IS_BLANK, _IS_UNARY = byte_table(BLANKS), byte_table(UNARY_CONTEXT + "\n\r")
 
 
 @dataclass(frozen=True)
-class Plain:
+class PlainNumbers:
     """Runs of digits and dots, most of which are plain numbers.
 
     Attributes:
@@ -186,9 +186,9 @@ class Plain:
     number: Bools
     odd: Bools
 
-    def take(self, some: Bools | Ints) -> Plain:
+    def take(self, some: Bools | Ints) -> PlainNumbers:
         """Return some of them."""
-        return Plain(*(column[some] for column in vars(self).values()))
+        return PlainNumbers(*(column[some] for column in vars(self).values()))
 
 
 def numeric_bytes(a: Bytes) -> Bools:
@@ -207,7 +207,7 @@ def runs_of(numeric: Bools) -> tuple[Ints, Ints]:
     return at[0::2], at[1::2]
 
 
-def plain_numbers(a: Bytes, start: Ints, end: Ints) -> Plain:
+def plain_numbers(a: Bytes, start: Ints, end: Ints) -> PlainNumbers:
     """Tell which runs of digits and dots are plain numbers.
 
     Args:
@@ -230,7 +230,7 @@ def plain_numbers(a: Bytes, start: Ints, end: Ints) -> Plain:
     odd[leading] |= in_word[leading] | np.isin(before[leading], (41, 93))
     odd |= digits & in_word & dotted & (a[end - 1] != DOT)
     point = np.where(dotted, dot[at], end)
-    return Plain(start, point, end, digits & ~odd & ~in_word, odd)
+    return PlainNumbers(start, point, end, digits & ~odd & ~in_word, odd)
 
 
 def with_signs(a: Bytes, first: Ints) -> tuple[Ints, Ints]:
@@ -260,7 +260,7 @@ def _previous(a: Bytes, at: Ints) -> tuple[Ints, Bools]:
     return at, _IS_BLANK[a[at]] & (at >= 0)
 
 
-def values(a: Bytes, numbers: Plain, start: Ints) -> Floats:
+def values(a: Bytes, numbers: PlainNumbers, start: Ints) -> Floats:
     """Return what numbers are worth, (m,).
 
     Up to 15 digits the digits are an exact integer and the power of ten an exact float,
@@ -445,7 +445,7 @@ _IS_IDLE = byte_table(BLANKS + ",({\n\r")
 
 
 @dataclass(frozen=True)
-class Masked:
+class MaskedLines:
     """The physical lines of a piece of a file.
 
     Attributes:
@@ -467,7 +467,7 @@ class Masked:
 
 
 @dataclass(frozen=True)
-class Marked:
+class MarkedLines:
     """The physical lines of a piece of a file, their numbered names marked too.
 
     Attributes:
@@ -477,7 +477,7 @@ class Marked:
         name_first: CSR offsets into them, (n + 1,).
     """
 
-    masked: Masked
+    masked: MaskedLines
     name: list[str]
     name_first: Ints
 
@@ -491,12 +491,12 @@ class _Code:
     quotes: Ints
     comment: Ints
     odd: Bools
-    runs: Plain
-    numbers: Plain
+    runs: PlainNumbers
+    numbers: PlainNumbers
     start: Ints
 
 
-def mask_lines(data: bytes, line_starts: Ints) -> Masked:
+def mask_lines(data: bytes, line_starts: Ints) -> MaskedLines:
     """Mask every physical line of a text that starts at a line start.
 
     Args:
@@ -508,7 +508,7 @@ def mask_lines(data: bytes, line_starts: Ints) -> Masked:
     return _with_odd_lines(data, line_starts, code.odd, _masked(code, none, none))
 
 
-def mark_lines(data: bytes, line_starts: Ints) -> Marked:
+def mark_lines(data: bytes, line_starts: Ints) -> MarkedLines:
     """Mask every line, and mark its numbered names where that is not out of the way.
 
     Args:
@@ -532,7 +532,7 @@ def mark_lines(data: bytes, line_starts: Ints) -> Marked:
     for k in np.flatnonzero(whole).tolist():
         masked.masks[k] = WHOLE + masked.masks[k]
     first = np.append(np.searchsorted(start, line_starts), len(start))
-    return Marked(masked, texts_of(a, start, end), first)
+    return MarkedLines(masked, texts_of(a, start, end), first)
 
 
 def _code(data: bytes, line_starts: Ints) -> _Code:
@@ -552,7 +552,7 @@ def _code(data: bytes, line_starts: Ints) -> _Code:
     return _Code(a, line_starts, quotes, comment, odd_line, runs, numbers, start)
 
 
-def _masked(code: _Code, names: Ints, name_ends: Ints) -> Masked:
+def _masked(code: _Code, names: Ints, name_ends: Ints) -> MaskedLines:
     """Mask the lines that are not odd, with the names from some places to others."""
     a, start, line_starts = code.a, code.start, code.line_starts
     dropped = _cover(len(a), start, code.numbers.end)
@@ -563,7 +563,7 @@ def _masked(code: _Code, names: Ints, name_ends: Ints) -> Masked:
     masks = _squeeze(a, dropped, code.quotes, start, names)
     first = np.append(np.searchsorted(start, line_starts), len(start))
     value = values(a, code.numbers, start)
-    return Masked(masks, code.comment, first, start, code.numbers.end, value, ())
+    return MaskedLines(masks, code.comment, first, start, code.numbers.end, value, ())
 
 
 def line_of(line_starts: Ints, place: Ints) -> Ints:
@@ -657,8 +657,8 @@ def _squeeze(
 
 
 def _with_odd_lines(
-    data: bytes, line_starts: Ints, odd: Bools, plain: Masked
-) -> Masked:
+    data: bytes, line_starts: Ints, odd: Bools, plain: MaskedLines
+) -> MaskedLines:
     """Mask the odd lines one by one and merge them with the plain ones."""
     if not odd.any():
         return plain
@@ -680,7 +680,7 @@ def _with_odd_lines(
     start = np.concatenate(starts)
     order = np.argsort(start, kind="stable")
     start = start[order]
-    return Masked(
+    return MaskedLines(
         plain.masks,
         plain.comment,
         np.append(np.searchsorted(start, line_starts), len(start)).astype(np.int64),

@@ -56,17 +56,17 @@ def alike(values: AnyInts, first: AnyInts, last: AnyInts) -> Ints:
 
 def _by_columns(values: AnyInts, first: AnyInts, length: AnyInts) -> Ints:
     """Number sequences: first by their lengths, then by one value after the other."""
-    kind, rows = in_order(length)[0], np.arange(len(first))
+    kind, rows = numbered_in_order(length)[0], np.arange(len(first))
     size = int(values.max(initial=0)) + 1
     for at in range(int(length.max(initial=0))):
         rows = rows[length[rows] > at]
         others = int(kind.max()) + 1
         pairs = kind[rows] * size + values[first[rows] + at]
-        kind[rows] = others + in_order(pairs)[0]
-    return in_order(kind)[0]
+        kind[rows] = others + numbered_in_order(pairs)[0]
+    return numbered_in_order(kind)[0]
 
 
-def in_order(keys: AnyInts) -> tuple[Ints, Ints]:
+def numbered_in_order(keys: AnyInts) -> tuple[Ints, Ints]:
     """Number keys in the order in which they appear.
 
     Args:
@@ -195,7 +195,7 @@ def find_shapes(
     count = np.zeros(len(texts), dtype=np.int64)
     own = np.full(len(texts), -1, dtype=np.int64)
     more: list[int] = []
-    for k in text[in_order(text)[1]].tolist():
+    for k in text[numbered_in_order(text)[1]].tolist():
         one = texts[k].decode("latin-1")
         found: tuple[str, ...] = ()
         if texts[k][:1] == WHOLE:
@@ -218,14 +218,14 @@ def find_shapes(
 def _numbered(
     form: Ints, begin: Ints, count: Ints, name: Ints, names: int
 ) -> tuple[Ints, Ints]:
-    """Number lines by their forms and their names; as `in_order`."""
+    """Number lines by their forms and their names; as `numbered_in_order`."""
     if not len(form) or not count.any():
-        return in_order(form)
+        return numbered_in_order(form)
     said = np.zeros(len(form), dtype=np.int64)
     one, many = np.flatnonzero(count == 1), np.flatnonzero(count > 1)
     said[one] = 1 + name[begin[one]]
     said[many] = 1 + names + alike(name, begin[many], (begin + count)[many])
-    return in_order(form * (int(said.max()) + 1) + said)
+    return numbered_in_order(form * (int(said.max()) + 1) + said)
 
 
 # Forms of lines: what differs in numbered names only is parsed once.
@@ -314,7 +314,7 @@ def _cased(name: str, letters: str) -> str:
 
 
 @dataclass(frozen=True, eq=False)
-class Formed(Sequence[T], Generic[T]):
+class ParsedShapes(Sequence[T], Generic[T]):
     """What each of k shapes says, made from its form when it is asked for.
 
     Attributes:
@@ -372,14 +372,14 @@ class Formed(Sequence[T], Generic[T]):
         return found
 
 
-def formed(shapes: Shapes, parse: Callable[[str], T]) -> Formed[T]:
+def parse_shapes(shapes: Shapes, parse: Callable[[str], T]) -> ParsedShapes[T]:
     """Parse the form of every shape.
 
     Args:
         shapes: Masks of lines.
         parse: Says what a form says.
     """
-    return Formed(tuple(map(parse, shapes.texts)), shapes)
+    return ParsedShapes(tuple(map(parse, shapes.texts)), shapes)
 
 
 def lower(names: Sequence[str]) -> list[str]:

@@ -13,7 +13,7 @@ from typing import NamedTuple, overload
 import numpy as np
 from numpy.typing import NDArray
 
-from postproc.arrays import Ints, pieces
+from postproc.arrays import Ints, chunks
 from postproc.exceptions import FileError, PostprocError, ProgramError
 
 # What is to be changed in a text: single edits, or a million of them as arrays.
@@ -113,7 +113,7 @@ class Replacements(Sequence[Edit]):
 
     def pieces(self) -> Iterator[Replacements]:
         """Cut into pieces that may become Python objects."""
-        return (self[some] for some in pieces(len(self), AT_ONCE))
+        return (self[some] for some in chunks(len(self), AT_ONCE))
 
     def apply(self, data: bytes) -> bytes:
         """Apply to a text.
@@ -132,7 +132,7 @@ class Replacements(Sequence[Edit]):
         if len(self) and not (self.start[0] >= 0 and self.end[-1] <= len(data)):
             raise ValueError("an edit lies outside")
         done = 0
-        for rows in pieces(len(self), WOVEN):
+        for rows in chunks(len(self), WOVEN):
             some = self[rows]
             yield _woven(data, done, some)
             done = int(some.end[-1])

@@ -14,7 +14,7 @@ import pydantic
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, NonNegativeFloat, PositiveInt
 
-from postproc.arrays import Bools, Floats, in_pieces, pieces
+from postproc.arrays import Bools, Floats, chunks, in_chunks
 from postproc.exceptions import ModelError
 from postproc.files import write_all
 from postproc.kernels import native
@@ -435,7 +435,7 @@ class Model:
     def error(self, arm: Arm, states: States) -> Floats:
         """Predict the error without its uncertainty, (n, 3) [m]."""
         effects, values, _ = self.compensable()
-        parts = in_pieces(
+        parts = in_chunks(
             lambda rows: effects.error(Batch(arm, states[rows]), values),
             len(states),
             CHUNK,
@@ -453,7 +453,7 @@ class Model:
         and half the gap enters both standard deviations.
         """
         model, arrival = np.empty((len(states), 3)), np.empty((len(states), 3))
-        for rows in pieces(len(states), CHUNK):
+        for rows in chunks(len(states), CHUNK):
             model[rows], at = self._variance(arm, states[rows])
             arrival[rows] = model[rows] + self.noise.arrival_variance(at.jacobian)
         model, arrival = (np.sqrt(np.maximum(v, 0.0)) for v in (model, arrival))
@@ -465,7 +465,7 @@ class Model:
 
     def std_error(self, arm: Arm, states: States) -> Floats:
         """Standard error of the predicted error, (n, 3) [m], as `predict` gives it."""
-        parts = in_pieces(
+        parts = in_chunks(
             lambda rows: self._variance(arm, states[rows])[0], len(states), CHUNK
         )
         variance = np.concatenate([np.zeros((0, 3)), *parts])

@@ -7,9 +7,9 @@ from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
-from postproc.arrays import Bools, Floats, Ints, in_pieces
+from postproc.arrays import Bools, Floats, Ints, in_chunks
 from postproc.kernels import floats, native
-from postproc.motion.path import Pull
+from postproc.motion.path import BlendCoupling
 from postproc.motion.targets import Fly, Targets
 from postproc.motion.trace import Trace
 from postproc.robot.arm import Arm
@@ -302,7 +302,7 @@ class Corners:
 def corners(arm: Arm, targets: Targets, traced: Trace) -> Corners:
     """Find all corners and where the path passes them."""
     found = zones(arm, targets, traced)
-    parts = in_pieces(
+    parts = in_chunks(
         lambda rows: _passed(arm, targets, traced, found[rows]), len(found.visit)
     )
     return _joined(parts)
@@ -470,7 +470,7 @@ class _Pieces:
     count: Ints
 
 
-def rounded(arm: Arm, targets: Targets, traced: Trace, timed: bool = True) -> Trace:
+def blend(arm: Arm, targets: Targets, traced: Trace, timed: bool = True) -> Trace:
     """Round the fly points of a trace.
 
     Its joint angles at rounded points become those of the point of the path that lies
@@ -498,7 +498,7 @@ def rounded(arm: Arm, targets: Targets, traced: Trace, timed: bool = True) -> Tr
     return replace(traced, q=q, aside=aside, edges=edges, share=share, pull=pull)
 
 
-def _pull(targets: Targets, traced: Trace, found: Corners) -> Pull:
+def _pull(targets: Targets, traced: Trace, found: Corners) -> BlendCoupling:
     """Tell how sharp corners move with the targets next to them.
 
     On a flat one the corrections of neighbours are alike but where a joint turns, and
@@ -506,7 +506,7 @@ def _pull(targets: Targets, traced: Trace, found: Corners) -> Pull:
     """
     to = np.repeat(np.arange(len(targets)), np.diff(targets.pred_start))
     zones, s = found.zones[~found.flat], found.nearest[~found.flat]
-    return Pull(
+    return BlendCoupling(
         zones.visit, traced.edges.source[zones.into], to[zones.out],
         zones.before * (1 - s) ** 2, zones.behind * s**2,
     )  # fmt: skip
@@ -600,7 +600,7 @@ def _samples(
 
 def _on_corners(traced: Trace, found: Corners, corner: Ints, s: Floats) -> Floats:
     """Place samples on corners, (m, 6) [rad]."""
-    parts = in_pieces(
+    parts = in_chunks(
         lambda rows: parabolas(traced, found.zones[corner[rows]])(s[rows]), len(s)
     )
     return np.concatenate([np.empty((0, 6)), *parts])

@@ -13,7 +13,7 @@ from postproc.robot.arm import Arm
 # The solutions at the samples of a path: all branches, or only those asked for.
 
 
-class Ways(Protocol):
+class Branched(Protocol):
     """Solutions of the inverse kinematics at k samples."""
 
     def __len__(self) -> int:
@@ -58,7 +58,7 @@ class SolvedBranches:
 
 
 @dataclass(frozen=True)
-class OnDemand:
+class BranchedLazily:
     """Ways of a long path, which keeps to one branch: the others are hardly needed.
 
     Attributes:
@@ -154,7 +154,7 @@ class Followed:
     reached: bool
 
 
-def follow(begin: Floats, ways: Ways) -> Followed:
+def follow(begin: Floats, ways: Branched) -> Followed:
     """Follow the branch and the turns that continue a motion.
 
     Args:

@@ -333,7 +333,7 @@ BETWEEN = (0.25, 0.5, 0.75)  # fractions of both parts of an arc that are looked
 
 
 @dataclass(frozen=True)
-class Rounds:
+class Arcs:
     """k arcs: one for every place from which a CIRCULAR move may begin.
 
     Attributes:
@@ -381,7 +381,7 @@ class Rounds:
         return np.where(known & ~after[0].valid, np.inf, extra)
 
 
-def rounds(targets: Targets, tcp: Floats, aside: Floats) -> Rounds:
+def arcs_of(targets: Targets, tcp: Floats, aside: Floats) -> Arcs:
     """Find the arcs of a program.
 
     Args:
@@ -391,7 +391,7 @@ def rounds(targets: Targets, tcp: Floats, aside: Floats) -> Rounds:
         aside: From the targets to there, (n, 3) [m].
     """
     if not targets.via.any():
-        return Rounds(np.empty((0, 3), dtype=np.int64), np.empty((0, 3, 3)))
+        return Arcs(np.empty((0, 3), dtype=np.int64), np.empty((0, 3, 3)))
     visit = np.repeat(np.arange(len(targets)), np.diff(targets.pred_start))
     source = targets.pred
     arc = (targets.move[visit] == Motion.CIRCULAR) & targets.via[visit]
@@ -400,10 +400,10 @@ def rounds(targets: Targets, tcp: Floats, aside: Floats) -> Rounds:
     own = tcp[start] @ inverse(targets.tool[start]) @ targets.tool[via]
     points = np.stack([own, tcp[via], tcp[via + 1]], axis=1)[:, :, :3, 3]
     arcs_at = np.stack([start, via, via + 1], axis=1)
-    return Rounds(arcs_at, points - aside[arcs_at])
+    return Arcs(arcs_at, points - aside[arcs_at])
 
 
-def from_every_start(
+def arc_per_start(
     move: Ints, via: Bools, pred_start: Ints, pred: Ints
 ) -> tuple[Ints, Ints]:
     """Let the end of an arc have VIA as its predecessor once for every start of it.
@@ -462,7 +462,7 @@ def _no_shares() -> Floats:
 
 
 @dataclass(frozen=True)
-class Pull:
+class BlendCoupling:
     """c rounded fly points where the path really bends.
 
     Attributes:

@@ -7,9 +7,9 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from postproc.arrays import Bools, Floats, Ints
-from postproc.motion.blending import rounded
-from postproc.motion.path import Pull
-from postproc.motion.replan import points, where_passed
+from postproc.motion.blending import blend
+from postproc.motion.path import BlendCoupling
+from postproc.motion.replan import planned_points, where_passed
 from postproc.motion.targets import CODE, REASONS, WRIST, Targets
 from postproc.motion.timing import no_time, tell_time
 from postproc.motion.trace import NOWHERE, StartState, Trace, trace
@@ -56,7 +56,7 @@ class Plan:
     reasons: tuple[str, ...]
     overruled: Bools
     untimed: Bools
-    pull: Pull
+    pull: BlendCoupling
     end: StartState
 
     def __post_init__(self) -> None:
@@ -100,12 +100,12 @@ def plan(
         PlanError: The arm has no closed-form inverse kinematics.
     """
     exact = trace(arm, targets, begin.known)
-    traced = rounded(arm, targets, exact, timed)
+    traced = blend(arm, targets, exact, timed)
     arrived = arrivals(arm, traced.q, traced.edges, begin.past)
     end = StartState.at_end(exact.q, exact.flange, exact.slot, arrived.past)
     clock = tell_time(arm, targets, traced) if timed else no_time(len(targets))
     tool = targets.tool
-    tcp = where_passed(arm, points(exact), traced.q) @ tool
+    tcp = where_passed(arm, planned_points(exact), traced.q) @ tool
     return Plan(
         traced.q, tcp, traced.aside, tool, arrived.direction, arrived.side,
         arrived.travel, clock.speed, clock.time, traced.slot,

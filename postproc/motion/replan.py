@@ -7,12 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from postproc.arrays import Bools, Floats, Ints, spans
-from postproc.motion.blending import rounded
+from postproc.motion.blending import blend
 from postproc.motion.targets import TargetKind, Targets
 from postproc.motion.trace import NOWHERE, Known, StartState, Trace, trace
 from postproc.robot.arm import Arm
 from postproc.robot.direction import Passages, Sides, passages, sides
-from postproc.robot.play import NOTHING, Clamps, Past
+from postproc.robot.play import NOTHING, Clamps, PlayState
 
 # Where moved targets lead the arm: joint angles and sides, without a time law.
 
@@ -48,7 +48,7 @@ class PlannedPoints:
 
 
 @dataclass(frozen=True)
-class Course:
+class Replanned:
     """The way through n targets, with what it takes to look at parts of it again.
 
     Attributes:
@@ -82,7 +82,7 @@ class Course:
     @property
     def end(self) -> StartState:
         """Return where the arm stands at the last target; reversals are not kept."""
-        past = Past(self.sides.play, NOTHING.turned)
+        past = PlayState(self.sides.play, NOTHING.turned)
         return StartState.at_end(self.exact.q, self.exact.flange, self.slot, past)
 
     @property
@@ -93,7 +93,7 @@ class Course:
         return Reached(self.passed, tcp, self.aside, self.side)
 
 
-def reach(arm: Arm, targets: Targets, begin: StartState = NOWHERE) -> Course:
+def replan_all(arm: Arm, targets: Targets, begin: StartState = NOWHERE) -> Replanned:
     """Find joint angles and sides only.
 
     For targets that a correction has moved: their speeds are those of the plan.
@@ -107,16 +107,16 @@ def reach(arm: Arm, targets: Targets, begin: StartState = NOWHERE) -> Course:
         PlanError: The arm has no closed-form inverse kinematics.
     """
     exact = trace(arm, targets, begin.known)
-    traced = rounded(arm, targets, exact, timed=False)
+    traced = blend(arm, targets, exact, timed=False)
     ways = passages(arm, traced.q, traced.edges)
     found = sides(arm, traced.q, ways, begin.past.play)
-    return Course(
-        arm, targets, points(exact), traced.q, traced.aside, exact.slot, ways, found,
-        begin,
+    return Replanned(
+        arm, targets, planned_points(exact), traced.q, traced.aside, exact.slot, ways,
+        found, begin,
     )  # fmt: skip
 
 
-def points(traced: Trace) -> PlannedPoints:
+def planned_points(traced: Trace) -> PlannedPoints:
     """Return the targets of a trace."""
     return PlannedPoints(traced.q, traced.flange)
 
@@ -175,10 +175,10 @@ class _Part:
     targets: Targets
 
 
-def reach_again(arm: Arm, before: Course, targets: Targets, moved: Bools) -> Course:
+def replan(arm: Arm, before: Replanned, targets: Targets, moved: Bools) -> Replanned:
     """Find where targets lead of which only some have moved.
 
-    The result is that of `reach`.
+    The result is that of `replan_all`.
 
     Args:
         arm: The arm.
@@ -191,7 +191,7 @@ def reach_again(arm: Arm, before: Course, targets: Targets, moved: Bools) -> Cou
     """
     part = _part(targets, moved, len(before.begin) > 0)
     if part is None:
-        return reach(arm, targets, before.begin)
+        return replan_all(arm, targets, before.begin)
     begins = part.rows[part.seeds]
     known = Known(
         np.flatnonzero(part.seeds), before.exact.q[begins],
@@ -202,8 +202,8 @@ def reach_again(arm: Arm, before: Course, targets: Targets, moved: Bools) -> Cou
     same = np.isclose(new, old, rtol=0, atol=SAME, equal_nan=True).all(axis=1)
     same &= exact.slot == before.slot[part.rows]
     if not same[part.lasts].all():
-        return reach(arm, targets, before.begin)
-    traced = rounded(arm, part.targets, exact, timed=False)
+        return replan_all(arm, targets, before.begin)
+    traced = blend(arm, part.targets, exact, timed=False)
     slot = np.array(before.slot)
     slot[part.rows[part.kept]] = exact.slot[part.kept]
     passed = _patched(before.passed, part, traced.q)
@@ -213,7 +213,7 @@ def reach_again(arm: Arm, before: Course, targets: Targets, moved: Bools) -> Cou
     )
     now = passages(arm, traced.q, traced.edges)
     ways = _spliced(before.passages, part, now)
-    return Course(
+    return Replanned(
         arm, targets, at_targets, passed, _patched(before.aside, part, traced.aside),
         slot, ways, sides(arm, passed, ways, before.begin.past.play), before.begin,
     )  # fmt: skip

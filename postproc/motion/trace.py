@@ -6,13 +6,13 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from postproc.arrays import Bools, Floats, Ints, pieces, spans
+from postproc.arrays import Bools, Floats, Ints, chunks, spans
 from postproc.motion.branches import (
     LOST,
     SUSPICIOUS,
-    OnDemand,
+    Branched,
+    BranchedLazily,
     SolvedBranches,
-    Ways,
     follow,
     nearest_slot,
     nearest_slots,
@@ -21,7 +21,7 @@ from postproc.motion.branches import (
     on_written_turns,
     wrist_interpolated,
 )
-from postproc.motion.path import Pull, Segments, arcs, lines, sample
+from postproc.motion.path import BlendCoupling, Segments, arcs, lines, sample
 from postproc.motion.targets import (
     AMBIGUOUS,
     ARC_END,
@@ -40,7 +40,7 @@ from postproc.motion.targets import (
     Targets,
 )
 from postproc.robot.arm import Arm
-from postproc.robot.play import NOTHING, Edges, Past
+from postproc.robot.play import NOTHING, Edges, PlayState
 from postproc.robot.pose import inverse, is_unknown
 from postproc.robot.trajectory import Motion
 
@@ -204,7 +204,7 @@ class Workspace:
         inner = np.flatnonzero(~self.long[visit] & ~settled[visit])
         asked = np.concatenate([self.flange[poses], samples.flange[inner]])
         self.branches = np.empty((len(asked), 8, 6))
-        for rows in pieces(len(asked), CHUNK):
+        for rows in chunks(len(asked), CHUNK):
             self.branches[rows] = self.arm.inverse(asked[rows]).q
         self.solved = np.full(len(self.q), -1)
         self.solved[poses] = np.arange(len(poses))
@@ -228,12 +228,14 @@ class Workspace:
         found[~known] = self.arm.inverse(self.flange[rows[~known]]).q
         return found
 
-    def ways(self, span: slice) -> Ways:
+    def ways(self, span: slice) -> Branched:
         """Return the solutions at some samples of ready edges."""
         rows = self.row[span]
         if len(rows) and (rows >= 0).all():
             return SolvedBranches(self.branches[rows])
-        return OnDemand(self.arm, self.flange_at(np.arange(span.start, span.stop)))
+        return BranchedLazily(
+            self.arm, self.flange_at(np.arange(span.start, span.stop))
+        )
 
     def flange_at(self, at: Ints) -> Floats:
         """Look up the flange poses at samples of ready edges, (k, 4, 4) [m]."""
@@ -320,7 +322,7 @@ def along_late_arc(
 
 
 def _followed(
-    work: Workspace, v: int, edge: int, flange: Floats, end: EdgeEnd, ways: Ways
+    work: Workspace, v: int, edge: int, flange: Floats, end: EdgeEnd, ways: Branched
 ) -> EdgeEnd:
     """Follow a Cartesian path through solutions; see `along_line`."""
     near = work.q[work.source[edge]]
@@ -341,7 +343,7 @@ def _followed(
     return EdgeEnd(end.q, flange, -1, np.vstack([done.q, end.q]), 0)
 
 
-def _ways(work: Workspace, v: int, edge: int, path: Segments, target: bool) -> Ways:
+def _ways(work: Workspace, v: int, edge: int, path: Segments, target: bool) -> Branched:
     """Solve along one path to v, with or without the target itself."""
     k = work.samples.count(edge)
     u = np.arange(1, k + (1 if target else 0)) / k
@@ -480,7 +482,7 @@ class _Stretches:
         return spans(self.begin, self.size)
 
 
-def at_once(work: Workspace, smooth: Bools, most: int) -> Bools:
+def trace_stretches(work: Workspace, smooth: Bools, most: int) -> Bools:
     """Follow what goes on from known targets; tell which targets that settles, (n,).
 
     Args:
@@ -591,7 +593,7 @@ class Trace:
     reason: Ints
     overruled: Bools
     aside: Floats
-    pull: Pull = field(default_factory=Pull)
+    pull: BlendCoupling = field(default_factory=BlendCoupling)
 
 
 def trace(arm: Arm, targets: Targets, known: Known | None = None) -> Trace:
@@ -608,7 +610,7 @@ def trace(arm: Arm, targets: Targets, known: Known | None = None) -> Trace:
     work = Workspace(arm, targets, known)
     settled = _from_strings(work) | work.given
     work.told = ~np.isnan(work.q[:, 0])
-    settled |= at_once(work, work.single & ~settled, WINDOW)
+    settled |= trace_stretches(work, work.single & ~settled, WINDOW)
     work.solve(settled)
     _in_order(work, np.flatnonzero(~settled), work.single & ~settled)
     return _finished(work)
@@ -801,14 +803,16 @@ class StartState:
     q: Floats
     flange: Floats
     slot: Ints
-    past: Past
+    past: PlayState
 
     def __len__(self) -> int:
         """Return 1 at a stop, 0 where nothing is known."""
         return len(self.q)
 
     @classmethod
-    def at_end(cls, q: Floats, flange: Floats, slot: Ints, past: Past) -> StartState:
+    def at_end(
+        cls, q: Floats, flange: Floats, slot: Ints, past: PlayState
+    ) -> StartState:
         """Keep the last of n targets, none of the others."""
         return cls(np.array(q[-1:]), np.array(flange[-1:]), np.array(slot[-1:]), past)
 

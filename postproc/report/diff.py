@@ -15,21 +15,21 @@ from typing import NamedTuple, Self
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
-from postproc.arrays import Bools, Bytes, Floats, Ints, pieces
+from postproc.arrays import Bools, Bytes, Floats, Ints, chunks
 from postproc.compensation.outcome import (
     LEFT_ALONE,
     LineOutcomes,
     Status,
     read_arrivals,
 )
-from postproc.compensation.parallel import in_turns, meanwhile
+from postproc.compensation.parallel import in_background, parallel_map
 from postproc.exceptions import ProgramError
 from postproc.files import VARIABLES
 from postproc.language.pdl2.names import entry_names
 from postproc.language.scan import (
     BLANKS,
-    Masked,
-    Plain,
+    MaskedLines,
+    PlainNumbers,
     in_code,
     line_of,
     mask_lines,
@@ -315,7 +315,12 @@ def _read(a: _Text, b: _Text, alike: Bools) -> Pairs:
 
 
 def _numbers(
-    a: _Text, b: _Text, runs: Plain, others: Plain, start: Ints, odd: Bools
+    a: _Text,
+    b: _Text,
+    runs: PlainNumbers,
+    others: PlainNumbers,
+    start: Ints,
+    odd: Bools,
 ) -> Pairs:
     """Read the numbers on lines that are not odd."""
     owner = line_of(a.line, start)
@@ -376,8 +381,8 @@ def changed_rows(
             old, new = (list(compress(texts, differ)) for texts in (old, new))
         return _compare(file, numbers, old, new)
 
-    tasks = list(pieces(len(before), PIECE))
-    return joined_rows(file, list(in_turns(compare, tasks)))
+    tasks = list(chunks(len(before), PIECE))
+    return joined_rows(file, list(parallel_map(compare, tasks)))
 
 
 def _compare(
@@ -419,7 +424,7 @@ def _by_shapes(before: Sequence[bytes], after: Sequence[bytes]) -> Pairs:
 
 
 def _only_numbers(
-    before: Sequence[bytes], after: Sequence[bytes], a: Masked, b: Masked
+    before: Sequence[bytes], after: Sequence[bytes], a: MaskedLines, b: MaskedLines
 ) -> Bools:
     """Tell which pairs of lines differ in nothing but numbers."""
     same = np.array([x == y for x, y in zip(a.masks, b.masks, strict=True)])
@@ -430,7 +435,7 @@ def _only_numbers(
     return same
 
 
-def _comments(lines: Sequence[bytes], masked: Masked) -> list[bytes]:
+def _comments(lines: Sequence[bytes], masked: MaskedLines) -> list[bytes]:
     """Return the comment of every line, b"" where it has none."""
     places = zip(lines, masked.comment - _starts(lines), masked.comment, strict=True)
     return [line[own:] if at >= 0 else b"" for line, own, at in places]
@@ -522,7 +527,7 @@ def _starts(lines: Sequence[bytes]) -> Ints:
     return np.cumsum([0, *map(len, lines[:-1])]) + np.arange(len(lines))
 
 
-def _masked(lines: Sequence[bytes]) -> Masked:
+def _masked(lines: Sequence[bytes]) -> MaskedLines:
     """Mask lines without their endings; at least one."""
     return mask_lines(b"\n".join([*lines, b""]), _starts(lines))
 
@@ -562,7 +567,7 @@ class TextLines(Sequence[bytes]):
         a = np.frombuffer(data, dtype=np.uint8)
         found = (
             np.flatnonzero(a[some] == 10) + some.start
-            for some in pieces(len(a), AT_ONCE)
+            for some in chunks(len(a), AT_ONCE)
         )
         ends = np.concatenate([*found, np.array([len(a)])])
         return cls(data, np.append(0, ends + 1)[skipped:])
@@ -738,7 +743,7 @@ def diff(original: Path, compensated: Path) -> Difference:
     if original.suffix.lower() != VARIABLES and all(v.is_file() for v in values):
         pairs.append(values)
     told_by = partial(read_arrivals, compensated, pairs)
-    with meanwhile(told_by, worth=_long(pairs)) as ask:
+    with in_background(told_by, worth=_long(pairs)) as ask:
         files = [compare_files(*pair) for pair in pairs]
         told = ask()
     found = [(f, told.get(f.original.name)) for f in files]

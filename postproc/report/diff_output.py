@@ -11,7 +11,7 @@ from typing import TextIO
 import numpy as np
 from numpy.typing import NDArray
 
-from postproc.arrays import Floats, Ints, pieces
+from postproc.arrays import Floats, Ints, chunks
 from postproc.byte_columns import (
     ByteColumn,
     beside,
@@ -24,7 +24,7 @@ from postproc.byte_columns import (
     whole,
 )
 from postproc.byte_columns import ByteColumn as Bytes
-from postproc.compensation.parallel import in_turns
+from postproc.compensation.parallel import parallel_map
 from postproc.files import VARIABLES
 from postproc.report.diff import STATUSES, Difference, DiffRow, DiffRows
 from postproc.report.terminal import (
@@ -67,7 +67,7 @@ def single_rows(rows: DiffRows) -> Ints:
 def blocks_of(rows: DiffRows) -> Iterator[tuple[Ints, Ints]]:
     """Cut rows: yield the rows of each block, and those that are written one by one."""
     single = single_rows(rows)
-    for some in pieces(len(rows), AT_ONCE):
+    for some in chunks(len(rows), AT_ONCE):
         here = (single >= some.start) & (single < some.stop)
         yield np.arange(some.start, some.stop), single[here]
 
@@ -118,7 +118,7 @@ def difference_pieces(found: Difference) -> Iterator[str]:
         yield f',\n "{key}": ['
         comma = ""
         tasks = [(rows, *block) for rows in parts for block in blocks_of(rows)]
-        for piece in in_turns(lambda task: _piece(*task), tasks):
+        for piece in parallel_map(lambda task: _piece(*task), tasks):
             yield comma + piece
             comma = ","
         yield "\n ]" if comma else "]"
@@ -243,7 +243,7 @@ class _Writer:
     ) -> Iterator[Block]:
         """Write the rows of all files, some columns of them."""
         tasks = [(rows, *block) for rows in parts for block in blocks_of(rows)]
-        return in_turns(lambda task: self._block(*task, shown), tasks, HERE)
+        return parallel_map(lambda task: self._block(*task, shown), tasks, HERE)
 
     def _block(
         self, rows: DiffRows, k: Ints, single: Ints, shown: Sequence[int]

@@ -9,7 +9,7 @@ from dataclasses import asdict
 import numpy as np
 from numpy.typing import NDArray
 
-from postproc.arrays import Each, Floats, Ints, pieces
+from postproc.arrays import Floats, Ints, Map, chunks
 from postproc.byte_columns import (
     ByteColumn,
     beside,
@@ -34,7 +34,7 @@ def report_text(outcome: Outcome) -> str:
     return "".join(report_pieces(outcome))
 
 
-def report_pieces(outcome: Outcome, each: Each = map) -> Iterator[str]:
+def report_pieces(outcome: Outcome, each: Map = map) -> Iterator[str]:
     """Write the report piece by piece.
 
     Args:
@@ -43,7 +43,7 @@ def report_pieces(outcome: Outcome, each: Each = map) -> Iterator[str]:
     """
     head = {"program": outcome.program, "model": outcome.model}
     yield json.dumps(head)[:-1] + ', "targets": ['
-    tasks = list(pieces(len(outcome.visits), AT_ONCE))
+    tasks = list(chunks(len(outcome.visits), AT_ONCE))
     yield from each(lambda rows: _targets(outcome, rows), tasks)
     tail = {
         "predicted": {"before": asdict(outcome.before), "after": asdict(outcome.after)},

@@ -21,16 +21,16 @@ from postproc.kernels import native
 from postproc.robot.arm import Arm
 from postproc.robot.play import (
     NOTHING,
-    Chains,
     Clamps,
     Edges,
-    Past,
-    chained,
+    PlayState,
+    VisitChains,
+    chains_of,
+    drive_paths,
     identity,
     last_reversals,
     passing,
     prefix,
-    walks,
 )
 
 WIDTH_IN_PLAYS = 4.0
@@ -55,7 +55,7 @@ class Arrivals:
     direction: Floats
     side: Floats
     travel: Floats
-    past: Past
+    past: PlayState
 
 
 @dataclass(frozen=True)
@@ -85,7 +85,7 @@ class Passages:
     clamps: Clamps
 
 
-def chain(n: int) -> tuple[Ints, Ints]:
+def in_row_order(n: int) -> tuple[Ints, Ints]:
     """Return `Edges.first` and `Edges.source` of n visits, one after the other."""
     return np.arange(n + 1), np.arange(n) - 1
 
@@ -97,7 +97,7 @@ def arrivals_of_rows(arm: Arm, q: Floats) -> Arrivals:
         arm: The arm.
         q: Joint angles in the order of the visits, (n, 6) [rad].
     """
-    first, source = chain(len(q))
+    first, source = in_row_order(len(q))
     return arrivals(arm, q, Edges(first, source, q, first))
 
 
@@ -106,7 +106,9 @@ def directions_of_rows(arm: Arm, q: Floats) -> Floats:
     return arrivals_of_rows(arm, q).direction
 
 
-def arrivals(arm: Arm, q: Floats, edges: Edges, before: Past = NOTHING) -> Arrivals:
+def arrivals(
+    arm: Arm, q: Floats, edges: Edges, before: PlayState = NOTHING
+) -> Arrivals:
     """Run the play operator over a graph of visits.
 
     Args:
@@ -117,15 +119,15 @@ def arrivals(arm: Arm, q: Floats, edges: Edges, before: Past = NOTHING) -> Arriv
     """
     if len(q) == 0:
         return Arrivals(np.empty((0, 6)), np.empty((0, 6)), np.empty((0, 6)), NOTHING)
-    chains = chained(q, arm.coupling, edges.first, edges.source)
-    ways, half = walks(chains, arm.coupling, edges), _half_width(arm)
+    chains = chains_of(q, arm.coupling, edges.first, edges.source)
+    ways, half = drive_paths(chains, arm.coupling, edges), _half_width(arm)
     z = _states(chains, ways.clamps(half), half, before.play)
     forward = chains.angles - z.hi >= half / 2
     backward = chains.angles - z.lo <= -half / 2
     direction = forward.astype(float) - backward.astype(float)
     turned = last_reversals(chains, ways, arm.play, before.turned)
     travel = np.abs(chains.angles - turned.angle)
-    past = Past(z[LAST], turned[LAST])
+    past = PlayState(z[LAST], turned[LAST])
     return Arrivals(direction, _side(chains.angles, z, half), travel, past)
 
 
@@ -137,8 +139,8 @@ def passages(arm: Arm, q: Floats, edges: Edges) -> Passages:
         q: Joint angles at the visits, (n, 6) [rad], NaN where not known.
         edges: The geometric paths between them.
     """
-    chains = chained(q, arm.coupling, edges.first, edges.source)
-    ways = walks(chains, arm.coupling, edges)
+    chains = chains_of(q, arm.coupling, edges.first, edges.source)
+    ways = drive_paths(chains, arm.coupling, edges)
     return Passages(edges.first, edges.source, ways.clamps(_half_width(arm)))
 
 
@@ -148,7 +150,7 @@ def sides(
     """Return the sides of `arrivals` alone, from what passing the edges does."""
     if len(q) == 0:
         return Sides(np.empty((0, 6)), NOTHING.play)
-    chains = chained(q, arm.coupling, passed.first, passed.source)
+    chains = chains_of(q, arm.coupling, passed.first, passed.source)
     half = _half_width(arm)
     z = _states(chains, passed.clamps, half, before)
     return Sides(_side(chains.angles, z, half), z[LAST])
@@ -171,7 +173,7 @@ def _side(angles: Floats, z: Clamps, half: Floats) -> Floats:
     return np.where(on_flank, np.sign(side), side)
 
 
-def _states(chains: Chains, own: Clamps, half: Floats, before: Clamps) -> Clamps:
+def _states(chains: VisitChains, own: Clamps, half: Floats, before: Clamps) -> Clamps:
     """Find what is known of the play's state at every visit, as intervals (n, 6).
 
     The intervals at the heads only grow and their ends come from a finite set, so that
@@ -207,7 +209,7 @@ def _states(chains: Chains, own: Clamps, half: Floats, before: Clamps) -> Clamps
 
 
 def _from_heads(
-    chains: Chains, known: list[Clamps | None], since_head: Clamps, half: Floats
+    chains: VisitChains, known: list[Clamps | None], since_head: Clamps, half: Floats
 ) -> Clamps:
     """Carry what is known at the heads on to all visits; the others know nothing."""
     out = passing(chains.angles, half)
@@ -223,7 +225,7 @@ def _from_heads(
     return out
 
 
-def _since_head(chains: Chains, passed: Clamps) -> Clamps:
+def _since_head(chains: VisitChains, passed: Clamps) -> Clamps:
     """Compose the clamps from each visit's chain head (not included) to the visit."""
     out = identity(chains.angles.shape)
     inner = np.ones(len(chains.angles), dtype=bool)
@@ -234,7 +236,7 @@ def _since_head(chains: Chains, passed: Clamps) -> Clamps:
 
 
 def _at_head(
-    chains: Chains,
+    chains: VisitChains,
     c: int,
     half: Floats,
     known: list[Clamps | None],

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from postproc.arrays import Bools, Floats, Ints, pieces
+from postproc.arrays import Bools, Floats, Ints, chunks
 from postproc.kernels import floats, native
 from postproc.robot.arm_file import OpwSection
 from postproc.robot.pose import MM
@@ -95,7 +95,7 @@ class ClosedForm:
             solved: Floats = native.branches(self._packed, floats(flange))
             return solved
         out = np.empty((len(flange), 8, 6))
-        for rows in pieces(len(flange), CHUNK):
+        for rows in chunks(len(flange), CHUNK):
             centre = self._centre(flange[rows])
             for behind in (False, True):
                 facing = self._facing(centre, np.asarray(behind))
@@ -122,7 +122,7 @@ class ClosedForm:
             solved: Floats = native.branch(self._packed, flange, slot)
             return solved
         out = np.empty((len(flange), 6))
-        for rows in pieces(len(flange), CHUNK):
+        for rows in chunks(len(flange), CHUNK):
             facing = self._facing(
                 self._centre(flange[rows]), (slot[rows] & SHOULDER) > 0
             )

@@ -185,7 +185,7 @@ class Edges:
 
 
 @dataclass(frozen=True)
-class Chains:
+class VisitChains:
     """Visits on the drive side, cut into chains.
 
     Attributes:
@@ -232,7 +232,7 @@ class Chains:
         return out
 
 
-def chained(q: Floats, coupling: Floats, first: Ints, source: Ints) -> Chains:
+def chains_of(q: Floats, coupling: Floats, first: Ints, source: Ints) -> VisitChains:
     """Move a graph to the drive side and cut it into chains.
 
     Args:
@@ -252,7 +252,7 @@ def chained(q: Floats, coupling: Floats, first: Ints, source: Ints) -> Chains:
     follows[single] = source[first[single]] == single - 1
     follows[:1] = False
     heads = np.flatnonzero(~follows)
-    return Chains(
+    return VisitChains(
         q @ coupling.T, first, source, heads, np.append(heads[1:], n),
         np.cumsum(~follows) - 1,
     )  # fmt: skip
@@ -262,7 +262,7 @@ def chained(q: Floats, coupling: Floats, first: Ints, source: Ints) -> Chains:
 
 
 @dataclass(frozen=True)
-class Walks:
+class DrivePaths:
     """The drive-side samples of e edges, with turning values inside.
 
     Attributes:
@@ -302,7 +302,7 @@ class Walks:
         return out
 
 
-def walks(chains: Chains, coupling: Floats, edges: Edges) -> Walks:
+def drive_paths(chains: VisitChains, coupling: Floats, edges: Edges) -> DrivePaths:
     """Move the ways between visits to the drive side.
 
     Args:
@@ -313,14 +313,14 @@ def walks(chains: Chains, coupling: Floats, edges: Edges) -> Walks:
     values = edges.path @ coupling.T
     if len(values) > len(chains.source):
         return _refined(chains.angles, chains.source, values, edges)
-    return Walks(values, edges.start)
+    return DrivePaths(values, edges.start)
 
 
-def _refined(angles: Floats, source: Ints, values: Floats, edges: Edges) -> Walks:
+def _refined(angles: Floats, source: Ints, values: Floats, edges: Edges) -> DrivePaths:
     """Insert turning values inside every edge from a known place."""
     start = edges.start
     if native is not None:
-        return Walks(*native.refined(angles, source, values, start, edges.uneven))
+        return DrivePaths(*native.refined(angles, source, values, start, edges.uneven))
     filled = np.flatnonzero(np.diff(start) > 0)
     begins, lasts = start[filled], start[filled + 1] - 1
     before = np.vstack([values[:1], values[:-1]])
@@ -331,7 +331,7 @@ def _refined(angles: Floats, source: Ints, values: Floats, edges: Edges) -> Walk
     inside[lasts] = inside[edges.uneven] = False
     inside[begins[source[filled] < 0]] = False
     out, count = with_turning_values(before, values, inside)
-    return Walks(out, np.append(0, np.cumsum(count))[start])
+    return DrivePaths(out, np.append(0, np.cumsum(count))[start])
 
 
 # Travel of every joint since its last reversal.
@@ -340,7 +340,7 @@ ROUNDS = 2  # the second one sees what arrives over jumps backwards
 
 
 @dataclass(frozen=True)
-class Turned:
+class LastReversal:
     """The last reversal before some moment, arrays of one shape.
 
     Attributes:
@@ -355,17 +355,19 @@ class Turned:
     angle: Floats
     z: Floats
 
-    def __getitem__(self, rows: int | slice | Ints) -> Turned:
+    def __getitem__(self, rows: int | slice | Ints) -> LastReversal:
         """Return some of them."""
-        return Turned(self.side[rows], self.angle[rows], self.z[rows])
+        return LastReversal(self.side[rows], self.angle[rows], self.z[rows])
 
 
-def never_turned(angle: Floats) -> Turned:
+def never_turned(angle: Floats) -> LastReversal:
     """Begin at drive-side angles [rad] without a past."""
-    return Turned(np.zeros_like(angle), np.array(angle), np.array(angle))
+    return LastReversal(np.zeros_like(angle), np.array(angle), np.array(angle))
 
 
-def last_reversals(chains: Chains, ways: Walks, play: Floats, before: Turned) -> Turned:
+def last_reversals(
+    chains: VisitChains, ways: DrivePaths, play: Floats, before: LastReversal
+) -> LastReversal:
     """Find the last reversal before every visit, (n, 6); travel counts from there.
 
     A reversal is a return by more than one play from the extreme value, so that jitter
@@ -399,7 +401,7 @@ def last_reversals(chains: Chains, ways: Walks, play: Floats, before: Turned) ->
     return last
 
 
-def along(values: Floats, before: Turned, play: Floats) -> Turned:
+def along(values: Floats, before: LastReversal, play: Floats) -> LastReversal:
     """Follow a path.
 
     Args:
@@ -420,18 +422,18 @@ def along(values: Floats, before: Turned, play: Floats) -> Turned:
     angle[0] = before.angle
     angle[1:] = z[:-1] + side[:-1] * half
     at = np.maximum.accumulate(np.where(turned, rows, 0), axis=0)
-    return Turned(side[1:], np.take_along_axis(angle, at, axis=0)[1:], z[1:])
+    return LastReversal(side[1:], np.take_along_axis(angle, at, axis=0)[1:], z[1:])
 
 
 def _merged(
-    chains: Chains,
-    ways: Walks,
+    chains: VisitChains,
+    ways: DrivePaths,
     head: int,
-    last: Turned,
+    last: LastReversal,
     seen: NDArray[np.bool_],
     play: Floats,
-    given: Turned,
-) -> Turned:
+    given: LastReversal,
+) -> LastReversal:
     """Merge the pasts that arrive at a head, unless its past is given."""
     if len(given.side):
         return given[0]
@@ -444,7 +446,7 @@ def _merged(
         if seen[source]:
             side = last.side[source]
             z = chains.angles[source] - side * half
-            before = Turned(side, last.angle[source], z)
+            before = LastReversal(side, last.angle[source], z)
             samples, _ = ways.of(slice(edge, edge + 1))
             pasts.append(along(samples, before, play)[-1])
     if not pasts:
@@ -455,14 +457,14 @@ def _merged(
     nearest = np.abs(angle - q).argmin(axis=0)
     sure = np.take_along_axis(angle, nearest[None], axis=0)[0]
     known = np.where(agree, side[0], 0.0)
-    return Turned(known, np.where(agree, sure, q), q - known * half)
+    return LastReversal(known, np.where(agree, sure, q), q - known * half)
 
 
 # What joints remember of the way that brought them to a place.
 
 
 @dataclass(frozen=True)
-class Past:
+class PlayState:
     """What is known at one place, (1, 6) each; (0, 6) where nothing is.
 
     Attributes:
@@ -471,8 +473,8 @@ class Past:
     """
 
     play: Clamps
-    turned: Turned
+    turned: LastReversal
 
 
 _NONE = np.empty((0, 6))
-NOTHING = Past(Clamps(_NONE, _NONE), Turned(_NONE, _NONE, _NONE))
+NOTHING = PlayState(Clamps(_NONE, _NONE), LastReversal(_NONE, _NONE, _NONE))

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from postproc.compensation.program import read_program
-from postproc.compensation.windows import begins, beside
+from postproc.compensation.windows import concatenate, first_visits
 from postproc.language.visits import Visits
 from tests.generated.landing import program
 
@@ -49,16 +49,16 @@ def told(visits: Visits, v: int, first: int) -> list[object]:
 
 
 def test_every_visit_says_the_same(programs):
-    together = beside(programs)
+    together = concatenate(programs)
     assert len(together) == sum(map(len, programs))
-    for own, first in zip(programs, begins(programs), strict=True):
+    for own, first in zip(programs, first_visits(programs), strict=True):
         for v in range(len(own)):
             alone, among = told(own, v, 0), told(together, first + v, first)
             np.testing.assert_equal(among, alone)
 
 
 def test_literals_follow_each_other(programs):
-    together = beside(programs)
+    together = concatenate(programs)
     assert len(together.literals) == sum(len(own.literals) for own in programs)
     used = together.literal[together.literal >= 0]
     assert used.max() < len(together.literals)
@@ -66,8 +66,8 @@ def test_literals_follow_each_other(programs):
 
 def test_one_program_stays_as_it_is(programs):
     (own,) = programs[:1]
-    assert begins([own]) == (0,)
-    np.testing.assert_equal(told(beside([own]), 0, 0), told(own, 0, 0))
+    assert first_visits([own]) == (0,)
+    np.testing.assert_equal(told(concatenate([own]), 0, 0), told(own, 0, 0))
 
 
 def test_each_program_has_as_many_auxiliary_axes_as_it_uses(job_cell):
@@ -76,6 +76,6 @@ def test_each_program_has_as_many_auxiliary_axes_as_it_uses(job_cell):
     own = [
         read_program({"a.pdl": head + move + tail}, job_cell).visits for move in moves
     ]
-    together = beside(own)
+    together = concatenate(own)
     assert [v.aux.shape[1] for v in own] == [0, 2]
     np.testing.assert_array_equal(together.aux, [[np.nan, np.nan], [7.0, 8.0]])

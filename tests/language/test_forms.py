@@ -6,7 +6,7 @@ from postproc.language.lines import read_lines
 from postproc.language.pdl2 import syntax as ast
 from postproc.language.pdl2.parser import parse_line, parse_value_form
 from postproc.language.scan import form_of
-from postproc.language.shapes import formed
+from postproc.language.shapes import parse_shapes
 from postproc.language.source import source_from_bytes
 
 
@@ -34,7 +34,7 @@ def test_case_is_kept_where_it_is_shown_only() -> None:
     moved = parse_line("MOVE TO Wp1")
     assert isinstance(moved, ast.Move) and moved.where == (ast.Reference("wp1"),)
     lines = read_lines(source_from_bytes("job.lsv", b"Wp1 XTND Arm: 1 Priv"))
-    (entered,) = formed(lines.shapes, parse_value_form)
+    (entered,) = parse_shapes(lines.shapes, parse_value_form)
     assert entered is not None and entered.name == "Wp1"
 
 

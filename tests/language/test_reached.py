@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from postproc.language.pdl2.effects import NEVER_REACHED, never_reached
+from postproc.language.pdl2.effects import NEVER_REACHED, dead_moves
 from postproc.language.pdl2.interpreter import resolve
 from postproc.language.pdl2.program import parse
 from postproc.language.source import Source
@@ -13,7 +13,7 @@ POINT = "MOVE LINEAR TO POS(1, 2, 3, 0, 180, 0, '')"
 def lines(*body, routine=()):
     text = "\n".join(["PROGRAM a", *routine, "BEGIN", *body, "END a", ""])
     program = parse(Source("a.pdl", text.encode()))
-    found = never_reached([program], resolve(program).visits)
+    found = dead_moves([program], resolve(program).visits)
     assert {d.code for d in found} <= {NEVER_REACHED}
     return [(d.line, int(d.message.split()[0])) for d in found]
 

@@ -8,7 +8,7 @@ import pytest
 from postproc.language.pdl2.interpreter import resolve
 from postproc.language.pdl2.job import Start
 from postproc.language.pdl2.program import parse
-from postproc.language.pdl2.stretches import Stretches
+from postproc.language.pdl2.stretches import MoveBlocks
 from postproc.language.pdl2.variable_file import read_variables
 from postproc.language.source import source_from_bytes
 from postproc.language.visits import Visits
@@ -141,7 +141,7 @@ def test_at_once_is_as_one_by_one(seed, monkeypatch) -> None:
         return resolve(program, START, variables if seed % 4 else None)
 
     found = read()
-    monkeypatch.setattr(Stretches, "run", lambda self, here: False)
+    monkeypatch.setattr(MoveBlocks, "run", lambda self, here: False)
     wanted = read()
     assert told(found.visits) == told(wanted.visits), text
     assert found.diagnostics == wanted.diagnostics, text
@@ -149,14 +149,14 @@ def test_at_once_is_as_one_by_one(seed, monkeypatch) -> None:
 
 def test_most_moves_of_a_spot_job_are_run_at_once(monkeypatch) -> None:
     ran = []
-    run = Stretches.run
+    run = MoveBlocks.run
 
     def counted(self, here):
         first, done = here.row, run(self, here)
         ran.append(here.row - first)
         return done
 
-    monkeypatch.setattr(Stretches, "run", counted)
+    monkeypatch.setattr(MoveBlocks, "run", counted)
     spots = "\n".join(
         f"MOVE TO WP_{k} , \n WITH CONDITION[spot(1, {k})],\nENDMOVE" for k in range(50)
     )

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from postproc.compensation import windows as cuts
-from postproc.compensation.windows import SHARED, quiet_stops, run_up, windows
+from postproc.compensation.windows import SHARED, cut_points, lead_in, windows
 from postproc.language.pdl2.interpreter import resolve
 from postproc.language.pdl2.program import parse
 from postproc.language.source import source_from_bytes
@@ -30,7 +30,7 @@ def stop(x: float) -> str:
 
 
 def quiet(*body: str) -> list[bool]:
-    return quiet_stops(read(HEAD + "".join(body) + "END job\n")).tolist()
+    return cut_points(read(HEAD + "".join(body) + "END job\n")).tolist()
 
 
 def test_every_stop_of_a_straight_program_but_the_last() -> None:
@@ -50,7 +50,7 @@ def test_jumps_are_not_cut() -> None:
     loop = loop.replace("$INT", "i")
     head = HEAD.replace("VAR ", "VAR i : INTEGER\n    ")
     text = head + stop(1000) + loop + stop(1030) + stop(1040) + "END job\n"
-    found = quiet_stops(read(text))
+    found = cut_points(read(text))
     assert not found[1:2].any() and found[-2]
     branch = "  IF $DIN[1] THEN\n" + stop(1010) + "  ENDIF\n"
     assert quiet(stop(1000), branch, stop(1020), stop(1030))[:2] == [False, False]
@@ -69,7 +69,7 @@ def test_numbers_that_are_used_again_are_not_cut() -> None:
 @pytest.mark.parametrize("seed", range(60))
 def test_nothing_crosses(seed: int) -> None:
     visits = read(reachable(seed, exact=seed % 2 == 0, pages=False).text)
-    found = np.flatnonzero(quiet_stops(visits)).tolist()
+    found = np.flatnonzero(cut_points(visits)).tolist()
     to = np.repeat(np.arange(len(visits)), np.diff(visits.pred_start))
     literals = visits.literal, visits.follows
     for c in found:
@@ -119,7 +119,7 @@ def test_a_run_up_is_the_last_targets_from_anywhere(monkeypatch, make) -> None:
     monkeypatch.setattr(cuts, "RUN_UP", 30)
     visits = read(make(300).source.decode())
     window = cuts.Window(250, len(visits))
-    found = run_up(visits, window)
+    found = lead_in(visits, window)
     assert found is not None and 30 <= len(found) < 40
     first = window.first - len(found)
     np.testing.assert_array_equal(found.values, visits.values[first : window.first])
@@ -127,8 +127,8 @@ def test_a_run_up_is_the_last_targets_from_anywhere(monkeypatch, make) -> None:
     assert found.literal[0] == -1
     before = [found.predecessors(v).tolist() for v in range(len(found))]
     assert before == [[-1], *([v] for v in range(len(found) - 1))]
-    assert run_up(visits, cuts.Window(30, 300)) is None
-    assert run_up(visits, cuts.Window(32, 300)) is not None
+    assert lead_in(visits, cuts.Window(30, 300)) is None
+    assert lead_in(visits, cuts.Window(32, 300)) is not None
 
 
 def test_no_run_up_begins_where_something_crosses(monkeypatch) -> None:
@@ -136,5 +136,5 @@ def test_no_run_up_begins_where_something_crosses(monkeypatch) -> None:
     loop = "  FOR i := 1 TO 3 DO\n" + stop(1010) * 8 + "  ENDFOR\n"
     head = HEAD.replace("VAR ", "VAR i : INTEGER\n    ")
     visits = read(head + stop(990) + stop(1000) + loop + stop(1030) + "END job\n")
-    found = run_up(visits, cuts.Window(8, len(visits)))
+    found = lead_in(visits, cuts.Window(8, len(visits)))
     assert found is not None and len(found) == 7  # the loop uses its numbers again

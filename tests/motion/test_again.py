@@ -10,7 +10,7 @@ import pytest
 from postproc.compensation.program import read_program
 from postproc.compensation.targets import targets_from_visits
 from postproc.motion import replan as replan_module
-from postproc.motion.replan import Course, reach, reach_again
+from postproc.motion.replan import Replanned, replan, replan_all
 from postproc.motion.targets import TargetKind, Targets
 from postproc.robot.cell import Cell, load_cell
 from postproc.robot.trajectory import Motion
@@ -47,7 +47,7 @@ def picked(targets: Targets, share: float, seed: int) -> np.ndarray:
     return np.asarray((rng.random(len(targets)) < share) & ~fixed)
 
 
-def assert_same(found: Course, wanted: Course) -> None:
+def assert_same(found: Replanned, wanted: Replanned) -> None:
     """Compare all that a course holds; 1e-11 is what summing in blocks rounds off."""
     for name in ("first", "source"):
         np.testing.assert_array_equal(
@@ -69,12 +69,12 @@ def assert_same(found: Course, wanted: Course) -> None:
 
 def compared(cell: Cell, targets: Targets, share: float, seed: int) -> None:
     """Move some targets, then some others; look again each time."""
-    course = reach(cell.arm, targets)
+    course = replan_all(cell.arm, targets)
     for k in range(2):
         moved = picked(targets, share, seed + k)
         targets = shifted(targets, moved, seed + k)
-        course = reach_again(cell.arm, course, targets, moved)
-        assert_same(course, reach(cell.arm, targets))
+        course = replan(cell.arm, course, targets, moved)
+        assert_same(course, replan_all(cell.arm, targets))
 
 
 ARC = b"""PROGRAM arcs
@@ -124,17 +124,17 @@ def test_random_flow(cell: Cell, seed: int) -> None:
 @pytest.mark.parametrize("row", range(6))
 def test_the_ends_of_a_program(cell: Cell, row: int) -> None:
     targets = read(cell, milling(300).source)
-    course, moved = reach(cell.arm, targets), np.zeros(len(targets), dtype=bool)
+    course, moved = replan_all(cell.arm, targets), np.zeros(len(targets), dtype=bool)
     for at in (row, len(targets) - 1 - row):
         moved[:] = False
         moved[at] = True
         new = shifted(targets, moved, 3)
-        assert_same(reach_again(cell.arm, course, new, moved), reach(cell.arm, new))
+        assert_same(replan(cell.arm, course, new, moved), replan_all(cell.arm, new))
 
 
 def test_only_what_moved_is_traced(cell: Cell, monkeypatch) -> None:
     targets = read(cell, milling(1500).source)
-    course, traced = reach(cell.arm, targets), []
+    course, traced = replan_all(cell.arm, targets), []
     original = replan_module.trace
 
     def counting(arm, part, known=None):
@@ -143,11 +143,11 @@ def test_only_what_moved_is_traced(cell: Cell, monkeypatch) -> None:
 
     monkeypatch.setattr(replan_module, "trace", counting)
     monkeypatch.setattr(
-        replan_module, "reach", lambda *_: pytest.fail("all was traced anew")
+        replan_module, "replan_all", lambda *_: pytest.fail("all was traced anew")
     )
     moved = np.zeros(len(targets), dtype=bool)
     moved[[100, 103, 900]] = True
-    reach_again(cell.arm, course, shifted(targets, moved, 1), moved)
+    replan(cell.arm, course, shifted(targets, moved, 1), moved)
     assert traced == [17]
 
 
@@ -157,17 +157,17 @@ def test_branching_flow_is_traced_anew(cell: Cell) -> None:
     pred = np.insert(targets.pred, 100, len(targets) - 1)
     start = targets.pred_start + (np.arange(len(targets) + 1) > 100)
     looped = replace(targets, pred=pred, pred_start=start)
-    course = reach(cell.arm, looped)
+    course = replan_all(cell.arm, looped)
     for row in (20, 98, 100, 101, 150):
         moved = np.zeros(len(targets), dtype=bool)
         moved[row] = True
         new = shifted(looped, moved, row)
-        assert_same(reach_again(cell.arm, course, new, moved), reach(cell.arm, new))
+        assert_same(replan(cell.arm, course, new, moved), replan_all(cell.arm, new))
 
 
 def test_a_stretch_that_changes_its_branch_is_traced_anew(cell: Cell) -> None:
     targets = read(cell, milling(300).source)
-    course = reach(cell.arm, targets)
+    course = replan_all(cell.arm, targets)
     # Without a string a JOINT move ends where it is nearest: on another turn of axis 6.
     row = 150
     move, kind = np.array(targets.move), np.array(targets.kind)
@@ -178,4 +178,4 @@ def test_a_stretch_that_changes_its_branch_is_traced_anew(cell: Cell) -> None:
     moved = np.zeros(len(targets), dtype=bool)
     moved[row] = True
     new = jointed.moved_to(np.array([row]), targets.tcp[[row]], joints[None])
-    assert_same(reach_again(cell.arm, course, new, moved), reach(cell.arm, new))
+    assert_same(replan(cell.arm, course, new, moved), replan_all(cell.arm, new))

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from postproc.motion.path import from_every_start
-from postproc.motion.replan import reach
+from postproc.motion.path import arc_per_start
+from postproc.motion.replan import replan_all
 from postproc.motion.targets import ARC_END, CODE, TargetKind, Targets, make_targets
 from postproc.motion.trace import trace
 from postproc.robot.arm import Arm
@@ -27,7 +27,7 @@ def arc_from(
     begin = arm.flange(home[None])[0] @ tool
     tcp = np.tile(begin, (4, 1, 1))
     tcp[:, :3, 3] += [[0, 0, 0.1], [0, 0, 0], [0, 0.1, 0.05], [0, 0.2, 0.05]]
-    first, pred = from_every_start(MOVE, VIA, *FROM[which])
+    first, pred = arc_per_start(MOVE, VIA, *FROM[which])
     given = {
         "move": MOVE, "via": VIA, "tool": np.tile(tool, (4, 1, 1)),
         "slot": np.array([0, 0, -1, -1]), "pred_start": first, "pred": pred,
@@ -37,11 +37,11 @@ def arc_from(
 
 
 def test_vias_end_is_reached_once_for_every_start() -> None:
-    first, pred = from_every_start(MOVE, VIA, *FROM["both"])
+    first, pred = arc_per_start(MOVE, VIA, *FROM["both"])
     assert first.tolist() == [0, 1, 2, 4, 6] and pred.tolist() == [-1, -1, 0, 1, 2, 2]
-    first, pred = from_every_start(MOVE, VIA, *FROM["first"])
+    first, pred = arc_per_start(MOVE, VIA, *FROM["first"])
     assert pred.tolist() == [-1, -1, 0, 2]
-    first, pred = from_every_start(MOVE[:1], VIA[:1], np.array([0, 1]), np.array([-2]))
+    first, pred = arc_per_start(MOVE[:1], VIA[:1], np.array([0, 1]), np.array([-2]))
     assert first.tolist() == [0, 1] and pred.tolist() == [-2]
 
 
@@ -63,7 +63,7 @@ def test_a_side_is_sure_where_all_circles_agree(
     arm: Arm, tool: np.ndarray, home: np.ndarray
 ) -> None:
     sides = [
-        reach(arm, arc_from(name, arm, tool, home)).side[3]
+        replan_all(arm, arc_from(name, arm, tool, home)).side[3]
         for name in ("both", "first", "second")
     ]
     both, first, second = sides
@@ -88,7 +88,7 @@ def test_an_arc_from_where_a_step_led_is_followed(
     late = arc_from(
         "second", arm, tool, home, kind=kind, joints=joints, pred_start=first, pred=pred
     )
-    found = reach(arm, late)
+    found = replan_all(arm, late)
     place = trace(arm, late).q[1]
     joints = np.full((4, 6), np.nan)
     joints[1] = place
@@ -98,7 +98,7 @@ def test_an_arc_from_where_a_step_led_is_followed(
     same = arc_from(
         "second", arm, tool, home, kind=kind, joints=joints, pred_start=first, pred=pred
     )
-    wanted = reach(arm, same)
+    wanted = replan_all(arm, same)
     assert (np.abs(found.side[2:]) > 0.5).all(axis=1).any()
     np.testing.assert_allclose(found.side, wanted.side, atol=1e-6)
 

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from postproc.motion.branches import (
-    OnDemand,
+    Branched,
+    BranchedLazily,
     SolvedBranches,
-    Ways,
     follow,
     on_written_turns,
 )
@@ -17,10 +17,10 @@ from postproc.robot.arm import Arm
 def ways(request):
     """The solutions at joint angles (k, 6) [rad], found in one of both ways."""
 
-    def solutions(arm: Arm, q: np.ndarray) -> Ways:
+    def solutions(arm: Arm, q: np.ndarray) -> Branched:
         flange = arm.flange(q)
         if request.param == "on demand":
-            return OnDemand(arm, flange)
+            return BranchedLazily(arm, flange)
         return SolvedBranches(arm.inverse(flange).q)
 
     return solutions

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from postproc.motion import blending
-from postproc.motion.blending import corners, nearest_on_parabola, parabolas, rounded
+from postproc.motion.blending import blend, corners, nearest_on_parabola, parabolas
 from postproc.motion.planner import plan
-from postproc.motion.replan import reach
+from postproc.motion.replan import replan_all
 from postproc.motion.targets import Fly, TargetKind, Targets, make_targets
 from postproc.motion.trace import trace
 from postproc.robot.arm import Arm
@@ -105,7 +105,7 @@ def test_the_arm_passes_where_the_corner_is_nearest_and_leaves_it_tangentially(
 
 def test_a_tolerance_is_kept(arm: Arm, tool: np.ndarray, home: np.ndarray) -> None:
     given = {"rounding": np.full(3, int(Fly.WITHIN)), "fly_distance": np.full(3, MM)}
-    aside = reach(arm, run(arm, tool, home, SQUARE, **given)).aside
+    aside = replan_all(arm, run(arm, tool, home, SQUARE, **given)).aside
     assert np.linalg.norm(aside[1]) == pytest.approx(MM, rel=0.02)
 
 
@@ -124,12 +124,12 @@ def test_exact_points_and_forks_are_passed_exactly(
 ) -> None:
     targets = run(arm, tool, home, SQUARE, rounding=np.full(3, int(Fly.EXACT)))
     exact = trace(arm, targets)
-    assert rounded(arm, targets, exact) is exact
+    assert blend(arm, targets, exact) is exact
     fork = replace(
         run(arm, tool, home, np.vstack([SQUARE, SQUARE[1:]])),
         pred_start=np.array([0, 1, 2, 3, 4]), pred=np.array([-1, 0, 1, 1]),
     )  # fmt: skip
-    assert (reach(arm, fork).aside == 0).all()
+    assert (replan_all(arm, fork).aside == 0).all()
 
 
 def test_smooth_runs_hardly_change(
@@ -168,9 +168,9 @@ def test_few_samples_tell_the_sides_that_many_do(
     rng = np.random.default_rng(seed)
     turns = rng.uniform(-8, 8, (60, 6))
     targets = joint_run(turns, overlap=rng.uniform(0.2, 1.0, 61))
-    few = reach(arm, targets)
+    few = replan_all(arm, targets)
     monkeypatch.setattr(blending, "SAMPLES", 200)
-    many = reach(arm, targets)
+    many = replan_all(arm, targets)
     np.testing.assert_allclose(few.side, many.side, atol=0.01)
     np.testing.assert_array_equal(few.aside, many.aside)
     assert np.linalg.norm(few.aside, axis=1).max() > 5 * MM
@@ -187,7 +187,7 @@ def test_sides_need_no_samples_where_nothing_turns(
     # Drives that turn although no joint does.
     coupling = np.eye(6) + 0.3 * np.eye(6, k=-1)
     arm, exact = replace(arm, coupling=coupling), trace(arm, targets)
-    all_, few = (rounded(arm, targets, exact, timed) for timed in (True, False))
+    all_, few = (blend(arm, targets, exact, timed) for timed in (True, False))
     assert len(targets) < len(few.edges.path) < 0.8 * len(all_.edges.path)
     wanted, found = (arrivals(arm, one.q, one.edges) for one in (all_, few))
     np.testing.assert_allclose(found.side, wanted.side, rtol=0, atol=1e-9)

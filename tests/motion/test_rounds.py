@@ -5,17 +5,17 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from postproc.motion.path import Rounds, arcs, rounds
+from postproc.motion.path import Arcs, arcs, arcs_of
 from postproc.motion.targets import TargetKind, make_targets
 from postproc.robot.pose import pose_from_record
 
 
-def of(*points: tuple[float, float, float]) -> Rounds:
+def of(*points: tuple[float, float, float]) -> Arcs:
     """One arc through points [m]."""
-    return Rounds(np.array([[0, 1, 2]]), np.array([points], dtype=float))
+    return Arcs(np.array([[0, 1, 2]]), np.array([points], dtype=float))
 
 
-def on_circle(*degrees: float, radius: float = 0.1) -> Rounds:
+def on_circle(*degrees: float, radius: float = 0.1) -> Arcs:
     angle = np.deg2rad(degrees)
     x, y = radius * np.cos(angle), radius * np.sin(angle)
     return of(*zip(x, y, np.zeros(3), strict=True))
@@ -79,7 +79,7 @@ def test_every_start_of_an_arc_makes_one_with_the_tool_of_the_arc() -> None:
     )  # fmt: skip
     aside = np.zeros((4, 3))
     aside[0, 0] = 0.01
-    found = rounds(targets, tcp, aside)
+    found = arcs_of(targets, tcp, aside)
     assert found.visit.tolist() == [[0, 2, 3], [1, 2, 3]]
     np.testing.assert_allclose(found.points[:, 0], [[-0.01, 0, 0.2], [1, 0, 0.2]])
     np.testing.assert_allclose(found.points[:, 1:, 2], 0.0)

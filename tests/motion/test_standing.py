@@ -9,10 +9,10 @@ import pytest
 
 from postproc.compensation.program import read_program
 from postproc.compensation.targets import targets_from_visits
-from postproc.compensation.windows import Window, quiet_stops
+from postproc.compensation.windows import Window, cut_points
 from postproc.language.visits import Visits
 from postproc.motion.planner import plan
-from postproc.motion.replan import reach, reach_again
+from postproc.motion.replan import replan, replan_all
 from postproc.motion.trace import NOWHERE
 from postproc.robot.cell import Cell
 from tests.bench import made
@@ -48,7 +48,7 @@ def read(cell: Cell, text: bytes) -> Visits:
 
 def cut(visits: Visits) -> list[Window]:
     """Cut at every fifth quiet stop."""
-    ends = np.flatnonzero(quiet_stops(visits))[2::5] + 1
+    ends = np.flatnonzero(cut_points(visits))[2::5] + 1
     marks = [0, *ends.tolist(), len(visits)]
     assert len(marks) > 3
     return [Window(a, b) for a, b in pairwise(marks)]
@@ -86,7 +86,7 @@ def test_courses_go_on_and_are_looked_at_again(cell: Cell, source) -> None:
     visits = read(cell, source())
     targets, _ = targets_from_visits(visits, cell)
     moved = picked(targets, 0.02, 5)
-    after = reach(cell.arm, shifted(targets, moved, 5))
+    after = replan_all(cell.arm, shifted(targets, moved, 5))
     begin = NOWHERE
     for window in cut(visits):
         whole, _ = targets_from_visits(window.of(visits), cell)
@@ -97,7 +97,7 @@ def test_courses_go_on_and_are_looked_at_again(cell: Cell, source) -> None:
         new = whole.moved_to(
             rows, after.targets.tcp[there], after.targets.joints[there]
         )
-        course = reach_again(cell.arm, reach(cell.arm, whole, begin), new, mine)
+        course = replan(cell.arm, replan_all(cell.arm, whole, begin), new, mine)
         found, kept = course.reached, slice(window.seeds, None)
         for name in ("q", "tcp", "aside"):
             wanted = getattr(after.reached, name)[own]
@@ -111,15 +111,15 @@ def test_courses_go_on_and_are_looked_at_again(cell: Cell, source) -> None:
 @pytest.mark.parametrize("row", [1, 2, 3, 4])
 def test_what_moves_next_to_the_stop_is_traced_from_there(cell: Cell, row: int) -> None:
     visits = read(cell, made.drilling(120).source)
-    first = reach(cell.arm, targets_from_visits(Window(0, 60).of(visits), cell)[0])
+    first = replan_all(cell.arm, targets_from_visits(Window(0, 60).of(visits), cell)[0])
     targets, _ = targets_from_visits(Window(60, len(visits)).of(visits), cell)
-    course = reach(cell.arm, targets, first.end)
+    course = replan_all(cell.arm, targets, first.end)
     moved = np.zeros(len(targets), dtype=bool)
     moved[row] = True
     new = shifted(targets, moved, 1)
     found, wanted = (
-        reach_again(cell.arm, course, new, moved),
-        reach(cell.arm, new, first.end),
+        replan(cell.arm, course, new, moved),
+        replan_all(cell.arm, new, first.end),
     )
     np.testing.assert_allclose(found.passed, wanted.passed, rtol=0, atol=CLOSE)
     np.testing.assert_allclose(found.side, wanted.side, rtol=0, atol=FINE)

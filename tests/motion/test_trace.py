@@ -6,7 +6,7 @@ from scipy.spatial.transform import Rotation
 
 from postproc.motion import trace as trace_module
 from postproc.motion.planner import plan
-from postproc.motion.replan import reach
+from postproc.motion.replan import replan_all
 from postproc.motion.targets import (
     AMBIGUOUS,
     LIMITS,
@@ -106,7 +106,7 @@ def test_joint_4_turns_back_before_the_end_of_a_straight_line(
     arm: Arm, tool: np.ndarray
 ) -> None:
     home, end = turning_line(arm, tool)
-    found = reach(arm, lines_from(arm, tool, home, [end]))
+    found = replan_all(arm, lines_from(arm, tool, home, [end]))
     q, side = found.passed, np.sign(found.side)
     assert side[1, 3] == -np.sign(q[1, 3] - q[0, 3]) != 0
 
@@ -293,7 +293,7 @@ def test_after_an_unknown_move_a_joint_target_is_known_again(
     found = trace(arm, targets)
     assert reason(found, 1) == NO_TARGET and np.isnan(found.q[1]).all()
     np.testing.assert_array_equal(found.q[2], home)
-    assert (reach(arm, targets).side == 0).all()
+    assert (replan_all(arm, targets).side == 0).all()
 
 
 def test_predecessors_that_lead_to_different_turns(arm: Arm, home: np.ndarray) -> None:

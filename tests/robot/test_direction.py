@@ -15,8 +15,8 @@ from postproc.robot.direction import (
     Arrivals,
     arrivals,
     arrivals_of_rows,
-    chain,
     directions_of_rows,
+    in_row_order,
 )
 from postproc.robot.play import (
     NOTHING,
@@ -210,7 +210,7 @@ def test_travel_counts_from_the_extreme_value_and_ignores_jitter(arm: Arm) -> No
 
 def test_long_chains_are_no_chains_of_python_calls(arm: Arm) -> None:
     q = np.cumsum(np.random.default_rng(1).normal(size=(20_000, 6)) * 0.01, axis=0)
-    first, source = chain(len(q))
+    first, source = in_row_order(len(q))
     found = arrivals(arm, q, Edges(first, source, q, first)).direction
     half = WIDTH_IN_PLAYS / 2 * arm.play
     z = sequential(q, q[0] - half, half)
@@ -283,11 +283,11 @@ def test_travel_matches_its_definition(steps: list[int]) -> None:
 def test_a_walk_goes_on_where_it_was_cut(arm: Arm, seed: int) -> None:
     rng = np.random.default_rng(seed)
     q = np.cumsum(rng.normal(0, arm.play, (300, 6)), axis=0)
-    first, source = chain(len(q))
+    first, source = in_row_order(len(q))
     whole, begin, at = arrivals(arm, q, Edges(first, source, q, first)), NOTHING, 0
     for end in (1, 2, 40, 41, 170, 300):
         some = q[max(at - 1, 0) : end]
-        first, source = chain(len(some))
+        first, source = in_row_order(len(some))
         part = arrivals(arm, some, Edges(first, source, some, first), begin)
         for name in ("direction", "side", "travel"):
             found = getattr(part, name)[min(at, 1) :]

@@ -11,8 +11,8 @@ from postproc.language.pdl2.effects import (
     HANDS_OVER,
     PURE,
     CallGraph,
+    call_graph_of,
     changed_arguments,
-    reach_of,
 )
 from postproc.language.pdl2.evaluate import (
     FRAME_NAMES,
@@ -20,17 +20,17 @@ from postproc.language.pdl2.evaluate import (
     component_index,
     copied,
     fill,
-    forget_key,
+    invalidate_key,
     owned,
     parts_of,
 )
 from postproc.language.pdl2.job import Place, Record
 from postproc.language.pdl2.machine import (
-    Here,
+    Execution,
     Machine,
-    forget,
-    forget_names,
-    pin_names,
+    escape_names,
+    invalidate,
+    invalidate_names,
 )
 from postproc.language.pdl2.moves import move
 from postproc.language.pdl2.store import Store
@@ -39,8 +39,8 @@ from postproc.language.pdl2.values import (
     Location,
     Nothing,
     Position,
+    SourceNumber,
     Value,
-    Written,
 )
 from postproc.language.visits import ELSEWHERE
 
@@ -52,9 +52,9 @@ from postproc.language.visits import ELSEWHERE
 _UNFOLLOWED = -4  # in a context: the body is not run, its moves are listed
 
 
-def leave_out(
+def summarise_call(
     machine: Machine,
-    here: Here,
+    here: Execution,
     name: str,
     reach: CallGraph,
     arguments: tuple[ast.Expression | None, ...] = (),
@@ -62,11 +62,11 @@ def leave_out(
     """Take in what a call may do without following it; list the moves it may make."""
     for argument in changed_arguments(arguments):
         here.world.pin(here.value(argument), f"{name} may move to it")
-        forget(here, argument, f"{name} may change it")
+        invalidate(here, argument, f"{name} may change it")
     for part in reach.parts:
-        within = Here(here.world, part.place, here.row, here.store, here.volatile)
-        pin_names(within, part.effects.read, f"{name} may compute with it")
-        forget_names(within, part.effects.assigned, f"{name} may change it")
+        within = Execution(here.world, part.place, here.row, here.store, here.volatile)
+        escape_names(within, part.effects.read, f"{name} may compute with it")
+        invalidate_names(within, part.effects.assigned, f"{name} may change it")
         _list_moves(machine, here, part.place, name)
     if reach.frames:
         why = f"a routine that {name} calls sets it"
@@ -75,7 +75,7 @@ def leave_out(
         here.store.last = frozenset({ELSEWHERE})
 
 
-def _list_moves(machine: Machine, here: Here, place: Place, name: str) -> None:
+def _list_moves(machine: Machine, here: Execution, place: Place, name: str) -> None:
     """List the moves of a body once, from nowhere and with nothing known."""
     program, body = place.program, place.body
     context = ((machine.position(program, body.first), _UNFOLLOWED),)
@@ -89,19 +89,19 @@ def _list_moves(machine: Machine, here: Here, place: Place, name: str) -> None:
         if isinstance(statement, ast.Move):
             store = Store(lambda key: nothing, last=frozenset({ELSEWHERE}))
             store.set(**dict.fromkeys(FRAMES, nothing))
-            at = Here(here.world, place, row, store, here.volatile, context, why)
+            at = Execution(here.world, place, row, store, here.volatile, context, why)
             move(machine, at, statement)
 
 
 # Calls: routines of the job are run, others are taken at their word.
 
 
-def call_statement(machine: Machine, here: Here, call: ast.Call) -> bool:
+def call_statement(machine: Machine, here: Execution, call: ast.Call) -> bool:
     """Run a call; tell whether control went into a routine of the job."""
     find = here.world.find_program if call.program else here.world.find_routine
     inside = find(here.place.program, call.name)
     if inside is None:
-        outside(here, call.name, call.arguments)
+        opaque_call(here, call.name, call.arguments)
         return False
     if inside.body in machine.calls_in(here.context):
         running = machine.calls_in(here.context)
@@ -114,26 +114,26 @@ def call_statement(machine: Machine, here: Here, call: ast.Call) -> bool:
 
 
 def calls_in_expressions(
-    machine: Machine, here: Here, statement: ast.Statement
+    machine: Machine, here: Execution, statement: ast.Statement
 ) -> None:
     """Let the function calls inside of a statement have their effects."""
     for call in machine.called(here.place, statement):
         inside = here.world.find_routine(here.place.program, call.name)
         if inside is None:
-            outside(here, call.name, call.arguments)
+            opaque_call(here, call.name, call.arguments)
         else:
             _summarised(machine, here, inside, call.arguments)
 
 
 def _summarised(
     machine: Machine,
-    here: Here,
+    here: Execution,
     inside: Place,
     arguments: tuple[ast.Expression | None, ...],
 ) -> None:
     """Take a function's effects from its text instead of running it."""
-    name, reach = inside.body.name, reach_of(here.world, inside)
-    leave_out(machine, here, name, reach, arguments)
+    name, reach = inside.body.name, call_graph_of(here.world, inside)
+    summarise_call(machine, here, name, reach, arguments)
     if reach.moves:
         here.world.report_once(
             here.place.program,
@@ -145,7 +145,7 @@ def _summarised(
         )
 
 
-def _refuse_recursion(machine: Machine, here: Here, inside: Place) -> None:
+def _refuse_recursion(machine: Machine, here: Execution, inside: Place) -> None:
     name = inside.body.name or inside.program.name
     here.world.report_once(
         here.place.program,
@@ -155,12 +155,12 @@ def _refuse_recursion(machine: Machine, here: Here, inside: Place) -> None:
         f"{name} calls itself: what it does is not followed; moves after it are taken "
         "to come from an unknown place",
     )
-    leave_out(machine, here, name, reach_of(here.world, inside))
+    summarise_call(machine, here, name, call_graph_of(here.world, inside))
     here.store.last = frozenset({ELSEWHERE})
 
 
 def _bind(
-    here: Here, inside: Place, arguments: tuple[ast.Expression | None, ...]
+    here: Execution, inside: Place, arguments: tuple[ast.Expression | None, ...]
 ) -> None:
     """Give the parameters their values; variables go by reference."""
     prefix = f"{inside.program.name}:{inside.body.name}/"
@@ -173,7 +173,7 @@ def _bind(
                 here.store.write(key, Alias(target.keys, target.exact))
                 continue
             for aliased in target.keys:
-                forget_key(here, aliased, f"{inside.body.name} may change it")
+                invalidate_key(here, aliased, f"{inside.body.name} may change it")
         if argument is None:
             here.store.write(key, Nothing("the argument is not given"))
             continue
@@ -187,8 +187,8 @@ def _bind(
         here.store.write(key, value)
 
 
-def outside(
-    here: Here, name: str, arguments: tuple[ast.Expression | None, ...]
+def opaque_call(
+    here: Execution, name: str, arguments: tuple[ast.Expression | None, ...]
 ) -> None:
     """Take in what a routine that the job does not hold is said, or assumed, to do."""
     start = here.world.start
@@ -197,9 +197,9 @@ def outside(
     for given in arguments:
         here.world.pin(here.value(given), why)
     named = frozenset(r.name for r in map(bare, arguments) if r is not None)
-    pin_names(here, named, why)
+    escape_names(here, named, why)
     for argument in changed_arguments(arguments):
-        forget(here, argument, f"{name} may change it (arguments go by reference)")
+        invalidate(here, argument, f"{name} may change it (arguments go by reference)")
     if built_in:
         return
     said = start.routines.get(name)
@@ -220,16 +220,16 @@ def outside(
                         f"[frames.routines.{name}] in the cell file")  # fmt: skip
 
 
-def _say(here: Here, code: str, name: str, text: str) -> None:
+def _say(here: Execution, code: str, name: str, text: str) -> None:
     here.world.report_once(here.place.program, here.row, code, name, f"{name} {text}")
 
 
-def _unknown_frames(here: Here, why: str) -> None:
+def _unknown_frames(here: Execution, why: str) -> None:
     here.store.set(**{frame: Nothing(why) for frame in FRAMES})
 
 
 def _frames_from_table(
-    here: Here, name: str, arguments: tuple[ast.Expression | None, ...]
+    here: Execution, name: str, arguments: tuple[ast.Expression | None, ...]
 ) -> None:
     table = here.world.start.frame_tables[name]
     values = [here.value(a) for a in arguments]
@@ -261,7 +261,7 @@ def frame_value(record: Record, why: str) -> Position | Nothing:
 # Assignments: what a variable, a component or a setting holds afterwards.
 
 
-def assign(here: Here, statement: ast.Assign, taught: bool) -> None:
+def assign(here: Execution, statement: ast.Assign, taught: bool) -> None:
     """Let an assignment have its effect; `taught` marks the literal in it."""
     new = statement.value
     if statement.operator != ":=":
@@ -286,7 +286,7 @@ def assign(here: Here, statement: ast.Assign, taught: bool) -> None:
     target = here.locate(statement.target)
     if not target.exact:
         for key in target.keys:
-            forget_key(here, key, "an element known only at run time is assigned")
+            invalidate_key(here, key, "an element known only at run time is assigned")
         return
     held = _new_value(here, statement, target, value)
     if isinstance(held, Position):
@@ -297,7 +297,7 @@ def assign(here: Here, statement: ast.Assign, taught: bool) -> None:
         here.store.write(target.key, held)
 
 
-def _assigns_component(here: Here, reference: ast.Reference) -> bool:
+def _assigns_component(here: Execution, reference: ast.Reference) -> bool:
     """Tell whether a reference means one of a position's six numbers."""
     if reference.name.startswith("$"):
         return False
@@ -305,7 +305,9 @@ def _assigns_component(here: Here, reference: ast.Reference) -> bool:
     return target.exact and component_index(target) >= 0
 
 
-def _assign_component(here: Here, reference: ast.Reference, new: Written) -> None:
+def _assign_component(
+    here: Execution, reference: ast.Reference, new: SourceNumber
+) -> None:
     """Replace one of the six numbers of a position."""
     target = here.locate(reference)
     held = here.store.read(target.key)
@@ -315,7 +317,7 @@ def _assign_component(here: Here, reference: ast.Reference, new: Written) -> Non
     here.store.write(target.key, owned(here, reference.name, target.key, held))
 
 
-def _setting(here: Here, reference: ast.Reference, value: Value) -> None:
+def _setting(here: Execution, reference: ast.Reference, value: Value) -> None:
     """Change a frame or motion variable of our arm."""
     name = here.setting_name(reference)
     if name is None:
@@ -332,7 +334,9 @@ def _setting(here: Here, reference: ast.Reference, value: Value) -> None:
     here.store.set(**{name: value})
 
 
-def _frame_part(here: Here, name: str, at: int, value: Value, taught: bool) -> None:
+def _frame_part(
+    here: Execution, name: str, at: int, value: Value, taught: bool
+) -> None:
     """Change one of the six numbers of a frame of our arm.
 
     The cell may say of its own frames that they were taught: what comes of one whose
@@ -343,7 +347,7 @@ def _frame_part(here: Here, name: str, at: int, value: Value, taught: bool) -> N
         held = Position()
     number = value if isinstance(value, float) else None
     new: Value = replace(
-        held.with_component(at, Written(number)), taught=held.taught or taught
+        held.with_component(at, SourceNumber(number)), taught=held.taught or taught
     )
     if any(held.numbers) and held.numbers in here.world.start.records:
         new = Nothing(f"a part of ${name.upper()}, which the cell gives, is assigned")
@@ -352,7 +356,7 @@ def _frame_part(here: Here, name: str, at: int, value: Value, taught: bool) -> N
     here.store.set(**{name: new})
 
 
-def _whose(here: Here, reference: ast.Reference) -> int | None:
+def _whose(here: Execution, reference: ast.Reference) -> int | None:
     """Return the arm that ``$ARM_DATA[n]`` names, None where it is not known."""
     first = reference.steps[0] if reference.steps else None
     if isinstance(first, ast.Index) and not isinstance(first.subscripts[0], tuple):
@@ -361,7 +365,7 @@ def _whose(here: Here, reference: ast.Reference) -> int | None:
 
 
 def _new_value(
-    here: Here, statement: ast.Assign, target: Location, value: Value
+    here: Execution, statement: ast.Assign, target: Location, value: Value
 ) -> Value:
     if target.component == ():
         return value
@@ -382,7 +386,7 @@ def _new_value(
     return Nothing("a part of it known only at run time is assigned")
 
 
-def _blank(here: Here, name: str, held: Value) -> Position:
+def _blank(here: Execution, name: str, held: Value) -> Position:
     """Return a position of which nothing is known yet."""
     type_ = here.world.type_of(here.place, name)
     joints = type_ is not None and type_.name == "jointpos"

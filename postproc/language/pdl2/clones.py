@@ -13,7 +13,7 @@ from postproc.language.pdl2 import syntax as ast
 from postproc.language.pdl2.entries import is_nested, last_head
 from postproc.language.pdl2.parser import parse_value_form
 from postproc.language.pdl2.program import Body, Program, Variable
-from postproc.language.shapes import formed
+from postproc.language.shapes import parse_shapes
 from postproc.language.source import (
     CloneError,
     Edit,
@@ -31,7 +31,7 @@ _STRING = re.compile(r"'(?:\\.|[^'\\])*'|'[^']*'|\"[^\"]*\"")
 
 
 @dataclass(frozen=True)
-class Named:
+class CloneTarget:
     """A variable that a move names as its destination.
 
     Attributes:
@@ -54,7 +54,7 @@ class Named:
 
 def named_at(
     programs: Sequence[Program], file: int, line: int, via: bool, name: str
-) -> Named:
+) -> CloneTarget:
     """Find the variable that a move goes to, as far as it can be cloned.
 
     Args:
@@ -91,7 +91,7 @@ def named_at(
     if variable.name.lower() != name.lower():
         raise CloneError(f"{variable.name} holds a copy of {name}")
     span = _destination(program, row, "VIA" if via else "TO", variable.name)
-    return Named(file, body.name if own else "", variable, span)
+    return CloneTarget(file, body.name if own else "", variable, span)
 
 
 def _unwrapped(statement: ast.Statement) -> ast.Statement | None:
@@ -162,7 +162,7 @@ def copied_entry(
         CloneError: The entry is not one of this variable alone.
     """
     lines = read_lines(values)
-    said = formed(lines.shapes, parse_value_form)
+    said = parse_shapes(lines.shapes, parse_value_form)
     heads = last_head(lines, said)
     row = int(np.searchsorted(lines.line, line, side="right")) - 1
     at = int(heads[row]) if row >= 0 else -1
@@ -230,7 +230,7 @@ def clone(
     programs: Sequence[Program],
     values: Source | None,
     literals: Literals,
-    named: Sequence[Named],
+    named: Sequence[CloneTarget],
     rows: Sequence[int],
     name: str,
 ) -> list[tuple[int, Edit]]:
@@ -276,7 +276,7 @@ def clone(
     return found
 
 
-def _means(program: Program, row: int, named: Named) -> bool:
+def _means(program: Program, row: int, named: CloneTarget) -> bool:
     """Tell whether a name in a row means the variable, and no other of its name."""
     body, name = body_at(program, row), named.variable.name.lower()
     if named.scope:
@@ -298,7 +298,7 @@ def _declared(program: Program, line: int, old: str, name: str) -> Edit:
 
 
 def _assigned(
-    program: Program, named: Named, line: int, name: str, starts: list[int]
+    program: Program, named: CloneTarget, line: int, name: str, starts: list[int]
 ) -> Edit:
     """Assign a value to the new name behind the line that gives it to the old one."""
     row = int(np.searchsorted(program.lines.line, line))

@@ -194,17 +194,17 @@ class CallGraph:
         return names | {f"${frame}" for frame in FRAMES if self.frames}
 
 
-def reach_of(world: World, place: Place) -> CallGraph:
+def call_graph_of(world: World, place: Place) -> CallGraph:
     """Follow a body into all that it calls; remembered for each body."""
     key = id(place.body)
     if key not in world.reached:
-        world.reached[key] = reach_rows(world, place, place.body.first, place.body.last)
+        world.reached[key] = live_rows(world, place, place.body.first, place.body.last)
     found = world.reached[key]
     assert isinstance(found, CallGraph)
     return found
 
 
-def reach_rows(world: World, place: Place, first: int, last: int) -> CallGraph:
+def live_rows(world: World, place: Place, first: int, last: int) -> CallGraph:
     """Follow rows first to last - 1 of a body into all that they call."""
     parts = [LiveRows(place, rows_effects(place.program, first, last))]
     done, waiting = {id(place.body)}, list(_called(world, place, first, last))
@@ -259,7 +259,7 @@ def _names(statement: ast.Statement) -> Iterator[tuple[str, bool]]:
 NEVER_REACHED = "never-reached"
 
 
-def never_reached(programs: Sequence[Program], visits: Visits) -> list[Diagnostic]:
+def dead_moves(programs: Sequence[Program], visits: Visits) -> list[Diagnostic]:
     """List the files with moves to targets that no way from the start leads to.
 
     Such a move stands in a routine that nobody calls, or behind a jump. From where it

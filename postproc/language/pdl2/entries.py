@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from postproc.arrays import Bools, Floats, Ints
 from postproc.language.lines import Lines
-from postproc.language.pdl2.parser import Entered
-from postproc.language.shapes import Formed, alike, in_order, name_index
+from postproc.language.pdl2.parser import EntryPart
+from postproc.language.shapes import ParsedShapes, alike, name_index, numbered_in_order
 
 # The entries of a variable file as columns; single ones are made when asked for.
 
@@ -173,7 +173,9 @@ class Records:
     element: Bools
 
 
-def find_records(lines: Lines, said: Formed[Entered | None], head: Ints) -> Records:
+def find_records(
+    lines: Lines, said: ParsedShapes[EntryPart | None], head: Ints
+) -> Records:
     """Find where the entries of a file begin and end.
 
     The fields of records and of path nodes, and lines that are not understood, end an
@@ -199,7 +201,7 @@ def find_records(lines: Lines, said: Formed[Entered | None], head: Ints) -> Reco
     return Records(head[first], first, closed, place[begins] % 2 == 1)
 
 
-def last_head(lines: Lines, said: Formed[Entered | None]) -> Ints:
+def last_head(lines: Lines, said: ParsedShapes[EntryPart | None]) -> Ints:
     """Return the row of the last variable's head up to every row, (n,), -1: none.
 
     A head below that of a record or path which does not say whose variable it is heads
@@ -227,21 +229,21 @@ def _heads(rows: Ints, fields: Bools, nested: Bools) -> Ints:
     return np.array(heads, dtype=np.int64)
 
 
-def is_nested(entered: Entered | None) -> bool:
+def is_nested(entered: EntryPart | None) -> bool:
     """Tell whether a line heads a record or a path, whose fields have heads too."""
     return entered is not None and kind_of(entered.type)[0] in NESTED
 
 
-def _is_head(entered: Entered | None) -> bool:
+def _is_head(entered: EntryPart | None) -> bool:
     return entered is not None and bool(entered.name)
 
 
-def is_no_value(entered: Entered | None) -> bool:
+def is_no_value(entered: EntryPart | None) -> bool:
     """Tell whether a line is not understood, or names a node: no variable has any."""
     return entered is None or entered.node >= 0
 
 
-def _may_be_field(entered: Entered | None) -> bool:
+def _may_be_field(entered: EntryPart | None) -> bool:
     if entered is None:
         return False
     return entered.name.startswith("$") or not entered.variable
@@ -262,7 +264,7 @@ class _Read:
         if at < 6:
             self.places[at] = place
 
-    def take(self, row: int, entered: Entered, axes: Iterator[int]) -> None:
+    def take(self, row: int, entered: EntryPart, axes: Iterator[int]) -> None:
         """Take in a line; `axes` are the numbers of the axes in it."""
         for letter, slot in entered.components:
             self.put(_LETTERS.index(letter.upper()), (row, slot))
@@ -280,7 +282,7 @@ class _Read:
 
 
 def read_records(
-    lines: Lines, said: Formed[Entered | None], records: Records
+    lines: Lines, said: ParsedShapes[EntryPart | None], records: Records
 ) -> Entries:
     """Read the entries of a file, layout by layout; no name is told yet to be twice."""
     k = len(records.first)
@@ -340,13 +342,13 @@ def _alike(form: Ints, records: Records) -> Iterator[Ints]:
         return iter(())
     own = alike(form, records.first, records.closed)
     heads = form[records.head]
-    kind, first = in_order(own * (int(heads.max()) + 1) + heads)
+    kind, first = numbered_in_order(own * (int(heads.max()) + 1) + heads)
     ends = np.cumsum(np.bincount(kind, minlength=len(first)))
     return iter(np.split(np.argsort(kind, kind="stable"), ends[:-1]))
 
 
 def _by_axes(
-    lines: Lines, first: Ints, mine: Ints, parts: Sequence[Entered | None]
+    lines: Lines, first: Ints, mine: Ints, parts: Sequence[EntryPart | None]
 ) -> Iterator[tuple[Ints, list[int]]]:
     """Split entries that are written alike by the axes that they give values of."""
     places = [
@@ -393,7 +395,9 @@ def _stacked(parts: Sequence[tuple[Ints, Floats]], k: int) -> Floats:
     return stacked
 
 
-def _names(lines: Lines, said: Formed[Entered | None], records: Records) -> list[str]:
+def _names(
+    lines: Lines, said: ParsedShapes[EntryPart | None], records: Records
+) -> list[str]:
     """Name every entry: as its head does, elements with their index."""
     heads, at = np.unique(records.head, return_inverse=True)
     names = _head_names(said, lines.shape[heads])[at]
@@ -404,7 +408,7 @@ def _names(lines: Lines, said: Formed[Entered | None], records: Records) -> list
 
 
 def _indices(
-    lines: Lines, said: Formed[Entered | None], records: Records
+    lines: Lines, said: ParsedShapes[EntryPart | None], records: Records
 ) -> dict[int, str]:
     """Write the indices of the entries that are elements of an array."""
     elements = np.flatnonzero(records.element)
@@ -421,7 +425,9 @@ def _indices(
     return found
 
 
-def _head_names(said: Formed[Entered | None], shapes: Ints) -> NDArray[np.object_]:
+def _head_names(
+    said: ParsedShapes[EntryPart | None], shapes: Ints
+) -> NDArray[np.object_]:
     """Return the names in some heads, (m,)."""
     found = np.empty(len(shapes), dtype=object)
     texts = np.array(said.shapes.names, dtype=object)

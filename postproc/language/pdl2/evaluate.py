@@ -16,9 +16,9 @@ from postproc.language.pdl2.values import (
     Location,
     Nothing,
     Position,
+    SourceNumber,
     Value,
     Vector,
-    Written,
     binary,
     function,
     inverted,
@@ -238,22 +238,22 @@ class ProgramPoint:
             along=frozenset(at for at, part in enumerate(parts) if part.along),
         )
 
-    def written(self, expression: ast.Expression | None) -> Written:
+    def written(self, expression: ast.Expression | None) -> SourceNumber:
         """Return a number, and where in the text it is written or comes from."""
         match expression:
             case ast.Number(slot):
-                return Written(self.real(expression), self.global_slot(slot))
+                return SourceNumber(self.real(expression), self.global_slot(slot))
             case ast.Unary("()", operand):
                 return self.written(operand)
             case ast.Reference():
-                return self._part(expression) or Written(self.real(expression))
+                return self._part(expression) or SourceNumber(self.real(expression))
             case ast.Binary("+" | "-" as sign, ast.Reference() as left, right):
                 part = self._part(left)
                 if part is not None:
                     return _moved(part, self.real(right), sign)
-        return Written(self.real(expression))
+        return SourceNumber(self.real(expression))
 
-    def _part(self, reference: ast.Reference) -> Written | None:
+    def _part(self, reference: ast.Reference) -> SourceNumber | None:
         """Return a component that stands in the text, None for anything else."""
         if reference.name.startswith("$"):
             return None
@@ -264,7 +264,7 @@ class ProgramPoint:
         held = self.store.read(target.key)
         if not isinstance(held, Position) or held.slots[at] < 0:
             return None
-        return Written(held.numbers[at], held.slots[at], along=True)
+        return SourceNumber(held.numbers[at], held.slots[at], along=True)
 
     def real(self, expression: ast.Expression | None) -> float | None:
         """Return a real number, None where it is not known."""
@@ -319,7 +319,7 @@ def component_index(target: Location) -> int:
     return -1
 
 
-def _moved(part: Written, by: float | None, sign: str) -> Written:
+def _moved(part: SourceNumber, by: float | None, sign: str) -> SourceNumber:
     if part.number is None or by is None or abs(by) > FARTHEST:
         return replace(part, number=None)
     return replace(part, number=part.number + (by if sign == "+" else -by))
@@ -347,7 +347,7 @@ def copied(here: ProgramPoint, value: ast.Expression, target: ast.Reference) -> 
     for part in parts.values():
         here.world.pin(part, f"{origin.name} is copied, to where only the run tells")
     for key in place.keys:
-        forget_key(here, key, f"a copy of {origin.name} is assigned")
+        invalidate_key(here, key, f"a copy of {origin.name} is assigned")
     return True
 
 
@@ -393,7 +393,7 @@ def is_standard(key: str) -> bool:
     return key.rpartition(".")[2].startswith("$")
 
 
-def forget_key(here: ProgramPoint, key: str, why: str) -> None:
+def invalidate_key(here: ProgramPoint, key: str, why: str) -> None:
     """Forget what a key and its parts hold: any of it may still be there."""
     if key in here.store.compound or here.world.first_parts(key):
         here.world.loosen(key, why)

@@ -17,24 +17,24 @@ from postproc.language.pdl2.calls import (
     frame_value,
 )
 from postproc.language.pdl2.collect import collect
-from postproc.language.pdl2.effects import changed_arguments, reach_rows, rows_effects
+from postproc.language.pdl2.effects import changed_arguments, live_rows, rows_effects
 from postproc.language.pdl2.entries import POSITIONS, Entries, Entry
 from postproc.language.pdl2.evaluate import ProgramPoint
 from postproc.language.pdl2.job import FilePoints, Place, Start, World, base_variable
 from postproc.language.pdl2.machine import (
     HANDLED,
     MAX_ROWS,
-    Here,
+    Execution,
     Machine,
     Visit,
-    forget,
-    forget_names,
-    pin_names,
+    escape_names,
+    invalidate,
+    invalidate_names,
 )
 from postproc.language.pdl2.moves import move
 from postproc.language.pdl2.program import Program, Variable, Variables, recovered
 from postproc.language.pdl2.store import Store, root_of
-from postproc.language.pdl2.stretches import Stretches
+from postproc.language.pdl2.stretches import MoveBlocks
 from postproc.language.pdl2.values import Nothing, Position, Value, Vector
 from postproc.language.pdl2.variable_file import VariableFile
 from postproc.language.pdl2.variable_file import VariableFile as ValueFile
@@ -45,7 +45,7 @@ from postproc.robot.trajectory import Motion
 # FOR loops: round by round where the bounds are constant, else over and over.
 
 
-def start_loop(machine: Machine, here: Here, statement: ast.For) -> None:
+def start_loop(machine: Machine, here: Execution, statement: ast.For) -> None:
     """Go into the first round, past the loop, or both where that is not known."""
     row, end = here.row, here.place.body.blocks.end[here.row]
     start, stop = here.value(statement.start), here.value(statement.stop)
@@ -66,14 +66,14 @@ def start_loop(machine: Machine, here: Here, statement: ast.For) -> None:
             _round(machine, here, here.context, row, 0)
             return
     machine.widened.add(loop)
-    forget(here, ast.Reference(statement.name), "it counts a loop")
+    invalidate(here, ast.Reference(statement.name), "it counts a loop")
     if rounds is None:
         machine.go_on(here.context, end + 1, here.store)
     machine.push(here.context, row + 1, here.store)
 
 
 def _unrolled(
-    machine: Machine, here: Here, statement: ast.For, rounds: int, end: int
+    machine: Machine, here: Execution, statement: ast.For, rounds: int, end: int
 ) -> bool:
     """Tell whether a loop is followed round by round."""
     loop = (here.context, here.row)
@@ -102,7 +102,7 @@ def _unrolled(
 
 def _round(
     machine: Machine,
-    here: Here,
+    here: Execution,
     context: tuple[tuple[int, int], ...],
     row: int,
     number: int,
@@ -121,7 +121,7 @@ def _round(
     machine.go_on(inner, row + 1, here.store)
 
 
-def end_round(machine: Machine, here: Here) -> None:
+def end_round(machine: Machine, here: Execution) -> None:
     """Go into the next round, out of the loop, or both where that is not known."""
     row = here.place.body.blocks.opener[here.row]
     at = machine.position(here.place.program, row)
@@ -136,9 +136,9 @@ def end_round(machine: Machine, here: Here) -> None:
             _round(machine, here, outer, row, last[1] + 1)
             return
     else:
-        forget(here, ast.Reference(name), "it counts a loop")
+        invalidate(here, ast.Reference(name), "it counts a loop")
         machine.push(here.context, row + 1, here.store)
-    forget(here, ast.Reference(name), "it counted a loop that has ended")
+    invalidate(here, ast.Reference(name), "it counted a loop that has ended")
     machine.go_on(here.context, here.row + 1, here.store)
 
 
@@ -154,7 +154,7 @@ _CANNOT_MOVE = re.compile(
 _MOVES = re.compile(r".*\b(?:MOVE|MOVEFLY|SYNCMOVE|SYNCMOVEFLY)\b", re.I)
 
 
-def step(machine: Machine, here: Here, statement: ast.Statement) -> bool:
+def step(machine: Machine, here: Execution, statement: ast.Statement) -> bool:
     """Run one statement; tell whether the next row follows."""
     statement = recovered(statement)
     if not isinstance(statement, ast.Label | ast.Else | ast.When):
@@ -177,7 +177,7 @@ def step(machine: Machine, here: Here, statement: ast.Statement) -> bool:
                 here.world.pin(here.value(operand), "the program writes it out")
         case ast.Transfer(word, operands):
             for operand in changed_arguments(operands):
-                forget(here, operand, f"{word} changes it")
+                invalidate(here, operand, f"{word} changes it")
         case ast.Unknown():
             _unknown(machine, here, statement)
         case _:
@@ -185,7 +185,7 @@ def step(machine: Machine, here: Here, statement: ast.Statement) -> bool:
     return True
 
 
-def _control(machine: Machine, here: Here, statement: ast.Statement) -> bool:
+def _control(machine: Machine, here: Execution, statement: ast.Statement) -> bool:
     blocks, row = here.place.body.blocks, here.row
     match statement:
         case ast.If(condition):
@@ -221,7 +221,7 @@ def _control(machine: Machine, here: Here, statement: ast.Statement) -> bool:
 
 def _branch(
     machine: Machine,
-    here: Here,
+    here: Execution,
     condition: ast.Expression | None,
     then: int,
     otherwise: int,
@@ -237,7 +237,7 @@ def _branch(
     return False
 
 
-def _select(machine: Machine, here: Here, value: Value) -> None:
+def _select(machine: Machine, here: Execution, value: Value) -> None:
     """Go to every CASE that may be meant."""
     blocks = here.place.body.blocks
     for row in blocks.inner[here.row]:
@@ -254,9 +254,9 @@ def _select(machine: Machine, here: Here, value: Value) -> None:
     machine.push(here.context, blocks.end[here.row], here.store)
 
 
-def _fits(here: Here, row: int, case: ast.Case, value: Value) -> bool | None:
+def _fits(here: Execution, row: int, case: ast.Case, value: Value) -> bool | None:
     """Tell whether a CASE means a value, None where it is not known."""
-    at = Here(here.world, here.place, row, here.store, here.volatile, here.context)
+    at = Execution(here.world, here.place, row, here.store, here.volatile, here.context)
     found: bool | None = not case.choices and None
     for choice in case.choices:
         low, high = choice if isinstance(choice, tuple) else (choice, choice)
@@ -269,12 +269,12 @@ def _fits(here: Here, row: int, case: ast.Case, value: Value) -> bool | None:
     return found
 
 
-def _unknown(machine: Machine, here: Here, statement: ast.Unknown) -> None:
+def _unknown(machine: Machine, here: Execution, statement: ast.Unknown) -> None:
     """Forget all that unknown text could influence."""
     line = int(here.place.program.lines.line[here.row])
     why = f"line {line}, which is not understood, may change it"
     names = frozenset(word.lower() for word in _WORD.findall(statement.text))
-    forget_names(here, names, why)
+    invalidate_names(here, names, why)
     if _MOVES.match(statement.text):
         arrival = Visit(
             here.place,
@@ -290,7 +290,7 @@ def _unknown(machine: Machine, here: Here, statement: ast.Unknown) -> None:
         here.store.last |= {ELSEWHERE}
 
 
-def run_broken(machine: Machine, here: Here) -> None:
+def run_broken(machine: Machine, here: Execution) -> None:
     """List the moves of a body whose blocks do not close; follow none of them."""
     body = here.place.body
     program = here.place.program
@@ -303,8 +303,8 @@ def run_broken(machine: Machine, here: Here) -> None:
             here.store.last = frozenset({ELSEWHERE})
             move(machine, here, said)
     effects = rows_effects(program, body.first, body.last)
-    pin_names(here, effects.read, f"{why}: it may be used in a computation")
-    forget_names(here, effects.assigned, why)
+    escape_names(here, effects.read, f"{why}: it may be used in a computation")
+    invalidate_names(here, effects.assigned, why)
     here.store.set(tool=Nothing(why), base=Nothing(why), uframe=Nothing(why))
     here.store.last = frozenset({ELSEWHERE})
     machine.leave(here)
@@ -477,7 +477,7 @@ def resolve(
     world = World(program, dict(others or {}), start or Start(), variables)
     fill_initial(world)
     machine = Machine(world)
-    stretches = Stretches(machine)
+    stretches = MoveBlocks(machine)
     _start(machine)
     while (here := machine.next()) is not None:
         _run(machine, here, stretches)
@@ -517,7 +517,7 @@ def _handlers(machine: Machine, store: Store) -> None:
             for first, last in body.blocks.handlers if body else ():
                 assert body is not None
                 place = Place(program, body)
-                reach = reach_rows(world, place, first, last)
+                reach = live_rows(world, place, first, last)
                 machine.volatile |= reach.assigned
                 for part in reach.parts:
                     for name in part.effects.read:
@@ -544,7 +544,7 @@ def _moving_handler(machine: Machine, place: Place, row: int, store: Store) -> N
     machine.push(context, row + 1, store)
 
 
-def _run(machine: Machine, here: Here, stretches: Stretches) -> None:
+def _run(machine: Machine, here: Execution, stretches: MoveBlocks) -> None:
     """Run statements one after the other until ways part or meet."""
     program, body = here.place.program, here.place.body
     joins = body.blocks.joins

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from postproc.arrays import Ints
 from postproc.language.pdl2 import syntax as ast
 from postproc.language.pdl2.effects import PURE, invocations, references
-from postproc.language.pdl2.evaluate import ProgramPoint, forget_key, parts_under
+from postproc.language.pdl2.evaluate import ProgramPoint, invalidate_key, parts_under
 from postproc.language.pdl2.job import Place, World
 from postproc.language.pdl2.program import Body, Program
 from postproc.language.pdl2.store import MANY, MOST_ORIGINS, Settings, Store
@@ -114,7 +114,7 @@ Key = tuple[Context, int, int]
 
 
 @dataclass
-class Here(ProgramPoint):
+class Execution(ProgramPoint):
     """A point of the execution with the way that led to it."""
 
     context: Context = ()
@@ -181,7 +181,7 @@ class Machine:
             self.next_id += count
         return self.ids[key]
 
-    def record(self, here: Here, sub: int, arrival: Visit | MoveRun) -> int:
+    def record(self, here: Execution, sub: int, arrival: Visit | MoveRun) -> int:
         """Keep a visit; return its (first) id."""
         key = (here.context, self.position(here.place.program, here.row), sub)
         self.arrivals[key] = arrival
@@ -189,14 +189,14 @@ class Machine:
             self._report_many(here)
         return self.visit_id(key, len(arrival))
 
-    def _report_many(self, here: Here) -> None:
+    def _report_many(self, here: Execution) -> None:
         here.world.report_once(
             here.place.program, here.row, "many-origins", str(here.row),
             f"more than {MOST_ORIGINS} arrivals may come before this move: they are "
             "not told apart, and from which side it arrives is not known",
         )  # fmt: skip
 
-    def predecessors(self, here: Here) -> frozenset[int]:
+    def predecessors(self, here: Execution) -> frozenset[int]:
         """Return where the arm may come from."""
         last = here.store.last
         return last | {ELSEWHERE} if self.interrupted else last
@@ -235,7 +235,7 @@ class Machine:
             context = context[:-1]
         return context
 
-    def next(self) -> Here | None:
+    def next(self) -> Execution | None:
         """Take the first piece of work, None when all is done."""
         if not self._heap:
             return None
@@ -247,7 +247,7 @@ class Machine:
             self.exhausted = True
             return None
         store = self.entries[config].copy()
-        return Here(
+        return Execution(
             self.world, self.places[context], row, store, self.volatile, context
         )
 
@@ -278,7 +278,7 @@ class Machine:
         ]
         return [self.places[way].body for way in ways if way in self.places]
 
-    def leave(self, here: Here, by_return: bool = False) -> None:
+    def leave(self, here: Execution, by_return: bool = False) -> None:
         """The body ends: go back to the caller, or into the next cycle."""
         context = here.context
         while context and context[-1][1] >= 0:
@@ -287,12 +287,12 @@ class Machine:
         if not by_return and blocks.cycle >= 0 and not here.place.body.name:
             self.push(context, blocks.cycle, here.store)
         elif context and context[-1][1] == CALLED:
-            _forget_locals(here)
+            _invalidate_locals(here)
             caller = self.places[context[:-1]]
             row = context[-1][0] - self._offsets[id(caller.program)]
             self.go_on(context[:-1], row + 1, here.store)
 
-    def call(self, here: Here, place: Place) -> None:
+    def call(self, here: Execution, place: Place) -> None:
         """Go into a routine; it comes back to the row after this one."""
         at = self.position(here.place.program, here.row)
         context = (*here.context, (at, CALLED))
@@ -301,7 +301,7 @@ class Machine:
         self.push(context, place.body.first + 1, here.store)
 
 
-def _forget_locals(here: Here) -> None:
+def _invalidate_locals(here: Execution) -> None:
     body = here.place.body
     for name in body.own_names:
         here.store.drop(here.world.root(here.place, name))
@@ -310,16 +310,16 @@ def _forget_locals(here: Here) -> None:
 # What is no longer known, and what must stay because something may depend on it.
 
 
-def forget_names(here: Here, names: frozenset[str], why: str) -> None:
+def invalidate_names(here: Execution, names: frozenset[str], why: str) -> None:
     """Forget variables and settings (with ``$``) by name."""
     for name in names:
         if name.startswith("$"):
             here.store.set(**{name[1:]: Nothing(why)})
         elif name:
-            forget(here, ast.Reference(name), why)
+            invalidate(here, ast.Reference(name), why)
 
 
-def pin_names(here: Here, names: frozenset[str], why: str) -> None:
+def escape_names(here: Execution, names: frozenset[str], why: str) -> None:
     """Keep the numbers of variables that something not followed may depend on."""
     for name in sorted(names):
         if not name.startswith("$"):
@@ -328,7 +328,7 @@ def pin_names(here: Here, names: frozenset[str], why: str) -> None:
                     here.world.pin(here.store.read(part), why)
 
 
-def forget(here: Here, reference: ast.Reference, why: str) -> None:
+def invalidate(here: Execution, reference: ast.Reference, why: str) -> None:
     """Forget what a variable holds, unless it is a constant."""
     declared = here.world.declared(here.place, reference.name)
     if declared is not None and declared.constant:
@@ -340,4 +340,4 @@ def forget(here: Here, reference: ast.Reference, why: str) -> None:
             here.store.set(**{str(name): Nothing(why)})
         return
     for key in here.locate(reference).keys:
-        forget_key(here, key, why)
+        invalidate_key(here, key, why)

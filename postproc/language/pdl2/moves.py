@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from postproc.language.pdl2 import syntax as ast
 from postproc.language.pdl2.effects import references
 from postproc.language.pdl2.evaluate import SINGLE, parts_under
-from postproc.language.pdl2.machine import Here, Machine, Visit, pin_names
+from postproc.language.pdl2.machine import Execution, Machine, Visit, escape_names
 from postproc.language.pdl2.store import Settings
 from postproc.language.pdl2.values import Nothing, Position, Value, Vector, unsure
 from postproc.language.visits import ELSEWHERE, NO_TARGET, Meaning
@@ -18,7 +18,7 @@ from postproc.robot.trajectory import Motion
 MAIN = ("$main_pos", "$main_jntp", "$main_xtnd")
 
 
-def may_be_node(here: Here, reference: ast.Reference) -> bool:
+def may_be_node(here: Execution, reference: ast.Reference) -> bool:
     """Tell whether a reference may mean a node of a path, or what is in one."""
     type_ = here.world.type_of(here.place, reference.name)
     if type_ is None:
@@ -26,7 +26,7 @@ def may_be_node(here: Here, reference: ast.Reference) -> bool:
     return type_.path or type_.name not in SINGLE
 
 
-def destination(here: Here, reference: ast.Reference) -> Value:
+def destination(here: Execution, reference: ast.Reference) -> Value:
     """Return where a move to what may be a node goes: to the one position in it.
 
     What other standard fields (``$LIN_SPD``, ``$SEG_TOOL_IDX``) of a node do in a move
@@ -57,7 +57,7 @@ def destination(here: Here, reference: ast.Reference) -> Value:
     return unsure(Nothing(f"{why} ({', '.join(standard).upper()})"), *fields)
 
 
-def _declared(here: Here, reference: ast.Reference) -> frozenset[str]:
+def _declared(here: Execution, reference: ast.Reference) -> frozenset[str]:
     """Return the standard fields that the type of a node declares."""
     type_ = here.world.type_of(here.place, reference.name)
     steps = [step for step in reference.steps if isinstance(step, str)]
@@ -67,7 +67,7 @@ def _declared(here: Here, reference: ast.Reference) -> frozenset[str]:
     return frozenset().union(*filter(None, found))
 
 
-def _unread(here: Here, key: str) -> bool:
+def _unread(here: Execution, key: str) -> bool:
     """Tell whether the variable file may say more of a node than what was read."""
     file, name = here.world.variables, key.rpartition("/")[2]
     unread = file.unread if file is not None else ()
@@ -104,7 +104,7 @@ class Goal:
     reason: str = ""
 
 
-def goal_of(here: Here, statement: ast.Move, motion: Motion) -> Goal:
+def goal_of(here: Execution, statement: ast.Move, motion: Motion) -> Goal:
     """Tell where a move goes."""
     where = statement.where
     match statement.how:
@@ -147,14 +147,14 @@ def _no_target(target: Meaning, numbers: tuple[float | None, ...], word: str) ->
     return Goal(target, numbers, reason=_why(word))
 
 
-def _relative(here: Here, vector: ast.Expression, frame: str) -> Goal:
+def _relative(here: Execution, vector: ast.Expression, frame: str) -> Goal:
     value = here.value(vector)
     if not isinstance(value, Vector) or frame not in _FRAME:
         return Goal(Meaning.UNKNOWN, reason=_why("RELATIVE"))
     return _no_target(_FRAME[frame], (*value.numbers, None, None, None), "RELATIVE")
 
 
-def _about(here: Here, where: tuple[ast.Expression, ...], frame: str) -> Goal:
+def _about(here: Execution, where: tuple[ast.Expression, ...], frame: str) -> Goal:
     axis, angle = here.value(where[0]), here.real(where[1])
     if not isinstance(axis, Vector) or frame not in _FRAME:
         return Goal(Meaning.UNKNOWN, reason=_why("ABOUT"))
@@ -162,7 +162,9 @@ def _about(here: Here, where: tuple[ast.Expression, ...], frame: str) -> Goal:
     return _no_target(Meaning.ABOUT, numbers, "ABOUT")
 
 
-def _towards(here: Here, where: tuple[ast.Expression, ...], motion: Motion) -> Goal:
+def _towards(
+    here: Execution, where: tuple[ast.Expression, ...], motion: Motion
+) -> Goal:
     """Go a distance towards a pose: a place of its own on a straight line only."""
     goal, distance = absolute(here, where[1]), here.real(where[0])
     known = goal.target is Meaning.POSE and distance is not None and distance >= 0.0
@@ -172,11 +174,11 @@ def _towards(here: Here, where: tuple[ast.Expression, ...], motion: Motion) -> G
     return Goal(Meaning.FOR, goal.numbers, towards, distance, _why("FOR"))
 
 
-def _along(here: Here, path: ast.Expression) -> Goal:
+def _along(here: Execution, path: ast.Expression) -> Goal:
     """Go along a path: its nodes must stay, for the arm goes to them from elsewhere."""
     name = path.name if isinstance(path, ast.Reference) else ""
     why = f"MOVE ALONG {name} goes to it too"
-    pin_names(here, frozenset({name}), why)
+    escape_names(here, frozenset({name}), why)
     reason = (
         f"the nodes of a path are not followed (MOVE ALONG {name}): the next move is "
         "taken to come from an unknown place"
@@ -184,7 +186,7 @@ def _along(here: Here, path: ast.Expression) -> Goal:
     return Goal(Meaning.UNKNOWN, reason=reason)
 
 
-def absolute(here: Here, expression: ast.Expression) -> Goal:
+def absolute(here: Execution, expression: ast.Expression) -> Goal:
     """Tell what a place means that does not depend on where the arm is."""
     if isinstance(expression, ast.Reference) and expression.name.startswith("$"):
         return _system(here, expression)
@@ -199,7 +201,7 @@ def absolute(here: Here, expression: ast.Expression) -> Goal:
     return from_value(value)
 
 
-def _system(here: Here, reference: ast.Reference) -> Goal:
+def _system(here: Execution, reference: ast.Reference) -> Goal:
     """Tell where a place of the controller is; it belongs to no target."""
     name = here.setting_name(reference)
     if name is None:
@@ -216,7 +218,7 @@ def _system(here: Here, reference: ast.Reference) -> Goal:
     return replace(from_value(held), reason=_why(f"${name.upper()}"))
 
 
-def _check_declared(here: Here, name: str) -> None:
+def _check_declared(here: Execution, name: str) -> None:
     if here.world.type_of(here.place, name) is None:
         if here.world.declared(here.place, name) is not None:
             return
@@ -263,7 +265,7 @@ _FROM_HERE = frozenset(
 _VIA, _END = 0, 1
 
 
-def move(machine: Machine, here: Here, statement: ast.Move) -> None:
+def move(machine: Machine, here: Execution, statement: ast.Move) -> None:
     """Record the visits of a move and let the arm stand at its end."""
     _beside(machine, here, statement)
     store = here.store
@@ -294,7 +296,7 @@ def move(machine: Machine, here: Here, statement: ast.Move) -> None:
         store.last |= {ELSEWHERE} if statement.til else predecessors
 
 
-def _beside(machine: Machine, here: Here, statement: ast.Move) -> None:
+def _beside(machine: Machine, here: Execution, statement: ast.Move) -> None:
     """Let the moves of SYNCMOVE clauses happen: ours runs along with another arm's."""
     for along in statement.sync:
         ours = along.arm is not None and _arm(here, along.arm) is not False
@@ -307,10 +309,10 @@ def _beside(machine: Machine, here: Here, statement: ast.Move) -> None:
             _keep(here, along)
 
 
-def _keep(here: Here, statement: ast.Move) -> None:
+def _keep(here: Execution, statement: ast.Move) -> None:
     """Keep the numbers of what another arm goes to."""
     names = frozenset(r.name for r in references((statement.where, statement.via)))
-    pin_names(here, names, "another arm goes to it too")
+    escape_names(here, names, "another arm goes to it too")
 
 
 def _as_via(arrival: Visit) -> Visit:
@@ -331,7 +333,7 @@ def _as_via(arrival: Visit) -> Visit:
 
 
 def _arrival(
-    here: Here,
+    here: Execution,
     statement: ast.Move,
     predecessors: frozenset[int],
     settings: Settings,
@@ -354,7 +356,7 @@ def _arrival(
     )
 
 
-def _arm(here: Here, arm: ast.Expression | None) -> bool | None:
+def _arm(here: Execution, arm: ast.Expression | None) -> bool | None:
     """Tell whether our arm moves, None where it is not known."""
     if arm is None:
         return True
@@ -362,7 +364,7 @@ def _arm(here: Here, arm: ast.Expression | None) -> bool | None:
     return None if number is None else number == here.world.arm
 
 
-def _with(here: Here, statement: ast.Move) -> Settings:
+def _with(here: Execution, statement: ast.Move) -> Settings:
     """Return the settings that hold during this move."""
     changes: dict[str, Value] = {}
     for reference, expression in statement.settings:
@@ -377,7 +379,7 @@ def _with(here: Here, statement: ast.Move) -> Settings:
 
 
 def motion_of(
-    here: Here, statement: ast.Move, settings: Settings
+    here: Execution, statement: ast.Move, settings: Settings
 ) -> tuple[Motion, str]:
     """Return the trajectory of a move, and why it is not known or not followed."""
     said: Value | None = statement.trajectory.lower() or settings.get("move_type")

@@ -18,9 +18,9 @@ from postproc.language.pdl2.entries import (
     is_nested,
     kind_of,
 )
-from postproc.language.pdl2.parser import Entered
+from postproc.language.pdl2.parser import EntryPart
 from postproc.language.pdl2.values import COMPONENTS
-from postproc.language.shapes import Formed
+from postproc.language.shapes import ParsedShapes
 from postproc.language.visits import Diagnostic
 
 # A field of a record or of a node, as a variable file lists it.
@@ -61,7 +61,7 @@ class OddLine(Exception):  # noqa: N818 - no error of the file, but the end of a
         self.row = row
 
 
-def fits(kind: str, line: Entered) -> bool:
+def fits(kind: str, line: EntryPart) -> bool:
     """Tell whether a line may be a part of a value of a type."""
     place = bool(line.components) or line.config is not None
     match kind:
@@ -96,7 +96,7 @@ class Nested:
     """
 
     lines: Lines
-    said: Formed[Entered | None]
+    said: ParsedShapes[EntryPart | None]
     row: int
     found: dict[str, dict[str, Field]] = field(default_factory=dict)
     unread: list[tuple[int, str]] = field(default_factory=list)
@@ -105,7 +105,7 @@ class Nested:
     _words: bool | None = None  # parts begin with NODE[1], not with [1]
     _listed: bool = False  # a field of this part has elements
     _deeper: bool = False  # a field of this part has fields
-    _open: tuple[int, Entered] | None = None
+    _open: tuple[int, EntryPart] | None = None
     _configs: int = 0
 
     def fields(self, end: int) -> list[Field]:
@@ -126,7 +126,7 @@ class Nested:
             if part not in self.dropped
         ]
 
-    def _entered(self, row: int) -> Entered:
+    def _entered(self, row: int) -> EntryPart:
         entered = self.said[int(self.lines.shape[row])]
         if entered is None:
             text = self.lines.source.line_text(int(self.lines.line[row]))
@@ -147,7 +147,7 @@ class Nested:
         slot = self.head.arm
         self._arm = self._index(self.row, slot) if slot >= 0 else 0
 
-    def _take(self, row: int, line: Entered) -> None:
+    def _take(self, row: int, line: EntryPart) -> None:
         if line.name:
             self._close(row)
             self._field(row, line)
@@ -160,12 +160,12 @@ class Nested:
         elif not (self._listed or self._deeper):
             raise OddLine(row, "it is not clear whose value this is")
 
-    def _is_element(self, line: Entered) -> bool:
+    def _is_element(self, line: EntryPart) -> bool:
         """Tell whether a line is an element of a field, and cannot be a part."""
         parts = self._words or (self.kind == "REC" and not self.array)
         return bool(line.element and self._listed and parts)
 
-    def _begin_part(self, row: int, line: Entered) -> None:
+    def _begin_part(self, row: int, line: EntryPart) -> None:
         words = line.node >= 0
         if self.kind == "REC" and (words or not self.array):
             raise OddLine(row, "a record has no such parts")
@@ -187,7 +187,7 @@ class Nested:
             raise OddLine(row, "an index, or an arm, is no whole number")
         return int(value)
 
-    def _field(self, row: int, line: Entered) -> None:
+    def _field(self, row: int, line: EntryPart) -> None:
         if self._part is None:
             raise OddLine(row, "a field stands before the first part")
         kind, array = kind_of(line.type)
@@ -210,7 +210,7 @@ class Nested:
         if self._open is not None and line.says_value:
             self._value(row, line)
 
-    def _value(self, row: int, line: Entered) -> None:
+    def _value(self, row: int, line: EntryPart) -> None:
         assert self._open is not None
         self._configs += line.config is not None
         if self._configs > 1 or not fits(kind_of(self._open[1].type)[0], line):
@@ -262,7 +262,9 @@ class Fields:
     unread: frozenset[str] = frozenset()
 
 
-def find_fields(lines: Lines, said: Formed[Entered | None], head: Ints) -> Fields:
+def find_fields(
+    lines: Lines, said: ParsedShapes[EntryPart | None], head: Ints
+) -> Fields:
     """Find the fields of the records and paths of a file.
 
     Args:
@@ -303,7 +305,7 @@ def find_fields(lines: Lines, said: Formed[Entered | None], head: Ints) -> Field
 
 
 def _unread(
-    lines: Lines, said: Formed[Entered | None], entry: Nested, end: int
+    lines: Lines, said: ParsedShapes[EntryPart | None], entry: Nested, end: int
 ) -> Iterator[Finding]:
     """Say which fields of an entry are not read, once."""
     if entry.unread:
@@ -314,7 +316,12 @@ def _unread(
 
 
 def _finding(
-    lines: Lines, said: Formed[Entered | None], row: int, at: int, code: str, text: str
+    lines: Lines,
+    said: ParsedShapes[EntryPart | None],
+    row: int,
+    at: int,
+    code: str,
+    text: str,
 ) -> Diagnostic:
     entered = said[int(lines.shape[row])]
     assert entered is not None
@@ -322,7 +329,7 @@ def _finding(
     return Diagnostic(lines.source.name, line, code, f"{entered.name} {text}")
 
 
-def _name(lines: Lines, said: Formed[Entered | None], row: int) -> str:
+def _name(lines: Lines, said: ParsedShapes[EntryPart | None], row: int) -> str:
     entered = said[int(lines.shape[row])]
     return entered.name.lower() if entered is not None else ""
 

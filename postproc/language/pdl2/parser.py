@@ -383,7 +383,7 @@ _ACCESS = frozenset({"priv", "xport", "local"})
 
 
 @dataclass(frozen=True)
-class Entered:
+class EntryPart:
     """The parts of a line; slots are numbers of the line, -1 for ``****``.
 
     Attributes:
@@ -439,11 +439,11 @@ class _Word(str):
     """A word of a head."""
 
 
-def _line(c: Sequence[Any]) -> Entered:
-    line = Entered()
+def _line(c: Sequence[Any]) -> EntryPart:
+    line = EntryPart()
     for part in c:
         match part:
-            case Entered():
+            case EntryPart():
                 line = part
             case _Element():
                 line = replace(line, element=tuple(part))
@@ -460,10 +460,10 @@ def _line(c: Sequence[Any]) -> Entered:
     return line
 
 
-def _head(c: Sequence[Any]) -> Entered:
+def _head(c: Sequence[Any]) -> EntryPart:
     arms = [int(x) for x in c if isinstance(x, _Arm)]
     words = {str(x).lower() for x in c if isinstance(x, _Word)}
-    return Entered(
+    return EntryPart(
         str(c[0]), str(c[1]), max([-1, *arms]), "xport" in words, bool(words & _ACCESS)
     )
 
@@ -537,10 +537,10 @@ def parse_form(form: str) -> ast.Statement:
 
 
 @lru_cache(maxsize=8192)
-def parse_value_form(form: str) -> Entered | None:
+def parse_value_form(form: str) -> EntryPart | None:
     """Parse the form of a line of a variable file, None where the grammar cannot."""
     found = _parse("lsv", form, VALUE_RULES)
-    return found if isinstance(found, Entered) else None
+    return found if isinstance(found, EntryPart) else None
 
 
 def parse_line(mask: str) -> ast.Statement:

@@ -11,11 +11,11 @@ from itertools import repeat
 
 import numpy as np
 
-from postproc.arrays import Bools, Each, Ints
+from postproc.arrays import Bools, Ints, Map
 from postproc.language.lines import Lines, read_lines
 from postproc.language.pdl2 import syntax as ast
 from postproc.language.pdl2.parser import parse_form
-from postproc.language.shapes import Formed, formed, lower
+from postproc.language.shapes import ParsedShapes, lower, parse_shapes
 from postproc.language.source import Source
 from postproc.language.visits import Diagnostic
 
@@ -78,7 +78,7 @@ def recovered(statement: ast.Statement) -> ast.Statement:
 
 
 def build_blocks(
-    lines: Lines, statements: Formed[ast.Statement], first: int, last: int
+    lines: Lines, statements: ParsedShapes[ast.Statement], first: int, last: int
 ) -> tuple[Blocks, list[tuple[int, str]]]:
     """Match the blocks of rows first to last - 1; also return (row, problem)."""
     end: dict[int, int] = {}
@@ -146,7 +146,7 @@ def _behind(statement: ast.Statement) -> ast.Statement:
 
 def _blocks(
     lines: Lines,
-    statements: Formed[ast.Statement],
+    statements: ParsedShapes[ast.Statement],
     end: dict[int, int],
     opener: dict[int, int],
     inner: dict[int, list[int]],
@@ -382,7 +382,7 @@ class Program:
 
     name: str
     lines: Lines
-    statements: Formed[ast.Statement]
+    statements: ParsedShapes[ast.Statement]
     main: Body | None
     routines: Mapping[str, Body]
     outside: Mapping[str, str]
@@ -416,7 +416,7 @@ class _Reader:
     """Collects the parts of a program, one structural line after the other."""
 
     lines: Lines
-    statements: Formed[ast.Statement]
+    statements: ParsedShapes[ast.Statement]
     taught: frozenset[int]
     name: str = ""
     arm: int = 0
@@ -531,7 +531,7 @@ class _Reader:
             self.scopes[-1] = _Scope(variables=scope.variables)
 
 
-def parse(source: Source, each: Each = map) -> Program:
+def parse(source: Source, each: Map = map) -> Program:
     """Parse a PDL2 program: every distinct shape of line once.
 
     Lines that the grammar does not know are kept and listed.
@@ -544,7 +544,7 @@ def parse(source: Source, each: Each = map) -> Program:
         ProgramError: A string does not end on its line.
     """
     lines = read_lines(source, each)
-    statements = formed(lines.shapes, parse_form)
+    statements = parse_shapes(lines.shapes, parse_form)
     taught = frozenset(line for line, _ in lines.marks("TAUGHT"))
     reader = _Reader(lines, statements, taught)
     structural = statements.which(lambda said: not isinstance(said, _PLAIN))

@@ -15,7 +15,7 @@ T = TypeVar("T")
 _COUNT = 256
 
 
-class Shelves(Generic[T]):
+class CowMap(Generic[T]):
     """Values by key on 256 shelves; a copy shares a shelf until one side writes to it.
 
     An analysis keeps one copy for every place of a program, and merges copies that
@@ -28,9 +28,9 @@ class Shelves(Generic[T]):
         self._shelves: list[dict[str, T]] = [{}] * _COUNT
         self._mine: set[int] | None = set()  # None: not even the row of shelves is
 
-    def copy(self) -> Shelves[T]:
+    def copy(self) -> CowMap[T]:
         """Return a mapping that can change on its own."""
-        other: Shelves[T] = Shelves.__new__(Shelves)
+        other: CowMap[T] = CowMap.__new__(CowMap)
         other._shelves = self._shelves
         other._mine = self._mine = None
         return other
@@ -60,7 +60,7 @@ class Shelves(Generic[T]):
         for shelf in self._shelves:
             yield from shelf
 
-    def differing(self, other: Shelves[T]) -> list[str]:
+    def differing(self, other: CowMap[T]) -> list[str]:
         """Return the keys that may hold other values in another mapping."""
         found: list[str] = []
         for mine, theirs in zip(self._shelves, other._shelves, strict=True):
@@ -101,8 +101,8 @@ class Store:
     """
 
     initial: Callable[[str], Value | None]
-    values: Shelves[Value] = field(default_factory=Shelves)
-    logs: Shelves[Log] = field(default_factory=Shelves)
+    values: CowMap[Value] = field(default_factory=CowMap)
+    logs: CowMap[Log] = field(default_factory=CowMap)
     settings: Settings = field(default_factory=dict)
     last: frozenset[int] = frozenset()
     compound: set[str] = field(default_factory=set)

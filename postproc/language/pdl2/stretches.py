@@ -20,10 +20,10 @@ from postproc.language.pdl2.effects import (
     references,
 )
 from postproc.language.pdl2.job import Place, World
-from postproc.language.pdl2.machine import HELD, WRITTEN, Here, Machine, MoveRun
+from postproc.language.pdl2.machine import HELD, WRITTEN, Execution, Machine, MoveRun
 from postproc.language.pdl2.moves import motion_of
 from postproc.language.pdl2.values import Nothing, Value
-from postproc.language.shapes import alike, in_order, lower, name_index
+from postproc.language.shapes import alike, lower, name_index, numbered_in_order
 from postproc.robot.trajectory import Motion
 
 # Lines that are run a thousand at a time: moves to known places, idle calls.
@@ -51,7 +51,7 @@ class PointVariable:
 
 
 @dataclass(frozen=True)
-class Quiet:
+class PlainMoves:
     """The quiet lines of a body.
 
     Attributes:
@@ -88,7 +88,9 @@ class Quiet:
         return int(self.ends[np.searchsorted(self.ends, row, side="right")])
 
 
-def find_quiet(world: World, place: Place, volatile: frozenset[str]) -> Quiet:
+def find_plain_moves(
+    world: World, place: Place, volatile: frozenset[str]
+) -> PlainMoves:
     """Find the quiet lines of a body.
 
     Args:
@@ -99,7 +101,7 @@ def find_quiet(world: World, place: Place, volatile: frozenset[str]) -> Quiet:
     program, body = place.program, place.body
     first = body.first + 1
     rows = program.lines.shape[first : body.last]
-    may_be = program.statements.which(_may_be_quiet)
+    may_be = program.statements.which(_may_be_plain)
     variants = _Variants(world, place, volatile)
     of_shape = np.full(len(program.lines.shapes), -1, dtype=np.int64)
     shapes = np.unique(rows[may_be[rows]])
@@ -111,7 +113,7 @@ def find_quiet(world: World, place: Place, volatile: frozenset[str]) -> Quiet:
     variant = of_shape[rows]
     joins = np.array(sorted(body.blocks.joins), dtype=np.int64)
     ends = np.concatenate([first + np.flatnonzero(variant < 0), joins, [body.last]])
-    return Quiet(
+    return PlainMoves(
         first,
         variant,
         tuple(variants.statements),
@@ -126,7 +128,7 @@ def find_quiet(world: World, place: Place, volatile: frozenset[str]) -> Quiet:
     )
 
 
-def _may_be_quiet(said: ast.Statement) -> bool:
+def _may_be_plain(said: ast.Statement) -> bool:
     if isinstance(said, ast.Call):
         return not said.program
     return isinstance(said, ast.Move) and _is_plain(said)
@@ -254,7 +256,7 @@ class _Variants:
         texts = self.place.program.lines.shapes.names
         found = [
             self._variant(int(shapes[k]), tuple([texts[i] for i in names[k].tolist()]))
-            for k in in_order(kind)[1].tolist()
+            for k in numbered_in_order(kind)[1].tolist()
         ]
         return np.array(found, dtype=np.int64)[kind]
 
@@ -339,13 +341,13 @@ _NO_INDEX = Nothing("its index is known only at run time")
 
 
 @dataclass
-class Stretches:
+class MoveBlocks:
     """The stretches of quiet lines of a job, found when a body is first come to."""
 
     machine: Machine
-    quiet: dict[int, Quiet] = field(default_factory=dict)
+    quiet: dict[int, PlainMoves] = field(default_factory=dict)
 
-    def run(self, here: Here) -> bool:
+    def run(self, here: Execution) -> bool:
         """Run the stretch that begins at a row; tell whether there is one.
 
         Where a condition handler may move the arm at any time there is none: every
@@ -365,14 +367,16 @@ class Stretches:
         here.row = end
         return True
 
-    def _quiet(self, here: Here) -> Quiet:
+    def _quiet(self, here: Execution) -> PlainMoves:
         body = here.place.body
         if id(body) not in self.quiet:
-            self.quiet[id(body)] = find_quiet(here.world, here.place, here.volatile)
+            self.quiet[id(body)] = find_plain_moves(
+                here.world, here.place, here.volatile
+            )
         return self.quiet[id(body)]
 
     def _run_one_of_each(
-        self, here: Here, quiet: Quiet, rows: Ints, variant: Ints
+        self, here: Execution, quiet: PlainMoves, rows: Ints, variant: Ints
     ) -> dict[int, tuple[Motion, str]]:
         """Let the first line of every variant have its effects.
 
@@ -395,8 +399,8 @@ class Stretches:
 
     def _record(
         self,
-        here: Here,
-        quiet: Quiet,
+        here: Execution,
+        quiet: PlainMoves,
         rows: Ints,
         variant: Ints,
         ways: dict[int, tuple[Motion, str]],
@@ -422,7 +426,7 @@ class Stretches:
 
 
 def _points(
-    here: Here, quiet: Quiet, rows: Ints, variant: Ints
+    here: Execution, quiet: PlainMoves, rows: Ints, variant: Ints
 ) -> tuple[Ints, dict[int, Value]]:
     """Look up the variables that moves go to, see `MoveRun`."""
     program, initial = here.place.program, here.world.initial
@@ -447,7 +451,7 @@ def _points(
     return point, held
 
 
-def _assigned(here: Here, quiet: Quiet, names: Ints) -> Bools:
+def _assigned(here: Execution, quiet: PlainMoves, names: Ints) -> Bools:
     """Tell which of the program's own variables it has given a value itself, (m,)."""
     values, found = here.store.values, np.zeros(len(names), dtype=bool)
     own = np.flatnonzero(names >= 0)

@@ -61,7 +61,7 @@ class Vector:
 
 
 @dataclass(frozen=True, slots=True)
-class Written:
+class SourceNumber:
     """A number and where it stands.
 
     Attributes:
@@ -114,7 +114,7 @@ class Position:
         """Tell whether every number stands in a text by itself."""
         return not (self.derived or self.along) and -1 not in self.slots
 
-    def with_component(self, at: int, new: Written) -> Position:
+    def with_component(self, at: int, new: SourceNumber) -> Position:
         """Return a copy with one component replaced."""
         numbers, slots = list(self.numbers), list(self.slots)
         numbers[at], slots[at] = new.number, new.slot

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from postproc.arrays import Each, Ints
+from postproc.arrays import Ints, Map
 from postproc.language.lines import Lines, read_lines
 from postproc.language.pdl2.entries import (
     NESTED,
@@ -22,9 +22,9 @@ from postproc.language.pdl2.entries import (
     read_records,
 )
 from postproc.language.pdl2.nested import completed, find_fields, with_fields
-from postproc.language.pdl2.parser import Entered, parse_value_form
+from postproc.language.pdl2.parser import EntryPart, parse_value_form
 from postproc.language.pdl2.store import root_of
-from postproc.language.shapes import Formed, formed, lower
+from postproc.language.shapes import ParsedShapes, lower, parse_shapes
 from postproc.language.source import Source
 from postproc.language.visits import Diagnostic
 
@@ -64,7 +64,7 @@ class VariableFile:
         return self.lines.end
 
 
-def read_variables(source: Source, each: Each = map) -> VariableFile:
+def read_variables(source: Source, each: Map = map) -> VariableFile:
     """Read a variable file; what is wrong in it is reported, not fatal.
 
     Args:
@@ -75,7 +75,7 @@ def read_variables(source: Source, each: Each = map) -> VariableFile:
         ProgramError: A string does not end on its line.
     """
     lines = read_lines(source, each)
-    said = formed(lines.shapes, parse_value_form)
+    said = parse_shapes(lines.shapes, parse_value_form)
     head = last_head(lines, said)
     fields = find_fields(lines, said, head)
     records = with_fields(find_records(lines, said, head), fields)
@@ -122,7 +122,7 @@ def _told_apart(
 
 
 def _not_understood(
-    lines: Lines, said: Formed[Entered | None], head: Ints
+    lines: Lines, said: ParsedShapes[EntryPart | None], head: Ints
 ) -> Iterator[Finding]:
     """Report lines that the grammar does not know, but for those of nested values."""
     nested = said.which(is_nested)[lines.shape]
