@@ -20,9 +20,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from postproc.compensation.record import restore_file
+from tests.batch.dask_cluster import Cluster
 from tests.chaos import Plant
 from tests.conftest import ROOT, make_job
-from tests.dask_cluster import Cluster
 from tests.plant import contents, grow
 from tests.plant_watch import Cost, watched
 

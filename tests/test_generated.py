@@ -17,7 +17,7 @@ from tests.generated.found import (
     within,
 )
 from tests.generated.landing import lands, program
-from tests.language.reread import reread
+from tests.language.pdl2.reread import reread
 
 SEEDS = range(100, 148)
 WIDE = (

@@ -16,7 +16,7 @@ from concurrent.futures import ProcessPoolExecutor
 from dataclasses import asdict
 from pathlib import Path
 
-from tests.accuracy.planted import NAMED, NAMELESS, SIZES
+from tests.calibration.planted import NAMED, NAMELESS, SIZES
 from tests.undeclared_trial import Trial, run
 
 FIRST_SEED = 7000  # seeds below are for trying things out

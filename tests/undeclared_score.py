@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from tests.accuracy.planted import NAMELESS
+from tests.calibration.planted import NAMELESS
 from tests.undeclared_trial import Trial
 
 CLEAR = 1e-3  # p-value of a finding that a reader takes for certain

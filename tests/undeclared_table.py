@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.figure import Figure
 
-from tests.accuracy.planted import NAMED, NAMELESS, SIZES
+from tests.calibration.planted import NAMED, NAMELESS, SIZES
 from tests.undeclared_score import WITHIN, close, groups, laws, misnamed, ok
 
 if TYPE_CHECKING:

@@ -15,7 +15,7 @@ from postproc.model.effects import BASE_EFFECTS, propose
 from postproc.model.effects.effect import Effect, Parameter
 from postproc.model.kinematics import Batch
 from postproc.simulation import VirtualArm, VirtualArrivals, virtual_arm
-from tests.accuracy.planted import (
+from tests.calibration.planted import (
     ARM,
     BASE,
     NAMED,

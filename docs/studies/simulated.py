@@ -13,7 +13,7 @@ from postproc.model.effects import BASE_EFFECTS
 from postproc.model.kinematics import Batch
 from postproc.model.model import Model
 from postproc.robot.state import States, make_states
-from tests.accuracy.simulator import (
+from tests.calibration.simulator import (
     NJ,
     PLATE,
     TOOL,
@@ -22,9 +22,9 @@ from tests.accuracy.simulator import (
     random_states,
     survey_of,
 )
-from tests.accuracy.test_fit import informed
-from tests.accuracy.test_turns import NOISE as TURN_NOISE
-from tests.accuracy.test_turns import oriented
+from tests.calibration.test_orientations import NOISE as TURN_NOISE
+from tests.calibration.test_orientations import oriented
+from tests.calibration.test_regression import informed
 
 MM = 1e-3
 

@@ -8,10 +8,10 @@ from functools import cache
 from pathlib import Path
 
 from tests.fuzz.mutation import mutated
-from tests.language.generator import POINTS, Generator
-from tests.language.generator.rarer import Rarer
-from tests.language.reachable import Reachable, ReachableJob
-from tests.language.whole_jobs import Job
+from tests.language.pdl2.generator import POINTS, Generator
+from tests.language.pdl2.generator.rarer import Rarer
+from tests.language.pdl2.reachable import Reachable, ReachableJob
+from tests.language.pdl2.whole_jobs import Job
 
 ROOT = Path(__file__).parents[2]
 Files = dict[str, bytes]

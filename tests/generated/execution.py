@@ -18,10 +18,10 @@ from postproc.robot.pose import MM
 from postproc.simulation import virtual_arm
 from postproc.simulation.program import ProgramRun, run_program
 from tests.conftest import SEED
-from tests.language.executed import Executed, Generated
-from tests.language.interpreter import Interpreter
-from tests.language.reread import reread
-from tests.language.straight import straight
+from tests.language.pdl2.executed import Executed, Generated
+from tests.language.pdl2.interpreter import Interpreter
+from tests.language.pdl2.reread import reread
+from tests.language.pdl2.straight import straight
 
 MOST = 80  # executed moves that are run on the virtual arm
 LONGEST = 10_000  # executed moves in which targets are looked for

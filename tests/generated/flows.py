@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from tests.language.interpreter import Interpreter
-from tests.language.test_flow_random import follow, generate
+from tests.language.pdl2.interpreter import Interpreter
+from tests.language.pdl2.test_flow_random import follow, generate
 
 RUNS = 3  # executions of each program whose inputs are random
 

@@ -18,10 +18,10 @@ from tests.fuzz.case import check_bytes, records_of
 from tests.generated.execution import Ran, executed
 from tests.generated.found import ALONG, CLONED, FIRST, KNOWN, ROUNDED, UNSURE, Found
 from tests.generated.once import count_once
-from tests.language.executed import PAGE, Generated
-from tests.language.reachable import OPENING, reachable
-from tests.language.reread import CLONE
-from tests.language.test_flow_random import follow
+from tests.language.pdl2.executed import PAGE, Generated
+from tests.language.pdl2.reachable import OPENING, reachable
+from tests.language.pdl2.reread import CLONE
+from tests.language.pdl2.test_flow_random import follow
 
 STUCK = "the arm can make this move as it was written, but not as it was corrected"
 COMPUTED = re.compile(r"\((?:NEAR|FOR|POS_SHIFT)\)|is computed, not written")

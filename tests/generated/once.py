@@ -11,7 +11,7 @@ import numpy as np
 from postproc.compensation.notes import SURE
 from postproc.compensation.outcome import Outcome, Status
 from tests.generated.found import DONE, Found
-from tests.language.executed import Executed
+from tests.language.pdl2.executed import Executed
 
 # Why a target may be left alone that is seen at one value from one side.
 ALLOWED = tuple(

@@ -1,0 +1,68 @@
+"""Undeclared effects of virtual arms are found, and nothing is found where nothing is.
+
+A small seeded selection of what `make undeclared` does at full size.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from postproc.calibration.diagnosis.trace import trace
+from postproc.model.combination import Combination
+from postproc.model.effects.base_shift import rigid_columns
+from postproc.model.kinematics import Batch
+from tests.calibration.planted import ARM, campaign, states_of, survey
+from tests.undeclared_score import close, ok
+from tests.undeclared_trial import run
+
+PLANTED = [
+    ("compliance", 300, 0.5),
+    ("payload", 301, 0.5),
+    ("transmission_free", 302, 0.5),
+    ("coupling", 303, 1.0),
+    ("load_backlash", 304, 1.0),
+    ("warmup", 305, 1.0),
+    ("windup", 306, 1.0),
+    ("tool_shift", 307, 0.5),
+    ("tracker_drift", 308, 1.0),
+    ("worn_spot", 309, 1.0),
+    ("joint_product", 310, 1.0),
+    ("hysteresis", 311, 1.0),
+    ("two", 312, 1.0),
+]
+
+
+@pytest.mark.parametrize(("kind", "seed", "size"), PLANTED)
+def test_an_undeclared_effect_is_named(kind: str, seed: int, size: float) -> None:
+    trial = run(kind, seed, size)
+    assert ok(trial), trial
+    assert all(len(f["group"]) <= 2 for f in trial.found)  # type: ignore[arg-type]
+    assert trial.true_mm[1] < trial.true_mm[0]
+    assert close(trial) or trial.true_mm[1] < 0.02, trial.true_mm
+
+
+def test_a_drift_leaves_only_where_the_base_stands_unsure() -> None:
+    """A drift of unknown shape begins anywhere: one rigid motion is not told apart."""
+    seed = 308
+    c = campaign(seed, ("tracker_drift",), 2.0)
+    after = trace(c.base_fit(), seed=0).search.fit
+    fresh = survey(c.arm, seed + 10**6, 200)
+    batch = Batch(ARM, states_of(fresh))
+    keep = tuple(e for e in after.combination.effects if e.origin == "arm")
+    values = after.values[after.combination.where("arm")]
+    left = c.arm.error(fresh) - Combination(keep).error(batch, values)
+    rigid = rigid_columns(batch).reshape(-1, 6)
+    motion = np.linalg.lstsq(rigid, left.reshape(-1))[0]
+    rest = left - (rigid @ motion).reshape(-1, 3)
+    mean = [np.linalg.norm(e, axis=1).mean() * 1e3 for e in (left, rest)]
+    informed = run("none", seed, 0.0).true_mm[2]
+    assert mean[1] < 1.2 * informed
+    assert mean[0] < 0.05
+
+
+@pytest.mark.parametrize("seed", [320, 321, 322, 323, 324])
+def test_nothing_is_found_where_nothing_is(seed: int) -> None:
+    trial = run("none", seed, 0.0)
+    assert trial.verdict == "noise", trial
+    assert not trial.found

@@ -1,0 +1,133 @@
+"""From measurement files to a model, as a user does it."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from postproc.calibration.fit import fit
+from postproc.exceptions import MeasurementError, PostprocError
+from postproc.model.effects import BASE_EFFECTS
+from postproc.model.model import load_model
+from postproc.robot.cell import Cell, load_cell
+from tests.calibration.simulator import NJ, PLATE, TOOL, random_arm, random_states
+from tests.written import cli
+
+
+def write(path: Path, n: int = 200, seed: int = 0, points: int = 1) -> Path:
+    rng = np.random.default_rng(seed)
+    arm = random_arm(rng)
+    states = random_states(n, rng, PLATE[:points])
+    measured, _ = arm.measure(states, rng)
+    measured[7] = 0.0
+    measured[9] += [0.003, 0.0, 0.0]
+    names = [f"q{j}_deg" for j in range(1, 7)] + [f"lambda{j}" for j in range(1, 7)]
+    lines = [",".join(["id", *names, "x_mm,y_mm,z_mm,tool_id"])]
+    for k in range(n):
+        q = [f"{v:.6f}" for v in np.rad2deg(states.q[k])]
+        side = [str(int(v)) for v in states.direction[k]]
+        xyz = [f"{v:.5f}" for v in measured[k] * 1e3]
+        lines.append(",".join([str(k + 1), *q, *side, *xyz, str(states.tool_id[k])]))
+    path.write_text("\n".join(lines) + "\n")
+    return path
+
+
+def cell(tmp_path: Path, points: int = 1) -> Cell:
+    path = tmp_path / "cell.toml"
+    plate = ", ".join(
+        str([float(round(v, 6)) for v in p * 1e3]) for p in PLATE[:points]
+    )
+    path.write_text(
+        '[robot]\narm = "nj220-2.7"\n[tool]\nxyz_mm = [80.0, -40.0, 150.0]\n'
+        f"[survey]\npoints_mm = [{plate}]\n"
+    )
+    return load_cell(path)
+
+
+def test_a_survey_becomes_a_model_with_a_report(tmp_path: Path) -> None:
+    found = fit([write(tmp_path / "s.csv")], cell(tmp_path), effects=BASE_EFFECTS)
+    report = found.report
+    assert report.before.mean_mm > 1.0 > 0.06 > report.after.mean_mm
+    assert [d.id for d in report.dropped] == ["8", "10"]
+    assert "beam" in report.dropped[0].why and "disagree" in report.dropped[1].why
+    assert sum(report.shares.values()) == pytest.approx(1.0, abs=0.01)
+    row = next(r for r in report.parameters if r.name == "backlash.b2")
+    assert row.unit == "mrad" and row.std_error < 0.05 and row.determined > 0.9
+    pairs = [{u.name, *u.partners} for u in report.unseen]
+    assert any({"geometry.base_z", "geometry.d1"} <= p for p in pairs)
+    assert found.model.rows == 198
+    found.model.save(tmp_path / "m.json")
+    assert load_model(tmp_path / "m.json").id == found.model.id
+
+
+def test_the_same_files_give_the_same_model(tmp_path: Path) -> None:
+    path = write(tmp_path / "s.csv")
+    ids = {fit([path], cell(tmp_path), effects=BASE_EFFECTS).model.id for _ in range(2)}
+    assert len(ids) == 1
+
+
+def test_a_probe_plate_has_nests_of_the_set_up(tmp_path: Path) -> None:
+    path = write(tmp_path / "s.csv", points=3)
+    model = fit([path], cell(tmp_path, 3), effects=BASE_EFFECTS).model
+    assert "probe" in {e.name for e in model.effects.effects}
+    assert "probe" not in {e.name for e in model.compensable()[0].effects}
+    assert model.ranges.see_all_rotations
+
+
+def test_methods_of_the_source_are_fitted_from_files(tmp_path: Path) -> None:
+    path = write(tmp_path / "s.csv")
+    found = fit([path], cell(tmp_path), method="elm", seed=4)
+    assert found.model.method == "elm" and not found.report.parameters
+    held = random_states(10, np.random.default_rng(0), TOOL[None])
+    assert found.model.predict(NJ, held).error.shape == (10, 3)
+
+
+def test_all_rows_from_one_side_name_the_backlash(tmp_path: Path) -> None:
+    path = write(tmp_path / "s.csv")
+    rows = [line.split(",") for line in path.read_text().splitlines()]
+    for row in rows[1:]:
+        row[7:13] = ["1"] * 6
+    path.write_text("\n".join(",".join(r) for r in rows) + "\n")
+    report = fit([path], cell(tmp_path), effects=("geometry", "backlash")).report
+    named = {n for u in report.unseen for n in (u.name, *u.partners)}
+    assert {"backlash.b1", "backlash.b2", "backlash.b3"} <= named
+
+
+def test_what_cannot_be_fitted_is_refused(tmp_path: Path) -> None:
+    path = write(tmp_path / "s.csv")
+    with pytest.raises(PostprocError, match="needs the payload"):
+        fit([path], cell(tmp_path), effects=("geometry", "payload"))
+    with pytest.raises(PostprocError, match="no effect 'gravity'"):
+        fit([path], cell(tmp_path), effects=("gravity",))
+    few = tmp_path / "few.csv"
+    few.write_text("\n".join(path.read_text().splitlines()[:7]) + "\n")
+    with pytest.raises(MeasurementError, match="determine"):
+        fit([few], cell(tmp_path))
+
+
+def test_fit_prints_what_an_engineer_reads(tmp_path: Path) -> None:
+    data = write(tmp_path / "s.csv")
+    cell(tmp_path)
+    found = cli(
+        "fit", data, "--cell", tmp_path / "cell.toml", "-o", tmp_path / "m.json",
+        "--effects", ",".join(BASE_EFFECTS),
+    )  # fmt: skip
+    assert found.exit_code == 0, found.stderr
+    lines = found.stdout.splitlines()
+    assert lines[0].split() == ["parameter", "value", "std", "error", "unit", "share",
+                                "seen"]  # fmt: skip
+    row = next(line.split() for line in lines if line.startswith("geometry.a2 "))
+    assert row[3] == "mm" and row[4].endswith("%") and 0 < float(row[2]) < 0.02
+    shares = [float(x) for x in re.findall(r"^\w+: (-?[\d.]+)% of", found.stdout, re.M)]
+    assert len(shares) == 3 and sum(shares) == pytest.approx(100.0, abs=1.0)
+    pairs = re.findall(r"^correlated ([+-][\d.]+): \S+ and \S+$", found.stdout, re.M)
+    assert pairs and all(abs(float(value)) > 0.9 for value in pairs)
+    assert "row 8 (line 9): position 0, 0, 0: beam lost" in lines
+    assert re.search(
+        r"row 10 \(line 11\): dropped: off by [\d.]+ mm, [\d.]+ sigma; its neighbours "
+        "disagree",
+        found.stdout,
+    )

@@ -1,0 +1,106 @@
+"""The source's methods, by their definitions."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from postproc.calibration.published import (
+    ORDER,
+    TRAINERS,
+    compare,
+    fit_method,
+    random_split,
+)
+from postproc.model.effects.elm import HiddenLayer
+from postproc.model.model import load_model
+from postproc.robot.state import make_states
+from tests.calibration.simulator import NJ, random_arm, random_states, survey_of
+
+
+def survey(n: int = 120, seed: int = 0) -> tuple:  # type: ignore[type-arg]
+    rng = np.random.default_rng(seed)
+    arm = random_arm(rng)
+    states = random_states(n, rng)
+    measured, _ = arm.measure(states, rng)
+    return arm, states, survey_of(states, measured)
+
+
+def test_output_weights_are_the_pseudo_inverse() -> None:
+    _, states, rows = survey()
+    model = fit_method("eja-elm", rows, NJ, seed=3)
+    layer = model.effects.effects[0].layer  # type: ignore[attr-defined]
+    assert len(layer) == 40 and len(layer.weights[0]) == 12
+    x = np.hstack(
+        [2 * (states.q - layer.lower) / np.subtract(layer.upper, layer.lower) - 1,
+         states.direction]
+    )  # fmt: skip
+    H = 1 / (1 + np.exp(-(x @ np.array(layer.weights).T + layer.bias)))
+    T = NJ.flange(states.q)
+    tcp = T[:, :3, 3] + np.einsum("nij,nj->ni", T[:, :3, :3], states.tool)
+    beta = np.linalg.pinv(H) @ (rows.position - tcp)
+    np.testing.assert_allclose(model.error(NJ, states), H @ beta, atol=1e-9)
+
+
+def test_without_directions_both_sides_are_alike() -> None:
+    _, states, rows = survey()
+    other = states.with_(direction=-states.direction)
+    for method, alike in (("elm", True), ("eja-elm", False), ("kriging", False)):
+        model = fit_method(method, rows, NJ, seed=0)  # type: ignore[arg-type]
+        same = np.allclose(model.error(NJ, states), model.error(NJ, other), atol=1e-12)
+        assert same is alike, method
+
+
+def test_interpolation_and_kriging_go_through_the_points() -> None:
+    _, states, rows = survey()
+    T = NJ.flange(states.q)
+    tcp = T[:, :3, 3] + np.einsum("nij,nj->ni", T[:, :3, :3], states.tool)
+    error = rows.position - tcp
+    found = fit_method("interpolation", rows, NJ, 0).error(NJ, states)
+    np.testing.assert_allclose(found, error, atol=1e-6)
+    found = fit_method("kriging", rows, NJ, 0).error(NJ, states)
+    assert np.linalg.norm(found - error, axis=1).mean() < 0.2e-3
+
+
+@pytest.mark.parametrize("method", TRAINERS)
+def test_every_method_makes_a_model_file(method: str, tmp_path: Path) -> None:
+    arm, _, rows = survey()
+    model = fit_method(method, rows, NJ, 0)  # type: ignore[arg-type]
+    model.save(tmp_path / "m.json")
+    again = load_model(tmp_path / "m.json")
+    held = random_states(40, np.random.default_rng(9))
+    p = again.predict(NJ, held)
+    np.testing.assert_array_equal(p.error, model.predict(NJ, held).error)
+    assert again.method == method
+    # Cross-validation says how wrong it is, within a factor of two.
+    truth, _ = arm.measure(held, np.random.default_rng(1))
+    T = NJ.flange(held.q)
+    tcp = T[:, :3, 3] + np.einsum("nij,nj->ni", T[:, :3, :3], held.tool)
+    real = np.sqrt(((truth - tcp - p.error) ** 2).mean())
+    assert 0.5 < p.std_model.mean() / real < 2.0
+
+
+def test_the_comparison_has_the_five_rows_and_ours() -> None:
+    _, _, rows = survey(150)
+    found = compare(rows, NJ, seed=1)
+    assert [r.method for r in found.rows] == ["no compensation", *ORDER]
+    assert all(r.n == 50 for r in found.rows)
+    mean = {r.method: r.mean_mm for r in found.rows}
+    assert mean["full"] < 0.5 * min(v for k, v in mean.items() if k != "full")
+    assert "100 rows to fit, 50 to test" in found.split
+    train, test = random_split(9, 0)
+    assert sorted([*train, *test]) == list(range(9)) and len(train) == 6
+
+
+def test_a_layer_ignores_joints_that_never_moved() -> None:
+    q = np.zeros((5, 6))
+    q[:, 0] = np.linspace(0, 1, 5)
+    layer = HiddenLayer.draw(make_states(q), 7, 0, directions=False)
+    other = q.copy()
+    other[:, 3] = 1.0
+    np.testing.assert_array_equal(layer(make_states(q)), layer(make_states(other)))
+    assert layer(make_states(q)).shape == (5, 7)
+    with pytest.raises(ValueError, match="activation"):
+        HiddenLayer(weights=(), bias=(), activation="step")

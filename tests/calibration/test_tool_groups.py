@@ -1,0 +1,87 @@
+"""Several tools under one name, and a nest that slipped, are told from noise."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from postproc.calibration.fit import fit_measurements
+from postproc.calibration.plausibility import check_survey
+from postproc.calibration.tool_groups import ToolGroups, find_groups
+from postproc.exceptions import MeasurementError
+from postproc.model.kinematics import Batch
+from postproc.robot.cell import Cell, load_cell
+from tests.calibration.simulator import NJ, random_arm, random_states, survey_of
+
+
+def shifted(tool: np.ndarray, by: list[float], seed: int = 0, n: int = 240):  # type: ignore[no-untyped-def]
+    """Survey an arm, some rows with a tool that lies elsewhere [mm]."""
+    rng = np.random.default_rng(seed)
+    arm = random_arm(rng)
+    states = random_states(n, rng)
+    moved = states.tool + tool[:, None] * np.array(by) * 1e-3
+    measured, _ = arm.measure(states.with_(tool=moved), rng)
+    return survey_of(states, measured)
+
+
+@pytest.mark.parametrize("share", [0.5, 0.1])
+@pytest.mark.parametrize("by", [[30.0, 10.0, 60.0], [0.0, 5.0, -5.0]])
+def test_rows_of_two_tools_are_refused(share: float, by: list[float]) -> None:
+    which = (np.random.default_rng(1).random(240) < share).astype(float)
+    which[0] = 0.0
+    first = int(np.argmax(which)) + 1
+    with pytest.raises(
+        MeasurementError, match=r"with 2 tools .*Add a column tool_id"
+    ) as e:
+        check_survey(shifted(which, by), NJ)
+    assert f"rows 1, {first})" in str(e.value) and e.value.line == first + 1
+
+
+def test_three_nests_without_tool_id_are_counted() -> None:
+    rng = np.random.default_rng(2)
+    states = random_states(240, rng)
+    nests = np.array([[0.0, 0, 0], [-0.14, 0.14, 0.05], [-0.03, 0.13, 0.17]])
+    moved = states.with_(tool=states.tool + nests[np.arange(240) % 3])
+    survey = survey_of(states, random_arm(rng).measure(moved, rng)[0])
+    with pytest.raises(MeasurementError, match="with 3 tools"):
+        check_survey(survey, NJ)
+
+
+def test_a_step_is_found_in_spite_of_a_stray_row() -> None:
+    which = np.repeat([0, 1], [150, 90])
+    centre = np.array([[0.0, 0, 0], [1.0, 0, 0]])
+    assert ToolGroups(which, centre).step == 150
+    which[[40, 200]] = [1, 0]
+    assert ToolGroups(which, centre).step == 150
+    assert ToolGroups(np.arange(240) % 2, centre).step is None
+    assert ToolGroups(np.repeat([0, 1, 0], 80), centre).step is None
+
+
+def test_one_tool_is_one_heap() -> None:
+    for seed in range(6):
+        survey = shifted(np.zeros(240), [0, 0, 0], seed)
+        check_survey(survey, NJ)
+        flange = Batch(NJ, survey.states).walk.flange
+        noise = np.random.default_rng(seed).standard_normal((240, 3))
+        assert find_groups(noise, flange) is None
+
+
+@pytest.fixture
+def cell(tmp_path) -> Cell:  # type: ignore[no-untyped-def]
+    path = tmp_path / "cell.toml"
+    path.write_text('[robot]\narm = "nj220-2.7"\n[tool]\nxyz_mm = [80, -40, 150]\n')
+    return load_cell(path)
+
+
+def test_a_nest_that_slips_is_told_with_its_row(cell: Cell) -> None:
+    after = (np.arange(240) >= 150).astype(float)
+    effects = ("geometry", "backlash", "backlash_profile")
+    slipped = shifted(after, [0.3, 0.0, -0.2])
+    (told,) = fit_measurements(slipped, cell, effects=effects).report.warnings
+    assert "at row 151: run postproc diagnose" in told
+    found = fit_measurements(slipped, cell)
+    assert "slipped at row 151: fitted as tool_shift" in found.report.warnings[0]
+    assert "tool_shift" not in {e.name for e in found.model.compensable()[0].effects}
+    assert found.report.after.mean_mm < 0.06
+    steady = shifted(after, [0.0, 0.0, 0.0])
+    assert not fit_measurements(steady, cell, effects=effects).report.warnings

@@ -1,0 +1,103 @@
+"""Help: every command has examples, the examples fit the command, shells complete."""
+
+from __future__ import annotations
+
+import os
+import shlex
+import subprocess
+import sys
+
+import pytest
+import typer
+
+from postproc.cli import app
+from postproc.cli.common import EXAMPLES
+from tests.cli.test_cli import COMMANDS
+from tests.written import cli
+
+COMMAND = typer.main.get_command(app)
+
+
+def commands_in(line: str) -> list[list[str]]:
+    """Return the calls of postproc in a shell line."""
+    words = shlex.split(line.partition(">")[0], comments=True)
+    calls: list[list[str]] = []
+    for word in words:
+        if word == "postproc":
+            calls.append([])
+        elif word == "|":
+            calls.append(["|"])
+        elif calls:
+            calls[-1].append(word)
+    return [call for call in calls if call and call[0] != "|" and call[0] in EXAMPLES]
+
+
+def test_every_command_has_examples():
+    assert set(EXAMPLES) == set(COMMANDS)
+
+
+@pytest.mark.parametrize("name", EXAMPLES)
+def test_examples_are_shown_and_fit_the_command(name):
+    told = cli(name, "--help").stdout
+    for example in EXAMPLES[name]:
+        assert example in told
+        (call,) = commands_in(example)
+        assert call[0] == name
+        command = COMMAND.get_command(typer.Context(COMMAND), name)
+        command.make_context(name, call[1:])  # refuses what it does not know
+
+
+def postproc(*arguments, **environment):
+    """Run the command as a shell does."""
+    code = "import sys; from postproc.cli import main; sys.argv[0] = 'postproc'; main()"
+    done = subprocess.run(
+        [sys.executable, "-c", code, *arguments],
+        capture_output=True, text=True, check=False, env={**os.environ, **environment},
+    )  # fmt: skip
+    return done.stdout
+
+
+@pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
+def test_shells_get_a_script(shell):
+    told = {"_TYPER_COMPLETE_TEST_DISABLE_SHELL_DETECTION": "1"}
+    script = postproc("--show-completion", shell, **told)
+    assert "_POSTPROC_COMPLETE" in script and f"complete_{shell}" in script
+
+
+@pytest.mark.parametrize(
+    ("typed", "offered"),
+    [
+        ("postproc com", {"compensate", "compare"}),
+        ("postproc fit --method el", {"elm"}),
+        ("postproc diff --js", {"--json"}),
+    ],
+)
+def test_what_is_typed_is_completed(typed, offered):
+    told = {"COMP_WORDS": typed, "COMP_CWORD": str(len(typed.split()) - 1)}
+    found = postproc(_POSTPROC_COMPLETE="complete_bash", **told)
+    assert set(found.split()) == offered
+
+
+def test_help_loads_nothing_heavy():
+    code = (
+        "import sys; from postproc.cli import app\n"
+        "try: app(['--help'])\n"
+        "except SystemExit: pass\n"
+        "heavy = {'numpy', 'scipy', 'pinocchio', 'lark', 'rich', 'plotly', 'pandas'}\n"
+        "print(sorted(heavy & set(sys.modules)))"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True
+    )
+    assert done.stdout.splitlines()[-1] == "[]"
+
+
+def test_compensating_loads_nothing_that_it_may_not_need():
+    code = (
+        "import sys, postproc.cli.jobs, postproc.cli.common\n"
+        "print(sorted({'matplotlib', 'pinocchio', 'rich', 'scipy'} & set(sys.modules)))"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True
+    )
+    assert done.stdout == "[]\n"

@@ -1,0 +1,61 @@
+"""Numbers as they will be read, before anything is written and read."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from postproc.compensation.program import Reading, read_program
+from postproc.compensation.rewrite import (
+    VerificationError,
+    check_numbers,
+    read_back,
+    write_numbers,
+)
+from postproc.robot.cell import Cell
+from tests.language.pdl2.reachable import reachable
+
+
+def changed(reading: Reading, seed: int) -> tuple[np.ndarray, np.ndarray]:
+    """Draw new numbers for some literals that may be edited."""
+    rng, visits = np.random.default_rng(seed), reading.visits
+    used = np.unique(visits.literal[visits.literal >= 0])
+    free = [k for k in used.tolist() if not visits.literals.pinned[k]]
+    rows = np.array([k for k in free if rng.random() < 0.7], dtype=np.int64)
+    first = [int(np.flatnonzero(visits.literal == k)[0]) for k in rows]
+    values = visits.values[first] + rng.normal(0, 0.3, (len(rows), 6))
+    known = np.isfinite(values).all(axis=1)
+    return rows[known], values[known]
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_they_are_those_of_the_output(job_cell: Cell, seed: int) -> None:
+    text = reachable(seed, exact=seed % 2 == 0, pages=False).text
+    reading = read_program({"job.pdl": text.encode("latin-1")}, job_cell)
+    rows, values = changed(reading, seed)
+    output = write_numbers(reading, rows, values, "0" * 12)
+    found = read_back(reading.visits, rows, output.edits)
+    again = read_program(output.files, job_cell).visits
+    direct = again.follows < 0
+    np.testing.assert_array_equal(found[direct], again.values[direct])
+    np.testing.assert_allclose(found, again.values, rtol=0, atol=1e-9)
+    check_numbers(reading.visits, found, again)
+
+
+def test_another_number_is_refused(job_cell: Cell) -> None:
+    text = "PROGRAM job\nBEGIN\n  MOVE TO {0, 0, -90, 0, 60, 0}\n"
+    text += "  MOVE TO {1, 0, -90, 0, 60, 0}\nEND job\n"
+    visits = read_program({"job.pdl": text.encode()}, job_cell).visits
+    check_numbers(visits, visits.values, visits)
+    other = np.array(visits.values)
+    other[1, 0] = np.nextafter(1.0, 2.0)
+    with pytest.raises(VerificationError, match="not read as written"):
+        check_numbers(visits, other, visits)
+    follows = np.array([-1, 0])
+    computed = replace(visits, follows=follows)
+    check_numbers(computed, other, computed)
+    other[1, 0] = 1.0 + 1e-5
+    with pytest.raises(VerificationError, match="computed target"):
+        check_numbers(computed, other, computed)

@@ -1,0 +1,29 @@
+"""Input, a line ``-- output``, expected: the first three numbers moved by 1.25."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from postproc.language.pdl2.interpreter import resolve
+from postproc.language.pdl2.program import parse
+from postproc.language.rewrite import compare, edits
+from postproc.language.source import Source, apply, source_from_bytes
+
+CASES = sorted((Path(__file__).parents[2] / "cases").glob("*.pdl"))
+
+
+@pytest.mark.parametrize("newline", [b"\n", b"\r\n"])
+@pytest.mark.parametrize("path", CASES, ids=[path.stem for path in CASES])
+def test_case(path: Path, newline: bytes) -> None:
+    parts = path.read_bytes().split(b"-- output\n")
+    given, wanted = (part.replace(b"\n", newline) for part in parts)
+    source = source_from_bytes(path.name, given)
+    visits = resolve(parse(source)).visits
+    rows = np.arange(len(visits.literals))
+    first = [int(np.flatnonzero(visits.literal == row)[0]) for row in rows]
+    new = visits.values[first] + [1.25, 1.25, 1.25, 0, 0, 0]
+    (mine,) = edits(visits.literals, (source,), rows, new)
+    out = apply(given, mine)
+    assert out == wanted
+    assert compare(source, Source(path.name, out), mine) == ()

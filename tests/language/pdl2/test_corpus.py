@@ -1,0 +1,88 @@
+"""The chapters of the language: every case is a program and what it does."""
+
+from pathlib import Path
+
+import pytest
+
+from postproc.language.pdl2.interpreter import Resolved, resolve
+from postproc.language.pdl2.job import Start
+from postproc.language.pdl2.program import parse
+from postproc.language.pdl2.variable_file import read_variables
+from postproc.language.rewrite import edits
+from postproc.language.source import apply, source_from_bytes
+from postproc.language.visits import ELSEWHERE, START, Meaning
+from postproc.robot.trajectory import Motion
+
+CORPUS = Path(__file__).parents[2] / "corpus"
+CELL = Start(
+    aux={1: "gun"},
+    frame_tables={"tf": {"1, 2": {"tool": (1.0, 2.0, 3.0, 0.0, 0.0, 0.0)}}},
+)
+
+
+def chapters() -> list[tuple[str, str, str]]:
+    found = []
+    for path in sorted(CORPUS.glob("*.txt")):
+        for case in path.read_text("utf-8").split("==== ")[1:]:
+            title, body = case.split("\n", 1)
+            program, _, expected = body.partition("----\n")
+            found.append((f"{path.stem}: {title}", program, expected))
+    return found
+
+
+def with_values(case: str) -> tuple[str, str]:
+    """Return the program of a case, and its variable file ("" for none)."""
+    program, _, values = case.partition("-- values\n")
+    return program, values
+
+
+def described(resolved: Resolved, *texts: str) -> str:
+    """Return one line for each visit, then one for each diagnostic."""
+    v = resolved.visits
+    out = []
+    for i in range(len(v)):
+        origins = {START: "start", ELSEWHERE: "?"}
+        before = [origins.get(p) or str(v.line[p]) for p in v.predecessors(i).tolist()]
+        word = Motion(v.motion[i]).name + (" VIA" if v.via[i] else "")
+        literal = "-"
+        if v.literal[i] >= 0:
+            row = v.literal[i]
+            places = zip(v.literals.start[row], v.literals.end[row], strict=True)
+            text = texts[v.literals.file[row]]
+            literal = ",".join(text[a:b] for a, b in places)
+            literal += " taught" * bool(v.literals.taught[row])
+        name = v.names[v.name[i]] or "-"
+        parts = [
+            f"{v.line[i]} {word} {Meaning(v.target[i]).name} {name}",
+            f"from {'|'.join(before)}",
+            f"numbers {literal}",
+        ]
+        parts += [f"measure {v.measure_id[i]}"] * bool(v.measure_id[i])
+        kept = v.literals.pinned[v.literal[i]] if v.literal[i] >= 0 else ""
+        parts += [f"stays, for {kept}"] * bool(kept)
+        parts += [f"because {v.reasons[v.reason[i]]}"] * bool(v.reason[i])
+        out.append("; ".join(parts))
+    out += [f"! {d.line} {d.code}" for d in resolved.diagnostics]
+    return "\n".join(out) + "\n"
+
+
+@pytest.mark.parametrize(
+    ("title", "program", "expected"), chapters(), ids=[c[0] for c in chapters()]
+)
+@pytest.mark.parametrize("newline", ["\n", "\r\n"])
+def test_chapter(title: str, program: str, expected: str, newline: str) -> None:
+    files = [
+        source_from_bytes(
+            f"case.{suffix}", text.replace("\n", newline).encode("latin-1")
+        )
+        for suffix, text in zip(("pdl", "lsv"), with_values(program), strict=True)
+        if text
+    ]
+    source, *listed = files
+    variables = read_variables(listed[0]) if listed else None
+    resolved = resolve(parse(source), CELL, variables)
+    assert described(resolved, *(file.text for file in files)) == expected
+    visits = resolved.visits
+    same = edits(visits.literals, files, [], [])
+    for file, own in zip(files, same, strict=True):
+        assert apply(file.data, own) == file.data

@@ -1,0 +1,188 @@
+"""Every effect by its definition: columns are derivatives of the displacement."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+from postproc.exceptions import PostprocError
+from postproc.model.combination import Combination
+from postproc.model.effects import EFFECTS, propose, restore
+from postproc.model.effects.effect import Effect, JointEffect, fade, fade_turns
+from postproc.model.kinematics import Batch
+from tests.calibration.simulator import NJ, PLATE, covariates, random_states
+
+RNG = np.random.default_rng(5)
+STATES = covariates(random_states(40, RNG, PLATE), RNG)
+
+
+def variants() -> list[Effect]:
+    out = list(propose(EFFECTS, NJ, STATES))
+    out.append(EFFECTS["thermal"](form="time", time_constant=100.0))
+    out.append(EFFECTS["load_backlash"](form="gravity_side"))
+    out.append(EFFECTS["tool_shift"](row=20.0, turns=True))
+    out.append(EFFECTS["base_shift"](row=20.0))
+    out.append(EFFECTS["backlash_profile"](constant=True))
+    out += [
+        EFFECTS["curve"](direction=d, source=s, lower=(low,), upper=(high,))
+        for d, s, low, high in (
+            ("base z", ("time",), 0.0, 400.0),
+            ("tool x", ("order",), 0.0, 40.0),
+            ("joint 2", ("torque 2",), -4e3, 4e3),
+        )
+    ]
+    return out
+
+
+@pytest.mark.parametrize("effect", variants(), ids=lambda e: e.name)
+def test_columns_are_finite_differences_of_the_error(effect: Effect) -> None:
+    one = Combination((effect,))
+    batch = Batch(NJ, STATES)
+    rng = np.random.default_rng(1)
+    at = rng.standard_normal(len(one.scales)) * one.scales
+    columns = one.columns(one.at(batch, at))
+    assert columns.shape == (len(STATES), 3, len(one.parameters))
+    for k, scale in enumerate(one.scales):
+        step = np.zeros(len(at))
+        step[k] = 1e-2 * scale
+        slope = one.error(batch, at + step) - one.error(batch, at - step)
+        slope /= 2 * step[k]
+        error = np.abs(slope - columns[:, :, k]).max() * scale
+        assert error < 2e-8, one.names[k]  # [m] at one prior scale
+
+
+@pytest.mark.parametrize(
+    "effect", [e for e in variants() if e.name != "probe_turn"], ids=lambda e: e.name
+)
+def test_rotation_columns_are_what_other_points_of_the_tool_show(
+    effect: Effect,
+) -> None:
+    """A rigid tool: the error at t + d differs from that at t by turn x R d."""
+    one, rng = Combination((effect,)), np.random.default_rng(2)
+    at = rng.standard_normal(len(one.scales)) * one.scales
+    load = np.tile([0.0, 0.0, 0.1], (len(STATES), 1))
+    states = STATES.with_(payload_com=load)
+    turns = one.rotation_columns(one.at(Batch(NJ, states), at))
+    for d in 0.2 * np.eye(3):
+        other = states.with_(tool=states.tool + d)
+        here, there = (one.at(Batch(NJ, s), at) for s in (states, other))
+        moved = one.columns(there) - one.columns(here)
+        lever = (there.walk.tcp - here.walk.tcp)[:, :, None]
+        gap = moved - np.cross(turns, lever, axis=1)
+        assert np.abs(gap).max(axis=(0, 1)) @ one.scales < 1e-9 * len(one.scales)
+
+
+def test_a_sum_of_effects_turns_the_tool_as_its_columns_say() -> None:
+    names = ("geometry", "backlash", "compliance", "tracker_drift", "registration")
+    all_, batch = Combination(propose(names, NJ, STATES)), Batch(NJ, STATES)
+    at = np.random.default_rng(3).standard_normal(len(all_.scales)) * all_.scales
+    columns = all_.rotation_columns(all_.at(batch, at))
+    for k, scale in enumerate(all_.scales):
+        step = 1e-2 * scale * np.eye(len(at))[k]
+        slope = all_.turn(batch, at + step) - all_.turn(batch, at - step)
+        gap = slope / (2e-2 * scale) - columns[:, :, k]
+        assert np.abs(gap).max() * scale < 2e-5, all_.names[k]  # [rad], products
+
+
+@pytest.mark.parametrize("effect", variants(), ids=lambda e: e.name)
+def test_settings_survive_a_model_file(effect: Effect) -> None:
+    plain = json.loads(json.dumps(effect.settings(), allow_nan=False))
+    again = restore(effect.name, plain)
+    assert again == effect
+    assert again.parameters() == effect.parameters()
+    names = [p.name for p in effect.parameters()]
+    assert len(set(names)) == len(names)
+
+
+def test_origins_say_what_may_be_compensated() -> None:
+    origin = {e.name: e.belongs_to() for e in variants() if e.name != "curve"}
+    assert {n for n, o in origin.items() if o == "setup"} == {
+        "base_shift", "tool_shift", "tracker_drift", "probe", "probe_turn",
+        "registration",
+    }  # fmt: skip
+    assert {n for n, o in origin.items() if o == "state"} == {"payload", "thermal"}
+    curve = EFFECTS["curve"]
+    assert curve(source=("order",)).belongs_to() == "setup"
+    assert curve(source=("joint 3", "temperature")).belongs_to() == "state"
+    assert curve(source=("joint 3",)).belongs_to() == "arm"
+    assert EFFECTS["thermal"]().requires() == ("temperature",)
+    assert EFFECTS["thermal"](form="time").requires() == ()
+
+
+def test_an_effect_without_its_covariate_is_refused() -> None:
+    bare = random_states(10, RNG)
+    with pytest.raises(PostprocError, match="payload needs the payload"):
+        propose(["payload"], NJ, bare)
+    with pytest.raises(PostprocError, match="no effect 'gravity'"):
+        propose(["gravity"], NJ, bare)
+
+
+def test_free_forms_fade_outside_the_survey() -> None:
+    low, high = STATES.q.min(axis=0), STATES.q.max(axis=0)
+    far = STATES.with_(q=np.where(STATES.q > 0, high + 1.0, low - 1.0))
+    for name in ("elm", "joint_map"):
+        effect = propose([name], NJ, STATES)[0]
+        assert np.abs(effect.columns(Batch(NJ, STATES))).max() > 0
+        assert np.abs(effect.columns(Batch(NJ, far))).max() < 1e-6
+    x = np.linspace(-1, 2, 301)
+    f = fade(x, np.array(0.0), np.array(1.0))
+    assert (np.diff(f[x >= 0.5]) <= 0).all() and (f[(x >= 0) & (x <= 1)] == 1).all()
+
+
+def test_joint_errors_are_their_basis_times_the_parameters() -> None:
+    for effect in (e for e in variants() if isinstance(e, JointEffect)):
+        batch, acts_on = Batch(NJ, STATES), effect.acts_on()
+        p = np.random.default_rng(4).standard_normal(len(acts_on))
+        wanted = np.zeros((len(STATES), 6))
+        for k, column in enumerate((effect.basis(batch) * p).T):
+            wanted[:, acts_on[k]] += column
+        assert np.allclose(effect.angles(batch, p), wanted, rtol=0, atol=1e-13)
+        none = Batch(NJ, STATES[:0])
+        assert effect.basis(none).shape == (0, len(p))
+        assert effect.angles(none, p).shape == (0, 6)
+
+
+def test_a_profile_of_some_joints_is_its_harmonics_as_far_as_surveyed() -> None:
+    low, high = np.full(6, -1.0), np.full(6, 1.5)
+    effect = EFFECTS["backlash_profile"](
+        joints=(2, 5), orders=(4, 1), constant=True, lower=tuple(low), upper=tuple(high)
+    )
+    q, direction = STATES.q, STATES.direction
+    inside = fade_turns(q, low, high)
+    assert 0 < (inside < 1).sum() < inside.size
+    wanted = [
+        direction[:, j] * part
+        for j in (1, 4)
+        for part in (
+            np.ones(len(q)),
+            inside[:, j] * np.sin(4 * q[:, j]), inside[:, j] * np.cos(4 * q[:, j]),
+            inside[:, j] * np.sin(q[:, j]), inside[:, j] * np.cos(q[:, j]),
+        )
+    ]  # fmt: skip
+    basis = effect.basis(Batch(NJ, STATES))
+    assert np.allclose(basis, np.stack(wanted, axis=1), rtol=0, atol=1e-14)
+
+
+def test_an_angle_fades_as_its_nearest_turn_does() -> None:
+    low, high = np.array([-1.0, -3.1, 0.0]), np.array([1.0, 3.1, 2.0])
+    q = np.random.default_rng(6).uniform(-9.0, 9.0, (200, 3))
+    near = (low + high) / 2 + np.mod(q - (low + high) / 2 + np.pi, 2 * np.pi) - np.pi
+    wanted = np.where([False, True, False], 1.0, fade(near, low, high))
+    assert np.array_equal(fade_turns(q, low, high), wanted)
+    assert np.isnan(fade_turns(np.array([[np.nan, 0.0, 0.0]]), low, high)[0, 0])
+
+
+def test_what_is_known_once_serves_the_same_poses_alone() -> None:
+    effect = EFFECTS["backlash_profile"].propose(NJ, STATES)
+    one, p = Combination((effect,)), RNG.standard_normal(len(effect.parameters()))
+    batch = Batch(NJ, STATES)
+    effect.angles(batch, p)
+    for other in (
+        batch.arriving(-STATES.direction),
+        batch.moved(one.deviation(p), one.shift(batch, p)),
+        batch[np.array([7, 3])],
+    ):
+        fresh = effect.angles(Batch(NJ, other.states), p)
+        np.testing.assert_array_equal(effect.angles(other, p), fresh)

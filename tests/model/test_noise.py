@@ -1,0 +1,46 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from postproc.model.kinematics import Batch
+from postproc.model.noise import Noise, Whitener
+from tests.calibration.simulator import NJ, random_states
+
+
+def test_the_rotated_variances_are_the_covariance() -> None:
+    batch = Batch(NJ, random_states(20, np.random.default_rng(0)))
+    origin = (3.0, 1.0, 1.0)
+    whitener = Whitener.build(batch, batch.walk.tcp, origin)
+    noise = Noise(1.5, 2e-5, origin)
+    J = batch.jacobian
+    reach = np.linalg.norm(batch.walk.tcp - origin, axis=1)
+    tracker = 1.5 * (1e-5 + 5e-6 * reach)
+    expected = tracker[:, None, None] ** 2 * np.eye(3)
+    expected = expected + noise.joint**2 * J @ np.swapaxes(J, 1, 2)
+    turn, v = whitener.turn, whitener.variance(noise)
+    found = np.einsum("nji,nj,njk->nik", turn, v, turn)
+    np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-20)
+    np.testing.assert_allclose(noise.tracker_std(batch.walk.tcp), tracker)
+
+
+def test_components_are_estimated_from_squares() -> None:
+    rng = np.random.default_rng(1)
+    batch = Batch(NJ, random_states(3000, rng))
+    whitener = Whitener.build(batch, batch.walk.tcp, None)
+    true = Noise(3.0, 2e-5)
+    e = np.sqrt(whitener.variance(true)) * rng.standard_normal((3000, 3))
+    found = whitener.estimate(e**2, np.ones(3000), Noise(1.0, 1e-6))
+    assert found.tracker == pytest.approx(3.0, rel=0.05)
+    assert found.joint == pytest.approx(2e-5, rel=0.05)
+
+
+def test_rotation_keeps_lengths_and_columns() -> None:
+    batch = Batch(NJ, random_states(10, np.random.default_rng(2)))
+    whitener = Whitener.build(batch, batch.walk.tcp, None)
+    rows = np.random.default_rng(3).standard_normal((10, 3, 4))
+    turned = whitener.rotate(rows)
+    np.testing.assert_allclose(
+        np.linalg.norm(turned, axis=1), np.linalg.norm(rows, axis=1)
+    )
+    np.testing.assert_allclose(turned[:, :, 2], whitener.rotate(rows[:, :, 2]))

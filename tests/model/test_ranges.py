@@ -1,0 +1,61 @@
+from __future__ import annotations
+
+import numpy as np
+
+from postproc.model.model import Ranges
+from postproc.robot.state import make_states
+from tests.calibration.simulator import PLATE, TOOL, covariates, random_states
+
+NOTHING: frozenset[str] = frozenset()
+
+
+def survey(tools: np.ndarray = TOOL[None]):  # type: ignore[no-untyped-def]
+    rng = np.random.default_rng(0)
+    return covariates(random_states(100, rng, tools), rng)
+
+
+def test_the_survey_itself_lies_inside() -> None:
+    for tools in (TOOL[None], PLATE):
+        states = survey(tools)
+        assert Ranges.of(states).outside(states, NOTHING) == {}
+
+
+def test_an_axis_surveyed_all_around_has_no_outside() -> None:
+    states = survey()
+    q = np.array(states.q)
+    q[:, 5] = np.linspace(-3.1, 3.1, 100)
+    ranges = Ranges.of(states.with_(q=q))
+    far = make_states(q[:3] + 20 * np.pi * np.eye(6)[5] + 3.0 * np.eye(6)[5], tool=TOOL)
+    assert ranges.outside(far, NOTHING) == {}
+
+
+def test_whole_turns_do_not_matter_but_angles_do() -> None:
+    ranges = Ranges.of(survey())
+    q = survey().q[:2] + np.array([[0, 0, 0, 2 * np.pi, 0, 0], [0, 2.0, 0, 0, 0, 0]])
+    found = ranges.outside(make_states(q, tool=TOOL), NOTHING)
+    assert len(found) == 1
+    (text, rows), = found.items()  # fmt: skip
+    assert text.startswith("axis 2") and rows.tolist() == [False, True]
+
+
+def test_loads_and_heat_are_compared_where_they_were_recorded() -> None:
+    states = survey()
+    ranges = Ranges.of(states)
+    hot = states.with_(temperature=np.full(100, 45.0))
+    assert list(ranges.outside(hot, NOTHING)) == [
+        "temperature outside the surveyed 20 to 30 deg C"
+    ]
+    unknown = states.with_(payload=np.full(100, np.nan))
+    assert ranges.outside(unknown, NOTHING) == {}
+    assert list(ranges.outside(unknown, frozenset({"payload"}))) == [
+        "payload is not known, and the model needs it"
+    ]
+    bare = Ranges.of(random_states(50, np.random.default_rng(1)))
+    assert bare.payload is None and "payload" not in str(bare.outside(hot, NOTHING))
+
+
+def test_collinear_points_do_not_show_all_rotations() -> None:
+    line = TOOL + np.array([[0, 0, 0], [0.1, 0, 0], [0.2, 0, 0]])
+    assert not Ranges.of(survey(line)).see_all_rotations
+    assert Ranges.of(survey(PLATE)).see_all_rotations
+    assert not Ranges.of(survey()).see_all_rotations

@@ -1,0 +1,55 @@
+"""Where a program lands."""
+
+import numpy as np
+import pytest
+
+from postproc.exceptions import PostprocError
+from postproc.robot.trajectory import Motion
+from postproc.simulation import VirtualCell, land, run_program, virtual_arm
+from tests.simulation.builders import Program
+
+ARM = virtual_arm(2)
+SETUP = VirtualCell(home=np.radians([0.0, 0.0, -90.0, 0.0, 45.0, 0.0]))
+
+
+def grid(moved: np.ndarray | None = None) -> Program:
+    program = Program(frames=[[0.0] * 6, [80, -40, 150, 0, 0, 0]])
+    for k, y in enumerate(np.linspace(-400, 400, 9)):
+        shift = np.zeros(3) if moved is None else moved[k]
+        at = np.array([1500.0, y, 900.0]) + shift
+        how = Motion.LINEAR if k else Motion.JOINT
+        program.add([*at, 0.0, 180.0, 0.0], how, tool=1, config="")
+    return program
+
+
+def test_uncompensated_the_error_is_that_of_the_arm() -> None:
+    visits = grid().visits()
+    found = land(ARM, SETUP, visits)
+    np.testing.assert_array_equal(found.visit, np.arange(9))
+    wanted = visits.values[:, :3] * 1e-3
+    np.testing.assert_allclose(found.wanted, wanted, atol=1e-12)
+    run = run_program(ARM, SETUP, visits)
+    np.testing.assert_allclose(found.error, ARM.error(run.arrivals), atol=1e-12)
+
+
+def test_moving_the_commands_against_the_error_removes_it() -> None:
+    original = grid().visits()
+    error, moved = land(ARM, SETUP, original).error, np.zeros((9, 3))
+    assert np.linalg.norm(error, axis=1).mean() > 0.5e-3
+    for _ in range(3):
+        moved -= error * 1e3
+        error = land(ARM, SETUP, original, grid(moved).visits()).error
+    assert np.linalg.norm(error, axis=1).max() < 1e-8
+
+
+def test_programs_that_do_not_pair_are_refused() -> None:
+    short = Program().add([1500, 0, 900, 0, 180, 0]).visits()
+    with pytest.raises(PostprocError, match="1 visits"):
+        land(ARM, SETUP, grid().visits(), short)
+
+
+def test_a_visit_that_one_version_cannot_reach_is_left_out() -> None:
+    moved = np.zeros((9, 3))
+    moved[4] = [9000.0, 0, 0]
+    found = land(ARM, SETUP, grid().visits(), grid(moved).visits())
+    assert 4 not in found.visit and len(found.visit) == 8
