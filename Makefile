@@ -5,6 +5,7 @@
 # make fuzz    20,000 damaged programs: refused, or rewritten byte for byte; the parsers by coverage
 # make plant-bench   10,000 files, a second run, memory, workers, a cluster: docs/plant.md
 # make generated    1,000 random programs: followed as they run, landing where they say
+# make golden  what the commands write, here and at BASE=<commit>: a changed byte fails
 # make bench   where the time goes on this machine: docs/benchmarks.md
 # make growth  how the time to read a program grows with its lines, variables and branches
 # make evidence    coverage of the intervals, and what direction is worth
@@ -25,7 +26,7 @@ export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
 
 .PHONY: help demo test lint format bench evidence reproduce accuracy undeclared blind chaos fuzz docs clean
-.PHONY: plant-bench generated growth native
+.PHONY: plant-bench generated growth native golden
 .DELETE_ON_ERROR:
 
 help:
@@ -87,6 +88,9 @@ native: $(STAMP)
 
 docs: $(STAMP)
 	@PATH="$(abspath $(VENV))/bin:$$PATH" python docs/tools/build.py $(UPDATE)
+
+golden: $(STAMP)
+	@$(PYTHON_BIN) -m tests.golden against $(or $(BASE),HEAD) $(if $(ONLY),--only '$(ONLY)')
 
 plant-bench: $(STAMP)
 	@$(PYTHON_BIN) -m tests.plant_bench --files $(or $(FILES),10000)

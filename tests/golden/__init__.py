@@ -1,0 +1,13 @@
+"""What the command line writes, kept: a changed byte is seen.
+
+A case is a few commands run one after the other in a folder of their own. What they
+print and write is recorded, with times, versions and paths masked, and compared:
+
+    make golden BASE=<commit>          all cases, here and at a commit
+    python -m tests.golden check       a quick set against manifest.json
+    python -m tests.golden update      write manifest.json anew
+
+Only the command line is used, and all inputs are kept: inputs.zip holds programs (the
+cases and the corpus of the tests, generated and damaged ones, a tree), models fitted
+once, and surveys. So the same cases run on a package whose modules lie elsewhere.
+"""

@@ -1,0 +1,76 @@
+"""The package of a commit against this one: the same cases, run on both."""
+
+from __future__ import annotations
+
+import gzip
+import hashlib
+import json
+import subprocess
+import sys
+import tempfile
+from collections.abc import Sequence
+from importlib.metadata import distributions
+from pathlib import Path
+
+from tests.golden.case import HERE, ROOT, Case, kept
+from tests.golden.record import Record, differences
+from tests.golden.running import run_all
+
+BUILD = ROOT / "build" / "golden"
+
+
+def against(
+    commit: str, cases: Sequence[Case], workers: int, fresh: bool
+) -> dict[str, list[str]]:
+    """Tell what the package here writes otherwise than that of a commit, by case."""
+    base = records_of(commit, cases, workers, fresh)
+    here = run_all(cases, ROOT, workers)
+    found = {
+        case.name: differences(base[case.name], here[case.name], case.fitted)
+        for case in cases
+    }
+    return {name: lines for name, lines in found.items() if lines}
+
+
+def records_of(
+    commit: str, cases: Sequence[Case], workers: int, fresh: bool
+) -> dict[str, Record]:
+    """Return the records of a commit; what ran before is kept below build/golden."""
+    full = git("rev-parse", f"{commit}^{{commit}}").decode().strip()
+    path = BUILD / f"{full[:12]}-{setup()}.json.gz"
+    records: dict[str, Record] = {}
+    if path.exists() and not fresh:
+        records = json.loads(gzip.decompress(path.read_bytes()))
+    missing = [case for case in cases if case.name not in records]
+    if missing:
+        print(f"running {len(missing)} cases on {full[:12]}", file=sys.stderr)
+        records |= run_at(full, missing, workers)
+        BUILD.mkdir(parents=True, exist_ok=True)
+        path.write_bytes(gzip.compress(json.dumps(records).encode(), 3))
+    return records
+
+
+def run_at(commit: str, cases: Sequence[Case], workers: int) -> dict[str, Record]:
+    """Run cases on the package of a commit."""
+    with tempfile.TemporaryDirectory(prefix="golden-base-") as name:
+        archive = git("archive", commit, "postproc", "grammars")
+        subprocess.run(["tar", "-x", "-C", name], input=archive, check=True)
+        return run_all(cases, Path(name).resolve(), workers)
+
+
+def setup() -> str:
+    """Hash what else decides on the records: cases, inputs, and what is installed."""
+    found = hashlib.sha256(sys.version.encode())
+    for path in sorted(HERE.glob("*.py")):
+        found.update(path.read_bytes())
+    for name, data in kept().items():
+        found.update(name.encode() + data)
+    for one in sorted(f"{d.name} {d.version}" for d in distributions()):
+        found.update(one.encode())
+    return found.hexdigest()[:12]
+
+
+def git(*words: str) -> bytes:
+    """Run git here."""
+    command = ["git", "-C", str(ROOT), *words]
+    return subprocess.run(command, check=True, capture_output=True).stdout
