@@ -14,6 +14,7 @@ Digest = dict[str, str | list[float]]
 FLOAT = re.compile(r"-?\d+\.\d+(?:[eE][-+]?\d+)?|-?\d+[eE][-+]?\d+")
 NUMBERS = (".json", ".jsonl", ".csv")  # of these, numbers are compared as numbers
 BINARY = (".png", ".pdf")
+LOGS = (".jsonl",)
 CLOSE = 1e-9  # relative, and absolute
 SHORT = 80  # characters that a digest holds as they are
 WEIGHTS = (0.7390851, 1.8954943, 2.7682811)
@@ -43,6 +44,11 @@ def masked(text: str, names: dict[str, str], fitted: bool) -> str:
     return IDS.sub("<id>", text) if fitted else text
 
 
+def in_order(what: str, text: str) -> str:
+    """Sort the lines of a log: two workers end their programs in any order."""
+    return "\n".join(sorted(text.split("\n"))) if what.endswith(LOGS) else text
+
+
 def is_numbers(what: str, text: str, fitted: bool) -> bool:
     """Tell whether the numbers of a text are compared as numbers."""
     return fitted or what.endswith(NUMBERS) or text[:1] in ("{", "[")
@@ -53,7 +59,7 @@ def differences(old: Record, new: Record, fitted: bool) -> list[str]:
     found = [f"{what}: no longer there" for what in old if what not in new]
     found += [f"{what}: new" for what in new if what not in old]
     for what in old.keys() & new.keys():
-        a, b = old[what], new[what]
+        a, b = in_order(what, old[what]), in_order(what, new[what])
         if a == b:
             continue
         if is_numbers(what, a, fitted) and (why := numbers_differ(a, b)) is not None:
@@ -97,6 +103,7 @@ def digest(record: Record, fitted: bool) -> Digest:
     """Shorten a record to what is kept with the sources."""
     found: Digest = {}
     for what, text in sorted(record.items()):
+        text = in_order(what, text)
         if is_numbers(what, text, fitted):
             numbers = [float(n) for n in FLOAT.findall(text)]
             found[what] = sha(FLOAT.sub("#", text))
