@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -463,117 +464,148 @@ class Proposal:
     fixed: Ints
 
 
-def propose(
-    reading: Reading,
-    planned: Planned,
-    solved: Commands,
-    aside: Floats,
-    held: Bools,
-    cell: Cell,
-    options: Options,
-) -> Proposal:
-    """Decide what moves, until no arc becomes quite another one by it.
+@dataclass(frozen=True)
+class Round:
+    """What is to be decided in a round: commands for all targets of a window.
 
-    Args and returns are those of `decide`: every round leaves more points alone.
-    """
-    strays, arcs = np.zeros(len(held), dtype=bool), planned.targets.via.any()
-    while True:
-        found = decide(
-            reading, planned, solved, aside, held, strays, cell, options
-        )  # fmt: skip
-        if not arcs:
-            return found
-        shift = solved.command[:, :3, 3] - planned.plan.tcp[:, :3, 3]
-        shift -= aside - planned.plan.aside
-        moves = np.where(found.corrected[:, None], shift, 0.0)
-        values = found.decisions.corrected
-        more = strayed_along(reading.visits, planned, cell, values, moves) & ~strays
-        if not more.any():
-            return found
-        strays = strays | more
-
-
-def decide(
-    reading: Reading,
-    planned: Planned,
-    solved: Commands,
-    aside: Floats,
-    held: Bools,
-    strays: Bools,
-    cell: Cell,
-    options: Options,
-) -> Proposal:
-    """Guard every solved visit, and compare the arrivals at every literal.
-
-    Args:
+    Attributes:
         reading: The program.
-        planned: Its plan.
+        planned: Its plan, n visits.
         solved: The corrected command of every visit.
         aside: From targets to where the corrected path passes them, (n, 3) [m].
         held: Visits that must be left alone, (n,).
-        strays: Visits whose correction would make another arc, (n,).
         cell: Guards and frames.
         options: What the user asked for.
     """
-    visits, plan, side = reading.visits, planned.plan, solved.direction
-    correction = solved.command[:, :3, 3] - plan.tcp[:, :3, 3]
-    reasons = Reasons(len(visits))
-    display = mark_display(visits, planned, reasons)
-    unchanged = mark_unchanged(visits, reasons, options)
-    reasons.adopt(planned.reasons.index, planned.reasons.texts)
-    for text, outside in solved.outside.items():
-        reasons.mark(outside, text)
-    guard_solutions(reasons, cell.arm, cell.limits, plan.q, solved.q)
-    guard_turn(reasons, cell.limits, solved.turn)
-    guard_size(reasons, cell.limits, correction, solved.residual)
-    # A fly point also moves for what the corner at it is rounded by.
-    moved = correction - (aside - plan.aside)
-    guard_size(reasons, cell.limits, moved, solved.residual)
-    guard_steps(reasons, cell.limits, correction, side, visits.run_mates)
-    reasons.mark(held, HELD)
-    reasons.mark(strays, STRAYS)
-    numbers = new_numbers(visits, plan, solved, aside)
-    change = change_mm(visits, numbers, correction)
-    both = change
-    if len(solved.turned):
-        turn = turns_in_file(visits, solved)
-        both = np.concatenate([change, turn * LEVER_MM], axis=1)
-    agreement = agree(visits.literal, reasons.none, numbers, both)
-    trusted = ~np.any([held, *solved.outside.values()], axis=0)
-    usable = reasons.none
-    stay = must_stay(visits, agreement, change, trusted, cell)
-    chosen, unsafe = mark_disagreement(visits, agreement, stay, cell, reasons)
-    status = np.where(reasons.none, Status.SAFE, Status.GUARDED)
-    for rows, value in (
-        (unsafe, Status.UNSAFE),
-        (display, Status.DISPLAY),
-        (unchanged, Status.UNCHANGED),
-    ):
-        status[rows] = value
-    corrected = status == Status.SAFE
-    values = np.array(visits.values)
-    values[corrected] = agreement.values[agreement.group[corrected]]
-    move_dependants(visits, agreement, chosen, values)
-    decisions = Decisions(
-        status=status.astype(np.int64),
-        why=reasons.index,
-        reasons=reasons.texts,
-        q=plan.q,
-        direction=(side >= KNOWN).astype(np.int8) - (side <= -KNOWN),
-        side=side,
-        corrected=values,
-        correction=np.where(corrected[:, None], correction, 0.0),
-        std_error=np.full_like(correction, np.nan),  # when it is settled
-        turn=np.where(corrected[:, None], solved.turn, 0.0)
-        if options.orientation
-        else NONE,
-    )
-    return Proposal(
-        agreement.literal[chosen],
-        agreement.values[chosen],
-        corrected,
-        decisions,
-        usable,
-        both,
-        agreement.literal[np.any([*stay.values()], axis=0)],
-    )
+
+    reading: Reading
+    planned: Planned
+    solved: Commands
+    aside: Floats
+    held: Bools
+    cell: Cell
+    options: Options
+
+    @cached_property
+    def correction(self) -> Floats:
+        """How far the commands move the TCP, base frame, (n, 3) [m]."""
+        moved: Floats = self.solved.command[:, :3, 3] - self.planned.plan.tcp[:, :3, 3]
+        return moved
+
+    @property
+    def shift(self) -> Floats:
+        """The same for where targets lie: a fly point also makes up for its corner."""
+        shift: Floats = self.correction - (self.aside - self.planned.plan.aside)
+        return shift
+
+    def propose(self) -> Proposal:
+        """Decide what moves, until no arc becomes quite another one by it.
+
+        Every round leaves more points alone.
+        """
+        strays = np.zeros(len(self.held), dtype=bool)
+        arcs = self.planned.targets.via.any()
+        while True:
+            found = self.decide(strays)
+            if not arcs:
+                return found
+            more = self._strayed(found) & ~strays
+            if not more.any():
+                return found
+            strays = strays | more
+
+    def _strayed(self, found: Proposal) -> Bools:
+        """Tell which targets must stay for every arc to stay what it is, (n,)."""
+        moves = np.where(found.corrected[:, None], self.shift, 0.0)
+        values = found.decisions.corrected
+        visits, planned = self.reading.visits, self.planned
+        return strayed_along(visits, planned, self.cell, values, moves)
+
+    def decide(self, strays: Bools) -> Proposal:
+        """Guard every solved visit, and compare the arrivals at every literal.
+
+        Args:
+            strays: Visits whose correction would make another arc, (n,).
+        """
+        visits, reasons = self.reading.visits, Reasons(len(self.reading.visits))
+        display = mark_display(visits, self.planned, reasons)
+        unchanged = mark_unchanged(visits, reasons, self.options)
+        self._guard(reasons, strays)
+        usable = reasons.none
+        agreement, change, both = self._agreement(usable)
+        stay = must_stay(visits, agreement, change, self._trusted, self.cell)
+        chosen, unsafe = mark_disagreement(visits, agreement, stay, self.cell, reasons)
+        status = np.where(reasons.none, Status.SAFE, Status.GUARDED)
+        status[unsafe] = Status.UNSAFE
+        status[display] = Status.DISPLAY
+        status[unchanged] = Status.UNCHANGED
+        corrected = status == Status.SAFE
+        values = np.array(visits.values)
+        values[corrected] = agreement.values[agreement.group[corrected]]
+        move_dependants(visits, agreement, chosen, values)
+        return Proposal(
+            agreement.literal[chosen],
+            agreement.values[chosen],
+            corrected,
+            self._decisions(status, reasons, values),
+            usable,
+            both,
+            agreement.literal[np.any([*stay.values()], axis=0)],
+        )
+
+    def _guard(self, reasons: Reasons, strays: Bools) -> None:
+        """Mark the visits whose corrections are not trusted."""
+        solved, limits, q = self.solved, self.cell.limits, self.planned.plan.q
+        reasons.adopt(self.planned.reasons.index, self.planned.reasons.texts)
+        for text, outside in solved.outside.items():
+            reasons.mark(outside, text)
+        guard_solutions(reasons, self.cell.arm, limits, q, solved.q)
+        guard_turn(reasons, limits, solved.turn)
+        guard_size(reasons, limits, self.correction, solved.residual)
+        guard_size(reasons, limits, self.shift, solved.residual)
+        mates = self.reading.visits.run_mates
+        guard_steps(reasons, limits, self.correction, solved.direction, mates)
+        reasons.mark(self.held, HELD)
+        reasons.mark(strays, STRAYS)
+
+    @property
+    def _trusted(self) -> Bools:
+        """Tell where the model may be believed, (n,)."""
+        out: Bools = ~np.any([self.held, *self.solved.outside.values()], axis=0)
+        return out
+
+    def _agreement(self, usable: Bools) -> tuple[Agreement, Floats, Floats]:
+        """Compare the arrivals that can be corrected.
+
+        Returns:
+            What they have in common at every literal; what every visit would be
+            corrected by, (n, 3) [mm], and the same with turns beside it where tools
+            are turned, (n, k) [mm].
+        """
+        visits, solved = self.reading.visits, self.solved
+        numbers = new_numbers(visits, self.planned.plan, solved, self.aside)
+        change = change_mm(visits, numbers, self.correction)
+        both = change
+        if len(solved.turned):
+            turn = turns_in_file(visits, solved)
+            both = np.concatenate([change, turn * LEVER_MM], axis=1)
+        return agree(visits.literal, usable, numbers, both), change, both
+
+    def _decisions(self, status: Ints, reasons: Reasons, values: Floats) -> Decisions:
+        """Say what was decided for every visit, but for standard errors."""
+        side, moves = self.solved.direction, (status == Status.SAFE)[:, None]
+        turn = (
+            np.where(moves, self.solved.turn, 0.0) if self.options.orientation else NONE
+        )
+        return Decisions(
+            status=status.astype(np.int64),
+            why=reasons.index,
+            reasons=reasons.texts,
+            q=self.planned.plan.q,
+            direction=(side >= KNOWN).astype(np.int8) - (side <= -KNOWN),
+            side=side,
+            corrected=values,
+            correction=np.where(moves, self.correction, 0.0),
+            std_error=np.full_like(self.correction, np.nan),  # when all is settled
+            turn=turn,
+        )

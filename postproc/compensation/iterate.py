@@ -14,7 +14,7 @@ from postproc.compensation.command import (
     solve_visits,
     std_errors,
 )
-from postproc.compensation.decide import Proposal, propose
+from postproc.compensation.decide import Proposal, Round
 from postproc.compensation.options import Clock, Options
 from postproc.compensation.program import Planned, Reading
 from postproc.compensation.rewrite import read_back
@@ -166,11 +166,8 @@ class Iteration:
         with self.clock("decide"):
             plan = self.planned.plan
             aside = passing_after(plan, self.wanted(aim)) + aim.bent
-            proposal = propose(
-                self.reading, self.planned, aim.solved, aside, aim.held, self.cell,
-                self.options,
-            )  # fmt: skip
-        return proposal, aside
+            given = self.reading, self.planned, aim.solved, aside, aim.held
+            return Round(*given, self.cell, self.options).propose(), aside
 
     def wanted(self, aim: Iterate) -> Floats:
         """Say what the path should move by at every target, (n, 3) [m]."""
