@@ -26,7 +26,7 @@ from postproc.calibration.measurements import (
 from postproc.calibration.registration import register
 from postproc.calibration.tables import DETECT, TableFormat
 from postproc.cli.jobs import read_files
-from postproc.compensation.program import plan_visits, read_program, states_of
+from postproc.compensation.program import Planned, plan_visits, read_program, states_of
 from postproc.exceptions import MeasurementError
 from postproc.model.model import Model, load_model
 from postproc.model.statistics import ErrorStatistics
@@ -70,16 +70,10 @@ def join_program(
         for column, (name, scale) in COVARIATES.items()
         if table.has(column)
     }
-    lost = np.isnan(states.q).any(axis=1)
-    if lost.any():
-        first = int(np.flatnonzero(lost)[0])
-        raise MeasurementError(
-            data,
-            f"the program's visit {ids[order[first]]} cannot be planned: "
-            f"{planned.reasons[int(rows[order][first])]}",
-            "Mend the program or leave the row out",
-            line=int(table.line[order][first]),
-        )
+    lost = np.flatnonzero(np.isnan(states.q).any(axis=1))
+    if len(lost):
+        row = order[lost[0]]
+        raise _unplanned(data, ids[row], int(table.line[row]), planned, int(rows[row]))
     return Measurements(
         path=table.path,
         states=states.with_(**recorded),
@@ -88,6 +82,16 @@ def join_program(
         line=table.line[order],
         inferred=np.zeros(len(rows), dtype=bool),
         sha256=table.sha256,
+    )
+
+
+def _unplanned(
+    data: Path, name: str, line: int, planned: Planned, visit: int
+) -> MeasurementError:
+    """Say that a measured visit has no planned state."""
+    problem = f"the program's visit {name} cannot be planned: {planned.reasons[visit]}"
+    return MeasurementError(
+        data, problem, "Mend the program or leave the row out", line=line
     )
 
 

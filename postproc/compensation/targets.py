@@ -142,11 +142,7 @@ def targets_from_visits(visits: Visits, cell: Cell) -> tuple[Targets, Reasons]:
     outside = _auxiliary(visits, cell, reasons)
     _explain(visits, values, poses, reasons)
     lost = (outside | visits.tool_remote) & (kind != TargetKind.JOINTS)
-    placed = np.isin(kind, PLACED)
-    lost |= placed & (is_unknown(tcp) | is_unknown(frames.tool))
-    lost |= np.isnan(joints).any(axis=1) & np.isin(
-        kind, (TargetKind.JOINTS, TargetKind.JOINT_STEP)
-    )
+    lost |= _unplaced(kind, tcp, joints, frames)
     slot, turns = configurations(visits.configs)
     rounding, distance, overlap = rounding_of(visits)
     pred_start, pred = arc_per_start(
@@ -177,6 +173,14 @@ def targets_from_visits(visits: Visits, cell: Cell) -> tuple[Targets, Reasons]:
         pred=pred,
     )
     return targets, reasons
+
+
+def _unplaced(kind: Ints, tcp: Floats, joints: Floats, frames: Frames) -> Bools:
+    """Tell which targets miss a number or the tool that they need, (n,)."""
+    placed = np.isin(kind, PLACED)
+    in_joints = np.isin(kind, (TargetKind.JOINTS, TargetKind.JOINT_STEP))
+    unknown: Bools = placed & (is_unknown(tcp) | is_unknown(frames.tool))
+    return unknown | (in_joints & np.isnan(joints).any(axis=1))
 
 
 def moved_targets(targets: Targets, visits: Visits, cell: Cell, rows: Ints) -> Targets:

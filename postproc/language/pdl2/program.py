@@ -81,59 +81,124 @@ def build_blocks(
     lines: Lines, statements: ParsedShapes[ast.Statement], first: int, last: int
 ) -> tuple[Blocks, list[tuple[int, str]]]:
     """Match the blocks of rows first to last - 1; also return (row, problem)."""
-    end: dict[int, int] = {}
-    opener: dict[int, int] = {}
-    inner: dict[int, list[int]] = {}
-    labels: dict[str, int] = {}
-    problems: list[tuple[int, str]] = []
-    cycle, gotos = -1, []
-    stack: list[tuple[int, ast.Statement]] = []
     structural = statements.which(lambda said: not isinstance(said, _PLAIN))
     rows = first + np.flatnonzero(structural[lines.shape[first:last]])
+    reader = _BlockReader(lines, statements)
     for row in rows.tolist():
-        statement = recovered(statements[int(lines.shape[row])])
+        reader.take(row)
+    return reader.blocks(), reader.problems
+
+
+class _BlockReader:
+    """The blocks of a body, as far as its rows have been read."""
+
+    def __init__(self, lines: Lines, statements: ParsedShapes[ast.Statement]) -> None:
+        self._lines, self._statements = lines, statements
+        self._end: dict[int, int] = {}
+        self._opener: dict[int, int] = {}
+        self._inner: dict[int, list[int]] = {}
+        self._labels: dict[str, int] = {}
+        self._gotos: list[tuple[int, str]] = []
+        self._open: list[tuple[int, ast.Statement]] = []
+        self._cycle = -1
+        self._problems: list[tuple[int, str]] = []
+
+    def take(self, row: int) -> None:
+        """Read the next row."""
+        statement = recovered(self._statements[int(self._lines.shape[row])])
         if isinstance(statement, ast.Label):
-            labels[statement.name] = row
+            self._labels[statement.name] = row
             statement = statement.then or ast.Statement()
+        self._take_behind(row, statement)
         kind = type(statement)
+        if kind in _CLOSED_BY:
+            self._open.append((row, statement))
+            self._inner[row] = []
+        elif kind in _CLOSED_BY.values():
+            self._close(row, statement)
+        elif kind in _INNER:
+            self._divide(row, statement)
+        elif kind is ast.Cycle:
+            self._cycle = row
+        elif isinstance(statement, ast.Goto):
+            self._gotos.append((row, statement.label))
+
+    def _take_behind(self, row: int, statement: ast.Statement) -> None:
+        """Read what a division of a block, or an event, has on its line."""
         behind = _behind(statement)
         if type(behind) in (*_CLOSED_BY, *_CLOSED_BY.values()):
             text = f"this {_word(behind)} stands behind {_word(statement)}"
-            problems.append((row, f"{text}: put it on a line of its own"))
+            self._problems.append((row, f"{text}: put it on a line of its own"))
         elif isinstance(behind, ast.Goto):
-            gotos.append((row, behind.label))
-        if kind in _CLOSED_BY:
-            stack.append((row, statement))
-            inner[row] = []
-        elif kind in _CLOSED_BY.values():
-            if stack and _CLOSED_BY[type(stack[-1][1])] is kind:
-                start, _ = stack.pop()
-                for part in (start, *inner[start]):
-                    end[part] = row
-                opener[row] = start
-            else:
-                problems.append((row, _unmatched(statement, stack, lines)))
-        elif kind in _INNER:
-            wanted = (ast.If, ast.Select) if kind is ast.Else else (ast.Select,)
-            if stack and isinstance(stack[-1][1], wanted):
-                inner[stack[-1][0]].append(row)
-            else:
-                problems.append((row, _unmatched(statement, stack, lines)))
-        elif kind is ast.Cycle:
-            cycle = row
-        elif isinstance(statement, ast.Goto):
-            gotos.append((row, statement.label))
-    for row, statement in stack:
-        problems.append((row, f"this {_word(statement)} is never closed"))
-    problems += [
-        (row, f"label {label} does not exist")
-        for row, label in gotos
-        if label not in labels
-    ]
-    return (
-        _blocks(lines, statements, end, opener, inner, labels, cycle, problems),
-        problems,
-    )
+            self._gotos.append((row, behind.label))
+
+    def _close(self, row: int, statement: ast.Statement) -> None:
+        """Close the innermost block."""
+        if self._open and _CLOSED_BY[type(self._open[-1][1])] is type(statement):
+            start, _ = self._open.pop()
+            for part in (start, *self._inner[start]):
+                self._end[part] = row
+            self._opener[row] = start
+        else:
+            self._refuse(row, statement)
+
+    def _divide(self, row: int, statement: ast.Statement) -> None:
+        """Divide the innermost block: ELSE, CASE."""
+        is_else = isinstance(statement, ast.Else)
+        wanted = (ast.If, ast.Select) if is_else else (ast.Select,)
+        if self._open and isinstance(self._open[-1][1], wanted):
+            self._inner[self._open[-1][0]].append(row)
+        else:
+            self._refuse(row, statement)
+
+    def _refuse(self, row: int, statement: ast.Statement) -> None:
+        self._problems.append((row, _unmatched(statement, self._open, self._lines)))
+
+    @property
+    def problems(self) -> list[tuple[int, str]]:
+        """Return what does not match, (row, text)."""
+        never = [
+            (row, f"this {_word(statement)} is never closed")
+            for row, statement in self._open
+        ]
+        lost = [
+            (row, f"label {label} does not exist")
+            for row, label in self._gotos
+            if label not in self._labels
+        ]
+        return [*self._problems, *never, *lost]
+
+    def blocks(self) -> Blocks:
+        """Return where jumps lead, and where ways of the program join."""
+        joins = {*self._labels.values(), *self._opener}
+        loops, handlers = [], []
+        for row, start in self._opener.items():
+            kind = recovered(self._statements[int(self._lines.shape[start])])
+            if isinstance(kind, ast.Label) and kind.then is not None:
+                kind = kind.then
+            if isinstance(kind, ast.For):
+                loops.append((start, row))
+                joins.add(row + 1)
+            elif isinstance(kind, ast.While):
+                joins |= {start, row + 1}
+            elif isinstance(kind, ast.Repeat):
+                joins.add(start)
+            elif isinstance(kind, ast.Condition):
+                handlers.append((start, row))
+                joins.add(row + 1)
+        if self._cycle >= 0:
+            joins.add(self._cycle)
+        return Blocks(
+            self._end,
+            self._opener,
+            {row: tuple(parts) for row, parts in self._inner.items()},
+            self._labels,
+            self._cycle,
+            frozenset(joins),
+            tuple(sorted(loops)),
+            tuple(sorted(handlers)),
+            min((int(self._lines.line[row]) for row, _ in self.problems), default=0),
+        )
 
 
 def _behind(statement: ast.Statement) -> ast.Statement:
@@ -142,47 +207,6 @@ def _behind(statement: ast.Statement) -> ast.Statement:
         case ast.Else(then) | ast.Case(_, then) | ast.When(then) if then is not None:
             return then
     return ast.Statement()
-
-
-def _blocks(
-    lines: Lines,
-    statements: ParsedShapes[ast.Statement],
-    end: dict[int, int],
-    opener: dict[int, int],
-    inner: dict[int, list[int]],
-    labels: dict[str, int],
-    cycle: int,
-    problems: list[tuple[int, str]],
-) -> Blocks:
-    joins = {*labels.values(), *opener}
-    loops, handlers = [], []
-    for row, start in opener.items():
-        kind = recovered(statements[int(lines.shape[start])])
-        if isinstance(kind, ast.Label) and kind.then is not None:
-            kind = kind.then
-        if isinstance(kind, ast.For):
-            loops.append((start, row))
-            joins.add(row + 1)
-        elif isinstance(kind, ast.While):
-            joins |= {start, row + 1}
-        elif isinstance(kind, ast.Repeat):
-            joins.add(start)
-        elif isinstance(kind, ast.Condition):
-            handlers.append((start, row))
-            joins.add(row + 1)
-    if cycle >= 0:
-        joins.add(cycle)
-    return Blocks(
-        end,
-        opener,
-        {row: tuple(parts) for row, parts in inner.items()},
-        labels,
-        cycle,
-        frozenset(joins),
-        tuple(sorted(loops)),
-        tuple(sorted(handlers)),
-        min((int(lines.line[row]) for row, _ in problems), default=0),
-    )
 
 
 def _word(statement: ast.Statement) -> str:
