@@ -8,7 +8,7 @@ from postproc import __version__
 from postproc.batch.workers import run_tasks
 
 
-class InlineCrew:
+class InlinePool:
     """Does a chunk when it is given it."""
 
     losses = ()

@@ -24,7 +24,7 @@ COUNT = 2.0  # [s] between two looks at how many workers there are
 _one_at_a_time = threading.Lock()
 
 
-class ClusterCrew:
+class ClusterPool:
     """The workers of a Dask cluster."""
 
     losses: tuple[type[BaseException], ...]

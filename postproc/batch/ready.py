@@ -1,6 +1,5 @@
 """All that a worker needs for its first program, loaded before workers are forked."""
 
-from postproc.batch import workers as workers
 from postproc.language.pdl2.parser import line_parser
 
 for _grammar in ("pdl2", "lsv"):

@@ -15,7 +15,7 @@ from types import FrameType
 from postproc.batch.journal import Journal, JournalEntry, Summary, read_entries
 from postproc.batch.plan import BatchPlan, Result, Task, Unit, digest_of
 from postproc.batch.tree import Tree, refuse_overlap, scan
-from postproc.batch.workers import Crew, work_through
+from postproc.batch.workers import WorkerPool, work_through
 from postproc.compensation.record import SUFFIX, file_sha256, sha256
 from postproc.exceptions import DiskFullError, OutputError
 from postproc.files import TEMPORARY, disk_error, replace_file, write_all
@@ -233,7 +233,7 @@ def file_hash(path: str | Path) -> str:
 STATUS = ("done", "left", "failed")  # by exit code
 
 Told = Callable[[int, int], None]  # how many files are done, of how many
-Gather = Callable[[BatchPlan], Crew]
+Gather = Callable[[BatchPlan], WorkerPool]
 
 
 @dataclass(frozen=True)
@@ -358,8 +358,8 @@ class BatchRun:
         first = next(tasks, None)
         if first is None or stop():
             return
-        with closing(gather(self.order.plan)) as crew:
-            for result in work_through(_chain(first, tasks), crew, stop):
+        with closing(gather(self.order.plan)) as pool:
+            for result in work_through(_chain(first, tasks), pool, stop):
                 self.deliver(result)
 
     def tasks(self) -> Iterator[Task]:

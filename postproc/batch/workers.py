@@ -88,7 +88,7 @@ _LOST = "its worker died over it twice: too little memory, or a defect of a libr
 Working = Future[list[Result]]
 
 
-class Crew(Protocol):
+class WorkerPool(Protocol):
     """Workers that take chunks.
 
     Attributes:
@@ -111,7 +111,7 @@ class Crew(Protocol):
 
 
 def work_through(
-    tasks: Iterator[Task], crew: Crew, stopped: Callable[[], bool]
+    tasks: Iterator[Task], pool: WorkerPool, stopped: Callable[[], bool]
 ) -> Iterator[Result]:
     """Have tasks done by workers, and yield what comes of them, as it comes.
 
@@ -120,7 +120,7 @@ def work_through(
 
     Args:
         tasks: Taken when there is a place for them, so that memory stays flat.
-        crew: The workers.
+        pool: The workers.
         stopped: Tells whether the user wants to stop.
     """
     pace = Pace()
@@ -129,27 +129,27 @@ def work_through(
     lost: list[Task] = []
     more = True
     while (more or running) and not stopped():
-        while more and not lost and len(running) < AHEAD * crew.lanes():
+        while more and not lost and len(running) < AHEAD * pool.lanes():
             chunk = next(waiting, None)
             more = chunk is not None
             if chunk is not None:
-                running[crew.submit(chunk)] = chunk
+                running[pool.submit(chunk)] = chunk
         done = wait(running, timeout=WAIT, return_when=FIRST_COMPLETED).done
         for future in done:
             chunk = running.pop(future)
             try:
-                results = _results(future, crew)
-            except crew.losses:
+                results = _results(future, pool)
+            except pool.losses:
                 lost += chunk
                 continue
             pace.learn(sum(t.size for t in chunk), sum(r.seconds for r in results))
             yield from results
         if lost and not running:
-            yield from _one_by_one(lost, crew, stopped)
+            yield from _one_by_one(lost, pool, stopped)
             lost = []
 
 
-def _results(future: Working, crew: Crew) -> list[Result]:
+def _results(future: Working, pool: WorkerPool) -> list[Result]:
     """Return what a worker made.
 
     Raises:
@@ -157,7 +157,7 @@ def _results(future: Working, crew: Crew) -> list[Result]:
     """
     try:
         return future.result()
-    except crew.losses:
+    except pool.losses:
         raise
     except CancelledError:
         raise PostprocError(
@@ -171,20 +171,20 @@ def _results(future: Working, crew: Crew) -> list[Result]:
 
 
 def _one_by_one(
-    tasks: list[Task], crew: Crew, stopped: Callable[[], bool]
+    tasks: list[Task], pool: WorkerPool, stopped: Callable[[], bool]
 ) -> Iterator[Result]:
     """Do tasks again that were lost with their worker."""
-    crew.renew()
+    pool.renew()
     for task in tasks:
-        future = crew.submit((task,))
+        future = pool.submit((task,))
         while not future.done() and not stopped():
             wait([future], timeout=WAIT)
         if stopped():
             return
         try:
-            yield from _results(future, crew)
-        except crew.losses:
-            crew.renew()
+            yield from _results(future, pool)
+        except pool.losses:
+            pool.renew()
             yield failed(task.unit, _LOST)
 
 
@@ -352,7 +352,7 @@ def _file_name(place: str) -> str:
 _setups: Sequence[JobSetup] = ()
 
 
-class LocalCrew:
+class LocalPool:
     """Worker processes of this machine.
 
     They are forked from a clean server process that has loaded the package already:

@@ -93,13 +93,13 @@ def batch(
 def _workers(jobs: int, scheduler: str | None, tls: Path | None) -> Gather:
     """Choose who does the work."""
     if scheduler is None:
-        from postproc.batch.workers import LocalCrew
+        from postproc.batch.workers import LocalPool
 
         count = jobs or os.cpu_count() or 1
-        return lambda plan: LocalCrew(plan.setups, count)
-    from postproc.batch.cluster import ClusterCrew
+        return lambda plan: LocalPool(plan.setups, count)
+    from postproc.batch.cluster import ClusterPool
 
-    return lambda plan: ClusterCrew(plan.setups, scheduler, tls)
+    return lambda plan: ClusterPool(plan.setups, scheduler, tls)
 
 
 def _print_summary(summary: Summary) -> None:

@@ -11,12 +11,12 @@ import pytest
 
 from postproc.batch.plan import make_plan
 from postproc.batch.run import Order, batch, check_room, default_log, locked
-from postproc.batch.workers import LocalCrew
+from postproc.batch.workers import LocalPool
 from postproc.compensation.options import AS_USUAL
 from postproc.compensation.record import restore_file
 from postproc.exceptions import CellError, DiskFullError, OutputError, PostprocError
 from postproc.language.stamp import read_stamp
-from tests.inline import InlineCrew
+from tests.inline import InlinePool
 from tests.plant import contents, grow, pages, program
 
 SUFFIX = ".postproc.json"
@@ -39,9 +39,9 @@ def run(tmp_path, plan):
         made = []
 
         def gather(plan):
-            crew = LocalCrew(plan.setups, jobs) if jobs else InlineCrew(plan.setups)
-            made.append(crew)
-            return crew
+            pool = LocalPool(plan.setups, jobs) if jobs else InlinePool(plan.setups)
+            made.append(pool)
+            return pool
 
         summary = batch(order, gather)
         summary.tasks = made[0].tasks if made and not jobs else []

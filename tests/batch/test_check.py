@@ -17,7 +17,7 @@ from postproc.compensation.outcome import Status
 from postproc.exceptions import ProgramError
 from postproc.files import TEMPORARY
 from postproc.model.model import load_model
-from tests.inline import InlineCrew
+from tests.inline import InlinePool
 from tests.plant import grow, program
 
 SUFFIX = ".postproc.json"
@@ -40,7 +40,7 @@ def trees(tmp_path, job_folder):
     )
     target = tmp_path / "dst"
     order = Order(source, target, plan, default_log(target), False)
-    assert batch(order, lambda plan: InlineCrew(plan.setups)).exit_code == 0
+    assert batch(order, lambda plan: InlinePool(plan.setups)).exit_code == 0
     (target / "spot.cod").unlink()
     return source, target, plan.setups[0].model.id
 

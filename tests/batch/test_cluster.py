@@ -7,13 +7,13 @@ import signal
 
 import pytest
 
-from postproc.batch.cluster import ClusterCrew
+from postproc.batch.cluster import ClusterPool
 from postproc.batch.plan import make_plan
 from postproc.batch.run import Order, batch, default_log
 from postproc.compensation.options import AS_USUAL
 from postproc.exceptions import PostprocError
 from tests.batch.dask_cluster import Cluster
-from tests.inline import InlineCrew
+from tests.inline import InlinePool
 from tests.plant import contents, grow, pages
 
 pytest.importorskip("distributed")
@@ -42,7 +42,7 @@ def test_same_bytes_as_here_although_a_worker_is_killed(
         target = tmp_path / name
         return Order(source, target, plan, default_log(target), False)
 
-    class Wounded(ClusterCrew):
+    class Wounded(ClusterPool):
         """Kills a worker that is at work, once."""
 
         killed = 0
@@ -57,15 +57,15 @@ def test_same_bytes_as_here_although_a_worker_is_killed(
                 os.kill(self.killed, signal.SIGKILL)
             return future
 
-    crews = []
+    pools = []
 
     def gather(plan):
-        crews.append(Wounded(plan.setups, cluster.address))
-        return crews[0]
+        pools.append(Wounded(plan.setups, cluster.address))
+        return pools[0]
 
-    local = batch(order("local"), lambda plan: InlineCrew(plan.setups))
+    local = batch(order("local"), lambda plan: InlinePool(plan.setups))
     there = batch(order("cluster"), gather)
-    killed = [worker for worker in cluster.workers if worker.pid == crews[0].killed]
+    killed = [worker for worker in cluster.workers if worker.pid == pools[0].killed]
     assert [worker.wait(10) for worker in killed] == [-signal.SIGKILL]
     assert contents(tmp_path / "cluster") == contents(tmp_path / "local")
     assert there.exit_code == local.exit_code == 2
@@ -79,9 +79,9 @@ def test_same_bytes_as_here_although_a_worker_is_killed(
 def test_nobody_answers(address, why, monkeypatch):
     monkeypatch.setattr("postproc.batch.cluster.CONNECT", 0.2)
     with pytest.raises(PostprocError, match=why):
-        ClusterCrew((), address)
+        ClusterPool((), address)
 
 
 def test_certificates_that_are_not_there(tmp_path):
     with pytest.raises(PostprocError, match="No such file"):
-        ClusterCrew((), "tls://127.0.0.1:9", tmp_path)
+        ClusterPool((), "tls://127.0.0.1:9", tmp_path)

@@ -14,7 +14,7 @@ import pytest
 
 from postproc.batch.plan import make_plan
 from postproc.batch.run import default_log, locked
-from postproc.batch.workers import LocalCrew
+from postproc.batch.workers import LocalPool
 from postproc.compensation.options import AS_USUAL
 from postproc.exceptions import OutputError
 from postproc.files import TEMPORARY
@@ -66,12 +66,12 @@ def test_closed_workers_leave_no_thread_behind(plant):
     # The interpreter would close its pipe a second time on its way out.
     plan = make_plan(None, plant.cell, plant.model, AS_USUAL)
     before = set(threading.enumerate())
-    crew = LocalCrew(plan.setups, 2)
+    pool = LocalPool(plan.setups, 2)
     for _ in range(5):
-        working = [crew.submit([]) for _ in range(4)]
-        crew.renew()
-        working += [crew.submit([])]
-    crew.close()
+        working = [pool.submit([]) for _ in range(4)]
+        pool.renew()
+        working += [pool.submit([])]
+    pool.close()
     assert set(threading.enumerate()) <= before
     assert all(w.done() for w in working)
 
