@@ -202,62 +202,113 @@ def sample(targets: Targets, flange: Floats) -> Samples:
         targets: The moves.
         flange: Flange poses at the targets, (n, 4, 4) [m], NaN where not known yet.
     """
-    visit = np.repeat(np.arange(len(targets)), np.diff(targets.pred_start))
-    source = np.array(targets.pred)
-    at = np.maximum(source, 0)  # no visit: looked up, and never used
-    cartesian = targets.move[visit] != Motion.JOINT
-    known = ~np.isnan(flange[:, 0, 0])
-    tool_known = ~np.isnan(targets.tool[:, 0, 0])
-    ready = cartesian & (source >= 0) & known[visit] & tool_known[visit]
-    ready &= known[at] & ~targets.wrist_joint[visit]
-    straight = np.flatnonzero(ready & (targets.move[visit] == Motion.LINEAR))
-    begins = _begins(targets, visit, source)
-    segments = _lines(targets, flange, source[straight], visit[straight])
-    edge = straight
-    if (begins >= 0).any():
-        round_, arc = _arcs(targets, flange, visit, source, ready, begins)
-        segments, edge = joined([segments, arc]), np.append(straight, round_)
-    broken = np.zeros(len(visit), dtype=bool)
-    broken[edge] = ~segments.valid
-    ready = np.zeros(len(visit), dtype=bool)
-    ready[edge] = segments.valid
-    passing = targets.fly | targets.via
-    free = passing[visit] | ((source >= 0) & passing[at])
-    count = np.where(cartesian & (source >= 0) & ~ready & ~broken, BLIND, 1)
-    count[edge] = segments.intervals(np.where(free[edge], 1, LEAST))
-    count[broken] = 1
-    start = np.concatenate([[0], np.cumsum(count)])
-    return _inner(
-        targets, segments, edge, visit, source, cartesian, broken, begins, start
-    )
+    ends = _Ends.of(targets, flange)
+    edge, segments = ends.segments(flange)
+    return ends.samples(edge, segments)
 
 
-def _inner(
-    targets: Targets,
-    segments: Segments,
-    edge: Ints,
-    visit: Ints,
-    source: Ints,
-    cartesian: Bools,
-    broken: Bools,
-    begins: Ints,
-    start: Ints,
-) -> Samples:
-    """Place the inner samples of the segments that belong to edges."""
-    ready = np.zeros(len(visit), dtype=bool)
-    ready[edge] = segments.valid
-    intervals = np.diff(start)[edge]
-    path = np.repeat(np.arange(len(edge)), np.where(segments.valid, intervals - 1, 0))
-    first = np.concatenate([[0], np.cumsum(np.bincount(path, minlength=len(edge)))])
-    nth = np.arange(len(path)) - first[path]
-    tcp = segments.poses(path, (nth + 1) / intervals[path])
-    tool = targets.tool.take(visit[edge[path]], axis=0)
-    length, turning = np.zeros(len(visit)), np.zeros(len(visit))
-    length[edge], turning[edge] = segments.length, segments.turning
-    return Samples(
-        visit, source, cartesian, ready, broken, begins, start, length, turning,
-        inner=start[edge[path]] + nth, flange=tcp @ inverse(tool),
-    )  # fmt: skip
+@dataclass(frozen=True)
+class _Ends:
+    """Both ends of e edges: which of them a Cartesian path joins.
+
+    Attributes:
+        targets: The moves.
+        visit, source, cartesian, begins: As in `Samples`.
+        known: The flange is known at both ends of a Cartesian path, (e,).
+    """
+
+    targets: Targets
+    visit: Ints
+    source: Ints
+    cartesian: Bools
+    begins: Ints
+    known: Bools
+
+    @classmethod
+    def of(cls, targets: Targets, flange: Floats) -> _Ends:
+        """Look at both ends of every edge."""
+        visit = np.repeat(np.arange(len(targets)), np.diff(targets.pred_start))
+        source = np.array(targets.pred)
+        at = np.maximum(source, 0)  # no visit: looked up, and never used
+        cartesian = targets.move[visit] != Motion.JOINT
+        known = ~np.isnan(flange[:, 0, 0])
+        tool_known = ~np.isnan(targets.tool[:, 0, 0])
+        ready = cartesian & (source >= 0) & known[visit] & tool_known[visit]
+        ready &= known[at] & ~targets.wrist_joint[visit]
+        begins = _begins(targets, visit, source)
+        return cls(targets, visit, source, cartesian, begins, ready)
+
+    def segments(self, flange: Floats) -> tuple[Ints, Segments]:
+        """Build the paths of edges (m,) whose ends are known; return both."""
+        lines = self.known & (self.targets.move[self.visit] == Motion.LINEAR)
+        edge = np.flatnonzero(lines)
+        found = _lines(self.targets, flange, self.source[edge], self.visit[edge])
+        if (self.begins >= 0).any():
+            on_arc, arc = self._arcs(flange)
+            found, edge = joined([found, arc]), np.append(edge, on_arc)
+        return edge, found
+
+    def samples(self, edge: Ints, segments: Segments) -> Samples:
+        """Place the inner samples of the segments that belong to edges."""
+        broken, ready, length, turning = self._flags(edge, segments)
+        start = self._starts(edge, segments, ready, broken)
+        intervals = np.diff(start)[edge]
+        inner = np.where(segments.valid, intervals - 1, 0)
+        path = np.repeat(np.arange(len(edge)), inner)
+        first = np.concatenate([[0], np.cumsum(np.bincount(path, minlength=len(edge)))])
+        nth = np.arange(len(path)) - first[path]
+        tcp = segments.poses(path, (nth + 1) / intervals[path])
+        tool = self.targets.tool.take(self.visit[edge[path]], axis=0)
+        return Samples(
+            self.visit, self.source, self.cartesian, ready, broken, self.begins, start,
+            length, turning, inner=start[edge[path]] + nth, flange=tcp @ inverse(tool),
+        )  # fmt: skip
+
+    def _flags(
+        self, edge: Ints, segments: Segments
+    ) -> tuple[Bools, Bools, Floats, Floats]:
+        """Spread what segments say over all edges: see `Samples`."""
+        e = len(self.visit)
+        broken, ready = np.zeros(e, dtype=bool), np.zeros(e, dtype=bool)
+        length, turning = np.zeros(e), np.zeros(e)
+        broken[edge], ready[edge] = ~segments.valid, segments.valid
+        length[edge], turning[edge] = segments.length, segments.turning
+        return broken, ready, length, turning
+
+    def _starts(
+        self, edge: Ints, segments: Segments, ready: Bools, broken: Bools
+    ) -> Ints:
+        """Count the samples of edges: where those of each begin, (e + 1,)."""
+        passing = self.targets.fly | self.targets.via
+        behind = (self.source >= 0) & passing[np.maximum(self.source, 0)]
+        free = passing[self.visit] | behind
+        blind = self.cartesian & (self.source >= 0) & ~ready & ~broken
+        count = np.where(blind, BLIND, 1)
+        count[edge] = segments.intervals(np.where(free[edge], 1, LEAST))
+        count[broken] = 1
+        return np.concatenate([[0], np.cumsum(count)])
+
+    def _arcs(self, flange: Floats) -> tuple[Ints, Segments]:
+        """Build both parts of every arc: edges (m,) and their segments."""
+        visit, n = self.visit, len(self.targets)
+        to_via = self.known & (self.begins == np.arange(len(visit)))
+        to_via &= ~np.isnan(flange[np.minimum(visit + 1, n - 1), 0, 0])
+        first = np.flatnonzero(to_via)
+        tool = self.targets.tool[visit[first]]
+        to, after = arcs(
+            flange[self.source[first]] @ tool,
+            flange[visit[first]] @ tool,
+            flange[visit[first] + 1] @ tool,
+        )
+        row = np.full(len(visit) + 1, -1)  # the last one is that of no edge
+        row[first] = np.arange(len(first))
+        from_via = self.known & ~self.targets.via[visit] & (row[self.begins] >= 0)
+        second = np.flatnonzero(from_via)
+        used = row[self.begins[second]]
+        picked = Segments(
+            *(getattr(after, name)[used] for name in Segments.__dataclass_fields__)
+        )
+        return np.append(first, second), joined([to, picked])
 
 
 def _lines(targets: Targets, flange: Floats, begin: Ints, end: Ints) -> Segments:
@@ -292,35 +343,6 @@ def _begins(targets: Targets, visit: Ints, source: Ints) -> Ints:
     nth = np.arange(len(second)) - np.searchsorted(via, via)
     begins[second[same]] = (targets.pred_start[via] + nth)[same]
     return begins
-
-
-def _arcs(
-    targets: Targets,
-    flange: Floats,
-    visit: Ints,
-    source: Ints,
-    ready: Bools,
-    begins: Ints,
-) -> tuple[Ints, Segments]:
-    """Build both parts of every arc: edges (m,) and their segments."""
-    n = len(targets)
-    to_via = ready & (begins == np.arange(len(visit)))
-    to_via &= ~np.isnan(flange[np.minimum(visit + 1, n - 1), 0, 0])
-    first = np.flatnonzero(to_via)
-    tool = targets.tool[visit[first]]
-    to, after = arcs(
-        flange[source[first]] @ tool,
-        flange[visit[first]] @ tool,
-        flange[visit[first] + 1] @ tool,
-    )
-    row = np.full(len(visit) + 1, -1)  # the last one is that of no edge
-    row[first] = np.arange(len(first))
-    second = np.flatnonzero(ready & ~targets.via[visit] & (row[begins] >= 0))
-    used = row[begins[second]]
-    picked = Segments(
-        *(getattr(after, name)[used] for name in Segments.__dataclass_fields__)
-    )
-    return np.append(first, second), joined([to, picked])
 
 
 # Arcs as a whole: their three points, and how far a correction bends them between.
