@@ -14,7 +14,7 @@
 # make undeclared  undeclared effects traced on virtual arms, 1,400 of them: docs/undeclared.md
 # make blind       effects traced in the blind campaigns and on a real arm: docs/blind.md
 # make native      lint and tests of the native kernels, for who changes them (needs Rust)
-# make docs     run every command of the documentation, check links, write build/docs
+# make docs     run every command of the documentation, write it as a site to build/docs
 # Each target first creates the environment .venv when it is missing or out of date.
 
 VENV ?= .venv

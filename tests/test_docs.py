@@ -1,40 +1,90 @@
-"""The documentation: links lead somewhere, a page's commands print what it says."""
+"""The documentation: a page's commands print what it says, and the site is whole."""
 
 from __future__ import annotations
 
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
 
-DOCS = Path(__file__).parents[1] / "docs"
-sys.path.insert(0, str(DOCS / "tools"))
+ROOT = Path(__file__).parents[1]
+sys.path.insert(0, str(ROOT / "docs" / "tools"))
 
-from links import anchor, broken_links  # noqa: E402
 from sessions import BLOCK, normal, run_page, steps_of  # noqa: E402
 
-PAGES = sorted(DOCS.glob("*.md"))
-SHORT = "howto-messages.md"  # a page that is run in seconds; make docs runs all
+from tests.report.html.browser import complaints, open_browser, requests  # noqa: E402
 
-
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
-def test_links_lead_somewhere(page):
-    assert list(broken_links(page)) == []
-
-
-def test_every_page_is_in_the_list():
-    listed = (DOCS / "README.md").read_text(encoding="utf-8")
-    for page in PAGES:
-        assert page.stem == "README" or f"({page.name})" in listed, page
+SHORT = ROOT / "docs/howto-messages.md"  # run in seconds; make docs runs all
+PHONE = {"width": 390, "height": 800, "deviceScaleFactor": 1, "mobile": True}
 
 
 def test_a_page_prints_what_it_says():
     done = subprocess.run(
-        [sys.executable, DOCS / "tools" / "build.py", "--no-html", SHORT],
+        [sys.executable, ROOT / "docs/tools/build.py", "--no-site", SHORT],
         capture_output=True, text=True, check=False,
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
+
+
+def build(config, out):
+    command = [sys.executable, "-m", "mkdocs", "build", "--strict", "-f", config]
+    return subprocess.run([*command, "-d", out], capture_output=True, text=True)
+
+
+@pytest.fixture(scope="module")
+def site(tmp_path_factory):
+    """Build the site; a link that leads nowhere fails here."""
+    pytest.importorskip("material", reason="no MkDocs: pip install -e '.[docs]'")
+    out = tmp_path_factory.mktemp("site")
+    done = build(ROOT / "mkdocs.yml", out)
+    assert done.returncode == 0, done.stderr
+    return out
+
+
+def test_the_site_is_whole(site):
+    for name in ("index", "tutorial", "changelog", "files/programs/Makefile.example"):
+        assert (site / f"{name}.html").stat().st_size > 5000, name
+
+
+def test_a_link_or_a_heading_that_is_not_there_fails(tmp_path):
+    pytest.importorskip("material", reason="no MkDocs: pip install -e '.[docs]'")
+    folder = tmp_path / "docs"
+    folder.mkdir()
+    wrong = "# Home\n\n[a](none.md), [b](#none), [c](../none.txt)\n"
+    (folder / "index.md").write_text(wrong)
+    text = (ROOT / "mkdocs.yml").read_text(encoding="utf-8").split("\nnav:\n")[0]
+    (tmp_path / "mkdocs.yml").write_text(text.replace("hooks:", "#"))
+    done = build(tmp_path / "mkdocs.yml", tmp_path / "site")
+    assert done.returncode != 0
+    for target in ("none.md", "#none", "../none.txt"):
+        assert target in done.stderr
+
+
+def test_pages_can_be_searched_from_disk_without_any_request(site, tmp_path):
+    with open_browser(tmp_path) as browser:
+        browser.get((site / "index.html").as_uri())
+        box = browser.find_element("css selector", "input.md-search__input")
+        box.click()
+        box.send_keys("backlash")
+        found = wait_for(browser, "a.md-search-result__link")
+        assert any("effects.html" in link.get_attribute("href") for link in found)
+        browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", PHONE)
+        for name in ("accuracy", "benchmarks", "pdl2", "tutorial"):
+            browser.get((site / f"{name}.html").as_uri())
+            wide = "return document.documentElement.scrollWidth - innerWidth"
+            assert browser.execute_script(wide) <= 0, f"{name} is wider than a phone"
+        assert requests(browser) == [] and complaints(browser) == []
+
+
+def wait_for(browser, selector, seconds=10.0):
+    end = time.monotonic() + seconds
+    while time.monotonic() < end:
+        if found := browser.find_elements("css selector", selector):
+            return found
+        time.sleep(0.1)
+    raise AssertionError(f"no {selector} on the page")
 
 
 def page(*lines: str) -> str:
@@ -68,7 +118,3 @@ def test_a_block_begins_with_a_command():
     with pytest.raises(ValueError, match="begins with output"):
         steps_of("output\n$ a\n")
     assert BLOCK.findall("```text\n$ a\n```\n") == []
-
-
-def test_anchors_are_those_of_code_hosts():
-    assert anchor("What `diff` shows: a, b") == "what-diff-shows-a-b"

@@ -1,17 +1,20 @@
-"""Build the documentation: run its commands, check its links, write HTML.
+"""Build the documentation: run the commands of its pages, write it as a site.
 
-    python docs/tools/build.py [PAGE.md ..]     run, check, write build/docs
+    python docs/tools/build.py [PAGE.md ..]     run, compare, write build/docs
     python docs/tools/build.py --update         put what is printed now into the pages
 
 A page says in its first line what it works in: ``<!-- works in: programs -->`` a copy
-of the sample programs, ``<!-- works in: tutorial.md -->`` what that page leaves.
+of the sample programs, ``<!-- works in: docs/tutorial.md -->`` what that page leaves.
+Links that lead nowhere are found while the site is written, and fail.
 """
 
 from __future__ import annotations
 
 import argparse
+import os
 import re
 import shutil
+import subprocess
 import sys
 import tempfile
 from collections.abc import Sequence
@@ -19,37 +22,29 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parent))
 
-from links import broken_links
 from sessions import run_page
 
-DOCS = Path(__file__).parents[1]
-PROGRAMS = DOCS.parent / "programs"
+ROOT = Path(__file__).parents[2]
+PAGES = sorted([*ROOT.glob("*.md"), *ROOT.glob("docs/**/*.md")])
 BASE = re.compile(r"\A<!-- works in: (\S+) -->")
 
 
 def main(arguments: Sequence[str]) -> int:
     """Build; return 0 when every output is as the pages say and every link leads."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
-    parser.add_argument("pages", nargs="*", help="default: all")
+    parser.add_argument("pages", nargs="*", type=Path, help="default: all")
     parser.add_argument("--update", action="store_true", help="rewrite the outputs")
-    parser.add_argument("--no-html", action="store_true", help="only run and check")
+    parser.add_argument("--no-site", action="store_true", help="only run and compare")
     options = parser.parse_args(arguments)
-    pages = sorted(DOCS.glob("*.md"))
-    chosen = [DOCS / name for name in options.pages] or pages
-    problems = [text for page in pages for text in broken_links(page)]
+    chosen = [page.resolve() for page in options.pages] or PAGES
     with tempfile.TemporaryDirectory() as place:
         wrong = run_all(chosen, Path(place), options.update)
-    if not options.update:
-        problems += wrong
+    problems = [] if options.update else wrong
     for problem in problems:
         print(problem, file=sys.stderr)
-    if not options.no_html:
-        from render import write_html
-
-        out = write_html(pages, DOCS.parent / "build" / "docs")
-        print(f"{len(pages)} pages in {out}")
     print(f"{len(chosen)} pages run, {len(problems)} problems")
-    return 1 if problems else 0
+    broken = 0 if options.no_site else write_site()
+    return 1 if problems or broken else 0
 
 
 def run_all(pages: Sequence[Path], place: Path, update: bool) -> list[str]:
@@ -59,19 +54,18 @@ def run_all(pages: Sequence[Path], place: Path, update: bool) -> list[str]:
         What differs, in words.
     """
     wrong: list[str] = []
-    done: set[Path] = set()
+    folders: dict[Path, Path] = {}
 
     def run(page: Path) -> None:
         text = page.read_text(encoding="utf-8")
         base = BASE.match(text)
-        if page in done or base is None:
+        if page in folders or base is None:
             return
-        done.add(page)
-        start = PROGRAMS
-        if base.group(1) != PROGRAMS.name:
-            run(DOCS / base.group(1))
-            start = place / Path(base.group(1)).stem
-        folder = place / page.stem
+        start = ROOT / base.group(1)
+        if start.suffix == ".md":
+            run(start)
+            start = folders[start]
+        folders[page] = folder = place / f"{len(folders)}-{page.stem}"
         shutil.copytree(start, folder)
         print(f"running {page.name}", flush=True)
         new, found = run_page(text, folder)
@@ -83,6 +77,13 @@ def run_all(pages: Sequence[Path], place: Path, update: bool) -> list[str]:
     for page in pages:
         run(page)
     return wrong
+
+
+def write_site() -> int:
+    """Write build/docs; return 0 when no link and no heading is missing."""
+    quiet = {"NO_MKDOCS_2_WARNING": "1"}  # a banner of the theme
+    command = [sys.executable, "-m", "mkdocs", "build", "--strict"]
+    return subprocess.run(command, cwd=ROOT, env=os.environ | quiet).returncode
 
 
 if __name__ == "__main__":
