@@ -15,6 +15,7 @@
 # make blind       effects traced in the blind campaigns and on a real arm: docs/blind.md
 # make native      lint and tests of the native kernels, for who changes them (needs Rust)
 # make docs     run every command of the documentation, write it as a site to build/docs
+# make pictures remake the pictures of the documentation (needs chromium, chromium-driver)
 # Each target first creates the environment .venv when it is missing or out of date.
 
 VENV ?= .venv
@@ -26,7 +27,7 @@ export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
 
 .PHONY: help demo test lint format bench evidence reproduce accuracy undeclared blind chaos fuzz docs clean
-.PHONY: plant-bench generated growth native golden
+.PHONY: plant-bench generated growth native golden pictures
 .DELETE_ON_ERROR:
 
 help:
@@ -91,6 +92,10 @@ docs: $(STAMP)
 
 golden: $(STAMP)
 	@$(PYTHON_BIN) -m tests.golden against $(or $(BASE),HEAD) $(if $(ONLY),--only '$(ONLY)')
+
+pictures: $(STAMP)
+	@PYTHONPATH=. $(PYTHON_BIN) docs/tools/pictures.py
+	@PYTHONPATH=. $(PYTHON_BIN) docs/tools/screenshot.py
 
 plant-bench: $(STAMP)
 	@$(PYTHON_BIN) -m tests.plant_bench --files $(or $(FILES),10000)

@@ -1,4 +1,4 @@
-"""Claims of the README, measured at full size: python -m tests.evidence."""
+"""Claims of docs/figures.md, measured at full size: python -m tests.evidence."""
 
 from __future__ import annotations
 

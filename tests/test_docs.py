@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import subprocess
 import sys
 import time
@@ -14,6 +15,7 @@ sys.path.insert(0, str(ROOT / "docs" / "tools"))
 
 from sessions import BLOCK, normal, run_page, steps_of  # noqa: E402
 
+from build import PAGES  # noqa: E402
 from tests.report.html.browser import complaints, open_browser, requests  # noqa: E402
 
 SHORT = ROOT / "docs/howto-messages.md"  # run in seconds; make docs runs all
@@ -26,6 +28,30 @@ def test_a_page_prints_what_it_says():
         capture_output=True, text=True, check=False,
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
+
+
+def options():
+    """Read from docs/commands.md which options every command has."""
+    text = (ROOT / "docs/commands.md").read_text(encoding="utf-8")
+    sections = re.split(r"(?m)^### (\w+)$", text)[1:]
+    return {
+        name: set(re.findall(r"(?<!\S)--?[a-z][\w-]*", section))
+        for name, section in zip(sections[::2], sections[1::2], strict=True)
+    }
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
+def test_commands_that_are_only_named_exist(page):
+    known, text = options(), page.read_text(encoding="utf-8")
+    text = text.replace("\\\n", " ")
+    named = r"(?m)(?:`|\$ |\| |^ {4})postproc ([a-z]+)([^`|\n]*)"
+    for name, rest in re.findall(named, text):
+        assert name in known, f"{page}: there is no postproc {name}"
+        given = set(re.findall(r"(?<!\S)--[a-z][\w-]*", rest))
+        assert given <= known[name], f"{page}: postproc {name} has no {given}"
+    targets = re.findall(r"(?m)^([\w-]+):", (ROOT / "Makefile").read_text())
+    for name in re.findall(r"`(?:\w+=\S+ )?make (\w[\w-]*)", text):
+        assert name in targets, f"{page}: there is no make {name}"
 
 
 def build(config, out):
@@ -44,7 +70,7 @@ def site(tmp_path_factory):
 
 
 def test_the_site_is_whole(site):
-    for name in ("index", "tutorial", "changelog", "files/programs/Makefile.example"):
+    for name in ("index", "tutorial", "changelog", "files/programs/drilling.pdl"):
         assert (site / f"{name}.html").stat().st_size > 5000, name
 
 

@@ -80,6 +80,11 @@ def _listing(path: Path) -> str:
     """Write a page that shows a file."""
     language = LANGUAGES.get(path.suffix, "text")
     title = path.relative_to(ROOT).as_posix()
-    text = path.read_text(encoding="utf-8")
+    data = path.read_bytes()
+    try:
+        text = data.decode("utf-8")
+    except UnicodeDecodeError:  # programs of controllers
+        text = data.decode("latin-1")
+    text = "\n".join(text.splitlines()) + "\n"
     head = f"---\nsearch:\n  exclude: true\n---\n\n# {title}\n\n"
     return f"{head}```` {language}\n{text}````\n"
