@@ -36,8 +36,8 @@ class Step:
 def steps_of(block: str) -> list[Step]:
     r"""Take a block apart.
 
-    >>> steps_of("$ a\n> b\nx\ny\n$ c\n")
-    [Step(command='a\nb', output='x\ny\n'), Step(command='c', output='')]
+    >>> steps_of("$ a\n>\n> b\nx\ny\n$ c\n")
+    [Step(command='a\n\nb', output='x\ny\n'), Step(command='c', output='')]
     """
     steps: list[Step] = []
     lines = block.splitlines()
@@ -46,8 +46,8 @@ def steps_of(block: str) -> list[Step]:
         if not line.startswith(PROMPT):
             raise ValueError(f"a block begins with output: {line!r}")
         command = [line.removeprefix(PROMPT)]
-        while lines and lines[0].startswith(MORE):
-            command.append(lines.pop(0).removeprefix(MORE))
+        while lines and f"{lines[0]} ".startswith(MORE):
+            command.append(lines.pop(0)[len(MORE) :])
         output = []
         while lines and not lines[0].startswith(PROMPT):
             output.append(lines.pop(0) + "\n")
@@ -74,7 +74,7 @@ def run_page(text: str, folder: Path) -> tuple[str, list[str]]:
             if normal(printed) != normal(step.output):
                 wrong.append(told_apart(step, printed))
                 step = Step(step.command, printed)
-            command = step.command.replace("\n", f"\n{MORE}")
+            command = step.command.replace("\n", f"\n{MORE}").replace("> \n", ">\n")
             parts.append(f"{PROMPT}{command}\n{step.output}")
         return "```console\n" + "".join(parts) + "```"
 
