@@ -95,6 +95,7 @@ golden: $(STAMP)
 
 pictures: $(STAMP)
 	@PYTHONPATH=. $(PYTHON_BIN) docs/tools/pictures.py
+	@$(PYTHON_BIN) docs/tools/architecture.py
 	@PYTHONPATH=. $(PYTHON_BIN) docs/tools/screenshot.py
 
 plant-bench: $(STAMP)

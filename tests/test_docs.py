@@ -13,9 +13,9 @@ import pytest
 ROOT = Path(__file__).parents[1]
 sys.path.insert(0, str(ROOT / "docs" / "tools"))
 
-from sessions import BLOCK, normal, run_page, steps_of  # noqa: E402
+import architecture  # noqa: E402
+from sessions import BLOCK, PAGES, normal, run_page, steps_of  # noqa: E402
 
-from build import PAGES  # noqa: E402
 from tests.report.html.browser import complaints, open_browser, requests  # noqa: E402
 
 SHORT = ROOT / "docs/howto-messages.md"  # run in seconds; make docs runs all
@@ -54,24 +54,45 @@ def test_commands_that_are_only_named_exist(page):
         assert name in targets, f"{page}: there is no make {name}"
 
 
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
+def test_files_that_are_only_named_exist(page):
+    if page.stem == "CHANGELOG":
+        return  # names what is no more, too
+    text = page.read_text(encoding="utf-8")
+    folders = "docs|grammars|native|postproc|programs|tests"
+    for name in re.findall(rf"`((?:{folders})/[\w./-]*)`", text):
+        assert (ROOT / name).exists(), f"{page}: there is no {name}"
+
+
+def test_the_drawing_of_the_chapters_is_that_of_the_code():
+    assert list(architecture.problems()) == []
+
+
 def build(config, out):
     command = [sys.executable, "-m", "mkdocs", "build", "--strict", "-f", config]
     return subprocess.run([*command, "-d", out], capture_output=True, text=True)
 
 
-@pytest.fixture(scope="module")
-def site(tmp_path_factory):
-    """Build the site; a link that leads nowhere fails here."""
+def test_the_site_is_whole_and_can_be_searched_from_disk(tmp_path):
     pytest.importorskip("material", reason="no MkDocs: pip install -e '.[docs]'")
-    out = tmp_path_factory.mktemp("site")
-    done = build(ROOT / "mkdocs.yml", out)
+    site = tmp_path / "site"
+    done = build(ROOT / "mkdocs.yml", site)
     assert done.returncode == 0, done.stderr
-    return out
-
-
-def test_the_site_is_whole(site):
     for name in ("index", "tutorial", "changelog", "files/programs/drilling.pdl"):
         assert (site / f"{name}.html").stat().st_size > 5000, name
+    with open_browser(tmp_path / "profile") as browser:
+        browser.get((site / "index.html").as_uri())
+        box = browser.find_element("css selector", "input.md-search__input")
+        box.click()
+        box.send_keys("backlash")
+        found = wait_for(browser, "a.md-search-result__link")
+        assert any("effects.html" in link.get_attribute("href") for link in found)
+        browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", PHONE)
+        for name in ("accuracy", "benchmarks", "pdl2", "tutorial"):
+            browser.get((site / f"{name}.html").as_uri())
+            wide = "return document.documentElement.scrollWidth - innerWidth"
+            assert browser.execute_script(wide) <= 0, f"{name} is wider than a phone"
+        assert requests(browser) == [] and complaints(browser) == []
 
 
 def test_a_link_or_a_heading_that_is_not_there_fails(tmp_path):
@@ -86,22 +107,6 @@ def test_a_link_or_a_heading_that_is_not_there_fails(tmp_path):
     assert done.returncode != 0
     for target in ("none.md", "#none", "../none.txt"):
         assert target in done.stderr
-
-
-def test_pages_can_be_searched_from_disk_without_any_request(site, tmp_path):
-    with open_browser(tmp_path) as browser:
-        browser.get((site / "index.html").as_uri())
-        box = browser.find_element("css selector", "input.md-search__input")
-        box.click()
-        box.send_keys("backlash")
-        found = wait_for(browser, "a.md-search-result__link")
-        assert any("effects.html" in link.get_attribute("href") for link in found)
-        browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", PHONE)
-        for name in ("accuracy", "benchmarks", "pdl2", "tutorial"):
-            browser.get((site / f"{name}.html").as_uri())
-            wide = "return document.documentElement.scrollWidth - innerWidth"
-            assert browser.execute_script(wide) <= 0, f"{name} is wider than a phone"
-        assert requests(browser) == [] and complaints(browser) == []
 
 
 def wait_for(browser, selector, seconds=10.0):

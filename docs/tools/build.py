@@ -4,7 +4,8 @@
     python docs/tools/build.py --update         put what is printed now into the pages
 
 A page says in its first line what it works in: ``<!-- works in: programs -->`` a copy
-of the sample programs, ``<!-- works in: docs/tutorial.md -->`` what that page leaves.
+of the sample programs, ``<!-- works in: . -->`` of the sources, and
+``<!-- works in: docs/tutorial.md -->`` what that page leaves.
 Links that lead nowhere are found while the site is written, and fail.
 """
 
@@ -22,10 +23,12 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parent))
 
-from sessions import run_page
+import architecture
+from sessions import PAGES, ROOT, run_page
 
-ROOT = Path(__file__).parents[2]
-PAGES = sorted([*ROOT.glob("*.md"), *ROOT.glob("docs/**/*.md")])
+NOT_COPIED = shutil.ignore_patterns(
+    ".git", ".venv", ".*_cache", "__pycache__", ".hypothesis", "build", "target", "demo"
+)
 BASE = re.compile(r"\A<!-- works in: (\S+) -->")
 
 
@@ -39,7 +42,7 @@ def main(arguments: Sequence[str]) -> int:
     chosen = [page.resolve() for page in options.pages] or PAGES
     with tempfile.TemporaryDirectory() as place:
         wrong = run_all(chosen, Path(place), options.update)
-    problems = [] if options.update else wrong
+    problems = [*([] if options.update else wrong), *architecture.problems()]
     for problem in problems:
         print(problem, file=sys.stderr)
     print(f"{len(chosen)} pages run, {len(problems)} problems")
@@ -66,7 +69,7 @@ def run_all(pages: Sequence[Path], place: Path, update: bool) -> list[str]:
             run(start)
             start = folders[start]
         folders[page] = folder = place / f"{len(folders)}-{page.stem}"
-        shutil.copytree(start, folder)
+        shutil.copytree(start, folder, ignore=NOT_COPIED)
         print(f"running {page.name}", flush=True)
         new, found = run_page(text, folder)
         if update and found:

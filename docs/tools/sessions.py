@@ -17,6 +17,8 @@ from dataclasses import dataclass
 from difflib import unified_diff
 from pathlib import Path
 
+ROOT = Path(__file__).parents[2]
+PAGES = sorted([*ROOT.glob("*.md"), *ROOT.glob("docs/**/*.md")])
 BLOCK = re.compile(r"(?ms)^```console\n(.*?)^```$")
 PROMPT, MORE = "$ ", "> "
 # All that is taken to be equal: seconds, rates, ids of models, which hash the last bits
