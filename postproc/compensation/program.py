@@ -81,7 +81,7 @@ class Planned:
         reasons: Why visits must not be compensated.
         shift: From where the controller takes every target to be to where it is, as
             far as a frame was taught with the arm's error in it, (n, 3) [m].
-        doubtful: What comes from the last target is doubtful (see `strings`).
+        doubtful: What comes from the last target is doubtful (see `eligibility`).
     """
 
     targets: Targets
@@ -218,7 +218,7 @@ def plan_visits(
         cell: The arm and its surroundings.
         timed: As in `plan`.
         begin: Where the arm stands at the first visit, if that is known beforehand.
-        doubtful: What comes from there is doubtful (see `strings`).
+        doubtful: What comes from there is doubtful (see `eligibility`).
 
     Raises:
         PlanError: The arm has no inverse kinematics.

@@ -109,8 +109,8 @@ def differences(
 # Numbers as text, a million at a time: fixed-width rows of bytes instead of strings.
 #
 # Only plain decimal numbers are treated here, and only values that round without doubt;
-# the functions tell which. The others are for `lexis` and Python's own formatting, one
-# by one, which define what all of it means.
+# the functions tell which. The others are for `mask_line` and Python's own formatting,
+# one by one, which define what all of it means.
 
 WIDEST = 24  # bytes of a number that is read here
 MOST_DIGITS = 15  # of a number that is written here: exact as a float

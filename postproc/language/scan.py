@@ -12,7 +12,7 @@ from postproc.arrays import Bools, Bytes, Floats, Ints
 
 # What a number, a string and a comment are, one line at a time.
 #
-# This is the definition; `masking` computes the same for whole files with arrays. A
+# This is the definition; `mask_lines` computes the same for whole files with arrays. A
 # *mask* is the code of a line in which every number is one NUL (no program holds any),
 # the comment is gone and idle blanks are dropped: lines that differ in their numbers
 # only have the same mask, their *shape*.
@@ -434,12 +434,12 @@ def texts_of(a: Bytes, start: Ints, end: Ints) -> list[str]:
     return words.tobytes().decode("latin-1").split("\n")[:-1]
 
 
-# Mask the numbers of whole files with array passes; `lexis` is the definition.
+# Mask the numbers of whole files with array passes; `mask_line` is the definition.
 #
 # CAM programs hold a million lines of a handful of shapes. A few passes over the bytes
 # find strings, comments and plain decimal numbers; the lines in which anything is out
 # of the ordinary (escapes, exponents, hexadecimal, ranges, open strings) are left to
-# `lexis.mask_line`, one by one.
+# `mask_line`, one by one.
 
 _IS_IDLE = byte_table(BLANKS + ",({\n\r")
 

@@ -470,7 +470,7 @@ def _place(part: Segments, u: float) -> Floats:
 #
 # The corner superposes two moves, so that the place where the path passes a point moves
 # by the share 1 - v - w of what the point moves, and by the shares v and w of what the
-# points before and behind it move; see `corner`. Exact for straight moves of the TCP.
+# points before and behind it move; see `blending`. Exact for straight moves of the TCP.
 
 ROUNDS = 12  # of Jacobi's method; v + w is 1/4 at most, each gains a factor of two
 

@@ -191,8 +191,8 @@ def joined_rows(file: str, parts: Sequence[DiffRows]) -> DiffRows:
 # What is not a digit or a dot is compared as it is; then every run of digits of one
 # line has its partner in the other, and strings, comments and signs have to be looked
 # for in one of both only. Lines with other blanks or signs, or with anything that
-# `masking` leaves to `lexis`, are not told alike here, which does not say that they are
-# not.
+# `mask_lines` leaves to `mask_line`, are not told alike here, which does not say that
+# they are not.
 
 LONGEST = 24  # digits outside of numbers that are compared; longer: not told alike
 

@@ -578,7 +578,7 @@ def _towards(present: Floats, goal: Floats, distance: float) -> Floats:
 # While the first of two moves is braked, the second one starts: between Cartesian moves
 # with FLY_CART their motions are added up in space, else joint by joint. Both motions
 # grow with the square of the time, so that the corner of two straight moves is a
-# parabola. How long that lasts is in `zone`.
+# parabola. How long that lasts is in `shares`.
 
 MOMENTS = np.linspace(0.0, 1.0, 33)  # of a corner, from its begin to its end
 STRAIGHT = 1e-12  # [m^2] distances that differ less make no parabola

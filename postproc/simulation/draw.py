@@ -48,7 +48,7 @@ def virtual_arm(
 
     Args:
         seed: Same seed, same arm; adding an effect leaves the others as they were.
-        effects: Names of `catalogue.NAMES`, with joints and sizes if wanted.
+        effects: Names of `laws.NAMES`, with joints and sizes if wanted.
         chain: The nominal arm.
         coupling: Motor angles = coupling @ joint angles, (6, 6); default identity.
         rows: Length of the campaign in which base or tool shift at some row; nothing

@@ -1,4 +1,4 @@
-"""The array passes agree with the definition in `lexis`, line by line."""
+"""The array passes agree with the definition of `mask_line`, line by line."""
 
 import re
 

@@ -71,7 +71,7 @@ class DestinationPart(tuple[Any, ...]):
     """(how, operands, via, frame)."""
 
 
-# Turn the grammar's trees into the statements of `pdl2`, rule by rule.
+# Turn the grammar's trees into the statements of `syntax`, rule by rule.
 #
 # Every function here is named after a rule of ``grammars/pdl2.lark`` and takes the
 # rule's children: tokens (strings that know their type) and what other rules gave.
@@ -377,7 +377,7 @@ def keep(key: str, data: bytes) -> None:
             raise
 
 
-# What one line of a variable file says; rule by rule like `build`.
+# What one line of a variable file says; rule by rule like statements.
 
 _ACCESS = frozenset({"priv", "xport", "local"})
 
