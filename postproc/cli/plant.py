@@ -4,13 +4,10 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from postproc.batch.check import Current
-from postproc.batch.journal import Summary
-from postproc.batch.run import Gather
 from postproc.cli.common import (
     CloneOption,
     HtmlOption,
@@ -24,6 +21,11 @@ from postproc.cli.common import (
 )
 from postproc.compensation.options import AS_USUAL
 from postproc.files import check_places
+
+if TYPE_CHECKING:
+    from postproc.batch.check import Current
+    from postproc.batch.journal import Summary
+    from postproc.batch.run import Gather
 
 CellFile = Annotated[
     Path | None, typer.Option("--cell", help="Cell of programs that no rule fits.")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from itertools import zip_longest
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -25,9 +25,11 @@ from postproc.cli.common import (
     say,
     write_text,
 )
-from postproc.compensation.outcome import Outcome
 from postproc.exceptions import PostprocError
 from postproc.files import STREAM, check_places
+
+if TYPE_CHECKING:
+    from postproc.compensation.outcome import Outcome
 
 CROWD = 8  # processes, each with a window of its own in memory
 SHOWN = 20  # targets left alone whose source lines are shown

@@ -24,7 +24,14 @@ from postproc.compensation.notes import (
     unsure_sides,
     untimed_runs,
 )
-from postproc.compensation.options import AS_USUAL, Clock, Options, Progress, silent
+from postproc.compensation.options import (
+    AS_USUAL,
+    Clock,
+    Options,
+    Progress,
+    Setting,
+    silent,
+)
 from postproc.compensation.outcome import Decisions, Outcome, tell_arrivals
 from postproc.compensation.parallel import in_processes, map_with, rounded
 from postproc.compensation.program import (
@@ -162,14 +169,7 @@ class WindowState:
     corrected: EndState = AT_START
 
 
-def correct(
-    reading: Reading,
-    cell: Cell,
-    model: Model,
-    options: Options,
-    clock: Clock,
-    processes: int = 1,
-) -> tuple[Reading, Correction]:
+def correct(reading: Reading, setting: Setting) -> tuple[Reading, Correction]:
     """Plan a program, and correct it until its sides are those corrected for.
 
     Moves can only be given points of their own when all arrivals are at hand: with
@@ -181,24 +181,19 @@ def correct(
 
     Args:
         reading: The program.
-        cell: The robot's surroundings.
-        model: The arm's error.
-        options: What the user asked for.
-        clock: Times the stages.
-        processes: How many may work at once; the result is the same.
+        setting: What it is compensated with.
 
     Returns:
         The program, with clones where they were asked for, and what came of it.
     """
-    work = _WindowWork(reading, cell, model, options)
-    if not options.clone:
+    work, clock = _WindowWork(reading, setting), setting.clock
+    if not setting.options.clone:
         cut = windows(reading.visits, cuts.LEAST)
-        return reading, joined(
-            list(in_processes(work, cut, WindowState(), clock, processes))
-        )
+        parts = in_processes(work, cut, WindowState(), clock, setting.processes)
+        return reading, joined(list(parts))
     kept, proposal = work.whole(clock)
     with clock("clone"):
-        reading = give_own_points(reading, proposal, cell)
+        reading = give_own_points(reading, proposal, setting.cell)
     if reading.cloned:
         kept, _ = replace(work, reading=reading).whole(clock)
     return reading, kept
@@ -209,9 +204,7 @@ class _WindowWork:
     """What it takes to correct any window of a program."""
 
     reading: Reading
-    cell: Cell
-    model: Model
-    options: Options
+    setting: Setting
 
     def whole(self, clock: Clock) -> tuple[Correction, Proposal]:
         """Correct the program as one window; return all of its proposal."""
@@ -245,16 +238,14 @@ class _WindowWork:
         self, visits: Visits, seeds: int, begin: WindowState, clock: Clock
     ) -> tuple[Correction, Proposal, WindowState]:
         """Correct some visits, the first `seeds` of which are only where they begin."""
-        cell, model, options = self.cell, self.model, self.options
+        setting, begun = self.setting.timed_by(clock), begin.planned
+        cell, model = setting.cell, setting.model
         part, timed = replace(self.reading, visits=visits), "speed" in model.needs
         with clock("plan"):
-            planned = plan_visits(visits, cell, timed, begin.planned, begin.doubtful)
+            planned = plan_visits(visits, cell, timed, begun, begin.doubtful)
             planned = correct_taught(planned, visits, cell, model)
-        given = options.temperature
-        temperature = cell.temperature if given is None else given
-        states = states_of(planned.plan, cell, temperature)
-        left = begin.corrected
-        found = iterate(part, planned, states, cell, model, options, clock, left)
+        states = states_of(planned.plan, cell, setting.temperature)
+        found = iterate(part, planned, states, setting, begin.corrected)
         with clock("report"):
             kept = correction_of(visits, planned, states, found, cell, model, seeds)
         end = rounded(WindowState(planned.plan.end, planned.doubtful, found.left))
@@ -297,14 +288,14 @@ def compensate(
         CellError: The controller compensates on its own.
         ModelError: The model was made for another arm.
     """
-    clock = Clock(progress)
     files = name_files(name, source, variables, pages)
     refuse(files, cell, model)
     cell = with_measured_play(cell, model)
-    with clock("parse"):
+    setting = Setting(cell, model, options, Clock(progress), processes)
+    with setting.clock("parse"):
         reading = read_program(files, cell, each=map_with(processes))
-    reading, kept = correct(reading, cell, model, options, clock, processes)
-    return finish(name, reading, kept, cell, model, options, clock, processes)
+    reading, kept = correct(reading, setting)
+    return finish(name, reading, kept, setting)
 
 
 def name_files(
@@ -346,60 +337,39 @@ def refuse(files: Mapping[str, bytes], cell: Cell, model: Model) -> None:
     model.check_arm(cell.arm)
 
 
-def finish(
-    name: str,
-    reading: Reading,
-    kept: Correction,
-    cell: Cell,
-    model: Model,
-    options: Options,
-    clock: Clock,
-    processes: int = 1,
-) -> Outcome:
+def finish(name: str, reading: Reading, kept: Correction, setting: Setting) -> Outcome:
     """Write what was corrected, verify it, and say what came of it.
 
     Raises:
         VerificationError: The output is not what was meant.
     """
-    output = write_and_verify(reading, kept, cell, model, clock, processes)
-    with clock("report"):
-        return report(name, reading, kept, output, cell, model, options, clock)
+    output = write_and_verify(reading, kept, setting)
+    with setting.clock("report"):
+        return report(name, reading, kept, output, setting)
 
 
-def write_and_verify(
-    reading: Reading,
-    kept: Correction,
-    cell: Cell,
-    model: Model,
-    clock: Clock,
-    processes: int = 1,
-) -> Output:
+def write_and_verify(reading: Reading, kept: Correction, setting: Setting) -> Output:
     """Write the numbers, and read what was written.
 
     Raises:
         VerificationError: The output is not what was meant.
     """
+    clock, processes = setting.clock, setting.processes
     with clock("rewrite"):
-        output = write_edits(reading, kept.edits, model.id)
+        output = write_edits(reading, kept.edits, setting.model.id)
     with clock("verify"):
         each = map_with(processes)
-        again = read_program(output.files, cell, reading.programs, each)
+        again = read_program(output.files, setting.cell, reading.programs, each)
         check_output(reading, again, output, kept.edited, processes)
         check_numbers(reading.visits, kept.decisions.corrected, again.visits)
     return output
 
 
 def report(
-    name: str,
-    reading: Reading,
-    kept: Correction,
-    output: Output,
-    cell: Cell,
-    model: Model,
-    options: Options,
-    clock: Clock,
+    name: str, reading: Reading, kept: Correction, output: Output, setting: Setting
 ) -> Outcome:
     """Say what came of every visit, and what error the model expects now."""
+    cell, model, options = setting.cell, setting.model, setting.options
     d, rows, visits = kept.decisions, kept.corrected, reading.visits
     return Outcome(
         program=name,
@@ -423,7 +393,7 @@ def report(
             *listing_cost(visits, rows, d.q, cell.arm),
             assumed_off(name, cell),
         ),
-        stages=clock.stages,
+        stages=setting.clock.stages,
         position=kept.position,
         sources={source.name: source.data for source, _ in reading.originals},
     )

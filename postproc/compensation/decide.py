@@ -16,7 +16,7 @@ from postproc.compensation.command import (
     turns_in_file,
 )
 from postproc.compensation.eligibility import STRAYS, Reasons, strayed
-from postproc.compensation.options import Options
+from postproc.compensation.options import Options, Setting
 from postproc.compensation.outcome import Decisions, Status
 from postproc.compensation.program import Planned, Reading
 from postproc.compensation.targets import moved_targets
@@ -474,8 +474,7 @@ class Round:
         solved: The corrected command of every visit.
         aside: From targets to where the corrected path passes them, (n, 3) [m].
         held: Visits that must be left alone, (n,).
-        cell: Guards and frames.
-        options: What the user asked for.
+        setting: Guards and frames, and what the user asked for.
     """
 
     reading: Reading
@@ -483,8 +482,7 @@ class Round:
     solved: Commands
     aside: Floats
     held: Bools
-    cell: Cell
-    options: Options
+    setting: Setting
 
     @cached_property
     def correction(self) -> Floats:
@@ -519,7 +517,7 @@ class Round:
         moves = np.where(found.corrected[:, None], self.shift, 0.0)
         values = found.decisions.corrected
         visits, planned = self.reading.visits, self.planned
-        return strayed_along(visits, planned, self.cell, values, moves)
+        return strayed_along(visits, planned, self.setting.cell, values, moves)
 
     def decide(self, strays: Bools) -> Proposal:
         """Guard every solved visit, and compare the arrivals at every literal.
@@ -529,12 +527,15 @@ class Round:
         """
         visits, reasons = self.reading.visits, Reasons(len(self.reading.visits))
         display = mark_display(visits, self.planned, reasons)
-        unchanged = mark_unchanged(visits, reasons, self.options)
+        unchanged = mark_unchanged(visits, reasons, self.setting.options)
         self._guard(reasons, strays)
         usable = reasons.none
         agreement, change, both = self._agreement(usable)
-        stay = must_stay(visits, agreement, change, self._trusted, self.cell)
-        chosen, unsafe = mark_disagreement(visits, agreement, stay, self.cell, reasons)
+        cell = self.setting.cell
+        stay = must_stay(visits, agreement, change, self._trusted, cell)
+        chosen, unsafe = mark_disagreement(
+            visits, agreement, stay, self.setting.cell, reasons
+        )
         status = np.where(reasons.none, Status.SAFE, Status.GUARDED)
         status[unsafe] = Status.UNSAFE
         status[display] = Status.DISPLAY
@@ -555,11 +556,11 @@ class Round:
 
     def _guard(self, reasons: Reasons, strays: Bools) -> None:
         """Mark the visits whose corrections are not trusted."""
-        solved, limits, q = self.solved, self.cell.limits, self.planned.plan.q
+        solved, limits, q = self.solved, self.setting.cell.limits, self.planned.plan.q
         reasons.adopt(self.planned.reasons.index, self.planned.reasons.texts)
         for text, outside in solved.outside.items():
             reasons.mark(outside, text)
-        guard_solutions(reasons, self.cell.arm, limits, q, solved.q)
+        guard_solutions(reasons, self.setting.cell.arm, limits, q, solved.q)
         guard_turn(reasons, limits, solved.turn)
         guard_size(reasons, limits, self.correction, solved.residual)
         guard_size(reasons, limits, self.shift, solved.residual)
@@ -595,7 +596,9 @@ class Round:
         """Say what was decided for every visit, but for standard errors."""
         side, moves = self.solved.direction, (status == Status.SAFE)[:, None]
         turn = (
-            np.where(moves, self.solved.turn, 0.0) if self.options.orientation else NONE
+            np.where(moves, self.solved.turn, 0.0)
+            if self.setting.options.orientation
+            else NONE
         )
         return Decisions(
             status=status.astype(np.int64),

@@ -15,14 +15,13 @@ from postproc.compensation.command import (
     std_errors,
 )
 from postproc.compensation.decide import Proposal, Round
-from postproc.compensation.options import Clock, Options
+from postproc.compensation.options import Clock, Setting
 from postproc.compensation.program import Planned, Reading
 from postproc.compensation.rewrite import read_back
 from postproc.compensation.targets import moved_targets
 from postproc.language.rewrite import edits as number_edits
 from postproc.language.source import Replacements
 from postproc.language.visits import Visits
-from postproc.model.model import Model
 from postproc.motion.planner import Plan
 from postproc.motion.replan import Reached, Replanned, replan, replan_all
 from postproc.motion.targets import Targets
@@ -124,56 +123,53 @@ class Iteration:
     Attributes:
         reading: The visits.
         planned, states: Their plan.
-        cell, model, options, clock: As everywhere.
+        setting: What it is compensated with.
         given: What the first targets move by, for they are others' last, (k, 3) [m].
     """
 
     reading: Reading
     planned: Planned
     states: States
-    cell: Cell
-    model: Model
-    options: Options
-    clock: Clock
+    setting: Setting
     given: Floats
 
     def first_aim(self) -> Iterate:
         """Correct for the sides that were planned."""
-        orientation = self.options.orientation
-        with self.clock("solve"):
+        setting, none = self.setting, np.zeros(len(self.states), dtype=bool)
+        with setting.clock("solve"):
             solved = solve_visits(
-                self.model, self.cell, self.planned, self.states, orientation
-            )
-        none = np.zeros(len(self.states), dtype=bool)
+                setting.model, setting.cell, self.planned, self.states,
+                setting.options.orientation,
+            )  # fmt: skip
         return Iterate(solved, np.zeros_like(self.planned.plan.aside), none, none)
 
     def next_aim(
-        self, aim: Iterate, moved: Bools, found: Floats, search: SecantSearch
+        self, current: Iterate, moved: Bools, found: Floats, search: SecantSearch
     ) -> Iterate:
         """Correct some targets for other sides, by those that were found."""
-        orientation = self.options.orientation
-        with self.clock("solve"):
-            sides = search.next_aim(aim.solved.direction, found)
+        setting = self.setting
+        with setting.clock("solve"):
+            sides = search.next_aim(current.solved.direction, found)
             states = self.states.with_(direction=sides)
             solved = solve_again(
-                aim.solved, moved, self.model, self.cell, self.planned, states,
-                orientation,
+                current.solved, moved, setting.model, setting.cell, self.planned,
+                states, setting.options.orientation,
             )  # fmt: skip
-        return replace(aim, solved=solved)
+        return replace(current, solved=solved)
 
-    def propose(self, aim: Iterate) -> tuple[Proposal, Floats]:
+    def propose(self, current: Iterate) -> tuple[Proposal, Floats]:
         """Decide on numbers; return too where the path is to pass its targets."""
-        with self.clock("decide"):
+        with self.setting.clock("decide"):
             plan = self.planned.plan
-            aside = passing_after(plan, self.wanted(aim)) + aim.bent
-            given = self.reading, self.planned, aim.solved, aside, aim.held
-            return Round(*given, self.cell, self.options).propose(), aside
+            aside = passing_after(plan, self.wanted(current)) + current.bent
+            given = self.reading, self.planned, current.solved, aside, current.held
+            return Round(*given, self.setting).propose(), aside
 
-    def wanted(self, aim: Iterate) -> Floats:
+    def wanted(self, current: Iterate) -> Floats:
         """Say what the path should move by at every target, (n, 3) [m]."""
         before = self.planned.plan.tcp[:, :3, 3]
-        wanted = np.nan_to_num(aim.solved.command[:, :3, 3] - before)
-        wanted[aim.held] = 0.0
+        wanted = np.nan_to_num(current.solved.command[:, :3, 3] - before)
+        wanted[current.held] = 0.0
         wanted[: len(self.given)] = self.given
         return wanted
 
@@ -287,10 +283,7 @@ def iterate(
     reading: Reading,
     planned: Planned,
     states: States,
-    cell: Cell,
-    model: Model,
-    options: Options,
-    clock: Clock,
+    setting: Setting,
     before: EndState = AT_START,
 ) -> Converged:
     """Correct and plan again, until the sides are those corrected for.
@@ -309,39 +302,38 @@ def iterate(
     than in a program alone, and how targets are settled depends on the round.
 
     Raises:
-        NotTogetherError: The last look found something in programs side by side.
+        NotConcatenableError: The last look found something in programs side by side.
     """
-    aiming = Iteration(
-        reading, planned, states, cell, model, options, clock, before.wanted
-    )
-    courses, search = Replanner(reading.visits, planned.targets, cell), SecantSearch()
-    aim = aiming.first_aim()
+    iteration = Iteration(reading, planned, states, setting, before.wanted)
+    replanner = Replanner(reading.visits, planned.targets, setting.cell)
+    search, clock = SecantSearch(), setting.clock
+    current = iteration.first_aim()
     for number in count():  # ends: from round ROUNDS on, `settled` or `held` grows
-        proposal, meant = aiming.propose(aim)
+        proposal, meant = iteration.propose(current)
         with clock("plan again"):
-            looked = courses.after(proposal.decisions.corrected, before.looked)
+            looked = replanner.after(proposal.decisions.corrected, before.looked)
         most = SAME if number < ROUNDS else OTHER
-        moved = aim.turned(proposal, looked.side, most)
-        missed = aiming.missed(proposal, looked.aside, meant)
+        moved = current.turned(proposal, looked.side, most)
+        missed = iteration.missed(proposal, looked.aside, meant)
         bend_on = number < CORNERS and bool(missed.any())
         if not moved.any() and not bend_on:
-            found, flipped = _read_back(aiming, aim, proposal, courses, before)
+            found, flipped = _read_back(iteration, current, proposal, replanner, before)
             if found is not None:
                 return found
-            aim = replace(aim, held=aim.held | flipped)
+            current = replace(current, held=current.held | flipped)
             continue
-        bent = aim.bent + missed if bend_on else aim.bent
-        settled = aim.settled | moved if number >= ROUNDS else aim.settled
-        aim = replace(aim, bent=bent, settled=settled)
-        aim = aiming.next_aim(aim, moved, looked.side, search)
+        bent = current.bent + missed if bend_on else current.bent
+        settled = current.settled | moved if number >= ROUNDS else current.settled
+        current = replace(current, bent=bent, settled=settled)
+        current = iteration.next_aim(current, moved, looked.side, search)
     raise AssertionError("unreachable")
 
 
 def _read_back(
-    aiming: Iteration,
-    aim: Iterate,
+    iteration: Iteration,
+    current: Iterate,
     proposal: Proposal,
-    courses: Replanner,
+    replanner: Replanner,
     before: EndState,
 ) -> tuple[Converged | None, Bools]:
     """Write the numbers, and look at them as they will be read.
@@ -350,20 +342,21 @@ def _read_back(
         What came of it, None where targets now come from another side; and those.
 
     Raises:
-        NotTogetherError: There are some, in programs side by side.
+        NotConcatenableError: There are some, in programs side by side.
     """
-    looked = courses.end
-    edits, proposal = write_and_read_back(aiming.reading, proposal, aiming.clock)
-    with aiming.clock("plan again"):
-        last = courses.after(proposal.decisions.corrected, before.written)
-    flipped = aim.turned(proposal, last.side, OTHER)
+    looked, setting = replanner.end, iteration.setting
+    edits, proposal = write_and_read_back(iteration.reading, proposal, setting.clock)
+    with setting.clock("plan again"):
+        last = replanner.after(proposal.decisions.corrected, before.written)
+    flipped = current.turned(proposal, last.side, OTHER)
     if flipped.any():
-        if len(aiming.reading.begins) > 1:
+        if len(iteration.reading.begins) > 1:
             raise NotConcatenableError
         return None, flipped
-    left = EndState(looked, last.end, aiming.wanted(aim)[-1:].copy())
-    with aiming.clock("solve"):
-        std_error = std_errors(aiming.model, aiming.cell, aiming.states, aim.solved)
+    left = EndState(looked, last.end, iteration.wanted(current)[-1:].copy())
+    with setting.clock("solve"):
+        model, cell = setting.model, setting.cell
+        std_error = std_errors(model, cell, iteration.states, current.solved)
     decided = replace(proposal.decisions, std_error=std_error)
     proposal = replace(proposal, decisions=decided)
     return Converged(proposal, edits, last.reached, left), flipped

@@ -1,11 +1,16 @@
-"""What the user asked for, and the seconds spent in every stage."""
+"""What programs are compensated with: options, and the seconds of every stage."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from time import perf_counter
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:  # the command line needs options only, and must start at once
+    from postproc.model.model import Model
+    from postproc.robot.cell import Cell
 
 # What the user asked for.
 
@@ -58,3 +63,32 @@ class Clock:
         """Add stages that ran elsewhere, such as in another process."""
         for stage, spent in seconds.items():
             self.stages[stage] = self.stages.get(stage, 0.0) + spent
+
+
+@dataclass(frozen=True)
+class Setting:
+    """What a program is compensated with.
+
+    Attributes:
+        cell: The robot's surroundings, with the play that was measured.
+        model: The arm's error.
+        options: What the user asked for.
+        clock: Times the stages.
+        processes: How many may work at once; the result is the same.
+    """
+
+    cell: Cell
+    model: Model
+    options: Options
+    clock: Clock
+    processes: int = 1
+
+    def timed_by(self, clock: Clock) -> Setting:
+        """Return the same with another clock."""
+        return replace(self, clock=clock)
+
+    @property
+    def temperature(self) -> float:
+        """The arm's temperature [deg C], NaN where nobody knows."""
+        given = self.options.temperature
+        return self.cell.temperature if given is None else given

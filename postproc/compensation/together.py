@@ -21,7 +21,7 @@ from postproc.compensation.compensate import (
     name_files,
     refuse,
 )
-from postproc.compensation.options import Clock, Options, silent
+from postproc.compensation.options import Clock, Options, Setting, silent
 from postproc.compensation.outcome import Outcome
 from postproc.compensation.program import Reading, read_program, with_measured_play
 from postproc.compensation.windows import concatenate, first_visits, offsets
@@ -59,52 +59,40 @@ def compensate_batch(
         For every program what `compensate` returns, or else what it raises. `stages` is
         the time of all programs that were worked on.
     """
-    shop = _Setting(with_measured_play(cell, model), model, options, Clock(silent))
-    readings = [_tried(shop.read, program) for program in programs]
+    cell = with_measured_play(cell, model)
+    setting = Setting(cell, model, options, Clock(silent))
+    readings = [_tried(_read, program, setting) for program in programs]
     readable = [found for found in readings if isinstance(found, Reading)]
-    corrected = chain.from_iterable(map(shop.corrected, _passes(readable)))
+    passes = (_corrected(some, setting) for some in _passes(readable))
+    corrected = chain.from_iterable(passes)
     out: list[Outcome | Exception] = []
     for program, reading in zip(programs, readings, strict=True):
         found = reading if isinstance(reading, Exception) else next(corrected)
         out.append(
             found
             if isinstance(found, Exception)
-            else _tried(shop.finished, program, *found)
+            else _tried(finish, program.name, *found, setting)
         )
     return out
 
 
-@dataclass(frozen=True)
-class _Setting:
-    """What all programs are worked on with."""
+def _read(given: Given, setting: Setting) -> Reading:
+    """Read a program that may be compensated."""
+    files = name_files(given.name, given.source, given.variables, given.pages)
+    refuse(files, setting.cell, setting.model)
+    with setting.clock("parse"):
+        return read_program(files, setting.cell)
 
-    cell: Cell
-    model: Model
-    options: Options
-    clock: Clock
 
-    def read(self, given: Given) -> Reading:
-        """Read a program that may be compensated."""
-        files = name_files(given.name, given.source, given.variables, given.pages)
-        refuse(files, self.cell, self.model)
-        with self.clock("parse"):
-            return read_program(files, self.cell)
-
-    def corrected(
-        self, readings: Sequence[Reading]
-    ) -> list[tuple[Reading, Correction] | Exception]:
-        """Correct the programs of a pass; one that fails leaves the others alone."""
-        with_ = (self.cell, self.model, self.options, self.clock)
-        if len(readings) > 1 and not self.options.clone:
-            found = _tried(correct_batch, readings, *with_)
-            if not isinstance(found, Exception):
-                return list(zip(readings, found, strict=True))
-        return [_tried(correct, reading, *with_) for reading in readings]
-
-    def finished(self, given: Given, reading: Reading, kept: Correction) -> Outcome:
-        """Write a corrected program and verify it."""
-        with_ = (self.cell, self.model, self.options, self.clock)
-        return finish(given.name, reading, kept, *with_)
+def _corrected(
+    readings: Sequence[Reading], setting: Setting
+) -> list[tuple[Reading, Correction] | Exception]:
+    """Correct the programs of a pass; one that fails leaves the others alone."""
+    if len(readings) > 1 and not setting.options.clone:
+        found = _tried(correct_batch, readings, setting)
+        if not isinstance(found, Exception):
+            return list(zip(readings, found, strict=True))
+    return [_tried(correct, reading, setting) for reading in readings]
 
 
 def _tried(work: Callable[P, T], *args: P.args, **named: P.kwargs) -> T | Exception:
@@ -130,32 +118,23 @@ def _passes(readings: Sequence[Reading]) -> Iterator[list[Reading]]:
         yield waiting
 
 
-def correct_batch(
-    readings: Sequence[Reading],
-    cell: Cell,
-    model: Model,
-    options: Options,
-    clock: Clock,
-) -> list[Correction]:
+def correct_batch(readings: Sequence[Reading], setting: Setting) -> list[Correction]:
     """Plan and correct programs side by side; what fails for one fails for all.
 
     Args:
         readings: The programs, none without visits.
-        cell: The robot's surroundings, with the play that was measured.
-        model: The arm's error.
-        options: What the user asked for; no clones.
-        clock: Times the stages of all.
+        setting: What they are compensated with; no clones.
 
     Returns:
         What `correct` keeps of each alone.
 
     Raises:
-        NotTogetherError: They would not come out as each alone.
+        NotConcatenableError: They would not come out as each alone.
     """
     own = [reading.visits for reading in readings]
     texts = tuple(text for reading in readings for text in reading.texts)
     all_ = Reading(texts, concatenate(own), (), begins=first_visits(own))
-    _, kept = correct(all_, cell, model, options, clock)
+    _, kept = correct(all_, setting)
     return list(_split(kept, readings))
 
 

@@ -21,7 +21,7 @@ PATIENCE = 20.0  # [s] until a process must be gone or be there
 
 SCRIPT = """
 import os, sys, time
-from postproc.compensation.parallel import in_child
+from postproc.compensation.parallel import in_worker
 
 def work():
     print("never flushed", end="")
@@ -30,7 +30,7 @@ def work():
         time.sleep(0.01)
 
 print("once")
-with in_child(work) as items:
+with in_worker(work) as items:
     sys.stderr.write(f"{next(items)}\\n")
     next(items)
 """
