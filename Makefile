@@ -1,6 +1,7 @@
 # make demo    survey, fit, compensate and check the sample programs on a virtual arm
 # make test    all tests
 # make lint    ruff and mypy
+# make lock    pin what is installed, in requirements/; UPGRADE=1: to the newest versions
 # make chaos   kill 200 batches of 300 files at random moments and resume them
 # make fuzz    20,000 damaged programs: refused, or rewritten byte for byte; the parsers by coverage
 # make plant-bench   10,000 files, a second run, memory, workers, a cluster: docs/plant.md
@@ -27,13 +28,13 @@ export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
 
 .PHONY: help demo test lint format bench evidence reproduce accuracy undeclared blind chaos fuzz docs clean
-.PHONY: plant-bench generated growth native golden pictures
+.PHONY: plant-bench generated growth native golden pictures lock
 .DELETE_ON_ERROR:
 
 help:
 	@sed -n 's/^# //p' Makefile
 
-$(STAMP): pyproject.toml .ci/venv $(wildcard native/*.toml native/*.rs native/src/*.rs)
+$(STAMP): pyproject.toml .ci/venv $(wildcard requirements/*.txt native/*.toml native/*.rs native/src/*.rs)
 	@bash .ci/venv $(VENV)
 	@touch $@
 
@@ -47,6 +48,9 @@ lint: $(STAMP)
 	@$(VENV)/bin/ruff check .
 	@$(VENV)/bin/ruff format --check .
 	@$(VENV)/bin/mypy
+
+lock:
+	@PATH="$(abspath $(VENV))/bin:$$PATH" bash .ci/lock $(if $(UPGRADE),--upgrade)
 
 format: $(STAMP)
 	@$(VENV)/bin/ruff check --fix .
@@ -78,7 +82,7 @@ chaos: $(STAMP)
 
 fuzz: $(STAMP)
 	@$(PYTHON_BIN) -m tests.fuzz --count $(or $(COUNT),20000)
-	@$(PYTHON_BIN) -c 'import atheris' 2>/dev/null || $(PYTHON_BIN) -m pip install --quiet -e '.[fuzz]' || true
+	@$(PYTHON_BIN) -c 'import atheris' 2>/dev/null || $(PYTHON_BIN) -m pip install --quiet --require-hashes -r requirements/fuzz.txt || true
 	@$(PYTHON_BIN) -m tests.fuzz.guided --runs $(or $(RUNS),20000)
 
 native: $(STAMP)

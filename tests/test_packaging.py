@@ -1,19 +1,29 @@
-"""An editable install and a wheel are complete: grammars, arms, licence."""
+"""An install and a wheel are complete: grammars, arms, licence, pinned packages."""
 
 from __future__ import annotations
 
 import os
+import re
 import subprocess
 import sys
+import tomllib
 import zipfile
 from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
+from packaging.requirements import Requirement
+from packaging.utils import canonicalize_name
 
 import postproc
 
 ROOT = Path(__file__).parent.parent
+
+PIN = re.compile(
+    r"^(?P<name>[\w.-]+)(?:\[.*\])?==(?P<version>\S+)(?: ; [^\n]*?)?"
+    r"(?P<hashes>(?: \\\n    --hash=sha256:[0-9a-f]{64})*)$",
+    re.M,
+)
 
 # Run in a process of its own, away from the sources.
 PROBE = """
@@ -89,3 +99,48 @@ def test_grammar_is_found_from_the_sources(tmp_path: Path) -> None:
         pytest.skip("postproc is not installed editable here: pip install -e '.[dev]'")
     text = (ROOT / "grammars" / "pdl2.lark").read_text(encoding="utf-8")
     assert first == text.strip().splitlines()[0]
+
+
+def declared() -> dict[str, list[str]]:
+    """Return what each file of requirements/ must hold."""
+    ours, native = (
+        tomllib.loads((ROOT / name).read_text("utf-8"))
+        for name in ("pyproject.toml", "native/pyproject.toml")
+    )
+    extras = ours["project"]["optional-dependencies"]
+    dev = list(ours["project"]["dependencies"])
+    for extra in extras.keys() - {"fuzz"}:
+        dev += extras[extra]
+    build = [*ours["build-system"]["requires"], *native["build-system"]["requires"]]
+    return {"build": build, "dev": dev, "fuzz": extras["fuzz"]}
+
+
+def pinned(name: str) -> dict[str, set[str]]:
+    """Return the versions of each package in a file of requirements/, all hashed."""
+    text = (ROOT / "requirements" / f"{name}.txt").read_text("utf-8")
+    found: dict[str, set[str]] = {}
+    for pin in PIN.finditer(text):
+        assert pin["hashes"], f"{pin[0]} has no hash"
+        found.setdefault(canonicalize_name(pin["name"]), set()).add(pin["version"])
+    assert sum(map(len, found.values())) == text.count("==") - markers(text)
+    return found
+
+
+def markers(text: str) -> int:
+    """Count the comparisons that belong to markers, not to pins."""
+    return sum(line.partition(" ; ")[2].count("==") for line in text.splitlines())
+
+
+@pytest.mark.parametrize("name", ["build", "dev", "fuzz"])
+def test_what_is_required_is_pinned_with_hashes(name: str) -> None:
+    versions = pinned(name)
+    for text in declared()[name]:
+        required = Requirement(text)
+        found = versions.get(canonicalize_name(required.name), set())
+        fit = [v for v in found if required.specifier.contains(v)]
+        assert found and len(fit) == len(found), f"{text}: {found}. Run make lock"
+
+
+def test_the_locked_files_agree() -> None:
+    build, dev = pinned("build"), pinned("dev")
+    assert all(dev.get(name, versions) == versions for name, versions in build.items())
