@@ -168,7 +168,7 @@ def _true_errors(
         (after, ("arm", "state")),
         (informed, ("arm", "state", "setup")),
     ):
-        keep = tuple(e for e in fit.combination.effects if e.origin in origins)
+        keep = tuple(e for e in fit.combination.effects if e.belongs_to() in origins)
         values = fit.values[fit.combination.where(*origins)]
         batch = Batch(ARM, states_of(fresh))
         left = truth - Combination(keep).error(batch, values)

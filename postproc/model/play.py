@@ -36,7 +36,7 @@ def half_gap(model: Model, arm: Arm) -> Floats:
     batch = Batch(arm, make_states(q, np.ones((SAMPLES, 6))))
     angles = np.zeros((SAMPLES, 6))
     for effect, part in zip(effects.effects, effects.slices, strict=True):
-        if isinstance(effect, JointEffect) and effect.direct and not effect.needs:
+        if isinstance(effect, JointEffect) and effect.direct and not effect.requires():
             angles += effect.angles(batch, values[part])
     return np.asarray(np.abs(angles).max(axis=0))
 

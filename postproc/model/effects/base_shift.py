@@ -41,9 +41,12 @@ class BaseShift(Effect):
     """
 
     name: ClassVar[str] = "base_shift"
-    origin: ClassVar[Origin] = "setup"
 
     row: float = 0.0
+
+    def belongs_to(self) -> Origin:
+        """Say that it is the set-up's."""
+        return "setup"
 
     def parameters(self) -> tuple[Parameter, ...]:
         """Name shift and turn, from before to after."""

@@ -36,7 +36,6 @@ class Curve(Effect):
     """
 
     name: ClassVar[str] = "curve"
-    origin: ClassVar[Origin] = "arm"
 
     direction: str = "joint 1"
     source: tuple[str, ...] = ("joint 1",)

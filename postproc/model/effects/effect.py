@@ -49,15 +49,10 @@ class Effect(ABC):
 
     Class attributes:
         name: Name in model files and reports.
-        origin: "arm" is compensated; "state" is compensated for the state that the cell
-            declares; "setup" is fitted and never compensated.
-        needs: Covariates of `States` without which the effect cannot be evaluated.
         direct: True where the effect is odd in the arrival direction.
     """
 
     name: ClassVar[str]
-    origin: ClassVar[Origin] = "arm"
-    needs: ClassVar[tuple[str, ...]] = ()
     direct: ClassVar[bool] = False
 
     @classmethod
@@ -66,12 +61,16 @@ class Effect(ABC):
         return cls()
 
     def belongs_to(self) -> Origin:
-        """Say what it is of, where that depends on the settings."""
-        return self.origin
+        """Say whose error it is.
+
+        That of the "arm" is compensated; that of a "state" is compensated for the
+        state that the cell declares; that of the "setup" of a survey never is.
+        """
+        return "arm"
 
     def requires(self) -> tuple[str, ...]:
-        """List what it needs, where that depends on the settings."""
-        return self.needs
+        """List the covariates of `States` without which it cannot be evaluated."""
+        return ()
 
     @abstractmethod
     def parameters(self) -> tuple[Parameter, ...]:

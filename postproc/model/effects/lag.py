@@ -24,9 +24,12 @@ class Lag(JointEffect):
 
     name: ClassVar[str] = "lag"
     direct: ClassVar[bool] = True
-    needs: ClassVar[tuple[str, ...]] = ("speed",)
 
     joints: tuple[int, ...] = (1, 2, 3, 4, 5, 6)
+
+    def requires(self) -> tuple[str, ...]:
+        """Need the speed."""
+        return ("speed",)
 
     def parameters(self) -> tuple[Parameter, ...]:
         """Name one k per joint."""

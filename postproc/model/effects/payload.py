@@ -28,10 +28,16 @@ class Payload(JointEffect):
     """
 
     name: ClassVar[str] = "payload"
-    origin: ClassVar[Origin] = "state"
-    needs: ClassVar[tuple[str, ...]] = ("payload",)
 
     joints: tuple[int, ...] = (2, 3, 5)
+
+    def belongs_to(self) -> Origin:
+        """Say that it is of the state: the cell declares the payload."""
+        return "state"
+
+    def requires(self) -> tuple[str, ...]:
+        """Need the payload."""
+        return ("payload",)
 
     def _places(self, joint: int) -> list[tuple[str, int, float]]:
         """List name, link and standard deviation [m] of a joint's levers."""

@@ -32,7 +32,6 @@ class Placement(Effect):
     """
 
     name: ClassVar[str] = "registration"
-    origin: ClassVar[Origin] = "setup"
 
     tools: tuple[int, ...] = (0,)
 
@@ -40,6 +39,10 @@ class Placement(Effect):
     def propose(cls, arm: Arm, states: States) -> Placement:
         """List the survey's probe points."""
         return cls(tuple(int(t) for t in np.unique(states.tool_id)))
+
+    def belongs_to(self) -> Origin:
+        """Say that it is the set-up's."""
+        return "setup"
 
     def parameters(self) -> tuple[Parameter, ...]:
         """Name shift and turn of the tracker, then the shift of every point."""

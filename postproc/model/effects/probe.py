@@ -25,7 +25,6 @@ class Probe(Effect):
     """
 
     name: ClassVar[str] = "probe"
-    origin: ClassVar[Origin] = "setup"
 
     tools: tuple[int, ...] = (0,)
 
@@ -33,6 +32,10 @@ class Probe(Effect):
     def propose(cls, arm: Arm, states: States) -> Self:
         """List the survey's probe points."""
         return cls(tuple(int(t) for t in np.unique(states.tool_id)))
+
+    def belongs_to(self) -> Origin:
+        """Say that it is the set-up's."""
+        return "setup"
 
     def parameters(self) -> tuple[Parameter, ...]:
         """Name three shifts per point."""

@@ -28,13 +28,17 @@ class ProbeTurn(Effect):
     """
 
     name: ClassVar[str] = "probe_turn"
-    origin: ClassVar[Origin] = "setup"
+
     tools: tuple[int, ...] = (0,)
 
     @classmethod
     def propose(cls, arm: Arm, states: States) -> Self:
         """List the survey's probe points."""
         return cls(tuple(int(t) for t in np.unique(states.tool_id)))
+
+    def belongs_to(self) -> Origin:
+        """Say that it is the set-up's."""
+        return "setup"
 
     def parameters(self) -> tuple[Parameter, ...]:
         """Name three turns per point."""

@@ -33,7 +33,6 @@ class Thermal(Effect):
     """
 
     name: ClassVar[str] = "thermal"
-    origin: ClassVar[Origin] = "state"
 
     lengths: tuple[str, ...] = ("a1", "d1", "a2", "a3", "d4", "d6")
     form: Literal["temperature", "time"] = "temperature"
@@ -54,6 +53,10 @@ class Thermal(Effect):
         return cls(
             lengths, form="time", time_constant=span / 4, start=float(time.min())
         )
+
+    def belongs_to(self) -> Origin:
+        """Say that it is of the state: the cell declares the temperature."""
+        return "state"
 
     def requires(self) -> tuple[str, ...]:
         """Need the temperature; a warm-up of unknown time is over."""

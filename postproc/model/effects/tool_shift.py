@@ -27,10 +27,13 @@ class ToolShift(Effect):
     """
 
     name: ClassVar[str] = "tool_shift"
-    origin: ClassVar[Origin] = "setup"
 
     row: float = 0.0
     turns: bool = False
+
+    def belongs_to(self) -> Origin:
+        """Say that it is the set-up's."""
+        return "setup"
 
     def parameters(self) -> tuple[Parameter, ...]:
         """Name shift and turn, from before to after, in the flange frame."""

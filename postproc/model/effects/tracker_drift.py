@@ -32,7 +32,6 @@ class TrackerDrift(Effect):
     """
 
     name: ClassVar[str] = "tracker_drift"
-    origin: ClassVar[Origin] = "setup"
 
     start: float = 0.0
     duration: float = 1.0
@@ -48,6 +47,10 @@ class TrackerDrift(Effect):
         if len(passed) == 0:
             return cls()
         return cls(float(passed.min()), max(float(np.ptp(passed)), 1e-9), clock)
+
+    def belongs_to(self) -> Origin:
+        """Say that it is the set-up's."""
+        return "setup"
 
     def parameters(self) -> tuple[Parameter, ...]:
         """Name shift and turn of every term."""

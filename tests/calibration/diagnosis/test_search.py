@@ -49,7 +49,7 @@ def test_a_drift_leaves_only_where_the_base_stands_unsure() -> None:
     after = trace(c.base_fit(), seed=0).search.fit
     fresh = survey(c.arm, seed + 10**6, 200)
     batch = Batch(ARM, states_of(fresh))
-    keep = tuple(e for e in after.combination.effects if e.origin == "arm")
+    keep = tuple(e for e in after.combination.effects if e.belongs_to() == "arm")
     values = after.values[after.combination.where("arm")]
     left = c.arm.error(fresh) - Combination(keep).error(batch, values)
     rigid = rigid_columns(batch).reshape(-1, 6)
