@@ -280,7 +280,7 @@ def _spread(spread: ErrorStatistics) -> str:
 
 def _unexplained(found: Diagnosis) -> list[str]:
     """Say what shows the structure, and where it lives."""
-    curves = [f for f in found.findings if f.effect == "curve"]
+    curves = [f for f in found.findings if f.nameless]
     lines = [
         f"no effect with a name follows {f.source}"
         + (f" at joint {f.joint}" if f.joint else "")

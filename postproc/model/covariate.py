@@ -10,6 +10,8 @@ from postproc.model.kinematics import Batch
 JOINT_KINDS = ("joint", "lambda", "before", "travel", "loop", "torque")
 SHORTEST = 1e-4  # [rad] of a way whose logarithm is taken
 PLAIN = ("speed", "payload", "temperature", "time", "order")
+JOINTS = (1, 2, 3, 4, 5, 6)
+CARRYING = 0.02  # of the largest torque: a joint that carries less cannot yield
 
 
 def covariate(batch: Batch, name: str) -> Floats:
@@ -51,6 +53,22 @@ def unit(name: str) -> str:
         "loop": "log rad", "torque": "N m", "speed": "m/s",
         "payload": "kg", "temperature": "deg C", "time": "s", "order": "rows",
     }[kind]  # fmt: skip
+
+
+def varies(values: Floats) -> bool:
+    """Tell whether a covariate (n,) was recorded in every row and varies at all."""
+    return bool(
+        not np.isnan(values).any()
+        and len(values) > 1
+        and np.ptp(values) > 1e-9 * max(1.0, float(np.abs(values).max()))
+    )
+
+
+def carrying(batch: Batch) -> tuple[int, ...]:
+    """List the joints, 1 to 6, that carry weight worth the name."""
+    torque = np.abs(batch.loads.gravity + batch.loads.payload).max(axis=0)
+    enough = torque > CARRYING * float(torque.max(initial=0.0))
+    return tuple(int(j) + 1 for j in np.flatnonzero(enough & (torque > 0)))
 
 
 def loops(batch: Batch, joint: int) -> Floats:

@@ -220,11 +220,9 @@ def _places(found: Search) -> tuple[ResidualPlace, ...]:
     out = []
     for score in ranking(Projection.of(found.fit), found.library)[:PLACES]:
         family = score.family
-        joint = f"joint {family.joint}"
-        direction = family.effect if family.joint is None else joint
+        at = family.along or family.effect
+        direction = at if family.joint is None else f"joint {family.joint}"
         driver = family.driver or score.best.source
-        if family.effect == "curve" and family.joint is None:
-            driver, _, direction = driver.partition(" along ")
         p_value = found.null.p_value(score.evidence)
         out.append(ResidualPlace(direction, driver, score.evidence, p_value))
     return tuple(out)

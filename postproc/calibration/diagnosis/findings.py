@@ -13,8 +13,6 @@ from postproc.calibration.report import SHOWN_UNITS
 from postproc.model.effects.effect import Effect
 from postproc.robot.pose import MM
 
-SPOT = 9  # bumps: more are a map of the whole joint, with no one place
-
 
 def describe(found: Search, standings: Sequence[JudgedAddition]) -> tuple[Finding, ...]:
     """Describe every addition of a search."""
@@ -43,6 +41,7 @@ def _describe(
     return Finding(
         effect=family.effect,
         joint=family.joint,
+        nameless=effect.nameless,
         source=addition.candidate.source,
         p_value=standing.p_value,
         evidence=standing.evidence,
@@ -63,37 +62,8 @@ def _parameters(
     for p, value, error in zip(effect.parameters(), values, std, strict=True):
         unit, factor = SHOWN_UNITS.get(p.unit, (p.unit, 1.0))
         out[p.name] = (float(value * factor), float(error * factor), unit)
-    for name, (number, unit) in nonlinear(effect).items():
+    for name, (number, unit) in effect.nonlinear().items():
         out[name] = (number, 0.0, unit)
-    return out
-
-
-def nonlinear(effect: Effect) -> dict[str, tuple[float, str]]:
-    """List what is not linear in an effect, in the units of people."""
-    settings = effect.settings()
-    known = {
-        "row": ("row", 1.0, "rows"),
-        "d0": ("d0", float(np.degrees(1.0)), "deg"),
-        "t0": ("t0", 1.0, "N m"),
-        "time_constant": ("time_constant", 1.0, "s"),
-        "ratio": ("pin_ratio", 1.0, "1"),
-        "upright": ("upright", float(np.degrees(1.0)), "deg"),
-    }
-    out = {
-        name: (float(settings[key]) * factor, unit)
-        for key, (name, factor, unit) in known.items()
-        if key in settings
-    }
-    if "waves" in settings:
-        out["order"] = (float(settings["waves"][0][1]), "1/turn")
-    if 0 < len(settings.get("bumps", ())) <= SPOT:
-        places = np.degrees([centre for _, centre in settings["bumps"]])
-        out["centre"] = (float(places.mean()), "deg")
-        out["width"] = (float(np.degrees(settings["width"])), "deg")
-        if len(places) > 1:
-            out["reach"] = (float(np.ptp(places)), "deg")
-    if settings.get("form") == "temperature":
-        out.pop("time_constant", None)
     return out
 
 

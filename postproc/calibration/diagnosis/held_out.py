@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 
 from postproc.arrays import Floats
-from postproc.calibration.diagnosis.candidates import Candidate
 from postproc.calibration.regression import Fit
+from postproc.model.effects.effect import Candidate
 from postproc.model.kinematics import Batch
 from postproc.model.noise import Noise
 

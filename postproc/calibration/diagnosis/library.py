@@ -9,12 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from postproc.arrays import Floats
-from postproc.calibration.diagnosis.candidates import (
-    Candidate,
-    free_candidates,
-    named_candidates,
-)
 from postproc.calibration.regression import Fit
+from postproc.model.effects import EFFECTS
+from postproc.model.effects.effect import Candidate
 from postproc.model.kinematics import Batch
 from postproc.model.noise import Whitener
 
@@ -162,7 +159,7 @@ class Library:
     def of(cls, fit: Fit) -> Library:
         """List all candidates that a fit's rows can show."""
         at = fit.combination.at(fit.batch, fit.values)
-        every = [*named_candidates(at), *free_candidates(at)]
+        every = candidates(at)
         numbers = 3 * len(at) * sum(c.width for c in every)
         shelves = []
         for width, alike in by_width(every):
@@ -194,6 +191,16 @@ class Library:
             )
             for s in self.shelves
         )
+
+
+def candidates(batch: Batch) -> list[Candidate]:
+    """List what a residual may be due to: effects with grids of settings, names first.
+
+    Args:
+        batch: The states, kinematics taken at the parameters of a fit.
+    """
+    every = [c for kind in EFFECTS.values() for c in kind.candidates(batch)]
+    return sorted(every, key=lambda c: c.family.tier)
 
 
 def by_width(candidates: Sequence[Candidate]) -> list[tuple[int, list[Candidate]]]:

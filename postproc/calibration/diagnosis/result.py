@@ -8,13 +8,12 @@ from typing import Any, Literal
 import numpy as np
 
 from postproc.arrays import Floats
-from postproc.calibration.diagnosis.candidates import Candidate
 from postproc.calibration.diagnosis.library import Projection
 from postproc.calibration.diagnosis.score import Leftover
 from postproc.calibration.measurements import DroppedRow
 from postproc.calibration.regression import Fit
 from postproc.model.covariate import covariate, unit
-from postproc.model.effects.effect import Effect
+from postproc.model.effects.effect import Candidate, Effect
 from postproc.model.kinematics import Batch
 from postproc.model.statistics import ErrorStatistics
 from postproc.robot.pose import MM
@@ -31,6 +30,7 @@ class Finding:
     Attributes:
         effect: Name.
         joint: Joint 1 to 6, or None.
+        nameless: Whether it only says that something is there, not what.
         source: Joint or covariate that drives it, or None.
         p_value: Probability that noise alone looks like it anywhere in the library.
         evidence: Log marginal likelihood ratio with and without it [nats].
@@ -45,6 +45,7 @@ class Finding:
 
     effect: str
     joint: int | None
+    nameless: bool
     source: str | None
     p_value: float
     evidence: float

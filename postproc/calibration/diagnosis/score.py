@@ -8,12 +8,12 @@ import numpy as np
 from scipy.stats import f as fisher
 
 from postproc.arrays import Floats
-from postproc.calibration.diagnosis.candidates import Candidate, Family
 from postproc.calibration.diagnosis.library import (
     Library,
     Projection,
     ReducedCandidates,
 )
+from postproc.model.effects.effect import Candidate, Family
 
 # How strongly a candidate's block of columns is called for.
 #

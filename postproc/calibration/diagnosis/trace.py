@@ -7,7 +7,6 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import norm
 
-from postproc.calibration.diagnosis.candidates import FREE
 from postproc.calibration.diagnosis.findings import describe
 from postproc.calibration.diagnosis.library import Library, Projection
 from postproc.calibration.diagnosis.result import Finding, Verdict
@@ -22,7 +21,7 @@ from postproc.calibration.diagnosis.search import (
     stand,
 )
 from postproc.calibration.regression import Fit
-from postproc.model.effects.effect import JointEffect
+from postproc.model.effects.effect import FREE, JointEffect
 
 # Taking names back that promise more than they explain.
 
@@ -112,10 +111,10 @@ class Investigation:
     def verdict(self) -> Verdict:
         """Decide between an effect, noise, and structure without a name."""
         p_value = min((x.p_value for x in self.leftovers), default=1.0)
-        added = [a.candidate.family.effect for a in self.search.additions]
+        added = [a.candidate.effect for a in self.search.additions]
         if not added:
             return "unexplained" if p_value < REMAINS else "noise"
-        nameless = "curve" in added or p_value < STILL_REMAINS
+        nameless = any(e.nameless for e in added) or p_value < STILL_REMAINS
         return "unexplained" if nameless else "effect"
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar, Self
 
 import numpy as np
@@ -10,7 +10,15 @@ from numpy.typing import NDArray
 
 from postproc.arrays import Floats
 from postproc.kernels import native
-from postproc.model.effects.effect import FAR, JointEffect, Parameter, fade_turns
+from postproc.model.covariate import JOINTS
+from postproc.model.effects.effect import (
+    FAR,
+    Candidate,
+    JointEffect,
+    Parameter,
+    alternatives,
+    fade_turns,
+)
 from postproc.model.kinematics import Batch
 from postproc.robot.arm import Arm
 from postproc.robot.state import States
@@ -31,8 +39,9 @@ class BacklashProfile(JointEffect):
 
     name: ClassVar[str] = "backlash_profile"
     direct: ClassVar[bool] = True
+    variation_of: ClassVar[str | None] = "backlash"
 
-    joints: tuple[int, ...] = (1, 2, 3, 4, 5, 6)
+    joints: tuple[int, ...] = JOINTS
     orders: tuple[int, ...] = (1, 2, 3)
     constant: bool = False
     lower: tuple[float, ...] = (-FAR,) * 6
@@ -43,6 +52,16 @@ class BacklashProfile(JointEffect):
         """Remember the surveyed range."""
         low, high = states.q.min(axis=0), states.q.max(axis=0)
         return cls(lower=tuple(map(float, low)), upper=tuple(map(float, high)))
+
+    @classmethod
+    def candidates(cls, batch: Batch) -> list[Candidate]:
+        """Try every joint."""
+        every = cls.propose(batch.arm, batch.states)
+        return [
+            c
+            for j in JOINTS
+            for c in alternatives([(replace(every, joints=(j,)), f"joint {j}")], j)
+        ]
 
     def parameters(self) -> tuple[Parameter, ...]:
         """Name b0 and the harmonics of every joint."""

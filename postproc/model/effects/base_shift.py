@@ -2,17 +2,42 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
 
 from postproc.arrays import Floats
-from postproc.model.effects.effect import Effect, Origin, Parameter
+from postproc.model.effects.effect import (
+    Candidate,
+    Effect,
+    Origin,
+    Parameter,
+    alternatives,
+)
 from postproc.model.kinematics import Batch
 
 SHIFT, TURN = 1e-4, 5e-5  # [m], [rad]
 AXES = "xyz"
+STEPS = 48  # moments at which a step is tried
+EDGE = 10  # rows before and after a step that must show it
+
+
+def moments(batch: Batch) -> Floats:
+    """List the places in the visit order at which a step is tried; none of few rows."""
+    order = np.sort(batch.states.order)
+    if len(order) < 3 * EDGE:
+        return np.zeros(0)
+    places = np.unique(np.linspace(EDGE, len(order) - EDGE, STEPS).astype(int))
+    return np.asarray(order[places])
+
+
+def moments_near(row: float, offsets: Floats, batch: Batch) -> Floats:
+    """List the places near one, offsets (k,) in steps of `moments`."""
+    order = np.sort(batch.states.order)
+    half = max(len(order) / STEPS, 1.0)
+    near = np.searchsorted(order, row) + np.round(half * offsets).astype(int)
+    return np.asarray(order[np.unique(np.clip(near, 1, len(order) - 1))])
 
 
 def rigid_columns(batch: Batch) -> Floats:
@@ -43,6 +68,20 @@ class BaseShift(Effect):
     name: ClassVar[str] = "base_shift"
 
     row: float = 0.0
+
+    @classmethod
+    def candidates(cls, batch: Batch) -> list[Candidate]:
+        """Try moments all along the campaign."""
+        return alternatives([(cls(float(r)), "order") for r in moments(batch)])
+
+    def refined(self, offsets: Floats, batch: Batch) -> list[Effect]:
+        """Move the moment."""
+        rows = moments_near(self.row, offsets, batch)
+        return [replace(self, row=float(r)) for r in rows]
+
+    def nonlinear(self) -> dict[str, tuple[float, str]]:
+        """Tell the moment."""
+        return {"row": (float(self.row), "rows")}
 
     def belongs_to(self) -> Origin:
         """Say that it is the set-up's."""

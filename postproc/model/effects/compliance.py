@@ -8,7 +8,13 @@ from typing import ClassVar
 import numpy as np
 
 from postproc.arrays import Floats
-from postproc.model.effects.effect import JointEffect, Parameter
+from postproc.model.covariate import carrying
+from postproc.model.effects.effect import (
+    Candidate,
+    JointEffect,
+    Parameter,
+    alternatives,
+)
 from postproc.model.kinematics import Batch
 from postproc.robot.arm import Arm
 
@@ -67,6 +73,16 @@ class Compliance(JointEffect):
         """Let the joints yield that carry weight."""
         carried = getattr(states, "payload", np.zeros(0))
         return cls.on(arm, (2, 3, 5), bool(np.nan_to_num(carried).any()))
+
+    @classmethod
+    def candidates(cls, batch: Batch) -> list[Candidate]:
+        """Try every joint that carries weight."""
+        loaded = bool(np.nan_to_num(batch.states.payload).any())
+        return [
+            c
+            for j in carrying(batch)
+            for c in alternatives([(cls.on(batch.arm, (j,), loaded), f"torque {j}")], j)
+        ]
 
     def parameters(self) -> tuple[Parameter, ...]:
         """Name softness, and moments over stiffness, joint by joint."""

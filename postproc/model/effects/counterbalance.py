@@ -2,16 +2,28 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
 
 from postproc.arrays import Floats
-from postproc.model.effects.effect import JointEffect, Parameter
+from postproc.model.effects.effect import (
+    Candidate,
+    Effect,
+    JointEffect,
+    Parameter,
+    alternatives,
+)
 from postproc.model.kinematics import Batch
 
 SCALE = 2e-4  # [rad] at the spring's largest torque
+SPRINGS = tuple(
+    (ratio, float(np.radians(upright)), preload)
+    for ratio in (0.25, 0.4, 0.6)
+    for upright in (-12.0, -6.0, 0.0, 6.0, 12.0)
+    for preload in (0.05, 0.3)
+)  # springs that a search tries
 
 
 @dataclass(frozen=True)
@@ -33,6 +45,24 @@ class Counterbalance(JointEffect):
     ratio: float = 0.4
     upright: float = 0.0
     preload: float = 0.2
+
+    @classmethod
+    def candidates(cls, batch: Batch) -> list[Candidate]:
+        """Try springs of usual proportions."""
+        return alternatives([(cls(*spring), "joint 2") for spring in SPRINGS], 2)
+
+    def refined(self, offsets: Floats, batch: Batch) -> list[Effect]:
+        """Turn the spring, and change its pins and its preload."""
+        turned = [replace(self, upright=float(self.upright + 0.1 * x)) for x in offsets]
+        ratio = [replace(self, ratio=float(self.ratio * 1.5**x)) for x in offsets]
+        ratio = [e for e in ratio if 0.1 < e.ratio < 0.9]
+        loaded = [replace(self, preload=float(self.preload * 3.0**x)) for x in offsets]
+        return [*turned, *ratio, *loaded]
+
+    def nonlinear(self) -> dict[str, tuple[float, str]]:
+        """Tell how the spring sits."""
+        upright = float(self.upright) * float(np.degrees(1.0))
+        return {"pin_ratio": (float(self.ratio), "1"), "upright": (upright, "deg")}
 
     def parameters(self) -> tuple[Parameter, ...]:
         """Name the size, at u = 90 deg."""

@@ -8,10 +8,17 @@ from typing import ClassVar
 import numpy as np
 
 from postproc.arrays import Floats
-from postproc.model.effects.effect import JointEffect, Parameter
+from postproc.model.effects.effect import (
+    Candidate,
+    JointEffect,
+    Parameter,
+    alternatives,
+)
 from postproc.model.kinematics import Batch
 
 SCALE = 5e-5  # [rad/rad]
+HOLLOW_WRIST = ((3, 2), (5, 4), (6, 4), (6, 5))  # receiving, driving
+TRIED = (*HOLLOW_WRIST, (2, 3), (4, 5), (4, 6), (5, 6))
 
 
 @dataclass(frozen=True)
@@ -24,7 +31,16 @@ class Coupling(JointEffect):
 
     name: ClassVar[str] = "coupling"
 
-    pairs: tuple[tuple[int, int], ...] = ((3, 2), (5, 4), (6, 4), (6, 5))
+    pairs: tuple[tuple[int, int], ...] = HOLLOW_WRIST
+
+    @classmethod
+    def candidates(cls, batch: Batch) -> list[Candidate]:
+        """Try neighbours, both ways; what drives a joint is part of the name."""
+        out = []
+        for pair in TRIED:
+            driver = f"joint {pair[1]}"
+            out += alternatives([(cls((pair,)), driver)], pair[0], driver)
+        return out
 
     def parameters(self) -> tuple[Parameter, ...]:
         """Name one factor per pair: c<receiving>_<driving>."""

@@ -3,18 +3,28 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import product
-from typing import ClassVar
+from itertools import combinations, product
+from typing import ClassVar, Self
 
 import numpy as np
 
 from postproc.arrays import Floats
-from postproc.model.covariate import covariate
-from postproc.model.effects.effect import Effect, Origin, Parameter, fade
+from postproc.model.covariate import JOINTS, PLAIN, carrying, covariate, varies
+from postproc.model.effects.effect import (
+    FREE,
+    Candidate,
+    Effect,
+    Family,
+    Origin,
+    Parameter,
+    fade,
+)
 from postproc.model.kinematics import Batch
 
 TURN, SHIFT = 1e-4, 1e-4  # [rad], [m]
 TERMS_ALONE, TERMS_OF_TWO, TERMS_OF_WHOLE = 8, 3, 5
+ANGLES = tuple(f"joint {j}" for j in JOINTS)
+FRAMES = tuple(f"{frame} {axis}" for frame in ("base", "tool") for axis in "xyz")
 
 
 @dataclass(frozen=True)
@@ -36,6 +46,7 @@ class Curve(Effect):
     """
 
     name: ClassVar[str] = "curve"
+    nameless: ClassVar[bool] = True
 
     direction: str = "joint 1"
     source: tuple[str, ...] = ("joint 1",)
@@ -43,6 +54,91 @@ class Curve(Effect):
     upper: tuple[float, ...] = (np.pi,)
     signed: bool = False
     whole: bool = False
+
+    @classmethod
+    def candidates(cls, batch: Batch) -> list[Candidate]:
+        """Try every covariate and pair of joints, along every joint and frame axis."""
+        passing = [name for name in PLAIN if varies(covariate(batch, name))]
+        if "time" in passing and "order" in passing:
+            passing.remove("order")  # they tell the same
+        out = []
+        for j in JOINTS:
+            out += cls._plain_of_joint(batch, j, passing)
+            out += cls._signed_of_joint(batch, j, passing)
+            pairs = combinations(ANGLES, 2)
+            out += [cls._candidate(batch, f"joint {j}", pair) for pair in pairs]
+        for axis in FRAMES:
+            out += [
+                cls._candidate(batch, axis, (name,)) for name in (*passing, *ANGLES)
+            ]
+        return out
+
+    @classmethod
+    def _plain_of_joint(
+        cls, batch: Batch, joint: int, passing: list[str]
+    ) -> list[Candidate]:
+        """Turn a joint whatever side it comes from."""
+        torques = [f"torque {k}" for k in carrying(batch)]
+        alone = [name for name in ANGLES if name != f"joint {joint}"]
+        return [
+            cls._candidate(batch, f"joint {joint}", (name,))
+            for name in (*alone, *passing, *torques)
+        ]
+
+    @classmethod
+    def _signed_of_joint(
+        cls, batch: Batch, joint: int, passing: list[str]
+    ) -> list[Candidate]:
+        """Turn a joint this way or that with its side, or with what was before."""
+        where, out = f"joint {joint}", []
+        names = ["speed"] if "speed" in passing else []
+        names += [f"torque {joint}"] if joint in carrying(batch) else []
+        if varies(covariate(batch, f"travel {joint}")):
+            names.append(f"travel {joint}")
+            both = (f"travel {joint}", f"loop {joint}")  # the last two reversals
+            out.append(cls._candidate(batch, where, both, signed=True, whole=True))
+        names += [name for name in ANGLES if name != where]
+        out += [cls._candidate(batch, where, (name,), signed=True) for name in names]
+        if np.ptp(batch.states.direction[:, joint - 1]) > 0:
+            before = (f"before {joint}",)
+            out += [
+                cls._candidate(batch, where, before, side) for side in (False, True)
+            ]
+        return out
+
+    @classmethod
+    def _candidate(
+        cls,
+        batch: Batch,
+        direction: str,
+        source: tuple[str, ...],
+        signed: bool = False,
+        whole: bool = False,
+    ) -> Candidate:
+        """Make the candidate of some covariates in one direction."""
+        effect = cls.over(batch, direction, source, signed, whole)
+        kind, _, which = direction.partition(" ")
+        joint = int(which) if kind == "joint" else None
+        driver = " x ".join(source)
+        label = f"lambda x {driver}" if signed else driver
+        along = direction if joint is None else None
+        family = Family(cls.name, joint, label, FREE, along)
+        return Candidate(family, effect, driver, 0.0)
+
+    @classmethod
+    def over(
+        cls,
+        batch: Batch,
+        direction: str,
+        source: tuple[str, ...],
+        signed: bool,
+        whole: bool,
+    ) -> Self:
+        """Make the curve over the surveyed ranges of its covariates."""
+        values = [covariate(batch, name) for name in source]
+        lower = tuple(float(np.nanmin(v)) for v in values)
+        upper = tuple(float(np.nanmax(v)) for v in values)
+        return cls(direction, source, lower, upper, signed, whole)
 
     def belongs_to(self) -> Origin:
         """Follow the covariate: what only a survey has is never compensated."""

@@ -7,6 +7,7 @@ as actual minus nominal TCP position for the commanded joints, in the base frame
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from functools import cached_property
 from typing import Any, ClassVar, Literal, Self
@@ -15,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from postproc.arrays import Floats
+from postproc.model.covariate import covariate
 from postproc.model.kinematics import Batch
 from postproc.robot.arm import Arm
 from postproc.robot.state import States
@@ -47,18 +49,47 @@ class Parameter:
 class Effect(ABC):
     """One cause of error. Subclasses are frozen dataclasses of plain settings.
 
+    Everything that a fit, a search and a report must know of an effect stands in its
+    own class; they ask for it here, of all effects alike.
+
     Class attributes:
         name: Name in model files and reports.
         direct: True where the effect is odd in the arrival direction.
+        variation_of: Name of the plainer effect that a search takes first.
+        nameless: True where finding it says no more than that something is there.
     """
 
     name: ClassVar[str]
     direct: ClassVar[bool] = False
+    variation_of: ClassVar[str | None] = None
+    nameless: ClassVar[bool] = False
 
     @classmethod
     def propose(cls, arm: Arm, states: States) -> Self:
         """Make the effect with the settings that fit an arm and a survey."""
         return cls()
+
+    @classmethod
+    def candidates(cls, batch: Batch) -> list[Candidate]:
+        """List what a search may try of it, a grid over what is not linear.
+
+        Args:
+            batch: The surveyed states, for ranges and for what was recorded.
+        """
+        return []
+
+    def refined(self, offsets: Floats, batch: Batch) -> list[Effect]:
+        """Vary what is not linear in it; nothing where there is nothing finer.
+
+        Args:
+            offsets: How far, in steps of the grid of `candidates`.
+            batch: The surveyed states, for ranges.
+        """
+        return []
+
+    def plainer(self) -> Effect:
+        """Return what is taken instead where it explains hardly less."""
+        return self
 
     def belongs_to(self) -> Origin:
         """Say whose error it is.
@@ -92,6 +123,10 @@ class Effect(ABC):
     def settings(self) -> dict[str, Any]:
         """Return the settings as plain data, for a model file."""
         return {f.name: getattr(self, f.name) for f in fields(self)}
+
+    def nonlinear(self) -> dict[str, tuple[float, str]]:
+        """List the settings that are not linear: value and unit, as people use them."""
+        return {}
 
 
 @dataclass(frozen=True)
@@ -141,6 +176,99 @@ class JointEffect(Effect):
         )
         columns = [np.flatnonzero(nth == k) for k in range(nth.max(initial=-1) + 1)]
         return [(acts_on[c], c) for c in columns]
+
+
+# What a search may try of an effect.
+
+NAMED, FREE = 0, 1
+
+
+@dataclass(frozen=True)
+class Family:
+    """What a person calls one cause: candidates of a family differ in settings only.
+
+    Attributes:
+        effect: Name of the effect.
+        joint: Joint 1 to 6 that it acts on, or None.
+        driver: What drives it where that is part of the name (``joint 5`` of a
+            coupling, the covariates of a curve), or None.
+        tier: NAMED for physics, FREE for functions that may have any shape.
+        along: Axis ``base x`` .. ``tool z`` that it moves the TCP along, or None.
+    """
+
+    effect: str
+    joint: int | None
+    driver: str | None
+    tier: int
+    along: str | None = None
+
+    def __str__(self) -> str:
+        where = "" if self.joint is None else f" of joint {self.joint}"
+        by = "" if self.driver is None else f" by {self.driver}"
+        along = "" if self.along is None else f" along {self.along}"
+        return f"{self.effect}{where}{by}{along}"
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """One effect to try, with all its settings.
+
+    Attributes:
+        family: Its family.
+        effect: The effect with its settings.
+        source: Covariate that reveals it, for the report.
+        log_prior: Log of its share of the family: a grid shares what the family has.
+    """
+
+    family: Family
+    effect: Effect
+    source: str
+    log_prior: float
+
+    @cached_property
+    def width(self) -> int:
+        """Number of columns."""
+        return len(self.effect.parameters())
+
+    @cached_property
+    def names(self) -> frozenset[str]:
+        """Names of its parameters in a model."""
+        effect = self.effect
+        return frozenset(f"{effect.name}.{p.name}" for p in effect.parameters())
+
+    @property
+    def in_time(self) -> bool:
+        """Whether what drives it passes with time rather than from pose to pose."""
+        return self.source in ("order", "time", "temperature")
+
+    def driver(self, batch: Batch) -> Floats:
+        """Return the covariate along which the candidate varies, (n,)."""
+        name = "order" if self.in_time else self.source.split(" x ")[0]
+        return np.nan_to_num(covariate(batch, name))
+
+
+def alternatives(
+    members: Sequence[tuple[Effect, str]],
+    joint: int | None = None,
+    driver: str | None = None,
+    tier: int = NAMED,
+) -> list[Candidate]:
+    """Make the candidates of one family, each with an equal share of its prior.
+
+    Args:
+        members: Effects of one name, each with the covariate that reveals it.
+        joint: Joint 1 to 6 that all of them act on, or None.
+        driver: What drives them where that is part of the name.
+        tier: NAMED or FREE.
+    """
+    share = -float(np.log(max(len(members), 1)))
+    return [
+        Candidate(Family(effect.name, joint, driver, tier), effect, source, share)
+        for effect, source in members
+    ]
+
+
+# Free-form parts end where the survey did.
 
 
 def fade(x: Floats, lower: Floats, upper: Floats) -> Floats:

@@ -8,7 +8,15 @@ from typing import ClassVar, Self
 import numpy as np
 
 from postproc.arrays import Floats
-from postproc.model.effects.effect import JointEffect, Parameter
+from postproc.model.covariate import JOINTS
+from postproc.model.effects.effect import (
+    FREE,
+    Candidate,
+    Effect,
+    JointEffect,
+    Parameter,
+    alternatives,
+)
 from postproc.model.kinematics import Batch
 from postproc.robot.arm import Arm
 from postproc.robot.state import States
@@ -16,6 +24,10 @@ from postproc.robot.state import States
 SCALE = 1e-4  # [rad]
 SPACING = 1.5  # distance of the bumps of a map, in their widths
 KNOTS = 24  # bumps over the range of a joint that is mapped
+KNOTS_TRIED = (12, 24, 48)
+ROWS_PER_KNOT = 12
+SPOTS = tuple(np.radians([3.0, 6.0, 12.0]))  # widths of a worn spot that are tried
+MOST_OF_A_SPOT = 9  # bumps: more are a map of the whole joint, with no one place
 
 
 @dataclass(frozen=True)
@@ -53,6 +65,69 @@ class JointMap(JointEffect):
             for c in np.arange(low[j], high[j] + width, SPACING * width)
         ]
         return cls(tuple(bumps), width)
+
+    @classmethod
+    def candidates(cls, batch: Batch) -> list[Candidate]:
+        """Try a worn spot anywhere, and free maps of a joint's whole range."""
+        return [
+            c
+            for j in JOINTS
+            for c in (
+                *alternatives(cls._spots(batch, j), j),
+                *alternatives(cls._maps(batch, j), j, tier=FREE),
+            )
+        ]
+
+    @classmethod
+    def _spots(cls, batch: Batch, joint: int) -> list[tuple[Effect, str]]:
+        """List single bumps all along a joint."""
+        q = batch.states.q[:, joint - 1]
+        return [
+            (cls(((joint, float(c)),), float(w)), f"joint {joint}")
+            for w in SPOTS
+            for c in np.arange(q.min(), q.max() + w, w)
+        ]
+
+    @classmethod
+    def _maps(cls, batch: Batch, joint: int) -> list[tuple[Effect, str]]:
+        """List smooth maps of one joint's own angle, as fine as the rows allow."""
+        q = batch.states.q[:, joint - 1]
+        return [
+            (cls.over(joint, float(q.min()), float(q.max()), k), f"joint {joint}")
+            for k in KNOTS_TRIED
+            if k == KNOTS_TRIED[0] or ROWS_PER_KNOT * k <= len(q)
+        ]
+
+    def refined(self, offsets: Floats, batch: Batch) -> list[Effect]:
+        """Move and widen a spot, and give it a shape of its own."""
+        if len(self.bumps) != 1:
+            return []
+        ((joint, centre),) = self.bumps
+        each = self.width * 2.0 ** np.array([-0.5, -0.25, 0.0, 0.25, 0.5])
+        moved = centre + self.width * offsets
+        single = [JointMap(((joint, float(c)),), float(w)) for c in moved for w in each]
+        return [*single, *(self._shaped(half) for half in (2, 4))]
+
+    def _shaped(self, half: int) -> JointMap:
+        """Replace a spot by narrower bumps over the same place, 2 half + 1 of them."""
+        ((joint, centre),) = self.bumps
+        reach = 2.0 * self.width
+        places = centre + reach * np.arange(-half, half + 1) / half
+        bumps = tuple((joint, float(c)) for c in places)
+        return JointMap(bumps, float(reach / half / SPACING))
+
+    def nonlinear(self) -> dict[str, tuple[float, str]]:
+        """Tell where a spot is and how wide; a whole map has no one place."""
+        if not 0 < len(self.bumps) <= MOST_OF_A_SPOT:
+            return {}
+        places = np.degrees([centre for _, centre in self.bumps])
+        out = {
+            "centre": (float(places.mean()), "deg"),
+            "width": (float(np.degrees(self.width)), "deg"),
+        }
+        if len(places) > 1:
+            out["reach"] = (float(np.ptp(places)), "deg")
+        return out
 
     def parameters(self) -> tuple[Parameter, ...]:
         """Name the height of every bump by its place in degrees."""

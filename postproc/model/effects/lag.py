@@ -8,7 +8,13 @@ from typing import ClassVar
 import numpy as np
 
 from postproc.arrays import Floats
-from postproc.model.effects.effect import JointEffect, Parameter
+from postproc.model.covariate import JOINTS, varies
+from postproc.model.effects.effect import (
+    Candidate,
+    JointEffect,
+    Parameter,
+    alternatives,
+)
 from postproc.model.kinematics import Batch
 
 SCALE = 2e-4  # [rad s/m]
@@ -25,7 +31,14 @@ class Lag(JointEffect):
     name: ClassVar[str] = "lag"
     direct: ClassVar[bool] = True
 
-    joints: tuple[int, ...] = (1, 2, 3, 4, 5, 6)
+    joints: tuple[int, ...] = JOINTS
+
+    @classmethod
+    def candidates(cls, batch: Batch) -> list[Candidate]:
+        """Try every joint, where the speed varies."""
+        if not varies(batch.states.speed):
+            return []
+        return [c for j in JOINTS for c in alternatives([(cls((j,)), "speed")], j)]
 
     def requires(self) -> tuple[str, ...]:
         """Need the speed."""

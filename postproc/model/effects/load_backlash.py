@@ -2,19 +2,28 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar, Literal, Self
 
 import numpy as np
 
 from postproc.arrays import Floats
-from postproc.model.effects.effect import JointEffect, Parameter
+from postproc.model.covariate import carrying
+from postproc.model.effects.effect import (
+    Candidate,
+    Effect,
+    JointEffect,
+    Parameter,
+    alternatives,
+)
 from postproc.model.kinematics import Batch
 from postproc.robot.arm import Arm
 from postproc.robot.state import States
 
 SCALE = 1e-4  # [rad] at the threshold torque
 UNSURE = 0.2  # of the power of the load, and of torque against t0
+FLANKS = (0.1, 0.3, 0.8)  # of the usual torque: t0 that are tried
+STRAIGHT = 3.0  # of it: the law is nearly proportional
 
 
 @dataclass(frozen=True)
@@ -33,6 +42,7 @@ class LoadBacklash(JointEffect):
 
     name: ClassVar[str] = "load_backlash"
     direct: ClassVar[bool] = True
+    variation_of: ClassVar[str | None] = "backlash"
 
     joints: tuple[int, ...] = (2, 3, 5)
     form: Literal["load", "signed", "gravity_side"] = "load"
@@ -43,6 +53,30 @@ class LoadBacklash(JointEffect):
         """Take the typical torque of the joints that carry weight."""
         torque = np.abs(arm.gravity_torque(states.q)[:, [1, 2, 4]])
         return cls(t0=max(float(np.median(torque)), 1.0))
+
+    @classmethod
+    def candidates(cls, batch: Batch) -> list[Candidate]:
+        """Try all forms at every joint that carries weight."""
+        torque = np.abs(batch.loads.gravity + batch.loads.payload)
+        typical = np.median(torque, axis=0)
+        out = []
+        for j in carrying(batch):
+            t0 = max(float(typical[j - 1]), 1e-3)
+            laws = [cls((j,), "load", t0)]
+            laws += [cls((j,), "gravity_side", k * t0) for k in FLANKS]
+            laws += [cls((j,), "signed", k * t0) for k in (*FLANKS, STRAIGHT)]
+            out += alternatives([(law, f"torque {j}") for law in laws], j)
+        return out
+
+    def refined(self, offsets: Floats, batch: Batch) -> list[Effect]:
+        """Change the torque at which the flank changes."""
+        if self.form == "load":
+            return []
+        return [replace(self, t0=float(self.t0 * 3.0**x)) for x in offsets]
+
+    def nonlinear(self) -> dict[str, tuple[float, str]]:
+        """Tell the torque."""
+        return {"t0": (float(self.t0), "N m")}
 
     def parameters(self) -> tuple[Parameter, ...]:
         """Name size and correction of the law, joint by joint."""

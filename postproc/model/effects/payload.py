@@ -8,8 +8,15 @@ from typing import ClassVar
 import numpy as np
 
 from postproc.arrays import Floats
+from postproc.model.covariate import carrying, varies
 from postproc.model.effects.compliance import AXES, SCALE, UNSURE_PAYLOAD
-from postproc.model.effects.effect import JointEffect, Origin, Parameter
+from postproc.model.effects.effect import (
+    Candidate,
+    JointEffect,
+    Origin,
+    Parameter,
+    alternatives,
+)
 from postproc.model.kinematics import Batch
 
 UNSURE_LEVER = 0.5  # [m] along the links of an arm of this size
@@ -30,6 +37,17 @@ class Payload(JointEffect):
     name: ClassVar[str] = "payload"
 
     joints: tuple[int, ...] = (2, 3, 5)
+
+    @classmethod
+    def candidates(cls, batch: Batch) -> list[Candidate]:
+        """Try every joint that carries weight, where the payload varies."""
+        if not varies(batch.states.payload):
+            return []
+        return [
+            c
+            for j in carrying(batch)
+            for c in alternatives([(cls((j,)), "payload")], j)
+        ]
 
     def belongs_to(self) -> Origin:
         """Say that it is of the state: the cell declares the payload."""

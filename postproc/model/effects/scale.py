@@ -6,7 +6,13 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from postproc.arrays import Floats
-from postproc.model.effects.effect import JointEffect, Parameter
+from postproc.model.covariate import JOINTS
+from postproc.model.effects.effect import (
+    Candidate,
+    JointEffect,
+    Parameter,
+    alternatives,
+)
 from postproc.model.kinematics import Batch
 
 SCALE = 5e-5  # [rad/rad]
@@ -22,7 +28,12 @@ class Scale(JointEffect):
 
     name: ClassVar[str] = "scale"
 
-    joints: tuple[int, ...] = (1, 2, 3, 4, 5, 6)
+    joints: tuple[int, ...] = JOINTS
+
+    @classmethod
+    def candidates(cls, batch: Batch) -> list[Candidate]:
+        """Try every joint."""
+        return [c for j in JOINTS for c in alternatives([(cls((j,)), f"joint {j}")], j)]
 
     def parameters(self) -> tuple[Parameter, ...]:
         """Name one gain per joint."""

@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar, Literal, Self
 
 import numpy as np
 
 from postproc.arrays import Floats
-from postproc.model.effects.effect import Effect, Origin, Parameter
+from postproc.model.covariate import varies
+from postproc.model.effects.effect import (
+    Candidate,
+    Effect,
+    Origin,
+    Parameter,
+    alternatives,
+)
 from postproc.model.kinematics import Batch
 from postproc.robot.arm import Arm
 from postproc.robot.state import States
@@ -17,6 +24,7 @@ STEEL = 12e-6  # [1/K] linear expansion
 WARM_UP = 10.0  # [K] usual rise inside an arm that starts cold
 UNSURE = 0.7  # share by which a length differs from the common growth
 SHORT = 1e-3  # [m] what has no length does not grow
+WARM_UPS = (0.1, 0.2, 0.4, 0.8)  # of the campaign's length: time constants tried
 
 
 @dataclass(frozen=True)
@@ -53,6 +61,34 @@ class Thermal(Effect):
         return cls(
             lengths, form="time", time_constant=span / 4, start=float(time.min())
         )
+
+    @classmethod
+    def candidates(cls, batch: Batch) -> list[Candidate]:
+        """Try growth with the recorded temperature, and along a warm-up."""
+        lengths, states = growing(batch.arm), batch.states
+        members: list[tuple[Effect, str]] = []
+        if varies(states.temperature):
+            middle = float(np.mean(states.temperature))
+            members.append((cls(lengths, reference=middle), "temperature"))
+        if varies(states.time):
+            span = float(np.ptp(states.time))
+            cold = cls(lengths, form="time", start=float(states.time.min()))
+            warm = (replace(cold, time_constant=k * span) for k in WARM_UPS)
+            members += [(effect, "time") for effect in warm]
+        return alternatives(members)
+
+    def refined(self, offsets: Floats, batch: Batch) -> list[Effect]:
+        """Change how fast the arm warms up."""
+        if self.form == "temperature":
+            return []
+        each = [float(self.time_constant * 2.0**x) for x in offsets]
+        return [replace(self, time_constant=c) for c in each]
+
+    def nonlinear(self) -> dict[str, tuple[float, str]]:
+        """Tell how fast the arm warms up."""
+        if self.form == "temperature":
+            return {}
+        return {"time_constant": (float(self.time_constant), "s")}
 
     def belongs_to(self) -> Origin:
         """Say that it is of the state: the cell declares the temperature."""

@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
 
 from postproc.arrays import Floats
-from postproc.model.effects.effect import Effect, Origin, Parameter
+from postproc.model.effects.base_shift import moments, moments_near
+from postproc.model.effects.effect import (
+    Candidate,
+    Effect,
+    Origin,
+    Parameter,
+    alternatives,
+)
 from postproc.model.kinematics import Batch
 
 SHIFT, TURN = 1e-4, 2e-4  # [m], [rad]
@@ -30,6 +37,21 @@ class ToolShift(Effect):
 
     row: float = 0.0
     turns: bool = False
+
+    @classmethod
+    def candidates(cls, batch: Batch) -> list[Candidate]:
+        """Try moments all along the campaign."""
+        several = len(np.unique(batch.states.tool.round(6), axis=0)) > 1
+        return alternatives([(cls(float(r), several), "order") for r in moments(batch)])
+
+    def refined(self, offsets: Floats, batch: Batch) -> list[Effect]:
+        """Move the moment."""
+        rows = moments_near(self.row, offsets, batch)
+        return [replace(self, row=float(r)) for r in rows]
+
+    def nonlinear(self) -> dict[str, tuple[float, str]]:
+        """Tell the moment."""
+        return {"row": (float(self.row), "rows")}
 
     def belongs_to(self) -> Origin:
         """Say that it is the set-up's."""

@@ -8,8 +8,19 @@ from typing import ClassVar, Literal, Self
 import numpy as np
 
 from postproc.arrays import Floats
-from postproc.model.effects.base_shift import AXES, rigid_columns, rigid_rotations
-from postproc.model.effects.effect import Effect, Origin, Parameter
+from postproc.model.effects.base_shift import (
+    AXES,
+    moments,
+    rigid_columns,
+    rigid_rotations,
+)
+from postproc.model.effects.effect import (
+    Candidate,
+    Effect,
+    Origin,
+    Parameter,
+    alternatives,
+)
 from postproc.model.kinematics import Batch
 from postproc.robot.arm import Arm
 from postproc.robot.state import States
@@ -47,6 +58,12 @@ class TrackerDrift(Effect):
         if len(passed) == 0:
             return cls()
         return cls(float(passed.min()), max(float(np.ptp(passed)), 1e-9), clock)
+
+    @classmethod
+    def candidates(cls, batch: Batch) -> list[Candidate]:
+        """Try it where the campaign is long enough to tell it from a step."""
+        drift = cls.propose(batch.arm, batch.states)
+        return alternatives([(drift, drift.clock)]) if len(moments(batch)) else []
 
     def belongs_to(self) -> Origin:
         """Say that it is the set-up's."""

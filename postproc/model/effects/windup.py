@@ -2,16 +2,25 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
 
 from postproc.arrays import Floats
-from postproc.model.effects.effect import JointEffect, Parameter
+from postproc.model.covariate import JOINTS, varies
+from postproc.model.effects.effect import (
+    Candidate,
+    Effect,
+    JointEffect,
+    Parameter,
+    alternatives,
+)
 from postproc.model.kinematics import Batch
 
 SCALE = 3e-5  # [rad]
+WAYS = tuple(np.radians([0.5, 1.0, 2.0, 4.0, 7.0]))  # d0 that are tried
+LONGEST = float(np.radians(8.0))  # what fades more slowly is no wind-up
 
 
 @dataclass(frozen=True)
@@ -27,9 +36,29 @@ class Windup(JointEffect):
 
     name: ClassVar[str] = "windup"
     direct: ClassVar[bool] = True
+    variation_of: ClassVar[str | None] = "backlash"
 
-    joints: tuple[int, ...] = (1, 2, 3, 4, 5, 6)
+    joints: tuple[int, ...] = JOINTS
     d0: float = 0.05
+
+    @classmethod
+    def candidates(cls, batch: Batch) -> list[Candidate]:
+        """Try short and long ways at every joint whose travel is known."""
+        out = []
+        for j in JOINTS:
+            if varies(batch.states.travel[:, j - 1]):
+                members = [(cls((j,), float(d0)), f"travel {j}") for d0 in WAYS]
+                out += alternatives(members, j)
+        return out
+
+    def refined(self, offsets: Floats, batch: Batch) -> list[Effect]:
+        """Change the way."""
+        ways = np.unique(np.minimum(self.d0 * 2.0**offsets, LONGEST))
+        return [replace(self, d0=float(way)) for way in ways]
+
+    def nonlinear(self) -> dict[str, tuple[float, str]]:
+        """Tell the way."""
+        return {"d0": (float(self.d0) * float(np.degrees(1.0)), "deg")}
 
     def parameters(self) -> tuple[Parameter, ...]:
         """Name one size per joint."""

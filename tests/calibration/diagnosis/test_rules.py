@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 
 from postproc.calibration.diagnosis import search
-from postproc.calibration.diagnosis.candidates import FREE, NAMED, Candidate, Family
 from postproc.calibration.diagnosis.held_out import RUN, Gain, deal, held_out_gain
 from postproc.calibration.diagnosis.library import Library, Projection
 from postproc.calibration.diagnosis.score import Null, Score, bootstrap
 from postproc.calibration.diagnosis.search import NEAR, Search, choose, ranking, stand
 from postproc.calibration.diagnosis.trace import silent
 from postproc.calibration.regression import Fit, fit_effects
+from postproc.model.effects.effect import FREE, NAMED, Candidate, Family
 from postproc.model.effects.scale import Scale
 from postproc.model.kinematics import Batch
 from tests.calibration.planted import ARM, TRACKER, Campaign, campaign

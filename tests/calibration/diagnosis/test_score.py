@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
 
-from postproc.calibration.diagnosis.candidates import NAMED, Candidate, Family
 from postproc.calibration.diagnosis.held_out import deal, held_out_errors
 from postproc.calibration.diagnosis.library import (
     Library,
@@ -23,6 +22,7 @@ from postproc.calibration.diagnosis.score import (
     rank,
     score_p_value,
 )
+from postproc.model.effects.effect import NAMED, Candidate, Family
 from postproc.model.effects.scale import Scale
 from tests.calibration.planted import campaign
 
