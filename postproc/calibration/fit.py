@@ -27,6 +27,8 @@ from postproc.calibration.selection import fit_survey, model_of
 from postproc.calibration.tables import DETECT, TableFormat
 from postproc.calibration.tool_groups import find_groups
 from postproc.model.combination import Combination
+from postproc.model.effects.placement import Placement
+from postproc.model.effects.probe import Probe
 from postproc.model.effects.tool_shift import ToolShift
 from postproc.model.model import Method, Model
 from postproc.robot.arm import Arm
@@ -91,7 +93,7 @@ def fit_measurements(
     tracker, setup = cell.tracker, several_points(survey)
     if frame == "tracker":
         survey, placed = into_base_frame(survey, cell.arm)
-        tracker, setup = placed.tracker, ("registration",)
+        tracker, setup = placed.tracker, (Placement.name,)
     check_survey(survey, cell.arm)
     survey = check_orientations(survey, cell.arm)
     if method != "full":
@@ -132,7 +134,7 @@ def _at(survey: Measurements, order: float) -> str:
 
 def several_points(survey: Measurements) -> tuple[str, ...]:
     """Name the effect of a probe plate's nests, where there are several."""
-    return ("probe",) if len(np.unique(survey.states.tool_id)) > 1 else ()
+    return (Probe.name,) if len(np.unique(survey.states.tool_id)) > 1 else ()
 
 
 def into_base_frame(

@@ -13,7 +13,8 @@ from postproc.calibration.measurements import Measurements
 from postproc.calibration.orientations import Turns
 from postproc.calibration.regression import Fit, fit_effects
 from postproc.calibration.tool_groups import find_groups
-from postproc.model.effects import BASE_EFFECTS, propose
+from postproc.model.covariate import DRIVERS
+from postproc.model.effects import BASE_EFFECTS, EFFECTS, propose
 from postproc.model.effects.effect import Effect
 from postproc.model.effects.probe_turn import ProbeTurn
 from postproc.model.effects.tool_shift import ToolShift
@@ -30,31 +31,20 @@ from postproc.robot.state import States
 # is left.
 
 ENOUGH = 3.0  # nats that an effect must be worth: 20 to 1
-NAMED = (
-    "compliance",
-    "load_backlash",
-    "counterbalance",
-    "transmission",
-    "scale",
-    "coupling",
-    "windup",
-    "tracker_drift",
-)
 STEPS = 12  # of the search for prior scales, which start near their best
-LONG = 600  # rows from which a joint spline resolves more than a joint map
-VARIES = {"thermal": ("temperature", 1.0), "payload": ("payload", 1.0)}  # [K], [kg]
-FASTER = 0.05  # [m/s] speeds must differ by so much to show a lag
 
 
 def candidates(states: States) -> tuple[str, ...]:
-    """Name the effects whose covariates vary in a survey."""
-    names = list(NAMED)
-    for name, (covariate, least) in VARIES.items():
-        if _span(getattr(states, covariate)) > least:
-            names.append(name)
-    if _span(states.speed) > FASTER:
-        names.append("lag")
-    return tuple(names)
+    """Name the effects that a survey may give evidence for, by what drives them."""
+    tried = [k for k in EFFECTS if k.unasked == "weighed" and k.may_show(states)]
+    tried.sort(key=lambda kind: DRIVERS.index(kind.driven_by))
+    return tuple(kind.name for kind in tried)
+
+
+def free_forms(states: States) -> tuple[str, ...]:
+    """Name the effects without a law that are weighed for what the others leave."""
+    last = [k for k in EFFECTS if k.unasked == "last" and k.may_show(states)]
+    return tuple(kind.name for kind in last)
 
 
 def fit_best(
@@ -77,10 +67,9 @@ def fit_best(
     """
     batch = Batch(arm, states)
     base = propose((*BASE_EFFECTS, *setup), arm, states)
-    free = ("joint_spline",) if len(states) >= LONG else ("joint_map", "elm")
     kept = base
     fitted = fit_effects(batch, position, base, origin, turns=turns)
-    for names in (candidates(states), *((name,) for name in free)):
+    for names in (candidates(states), *((name,) for name in free_forms(states))):
         tried = (*kept, *propose(names, arm, states), *slipped(fitted))
         fitted = fit_effects(batch, position, tried, origin, fitted)
         kept = keep_needed(fitted, always=base)
@@ -151,12 +140,6 @@ def _evidence(
     start = fitted.log_scale[used]
     best = maximise(part, group, start, STEPS)
     return best.log_evidence - 0.5 * float((best.log_scale**2).sum()) / LOG_SPREAD**2
-
-
-def _span(values: Floats) -> float:
-    """Range of the known values."""
-    known = values[~np.isnan(values)]
-    return float(np.ptp(known)) if len(known) else 0.0
 
 
 # The product's own method: a survey becomes a fit of named effects, and a model.

@@ -28,6 +28,7 @@ from postproc.calibration.tables import DETECT, TableFormat
 from postproc.cli.jobs import read_files
 from postproc.compensation.program import Planned, plan_visits, read_program, states_of
 from postproc.exceptions import MeasurementError
+from postproc.model.effects.placement import Placement
 from postproc.model.model import Model, load_model
 from postproc.model.statistics import ErrorStatistics
 from postproc.report.terminal import Column, table_text
@@ -177,7 +178,7 @@ def diagnose_files(
         survey = from_user_frame(survey, cell)
     elif measured_frame == "tracker":
         survey, tracker = from_tracker_frame(survey, cell, model)
-        setup = ("registration",)
+        setup = (Placement.name,)
     found = diagnose(
         survey, cell.arm, model, tracker=tracker, setup=setup, seed=seed,
         progress=progress,
@@ -211,7 +212,7 @@ def from_tracker_frame(
     effects, values, _ = model.compensable()
     placed = register(cell.arm, survey.states, survey.position, effects, values)
     states = survey.states
-    if any(e.name == "registration" for e in model.effects.effects):
+    if any(isinstance(e, Placement) for e in model.effects.effects):
         _, which = np.unique(states.tool_id, return_inverse=True)
         states = states.with_(tool=placed.probes[which])
     position = placed.to_base(survey.position)

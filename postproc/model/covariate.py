@@ -6,12 +6,18 @@ import numpy as np
 
 from postproc.arrays import Floats
 from postproc.model.kinematics import Batch
+from postproc.robot.state import States
 
 JOINT_KINDS = ("joint", "lambda", "before", "travel", "loop", "torque")
 SHORTEST = 1e-4  # [rad] of a way whose logarithm is taken
 PLAIN = ("speed", "payload", "temperature", "time", "order")
+DRIVERS = (
+    "torque", "joint", "lambda", "before", "travel", "loop",
+    "time", "order", "temperature", "payload", "speed",
+)  # fmt: skip
 JOINTS = (1, 2, 3, 4, 5, 6)
 CARRYING = 0.02  # of the largest torque: a joint that carries less cannot yield
+LEAST = {"temperature": 1.0, "payload": 1.0, "speed": 0.05}  # [K], [kg], [m/s]
 
 
 def covariate(batch: Batch, name: str) -> Floats:
@@ -62,6 +68,18 @@ def varies(values: Floats) -> bool:
         and len(values) > 1
         and np.ptp(values) > 1e-9 * max(1.0, float(np.abs(values).max()))
     )
+
+
+def varies_enough(states: States, kind: str) -> bool:
+    """Tell whether rows differ enough in a kind of covariate to show what it drives.
+
+    Angles and their kin always do: no survey determines the geometry otherwise.
+    """
+    if kind not in LEAST:
+        return True
+    values = getattr(states, kind)
+    known = values[~np.isnan(values)]
+    return len(known) > 0 and float(np.ptp(known)) > LEAST[kind]
 
 
 def carrying(batch: Batch) -> tuple[int, ...]:

@@ -3,14 +3,22 @@
 from __future__ import annotations
 
 import json
+from collections import defaultdict
 
 import numpy as np
 import pytest
 
 from postproc.exceptions import PostprocError
 from postproc.model.combination import Combination
-from postproc.model.effects import EFFECTS, propose, restore
-from postproc.model.effects.effect import Effect, JointEffect, fade, fade_turns
+from postproc.model.covariate import DRIVERS
+from postproc.model.effects import BY_NAME, EFFECTS, KNOWN, propose, restore
+from postproc.model.effects.effect import (
+    Effect,
+    Family,
+    JointEffect,
+    fade,
+    fade_turns,
+)
 from postproc.model.kinematics import Batch
 from tests.calibration.simulator import NJ, PLATE, covariates, random_states
 
@@ -19,14 +27,14 @@ STATES = covariates(random_states(40, RNG, PLATE), RNG)
 
 
 def variants() -> list[Effect]:
-    out = list(propose(EFFECTS, NJ, STATES))
-    out.append(EFFECTS["thermal"](form="time", time_constant=100.0))
-    out.append(EFFECTS["load_backlash"](form="gravity_side"))
-    out.append(EFFECTS["tool_shift"](row=20.0, turns=True))
-    out.append(EFFECTS["base_shift"](row=20.0))
-    out.append(EFFECTS["backlash_profile"](constant=True))
+    out = list(propose(KNOWN, NJ, STATES))
+    out.append(BY_NAME["thermal"](form="time", time_constant=100.0))
+    out.append(BY_NAME["load_backlash"](form="gravity_side"))
+    out.append(BY_NAME["tool_shift"](row=20.0, turns=True))
+    out.append(BY_NAME["base_shift"](row=20.0))
+    out.append(BY_NAME["backlash_profile"](constant=True))
     out += [
-        EFFECTS["curve"](direction=d, source=s, lower=(low,), upper=(high,))
+        BY_NAME["curve"](direction=d, source=s, lower=(low,), upper=(high,))
         for d, s, low, high in (
             ("base z", ("time",), 0.0, 400.0),
             ("tool x", ("order",), 0.0, 40.0),
@@ -103,12 +111,30 @@ def test_origins_say_what_may_be_compensated() -> None:
         "registration",
     }  # fmt: skip
     assert {n for n, o in origin.items() if o == "state"} == {"payload", "thermal"}
-    curve = EFFECTS["curve"]
+    curve = BY_NAME["curve"]
     assert curve(source=("order",)).belongs_to() == "setup"
     assert curve(source=("joint 3", "temperature")).belongs_to() == "state"
     assert curve(source=("joint 3",)).belongs_to() == "arm"
-    assert EFFECTS["thermal"]().requires() == ("temperature",)
-    assert EFFECTS["thermal"](form="time").requires() == ()
+    assert BY_NAME["thermal"]().requires() == ("temperature",)
+    assert BY_NAME["thermal"](form="time").requires() == ()
+
+
+@pytest.mark.parametrize("kind", EFFECTS, ids=lambda kind: kind.name)
+def test_what_a_search_tries_of_an_effect_is_that_effect(kind: type[Effect]) -> None:
+    batch, shares = Batch(NJ, STATES), defaultdict[Family, float](float)
+    for c in kind.candidates(batch):
+        assert c.family.effect == kind.name
+        assert {p.joint for p in c.effect.parameters()} == {c.family.joint}
+        assert np.isfinite(c.driver(batch)).all()
+        finer = c.effect.refined(np.linspace(-1.0, 1.0, 9), batch)
+        assert {type(e) for e in (c.effect, c.effect.plainer(), *finer)} == {kind}
+        shares[c.family] += np.exp(c.log_prior)
+    assert np.allclose(list(shares.values()), 1.0)
+    assert kind.driven_by in DRIVERS
+    if kind.variation_of is not None:
+        joints = {f.joint for f in shares}
+        plain = BY_NAME[kind.variation_of].candidates(batch)
+        assert joints <= {c.family.joint for c in plain}
 
 
 def test_an_effect_without_its_covariate_is_refused() -> None:
@@ -146,7 +172,7 @@ def test_joint_errors_are_their_basis_times_the_parameters() -> None:
 
 def test_a_profile_of_some_joints_is_its_harmonics_as_far_as_surveyed() -> None:
     low, high = np.full(6, -1.0), np.full(6, 1.5)
-    effect = EFFECTS["backlash_profile"](
+    effect = BY_NAME["backlash_profile"](
         joints=(2, 5), orders=(4, 1), constant=True, lower=tuple(low), upper=tuple(high)
     )
     q, direction = STATES.q, STATES.direction
@@ -175,7 +201,7 @@ def test_an_angle_fades_as_its_nearest_turn_does() -> None:
 
 
 def test_what_is_known_once_serves_the_same_poses_alone() -> None:
-    effect = EFFECTS["backlash_profile"].propose(NJ, STATES)
+    effect = BY_NAME["backlash_profile"].propose(NJ, STATES)
     one, p = Combination((effect,)), RNG.standard_normal(len(effect.parameters()))
     batch = Batch(NJ, STATES)
     effect.angles(batch, p)

@@ -15,7 +15,7 @@ import pytest
 from postproc.calibration.regression import fit_effects
 from postproc.calibration.selection import fit_survey, model_of
 from postproc.exceptions import ModelError, OutputError
-from postproc.model.effects import BASE_EFFECTS, EFFECTS, propose
+from postproc.model.effects import BASE_EFFECTS, BY_NAME, propose
 from postproc.model.kinematics import Batch
 from postproc.model.model import Model, content_id, load_model
 from postproc.robot.state import make_states
@@ -197,7 +197,7 @@ def test_the_set_up_is_fitted_and_never_compensated() -> None:
     slipped[:150] += 3e-4 * R[:150, :, 0]
     survey = survey_of(states, slipped)
     effects = propose((*BASE_EFFECTS, "tracker_drift"), NJ, states)
-    slip = EFFECTS["tool_shift"](row=150.0)
+    slip = BY_NAME["tool_shift"](row=150.0)
     fit = fit_effects(Batch(NJ, states), slipped, (*effects, slip))
     m = model_of(fit, survey)
     kept, _, _ = m.compensable()

@@ -8,7 +8,7 @@ import pytest
 from postproc.calibration.regression import fit_effects
 from postproc.calibration.selection import model_of
 from postproc.model.combination import Combination
-from postproc.model.effects import BASE_EFFECTS, EFFECTS, propose
+from postproc.model.effects import BASE_EFFECTS, BY_NAME, propose
 from postproc.model.effects.effect import Effect
 from postproc.model.kinematics import Batch
 from postproc.robot.state import States
@@ -46,8 +46,8 @@ def nest_slips(states: States, tcp: np.ndarray) -> np.ndarray:
 
 CASES = {
     "tracker_drift": (stand_moves, None),
-    "base_shift": (base_slips, EFFECTS["base_shift"](row=120.0)),
-    "tool_shift": (nest_slips, EFFECTS["tool_shift"](row=120.0)),
+    "base_shift": (base_slips, BY_NAME["base_shift"](row=120.0)),
+    "tool_shift": (nest_slips, BY_NAME["tool_shift"](row=120.0)),
 }
 
 

@@ -199,7 +199,7 @@ def candidates(batch: Batch) -> list[Candidate]:
     Args:
         batch: The states, kinematics taken at the parameters of a fit.
     """
-    every = [c for kind in EFFECTS.values() for c in kind.candidates(batch)]
+    every = [c for kind in EFFECTS for c in kind.candidates(batch)]
     return sorted(every, key=lambda c: c.family.tier)
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -37,9 +36,13 @@ from postproc.model.effects.windup import Windup
 from postproc.robot.arm import Arm
 from postproc.robot.state import States
 
-# The effects that an arm may have beyond geometry and backlash.
+# Every effect, one line each. Where order matters (messages, the order in which a fit
+# and a search try them), it is this one.
 
-FURTHER: tuple[type[Effect], ...] = (
+EFFECTS: tuple[type[Effect], ...] = (
+    Geometry,
+    Backlash,
+    BacklashProfile,
     Compliance,
     Payload,
     Counterbalance,
@@ -55,26 +58,19 @@ FURTHER: tuple[type[Effect], ...] = (
     TrackerDrift,
     JointMap,
     Curve,
-)
-
-# Effects by name.
-
-KINDS: tuple[type[Effect], ...] = (
-    Geometry,
-    Backlash,
-    BacklashProfile,
-    *FURTHER,
     Probe,
     ProbeTurn,
     Placement,
     JointSpline,
     Elm,
+    ElmMap,
+    Interpolation,
+    Kriging,
 )
-OTHERS: tuple[type[Effect], ...] = (ElmMap, Interpolation, Kriging)
-EFFECTS: dict[str, type[Effect]] = {kind.name: kind for kind in KINDS}
-MAPS: dict[str, type[Effect]] = {kind.name: kind for kind in OTHERS}
 
-BASE_EFFECTS = ("geometry", "backlash", "backlash_profile")
+BY_NAME: dict[str, type[Effect]] = {kind.name: kind for kind in EFFECTS}
+KNOWN = tuple(kind.name for kind in EFFECTS if not kind.published)
+BASE_EFFECTS = tuple(kind.name for kind in EFFECTS if kind.unasked == "always")
 
 
 def propose(names: Iterable[str], arm: Arm, states: States) -> tuple[Effect, ...]:
@@ -86,17 +82,13 @@ def propose(names: Iterable[str], arm: Arm, states: States) -> tuple[Effect, ...
     """
     chosen = tuple(dict.fromkeys(name.strip() for name in names))
     for name in chosen:
-        if name not in EFFECTS:
-            known = ", ".join(EFFECTS)
+        if name not in KNOWN:
+            known = ", ".join(KNOWN)
             raise PostprocError(f"there is no effect {name!r}. Known effects: {known}")
-    effects = tuple(EFFECTS[name].propose(arm, states) for name in chosen)
+    effects = tuple(BY_NAME[name].propose(arm, states) for name in chosen)
     for effect in effects:
         _check_needs(effect, states)
-    if Placement.name not in chosen:
-        return effects
-    return tuple(
-        replace(e, base=False) if isinstance(e, Geometry) else e for e in effects
-    )
+    return tuple(effect.beside(effects) for effect in effects)
 
 
 def _check_needs(kind: Effect, states: States) -> None:
@@ -119,7 +111,7 @@ def restore(name: str, settings: Mapping[str, Any]) -> Effect:
     Raises:
         ValueError: Unknown effect or settings that do not fit it.
     """
-    kind = {**EFFECTS, **MAPS}.get(name)
+    kind = BY_NAME.get(name)
     if kind is None:
         raise ValueError(f"unknown effect {name!r}")
     try:

@@ -11,6 +11,7 @@ from postproc.model.effects.effect import (
     Candidate,
     JointEffect,
     Parameter,
+    Unasked,
     alternatives,
 )
 from postproc.model.kinematics import Batch
@@ -24,6 +25,8 @@ class Backlash(JointEffect):
 
     name: ClassVar[str] = "backlash"
     direct: ClassVar[bool] = True
+    driven_by: ClassVar[str] = "lambda"
+    unasked: ClassVar[Unasked | None] = "always"
 
     joints: tuple[int, ...] = JOINTS
 

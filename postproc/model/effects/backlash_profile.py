@@ -16,6 +16,7 @@ from postproc.model.effects.effect import (
     Candidate,
     JointEffect,
     Parameter,
+    Unasked,
     alternatives,
     fade_turns,
 )
@@ -39,6 +40,8 @@ class BacklashProfile(JointEffect):
 
     name: ClassVar[str] = "backlash_profile"
     direct: ClassVar[bool] = True
+    driven_by: ClassVar[str] = "lambda"
+    unasked: ClassVar[Unasked | None] = "always"
     variation_of: ClassVar[str | None] = "backlash"
 
     joints: tuple[int, ...] = JOINTS

@@ -66,6 +66,7 @@ class BaseShift(Effect):
     """
 
     name: ClassVar[str] = "base_shift"
+    driven_by: ClassVar[str] = "order"
 
     row: float = 0.0
 

@@ -13,6 +13,7 @@ from postproc.model.effects.effect import (
     Candidate,
     JointEffect,
     Parameter,
+    Unasked,
     alternatives,
 )
 from postproc.model.kinematics import Batch
@@ -58,6 +59,8 @@ class Compliance(JointEffect):
     """
 
     name: ClassVar[str] = "compliance"
+    driven_by: ClassVar[str] = "torque"
+    unasked: ClassVar[Unasked | None] = "weighed"
 
     joints: tuple[int, ...] = (2, 3, 5)
     moments: tuple[tuple[tuple[int, float], ...], ...] = ((), (), ())

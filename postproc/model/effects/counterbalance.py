@@ -13,6 +13,7 @@ from postproc.model.effects.effect import (
     Effect,
     JointEffect,
     Parameter,
+    Unasked,
     alternatives,
 )
 from postproc.model.kinematics import Batch
@@ -41,6 +42,7 @@ class Counterbalance(JointEffect):
     """
 
     name: ClassVar[str] = "counterbalance"
+    unasked: ClassVar[Unasked | None] = "weighed"
 
     ratio: float = 0.4
     upright: float = 0.0

@@ -12,6 +12,7 @@ from postproc.model.effects.effect import (
     Candidate,
     JointEffect,
     Parameter,
+    Unasked,
     alternatives,
 )
 from postproc.model.kinematics import Batch
@@ -30,6 +31,7 @@ class Coupling(JointEffect):
     """
 
     name: ClassVar[str] = "coupling"
+    unasked: ClassVar[Unasked | None] = "weighed"
 
     pairs: tuple[tuple[int, int], ...] = HOLLOW_WRIST
 

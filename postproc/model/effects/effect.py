@@ -16,12 +16,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from postproc.arrays import Floats
-from postproc.model.covariate import covariate
+from postproc.model.covariate import covariate, varies_enough
 from postproc.model.kinematics import Batch
 from postproc.robot.arm import Arm
 from postproc.robot.state import States
 
 Origin = Literal["arm", "state", "setup"]
+Unasked = Literal["always", "weighed", "last"]
 
 FAR = 1e3  # [rad] a joint angle that no arm reaches: no range is known
 
@@ -55,19 +56,33 @@ class Effect(ABC):
     Class attributes:
         name: Name in model files and reports.
         direct: True where the effect is odd in the arrival direction.
+        driven_by: Kind of covariate that drives it, one of `covariate.DRIVERS`.
+        unasked: What a fit does with it that is not told which effects to fit:
+            "always" fits it; "weighed" keeps it where the rows speak for it; "last"
+            weighs it alone, for what all others leave. None: it must be asked for.
         variation_of: Name of the plainer effect that a search takes first.
         nameless: True where finding it says no more than that something is there.
+        published: True for what a method of the literature trains: no fit of effects
+            knows it.
     """
 
     name: ClassVar[str]
     direct: ClassVar[bool] = False
+    driven_by: ClassVar[str] = "joint"
+    unasked: ClassVar[Unasked | None] = None
     variation_of: ClassVar[str | None] = None
     nameless: ClassVar[bool] = False
+    published: ClassVar[bool] = False
 
     @classmethod
     def propose(cls, arm: Arm, states: States) -> Self:
         """Make the effect with the settings that fit an arm and a survey."""
         return cls()
+
+    @classmethod
+    def may_show(cls, states: States) -> bool:
+        """Tell whether a survey can show it: what drives it varies enough."""
+        return varies_enough(states, cls.driven_by)
 
     @classmethod
     def candidates(cls, batch: Batch) -> list[Candidate]:
@@ -89,6 +104,10 @@ class Effect(ABC):
 
     def plainer(self) -> Effect:
         """Return what is taken instead where it explains hardly less."""
+        return self
+
+    def beside(self, others: Sequence[Effect]) -> Effect:
+        """Return it as it is fitted beside others, which may hold a part of it."""
         return self
 
     def belongs_to(self) -> Origin:

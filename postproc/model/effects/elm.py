@@ -8,7 +8,15 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from postproc.arrays import Floats
-from postproc.model.effects.effect import FAR, Effect, JointEffect, Parameter, fade
+from postproc.model.effects.effect import (
+    FAR,
+    Effect,
+    JointEffect,
+    Parameter,
+    Unasked,
+    fade,
+)
+from postproc.model.effects.joint_spline import LONG_SURVEY
 from postproc.model.kinematics import Batch
 from postproc.robot.arm import Arm
 from postproc.robot.state import States
@@ -107,6 +115,7 @@ class Elm(JointEffect):
     """
 
     name: ClassVar[str] = "elm"
+    unasked: ClassVar[Unasked | None] = "last"
 
     layer: HiddenLayer
 
@@ -118,6 +127,11 @@ class Elm(JointEffect):
     def propose(cls, arm: Arm, states: States) -> Self:
         """Draw a layer with directions, scaled to the survey."""
         return cls(HiddenLayer.draw(states, NEURONS, SEED, directions=True))
+
+    @classmethod
+    def may_show(cls, states: States) -> bool:
+        """Leave long surveys to the joint spline."""
+        return len(states) < LONG_SURVEY
 
     def parameters(self) -> tuple[Parameter, ...]:
         """Name the output weights, joint by joint."""
@@ -150,6 +164,7 @@ class ElmMap(Effect):
     """
 
     name: ClassVar[str] = "elm_map"
+    published: ClassVar[bool] = True
 
     layer: HiddenLayer
 

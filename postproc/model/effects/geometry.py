@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from typing import ClassVar, Self
 
 import numpy as np
 
 from postproc.arrays import Floats
-from postproc.model.effects.effect import Effect, Parameter
+from postproc.model.effects.effect import Effect, Parameter, Unasked
+from postproc.model.effects.placement import Placement
 from postproc.model.kinematics import Batch, Deviation
 from postproc.robot.arm import Arm
 from postproc.robot.pose import cross
@@ -34,6 +36,7 @@ class Geometry(Effect):
     """
 
     name: ClassVar[str] = "geometry"
+    unasked: ClassVar[Unasked | None] = "always"
 
     beta: tuple[int, ...] = (2, 6)
     base: bool = True
@@ -44,6 +47,11 @@ class Geometry(Effect):
         parallel = np.abs(np.sin(arm.dh.alpha)) < 0.2
         parallel[5] = True
         return cls(beta=tuple(int(j) + 1 for j in np.flatnonzero(parallel)))
+
+    def beside(self, others: Sequence[Effect]) -> Effect:
+        """Leave the base to a registration, which places the base frame by the arm."""
+        placed = any(isinstance(e, Placement) for e in others)
+        return replace(self, base=False) if placed else self
 
     @property
     def links(self) -> list[tuple[int, int]]:

@@ -15,8 +15,10 @@ from postproc.model.effects.effect import (
     Effect,
     JointEffect,
     Parameter,
+    Unasked,
     alternatives,
 )
+from postproc.model.effects.joint_spline import LONG_SURVEY
 from postproc.model.kinematics import Batch
 from postproc.robot.arm import Arm
 from postproc.robot.state import States
@@ -43,6 +45,7 @@ class JointMap(JointEffect):
     """
 
     name: ClassVar[str] = "joint_map"
+    unasked: ClassVar[Unasked | None] = "last"
 
     bumps: tuple[tuple[int, float], ...] = ()
     width: float = 0.1
@@ -65,6 +68,11 @@ class JointMap(JointEffect):
             for c in np.arange(low[j], high[j] + width, SPACING * width)
         ]
         return cls(tuple(bumps), width)
+
+    @classmethod
+    def may_show(cls, states: States) -> bool:
+        """Leave long surveys to the joint spline, which resolves more of them."""
+        return len(states) < LONG_SURVEY
 
     @classmethod
     def candidates(cls, batch: Batch) -> list[Candidate]:

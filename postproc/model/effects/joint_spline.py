@@ -12,7 +12,7 @@ from typing import ClassVar, Self
 import numpy as np
 
 from postproc.arrays import Floats
-from postproc.model.effects.effect import JointEffect, Parameter, fade
+from postproc.model.effects.effect import JointEffect, Parameter, Unasked, fade
 from postproc.model.effects.smooth import smooth_columns, smooth_count
 from postproc.model.kinematics import Batch
 from postproc.robot.arm import Arm
@@ -23,6 +23,7 @@ LONG = np.deg2rad(60.0)
 SHORTEST = np.deg2rad(5.0)
 ROWS_A_LENGTH = 20.0  # rows that the shortest length must see
 LEAST_RANGE = np.deg2rad(10.0)
+LONG_SURVEY = 600  # rows from which it resolves more than a joint map
 
 
 @dataclass(frozen=True)
@@ -36,6 +37,7 @@ class JointSpline(JointEffect):
     """
 
     name: ClassVar[str] = "joint_spline"
+    unasked: ClassVar[Unasked | None] = "last"
 
     joints: tuple[int, ...] = (1, 2, 3, 4, 5, 6)
     lower: tuple[float, ...] = (-np.pi,) * 6
@@ -55,6 +57,11 @@ class JointSpline(JointEffect):
             upper=tuple(map(float, high)),
             lengths=(LONG, short),
         )
+
+    @classmethod
+    def may_show(cls, states: States) -> bool:
+        """Wait for a survey that is long enough."""
+        return len(states) >= LONG_SURVEY
 
     def _parts(self) -> list[tuple[int, float]]:
         """List joints (from 0) with lengths."""

@@ -13,6 +13,7 @@ from postproc.model.effects.effect import (
     Candidate,
     JointEffect,
     Parameter,
+    Unasked,
     alternatives,
 )
 from postproc.model.kinematics import Batch
@@ -30,6 +31,8 @@ class Lag(JointEffect):
 
     name: ClassVar[str] = "lag"
     direct: ClassVar[bool] = True
+    driven_by: ClassVar[str] = "speed"
+    unasked: ClassVar[Unasked | None] = "weighed"
 
     joints: tuple[int, ...] = JOINTS
 

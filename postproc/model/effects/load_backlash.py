@@ -14,6 +14,7 @@ from postproc.model.effects.effect import (
     Effect,
     JointEffect,
     Parameter,
+    Unasked,
     alternatives,
 )
 from postproc.model.kinematics import Batch
@@ -42,6 +43,8 @@ class LoadBacklash(JointEffect):
 
     name: ClassVar[str] = "load_backlash"
     direct: ClassVar[bool] = True
+    driven_by: ClassVar[str] = "torque"
+    unasked: ClassVar[Unasked | None] = "weighed"
     variation_of: ClassVar[str | None] = "backlash"
 
     joints: tuple[int, ...] = (2, 3, 5)

@@ -30,6 +30,7 @@ class Interpolation(Effect):
     """
 
     name: ClassVar[str] = "interpolation"
+    published: ClassVar[bool] = True
 
     points: tuple[tuple[float, ...], ...]
     neighbours: int = 8
@@ -96,6 +97,7 @@ class Kriging(Effect):
     """
 
     name: ClassVar[str] = "kriging"
+    published: ClassVar[bool] = True
 
     centres: tuple[tuple[float, ...], ...]
     lower: tuple[float, ...]

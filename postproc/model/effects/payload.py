@@ -15,6 +15,7 @@ from postproc.model.effects.effect import (
     JointEffect,
     Origin,
     Parameter,
+    Unasked,
     alternatives,
 )
 from postproc.model.kinematics import Batch
@@ -35,6 +36,8 @@ class Payload(JointEffect):
     """
 
     name: ClassVar[str] = "payload"
+    driven_by: ClassVar[str] = "payload"
+    unasked: ClassVar[Unasked | None] = "weighed"
 
     joints: tuple[int, ...] = (2, 3, 5)
 

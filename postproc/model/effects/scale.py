@@ -11,6 +11,7 @@ from postproc.model.effects.effect import (
     Candidate,
     JointEffect,
     Parameter,
+    Unasked,
     alternatives,
 )
 from postproc.model.kinematics import Batch
@@ -27,6 +28,7 @@ class Scale(JointEffect):
     """
 
     name: ClassVar[str] = "scale"
+    unasked: ClassVar[Unasked | None] = "weighed"
 
     joints: tuple[int, ...] = JOINTS
 

@@ -14,6 +14,7 @@ from postproc.model.effects.effect import (
     Effect,
     Origin,
     Parameter,
+    Unasked,
     alternatives,
 )
 from postproc.model.kinematics import Batch
@@ -41,6 +42,8 @@ class Thermal(Effect):
     """
 
     name: ClassVar[str] = "thermal"
+    driven_by: ClassVar[str] = "temperature"
+    unasked: ClassVar[Unasked | None] = "weighed"
 
     lengths: tuple[str, ...] = ("a1", "d1", "a2", "a3", "d4", "d6")
     form: Literal["temperature", "time"] = "temperature"

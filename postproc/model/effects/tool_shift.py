@@ -34,6 +34,7 @@ class ToolShift(Effect):
     """
 
     name: ClassVar[str] = "tool_shift"
+    driven_by: ClassVar[str] = "order"
 
     row: float = 0.0
     turns: bool = False

@@ -19,6 +19,7 @@ from postproc.model.effects.effect import (
     Effect,
     Origin,
     Parameter,
+    Unasked,
     alternatives,
 )
 from postproc.model.kinematics import Batch
@@ -43,6 +44,8 @@ class TrackerDrift(Effect):
     """
 
     name: ClassVar[str] = "tracker_drift"
+    driven_by: ClassVar[str] = "time"
+    unasked: ClassVar[Unasked | None] = "weighed"
 
     start: float = 0.0
     duration: float = 1.0

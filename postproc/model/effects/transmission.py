@@ -16,6 +16,7 @@ from postproc.model.effects.effect import (
     Family,
     JointEffect,
     Parameter,
+    Unasked,
 )
 from postproc.model.kinematics import Batch
 
@@ -36,6 +37,7 @@ class Transmission(JointEffect):
     """
 
     name: ClassVar[str] = "transmission"
+    unasked: ClassVar[Unasked | None] = "weighed"
 
     waves: tuple[tuple[int, float], ...] = tuple(
         (j, float(k)) for j in range(1, 7) for k in (1, 2)

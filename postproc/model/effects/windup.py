@@ -14,6 +14,7 @@ from postproc.model.effects.effect import (
     Effect,
     JointEffect,
     Parameter,
+    Unasked,
     alternatives,
 )
 from postproc.model.kinematics import Batch
@@ -36,6 +37,8 @@ class Windup(JointEffect):
 
     name: ClassVar[str] = "windup"
     direct: ClassVar[bool] = True
+    driven_by: ClassVar[str] = "travel"
+    unasked: ClassVar[Unasked | None] = "weighed"
     variation_of: ClassVar[str | None] = "backlash"
 
     joints: tuple[int, ...] = JOINTS
