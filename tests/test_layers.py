@@ -33,6 +33,22 @@ ONLY = {
     "simulation": LEAVES | {"language", "robot.trajectory"},
 }
 
+# Which modules know one effect in particular: all others take effects as they come.
+KNOWING = {
+    # The others move along the chain that it deviates.
+    "model.combination": {"geometry"},
+    # The native kernel makes its columns and those of the joints itself.
+    "model.model": {"geometry"},
+    # Any survey must determine it, or be refused.
+    "calibration.plausibility": {"geometry"},
+    # What the methods of the literature train.
+    "calibration.published": {"elm", "geometry", "maps"},
+    # How the rows were measured decides: frame, probe points, orientations, a slip.
+    "calibration.fit": {"placement", "probe", "tool_shift"},
+    "calibration.selection": {"probe_turn", "tool_shift"},
+    "cli.diagnose": {"placement"},
+}
+
 # Foreign libraries that every module may use.
 EVERYWHERE = {"numpy", "scipy"}
 
@@ -99,6 +115,17 @@ def test_imports_point_down() -> None:
             if not down or not within(other, ONLY.get(chapter, {first})):
                 wrong.append(f"{name} imports {other}")
     assert not wrong, wrong
+
+
+def test_an_effect_is_known_to_its_own_file_and_to_the_list() -> None:
+    effects = {name for name, _ in modules() if name.startswith("model.effects.")}
+    effects -= {"model.effects.effect"}
+    found = {}
+    for name, path in modules():
+        own = {other.rpartition(".")[2] for other in ours(name, path) & effects}
+        if own and not within(name, {"model.effects"}):
+            found[name] = own
+    assert found == KNOWING
 
 
 def test_no_two_classes_have_one_name() -> None:
