@@ -32,7 +32,7 @@ class Map(Protocol):
 def in_chunks(work: Callable[[slice], T], n: int, size: int = CHUNK) -> list[T]:
     """Do the work on slices of n rows, one after the other.
 
-    >>> in_pieces(lambda rows: (rows.start, rows.stop), 5, 2)
+    >>> in_chunks(lambda rows: (rows.start, rows.stop), 5, 2)
     [(0, 2), (2, 4), (4, 5)]
     """
     return [work(rows) for rows in chunks(n, size)]

@@ -31,7 +31,7 @@ from postproc.exceptions import MeasurementError
 from postproc.model.effects.placement import Placement
 from postproc.model.model import Model, load_model
 from postproc.model.statistics import ErrorStatistics
-from postproc.report.terminal import Column, table_text
+from postproc.report.terminal import Column, folded, table_text
 from postproc.robot.cell import Cell, load_cell
 from postproc.robot.pose import MM, inverse
 
@@ -121,10 +121,11 @@ def _visit_of(places: dict[str, list[int]], key: str, path: Path, line: int) -> 
 
 # Diagnosing files: what is read, written and told.
 
+ADDED = "added"
 HISTORY = (
     Column("model", "left"),
     Column("verdict", "left"),
-    Column("added", "left", fold=True),
+    Column(ADDED, "left"),
     Column("before mm"),
     Column("after mm"),
     Column("rows"),
@@ -308,13 +309,14 @@ def history_text(model_path: Path) -> str:
     model = load_model(model_path)
     if not model.history:
         row = (model.id, "fitted", _named(model), "", "", str(model.rows), "")
-        return table_text(HISTORY, [row])
+        return table_text(HISTORY, folded(HISTORY, [row], ADDED))
     first = str(model.history[0].get("parent", ""))
     made = [*(str(r.get("parent", "")) for r in model.history[1:]), model.id]
     steps = [
         _step(name, record) for name, record in zip(made, model.history, strict=True)
     ]
-    return table_text(HISTORY, [(first, "given", "", "", "", "", ""), *steps])
+    rows = [(first, "given", "", "", "", "", ""), *steps]
+    return table_text(HISTORY, folded(HISTORY, rows, ADDED))
 
 
 def _step(name: str, record: Mapping[str, Any]) -> tuple[str, ...]:

@@ -23,7 +23,7 @@ from postproc.files import VARIABLES, suffix_of
 from postproc.language.visits import ELSEWHERE, START, Visits
 from postproc.model.model import Model, load_model
 from postproc.report.json import target_row
-from postproc.report.terminal import Column, arrows, print_listing, status_colour
+from postproc.report.terminal import Column, arrows, print_table, status_colour
 from postproc.robot.cell import Cell, load_cell
 from postproc.robot.pose import MM
 
@@ -90,7 +90,7 @@ class Explanation:
         rows = self._chosen(line)
         cells = (self._cells(i) for i in rows)
         columns = PLANNED if self.outcome is None else COLUMNS
-        print_listing(columns, cells, {STATUS: status_colour})
+        print_table(columns, cells, {STATUS: status_colour})
         if line is None:
             print(self.summary())
 

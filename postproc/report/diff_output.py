@@ -212,7 +212,7 @@ def print_difference(found: Difference, out: TextIO | None = None) -> None:
     names = {r.file for r in (*found.differing, *found.untouched) if len(r)}
     skip = 0 if len(names) > 1 or any(n.endswith(VARIABLES) for n in names) else 1
     told = bool(found.counts)
-    size = Column("|c| mm" if told else "change mm")
+    size = Column("|c| mm") if told else Column("change mm", "left")
     columns = [*PLACE, *NUMBERS, size, *(TOLD if told else ())]
     writer = _Writer(told, is_coloured(out))
     if found:

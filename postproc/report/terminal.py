@@ -1,10 +1,11 @@
-"""Tables and long listings for a terminal; the only module that imports rich."""
+"""Tables of any length, progress and colours; the only module that imports rich."""
 
 from __future__ import annotations
 
 import io
 import os
 import sys
+import textwrap
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -22,7 +23,6 @@ from rich.progress import (
     TextColumn,
     TimeRemainingColumn,
 )
-from rich.table import Table
 from rich.text import Text
 
 from postproc.arrays import Ints
@@ -30,9 +30,20 @@ from postproc.byte_columns import ByteColumn as Bytes
 from postproc.byte_columns import joined
 from postproc.exceptions import printable
 
-# Tables for a terminal; the only module that imports rich.
+# Tables: aligned, row by row, never held whole.
+#
+# The first rows set the widths; a later cell that is wider widens its column from the
+# next row on. The width of a column at a row is thus the longest cell before it, which
+# is one running maximum.
 
-PLAIN_WIDTH = 200  # of a table that goes to a file or a pipe
+PLAIN_WIDTH = 200  # of a table with a column that folds
+MEASURED = 1000  # rows that the widths of the columns are taken from
+GAP = "  "
+CODES = {"bold": "1", "faint": "2", "red": "31", "yellow": "33", "magenta": "35"}
+ARROWS = {1: "↑", -1: "↓", 0: "·", 2: "↕"}  # 2: arrivals from both sides
+STATUS_COLOURS = {"unsafe": "red", "guarded": "yellow", "display": "magenta"}
+
+Colours = Mapping[str, Callable[[str], str]]
 
 
 @dataclass(frozen=True)
@@ -41,39 +52,212 @@ class Column:
 
     title: str
     justify: Literal["left", "right"] = "right"
-    fold: bool = False
+
+
+@dataclass(frozen=True)
+class Block:
+    """Some rows of a table.
+
+    Attributes:
+        cells: The texts of every column as UTF-8, (k, w) each; coloured in the last
+            column where colours are wanted.
+        lengths: How many characters they have, (k, columns).
+        single: Rows that are given as texts instead, which may be of any kind.
+    """
+
+    cells: Sequence[Bytes]
+    lengths: Ints
+    single: Mapping[int, Sequence[str]] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, rows: Sequence[Sequence[str]], coloured: bool) -> Block:
+        """Take rows of texts; those that must be looked at by themselves stay texts."""
+        single = {
+            k: row
+            for k, row in enumerate(rows)
+            if coloured or not "".join(row).isprintable()
+        }
+        plain = [[""] * len(row) if k in single else row for k, row in enumerate(rows)]
+        columns = [*zip(*plain, strict=True)]
+        encoded = [np.array([t.encode() for t in texts]) for texts in columns]
+        cells = [texts.view(np.uint8).reshape(len(rows), -1) for texts in encoded]
+        lengths = np.array([[*map(len, texts)] for texts in columns]).T
+        return cls(cells, lengths, single)
 
 
 def print_table(
     columns: Sequence[Column],
     rows: Iterable[Sequence[str]],
+    colours: Colours | None = None,
     out: TextIO | None = None,
 ) -> None:
-    """Print an aligned table, coloured only on a terminal.
+    """Print an aligned table of any length; as `print_blocks`.
 
     Args:
         columns: Its columns.
-        rows: The texts of its cells; they are printed as they are, never as markup.
+        rows: The texts of its cells.
+        colours: See `print_blocks`.
         out: Where to; default: stdout.
     """
     out = out or sys.stdout
-    table = Table(box=None, pad_edge=False, header_style="bold")
-    for c in columns:
-        overflow: Literal["fold", "ellipsis"] = "fold" if c.fold else "ellipsis"
-        table.add_column(
-            Text(c.title), justify=c.justify, no_wrap=not c.fold, overflow=overflow
-        )
-    for row in rows:
-        table.add_row(*(Text(printable(cell)) for cell in row))
-    width = None if out.isatty() else PLAIN_WIDTH
-    Console(file=out, width=width, highlight=False).print(table)
+    coloured, given = bool(colours) and is_coloured(out), iter(rows)
+    parts = iter(lambda: list(islice(given, MEASURED)), [])
+    print_blocks(columns, (Block.of(part, coloured) for part in parts), colours, out)
+
+
+def print_blocks(
+    columns: Sequence[Column],
+    blocks: Iterable[Block],
+    colours: Colours | None = None,
+    out: TextIO | None = None,
+) -> None:
+    """Print an aligned table of any length.
+
+    Args:
+        columns: Its columns.
+        blocks: Its rows.
+        colours: Which colour a cell of a column (by title) has; "" for none. Used on
+            a terminal only, and not where NO_COLOR is set.
+        out: Where to; default: stdout.
+    """
+    out = out or sys.stdout
+    coloured = is_coloured(out)
+    shown = (colours or {}) if coloured else {}
+    given = iter(blocks)
+    first, rows = [], 0
+    while rows < MEASURED and (block := next(given, None)):
+        first.append(block)
+        rows += len(block.lengths)
+    titles = [c.title for c in columns]
+    left = [c.justify == "left" for c in columns]
+    layout = _Layout(left, [shown.get(t) for t in titles])
+    widths = layout.measured(titles, first)
+    bold = [(lambda _: "bold") if coloured else None for _ in titles]
+    print(_Layout(left, bold).line(titles, widths), file=out)
+    for block in chain(first, given):
+        text, widths = layout.text(block, widths)
+        out.write(text)
 
 
 def table_text(columns: Sequence[Column], rows: Iterable[Sequence[str]]) -> str:
     """Return a table as text."""
     out = io.StringIO()
-    print_table(columns, rows, out)
-    return "\n".join(line.rstrip() for line in out.getvalue().splitlines())
+    print_table(columns, rows, out=out)
+    return out.getvalue().removesuffix("\n")
+
+
+def folded(
+    columns: Sequence[Column], rows: Sequence[Sequence[str]], title: str
+) -> list[Sequence[str]]:
+    """Fold the cells of a column at words, so that rows are `PLAIN_WIDTH` wide at most.
+
+    Args:
+        columns: The columns of the table.
+        rows: The texts of its cells.
+        title: The column.
+
+    Returns:
+        The rows; what a cell has no room for stands alone in rows below it.
+    """
+    at = [c.title for c in columns].index(title)
+    texts = [[c.title for c in columns], *rows]
+    widest = [max(map(len, column)) for column in zip(*texts, strict=True)]
+    others = sum(widest) - widest[at] + len(GAP) * (len(columns) - 1)
+    width = min(widest[at], max(PLAIN_WIDTH - others, 1))
+    found: list[Sequence[str]] = []
+    for row in rows:
+        first, *more = textwrap.wrap(row[at], width, break_on_hyphens=False) or [""]
+        found.append([*row[:at], first.ljust(width), *row[at + 1 :]])
+        behind = [""] * (len(columns) - at - 1)
+        found += [[*[""] * at, text, *behind] for text in more]
+    return found
+
+
+def is_coloured(out: TextIO) -> bool:
+    """Tell whether colours are wanted there (see https://no-color.org)."""
+    plain = os.environ.get("NO_COLOR") or os.environ.get("TERM") == "dumb"
+    return out.isatty() and not plain
+
+
+def arrows(direction: Iterable[int]) -> str:
+    """Show the direction in which every joint arrives.
+
+    >>> arrows([1, -1, 0, 2])
+    '↑↓·↕'
+    """
+    return "".join(ARROWS[int(d)] for d in direction)
+
+
+def status_colour(cell: str) -> str:
+    """Choose the colour of a cell that begins with a status."""
+    return STATUS_COLOURS.get(cell.partition(":")[0], "")
+
+
+def paint(text: str, colour: str) -> str:
+    """Colour a text; "" leaves it as it is."""
+    return f"\x1b[{CODES[colour]}m{text}\x1b[0m" if colour else text
+
+
+@dataclass(frozen=True)
+class _Layout:
+    """On which side cells stand, and which colour they have.
+
+    A last column whose cells stand on the left has no width: nothing is behind it.
+    """
+
+    left: Sequence[bool]
+    colours: Sequence[Callable[[str], str] | None]
+
+    def measured(self, titles: Sequence[str], blocks: Sequence[Block]) -> Ints:
+        """Return the widths that titles and the first rows ask for."""
+        lengths = [np.array([[len(title) for title in titles]])]
+        for block in blocks:
+            lengths.append(block.lengths.copy())
+            for k, row in block.single.items():
+                lengths[-1][k] = [len(cell) for cell in row]
+        widths: Ints = np.concatenate(lengths)[: MEASURED + 1].max(axis=0)
+        widths[-1] *= not self.left[-1]
+        return widths
+
+    def text(self, block: Block, widths: Ints) -> tuple[str, Ints]:
+        """Write rows; return the widths from there on, too."""
+        lengths = block.lengths.copy()
+        for k, row in block.single.items():
+            lengths[k] = [len(printable(cell)) for cell in row]
+        lengths[:, -1] *= not self.left[-1]
+        wide = np.maximum.accumulate(np.concatenate([widths[None], lengths]))
+        parts: list[Bytes | bytes] = []
+        for number, cells in enumerate(block.cells):
+            parts += [GAP.encode()] if number else []
+            blanks = _blanks(wide[:-1, number] - lengths[:, number])
+            parts += [cells, blanks] if self.left[number] else [blanks, cells]
+        text = joined([*parts, b"\n"]).decode()
+        if block.single or " \n" in text:
+            lines = [*map(str.rstrip, text.split("\n"))]
+            for k, row in block.single.items():
+                lines[k] = self.line(row, wide[k])
+            text = "\n".join(lines)
+        return text, wide[-1]
+
+    def line(self, row: Sequence[str], widths: Ints) -> str:
+        """Write a row of texts."""
+        texts = [printable(cell) for cell in row]
+        cells = []
+        for text, width, left, colour in zip(
+            texts, widths.tolist(), self.left, self.colours, strict=True
+        ):
+            cell = text.ljust(width) if left else text.rjust(width)
+            cells.append(paint(cell, colour(text)) if colour else cell)
+        return GAP.join(cells).rstrip()
+
+
+def _blanks(count: Ints) -> Bytes:
+    """Return so many blanks a row; none for less than one."""
+    most = int(count.max(initial=0))
+    return np.where(np.arange(most) < count[:, None], 32, 0).astype(np.uint8)
+
+
+# How far something is.
 
 
 def show_status(
@@ -142,233 +326,3 @@ class _Rate(ProgressColumn):
     def render(self, task: Task) -> Text:
         """Return the cell."""
         return Text(f"{task.speed:.1f}/s" if task.speed else "")
-
-
-# Long listings for a terminal or a pager: aligned, row by row, never held whole.
-
-MEASURED = 1000  # rows that the widths of the columns are taken from
-BATCH = 500  # lines that are written at a time
-GAP = "  "
-CODES = {"bold": "1", "faint": "2", "red": "31", "yellow": "33", "magenta": "35"}
-ARROWS = {1: "↑", -1: "↓", 0: "·", 2: "↕"}  # 2: arrivals from both sides
-STATUS_COLOURS = {"unsafe": "red", "guarded": "yellow", "display": "magenta"}
-
-Colours = Mapping[str, Callable[[str], str]]
-
-
-def print_listing(
-    columns: Sequence[Column],
-    rows: Iterable[Sequence[str]],
-    colours: Colours | None = None,
-    out: TextIO | None = None,
-) -> None:
-    """Print an aligned table of any length.
-
-    The first rows set the widths; a later cell that is wider widens its column from
-    there on.
-
-    Args:
-        columns: Its columns; the last one is not padded.
-        rows: The texts of its cells.
-        colours: Which colour a cell of a column (by title) has; "" for none. Used on
-            a terminal only, and not where NO_COLOR is set.
-        out: Where to; default: stdout.
-    """
-    out = out or sys.stdout
-    shown = (colours or {}) if is_coloured(out) else {}
-    given = iter(rows)
-    first = list(islice(given, MEASURED))
-    titles = [c.title for c in columns]
-    head = _Layout(columns, {title: lambda _: "bold" for title in titles if shown})
-    body = _Layout(columns, shown)
-    for row in (titles, *first):
-        head.widen(row)
-        body.widen(row)
-    _write(out, chain([head.line(titles)], map(body.line, chain(first, given))))
-
-
-def is_coloured(out: TextIO) -> bool:
-    """Tell whether colours are wanted there (see https://no-color.org)."""
-    plain = os.environ.get("NO_COLOR") or os.environ.get("TERM") == "dumb"
-    return out.isatty() and not plain
-
-
-def arrows(direction: Iterable[int]) -> str:
-    """Show the direction in which every joint arrives.
-
-    >>> arrows([1, -1, 0, 2])
-    '↑↓·↕'
-    """
-    return "".join(ARROWS[int(d)] for d in direction)
-
-
-def status_colour(cell: str) -> str:
-    """Choose the colour of a cell that begins with a status."""
-    return STATUS_COLOURS.get(cell.partition(":")[0], "")
-
-
-def paint(text: str, colour: str) -> str:
-    """Colour a text; "" leaves it as it is."""
-    return f"\x1b[{CODES[colour]}m{text}\x1b[0m" if colour else text
-
-
-class _Layout:
-    """Widths of the columns, and rows written in them."""
-
-    def __init__(self, columns: Sequence[Column], colours: Colours) -> None:
-        self._left = [c.justify == "left" for c in columns]
-        self._colours = [colours.get(c.title) for c in columns]
-        self._plain = not any(self._colours)
-        self._widths = [0] * len(columns)
-        self.widen([""] * len(columns))
-
-    def widen(self, row: Sequence[str]) -> None:
-        """Make room for a row."""
-        lengths = [len(cell) for cell in row[:-1]]
-        self._widths = [*map(max, self._widths, lengths), 0]  # the last is not padded
-        signs = ["-" if left else "" for left in self._left]
-        fields = zip(signs, self._widths, strict=True)
-        self._fields = [f"%{sign}{width}s" for sign, width in fields]
-        self._template = GAP.join(self._fields)
-        self._length = len(self._template % (("",) * len(row)))
-
-    def line(self, row: Sequence[str]) -> str:
-        """Write a row."""
-        line = self._template % tuple(row)
-        if not line.isprintable():
-            row = [printable(cell) for cell in row]
-            line = self._template % tuple(row)
-        if len(line) - len(row[-1]) > self._length:  # a cell sticks out
-            self.widen(row)
-        return line.rstrip() if self._plain else self._coloured(row)
-
-    def _coloured(self, row: Sequence[str]) -> str:
-        """Write a row with its colours."""
-        parts = zip(self._fields, row, self._colours, strict=True)
-        return GAP.join(
-            paint(field % cell, colour(cell)) if colour else field % cell
-            for field, cell, colour in parts
-        ).rstrip()
-
-
-def _write(out: TextIO, lines: Iterator[str]) -> None:
-    """Write lines, some at a time."""
-    while batch := list(islice(lines, BATCH)):
-        out.write("\n".join(batch) + "\n")
-
-
-# The listing of `postproc.listing` from columns of bytes: the same text, no loop.
-#
-# `print_listing` lets a cell that sticks out widen its column from the next row on. The
-# width of a column at a row is thus the longest cell before it, which is one running
-# maximum.
-
-
-@dataclass(frozen=True)
-class Block:
-    """Some rows of a listing.
-
-    Attributes:
-        cells: The texts of every column as UTF-8, (k, w) each; coloured in the last
-            column where colours are wanted.
-        lengths: How many characters they have, (k, columns).
-        single: Rows that are given as texts instead, which may be of any kind.
-    """
-
-    cells: Sequence[Bytes]
-    lengths: Ints
-    single: Mapping[int, Sequence[str]] = field(default_factory=dict)
-
-
-def print_blocks(
-    columns: Sequence[Column],
-    blocks: Iterable[Block],
-    colours: Colours | None = None,
-    out: TextIO | None = None,
-) -> None:
-    """Print an aligned table of any length as `print_listing` does.
-
-    Args:
-        columns: Its columns; the last one is not padded.
-        blocks: Its rows.
-        colours: Which colour a cell of a column (by title) has. Used on a terminal
-            only.
-        out: Where to; default: stdout.
-    """
-    out = out or sys.stdout
-    shown = (colours or {}) if is_coloured(out) else {}
-    given = iter(blocks)
-    first, rows = [], 0
-    while rows < MEASURED and (block := next(given, None)):
-        first.append(block)
-        rows += len(block.lengths)
-    titles = [c.title for c in columns]
-    layout = _ColumnLayout(
-        [c.justify == "left" for c in columns], [shown.get(t) for t in titles]
-    )
-    widths = _measured(titles, first)
-    bold = [(lambda _: "bold") if shown else None for _ in titles]
-    print(_ColumnLayout(layout.left, bold).line(titles, widths), file=out)
-    for block in chain(first, given):
-        text, widths = layout.text(block, widths)
-        out.write(text)
-
-
-def _measured(titles: Sequence[str], blocks: Sequence[Block]) -> Ints:
-    """Return the widths that titles and the first rows ask for."""
-    lengths = [np.array([[len(title) for title in titles]])]
-    for block in blocks:
-        lengths.append(block.lengths.copy())
-        for k, row in block.single.items():
-            lengths[-1][k] = [len(cell) for cell in row]
-    widths: Ints = np.concatenate(lengths)[: MEASURED + 1].max(axis=0)
-    widths[-1] = 0  # the last column is not padded
-    return widths
-
-
-@dataclass(frozen=True)
-class _ColumnLayout:
-    """On which side cells stand, and which colour they have."""
-
-    left: Sequence[bool]
-    colours: Sequence[Callable[[str], str] | None]
-
-    def text(self, block: Block, widths: Ints) -> tuple[str, Ints]:
-        """Write rows; return the widths from there on, too."""
-        lengths = block.lengths.copy()
-        for k, row in block.single.items():
-            lengths[k] = [len(printable(cell)) for cell in row]
-        lengths[:, -1] = 0
-        wide = np.maximum.accumulate(np.concatenate([widths[None], lengths]))
-        parts: list[Bytes | bytes] = []
-        for number, cells in enumerate(block.cells):
-            parts += [GAP.encode()] if number else []
-            blanks = _blanks(wide[:-1, number] - lengths[:, number])
-            if number == len(block.cells) - 1:
-                parts += [cells]
-            else:
-                parts += [cells, blanks] if self.left[number] else [blanks, cells]
-        text = joined([*parts, b"\n"]).decode()
-        if block.single or " \n" in text:
-            lines = [*map(str.rstrip, text.split("\n"))]
-            for k, row in block.single.items():
-                lines[k] = self.line(row, wide[k])
-            text = "\n".join(lines)
-        return text, wide[-1]
-
-    def line(self, row: Sequence[str], widths: Ints) -> str:
-        """Write a row of texts."""
-        texts = [printable(cell) for cell in row]
-        cells = []
-        for text, width, left, colour in zip(
-            texts, widths.tolist(), self.left, self.colours, strict=True
-        ):
-            cell = text.ljust(width) if left else text.rjust(width)
-            cells.append(paint(cell, colour(text)) if colour else cell)
-        return GAP.join(cells).rstrip()
-
-
-def _blanks(count: Ints) -> Bytes:
-    """Return so many blanks a row; none for less than one."""
-    most = int(count.max(initial=0))
-    return np.where(np.arange(most) < count[:, None], 32, 0).astype(np.uint8)

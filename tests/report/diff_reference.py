@@ -8,9 +8,10 @@ import re
 from collections.abc import Sequence
 from typing import TextIO
 
+from postproc.exceptions import printable
 from postproc.language.scan import mask_line, number_value
 from postproc.report.diff import DiffRow, target_name
-from postproc.report.terminal import Column, arrows, print_listing, status_colour
+from postproc.report.terminal import MEASURED, arrows
 
 ASSIGNED = re.compile(r"\s*([A-Za-z_$][\w$.\[\]]*)\s*(?::=|:)")
 LED = re.compile(r"(?:ELSE\s*:|CASE\s*\([^()]*\)\s*:|\w+\s*::)(.*)", re.S)
@@ -70,10 +71,28 @@ def list_rows(rows: Sequence[DiffRow], skip: int, told: bool, out: TextIO) -> No
     """List rows that differ, one by one."""
     titles = ["file", "line", "target", "original", "", "compensated"]
     titles += ["|c| mm", "J1-6", "status"] if told else ["change mm"]
-    left = {"file", "target", "", "J1-6", "status"}
-    columns = [Column(t, "left" if t in left else "right") for t in titles]
-    cells = (cells_of(row, told)[skip:] for row in rows)
-    print_listing(columns[skip:], cells, {"status": status_colour}, out)
+    left = ("file", "target", "", "J1-6", "status")
+    cells = [cells_of(row, told)[skip:] for row in rows]
+    print_aligned(titles[skip:], left, cells, out)
+
+
+def print_aligned(
+    titles: Sequence[str],
+    left: Sequence[str],
+    rows: Sequence[Sequence[str]],
+    out: TextIO,
+) -> None:
+    """Print a table; a cell that sticks out widens its column from the next row on."""
+    first = [titles, *rows[:MEASURED]]
+    widths = [max(map(len, column)) for column in zip(*first, strict=True)]
+    for row in (titles, *rows):
+        shown = [*map(printable, row)]
+        cells = [
+            cell.ljust(width) if title in left else cell.rjust(width)
+            for cell, width, title in zip(shown[:-1], widths, titles, strict=False)
+        ]
+        print("  ".join([*cells, shown[-1]]).rstrip(), file=out)
+        widths = [max(w, len(c)) for w, c in zip(widths, shown, strict=True)]
 
 
 def cells_of(row: DiffRow, told: bool) -> list[str]:

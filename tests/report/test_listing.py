@@ -11,7 +11,7 @@ from postproc.report.terminal import (
     MEASURED,
     Column,
     arrows,
-    print_listing,
+    print_table,
     status_colour,
 )
 
@@ -26,7 +26,7 @@ class Screen(io.StringIO):
 
 def printed(rows, out=None):
     out = out or io.StringIO()
-    print_listing(COLUMNS, rows, COLOURS, out)
+    print_table(COLUMNS, rows, COLOURS, out)
     return out.getvalue().splitlines()
 
 
@@ -48,7 +48,7 @@ def test_rows_are_printed_as_they_come():
 
     taken = iter([str(i), "", ""] for i in range(10**9))
     with pytest.raises(BrokenPipeError):
-        print_listing(COLUMNS, taken, COLOURS, Sink())
+        print_table(COLUMNS, taken, COLOURS, Sink())
     assert int(next(taken)[0]) <= 2 * MEASURED
 
 

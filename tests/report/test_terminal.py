@@ -8,7 +8,9 @@ import threading
 from postproc.cli.common import stages
 from postproc.exceptions import printable
 from postproc.report.terminal import (
+    PLAIN_WIDTH,
     Column,
+    folded,
     print_table,
     progress_bar,
     show_status,
@@ -41,7 +43,7 @@ def test_columns_are_aligned_as_asked():
 
 def test_control_characters_cannot_steer_the_terminal():
     out = Screen()
-    print_table([Column("name")], [["\x1b[2Jgone\r"]], out)
+    print_table([Column("name")], [["\x1b[2Jgone\r"]], out=out)
     assert "\x1b[2J" not in out.getvalue() and "\\x1b[2Jgone\\r" in out.getvalue()
     assert printable("Br\xfccke 'a'\t") == "Br\xfccke 'a'\\t"
 
@@ -50,6 +52,19 @@ def test_long_tables_are_not_cut_in_a_pipe():
     rows = [[str(i), "x" * 40, "y" * 40, "z" * 40] for i in range(300)]
     text = table_text([Column(c) for c in "abcd"], rows)
     assert len(text.splitlines()) == 301 and "\u2026" not in text
+
+
+def test_a_long_cell_is_folded_at_words_and_nothing_is_cut():
+    columns = [Column("a", "left"), Column("added", "left"), Column("rows")]
+    told = " ".join(["backlash"] * 50)
+    rows = [["model", told, "12"], ["b", "", "7"]]
+    head, *lines = table_text(columns, folded(columns, rows, "added")).splitlines()
+    assert len(head) == len(lines[0]) == PLAIN_WIDTH
+    assert " ".join(lines).split() == ["model", *told.split()[:20], "12",
+                                       *told.split()[20:], "b", "7"]  # fmt: skip
+    assert max(map(len, lines)) == PLAIN_WIDTH
+    findings = table_text([*columns[:1], columns[2]], [["backlash", told]])
+    assert findings.splitlines()[1] == f"backlash  {told}"
 
 
 def test_nothing_of_progress_reaches_a_pipe():
