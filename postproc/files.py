@@ -159,7 +159,7 @@ def _reason(exc: OSError) -> str:
 
 # Kinds of files in a tree of programs, told by their names and contents.
 
-PROGRAM, VARIABLES, COMPILED = ".pdl", ".lsv", (".cod", ".var")
+_PROGRAM, _VARIABLES, _COMPILED = ".pdl", ".lsv", (".cod", ".var")
 LARGEST = 500_000_000  # bytes of a program or variable file; a longer one is neither
 
 _TARGETS = re.compile(
@@ -167,22 +167,51 @@ _TARGETS = re.compile(
 )
 
 
-def suffix_of(place: str) -> str:
-    """Return a path's suffix in lower case.
+def is_program(place: str) -> bool:
+    """Tell whether a file is a program.
 
-    >>> suffix_of("a/JOB.PDL")
-    '.pdl'
+    >>> is_program("a/JOB.PDL")
+    True
     """
+    return _suffix(place) == _PROGRAM
+
+
+def is_variables(place: str) -> bool:
+    """Tell whether a file is a variable file."""
+    return _suffix(place) == _VARIABLES
+
+
+def is_compiled(place: str) -> bool:
+    """Tell whether a file is a program or a variable file as controllers load it."""
+    return _suffix(place) in _COMPILED
+
+
+def variables_of(program: str) -> str:
+    """Name the variable file of a program.
+
+    >>> variables_of("a/JOB.PDL")
+    'a/JOB.lsv'
+    """
+    return os.path.splitext(program)[0] + _VARIABLES
+
+
+def program_of(place: str) -> str:
+    """Name the program that a variable file, or a compiled one, belongs to."""
+    return os.path.splitext(place)[0] + _PROGRAM
+
+
+def _suffix(place: str) -> str:
     return os.path.splitext(place)[1].lower()
 
 
-def base_of(place: str) -> str:
-    """Return a file's name without folder and suffix, in lower case.
+def base_name(place: str) -> str:
+    r"""Return a file's name without folders and suffix, in lower case.
 
-    >>> base_of("a/JOB.PDL")
-    'job'
+    >>> base_name("a/JOB.PDL"), base_name(r"UD:\\USR\\Page2.cod")
+    ('job', 'page2')
     """
-    return os.path.splitext(place.rpartition("/")[2])[0].lower()
+    name = place.replace("\\", "/").rpartition("/")[2]
+    return os.path.splitext(name)[0].lower()
 
 
 def holds_targets(data: bytes) -> bool:

@@ -18,13 +18,14 @@ from postproc.compensation.record import (
 )
 from postproc.exceptions import ProgramError
 from postproc.files import (
-    COMPILED,
-    PROGRAM,
     TEMPORARY,
-    VARIABLES,
     holds_targets,
+    is_compiled,
+    is_program,
+    is_variables,
+    program_of,
     read_input,
-    suffix_of,
+    variables_of,
 )
 from postproc.language.stamp import read_stamp
 
@@ -98,7 +99,7 @@ def check(
     findings = [f for place in places for f in look.at(place)]
     if source is not None:
         findings += _absent(source, set(places))
-    programs = sum(suffix_of(place) == PROGRAM for place in places)
+    programs = sum(map(is_program, places))
     return Checked(programs, tuple(sorted(findings)))
 
 
@@ -125,7 +126,7 @@ def _absent(source: Path, places: set[str]) -> list[CheckFinding]:
             place, "absent", "is in the source tree only: it was not compensated"
         )
         for place in _places(source)
-        if suffix_of(place) == PROGRAM and place not in places
+        if is_program(place) and place not in places
     ]
 
 
@@ -147,22 +148,21 @@ class _Look:
 
     def at(self, place: str) -> Iterator[CheckFinding]:
         """Find what is wrong with a file."""
-        suffix = suffix_of(place)
         if place.endswith(TEMPORARY):
             yield CheckFinding(place, "unfinished", "was left by a run that was killed")
-        elif suffix == PROGRAM:
+        elif is_program(place):
             yield from self._program(place)
-        elif suffix == VARIABLES and not self._beside(place, PROGRAM):
+        elif is_variables(place) and not self._existing(program_of(place)):
             if holds_targets(read_input(self.root / place)):
                 yield CheckFinding(
                     place, "uncompensated", "its program is not beside it"
                 )
-        elif suffix in COMPILED and self._beside(place, PROGRAM):
+        elif is_compiled(place) and self._existing(program_of(place)):
             yield from self._compiled(place)
 
-    def _beside(self, place: str, suffix: str) -> str | None:
-        """Return the file of another kind with the same base name."""
-        return self.places.get(os.path.splitext(place)[0].lower() + suffix)
+    def _existing(self, place: str) -> str | None:
+        """Return the file of a name, whatever its case."""
+        return self.places.get(place.lower())
 
     def _program(self, place: str) -> Iterator[CheckFinding]:
         """Check a program and the variable file that was written with it."""
@@ -185,7 +185,7 @@ class _Look:
             return
         yield from self._model(place, sidecar)
         yield from self._content(place, data, sidecar)
-        if values := self._beside(place, VARIABLES):
+        if values := self._existing(variables_of(place)):
             yield from self._content(values, read_input(self.root / values), sidecar)
 
     def _model(self, place: str, sidecar: Sidecar) -> Iterator[CheckFinding]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import re
 from collections import defaultdict
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -13,16 +13,14 @@ from postproc.batch.plan import BatchPlan, Unit
 from postproc.compensation.record import SUFFIX
 from postproc.exceptions import OutputError, ProgramError
 from postproc.files import (
-    COMPILED,
     LARGEST,
-    PROGRAM,
     TEMPORARY,
-    VARIABLES,
-    base_of,
+    base_name,
     holds_targets,
-    suffix_of,
+    is_compiled,
+    is_program,
+    is_variables,
 )
-from postproc.language.pdl2.job import base_name
 
 # Which programs of a folder belong together: a main program and its pages.
 #
@@ -170,7 +168,7 @@ def scan(root: Path, plan: BatchPlan) -> Tree:
             refused[place] = f"is {kind}: it is not followed; put the file itself here"
             continue
         size = entry.stat(follow_symlinks=False).st_size
-        if size > LARGEST and suffix_of(place) in (PROGRAM, VARIABLES):
+        if size > LARGEST and (is_program(place) or is_variables(place)):
             refused[place] = f"is longer than {LARGEST} bytes: is it a program?"
             continue
         folders[place.rpartition("/")[0]].append(place)
@@ -225,17 +223,17 @@ class _Folder:
 def _sort(root: Path, places: Sequence[str], plan: BatchPlan) -> _Folder:
     """Sort the files of one folder into programs, what belongs to them, and others."""
     part = _Folder([], [], {}, [])
-    programs = _by_base(places, PROGRAM, part)
-    variables = _by_base(places, VARIABLES, part)
+    programs = _by_base(filter(is_program, places), part)
+    variables = _by_base(filter(is_variables, places), part)
     records = {place + SUFFIX for place in programs.values()}
     for place in places:
         if place in records or place in part.refused:
             continue  # a record of an earlier output would be taken for ours
-        if suffix_of(place) == VARIABLES and base_of(place) not in programs:
+        if is_variables(place) and base_name(place) not in programs:
             _lone_variables(root, place, part)
-        elif suffix_of(place) not in (PROGRAM, VARIABLES):
+        elif not (is_program(place) or is_variables(place)):
             part.copies.append(place)
-            if suffix_of(place) in COMPILED and base_of(place) in programs:
+            if is_compiled(place) and base_name(place) in programs:
                 part.notes.append((place, _STALE))
     named = {}
     for base, place in programs.items():
@@ -248,14 +246,13 @@ def _sort(root: Path, places: Sequence[str], plan: BatchPlan) -> _Folder:
     return part
 
 
-def _by_base(places: Sequence[str], suffix: str, part: _Folder) -> dict[str, str]:
+def _by_base(places: Iterable[str], part: _Folder) -> dict[str, str]:
     """Index files of one kind by base name; refuse those that differ in case only."""
     found: dict[str, str] = {}
     for place in places:
-        if suffix_of(place) == suffix:
-            first = found.setdefault(base_of(place), place)
-            if first != place:
-                part.refused[place] = f"has the name of {first} but for upper case"
+        first = found.setdefault(base_name(place), place)
+        if first != place:
+            part.refused[place] = f"has the name of {first} but for upper case"
     return found
 
 
@@ -282,7 +279,7 @@ def _add_unit(
 ) -> None:
     """Add a program, or refuse it where no rule of the plan fits."""
     setup = plan.setup_of(program)
-    values = variables.get(base_of(program))
+    values = variables.get(base_name(program))
     if setup is not None:
         part.units.append(Unit(program, tuple(pages), values, setup))
         return

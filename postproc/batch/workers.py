@@ -29,6 +29,7 @@ from postproc.compensation.outcome import Outcome
 from postproc.compensation.record import SUFFIX
 from postproc.compensation.together import Given, compensate_batch
 from postproc.exceptions import PostprocError
+from postproc.files import variables_of
 from postproc.robot.pose import MM
 
 # Tasks in chunks that last about a second each.
@@ -291,8 +292,7 @@ def _outputs(
     """
     place_of = {_file_name(place): place for place in unit.files}
     if unit.variables is not None:
-        stem = _file_name(unit.program).rpartition(".")[0]
-        place_of[f"{stem}.lsv"] = unit.variables
+        place_of[variables_of(_file_name(unit.program))] = unit.variables
     new = {place_of[name]: data for name, data in outcome.outputs.items()}
     outputs: dict[str, bytes] = {}
     for place in reversed(unit.programs):

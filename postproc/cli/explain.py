@@ -19,7 +19,7 @@ from postproc.compensation.program import (
     with_measured_play,
 )
 from postproc.exceptions import ProgramError, printable
-from postproc.files import VARIABLES, suffix_of
+from postproc.files import is_variables
 from postproc.language.visits import ELSEWHERE, START, Visits
 from postproc.model.model import Model, load_model
 from postproc.report.json import target_row
@@ -197,7 +197,7 @@ def explain(
     outcome = None
     if model is not None:
         (name, source), *rest = files.items()
-        values = {n: data for n, data in rest if suffix_of(n) == VARIABLES}
+        values = {n: data for n, data in rest if is_variables(n)}
         outcome = compensate(
             source,
             cell,

@@ -15,15 +15,16 @@ from postproc.compensation.outcome import Outcome
 from postproc.compensation.parallel import map_with
 from postproc.compensation.record import sidecar_path
 from postproc.files import (
-    PROGRAM,
     STREAM,
-    VARIABLES,
     Content,
-    base_of,
+    base_name,
     check_places,
+    is_program,
+    is_variables,
+    program_of,
     read_input,
     read_stream,
-    suffix_of,
+    variables_of,
     write_all,
 )
 from postproc.language.stamp import read_stamp
@@ -57,12 +58,12 @@ def find_pages(program: Path) -> Pages:
     """
     wanted, outside = named_programs(read_head(program))
     notes = [f"{name!r} leads out of the folder: not followed" for name in outside]
-    main = base_of(program.name)
+    main = base_name(program.name)
     if not set(wanted) - {main} or not program.parent.is_dir():
         return Pages((), tuple(notes))
     files = [p for p in sorted(program.parent.iterdir()) if not p.is_symlink()]
-    values = {base_of(p.name) for p in files if suffix_of(p.name) == VARIABLES}
-    programs = {base_of(p.name): p for p in files if _is_source(p)} | {main: program}
+    values = {base_name(p.name) for p in files if is_variables(p.name)}
+    programs = {base_name(p.name): p for p in files if _is_source(p)} | {main: program}
     named = {base: _named(path, main) for base, path in programs.items()}
     alone = {
         base: [other for other in others if other not in values]
@@ -75,7 +76,7 @@ def find_pages(program: Path) -> Pages:
 
 def _is_source(path: Path) -> bool:
     """Tell whether a file is a program, and no output of ours."""
-    if suffix_of(path.name) != PROGRAM or not path.is_file():
+    if not (is_program(path.name) and path.is_file()):
         return False
     return read_stamp(read_head(path)) is None
 
@@ -153,7 +154,7 @@ class Job:
         fitted.check_arm(loaded.arm, model)
         path = None if program == STREAM else Path(program)
         if path is None:
-            name = "stdin.pdl" if lsv is None else lsv.with_suffix(".pdl").name
+            name = program_of("stdin" if lsv is None else lsv.name)
             source = read_stream(sys.stdin.buffer, STREAM)
         else:
             name, source = path.name, read_input(path)
@@ -248,7 +249,7 @@ class Job:
             piped: The program goes elsewhere; only values get a file.
             each: How pieces of long texts are made.
         """
-        values = target.with_suffix(VARIABLES)
+        values = target.with_name(variables_of(target.name))
         files: dict[Path, Content] = {}
         for page, _ in reversed(self.pages):
             if page.name in outcome.outputs:
@@ -293,10 +294,10 @@ def default_output(program: Path) -> Path:
 
 
 def find_variables(program: Path) -> Path | None:
-    """Find the variable file of a program: same base name, any case of .lsv."""
+    """Find the variable file of a program: same base name, in any case."""
     if not program.parent.is_dir():
         return None
-    wanted = f"{program.stem}.lsv".lower()
+    wanted = variables_of(program.name).lower()
     found = [p for p in program.parent.iterdir() if p.name.lower() == wanted]
     return min(found, default=None)
 

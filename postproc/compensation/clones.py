@@ -13,7 +13,7 @@ from postproc.arrays import Floats, Ints
 from postproc.compensation.decide import Proposal
 from postproc.compensation.outcome import Status
 from postproc.compensation.program import Reading, read_program
-from postproc.files import VARIABLES
+from postproc.files import is_variables
 from postproc.language.pdl2.clones import CloneTarget, clone, free_name, named_at
 from postproc.language.pdl2.program import Program, parse
 from postproc.language.source import CloneError, Edit, Source, apply
@@ -340,7 +340,7 @@ class _CloneWork:
     def of(cls, reading: Reading, proposal: Proposal) -> _CloneWork:
         """Parse the files of a program."""
         sources = reading.sources
-        own = [s for s in sources if not s.name.lower().endswith(VARIABLES)]
+        own = [s for s in sources if not is_variables(s.name)]
         values = next((s for s in sources if s not in own), None)
         taken = {
             word.decode("ascii").lower()

@@ -51,6 +51,7 @@ from postproc.compensation.rewrite import (
 from postproc.compensation.targets import rounded_points
 from postproc.compensation.windows import Window, lead_in, windows
 from postproc.exceptions import CellError, ProgramError
+from postproc.files import variables_of
 from postproc.language.source import Replacements, Source
 from postproc.language.stamp import is_stamped
 from postproc.language.visits import Visits
@@ -307,7 +308,7 @@ def name_files(
     """Name a program, its pages and its variable file, the program first."""
     files = {name: source, **pages}
     if variables is not None:
-        files[name.rpartition(".")[0] + ".lsv"] = variables
+        files[variables_of(name)] = variables
     return files
 
 

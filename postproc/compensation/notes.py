@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from postproc.arrays import Bools, Floats, in_chunks
-from postproc.files import VARIABLES
+from postproc.files import is_variables, variables_of
 from postproc.language.visits import NO_VALUE, Diagnostic, Meaning, Visits
 from postproc.robot.arm import Arm
 from postproc.robot.cell import Cell
@@ -29,14 +29,14 @@ def followed_pages(visits: Visits) -> list[Diagnostic]:
     return [
         Diagnostic(visits.files[0], 1, "page", f"{name} {text}")
         for name in visits.files[1:]
-        if not name.lower().endswith(VARIABLES)
+        if not is_variables(name)
     ]
 
 
 def missing_file(visits: Visits) -> list[Diagnostic]:
     """Tell that a program came without the variable file that holds its targets."""
-    name = visits.files[0].rpartition(".")[0] + VARIABLES
-    if any(file.lower().endswith(VARIABLES) for file in visits.files):
+    name = variables_of(visits.files[0])
+    if any(map(is_variables, visits.files)):
         return []
     lost = np.array([text.endswith(NO_VALUE) for text in visits.reasons])[visits.reason]
     text = (
@@ -81,7 +81,7 @@ def listing_cost(
     """
     if len(visits.literals) == 0:
         return []
-    files = np.array([name.lower().endswith(VARIABLES) for name in visits.files])
+    files = np.array([*map(is_variables, visits.files)])
     rows = corrected & files[visits.literals.file[visits.literal]]
     found = []
     poses = rows & (visits.target != Meaning.JOINTS)

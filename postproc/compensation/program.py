@@ -16,10 +16,10 @@ from postproc.compensation.eligibility import (
 )
 from postproc.compensation.targets import targets_from_visits
 from postproc.exceptions import ProgramError
-from postproc.files import VARIABLES
+from postproc.files import base_name, is_variables
 from postproc.language.pdl2.effects import dead_moves
 from postproc.language.pdl2.interpreter import resolve
-from postproc.language.pdl2.job import Start, base_name
+from postproc.language.pdl2.job import Start
 from postproc.language.pdl2.program import Program, parse
 from postproc.language.pdl2.variable_file import VariableFile, read_variables
 from postproc.language.rewrite import Skeleton
@@ -154,7 +154,7 @@ def read_program(
     variables: VariableFile | None = None
     texts = [Skeleton.of(program.lines)]
     for source in sources[1:]:
-        if source.name.lower().endswith(VARIABLES):
+        if is_variables(source.name):
             variables = read_variables(source, each)
             texts.append(Skeleton.of(variables.lines))
         else:

@@ -24,7 +24,7 @@ from postproc.compensation.outcome import (
 )
 from postproc.compensation.parallel import in_background, parallel_map
 from postproc.exceptions import ProgramError
-from postproc.files import VARIABLES
+from postproc.files import is_variables, variables_of
 from postproc.language.pdl2.names import entry_names
 from postproc.language.scan import (
     BLANKS,
@@ -613,7 +613,7 @@ class Compared:
 
     def targets(self, lines: Ints) -> list[str]:
         """Name what the numbers on lines of the original, ascending, belong to."""
-        if self.original.suffix.lower() == VARIABLES:
+        if is_variables(self.original.name):
             return list(entry_names(self.lines, lines.tolist()))
         texts = (self.lines[line - 1].decode("latin-1") for line in lines.tolist())
         return [target_name(text) for text in texts]
@@ -641,7 +641,7 @@ def compare_files(original: Path, compensated: Path) -> Compared:
     before, _ = _read_lines(original)
     after, stamped = _read_lines(compensated)
     rows = joined_rows(original.name, list(_rows(original.name, before, after)))
-    if original.suffix.lower() == VARIABLES:
+    if is_variables(original.name):
         rows = _named_by_entries(rows, before)
     return Compared(original, compensated, before, rows, stamped)
 
@@ -739,9 +739,9 @@ def diff(original: Path, compensated: Path) -> Difference:
         ProgramError: A file cannot be read.
     """
     pairs = [(original, compensated)]
-    values = original.with_suffix(VARIABLES), compensated.with_suffix(VARIABLES)
-    if original.suffix.lower() != VARIABLES and all(v.is_file() for v in values):
-        pairs.append(values)
+    old, new = (p.with_name(variables_of(p.name)) for p in pairs[0])
+    if not is_variables(original.name) and old.is_file() and new.is_file():
+        pairs.append((old, new))
     told_by = partial(read_arrivals, compensated, pairs)
     with in_background(told_by, worth=_long(pairs)) as ask:
         files = [compare_files(*pair) for pair in pairs]

@@ -25,7 +25,7 @@ from postproc.byte_columns import (
 )
 from postproc.byte_columns import ByteColumn as Bytes
 from postproc.compensation.parallel import parallel_map
-from postproc.files import VARIABLES
+from postproc.files import is_variables
 from postproc.report.diff import STATUSES, Difference, DiffRow, DiffRows
 from postproc.report.terminal import (
     ARROWS,
@@ -210,7 +210,7 @@ def print_difference(found: Difference, out: TextIO | None = None) -> None:
     """Print a row for every line that differs, the targets left alone, a summary."""
     out = out or sys.stdout
     names = {r.file for r in (*found.differing, *found.untouched) if len(r)}
-    skip = 0 if len(names) > 1 or any(n.endswith(VARIABLES) for n in names) else 1
+    skip = 0 if len(names) > 1 or any(map(is_variables, names)) else 1
     told = bool(found.counts)
     size = Column("|c| mm") if told else Column("change mm", "left")
     columns = [*PLACE, *NUMBERS, size, *(TOLD if told else ())]

@@ -10,6 +10,7 @@ from itertools import chain, repeat
 import numpy as np
 
 from postproc.arrays import Bools, Ints
+from postproc.files import base_name
 from postproc.language.pdl2 import syntax as ast
 from postproc.language.pdl2.entries import Entries
 from postproc.language.pdl2.program import Body, Program, Variable, Variables
@@ -407,12 +408,3 @@ def base_variable(name: str) -> str:
     'tab'
     """
     return root_of(name.lower())
-
-
-def base_name(file: str) -> str:
-    r"""Return a file's name without folders and suffix, in lower case.
-
-    >>> base_name(r"UD:\\USR\\Page2.cod")
-    'page2'
-    """
-    return file.replace("\\", "/").rsplit("/", 1)[-1].rsplit(".", 1)[0].lower()
