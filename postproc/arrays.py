@@ -1,8 +1,10 @@
-"""Arrays by their type, and work on long ones: in chunks, in spans."""
+"""Arrays by their type, work on long ones, and numbers in the place of texts."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections import defaultdict
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from itertools import count
 from typing import Any, Protocol, TypeVar
 
 import numpy as np
@@ -54,3 +56,24 @@ def spans(begin: Ints, count: Ints) -> Ints:
     """
     offset = np.cumsum(count) - count
     return np.repeat(begin - offset, count) + np.arange(int(count.sum()))
+
+
+# Texts that stand in many rows, once each; rows hold their numbers.
+
+
+class Interned(defaultdict[K, int]):
+    """Things by number, in the order in which they are asked for first.
+
+    >>> names = Interned([""])
+    >>> names["wp_1"], names[""], names.of(["wp_2", "wp_1"]).tolist(), tuple(names)
+    (1, 0, [2, 1], ('', 'wp_1', 'wp_2'))
+    """
+
+    def __init__(self, first: Iterable[K] = ()) -> None:
+        """Number some things from 0 on."""
+        super().__init__(count().__next__)
+        self.of([*first])
+
+    def of(self, things: Sequence[K]) -> Ints:
+        """Return the numbers of things, (n,)."""
+        return np.fromiter(map(self.__getitem__, things), np.int64, len(things))

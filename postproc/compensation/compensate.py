@@ -8,7 +8,7 @@ from types import MappingProxyType
 
 import numpy as np
 
-from postproc.arrays import Bools, Floats, Ints
+from postproc.arrays import Bools, Floats, Interned, Ints
 from postproc.compensation import windows as cuts
 from postproc.compensation.clones import give_own_points
 from postproc.compensation.decide import Proposal
@@ -148,12 +148,12 @@ def _one_after_another(parts: Sequence[Decisions]) -> Decisions:
         for f in fields(Decisions)
         if f.name not in ("why", "reasons")
     }
-    codes: dict[str, int] = {"": 0}
+    codes = Interned([""])
     why = []
     for part in parts:
         new = np.zeros(len(part.reasons), dtype=np.int64)
         for k in np.unique(part.why).tolist():
-            new[k] = codes.setdefault(part.reasons[k], len(codes))
+            new[k] = codes[part.reasons[k]]
         why.append(new[part.why])
     return Decisions(why=np.concatenate(why), reasons=tuple(codes), **arrays)
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from postproc.arrays import Bools, Floats, Ints
+from postproc.arrays import Bools, Floats, Interned, Ints
 from postproc.language.visits import OrntType, Switch, Visits
 from postproc.motion.branches import OTHER_TURN, nearest_turns, on_other_turns
 from postproc.motion.path import NEAR, arcs_of
@@ -32,7 +32,7 @@ class Reasons:
     def __init__(self, n: int) -> None:
         """Start with no reason for n visits."""
         self.index: Ints = np.zeros(n, dtype=np.int64)
-        self._codes: dict[str, int] = {"": 0}
+        self._codes = Interned([""])
 
     @property
     def texts(self) -> tuple[str, ...]:
@@ -53,7 +53,7 @@ class Reasons:
         """
         rows = rows & self.none
         if rows.any():
-            self.index[rows] = self._codes.setdefault(text, len(self._codes))
+            self.index[rows] = self._codes[text]
 
     def adopt(self, index: Ints, texts: tuple[str, ...]) -> None:
         """Take over reasons found elsewhere, (n,) indices into texts."""

@@ -9,11 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from postproc.arrays import Bools, Floats, Indices, Map
+from postproc.arrays import Bools, Floats, Indices, Interned, Map
 from postproc.exceptions import ProgramError
 from postproc.language.scan import NAME_MARK, NUMBER_MARK, WHOLE, mark_lines, mask_of
 from postproc.language.shapes import (
-    Numbers,
     Shapes,
     alike,
     find_shapes,
@@ -90,22 +89,21 @@ def join(masks: Sequence[bytes], shape: Indices, names: Names) -> JoinedLines:
     shape, keep = shape.copy(), np.ones(len(shape), dtype=bool)
     inner = np.repeat(starts - np.cumsum(length - 1) + length, length - 1)
     keep[inner + np.arange(len(inner))] = False
-    number: dict[bytes, int] = {}
+    joined = Interned[bytes]()
     parts, of_kind = shape.tolist() if len(starts) else [], []
     for k in numbered_in_order(kind)[1].tolist():
         some = [own[part] for part in parts[starts[k] : starts[k] + length[k]]]
         if any(mask[:1] == WHOLE for mask in some):
             of_kind.append(-1)  # a row at a time: their names are filled in again
         else:
-            of_kind.append(number.setdefault(b" ".join(some), len(number)))
+            of_kind.append(joined[b" ".join(some)])
     found = np.array(of_kind, dtype=np.int64)[kind]
     for k in np.flatnonzero(found < 0).tolist():
         a, b = int(starts[k]), int(starts[k] + length[k])
-        text = _whole([own[part] for part in parts[a:b]], a, names)
-        found[k] = number.setdefault(text, len(number))
+        found[k] = joined[_whole([own[part] for part in parts[a:b]], a, names)]
     shape[starts] = len(masks) + found
     rows = np.flatnonzero(keep)
-    return JoinedLines((*own, *number), shape[rows], rows)
+    return JoinedLines((*own, *joined), shape[rows], rows)
 
 
 def _whole(parts: Sequence[bytes], row: int, names: Names) -> bytes:
@@ -275,7 +273,7 @@ def read_lines(source: Source, each: Map = map) -> Lines:
     data = source.data
     if data.startswith(b"\xef\xbb\xbf"):
         data = b"   " + data[3:]  # a byte order mark is no code
-    ids, names = Numbers[bytes](), Numbers[str]()
+    ids, names = Interned[bytes](), Interned[str]()
     pieces: list[_Piece] = []
     tasks = list(_tasks(source))
     read = each(lambda task: _read(data, source.line_starts, *task), tasks)
@@ -350,7 +348,7 @@ def _read(data: bytes, starts: Indices, lines: slice, place: slice) -> _Piece:
     marked = mark_lines(data[place], starts[lines] - place.start)
     piece, at = marked.masked, place.start
     short = np.int32 if len(data) < 2**31 else np.int64
-    ids = Numbers[bytes]()
+    ids = Interned[bytes]()
     shape = ids.of(piece.masks)
     return _Piece(
         tuple(ids),
@@ -394,7 +392,7 @@ def _offsets(parts: list[Indices]) -> Indices:
 
 
 def _logical(
-    source: Source, masks: tuple[bytes, ...], names: Numbers[str], found: _Piece
+    source: Source, masks: tuple[bytes, ...], names: Interned[str], found: _Piece
 ) -> Lines:
     """Join the continued lines and drop the empty ones."""
     code = np.array([*map(bool, map(stripped, masks))], dtype=bool)

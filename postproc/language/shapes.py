@@ -3,36 +3,20 @@
 from __future__ import annotations
 
 import re
-from collections import defaultdict
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
-from itertools import count
 from operator import itemgetter
 from typing import Any, Generic, TypeVar, overload
 
 import numpy as np
 from numpy.typing import NDArray
 
-from postproc.arrays import Bools, Ints
+from postproc.arrays import Bools, Interned, Ints
 from postproc.language.scan import NAME_MARK, WHOLE, form_of, mask_of
 
 # Rows that are alike, numbered in the order in which they appear.
 
-Text = TypeVar("Text", bytes, str)
-
 _SHORT = 12  # longer sequences are told apart in Python
-
-
-class Numbers(defaultdict[Text, int]):
-    """Numbers of texts, in the order in which they are asked for first."""
-
-    def __init__(self) -> None:
-        """Begin at 0."""
-        super().__init__(count().__next__)
-
-    def of(self, texts: Sequence[Text]) -> Ints:
-        """Return the numbers of texts, (n,)."""
-        return np.fromiter(map(self.__getitem__, texts), np.int64, len(texts))
 
 
 def alike(values: AnyInts, first: AnyInts, last: AnyInts) -> Ints:
@@ -51,7 +35,7 @@ def alike(values: AnyInts, first: AnyInts, last: AnyInts) -> Ints:
         return _by_columns(values, first, length)
     data = np.ascontiguousarray(values, dtype=np.int32).tobytes()
     ends = zip((4 * first).tolist(), (4 * last).tolist(), strict=True)
-    return Numbers[bytes]().of([data[a:b] for a, b in ends])
+    return Interned[bytes]().of([data[a:b] for a, b in ends])
 
 
 def _by_columns(values: AnyInts, first: AnyInts, length: AnyInts) -> Ints:
@@ -75,7 +59,7 @@ def numbered_in_order(keys: AnyInts) -> tuple[Ints, Ints]:
     Returns:
         The number of every row, (n,), and the first row of every number.
 
-    >>> in_order(np.array([5, 2, 5]))
+    >>> numbered_in_order(np.array([5, 2, 5]))
     (array([0, 1, 0]), array([0, 1]))
     """
     if len(keys) == 0:
@@ -176,7 +160,7 @@ def find_shapes(
     text: AnyInts,
     at: AnyInts,
     name: Ints,
-    names: Numbers[str],
+    names: Interned[str],
 ) -> tuple[Shapes, Ints]:
     """Find the distinct shapes of lines, in the order of appearance.
 
@@ -190,7 +174,7 @@ def find_shapes(
     Returns:
         The shapes, and that of every line, (n,).
     """
-    forms: dict[str, int] = {}
+    forms = Interned[str]()
     form = np.zeros(len(texts), dtype=np.int64)
     count = np.zeros(len(texts), dtype=np.int64)
     own = np.full(len(texts), -1, dtype=np.int64)
@@ -204,7 +188,7 @@ def find_shapes(
             more += names.of(found).tolist()
         else:
             count[k] = one.count(NAME_MARK)
-        form[k] = forms.setdefault(one, len(forms))
+        form[k] = forms[one]
     name = np.append(name, np.array(more, dtype=np.int64))
     begin = np.where(own[text] >= 0, own[text], at).astype(np.int64)
     shape, example = _numbered(form[text], begin, count[text], name, len(names))

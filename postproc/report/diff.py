@@ -15,7 +15,7 @@ from typing import NamedTuple, Self
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
-from postproc.arrays import Bools, Bytes, Floats, Ints, chunks
+from postproc.arrays import Bools, Bytes, Floats, Interned, Ints, chunks
 from postproc.compensation.outcome import (
     LEFT_ALONE,
     LineOutcomes,
@@ -474,12 +474,11 @@ def _targets(before: Sequence[bytes], begins: Ints) -> tuple[list[str], Ints]:
         if begin not in known:
             known[begin] = _told_by(begin.translate(_AS_BLANKS).decode("latin-1"))
         told.append(known[begin] if length >= 0 else "")
-    names: dict[str, int] = {}
-    code = [-1 if t is None else names.setdefault(t, len(names)) for t in told]
+    names = Interned[str]()
+    code = [-1 if t is None else names[t] for t in told]
     index = np.repeat(code, np.diff(lead, append=len(before)))
     for k in np.flatnonzero(index < 0).tolist():
-        name = target_name(before[k].decode("latin-1"))
-        index[k] = names.setdefault(name, len(names))
+        index[k] = names[target_name(before[k].decode("latin-1"))]
     return list(names), index
 
 

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from enum import IntEnum
 from typing import Any, Protocol
 
 import numpy as np
 
-from postproc.arrays import Bools, Indices, Ints
+from postproc.arrays import Bools, Indices, Interned, Ints
 from postproc.language.pdl2 import syntax as ast
 from postproc.language.pdl2.job import FilePoints, World, base_variable
 from postproc.language.pdl2.machine import HERE, Key, Machine, MoveRun, Visit
@@ -17,7 +17,6 @@ from postproc.language.pdl2.moves import UNSURE, from_value
 from postproc.language.pdl2.program import Program
 from postproc.language.pdl2.store import MANY, Settings
 from postproc.language.pdl2.values import Nothing, Position, Value
-from postproc.language.shapes import Numbers
 from postproc.language.source import Source
 from postproc.language.visits import (
     ELSEWHERE,
@@ -44,16 +43,15 @@ class SettingColumns:
 
     def __init__(self) -> None:
         self._kept: list[Settings] = []
-        self._rows: dict[int, int] = {}
+        self._rows = Interned[int]()
         self._problems: list[tuple[str, str]] = []
-        self._frames: dict[tuple[tuple[float, ...], bool], int] = {}
+        self._frames = Interned[tuple[tuple[float, ...], bool]]()
         self._table: dict[str, list[Any]] = {}
 
     def index(self, settings: Settings) -> int:
         """Return the row of a state of the settings."""
-        row = self._rows.get(id(settings))
-        if row is None:
-            row = self._rows[id(settings)] = len(self._kept)
+        row = self._rows[id(settings)]
+        if row == len(self._kept):
             self._kept.append(settings)  # keeps its id from being used again
             for name, value in _row(settings, self._frame).items():
                 self._table.setdefault(name, []).append(value)
@@ -76,7 +74,7 @@ class SettingColumns:
         if not isinstance(value, Position) or value.joints or not value.complete:
             return -1
         numbers = tuple(float(n) for n in value.numbers if n is not None)
-        return self._frames.setdefault((numbers, value.taught), len(self._frames))
+        return self._frames[numbers, value.taught]
 
     def columns(self, rows: Ints) -> dict[str, Any]:
         """Return the columns of `Visits` that come from settings."""
@@ -164,27 +162,6 @@ def _unknown(settings: Settings, names: tuple[str, ...]) -> str:
 _COMPUTED = (Meaning.POSE, Meaning.NEAR, Meaning.FOR)  # may move along with a literal
 
 
-class TextColumn:
-    """Distinct texts in order of appearance; index 0 is ""."""
-
-    def __init__(self) -> None:
-        """Begin with ""."""
-        self._index = Numbers[str]()
-        self("")
-
-    def __call__(self, text: str) -> int:
-        """Return the index of a text."""
-        return self._index[text]
-
-    def many(self, texts: Sequence[str]) -> Ints:
-        """Return the indices of texts, (m,)."""
-        return self._index.of(texts)
-
-    def texts(self) -> tuple[str, ...]:
-        """Return the texts by index."""
-        return tuple(self._index)
-
-
 class VisitColumns:
     """Columns of n visits, filled visit by visit or stretch by stretch."""
 
@@ -225,9 +202,9 @@ class Collector:
     machine: Machine
     columns: VisitColumns
     settings: SettingColumns
-    configs: TextColumn = field(default_factory=TextColumn)
-    names: TextColumn = field(default_factory=TextColumn)
-    reasons: TextColumn = field(default_factory=TextColumn)
+    configs: Interned[str] = field(default_factory=lambda: Interned([""]))
+    names: Interned[str] = field(default_factory=lambda: Interned([""]))
+    reasons: Interned[str] = field(default_factory=lambda: Interned([""]))
     marks: dict[int, tuple[Ints, list[str]]] = field(default_factory=dict)
 
     def arrival(self, at: int, arrival: Visit) -> None:
@@ -244,21 +221,21 @@ class Collector:
         if not arrival.via:
             c.measure_id[at] = self._mark(program, arrival.row)
         self._position(at, arrival)
-        c.reason[at] = self.reasons(
+        c.reason[at] = self.reasons[
             arrival.reason
             or self.recursion(arrival)
             or self.settings.problem(c.setting[at], arrival.target)
             or (arrival.position and self.aux_problem(_aux_axes(arrival.position)))
             or ""
-        )
+        ]
 
     def _position(self, at: int, arrival: Visit) -> None:
         c, position = self.columns, arrival.position
         if position is None:
             return
         world = self.machine.world
-        c.name[at] = self.names(position.name)
-        c.config[at] = self.configs(position.config or "")
+        c.name[at] = self.names[position.name]
+        c.config[at] = self.configs[position.config or ""]
         c.config_given[at] = position.config is not None
         for axis, value in position.aux or ():
             if 1 <= axis <= c.aux.shape[1] and value is not None:
@@ -401,7 +378,7 @@ def _written(
     c.target[mine] = Meaning.JOINTS if joints else Meaning.POSE
     config = items[6] if len(items) > 6 else None
     if isinstance(config, ast.Text):
-        c.config[mine] = collector.configs(config.value)
+        c.config[mine] = collector.configs[config.value]
         c.config_given[mine] = True
     _reasons(collector, mine, run, variant, "")
     wrong = mine[~np.isfinite(c.values[mine]).all(axis=1)]
@@ -409,7 +386,7 @@ def _written(
         c.target[wrong] = Meaning.UNKNOWN
         c.slots[wrong] = -1
         c.values[wrong] = np.nan
-        c.reason[wrong] = collector.reasons("a number of the target cannot be read")
+        c.reason[wrong] = collector.reasons["a number of the target cannot be read"]
     taught = world.taught_lines[lines.source.name]
     if taught:
         c.taught[mine] = np.isin(c.line[mine], np.array(sorted(taught)))
@@ -424,9 +401,9 @@ def _reasons(
     pairs = c.setting[mine] * KINDS + c.target[mine]  # many rows, few pairs
     distinct, which = np.unique(pairs, return_inverse=True)
     reason = [
-        collector.reasons(
+        collector.reasons[
             known or collector.settings.problem(setting, Meaning(target)) or otherwise
-        )
+        ]
         for setting, target in (divmod(pair, KINDS) for pair in distinct.tolist())
     ]
     c.reason[mine] = np.array(reason, dtype=np.int64)[which]
@@ -441,14 +418,14 @@ def _points(collector: Collector, at: int, run: MoveRun, points: FilePoints) -> 
     c.slots[visits] = entries.slots[rows] + points.base
     c.taught[visits], c.shared[visits] = points.taught[rows], points.shared[rows]
     names = [entries.name[row] for row in rows.tolist()]
-    c.name[visits] = collector.names.many(names)
+    c.name[visits] = collector.names.of(names)
     if collector.machine.world.start.taught:
         c.taught[visits] |= [collector.is_listed(name) for name in names]
     found, first = np.unique(entries.layout[rows], return_index=True)
     for number in found[np.argsort(first)].tolist():
         layout = entries.layouts[number]
         mine = np.flatnonzero(entries.layout[rows] == number)
-        c.config[visits[mine]] = collector.configs(layout.config or "")
+        c.config[visits[mine]] = collector.configs[layout.config or ""]
         c.config_given[visits[mine]] = layout.config is not None
         joints = layout.kind == "JNTP"
         c.target[visits[mine]] = Meaning.JOINTS if joints else Meaning.POSE
@@ -516,11 +493,6 @@ class SlotColumns(Protocol):
     shared: Bools
 
 
-class _Texts(Protocol):
-    def texts(self) -> tuple[str, ...]:
-        """Return the names by index."""
-
-
 @dataclass(frozen=True)
 class Numbering:
     """All numbers of all files of a job.
@@ -572,7 +544,7 @@ def _together(columns: list[Indices]) -> Indices:
 
 
 def find_literals(
-    columns: SlotColumns, numbering: Numbering, names: _Texts
+    columns: SlotColumns, numbering: Numbering, names: Iterable[str]
 ) -> tuple[Literals, Indices]:
     """Find the distinct literals; also return the literal of every visit.
 
@@ -599,7 +571,7 @@ def find_literals(
 def _literals(
     columns: SlotColumns,
     numbering: Numbering,
-    names: _Texts,
+    names: Iterable[str],
     slots: Indices,
     visit: Indices,
     literal: Indices,
@@ -611,7 +583,7 @@ def _literals(
         mine = file == i
         places = start[mine].min(axis=1) if mine.any() else start[mine][:, 0]
         line[mine] = np.searchsorted(source.line_starts, places, side="right")
-    texts = names.texts()
+    texts = tuple(names)
     return Literals(
         file=file.astype(np.int64),
         line=line,
@@ -700,20 +672,20 @@ def collect(machine: Machine) -> Visits:
             collector.arrival(at, record)
     c, world = collector.columns, machine.world
     if machine.exhausted:
-        c.reason[:] = collector.reasons("the program is too complex to be followed")
+        c.reason[:] = collector.reasons["the program is too complex to be followed"]
     literals, literal = find_literals(c, numbering, collector.names)
     literals, follows = find_uses(literals, c.slots, c.bases, literal, world.pinned)
     overlapping = (literal < 0) & (c.slots[:, 0] >= 0) & (c.reason == 0)
     if overlapping.any():
         apart = overlapping & numbering.apart(c.slots)
         why = "a number of the target belongs to another target too"
-        c.reason[overlapping] = collector.reasons(why)
+        c.reason[overlapping] = collector.reasons[why]
         if apart.any():
             why = (
                 "some of its numbers stand in the program, others in another file: "
                 "write them in one"
             )
-            c.reason[apart] = collector.reasons(why)
+            c.reason[apart] = collector.reasons[why]
     pred_start, pred = _predecessors(machine, ordered, offsets)
     return Visits(
         files=tuple(world.files),
@@ -726,15 +698,15 @@ def collect(machine: Machine) -> Visits:
         distance_mm=slim(c.distance_mm),
         aux=slim(c.aux),
         config=slim(c.config),
-        configs=collector.configs.texts(),
+        configs=tuple(collector.configs),
         config_given=slim(c.config_given),
         literal=literal,
         follows=slim(follows),
         name=slim(c.name),
-        names=collector.names.texts(),
+        names=tuple(collector.names),
         fly=slim(c.fly),
         reason=slim(c.reason),
-        reasons=collector.reasons.texts(),
+        reasons=tuple(collector.reasons),
         pred_start=pred_start,
         pred=pred,
         measure_id=tuple(c.measure_id),
