@@ -3,26 +3,25 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Self
 
 import numpy as np
 
+from postproc.arrays import Floats, Ints, Signs
 from postproc.cli.jobs import read_files
+from postproc.compensation.arrivals import ArrivalStates
 from postproc.compensation.compensate import compensate
 from postproc.compensation.options import Options
 from postproc.compensation.outcome import Outcome, Status
-from postproc.compensation.program import (
-    Planned,
-    plan_visits,
-    read_program,
-    with_measured_play,
-)
+from postproc.compensation.program import Planned, plan_visits, read_program
 from postproc.exceptions import ProgramError, printable
 from postproc.files import is_variables
 from postproc.language.visits import ELSEWHERE, START, Visits
 from postproc.model.model import Model, load_model
-from postproc.report.json import target_row
+from postproc.report.json import target_rows
 from postproc.report.terminal import Column, arrows, print_table, status_colour
 from postproc.robot.cell import Cell, load_cell
 from postproc.robot.pose import MM
@@ -40,21 +39,46 @@ COLUMNS = (
     Column(STATUS, "left"),
 )
 PLANNED = (*COLUMNS[:5], Column(STATUS, "left"))  # without a model
+SHARES = (Column("effect", "left"), *map(Column, ("share mm", "x", "y", "z")))
+WHOLE = "predicted error"  # the sum of the shares
 
 
 @dataclass(frozen=True)
 class Explanation:
-    """A planned program, and what its compensation would do.
+    """How the arm gets to the targets of a program, and what corrects them.
 
     Attributes:
         visits: Every arrival at a target.
-        planned: How the arm gets there.
+        q: Joint angles there, (n, 6) [rad], NaN where not known.
+        direction: Side every joint arrives from, (n, 6): +1, -1, or 0 where not known;
+            with a model that for which the visit is corrected.
+        travel: Of every joint since its last reversal, (n, 6) [rad].
+        why: Why a visit cannot be compensated, (n,); without a model.
         outcome: The compensation, or None without a model.
     """
 
     visits: Visits
-    planned: Planned
+    q: Floats
+    direction: Signs
+    travel: Floats
+    why: Sequence[str]
     outcome: Outcome | None
+
+    @classmethod
+    def of_plan(cls, visits: Visits, planned: Planned) -> Self:
+        """Explain a plan."""
+        plan, reasons = planned.plan, planned.reasons
+        why = [reasons[i] for i in range(len(visits))]
+        direction = plan.direction.astype(np.int8)
+        return cls(visits, plan.q, direction, plan.travel, why, None)
+
+    @classmethod
+    def of_outcome(cls, outcome: Outcome) -> Self:
+        """Explain a compensation by what it has planned."""
+        d, arrivals = outcome.decisions, outcome.arrivals
+        n = len(outcome.visits)
+        travel = np.full((n, 6), np.nan) if arrivals is None else arrivals.travel
+        return cls(outcome.visits, d.q, d.direction, travel, (), outcome)
 
     def to_json(self, line: int | None = None) -> str:
         """Return one object per visit as JSON text.
@@ -62,66 +86,80 @@ class Explanation:
         Raises:
             ProgramError: There is no target on the line asked for.
         """
-        rows = [self.row(i) for i in self._chosen(line)]
+        chosen = self._chosen(line)
+        if self.outcome is not None:
+            told = target_rows(self.outcome, chosen)
+        else:
+            told = map(self._plan_row, chosen.tolist())
+        rows = [
+            {**row, "from": self._from(i), "travel_deg": _known_deg(self.travel[i])}
+            for i, row in zip(chosen.tolist(), told, strict=True)
+        ]
         return json.dumps({"visits": rows}, indent=1) + "\n"
 
-    def row(self, i: int) -> dict[str, object]:
-        """Describe visit i."""
-        plan, v = self.planned.plan, self.visits
-        if self.outcome is not None:
-            row = target_row(self.outcome, i)
-        else:
-            row = {
-                "line": int(v.line[i]),
-                "name": v.names[v.name[i]] or None,
-                "q_deg": _known(np.rad2deg(plan.q[i])),
-                "lambda": [int(s) for s in plan.direction[i]],
-                "why": self.planned.reasons[i],
-            }
-        travel = _known(np.rad2deg(plan.travel[i]))
-        return {**row, "from": self._from(i), "travel_deg": travel}
+    def _plan_row(self, i: int) -> dict[str, object]:
+        """Describe visit i without a model."""
+        v = self.visits
+        return {
+            "line": int(v.line[i]),
+            "name": v.names[v.name[i]] or None,
+            "q_deg": _known_deg(self.q[i]),
+            "lambda": [int(s) for s in self.direction[i]],
+            "why": self.why[i],
+        }
 
     def print(self, line: int | None = None) -> None:
         """Print a table, one row per visit, and how many came out how.
+
+        Of one line, the shares of the effects in every visit follow instead.
 
         Raises:
             ProgramError: There is no target on the line asked for.
         """
         rows = self._chosen(line)
-        cells = (self._cells(i) for i in rows)
+        cells = (self._cells(i) for i in rows.tolist())
         columns = PLANNED if self.outcome is None else COLUMNS
         print_table(columns, cells, {STATUS: status_colour})
         if line is None:
             print(self.summary())
+        elif self.outcome is not None and self.outcome.arrivals is not None:
+            for i in rows.tolist():
+                self._print_shares(i, self.outcome.arrivals)
+
+    def _print_shares(self, i: int, arrivals: ArrivalStates) -> None:
+        """Print which effect has which share in the error at visit i."""
+        shares = arrivals.shares(np.array([i]))[0] / MM
+        if not np.isfinite(shares).any():
+            return
+        whole = shares.sum(axis=0)
+        sizes = np.linalg.norm(shares, axis=1)
+        order = np.argsort(-sizes, kind="stable").tolist()
+        told = [(arrivals.effects[k], shares[k]) for k in order]
+        print(f"\n{self._line(i, 'line ')} from {_few(self._from(i))}:")
+        print_table(SHARES, (_share_cells(*row) for row in [*told, (WHOLE, whole)]))
 
     def summary(self) -> str:
         """Say in one line what came of the program."""
         if self.outcome is not None:
             return printable(self.outcome.summary())
-        known = np.isfinite(self.planned.plan.q).all(axis=1)
+        known = np.isfinite(self.q).all(axis=1)
         return f"{len(self.visits)} visits, {int((~known).sum())} of them not planned"
 
     def _cells(self, i: int) -> list[str]:
         """Write visit i as the cells of a table row."""
-        plan, v = self.planned.plan, self.visits
+        v = self.visits
         name = v.names[v.name[i]] or ("VIA" if v.via[i] else "inline")
-        sides = arrows(self._direction(i))
-        angles = " ".join(_told(q, 8, 3) for q in np.rad2deg(plan.q[i]))
+        sides = arrows(self.direction[i])
+        angles = " ".join(_told(q, 8, 3) for q in np.rad2deg(self.q[i]))
         cells = [self._line(i), name, _few(self._from(i)), angles, sides]
         if self.outcome is None:
-            return [*cells, self.planned.reasons[i]]
+            return [*cells, self.why[i]]
         d = self.outcome.decisions
         moved = " ".join(_told(c, 7, 3) for c in d.correction[i] / MM)
         sure = " ".join(_told(s, 5, 3) for s in d.std_error[i] / MM)
         status = Status(d.status[i]).name.lower()
         why = d.reasons[d.why[i]]
         return [*cells, moved, sure, f"{status}: {why}" if why else status]
-
-    def _direction(self, i: int) -> np.ndarray:
-        """Return the direction that visit i is compensated for."""
-        if self.outcome is None:
-            return np.asarray(self.planned.plan.direction[i])
-        return np.asarray(self.outcome.decisions.direction[i])
 
     def _from(self, i: int) -> str:
         """Name the lines that visit i is reached from."""
@@ -135,11 +173,11 @@ class Explanation:
         v = self.visits
         return f"{f'{v.files[v.file[i]]}:' if v.file[i] else word}{v.line[i]}"
 
-    def _chosen(self, line: int | None) -> list[int]:
+    def _chosen(self, line: int | None) -> Ints:
         """Choose the visits to show: those whose move or literal is on a line."""
         v = self.visits
         if line is None:
-            return list(range(len(v)))
+            return np.arange(len(v))
         found = v.line == line
         if len(v.literals):
             found = found | (
@@ -154,7 +192,7 @@ class Explanation:
                 "Take a line that holds a move or the numbers of its target",
                 line=line,
             )
-        return np.flatnonzero(found).tolist()
+        return np.flatnonzero(found)
 
 
 def _few(places: str) -> str:
@@ -174,9 +212,17 @@ def _told(value: float, width: int, digits: int) -> str:
     return f"{value:{width}.{digits}f}" if np.isfinite(value) else "-".rjust(width)
 
 
-def _known(values: np.ndarray) -> list[float | None]:
-    """Round; what is not known becomes None."""
-    return [round(float(v), 5) if np.isfinite(v) else None for v in values]
+def _known_deg(values: Floats) -> list[float | None]:
+    """Round angles [rad] to degrees; what is not known becomes None."""
+    degrees = np.rad2deg(values).tolist()
+    return [round(v, 5) if np.isfinite(v) else None for v in degrees]
+
+
+def _share_cells(name: str, share: Floats) -> list[str]:
+    """Write a share (3,) [mm] as the cells of a table row."""
+    size = float(np.linalg.norm(share))
+    rounded = [round(v, 4) + 0.0 for v in (size, *share.tolist())]  # no -0.0
+    return [name, *(_told(v, 7, 4) for v in rounded)]
 
 
 def explain(
@@ -185,29 +231,26 @@ def explain(
     model: Model | None,
     temperature: float | None = None,
 ) -> Explanation:
-    """Plan a program and, with a model, compensate it.
+    """Plan a program; with a model, compensate it, which plans it too.
 
     Raises:
         PostprocError: The program, the cell or the model cannot be used.
     """
-    if model is not None:
-        cell = with_measured_play(cell, model)
-    reading = read_program(files, cell)
-    planned = plan_visits(reading.visits, cell)
-    outcome = None
-    if model is not None:
-        (name, source), *rest = files.items()
-        values = {n: data for n, data in rest if is_variables(n)}
-        outcome = compensate(
-            source,
-            cell,
-            model,
-            name=name,
-            variables=next(iter(values.values()), None),
-            pages={n: data for n, data in rest if n not in values},
-            options=Options(temperature=temperature),
-        )
-    return Explanation(reading.visits, planned, outcome)
+    if model is None:
+        visits = read_program(files, cell).visits
+        return Explanation.of_plan(visits, plan_visits(visits, cell))
+    (name, source), *rest = files.items()
+    values = {n: data for n, data in rest if is_variables(n)}
+    outcome = compensate(
+        source,
+        cell,
+        model,
+        name=name,
+        variables=next(iter(values.values()), None),
+        pages={n: data for n, data in rest if n not in values},
+        options=Options(temperature=temperature),
+    )
+    return Explanation.of_outcome(outcome)
 
 
 def explain_file(

@@ -10,6 +10,7 @@ import numpy as np
 
 from postproc.arrays import Bools, Floats, Interned, Ints
 from postproc.compensation import windows as cuts
+from postproc.compensation.arrivals import ArrivalStates
 from postproc.compensation.clones import give_own_points
 from postproc.compensation.decide import Proposal
 from postproc.compensation.eligibility import overruled
@@ -80,6 +81,8 @@ class Correction:
         overruled: The path does not follow the configuration string, and nobody said
             that it must, (n,).
         untimed: No time law was found, (n,).
+        travel: Of every joint since its last reversal, (n, 6) [rad].
+        speed: Of the TCP, (n,) [m/s], NaN where nobody asked.
     """
 
     edited: Ints
@@ -92,6 +95,8 @@ class Correction:
     away: Floats
     overruled: Bools
     untimed: Bools
+    travel: Floats
+    speed: Floats
 
 
 def correction_of(
@@ -121,6 +126,8 @@ def correction_of(
         away=np.linalg.norm(np.nan_to_num(plan.aside), axis=1)[seeds:] / MM,
         overruled=overruled(planned.targets, plan).unchecked(visits)[seeds:],
         untimed=plan.untimed[seeds:],
+        travel=plan.travel[seeds:],
+        speed=plan.speed[seeds:],
     )
 
 
@@ -397,4 +404,14 @@ def report(
         stages=setting.clock.stages,
         position=kept.position,
         sources={source.name: source.data for source, _ in reading.originals},
+        arrivals=ArrivalStates(
+            visits,
+            q=d.q,
+            side=d.side,
+            travel=kept.travel,
+            speed=kept.speed,
+            temperature=setting.temperature,
+            cell=cell,
+            model=model,
+        ),
     )

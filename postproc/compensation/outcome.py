@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from enum import IntEnum
 from pathlib import Path
-from typing import Any, Self
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,9 +24,13 @@ from postproc.language.visits import Diagnostic, Visits
 from postproc.model.statistics import ErrorStatistics
 from postproc.robot.pose import MM
 
+if TYPE_CHECKING:  # it loads all of the planning, which a record does not want
+    from postproc.compensation.arrivals import ArrivalStates
+
 # What came of a program: every visit with its status, and the exit code.
 
 DONE, NOT_ALL, FAILED = 0, 1, 2  # exit codes
+SHARED = 40_000  # visits up to which reports tell the shares of the effects
 
 
 class Status(IntEnum):
@@ -100,6 +104,8 @@ class Outcome:
         position: Where the program wants the TCP at every visit, base frame, (n, 3)
             [m], NaN where it is not known; empty where nobody asked.
         sources: The bytes of the source files by name, for showing lines.
+        arrivals: The states that the visits are corrected for, with the shares of the
+            effects in their errors; None where nobody knows.
     """
 
     program: str
@@ -114,11 +120,21 @@ class Outcome:
     stages: Mapping[str, float] = field(default_factory=dict)
     position: Floats = field(default_factory=lambda: np.empty((0, 3)))
     sources: Mapping[str, bytes] = field(default_factory=dict)
+    arrivals: ArrivalStates | None = None
 
     @property
     def sidecar(self) -> str:
         """The record that `restore` needs, as JSON text."""
         return "".join(self.record.to_json())
+
+    @property
+    def reported(self) -> Outcome:
+        """Return what reports tell: of a long program no shares of effects.
+
+        They cost more than all else that a report says of a target, up to four times
+        as much.
+        """
+        return self if len(self.visits) <= SHARED else replace(self, arrivals=None)
 
     @property
     def exit_code(self) -> int:

@@ -159,4 +159,6 @@ def _split(kept: Correction, readings: Sequence[Reading]) -> Iterator[Correction
             away=kept.away[rows],
             overruled=kept.overruled[rows],
             untimed=kept.untimed[rows],
+            travel=kept.travel[rows],
+            speed=kept.speed[rows],
         )

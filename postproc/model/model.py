@@ -442,6 +442,21 @@ class Model:
         )
         return np.concatenate([np.zeros((0, 3)), *parts])
 
+    @property
+    def share_names(self) -> tuple[str, ...]:
+        """Names of the shares of the error: see `Combination.shares`."""
+        return self.compensable()[0].share_names
+
+    def shares(self, arm: Arm, states: States) -> Floats:
+        """Split the error into the shares of the effects, (n, k, 3) [m], base frame."""
+        effects, values, _ = self.compensable()
+        parts = in_chunks(
+            lambda rows: effects.shares(Batch(arm, states[rows]), values),
+            len(states),
+            CHUNK,
+        )
+        return np.concatenate([np.zeros((0, len(effects.share_names), 3)), *parts])
+
     def measured_error(self, arm: Arm, states: States) -> Floats:
         """Predict what the survey's set-up would measure, (n, 3) [m]."""
         return self.effects.error(Batch(arm, states), self.values)

@@ -22,6 +22,7 @@ from postproc.byte_columns import (
     shortest,
     whole,
 )
+from postproc.compensation.arrivals import ArrivalStates
 from postproc.compensation.outcome import Outcome, Status
 from postproc.robot.pose import MM
 from postproc.robot.trajectory import Motion
@@ -41,6 +42,7 @@ def report_pieces(outcome: Outcome, each: Map = map) -> Iterator[str]:
         outcome: What came of a program.
         each: How the pieces are made.
     """
+    outcome = outcome.reported
     head = {"program": outcome.program, "model": outcome.model}
     yield json.dumps(head)[:-1] + ', "targets": ['
     tasks = list(chunks(len(outcome.visits), AT_ONCE))
@@ -60,11 +62,11 @@ def _targets(outcome: Outcome, rows: slice) -> str:
     return comma + text[: -len(",\n")]
 
 
-def target_row(outcome: Outcome, i: int) -> dict[str, object]:
-    """Describe visit i in the keys of the report."""
-    text = _objects(_columns(outcome, np.array([i])))
-    row: dict[str, object] = json.loads(text[: -len(",\n")])
-    return row
+def target_rows(outcome: Outcome, rows: Ints) -> Iterator[dict[str, object]]:
+    """Describe visits, ascending, in the keys of the report."""
+    for some in chunks(len(rows), AT_ONCE):
+        text = _objects(_columns(outcome, rows[some]))
+        yield from json.loads("[" + text[: -len(",\n")] + "]")
 
 
 def _objects(columns: Mapping[str, ByteColumn]) -> str:
@@ -77,7 +79,7 @@ def _objects(columns: Mapping[str, ByteColumn]) -> str:
 
 def _columns(outcome: Outcome, rows: Ints) -> dict[str, ByteColumn]:
     """Write the values of every key as JSON, for some visits."""
-    v, d = outcome.visits, outcome.decisions
+    v, d, told = outcome.visits, outcome.decisions, outcome.arrivals
     move = np.where(v.via[rows], len(Motion), v.motion[rows])
     has = v.literal[rows] >= 0
     placed, turned = len(outcome.position) > 0, len(d.turn) > 0
@@ -104,6 +106,7 @@ def _columns(outcome: Outcome, rows: Ints) -> dict[str, ByteColumn]:
         **degrees,
         "step_mm": _steps(outcome, rows),
         "std_error_mm": _rounded(d.std_error[rows] / MM, 5),
+        **({} if told is None else {"share_mm": _shares(told, rows)}),
     }
 
 
@@ -112,6 +115,16 @@ def _steps(outcome: Outcome, rows: Ints) -> ByteColumn:
     before, correction = outcome.visits.run_mates[rows], outcome.decisions.correction
     step = np.linalg.norm(correction[rows] - correction[before], axis=1) / MM
     return fixed(np.where(before < 0, np.nan, step), 5)
+
+
+def _shares(arrivals: ArrivalStates, rows: Ints) -> ByteColumn:
+    """Write the size of every effect's share as an object."""
+    sizes = arrivals.sizes(rows) / MM
+    parts: list[ByteColumn | bytes] = []
+    for number, name in enumerate(arrivals.effects):
+        key = f"{', ' if number else ''}{json.dumps(name)}: "
+        parts += [key.encode(), fixed(sizes[:, number], 5)]
+    return beside([b"{", *parts, repeated(b"}", len(rows))])
 
 
 def _literals(outcome: Outcome, rows: Ints) -> ByteColumn:

@@ -5,7 +5,10 @@ from __future__ import annotations
 import json
 
 import numpy as np
+import pytest
 
+from postproc.compensation import program as planning
+from postproc.model.combination import INTERACTION
 from tests.written import FIRST, NEXT, POSE, cli, program
 
 LOOPED = (
@@ -65,7 +68,66 @@ def test_the_table(desk):
     full = cli("explain", source, *cell, "--model", desk.model, "--line", 6)
     assert "correction x, y, z [mm]" in full.stdout
     assert full.stdout.splitlines()[1].split()[:4] == ["6", "inline", "line", "5"]
-    assert full.stdout.rstrip().endswith("safe")
+    assert full.stdout.splitlines()[1].endswith("safe")
+
+
+def test_the_shares_of_a_line(desk):
+    found = explained(desk, "--line", 8)
+    (row,) = visits(found)
+    shares = row["share_mm"]
+    assert {"geometry", "backlash", INTERACTION} <= set(shares)
+    source = desk.folder / "job.pdl"
+    given = ("--cell", desk.cell, "--model", desk.model, "--line", 8)
+    lines = cli("explain", source, *given).stdout.splitlines()
+    assert lines[3] == "line 8 from line 5:"
+    assert lines[4].split() == ["effect", "share", "mm", "x", "y", "z"]
+    table = [line.rsplit(None, 4) for line in lines[5:]]
+    numbers = {name: np.array(cells, dtype=float) for name, *cells in table}
+    whole = numbers.pop("predicted error")
+    assert numbers.keys() == shares.keys()
+    sizes = [cells[0] for cells in numbers.values()]
+    assert sizes == sorted(sizes, reverse=True)
+    for name, (size, *vector) in numbers.items():
+        assert shares[name] == pytest.approx(size, abs=1e-4)
+        assert size == pytest.approx(np.linalg.norm(vector), abs=2e-4)
+    total = sum(cells[1:] for cells in numbers.values())
+    np.testing.assert_allclose(total, whole[1:], atol=5e-4)
+    np.testing.assert_allclose(whole[1:], -np.array(row["correction_mm"]), atol=0.05)
+
+
+def test_every_visit_of_a_line_has_its_shares(desk):
+    point = "p := POS(120.0, 200.0, 150.0, 0.0, 175.0, 0.0, '')"
+    lines = (FIRST, point, "MOVE LINEAR TO p", POSE, "MOVE LINEAR TO p")
+    source = desk.put("job.pdl", program(*lines))
+    given = ("--cell", desk.cell, "--model", desk.model, "--line", 6)
+    found = cli("explain", source, *given).stdout.splitlines()
+    assert [line for line in found if line.endswith(":")] == [
+        "line 7 from line 5:",
+        "line 9 from line 8:",
+    ]
+
+
+def test_without_a_model_there_are_no_shares(desk):
+    source = desk.put("job.pdl", program(FIRST, POSE))
+    found = cli("explain", source, "--cell", desk.cell, "--line", 6).stdout
+    assert len(found.splitlines()) == 2
+    rows = visits(cli("explain", source, "--cell", desk.cell, "--json", "-"))
+    assert "share_mm" not in rows[0]
+
+
+@pytest.mark.parametrize("with_model", [True, False])
+def test_a_program_is_planned_once(desk, monkeypatch, with_model):
+    planned = []
+
+    def counted(*given, plan=planning.plan):
+        planned.append(given)
+        return plan(*given)
+
+    monkeypatch.setattr(planning, "plan", counted)
+    source = desk.put("job.pdl", program(*LOOPED))
+    model = ("--model", desk.model) if with_model else ()
+    visits(cli("explain", source, "--cell", desk.cell, *model, "--json", "-"))
+    assert len(planned) == 1
 
 
 def test_sides_follow_from_the_way(desk, job_cell):

@@ -83,6 +83,19 @@ class PageColumns:
 
 
 @dataclass(frozen=True)
+class PageShares:
+    """How much of the predicted error of n visits is of which of k effects.
+
+    Attributes:
+        effects: Names of the effects, and of their interaction.
+        size_mm: Size of every share, (n, k).
+    """
+
+    effects: tuple[str, ...]
+    size_mm: Floats
+
+
+@dataclass(frozen=True)
 class ProgramPage:
     """Everything that the program page shows.
 
@@ -94,6 +107,7 @@ class ProgramPage:
         diagnostics: Rows of file, line, code and message.
         stages: Seconds by stage.
         sources: Bytes by file name; empty where they are not at hand.
+        shares: What the effects do; none where the report does not say.
     """
 
     name: str
@@ -103,6 +117,7 @@ class ProgramPage:
     diagnostics: tuple[Mapping[str, object], ...]
     stages: Mapping[str, float]
     sources: Mapping[str, bytes]
+    shares: PageShares
 
 
 def columns_of(outcome: Outcome) -> PageColumns:
@@ -137,6 +152,14 @@ def columns_of(outcome: Outcome) -> PageColumns:
         correction_mm=d.correction / MM,
         std_mm=d.std_error / MM,
     )
+
+
+def shares_of(outcome: Outcome) -> PageShares:
+    """Take the shares of effects out of an outcome, as far as reports tell them."""
+    told, n = outcome.reported.arrivals, len(outcome.visits)
+    if told is None:
+        return PageShares((), np.empty((n, 0)))
+    return PageShares(told.effects, told.sizes(np.arange(n)) / MM)
 
 
 # The columns of the program page out of a written report.
@@ -200,6 +223,19 @@ def columns_from(targets: Sequence[Mapping[str, Any]]) -> PageColumns:
     )
 
 
+def shares_from(targets: Sequence[Mapping[str, Any]]) -> PageShares:
+    """Take the shares of effects out of the targets of a report.
+
+    Raises:
+        KeyError, ValueError, TypeError: They are not the targets of a report.
+    """
+    told = [t.get("share_mm") or {} for t in targets]
+    effects = tuple(dict.fromkeys(str(name) for shares in told for name in shares))
+    rows = [[shares.get(name) for name in effects] for shares in told]
+    size = np.array(rows, dtype=np.float64).reshape(len(targets), len(effects))
+    return PageShares(effects, size)
+
+
 def _numbers(targets: Sequence[Mapping[str, Any]], key: str, width: int) -> Floats:
     """Stack the lists under a key, (n, width); NaN where there is none."""
     blank = [None] * width
@@ -220,6 +256,7 @@ STEPS = {
     "position_mm": 1e-2,
     "correction_mm": 1e-4,
     "std_mm": 1e-4,
+    "share_mm": 1e-4,
 }
 
 
@@ -253,9 +290,15 @@ def _evenly(rows: Ints, most: int) -> Ints:
     return rows[np.arange(most) * len(rows) // most]
 
 
-def pack(columns: PageColumns) -> dict[str, Any]:
-    """Write columns as lists of integers, with the size of a step beside them."""
-    width = {"original": 6, "change": 6, "q_deg": 6}
+def pack(columns: PageColumns, shares: PageShares) -> dict[str, Any]:
+    """Write columns as lists of integers, with the size of a step beside them.
+
+    Args:
+        columns: The visits on the page.
+        shares: Of all visits.
+    """
+    effects = [visible(name) for name in shares.effects]
+    width = {"original": 6, "change": 6, "q_deg": 6, "share_mm": len(effects)}
     numbers = {
         "original": columns.original,
         "change": columns.corrected - columns.original,
@@ -263,6 +306,7 @@ def pack(columns: PageColumns) -> dict[str, Any]:
         "position_mm": columns.position_mm,
         "correction_mm": columns.correction_mm,
         "std_mm": columns.std_mm,
+        "share_mm": shares.size_mm[columns.visit - 1],
     }
     packed = {
         key: {
@@ -279,6 +323,7 @@ def pack(columns: PageColumns) -> dict[str, Any]:
         "reasons": [visible(t) for t in columns.reasons],
         "moves": list(MOVES),
         "statuses": [s.name.lower() for s in Status],
+        "effects": effects,
         "index": {k: getattr(columns, k).tolist() for k in (*indices, "status", "why")},
         "direction": _signs(columns.direction),
         "numbers": packed,
@@ -493,6 +538,7 @@ def program_report(outcome: Outcome, sources: Mapping[str, bytes] | None = None)
         diagnostics=tuple(asdict(d) for d in outcome.diagnostics),
         stages=outcome.stages,
         sources=outcome.sources if sources is None else sources,
+        shares=shares_of(outcome),
     )
     return _page(program)
 
@@ -517,6 +563,7 @@ def program_report_from_json(
         diagnostics=tuple(data.get("diagnostics", ())),
         stages=data.get("stages_s", {}),
         sources=sources or {},
+        shares=shares_from(data["targets"]),
     )
     return _page(program)
 
@@ -526,7 +573,7 @@ def _page(program: ProgramPage) -> str:
     columns = program.columns
     carried = columns[choose(columns)]
     payload = {
-        "columns": pack(carried),
+        "columns": pack(carried, program.shares),
         "listing": listing(program.sources, carried),
         "histogram": histogram(columns),
         "predicted": finite(program.predicted),

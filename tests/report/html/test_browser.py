@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import base64
+import json
 import os
 import time
 from collections.abc import Iterator
@@ -21,7 +22,9 @@ from postproc.report.html import (
     comparison_report,
     diagnosis_report,
     program_report,
+    program_report_from_json,
 )
+from postproc.report.json import report_text
 from tests.report.html.browser import complaints, open_browser, requests
 from tests.report.html.builders import FIRST_LINE, outcome_of
 from tests.report.html.test_program import NASTY
@@ -157,6 +160,25 @@ def test_a_row_leads_to_the_view_and_the_source(program: Any) -> None:
     wanted = outcome_of(250).position[11] * 1e3
     assert drawn == pytest.approx(wanted.tolist(), abs=0.01)
     picture(program, "selected")
+
+
+def test_a_target_shows_the_shares_of_the_effects(browser: Any, folder: Path) -> None:
+    data = json.loads(report_text(outcome_of(30)))
+    for target in data["targets"]:
+        target["share_mm"] = {"backlash": 0.125, "<b>x</b>": 0.5, "thermal": None}
+    show(browser, folder, "shares", program_report_from_json(data))
+    click(browser, "#targets tbody tr[data-row='11']")
+    rows = browser.find_elements("css selector", "#detail .shares tbody tr")
+    told = [row.text.rsplit(None, 1) for row in rows]
+    assert told == [["<b>x</b>", "0.5000"], ["backlash", "0.1250"], ["thermal", "–"]]
+    bars = "return [...document.querySelectorAll('#detail meter')].map((m) => m.value)"
+    assert browser.execute_script(bars) == [0.5, 0.125, 0]
+    assert complaints(browser) == []
+    picture(browser, "shares")
+    bare = program_report(outcome_of(30))
+    show(browser, folder, "bare", bare)
+    click(browser, "#targets tbody tr[data-row='11']")
+    assert not browser.find_elements("css selector", "#detail .shares")
 
 
 def test_a_click_into_the_view_leads_to_the_row(program: Any) -> None:

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from postproc.compensation.compensate import compensate
 from postproc.compensation.outcome import Status
 from postproc.report.html import program, program_report, program_report_from_json
 from postproc.report.html.program import (
@@ -22,6 +23,8 @@ from postproc.report.html.program import (
 )
 from postproc.report.json import report_text
 from tests.report.html.builders import FIRST_LINE, outcome_of
+from tests.written import FIRST, POSE
+from tests.written import program as written
 
 NASTY = '<script>alert("x")</script>\'\x1b[31m\u202e'
 
@@ -134,6 +137,31 @@ def test_a_written_report_makes_a_page() -> None:
     assert bare["listing"] == {}
 
 
+def test_a_report_says_which_effect_has_which_share() -> None:
+    data = json.loads(report_text(outcome_of(3)))
+    assert program.shares_from(data["targets"]).effects == ()
+    told = [{"geometry": 0.5, "backlash": 0.125}, {"geometry": 0.25}, None]
+    for target, shares in zip(data["targets"], told, strict=True):
+        target["share_mm"] = shares
+    columns = Elements(program_report_from_json(data)).payload()["columns"]
+    assert columns["effects"] == ["geometry", "backlash"]
+    assert columns["numbers"]["share_mm"]["values"] == [
+        5000, 1250, 2500, None, None, None,
+    ]  # fmt: skip
+
+
+def test_an_outcome_says_which_effect_has_which_share(job_cell, job_model) -> None:
+    outcome = compensate(written(FIRST, POSE), job_cell, job_model, name="job.pdl")
+    direct = program.shares_of(outcome)
+    data = json.loads(report_text(outcome))
+    again = program.shares_from(data["targets"])
+    assert direct.effects == again.effects and "geometry" in direct.effects
+    np.testing.assert_allclose(direct.size_mm, again.size_mm, atol=1e-5)
+    pages = [program_report(outcome), program_report_from_json(data, outcome.sources)]
+    a, b = (Elements(page).payload()["columns"]["numbers"] for page in pages)
+    assert a["share_mm"] == b["share_mm"]
+
+
 def test_a_report_without_positions_has_no_view() -> None:
     data = json.loads(report_text(outcome_of(20)))
     for target in data["targets"]:
@@ -149,12 +177,17 @@ def test_an_empty_program_makes_a_page() -> None:
 
 def test_numbers_survive_packing() -> None:
     columns = columns_of(outcome_of(50))
-    packed = program.pack(columns)
+    size = np.random.default_rng(2).uniform(0.0, 1.0, (50, 3))
+    packed = program.pack(columns, program.PageShares(("a", "b", NASTY), size))
     for key in ("position_mm", "correction_mm", "std_mm", "q_deg", "original"):
         step = packed["numbers"][key]["step"]
         values = np.array(packed["numbers"][key]["values"], dtype=float) * step
         wanted = getattr(columns, key).ravel()
         np.testing.assert_allclose(values, wanted, atol=0.5001 * step)
+    told = packed["numbers"]["share_mm"]
+    assert told["width"] == len(packed["effects"]) == 3
+    values = np.array(told["values"]).reshape(50, 3) * told["step"]
+    np.testing.assert_allclose(values, size, atol=0.5001 * told["step"])
     sides = np.array([{"-": -1, "0": 0, "+": 1}[s] for s in packed["direction"]])
     np.testing.assert_array_equal(sides.reshape(-1, 6), columns.direction)
 

@@ -8,6 +8,7 @@ class Columns {
     this.reasons = packed.reasons;
     this.moves = packed.moves;
     this.statuses = packed.statuses;
+    this.effects = packed.effects;
     Object.assign(this, packed.index);
     this.length = this.visit.length;
     this.direction = packed.direction;

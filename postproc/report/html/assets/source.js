@@ -49,7 +49,7 @@ class Detail {
       Page.element("h3", {}, title),
       Page.element("p", {}, `${c.moves[c.move[i]]}, ${status.told}${why ? ` – ${why}` : ""}`),
       ...this.source(i),
-      Page.element("div", { className: "pair" }, this.tool(i), this.joints(i)),
+      Page.element("div", { className: "pair" }, this.tool(i), this.shares(i), this.joints(i)),
       this.numbers(i),
     );
     const here = this.node.querySelector(".here");
@@ -84,6 +84,21 @@ class Detail {
       ["correction", ...told("correction_mm", 4), Page.number(c.size[i], 4)],
       ["± std error", ...told("std_mm", 4), Page.number(c.sigma[i], 4)],
     ]);
+  }
+
+  // Which effect has which share in the predicted error, the largest first.
+  shares(i) {
+    const c = this.columns, sizes = [...c.of("share_mm", i)];
+    if (!sizes.some(Number.isFinite)) return "";
+    const known = sizes.map((v) => (Number.isFinite(v) ? v : 0));
+    const order = known.map((_, k) => k).sort((a, b) => known[b] - known[a]);
+    const most = known[order[0]] || 1;
+    const rows = order.map((k) => Page.element("tr", {},
+      Page.element("th", { scope: "row" }, c.effects[k]),
+      Page.element("td", { className: "number" }, Page.number(sizes[k], 4)),
+      Page.element("td", { className: "wide" }, Page.element("meter", { min: 0, max: most, value: known[k] }))));
+    return Page.element("table", { className: "small shares" },
+      Page.element("caption", {}, "Shares in the predicted error [mm]"), Page.element("tbody", {}, ...rows));
   }
 
   joints(i) {
