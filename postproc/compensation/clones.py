@@ -5,12 +5,13 @@ from __future__ import annotations
 import re
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from postproc.arrays import Floats, Ints
 from postproc.compensation.decide import Proposal
+from postproc.compensation.equivalence import equivalent
 from postproc.compensation.outcome import Status
 from postproc.compensation.program import Reading, read_program
 from postproc.files import is_variables
@@ -152,63 +153,29 @@ def connected(sets: Iterable[frozenset[int]]) -> list[frozenset[int]]:
     return sorted({*owner.values()}, key=min)
 
 
-# Two readings of one program: do both make the same moves to the same values?
-
-_APART = frozenset(
-    "line config configs literal literals follows name names reason reasons".split()
-)
-"""Columns that are numbered anew, or speak of lines: they are compared by meaning."""
+# The lines of visits as they were before something was cloned.
 
 
-def same_moves(
-    before: Reading,
-    after: Reading,
-    edits: Sequence[Sequence[Edit]],
-    names: Mapping[int, str],
+def with_lines_of(
+    before: Reading, after: Reading, edits: Sequence[Sequence[Edit]]
 ) -> Visits | None:
-    """Compare a program with itself after clones.
-
-    Every visit must be there, in the same order, with the same predecessors, numbers,
-    frames and settings, from the same line; its numbers must stand in a literal of its
-    own exactly where it goes to a clone.
+    """Give the visits of a program with clones the lines that they had before.
 
     Args:
         before: The program.
-        after: The program with clones, read anew.
+        after: The program with clones, which is equivalent.
         edits: The edits between them, file by file.
-        names: The clone that each separated visit goes to.
 
     Returns:
-        The visits after it, with the lines of the program before; None where they
-        differ.
+        The visits; None where a line is not that of the visit before.
     """
     v, w = before.visits, after.visits
-    columns = [f.name for f in fields(Visits) if f.name not in _APART]
-    if len(v) != len(w) or any(_differ(getattr(v, n), getattr(w, n)) for n in columns):
-        return None
-    if _configs(v) != _configs(w) or ((v.reason > 0) != (w.reason > 0)).any():
-        return None
     if _origin(before.sources, after.sources, edits, w) != v.line.tolist():
         return None
-    wanted = [names.get(i, v.names[k]) for i, k in enumerate(v.name.tolist())]
-    if wanted != [w.names[k] for k in w.name.tolist()]:
-        return None
-    pairs = _pairs(v, w, names)
-    if pairs is None:
-        return None
+    has = np.flatnonzero(v.literal >= 0)
     line = np.zeros(len(w.literals), dtype=np.int64)
-    line[pairs[1]] = v.literals.line[pairs[0]]
+    line[w.literal[has]] = v.literals.line[v.literal[has]]
     return replace(w, line=v.line, literals=replace(w.literals, line=line))
-
-
-def _configs(visits: Visits) -> list[str]:
-    return [visits.configs[k] for k in visits.config.tolist()]
-
-
-def _differ(a: object, b: object) -> bool:
-    if isinstance(a, np.ndarray) and isinstance(b, np.ndarray):
-        return not np.array_equal(a, b, equal_nan=a.dtype.kind == "f")
-    return a != b
 
 
 def _origin(
@@ -232,27 +199,10 @@ def _origin(
     return [int(line) for line in lines]
 
 
-def _pairs(v: Visits, w: Visits, names: Mapping[int, str]) -> tuple[Ints, Ints] | None:
-    """Match literals: one before and after for every visit that has one.
-
-    Returns:
-        Literals before and after, visit by visit; None where visits share a literal
-        after the clones that they did not share before, or no longer do.
-    """
-    has = np.flatnonzero(v.literal >= 0)
-    if not np.array_equal(has, np.flatnonzero(w.literal >= 0)):
-        return None
-    old = [(int(v.literal[i]), names.get(i, "")) for i in has.tolist()]
-    new = w.literal[has].tolist()
-    both = set(zip(old, new, strict=True))
-    if not len(both) == len(set(old)) == len(set(new)):
-        return None
-    return v.literal[has], w.literal[has]
-
-
 # Points of their own for moves that cannot share one, and the proof that they fit.
 
 _WORD = re.compile(rb"[A-Za-z_]\w*")
+NOTHING = np.zeros(0, dtype=np.int64)  # no literal gets new numbers
 
 
 def give_own_points(reading: Reading, proposal: Proposal, cell: Cell) -> Reading:
@@ -278,7 +228,9 @@ def give_own_points(reading: Reading, proposal: Proposal, cell: Cell) -> Reading
         for source, edits in zip(reading.sources, cloned, strict=True)
     )
     again = read_program({s.name: s.data for s in sources}, cell)
-    visits = same_moves(reading, again, cloned, work.names)
+    v = reading.visits
+    problem = equivalent(v, again.visits, NOTHING, v.values, work.names)
+    visits = None if problem else with_lines_of(reading, again, cloned)
     if visits is None:
         text = "clones would change what the program does: nothing is cloned"
         found = Diagnostic(reading.sources[0].name, 1, "not-cloned", text)

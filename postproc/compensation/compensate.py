@@ -45,7 +45,6 @@ from postproc.compensation.program import (
 )
 from postproc.compensation.rewrite import (
     Output,
-    check_numbers,
     check_output,
     write_edits,
 )
@@ -368,8 +367,8 @@ def write_and_verify(reading: Reading, kept: Correction, setting: Setting) -> Ou
     with clock("verify"):
         each = map_with(processes)
         again = read_program(output.files, setting.cell, reading.programs, each)
-        check_output(reading, again, output, kept.edited, processes)
-        check_numbers(reading.visits, kept.decisions.corrected, again.visits)
+        values = kept.decisions.corrected
+        check_output(reading, again, output, kept.edited, values, processes)
     return output
 
 

@@ -59,28 +59,45 @@ class Skeleton:
         return cls.of(read_lines(source))
 
 
-def differences(
-    before: Skeleton, after: Skeleton, allowed: Replacements, stamp: int
-) -> tuple[str, ...]:
-    """Check what was read of a rewritten text against the edits that were meant.
+def difference(
+    before: Source | Skeleton,
+    after: Source | Skeleton,
+    allowed: Replacements,
+    stamp: int = 0,
+) -> str:
+    """Say where a text differs from its origin otherwise than by the edits meant.
 
-    Every line must have the shape it had, every edit must replace one whole number,
-    and every number must stand where the edits move it to.
+    Its bytes must be those of the edited original. Read by itself, every line must
+    have the shape it had, every edit must replace one whole number, and every number
+    must stand where the edits move it to.
 
     Args:
-        before: The original.
-        after: The rewritten text, read by itself.
+        before: The original; it is read where it has not been yet.
+        after: The rewritten text, likewise.
         allowed: The edits of numbers that were meant.
-        stamp: Bytes of the rewritten text before the first line of the original.
+        stamp: Bytes of the stamp line that the rewritten text begins with.
 
     Returns:
-        What is wrong, empty where all is well.
+        What is wrong, "" where all is well.
     """
-    if len(before.shape) != len(after.shape) or len(before.start) != len(after.start):
-        return ("the rewritten text has other lines or numbers than the original",)
-    if before.shapes != after.shapes or (before.shape != after.shape).any():
-        row = int(np.flatnonzero(before.shape != after.shape)[:1].sum())
-        return (f"line {before.line[row]}: the rewritten line has another shape",)
+    old, new = (s.source if isinstance(s, Skeleton) else s for s in (before, after))
+    if not _is_meant(old.data, allowed, new.data, stamp):
+        return _first_difference(apply(old.data, allowed), new, stamp)
+    try:
+        a = before if isinstance(before, Skeleton) else Skeleton.read(before)
+        b = after if isinstance(after, Skeleton) else Skeleton.read(after)
+    except ProgramError as problem:
+        return str(problem)
+    if len(a.shape) != len(b.shape) or len(a.start) != len(b.start):
+        return "the rewritten text has other lines or numbers than the original"
+    if a.shapes != b.shapes or (a.shape != b.shape).any():
+        row = int(np.flatnonzero(a.shape != b.shape)[:1].sum())
+        return f"line {a.line[row]}: the rewritten line has another shape"
+    return _part_of_a_number(a, allowed) or _number_elsewhere(a, b, allowed, stamp)
+
+
+def _part_of_a_number(before: Skeleton, allowed: Replacements) -> str:
+    """Say which edit does not replace one whole number."""
     for rows in chunks(len(allowed), AT_ONCE):
         some = allowed[rows]
         at = np.searchsorted(before.start, some.start)
@@ -91,7 +108,14 @@ def differences(
             whole &= before.end[at] == some.end
         if not whole.all():
             line = before.source.line_of(int(some.start[~whole][0]))
-            return (f"line {line}: an edit does not replace one whole number",)
+            return f"line {line}: an edit does not replace one whole number"
+    return ""
+
+
+def _number_elsewhere(
+    before: Skeleton, after: Skeleton, allowed: Replacements, stamp: int
+) -> str:
+    """Say which number does not stand where the edits move it to."""
     growth = np.char.str_len(allowed.new) - (allowed.end - allowed.start)
     shift = stamp + np.cumsum(np.append(0, growth))
     for rows in chunks(len(before.start), AT_ONCE):
@@ -102,8 +126,26 @@ def differences(
         wrong |= after.end[rows] != end + shift[edits]
         if wrong.any():
             line = before.source.line_of(int(start[wrong][0]))
-            return (f"line {line}: a number stands elsewhere than it should",)
-    return ()
+            return f"line {line}: a number stands elsewhere than it should"
+    return ""
+
+
+def _is_meant(old: bytes, allowed: Replacements, new: bytes, stamp: int) -> bool:
+    """Tell whether a text is another one with edits, without making it once more."""
+    at = stamp
+    for piece in allowed.applied(old):
+        if not new.startswith(piece, at):
+            return False
+        at += len(piece)
+    return at == len(new)
+
+
+def _first_difference(meant: bytes, after: Source, stamp: int) -> str:
+    length = min(len(meant), len(after.data) - stamp)
+    pairs = zip(meant, after.data[stamp:], strict=False)
+    at = next((i for i, (a, b) in enumerate(pairs) if a != b), length)
+    line = after.line_of(min(at + stamp, max(len(after.data) - 1, 0)))
+    return f"line {line}: the text is not what was meant"
 
 
 # Numbers as text, a million at a time: fixed-width rows of bytes instead of strings.
@@ -330,51 +372,3 @@ def _width(texts: Texts) -> int:
     """Return the length of the longest text, at least 1."""
     used = np.flatnonzero(as_bytes(texts).any(axis=0))
     return 1 + int(used.max(initial=0))
-
-
-def compare(
-    before: Source | Skeleton,
-    after: Source | Skeleton,
-    allowed: Replacements,
-    stamp: int = 0,
-) -> tuple[str, ...]:
-    """Check that a text differs from its origin only by the edits meant.
-
-    Texts that have not been read yet are; `differences` says what is looked at.
-
-    Args:
-        before: The original.
-        after: The rewritten text.
-        allowed: The edits of numbers that were meant.
-        stamp: Bytes of the stamp line that it begins with.
-
-    Returns:
-        What is wrong, empty where all is well.
-    """
-    old, new = (s.source if isinstance(s, Skeleton) else s for s in (before, after))
-    if not _is_meant(old.data, allowed, new.data, stamp):
-        return (_first_difference(apply(old.data, allowed), new, stamp),)
-    try:
-        a = before if isinstance(before, Skeleton) else Skeleton.read(before)
-        b = after if isinstance(after, Skeleton) else Skeleton.read(after)
-    except ProgramError as problem:
-        return (str(problem),)
-    return differences(a, b, allowed, stamp)
-
-
-def _is_meant(old: bytes, allowed: Replacements, new: bytes, stamp: int) -> bool:
-    """Tell whether a text is another one with edits, without making it once more."""
-    at = stamp
-    for piece in allowed.applied(old):
-        if not new.startswith(piece, at):
-            return False
-        at += len(piece)
-    return at == len(new)
-
-
-def _first_difference(meant: bytes, after: Source, stamp: int) -> str:
-    length = min(len(meant), len(after.data) - stamp)
-    pairs = zip(meant, after.data[stamp:], strict=False)
-    at = next((i for i, (a, b) in enumerate(pairs) if a != b), length)
-    line = after.line_of(min(at + stamp, max(len(after.data) - 1, 0)))
-    return f"line {line}: the text is not what was meant"

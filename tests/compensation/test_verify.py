@@ -13,6 +13,7 @@ from postproc.compensation.rewrite import (
     Output,
     VerificationError,
     check_output,
+    read_back,
     write_numbers,
 )
 from postproc.robot.cell import Cell
@@ -22,7 +23,7 @@ from tests.written import FIRST, POSE, program
 @pytest.fixture(params=[1, 50_000], autouse=True)
 def window(request, monkeypatch):
     """Check as many rows at a time."""
-    monkeypatch.setattr("postproc.compensation.rewrite.ROWS", request.param)
+    monkeypatch.setattr("postproc.compensation.equivalence.ROWS", request.param)
     monkeypatch.setattr("postproc.language.rewrite.AT_ONCE", request.param)
 
 
@@ -44,6 +45,12 @@ def written(cell: Cell) -> tuple[Reading, Output, np.ndarray]:
     return reading, write_numbers(reading, rows, values, "0" * 16), rows
 
 
+def check(reading: Reading, after: Reading, output: Output, rows: np.ndarray) -> None:
+    """Check an output that should be read as it was written."""
+    values = read_back(reading.visits, rows, output.edits)
+    check_output(reading, after, output, rows, values)
+
+
 def with_text(output: Output, old: bytes, new: bytes) -> Output:
     files = {"job.pdl": output.files["job.pdl"].replace(old, new)}
     assert files != output.files
@@ -52,7 +59,7 @@ def with_text(output: Output, old: bytes, new: bytes) -> Output:
 
 def test_what_was_meant_passes(job_cell: Cell) -> None:
     reading, output, rows = written(job_cell)
-    check_output(reading, read_program(output.files, job_cell), output, rows)
+    check(reading, read_program(output.files, job_cell), output, rows)
 
 
 @pytest.mark.parametrize(
@@ -68,23 +75,26 @@ def test_another_byte_is_refused(job_cell: Cell, old: bytes, new: bytes) -> None
     reading, output, rows = written(job_cell)
     other = with_text(output, old, new)
     with pytest.raises(VerificationError, match=r"job\.pdl"):
-        check_output(reading, read_program(other.files, job_cell), output, rows)
+        check(reading, read_program(other.files, job_cell), output, rows)
 
 
 def test_a_target_that_was_to_be_kept_is_refused(job_cell: Cell) -> None:
     reading, output, rows = written(job_cell)
     after = read_program(output.files, job_cell)
     with pytest.raises(VerificationError, match="was to be kept"):
-        check_output(reading, after, output, rows[1:])
+        check(reading, after, output, rows[1:])
+    values = np.array(reading.visits.values)
+    with pytest.raises(VerificationError, match="as it was meant"):
+        check_output(reading, after, output, rows, values)
     frames = after.visits.frames + 1e-3
     moved = replace(after, visits=replace(after.visits, frames=frames))
     with pytest.raises(VerificationError, match="another frames"):
-        check_output(reading, moved, output, rows)
+        check(reading, moved, output, rows)
     fewer = replace(
         after, visits=read_program({"job.pdl": program(FIRST)}, job_cell).visits
     )
     with pytest.raises(VerificationError, match="other moves"):
-        check_output(reading, fewer, output, rows)
+        check(reading, fewer, output, rows)
 
 
 @pytest.mark.parametrize("error", [VerificationError, ValueError])

@@ -6,9 +6,14 @@ import numpy as np
 import pytest
 
 from postproc.compensation.program import read_program
-from postproc.compensation.rewrite import VerificationError, check_output, write_numbers
-from postproc.language.rewrite import Skeleton, differences
-from postproc.language.source import Replacements, Source
+from postproc.compensation.rewrite import (
+    VerificationError,
+    check_output,
+    read_back,
+    write_numbers,
+)
+from postproc.language.rewrite import Skeleton, difference
+from postproc.language.source import Replacements, Source, apply
 from postproc.robot.cell import load_cell
 from tests.bench.__main__ import CELL
 from tests.bench.made import spot
@@ -31,7 +36,7 @@ def cell():
 
 @pytest.fixture(params=["poses", "crlf", "mark", "spot"])
 def job(request, cell):
-    """Yield a reading, its output with all literals moved, and those literals."""
+    """Return a reading, its output with all literals moved, those, all numbers."""
     files = {"a.pdl": POSES}
     if request.param == "crlf":
         files = {"a.pdl": POSES.replace(b"\n", b"\r\n")}
@@ -45,34 +50,35 @@ def job(request, cell):
     rows = np.arange(len(v.literals))
     first = [int(np.flatnonzero(v.literal == row)[0]) for row in rows]
     moved = v.values[first] + np.array([0.25, -11.5, 100.0, 0.5, 0.25, 0.125])
-    return reading, write_numbers(reading, rows, moved, "m"), rows
+    output = write_numbers(reading, rows, moved, "m")
+    return reading, output, rows, read_back(v, rows, output.edits)
 
 
 def test_what_was_meant_is_accepted(job, cell) -> None:
-    reading, output, rows = job
-    check_output(reading, read_program(output.files, cell), output, rows)
+    reading, output, rows, values = job
+    check_output(reading, read_program(output.files, cell), output, rows, values)
 
 
 @pytest.mark.parametrize("old, new", [(b"5", b"6"), (b"MOVE", b"MOVE "), (b"\n", b" ")])
 def test_another_byte_is_refused(job, cell, old, new) -> None:
-    reading, output, rows = job
+    reading, output, rows, values = job
     for name in output.records:
         head, _, rest = output.files[name].rpartition(old)
         if not head:
             continue
         files = {**output.files, name: head + new + rest}
         with pytest.raises(VerificationError):
-            check_output(reading, read_program(files, cell), output, rows)
+            check_output(reading, read_program(files, cell), output, rows, values)
 
 
 def test_a_number_that_reads_otherwise_is_refused(job, cell) -> None:
-    reading, output, rows = job
+    reading, output, rows, values = job
     after = read_program(output.files, cell)
-    values = after.visits.values.copy()
-    values[after.visits.literal >= 0, 3] += 1e-4
-    wrong = replace(after, visits=replace(after.visits, values=values))
+    read = after.visits.values.copy()
+    read[after.visits.literal >= 0, 3] += 1e-4
+    wrong = replace(after, visits=replace(after.visits, values=read))
     with pytest.raises(VerificationError, match="not read as it was meant"):
-        check_output(reading, wrong, output, rows)
+        check_output(reading, wrong, output, rows, values)
 
 
 def test_a_number_elsewhere_is_refused() -> None:
@@ -81,16 +87,20 @@ def test_a_number_elsewhere_is_refused() -> None:
     edits = Replacements(start, start + 1, np.array([b"9.500"]))
     data = POSES[: start[0]] + b"9.500" + POSES[start[0] + 1 :]
     after = Skeleton.read(Source("a.pdl", data))
-    assert differences(before, after, edits, 0) == ()
-    assert differences(before, after, edits, 1)
+    assert difference(before, after, edits) == ""
+    assert difference(before, after, edits, 1)
     for places in ("start", "end"):
         moved = getattr(after, places).copy()
         moved[5] += 1
-        assert differences(before, replace(after, **{places: moved}), edits, 0)
-    half = Replacements(start, start, np.array([b"9.500"]))
-    assert "one whole number" in differences(before, after, half, 0)[0]
-    none = replace(before, start=before.start[:0], end=before.end[:0])
-    assert differences(none, none, edits, 0)
+        wrong = replace(after, **{places: moved})
+        assert "elsewhere" in difference(before, wrong, edits)
+    half = Replacements(start, start, np.array([b"9.5"]))
+    after = Skeleton.read(Source("a.pdl", apply(POSES, half)))
+    assert "one whole number" in difference(before, after, half)
+    none = Replacements(start[:0], start[:0], np.array([], dtype="S1"))
+    fewer = replace(before, start=before.start[:0], end=before.end[:0])
+    assert "other lines or numbers" in difference(before, fewer, none)
+    assert difference(before, before, none) == ""
 
 
 def test_a_file_without_targets_is_not_parsed_again(cell) -> None:

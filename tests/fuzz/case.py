@@ -13,7 +13,7 @@ import numpy as np
 from postproc.compensation.compensate import compensate
 from postproc.compensation.program import read_program
 from postproc.compensation.record import FileRecord, Sidecar, restore
-from postproc.compensation.rewrite import check_output, write_numbers
+from postproc.compensation.rewrite import check_output, read_back, write_numbers
 from postproc.exceptions import PostprocError
 from postproc.language.visits import Visits
 from postproc.model.model import Model
@@ -71,7 +71,8 @@ def rewrite(files: Mapping[str, bytes], cell: Cell) -> str:
     known &= np.array([not why for why in visits.literals.pinned], dtype=bool)
     rows, example = rows[known], example[known]
     output = write_numbers(reading, rows, visits.values[example] + SHIFT, "0" * 12)
-    check_output(reading, read_program(output.files, cell), output, rows)
+    values = read_back(visits, rows, output.edits)
+    check_output(reading, read_program(output.files, cell), output, rows, values)
     check_bytes(files, output.files, output.records, visits)
     return "rewritten"
 

@@ -10,7 +10,7 @@ from postproc.exceptions import PostprocError
 from postproc.language.lines import Lines, read_lines
 from postproc.language.pdl2.program import parse
 from postproc.language.pdl2.variable_file import read_variables
-from postproc.language.rewrite import compare
+from postproc.language.rewrite import difference
 from postproc.language.source import Replacements, Source, apply, source_from_bytes
 
 
@@ -45,8 +45,8 @@ def check_numbers(lines: Lines) -> None:
     signed = [source.data[max(a - 1, 0) : a] in (b"+", b"-") for a in start.tolist()]
     new = [own if kept else b"7.5" for own, kept in zip(same, signed, strict=True)]
     other = replaced(lines, new)
-    problems = compare(source, Source(source.name, apply(source.data, other)), other)
-    assert not problems, problems
+    problem = difference(source, Source(source.name, apply(source.data, other)), other)
+    assert not problem, problem
 
 
 def replaced(lines: Lines, texts: list[bytes]) -> Replacements:

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from postproc.language.pdl2.interpreter import resolve
 from postproc.language.pdl2.program import parse
-from postproc.language.rewrite import compare, decimals_of, edits, number_text
+from postproc.language.rewrite import decimals_of, difference, edits, number_text
 from postproc.language.source import (
     Edit,
     Replacements,
@@ -36,20 +36,20 @@ def test_new_numbers_have_enough_digits_and_nothing_else_changes() -> None:
     assert out == PROGRAM.replace(b"1.5,- 2.25 ", b"1.250,2.500 ").replace(
         b"-0.00000", b"-0.50000"
     ).replace(b"1e1", b"10.5000").replace(b"{1, 2.5, 3,", b"{1.00001, 2.5, -3.00000,")
-    assert compare(source, Source("a.pdl", out), mine) == ()
+    assert difference(source, Source("a.pdl", out), mine) == ""
 
 
-def test_compare_finds_what_was_not_meant() -> None:
+def test_a_difference_that_was_not_meant_is_found() -> None:
     source = source_from_bytes("a.pdl", PROGRAM)
     at = PROGRAM.index(b"1.5")
     meant = Replacements.of([Edit(Span(at, at + 3), b"1.7")])
     good = Source("a", apply(PROGRAM, meant))
-    assert compare(source, good, meant) == ()
-    assert compare(source, Source("a", good.data.replace(b"45.1", b"45.2")), meant)
-    assert compare(source, Source("a", good.data.replace(b"\xe9", b"e")), meant)
-    assert compare(source, Source("a", good.data + b"\r\nx"), meant)
-    assert compare(source, Source("a", good.data.replace(b"1.7", b"1.8")), meant)
-    assert compare(source, source, meant)
+    assert difference(source, good, meant) == ""
+    assert difference(source, Source("a", good.data.replace(b"45.1", b"45.2")), meant)
+    assert difference(source, Source("a", good.data.replace(b"\xe9", b"e")), meant)
+    assert difference(source, Source("a", good.data + b"\r\nx"), meant)
+    assert difference(source, Source("a", good.data.replace(b"1.7", b"1.8")), meant)
+    assert difference(source, source, meant)
 
 
 def test_a_value_that_is_none_is_refused() -> None:
@@ -80,4 +80,4 @@ def test_a_plus_belongs_to_its_number_and_stays_while_it_is_not_below_zero() -> 
     assert b"POS(+1501.250, +3.500, -0.020, +91.0000, 44.0000, +16.0000, '')" in out
     again = resolve(parse(source_from_bytes("a.pdl", out))).visits
     np.testing.assert_array_equal(again.values, wanted)
-    assert compare(source, Source("a.pdl", out), mine) == ()
+    assert difference(source, Source("a.pdl", out), mine) == ""

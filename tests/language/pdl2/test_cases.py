@@ -7,7 +7,7 @@ import pytest
 
 from postproc.language.pdl2.interpreter import resolve
 from postproc.language.pdl2.program import parse
-from postproc.language.rewrite import compare, edits
+from postproc.language.rewrite import difference, edits
 from postproc.language.source import Source, apply, source_from_bytes
 
 CASES = sorted((Path(__file__).parents[2] / "cases").glob("*.pdl"))
@@ -26,4 +26,4 @@ def test_case(path: Path, newline: bytes) -> None:
     (mine,) = edits(visits.literals, (source,), rows, new)
     out = apply(given, mine)
     assert out == wanted
-    assert compare(source, Source(path.name, out), mine) == ()
+    assert difference(source, Source(path.name, out), mine) == ""
