@@ -1,4 +1,4 @@
-//! The Denavit-Hartenberg chain: `postproc.robot.dh`.
+//! The Denavit-Hartenberg chain: `postproc.robot.arm`.
 
 use numpy::{PyArray2, PyArray3, PyReadonlyArray2};
 use pyo3::exceptions::PyValueError;

@@ -1,4 +1,4 @@
-//! How the path runs round fly points: `postproc.motion.corner`.
+//! How the path runs round fly points: `postproc.motion.blending`.
 
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;

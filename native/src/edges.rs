@@ -1,4 +1,4 @@
-//! Places on the sampled paths of edges: `postproc.motion.paths`.
+//! Places on the sampled paths of edges: `postproc.motion.blending`.
 
 use numpy::{PyArray2, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::exceptions::PyIndexError;

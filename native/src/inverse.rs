@@ -1,5 +1,5 @@
 //! The closed-form inverse kinematics of an ortho-parallel arm:
-//! `postproc.robot.closed_form`.
+//! `postproc.robot.inverse`.
 
 use std::f64::consts::PI;
 

@@ -1,4 +1,4 @@
-//! Straight paths of the TCP: `postproc.motion.path` and `postproc.motion.zone`.
+//! Straight paths of the TCP: `postproc.motion.path` and `postproc.motion.blending`.
 
 use numpy::{
     IntoPyArray, PyArray1, PyArray2, PyArray3, PyReadonlyArray1, PyReadonlyArray3,

@@ -1,4 +1,4 @@
-//! Rigid transforms, pose by pose: `postproc.pose`.
+//! Rigid transforms, pose by pose: `postproc.robot.pose`.
 
 use numpy::PyUntypedArrayMethods;
 use numpy::{PyArray2, PyArray3, PyReadonlyArray2, PyReadonlyArray3};

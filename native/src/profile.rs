@@ -1,4 +1,4 @@
-//! Backlash along the gear: `postproc.accuracy.backlash_profile`.
+//! Backlash along the gear: `postproc.model.effects.backlash_profile`.
 
 use std::f64::consts::{PI, TAU};
 

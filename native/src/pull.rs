@@ -1,4 +1,4 @@
-//! How corners pull at each other: `postproc.motion.pull`.
+//! How corners pull at each other: `postproc.motion.path`.
 
 use numpy::{PyArray2, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::exceptions::PyValueError;

@@ -1,4 +1,4 @@
-//! Samples of paths whose fly points are rounded: `postproc.motion.rounding`.
+//! Samples of paths whose fly points are rounded: `postproc.motion.blending`.
 
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::exceptions::PyIndexError;

@@ -1,4 +1,4 @@
-//! What uncertain parameters of geometry and joints give: `postproc.accuracy.variance`.
+//! What uncertain parameters of geometry and joints give: `postproc.model.model`.
 //!
 //! The columns of all parameters that turn one joint are its column of the Jacobian, by
 //! a number each: their part of the covariance shrinks to one row per joint.

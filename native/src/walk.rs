@@ -1,4 +1,4 @@
-//! Axes and points met along a chain with deviations: `postproc.accuracy.chain.walk`.
+//! Axes and points met along a chain with deviations: `postproc.model.kinematics.walk`.
 
 use crate::chain::Chain;
 use crate::rows::{minus, Six, Three};

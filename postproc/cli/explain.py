@@ -12,7 +12,6 @@ import numpy as np
 
 from postproc.arrays import Floats, Ints, Signs
 from postproc.cli.jobs import read_files
-from postproc.compensation.arrivals import ArrivalStates
 from postproc.compensation.compensate import compensate
 from postproc.compensation.options import Options
 from postproc.compensation.outcome import Outcome, Status
@@ -123,20 +122,20 @@ class Explanation:
         if line is None:
             print(self.summary())
         elif self.outcome is not None and self.outcome.arrivals is not None:
-            for i in rows.tolist():
-                self._print_shares(i, self.outcome.arrivals)
+            shares = self.outcome.arrivals.shares(rows) / MM
+            for i, own in zip(rows.tolist(), shares, strict=True):
+                self._print_shares(i, own, self.outcome.arrivals.effects)
 
-    def _print_shares(self, i: int, arrivals: ArrivalStates) -> None:
-        """Print which effect has which share in the error at visit i."""
-        shares = arrivals.shares(np.array([i]))[0] / MM
+    def _print_shares(self, i: int, shares: Floats, effects: Sequence[str]) -> None:
+        """Print which of k effects has which share (k, 3) [mm] in the error there."""
         if not np.isfinite(shares).any():
             return
-        whole = shares.sum(axis=0)
         sizes = np.linalg.norm(shares, axis=1)
         order = np.argsort(-sizes, kind="stable").tolist()
-        told = [(arrivals.effects[k], shares[k]) for k in order]
-        print(f"\n{self._line(i, 'line ')} from {_few(self._from(i))}:")
-        print_table(SHARES, (_share_cells(*row) for row in [*told, (WHOLE, whole)]))
+        rows = [_share_cells(effects[k], shares[k]) for k in order]
+        place = f"{self._line(i, 'line ')} from {_few(self._from(i))}:"
+        print(f"\n{printable(place)}")
+        print_table(SHARES, [*rows, _share_cells(WHOLE, shares.sum(axis=0))])
 
     def summary(self) -> str:
         """Say in one line what came of the program."""
