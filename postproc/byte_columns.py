@@ -19,6 +19,7 @@ T = TypeVar("T")
 
 TIE = 1e-4  # nearer to halfway than this the last digit is left to Python
 MOST = 1e10  # scaled numbers from here on, too: they are not exact enough
+EXACT = 8  # decimals that are written here
 _FOUR = 10_000
 
 
@@ -31,6 +32,17 @@ _MORE = np.where(_NUMBERS > 0, _BARE, np.uint32(0))  # 0: nothing
 def joined(columns: Sequence[ByteColumn | bytes]) -> bytes:
     """Return the rows one after the other; bytes are the same text in every row."""
     return beside(columns).tobytes().translate(None, b"\0")
+
+
+def as_texts(column: ByteColumn) -> NDArray[np.bytes_]:
+    """Return the rows by themselves, (k,)."""
+    held = column != 0
+    length = np.count_nonzero(held, axis=1)
+    width = max(int(length.max(initial=0)), 1)
+    rows = np.zeros((len(column), width), dtype=np.uint8)
+    rows[np.arange(width) < length[:, None]] = column[held]
+    texts: NDArray[np.bytes_] = rows.view(f"S{width}")[:, 0]
+    return texts
 
 
 def beside(columns: Sequence[ByteColumn | bytes]) -> ByteColumn:
@@ -93,14 +105,15 @@ def fixed(values: Floats, decimals: int) -> ByteColumn:
 
     Args:
         values: (k,).
-        decimals: At most 8.
+        decimals: More than 8 are left to Python.
 
     >>> joined([fixed(np.array([-0.0625, 12345.678, np.nan]), 3), b" "])
     b'-0.062 12345.678 null '
     """
-    scaled = np.abs(values) * 10.0**decimals
-    with np.errstate(invalid="ignore"):
+    with np.errstate(invalid="ignore", over="ignore"):
+        scaled = np.abs(values) * 10.0**decimals
         sure = (scaled < MOST) & (np.abs(scaled - np.floor(scaled) - 0.5) > TIE)
+    sure &= decimals <= EXACT
     rounded = np.rint(np.where(sure, scaled, 0.0)).astype(np.int64)
     rows = _written(rounded, decimals, np.signbit(values))
     rows = blanked(rows, np.isnan(values), b"null")

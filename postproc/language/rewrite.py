@@ -8,12 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from postproc.arrays import Bools, Bytes, Floats, Indices, Ints, chunks
+from postproc.arrays import Bytes, Floats, Indices, Ints, chunks
+from postproc.byte_columns import as_texts, fixed
 from postproc.exceptions import ProgramError
 from postproc.language.lines import Lines, read_lines
-from postproc.language.scan import number_value
+from postproc.language.scan import read_numbers
 from postproc.language.shapes import Shapes
-from postproc.language.source import Replacements, Source, apply, as_bytes
+from postproc.language.source import Replacements, Source, apply
 from postproc.language.visits import Literals
 
 # What new numbers must leave alone: the shapes of lines and where numbers stand.
@@ -148,108 +149,6 @@ def _first_difference(meant: bytes, after: Source, stamp: int) -> str:
     return f"line {line}: the text is not what was meant"
 
 
-# Numbers as text, a million at a time: fixed-width rows of bytes instead of strings.
-#
-# Only plain decimal numbers are treated here, and only values that round without doubt;
-# the functions tell which. The others are for `mask_line` and Python's own formatting,
-# one by one, which define what all of it means.
-
-WIDEST = 24  # bytes of a number that is read here
-MOST_DIGITS = 15  # of a number that is written here: exact as a float
-TIE = 1e-4  # nearer to halfway than this the last digit is not sure
-_TENS = 10.0 ** np.arange(MOST_DIGITS + 1)
-_DOT, _MINUS, _ZERO = 46, 45, 48
-
-
-def cut(data: bytes, start: Ints, end: Ints) -> tuple[Texts, Bools]:
-    """Cut numbers out of a text.
-
-    Args:
-        data: The text.
-        start: Offsets at which numbers begin, (m,).
-        end: Offsets at which they end, (m,).
-
-    Returns:
-        The texts, (m,), and which of them are plain: digits with or without a dot,
-        after a minus or nothing.
-    """
-    a = np.frombuffer(data, dtype=np.uint8)
-    length = end - start
-    width = int(min(length.max(initial=1), WIDEST))
-    rows = np.zeros((len(start), width), dtype=np.uint8)
-    plain, dots = length <= width, np.zeros(len(start), dtype=np.int64)
-    for k in range(width):
-        inside = k < length
-        byte = np.where(inside, a[np.minimum(start + k, len(a) - 1)], 0)
-        digit = (byte >= _ZERO) & (byte < _ZERO + 10)
-        dot = byte == _DOT
-        dots += dot
-        plain &= digit | dot | ~inside | ((byte == _MINUS) & (k == 0))
-        rows[:, k] = byte
-    digits = length - dots - (rows[:, 0] == _MINUS)
-    plain &= (dots <= 1) & (digits > 0)
-    return _as_texts(rows), plain
-
-
-def decimals(texts: Texts) -> Ints:
-    """Count the decimals of plain numbers, (m,)."""
-    dot = np.char.find(texts, b".")
-    return np.where(dot < 0, 0, np.char.str_len(texts) - dot - 1)
-
-
-def fixed(values: Floats, decimals: Ints) -> tuple[Texts, Bools]:
-    """Write numbers with so many decimals each; a zero carries no sign.
-
-    Args:
-        values: (m,).
-        decimals: (m,).
-
-    Returns:
-        The texts, (m,), and which of them are sure.
-
-    >>> fixed(np.array([12.34567, -0.00001]), np.array([3, 4]))[0].tolist()
-    [b'12.346', b'0.0000']
-    """
-    scaled = np.abs(values) * _TENS[np.minimum(decimals, MOST_DIGITS)]
-    sure = (scaled < _TENS[-1] / 10) & (decimals < MOST_DIGITS)
-    scaled[~sure] = 0.0
-    whole = np.rint(scaled).astype(np.int64)
-    sure &= np.abs(scaled - np.floor(scaled) - 0.5) > TIE
-    negative = (values < 0) & (whole > 0)
-    count = np.searchsorted(_TENS, whole, side="right")
-    before = np.maximum(count - decimals, 1)
-    rows = np.zeros((len(values), 2 * MOST_DIGITS), dtype=np.uint8)
-    layout = (decimals * 32 + before) * 2 + negative
-    for key in np.unique(layout[sure]).tolist():
-        mine = np.flatnonzero(sure & (layout == key))
-        rest, sign = divmod(key, 2)
-        after, ahead = divmod(rest, 32)
-        rows[mine] = _written(whole[mine], ahead, after, bool(sign), rows.shape[1])
-    return _as_texts(rows), sure
-
-
-def _written(whole: Ints, ahead: int, after: int, sign: bool, width: int) -> Bytes:
-    """Write scaled numbers that have one layout, (g, width)."""
-    rows = np.zeros((len(whole), width), dtype=np.uint8)
-    at = sign + ahead + after + (after > 0)
-    for k in range(ahead + after):
-        if k == after and after > 0:
-            at -= 1
-            rows[:, at] = _DOT
-        at -= 1
-        whole, digit = np.divmod(whole, 10)
-        rows[:, at] = digit + _ZERO
-    if sign:
-        rows[:, 0] = _MINUS
-    return rows
-
-
-def _as_texts(rows: Bytes) -> Texts:
-    """See rows of bytes as texts."""
-    texts: Texts = np.ascontiguousarray(rows).view(f"S{rows.shape[1]}")[:, 0]
-    return texts
-
-
 # New numbers into old text: edits of the numbers of targets, and nothing else.
 
 Texts = NDArray[np.bytes_]
@@ -260,31 +159,23 @@ _POSE_DECIMALS = (MM_DECIMALS,) * 3 + (DEGREE_DECIMALS,) * 3
 _JOINT_DECIMALS = (JOINT_DECIMALS,) * 6
 
 
-def decimals_of(text: str) -> int:
-    """Return how many decimals a number is written with.
+def number_texts(values: Floats, decimals: Ints) -> Texts:
+    """Write numbers with so many decimals each; a zero carries no sign, (m,).
 
-    >>> decimals_of("-12.50"), decimals_of("7"), decimals_of("1.25e1")
-    (2, 0, 1)
+    >>> number_texts(np.array([12.34567, -0.00001]), np.array([3, 4])).tolist()
+    [b'12.346', b'0.0000']
     """
-    if text.replace(".", "", 1).lstrip("-").isdecimal():
-        return len(text.partition(".")[2])
-    mantissa, _, exponent = text.lower().partition("e")
-    if "x" in mantissa:
-        return 0
-    written = len(mantissa.partition(".")[2])
-    return max(written - int(exponent or 0), 0)
-
-
-def number_text(value: float, decimals: int, least: int) -> str:
-    """Write a number with the decimals it had and at least `least`.
-
-    The sign stands directly before the digits; a zero carries none.
-
-    >>> number_text(12.34567, 1, 3), number_text(-0.00001, 4, 3)
-    ('12.346', '0.0000')
-    """
-    text = f"{value:.{max(decimals, least)}f}"
-    return text.lstrip("-") if float(text) == 0.0 else text
+    groups = [np.flatnonzero(decimals == d) for d in np.unique(decimals).tolist()]
+    written = []
+    for rows in groups:
+        column = fixed(values[rows], int(decimals[rows[0]]))
+        nought = ~((column > ord("0")) & (column <= ord("9"))).any(axis=1)
+        column[nought & (column[:, 0] == ord("-")), 0] = 0
+        written.append(as_texts(column))
+    texts = np.zeros(len(values), np.result_type("S1", *written))
+    for rows, own in zip(groups, written, strict=True):
+        texts[rows] = own
+    return texts
 
 
 def edits(
@@ -333,42 +224,19 @@ def _edits_of(
     source: Source, start: Ints, end: Ints, values: Floats, least: Ints
 ) -> Replacements:
     """Return the edits of one file's numbers, which are in ascending order."""
-    old, plain = cut(source.data, start, end)
-    had, before = np.zeros(len(old), dtype=np.int64), np.empty(len(old))
-    had[plain], before[plain] = decimals(old[plain]), old[plain].astype(float)
-    for row in np.flatnonzero(~plain).tolist():
-        text = source.text[start[row] : end[row]]
-        had[row], before[row] = decimals_of(text), number_value(text)
-    moved = ~(np.abs(values - before) <= 0.5 * 10.0 ** -np.maximum(had, least))
-    rows = np.flatnonzero(moved)
-    new = _texts(values[rows], had[rows], least[rows])
-    new = _with_plus(new, old[rows])
+    before, had = read_numbers(source.data, start, end)
+    digits = np.maximum(had, least)
+    rows = np.flatnonzero(~(np.abs(values - before) <= 0.5 * 10.0**-digits))
+    new = number_texts(values[rows], digits[rows])
+    new = _with_plus(new, np.frombuffer(source.data, dtype=np.uint8)[start[rows]])
     other = new.astype(float) != before[rows]
     return Replacements(start[rows[other]], end[rows[other]], new[other])
 
 
-def _with_plus(new: Texts, old: Texts) -> Texts:
-    """Keep the plus of numbers that had one and are not below zero."""
-    rows = np.char.startswith(old, b"+") & ~np.char.startswith(new, b"-")
+def _with_plus(new: Texts, before: Bytes) -> Texts:
+    """Keep the plus that numbers began with, where they are not below zero."""
+    rows = (before == ord("+")) & ~np.char.startswith(new, b"-")
     if not rows.any():
         return new
     signed: Texts = np.where(rows, np.char.add(b"+", new), new)
     return signed
-
-
-def _texts(values: Floats, decimals: Ints, least: Ints) -> NDArray[np.bytes_]:
-    """Write numbers with the decimals they had and at least `least`, (m,)."""
-    new, sure = fixed(values, np.maximum(decimals, least))
-    rest = np.flatnonzero(~sure)
-    triples = zip(values[rest], decimals[rest], least[rest], strict=True)
-    texts = [number_text(v, d, few).encode("ascii") for v, d, few in triples]
-    widest = max([_width(new), *map(len, texts)])
-    new = new.astype(f"S{widest}")
-    new[rest] = texts
-    return new
-
-
-def _width(texts: Texts) -> int:
-    """Return the length of the longest text, at least 1."""
-    used = np.flatnonzero(as_bytes(texts).any(axis=0))
-    return 1 + int(used.max(initial=0))

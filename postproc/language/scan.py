@@ -133,6 +133,19 @@ def number_value(text: str) -> float:
     return -value if text.startswith("-") else value
 
 
+def decimals_of(text: str) -> int:
+    """Return how many decimals a number is written with.
+
+    >>> decimals_of("-12.50"), decimals_of("7"), decimals_of("1.25e1")
+    (2, 0, 1)
+    """
+    mantissa, _, exponent = text.lower().partition("e")
+    if "x" in mantissa:
+        return 0
+    written = len(mantissa.partition(".")[2])
+    return max(written - int(exponent or 0), 0)
+
+
 # Plain decimal numbers in a text: where they stand, what they are worth, in arrays.
 #
 # A pass over all bytes costs far more than one over the numbers, so that only digits
@@ -287,6 +300,36 @@ def values(a: Bytes, numbers: PlainNumbers, start: Ints) -> Floats:
         text = a[start[i] : numbers.end[i]].tobytes()
         value[i] = number_value(text.decode("latin-1"))
     return value
+
+
+def read_numbers(data: bytes, start: Ints, end: Ints) -> tuple[Floats, Ints]:
+    """Read numbers that stand at known places of a text.
+
+    Args:
+        data: The text.
+        start: Where they start, the sign included, ascending, (m,).
+        end: Where they end, (m,).
+
+    Returns:
+        What they are worth, and how many decimals they are written with, (m,).
+    """
+    value, decimals = np.zeros(len(start)), np.zeros(len(start), dtype=np.int64)
+    if not len(start):
+        return value, decimals
+    a = np.frombuffer(data, dtype=np.uint8)[start[0] : end[-1]]
+    begin, stop = start - start[0], end - start[0]
+    first = begin + ((a[begin] == _MINUS) | (a[begin] == _PLUS))
+    runs = runs_of(numeric_bytes(a))
+    at = np.minimum(np.searchsorted(runs[0], first), len(runs[0]) - 1)
+    plain = np.flatnonzero((runs[0][at] == first) & (runs[1][at] == stop))
+    numbers = plain_numbers(a, first[plain], stop[plain])
+    plain, numbers = plain[numbers.number], numbers.take(numbers.number)
+    value[plain] = values(a, numbers, begin[plain])
+    decimals[plain] = np.maximum(numbers.end - numbers.point - 1, 0)
+    for k in np.setdiff1d(np.arange(len(start)), plain, assume_unique=True).tolist():
+        text = data[start[k] : end[k]].decode("latin-1")
+        value[k], decimals[k] = number_value(text), decimals_of(text)
+    return value, decimals
 
 
 def _short(a: Bytes, end: Ints, before: Ints, after: Ints, dotted: Bools) -> Ints:

@@ -4,46 +4,47 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from postproc.language.rewrite import (
-    _texts,
-    cut,
-    decimals,
-    decimals_of,
-    fixed,
-    number_text,
-)
+from postproc.language.rewrite import number_texts
+from postproc.language.scan import decimals_of, number_value, read_numbers
 from postproc.language.source import Edit, Replacements, Span, apply
 
 VALUES = st.floats(-1e9, 1e9) | st.integers(-10_000, 10_000).map(lambda k: k / 2000)
+WORDS = (
+    "1.5", "-12.", ".25", "7", "-0.0000", "+3.25", "- 3", "1e5", "-1.25e-2", "0x1F",
+    "0b101", "123456789.123456789", "-1234567.12345678",
+)  # fmt: skip
 
 
-@given(st.lists(st.tuples(VALUES, st.integers(0, 9), st.integers(3, 5)), max_size=30))
+def number_text(value: float, decimals: int) -> str:
+    """Write a number; its sign stands before the digits, a zero carries none."""
+    text = f"{value:.{decimals}f}"
+    return text.lstrip("-") if float(text) == 0.0 else text
+
+
+@given(st.lists(st.tuples(VALUES, st.integers(0, 12)), max_size=30))
 def test_numbers_are_written_as_python_writes_them(rows):
-    values, had, least = (
-        (np.array(column) for column in zip(*rows, strict=True))
-        if (rows)
-        else (np.empty(0), np.empty(0, int), np.empty(0, int))
-    )
-    wanted = [number_text(v, d, few) for v, d, few in rows]
-    assert [t.decode() for t in _texts(values, had, least)] == wanted
+    values = np.array([value for value, _ in rows], dtype=float)
+    decimals = np.array([d for _, d in rows], dtype=np.int64)
+    found = [text.decode() for text in number_texts(values, decimals)]
+    assert found == [number_text(v, d) for v, d in rows]
 
 
-def test_only_values_next_to_halfway_are_not_sure():
-    values = np.random.default_rng(1).uniform(-3000, 3000, 20_000)
-    _, sure = fixed(values, np.full(len(values), 4))
-    assert sure.mean() > 0.999
-    _, sure = fixed(np.array([0.00005, 1e18, np.nan]), np.array([4, 4, 4]))
-    assert not sure.any()
+@given(st.lists(st.sampled_from(WORDS) | VALUES.map("{:.3f}".format), max_size=20))
+def test_numbers_are_read_at_their_places(words):
+    data = f"({', '.join(words)})".encode()
+    start = 1 + np.cumsum([0, *(len(w) + 2 for w in words)])[:-1]
+    end = start + np.array([len(w) for w in words], dtype=np.int64)
+    values, decimals = read_numbers(data, start, end)
+    assert values.tolist() == [number_value(w) for w in words]
+    assert decimals.tolist() == [decimals_of(w) for w in words]
 
 
-def test_numbers_are_cut_and_read():
-    words = ["1.5", "-12.", ".25", "7", "-0.0000", "- 3", "1e5", "0x1F", "1..2", "-"]
-    data = " ".join(words).encode()
-    ends = np.cumsum([len(w) + 1 for w in words]) - 1
-    texts, plain = cut(data, ends - [len(w) for w in words], ends)
-    assert plain.tolist() == [True] * 5 + [False] * 5
-    assert [t.decode() for t in texts] == words
-    assert decimals(texts[plain]).tolist() == [decimals_of(w) for w in words[:5]]
+def test_a_part_of_something_is_read_by_itself():
+    data = b"1..2 x5 4 .5"
+    start, end = np.array([0, 3, 6, 8, 10]), np.array([1, 4, 7, 9, 12])
+    values, decimals = read_numbers(data, start, end)
+    assert values.tolist() == [1, 2, 5, 4, 0.5]
+    assert decimals.tolist() == [0, 0, 0, 0, 1]
 
 
 @given(st.data())
