@@ -17,7 +17,15 @@ Bools = NDArray[np.bool_]
 Signs = NDArray[np.int8]  # -1, 0, +1
 Bytes = NDArray[np.uint8]
 
-# Work on long arrays in pieces: what a piece needs stays in the cache.
+
+def read_only(columns: object) -> None:
+    """Refuse to have the arrays of a dataclass changed."""
+    for column in vars(columns).values():
+        if isinstance(column, np.ndarray):
+            column.setflags(write=False)
+
+
+# Long arrays in chunks: what a chunk needs stays in the cache.
 
 K = TypeVar("K")
 T = TypeVar("T")

@@ -124,7 +124,7 @@ def _pages(
     return found
 
 
-# What a source tree holds: programs with all that belongs to them, and the rest.
+# The files of a tree, sorted folder by folder.
 
 _STALE = "is compiled from the uncompensated program: translate it anew"
 

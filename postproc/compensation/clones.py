@@ -199,7 +199,7 @@ def _origin(
     return [int(line) for line in lines]
 
 
-# Points of their own for moves that cannot share one, and the proof that they fit.
+# Cloning what moves disagree on, group by group, and the proof that it fits.
 
 _WORD = re.compile(rb"[A-Za-z_]\w*")
 NOTHING = np.zeros(0, dtype=np.int64)  # no literal gets new numbers

@@ -259,7 +259,7 @@ class _WindowWork:
         return kept, found.proposal, end
 
 
-# The first sentence: a program goes in, the same program lands where it says.
+# All of it: what is given, checked, corrected, written and told.
 
 NO_PAGES: Mapping[str, bytes] = MappingProxyType({})
 

@@ -210,7 +210,7 @@ def with_block_rows(rows: LogicalRows) -> LogicalRows:
     )
 
 
-# Logical lines of a file: shapes and numbers as arrays, no object per line.
+# All lines of a file, read piece by piece.
 
 """Whole numbers, as short as the length of the file allows: there are millions."""
 

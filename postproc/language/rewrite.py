@@ -149,7 +149,7 @@ def _first_difference(meant: bytes, after: Source, stamp: int) -> str:
     return f"line {line}: the text is not what was meant"
 
 
-# New numbers into old text: edits of the numbers of targets, and nothing else.
+# The edits, file by file.
 
 Texts = NDArray[np.bytes_]
 

@@ -212,7 +212,7 @@ def _numbered(
     return numbered_in_order(form * (int(said.max()) + 1) + said)
 
 
-# Forms of lines: what differs in numbered names only is parsed once.
+# What forms say.
 #
 # Programs name points ``p1`` to ``p3000``: every line has a shape of its own, but all
 # have one form. What a form says is built once, with its names left open; what a line

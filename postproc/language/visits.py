@@ -5,7 +5,7 @@ What a language hands to everything else; nothing after it knows how a program i
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from enum import IntEnum
 from functools import cached_property
 from typing import Any
@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from postproc.arrays import Bools, Floats, Ints
+from postproc.arrays import Bools, Floats, Ints, read_only
 
 START = -1  # predecessor: wherever the arm stands when the program starts
 NO_VALUE = "it has no value in the program or its variable file"  # ends a reason
@@ -221,10 +221,7 @@ class Visits:
     literals: Literals
 
     def __post_init__(self) -> None:
-        for f in fields(self):
-            value = getattr(self, f.name)
-            if isinstance(value, np.ndarray):
-                value.setflags(write=False)
+        read_only(self)
 
     def __len__(self) -> int:
         """Return the number of visits."""

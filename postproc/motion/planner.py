@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
 
-from postproc.arrays import Bools, Floats, Ints
+from postproc.arrays import Bools, Floats, Ints, read_only
 from postproc.motion.blending import blend
 from postproc.motion.path import BlendCoupling
 from postproc.motion.replan import planned_points, where_passed
@@ -60,10 +60,7 @@ class Plan:
     end: StartState
 
     def __post_init__(self) -> None:
-        for f in fields(self):
-            value = getattr(self, f.name)
-            if isinstance(value, np.ndarray):
-                value.setflags(write=False)
+        read_only(self)
 
     def __len__(self) -> int:
         """Return the number of arrivals."""

@@ -7,7 +7,7 @@ from enum import IntEnum
 
 import numpy as np
 
-from postproc.arrays import Bools, Floats, Ints
+from postproc.arrays import Bools, Floats, Ints, read_only
 
 
 class Fly(IntEnum):
@@ -83,8 +83,7 @@ class Targets:
     pred: Ints
 
     def __post_init__(self) -> None:
-        for f in fields(self):
-            getattr(self, f.name).setflags(write=False)
+        read_only(self)
 
     def __len__(self) -> int:
         """Return the number of moves."""

@@ -678,7 +678,7 @@ def _named_by_entries(rows: DiffRows, lines: Sequence[bytes]) -> DiffRows:
     return replace(rows, targets=names, target=np.arange(len(names)))
 
 
-# What differs between two programs: the numbers of targets, or more.
+# Two programs, with the variable files beside them.
 
 LONG = 10_000_000  # bytes of a file whose record is read beside it
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from postproc.arrays import Floats
+from postproc.arrays import Floats, read_only
 
 
 @dataclass(frozen=True)
@@ -43,8 +43,7 @@ class States:
     order: Floats
 
     def __post_init__(self) -> None:
-        for f in fields(self):
-            getattr(self, f.name).setflags(write=False)
+        read_only(self)
 
     def __len__(self) -> int:
         """Return the number of visits."""

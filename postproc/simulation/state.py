@@ -8,7 +8,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from postproc.arrays import Floats
+from postproc.arrays import Floats, read_only
 from postproc.simulation.kinematics import pose
 
 LONG_TRAVEL = 1.0  # [rad] travel since a reversal that nobody recorded
@@ -47,8 +47,7 @@ class VirtualArrivals:
     tool: Floats
 
     def __post_init__(self) -> None:
-        for f in fields(self):
-            getattr(self, f.name).setflags(write=False)
+        read_only(self)
 
     def __len__(self) -> int:
         """Return the number of arrivals."""

@@ -650,7 +650,7 @@ def find_uses(
     return replace(literals, pinned=why), follows
 
 
-# From the analysis' records to the arrays of `Visits`.
+# All of it: visits in program order.
 
 MOST_AXES = 12  # auxiliary axes that are told
 

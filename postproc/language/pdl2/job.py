@@ -140,7 +140,7 @@ class InitialValues:
         return chain(own, (key for key in self.other if self.point(key) < 0))
 
 
-# All files of one job: names, initial values, and the place of every number.
+# The files together: what a name means where, and what must stay.
 
 Record = tuple[float, ...] | None
 

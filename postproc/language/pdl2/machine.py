@@ -96,8 +96,6 @@ class MoveRun:
         return len(self.rows)
 
 
-# Run a program over what is known: every way it may take, with a list of work.
-#
 # A *configuration* is a place in the program with the calls and the rounds of constant
 # FOR loops that led there. Each has one store, in which all ways that lead there are
 # merged; a configuration is run again when its store has changed, until nothing
