@@ -244,7 +244,7 @@ def in_processes(
 def parts_of(windows: Sequence[W], processes: int) -> list[Sequence[W]]:
     """Give every process its part, each one window at least.
 
-    >>> shared_out("abcde", 2)
+    >>> parts_of("abcde", 2)
     ['ab', 'cde']
     """
     k = max(min(processes, len(windows)), 1)
