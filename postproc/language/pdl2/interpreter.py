@@ -25,11 +25,13 @@ from postproc.language.pdl2.machine import (
     HANDLED,
     MAX_ROWS,
     Execution,
+    Goal,
     Machine,
-    Visit,
+    MoveForm,
     escape_names,
     invalidate,
     invalidate_names,
+    single,
 )
 from postproc.language.pdl2.moves import move
 from postproc.language.pdl2.program import Program, Variable, Variables, recovered
@@ -276,15 +278,9 @@ def _unknown(machine: Machine, here: Execution, statement: ast.Unknown) -> None:
     names = frozenset(word.lower() for word in _WORD.findall(statement.text))
     invalidate_names(here, names, why)
     if _MOVES.match(statement.text):
-        arrival = Visit(
-            here.place,
-            here.row,
-            machine.predecessors(here),
-            here.store.settings,
-            Motion.JOINT,
-            Meaning.UNKNOWN,
-            reason="the move statement is not understood",
-        )
+        goal = Goal(Meaning.UNKNOWN, reason="the move statement is not understood")
+        form, come = MoveForm(Motion.JOINT), machine.predecessors(here)
+        arrival = single(here, form, come, here.store.settings, goal)
         here.store.last = frozenset({machine.record(here, 1, arrival), ELSEWHERE})
     elif not _CANNOT_MOVE.match(statement.text):
         here.store.last |= {ELSEWHERE}

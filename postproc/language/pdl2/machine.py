@@ -5,6 +5,9 @@ from __future__ import annotations
 import heapq
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import lru_cache
+
+import numpy as np
 
 from postproc.arrays import Ints
 from postproc.language.pdl2 import syntax as ast
@@ -13,8 +16,7 @@ from postproc.language.pdl2.evaluate import ProgramPoint, invalidate_key, parts_
 from postproc.language.pdl2.job import Place, World
 from postproc.language.pdl2.program import Body, Program
 from postproc.language.pdl2.store import MANY, MOST_ORIGINS, Settings, Store
-from postproc.language.pdl2.syntax import Move
-from postproc.language.pdl2.values import Nothing, Position, Value
+from postproc.language.pdl2.values import Nothing, Position
 from postproc.language.visits import ELSEWHERE, Meaning
 from postproc.robot.trajectory import Motion
 
@@ -23,77 +25,109 @@ from postproc.robot.trajectory import Motion
 Numbers = tuple[float | None, ...]
 _NO_NUMBERS: Numbers = (None,) * 6
 
+
+@dataclass(frozen=True, slots=True)
+class Goal:
+    """What a destination means.
+
+    Attributes:
+        target: What the numbers mean.
+        numbers: Six numbers, None where not known.
+        position: The position value where there is one.
+        distance: For NEAR and FOR [mm].
+        reason: Why it cannot be compensated, "" where it can.
+    """
+
+    target: Meaning
+    numbers: Numbers = _NO_NUMBERS
+    position: Position | None = None
+    distance: float | None = None
+    reason: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class MoveForm:
+    """What moves have in common that differ in numbers and points only.
+
+    Attributes:
+        motion: Trajectory.
+        reason: Why that is not known, or why none can be compensated, "" where they
+            can.
+        fly: MOVEFLY.
+        via: The VIA point of an arc.
+        slots: Number slots of the six numbers that stand in the move, () where it goes
+            to something else.
+        joints: Those are joint angles.
+        config: The configuration string beside them, None where there is none.
+        overrides: Settings that WITH sets to numbers, and the slots of these.
+    """
+
+    motion: Motion
+    reason: str = ""
+    fly: bool = False
+    via: bool = False
+    slots: tuple[int, ...] = ()
+    joints: bool = False
+    config: str | None = None
+    overrides: tuple[tuple[str, int], ...] = ()
+
+
 WRITTEN, HELD = -1, -2  # instead of a row of the variable file
 
 
 @dataclass(frozen=True, slots=True)
-class Visit:
-    """One visit.
-
-    Attributes:
-        place, row: Where the move stands.
-        predecessors: Visits it may come from.
-        settings: Frames and motion variables that hold.
-        motion: Trajectory.
-        target: What the numbers mean.
-        numbers: Six numbers, None where not known.
-        position: The position value where there is one.
-        fly: MOVEFLY.
-        via: The VIA point of an arc.
-        distance: For NEAR [mm].
-        reason: Why it cannot be compensated, "" where it can.
-    """
-
-    place: Place
-    row: int
-    predecessors: frozenset[int]
-    settings: Settings
-    motion: Motion
-    target: Meaning
-    numbers: Numbers = _NO_NUMBERS
-    position: Position | None = None
-    fly: bool = False
-    via: bool = False
-    distance: float | None = None
-    reason: str = ""
-
-    def __len__(self) -> int:
-        """Return the number of visits."""
-        return 1
-
-
-@dataclass(frozen=True, slots=True)
 class MoveRun:
-    """Moves that follow each other, each from the one before.
+    """Moves that follow each other, each from the one before; often a single one.
 
     Attributes:
         place: Where they stand.
         rows: Their rows, (k,).
-        variant: Which lines differ in numbers and points only, (k,).
-        moves: What each variant says.
-        ways: Trajectory of each variant, and why that is not known.
+        form: Which form each has, (k,).
+        forms: The forms, by number.
         predecessors: Visits the first of them may come from.
-        settings: Frames and motion variables that hold, but for those of WITH.
+        settings: Frames and motion variables that hold, but for overrides.
         point: Row of the variable file that each goes to, (k,); WRITTEN where the
-            numbers stand in the move, HELD where a variable holds something else.
-        held: What that is, by the index of the move.
+            numbers stand in the move, HELD where its goal was evaluated.
+        goals: These, by the index of the move.
         reason: Why none of them can be compensated, "" where they can.
     """
 
     place: Place
     rows: Ints
-    variant: Ints
-    moves: Mapping[int, Move]
-    ways: Mapping[int, tuple[Motion, str]]
+    form: Ints
+    forms: Mapping[int, MoveForm]
     predecessors: frozenset[int]
     settings: Settings
     point: Ints
-    held: Mapping[int, Value]
+    goals: Mapping[int, Goal]
     reason: str = ""
 
     def __len__(self) -> int:
         """Return the number of visits."""
         return len(self.rows)
+
+
+_FIRST, _HELD = np.zeros(1, dtype=np.int64), np.full(1, HELD)
+
+
+@lru_cache(maxsize=64)
+def _only(form: MoveForm) -> dict[int, MoveForm]:
+    """Return the forms of a run of one move: the same ones for all that are alike."""
+    return {0: form}
+
+
+def single(
+    here: Execution,
+    form: MoveForm,
+    predecessors: frozenset[int],
+    settings: Settings,
+    goal: Goal,
+) -> MoveRun:
+    """Return the run of one move, whose goal was evaluated."""
+    row, forms = np.array([here.row]), _only(form)
+    return MoveRun(
+        here.place, row, _FIRST, forms, predecessors, settings, _HELD, {0: goal}
+    )
 
 
 # A *configuration* is a place in the program with the calls and the rounds of constant
@@ -125,8 +159,7 @@ class Machine:
 
     Attributes:
         world: The files of the job.
-        arrivals: Visits and runs of visits, by place; the last analysis of a place
-            holds.
+        arrivals: Runs of visits, by place; the last analysis of a place holds.
         ids: First visit id of each.
         places: Program and body of each context.
         entries: The store of each configuration.
@@ -138,7 +171,7 @@ class Machine:
     """
 
     world: World
-    arrivals: dict[Key, Visit | MoveRun] = field(default_factory=dict)
+    arrivals: dict[Key, MoveRun] = field(default_factory=dict)
     ids: dict[Key, int] = field(default_factory=dict)
     places: dict[Context, Place] = field(default_factory=dict)
     entries: dict[tuple[Context, int], Store] = field(default_factory=dict)
@@ -179,8 +212,8 @@ class Machine:
             self.next_id += count
         return self.ids[key]
 
-    def record(self, here: Execution, sub: int, arrival: Visit | MoveRun) -> int:
-        """Keep a visit; return its (first) id."""
+    def record(self, here: Execution, sub: int, arrival: MoveRun) -> int:
+        """Keep visits; return the id of the first."""
         key = (here.context, self.position(here.place.program, here.row), sub)
         self.arrivals[key] = arrival
         if MANY in arrival.predecessors:

@@ -2,12 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from postproc.language.pdl2 import syntax as ast
 from postproc.language.pdl2.effects import references
 from postproc.language.pdl2.evaluate import SINGLE, parts_under
-from postproc.language.pdl2.machine import Execution, Machine, Visit, escape_names
+from postproc.language.pdl2.machine import (
+    Execution,
+    Goal,
+    Machine,
+    MoveForm,
+    escape_names,
+    single,
+)
 from postproc.language.pdl2.store import Settings
 from postproc.language.pdl2.values import Nothing, Position, Value, Vector, unsure
 from postproc.language.visits import ELSEWHERE, NO_TARGET, Meaning
@@ -83,25 +90,6 @@ _FRAME = {
 }
 UNSURE = "a move whose target is not sure may go to it"
 _PLACES = {"home": Meaning.HOME, "cal_sys": Meaning.CALIBRATION}
-
-
-@dataclass(frozen=True)
-class Goal:
-    """What a destination means.
-
-    Attributes:
-        target: What the numbers mean.
-        numbers: Six numbers, None where not known.
-        position: The position value where there is one.
-        distance: For NEAR and FOR [mm].
-        reason: Why it cannot be compensated, "" where it can.
-    """
-
-    target: Meaning
-    numbers: tuple[float | None, ...] = (None,) * 6
-    position: Position | None = None
-    distance: float | None = None
-    reason: str = ""
 
 
 def goal_of(here: Execution, statement: ast.Move, motion: Motion) -> Goal:
@@ -282,12 +270,14 @@ def move(machine: Machine, here: Execution, statement: ast.Move) -> None:
     several = len(predecessors) > 1
     if statement.via is not None:
         goal = absolute(here, statement.via)
-        via = _arrival(here, statement, predecessors, settings, motion, goal, reason)
-        predecessors = frozenset({machine.record(here, _VIA, _as_via(via))})
+        form = MoveForm(motion, reason, fly=True, via=True)
+        via = single(here, form, predecessors, settings, goal)
+        predecessors = frozenset({machine.record(here, _VIA, via)})
         if several or machine.interrupted:  # the arc depends on where it starts
             predecessors |= {ELSEWHERE}
     goal = goal_of(here, statement, motion)
-    end = _arrival(here, statement, predecessors, settings, motion, goal, reason)
+    form = MoveForm(motion, reason, fly=statement.fly)
+    end = single(here, form, predecessors, settings, goal)
     arrived = machine.record(here, _END, end)
     store.last = frozenset({arrived})
     if several and goal.target in _FROM_HERE:
@@ -313,47 +303,6 @@ def _keep(here: Execution, statement: ast.Move) -> None:
     """Keep the numbers of what another arm goes to."""
     names = frozenset(r.name for r in references((statement.where, statement.via)))
     escape_names(here, names, "another arm goes to it too")
-
-
-def _as_via(arrival: Visit) -> Visit:
-    return Visit(
-        arrival.place,
-        arrival.row,
-        arrival.predecessors,
-        arrival.settings,
-        arrival.motion,
-        arrival.target,
-        arrival.numbers,
-        arrival.position,
-        fly=True,
-        via=True,
-        distance=None,
-        reason=arrival.reason,
-    )
-
-
-def _arrival(
-    here: Execution,
-    statement: ast.Move,
-    predecessors: frozenset[int],
-    settings: Settings,
-    motion: Motion,
-    goal: Goal,
-    reason: str,
-) -> Visit:
-    return Visit(
-        here.place,
-        here.row,
-        predecessors,
-        settings,
-        motion,
-        goal.target,
-        goal.numbers,
-        goal.position,
-        fly=statement.fly,
-        distance=goal.distance,
-        reason=goal.reason or reason,
-    )
 
 
 def _arm(here: Execution, arm: ast.Expression | None) -> bool | None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import islice
 
 import numpy as np
@@ -20,9 +20,17 @@ from postproc.language.pdl2.effects import (
     references,
 )
 from postproc.language.pdl2.job import Place, World
-from postproc.language.pdl2.machine import HELD, WRITTEN, Execution, Machine, MoveRun
-from postproc.language.pdl2.moves import motion_of
-from postproc.language.pdl2.values import Nothing, Value
+from postproc.language.pdl2.machine import (
+    HELD,
+    WRITTEN,
+    Execution,
+    Goal,
+    Machine,
+    MoveForm,
+    MoveRun,
+)
+from postproc.language.pdl2.moves import UNSURE, from_value, motion_of
+from postproc.language.pdl2.values import Nothing
 from postproc.language.shapes import alike, lower, name_index, numbered_in_order
 from postproc.robot.trajectory import Motion
 
@@ -58,6 +66,8 @@ class PlainMoves:
         first: Row of the first line that `variant` tells of.
         variant: Index into `statements` of every row, (n,), -1 where it is not quiet.
         statements: What the lines of each variant say, but for numbers and points.
+        forms: What moves of each variant have in common, but for their trajectory;
+            None for calls.
         calls: Which of them call something.
         named: Which of them are moves to points.
         points: The point that lines of a shape go to, unless `name` tells it.
@@ -71,6 +81,7 @@ class PlainMoves:
     first: int
     variant: Ints
     statements: tuple[ast.Statement, ...]
+    forms: tuple[MoveForm | None, ...]
     calls: tuple[bool, ...]
     named: tuple[bool, ...]
     points: Mapping[int, PointVariable]
@@ -113,12 +124,14 @@ def find_plain_moves(
     variant = of_shape[rows]
     joins = np.array(sorted(body.blocks.joins), dtype=np.int64)
     ends = np.concatenate([first + np.flatnonzero(variant < 0), joins, [body.last]])
+    said = variants.statements
     return PlainMoves(
         first,
         variant,
-        tuple(variants.statements),
-        tuple(any(_calls(world, place, s)) for s in variants.statements),
-        tuple(_goes_to_point(s) for s in variants.statements),
+        tuple(said),
+        tuple(_form(one) if isinstance(one, ast.Move) else None for one in said),
+        tuple(any(_calls(world, place, one)) for one in said),
+        tuple(_goes_to_point(one) for one in said),
         variants.points,
         variants.prefix,
         variants.names,
@@ -156,6 +169,34 @@ def _is_plain(move: ast.Move) -> bool:
 
 def _goes_to_point(said: ast.Statement) -> bool:
     return isinstance(said, ast.Move) and isinstance(said.where[0], ast.Reference)
+
+
+def _form(move: ast.Move) -> MoveForm:
+    """Return what moves of a variant have in common, but for their trajectory."""
+    slots: tuple[int, ...] = ()
+    items, where = _literal_items(move.where[0]), move.where[0]
+    if not isinstance(where, ast.Reference):
+        slots = tuple(i.slot for i in items[:6] if isinstance(i, ast.Number))
+    config = items[6] if len(items) > 6 else None
+    return MoveForm(
+        Motion.JOINT,
+        fly=move.fly,
+        slots=slots,
+        joints=isinstance(where, ast.Aggregate),
+        config=config.value if isinstance(config, ast.Text) else None,
+        overrides=tuple(
+            (reference.name.lstrip("$"), value.slot)
+            for reference, value in move.settings
+            if isinstance(value, ast.Number)
+        ),
+    )
+
+
+def _literal_items(literal: ast.Expression) -> tuple[ast.Expression | None, ...]:
+    """Return what stands between the brackets of ``{..}`` or ``POS(..)``."""
+    if isinstance(literal, ast.Aggregate):
+        return literal.items
+    return literal.arguments if isinstance(literal, ast.Invoke) else ()
 
 
 def _six_numbers(items: object) -> bool:
@@ -361,9 +402,9 @@ class MoveBlocks:
             return False
         rows = np.arange(here.row, end)
         variant = quiet.variant[rows - quiet.first]
-        ways = self._run_one_of_each(here, quiet, rows, variant)
-        moves = np.isin(variant, np.array([*ways], dtype=np.int64))
-        self._record(here, quiet, rows[moves], variant[moves], ways)
+        forms = self._run_one_of_each(here, quiet, rows, variant)
+        moves = np.isin(variant, np.array([*forms], dtype=np.int64))
+        self._record(here, quiet, rows[moves], variant[moves], forms)
         here.row = end
         return True
 
@@ -377,25 +418,26 @@ class MoveBlocks:
 
     def _run_one_of_each(
         self, here: Execution, quiet: PlainMoves, rows: Ints, variant: Ints
-    ) -> dict[int, tuple[Motion, str]]:
+    ) -> dict[int, MoveForm]:
         """Let the first line of every variant have its effects.
 
         Returns:
-            The trajectory of every variant of a move, and why it is not known.
+            The forms of the moves, with their trajectories, by variant.
         """
         found, first = np.unique(variant, return_index=True)
-        ways = {}
+        forms = {}
         for at in np.argsort(first).tolist():
             here.row = int(rows[first[at]])
             number = int(found[at])
-            statement = quiet.statements[number]
+            statement, form = quiet.statements[number], quiet.forms[number]
             if quiet.calls[number]:
                 calls_in_expressions(self.machine, here, statement)
             if isinstance(statement, ast.Call):
                 call_statement(self.machine, here, statement)
-            elif isinstance(statement, ast.Move):
-                ways[number] = motion_of(here, statement, here.store.settings)
-        return ways
+            elif isinstance(statement, ast.Move) and form is not None:
+                motion, reason = motion_of(here, statement, here.store.settings)
+                forms[number] = replace(form, motion=motion, reason=reason)
+        return forms
 
     def _record(
         self,
@@ -403,23 +445,14 @@ class MoveBlocks:
         quiet: PlainMoves,
         rows: Ints,
         variant: Ints,
-        ways: dict[int, tuple[Motion, str]],
+        forms: dict[int, MoveForm],
     ) -> None:
         """Record the moves and let the arm stand at the end of the last."""
         here.row = int(rows[0])
-        point, held = _points(here, quiet, rows, variant)
-        moves = {k: quiet.statements[k] for k in ways}
+        point, goals = _points(here, quiet, rows, variant)
+        come, settings = self.machine.predecessors(here), here.store.settings
         run = MoveRun(
-            here.place,
-            rows,
-            variant,
-            {k: move for k, move in moves.items() if isinstance(move, ast.Move)},
-            ways,
-            self.machine.predecessors(here),
-            here.store.settings,
-            point,
-            held,
-            here.reason,
+            here.place, rows, variant, forms, come, settings, point, goals, here.reason
         )
         base = self.machine.record(here, 0, run)
         here.store.last = frozenset({base + len(rows) - 1})
@@ -427,11 +460,11 @@ class MoveBlocks:
 
 def _points(
     here: Execution, quiet: PlainMoves, rows: Ints, variant: Ints
-) -> tuple[Ints, dict[int, Value]]:
+) -> tuple[Ints, dict[int, Goal]]:
     """Look up the variables that moves go to, see `MoveRun`."""
     program, initial = here.place.program, here.world.initial
     point = np.full(len(rows), WRITTEN, dtype=np.int64)
-    held: dict[int, Value] = {}
+    goals: dict[int, Goal] = {}
     named = np.flatnonzero(np.array(quiet.named, dtype=bool)[variant])
     shapes = program.lines.shape[rows[named]]
     own = quiet.name[shapes]
@@ -447,8 +480,11 @@ def _points(
         value = here.store.assigned(key) if key else _NO_INDEX
         point[at] = initial.point(key) if value is None else HELD
         if point[at] < 0:
-            point[at], held[at] = HELD, value or here.store.read(key)
-    return point, held
+            value = value or here.store.read(key)
+            if isinstance(value, Nothing):
+                here.world.pin(value, UNSURE)
+            point[at], goals[at] = HELD, from_value(value)
+    return point, goals
 
 
 def _assigned(here: Execution, quiet: PlainMoves, names: Ints) -> Bools:

@@ -1,0 +1,511 @@
+"""Columns of `Visits` from what the analysis recorded: settings, targets, reasons."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, field
+from enum import IntEnum
+from typing import Any
+
+import numpy as np
+
+from postproc.arrays import Interned, Ints, spans
+from postproc.language.pdl2 import syntax as ast
+from postproc.language.pdl2.job import base_variable
+from postproc.language.pdl2.machine import WRITTEN, Goal, Machine, MoveForm, MoveRun
+from postproc.language.pdl2.program import Program
+from postproc.language.pdl2.store import Settings
+from postproc.language.pdl2.values import Nothing, Position, Value
+from postproc.language.visits import (
+    FlyTrajectory,
+    FlyType,
+    Meaning,
+    OrntType,
+    Switch,
+    slim,
+)
+
+# Frames and motion variables of visits as columns.
+
+_FRAMES = ("tool", "base", "uframe")
+_CARE = ("cnfg_care", "turn_care", "jnt_mturn")
+_OVERRIDES = ("arm_spd_ovr", "prog_spd_ovr", "gen_ovr")
+_WITHOUT_UFRAME = (Meaning.JOINTS, Meaning.HOME, Meaning.CALIBRATION, Meaning.BY)
+
+
+class SettingColumns:
+    """Each distinct state of the settings becomes one row, read off once."""
+
+    def __init__(self) -> None:
+        self._kept: list[Settings] = []
+        self._rows = Interned[int]()
+        self._problems: list[tuple[str, str]] = []
+        self._frames = Interned[tuple[tuple[float, ...], bool]]()
+        self._table: dict[str, list[Any]] = {}
+
+    def index(self, settings: Settings) -> int:
+        """Return the row of a state of the settings."""
+        row = self._rows[id(settings)]
+        if row == len(self._kept):
+            self._kept.append(settings)  # keeps its id from being used again
+            for name, value in _row(settings, self._frame).items():
+                self._table.setdefault(name, []).append(value)
+            tool = _unknown(settings, ("tool", "tool_rmt"))
+            self._problems.append(
+                (tool or _unknown(settings, ("base", "uframe")), tool)
+            )
+        return row
+
+    def kept(self, row: int) -> Settings:
+        """Return the state of the settings of a row."""
+        return self._kept[row]
+
+    def problem(self, row: int, target: Meaning) -> str:
+        """Return why a visit cannot be compensated under these settings, or ""."""
+        pose, joints = self._problems[row]
+        return joints if target in _WITHOUT_UFRAME else pose
+
+    def _frame(self, value: object) -> int:
+        if not isinstance(value, Position) or value.joints or not value.complete:
+            return -1
+        numbers = tuple(float(n) for n in value.numbers if n is not None)
+        return self._frames[numbers, value.taught]
+
+    def columns(self, rows: Ints) -> dict[str, Any]:
+        """Return the columns of `Visits` that come from settings."""
+        frames = list(self._frames)
+        columns: dict[str, Any] = {
+            name: slim(np.array(values)[rows]) for name, values in self._table.items()
+        }
+        if not columns:
+            empty = _row({}, lambda value: -1)
+            columns = {name: np.array([value])[:0] for name, value in empty.items()}
+        columns["frames"] = np.array([f for f, _ in frames], float).reshape(-1, 6)
+        columns["frame_taught"] = np.array([taught for _, taught in frames], bool)
+        return columns
+
+
+def _row(settings: Settings, frame: Any) -> dict[str, Any]:
+    return {
+        **{name: frame(settings.get(name)) for name in _FRAMES},
+        "tool_remote": settings.get("tool_rmt") is True,
+        "nearest_turn": settings.get("jnt_mturn") is False,
+        "care": [_switch(settings.get(name)) for name in _CARE],
+        "fly_dist_mm": _number(settings, "fly_dist"),
+        "fly_per": _number(settings, "fly_per"),
+        "fly_type": _word(settings, "fly_type", FlyType),
+        "fly_traj": _word(settings, "fly_traj", FlyTrajectory),
+        "lin_spd": _number(settings, "lin_spd"),
+        "rot_spd": _number(settings, "rot_spd"),
+        "override": _override(settings),
+        "wrist_joint": settings.get("ornt_type") == "wrist_jnt",
+        "ornt_type": _ornt_type(settings),
+    }
+
+
+def _number(settings: Settings, name: str) -> float:
+    value = settings.get(name)
+    return value if isinstance(value, float) else np.nan
+
+
+def _word(settings: Settings, name: str, words: type[IntEnum]) -> int:
+    """Return the number of a predefined word, 0 where it is not set or not known."""
+    said = str(settings.get(name)).upper()
+    return int(words[said]) if said in words.__members__ else 0
+
+
+def _ornt_type(settings: Settings) -> OrntType:
+    if "ornt_type" not in settings:
+        return OrntType.UNSET
+    return OrntType(_word(settings, "ornt_type", OrntType) or OrntType.UNKNOWN)
+
+
+def _switch(value: Value | None) -> Switch:
+    if value is None:
+        return Switch.UNSET
+    if isinstance(value, bool):
+        return Switch.ON if value else Switch.OFF
+    return Switch.UNKNOWN
+
+
+def _override(settings: Settings) -> float:
+    product = 1.0
+    for name in _OVERRIDES:
+        value = _number(settings, name)
+        if value > 0:
+            product *= min(value, 100.0) / 100.0
+    return product
+
+
+def _unknown(settings: Settings, names: tuple[str, ...]) -> str:
+    """Say which of some settings is not known, and why."""
+    for name in names:
+        value = settings.get(name)
+        if isinstance(value, Nothing):
+            return f"${name.upper()} is not known here: {value.why}"
+        if name in _FRAMES and not (
+            isinstance(value, Position) and value.complete and not value.joints
+        ):
+            partly = isinstance(value, Position) and not value.joints
+            why = "a part of it is not known" if partly else "it is no known position"
+            return f"${name.upper()} is not known here: {why}"
+    return ""
+
+
+# Columns of visits: those of all moves of a program in a few array passes.
+
+_COMPUTED = (Meaning.POSE, Meaning.NEAR, Meaning.FOR)  # may move along with a literal
+MOST_CODES = 2**62  # combinations of columns that an integer tells apart
+_UNREAD = "a number of the target cannot be read"
+
+
+class VisitColumns:
+    """Columns of n visits."""
+
+    def __init__(self, n: int, axes: int, slots: int) -> None:
+        """Make room.
+
+        Args:
+            n: Visits.
+            axes: The last auxiliary axis.
+            slots: Numbers in all files: theirs are the longest columns.
+        """
+        short = np.int32 if slots < 2**31 else np.int64
+        self.file = np.zeros(n, dtype=np.int64)
+        self.line = np.zeros(n, dtype=np.int64)
+        self.motion = np.zeros(n, dtype=np.int64)
+        self.target = np.zeros(n, dtype=np.int64)
+        self.via = np.zeros(n, dtype=bool)
+        self.fly = np.zeros(n, dtype=bool)
+        self.values = np.full((n, 6), np.nan)
+        self.distance_mm = np.full(n, np.nan)
+        self.aux = np.full((n, axes), np.nan)
+        self.config = np.zeros(n, dtype=np.int64)
+        self.config_given = np.zeros(n, dtype=bool)
+        self.name = np.zeros(n, dtype=np.int64)
+        self.reason = np.zeros(n, dtype=np.int64)
+        self.setting = np.zeros(n, dtype=np.int64)
+        self.slots = np.full((n, 6), -1, dtype=short)
+        self.bases: dict[int, tuple[int, ...]] = {}
+        self.taught = np.zeros(n, dtype=bool)
+        self.shared = np.zeros(n, dtype=bool)
+        self.measure_id = [""] * n
+
+
+@dataclass
+class ProgramMoves:
+    """All moves of a program.
+
+    Attributes:
+        program: The program.
+        runs: Its runs, in the order of their visits, and the first visit of each.
+        visit: The visits, (n,).
+        row: Rows of the moves in the program, (n,).
+        run: The run of each, (n,).
+        forms: What their forms are.
+        form: The form of each, (n,).
+        point: See `MoveRun`, (n,).
+        first, last: Numbers of reasons that come before and after all others, (n,).
+    """
+
+    program: Program
+    runs: list[tuple[int, MoveRun]]
+
+    def __post_init__(self) -> None:
+        at, runs = zip(*self.runs, strict=True)
+        sizes = np.array([len(run) for run in runs])
+        self.visit: Ints = spans(np.array(at), sizes)
+        self.row: Ints = np.concatenate([run.rows for run in runs])
+        self.run: Ints = np.repeat(np.arange(len(runs)), sizes)
+        self.point: Ints = np.concatenate([run.point for run in runs])
+        numbers = Interned[MoveForm]()
+        self.form: Ints = np.concatenate([_numbered(run, numbers) for run in runs])
+        self.forms = [*numbers]
+        self.first: Ints = np.zeros(len(self.row), dtype=np.int64)
+        self.last: Ints = np.zeros(len(self.row), dtype=np.int64)
+
+    def of_forms(self, said: Callable[[MoveForm], int]) -> Ints:
+        """Return what is said of every move's form, (n,)."""
+        return np.array([said(form) for form in self.forms])[self.form]
+
+    def evaluated(self) -> Iterator[tuple[int, MoveRun, Goal]]:
+        """Yield the moves whose goals were evaluated: index, run, goal."""
+        begin = 0
+        for _, run in self.runs:
+            for k, goal in run.goals.items():
+                yield begin + k, run, goal
+            begin += len(run)
+
+
+def _numbered(run: MoveRun, numbers: Interned[MoveForm]) -> Ints:
+    """Return the numbers of the forms of a run's moves."""
+    if len(run.forms) == 1:
+        (form,) = run.forms.values()
+        return np.full(len(run.rows), numbers[form])
+    table = np.zeros(max(run.forms) + 1, dtype=np.int64)
+    for number, form in run.forms.items():
+        table[number] = numbers[form]
+    return table[run.form]
+
+
+@dataclass
+class Collector:
+    """Fills the columns; holds the tables that they index."""
+
+    machine: Machine
+    columns: VisitColumns
+    settings: SettingColumns = field(default_factory=SettingColumns)
+    configs: Interned[str] = field(default_factory=lambda: Interned([""]))
+    names: Interned[str] = field(default_factory=lambda: Interned([""]))
+    reasons: Interned[str] = field(default_factory=lambda: Interned([""]))
+
+    def fill(self, runs: Iterable[tuple[int, MoveRun]]) -> None:
+        """Fill the visits of all runs; each is given with the first of its visits."""
+        of_program: dict[int, list[tuple[int, MoveRun]]] = {}
+        for at, run in runs:
+            of_program.setdefault(id(run.place.program), []).append((at, run))
+        for mine in of_program.values():
+            moves = ProgramMoves(mine[0][1].place.program, mine)
+            self._place(moves)
+            self._settings(moves)
+            self._written(moves)
+            self._points(moves)
+            self._evaluated(moves)
+            self._reasons(moves)
+            self._marks(moves)
+
+    def _place(self, moves: ProgramMoves) -> None:
+        """Enter where moves stand, and what their forms say."""
+        c, visit, lines = self.columns, moves.visit, moves.program.lines
+        c.file[visit] = self.machine.world.files.index(lines.source.name)
+        c.line[visit] = lines.line[moves.row]
+        c.motion[visit] = moves.of_forms(lambda form: form.motion)
+        c.fly[visit] = moves.of_forms(lambda form: form.fly)
+        c.via[visit] = moves.of_forms(lambda form: form.via)
+
+    def _settings(self, moves: ProgramMoves) -> None:
+        """Enter the settings at moves; WITH may set numbers for them."""
+        index = [self.settings.index(run.settings) for _, run in moves.runs]
+        setting = np.array(index, dtype=np.int64)[moves.run]
+        for number, form in enumerate(moves.forms):
+            if form.overrides:
+                mine = np.flatnonzero(moves.form == number)
+                setting[mine] = self._overridden(moves, mine, setting[mine])
+        self.columns.setting[moves.visit] = setting
+
+    def _overridden(self, moves: ProgramMoves, mine: Ints, setting: Ints) -> Ints:
+        """Return the settings at moves of one form whose WITH sets numbers, (m,)."""
+        lines, overrides = (
+            moves.program.lines,
+            moves.forms[moves.form[mine[0]]].overrides,
+        )
+        names = [name for name, _ in overrides]
+        slots = np.array([slot for _, slot in overrides])
+        numbers = lines.value[lines.first[moves.row[mine]][:, None] + slots]
+        both = np.column_stack([setting, numbers])
+        distinct, which = np.unique(both, axis=0, return_inverse=True)
+        index = [
+            self.settings.index({**self.settings.kept(int(base)), **_set(names, row)})
+            for base, *row in distinct.tolist()
+        ]
+        return np.array(index, dtype=np.int64)[which.ravel()]
+
+    def _written(self, moves: ProgramMoves) -> None:
+        """Fill moves to six numbers that stand in them."""
+        c, lines = self.columns, moves.program.lines
+        base = self.machine.world.slot_base[lines.source.name]
+        here = moves.point == WRITTEN
+        for number, form in enumerate(moves.forms):
+            if not form.slots:
+                continue
+            some = np.flatnonzero(here & (moves.form == number))
+            mine = moves.visit[some]
+            numbers = lines.first[moves.row[some]][:, None] + np.array(form.slots)
+            c.values[mine], c.slots[mine] = lines.value[numbers], numbers + base
+            c.target[mine] = Meaning.JOINTS if form.joints else Meaning.POSE
+            if form.config is not None:
+                c.config[mine] = self.configs[form.config]
+                c.config_given[mine] = True
+        mine = moves.visit[here]
+        wrong = ~np.isfinite(c.values[mine]).all(axis=1)
+        bad = mine[wrong]
+        c.target[bad], c.slots[bad], c.values[bad] = Meaning.UNKNOWN, -1, np.nan
+        if len(bad):
+            moves.first[np.flatnonzero(here)[wrong]] = self.reasons[_UNREAD]
+        taught = self.machine.world.taught_lines[lines.source.name]
+        if taught:
+            c.taught[mine] = np.isin(c.line[mine], np.array(sorted(taught)))
+
+    def _points(self, moves: ProgramMoves) -> None:
+        """Fill moves to points that the variable file tells, layout by layout."""
+        points = self.machine.world.initial.points
+        some = np.flatnonzero(moves.point >= 0)
+        if points is None or len(some) == 0:
+            return
+        c, entries = self.columns, points.entries
+        rows, visit = moves.point[some], moves.visit[some]
+        c.values[visit] = entries.numbers[rows]
+        c.slots[visit] = entries.slots[rows] + points.base
+        c.taught[visit], c.shared[visit] = points.taught[rows], points.shared[rows]
+        names = [entries.name[row] for row in rows.tolist()]
+        c.name[visit] = self.names.of(names)
+        if self.machine.world.start.taught:
+            c.taught[visit] |= [self.is_listed(name) for name in names]
+        for number in _in_order(entries.layout[rows]):
+            layout, mine = entries.layouts[number], entries.layout[rows] == number
+            c.config[visit[mine]] = self.configs[layout.config or ""]
+            c.config_given[visit[mine]] = layout.config is not None
+            joints = layout.kind == "JNTP"
+            c.target[visit[mine]] = Meaning.JOINTS if joints else Meaning.POSE
+            for column, axis in enumerate(layout.axes):
+                if 1 <= axis <= c.aux.shape[1]:
+                    c.aux[visit[mine], axis - 1] = entries.aux[rows[mine], column]
+            moves.last[some[mine]] = self.reasons[self.aux_problem(layout.axes)]
+
+    def _evaluated(self, moves: ProgramMoves) -> None:
+        """Fill moves whose goals were evaluated."""
+        c, found = self.columns, [*moves.evaluated()]
+        if not found:
+            return
+        index = np.array([k for k, _, _ in found])
+        visit = moves.visit[index]
+        goals = [goal for _, _, goal in found]
+        c.target[visit] = [goal.target for goal in goals]
+        c.values[visit] = np.array([goal.numbers for goal in goals], dtype=float)
+        distances = [goal.distance for goal in goals]
+        c.distance_mm[visit] = np.array(distances, dtype=float)
+        moves.first[index] = self.reasons.of([goal.reason for goal in goals])
+        for at, k, goal in zip(visit.tolist(), index.tolist(), goals, strict=True):
+            if goal.position is not None:
+                self._position(at, moves.program, goal.target, goal.position)
+                problem = self.aux_problem(_aux_axes(goal.position))
+                moves.last[k] = self.reasons[problem]
+
+    def _position(
+        self, at: int, program: Program, target: Meaning, position: Position
+    ) -> None:
+        """Fill what is known of the position value that a visit goes to."""
+        c, world = self.columns, self.machine.world
+        c.name[at] = self.names[position.name]
+        c.config[at] = self.configs[position.config or ""]
+        c.config_given[at] = position.config is not None
+        for axis, value in position.aux or ():
+            if 1 <= axis <= c.aux.shape[1] and value is not None:
+                c.aux[at, axis - 1] = value
+        if position.editable and target in (Meaning.POSE, Meaning.JOINTS):
+            c.slots[at] = position.slots
+        elif -1 not in position.slots and target in _COMPUTED:
+            c.bases[at] = position.slots
+        else:
+            world.pin(position, "a target is computed from a part of it")
+        lines = world.taught_lines[program.lines.source.name]
+        inline = not position.name and int(c.line[at]) in lines
+        listed = self.is_listed(position.name)
+        c.taught[at] = position.taught or inline or listed
+        c.shared[at] = position.shared
+
+    def _reasons(self, moves: ProgramMoves) -> None:
+        """Say why moves must not be compensated: many moves, few combinations."""
+        c, runs = self.columns, [run for _, run in moves.runs]
+        whole = Interned[str]()
+        kinds = [moves.first, whole.of([self._reason(run) for run in runs])[moves.run]]
+        kinds += [moves.form, c.setting[moves.visit], c.target[moves.visit], moves.last]
+        which, example = _alike(kinds)
+        texts, of_runs = [*self.reasons], [*whole]
+        reasons = []
+        for first, run, form, setting, target, last in zip(
+            *(kind[example].tolist() for kind in kinds), strict=True
+        ):
+            reason = texts[first] or of_runs[run] or moves.forms[form].reason
+            problem = self.settings.problem(setting, Meaning(target))
+            reasons.append(self.reasons[reason or problem or texts[last]])
+        c.reason[moves.visit] = np.array(reasons, dtype=np.int64)[which]
+
+    def _reason(self, run: MoveRun) -> str:
+        """Return why no move of a run can be compensated, "" where it can."""
+        if run.reason or id(run.place.body) not in self.machine.recursive:
+            return run.reason
+        return "it stands in a routine that calls itself, which is not followed"
+
+    def aux_problem(self, axes: tuple[int, ...] | None) -> str:
+        """Return why a target with some auxiliary axes stays, None: not known which."""
+        kinds = self.machine.world.start.aux
+        if axes is None:
+            if kinds and all(kind == "gun" for kind in kinds.values()):
+                return ""
+            return "its auxiliary axes are not known before the program runs"
+        for axis in axes:
+            kind = kinds.get(axis)
+            if kind is None:
+                return (
+                    f"auxiliary axis {axis} is not declared: say under [aux] in the "
+                    "cell file whether it is a gun, a track or a positioner"
+                )
+            if kind != "gun":
+                return f"auxiliary axis {axis} is a {kind}: it moves arm or part"
+        return ""
+
+    def is_listed(self, name: str) -> bool:
+        """Tell whether the cell file says that a point was taught."""
+        taught = self.machine.world.start.taught
+        name = name.lower()
+        return name in taught or base_variable(name) in taught
+
+    def _marks(self, moves: ProgramMoves) -> None:
+        """Enter the ids of moves that are measured."""
+        rows, ids = _measured(moves.program)
+        ends = np.flatnonzero(np.isin(moves.row, rows) & ~self.columns.via[moves.visit])
+        at = np.searchsorted(rows, moves.row[ends])
+        for visit, k in zip(moves.visit[ends].tolist(), at.tolist(), strict=True):
+            self.columns.measure_id[visit] = ids[k]
+
+
+def _alike(kinds: list[Ints]) -> tuple[Ints, Ints]:
+    """Number the combinations of some columns in the order in which they first stand.
+
+    Returns:
+        The combination of every row, (n,), and a row of every combination.
+    """
+    code, codes = np.zeros(len(kinds[0]), dtype=np.int64), 1
+    for kind in kinds:
+        size = int(kind.max()) + 1
+        if codes * size > MOST_CODES:
+            code = np.unique(code, return_inverse=True)[1]
+            codes = len(code)
+        code, codes = code * size + kind, codes * size
+    _, example, which = np.unique(code, return_index=True, return_inverse=True)
+    order = np.argsort(example)
+    place = np.empty(len(order), dtype=np.int64)
+    place[order] = np.arange(len(order))
+    return place[which], example[order]
+
+
+def _in_order(numbers: Ints) -> list[int]:
+    """Return what differs, in the order in which it first stands."""
+    found, first = np.unique(numbers, return_index=True)
+    ordered: list[int] = found[np.argsort(first)].tolist()
+    return ordered
+
+
+def _set(names: list[str], numbers: list[float]) -> dict[str, Value]:
+    """Return the settings that WITH changes to some numbers."""
+    unread = Nothing("the number cannot be read")
+    pairs = zip(names, numbers, strict=True)
+    return {name: unread if n != n else n for name, n in pairs}
+
+
+def _aux_axes(position: Position) -> tuple[int, ...] | None:
+    return None if position.aux is None else tuple(axis for axis, _ in position.aux)
+
+
+def _measured(program: Program) -> tuple[Ints, list[str]]:
+    """Return the rows of moves with a ``-- MEASURE`` comment, and its ids."""
+    lines = program.lines
+    moves = program.statements.which(lambda said: isinstance(said, ast.Move))
+    rows = np.flatnonzero(moves[lines.shape])
+    found: dict[int, str] = {}
+    for line, mark in lines.marks("MEASURE"):
+        at = int(np.searchsorted(lines.line[rows], line))
+        if at < len(rows):
+            found.setdefault(int(rows[at]), mark)
+    return np.array([*found], dtype=np.int64), [*found.values()]
