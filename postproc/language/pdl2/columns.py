@@ -269,6 +269,7 @@ class Collector:
             self._place(moves)
             self._settings(moves)
             self._written(moves)
+            self._names(moves)
             self._points(moves)
             self._evaluated(moves)
             self._reasons(moves)
@@ -336,6 +337,19 @@ class Collector:
         if taught:
             c.taught[mine] = np.isin(c.line[mine], np.array(sorted(taught)))
 
+    def _names(self, moves: ProgramMoves) -> None:
+        """Enter the names of the points that moves go to."""
+        points, some = self.machine.world.initial.points, moves.point >= 0
+        names = {
+            k: goal.position.name for k, _, goal in moves.evaluated() if goal.position
+        }
+        if points is not None and some.any():
+            told = [points.entries.name[row] for row in moves.point[some].tolist()]
+            names |= zip(np.flatnonzero(some).tolist(), told, strict=True)
+            names = dict(sorted(names.items()))
+        visit = moves.visit[np.array([*names], dtype=np.int64)]
+        self.columns.name[visit] = self.names.of([*names.values()])
+
     def _points(self, moves: ProgramMoves) -> None:
         """Fill moves to points that the variable file tells, layout by layout."""
         points = self.machine.world.initial.points
@@ -347,9 +361,8 @@ class Collector:
         c.values[visit] = entries.numbers[rows]
         c.slots[visit] = entries.slots[rows] + points.base
         c.taught[visit], c.shared[visit] = points.taught[rows], points.shared[rows]
-        names = [entries.name[row] for row in rows.tolist()]
-        c.name[visit] = self.names.of(names)
         if self.machine.world.start.taught:
+            names = [entries.name[row] for row in rows.tolist()]
             c.taught[visit] |= [self.is_listed(name) for name in names]
         for number in _in_order(entries.layout[rows]):
             layout, mine = entries.layouts[number], entries.layout[rows] == number
@@ -386,7 +399,6 @@ class Collector:
     ) -> None:
         """Fill what is known of the position value that a visit goes to."""
         c, world = self.columns, self.machine.world
-        c.name[at] = self.names[position.name]
         c.config[at] = self.configs[position.config or ""]
         c.config_given[at] = position.config is not None
         for axis, value in position.aux or ():
