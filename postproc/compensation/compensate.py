@@ -33,7 +33,12 @@ from postproc.compensation.options import (
     Setting,
     silent,
 )
-from postproc.compensation.outcome import Decisions, Outcome, tell_arrivals
+from postproc.compensation.outcome import (
+    Decisions,
+    Outcome,
+    largest_motion,
+    tell_arrivals,
+)
 from postproc.compensation.parallel import in_processes, map_with, rounded
 from postproc.compensation.program import (
     Planned,
@@ -45,6 +50,7 @@ from postproc.compensation.program import (
 )
 from postproc.compensation.rewrite import (
     Output,
+    check_motion,
     check_output,
     write_edits,
 )
@@ -82,6 +88,8 @@ class Correction:
         untimed: No time law was found, (n,).
         travel: Of every joint since its last reversal, (n, 6) [rad].
         speed: Of the TCP, (n,) [m/s], NaN where nobody asked.
+        departure: Largest change on the way to every visit of a joint [rad], elbow,
+            wrist centre and TCP [m], (n, 4), NaN where not known.
     """
 
     edited: Ints
@@ -96,6 +104,7 @@ class Correction:
     untimed: Bools
     travel: Floats
     speed: Floats
+    departure: Floats
 
 
 def correction_of(
@@ -127,6 +136,7 @@ def correction_of(
         untimed=plan.untimed[seeds:],
         travel=plan.travel[seeds:],
         speed=plan.speed[seeds:],
+        departure=found.moved.sizes[seeds:],
     )
 
 
@@ -253,6 +263,7 @@ class _WindowWork:
             planned = correct_taught(planned, visits, cell, model)
         states = states_of(planned.plan, cell, setting.temperature)
         found = iterate(part, planned, states, setting, begin.corrected)
+        check_motion(visits, found.moved, cell.limits)
         with clock("report"):
             kept = correction_of(visits, planned, states, found, cell, model, seeds)
         end = rounded(WindowState(planned.plan.end, planned.doubtful, found.left))
@@ -401,6 +412,7 @@ def report(
             assumed_off(name, cell),
         ),
         stages=setting.clock.stages,
+        motion=largest_motion(kept.departure),
         position=kept.position,
         sources={source.name: source.data for source, _ in reading.originals},
         arrivals=ArrivalStates(

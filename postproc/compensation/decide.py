@@ -21,6 +21,7 @@ from postproc.compensation.outcome import Decisions, Status
 from postproc.compensation.program import Planned, Reading
 from postproc.compensation.targets import moved_targets
 from postproc.language.visits import NO_TARGET, Meaning, Visits
+from postproc.motion.departure import Departure, departure
 from postproc.motion.replan import IS_STEP
 from postproc.motion.targets import TargetKind
 from postproc.robot.arm import Arm
@@ -339,6 +340,8 @@ def _steps(planned: Planned) -> Iterator[tuple[int, Ints]]:
 
 TURNED = 0.5  # change of a side by which a joint has turned
 SOLVED = 1e-6  # [m] model against wanted pose
+ROUNDING = 1e-9  # [rad] and [m]
+OTHER_BRANCH = "corrected, the arm would stand on another branch"
 
 
 def guard_solutions(
@@ -384,6 +387,36 @@ def guard_size(
         text = f"the correction exceeds correction_mm = {limits.correction_mm:g}"
         reasons.mark(size > limits.correction_mm, text)
         reasons.mark(~(residual <= SOLVED), "the correction did not converge to 1 um")
+
+
+def guard_motion(reasons: Reasons, limits: LimitSection, moved: Departure) -> None:
+    """Mark targets at which joints, elbow or wrist centre would swing too far.
+
+    Args:
+        reasons: Collects the first reason of every visit.
+        limits: The cell's guards.
+        moved: What the corrections do there, n visits.
+    """
+    reasons.mark(moved.branch, OTHER_BRANCH)
+    for text, far in swings(limits, moved).items():
+        reasons.mark(far, f"corrected, {text}")
+
+
+def swings(limits: LimitSection, moved: Departure) -> dict[str, Bools]:
+    """Say where a departure is beyond the limits: what does it, and which rows, (n,)."""
+    found = {}
+    with np.errstate(invalid="ignore"):
+        for j, most in enumerate(limits.joint_deg):
+            text = f"axis {j + 1} would turn by more than joint_deg = {most:g}"
+            found[text] = moved.joints[:, j] > np.deg2rad(most) + ROUNDING
+        for what, size, name, most_mm in (
+            ("elbow", moved.elbow, "elbow_mm", limits.elbow_mm),
+            ("wrist centre", moved.wrist_centre, "wrist_centre_mm",
+             limits.wrist_centre_mm),
+        ):  # fmt: skip
+            text = f"the {what} would move by more than {name} = {most_mm:g}"
+            found[text] = size > most_mm * MM + ROUNDING
+    return found
 
 
 def guard_turn(reasons: Reasons, limits: LimitSection, turn: Floats) -> None:
@@ -438,6 +471,10 @@ LEVER_MM = 100.0  # from the TCP, by which turns count where arrivals must agree
 NONE = np.empty((0, 3))
 KNOWN = 0.5  # part of its play that a joint must have left behind to be on a side
 HELD = "its direction of arrival would change with the correction"
+SWUNG = (
+    "corrected, the way to it or on from it would swing a joint, the elbow or the "
+    "wrist centre by more than the cell's limits, or pass a singularity otherwise"
+)
 
 
 @dataclass(frozen=True)
@@ -473,7 +510,8 @@ class Round:
         planned: Its plan, n visits.
         solved: The corrected command of every visit.
         aside: From targets to where the corrected path passes them, (n, 3) [m].
-        held: Visits that must be left alone, (n,).
+        held: Visits that must be left alone for the side they are reached from, (n,).
+        swung: .. for the ways to or from them, (n,).
         setting: Guards and frames, and what the user asked for.
     """
 
@@ -482,7 +520,15 @@ class Round:
     solved: Commands
     aside: Floats
     held: Bools
+    swung: Bools
     setting: Setting
+
+    @cached_property
+    def departure(self) -> Departure:
+        """How far the commands lead the arm from where it was, n visits."""
+        plan, setting = self.planned.plan, self.setting
+        arm, tool = setting.cell.arm, plan.tool[:, :3, 3]
+        return departure(arm, plan.q, self.solved.q, tool, setting.offset)
 
     @cached_property
     def correction(self) -> Floats:
@@ -561,18 +607,21 @@ class Round:
         for text, outside in solved.outside.items():
             reasons.mark(outside, text)
         guard_solutions(reasons, self.setting.cell.arm, limits, q, solved.q)
+        guard_motion(reasons, limits, self.departure)
         guard_turn(reasons, limits, solved.turn)
         guard_size(reasons, limits, self.correction, solved.residual)
         guard_size(reasons, limits, self.shift, solved.residual)
         mates = self.reading.visits.run_mates
         guard_steps(reasons, limits, self.correction, solved.direction, mates)
         reasons.mark(self.held, HELD)
+        reasons.mark(self.swung, SWUNG)
         reasons.mark(strays, STRAYS)
 
     @property
     def _trusted(self) -> Bools:
         """Tell where the model may be believed, (n,)."""
-        out: Bools = ~np.any([self.held, *self.solved.outside.values()], axis=0)
+        left = self.held | self.swung
+        out: Bools = ~np.any([left, *self.solved.outside.values()], axis=0)
         return out
 
     def _agreement(self, usable: Bools) -> tuple[Agreement, Floats, Floats]:

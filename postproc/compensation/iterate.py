@@ -7,14 +7,14 @@ from itertools import count, pairwise
 
 import numpy as np
 
-from postproc.arrays import Bools, Floats
+from postproc.arrays import Bools, Floats, spans
 from postproc.compensation.command import (
     Commands,
     solve_again,
     solve_visits,
     std_errors,
 )
-from postproc.compensation.decide import Proposal, Round
+from postproc.compensation.decide import Proposal, Round, swings, with_origins
 from postproc.compensation.options import Clock, Setting
 from postproc.compensation.program import Planned, Reading
 from postproc.compensation.rewrite import read_back
@@ -22,10 +22,11 @@ from postproc.compensation.targets import moved_targets
 from postproc.language.rewrite import edits as number_edits
 from postproc.language.source import Replacements
 from postproc.language.visits import Visits
+from postproc.motion.departure import Departure, path_departure
 from postproc.motion.planner import Plan
 from postproc.motion.replan import Reached, Replanned, replan, replan_all
 from postproc.motion.targets import Targets
-from postproc.motion.trace import NOWHERE, StartState
+from postproc.motion.trace import NOWHERE, StartState, trace
 from postproc.robot.cell import Cell
 from postproc.robot.state import States
 
@@ -92,13 +93,15 @@ class Iterate:
     Attributes:
         solved: The commands.
         bent: What rounded points are moved by beyond what is foretold, (n, 3) [m].
-        held: Targets that keep their values, (n,).
+        held: Targets that keep their values for the side they are reached from, (n,).
+        swung: .. for the ways to or from them, (n,).
         settled: Targets whose sides changed till the last round, and may, (n,).
     """
 
     solved: Commands
     bent: Floats
     held: Bools
+    swung: Bools
     settled: Bools
 
     def turned(self, proposal: Proposal, side: Floats, most: float) -> Bools:
@@ -141,7 +144,7 @@ class Iteration:
                 setting.model, setting.cell, self.planned, self.states,
                 setting.options.orientation,
             )  # fmt: skip
-        return Iterate(solved, np.zeros_like(self.planned.plan.aside), none, none)
+        return Iterate(solved, np.zeros_like(self.planned.plan.aside), none, none, none)
 
     def next_aim(
         self, current: Iterate, moved: Bools, found: Floats, search: SecantSearch
@@ -162,14 +165,15 @@ class Iteration:
         with self.setting.clock("decide"):
             plan = self.planned.plan
             aside = passing_after(plan, self.wanted(current)) + current.bent
-            given = self.reading, self.planned, current.solved, aside, current.held
-            return Round(*given, self.setting).propose(), aside
+            given = self.reading, self.planned, current.solved, aside
+            left = current.held, current.swung
+            return Round(*given, *left, self.setting).propose(), aside
 
     def wanted(self, current: Iterate) -> Floats:
         """Say what the path should move by at every target, (n, 3) [m]."""
         before = self.planned.plan.tcp[:, :3, 3]
         wanted = np.nan_to_num(current.solved.command[:, :3, 3] - before)
-        wanted[current.held] = 0.0
+        wanted[current.held | current.swung] = 0.0
         wanted[: len(self.given)] = self.given
         return wanted
 
@@ -189,6 +193,30 @@ class Iteration:
             if not far:  # nor where it is not known
                 missed[first:end] = 0.0
         return missed
+
+    def swung(self, proposal: Proposal, found: Converged | None) -> Bools:
+        """Tell which targets must stay for the ways to or from them, (n,).
+
+        Raises:
+            NotConcatenableError: There are some, in programs side by side.
+        """
+        n = len(self.states)
+        if found is None:
+            return np.zeros(n, dtype=bool)
+        limits, targets = self.setting.cell.limits, self.planned.targets
+        far = np.any([found.moved.branch, *swings(limits, found.moved).values()], 0)
+        rows = np.flatnonzero(far)
+        before = spans(targets.pred_start[rows], np.diff(targets.pred_start)[rows])
+        sources = targets.pred[before]
+        ends = np.zeros(n, dtype=bool)
+        ends[rows] = ends[sources[sources >= 0]] = True
+        ends = with_origins(self.reading.visits, self.planned, ends)
+        ends &= proposal.corrected
+        if far.any() and not ends.any():  # by what came long before
+            ends = np.array(proposal.corrected)
+        if ends.any() and len(self.reading.begins) > 1:
+            raise NotConcatenableError
+        return ends
 
 
 def passing_after(plan: Plan, wanted: Floats) -> Floats:
@@ -271,12 +299,21 @@ class NotConcatenableError(Exception):
 
 @dataclass(frozen=True)
 class Converged:
-    """A proposal, the edits that write it, and where the written numbers lead."""
+    """A proposal, the edits that write it, and where the written numbers lead.
+
+    Attributes:
+        proposal: What is written.
+        edits: The edits that write it.
+        reached: Where these numbers lead.
+        left: How the last target is left.
+        moved: How far the ways lead the arm from where it was, n visits.
+    """
 
     proposal: Proposal
     edits: tuple[Replacements, ...]
     reached: Reached
     left: EndState
+    moved: Departure
 
 
 def iterate(
@@ -318,9 +355,11 @@ def iterate(
         bend_on = number < CORNERS and bool(missed.any())
         if not moved.any() and not bend_on:
             found, flipped = _read_back(iteration, current, proposal, replanner, before)
-            if found is not None:
+            swung = iteration.swung(proposal, found)
+            if found is not None and not swung.any():
                 return found
-            current = replace(current, held=current.held | flipped)
+            held, swung = current.held | flipped, current.swung | swung
+            current = replace(current, held=held, swung=swung)
             continue
         bent = current.bent + missed if bend_on else current.bent
         settled = current.settled | moved if number >= ROUNDS else current.settled
@@ -359,7 +398,17 @@ def _read_back(
         std_error = std_errors(model, cell, iteration.states, current.solved)
     decided = replace(proposal.decisions, std_error=std_error)
     proposal = replace(proposal, decisions=decided)
-    return Converged(proposal, edits, last.reached, left), flipped
+    with setting.clock("verify"):
+        moved = _departed(iteration, last.targets, before.written)
+    return Converged(proposal, edits, last.reached, left, moved), flipped
+
+
+def _departed(iteration: Iteration, targets: Targets, begin: StartState) -> Departure:
+    """Trace all ways to targets as they are written, and compare them with the plan."""
+    setting, plan = iteration.setting, iteration.planned.plan
+    arm, tool, offset = setting.cell.arm, plan.tool[:, :3, 3], setting.offset
+    new = trace(arm, targets, begin.known)
+    return path_departure(arm, targets.move, tool, plan.exact, new, offset)
 
 
 def write_and_read_back(

@@ -5,10 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from functools import cached_property
 from time import perf_counter
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:  # the command line needs options only, and must start at once
+    from postproc.arrays import Floats
     from postproc.model.model import Model
     from postproc.robot.cell import Cell
 
@@ -86,6 +88,11 @@ class Setting:
     def timed_by(self, clock: Clock) -> Setting:
         """Return the same with another clock."""
         return replace(self, clock=clock)
+
+    @cached_property
+    def offset(self) -> Floats:
+        """By what every joint is moved for its constant zero error, (6,) [rad]."""
+        return -self.model.joint_offset(self.cell.arm)
 
     @property
     def temperature(self) -> float:

@@ -101,6 +101,8 @@ class Outcome:
         before, after: Predicted error on the visits that could be compensated.
         diagnostics: What else was found, in order of line.
         stages: Seconds spent in every stage, by all processes together.
+        motion: The largest change on the ways between targets: ``joint_deg``,
+            ``elbow_mm``, ``wrist_centre_mm``, ``tcp_mm``.
         position: Where the program wants the TCP at every visit, base frame, (n, 3)
             [m], NaN where it is not known; empty where nobody asked.
         sources: The bytes of the source files by name, for showing lines.
@@ -118,6 +120,7 @@ class Outcome:
     after: ErrorStatistics
     diagnostics: tuple[Diagnostic, ...]
     stages: Mapping[str, float] = field(default_factory=dict)
+    motion: Mapping[str, float] = field(default_factory=dict)
     position: Floats = field(default_factory=lambda: np.empty((0, 3)))
     sources: Mapping[str, bytes] = field(default_factory=dict)
     arrivals: ArrivalStates | None = None
@@ -172,6 +175,22 @@ class Outcome:
             f"{d.reasons[d.why[i]]}"
             for i in self.left_rows()
         ]
+
+
+def largest_motion(departure: Floats) -> dict[str, float]:
+    """Name the largest changes of motion.
+
+    Args:
+        departure: Changes of a joint [rad], elbow, wrist centre and TCP [m], (n, 4).
+    """
+    largest = np.fmax.reduce(departure, axis=0, initial=0.0)
+    joint, elbow, wrist, tcp = np.append(np.rad2deg(largest[:1]), largest[1:] / MM)
+    return {
+        "joint_deg": float(joint),
+        "elbow_mm": float(elbow),
+        "wrist_centre_mm": float(wrist),
+        "tcp_mm": float(tcp),
+    }
 
 
 # What came of the targets on every line: kept beside an output, told by `diff`.

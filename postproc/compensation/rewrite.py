@@ -9,6 +9,7 @@ import numpy as np
 
 from postproc import __version__
 from postproc.arrays import Bools, Floats, Ints
+from postproc.compensation.decide import swings
 from postproc.compensation.equivalence import equivalent
 from postproc.compensation.parallel import in_background
 from postproc.compensation.program import Reading
@@ -27,6 +28,8 @@ from postproc.language.source import (
 )
 from postproc.language.stamp import stamp_length, stamp_line
 from postproc.language.visits import Literals, Visits
+from postproc.motion.departure import Departure
+from postproc.robot.cell import LimitSection
 
 # The files that a compensation writes, and the record that undoes them.
 
@@ -235,3 +238,27 @@ def _in_text(old: Skeleton, new: Skeleton, edits: Replacements, stamped: bool) -
         text = new.source.data[length:]
         return difference(old, Source(new.source.name, text), edits)
     return difference(old, new, edits, length)
+
+
+# Our own output, planned again: the same motion, to the limits of the cell.
+
+
+def check_motion(visits: Visits, moved: Departure, limits: LimitSection) -> None:
+    """Check that the arm moves as it did, but for what the cell's limits allow.
+
+    Args:
+        visits: The program, n visits.
+        moved: How far the ways to the written targets lead from those before.
+        limits: The cell's guards.
+
+    Raises:
+        VerificationError: A joint, the elbow or the wrist centre would swing too far,
+            or the arm would stand on another branch.
+    """
+    found = {"the arm would be on another branch": moved.branch}
+    for text, far in (found | swings(limits, moved)).items():
+        for row in np.flatnonzero(far)[:1].tolist():
+            raise VerificationError(
+                f"{visits.files[visits.file[row]]}:{visits.line[row]}: {text} on the "
+                "way there, which no guard has held back; nothing is written"
+            )

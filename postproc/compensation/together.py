@@ -161,4 +161,5 @@ def _split(kept: Correction, readings: Sequence[Reading]) -> Iterator[Correction
             untimed=kept.untimed[rows],
             travel=kept.travel[rows],
             speed=kept.speed[rows],
+            departure=kept.departure[rows],
         )

@@ -432,6 +432,17 @@ class Model:
             covariance = covariance[np.ix_(keep, keep)]
         return Combination(part), self.values[keep], covariance
 
+    def joint_offset(self, arm: Arm) -> Floats:
+        """Return what every joint is off by wherever it stands, (6,) [rad].
+
+        Zero errors of the joints, among the effects that may be compensated: D-H angle
+        = offset + sense * (mix @ q), so that q is off by inverse(mix) (sense * theta).
+        """
+        effects, values, _ = self.compensable()
+        pairs = zip(effects.effects, effects.slices, strict=True)
+        theta = np.sum([e.zero_errors(values[part]) for e, part in pairs], axis=0)
+        return np.asarray(np.linalg.solve(arm.dh.mix, arm.dh.sense * theta))
+
     def error(self, arm: Arm, states: States) -> Floats:
         """Predict the error without its uncertainty, (n, 3) [m]."""
         effects, values, _ = self.compensable()

@@ -40,6 +40,7 @@ class Plan:
         untimed: Time and speed are estimates: no time law was found, (n,).
         pull: How rounded fly points move with their neighbours.
         end: Where the arm stands at the last arrival.
+        exact: The ways as if the arm stopped at every target.
     """
 
     q: Floats
@@ -58,6 +59,7 @@ class Plan:
     untimed: Bools
     pull: BlendCoupling
     end: StartState
+    exact: Trace
 
     def __post_init__(self) -> None:
         read_only(self)
@@ -107,7 +109,7 @@ def plan(
         traced.q, tcp, traced.aside, tool, arrived.direction, arrived.side,
         arrived.travel, clock.speed, clock.time, traced.slot,
         _guard(traced, wrist), REASONS, traced.overruled, clock.untimed,
-        traced.pull, end,
+        traced.pull, end, exact,
     )  # fmt: skip
 
 

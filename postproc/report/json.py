@@ -49,6 +49,7 @@ def report_pieces(outcome: Outcome, each: Map = map) -> Iterator[str]:
     yield from each(lambda rows: _targets(outcome, rows), tasks)
     tail = {
         "predicted": {"before": asdict(outcome.before), "after": asdict(outcome.after)},
+        "motion": {key: round(size, 5) for key, size in outcome.motion.items()},
         "diagnostics": [asdict(d) for d in outcome.diagnostics],
         "stages_s": dict(outcome.stages),
     }

@@ -6,6 +6,7 @@ import hashlib
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -209,6 +210,19 @@ class Arm:
             tool: TCP in the flange frame, (n, 3) [m].
         """
         return self.dh.placed(q, tool)
+
+    def landmarks(self, q: Floats, tool: Floats) -> Floats:
+        """Place elbow, wrist centre and TCP: (n, 3, 3) [m], base frame.
+
+        The elbow is the origin of D-H frame 2, on axis 3; the wrist centre that of
+        frame 4, on axis 5.
+
+        Args:
+            q: Joint angles, (n, 6) [rad].
+            tool: TCP in the flange frame, (n, 3) [m].
+        """
+        points = [frame[3].T for frame in islice(self.dh.frames(q), 5)]
+        return np.stack([points[2], points[4], self.tcp(q, tool)], axis=1)
 
     def kinematics(self, q: Floats) -> tuple[Floats, Floats]:
         """Place the flange and give the joint screws.

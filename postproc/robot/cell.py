@@ -101,14 +101,31 @@ class SurveySection(Strict):
     euler_zyz_deg: Triple | None = None
 
 
+Limits = Annotated[list[PositiveFloat], Field(min_length=6, max_length=6)]
+JOINT_DEG = [5.0, 5.0, 5.0, 10.0, 10.0, 10.0]
+
+
 class LimitSection(Strict):
-    """When a correction is not trusted."""
+    """When a correction is not trusted.
+
+    Attributes:
+        correction_mm, correction_deg: Most that a target moves and turns.
+        agree_mm: Arrivals at one point that differ by more are not corrected together.
+        step_mm: Most that the correction changes along 100 mm of a continuous path.
+        wrist_deg: Axis 5 nearer to zero than this is the wrist singularity.
+        joint_deg: Most that every joint turns by a correction, at a target and on the
+            way to it.
+        elbow_mm, wrist_centre_mm: Most that elbow and wrist centre move likewise.
+    """
 
     correction_mm: PositiveFloat = 5.0
     correction_deg: PositiveFloat = 1.0
     agree_mm: PositiveFloat = 0.02
     step_mm: PositiveFloat = 0.5
     wrist_deg: PositiveFloat = 3.0
+    joint_deg: Limits = JOINT_DEG
+    elbow_mm: PositiveFloat = 10.0
+    wrist_centre_mm: PositiveFloat = 10.0
 
 
 class FrameTableEntry(Strict):

@@ -139,6 +139,14 @@ class Effect(ABC):
         moved: Floats = self.columns(batch) @ p
         return moved
 
+    def zero_errors(self, p: Floats) -> Floats:
+        """Return by what it turns every D-H angle wherever the arm stands, (6,) [rad].
+
+        Args:
+            p: Its parameters.
+        """
+        return np.zeros(6)
+
     def settings(self) -> dict[str, Any]:
         """Return the settings as plain data, for a model file."""
         return {f.name: getattr(self, f.name) for f in fields(self)}

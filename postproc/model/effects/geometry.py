@@ -87,6 +87,10 @@ class Geometry(Effect):
             link[j, k] = value
         return Deviation(np.array(base), link, np.array(rest[-3:]))
 
+    def zero_errors(self, p: Floats) -> Floats:
+        """Return the errors theta of the joints' zeros, (6,) [rad]."""
+        return np.array(self.deviation(p).link[:, KINDS.index("theta")])
+
     def _kind(
         self, batch: Batch, kind: int, joint: int
     ) -> tuple[Floats, Floats | None]:
