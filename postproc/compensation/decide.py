@@ -15,6 +15,11 @@ from postproc.compensation.command import (
     new_numbers,
     turns_in_file,
 )
+from postproc.compensation.continuity import (
+    PathCorrection,
+    keep_whole,
+    path_correction,
+)
 from postproc.compensation.eligibility import STRAYS, Reasons, strayed
 from postproc.compensation.options import Options, Setting
 from postproc.compensation.outcome import Decisions, Status
@@ -338,7 +343,6 @@ def _steps(planned: Planned) -> Iterator[tuple[int, Ints]]:
 
 # When a correction is not trusted.
 
-TURNED = 0.5  # change of a side by which a joint has turned
 SOLVED = 1e-6  # [m] model against wanted pose
 ROUNDING = 1e-9  # [rad] and [m]
 OTHER_BRANCH = "corrected, the arm would stand on another branch"
@@ -403,7 +407,7 @@ def guard_motion(reasons: Reasons, limits: LimitSection, moved: Departure) -> No
 
 
 def swings(limits: LimitSection, moved: Departure) -> dict[str, Bools]:
-    """Say where a departure is beyond the limits: what does it, and which rows, (n,)."""
+    """Say what is beyond the limits, and in which of n rows, (n,) each."""
     found = {}
     with np.errstate(invalid="ignore"):
         for j, most in enumerate(limits.joint_deg):
@@ -431,38 +435,6 @@ def guard_turn(reasons: Reasons, limits: LimitSection, turn: Floats) -> None:
         angle = np.rad2deg(lengths(turn))
         text = f"the correction exceeds correction_deg = {limits.correction_deg:g}"
         reasons.mark(angle > limits.correction_deg, text)
-
-
-def guard_steps(
-    reasons: Reasons,
-    limits: LimitSection,
-    correction: Floats,
-    direction: Floats,
-    before: Ints,
-) -> None:
-    """Mark jumps of the correction between neighbours of a fly run.
-
-    A step is allowed where a joint really turns.
-
-    Args:
-        reasons: Collects the first reason of every visit.
-        limits: The cell's guards.
-        correction: Change of the commanded TCP, (n, 3) [m].
-        direction: Arrival direction, (n, 6).
-        before: The visit before within the same fly run, (n,), -1 where there is none.
-    """
-    inside = before >= 0
-    last = np.where(inside, before, 0)
-    with np.errstate(invalid="ignore"):
-        step = lengths(correction - correction[last]) / MM
-        jump = inside & (step > limits.step_mm)
-    rows = np.flatnonzero(jump)
-    turned = np.abs(direction[rows] - direction[last[rows]])
-    jump[rows] = (turned < TURNED).all(axis=1)
-    text = (
-        f"the correction steps by more than step_mm = {limits.step_mm:g} in a fly run"
-    )
-    reasons.mark(jump, text)
 
 
 # Which targets move, where to, and why the others do not.
@@ -529,6 +501,16 @@ class Round:
         plan, setting = self.planned.plan, self.setting
         arm, tool = setting.cell.arm, plan.tool[:, :3, 3]
         return departure(arm, plan.q, self.solved.q, tool, setting.offset)
+
+    @cached_property
+    def path(self) -> PathCorrection:
+        """How the correction changes along continuous paths."""
+        plan, setting = self.planned.plan, self.setting
+        return path_correction(
+            self.reading.visits, setting.cell.arm, plan.q, plan.tcp,
+            plan.tool[:, :3, 3], self.correction, self.solved.direction,
+            setting.gap, setting.cell.limits.step_mm,
+        )  # fmt: skip
 
     @cached_property
     def correction(self) -> Floats:
@@ -603,6 +585,7 @@ class Round:
     def _guard(self, reasons: Reasons, strays: Bools) -> None:
         """Mark the visits whose corrections are not trusted."""
         solved, limits, q = self.solved, self.setting.cell.limits, self.planned.plan.q
+        visits, given = self.reading.visits, ~reasons.none
         reasons.adopt(self.planned.reasons.index, self.planned.reasons.texts)
         for text, outside in solved.outside.items():
             reasons.mark(outside, text)
@@ -611,11 +594,10 @@ class Round:
         guard_turn(reasons, limits, solved.turn)
         guard_size(reasons, limits, self.correction, solved.residual)
         guard_size(reasons, limits, self.shift, solved.residual)
-        mates = self.reading.visits.run_mates
-        guard_steps(reasons, limits, self.correction, solved.direction, mates)
         reasons.mark(self.held, HELD)
         reasons.mark(self.swung, SWUNG)
         reasons.mark(strays, STRAYS)
+        keep_whole(reasons, self.path, visits, given, limits.step_mm)
 
     @property
     def _trusted(self) -> Bools:

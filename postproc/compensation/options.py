@@ -94,6 +94,13 @@ class Setting:
         """By what every joint is moved for its constant zero error, (6,) [rad]."""
         return -self.model.joint_offset(self.cell.arm)
 
+    @cached_property
+    def gap(self) -> Floats:
+        """Half the fitted gap between the flanks of every joint, (6,) [rad]."""
+        from postproc.model.play import half_gap
+
+        return half_gap(self.model, self.cell.arm)
+
     @property
     def temperature(self) -> float:
         """The arm's temperature [deg C], NaN where nobody knows."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from postproc.compensation.decide import guard_size, guard_solutions, guard_steps
+from postproc.compensation.decide import guard_size, guard_solutions
 from postproc.compensation.eligibility import Reasons
 from postproc.robot.arm import load_arm
 from postproc.robot.cell import LimitSection
@@ -65,24 +65,3 @@ def test_the_cap_on_a_correction():
 def test_what_did_not_converge_is_held():
     found = sizes([1.0, 1.0, 1.0], [0.9e-6, 1.1e-6, np.nan])
     assert found[0] == "" and all("1 um" in text for text in found[1:])
-
-
-def steps(correction_mm, direction, before):
-    reasons = Reasons(len(correction_mm))
-    correction = np.zeros((len(correction_mm), 3))
-    correction[:, 2] = np.array(correction_mm) * 1e-3
-    sides = np.tile(np.array(direction, dtype=float)[:, None], 6)
-    guard_steps(reasons, LIMITS, correction, sides, np.array(before))
-    return [bool(reasons[i]) for i in range(len(correction))]
-
-
-def test_a_jump_inside_a_fly_run_is_held():
-    assert steps([1.0, 1.05, 1.3], [1, 1, 1], [-1, 0, 1]) == [False, False, True]
-
-
-def test_a_jump_where_a_joint_turns_is_allowed():
-    assert steps([1.0, 1.3], [1, -1], [-1, 0]) == [False, False]
-
-
-def test_a_jump_between_runs_is_allowed():
-    assert steps([1.0, 1.3], [1, 1], [-1, -1]) == [False, False]
