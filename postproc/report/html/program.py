@@ -108,6 +108,7 @@ class ProgramPage:
         stages: Seconds by stage.
         sources: Bytes by file name; empty where they are not at hand.
         shares: What the effects do; none where the report does not say.
+        motion: Largest changes of joints, elbow and wrist centre; empty likewise.
     """
 
     name: str
@@ -118,6 +119,7 @@ class ProgramPage:
     stages: Mapping[str, float]
     sources: Mapping[str, bytes]
     shares: PageShares
+    motion: Mapping[str, float]
 
 
 def columns_of(outcome: Outcome) -> PageColumns:
@@ -539,6 +541,7 @@ def program_report(outcome: Outcome, sources: Mapping[str, bytes] | None = None)
         stages=outcome.stages,
         sources=outcome.sources if sources is None else sources,
         shares=shares_of(outcome),
+        motion=outcome.motion,
     )
     return _page(program)
 
@@ -564,6 +567,7 @@ def program_report_from_json(
         stages=data.get("stages_s", {}),
         sources=sources or {},
         shares=shares_from(data["targets"]),
+        motion=data.get("motion", {}),
     )
     return _page(program)
 
