@@ -41,6 +41,7 @@ from postproc.language.pdl2.values import (
     Position,
     SourceNumber,
     Value,
+    points_of,
 )
 from postproc.language.visits import ELSEWHERE
 
@@ -167,6 +168,11 @@ def _bind(
     for at, parameter in enumerate(inside.body.parameters):
         argument = arguments[at] if at < len(arguments) else None
         key = prefix + parameter.name
+        other = inside.body.arms.get(parameter.name, here.world.arm)
+        if other != here.world.arm:
+            here.world.pin(here.value(argument), f"arm {other} goes to it too")
+            here.store.write(key, Nothing(points_of(other)))
+            continue
         if isinstance(argument, ast.Reference) and not argument.name.startswith("$"):
             target = here.locate(argument)
             if target.component == ():
@@ -263,6 +269,10 @@ def frame_value(record: Record, why: str) -> Position | Nothing:
 
 def assign(here: Execution, statement: ast.Assign, taught: bool) -> None:
     """Let an assignment have its effect; `taught` marks the literal in it."""
+    other = here.world.other_arm(here.place, statement.target.name)
+    if other:
+        _assign_other(here, statement, other)
+        return
     new = statement.value
     if statement.operator != ":=":
         new = ast.Binary(statement.operator[0], statement.target, statement.value)
@@ -297,6 +307,13 @@ def assign(here: Execution, statement: ast.Assign, taught: bool) -> None:
         here.store.write(target.key, held)
 
 
+def _assign_other(here: Execution, statement: ast.Assign, arm: int) -> None:
+    """Forget a point of another arm: what it is given goes to that arm too."""
+    here.world.pin(here.value(statement.value), f"arm {arm} goes to it too")
+    for key in here.locate(statement.target).keys:
+        invalidate_key(here, key, points_of(arm))
+
+
 def _assigns_component(here: Execution, reference: ast.Reference) -> bool:
     """Tell whether a reference means one of a position's six numbers."""
     if reference.name.startswith("$"):
@@ -321,8 +338,9 @@ def _setting(here: Execution, reference: ast.Reference, value: Value) -> None:
     """Change a frame or motion variable of our arm."""
     name = here.setting_name(reference)
     if name is None:
-        if reference.name[1:] in FRAME_NAMES:
-            why = f"a part of {reference.name.upper()} is assigned"
+        if reference.name[1:] in FRAME_NAMES or not reference.steps:
+            said = f"a part of {reference.name.upper()} is assigned"
+            why = said if reference.steps else here.other_default()
             here.store.set(**{reference.name[1:]: Nothing(why)})
         elif reference.name == "$arm_data" and _whose(here, reference) is None:
             field = str((*reference.steps, "")[1]).lstrip("$")

@@ -257,6 +257,9 @@ def _names(statement: ast.Statement) -> Iterator[tuple[str, bool]]:
 # Moves that a program never comes to: their targets keep their values.
 
 NEVER_REACHED = "never-reached"
+OTHER_ARM = "other-arm"  # a target that is another arm's
+NOT_FOLLOWED = frozenset({NEVER_REACHED, OTHER_ARM})
+"""Findings that tell of targets without a visit: they keep their values."""
 
 
 def dead_moves(programs: Sequence[Program], visits: Visits) -> list[Diagnostic]:
@@ -293,7 +296,12 @@ def _has_target(statement: ast.Statement) -> bool:
     A move that names its arm may be one of another arm, and does not count.
     """
     move = ast.action(statement)
-    if not isinstance(move, ast.Move) or move.how != "TO" or move.arm:
+    return isinstance(move, ast.Move) and not move.arm and goes_to_target(move)
+
+
+def goes_to_target(move: ast.Move) -> bool:
+    """Tell whether a move goes to a place that is no system variable."""
+    if move.how != "TO":
         return False
     where = move.where[0] if move.where else None
     return not (isinstance(where, ast.Reference) and where.name.startswith("$"))

@@ -37,7 +37,13 @@ from postproc.language.pdl2.moves import move
 from postproc.language.pdl2.program import Program, Variable, Variables, recovered
 from postproc.language.pdl2.store import Store, root_of
 from postproc.language.pdl2.stretches import MoveBlocks
-from postproc.language.pdl2.values import Nothing, Position, Value, Vector
+from postproc.language.pdl2.values import (
+    Nothing,
+    Position,
+    Value,
+    Vector,
+    points_of,
+)
 from postproc.language.pdl2.variable_file import VariableFile
 from postproc.language.pdl2.variable_file import VariableFile as ValueFile
 from postproc.language.shapes import lower
@@ -367,6 +373,8 @@ def _declared(world: World, place: Place, seen: Variables) -> None:
         if variable.initial is None or key in world.initial:
             continue
         value = ProgramPoint(world, place, variable.row, store).value(variable.initial)
+        if variable.arm not in (0, world.arm):
+            value = Nothing(points_of(variable.arm))
         if isinstance(value, Position) and not value.name:
             value = replace(
                 value,
@@ -388,6 +396,7 @@ def _enter_all(world: World, place: Place, file: ValueFile) -> None:
     known = np.array(places, dtype=bool)[entries.layout]
     known &= np.isfinite(entries.numbers).all(axis=1)
     known &= np.isin(entries.arm, (0, world.arm))
+    known[_declared_for_other(world, place.program, entries)] = False
     shared = np.array([layout.shared for layout in entries.layouts], dtype=bool)
     shared, taught = shared[entries.layout], np.zeros(len(known), dtype=bool)
     named = np.fromiter(entries.row.values(), np.int64, len(entries.row))
@@ -407,7 +416,8 @@ def _enter_all(world: World, place: Place, file: ValueFile) -> None:
         name = entries.name[row].lower()
         root = root_of(name)
         key = world.root(place, root) + name[len(root) :]
-        _enter(world, file, entries.entry(row), key)
+        arm = world.other_arm(place, root)
+        _enter(world, file, entries.entry(row), key, arm)
     prefix = f"{place.program.name}/"
     world.initial.points = FilePoints(prefix, own, other, entries, base, shared, taught)
 
@@ -420,8 +430,16 @@ def _told_by_declaration(program: Program, entries: Entries) -> list[int]:
     return [row for name, row in entries.row.items() if root_of(name) in marked]
 
 
-def _enter(world: World, file: ValueFile, entry: Entry, key: str) -> None:
-    """Enter a value that is no known point, where there is any."""
+def _declared_for_other(world: World, program: Program, entries: Entries) -> list[int]:
+    """List the rows of variables that are declared for another arm."""
+    other = {*program.variables.which(lambda v: v.arm not in (0, world.arm))}
+    if not other:
+        return []
+    return [row for name, row in entries.row.items() if root_of(name) in other]
+
+
+def _enter(world: World, file: ValueFile, entry: Entry, key: str, arm: int) -> None:
+    """Enter a value that is no known point, where there is any, or another arm's."""
     value: Value | None = entry.numbers[0] if entry.numbers else None
     if entry.kind in POSITIONS:
         value = Nothing(f"its value is not initialised in {file.source.name}")
@@ -430,8 +448,8 @@ def _enter(world: World, file: ValueFile, entry: Entry, key: str) -> None:
         value = Vector((x, y, z))
     if value is None and "." in entry.name:  # that it is there counts, see `nodes`
         value = Nothing(f"its value in {file.source.name} is no number")
-    if entry.arm not in (0, world.arm):
-        value = Nothing(f"its value is one of arm {entry.arm}")
+    if arm or entry.arm not in (0, world.arm):
+        value = Nothing(points_of(arm or entry.arm))
     if value is not None:
         world.initial[key] = value
 

@@ -111,6 +111,12 @@ def _program_attribute(c: Children) -> int:
     return c[1].slot if arm else -1
 
 
+def _arm_slot(c: Children) -> int:
+    """Return the slot of the number in ``FOR ARM[n]``, -1 where there is none."""
+    found = [part[0].slot for part in _of(c, ArmPart) if isinstance(part[0], Number)]
+    return found[0] if found else -1
+
+
 def _routine(c: Children) -> ast.Routine:
     parameters = _of(c, list)
     exported, _ = _declared(c, 1)
@@ -230,8 +236,8 @@ RULES: dict[str, Rule] = {
     "names": lambda c: NamesPart(str(n) for n in c),
     "exported": lambda c: ExportedPart(_name(c[0])),
     "attribute": lambda c: c[0],
-    "simple_type": lambda c: ast.Type(_name(c[0])),
-    "array_type": lambda c: ast.Type(c[-1].name, array=True),
+    "simple_type": lambda c: ast.Type(_name(c[0]), arm=_arm_slot(c)),
+    "array_type": lambda c: ast.Type(c[-1].name, array=True, arm=c[-1].arm),
     "path_type": lambda c: ast.Type(_name(c[0]), path=True),
     "dimensions": lambda c: None,
     "dimension": lambda c: None,

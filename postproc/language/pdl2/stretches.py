@@ -392,9 +392,10 @@ class MoveBlocks:
         """Run the stretch that begins at a row; tell whether there is one.
 
         Where a condition handler may move the arm at any time there is none: every
-        move may then come from elsewhere.
+        move may then come from elsewhere. Nor is there where the moves may be another
+        arm's.
         """
-        if self.machine.interrupted:
+        if self.machine.interrupted or here.other_default():
             return False
         quiet = self._quiet(here)
         end = quiet.end(here.row)
