@@ -49,7 +49,7 @@ def batch(
         int, typer.Option("--jobs", "-j", min=0, help="Processes; 0: one for a core.")
     ] = 0,
     scheduler: Annotated[
-        str | None, typer.Option("--scheduler", help="Dask: tcp://host:8786.")
+        str | None, typer.Option("--scheduler", help="Dask: tls://host:8786.")
     ] = None,
     tls: Annotated[
         Path | None,
