@@ -79,7 +79,7 @@ def summarise_call(
 def _list_moves(machine: Machine, here: Execution, place: Place, name: str) -> None:
     """List the moves of a body once, from nowhere and with nothing known."""
     program, body = place.program, place.body
-    context = ((machine.position(program, body.first), _UNFOLLOWED),)
+    context = machine.root.within(machine.position(program, body.first), _UNFOLLOWED)
     if context in machine.places or id(body) in machine.recursive:
         return
     machine.enter(context, place)
@@ -104,9 +104,9 @@ def call_statement(machine: Machine, here: Execution, call: ast.Call) -> bool:
     if inside is None:
         opaque_call(here, call.name, call.arguments)
         return False
-    if inside.body in machine.calls_in(here.context):
-        running = machine.calls_in(here.context)
-        machine.recursive |= {id(b) for b in running[running.index(inside.body) :]}
+    running = machine.calls_to(inside.body, here.context)
+    if running:
+        machine.recursive |= {id(body) for body in running}
         _refuse_recursion(machine, here, inside)
         return False
     _bind(here, inside, call.arguments)

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import get_args
 
 import numpy as np
 
@@ -59,14 +60,27 @@ def references(node: object) -> Iterator[ast.Reference]:
     return (part for part in _parts(node) if isinstance(part, ast.Reference))
 
 
-def _parts(node: object) -> Iterator[object]:
+_LEAVES = (str, int, float, type(None))
+_NODES = (ast.Statement, *get_args(ast.Expression), ast.Index)
+
+
+def _parts(node: object) -> list[object]:
+    """List a statement or expression with all that is in it, inner ones first."""
+    found: list[object] = []
+    _add_parts(node, found)
+    return found
+
+
+def _add_parts(node: object, found: list[object]) -> None:
     if isinstance(node, tuple):
         for part in node:
-            yield from _parts(part)
-    elif isinstance(node, ast.Statement | ast.Expression | ast.Index):
+            _add_parts(part, found)
+    elif isinstance(node, _NODES):
         for name in node.__slots__:
-            yield from _parts(getattr(node, name))
-        yield node
+            part = getattr(node, name)
+            if not isinstance(part, _LEAVES):
+                _add_parts(part, found)
+        found.append(node)
 
 
 def changed_arguments(
@@ -237,6 +251,44 @@ def _called(world: World, place: Place, first: int, last: int) -> Iterator[Place
             found = find(place.program, name)
             if found is not None:
                 yield found
+
+
+def circles(world: World) -> frozenset[int]:
+    """Return the bodies (by id) that may call themselves, and those between such.
+
+    Bodies that call none that is left are taken out, then those that none calls.
+    """
+    calls: dict[int, set[int]] = {}
+    for program in world.programs():
+        for body in filter(None, (program.main, *program.routines.values())):
+            called = _called(world, Place(program, body), body.first, body.last)
+            calls[id(body)] = {id(one.body) for one in called}
+    callers = _turned(_without_sinks(calls))
+    return frozenset(_without_sinks(callers))
+
+
+def _without_sinks(edges: Mapping[int, set[int]]) -> dict[int, set[int]]:
+    """Take out, again and again, what leads to nothing that is left."""
+    back, count = _turned(edges), {one: len(to) for one, to in edges.items()}
+    waiting = [one for one, left in count.items() if not left]
+    gone: set[int] = set()
+    while waiting:
+        sink = waiting.pop()
+        gone.add(sink)
+        for one in back[sink]:
+            count[one] -= 1
+            if not count[one]:
+                waiting.append(one)
+    return {one: to - gone for one, to in edges.items() if one not in gone}
+
+
+def _turned(edges: Mapping[int, set[int]]) -> dict[int, set[int]]:
+    """Turn the edges of a graph round."""
+    back: dict[int, set[int]] = {one: set() for one in edges}
+    for one, to in edges.items():
+        for other in to:
+            back[other].add(one)
+    return back
 
 
 def _names(statement: ast.Statement) -> Iterator[tuple[str, bool]]:

@@ -17,12 +17,12 @@ from postproc.language.pdl2.calls import (
     frame_value,
 )
 from postproc.language.pdl2.collect import collect
+from postproc.language.pdl2.context import HANDLED, Context
 from postproc.language.pdl2.effects import changed_arguments, live_rows, rows_effects
 from postproc.language.pdl2.entries import POSITIONS, Entries, Entry
 from postproc.language.pdl2.evaluate import ProgramPoint
 from postproc.language.pdl2.job import FilePoints, Place, Start, World, base_variable
 from postproc.language.pdl2.machine import (
-    HANDLED,
     MAX_ROWS,
     Execution,
     Goal,
@@ -111,7 +111,7 @@ def _unrolled(
 def _round(
     machine: Machine,
     here: Execution,
-    context: tuple[tuple[int, int], ...],
+    context: Context,
     row: int,
     number: int,
 ) -> None:
@@ -121,7 +121,7 @@ def _round(
     statement = recovered(program.statement(row))
     if isinstance(statement, ast.Label) and statement.then is not None:
         statement = statement.then
-    inner = (*context, (machine.position(program, row), number))
+    inner = context.within(machine.position(program, row), number)
     machine.enter(inner, here.place)
     if isinstance(statement, ast.For):
         key = here.locate(ast.Reference(statement.name)).key
@@ -137,11 +137,10 @@ def end_round(machine: Machine, here: Execution) -> None:
     if isinstance(statement, ast.Label) and statement.then is not None:
         statement = statement.then
     name = statement.name if isinstance(statement, ast.For) else ""
-    last = here.context[-1] if here.context else None
-    if last is not None and last[0] == at and last[1] >= 0:
-        outer = here.context[:-1]
-        if last[1] + 1 < machine.ranges[(outer, row)][2]:
-            _round(machine, here, outer, row, last[1] + 1)
+    last = here.context
+    if last.is_round and last.at == at:
+        if last.kind + 1 < machine.ranges[(last.outer, row)][2]:
+            _round(machine, here, last.outer, row, last.kind + 1)
             return
     else:
         invalidate(here, ast.Reference(name), "it counts a loop")
@@ -516,8 +515,8 @@ def _start(machine: Machine) -> None:
     )
     _handlers(machine, store)
     if program.main is not None:
-        machine.enter((), Place(program, program.main))
-        machine.push((), program.main.first + 1, store)
+        machine.enter(machine.root, Place(program, program.main))
+        machine.push(machine.root, program.main.first + 1, store)
 
 
 def _handlers(machine: Machine, store: Store) -> None:
@@ -553,7 +552,7 @@ def _moving_handler(machine: Machine, place: Place, row: int, store: Store) -> N
         str(row),
         "this condition handler may move the arm at any time: no move's origin is sure",
     )
-    context = ((machine.position(place.program, row), HANDLED),)
+    context = machine.root.within(machine.position(place.program, row), HANDLED)
     machine.enter(context, place)
     machine.push(context, row + 1, store)
 

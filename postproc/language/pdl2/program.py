@@ -78,11 +78,9 @@ def recovered(statement: ast.Statement) -> ast.Statement:
 
 
 def build_blocks(
-    lines: Lines, statements: ParsedShapes[ast.Statement], first: int, last: int
+    lines: Lines, statements: ParsedShapes[ast.Statement], rows: Ints
 ) -> tuple[Blocks, list[tuple[int, str]]]:
-    """Match the blocks of rows first to last - 1; also return (row, problem)."""
-    structural = statements.which(lambda said: not isinstance(said, _PLAIN))
-    rows = first + np.flatnonzero(structural[lines.shape[first:last]])
+    """Match the blocks of rows that are no plain ones; also return (row, problem)."""
     reader = _BlockReader(lines, statements)
     for row in rows.tolist():
         reader.take(row)
@@ -454,6 +452,7 @@ class _Reader:
     lines: Lines
     statements: ParsedShapes[ast.Statement]
     taught: frozenset[int]
+    structural: Ints  # rows of other statements than plain ones, ascending
     name: str = ""
     arm: int = 0
     main: Body | None = None
@@ -557,9 +556,9 @@ class _Reader:
         """End the innermost routine, or the program."""
         scope = self.scopes[-1]
         routine = scope.routine
-        blocks, problems = build_blocks(
-            self.lines, self.statements, scope.begin + 1, last
-        )
+        within = np.searchsorted(self.structural, (scope.begin + 1, last))
+        rows = self.structural[slice(*within)]
+        blocks, problems = build_blocks(self.lines, self.statements, rows)
         for row, message in problems:
             self.report(row, "block-structure", message)
         name = routine.name if routine else ""
@@ -591,9 +590,10 @@ def parse(source: Source, each: Map = map) -> Program:
     lines = read_lines(source, each)
     statements = parse_shapes(lines.shapes, parse_form)
     taught = frozenset(line for line, _ in lines.marks("TAUGHT"))
-    reader = _Reader(lines, statements, taught)
     structural = statements.which(lambda said: not isinstance(said, _PLAIN))
-    for row in np.flatnonzero(structural[lines.shape]).tolist():
+    rows = np.flatnonzero(structural[lines.shape])
+    reader = _Reader(lines, statements, taught, rows)
+    for row in rows.tolist():
         statement = statements[int(lines.shape[row])]
         if isinstance(statement, ast.Unknown):
             _report_unknown(reader, row)
