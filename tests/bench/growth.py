@@ -162,6 +162,17 @@ def chain(n: int) -> Files:
     return job("  r0", head=_bodies(n, lambda k: [f"  r{k + 1}"] * (k + 1 < n)))
 
 
+def nested_functions(n: int) -> Files:
+    """Write functions, each of which calls the next one in an expression."""
+    lines = ["VAR n : INTEGER"]
+    for k in range(n):
+        value = f"f{k + 1}(k)" if k + 1 < n else "k"
+        lines += [f"ROUTINE f{k}(k : INTEGER) : INTEGER", "BEGIN",
+                  f"  RETURN({value})", f"END f{k}"]  # fmt: skip
+    move = f"  MOVE LINEAR TO {AT.format(7)}"
+    return job("  n := f0(1)", move, head=tuple(lines))
+
+
 def tree(n: int) -> Files:
     """Write routines that call the next one twice: n visits and more, in few lines."""
     deep = max(n - 1, 1).bit_length()
@@ -201,6 +212,7 @@ KINDS: dict[str, tuple[Callable[[int], Files], int]] = {
     "jumps forward": (jumps, 3_000),
     "routines": (routines, 3_000),
     "calls within calls": (chain, 3_000),
+    "functions within functions": (nested_functions, 2_000),
     "visits of a tree of calls": (tree, 1 << 14),
     "terms of a sum": (terms, 50_000),
 }

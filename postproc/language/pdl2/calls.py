@@ -68,7 +68,7 @@ def summarise_call(
         within = Execution(here.world, part.place, here.row, here.store, here.volatile)
         escape_names(within, part.effects.read, f"{name} may compute with it")
         invalidate_names(within, part.effects.assigned, f"{name} may change it")
-        _list_moves(machine, here, part.place, name)
+        list_moves(machine, here, part.place, name)
     if reach.frames:
         why = f"a routine that {name} calls sets it"
         here.store.set(**{frame: Nothing(why) for frame in FRAMES})
@@ -76,7 +76,7 @@ def summarise_call(
         here.store.last = frozenset({ELSEWHERE})
 
 
-def _list_moves(machine: Machine, here: Execution, place: Place, name: str) -> None:
+def list_moves(machine: Machine, here: Execution, place: Place, name: str) -> None:
     """List the moves of a body once, from nowhere and with nothing known."""
     program, body = place.program, place.body
     context = machine.root.within(machine.position(program, body.first), _UNFOLLOWED)

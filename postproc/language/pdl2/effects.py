@@ -98,6 +98,16 @@ def body_effects(program: Program, body: Body) -> Effects:
 def rows_effects(program: Program, first: int, last: int) -> Effects:
     """Return what the statements of rows first to last - 1 may do."""
     own, names = _reach(program, _shapes(program, first, last))
+    return _united(program, own, names)
+
+
+def _own_effects(program: Program, first: int, last: int) -> Effects:
+    """Return what the statements of rows do, without the routines that they call."""
+    own = [_direct(program.statements[s]) for s in _shapes(program, first, last)]
+    return _united(program, own, frozenset().union(*(e.calls for e in own)))
+
+
+def _united(program: Program, own: list[Effects], names: frozenset[str]) -> Effects:
     return Effects(
         any(e.moves for e in own),
         frozenset().union(*(e.assigned for e in own)),
@@ -180,7 +190,7 @@ class LiveRows:
 
     Attributes:
         place: Where they stand.
-        effects: What they may do.
+        effects: What they may do themselves; what they call are parts of their own.
     """
 
     place: Place
@@ -220,7 +230,7 @@ def call_graph_of(world: World, place: Place) -> CallGraph:
 
 def live_rows(world: World, place: Place, first: int, last: int) -> CallGraph:
     """Follow rows first to last - 1 of a body into all that they call."""
-    parts = [LiveRows(place, rows_effects(place.program, first, last))]
+    parts = [LiveRows(place, _own_effects(place.program, first, last))]
     done, waiting = {id(place.body)}, list(_called(world, place, first, last))
     if (first, last) != (place.body.first, place.body.last):
         done.clear()  # the rest of the body may be called from these rows
@@ -229,7 +239,7 @@ def live_rows(world: World, place: Place, first: int, last: int) -> CallGraph:
         if id(one.body) not in done:
             done.add(id(one.body))
             rows = (one.body.first, one.body.last)
-            parts.append(LiveRows(one, rows_effects(one.program, *rows)))
+            parts.append(LiveRows(one, _own_effects(one.program, *rows)))
             waiting += _called(world, one, *rows)
     outside = frozenset().union(*(part.effects.calls for part in parts))
     said = {world.start.routines.get(name) for name in outside}

@@ -15,6 +15,7 @@ from postproc.language.pdl2.calls import (
     call_statement,
     calls_in_expressions,
     frame_value,
+    list_moves,
 )
 from postproc.language.pdl2.collect import collect
 from postproc.language.pdl2.context import HANDLED, Context
@@ -24,6 +25,7 @@ from postproc.language.pdl2.evaluate import ProgramPoint
 from postproc.language.pdl2.job import FilePoints, Place, Start, World, base_variable
 from postproc.language.pdl2.machine import (
     MAX_ROWS,
+    MAX_STEPS,
     Execution,
     Goal,
     Machine,
@@ -496,11 +498,23 @@ def resolve(
         _run(machine, here, stretches)
     if machine.exhausted:
         world.report_once(
-            program, 0, "too-complex", "", "the program has too many ways to be "
-            "followed to the end: nothing in it is compensated",
+            program, 0, "too-complex", "", "the program has too many ways, or calls, "
+            f"to be followed to the end (more than {MAX_STEPS} steps): nothing "
+            "in it is compensated",
         )  # fmt: skip
+        machine = _listed(world)
     world.pin_loose()
     return Resolved(collect(machine), tuple(sorted(world.diagnostics)))
+
+
+def _listed(world: World) -> Machine:
+    """List every move of a job that is too complex to be followed, once."""
+    machine = Machine(world, exhausted=True)
+    for place, _ in world.declarations():
+        here = Execution(world, place, place.body.first, Store(lambda key: None))
+        name = place.body.name or place.program.name
+        list_moves(machine, here, place, name)
+    return machine
 
 
 def _start(machine: Machine) -> None:

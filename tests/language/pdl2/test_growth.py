@@ -11,6 +11,7 @@ import pytest
 from postproc.compensation.program import read_program
 from postproc.language.pdl2 import parser
 from postproc.language.pdl2 import syntax as ast
+from postproc.language.visits import ELSEWHERE
 from tests.bench.growth import KINDS, Files, chain, routines, terms, tree
 
 SMALL = 150
@@ -76,3 +77,16 @@ def test_a_line_that_no_program_has_is_not_even_parsed(monkeypatch):
     monkeypatch.setattr(parser, "line_parser", lambda name, start: pytest.fail())
     text = "n := " + "n + " * (parser.LONGEST // 4) + "n"
     assert isinstance(parser.parse_form(text), ast.Unknown)
+
+
+def test_a_program_beyond_the_limit_is_listed_once_and_left(job_cell, monkeypatch):
+    monkeypatch.setattr("postproc.language.pdl2.machine.MAX_STEPS", 5000)
+    found = read_program(tree(1 << 14), job_cell)
+    assert [d.code for d in found.diagnostics] == ["too-complex"]
+    assert "too many ways, or calls" in found.diagnostics[0].message
+    visits = found.visits
+    lines = [k + 1 for k, line in enumerate(tree(1 << 14)["job.pdl"].splitlines())
+             if b"MOVE" in line]  # fmt: skip
+    assert visits.line.tolist() == lines and len(lines) == 14
+    assert all("too complex" in visits.reasons[k] for k in visits.reason)
+    assert (visits.pred == ELSEWHERE).all()
