@@ -36,7 +36,7 @@ class ClusterPool:
 
         Args:
             setups: What units mean by their `setup`.
-            address: For instance ``tcp://host:8786``.
+            address: For instance ``tls://host:8786``.
             tls: Folder with ``ca.pem``, ``cert.pem`` and ``key.pem``; default: what
                 Dask's own configuration says.
 
@@ -52,8 +52,8 @@ class ClusterPool:
             self._client = _connect(address, tls)
         except (OSError, ValueError, RuntimeError) as exc:
             raise PostprocError(
-                f"{address}: no scheduler with workers answers ({exc}). Start them "
-                f"with: dask scheduler; dask worker {address}"
+                f"{address}: no scheduler with workers answers ({exc}). Start them as "
+                "docs/cluster.md says, with TLS and --host, which keeps others out"
             ) from None
         self._pool = self._client.get_executor(pure=False)
         # As results of tasks, they are made again when the worker that has them is

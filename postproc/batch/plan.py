@@ -16,7 +16,7 @@ from postproc.compensation.options import Options
 from postproc.exceptions import CellError, PostprocError
 from postproc.model.model import Model, load_model
 from postproc.robot.arm_file import Strict, read_toml
-from postproc.robot.cell import Cell, load_cell
+from postproc.robot.cell import ArmNumber, Cell, load_cell
 
 # Which cell and which model a program is compensated with.
 
@@ -70,9 +70,13 @@ def open_setup(cell: Path, model: Path, options: Options) -> JobSetup:
 
 
 class RuleSection(Strict):
-    """One rule of a plan file; paths are relative to the plan file."""
+    """One rule of a plan file; paths are relative to the plan file.
+
+    With `arm` it is for programs of that arm of a controller only.
+    """
 
     pattern: str
+    arm: ArmNumber | None = None
     cell: str
     model: str
 
@@ -89,22 +93,26 @@ class BatchPlan:
 
     Attributes:
         patterns: Matched against the program's path below the source tree, with ``/``.
+        arms: Of which arm a program must be for each, None for any.
         which: Index into `setups` of every pattern.
         setups: Each distinct pair of cell and model once.
     """
 
     patterns: tuple[re.Pattern[str], ...]
+    arms: tuple[int | None, ...]
     which: tuple[int, ...]
     setups: tuple[JobSetup, ...]
 
-    def setup_of(self, program: str) -> int | None:
-        """Return the index of a program's setup, None where no pattern fits.
+    def setup_of(self, program: str, arm: int) -> int | None:
+        """Return the index of a program's setup, None where no rule fits.
 
         Args:
             program: Its path below the source tree, with ``/``.
+            arm: ``PROG_ARM``, 0 where it is not said: the program is one of arm 1.
         """
-        for pattern, index in zip(self.patterns, self.which, strict=True):
-            if pattern.fullmatch(program):
+        rules = zip(self.patterns, self.arms, self.which, strict=True)
+        for pattern, wanted, index in rules:
+            if wanted in (None, arm or 1) and pattern.fullmatch(program):
                 return index
         return None
 
@@ -137,17 +145,27 @@ def make_plan(
     Raises:
         PostprocError: Neither a plan nor both files are given, or one cannot be used.
     """
-    rules: list[tuple[str, Path, Path]] = []
+    rules: list[Rule] = []
     if plan is not None:
         rules += _read_rules(plan)
     if (cell is None) != (model is None) or (cell is None and plan is None):
         raise PostprocError("Give --cell and --model, or --plan, or all three")
     if cell is not None and model is not None:
-        rules.append(("**", cell, model))
+        rules.append(Rule("**", None, cell, model))
     return _open_rules(rules, options)
 
 
-def _read_rules(path: Path) -> list[tuple[str, Path, Path]]:
+@dataclass(frozen=True)
+class Rule:
+    """One rule of a plan, with the places of its files; see `RuleSection`."""
+
+    pattern: str
+    arm: int | None
+    cell: Path
+    model: Path
+
+
+def _read_rules(path: Path) -> list[Rule]:
     """Read the rules of a plan file.
 
     Raises:
@@ -157,18 +175,42 @@ def _read_rules(path: Path) -> list[tuple[str, Path, Path]]:
     if not file.rule:
         raise CellError(path, "holds no [[rule]]", "Add one", place="$.rule")
     here = path.parent
-    return [(r.pattern, here / r.cell, here / r.model) for r in file.rule]
+    return [Rule(r.pattern, r.arm, here / r.cell, here / r.model) for r in file.rule]
 
 
-def _open_rules(rules: Sequence[tuple[str, Path, Path]], options: Options) -> BatchPlan:
-    """Open each distinct pair of files once."""
-    pairs = list(dict.fromkeys((cell, model) for _, cell, model in rules))
+def _open_rules(rules: Sequence[Rule], options: Options) -> BatchPlan:
+    """Open each distinct pair of files once.
+
+    Raises:
+        PostprocError: A file cannot be used, or a cell is of another arm than its rule.
+    """
+    pairs = list(dict.fromkeys((rule.cell, rule.model) for rule in rules))
     setups = tuple(open_setup(cell, model, options) for cell, model in pairs)
+    which = tuple(pairs.index((rule.cell, rule.model)) for rule in rules)
+    for rule, index in zip(rules, which, strict=True):
+        _check_number(rule, setups[index].cell)
     return BatchPlan(
-        tuple(pattern_from_glob(pattern) for pattern, _, _ in rules),
-        tuple(pairs.index((cell, model)) for _, cell, model in rules),
+        tuple(pattern_from_glob(rule.pattern) for rule in rules),
+        tuple(rule.arm for rule in rules),
+        which,
         setups,
     )
+
+
+def _check_number(rule: Rule, cell: Cell) -> None:
+    """Refuse a rule for one arm with the cell of another.
+
+    Raises:
+        CellError: They differ.
+    """
+    if rule.arm not in (None, cell.arm_number):
+        raise CellError(
+            rule.cell,
+            f"is of arm {cell.arm_number}, and a rule of the plan gives it to "
+            f"programs of arm {rule.arm}",
+            f"Set arm_number = {rule.arm} if that is its arm, or mend the rule",
+            place="$.robot.arm_number",
+        )
 
 
 # What travels to a worker and what comes back: bytes, never paths of a disk.

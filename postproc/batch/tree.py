@@ -63,6 +63,35 @@ def named_programs(head: bytes) -> tuple[list[str], list[str]]:
     return list(inside), list(outside)
 
 
+_PROGRAM_ARM = re.compile(
+    rb"^[ \t]*PROGRAM\b[^\r\n]*?\bPROG_ARM[ \t]*=[ \t]*(\d{1,9})\b",
+    re.IGNORECASE | re.MULTILINE,
+)
+
+
+def program_arm(head: bytes) -> int:
+    r"""Return the arm that a program says it is for, 0 where it says none.
+
+    Args:
+        head: Its first bytes.
+
+    >>> program_arm(b"-- PROG_ARM=3\nPROGRAM m EZ, PROG_ARM = 2, HOLD\nBEGIN\nEND m")
+    2
+    """
+    found = _PROGRAM_ARM.search(head)
+    return int(found[1]) if found else 0
+
+
+def of_one_arm(program: int, page: int) -> bool:
+    """Tell whether a page may be of its program's arm.
+
+    Args:
+        program: The arm that the program says, 0 for nothing: it is of arm 1 then.
+        page: Likewise of the page, which is of its program's arm then.
+    """
+    return page in (0, program or 1)
+
+
 def read_head(path: Path) -> bytes:
     """Read the first bytes of a program, nothing where it cannot be read."""
     try:
@@ -235,14 +264,17 @@ def _sort(root: Path, places: Sequence[str], plan: BatchPlan) -> _Folder:
             part.copies.append(place)
             if is_compiled(place) and base_name(place) in programs:
                 part.notes.append((place, _STALE))
-    named = {}
+    named, arms = {}, {}
     for base, place in programs.items():
-        named[base], outside = named_programs(read_head(root / place))
+        head = read_head(root / place)
+        named[base], outside = named_programs(head)
+        arms[base] = program_arm(head)
         part.notes += [
             (place, f"{n!r} is outside of its folder: not followed") for n in outside
         ]
-    for main, pages in _joined(named, variables).items():
-        _add_unit(programs[main], [programs[p] for p in pages], variables, plan, part)
+    for main, pages in _joined(named, variables, arms).items():
+        setup = plan.setup_of(programs[main], arms[main])
+        _add_unit(programs[main], [programs[p] for p in pages], variables, setup, part)
     return part
 
 
@@ -257,14 +289,21 @@ def _by_base(places: Iterable[str], part: _Folder) -> dict[str, str]:
 
 
 def _joined(
-    named: Mapping[str, Sequence[str]], variables: Mapping[str, str]
+    named: Mapping[str, Sequence[str]],
+    variables: Mapping[str, str],
+    arms: Mapping[str, int],
 ) -> dict[str, tuple[str, ...]]:
     """Join pages to their programs, but for pages that have variables of their own.
 
-    Only the main program's variable file is read with it.
+    Only the main program's variable file is read with it. A program of another arm is
+    none of its pages either: it belongs to another cell and model.
     """
     keep = {
-        name: [o for o in others if o not in variables]
+        name: [
+            other
+            for other in others
+            if other not in variables and of_one_arm(arms[name], arms.get(other, 0))
+        ]
         for name, others in named.items()
     }
     return group_pages(keep)
@@ -274,11 +313,18 @@ def _add_unit(
     program: str,
     pages: Sequence[str],
     variables: Mapping[str, str],
-    plan: BatchPlan,
+    setup: int | None,
     part: _Folder,
 ) -> None:
-    """Add a program, or refuse it where no rule of the plan fits."""
-    setup = plan.setup_of(program)
+    """Add a program, or refuse it where no rule of the plan fits.
+
+    Args:
+        program: Its place.
+        pages: Places of its pages.
+        variables: Places of variable files, by base name.
+        setup: Index of its setup, None where no rule fits.
+        part: Where it is added.
+    """
     values = variables.get(base_name(program))
     if setup is not None:
         part.units.append(Unit(program, tuple(pages), values, setup))

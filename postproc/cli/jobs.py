@@ -8,7 +8,13 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from postproc.arrays import Map
-from postproc.batch.tree import group_pages, named_programs, read_head
+from postproc.batch.tree import (
+    group_pages,
+    named_programs,
+    of_one_arm,
+    program_arm,
+    read_head,
+)
 from postproc.compensation.compensate import compensate, name_files
 from postproc.compensation.options import Options, Progress, silent
 from postproc.compensation.outcome import Outcome
@@ -53,8 +59,8 @@ def find_pages(program: Path) -> Pages:
     """Find the programs that IMPORT, CALL or EXPORTED FROM name, in the same folder.
 
     A program that others name too is theirs as well, and one with a variable file of
-    its own is a program by itself: neither is followed. Earlier outputs and symbolic
-    links do not count.
+    its own or of another arm is a program by itself: none is followed. Earlier outputs
+    and symbolic links do not count.
     """
     wanted, outside = named_programs(read_head(program))
     notes = [f"{name!r} leads out of the folder: not followed" for name in outside]
@@ -65,12 +71,17 @@ def find_pages(program: Path) -> Pages:
     values = {base_name(p.name) for p in files if is_variables(p.name)}
     programs = {base_name(p.name): p for p in files if _is_source(p)} | {main: program}
     named = {base: _named(path, main) for base, path in programs.items()}
+    arms = {base: program_arm(read_head(path)) for base, path in programs.items()}
+    apart = dict.fromkeys(values, "it has a variable file of its own")
+    for base, arm in arms.items():
+        if not of_one_arm(arms[main], arm):
+            apart[base] = f"it is a program of arm {arm} (PROG_ARM)"
     alone = {
-        base: [other for other in others if other not in values]
+        base: [other for other in others if other not in apart]
         for base, others in named.items()
     }
     pages = group_pages(alone).get(main, ())
-    notes += _left_out(programs, named, (main, *pages), values)
+    notes += _left_out(programs, named, (main, *pages), apart)
     return Pages(tuple(programs[page] for page in pages), tuple(notes))
 
 
@@ -90,15 +101,22 @@ def _left_out(
     programs: Mapping[str, Path],
     named: Mapping[str, Sequence[str]],
     followed: Sequence[str],
-    values: set[str],
+    apart: Mapping[str, str],
 ) -> list[str]:
-    """Say which programs are there and named, and not followed."""
+    """Say which programs are there and named, and not followed.
+
+    Args:
+        programs: The programs of the folder.
+        named: Those that each of them names.
+        followed: The main program and its pages.
+        apart: Why some are programs by themselves.
+    """
     notes = []
     for other in dict.fromkeys(name for base in followed for name in named[base]):
         if other in followed or other not in programs:
             continue
-        why = "it has a variable file of its own"
-        if other not in values:
+        why = apart.get(other, "")
+        if not why:
             users = [base for base in named if other in named[base] and base != other]
             why = f"{' and '.join(programs[user].name for user in users)} name it"
         notes.append(f"{programs[other].name} is not followed: {why}")

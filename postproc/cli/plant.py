@@ -49,7 +49,7 @@ def batch(
         int, typer.Option("--jobs", "-j", min=0, help="Processes; 0: one for a core.")
     ] = 0,
     scheduler: Annotated[
-        str | None, typer.Option("--scheduler", help="Dask: tcp://host:8786.")
+        str | None, typer.Option("--scheduler", help="Dask: tls://host:8786.")
     ] = None,
     tls: Annotated[
         Path | None,
@@ -149,7 +149,7 @@ def check(
     from postproc.batch.check import check as look
 
     with explained():
-        found = look(folder, _current_model(model, plan), source)
+        found = look(folder, _current_model(folder, model, plan), source)
         if accept_left:
             found = found.accepting_left()
         if json:
@@ -160,15 +160,20 @@ def check(
     raise typer.Exit(found.exit_code)
 
 
-def _current_model(model: Path | None, plan: Path | None) -> Current:
-    """Tell which model a program should have been made with."""
+def _current_model(folder: Path, model: Path | None, plan: Path | None) -> Current:
+    """Tell which model a program of a tree should have been made with."""
     if plan is not None:
         from postproc.batch.plan import make_plan
+        from postproc.batch.tree import program_arm, read_head
 
         made = make_plan(plan, None, None, AS_USUAL)
         ids = [setup.model.id for setup in made.setups]
-        which = made.setup_of
-        return lambda place: None if (i := which(place)) is None else ids[i]
+
+        def current_of(place: str) -> str | None:
+            which = made.setup_of(place, program_arm(read_head(folder / place)))
+            return None if which is None else ids[which]
+
+        return current_of
     if model is not None:
         from postproc.model.model import load_model
 

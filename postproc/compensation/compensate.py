@@ -11,6 +11,7 @@ import numpy as np
 from postproc.arrays import Bools, Floats, Interned, Ints
 from postproc.compensation import windows as cuts
 from postproc.compensation.arrivals import ArrivalStates
+from postproc.compensation.base import contradicted_base
 from postproc.compensation.clones import give_own_points
 from postproc.compensation.decide import Proposal
 from postproc.compensation.eligibility import overruled
@@ -404,6 +405,7 @@ def report(
             *reading.diagnostics,
             *followed_pages(visits),
             *missing_file(visits),
+            *contradicted_base(visits, cell),
             *overruled_strings(visits, kept.overruled),
             *untimed_runs(visits, kept.untimed),
             *rounded_points(visits, kept.away),

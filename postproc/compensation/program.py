@@ -118,6 +118,7 @@ def start_of(cell: Cell) -> Start:
         frame_tables=tables,
         aux=dict(cell.aux),
         taught=cell.taught,
+        arm=cell.arm_number,
     )
 
 
@@ -143,13 +144,14 @@ def read_program(
         each: How the pieces of long texts are read.
 
     Raises:
-        ProgramError: A file is no program text.
+        ProgramError: A file is no program text, or the program is another arm's.
     """
     sources = [source_from_bytes(name, data) for name, data in files.items()]
     program = _parsed(sources[0], known, each)
     if program.main is None and not program.routines:
         problem, cure = "the file holds no BEGIN .. END", "Give a PDL2 program"
         raise ProgramError(sources[0].name, problem, cure)
+    _refuse_other_arm(program, cell)
     pages: list[Program] = []
     variables: VariableFile | None = None
     texts = [Skeleton.of(program.lines)]
@@ -168,6 +170,25 @@ def read_program(
     corrected = {visits.files[k] for k in np.unique(visits.literals.file).tolist()}
     kept = tuple(p for p in parsed if p.lines.source.name not in corrected)
     return Reading(tuple(texts), visits, found, programs=kept)
+
+
+def _refuse_other_arm(program: Program, cell: Cell) -> None:
+    """Refuse a program that says it is another arm's than the cell's.
+
+    Raises:
+        ProgramError: It is.
+    """
+    if program.arm not in (0, cell.arm_number):
+        problem = (
+            f"PROG_ARM = {program.arm}: it is a program of arm {program.arm}, and the "
+            f"cell ({cell.path}) is of arm {cell.arm_number}"
+        )
+        cure = (
+            f"Give the cell of that arm, with arm_number = {program.arm} under "
+            "[robot], and its model"
+        )
+        name = program.lines.source.name
+        raise ProgramError(name, problem, cure, line=program.head)
 
 
 def _parsed(source: Source, known: Sequence[Program], each: Map) -> Program:

@@ -8,7 +8,13 @@ from pathlib import Path
 from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import Field, NonNegativeFloat, PositiveFloat, model_validator
+from pydantic import (
+    Field,
+    NonNegativeFloat,
+    PositiveFloat,
+    PositiveInt,
+    model_validator,
+)
 
 from postproc.arrays import Floats
 from postproc.exceptions import CellError
@@ -18,6 +24,7 @@ from postproc.robot.pose import MM, pose_from_record, rotation_from_zyz
 
 Source = Literal["cad", "tracker", "taught"]
 Effect = Literal["still", "moves", "sets-frames"]
+ArmNumber = PositiveInt  # which arm of its controller
 
 NO_ANGLES = [0.0, 0.0, 0.0]
 TAUGHT_POINTS = ("the origin", "a point on +x", "a point at +y")
@@ -62,6 +69,7 @@ class RobotSection(Strict):
     """Which arm, and what its controller does."""
 
     arm: str
+    arm_number: ArmNumber = 1
     absolute_accuracy: bool = False
 
 
@@ -178,6 +186,7 @@ class Cell:
     Attributes:
         path: Where the cell was read from.
         arm: The arm.
+        arm_number: Which arm of its controller it is.
         tool: TCP in the flange frame at program start.
         base: The arm's base in the world at program start.
         uframe: The user frame in the world at program start.
@@ -202,6 +211,7 @@ class Cell:
     path: Path
     file: CellFile
     arm: Arm
+    arm_number: int
     tool: Frame
     base: Frame
     uframe: Frame
@@ -245,6 +255,7 @@ def load_cell(path: str | Path) -> Cell:
         path=path,
         file=file,
         arm=arm,
+        arm_number=file.robot.arm_number,
         tool=_frame(file.tool),
         base=_frame(file.base),
         uframe=_frame(file.uframe),

@@ -22,17 +22,21 @@ class Cluster:
             scratch: Folder for what workers put aside.
             workers: How many.
         """
-        with socket.socket() as free:
-            free.bind(("127.0.0.1", 0))
-            port = free.getsockname()[1]
+        port = free_port()
         self.address = f"tcp://127.0.0.1:{port}"
-        here = ["--host", "127.0.0.1", "--port", str(port), "--no-dashboard"]
-        self._scheduler = _started([*SCHEDULER, *here])
-        options = ["--nthreads", "1", "--no-nanny", "--no-dashboard"]
+        here = ["--host", "127.0.0.1", "--no-dashboard"]
+        here += ["--dashboard-address", "127.0.0.1:0"]  # an HTTP server in any case
+        self._scheduler = _started([*SCHEDULER, *here, "--port", str(port)])
+        options = ["--nthreads", "1", "--no-nanny", *here]
         place = ["--local-directory", str(scratch)]
         self.workers = [
             _started([*WORKER, self.address, *options, *place]) for _ in range(workers)
         ]
+
+    @property
+    def processes(self) -> tuple[subprocess.Popen[bytes], ...]:
+        """Return the scheduler and its workers."""
+        return (self._scheduler, *self.workers)
 
     def kill_one(self) -> None:
         """Kill the first worker."""
@@ -43,9 +47,17 @@ class Cluster:
         return self
 
     def __exit__(self, *_: object) -> None:
-        for process in (*self.workers, self._scheduler):
+        for process in reversed(self.processes):
             process.kill()
             process.wait()
+
+
+def free_port() -> int:
+    """Find a port of loopback that nothing listens at."""
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        port: int = free.getsockname()[1]
+    return port
 
 
 def _started(command: list[str]) -> subprocess.Popen[bytes]:

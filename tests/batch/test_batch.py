@@ -260,6 +260,42 @@ def test_a_plan_serves_many_arms(tmp_path, run, job_folder):
     assert [place for place, _ in summary.problems] == ["line002/job00020.pdl"]
 
 
+def test_a_plan_maps_arms_to_cells_and_models(tmp_path, run, job_folder):
+    source = tmp_path / "src"
+    source.mkdir()
+    move = "MOVE JOINT TO {5.0, 10.0, -95.0, 20.0, 50.0, 30.0}"
+    for name, head in (("a", ", PROG_ARM = 2"), ("b", ""), ("c", " PROG_ARM=1")):
+        calls = "CALL a\n" if name == "b" else ""
+        text = f"PROGRAM {name}{head}\nBEGIN\n{calls}{move}\nEND {name}\n"
+        (source / f"{name}.pdl").write_text(text)
+    cell = (job_folder / "cell.toml").read_text()
+    for number in (1, 2):
+        text = cell.replace("[robot]", f"[robot]\narm_number = {number}")
+        (tmp_path / f"r{number}.toml").write_text(text)
+    model = (job_folder / "model.json").as_posix()
+    rule = '[[rule]]\npattern = "**"\narm = {}\ncell = "r{}.toml"\nmodel = "{}"\n'
+    file = tmp_path / "batch.toml"
+    file.write_text(rule.format(2, 2, model) + rule.format(1, 1, model))
+    summary = run(plan=make_plan(file, None, None, AS_USUAL))
+    assert {(t.unit.program, t.unit.pages, t.unit.setup) for t in summary.tasks} == {
+        ("a.pdl", (), 0), ("b.pdl", (), 1), ("c.pdl", (), 1),
+    }  # fmt: skip
+    assert summary.exit_code == 0 and len(contents(tmp_path / "dst")) == 6
+    file.write_text(rule.format(1, 2, model))
+    with pytest.raises(CellError, match=r"r2\.toml: is of arm 2.*of arm 1.*arm_number"):
+        make_plan(file, None, None, AS_USUAL)
+
+
+def test_a_program_of_another_arm_is_absent(tmp_path, run):
+    source = tmp_path / "src"
+    source.mkdir()
+    (source / "a.pdl").write_text("PROGRAM a PROG_ARM = 2\nBEGIN\nEND a\n")
+    summary = run()
+    assert summary.exit_code == 2 and contents(tmp_path / "dst") == {}
+    ((place, why),) = summary.problems
+    assert place == "a.pdl" and "arm_number = 2" in why
+
+
 def test_a_bad_plan_is_refused(tmp_path, job_folder):
     file = tmp_path / "batch.toml"
     file.write_text('[[rule]]\npattern = "*"\ncell = "c"\nmodel = "m"\nrobot = "r1"\n')
@@ -305,7 +341,7 @@ class _Killing:
     def __init__(self):
         self.setups = (_KillingSetup(),)
 
-    def setup_of(self, program):
+    def setup_of(self, program, arm):
         return 0
 
 

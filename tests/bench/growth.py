@@ -11,7 +11,7 @@ import argparse
 import math
 import sys
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 from postproc.compensation.program import read_program
@@ -152,6 +152,49 @@ def jumps(n: int) -> Files:
     return job(*lines)
 
 
+def routines(n: int) -> Files:
+    """Write routines, each of them called once."""
+    return job(*(f"  r{k}" for k in range(n)), head=_bodies(n, lambda k: ()))
+
+
+def chain(n: int) -> Files:
+    """Write routines, each of which calls the next."""
+    return job("  r0", head=_bodies(n, lambda k: [f"  r{k + 1}"] * (k + 1 < n)))
+
+
+def nested_functions(n: int) -> Files:
+    """Write functions, each of which calls the next one in an expression."""
+    lines = ["VAR n : INTEGER"]
+    for k in range(n):
+        value = f"f{k + 1}(k)" if k + 1 < n else "k"
+        lines += [f"ROUTINE f{k}(k : INTEGER) : INTEGER", "BEGIN",
+                  f"  RETURN({value})", f"END f{k}"]  # fmt: skip
+    move = f"  MOVE LINEAR TO {AT.format(7)}"
+    return job("  n := f0(1)", move, head=tuple(lines))
+
+
+def tree(n: int) -> Files:
+    """Write routines that call the next one twice: n visits and more, in few lines."""
+    deep = max(n - 1, 1).bit_length()
+    return job(
+        "  r0", head=_bodies(deep, lambda k: [f"  r{k + 1}"] * 2 * (k + 1 < deep))
+    )
+
+
+def _bodies(n: int, calls: Callable[[int], Sequence[str]]) -> tuple[str, ...]:
+    """Write routines that move and then call others."""
+    lines = []
+    for k in range(n):
+        move = f"  MOVE LINEAR TO {AT.format(k % 900)}"
+        lines += [f"ROUTINE r{k}", "BEGIN", move, *calls(k), f"END r{k}"]
+    return tuple(lines)
+
+
+def terms(n: int) -> Files:
+    """Write one sum of many terms."""
+    return job("  n := " + " + ".join(["n"] * n), head=("VAR n : INTEGER",))
+
+
 KINDS: dict[str, tuple[Callable[[int], Files], int]] = {
     "lines of moves": (moves, 50_000),
     "lines of 456 characters": (wide, 10_000),
@@ -167,6 +210,11 @@ KINDS: dict[str, tuple[Callable[[int], Files], int]] = {
     "condition handlers": (handlers, 1_000),
     "arcs and steps": (arcs, 5_000),
     "jumps forward": (jumps, 3_000),
+    "routines": (routines, 3_000),
+    "calls within calls": (chain, 3_000),
+    "functions within functions": (nested_functions, 2_000),
+    "visits of a tree of calls": (tree, 1 << 14),
+    "terms of a sum": (terms, 50_000),
 }
 
 

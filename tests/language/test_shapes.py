@@ -24,8 +24,9 @@ from postproc.language.source import source_from_bytes
 def test_names_are_taken_out_and_filled_in(mask, names) -> None:
     assert form_of(mask)[1] == names
     plain = parse_line(mask.translate(str.maketrans("123", "abc")))
-    said = repr(parse_line(mask)).translate(str.maketrans("123", "abc"))
-    assert said == repr(plain)
+    said = repr(parse_line(mask)).replace("-1", "-")  # a slot that is not there
+    said = said.translate(str.maketrans("123", "abc"))
+    assert said == repr(plain).replace("-1", "-")
 
 
 def test_case_is_kept_where_it_is_shown_only() -> None:

@@ -41,6 +41,7 @@ from postproc.language.pdl2.values import (
     Position,
     SourceNumber,
     Value,
+    points_of,
 )
 from postproc.language.visits import ELSEWHERE
 
@@ -67,7 +68,7 @@ def summarise_call(
         within = Execution(here.world, part.place, here.row, here.store, here.volatile)
         escape_names(within, part.effects.read, f"{name} may compute with it")
         invalidate_names(within, part.effects.assigned, f"{name} may change it")
-        _list_moves(machine, here, part.place, name)
+        list_moves(machine, here, part.place, name)
     if reach.frames:
         why = f"a routine that {name} calls sets it"
         here.store.set(**{frame: Nothing(why) for frame in FRAMES})
@@ -75,10 +76,10 @@ def summarise_call(
         here.store.last = frozenset({ELSEWHERE})
 
 
-def _list_moves(machine: Machine, here: Execution, place: Place, name: str) -> None:
+def list_moves(machine: Machine, here: Execution, place: Place, name: str) -> None:
     """List the moves of a body once, from nowhere and with nothing known."""
     program, body = place.program, place.body
-    context = ((machine.position(program, body.first), _UNFOLLOWED),)
+    context = machine.root.within(machine.position(program, body.first), _UNFOLLOWED)
     if context in machine.places or id(body) in machine.recursive:
         return
     machine.enter(context, place)
@@ -103,9 +104,9 @@ def call_statement(machine: Machine, here: Execution, call: ast.Call) -> bool:
     if inside is None:
         opaque_call(here, call.name, call.arguments)
         return False
-    if inside.body in machine.calls_in(here.context):
-        running = machine.calls_in(here.context)
-        machine.recursive |= {id(b) for b in running[running.index(inside.body) :]}
+    running = machine.calls_to(inside.body, here.context)
+    if running:
+        machine.recursive |= {id(body) for body in running}
         _refuse_recursion(machine, here, inside)
         return False
     _bind(here, inside, call.arguments)
@@ -167,6 +168,11 @@ def _bind(
     for at, parameter in enumerate(inside.body.parameters):
         argument = arguments[at] if at < len(arguments) else None
         key = prefix + parameter.name
+        other = inside.body.arms.get(parameter.name, here.world.arm)
+        if other != here.world.arm:
+            here.world.pin(here.value(argument), f"arm {other} goes to it too")
+            here.store.write(key, Nothing(points_of(other)))
+            continue
         if isinstance(argument, ast.Reference) and not argument.name.startswith("$"):
             target = here.locate(argument)
             if target.component == ():
@@ -263,6 +269,10 @@ def frame_value(record: Record, why: str) -> Position | Nothing:
 
 def assign(here: Execution, statement: ast.Assign, taught: bool) -> None:
     """Let an assignment have its effect; `taught` marks the literal in it."""
+    other = here.world.other_arm(here.place, statement.target.name)
+    if other:
+        _assign_other(here, statement, other)
+        return
     new = statement.value
     if statement.operator != ":=":
         new = ast.Binary(statement.operator[0], statement.target, statement.value)
@@ -297,6 +307,13 @@ def assign(here: Execution, statement: ast.Assign, taught: bool) -> None:
         here.store.write(target.key, held)
 
 
+def _assign_other(here: Execution, statement: ast.Assign, arm: int) -> None:
+    """Forget a point of another arm: what it is given goes to that arm too."""
+    here.world.pin(here.value(statement.value), f"arm {arm} goes to it too")
+    for key in here.locate(statement.target).keys:
+        invalidate_key(here, key, points_of(arm))
+
+
 def _assigns_component(here: Execution, reference: ast.Reference) -> bool:
     """Tell whether a reference means one of a position's six numbers."""
     if reference.name.startswith("$"):
@@ -321,8 +338,9 @@ def _setting(here: Execution, reference: ast.Reference, value: Value) -> None:
     """Change a frame or motion variable of our arm."""
     name = here.setting_name(reference)
     if name is None:
-        if reference.name[1:] in FRAME_NAMES:
-            why = f"a part of {reference.name.upper()} is assigned"
+        if reference.name[1:] in FRAME_NAMES or not reference.steps:
+            said = f"a part of {reference.name.upper()} is assigned"
+            why = said if reference.steps else here.other_default()
             here.store.set(**{reference.name[1:]: Nothing(why)})
         elif reference.name == "$arm_data" and _whose(here, reference) is None:
             field = str((*reference.steps, "")[1]).lstrip("$")

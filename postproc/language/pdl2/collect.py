@@ -11,8 +11,9 @@ import numpy as np
 
 from postproc.arrays import Bools, Indices, Ints, spans
 from postproc.language.pdl2.columns import Collector, VisitColumns
+from postproc.language.pdl2.context import Point
 from postproc.language.pdl2.job import World
-from postproc.language.pdl2.machine import HERE, Key, Machine, MoveRun
+from postproc.language.pdl2.machine import Key, Machine, MoveRun
 from postproc.language.pdl2.store import MANY
 from postproc.language.source import Source
 from postproc.language.visits import ELSEWHERE, Literals, Meaning, Visits, slim
@@ -248,9 +249,9 @@ def collect(machine: Machine) -> Visits:
     )
 
 
-def _order(key: Key) -> tuple[tuple[tuple[int, int], ...], int]:
+def _order(key: Key) -> tuple[Point, int]:
     context, at, sub = key
-    return (*context, (at, HERE)), sub
+    return Point(context, at), sub
 
 
 def _most_axes(runs: list[MoveRun], world: World) -> int:

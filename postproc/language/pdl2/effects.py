@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import get_args
 
 import numpy as np
 
@@ -59,14 +60,27 @@ def references(node: object) -> Iterator[ast.Reference]:
     return (part for part in _parts(node) if isinstance(part, ast.Reference))
 
 
-def _parts(node: object) -> Iterator[object]:
+_LEAVES = (str, int, float, type(None))
+_NODES = (ast.Statement, *get_args(ast.Expression), ast.Index)
+
+
+def _parts(node: object) -> list[object]:
+    """List a statement or expression with all that is in it, inner ones first."""
+    found: list[object] = []
+    _add_parts(node, found)
+    return found
+
+
+def _add_parts(node: object, found: list[object]) -> None:
     if isinstance(node, tuple):
         for part in node:
-            yield from _parts(part)
-    elif isinstance(node, ast.Statement | ast.Expression | ast.Index):
+            _add_parts(part, found)
+    elif isinstance(node, _NODES):
         for name in node.__slots__:
-            yield from _parts(getattr(node, name))
-        yield node
+            part = getattr(node, name)
+            if not isinstance(part, _LEAVES):
+                _add_parts(part, found)
+        found.append(node)
 
 
 def changed_arguments(
@@ -84,6 +98,16 @@ def body_effects(program: Program, body: Body) -> Effects:
 def rows_effects(program: Program, first: int, last: int) -> Effects:
     """Return what the statements of rows first to last - 1 may do."""
     own, names = _reach(program, _shapes(program, first, last))
+    return _united(program, own, names)
+
+
+def _own_effects(program: Program, first: int, last: int) -> Effects:
+    """Return what the statements of rows do, without the routines that they call."""
+    own = [_direct(program.statements[s]) for s in _shapes(program, first, last)]
+    return _united(program, own, frozenset().union(*(e.calls for e in own)))
+
+
+def _united(program: Program, own: list[Effects], names: frozenset[str]) -> Effects:
     return Effects(
         any(e.moves for e in own),
         frozenset().union(*(e.assigned for e in own)),
@@ -166,7 +190,7 @@ class LiveRows:
 
     Attributes:
         place: Where they stand.
-        effects: What they may do.
+        effects: What they may do themselves; what they call are parts of their own.
     """
 
     place: Place
@@ -206,7 +230,7 @@ def call_graph_of(world: World, place: Place) -> CallGraph:
 
 def live_rows(world: World, place: Place, first: int, last: int) -> CallGraph:
     """Follow rows first to last - 1 of a body into all that they call."""
-    parts = [LiveRows(place, rows_effects(place.program, first, last))]
+    parts = [LiveRows(place, _own_effects(place.program, first, last))]
     done, waiting = {id(place.body)}, list(_called(world, place, first, last))
     if (first, last) != (place.body.first, place.body.last):
         done.clear()  # the rest of the body may be called from these rows
@@ -215,7 +239,7 @@ def live_rows(world: World, place: Place, first: int, last: int) -> CallGraph:
         if id(one.body) not in done:
             done.add(id(one.body))
             rows = (one.body.first, one.body.last)
-            parts.append(LiveRows(one, rows_effects(one.program, *rows)))
+            parts.append(LiveRows(one, _own_effects(one.program, *rows)))
             waiting += _called(world, one, *rows)
     outside = frozenset().union(*(part.effects.calls for part in parts))
     said = {world.start.routines.get(name) for name in outside}
@@ -239,6 +263,44 @@ def _called(world: World, place: Place, first: int, last: int) -> Iterator[Place
                 yield found
 
 
+def circles(world: World) -> frozenset[int]:
+    """Return the bodies (by id) that may call themselves, and those between such.
+
+    Bodies that call none that is left are taken out, then those that none calls.
+    """
+    calls: dict[int, set[int]] = {}
+    for program in world.programs():
+        for body in filter(None, (program.main, *program.routines.values())):
+            called = _called(world, Place(program, body), body.first, body.last)
+            calls[id(body)] = {id(one.body) for one in called}
+    callers = _turned(_without_sinks(calls))
+    return frozenset(_without_sinks(callers))
+
+
+def _without_sinks(edges: Mapping[int, set[int]]) -> dict[int, set[int]]:
+    """Take out, again and again, what leads to nothing that is left."""
+    back, count = _turned(edges), {one: len(to) for one, to in edges.items()}
+    waiting = [one for one, left in count.items() if not left]
+    gone: set[int] = set()
+    while waiting:
+        sink = waiting.pop()
+        gone.add(sink)
+        for one in back[sink]:
+            count[one] -= 1
+            if not count[one]:
+                waiting.append(one)
+    return {one: to - gone for one, to in edges.items() if one not in gone}
+
+
+def _turned(edges: Mapping[int, set[int]]) -> dict[int, set[int]]:
+    """Turn the edges of a graph round."""
+    back: dict[int, set[int]] = {one: set() for one in edges}
+    for one, to in edges.items():
+        for other in to:
+            back[other].add(one)
+    return back
+
+
 def _names(statement: ast.Statement) -> Iterator[tuple[str, bool]]:
     """Yield names that may be called, and whether each is that of a program."""
     match statement:
@@ -257,6 +319,9 @@ def _names(statement: ast.Statement) -> Iterator[tuple[str, bool]]:
 # Moves that a program never comes to: their targets keep their values.
 
 NEVER_REACHED = "never-reached"
+OTHER_ARM = "other-arm"  # a target that is another arm's
+NOT_FOLLOWED = frozenset({NEVER_REACHED, OTHER_ARM})
+"""Findings that tell of targets without a visit: they keep their values."""
 
 
 def dead_moves(programs: Sequence[Program], visits: Visits) -> list[Diagnostic]:
@@ -293,7 +358,12 @@ def _has_target(statement: ast.Statement) -> bool:
     A move that names its arm may be one of another arm, and does not count.
     """
     move = ast.action(statement)
-    if not isinstance(move, ast.Move) or move.how != "TO" or move.arm:
+    return isinstance(move, ast.Move) and not move.arm and goes_to_target(move)
+
+
+def goes_to_target(move: ast.Move) -> bool:
+    """Tell whether a move goes to a place that is no system variable."""
+    if move.how != "TO":
         return False
     where = move.where[0] if move.where else None
     return not (isinstance(where, ast.Reference) and where.name.startswith("$"))

@@ -31,6 +31,7 @@ from postproc.language.pdl2.values import (
 # Evaluate expressions as far as the program text tells.
 
 FRAME_NAMES = ("tool", "base", "uframe")
+_DEFAULT_ARM = ("prog_arm", "dft_arm")  # the arm of all that names none
 _TRUTH = {"true": True, "on": True, "false": False, "off": False}
 _WORDS = frozenset(
     "joint linear circular seg_via fly_norm fly_cart fly_auto fly_pass fly_tol "
@@ -50,6 +51,31 @@ class ProgramPoint:
     row: int
     store: Store
     volatile: frozenset[str] = frozenset()
+
+    # ---- arms -----------------------------------------------------------------------
+    def is_ours(self, arm: ast.Expression | None) -> bool | None:
+        """Tell whether an arm is ours, None where that is not sure.
+
+        Args:
+            arm: ``ARM[n]``, None where it is not said.
+        """
+        if arm is None:
+            return None if self.other_default() else True
+        number = self.integer(arm)
+        return None if number is None else number == self.world.arm
+
+    def other_default(self) -> str:
+        """Say why what names no arm may be another's, "" where it is our arm's."""
+        ours, settings = float(self.world.arm), self.store.settings
+        said = self.place.program.arm
+        if said and said != self.world.arm:
+            return (
+                f"its program says PROG_ARM = {said}, and the cell is of arm {ours:g}"
+            )
+        for name in _DEFAULT_ARM:
+            if settings.get(name, ours) != ours:
+                return f"${name.upper()} may not be {ours:g}, the arm of the cell, here"
+        return ""
 
     # ---- numbers and places ---------------------------------------------------------
     def number(self, slot: int) -> float:
@@ -208,14 +234,13 @@ class ProgramPoint:
         """Return the name of our arm's setting, None for another arm's or none."""
         match reference:
             case ast.Reference("$arm_data", (ast.Index((index,)), str(name))):
-                if (
-                    not isinstance(index, tuple)
-                    and self.integer(index) == self.world.arm
-                ):
+                if not isinstance(index, tuple) and self.is_ours(index):
                     return name.lstrip("$")
                 return None
             case ast.Reference(name, ()):
-                return name.lstrip("$")
+                setting = name.lstrip("$")
+                ours = setting in _DEFAULT_ARM or not self.other_default()
+                return setting if ours else None
         return None
 
     def _binary(self, sign: str, left: Value, right: Value) -> Value:

@@ -15,15 +15,17 @@ from postproc.language.pdl2.calls import (
     call_statement,
     calls_in_expressions,
     frame_value,
+    list_moves,
 )
 from postproc.language.pdl2.collect import collect
+from postproc.language.pdl2.context import HANDLED, Context
 from postproc.language.pdl2.effects import changed_arguments, live_rows, rows_effects
 from postproc.language.pdl2.entries import POSITIONS, Entries, Entry
 from postproc.language.pdl2.evaluate import ProgramPoint
 from postproc.language.pdl2.job import FilePoints, Place, Start, World, base_variable
 from postproc.language.pdl2.machine import (
-    HANDLED,
     MAX_ROWS,
+    MAX_STEPS,
     Execution,
     Goal,
     Machine,
@@ -37,7 +39,13 @@ from postproc.language.pdl2.moves import move
 from postproc.language.pdl2.program import Program, Variable, Variables, recovered
 from postproc.language.pdl2.store import Store, root_of
 from postproc.language.pdl2.stretches import MoveBlocks
-from postproc.language.pdl2.values import Nothing, Position, Value, Vector
+from postproc.language.pdl2.values import (
+    Nothing,
+    Position,
+    Value,
+    Vector,
+    points_of,
+)
 from postproc.language.pdl2.variable_file import VariableFile
 from postproc.language.pdl2.variable_file import VariableFile as ValueFile
 from postproc.language.shapes import lower
@@ -105,7 +113,7 @@ def _unrolled(
 def _round(
     machine: Machine,
     here: Execution,
-    context: tuple[tuple[int, int], ...],
+    context: Context,
     row: int,
     number: int,
 ) -> None:
@@ -115,7 +123,7 @@ def _round(
     statement = recovered(program.statement(row))
     if isinstance(statement, ast.Label) and statement.then is not None:
         statement = statement.then
-    inner = (*context, (machine.position(program, row), number))
+    inner = context.within(machine.position(program, row), number)
     machine.enter(inner, here.place)
     if isinstance(statement, ast.For):
         key = here.locate(ast.Reference(statement.name)).key
@@ -131,11 +139,10 @@ def end_round(machine: Machine, here: Execution) -> None:
     if isinstance(statement, ast.Label) and statement.then is not None:
         statement = statement.then
     name = statement.name if isinstance(statement, ast.For) else ""
-    last = here.context[-1] if here.context else None
-    if last is not None and last[0] == at and last[1] >= 0:
-        outer = here.context[:-1]
-        if last[1] + 1 < machine.ranges[(outer, row)][2]:
-            _round(machine, here, outer, row, last[1] + 1)
+    last = here.context
+    if last.is_round and last.at == at:
+        if last.kind + 1 < machine.ranges[(last.outer, row)][2]:
+            _round(machine, here, last.outer, row, last.kind + 1)
             return
     else:
         invalidate(here, ast.Reference(name), "it counts a loop")
@@ -367,6 +374,8 @@ def _declared(world: World, place: Place, seen: Variables) -> None:
         if variable.initial is None or key in world.initial:
             continue
         value = ProgramPoint(world, place, variable.row, store).value(variable.initial)
+        if variable.arm not in (0, world.arm):
+            value = Nothing(points_of(variable.arm))
         if isinstance(value, Position) and not value.name:
             value = replace(
                 value,
@@ -388,6 +397,7 @@ def _enter_all(world: World, place: Place, file: ValueFile) -> None:
     known = np.array(places, dtype=bool)[entries.layout]
     known &= np.isfinite(entries.numbers).all(axis=1)
     known &= np.isin(entries.arm, (0, world.arm))
+    known[_declared_for_other(world, place.program, entries)] = False
     shared = np.array([layout.shared for layout in entries.layouts], dtype=bool)
     shared, taught = shared[entries.layout], np.zeros(len(known), dtype=bool)
     named = np.fromiter(entries.row.values(), np.int64, len(entries.row))
@@ -407,7 +417,8 @@ def _enter_all(world: World, place: Place, file: ValueFile) -> None:
         name = entries.name[row].lower()
         root = root_of(name)
         key = world.root(place, root) + name[len(root) :]
-        _enter(world, file, entries.entry(row), key)
+        arm = world.other_arm(place, root)
+        _enter(world, file, entries.entry(row), key, arm)
     prefix = f"{place.program.name}/"
     world.initial.points = FilePoints(prefix, own, other, entries, base, shared, taught)
 
@@ -420,8 +431,16 @@ def _told_by_declaration(program: Program, entries: Entries) -> list[int]:
     return [row for name, row in entries.row.items() if root_of(name) in marked]
 
 
-def _enter(world: World, file: ValueFile, entry: Entry, key: str) -> None:
-    """Enter a value that is no known point, where there is any."""
+def _declared_for_other(world: World, program: Program, entries: Entries) -> list[int]:
+    """List the rows of variables that are declared for another arm."""
+    other = {*program.variables.which(lambda v: v.arm not in (0, world.arm))}
+    if not other:
+        return []
+    return [row for name, row in entries.row.items() if root_of(name) in other]
+
+
+def _enter(world: World, file: ValueFile, entry: Entry, key: str, arm: int) -> None:
+    """Enter a value that is no known point, where there is any, or another arm's."""
     value: Value | None = entry.numbers[0] if entry.numbers else None
     if entry.kind in POSITIONS:
         value = Nothing(f"its value is not initialised in {file.source.name}")
@@ -430,8 +449,8 @@ def _enter(world: World, file: ValueFile, entry: Entry, key: str) -> None:
         value = Vector((x, y, z))
     if value is None and "." in entry.name:  # that it is there counts, see `nodes`
         value = Nothing(f"its value in {file.source.name} is no number")
-    if entry.arm not in (0, world.arm):
-        value = Nothing(f"its value is one of arm {entry.arm}")
+    if arm or entry.arm not in (0, world.arm):
+        value = Nothing(points_of(arm or entry.arm))
     if value is not None:
         world.initial[key] = value
 
@@ -479,11 +498,23 @@ def resolve(
         _run(machine, here, stretches)
     if machine.exhausted:
         world.report_once(
-            program, 0, "too-complex", "", "the program has too many ways to be "
-            "followed to the end: nothing in it is compensated",
+            program, 0, "too-complex", "", "the program has too many ways, or calls, "
+            f"to be followed to the end (more than {MAX_STEPS} steps): nothing "
+            "in it is compensated",
         )  # fmt: skip
+        machine = _listed(world)
     world.pin_loose()
     return Resolved(collect(machine), tuple(sorted(world.diagnostics)))
+
+
+def _listed(world: World) -> Machine:
+    """List every move of a job that is too complex to be followed, once."""
+    machine = Machine(world, exhausted=True)
+    for place, _ in world.declarations():
+        here = Execution(world, place, place.body.first, Store(lambda key: None))
+        name = place.body.name or place.program.name
+        list_moves(machine, here, place, name)
+    return machine
 
 
 def _start(machine: Machine) -> None:
@@ -498,8 +529,8 @@ def _start(machine: Machine) -> None:
     )
     _handlers(machine, store)
     if program.main is not None:
-        machine.enter((), Place(program, program.main))
-        machine.push((), program.main.first + 1, store)
+        machine.enter(machine.root, Place(program, program.main))
+        machine.push(machine.root, program.main.first + 1, store)
 
 
 def _handlers(machine: Machine, store: Store) -> None:
@@ -535,7 +566,7 @@ def _moving_handler(machine: Machine, place: Place, row: int, store: Store) -> N
         str(row),
         "this condition handler may move the arm at any time: no move's origin is sure",
     )
-    context = ((machine.position(place.program, row), HANDLED),)
+    context = machine.root.within(machine.position(place.program, row), HANDLED)
     machine.enter(context, place)
     machine.push(context, row + 1, store)
 

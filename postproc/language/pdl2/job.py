@@ -156,7 +156,7 @@ class Start:
             frames (``tool``, ``base``, ``uframe``) that it sets.
         aux: Auxiliary axis to ``gun``, ``track`` or ``positioner``.
         taught: Names of points that were taught with the robot.
-        arm: Number of our arm, 0 to take the program's ``PROG_ARM`` (else 1).
+        arm: Number of our arm.
     """
 
     tool: Record = (0.0,) * 6
@@ -168,7 +168,7 @@ class Start:
     )
     aux: Mapping[int, str] = field(default_factory=dict)
     taught: Collection[str] = frozenset()
-    arm: int = 0
+    arm: int = 1
 
     def __post_init__(self) -> None:
         """PDL2 does not tell cases apart: keep names in lower case."""
@@ -248,7 +248,7 @@ class World:
     @property
     def arm(self) -> int:
         """Return the number of our arm."""
-        return self.start.arm or self.main.arm or 1
+        return self.start.arm
 
     def programs(self) -> list[Program]:
         """Return the programs, the main one first, each once."""
@@ -369,6 +369,14 @@ class World:
                 return parameter.type
         declared = self.declared(place, name)
         return declared.type if declared else None
+
+    def other_arm(self, place: Place, name: str) -> int:
+        """Return the arm whose points a variable holds, 0 where it is ours."""
+        arm = place.body.arms.get(name, 0)
+        if not arm:
+            declared = self.declared(place, name)
+            arm = declared.arm if declared else 0
+        return 0 if arm == self.arm else arm
 
     def is_function(self, place: Place, name: str) -> bool:
         """Tell whether a name by itself calls a routine."""

@@ -5,13 +5,14 @@ from __future__ import annotations
 import heapq
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 import numpy as np
 
 from postproc.arrays import Ints
 from postproc.language.pdl2 import syntax as ast
-from postproc.language.pdl2.effects import PURE, invocations, references
+from postproc.language.pdl2.context import CALLED, Context, Point
+from postproc.language.pdl2.effects import PURE, circles, invocations, references
 from postproc.language.pdl2.evaluate import ProgramPoint, invalidate_key, parts_under
 from postproc.language.pdl2.job import Place, World
 from postproc.language.pdl2.program import Body, Program
@@ -135,11 +136,8 @@ def single(
 # merged; a configuration is run again when its store has changed, until nothing
 # changes. Work is done in program order, so that most configurations are run once.
 
-Context = tuple[tuple[int, int], ...]
-"""Calls (row, CALLED) and loop rounds (row, round), outermost first."""
-
-CALLED, HANDLED, HERE = -1, -3, -2
 MAX_ROWS = 20_000  # rows of unrolled loops and of calls, each time they are run
+DEEP = 64  # calls within calls, from where on it pays to know which call themselves
 MAX_STEPS = 2_000_000  # times a configuration is run again, all in all
 
 Key = tuple[Context, int, int]
@@ -149,7 +147,7 @@ Key = tuple[Context, int, int]
 class Execution(ProgramPoint):
     """A point of the execution with the way that led to it."""
 
-    context: Context = ()
+    context: Context = field(default_factory=Context)
     reason: str = ""  # why nothing here may be compensated
 
 
@@ -159,6 +157,7 @@ class Machine:
 
     Attributes:
         world: The files of the job.
+        root: The context of the main part.
         arrivals: Runs of visits, by place; the last analysis of a place holds.
         ids: First visit id of each.
         places: Program and body of each context.
@@ -171,6 +170,7 @@ class Machine:
     """
 
     world: World
+    root: Context = field(default_factory=Context)
     arrivals: dict[Key, MoveRun] = field(default_factory=dict)
     ids: dict[Key, int] = field(default_factory=dict)
     places: dict[Context, Place] = field(default_factory=dict)
@@ -184,7 +184,7 @@ class Machine:
     interrupted: bool = False
     exhausted: bool = False
     rows: int = 0
-    _heap: list[tuple[Context, tuple[Context, int]]] = field(default_factory=list)
+    _heap: list[tuple[Point, int]] = field(default_factory=list)
     _queued: set[tuple[Context, int]] = field(default_factory=set)
     _called: dict[int, tuple[ast.Invoke, ...]] = field(default_factory=dict)
     _offsets: dict[int, int] = field(default_factory=dict)
@@ -245,7 +245,7 @@ class Machine:
         if config not in self._queued:
             self._queued.add(config)
             at = self.position(self.places[context].program, row)
-            heapq.heappush(self._heap, ((*context, (at, HERE)), config))
+            heapq.heappush(self._heap, (Point(context, at), row))
 
     def go_on(self, context: Context, row: int, store: Store) -> None:
         """Go on with a row as the one after the last: ELSE and CASE end a branch."""
@@ -259,20 +259,21 @@ class Machine:
     def _inside(self, context: Context, row: int) -> Context:
         """Drop the rounds of loops that a jump to a row leaves."""
         place = self.places[context]
-        while context and context[-1][1] >= 0:
-            start = context[-1][0] - self._offsets[id(place.program)]
+        while context.is_round:
+            start = context.at - self._offsets[id(place.program)]
             if start < row <= place.body.blocks.end[start]:
                 break
-            context = context[:-1]
+            context = context.outer
         return context
 
     def next(self) -> Execution | None:
         """Take the first piece of work, None when all is done."""
         if not self._heap:
             return None
-        _, config = heapq.heappop(self._heap)
+        point, row = heapq.heappop(self._heap)
+        context = point.context
+        config = (context, row)
         self._queued.discard(config)
-        context, row = config
         self.rows += 1
         if self.rows > MAX_STEPS:
             self.exhausted = True
@@ -297,36 +298,47 @@ class Machine:
         return known
 
     # ---- calls ----------------------------------------------------------------------
-    def calls_in(self, context: Context) -> list[Body]:
-        """Return the bodies that are running.
+    def calls_to(self, body: Body, context: Context) -> list[Body]:
+        """Return the bodies that run since one of them was called, none if it was not.
 
         Below a handler of a file without a main body there is none.
         """
-        ways = [
-            context[:i]
-            for i in range(len(context) + 1)
-            if i == 0 or context[i - 1][1] < 0
-        ]
-        return [self.places[way].body for way in ways if way in self.places]
+        if context.depth > DEEP and id(body) not in self._circles:
+            return []
+        found: list[Body] = []
+        while True:
+            place = None if context.is_round else self.places.get(context)
+            if place is not None:
+                found.append(place.body)
+                if place.body is body:
+                    return found
+            if context is self.root:
+                return []
+            context = context.outer
+
+    @cached_property
+    def _circles(self) -> frozenset[int]:
+        """Bodies (by id) that may call themselves, directly or not."""
+        return circles(self.world)
 
     def leave(self, here: Execution, by_return: bool = False) -> None:
         """The body ends: go back to the caller, or into the next cycle."""
         context = here.context
-        while context and context[-1][1] >= 0:
-            context = context[:-1]
+        while context.is_round:
+            context = context.outer
         blocks = here.place.body.blocks
         if not by_return and blocks.cycle >= 0 and not here.place.body.name:
             self.push(context, blocks.cycle, here.store)
-        elif context and context[-1][1] == CALLED:
+        elif context.kind == CALLED:
             _invalidate_locals(here)
-            caller = self.places[context[:-1]]
-            row = context[-1][0] - self._offsets[id(caller.program)]
-            self.go_on(context[:-1], row + 1, here.store)
+            caller = self.places[context.outer]
+            row = context.at - self._offsets[id(caller.program)]
+            self.go_on(context.outer, row + 1, here.store)
 
     def call(self, here: Execution, place: Place) -> None:
         """Go into a routine; it comes back to the row after this one."""
         at = self.position(here.place.program, here.row)
-        context = (*here.context, (at, CALLED))
+        context = here.context.within(at, CALLED)
         self.enter(context, place)
         self.rows += 1
         self.push(context, place.body.first + 1, here.store)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from postproc.language.pdl2 import syntax as ast
-from postproc.language.pdl2.effects import references
+from postproc.language.pdl2.effects import OTHER_ARM, goes_to_target, references
 from postproc.language.pdl2.evaluate import SINGLE, parts_under
 from postproc.language.pdl2.machine import (
     Execution,
@@ -257,14 +257,16 @@ def move(machine: Machine, here: Execution, statement: ast.Move) -> None:
     """Record the visits of a move and let the arm stand at its end."""
     _beside(machine, here, statement)
     store = here.store
-    whose = _arm(here, statement.arm)
+    whose = here.is_ours(statement.arm)
     if whose is False:
         _keep(here, statement)
         return
     settings = _with(here, statement)
     motion, reason = motion_of(here, statement, settings)
     if whose is None:
-        reason = "the arm that moves (ARM[..]) is known only at run time"
+        named = statement.arm is not None
+        unsure = "the arm that moves (ARM[..]) is known only at run time"
+        reason = unsure if named else here.other_default()
     reason = here.reason or reason
     predecessors = machine.predecessors(here)
     several = len(predecessors) > 1
@@ -289,8 +291,8 @@ def move(machine: Machine, here: Execution, statement: ast.Move) -> None:
 def _beside(machine: Machine, here: Execution, statement: ast.Move) -> None:
     """Let the moves of SYNCMOVE clauses happen: ours runs along with another arm's."""
     for along in statement.sync:
-        ours = along.arm is not None and _arm(here, along.arm) is not False
-        if ours and _arm(here, statement.arm) is False:
+        ours = along.arm is not None and here.is_ours(along.arm) is not False
+        if ours and here.is_ours(statement.arm) is False:
             reason = here.reason
             here.reason = reason or "it runs along with another arm's move (SYNCMOVE)"
             move(machine, here, along)
@@ -300,17 +302,22 @@ def _beside(machine: Machine, here: Execution, statement: ast.Move) -> None:
 
 
 def _keep(here: Execution, statement: ast.Move) -> None:
-    """Keep the numbers of what another arm goes to."""
+    """Keep the numbers of what another arm goes to, and list its target."""
+    if goes_to_target(statement):
+        _list_other(here, statement)
     names = frozenset(r.name for r in references((statement.where, statement.via)))
     escape_names(here, names, "another arm goes to it too")
 
 
-def _arm(here: Execution, arm: ast.Expression | None) -> bool | None:
-    """Tell whether our arm moves, None where it is not known."""
-    if arm is None:
-        return True
-    number = here.integer(arm)
-    return None if number is None else number == here.world.arm
+def _list_other(here: Execution, statement: ast.Move) -> None:
+    arm = here.integer(statement.arm) if statement.arm is not None else None
+    whose = f"arm {arm}'s" if arm is not None else "not our arm's"
+    number = f" with arm_number = {arm} under [robot]" if arm is not None else ""
+    text = (
+        f"this move is {whose}, and the cell is of arm {here.world.arm}: it is left as "
+        f"it is. Compensate it with a cell of its arm{number}, and its model"
+    )
+    here.world.report(here.place.program, here.row, OTHER_ARM, text)
 
 
 def _with(here: Execution, statement: ast.Move) -> Settings:

@@ -111,6 +111,12 @@ def _program_attribute(c: Children) -> int:
     return c[1].slot if arm else -1
 
 
+def _arm_slot(c: Children) -> int:
+    """Return the slot of the number in ``FOR ARM[n]``, -1 where there is none."""
+    found = [part[0].slot for part in _of(c, ArmPart) if isinstance(part[0], Number)]
+    return found[0] if found else -1
+
+
 def _routine(c: Children) -> ast.Routine:
     parameters = _of(c, list)
     exported, _ = _declared(c, 1)
@@ -230,8 +236,8 @@ RULES: dict[str, Rule] = {
     "names": lambda c: NamesPart(str(n) for n in c),
     "exported": lambda c: ExportedPart(_name(c[0])),
     "attribute": lambda c: c[0],
-    "simple_type": lambda c: ast.Type(_name(c[0])),
-    "array_type": lambda c: ast.Type(c[-1].name, array=True),
+    "simple_type": lambda c: ast.Type(_name(c[0]), arm=_arm_slot(c)),
+    "array_type": lambda c: ast.Type(c[-1].name, array=True, arm=c[-1].arm),
     "path_type": lambda c: ast.Type(_name(c[0]), path=True),
     "dimensions": lambda c: None,
     "dimension": lambda c: None,
@@ -491,6 +497,9 @@ VALUE_RULES: Mapping[str, Rule] = {
 
 # The one place where lark is used: grammars in, statements of a line out.
 
+LONGEST = 1 << 18  # characters of a form; lines of real programs have some hundreds
+DEEPEST = 200  # operators or parentheses within each other; followed by recursion
+
 _PACKAGE = Path(__file__).resolve().parents[2]
 _FAILED = object()
 _OPTIONS = {"parser": "lalr", "lexer": "contextual", "maybe_placeholders": False}
@@ -525,6 +534,10 @@ def line_parser(name: str, start: str) -> lark.Lark:
     return made
 
 
+class _TooDeepError(Exception):
+    """A line holds more operators within each other than any program does."""
+
+
 @lru_cache(maxsize=8192)
 def parse_form(form: str) -> ast.Statement:
     """Parse the form of a logical line of PDL2, `Unknown` where the grammar cannot."""
@@ -556,13 +569,11 @@ def parse_line(mask: str) -> ast.Statement:
 
 def _parse(name: str, form: str, rules: Mapping[str, Rule]) -> object:
     """Parse a form and build what it says, _FAILED where the grammar has no rule."""
-    if form.startswith(UNREADABLE):
+    if form.startswith(UNREADABLE) or len(form) > LONGEST:
         return _FAILED
     try:
         return _build(line_parser(name, "line").parse(form), rules)
-    except lark.exceptions.LarkError:
-        return _FAILED
-    except RecursionError:  # hundreds of nested parentheses: no program has them
+    except (lark.exceptions.LarkError, _TooDeepError):
         return _FAILED
 
 
@@ -570,12 +581,16 @@ def _build(tree: lark.Tree[lark.Token], rules: Mapping[str, Rule]) -> object:
     """Build what a tree says, counting its names and its numbers."""
     names, slots = count(), count()
 
-    def walk(node: lark.Tree[lark.Token] | lark.Token) -> object:
+    def walk(node: lark.Tree[lark.Token] | lark.Token, depth: int = 0) -> object:
+        if depth > DEEPEST:
+            raise _TooDeepError
         if isinstance(node, lark.Token):
             if node.type == "NUMBER":
                 return ast.Number(next(slots))
             text = open_name(next(names)) if node == NAME_MARK else str(node)
             return Mark(text, node.type)
-        return rules[str(node.data)]([walk(child) for child in node.children])
+        return rules[str(node.data)](
+            [walk(child, depth + 1) for child in node.children]
+        )
 
     return walk(tree)

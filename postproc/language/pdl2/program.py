@@ -78,11 +78,9 @@ def recovered(statement: ast.Statement) -> ast.Statement:
 
 
 def build_blocks(
-    lines: Lines, statements: ParsedShapes[ast.Statement], first: int, last: int
+    lines: Lines, statements: ParsedShapes[ast.Statement], rows: Ints
 ) -> tuple[Blocks, list[tuple[int, str]]]:
-    """Match the blocks of rows first to last - 1; also return (row, problem)."""
-    structural = statements.which(lambda said: not isinstance(said, _PLAIN))
-    rows = first + np.flatnonzero(structural[lines.shape[first:last]])
+    """Match the blocks of rows that are no plain ones; also return (row, problem)."""
     reader = _BlockReader(lines, statements)
     for row in rows.tolist():
         reader.take(row)
@@ -238,6 +236,7 @@ class Variable:
         exported: The program it is exported from, or "".
         constant: Declared in a CONST section.
         taught: Marked ``-- TAUGHT``.
+        arm: ``FOR ARM[n]``, 0 where it is not said.
     """
 
     name: str
@@ -247,6 +246,7 @@ class Variable:
     exported: str = ""
     constant: bool = False
     taught: bool = False
+    arm: int = 0
 
 
 class Variables(Mapping[str, Variable]):
@@ -371,6 +371,7 @@ class Body:
         parameters: Formal parameters.
         variables: Its own variables, by lower-case name; the main part has none.
         blocks: Where its jumps lead.
+        arms: ``FOR ARM[n]`` of its parameters, by name, where it is said.
     """
 
     name: str
@@ -379,6 +380,7 @@ class Body:
     parameters: tuple[ast.FormalParameter, ...]
     variables: Variables
     blocks: Blocks
+    arms: Mapping[str, int] = field(default_factory=dict)
 
     @cached_property
     def own_names(self) -> frozenset[str]:
@@ -420,6 +422,13 @@ class Program:
         """Return what a logical line says."""
         return self.statements[int(self.lines.shape[row])]
 
+    @property
+    def head(self) -> int:
+        """Return the line that names the program, 1 where there is none."""
+        heads = self.statements.which(lambda said: isinstance(said, ast.ProgramHead))
+        rows = np.flatnonzero(heads[self.lines.shape])
+        return int(self.lines.line[rows[0]]) if len(rows) else 1
+
 
 # Programs from lines: declarations, routines, blocks, and where each jump leads.
 
@@ -431,6 +440,7 @@ class _Scope:
     """What is being read: a program's or a routine's declarations."""
 
     routine: ast.Routine | None = None
+    row: int = -1  # of ROUTINE
     begin: int = -1
     variables: Variables = field(default_factory=Variables)
 
@@ -442,6 +452,7 @@ class _Reader:
     lines: Lines
     statements: ParsedShapes[ast.Statement]
     taught: frozenset[int]
+    structural: Ints  # rows of other statements than plain ones, ascending
     name: str = ""
     arm: int = 0
     main: Body | None = None
@@ -465,8 +476,7 @@ class _Reader:
                 self.take(row, then)
             case ast.ProgramHead(name, slot):
                 self.name = name
-                if slot >= 0:
-                    self.arm = int(self.lines.value[self.lines.first[row] + slot])
+                self.arm = self._arm(row, slot)
             case ast.Import(file):
                 self.imports.append(file)
             case ast.Structure(name):
@@ -483,7 +493,7 @@ class _Reader:
                     self.outside[name] = exported
                 else:
                     self._before_next(row)
-                    self.scopes.append(_Scope(statement))
+                    self.scopes.append(_Scope(statement, row))
             case ast.Begin():
                 if scope.begin >= 0:
                     self._before_next(row)
@@ -495,6 +505,13 @@ class _Reader:
                 self.close(row)
             case _:
                 pass
+
+    def _arm(self, row: int, slot: int) -> int:
+        """Return the number of an arm in a line, 0 where none is said."""
+        if slot < 0:
+            return 0
+        number = float(self.lines.value[self.lines.first[row] + slot])
+        return int(number) if number.is_integer() else 0
 
     def _declare(self, row: int, statement: ast.Declare | ast.Constant) -> None:
         if self.structure:
@@ -513,6 +530,7 @@ class _Reader:
             statement.exported,
             "const" in statement.attributes,
             int(self.lines.line[row]) in self.taught,
+            self._arm(row, statement.type.arm),
         )
         variables.declare(statement.names, said)
 
@@ -538,15 +556,17 @@ class _Reader:
         """End the innermost routine, or the program."""
         scope = self.scopes[-1]
         routine = scope.routine
-        blocks, problems = build_blocks(
-            self.lines, self.statements, scope.begin + 1, last
-        )
+        within = np.searchsorted(self.structural, (scope.begin + 1, last))
+        rows = self.structural[slice(*within)]
+        blocks, problems = build_blocks(self.lines, self.statements, rows)
         for row, message in problems:
             self.report(row, "block-structure", message)
         name = routine.name if routine else ""
         parameters = routine.parameters if routine else ()
         own = scope.variables if routine else Variables()
-        body = Body(name, scope.begin, last, parameters, own, blocks)
+        given = {p.name: self._arm(scope.row, p.type.arm) for p in parameters}
+        arms = {name: arm for name, arm in given.items() if arm}
+        body = Body(name, scope.begin, last, parameters, own, blocks, arms)
         if routine:
             self.routines[name] = body
             self.scopes.pop()
@@ -570,9 +590,10 @@ def parse(source: Source, each: Map = map) -> Program:
     lines = read_lines(source, each)
     statements = parse_shapes(lines.shapes, parse_form)
     taught = frozenset(line for line, _ in lines.marks("TAUGHT"))
-    reader = _Reader(lines, statements, taught)
     structural = statements.which(lambda said: not isinstance(said, _PLAIN))
-    for row in np.flatnonzero(structural[lines.shape]).tolist():
+    rows = np.flatnonzero(structural[lines.shape])
+    reader = _Reader(lines, statements, taught, rows)
+    for row in rows.tolist():
         statement = statements[int(lines.shape[row])]
         if isinstance(statement, ast.Unknown):
             _report_unknown(reader, row)

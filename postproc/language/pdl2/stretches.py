@@ -74,7 +74,7 @@ class PlainMoves:
         prefix: What keys of the program's own variables begin with.
         names: Names, in lower case, of the program's own variables that lines go to.
         rows: Their rows in the variable file, -1 where it tells none.
-        name: Index into `names` for every shape, -1 for none.
+        name: Index into `names` for every row, (n,), -1 for none.
         ends: Rows at which stretches end, ascending.
     """
 
@@ -100,7 +100,7 @@ class PlainMoves:
 
 
 def find_plain_moves(
-    world: World, place: Place, volatile: frozenset[str]
+    world: World, place: Place, volatile: frozenset[str], may_be: Bools
 ) -> PlainMoves:
     """Find the quiet lines of a body.
 
@@ -108,20 +108,20 @@ def find_plain_moves(
         world: The files of the job.
         place: The body.
         volatile: Names that condition handlers change.
+        may_be: Which shapes of the program may be those of quiet lines, (k,).
     """
     program, body = place.program, place.body
     first = body.first + 1
-    rows = program.lines.shape[first : body.last]
-    may_be = program.statements.which(_may_be_plain)
-    variants = _Variants(world, place, volatile)
-    of_shape = np.full(len(program.lines.shapes), -1, dtype=np.int64)
-    shapes = np.unique(rows[may_be[rows]])
+    used, own = np.unique(program.lines.shape[first : body.last], return_inverse=True)
+    variants = _Variants(world, place, volatile, used)
+    of_shape = np.full(len(used), -1, dtype=np.int64)
+    shapes = used[may_be[used]]
     forms = program.statements.form[shapes]
-    used, begins = np.unique(np.sort(forms), return_index=True)
+    kinds, begins = np.unique(np.sort(forms), return_index=True)
     groups = np.split(shapes[np.argsort(forms, kind="stable")], begins[1:])
-    for form, mine in zip(used.tolist(), groups, strict=False):
-        of_shape[mine] = variants.add(form, mine)
-    variant = of_shape[rows]
+    for form, mine in zip(kinds.tolist(), groups, strict=False):
+        of_shape[np.searchsorted(used, mine)] = variants.add(form, mine)
+    variant = of_shape[own]
     joins = np.array(sorted(body.blocks.joins), dtype=np.int64)
     ends = np.concatenate([first + np.flatnonzero(variant < 0), joins, [body.last]])
     said = variants.statements
@@ -136,7 +136,7 @@ def find_plain_moves(
         variants.prefix,
         variants.names,
         world.initial.rows(variants.prefix, variants.names),
-        variants.name,
+        variants.name[own],
         np.unique(ends),
     )
 
@@ -211,6 +211,7 @@ class _Variants:
     world: World
     place: Place
     volatile: frozenset[str]
+    shapes: Ints  # of the body, ascending
 
     def __post_init__(self) -> None:
         self.statements: list[ast.Statement] = []
@@ -219,7 +220,7 @@ class _Variants:
         self._parameters = {p.name for p in self.place.body.parameters}
         self.prefix = f"{self.place.program.name}/"
         self.names: list[str] = []
-        self.name = np.full(len(self.place.program.lines.shapes), -1, dtype=np.int64)
+        self.name = np.full(len(self.shapes), -1, dtype=np.int64)
 
     def add(self, form: int, shapes: Ints) -> Ints:
         """Return the variants of shapes of one form, -1 where one is not quiet."""
@@ -282,7 +283,8 @@ class _Variants:
         for k in np.flatnonzero([name in hidden for name in goal]).tolist():
             points[k], alone[k] = self._is_point(goal[k], array), False
         own = np.flatnonzero((points & alone)[which])
-        self.name[shapes[own]] = len(self.names) + which[own]
+        at = np.searchsorted(self.shapes, shapes[own])
+        self.name[at] = len(self.names) + which[own]
         self.names += goal
         for k in np.flatnonzero((points & ~alone)[which]).tolist():
             key = self.world.root(place, goal[which[k]])
@@ -387,14 +389,16 @@ class MoveBlocks:
 
     machine: Machine
     quiet: dict[int, PlainMoves] = field(default_factory=dict)
+    _may_be: dict[int, Bools] = field(default_factory=dict)
 
     def run(self, here: Execution) -> bool:
         """Run the stretch that begins at a row; tell whether there is one.
 
         Where a condition handler may move the arm at any time there is none: every
-        move may then come from elsewhere.
+        move may then come from elsewhere. Nor is there where the moves may be another
+        arm's.
         """
-        if self.machine.interrupted:
+        if self.machine.interrupted or here.other_default():
             return False
         quiet = self._quiet(here)
         end = quiet.end(here.row)
@@ -409,10 +413,12 @@ class MoveBlocks:
         return True
 
     def _quiet(self, here: Execution) -> PlainMoves:
-        body = here.place.body
+        program, body = here.place.program, here.place.body
+        if id(program) not in self._may_be:
+            self._may_be[id(program)] = program.statements.which(_may_be_plain)
         if id(body) not in self.quiet:
             self.quiet[id(body)] = find_plain_moves(
-                here.world, here.place, here.volatile
+                here.world, here.place, here.volatile, self._may_be[id(program)]
             )
         return self.quiet[id(body)]
 
@@ -467,7 +473,7 @@ def _points(
     goals: dict[int, Goal] = {}
     named = np.flatnonzero(np.array(quiet.named, dtype=bool)[variant])
     shapes = program.lines.shape[rows[named]]
-    own = quiet.name[shapes]
+    own = quiet.name[rows[named] - quiet.first]
     point[named] = HELD
     point[named[own >= 0]] = quiet.rows[own[own >= 0]]
     asked = (point[named] < 0) | _assigned(here, quiet, own)

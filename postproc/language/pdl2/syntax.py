@@ -93,11 +93,18 @@ class Unknown(Statement):
 
 @dataclass(frozen=True, slots=True)
 class Type:
-    """A type: its name in lower case; for arrays and paths that of the elements."""
+    """A type.
+
+    Attributes:
+        name: In lower case; for arrays and paths that of the elements.
+        array, path: Whether it is one of these.
+        arm: Slot of the number in ``FOR ARM[n]``, -1 where there is none.
+    """
 
     name: str
     array: bool = False
     path: bool = False
+    arm: int = -1
 
 
 @dataclass(frozen=True, slots=True)

@@ -40,6 +40,11 @@ class Nothing:
         return hash(Nothing)
 
 
+def points_of(arm: int) -> str:
+    """Say why the points of another arm are not known."""
+    return f"it is a point of arm {arm}, not of ours"
+
+
 @dataclass(frozen=True, slots=True)
 class Alias:
     """A parameter stands for the caller's variables.

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import sys
+import tracemalloc
 from collections.abc import Mapping
 
 import pytest
 
 from postproc.compensation.program import read_program
-from tests.bench.growth import KINDS
+from postproc.language.pdl2 import parser
+from postproc.language.pdl2 import syntax as ast
+from postproc.language.visits import ELSEWHERE
+from tests.bench.growth import KINDS, Files, chain, routines, terms, tree
 
 SMALL = 150
 
@@ -37,3 +41,52 @@ def test_twice_the_program_is_twice_the_work(name, job_cell):
     for files in (half, whole):
         read_program(files, job_cell)  # what is remembered between programs
     assert calls_to_read(whole, job_cell) < 2.3 * calls_to_read(half, job_cell)
+
+
+def memory_to_read(files: Files, cell) -> int:
+    """Return the bytes that are held at once, those of arrays too."""
+    tracemalloc.start()
+    read_program(files, cell)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    return peak
+
+
+@pytest.mark.parametrize("write", [routines, chain])
+def test_twice_the_routines_take_twice_the_memory(write, job_cell):
+    read_program(write(SMALL), job_cell)
+    half, whole = (memory_to_read(write(n), job_cell) for n in (1000, 2000))
+    assert whole < 2.3 * half
+
+
+def test_calls_however_deep_are_followed_to_the_last(job_cell):
+    visits = read_program(chain(3000), job_cell).visits
+    assert len(visits) == 3000
+    assert visits.pred.tolist() == list(range(-1, 2999))
+    assert len(read_program(tree(1 << 10), job_cell).visits) == (1 << 10) - 1
+
+
+@pytest.mark.parametrize("n", [300, 5000])
+def test_a_line_of_more_terms_than_are_followed_is_listed(n, job_cell):
+    found = read_program(terms(n), job_cell)
+    assert [d.code for d in found.diagnostics] == ["unknown-statement"]
+    assert read_program(terms(150), job_cell).diagnostics == ()
+
+
+def test_a_line_that_no_program_has_is_not_even_parsed(monkeypatch):
+    monkeypatch.setattr(parser, "line_parser", lambda name, start: pytest.fail())
+    text = "n := " + "n + " * (parser.LONGEST // 4) + "n"
+    assert isinstance(parser.parse_form(text), ast.Unknown)
+
+
+def test_a_program_beyond_the_limit_is_listed_once_and_left(job_cell, monkeypatch):
+    monkeypatch.setattr("postproc.language.pdl2.machine.MAX_STEPS", 5000)
+    found = read_program(tree(1 << 14), job_cell)
+    assert [d.code for d in found.diagnostics] == ["too-complex"]
+    assert "too many ways, or calls" in found.diagnostics[0].message
+    visits = found.visits
+    lines = [k + 1 for k, line in enumerate(tree(1 << 14)["job.pdl"].splitlines())
+             if b"MOVE" in line]  # fmt: skip
+    assert visits.line.tolist() == lines and len(lines) == 14
+    assert all("too complex" in visits.reasons[k] for k in visits.reason)
+    assert (visits.pred == ELSEWHERE).all()
