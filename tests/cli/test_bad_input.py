@@ -370,7 +370,11 @@ BOTH = LISTED + entry("a") + entry("b", 130.0)
             ["display", "safe"],
             "job.lsv:8: .*A has two ",
         ),
-        (LISTED + entry("a", arm=2) + entry("b"), ["display", "safe"], "a point of arm 2"),
+        (
+            LISTED + entry("a", arm=2) + entry("b"),
+            ["display", "safe"],
+            "a point of arm 2",
+        ),
         (
             BOTH.replace("130.00", "*******"),
             ["safe", "display"],

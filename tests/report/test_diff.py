@@ -77,19 +77,21 @@ def test_directions_and_statuses_are_those_of_the_report(desk):
 
 
 def test_a_line_with_several_statuses_counts_its_visits(desk):
-    via = "POS(320.0, 120.0, 200.0, 0.0, 175.0, 0.0, '')"
-    arc = f"MOVE CIRCULAR TO POS(300.0, 200.0, 200.0, 0.0, 175.0, 0.0, 'W') VIA {via}"
-    source = desk.put("job.pdl", program("$CNFG_CARE := ON", FIRST, POSE, arc))
+    begin = "p := POS(320.0, 120.0, 190.0, 0.0, 175.0, 0.0, '')"
+    via = "VIA POS_SHIFT(p, VEC(0, 0, 10))"  # it moves along with p
+    arc = f"MOVE CIRCULAR TO POS(300.0, 200.0, 200.0, 0.0, 175.0, 0.0, '') {via}"
+    source = desk.put("job.pdl", program(begin, FIRST, "MOVE LINEAR TO p", POSE, arc))
     out = desk.folder / "out.pdl"
     report = desk.report(source, "-o", out)["targets"]
-    assert [row["status"] for row in report] == ["safe", "safe", "safe", "guarded"]
+    found = [row["status"] for row in report]
+    assert found == ["safe", "safe", "safe", "display", "safe"]
     *others, row = json.loads(cli("diff", source, out, "--json", "-").stdout)["rows"]
-    assert [other["visits"] for other in others] == [{}, {}]
-    assert row["visits"] == {"guarded": 1, "safe": 1}
-    assert (row["status"], row["why"]) == ("guarded", report[3]["why"])
+    assert not any(other["visits"] for other in others)
+    assert row["visits"] == {"display": 1, "safe": 1}
+    assert (row["status"], row["why"]) == ("display", report[3]["why"])
     assert row["correction_mm"] > 0.5 and row["original"] != row["compensated"]
     listed = cli("diff", source, out).stdout
-    assert f"guarded: {row['why']} (1 guarded, 1 safe)\n" in listed
+    assert f"display: {row['why']} (1 display, 1 safe)\n" in listed
 
 
 def test_what_was_left_alone_is_listed_with_its_reason(desk):
