@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import os
 import re
+import stat
 import tempfile
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
@@ -18,6 +19,40 @@ from postproc.exceptions import DiskFullError, OutputError, ProgramError
 TEMPORARY = ".postproc-tmp"  # end of the names of files that are being written
 Content = bytes | Iterable[bytes]  # of a file, whole or in pieces
 STREAM = "-"  # stands for standard input or output
+
+_PASSING = (stat.S_ISFIFO, stat.S_ISCHR)  # kinds that bytes pass through
+_DESCRIPTORS = re.compile(r"/proc/[^/]+(?:/task/\d+)?/fd")
+_LINKS = 40  # that lead on to each other; Linux follows no more
+
+
+def is_stream(place: str | Path) -> bool:
+    """Tell whether bytes pass by here once, with no name that could be replaced.
+
+    That is ``-``, a pipe, a device, and an open file of a process (``/dev/stdout``,
+    ``/dev/fd/3``, ``<(command)`` of a shell). What is not there yet is none.
+
+    >>> is_stream("-"), is_stream("job.pdl")
+    (True, False)
+    """
+    if str(place) == STREAM or _is_descriptor(Path(place)):
+        return True
+    try:
+        mode = os.stat(place).st_mode
+    except OSError:
+        return False
+    return any(kind(mode) for kind in _PASSING)
+
+
+def _is_descriptor(path: Path) -> bool:
+    """Tell whether a path names an open file of a process, maybe through links."""
+    for _ in range(_LINKS):
+        if not path.is_symlink():
+            return False
+        path = Path(os.path.realpath(path.parent), path.name)
+        if _DESCRIPTORS.fullmatch(str(path.parent)):
+            return True
+        path = path.parent / os.readlink(path)
+    return False
 
 
 def check_places(outputs: Iterable[Path | None], inputs: Iterable[Path | None]) -> None:
@@ -39,6 +74,8 @@ def check_places(outputs: Iterable[Path | None], inputs: Iterable[Path | None]) 
         if any(place.exists() and place.samefile(source) for source in read):
             cure = "Give another output with -o; inputs are never overwritten"
             raise OutputError(place, "is an input", cure)
+        if is_stream(place):
+            continue
         if place.resolve() in taken:
             raise OutputError(place, "is named twice", "Give each output its own name")
         taken.add(place.resolve())
@@ -46,13 +83,19 @@ def check_places(outputs: Iterable[Path | None], inputs: Iterable[Path | None]) 
 
 
 def _check_folder(place: Path) -> None:
-    """Refuse a place that is a folder, or that lies in none.
+    """Refuse a place that is no file, or that lies in no folder.
 
     Raises:
-        OutputError: It does.
+        OutputError: It does; or it is a socket or a disk, which nothing writes through.
     """
     if place.is_dir():
         raise OutputError(place, "is a folder", "Name the file to write in it")
+    if is_stream(place):
+        return
+    place = _followed(place)
+    if place.exists() and not place.is_file():
+        cure = "Give a file, a pipe or a terminal"
+        raise OutputError(place, "is neither a file nor a pipe", cure)
     if not place.parent.exists():
         cure = f"Make the folder {place.parent} first, or give another place"
         raise OutputError(place, "the folder does not exist", cure)
@@ -65,7 +108,10 @@ def write_all(files: Mapping[Path, Content]) -> None:
     """Write several files, each to a temporary name, synced, then renamed.
 
     No file appears under its name before all of them are safely on the disk. They are
-    renamed in the order given: name the one that users wait for last.
+    renamed in the order given: name the one that users wait for last. Only regular
+    files are replaced: a link stays, and the file that it leads to is replaced; into a
+    pipe, a device or an open file (`is_stream`) the bytes are written, before any
+    rename.
 
     Raises:
         OutputError: A folder is missing or cannot be written to, or the disk is full;
@@ -77,10 +123,15 @@ def write_all(files: Mapping[Path, Content]) -> None:
     path = Path()
     try:
         for path, data in files.items():
-            ready.append((_write_temporary(path, data), path))
+            if not is_stream(path):
+                place = _followed(path)
+                ready.append((_write_temporary(place, data), place))
+        for path, data in files.items():
+            if is_stream(path):
+                _write_through(path, data)
         for temporary, path in ready:
             os.replace(temporary, path)
-        for folder in {path.parent for path in files}:
+        for folder in {path.parent for _, path in ready}:
             _sync_folder(folder)
     except OSError as exc:
         raise disk_error(exc, path) from None
@@ -114,6 +165,18 @@ def disk_error(exc: OSError, path: str | Path) -> OutputError:
         return DiskFullError(path, "no room is left there", "Make room, then go on")
     cure = "Give an existing folder with room that may be written to"
     return OutputError(path, _reason(exc), cure)
+
+
+def _followed(path: Path) -> Path:
+    """Return the file that a link leads to, whether it is there yet or not."""
+    return Path(os.path.realpath(path)) if path.is_symlink() else path
+
+
+def _write_through(path: Path, data: Content) -> None:
+    """Write into what is open elsewhere; nothing that it holds is cut off."""
+    handle = os.open(path, os.O_WRONLY | os.O_APPEND)
+    with os.fdopen(handle, "wb") as out:
+        out.writelines([data] if isinstance(data, bytes) else data)
 
 
 def _write_temporary(path: Path, data: Content) -> str:
@@ -152,6 +215,8 @@ def _reason(exc: OSError) -> str:
     """Say in plain words why writing failed."""
     if isinstance(exc, FileNotFoundError):
         return "the folder does not exist"
+    if isinstance(exc, BrokenPipeError):
+        return "nobody reads it any more"
     if isinstance(exc, PermissionError) or exc.errno == errno.EROFS:
         return "the folder is read-only"
     return f"cannot be written ({exc.strerror})"

@@ -18,7 +18,13 @@ from postproc.batch.tree import Tree, refuse_overlap, scan
 from postproc.batch.workers import WorkerPool, work_through
 from postproc.compensation.record import SUFFIX, file_sha256, sha256
 from postproc.exceptions import DiskFullError, OutputError
-from postproc.files import TEMPORARY, disk_error, replace_file, write_all
+from postproc.files import (
+    TEMPORARY,
+    disk_error,
+    is_stream,
+    replace_file,
+    write_all,
+)
 
 # Conditions of a run: alone on its tree, with room, and stopped in good order.
 
@@ -148,7 +154,7 @@ class TargetTree:
             OutputError: They cannot be written.
         """
         for place in outputs:
-            self._make_folder(place)
+            self._make_room(place)
         write_all({self.root / place: data for place, data in outputs.items()})
         return {place: sha256(data) for place, data in outputs.items()}
 
@@ -161,7 +167,7 @@ class TargetTree:
         Raises:
             OutputError: It cannot be read or written.
         """
-        self._make_folder(place)
+        self._make_room(place)
         try:
             with source.open("rb") as data, replace_file(self.root / place) as out:
                 shutil.copyfileobj(data, out, 1 << 20)
@@ -205,11 +211,19 @@ class TargetTree:
         same = {p: d for p, d in outputs.items() if self.holds({p: d})}
         return self.remove(same)
 
-    def _make_folder(self, place: str) -> None:
+    def _make_room(self, place: str) -> None:
+        """Make the folder of a file; refuse what stands there and is no file.
+
+        A link may lead to a source; a pipe or a device is nothing that a tree holds.
+        """
+        path = self.root / place
         try:
-            (self.root / place).parent.mkdir(parents=True, exist_ok=True)
+            path.parent.mkdir(parents=True, exist_ok=True)
         except OSError as exc:
-            raise disk_error(exc, (self.root / place).parent) from None
+            raise disk_error(exc, path.parent) from None
+        if os.path.lexists(path) and (path.is_symlink() or not path.is_file()):
+            problem = "is a link or no regular file: it is not replaced"
+            raise OutputError(path, problem, "Remove it, then run the command again")
 
 
 def places_of(unit: Unit) -> tuple[str, ...]:
@@ -302,6 +316,9 @@ class BatchRun:
         Raises:
             OutputError: The log cannot be written.
         """
+        if is_stream(order.log):
+            problem = "is no file that a later run could read"
+            raise OutputError(order.log, problem, "Give a file as --log")
         self.order, self.tree, self.told = order, tree, told
         self.target = TargetTree(order.target)
         self.earlier = read_entries(order.log)
