@@ -122,6 +122,12 @@ def write_text(target: str, text: str | Iterable[str]) -> None:
         write_all({Path(target): map(str.encode, text)})
 
 
+def write_stdout(data: bytes) -> None:
+    """Write bytes to standard output, all of them or an error."""
+    sys.stdout.buffer.write(data)
+    sys.stdout.buffer.flush()
+
+
 # What every command looks like in use; its --help shows them.
 
 KEEP = "\b"  # begins a paragraph whose lines are not wrapped
@@ -132,6 +138,8 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
         "postproc compensate job.pdl --cell cell.toml --model model.json"
         " -o out/job.pdl --html job.html",
         "cat job.pdl | postproc compensate - --cell cell.toml --model model.json > out",
+        "cat job.pdl | postproc compensate - --lsv job.lsv --lsv-out new.lsv"
+        " --cell cell.toml --model model.json > new.pdl",
     ),
     "diff": (
         "postproc diff job.pdl out/job.pdl | less -S",

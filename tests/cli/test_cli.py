@@ -191,15 +191,55 @@ def test_values_are_written_and_the_program_stays_byte_identical(desk):
     assert desk.compensate(out, "-o", desk.folder / "again.pdl").exit_code == 2
 
 
-def test_values_of_a_piped_program_get_a_file_of_their_own(desk):
-    source = program(FIRST, "MOVE LINEAR TO a", declared="a : XTNDPOS")
+VALUED = program(FIRST, "MOVE LINEAR TO a", declared="a : XTNDPOS")
+
+
+def test_values_of_a_piped_program_go_where_they_are_told_to(desk):
     values = desk.put("job.lsv", LISTED + entry("a"))
-    found = desk.compensate("-", "--lsv", values, stdin=source)
+    out = desk.folder / "out.lsv"
+    found = desk.compensate("-", "--lsv", values, "--lsv-out", out, stdin=VALUED)
     assert found.exit_code == 0
-    out = desk.folder / "job.compensated.lsv"
+    assert found.stdout_bytes.startswith(b"-- postproc")
     assert out.read_bytes().startswith(b"-- postproc")
+    assert desk.names() == {"job.lsv", "out.lsv", "out.lsv.postproc.json"}
     assert cli("restore", out).exit_code == 0
     assert out.read_bytes() == values.read_bytes()
+
+
+def test_a_piped_program_writes_nothing_beside_its_sources(desk):
+    values = desk.put("job.lsv", LISTED + entry("a"))
+    found = desk.compensate("-", "--lsv", values, stdin=VALUED)
+    assert found.exit_code == 2 and found.stdout_bytes == b""
+    assert "job.lsv: changes too" in found.stderr and "--lsv-out" in found.stderr
+    assert desk.names() == {"job.lsv"}
+
+
+def test_values_that_stay_come_out_of_the_filter_too(desk):
+    values, out = desk.put("job.lsv", LISTED + entry("b")), desk.folder / "out.lsv"
+    source = program(FIRST, POSE)
+    found = desk.compensate("-", "--lsv", values, "--lsv-out", out, stdin=source)
+    assert found.exit_code == 0
+    assert out.read_bytes() == values.read_bytes()
+    assert desk.names() == {"job.lsv", "out.lsv"}
+
+
+def test_values_in_a_folder_of_their_own_have_a_record_of_their_own(desk):
+    source = desk.put("job.pdl", VALUED)
+    values = desk.put("job.lsv", LISTED + entry("a"))
+    far = desk.folder / "far"
+    far.mkdir()
+    found = desk.compensate(source, "--lsv-out", far / "v.lsv")
+    assert found.exit_code == 0
+    assert {p.name for p in far.iterdir()} == {"v.lsv", "v.lsv.postproc.json"}
+    assert cli("restore", far / "v.lsv").exit_code == 0
+    assert (far / "v.lsv").read_bytes() == values.read_bytes()
+
+
+def test_a_place_for_values_needs_values(desk):
+    for place, why in ((desk.folder / "out.lsv", "no variable file"), ("-", "stdout")):
+        found = desk.compensate("-", "--lsv-out", place, stdin=program(FIRST, POSE))
+        assert found.exit_code == 2 and why in found.stderr
+        assert desk.names() == set()
 
 
 def test_restore_refuses_what_was_edited_since_and_says_where(desk):
