@@ -5,12 +5,15 @@ from __future__ import annotations
 import errno
 import os
 import re
+import signal
 import stat
 import tempfile
+import threading
 from collections.abc import Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import IO, BinaryIO
+from types import FrameType
+from typing import IO, BinaryIO, NoReturn, Self
 
 from postproc.exceptions import DiskFullError, OutputError, ProgramError
 
@@ -104,6 +107,64 @@ def _check_folder(place: Path) -> None:
         raise OutputError(place, "there is no such folder", cure)
 
 
+# What a signal that ends the process leaves behind: nothing.
+#
+# Commands leave such signals to the system, which ends them at once wherever they are,
+# in a long sum as well as while modules are loaded. Only what is being written asks for
+# more: temporary files are to be gone, and several files are renamed all or none.
+
+ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+_unfinished: set[str] = set()  # temporary files of this process
+
+
+def end_process(number: int) -> NoReturn:
+    """Remove what is not finished, and end as shells tell of a signal: 128 + number."""
+    for name in list(_unfinished):
+        with suppress(OSError):
+            os.unlink(name)
+    os._exit(128 + number)
+
+
+class _Shield:
+    """Signals that would end the process at once let it tidy up first.
+
+    Handlers that somebody else has set stay: they decide. Without a handler to set, in
+    a thread, nothing is changed.
+    """
+
+    def __init__(self) -> None:
+        self._taken: list[int] = []
+        self._held, self._asked = False, 0
+
+    def __enter__(self) -> Self:
+        if threading.current_thread() is threading.main_thread():
+            all_ = (n for n in ENDING if signal.getsignal(n) is signal.SIG_DFL)
+            for number in all_:
+                self._taken.append(number)
+                signal.signal(number, self._end)
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        for number in self._taken:
+            signal.signal(number, signal.SIG_DFL)
+
+    @contextmanager
+    def held(self) -> Iterator[None]:
+        """Let the block come to its end first."""
+        self._held = True
+        try:
+            yield
+        finally:
+            self._held = False
+            if self._asked:
+                end_process(self._asked)
+
+    def _end(self, number: int, frame: FrameType | None) -> None:
+        self._asked = number
+        if not self._held:
+            end_process(number)
+
+
 def write_all(files: Mapping[Path, Content]) -> None:
     """Write several files, each to a temporary name, synced, then renamed.
 
@@ -119,25 +180,59 @@ def write_all(files: Mapping[Path, Content]) -> None:
     """
     for path in files:
         _check_folder(path)
-    ready: list[tuple[str, Path]] = []
     path = Path()
     try:
-        for path, data in files.items():
-            if not is_stream(path):
-                place = _followed(path)
-                ready.append((_write_temporary(place, data), place))
-        for path, data in files.items():
-            if is_stream(path):
-                _write_through(path, data)
-        for temporary, path in ready:
-            os.replace(temporary, path)
-        for folder in {path.parent for _, path in ready}:
-            _sync_folder(folder)
+        with _Shield() as shield, _Temporaries(shield) as ready:
+            for path, data in files.items():
+                if not is_stream(path):
+                    ready.write(_followed(path), data)
+            for path, data in files.items():
+                if is_stream(path):
+                    _write_through(path, data)
+            ready.rename()
     except OSError as exc:
         raise disk_error(exc, path) from None
-    finally:
-        for temporary, _ in ready:
-            Path(temporary).unlink(missing_ok=True)
+
+
+class _Temporaries:
+    """Files under temporary names, in the folders of the final ones."""
+
+    def __init__(self, shield: _Shield) -> None:
+        self._shield = shield
+        self._ready: list[tuple[str, Path]] = []
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        for name, _place in self._ready:
+            Path(name).unlink(missing_ok=True)
+            _unfinished.discard(name)
+
+    def open(self, place: Path) -> IO[bytes]:
+        """Open a temporary file for a place."""
+        with self._shield.held():
+            start = f".{place.name[:100]}."
+            handle, name = tempfile.mkstemp(TEMPORARY, start, place.parent)
+            _unfinished.add(name)
+            self._ready.append((name, place))
+        return os.fdopen(handle, "wb")
+
+    def write(self, place: Path, data: Content) -> None:
+        """Write and sync a file that has the rights of the one in its place."""
+        mode = place.stat().st_mode & 0o777 if place.exists() else 0o666 & ~_umask()
+        with self.open(place) as out:
+            out.writelines([data] if isinstance(data, bytes) else data)
+            _sync(out)
+            os.fchmod(out.fileno(), mode)
+
+    def rename(self) -> None:
+        """Give all files their names; make that durable."""
+        with self._shield.held():
+            for name, place in self._ready:
+                os.replace(name, place)
+        for folder in {place.parent for _, place in self._ready}:
+            _sync_folder(folder)
 
 
 @contextmanager
@@ -147,16 +242,17 @@ def replace_file(path: Path) -> Iterator[IO[bytes]]:
     Raises:
         OSError: It cannot be written; what was there is there still.
     """
-    handle, name = tempfile.mkstemp(TEMPORARY, f".{path.name[:100]}.", path.parent)
-    try:
-        with os.fdopen(handle, "wb") as out:
+    with _Shield() as shield, _Temporaries(shield) as ready:
+        with ready.open(path) as out:
             yield out
-            out.flush()
-            os.fsync(out.fileno())
-        os.replace(name, path)
-        _sync_folder(path.parent)
-    finally:
-        Path(name).unlink(missing_ok=True)
+            _sync(out)
+        ready.rename()
+
+
+def _sync(out: IO[bytes]) -> None:
+    """Bring what was written to the disk."""
+    out.flush()
+    os.fsync(out.fileno())
 
 
 def disk_error(exc: OSError, path: str | Path) -> OutputError:
@@ -177,22 +273,6 @@ def _write_through(path: Path, data: Content) -> None:
     handle = os.open(path, os.O_WRONLY | os.O_APPEND)
     with os.fdopen(handle, "wb") as out:
         out.writelines([data] if isinstance(data, bytes) else data)
-
-
-def _write_temporary(path: Path, data: Content) -> str:
-    """Write and sync a temporary file in the folder of the final one."""
-    mode = path.stat().st_mode & 0o777 if path.exists() else 0o666 & ~_umask()
-    handle, name = tempfile.mkstemp(TEMPORARY, f".{path.name[:100]}.", path.parent)
-    try:
-        with os.fdopen(handle, "wb") as out:
-            out.writelines([data] if isinstance(data, bytes) else data)
-            out.flush()
-            os.fsync(out.fileno())
-        os.chmod(name, mode)
-    except BaseException:
-        Path(name).unlink(missing_ok=True)
-        raise
-    return name
 
 
 def _umask() -> int:

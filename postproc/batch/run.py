@@ -6,6 +6,7 @@ import fcntl
 import os
 import shutil
 import signal
+import threading
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import closing, contextmanager
 from dataclasses import dataclass, replace
@@ -21,6 +22,7 @@ from postproc.exceptions import DiskFullError, OutputError
 from postproc.files import (
     TEMPORARY,
     disk_error,
+    end_process,
     is_stream,
     replace_file,
     write_all,
@@ -30,6 +32,7 @@ from postproc.files import (
 
 ROOM = 2.5  # bytes written for a byte of source: the program and its record
 SPARE = 16_000_000  # bytes left over for the log and for others
+HASTE = 1.5  # [s] that a run may take to stop in good order
 
 
 @contextmanager
@@ -104,22 +107,34 @@ def check_room(folder: Path, sources: int, present: int) -> None:
 class StopRequest:
     """Whether the user wants to stop: Ctrl-C or SIGTERM.
 
-    The first one lets the file in hand be finished; a second one ends at once, which
-    leaves no half-written file either.
+    The first one lets what is being written be finished, for `HASTE` seconds; a second
+    one ends at once, which leaves no half-written file either.
+
+    Attributes:
+        number: The signal that asked, 0 for none.
     """
 
     def __init__(self) -> None:
         """Nobody has asked yet."""
-        self.asked = False
+        self.number = 0
+        self._end: threading.Timer | None = None
 
     def __call__(self) -> bool:
         """Tell whether to stop."""
-        return self.asked
+        return self.number > 0
 
     def _ask(self, number: int, frame: FrameType | None) -> None:
-        if self.asked:
-            raise KeyboardInterrupt
-        self.asked = True
+        if self.number:
+            end_process(number)
+        self.number = number
+        self._end = threading.Timer(HASTE, end_process, [number])
+        self._end.daemon = True
+        self._end.start()
+
+    def _heard(self) -> None:
+        """Come to the end in good order."""
+        if self._end is not None:
+            self._end.cancel()
 
 
 @contextmanager
@@ -131,6 +146,7 @@ def stoppable() -> Iterator[StopRequest]:
     try:
         yield stop
     finally:
+        stop._heard()
         for number, handler in zip(signals, before, strict=True):
             signal.signal(number, handler)
 
@@ -303,7 +319,7 @@ def batch(order: Order, gather: Gather, told: Told = lambda done, of: None) -> S
             run.work(gather, stop)
             if not stop():
                 run.tidy()
-        run.summary.stopped, run.summary.notes = stop(), tree.notes
+        run.summary.stopped, run.summary.notes = stop.number, tree.notes
         return run.summary
 
 

@@ -8,7 +8,7 @@ import re
 import pytest
 
 from postproc import __version__
-from postproc.cli import app
+from postproc.cli.commands import app
 from postproc.language.source import source_from_bytes
 from tests.written import FIRST, LISTED, NEXT, POSE, cli, entry, program
 

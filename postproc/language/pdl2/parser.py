@@ -7,7 +7,6 @@ import os
 import re
 import stat
 import sys
-import tempfile
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
@@ -19,6 +18,7 @@ from typing import Any, cast
 
 import lark
 
+from postproc.files import replace_file
 from postproc.language.pdl2 import syntax as ast
 from postproc.language.pdl2.syntax import Number
 from postproc.language.scan import NAME_MARK, UNREADABLE, form_of
@@ -367,14 +367,8 @@ def keep(key: str, data: bytes) -> None:
         return
     with suppress(OSError):
         place.mkdir(mode=0o700, parents=True, exist_ok=True)
-        handle, temporary = tempfile.mkstemp(dir=place)
-        try:
-            with os.fdopen(handle, "wb") as file:
-                file.write(hashlib.sha256(data).digest() + data)
-            os.replace(temporary, place / key)
-        except BaseException:  # Ctrl-C too
-            os.unlink(temporary)
-            raise
+        with replace_file(place / key) as file:
+            file.write(hashlib.sha256(data).digest() + data)
 
 
 # What one line of a variable file says; rule by rule like statements.
