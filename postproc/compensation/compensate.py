@@ -22,6 +22,7 @@ from postproc.compensation.notes import (
     listing_cost,
     missing_file,
     overruled_strings,
+    tool_in_metres,
     unsure_sides,
     untimed_runs,
 )
@@ -393,6 +394,7 @@ def report(
             *reading.diagnostics,
             *followed_pages(visits),
             *missing_file(visits),
+            *tool_in_metres(visits),
             *overruled_strings(visits, kept.overruled),
             *untimed_runs(visits, kept.untimed),
             *rounded_points(visits, kept.away),

@@ -433,7 +433,12 @@ class _Word(str):
     """A word of a head."""
 
 
-def _line(c: Sequence[Any]) -> EntryPart:
+def _line(c: Sequence[Any]) -> EntryPart | None:
+    """Put a line together; None where a number behind a value has no name.
+
+    Such a number may be the rest of one that is torn, by a blank or by a control
+    character, which counts as one: ``X: 10 93.44`` is no X of 10.
+    """
     line = EntryPart()
     for part in c:
         match part:
@@ -451,7 +456,8 @@ def _line(c: Sequence[Any]) -> EntryPart:
                 line = replace(line, config=text)
             case ("plain", slot):
                 line = replace(line, plain=(*line.plain, slot))
-    return line
+    torn = bool(line.plain) and bool(line.components or line.axes)
+    return None if torn else line
 
 
 def _head(c: Sequence[Any]) -> EntryPart:
