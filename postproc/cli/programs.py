@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from itertools import zip_longest
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -125,8 +126,9 @@ def _print_outcome(outcome: Outcome) -> None:
         place = f"{finding.file}:{finding.line}"
         say(f"{place}: {finding.code}: {finding.message}")
     excerpts = point_at_visits(outcome, outcome.left_rows()[:SHOWN])
-    for line, source in zip_longest(outcome.left_alone(), excerpts, fillvalue=""):
-        say(line)
+    left = Counter(zip_longest(outcome.left_alone(), excerpts, fillvalue=""))
+    for (line, source), times in left.items():
+        say(line if times == 1 else f"{line} ({times} times)")
         if source:
             say(source)
     say(outcome.summary())

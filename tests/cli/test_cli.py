@@ -323,3 +323,19 @@ def test_messages_show_control_characters_escaped(desk):
     source = program("glob \x1b[31m red", POSE)
     found = desk.compensate(desk.put("job.pdl", source), "-o", desk.folder / "o.pdl")
     assert "\x1b" not in found.stderr and "\\x1b" in found.stderr
+
+
+def test_what_is_said_of_a_line_is_said_once_with_a_count(desk):
+    # A routine that is called twice: each of its lines is reached twice.
+    moves = "".join(f"  {line}\r\n" for line in (FIRST, POSE, UNREACHED, NEXT))
+    text = (
+        f"PROGRAM job\r\nROUTINE r\r\nBEGIN\r\n{moves}END r\r\n"
+        "BEGIN\r\n  r\r\n  r\r\n  r\r\nEND job\r\n"
+    )
+    source = desk.put("job.pdl", text)
+    found = desk.compensate(source, "-o", desk.folder / "out.pdl")
+    said = [line for line in found.stderr.splitlines() if line.startswith("job.pdl:")]
+    assert len(said) == len(set(said)), found.stderr
+    assert [line for line in said if line.endswith(" (3 times)")]
+    told = desk.report(source, "-o", desk.folder / "more.pdl")["diagnostics"]
+    assert len(told) == len({json.dumps(d) for d in told})
