@@ -340,6 +340,15 @@ def variables_of(program: str) -> str:
     return os.path.splitext(program)[0] + _VARIABLES
 
 
+def find_variables(program: Path) -> Path | None:
+    """Find the variable file of a program: same base name, in any case."""
+    if not program.parent.is_dir():
+        return None
+    wanted = variables_of(program.name).lower()
+    found = [p for p in program.parent.iterdir() if p.name.lower() == wanted]
+    return min(found, default=None)
+
+
 def program_of(place: str) -> str:
     """Name the program that a variable file, or a compiled one, belongs to."""
     return os.path.splitext(place)[0] + _PROGRAM

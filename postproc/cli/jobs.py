@@ -21,6 +21,7 @@ from postproc.files import (
     Content,
     base_name,
     check_places,
+    find_variables,
     is_program,
     is_stream,
     is_variables,
@@ -273,7 +274,10 @@ class Job:
         if name in outcome.outputs:
             changed = Path(name) if self.variables is None else self.variables[0]
             place = values or _file_of(target, changed)
-            own[name] = values or place.with_name(variables_of(place.name))
+            beside = place.with_name(variables_of(place.name))
+            if place.suffix.isupper():  # JOB.PDL has JOB.LSV beside it
+                beside = beside.with_suffix(beside.suffix.upper())
+            own[name] = values or beside
         if target is not None and not is_stream(target):
             own[self.name] = target
         return own
@@ -351,15 +355,6 @@ def read_program_file(program: str) -> bytes:
     if program == STREAM:
         return read_stream(sys.stdin.buffer, STREAM)
     return read_input(Path(program))
-
-
-def find_variables(program: Path) -> Path | None:
-    """Find the variable file of a program: same base name, in any case."""
-    if not program.parent.is_dir():
-        return None
-    wanted = variables_of(program.name).lower()
-    found = [p for p in program.parent.iterdir() if p.name.lower() == wanted]
-    return min(found, default=None)
 
 
 def read_files(program: Path, lsv: Path | None = None) -> dict[str, bytes]:

@@ -191,6 +191,8 @@ def explain(
         check_places([as_path(json)], [program, cell, model, lsv])
         with busy("plan"):
             found = explain_file(program, cell, model, lsv, temperature)
+        for finding in found.findings(line):
+            say(finding)
         if json:
             write_text(json, found.to_json(line))
         if json != "-":

@@ -339,3 +339,18 @@ def test_what_is_said_of_a_line_is_said_once_with_a_count(desk):
     assert [line for line in said if line.endswith(" (3 times)")]
     told = desk.report(source, "-o", desk.folder / "more.pdl")["diagnostics"]
     assert len(told) == len({json.dumps(d) for d in told})
+
+
+def test_a_variable_file_keeps_the_case_of_its_name(desk):
+    source = desk.put("JOB.PDL", VALUED)
+    values = desk.put("JOB.LSV", LISTED + entry("a"))
+    assert desk.compensate(source).exit_code == 0
+    out = desk.folder / "JOB.compensated.PDL"
+    assert out.with_suffix(".LSV").exists() and not out.with_suffix(".lsv").exists()
+    found = cli("diff", source, out)
+    assert found.exit_code == 1 and "JOB.LSV" in found.stdout
+    back = desk.folder / "back"
+    back.mkdir()
+    assert cli("restore", out, "-o", back / "JOB.PDL").exit_code == 0
+    assert {p.name for p in back.iterdir()} == {"JOB.PDL", "JOB.LSV"}
+    assert (back / "JOB.LSV").read_bytes() == values.read_bytes()
