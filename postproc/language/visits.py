@@ -270,8 +270,8 @@ def told_once(found: Iterable[Diagnostic]) -> tuple[Diagnostic, ...]:
     A line that is reached several times, in a routine or a loop, gives one for every
     visit.
 
-    >>> [d.message for d in told_once([Diagnostic("a.pdl", 1, "x", "odd")] * 3)]
-    ['odd (3 times)']
+    >>> told_once([Diagnostic("a.pdl", 1, "x", "odd")] * 3)[0].message
+    'odd (3 times)'
     """
     return tuple(
         one if times == 1 else replace(one, message=f"{one.message} ({times} times)")
