@@ -2,7 +2,7 @@
 # make test    all tests
 # make lint    ruff and mypy
 # make lock    pin what is installed, in requirements/; UPGRADE=1: to the newest versions
-# make chaos   kill 200 batches of 300 files at random moments and resume them
+# make chaos   kill 200 batches of 300 files at random moments and resume them; end 50 long runs by signals
 # make fuzz    20,000 damaged programs: refused, or rewritten byte for byte; the parsers by coverage
 # make plant-bench   10,000 files, a second run, memory, workers, a cluster: docs/plant.md
 # make generated    1,000 random programs: followed as they run, landing where they say
@@ -78,7 +78,7 @@ blind: $(STAMP)
 	@PYTHONPATH=. $(PYTHON_BIN) docs/studies/diagnosed.py
 
 chaos: $(STAMP)
-	@$(PYTHON_BIN) -m tests.chaos --runs $(or $(RUNS),200) --files $(or $(FILES),300)
+	@$(PYTHON_BIN) -m tests.chaos --runs $(or $(RUNS),200) --files $(or $(FILES),300) --signals $(or $(SIGNALS),50)
 
 fuzz: $(STAMP)
 	@$(PYTHON_BIN) -m tests.fuzz --count $(or $(COUNT),20000)

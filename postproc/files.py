@@ -5,11 +5,15 @@ from __future__ import annotations
 import errno
 import os
 import re
+import signal
+import stat
 import tempfile
+import threading
 from collections.abc import Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import IO, BinaryIO
+from types import FrameType
+from typing import IO, BinaryIO, NoReturn, Self
 
 from postproc.exceptions import DiskFullError, OutputError, ProgramError
 
@@ -18,6 +22,40 @@ from postproc.exceptions import DiskFullError, OutputError, ProgramError
 TEMPORARY = ".postproc-tmp"  # end of the names of files that are being written
 Content = bytes | Iterable[bytes]  # of a file, whole or in pieces
 STREAM = "-"  # stands for standard input or output
+
+_PASSING = (stat.S_ISFIFO, stat.S_ISCHR)  # kinds that bytes pass through
+_DESCRIPTORS = re.compile(r"/proc/[^/]+(?:/task/\d+)?/fd")
+_LINKS = 40  # that lead on to each other; Linux follows no more
+
+
+def is_stream(place: str | Path) -> bool:
+    """Tell whether bytes pass by here once, with no name that could be replaced.
+
+    That is ``-``, a pipe, a device, and an open file of a process (``/dev/stdout``,
+    ``/dev/fd/3``, ``<(command)`` of a shell). What is not there yet is none.
+
+    >>> is_stream("-"), is_stream("job.pdl")
+    (True, False)
+    """
+    if str(place) == STREAM or _is_descriptor(Path(place)):
+        return True
+    try:
+        mode = os.stat(place).st_mode
+    except OSError:
+        return False
+    return any(kind(mode) for kind in _PASSING)
+
+
+def _is_descriptor(path: Path) -> bool:
+    """Tell whether a path names an open file of a process, maybe through links."""
+    for _ in range(_LINKS):
+        if not path.is_symlink():
+            return False
+        path = Path(os.path.realpath(path.parent), path.name)
+        if _DESCRIPTORS.fullmatch(str(path.parent)):
+            return True
+        path = path.parent / os.readlink(path)
+    return False
 
 
 def check_places(outputs: Iterable[Path | None], inputs: Iterable[Path | None]) -> None:
@@ -39,6 +77,8 @@ def check_places(outputs: Iterable[Path | None], inputs: Iterable[Path | None]) 
         if any(place.exists() and place.samefile(source) for source in read):
             cure = "Give another output with -o; inputs are never overwritten"
             raise OutputError(place, "is an input", cure)
+        if is_stream(place):
+            continue
         if place.resolve() in taken:
             raise OutputError(place, "is named twice", "Give each output its own name")
         taken.add(place.resolve())
@@ -46,13 +86,19 @@ def check_places(outputs: Iterable[Path | None], inputs: Iterable[Path | None]) 
 
 
 def _check_folder(place: Path) -> None:
-    """Refuse a place that is a folder, or that lies in none.
+    """Refuse a place that is no file, or that lies in no folder.
 
     Raises:
-        OutputError: It does.
+        OutputError: It does; or it is a socket or a disk, which nothing writes through.
     """
     if place.is_dir():
         raise OutputError(place, "is a folder", "Name the file to write in it")
+    if is_stream(place):
+        return
+    place = _followed(place)
+    if place.exists() and not place.is_file():
+        cure = "Give a file, a pipe or a terminal"
+        raise OutputError(place, "is neither a file nor a pipe", cure)
     if not place.parent.exists():
         cure = f"Make the folder {place.parent} first, or give another place"
         raise OutputError(place, "the folder does not exist", cure)
@@ -61,11 +107,72 @@ def _check_folder(place: Path) -> None:
         raise OutputError(place, "there is no such folder", cure)
 
 
+# What a signal that ends the process leaves behind: nothing.
+#
+# Commands leave such signals to the system, which ends them at once wherever they are,
+# in a long sum as well as while modules are loaded. Only what is being written asks for
+# more: temporary files are to be gone, and several files are renamed all or none.
+
+ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+_unfinished: set[str] = set()  # temporary files of this process
+
+
+def end_process(number: int) -> NoReturn:
+    """Remove what is not finished, and end as shells tell of a signal: 128 + number."""
+    for name in list(_unfinished):
+        with suppress(OSError):
+            os.unlink(name)
+    os._exit(128 + number)
+
+
+class _Shield:
+    """Signals that would end the process at once let it tidy up first.
+
+    Handlers that somebody else has set stay: they decide. Without a handler to set, in
+    a thread, nothing is changed.
+    """
+
+    def __init__(self) -> None:
+        self._taken: list[int] = []
+        self._held, self._asked = False, 0
+
+    def __enter__(self) -> Self:
+        if threading.current_thread() is threading.main_thread():
+            all_ = (n for n in ENDING if signal.getsignal(n) is signal.SIG_DFL)
+            for number in all_:
+                self._taken.append(number)
+                signal.signal(number, self._end)
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        for number in self._taken:
+            signal.signal(number, signal.SIG_DFL)
+
+    @contextmanager
+    def held(self) -> Iterator[None]:
+        """Let the block come to its end first."""
+        self._held = True
+        try:
+            yield
+        finally:
+            self._held = False
+            if self._asked:
+                end_process(self._asked)
+
+    def _end(self, number: int, frame: FrameType | None) -> None:
+        self._asked = number
+        if not self._held:
+            end_process(number)
+
+
 def write_all(files: Mapping[Path, Content]) -> None:
     """Write several files, each to a temporary name, synced, then renamed.
 
     No file appears under its name before all of them are safely on the disk. They are
-    renamed in the order given: name the one that users wait for last.
+    renamed in the order given: name the one that users wait for last. Only regular
+    files are replaced: a link stays, and the file that it leads to is replaced; into a
+    pipe, a device or an open file (`is_stream`) the bytes are written, before any
+    rename.
 
     Raises:
         OutputError: A folder is missing or cannot be written to, or the disk is full;
@@ -73,20 +180,59 @@ def write_all(files: Mapping[Path, Content]) -> None:
     """
     for path in files:
         _check_folder(path)
-    ready: list[tuple[str, Path]] = []
     path = Path()
     try:
-        for path, data in files.items():
-            ready.append((_write_temporary(path, data), path))
-        for temporary, path in ready:
-            os.replace(temporary, path)
-        for folder in {path.parent for path in files}:
-            _sync_folder(folder)
+        with _Shield() as shield, _Temporaries(shield) as ready:
+            for path, data in files.items():
+                if not is_stream(path):
+                    ready.write(_followed(path), data)
+            for path, data in files.items():
+                if is_stream(path):
+                    _write_through(path, data)
+            ready.rename()
     except OSError as exc:
         raise disk_error(exc, path) from None
-    finally:
-        for temporary, _ in ready:
-            Path(temporary).unlink(missing_ok=True)
+
+
+class _Temporaries:
+    """Files under temporary names, in the folders of the final ones."""
+
+    def __init__(self, shield: _Shield) -> None:
+        self._shield = shield
+        self._ready: list[tuple[str, Path]] = []
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        for name, _place in self._ready:
+            Path(name).unlink(missing_ok=True)
+            _unfinished.discard(name)
+
+    def open(self, place: Path) -> IO[bytes]:
+        """Open a temporary file for a place."""
+        with self._shield.held():
+            start = f".{place.name[:100]}."
+            handle, name = tempfile.mkstemp(TEMPORARY, start, place.parent)
+            _unfinished.add(name)
+            self._ready.append((name, place))
+        return os.fdopen(handle, "wb")
+
+    def write(self, place: Path, data: Content) -> None:
+        """Write and sync a file that has the rights of the one in its place."""
+        mode = place.stat().st_mode & 0o777 if place.exists() else 0o666 & ~_umask()
+        with self.open(place) as out:
+            out.writelines([data] if isinstance(data, bytes) else data)
+            _sync(out)
+            os.fchmod(out.fileno(), mode)
+
+    def rename(self) -> None:
+        """Give all files their names; make that durable."""
+        with self._shield.held():
+            for name, place in self._ready:
+                os.replace(name, place)
+        for folder in {place.parent for _, place in self._ready}:
+            _sync_folder(folder)
 
 
 @contextmanager
@@ -96,16 +242,17 @@ def replace_file(path: Path) -> Iterator[IO[bytes]]:
     Raises:
         OSError: It cannot be written; what was there is there still.
     """
-    handle, name = tempfile.mkstemp(TEMPORARY, f".{path.name[:100]}.", path.parent)
-    try:
-        with os.fdopen(handle, "wb") as out:
+    with _Shield() as shield, _Temporaries(shield) as ready:
+        with ready.open(path) as out:
             yield out
-            out.flush()
-            os.fsync(out.fileno())
-        os.replace(name, path)
-        _sync_folder(path.parent)
-    finally:
-        Path(name).unlink(missing_ok=True)
+            _sync(out)
+        ready.rename()
+
+
+def _sync(out: IO[bytes]) -> None:
+    """Bring what was written to the disk."""
+    out.flush()
+    os.fsync(out.fileno())
 
 
 def disk_error(exc: OSError, path: str | Path) -> OutputError:
@@ -116,20 +263,16 @@ def disk_error(exc: OSError, path: str | Path) -> OutputError:
     return OutputError(path, _reason(exc), cure)
 
 
-def _write_temporary(path: Path, data: Content) -> str:
-    """Write and sync a temporary file in the folder of the final one."""
-    mode = path.stat().st_mode & 0o777 if path.exists() else 0o666 & ~_umask()
-    handle, name = tempfile.mkstemp(TEMPORARY, f".{path.name[:100]}.", path.parent)
-    try:
-        with os.fdopen(handle, "wb") as out:
-            out.writelines([data] if isinstance(data, bytes) else data)
-            out.flush()
-            os.fsync(out.fileno())
-        os.chmod(name, mode)
-    except BaseException:
-        Path(name).unlink(missing_ok=True)
-        raise
-    return name
+def _followed(path: Path) -> Path:
+    """Return the file that a link leads to, whether it is there yet or not."""
+    return Path(os.path.realpath(path)) if path.is_symlink() else path
+
+
+def _write_through(path: Path, data: Content) -> None:
+    """Write into what is open elsewhere; nothing that it holds is cut off."""
+    handle = os.open(path, os.O_WRONLY | os.O_APPEND)
+    with os.fdopen(handle, "wb") as out:
+        out.writelines([data] if isinstance(data, bytes) else data)
 
 
 def _umask() -> int:
@@ -152,6 +295,8 @@ def _reason(exc: OSError) -> str:
     """Say in plain words why writing failed."""
     if isinstance(exc, FileNotFoundError):
         return "the folder does not exist"
+    if isinstance(exc, BrokenPipeError):
+        return "nobody reads it any more"
     if isinstance(exc, PermissionError) or exc.errno == errno.EROFS:
         return "the folder is read-only"
     return f"cannot be written ({exc.strerror})"
@@ -193,6 +338,15 @@ def variables_of(program: str) -> str:
     'a/JOB.lsv'
     """
     return os.path.splitext(program)[0] + _VARIABLES
+
+
+def find_variables(program: Path) -> Path | None:
+    """Find the variable file of a program: same base name, in any case."""
+    if not program.parent.is_dir():
+        return None
+    wanted = variables_of(program.name).lower()
+    found = [p for p in program.parent.iterdir() if p.name.lower() == wanted]
+    return min(found, default=None)
 
 
 def program_of(place: str) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from typer.testing import CliRunner
 
-from postproc.cli import app
+from postproc.cli.commands import app
 from postproc.exceptions import ProgramError
 from postproc.files import read_input
 from tests.plant import program

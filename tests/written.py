@@ -8,7 +8,7 @@ from pathlib import Path
 
 from typer.testing import CliRunner, Result
 
-from postproc.cli import app
+from postproc.cli.commands import app
 
 FIRST = "MOVE JOINT TO {5.0, 10.0, -95.0, 20.0, 50.0, 30.0}"
 POSE = "MOVE LINEAR TO POS(100.0, 200.0, 150.0, 0.0, 175.0, 0.0, '')"

@@ -154,7 +154,7 @@ class Summary:
         left: Programs with targets left alone, and how many.
         removed: Files of earlier runs that no source stands for any more.
         notes: What a person should know: path and text.
-        stopped: The user stopped the run before its end.
+        stopped: The signal with which the user stopped the run before its end, or 0.
     """
 
     counts: dict[str, Count] = field(default_factory=dict)
@@ -162,7 +162,7 @@ class Summary:
     left: list[tuple[str, int]] = field(default_factory=list)
     removed: list[str] = field(default_factory=list)
     notes: tuple[tuple[str, str], ...] = ()
-    stopped: bool = False
+    stopped: int = 0
     worst: int = 0
 
     def add(self, entry: JournalEntry) -> None:
@@ -185,8 +185,8 @@ class Summary:
 
     @property
     def exit_code(self) -> int:
-        """Return that of the worst file; a run that was stopped could not."""
-        return 2 if self.stopped else self.worst
+        """Return that of the worst file; 128 + signal for a run that was stopped."""
+        return 128 + self.stopped if self.stopped else self.worst
 
     def rows(self) -> list[tuple[str, ...]]:
         """Return the cells of the table, one row for every status there is."""

@@ -6,6 +6,7 @@ import fcntl
 import os
 import shutil
 import signal
+import threading
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import closing, contextmanager
 from dataclasses import dataclass, replace
@@ -18,12 +19,20 @@ from postproc.batch.tree import Tree, refuse_overlap, scan
 from postproc.batch.workers import WorkerPool, work_through
 from postproc.compensation.record import SUFFIX, file_sha256, sha256
 from postproc.exceptions import DiskFullError, OutputError
-from postproc.files import TEMPORARY, disk_error, replace_file, write_all
+from postproc.files import (
+    TEMPORARY,
+    disk_error,
+    end_process,
+    is_stream,
+    replace_file,
+    write_all,
+)
 
 # Conditions of a run: alone on its tree, with room, and stopped in good order.
 
 ROOM = 2.5  # bytes written for a byte of source: the program and its record
 SPARE = 16_000_000  # bytes left over for the log and for others
+HASTE = 1.5  # [s] that a run may take to stop in good order
 
 
 @contextmanager
@@ -98,22 +107,34 @@ def check_room(folder: Path, sources: int, present: int) -> None:
 class StopRequest:
     """Whether the user wants to stop: Ctrl-C or SIGTERM.
 
-    The first one lets the file in hand be finished; a second one ends at once, which
-    leaves no half-written file either.
+    The first one lets what is being written be finished, for `HASTE` seconds; a second
+    one ends at once, which leaves no half-written file either.
+
+    Attributes:
+        number: The signal that asked, 0 for none.
     """
 
     def __init__(self) -> None:
         """Nobody has asked yet."""
-        self.asked = False
+        self.number = 0
+        self._end: threading.Timer | None = None
 
     def __call__(self) -> bool:
         """Tell whether to stop."""
-        return self.asked
+        return self.number > 0
 
     def _ask(self, number: int, frame: FrameType | None) -> None:
-        if self.asked:
-            raise KeyboardInterrupt
-        self.asked = True
+        if self.number:
+            end_process(number)
+        self.number = number
+        self._end = threading.Timer(HASTE, end_process, [number])
+        self._end.daemon = True
+        self._end.start()
+
+    def _heard(self) -> None:
+        """Come to the end in good order."""
+        if self._end is not None:
+            self._end.cancel()
 
 
 @contextmanager
@@ -125,6 +146,7 @@ def stoppable() -> Iterator[StopRequest]:
     try:
         yield stop
     finally:
+        stop._heard()
         for number, handler in zip(signals, before, strict=True):
             signal.signal(number, handler)
 
@@ -148,7 +170,7 @@ class TargetTree:
             OutputError: They cannot be written.
         """
         for place in outputs:
-            self._make_folder(place)
+            self._make_room(place)
         write_all({self.root / place: data for place, data in outputs.items()})
         return {place: sha256(data) for place, data in outputs.items()}
 
@@ -161,7 +183,7 @@ class TargetTree:
         Raises:
             OutputError: It cannot be read or written.
         """
-        self._make_folder(place)
+        self._make_room(place)
         try:
             with source.open("rb") as data, replace_file(self.root / place) as out:
                 shutil.copyfileobj(data, out, 1 << 20)
@@ -205,11 +227,19 @@ class TargetTree:
         same = {p: d for p, d in outputs.items() if self.holds({p: d})}
         return self.remove(same)
 
-    def _make_folder(self, place: str) -> None:
+    def _make_room(self, place: str) -> None:
+        """Make the folder of a file; refuse what stands there and is no file.
+
+        A link may lead to a source; a pipe or a device is nothing that a tree holds.
+        """
+        path = self.root / place
         try:
-            (self.root / place).parent.mkdir(parents=True, exist_ok=True)
+            path.parent.mkdir(parents=True, exist_ok=True)
         except OSError as exc:
-            raise disk_error(exc, (self.root / place).parent) from None
+            raise disk_error(exc, path.parent) from None
+        if os.path.lexists(path) and (path.is_symlink() or not path.is_file()):
+            problem = "is a link or no regular file: it is not replaced"
+            raise OutputError(path, problem, "Remove it, then run the command again")
 
 
 def places_of(unit: Unit) -> tuple[str, ...]:
@@ -289,7 +319,7 @@ def batch(order: Order, gather: Gather, told: Told = lambda done, of: None) -> S
             run.work(gather, stop)
             if not stop():
                 run.tidy()
-        run.summary.stopped, run.summary.notes = stop(), tree.notes
+        run.summary.stopped, run.summary.notes = stop.number, tree.notes
         return run.summary
 
 
@@ -302,6 +332,9 @@ class BatchRun:
         Raises:
             OutputError: The log cannot be written.
         """
+        if is_stream(order.log):
+            problem = "is no file that a later run could read"
+            raise OutputError(order.log, problem, "Give a file as --log")
         self.order, self.tree, self.told = order, tree, told
         self.target = TargetTree(order.target)
         self.earlier = read_entries(order.log)

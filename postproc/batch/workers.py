@@ -26,6 +26,7 @@ import numpy as np
 from postproc import __version__
 from postproc.batch.plan import JobSetup, Result, Task, Unit, failed
 from postproc.compensation.outcome import Outcome
+from postproc.compensation.parallel import end_with_parent
 from postproc.compensation.record import SUFFIX
 from postproc.compensation.together import Given, compensate_batch
 from postproc.exceptions import PostprocError
@@ -414,6 +415,7 @@ def _begin(setups: Sequence[JobSetup]) -> None:
     # Ctrl-C goes to the whole group: the parent decides what becomes of us.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    end_with_parent()
     threading.Thread(target=_follow_parent, daemon=True).start()
 
 

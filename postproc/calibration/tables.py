@@ -542,7 +542,10 @@ def read_column_map(path: str | Path) -> Format:
     """
     try:
         data = tomllib.loads(Path(path).read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as exc:
+    except RecursionError:
+        problem = "is nested too deeply"
+        raise MeasurementError(path, problem, "Correct the column map") from None
+    except (OSError, ValueError) as exc:  # no UTF-8, no TOML, a number beyond all sizes
         problem = f"cannot be read as TOML ({exc})"
         raise MeasurementError(path, problem, "Correct the column map") from None
     _refuse_unknown(path, data, MAP_KEYS, "$")

@@ -1,43 +1,38 @@
-"""The command line: arguments, a call, and what is printed."""
+"""The command line: arguments, a call, and what is printed.
+
+Nothing is imported here but what ends a command: the rest takes long enough to be
+interrupted on its way.
+"""
 
 from __future__ import annotations
 
 import os
 import signal
 import sys
-from typing import Annotated
+from typing import Any
 
-import typer
-
-from postproc import __version__
-from postproc.cli import loop, models, plant, programs
-from postproc.cli.common import app, epilog, say
-
-NAME = "__name__"  # a command is called like its function
-
-__all__ = ["app", "loop", "main", "models", "plant", "programs"]
-
-for _command in app.registered_commands:
-    _command.epilog = epilog(str(_command.name or getattr(_command.callback, NAME)))
+__all__ = ["app", "main"]
 
 
-@app.callback(invoke_without_command=True)
-def _main(
-    version: Annotated[
-        bool, typer.Option("--version", help="Print the version.")
-    ] = False,
-) -> None:
-    if version:
-        typer.echo(f"postproc {__version__}")
-        raise typer.Exit(0)
+def __getattr__(name: str) -> Any:
+    """Load the application, for who does not come through `main`."""
+    if name != "app":
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    from postproc.cli.commands import app
+
+    return app
 
 
 def main() -> None:
     """Run the command line; a defect of ours ends with 2, like all that failed."""
-    # SIGTERM ends a command as Ctrl-C does: what was begun is cleaned up.
-    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    _leave_signals_to_the_system()
+    from postproc.cli.commands import app
+    from postproc.cli.common import broken, say
+
     try:
         app()
+    except OSError as exc:
+        sys.exit(broken(exc))
     except Exception as exc:
         if os.environ.get("POSTPROC_DEBUG"):
             raise
@@ -46,3 +41,15 @@ def main() -> None:
             "written. Set POSTPROC_DEBUG=1 for the trace, and please report it"
         )
         sys.exit(2)
+
+
+def _leave_signals_to_the_system() -> None:
+    """Let Ctrl-C and SIGTERM end this process at once, wherever it is.
+
+    Python would wait for the end of a long sum, and raise where nobody catches it:
+    while modules are loaded, or where an exception is dropped. Who has to tidy up says
+    so (`files.end_process`, `batch.run.stoppable`). A signal that is ignored stays so.
+    """
+    for number in (signal.SIGINT, signal.SIGTERM):
+        if signal.getsignal(number) is not signal.SIG_IGN:
+            signal.signal(number, signal.SIG_DFL)

@@ -2,18 +2,24 @@
 
 from __future__ import annotations
 
+import os
 import sys
 import threading
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
+from functools import wraps
 from pathlib import Path
-from typing import Annotated, TextIO
+from typing import Annotated, ParamSpec, TextIO, TypeVar
 
 import typer
 
-from postproc.exceptions import FileError, PostprocError, printable
+from postproc.exceptions import FileError, OutputError, PostprocError, printable
+from postproc.files import STREAM, disk_error, write_all
 
 # What all commands share: options, messages, and how errors end.
+
+P = ParamSpec("P")
+R = TypeVar("R")
 
 app = typer.Typer(
     no_args_is_help=True,
@@ -55,8 +61,47 @@ TemperatureOption = Annotated[
 
 
 def say(text: str) -> None:
-    """Print a message for a person, on stderr; no name in it steers the terminal."""
-    typer.echo("\n".join(map(printable, text.split("\n"))), err=True)
+    """Print a message for a person, on stderr; no name in it steers the terminal.
+
+    Where stderr takes nothing, the exit code has to tell.
+    """
+    with suppress(OSError):
+        typer.echo("\n".join(map(printable, text.split("\n"))), err=True)
+
+
+def guarded(command: Callable[P, R]) -> Callable[P, R]:
+    """Let a command end with 2 and in words where a place takes what it prints no more.
+
+    What it printed is written when it returns: later, nobody could tell.
+    """
+
+    @wraps(command)
+    def run(*args: P.args, **kwargs: P.kwargs) -> R:
+        try:
+            try:
+                return command(*args, **kwargs)
+            finally:
+                if sys.stdout is not None:
+                    sys.stdout.flush()
+        except OSError as exc:
+            raise typer.Exit(broken(exc)) from None
+
+    return run
+
+
+def broken(exc: OSError) -> int:
+    """Say why the system refused to go on, and return the exit code.
+
+    That somebody has read enough is nothing to tell.
+    """
+    with suppress(OSError, AttributeError, ValueError):
+        # What is left in the buffer is for nobody; the interpreter would try again.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    if exc.filename is not None:
+        say(f"postproc: {FileError(exc.filename, str(exc.strerror), 'Check it')}")
+    elif not isinstance(exc, BrokenPipeError):
+        say(f"postproc: {disk_error(exc, 'standard output')}")
+    return 2
 
 
 @contextmanager
@@ -75,12 +120,6 @@ def explained(*files: Path | None) -> Iterator[None]:
 
             if shown := point_at(exc, files):
                 say(shown)
-        raise typer.Exit(2) from None
-    except KeyboardInterrupt:
-        say("postproc: interrupted; nothing is half written. Run the command again")
-        raise typer.Exit(2) from None
-    except BrokenPipeError:
-        sys.stderr.close()
         raise typer.Exit(2) from None
 
 
@@ -112,14 +151,34 @@ def write_text(target: str, text: str | Iterable[str]) -> None:
     Raises:
         OutputError: The file cannot be written.
     """
-    from postproc.files import write_all
-
     if isinstance(text, str):
-        text = [text if target != "-" or text.endswith("\n") else text + "\n"]
-    if target == "-":
-        sys.stdout.writelines(text)
+        text = [text if target != STREAM or text.endswith("\n") else text + "\n"]
+    if target == STREAM:
+        _stdout().writelines(text)
     else:
         write_all({Path(target): map(str.encode, text)})
+
+
+def write_stdout(data: bytes) -> None:
+    """Write bytes to standard output.
+
+    Raises:
+        OutputError: It is closed.
+    """
+    out = _stdout().buffer
+    out.write(data)
+    out.flush()
+
+
+def _stdout() -> TextIO:
+    """Return standard output.
+
+    Raises:
+        OutputError: It is closed.
+    """
+    if sys.stdout is None:
+        raise OutputError("standard output", "is closed", "Name a file with -o")
+    return sys.stdout
 
 
 # What every command looks like in use; its --help shows them.
@@ -132,6 +191,8 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
         "postproc compensate job.pdl --cell cell.toml --model model.json"
         " -o out/job.pdl --html job.html",
         "cat job.pdl | postproc compensate - --cell cell.toml --model model.json > out",
+        "cat job.pdl | postproc compensate - --lsv job.lsv --lsv-out new.lsv"
+        " --cell cell.toml --model model.json > new.pdl",
     ),
     "diff": (
         "postproc diff job.pdl out/job.pdl | less -S",

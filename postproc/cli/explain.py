@@ -15,10 +15,21 @@ from postproc.cli.jobs import read_files
 from postproc.compensation.compensate import compensate
 from postproc.compensation.options import Options
 from postproc.compensation.outcome import Outcome, Status
-from postproc.compensation.program import Planned, plan_visits, read_program
+from postproc.compensation.program import (
+    Planned,
+    Reading,
+    plan_visits,
+    read_program,
+)
 from postproc.exceptions import ProgramError, printable
 from postproc.files import is_variables
-from postproc.language.visits import ELSEWHERE, START, Visits
+from postproc.language.visits import (
+    ELSEWHERE,
+    START,
+    Diagnostic,
+    Visits,
+    told_once,
+)
 from postproc.model.model import Model, load_model
 from postproc.report.json import target_rows
 from postproc.report.terminal import Column, arrows, print_table, status_colour
@@ -54,6 +65,7 @@ class Explanation:
         travel: Of every joint since its last reversal, (n, 6) [rad].
         why: Why a visit cannot be compensated, (n,); without a model.
         outcome: The compensation, or None without a model.
+        diagnostics: What was found in the program.
     """
 
     visits: Visits
@@ -62,14 +74,16 @@ class Explanation:
     travel: Floats
     why: Sequence[str]
     outcome: Outcome | None
+    diagnostics: tuple[Diagnostic, ...] = ()
 
     @classmethod
-    def of_plan(cls, visits: Visits, planned: Planned) -> Self:
+    def of_plan(cls, reading: Reading, planned: Planned) -> Self:
         """Explain a plan."""
+        visits, told = reading.visits, told_once(reading.diagnostics)
         plan, reasons = planned.plan, planned.reasons
         why = [reasons[i] for i in range(len(visits))]
         direction = plan.direction.astype(np.int8)
-        return cls(visits, plan.q, direction, plan.travel, why, None)
+        return cls(visits, plan.q, direction, plan.travel, why, None, told)
 
     @classmethod
     def of_outcome(cls, outcome: Outcome) -> Self:
@@ -77,7 +91,16 @@ class Explanation:
         d, arrivals = outcome.decisions, outcome.arrivals
         n = len(outcome.visits)
         travel = np.full((n, 6), np.nan) if arrivals is None else arrivals.travel
-        return cls(outcome.visits, d.q, d.direction, travel, (), outcome)
+        told = outcome.diagnostics
+        return cls(outcome.visits, d.q, d.direction, travel, (), outcome, told)
+
+    def findings(self, line: int | None = None) -> list[str]:
+        """Return what was found in the program, or on one line of it, as messages."""
+        return [
+            f"{d.file}:{d.line}: {d.code}: {d.message}"
+            for d in self.diagnostics
+            if line in (None, d.line)
+        ]
 
     def to_json(self, line: int | None = None) -> str:
         """Return one object per visit as JSON text.
@@ -236,8 +259,8 @@ def explain(
         PostprocError: The program, the cell or the model cannot be used.
     """
     if model is None:
-        visits = read_program(files, cell).visits
-        return Explanation.of_plan(visits, plan_visits(visits, cell))
+        reading = read_program(files, cell)
+        return Explanation.of_plan(reading, plan_visits(reading.visits, cell))
     (name, source), *rest = files.items()
     values = {n: data for n, data in rest if is_variables(n)}
     outcome = compensate(

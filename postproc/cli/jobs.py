@@ -15,17 +15,21 @@ from postproc.batch.tree import (
     program_arm,
     read_head,
 )
+from postproc.cli.common import write_stdout
 from postproc.compensation.compensate import compensate, name_files
 from postproc.compensation.options import Options, Progress, silent
 from postproc.compensation.outcome import Outcome
 from postproc.compensation.parallel import map_with
 from postproc.compensation.record import sidecar_path
+from postproc.exceptions import OutputError
 from postproc.files import (
     STREAM,
     Content,
     base_name,
     check_places,
+    find_variables,
     is_program,
+    is_stream,
     is_variables,
     program_of,
     read_input,
@@ -131,7 +135,7 @@ class Job:
     """A program with all that its compensation needs.
 
     Attributes:
-        path: The program, or None for standard input.
+        path: The program, or None for one that passes by once: standard input, a pipe.
         name: The program's file name.
         source: Its bytes.
         variables: Path and bytes of its variable file, or None.
@@ -159,7 +163,8 @@ class Job:
         """Read a program, its variable file, the cell and the model.
 
         Args:
-            program: A path, or ``-`` for standard input.
+            program: A path, or ``-`` for standard input; a pipe is read once, and
+                nothing is looked for beside it.
             cell: The cell file.
             model: The model file.
             lsv: The variable file; default: the one of the program's base name.
@@ -170,13 +175,10 @@ class Job:
         loaded = load_cell(cell)
         fitted = load_model(model)
         fitted.check_arm(loaded.arm, model)
-        path = None if program == STREAM else Path(program)
-        if path is None:
-            name = program_of("stdin" if lsv is None else lsv.name)
-            source = read_stream(sys.stdin.buffer, STREAM)
-        else:
-            name, source = path.name, read_input(path)
-            lsv = lsv or find_variables(path)
+        path = None if is_stream(program) else Path(program)
+        name = program_name(program, lsv)
+        source = read_program_file(program)
+        lsv = lsv or (None if path is None else find_variables(path))
         values = None if lsv is None else (lsv, read_input(lsv))
         found = Pages() if path is None else find_pages(path)
         pages = tuple((page, read_input(page)) for page in found.paths)
@@ -212,11 +214,13 @@ class Job:
         report: Path | None = None,
         html: Path | None = None,
         processes: int = 1,
+        values: Path | None = None,
     ) -> list[Path]:
         """Write the program, its variable file, the record and the reports.
 
-        A program from standard input goes to standard output unless it is told where
-        to; values that change go to a file in any case.
+        A program from standard input or a pipe goes to standard output unless it is
+        told where to. One that goes to standard output, a pipe or a device has no
+        record, and files only where it is told to.
 
         Args:
             outcome: What came of the program.
@@ -224,14 +228,17 @@ class Job:
             report: Where the report goes, None for nowhere.
             html: Where the report for a browser goes.
             processes: How many may work at once on long texts.
+            values: Where the variable file goes, changed or not; default: beside the
+                program, if it has changed.
 
         Returns:
             The files written.
 
         Raises:
-            OutputError: The output is the input, or cannot be written.
+            OutputError: An output is an input, cannot be written, or a part of the
+                program has no place to go to.
         """
-        check_places([output, report, html], self.inputs)
+        check_places([output, report, html, values], self.inputs)
         each = map_with(processes)
         files: dict[Path, Content] = {}
         if report is not None and report != Path(STREAM):
@@ -240,59 +247,93 @@ class Job:
             from postproc.report.html import program_report
 
             files[html] = program_report(outcome).encode()
-        piped = self.path is None and output is None
-        place = output or default_output(self._beside())
-        files |= self._results(outcome, place, piped, each)
+        place = output or (None if self.path is None else default_output(self.path))
+        files |= self._results(outcome, place, values, each)
         check_places(files, self.inputs)
         write_all(files)
-        if piped:
-            sys.stdout.buffer.write(outcome.outputs[self.name])
-            sys.stdout.buffer.flush()
+        if place is None:
+            write_stdout(outcome.outputs[self.name])
         return list(files)
 
-    def _beside(self) -> Path:
-        """Name the file that outputs lie beside, unless the user says where."""
-        if self.path is None and self.variables is not None:
-            return self.variables[0].with_name(self.name)
-        return self.path or Path(self.name)
-
     def _results(
-        self, outcome: Outcome, target: Path, piped: bool, each: Map
+        self, outcome: Outcome, target: Path | None, values: Path | None, each: Map
     ) -> dict[Path, Content]:
         """Name what a compensation gives, the file that users wait for last.
 
         Args:
             outcome: The compensation.
-            target: Where the program goes.
-            piped: The program goes elsewhere; only values get a file.
+            target: Where the program goes, None for standard output.
+            values: Where its variable file goes, None for beside it.
             each: How pieces of long texts are made.
+
+        Raises:
+            OutputError: A part of the program has no place to go to.
         """
-        values = target.with_name(variables_of(target.name))
         files: dict[Path, Content] = {}
         for page, _ in reversed(self.pages):
             if page.name in outcome.outputs:
-                place = _page_place(page, target)
+                place = _page_place(page, _file_of(target, page))
                 files |= _with_record(outcome, {page.name: place}, place, each)
-        own = {
-            name: target if name == self.name else values
-            for name in reversed(list(outcome.outputs))
-            if name not in {page.name for page, _ in self.pages}
-            and not (piped and name == self.name)
-        }
-        main = values if piped else target
-        return files | _with_record(outcome, own, main, each)
+        own = self._own_places(outcome, target, values)
+        if values and self.variables and variables_of(self.name) not in own:
+            files[values] = self.variables[1]
+        for places in _by_folder(own):
+            files |= _with_record(outcome, places, list(places.values())[-1], each)
+        if target is not None and is_stream(target):
+            files[target] = outcome.outputs[self.name]
+        return files
+
+    def _own_places(
+        self, outcome: Outcome, target: Path | None, values: Path | None
+    ) -> dict[str, Path]:
+        """Tell where the program and its values go, where those are files."""
+        name = variables_of(self.name)
+        own: dict[str, Path] = {}
+        if name in outcome.outputs:
+            changed = Path(name) if self.variables is None else self.variables[0]
+            place = values or _file_of(target, changed)
+            beside = place.with_name(variables_of(place.name))
+            if place.suffix.isupper():  # JOB.PDL has JOB.LSV beside it
+                beside = beside.with_suffix(beside.suffix.upper())
+            own[name] = values or beside
+        if target is not None and not is_stream(target):
+            own[self.name] = target
+        return own
+
+
+def _file_of(target: Path | None, part: Path) -> Path:
+    """Return the file of a program, beside which a part of it may go.
+
+    Raises:
+        OutputError: The program goes to standard output, a pipe or a device.
+    """
+    if target is None or is_stream(target):
+        how = "--lsv-out FILE, or " if is_variables(part.name) else ""
+        raise OutputError(
+            part,
+            "changes too, and nothing says where it goes",
+            f"Give {how}the program a file with -o",
+        )
+    return target
+
+
+def _by_folder(own: Mapping[str, Path]) -> list[dict[str, Path]]:
+    """Group files by their folder, in order: a record speaks of files beside it."""
+    found: dict[Path, dict[str, Path]] = {}
+    for name, place in own.items():
+        folder = place if is_stream(place) else place.parent.resolve()
+        found.setdefault(folder, {})[name] = place
+    return list(found.values())
 
 
 def _with_record(
     outcome: Outcome, places: Mapping[str, Path], main: Path, each: Map
 ) -> dict[Path, Content]:
     """Name the files of one program, behind the record that undoes them."""
-    if not places:
-        return {}
     names = {name: place.name for name, place in places.items()}
     record = map(str.encode, outcome.record.renamed(names).to_json(each))
     files = {place: outcome.outputs[name] for name, place in places.items()}
-    return {sidecar_path(main): record, **files}
+    return {**({} if is_stream(main) else {sidecar_path(main): record}), **files}
 
 
 def _page_place(page: Path, target: Path) -> Path:
@@ -311,25 +352,44 @@ def default_output(program: Path) -> Path:
     return program.with_name(f"{program.stem}.compensated{program.suffix}")
 
 
-def find_variables(program: Path) -> Path | None:
-    """Find the variable file of a program: same base name, in any case."""
-    if not program.parent.is_dir():
-        return None
-    wanted = variables_of(program.name).lower()
-    found = [p for p in program.parent.iterdir() if p.name.lower() == wanted]
-    return min(found, default=None)
+def program_name(program: str, lsv: Path | None) -> str:
+    """Name a program for messages, and for its variables: those share its base name.
+
+    >>> program_name("cell/job.pdl", None), program_name("-", Path("values/weld.lsv"))
+    ('job.pdl', 'weld.pdl')
+    """
+    name = Path(program).name
+    if not is_stream(program) or is_program(name):
+        return name
+    return program_of("stdin" if lsv is None else lsv.name)
+
+
+def read_program_file(program: str) -> bytes:
+    """Read a program, ``-`` for standard input.
+
+    Raises:
+        ProgramError: It cannot be read.
+    """
+    if program == STREAM:
+        return read_stream(sys.stdin.buffer, STREAM)
+    return read_input(Path(program))
 
 
 def read_files(program: Path, lsv: Path | None = None) -> dict[str, bytes]:
     """Read a program with its pages and its variable file, the program first.
 
+    Beside a pipe nothing is looked for.
+
     Raises:
         ProgramError: A file cannot be read.
     """
-    values = lsv or find_variables(program)
+    passing = is_stream(program)
+    source = read_program_file(str(program))
+    values = lsv or (None if passing else find_variables(program))
+    pages = () if passing else find_pages(program).paths
     return name_files(
-        program.name,
-        read_input(program),
+        program_name(str(program), lsv),
+        source,
         None if values is None else read_input(values),
-        {path.name: read_input(path) for path in find_pages(program).paths},
+        {path.name: read_input(path) for path in pages},
     )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from itertools import zip_longest
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -26,9 +27,10 @@ from postproc.cli.common import (
     write_text,
 )
 from postproc.exceptions import PostprocError
-from postproc.files import STREAM, check_places
+from postproc.files import STREAM, check_places, is_stream
 
 if TYPE_CHECKING:
+    from postproc.cli.jobs import Job
     from postproc.compensation.outcome import Outcome
 
 CROWD = 8  # processes, each with a window of its own in memory
@@ -47,6 +49,10 @@ def compensate(
         ),
     ] = None,
     lsv: LsvOption = None,
+    lsv_out: Annotated[
+        Path | None,
+        typer.Option("--lsv-out", help="Where the variable file goes, changed or not."),
+    ] = None,
     report: Annotated[
         Path | None,
         typer.Option("--report", help="Write the report (JSON), - for stdout."),
@@ -71,13 +77,15 @@ def compensate(
     from postproc.compensation.options import Options
     from postproc.report.json import report_text
 
-    given = None if program == STREAM else Path(program)
+    given = None if is_stream(program) else Path(program)
     with explained(given, lsv):
         options = Options(clone, shared, temperature, orientation)
         if report == Path(STREAM) and given is None and output is None:
             raise PostprocError("--report -: stdout holds the program. Name a file")
-        check_places([output, report, html], [given, lsv, cell, model])
+        check_places([output, report, html, lsv_out], [given, lsv, cell, model])
         job = jobs.Job.open(program, cell, model, lsv)
+        if lsv_out is not None:
+            _check_values(lsv_out, job)
         crowd = processes or min(parallel.available(), CROWD)
         with stages() as progress:
             outcome = job.run(options, progress, crowd)
@@ -87,13 +95,27 @@ def compensate(
                 "--strict: targets were left uncompensated (listed above), nothing is "
                 "written. Mend them, or run without --strict"
             )
-        written = job.write(outcome, output, report, html, crowd)
+        written = job.write(outcome, output, report, html, crowd, lsv_out)
         _print_outcome(outcome)
         if report == Path(STREAM):
             write_text(STREAM, report_text(outcome))
         for path in written:
             say(f"written {path}")
     raise typer.Exit(outcome.exit_code)
+
+
+def _check_values(place: Path, job: Job) -> None:
+    """Refuse a place for a variable file that is none, or where there is no such file.
+
+    Raises:
+        PostprocError: It is.
+    """
+    if place == Path(STREAM):
+        raise PostprocError("--lsv-out -: stdout holds the program. Name a file")
+    if job.variables is None:
+        raise PostprocError(
+            "--lsv-out: the program has no variable file. Give it with --lsv"
+        )
 
 
 def _print_outcome(outcome: Outcome) -> None:
@@ -104,8 +126,9 @@ def _print_outcome(outcome: Outcome) -> None:
         place = f"{finding.file}:{finding.line}"
         say(f"{place}: {finding.code}: {finding.message}")
     excerpts = point_at_visits(outcome, outcome.left_rows()[:SHOWN])
-    for line, source in zip_longest(outcome.left_alone(), excerpts, fillvalue=""):
-        say(line)
+    left = Counter(zip_longest(outcome.left_alone(), excerpts, fillvalue=""))
+    for (line, source), times in left.items():
+        say(line if times == 1 else f"{line} ({times} times)")
         if source:
             say(source)
     say(outcome.summary())
@@ -168,6 +191,8 @@ def explain(
         check_places([as_path(json)], [program, cell, model, lsv])
         with busy("plan"):
             found = explain_file(program, cell, model, lsv, temperature)
+        for finding in found.findings(line):
+            say(finding)
         if json:
             write_text(json, found.to_json(line))
         if json != "-":

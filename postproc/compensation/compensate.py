@@ -23,6 +23,7 @@ from postproc.compensation.notes import (
     listing_cost,
     missing_file,
     overruled_strings,
+    tool_in_metres,
     unsure_sides,
     untimed_runs,
 )
@@ -61,7 +62,7 @@ from postproc.exceptions import CellError, ProgramError
 from postproc.files import variables_of
 from postproc.language.source import Replacements, Source
 from postproc.language.stamp import is_stamped
-from postproc.language.visits import Visits
+from postproc.language.visits import Visits, told_once
 from postproc.model.model import Model
 from postproc.model.statistics import ErrorStatistics
 from postproc.motion.trace import NOWHERE, StartState
@@ -401,17 +402,20 @@ def report(
         decisions=d,
         before=ErrorStatistics.of_sizes(kept.before),
         after=ErrorStatistics.of_sizes(kept.after),
-        diagnostics=(
-            *reading.diagnostics,
-            *followed_pages(visits),
-            *missing_file(visits),
-            *contradicted_base(visits, cell),
-            *overruled_strings(visits, kept.overruled),
-            *untimed_runs(visits, kept.untimed),
-            *rounded_points(visits, kept.away),
-            *unsure_sides(visits, rows, d.side, d.std_error),
-            *listing_cost(visits, rows, d.q, cell.arm),
-            assumed_off(name, cell),
+        diagnostics=told_once(
+            (
+                *reading.diagnostics,
+                *followed_pages(visits),
+                *missing_file(visits),
+                *contradicted_base(visits, cell),
+                *tool_in_metres(visits),
+                *overruled_strings(visits, kept.overruled),
+                *untimed_runs(visits, kept.untimed),
+                *rounded_points(visits, kept.away),
+                *unsure_sides(visits, rows, d.side, d.std_error),
+                *listing_cost(visits, rows, d.q, cell.arm),
+                assumed_off(name, cell),
+            )
         ),
         stages=setting.clock.stages,
         motion=largest_motion(kept.departure),

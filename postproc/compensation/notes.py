@@ -14,6 +14,8 @@ from postproc.robot.pose import MM
 SURE = 0.9  # part of its play from its middle at which a joint rests on a flank
 LISTED = 0.01  # [mm] and [deg], the last decimal of the controller's own listing
 
+SHORTEST = 2.0  # [mm] of a tool that is no flange; a longer one has no 2 m
+
 SINGLY = 20  # findings of one kind that are listed line by line
 
 
@@ -21,6 +23,27 @@ def assumed_off(name: str, cell: Cell) -> Diagnostic:
     """State that the controller is taken not to compensate on its own."""
     text = f"the controller's own absolute accuracy is taken to be off ({cell.path})"
     return Diagnostic(name, 1, "absolute-accuracy", text)
+
+
+def tool_in_metres(visits: Visits) -> list[Diagnostic]:
+    """Ask about the first tool that is shorter than any, but not of no length.
+
+    Tools are tens of millimetres long and more; written in metres none reaches two.
+    """
+    longest = np.abs(visits.frames[:, :3]).max(axis=1, initial=0.0)
+    short = (longest > 0.0) & (longest < SHORTEST)
+    known = np.flatnonzero(visits.tool >= 0)
+    first = known[short[visits.tool[known]]][:1]
+    return [
+        Diagnostic(
+            visits.files[visits.file[i]],
+            int(visits.line[i]),
+            "tool-length",
+            f"the tool here is {longest[visits.tool[i]]:g} mm long, by the program or "
+            "by [tool] of the cell: are these metres? Write millimetres",
+        )
+        for i in first
+    ]
 
 
 def followed_pages(visits: Visits) -> list[Diagnostic]:

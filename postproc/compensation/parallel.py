@@ -104,12 +104,18 @@ def _live(
 ) -> NoReturn:
     """Be the child."""
     try:
-        ctypes.CDLL(None).prctl(SET_PDEATHSIG, signal.SIGKILL)
+        end_with_parent()
         if os.getppid() == parent:
             gc.freeze()  # pages with objects of the parent stay shared
             _make(work, there, ahead)
     finally:
         os._exit(1)
+
+
+def end_with_parent() -> None:
+    """Let the system kill this process when its parent ends, on Linux."""
+    if sys.platform == "linux":
+        ctypes.CDLL(None).prctl(SET_PDEATHSIG, signal.SIGKILL)
 
 
 def _make(work: Callable[[], Iterable[T]], there: int, ahead: int) -> None:

@@ -16,8 +16,9 @@ import numpy as np
 from postproc.arrays import Map
 from postproc.byte_columns import joined, shortest, whole
 from postproc.exceptions import ProgramError
-from postproc.files import read_input, write_all
+from postproc.files import LARGEST, check_places, read_input, write_all
 from postproc.language.source import Replacements, Source, apply, as_bytes
+from postproc.language.stamp import read_stamp
 
 # The record beside an output that gives the source back, byte for byte.
 
@@ -87,6 +88,8 @@ class FileRecord:
             KeyError, ValueError, TypeError: It is something else.
         """
         rows = told["edits"]
+        if len(rows) * max((len(str(text)) for *_, text in rows), default=0) > LARGEST:
+            raise ValueError("replaced texts are numbers, and these are longer")
         return cls(
             str(told["source_sha256"]),
             str(told["output_sha256"]),
@@ -204,10 +207,24 @@ def _record(path: Path, text: bytes) -> Sidecar:
     try:
         data = json.loads(text)
         files = {name: FileRecord.read(told) for name, told in data["files"].items()}
+        if not all(map(_is_name, files)):
+            raise ValueError("a name that no file has")
         version, model = str(data["postproc"]), str(data["model"])
         return Sidecar(version, model, files, data.get("options", {}))
-    except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
+    except (
+        *(ValueError, KeyError, TypeError, AttributeError),
+        *(RecursionError, OverflowError),
+    ):
         raise ProgramError(path, "is not a record of postproc", CURE) from None
+
+
+def _is_name(name: str) -> bool:
+    r"""Tell whether a file beside the record can have a name.
+
+    >>> _is_name("job.pdl"), _is_name(""), _is_name(".."), _is_name("a\0b")
+    (True, False, False, False)
+    """
+    return Path(name).name not in ("", "..") and "\0" not in name
 
 
 # Give a compensated program back as it was.
@@ -227,15 +244,22 @@ def restore(data: bytes, record: FileRecord, name: str) -> bytes:
         ProgramError: The file was changed since it was compensated, or the record does
             not belong to it.
     """
-    if sha256(data) != record.output_sha256:
+    stamp = read_stamp(data)
+    if stamp is not None and stamp.source != record.source_sha256.lower():
+        problem = "its stamp names another source than its record"
+        raise ProgramError(name, problem, CURE, line=1)
+    if sha256(data) != record.output_sha256.lower():
         raise ProgramError(
             name,
             f"was changed after it was compensated ({_where(data, record)})",
             "Undo that change, or take the source from your archive",
             line=_first_changed_line(data, record),
         )
-    source = apply(data, record.edits)
-    if sha256(source) != record.source_sha256:
+    try:
+        source = apply(data, record.edits)
+    except ValueError:
+        source = b""  # an edit lies outside of the file
+    if sha256(source) != record.source_sha256.lower():
         raise ProgramError(
             name, "the record does not give its source back", "It belongs elsewhere"
         )
@@ -269,22 +293,39 @@ def restore_file(compensated: Path, output: Path | None = None) -> list[Path]:
         The files written.
 
     Raises:
-        ProgramError: No record, or a file was changed since.
-        OutputError: A file cannot be written; nothing is changed then.
+        ProgramError: No record, one that does not speak of the program, or a file was
+            changed since.
+        OutputError: A file cannot be written, or would be written over the record;
+            nothing is changed then.
     """
-    record = read_sidecar(sidecar_path(compensated))
+    path = sidecar_path(compensated)
+    record = read_sidecar(path)
     target = output or compensated
     restored: dict[Path, bytes] = {}
-    if output is not None and compensated.name not in record.files:
-        restored[output] = read_input(
-            compensated, BESIDE
-        )  # only its values were changed
+    if compensated.name not in record.files:
+        kept = _unchanged(compensated, record, path)
+        restored |= {} if output is None else {output: kept}
     for name, file in record.files.items():
         source = compensated.with_name(Path(name).name)
         place = source
         if output is not None:
             place = target.with_name(target.stem + source.suffix)
             place = target if source == compensated else place
+        check_places([*restored, place], [path])
         restored[place] = restore(read_input(source, BESIDE), file, str(source))
     write_all(restored)
     return list(restored)
+
+
+def _unchanged(program: Path, record: Sidecar, path: Path) -> bytes:
+    """Read a program that its record does not name: only its values were changed.
+
+    Raises:
+        ProgramError: The record speaks of no file, or the program was changed.
+    """
+    if not record.files:
+        raise ProgramError(path, "speaks of no file", CURE)
+    data = read_input(program, BESIDE)
+    if read_stamp(data) is not None:
+        raise ProgramError(path, f"does not speak of {program.name}", CURE)
+    return data

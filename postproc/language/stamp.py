@@ -6,14 +6,17 @@ import hashlib
 import re
 from dataclasses import dataclass
 
-from postproc.language.source import Source
+from postproc.language.source import UTF8_MARK, Source
 
+_INDENT = 400  # blanks before a stamp that an editor has moved
 _STAMP = re.compile(
-    rb"-- postproc (?P<version>\S+) model=(?P<model>\S+) "
-    rb"source=(?P<source>[0-9a-f]{64})(?P<rest>[^\r\n]*)(?:\r\n|\n|\r|\Z)"
+    rb"[ \t]*--[ \t]*postproc[ \t]+(?P<version>\S+)[ \t]+"
+    rb"model[ \t]*=[ \t]*(?P<model>\S+)"
+    rb"[ \t]+source[ \t]*=[ \t]*(?P<source>[0-9a-f]{64})\b(?P<rest>[^\r\n]*)"
+    rb"(?:\r\n|\n|\r|\Z)",
+    re.IGNORECASE,  # an editor may have changed the case, and blanks
 )
-_MARK = b"-- postproc "  # looked for first: that is much faster
-_ANY_STAMP = re.compile(rb"^[ \t]*-- postproc \S+ model=", re.M)
+_BEGINS = re.compile(rb"--[ \t]*postproc[ \t]+\S+[ \t]+model[ \t]*=", re.IGNORECASE)
 
 
 @dataclass(frozen=True)
@@ -23,7 +26,8 @@ class Stamp:
     Attributes:
         version: Version of the tool.
         model: Id of the model.
-        source: SHA-256 of the original's bytes, hexadecimal.
+        source: SHA-256 of the original's bytes, hexadecimal. All are lower-case,
+            whatever an editor has made of them.
     """
 
     version: str
@@ -52,17 +56,28 @@ def stamped(version: str, model: str, source: Source, data: bytes) -> bytes:
 
 def read_stamp(data: bytes) -> Stamp | None:
     """Return the stamp on line 1, None where there is none."""
-    found = _STAMP.match(data.removeprefix(b"\xef\xbb\xbf"))
+    found = _STAMP.match(data.removeprefix(UTF8_MARK))
     if found is None:
         return None
     return Stamp(
-        *(found[name].decode("ascii") for name in ("version", "model", "source"))
+        *(
+            found[name].decode("ascii", "replace").lower()
+            for name in ("version", "model", "source")
+        )
     )
 
 
 def is_stamped(source: Source) -> bool:
     """Tell whether a program is an output of this tool, stamp moved or not."""
-    return _MARK in source.data and _ANY_STAMP.search(source.data) is not None
+    data = source.data
+    return any(_leads(data, found.start()) for found in _BEGINS.finditer(data))
+
+
+def _leads(data: bytes, at: int) -> bool:
+    """Tell whether nothing but blanks stands on a line before an offset."""
+    before = data[:at] if at < _INDENT else data[at - _INDENT : at]
+    before = before.rstrip(b" \t").removesuffix(UTF8_MARK)
+    return not before or before.endswith((b"\n", b"\r"))
 
 
 def strip_stamp(data: bytes) -> bytes:

@@ -5,7 +5,9 @@ What a language hands to everything else; nothing after it knows how a program i
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections import Counter
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
 from enum import IntEnum
 from functools import cached_property
 from typing import Any
@@ -260,3 +262,18 @@ class Diagnostic:
     line: int
     code: str
     message: str
+
+
+def told_once(found: Iterable[Diagnostic]) -> tuple[Diagnostic, ...]:
+    """Join findings that say the same of the same line, and say how often.
+
+    A line that is reached several times, in a routine or a loop, gives one for every
+    visit.
+
+    >>> told_once([Diagnostic("a.pdl", 1, "x", "odd")] * 3)[0].message
+    'odd (3 times)'
+    """
+    return tuple(
+        one if times == 1 else replace(one, message=f"{one.message} ({times} times)")
+        for one, times in Counter(found).items()
+    )

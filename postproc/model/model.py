@@ -328,7 +328,8 @@ def read_model_file(path: Path) -> ModelFile:
         raise ModelError(path, "is too large for a model", "Check the path")
     try:
         data = json.loads(raw)
-    except (UnicodeDecodeError, json.JSONDecodeError, RecursionError):
+        own = content_id(data) if isinstance(data, dict) else ""
+    except (ValueError, RecursionError):  # also a number of thousands of digits
         cure = "Make it again with postproc fit"
         raise ModelError(path, "is not valid JSON", cure) from None
     try:
@@ -338,7 +339,7 @@ def read_model_file(path: Path) -> ModelFile:
         place = "$" + "".join(f".{key}" for key in first["loc"])
         cure = "Make the model again with postproc fit"
         raise ModelError(path, first["msg"], cure, place=place) from None
-    if content_id(data) != file.id:
+    if own != file.id:
         raise ModelError(
             path,
             "has been changed since it was made: its id does not match its content",

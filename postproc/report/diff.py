@@ -24,7 +24,7 @@ from postproc.compensation.outcome import (
 )
 from postproc.compensation.parallel import in_background, parallel_map
 from postproc.exceptions import ProgramError
-from postproc.files import is_variables, variables_of
+from postproc.files import find_variables, is_variables
 from postproc.language.pdl2.names import entry_names
 from postproc.language.scan import (
     BLANKS,
@@ -738,8 +738,8 @@ def diff(original: Path, compensated: Path) -> Difference:
         ProgramError: A file cannot be read.
     """
     pairs = [(original, compensated)]
-    old, new = (p.with_name(variables_of(p.name)) for p in pairs[0])
-    if not is_variables(original.name) and old.is_file() and new.is_file():
+    old, new = map(find_variables, pairs[0])
+    if not is_variables(original.name) and old is not None and new is not None:
         pairs.append((old, new))
     told_by = partial(read_arrivals, compensated, pairs)
     with in_background(told_by, worth=_long(pairs)) as ask:

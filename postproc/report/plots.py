@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,7 @@ from postproc.calibration.diagnosis.library import Projection
 from postproc.calibration.diagnosis.result import Profile, periodogram, profile
 from postproc.calibration.published import Comparison
 from postproc.exceptions import OutputError
+from postproc.files import write_all
 from postproc.robot.pose import MM
 
 BEFORE, AFTER = "#d55e00", "#0072b2"  # told apart by all kinds of colour vision
@@ -80,13 +82,16 @@ def save(figure: Figure, path: Path) -> Path:
     Raises:
         OutputError: It cannot be written.
     """
-    dated = {"Date": None} if path.suffix.lower() == ".svg" else None
+    kind = path.suffix.lower().removeprefix(".") or "png"
+    drawn = BytesIO()
     try:
         with rc_context({"svg.hashsalt": "postproc"}):
-            figure.savefig(path, dpi=150, metadata=dated)
-    except (OSError, ValueError) as exc:
+            dated = {"Date": None} if kind == "svg" else None
+            figure.savefig(drawn, dpi=150, metadata=dated, format=kind)
+    except ValueError as exc:
         cure = "Name a .png or .svg file in an existing folder"
         raise OutputError(path, str(exc), cure) from None
+    write_all({path: drawn.getvalue()})
     return path
 
 

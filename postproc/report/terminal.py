@@ -260,11 +260,19 @@ def _blanks(count: Ints) -> Bytes:
 # How far something is.
 
 
+class _Steady(Console):
+    """A terminal whose cursor stays: a signal ends us at once, and it would be gone."""
+
+    def show_cursor(self, show: bool = True) -> bool:
+        """Leave the cursor as it is."""
+        return False
+
+
 def show_status(
     out: TextIO, text: str
 ) -> tuple[Callable[[str], None], Callable[[], None]]:
     """Show a line that moves; return how to change its text, and how to end it."""
-    status = Console(file=out).status(text)
+    status = _Steady(file=out).status(text)
     status.start()
     return status.update, status.stop
 
@@ -293,7 +301,7 @@ def progress_bar(
         _Rate(),
         TimeRemainingColumn(),
     )
-    with Progress(*columns, console=Console(file=out), transient=True) as progress:
+    with Progress(*columns, console=_Steady(file=out), transient=True) as progress:
         bar = progress.add_task(printable(title), total=None)
         yield lambda done, of: progress.update(bar, completed=done, total=of)
 
@@ -313,7 +321,7 @@ def stage_bar(out: TextIO | None = None) -> Iterator[Callable[[str, float], None
         yield lambda stage, share: None
         return
     columns = (BarColumn(), TextColumn("{task.description}", markup=False))
-    with Progress(*columns, console=Console(file=out), transient=True) as progress:
+    with Progress(*columns, console=_Steady(file=out), transient=True) as progress:
         bar = progress.add_task("starting", total=1.0)
         yield lambda stage, share: progress.update(
             bar, description=printable(stage), completed=share

@@ -49,6 +49,11 @@ def read_toml(path: Path, schema: type[Schema], error: type[FileError]) -> Schem
         raise error(path, "is not UTF-8 text", "Save it as UTF-8") from None
     except tomllib.TOMLDecodeError as exc:
         raise _syntax(path, str(exc), error) from None
+    except RecursionError:
+        raise error(path, "is nested too deeply", "Write it flat") from None
+    except ValueError:
+        problem = "holds an integer of more digits than any number needs"
+        raise error(path, problem, "Write it shorter") from None
     try:
         return schema.model_validate(data)
     except pydantic.ValidationError as exc:

@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 from postproc.batch.check import check
 from postproc.batch.plan import make_plan
 from postproc.batch.run import Order, batch, default_log
-from postproc.cli import app
+from postproc.cli.commands import app
 from postproc.compensation.options import AS_USUAL
 from postproc.compensation.outcome import Status
 from postproc.exceptions import ProgramError

@@ -53,13 +53,48 @@ def test_an_interrupted_run_stops_in_order_and_can_go_on(plant):
     process.send_signal(signal.SIGTERM)
     _, said = process.communicate(timeout=60)
     there = contents(plant.root / "dst")
-    assert process.returncode == 2
+    assert process.returncode == 128 + signal.SIGTERM
     assert "--resume" in said and "Traceback" not in said
     assert not [p for p in there if p.endswith(TEMPORARY)]
     assert 0 < len([p for p in there if p.endswith(".pdl")]) < 60
     gone(workers)
     assert plant.run(plant.root / "dst", "--resume") == 0
     assert len([p for p in contents(plant.root / "dst") if p.endswith(".pdl")]) == 60
+
+
+def test_a_second_signal_ends_a_run_at_once(plant):
+    grow(plant.source, 60, 1)
+    process = started(plant)
+    workers = list(descendants(process.pid))
+    process.send_signal(signal.SIGINT)
+    process.send_signal(signal.SIGTERM)
+    _, said = process.communicate(timeout=60)
+    assert process.returncode in (128 + signal.SIGTERM, 128 + signal.SIGINT)
+    assert "Traceback" not in said
+    there = contents(plant.root / "dst")
+    assert not [p for p in there if p.endswith(TEMPORARY)]
+    gone(workers)
+
+
+def test_a_run_that_cannot_stop_in_order_is_ended(tmp_path):
+    code = (
+        "import time\n"
+        "from postproc.batch.run import stoppable\n"
+        "from postproc.files import replace_file\n"
+        "from pathlib import Path\n"
+        "with stoppable(), replace_file(Path('copy')) as out:\n"
+        "    print('begun', flush=True)\n"
+        "    for _ in range(600): time.sleep(0.1)\n"
+    )
+    process = subprocess.Popen(
+        [sys.executable, "-c", code], cwd=tmp_path, stdout=subprocess.PIPE
+    )
+    assert process.stdout.readline() == b"begun\n"
+    start = time.monotonic()
+    process.terminate()
+    assert process.wait(timeout=60) == 128 + signal.SIGTERM
+    assert time.monotonic() - start < 2.0
+    assert not list(tmp_path.iterdir())
 
 
 def test_closed_workers_leave_no_thread_behind(plant):

@@ -7,6 +7,10 @@ import errno
 import json
 import os
 import re
+import resource
+import subprocess
+import sys
+from resource import setrlimit
 
 import pytest
 
@@ -455,3 +459,138 @@ def test_a_straight_line_to_the_joints_where_the_arm_already_is(desk):
     source = desk.put("job.pdl", program("REPEAT", again, "UNTIL $DIN[1]"))
     found = desk.compensate(source)
     assert found.exit_code in (0, 1), found.stderr
+
+
+def model_with(desk, old, new):
+    """Write the model with another text in it."""
+    text = desk.model.read_text()
+    assert old in text
+    return desk.put("odd.json", text.replace(old, new, 1))
+
+
+@pytest.mark.parametrize(
+    "text", ["9" * 5000, "[" * 100_000 + "]" * 100_000, '{"a":' * 50_000 + "1"]
+)
+def test_a_model_that_json_cannot_hold_is_refused_in_words(desk, text):
+    odd = model_with(desk, '"rows": ', f'"rows": {text}')
+    source = desk.put("job.pdl", program(FIRST, POSE))
+    found = cli("compensate", source, "--cell", desk.cell, "--model", odd)
+    refused(found, r"odd\.json: is not valid JSON\. Make it again")
+    refused(cli("report", odd, "-o", desk.folder / "o.html"), "is not valid JSON")
+
+
+DEEP = {
+    "arrays": ("x = " + "[" * 5000 + "]" * 5000, "nested too deeply"),
+    "tables": ("x = " + "{a = " * 3000 + "1" + "}" * 3000, "nested too deeply"),
+    "digits": ("x = " + "9" * 5000, "more digits than any number needs"),
+}
+
+
+@pytest.mark.parametrize(("text", "said"), DEEP.values(), ids=DEEP)
+def test_toml_beyond_all_measure_is_refused_in_words(desk, text, said):
+    source = desk.put("job.pdl", program(FIRST, POSE))
+    cell = desk.put("odd.toml", desk.cell.read_text() + "\n" + text)
+    refused(cli("explain", source, "--cell", cell), rf"odd\.toml: .*{said}")
+    plan = ["--plan", cell]
+    found = cli("batch", desk.folder, desk.folder / "dst", *plan)
+    refused(found, rf"odd\.toml: .*{said}")
+    columns = ["--cell", desk.cell, "--columns", cell]
+    found = cli("compare", desk.put("d.csv", "id,q1_deg\n1,2\n"), *columns)
+    refused(found, r"odd\.toml: ")
+
+
+TORN = ["10\x1a0.00", "10 0.00", "10\x010.00", "100.00 \x1a7"]
+
+
+@pytest.mark.parametrize("number", TORN)
+def test_a_number_that_is_torn_is_no_shorter_one(desk, number):
+    source = desk.put(
+        "job.pdl", program(FIRST, "MOVE LINEAR TO a", declared="a : XTNDPOS")
+    )
+    text = (LISTED + entry("a")).replace("X: 100.00", f"X: {number}")
+    desk.put("job.lsv", text)
+    out = desk.folder / "out.pdl"
+    found = desk.compensate(source, "-o", out)
+    assert found.exit_code == 1
+    assert "job.lsv:3: lsv-line: not understood" in found.stderr
+    assert re.search(r"job\.pdl:6: \w+: .*a", found.stderr)
+    assert not out.with_suffix(".lsv").exists()
+
+
+@pytest.mark.parametrize("end", ["\x1a", "\r\n\x1a"])
+def test_the_mark_at_the_end_of_old_files_is_kept(desk, end):
+    source = desk.put(
+        "job.pdl", program(FIRST, "MOVE LINEAR TO a", declared="a : XTNDPOS")
+    )
+    desk.put("job.lsv", LISTED + entry("a").rstrip() + end)
+    out = desk.folder / "out.pdl"
+    assert desk.compensate(source, "-o", out).exit_code == 0
+    assert out.with_suffix(".lsv").read_bytes().endswith(end.encode())
+
+
+@pytest.mark.parametrize(
+    ("tool", "told"),
+    [("0.08, -0.04, 0.318", True), ("80, -40, 318", False), ("0, 0, 0", False)],
+)
+def test_a_tool_in_metres_is_asked_about(desk, tool, told):
+    frame = f"$TOOL := POS({tool}, 0, 0, 0, '')"
+    source = desk.put("job.pdl", program(FIRST, frame, FIRST, POSE))
+    found = desk.compensate(source, "-o", desk.folder / "out.pdl")
+    assert ("are these metres?" in found.stderr) == told
+    assert not told or "job.pdl:7: tool-length: the tool here is 0.318" in found.stderr
+
+
+def test_a_tool_of_the_cell_in_metres_is_asked_about(desk):
+    text = desk.cell.read_text().replace(
+        "[80.0, -40.0, 150.0]", "[0.08, -0.04, 0.15]", 1
+    )
+    source = desk.put("job.pdl", program(FIRST))
+    cell = desk.put("odd.toml", text)
+    found = cli("compensate", source, "--cell", cell, "--model", desk.model)
+    assert "tool-length: the tool here is 0.15 mm long" in found.stderr
+
+
+GIVEN = ("--cell", "CELL", "--model", "MODEL")
+COMMANDS = {
+    "diff": ("diff", "job.pdl", "job.pdl"),
+    "explain": ("explain", "job.pdl", "--cell", "CELL"),
+    "json": ("explain", "job.pdl", "--cell", "CELL", "--json", "-"),
+    "filter": ("compensate", "-", *GIVEN),
+    "help": ("--help",),
+}
+
+
+def run_with(desk, name, **how):
+    """Run a command as a shell does."""
+    source = desk.put("job.pdl", program(FIRST, POSE))
+    places = {"CELL": str(desk.cell), "MODEL": str(desk.model)}
+    words = [places.get(word, word) for word in COMMANDS[name]]
+    code = "from postproc.cli import main; main()"
+    with source.open("rb") as given:
+        return subprocess.run(
+            [sys.executable, "-c", code, *words],
+            cwd=desk.folder,
+            stdin=given,
+            stderr=subprocess.PIPE,
+            text=True,
+            timeout=60,
+            **how,
+        )
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_a_full_disk_behind_stdout_is_told_as_that(desk, name):
+    with (desk.folder / "out").open("wb") as out:
+        limits = resource.RLIMIT_FSIZE, (0, 0)
+        done = run_with(desk, name, stdout=out, preexec_fn=lambda: setrlimit(*limits))
+    assert done.returncode == 2
+    assert "standard output: no room is left there. Make room" in done.stderr
+    assert "internal error" not in done.stderr and "Traceback" not in done.stderr
+    assert "Exception ignored" not in done.stderr
+
+
+@pytest.mark.parametrize("name", ["json", "filter"])
+def test_a_closed_stdout_is_told_as_that(desk, name):
+    done = run_with(desk, name, preexec_fn=lambda: os.close(1))
+    assert done.returncode == 2
+    assert "standard output: is closed" in done.stderr

@@ -8,7 +8,7 @@ import re
 import pytest
 
 from postproc import __version__
-from postproc.cli import app
+from postproc.cli.commands import app
 from postproc.language.source import source_from_bytes
 from tests.written import FIRST, LISTED, NEXT, POSE, cli, entry, program
 
@@ -191,15 +191,55 @@ def test_values_are_written_and_the_program_stays_byte_identical(desk):
     assert desk.compensate(out, "-o", desk.folder / "again.pdl").exit_code == 2
 
 
-def test_values_of_a_piped_program_get_a_file_of_their_own(desk):
-    source = program(FIRST, "MOVE LINEAR TO a", declared="a : XTNDPOS")
+VALUED = program(FIRST, "MOVE LINEAR TO a", declared="a : XTNDPOS")
+
+
+def test_values_of_a_piped_program_go_where_they_are_told_to(desk):
     values = desk.put("job.lsv", LISTED + entry("a"))
-    found = desk.compensate("-", "--lsv", values, stdin=source)
+    out = desk.folder / "out.lsv"
+    found = desk.compensate("-", "--lsv", values, "--lsv-out", out, stdin=VALUED)
     assert found.exit_code == 0
-    out = desk.folder / "job.compensated.lsv"
+    assert found.stdout_bytes.startswith(b"-- postproc")
     assert out.read_bytes().startswith(b"-- postproc")
+    assert desk.names() == {"job.lsv", "out.lsv", "out.lsv.postproc.json"}
     assert cli("restore", out).exit_code == 0
     assert out.read_bytes() == values.read_bytes()
+
+
+def test_a_piped_program_writes_nothing_beside_its_sources(desk):
+    values = desk.put("job.lsv", LISTED + entry("a"))
+    found = desk.compensate("-", "--lsv", values, stdin=VALUED)
+    assert found.exit_code == 2 and found.stdout_bytes == b""
+    assert "job.lsv: changes too" in found.stderr and "--lsv-out" in found.stderr
+    assert desk.names() == {"job.lsv"}
+
+
+def test_values_that_stay_come_out_of_the_filter_too(desk):
+    values, out = desk.put("job.lsv", LISTED + entry("b")), desk.folder / "out.lsv"
+    source = program(FIRST, POSE)
+    found = desk.compensate("-", "--lsv", values, "--lsv-out", out, stdin=source)
+    assert found.exit_code == 0
+    assert out.read_bytes() == values.read_bytes()
+    assert desk.names() == {"job.lsv", "out.lsv"}
+
+
+def test_values_in_a_folder_of_their_own_have_a_record_of_their_own(desk):
+    source = desk.put("job.pdl", VALUED)
+    values = desk.put("job.lsv", LISTED + entry("a"))
+    far = desk.folder / "far"
+    far.mkdir()
+    found = desk.compensate(source, "--lsv-out", far / "v.lsv")
+    assert found.exit_code == 0
+    assert {p.name for p in far.iterdir()} == {"v.lsv", "v.lsv.postproc.json"}
+    assert cli("restore", far / "v.lsv").exit_code == 0
+    assert (far / "v.lsv").read_bytes() == values.read_bytes()
+
+
+def test_a_place_for_values_needs_values(desk):
+    for place, why in ((desk.folder / "out.lsv", "no variable file"), ("-", "stdout")):
+        found = desk.compensate("-", "--lsv-out", place, stdin=program(FIRST, POSE))
+        assert found.exit_code == 2 and why in found.stderr
+        assert desk.names() == set()
 
 
 def test_restore_refuses_what_was_edited_since_and_says_where(desk):
@@ -283,3 +323,34 @@ def test_messages_show_control_characters_escaped(desk):
     source = program("glob \x1b[31m red", POSE)
     found = desk.compensate(desk.put("job.pdl", source), "-o", desk.folder / "o.pdl")
     assert "\x1b" not in found.stderr and "\\x1b" in found.stderr
+
+
+def test_what_is_said_of_a_line_is_said_once_with_a_count(desk):
+    # A routine that is called twice: each of its lines is reached twice.
+    moves = "".join(f"  {line}\r\n" for line in (FIRST, POSE, UNREACHED, NEXT))
+    text = (
+        f"PROGRAM job\r\nROUTINE r\r\nBEGIN\r\n{moves}END r\r\n"
+        "BEGIN\r\n  r\r\n  r\r\n  r\r\nEND job\r\n"
+    )
+    source = desk.put("job.pdl", text)
+    found = desk.compensate(source, "-o", desk.folder / "out.pdl")
+    said = [line for line in found.stderr.splitlines() if line.startswith("job.pdl:")]
+    assert len(said) == len(set(said)), found.stderr
+    assert [line for line in said if line.endswith(" (3 times)")]
+    told = desk.report(source, "-o", desk.folder / "more.pdl")["diagnostics"]
+    assert len(told) == len({json.dumps(d) for d in told})
+
+
+def test_a_variable_file_keeps_the_case_of_its_name(desk):
+    source = desk.put("JOB.PDL", VALUED)
+    values = desk.put("JOB.LSV", LISTED + entry("a"))
+    assert desk.compensate(source).exit_code == 0
+    out = desk.folder / "JOB.compensated.PDL"
+    assert out.with_suffix(".LSV").exists() and not out.with_suffix(".lsv").exists()
+    found = cli("diff", source, out)
+    assert found.exit_code == 1 and "JOB.LSV" in found.stdout
+    back = desk.folder / "back"
+    back.mkdir()
+    assert cli("restore", out, "-o", back / "JOB.PDL").exit_code == 0
+    assert {p.name for p in back.iterdir()} == {"JOB.PDL", "JOB.LSV"}
+    assert (back / "JOB.LSV").read_bytes() == values.read_bytes()

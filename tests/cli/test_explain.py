@@ -141,3 +141,13 @@ def test_sides_follow_from_the_way(desk, job_cell):
     assert [r["lambda"] for r in rows] == [[0] * 6, *np.sign(ways).tolist()]
     turned = ways[0] * ways[1] < 0
     assert np.allclose(np.array(rows[2]["travel_deg"])[turned], 3.0)
+
+
+@pytest.mark.parametrize("model", [True, False])
+def test_what_was_found_is_told_too(desk, model):
+    source = desk.put("job.pdl", program(FIRST, "frobnicate the 3,gripper", POSE))
+    given = ["--cell", desk.cell, *(["--model", desk.model] if model else [])]
+    said = cli("explain", source, *given).stderr
+    assert said.count("job.pdl:6: unknown-statement: ") == 1
+    of_line = cli("explain", source, *given, "--line", 7).stderr
+    assert "unknown-statement" not in of_line

@@ -10,7 +10,7 @@ import sys
 import pytest
 import typer
 
-from postproc.cli import app
+from postproc.cli.commands import app
 from postproc.cli.common import EXAMPLES
 from tests.cli.test_cli import COMMANDS
 from tests.written import cli

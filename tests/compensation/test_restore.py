@@ -1,5 +1,7 @@
 """Restoring undoes edits, and refuses whatever was changed since."""
 
+import json
+
 import pytest
 
 from postproc.compensation.record import (
@@ -12,8 +14,9 @@ from postproc.compensation.record import (
     sha256,
     sidecar_path,
 )
-from postproc.exceptions import ProgramError
-from postproc.language.source import Edit, Replacements, Span
+from postproc.exceptions import OutputError, ProgramError
+from postproc.language.source import Edit, Replacements, Source, Span
+from postproc.language.stamp import stamped
 
 SOURCE = b"PROGRAM x\r\nMOVE TO {1.0, \xe4 2}\r\nEND x"
 OUTPUT = b"-- stamp\r\nPROGRAM x\r\nMOVE TO {1.25, \xe4 2}\r\nEND x"
@@ -61,6 +64,94 @@ def test_round_trip_through_files(tmp_path, record):
     assert program.read_bytes() == OUTPUT
     restore_file(program)
     assert program.read_bytes() == SOURCE
+
+
+ODD = {
+    "a name of nothing": {"": {}},
+    "a name of the folder above": {"..": {}},
+    "a name with NUL": {"job\0.pdl": {}},
+    "a huge offset": {"job.pdl": {"edits": [[10**30, 10**30, "1"]]}},
+    "texts that would fill the memory": {
+        "job.pdl": {"edits": [[0, 1, "1" * 10**5]] + [[1, 1, ""]] * 10**4}
+    },
+}
+
+
+def odd_record(files):
+    """Write a record of files of which only what is odd is told."""
+    bare = {
+        "source_sha256": sha256(SOURCE),
+        "output_sha256": sha256(OUTPUT),
+        "checksums": [],
+        "edits": [],
+    }
+    told = {name: bare | own for name, own in files.items()}
+    return json.dumps({"postproc": "0", "model": "m", "options": {}, "files": told})
+
+
+@pytest.mark.parametrize("odd", ODD)
+def test_an_odd_record_is_refused_in_words(tmp_path, odd):
+    program = tmp_path / "job.pdl"
+    program.write_bytes(OUTPUT)
+    sidecar_path(program).write_text(odd_record(ODD[odd]))
+    with pytest.raises(ProgramError, match="not a record"):
+        restore_file(program)
+
+
+@pytest.mark.parametrize("edit", [[-5, -1, "1"], [3, 10**12, "1"]])
+def test_edits_outside_of_the_file_are_refused(tmp_path, edit):
+    program = tmp_path / "job.pdl"
+    program.write_bytes(OUTPUT)
+    sidecar_path(program).write_text(odd_record({"job.pdl": {"edits": [edit]}}))
+    with pytest.raises(ProgramError, match="belongs elsewhere"):
+        restore_file(program)
+
+
+def test_an_empty_record_restores_nothing_and_says_so(tmp_path):
+    program = tmp_path / "job.pdl"
+    program.write_bytes(OUTPUT)
+    sidecar_path(program).write_text(odd_record({}))
+    for output in (None, tmp_path / "back.pdl"):
+        with pytest.raises(ProgramError, match="speaks of no file"):
+            restore_file(program, output)
+    assert program.read_bytes() == OUTPUT and not (tmp_path / "back.pdl").exists()
+
+
+STAMPED = stamped("1.0", "m", Source("job.pdl", SOURCE), SOURCE)
+
+
+def test_a_record_of_another_program_is_refused(tmp_path, record):
+    program = tmp_path / "job.pdl"
+    program.write_bytes(STAMPED)
+    sidecar_path(program).write_text(odd_record({"other.pdl": {}}))
+    (tmp_path / "other.pdl").write_bytes(OUTPUT)
+    with pytest.raises(ProgramError, match=r"does not speak of job\.pdl"):
+        restore_file(program)
+
+
+def test_a_record_that_does_not_fit_the_stamp_is_refused():
+    # It gives back what it says, which is not what the stamp says.
+    other = SOURCE + b"\r\n-- more"
+    edits = Replacements.of(
+        [
+            Edit(Span(0, len(STAMPED) - len(SOURCE)), b""),
+            Edit(Span(len(STAMPED), len(STAMPED)), b"\r\n-- more"),
+        ]
+    )
+    forged = FileRecord(sha256(other), sha256(STAMPED), [], edits)
+    with pytest.raises(ProgramError, match="its stamp names another source"):
+        restore(STAMPED, forged, "job.pdl")
+
+
+def test_nothing_is_restored_over_the_record(tmp_path, record):
+    program = tmp_path / "job.pdl"
+    program.write_bytes(OUTPUT)
+    side = sidecar_path(program)
+    side.write_text("".join(Sidecar("0", "m", {"job.pdl": record}).to_json()))
+    before = side.read_bytes()
+    with pytest.raises(OutputError, match="is an input"):
+        restore_file(program, side)
+    assert side.read_bytes() == before
 
 
 @pytest.mark.parametrize("text", ["", "[]", "{}", '{"files": 3}', "{"])

@@ -148,7 +148,8 @@ def effects() -> Iterator[Case]:
         for option in ("--orientation", "--clone", "--strict", "--clone --shared"):
             files = {**PLANT, **job(name)}
             yield Case(f"options/{name}{option}", (f"{COMPENSATE} {option}",), files)
-    streams = f"compensate - {SETUP} --lsv job.lsv --report r.json < job.pdl"
+    values = "--lsv job.lsv --lsv-out out.lsv"
+    streams = f"compensate - {SETUP} {values} --report r.json < job.pdl"
     files = {**PLANT, **job("spot")}
     yield Case("stdin", (streams,), files, quick=True)
     commands = (f"compensate job.pdl {SETUP}", f"compensate job.pdl {SETUP} --report -")

@@ -30,6 +30,7 @@ def test_a_comparison_becomes_a_picture(suffix, tmp_path):
 
 
 def test_other_formats_and_missing_folders_are_refused(tmp_path):
-    for place in (tmp_path / "a.xyz", tmp_path / "none" / "a.png"):
-        with pytest.raises(OutputError, match=r"\.png or \.svg"):
-            plot_comparison(comparison(), place)
+    wrong = {"a.xyz": r"\.png or \.svg", "none/a.png": "folder does not exist"}
+    for place, why in wrong.items():
+        with pytest.raises(OutputError, match=why):
+            plot_comparison(comparison(), tmp_path / place)

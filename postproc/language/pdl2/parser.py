@@ -7,7 +7,6 @@ import os
 import re
 import stat
 import sys
-import tempfile
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
@@ -19,6 +18,7 @@ from typing import Any, cast
 
 import lark
 
+from postproc.files import replace_file
 from postproc.language.pdl2 import syntax as ast
 from postproc.language.pdl2.syntax import Number
 from postproc.language.scan import NAME_MARK, UNREADABLE, form_of
@@ -373,14 +373,8 @@ def keep(key: str, data: bytes) -> None:
         return
     with suppress(OSError):
         place.mkdir(mode=0o700, parents=True, exist_ok=True)
-        handle, temporary = tempfile.mkstemp(dir=place)
-        try:
-            with os.fdopen(handle, "wb") as file:
-                file.write(hashlib.sha256(data).digest() + data)
-            os.replace(temporary, place / key)
-        except BaseException:  # Ctrl-C too
-            os.unlink(temporary)
-            raise
+        with replace_file(place / key) as file:
+            file.write(hashlib.sha256(data).digest() + data)
 
 
 # What one line of a variable file says; rule by rule like statements.
@@ -445,7 +439,12 @@ class _Word(str):
     """A word of a head."""
 
 
-def _line(c: Sequence[Any]) -> EntryPart:
+def _line(c: Sequence[Any]) -> EntryPart | None:
+    """Put a line together; None where a number behind a value has no name.
+
+    Such a number may be the rest of one that is torn, by a blank or by a control
+    character, which counts as one: ``X: 10 93.44`` is no X of 10.
+    """
     line = EntryPart()
     for part in c:
         match part:
@@ -463,7 +462,8 @@ def _line(c: Sequence[Any]) -> EntryPart:
                 line = replace(line, config=text)
             case ("plain", slot):
                 line = replace(line, plain=(*line.plain, slot))
-    return line
+    torn = bool(line.plain) and bool(line.components or line.axes)
+    return None if torn else line
 
 
 def _head(c: Sequence[Any]) -> EntryPart:
