@@ -17,6 +17,7 @@ from postproc.cli.common import (
     ModelOption,
     OrientationOption,
     ProcessesOption,
+    StrictCallsOption,
     TemperatureOption,
     app,
     as_path,
@@ -62,6 +63,7 @@ def compensate(
     ] = False,
     orientation: OrientationOption = False,
     temperature: TemperatureOption = None,
+    strict_calls: StrictCallsOption = False,
     processes: ProcessesOption = 0,
 ) -> None:
     """Rewrite a program so that the tool lands where its targets say."""
@@ -73,7 +75,7 @@ def compensate(
 
     given = None if program == STREAM else Path(program)
     with explained(given, lsv):
-        options = Options(clone, shared, temperature, orientation)
+        options = Options(clone, shared, temperature, orientation, strict_calls)
         if report == Path(STREAM) and given is None and output is None:
             raise PostprocError("--report -: stdout holds the program. Name a file")
         check_places([output, report, html], [given, lsv, cell, model])
@@ -159,15 +161,18 @@ def explain(
         int | None, typer.Option("--line", help="Only the visits of this line.")
     ] = None,
     temperature: TemperatureOption = None,
+    strict_calls: StrictCallsOption = False,
     json: JsonOption = None,
 ) -> None:
     """Show why every target moves: from where it is reached, and what that costs."""
     from postproc.cli.explain import explain_file
+    from postproc.compensation.options import Options
 
     with explained(program, lsv):
         check_places([as_path(json)], [program, cell, model, lsv])
+        options = Options(temperature=temperature, strict_calls=strict_calls)
         with busy("plan"):
-            found = explain_file(program, cell, model, lsv, temperature)
+            found = explain_file(program, cell, model, lsv, options)
         if json:
             write_text(json, found.to_json(line))
         if json != "-":

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, fields, replace
+from dataclasses import dataclass, fields, replace
 from types import MappingProxyType
 
 import numpy as np
@@ -39,9 +39,9 @@ from postproc.compensation.program import (
     Planned,
     Reading,
     plan_visits,
+    prepared,
     read_program,
     states_of,
-    with_measured_play,
 )
 from postproc.compensation.rewrite import (
     Output,
@@ -297,7 +297,7 @@ def compensate(
     """
     files = name_files(name, source, variables, pages)
     refuse(files, cell, model)
-    cell = with_measured_play(cell, model)
+    cell = prepared(cell, model, options)
     setting = Setting(cell, model, options, Clock(progress), processes)
     with setting.clock("parse"):
         reading = read_program(files, cell, each=map_with(processes))
@@ -383,7 +383,7 @@ def report(
         model=model.id,
         outputs=output.changed,
         record=output.sidecar(
-            model.id, asdict(options), tell_arrivals(visits, d, tuple(output.records))
+            model.id, options.told(), tell_arrivals(visits, d, tuple(output.records))
         ),
         visits=visits,
         decisions=d,

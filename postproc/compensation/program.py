@@ -14,6 +14,7 @@ from postproc.compensation.eligibility import (
     mark_configuration_flags,
     mark_orientation_interpolation,
 )
+from postproc.compensation.options import Options
 from postproc.compensation.targets import targets_from_visits
 from postproc.exceptions import ProgramError
 from postproc.files import base_name, is_variables
@@ -115,6 +116,8 @@ def start_of(cell: Cell) -> Start:
         base=cell.base.record,
         uframe=cell.uframe.record,
         routines=dict(cell.routines),
+        still=cell.still,
+        strict_calls=cell.strict_calls,
         frame_tables=tables,
         aux=dict(cell.aux),
         taught=cell.taught,
@@ -125,6 +128,12 @@ def with_measured_play(cell: Cell, model: Model) -> Cell:
     """Let directions be told by the gaps that the model found, not by a guess."""
     arm = replace(cell.arm, play=measured_play(model, cell.arm))
     return replace(cell, arm=arm)
+
+
+def prepared(cell: Cell, model: Model, options: Options) -> Cell:
+    """Let a cell know the model's play, and how strictly calls are taken."""
+    strict = cell.strict_calls or options.strict_calls
+    return with_measured_play(replace(cell, strict_calls=strict), model)
 
 
 def read_program(

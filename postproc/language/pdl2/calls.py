@@ -8,7 +8,6 @@ from postproc.language.pdl2 import syntax as ast
 from postproc.language.pdl2.effects import (
     CHANGING,
     FRAMES,
-    HANDS_OVER,
     PURE,
     CallGraph,
     call_graph_of,
@@ -33,6 +32,12 @@ from postproc.language.pdl2.machine import (
     invalidate_names,
 )
 from postproc.language.pdl2.moves import move
+from postproc.language.pdl2.routines import (
+    TRACKING,
+    RoutineEffect,
+    effect_of,
+    report_unknown_routine,
+)
 from postproc.language.pdl2.store import Store
 from postproc.language.pdl2.values import (
     Alias,
@@ -191,7 +196,6 @@ def opaque_call(
     here: Execution, name: str, arguments: tuple[ast.Expression | None, ...]
 ) -> None:
     """Take in what a routine that the job does not hold is said, or assumed, to do."""
-    start = here.world.start
     built_in = name in CHANGING or name in PURE
     why = f"{name.upper()} computes with it" if built_in else f"{name} is given it"
     for given in arguments:
@@ -202,30 +206,52 @@ def opaque_call(
         invalidate(here, argument, f"{name} may change it (arguments go by reference)")
     if built_in:
         return
-    said = start.routines.get(name)
-    if name in start.frame_tables:
-        _frames_from_table(here, name, arguments)
-    elif name.startswith(HANDS_OVER):
-        here.store.last = frozenset({ELSEWHERE})
-        _say(here, "position-unknown", name, "hands the arm over to a sensor or an "
-             "outside stream: the next move comes from an unknown place")  # fmt: skip
-    elif said is None:
-        _say(here, "assumed-still", name, "is not in the files at hand: assumed "
-             "neither to move the arm nor to set frames; if it does, say so under "
-             f"[routines] or [frames.routines.{name}] in the cell file")  # fmt: skip
-    if said == "moves":
-        here.store.last = frozenset({ELSEWHERE})
-    elif said == "sets-frames" and name not in start.frame_tables:
-        _unknown_frames(here, f"{name} sets it; give its table under "
-                        f"[frames.routines.{name}] in the cell file")  # fmt: skip
+    match effect_of(here.world, here.place.program, name):
+        case RoutineEffect.TABLE:
+            _frames_from_table(here, name, arguments)
+        case RoutineEffect.MOVES:
+            here.store.last = frozenset({ELSEWHERE})
+        case RoutineEffect.SETS_FRAMES:
+            _unknown_frames(here, f"{name} sets it; give its table under "
+                            f"[frames.routines.{name}] in the cell file")  # fmt: skip
+        case RoutineEffect.TRACKS:
+            _track(here, name, arguments)
+        case RoutineEffect.KNOWN:
+            _say(here, "assumed-still", name, "is not in the files at hand: it is on "
+                 "the list of routines known neither to move the arm nor to set frames "
+                 "(docs/routines.md); if it does, say so under [routines] in the cell "
+                 "file, or pass --strict-calls")  # fmt: skip
+        case RoutineEffect.UNKNOWN:
+            report_unknown_routine(here.world, here.place.program, here.row, name)
+            forget_surroundings(here, f"{name}, which is not in the files at hand, may "
+                                "set it: say under [routines] in the cell file what it "
+                                "does")  # fmt: skip
 
 
 def _say(here: Execution, code: str, name: str, text: str) -> None:
     here.world.report_once(here.place.program, here.row, code, name, f"{name} {text}")
 
 
+def _track(
+    here: Execution, name: str, arguments: tuple[ast.Expression | None, ...]
+) -> None:
+    """Let a sensor lead the arm, or no longer: only an absolute move ends it."""
+    on = here.value(arguments[0]) if arguments else Nothing("")
+    here.store.set(**{TRACKING: on})
+    here.store.last = frozenset({ELSEWHERE})
+    _say(here, "position-unknown", name, "lets a sensor lead the arm, or ends that: "
+         "the next move comes from an unknown place")  # fmt: skip
+
+
 def _unknown_frames(here: Execution, why: str) -> None:
     here.store.set(**{frame: Nothing(why) for frame in FRAMES})
+
+
+def forget_surroundings(here: Execution, why: str) -> None:
+    """Forget where the arm is, its frames, and all motion settings of the program."""
+    names = (*FRAMES, *here.store.settings)
+    here.store.set(**dict.fromkeys(names, Nothing(why)))
+    here.store.last = frozenset({ELSEWHERE})
 
 
 def _frames_from_table(

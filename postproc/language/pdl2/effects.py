@@ -11,6 +11,11 @@ import numpy as np
 from postproc.language.pdl2 import syntax as ast
 from postproc.language.pdl2.job import Place, World
 from postproc.language.pdl2.program import Body, Program
+from postproc.language.pdl2.routines import (
+    RoutineEffect,
+    effect_of,
+    report_unknown_routine,
+)
 from postproc.language.visits import Diagnostic, Visits
 
 # What a statement or a routine may do, read off its text.
@@ -156,7 +161,6 @@ def _assigned_name(reference: ast.Reference) -> str:
 
 # What a call or a handler may do, through all files of the job.
 
-HANDS_OVER = ("sensor_", "c5gopen", "c4gopen", "open_controller", "opencontrol")
 FRAMES = ("tool", "base", "uframe")
 
 
@@ -217,15 +221,27 @@ def live_rows(world: World, place: Place, first: int, last: int) -> CallGraph:
             rows = (one.body.first, one.body.last)
             parts.append(LiveRows(one, rows_effects(one.program, *rows)))
             waiting += _called(world, one, *rows)
-    outside = frozenset().union(*(part.effects.calls for part in parts))
-    said = {world.start.routines.get(name) for name in outside}
+    outside = {effect for part in parts for effect in _outside(world, part)}
+    moves = {RoutineEffect.MOVES, RoutineEffect.TRACKS, RoutineEffect.UNKNOWN}
     return CallGraph(
         tuple(parts),
-        any(part.effects.moves for part in parts)
-        or "moves" in said
-        or any(name.startswith(HANDS_OVER) for name in outside),
-        "sets-frames" in said or not outside.isdisjoint(world.start.frame_tables),
+        any(part.effects.moves for part in parts) or not outside.isdisjoint(moves),
+        not outside.isdisjoint(
+            {RoutineEffect.SETS_FRAMES, RoutineEffect.TABLE, RoutineEffect.UNKNOWN}
+        ),
     )
+
+
+def _outside(world: World, part: LiveRows) -> Iterator[RoutineEffect]:
+    """Yield what the routines do that some rows call and the job does not hold."""
+    program = part.place.program
+    for name in sorted(part.effects.calls):
+        inside = world.find_routine(program, name) or world.find_program(program, name)
+        if inside is None:
+            effect = effect_of(world, program, name)
+            if effect is RoutineEffect.UNKNOWN:
+                report_unknown_routine(world, program, part.place.body.first, name)
+            yield effect
 
 
 def _called(world: World, place: Place, first: int, last: int) -> Iterator[Place]:

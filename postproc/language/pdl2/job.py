@@ -152,6 +152,9 @@ class Start:
     Attributes:
         tool, base, uframe: Position records (6,) [mm, deg], None where unknown.
         routines: Outside routine to ``still``, ``moves`` or ``sets-frames``.
+        still: Patterns of outside routines, ``name`` or ``program.name``, that neither
+            move the arm nor set frames.
+        strict_calls: The shipped list of such routines does not count.
         frame_tables: Outside routine to arguments (``"1,2"``) to the records of the
             frames (``tool``, ``base``, ``uframe``) that it sets.
         aux: Auxiliary axis to ``gun``, ``track`` or ``positioner``.
@@ -163,6 +166,8 @@ class Start:
     base: Record = (0.0,) * 6
     uframe: Record = (0.0,) * 6
     routines: Mapping[str, str] = field(default_factory=dict)
+    still: tuple[str, ...] = ()
+    strict_calls: bool = False
     frame_tables: Mapping[str, Mapping[str, Mapping[str, Record]]] = field(
         default_factory=dict
     )
@@ -174,6 +179,7 @@ class Start:
         """PDL2 does not tell cases apart: keep names in lower case."""
         lower = {name.lower(): said for name, said in self.routines.items()}
         object.__setattr__(self, "routines", lower)
+        object.__setattr__(self, "still", tuple(map(str.lower, self.still)))
         tables = {name.lower(): table for name, table in self.frame_tables.items()}
         object.__setattr__(self, "frame_tables", tables)
         taught = frozenset(name.lower() for name in self.taught)
