@@ -19,7 +19,7 @@ from postproc.compensation.record import (
     sidecar_path,
 )
 from postproc.exceptions import ProgramError
-from postproc.language.pdl2.effects import NEVER_REACHED
+from postproc.language.pdl2.effects import NOT_FOLLOWED
 from postproc.language.visits import Diagnostic, Visits
 from postproc.model.statistics import ErrorStatistics
 from postproc.robot.pose import MM
@@ -140,7 +140,7 @@ class Outcome:
     def exit_code(self) -> int:
         """Return 1 where a target could have been compensated and was not."""
         left = (Status.UNSAFE, Status.DISPLAY, Status.GUARDED)
-        missed = any(d.code == NEVER_REACHED for d in self.diagnostics)
+        missed = any(d.code in NOT_FOLLOWED for d in self.diagnostics)
         return NOT_ALL if missed or np.isin(self.decisions.status, left).any() else DONE
 
     def summary(self) -> str:

@@ -118,6 +118,7 @@ def start_of(cell: Cell) -> Start:
         routines=dict(cell.routines),
         still=cell.still,
         strict_calls=cell.strict_calls,
+        payload_kg=cell.payload_mass,
         frame_tables=tables,
         aux=dict(cell.aux),
         taught=cell.taught,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
@@ -35,6 +36,47 @@ CHANGING = frozenset(
     "bit_assign node_app node_del node_ins err_trap_on err_trap_off".split()
 )
 """Built-in routines: they may change their arguments, nothing else."""
+
+
+FRAMES = ("tool", "base", "uframe")
+
+# What text may do that is not understood.
+
+_WORD = re.compile(r"\$?[A-Za-z_]\w*")
+_CALL = re.compile(r"(?<![\w$.])([A-Za-z_]\w*)\s*\(")
+_HARMLESS = re.compile(
+    r"(?:(?:IF|ELSE|ENDIF|SELECT|CASE|ENDSELECT|FOR|ENDFOR|WHILE|ENDWHILE|REPEAT|UNTIL|"
+    r"WAIT|SIGNAL|DELAY|PULSE|WRITE|READ|ENCODE|DECODE|OPEN|CLOSE|ENABLE|DISABLE)\b|"
+    r"\$?\w+(?:\[[^\]]*\]|\.\$?\w+)*\s*:=)",
+    re.I,
+)
+_MOVING = re.compile(r"\b(?:MOVE|MOVEFLY|SYNCMOVE|SYNCMOVEFLY)\b|\$ARM_DATA\b", re.I)
+_NO_CALLS = frozenset(
+    "if select case for while until wait write read encode decode open and or not div "
+    "mod then do of to downto step xor condition event".split()
+)
+
+
+def words_in(text: str) -> frozenset[str]:
+    """Return the names in a text, in lower case, system variables with ``$``."""
+    return frozenset(word.lower() for word in _WORD.findall(text))
+
+
+def is_harmless(text: str) -> bool:
+    """Tell whether a statement that is not understood does nothing to the arm.
+
+    It must begin like one that cannot move the arm or set frames (an assignment sets
+    what it names), and call nothing but built-in functions.
+
+    >>> is_harmless("WAIT FOR $DIN[1] ?? 3"), is_harmless("WAIT FOR f(1) ?? 3")
+    (True, False)
+    >>> is_harmless("n := abs(3 3)"), is_harmless("FROBNICATE p WITH 3")
+    (True, False)
+    """
+    if not _HARMLESS.match(text) or _MOVING.search(text):
+        return False
+    called = {name.lower() for name in _CALL.findall(text)}
+    return called <= PURE | CHANGING | _NO_CALLS
 
 
 @dataclass(frozen=True)
@@ -133,8 +175,12 @@ def _direct(statement: ast.Statement) -> Effects:
                 inner = _direct(then)
                 moves, assigned = inner.moves, set(inner.assigned)
                 calls |= inner.calls
-        case ast.Move() | ast.Unknown():
+        case ast.Move():
             moves = True
+        case ast.Unknown(text):
+            moves, assigned = True, set(words_in(text))
+            if not is_harmless(text):
+                assigned |= {f"${frame}" for frame in FRAMES}
         case ast.Assign(target):
             assigned.add(_assigned_name(target))
         case ast.For(name):
@@ -160,8 +206,6 @@ def _assigned_name(reference: ast.Reference) -> str:
 
 
 # What a call or a handler may do, through all files of the job.
-
-FRAMES = ("tool", "base", "uframe")
 
 
 @dataclass(frozen=True)
@@ -273,6 +317,8 @@ def _names(statement: ast.Statement) -> Iterator[tuple[str, bool]]:
 # Moves that a program never comes to: their targets keep their values.
 
 NEVER_REACHED = "never-reached"
+MOTION_UNKNOWN = "motion-unknown"
+NOT_FOLLOWED = (NEVER_REACHED, MOTION_UNKNOWN)  # what may hold targets, and is left
 
 
 def dead_moves(programs: Sequence[Program], visits: Visits) -> list[Diagnostic]:

@@ -14,10 +14,18 @@ from postproc.language.pdl2.calls import (
     assign,
     call_statement,
     calls_in_expressions,
+    forget_surroundings,
     frame_value,
 )
 from postproc.language.pdl2.collect import collect
-from postproc.language.pdl2.effects import changed_arguments, live_rows, rows_effects
+from postproc.language.pdl2.effects import (
+    MOTION_UNKNOWN,
+    changed_arguments,
+    is_harmless,
+    live_rows,
+    rows_effects,
+    words_in,
+)
 from postproc.language.pdl2.entries import POSITIONS, Entries, Entry
 from postproc.language.pdl2.evaluate import ProgramPoint
 from postproc.language.pdl2.job import FilePoints, Place, Start, World, base_variable
@@ -144,19 +152,16 @@ def end_round(machine: Machine, here: Execution) -> None:
 
 # What each statement does to the store, and which way the program goes on.
 
-_WORD = re.compile(r"\$?[A-Za-z_]\w*")
-_CANNOT_MOVE = re.compile(
-    r"(?:IF|ELSE|ENDIF|SELECT|CASE|ENDSELECT|FOR|ENDFOR|WHILE|ENDWHILE|REPEAT|UNTIL|"
-    r"WAIT|SIGNAL|DELAY|PULSE|WRITE|READ|ENCODE|DECODE|OPEN|CLOSE|ENABLE|DISABLE|"
-    r"\$?\w+(?:\[[^\]]*\]|\.\$?\w+)*\s*:=)",
-    re.I,
-)
 _MOVES = re.compile(r".*\b(?:MOVE|MOVEFLY|SYNCMOVE|SYNCMOVEFLY)\b", re.I)
 
 
 def step(machine: Machine, here: Execution, statement: ast.Statement) -> bool:
     """Run one statement; tell whether the next row follows."""
+    text = statement.text if isinstance(statement, ast.Unknown) else ""
     statement = recovered(statement)
+    if text and not isinstance(statement, ast.Unknown):
+        if not _is_harmless(here, text):
+            _forget_by_text(here, _why_unknown(here))
     if not isinstance(statement, ast.Label | ast.Else | ast.When):
         calls_in_expressions(machine, here, statement)
     match statement:
@@ -271,10 +276,9 @@ def _fits(here: Execution, row: int, case: ast.Case, value: Value) -> bool | Non
 
 def _unknown(machine: Machine, here: Execution, statement: ast.Unknown) -> None:
     """Forget all that unknown text could influence."""
-    line = int(here.place.program.lines.line[here.row])
-    why = f"line {line}, which is not understood, may change it"
-    names = frozenset(word.lower() for word in _WORD.findall(statement.text))
-    invalidate_names(here, names, why)
+    why = _why_unknown(here)
+    invalidate_names(here, words_in(statement.text), why)
+    arrived = frozenset[int]()
     if _MOVES.match(statement.text):
         arrival = Visit(
             here.place,
@@ -285,9 +289,34 @@ def _unknown(machine: Machine, here: Execution, statement: ast.Unknown) -> None:
             Meaning.UNKNOWN,
             reason="the move statement is not understood",
         )
-        here.store.last = frozenset({machine.record(here, 1, arrival), ELSEWHERE})
-    elif not _CANNOT_MOVE.match(statement.text):
-        here.store.last |= {ELSEWHERE}
+        arrived = frozenset({machine.record(here, 1, arrival)})
+    if not _is_harmless(here, statement.text):
+        _forget_by_text(here, why)
+        here.store.last |= arrived
+
+
+def _why_unknown(here: Execution) -> str:
+    line = int(here.place.program.lines.line[here.row])
+    return f"line {line}, which is not understood, may change it"
+
+
+def _is_harmless(here: Execution, text: str) -> bool:
+    """Tell whether unknown text does nothing to the arm and calls no function."""
+    called = (here.world.is_function(here.place, name) for name in words_in(text))
+    return is_harmless(text) and not any(called)
+
+
+def _forget_by_text(here: Execution, why: str) -> None:
+    """Forget what only a statement that may move the arm could change."""
+    forget_surroundings(here, why)
+    here.world.report(
+        here.place.program,
+        here.row,
+        MOTION_UNKNOWN,
+        "where the arm is, its frames and its motion settings are not known after "
+        "this statement, which is not understood: targets after it are left as they "
+        "are until these are set again",
+    )
 
 
 def run_broken(machine: Machine, here: Execution) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -154,6 +155,7 @@ class Start:
         routines: Outside routine to ``still``, ``moves`` or ``sets-frames``.
         still: Patterns of outside routines, ``name`` or ``program.name``, that neither
             move the arm nor set frames.
+        payload_kg: What the arm carries, NaN where that is not known.
         strict_calls: The shipped list of such routines does not count.
         frame_tables: Outside routine to arguments (``"1,2"``) to the records of the
             frames (``tool``, ``base``, ``uframe``) that it sets.
@@ -168,6 +170,7 @@ class Start:
     routines: Mapping[str, str] = field(default_factory=dict)
     still: tuple[str, ...] = ()
     strict_calls: bool = False
+    payload_kg: float = math.nan
     frame_tables: Mapping[str, Mapping[str, Mapping[str, Record]]] = field(
         default_factory=dict
     )

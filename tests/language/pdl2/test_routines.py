@@ -48,7 +48,7 @@ def test_targets_after_an_unknown_routine_are_left(call: str, target: str) -> No
     found = followed(FIRST, call, target)
     before, after = reasons(found)
     assert before == ""
-    assert "$TOOL is not known here" in after and "[routines]" in after
+    assert "not known here" in after and "$TOOL" in after and "[routines]" in after
     assert found.visits.predecessors(1).tolist() == [ELSEWHERE]
     assert codes(found) == ["unknown-routine"]
 
@@ -141,7 +141,7 @@ def test_a_function_that_calls_one_leaves_the_same_unknown() -> None:
     inner = routine("f", "tt_tool(1)", "RETURN(1)", takes=": INTEGER")
     inner = ["VAR n : INTEGER", *inner]
     found = followed(FIRST, "n := f", THEN, head=inner)
-    assert "$TOOL is not known" in reasons(found)[1]
+    assert "$TOOL" in reasons(found)[1]
     assert "unknown-routine" in codes(found)
     found = followed(FIRST, "n := f", THEN, head=inner, still=("tt_*",))
     assert reasons(found) == ["", ""]
