@@ -117,6 +117,7 @@ def start_of(cell: Cell) -> Start:
         uframe=cell.uframe.record,
         routines=dict(cell.routines),
         still=cell.still,
+        constant=cell.constant,
         strict_calls=cell.strict_calls,
         payload_kg=cell.payload_mass,
         frame_tables=tables,

@@ -108,6 +108,12 @@ class SurveySection(Strict):
     euler_zyz_deg: Triple | None = None
 
 
+class VariablesSection(Strict):
+    """What other programs do to variables that they share with ours."""
+
+    constant: list[str] = Field(default_factory=list)
+
+
 class LimitSection(Strict):
     """When a correction is not trusted."""
 
@@ -149,6 +155,7 @@ class CellFile(Strict):
     limits: LimitSection = LimitSection()
     routines: dict[str, Effect | list[str]] = Field(default_factory=dict)
     frames: FramesSection = FramesSection()
+    variables: VariablesSection = VariablesSection()
     taught: list[str] = Field(default_factory=list)
 
     @field_validator("routines")
@@ -201,6 +208,8 @@ class Cell:
         taught: Lower-case names of points that were taught with the robot.
         taught_frames: Records of the frames that were taught with the robot, with the
             joint angles of their three points, (3, 6) [rad], or None.
+        constant: Lower-case patterns of exported variables, ``name`` or
+            ``program.name``, that no other program changes.
         strict_calls: The shipped list of still routines does not count.
     """
 
@@ -225,6 +234,7 @@ class Cell:
     taught: frozenset[str]
     taught_frames: Mapping[tuple[float, ...], Floats | None]
     still: tuple[str, ...] = ()
+    constant: tuple[str, ...] = ()
     strict_calls: bool = False
 
 
@@ -271,6 +281,7 @@ def load_cell(path: str | Path) -> Cell:
             if not isinstance(what, list)
         },
         still=_patterns(file.routines.get(STILL)),
+        constant=_patterns(file.variables.constant),
         frame_tables={k.lower(): v for k, v in file.frames.routines.items()},
         taught=frozenset(name.lower() for name in file.taught),
         taught_frames=_taught_frames(file),

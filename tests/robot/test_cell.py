@@ -32,6 +32,8 @@ correction_mm = 4.0
 [routines]
 Dock = "moves"
 still = ["Spot", "LRobot.*"]
+[variables]
+constant = ["VI_style", "Lib.*"]
 [frames.routines.TF]
 "1,2" = {tool = {xyz_mm = [1.0, 2.0, 3.0]}, uframe = [4.0, 5.0, 6.0, 0.0, 90.0, 0.0]}
 """
@@ -52,6 +54,7 @@ def test_full_cell(tmp_path):
     assert cell.aux == {1: "gun"}
     assert cell.limits.correction_mm == 4.0 and cell.limits.agree_mm == 0.02
     assert cell.routines == {"dock": "moves"}
+    assert cell.constant == ("vi_style", "lib.*")
     assert cell.still == ("spot", "lrobot.*")
     assert cell.frame_tables["tf"]["1,2"].uframe.record() == (4, 5, 6, 0, 90, 0)
     assert cell.taught == {"p_dock"}

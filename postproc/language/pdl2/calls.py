@@ -31,6 +31,7 @@ from postproc.language.pdl2.machine import (
     escape_names,
     invalidate,
     invalidate_names,
+    let_others_run,
 )
 from postproc.language.pdl2.moves import move
 from postproc.language.pdl2.routines import (
@@ -207,6 +208,7 @@ def opaque_call(
         invalidate(here, argument, f"{name} may change it (arguments go by reference)")
     if built_in:
         return
+    let_others_run(here)
     match effect_of(here.world, here.place.program, name):
         case RoutineEffect.TABLE:
             _frames_from_table(here, name, arguments)

@@ -32,15 +32,22 @@ from postproc.language.pdl2.job import FilePoints, Place, Start, World, base_var
 from postproc.language.pdl2.machine import (
     HANDLED,
     MAX_ROWS,
+    OTHERS_WRITE,
     Execution,
     Machine,
     Visit,
     escape_names,
     invalidate,
     invalidate_names,
+    let_others_run,
 )
 from postproc.language.pdl2.moves import move
 from postproc.language.pdl2.program import Program, Variable, Variables, recovered
+from postproc.language.pdl2.sharing import (
+    IMPORTED,
+    changing_variables,
+    imported_points,
+)
 from postproc.language.pdl2.store import Store, root_of
 from postproc.language.pdl2.stretches import MoveBlocks
 from postproc.language.pdl2.values import Nothing, Position, Value, Vector
@@ -155,10 +162,18 @@ def end_round(machine: Machine, here: Execution) -> None:
 _MOVES = re.compile(r".*\b(?:MOVE|MOVEFLY|SYNCMOVE|SYNCMOVEFLY)\b", re.I)
 
 
+_OTHERS_RUN = (
+    ast.Still, ast.Transfer, ast.Condition, ast.Cycle, ast.While, ast.Until, ast.Goto
+)  # fmt: skip
+"""Statements that take time, or that a program may wait with."""
+
+
 def step(machine: Machine, here: Execution, statement: ast.Statement) -> bool:
     """Run one statement; tell whether the next row follows."""
     text = statement.text if isinstance(statement, ast.Unknown) else ""
     statement = recovered(statement)
+    if isinstance(statement, _OTHERS_RUN) or text:
+        let_others_run(here)
     if text and not isinstance(statement, ast.Unknown):
         if not _is_harmless(here, text):
             _forget_by_text(here, _why_unknown(here))
@@ -344,6 +359,8 @@ def run_broken(machine: Machine, here: Execution) -> None:
 
 def fill_initial(world: World) -> None:
     """Enter declared initial values, constants and the variable file's values."""
+    world.changing = changing_variables(world)
+    world.imported = imported_points(world)
     for place, seen in world.declarations():
         _declared(world, place, seen)
     if world.variables is not None and world.main.main is not None:
@@ -399,6 +416,9 @@ def _declared(world: World, place: Place, seen: Variables) -> None:
         key = world.root(place, variable.name.lower())
         if variable.initial is None or key in world.initial:
             continue
+        if why := _why_untrusted(world, key):
+            world.initial[key] = Nothing(why)
+            continue
         value = ProgramPoint(world, place, variable.row, store).value(variable.initial)
         if isinstance(value, Position) and not value.name:
             value = replace(
@@ -435,7 +455,11 @@ def _enter_all(world: World, place: Place, file: ValueFile) -> None:
         )
         if known[row] and declared.exported:
             own[row] = False
-            other[world.root(place, root) + name[len(root) :]] = row
+            key = world.root(place, root)
+            if key in world.imported:
+                world.initial[key + name[len(root) :]] = Nothing(IMPORTED)
+            else:
+                other[key + name[len(root) :]] = row
     for row in named[~known[named]].tolist():
         name = entries.name[row].lower()
         root = root_of(name)
@@ -466,7 +490,15 @@ def _enter(world: World, file: ValueFile, entry: Entry, key: str) -> None:
     if entry.arm not in (0, world.arm):
         value = Nothing(f"its value is one of arm {entry.arm}")
     if value is not None:
-        world.initial[key] = value
+        why = _why_untrusted(world, root_of(key))
+        world.initial[key] = Nothing(why) if why else value
+
+
+def _why_untrusted(world: World, root: str) -> str:
+    """Say why the first value of a variable is not taken from a file, else ""."""
+    if root in world.imported:
+        return IMPORTED
+    return OTHERS_WRITE if root in world.changing else ""
 
 
 # From a parsed program to its visits: what it moves to, and from where.
@@ -522,7 +554,7 @@ def resolve(
 def _start(machine: Machine) -> None:
     world = machine.world
     program, start = world.main, world.start
-    store = Store(world.initial.find, last=frozenset({START}))
+    store = Store(world.initial.find, last=frozenset({START}), changing=world.changing)
     why = "the cell file does not say what it is"
     store.set(
         tool=frame_value(start.tool, why),
@@ -540,6 +572,7 @@ def _handlers(machine: Machine, store: Store) -> None:
     world = machine.world
     nothing = Nothing("a condition handler runs at any time")
     unknown = Store(lambda key: nothing, last=frozenset({ELSEWHERE}))
+    unknown.changing = world.changing
     unknown.set(tool=nothing, base=nothing, uframe=nothing)
     for program in world.programs():
         for body in (program.main, *program.routines.values()):

@@ -126,7 +126,8 @@ def test_the_shipped_list_names_no_routine_that_sets_frames_or_moves() -> None:
 
 def test_the_page_lists_the_shipped_list() -> None:
     page = Path(__file__).parents[3] / "docs" / "routines.md"
-    rows = [r for r in page.read_text("utf-8").splitlines() if r.startswith("| ")]
+    section = page.read_text("utf-8").split("\n## ")[2]
+    rows = [row for row in section.splitlines() if row.startswith("| ")]
     listed = [name for row in rows for name in re.findall(r"`(\w+)`", row)]
     assert sorted(listed) == sorted(known_still())
 
