@@ -7,10 +7,12 @@ import os
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Any
 
-from postproc.compensation.outcome import LEFT_ALONE
+from postproc.compensation.outcome import LEFT_ALONE, with_left
 from postproc.compensation.record import (
     FileRecord,
+    LeftLine,
     Sidecar,
     read_sidecar,
     sha256,
@@ -28,9 +30,9 @@ from postproc.files import (
     variables_of,
 )
 from postproc.language.stamp import read_stamp
+from postproc.language.visits import line_ranges
 
 LEFT = "left-alone"  # code of targets that kept their value
-NAMED = 5  # lines of such targets that a message names
 
 Current = Callable[[str], str | None]  # program -> id of the model it should have
 
@@ -199,12 +201,14 @@ class _Look:
         self, place: str, data: bytes, sidecar: Sidecar
     ) -> Iterator[CheckFinding]:
         """Check a file against its record, and the record against the source."""
-        record = sidecar.files.get(place.rpartition("/")[2])
+        name = place.rpartition("/")[2]
+        record = sidecar.files.get(name)
         stamp = read_stamp(data)
         if record is None:
             if stamp is not None:
                 text = "is stamped, and its record does not know it"
                 yield CheckFinding(place, "no-record", text)
+            yield from _left_alone(place, {}, sidecar.left_in(name))
             yield from self._source(place, sha256(data))
             return
         if sha256(data) != record.output_sha256:
@@ -213,7 +217,7 @@ class _Look:
             yield CheckFinding(
                 place, "no-record", "its stamp is not that of its record"
             )
-        yield from _left_alone(place, record)
+        yield from _left_alone(place, record.targets, sidecar.left_in(name))
         yield from self._source(place, record.source_sha256)
 
     def _source(self, place: str, digest: str) -> Iterator[CheckFinding]:
@@ -235,17 +239,32 @@ class _Look:
                 yield CheckFinding(place, "uncompensated", text)
 
 
-def _left_alone(place: str, record: FileRecord) -> Iterator[CheckFinding]:
+def _left_alone(
+    place: str, targets: Mapping[str, Any], left: tuple[LeftLine, ...]
+) -> Iterator[CheckFinding]:
     """Find targets that could have been compensated and kept their value."""
-    told = record.targets
+    told = with_left(targets, left) if left else targets
     codes = "".join(str(int(status)) for status in LEFT_ALONE)
-    pairs = zip(str(told.get("status", "")), told.get("line", ()), strict=False)
-    lines = [str(line) for status, line in pairs if status in codes]
-    if lines:
-        more = " .." if len(lines) > NAMED else ""
-        text = f"{len(lines)} visits were left alone, lines {', '.join(lines[:NAMED])}"
+    columns = (str(told.get("status", "")), told.get("line", ()), told.get("why", ()))
+    rows = [row for row in zip(*columns, strict=False) if row[0] in codes]
+    if rows:
+        lines = line_ranges(sorted(line for _, line, _ in rows))
+        text = f"{len(rows)} visits were left alone, lines {lines} of the source"
         cure = "look at them, then pass --accept-left"
-        yield CheckFinding(place, LEFT, f"{text}{more} of the source: {cure}")
+        yield CheckFinding(place, LEFT, f"{text}: {cure}; {_by_reason(rows, told)}")
+
+
+def _by_reason(rows: list[tuple[str, int, int]], told: Mapping[str, Any]) -> str:
+    """Say why lines were left, a reason at a time."""
+    lines: dict[int, list[int]] = {}
+    for _, line, why in rows:
+        lines.setdefault(why, []).append(line)
+    reasons = told.get("reasons", ())
+    return "; ".join(
+        f"{reasons[why]} (lines {line_ranges(sorted(own))})"
+        for why, own in lines.items()
+        if why < len(reasons)
+    )
 
 
 def _agree(source: str, model: str, record: FileRecord, sidecar: Sidecar) -> bool:

@@ -33,7 +33,12 @@ from postproc.compensation.options import (
     Setting,
     silent,
 )
-from postproc.compensation.outcome import Decisions, Outcome, tell_arrivals
+from postproc.compensation.outcome import (
+    Decisions,
+    Outcome,
+    left_elsewhere,
+    tell_arrivals,
+)
 from postproc.compensation.parallel import in_processes, map_with, rounded
 from postproc.compensation.program import (
     Planned,
@@ -378,12 +383,14 @@ def report(
     """Say what came of every visit, and what error the model expects now."""
     cell, model, options = setting.cell, setting.model, setting.options
     d, rows, visits = kept.decisions, kept.corrected, reading.visits
+    files = tuple(output.records)
     return Outcome(
         program=name,
         model=model.id,
         outputs=output.changed,
-        record=output.sidecar(
-            model.id, options.told(), tell_arrivals(visits, d, tuple(output.records))
+        record=replace(
+            output.sidecar(model.id, options.told(), tell_arrivals(visits, d, files)),
+            left=left_elsewhere(visits, d, files, reading.missed, reading.diagnostics),
         ),
         visits=visits,
         decisions=d,

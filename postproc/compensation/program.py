@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -18,7 +18,7 @@ from postproc.compensation.options import Options
 from postproc.compensation.targets import targets_from_visits
 from postproc.exceptions import ProgramError
 from postproc.files import base_name, is_variables
-from postproc.language.pdl2.effects import dead_moves
+from postproc.language.pdl2.effects import dead_lines, dead_moves
 from postproc.language.pdl2.interpreter import resolve
 from postproc.language.pdl2.job import Start
 from postproc.language.pdl2.program import Program, parse
@@ -46,6 +46,7 @@ class Reading:
         cloned: Edits, file by file, that gave `sources` clones of variables; empty
             where there are none. Lines of visits are those before these edits.
         given: The files as they were before that; empty where nothing was cloned.
+        missed: Lines of moves that are never reached, by file.
         begins: The first visit of every program.
         programs: What was parsed of the files that hold no number of a target: they
             come out as they went in, and need not be parsed again.
@@ -58,6 +59,7 @@ class Reading:
     given: tuple[Source, ...] = ()
     begins: tuple[int, ...] = (0,)
     programs: tuple[Program, ...] = ()
+    missed: Mapping[str, Ints] = field(default_factory=dict)
 
     @property
     def sources(self) -> tuple[Source, ...]:
@@ -178,7 +180,8 @@ def read_program(
     visits, parsed = resolved.visits, (program, *pages)
     corrected = {visits.files[k] for k in np.unique(visits.literals.file).tolist()}
     kept = tuple(p for p in parsed if p.lines.source.name not in corrected)
-    return Reading(tuple(texts), visits, found, programs=kept)
+    lost = dead_lines([program, *pages], visits)
+    return Reading(tuple(texts), visits, found, programs=kept, missed=lost)
 
 
 def _parsed(source: Source, known: Sequence[Program], each: Map) -> Program:

@@ -134,14 +134,32 @@ def _rows(edits: Replacements) -> str:
     return text[:-2].decode("ascii")
 
 
+LeftLine = tuple[str, int, str]
+"""A file, a line of its source, and why what stands there was left as it is."""
+
+
 @dataclass(frozen=True)
 class Sidecar:
-    """The records of a program and of the files written with it."""
+    """The records of a program and of the files written with it.
+
+    Attributes:
+        version, model: What wrote it, and the model's id.
+        files: The record of every file that was written, by name.
+        options: What the user asked for.
+        left: What may hold targets, was left, and no record of a file tells: targets
+            in files that were not changed, moves that are never reached, statements
+            that are not understood.
+    """
 
     version: str
     model: str
     files: Mapping[str, FileRecord]
     options: Mapping[str, Any] = field(default_factory=dict)
+    left: tuple[LeftLine, ...] = ()
+
+    def left_in(self, name: str) -> tuple[LeftLine, ...]:
+        """Return what was left in a file, beside what its own record tells."""
+        return tuple(line for line in self.left if line[0] == name)
 
     def to_json(self, each: Map = map) -> Iterator[str]:
         """Write the record as JSON text, piece by piece.
@@ -149,7 +167,9 @@ class Sidecar:
         Args:
             each: How the pieces are made.
         """
-        head = {"postproc": self.version, "model": self.model}
+        head: dict[str, Any] = {"postproc": self.version, "model": self.model}
+        if self.left:
+            head["left"] = self.left
         yield json.dumps({**head, "options": dict(self.options)})[:-1] + ', "files": {'
         for number, (name, record) in enumerate(self.files.items()):
             yield (", " if number else "") + json.dumps(name) + ": "
@@ -163,7 +183,14 @@ class Sidecar:
             names: New names by old ones; files that have none are left out.
         """
         files = {names[name]: r for name, r in self.files.items() if name in names}
-        return replace(self, files=files)
+        main = next(iter(self.files), None)
+        rest = not files or main in names
+        left = tuple(
+            (names.get(file, file), line, why)
+            for file, line, why in self.left
+            if file in names or (rest and file not in self.files)
+        )
+        return replace(self, files=files, left=left)
 
 
 def read_sidecar(path: Path) -> Sidecar:
@@ -205,7 +232,8 @@ def _record(path: Path, text: bytes) -> Sidecar:
         data = json.loads(text)
         files = {name: FileRecord.read(told) for name, told in data["files"].items()}
         version, model = str(data["postproc"]), str(data["model"])
-        return Sidecar(version, model, files, data.get("options", {}))
+        left = [(str(f), int(line), str(why)) for f, line, why in data.get("left", ())]
+        return Sidecar(version, model, files, data.get("options", {}), tuple(left))
     except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
         raise ProgramError(path, "is not a record of postproc", CURE) from None
 

@@ -9,6 +9,7 @@ from functools import lru_cache
 
 import numpy as np
 
+from postproc.arrays import Ints
 from postproc.language.pdl2 import syntax as ast
 from postproc.language.pdl2.job import Place, World
 from postproc.language.pdl2.program import Body, Program
@@ -17,7 +18,7 @@ from postproc.language.pdl2.routines import (
     effect_of,
     report_unknown_routine,
 )
-from postproc.language.visits import Diagnostic, Visits
+from postproc.language.visits import Diagnostic, Visits, line_ranges
 
 # What a statement or a routine may do, read off its text.
 
@@ -332,7 +333,22 @@ def dead_moves(programs: Sequence[Program], visits: Visits) -> list[Diagnostic]:
         programs: The files of a job.
         visits: Every arrival in them.
     """
-    found = []
+    return [
+        Diagnostic(
+            name,
+            int(lines[0]),
+            NEVER_REACHED,
+            f"{len(lines)} moves, lines {line_ranges(lines)}, are never reached from "
+            "the start: they are not compensated. Give the program that calls them, "
+            "or remove them",
+        )
+        for name, lines in dead_lines(programs, visits).items()
+    ]
+
+
+def dead_lines(programs: Sequence[Program], visits: Visits) -> dict[str, Ints]:
+    """Return the lines of such moves, (k,) ascending, of files that hold any."""
+    found = {}
     for program in programs:
         name = program.lines.source.name
         moves = program.statements.which(_has_target)
@@ -340,12 +356,7 @@ def dead_moves(programs: Sequence[Program], visits: Visits) -> list[Diagnostic]:
         own = visits.file == visits.files.index(name)
         missed = lines[~np.isin(lines, visits.line[own])]
         if len(missed):
-            text = (
-                f"{len(missed)} moves, the first here, are never reached from the "
-                "start: they are not compensated. Give the program that calls them, "
-                "or remove them"
-            )
-            found.append(Diagnostic(name, int(missed[0]), NEVER_REACHED, text))
+            found[name] = missed
     return found
 
 
