@@ -29,6 +29,7 @@ from postproc.files import (
     read_input,
     variables_of,
 )
+from postproc.language.pdl2.routines import ASSUMED_STILL
 from postproc.language.stamp import read_stamp
 from postproc.language.visits import line_ranges
 
@@ -81,7 +82,10 @@ class Checked:
 
 
 def check(
-    folder: Path, current: Current = lambda place: None, source: Path | None = None
+    folder: Path,
+    current: Current = lambda place: None,
+    source: Path | None = None,
+    strict_calls: bool = False,
 ) -> Checked:
     """Check a tree of compensated programs.
 
@@ -89,6 +93,7 @@ def check(
         folder: The tree.
         current: Tells the model that a program should be made with, None: any.
         source: The tree that it was made from.
+        strict_calls: Find programs with calls that the shipped list took as still.
 
     Raises:
         ProgramError: A folder or a file cannot be read.
@@ -97,7 +102,8 @@ def check(
         if root is not None and not root.is_dir():
             raise ProgramError(root, "is no folder", "Give a tree of programs")
     places = list(_places(folder))
-    look = _Look(folder, source, current, {place.lower(): place for place in places})
+    names = {place.lower(): place for place in places}
+    look = _Look(folder, source, current, names, strict_calls)
     findings = [f for place in places for f in look.at(place)]
     if source is not None:
         findings += _absent(source, set(places))
@@ -141,12 +147,14 @@ class _Look:
         source: The tree that it was made from, or None.
         current: Tells the model that a program should be made with.
         places: All files, by their paths in lower case.
+        strict_calls: No routine is still because the shipped list says so.
     """
 
     root: Path
     source: Path | None
     current: Current
     places: Mapping[str, str]
+    strict_calls: bool = False
 
     def at(self, place: str) -> Iterator[CheckFinding]:
         """Find what is wrong with a file."""
@@ -186,6 +194,8 @@ class _Look:
             yield CheckFinding(place, "no-record", str(exc))
             return
         yield from self._model(place, sidecar)
+        if self.strict_calls:
+            yield from _assumed(place, sidecar)
         yield from self._content(place, data, sidecar)
         if values := self._existing(variables_of(place)):
             yield from self._content(values, read_input(self.root / values), sidecar)
@@ -252,6 +262,13 @@ def _left_alone(
         text = f"{len(rows)} visits were left alone, lines {lines} of the source"
         cure = "look at them, then pass --accept-left"
         yield CheckFinding(place, LEFT, f"{text}: {cure}; {_by_reason(rows, told)}")
+
+
+def _assumed(place: str, sidecar: Sidecar) -> Iterator[CheckFinding]:
+    """Find routines that were taken as still because the shipped list says so."""
+    for file, line, message in sidecar.assumed:
+        text = f"line {line} of {file}: {message}; compensate it with --strict-calls"
+        yield CheckFinding(place, ASSUMED_STILL, text)
 
 
 def _by_reason(rows: list[tuple[str, int, int]], told: Mapping[str, Any]) -> str:

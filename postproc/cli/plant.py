@@ -141,6 +141,7 @@ def check(
     accept_left: Annotated[
         bool, typer.Option("--accept-left", help="Let targets left alone pass.")
     ] = False,
+    strict_calls: StrictCallsOption = False,
     json: JsonOption = None,
 ) -> None:
     """Tell whether a tree may be uploaded: exit 0 yes, 1 no, 2 trouble.
@@ -151,7 +152,7 @@ def check(
     from postproc.batch.check import check as look
 
     with explained():
-        found = look(folder, _current_model(model, plan), source)
+        found = look(folder, _current_model(model, plan), source, strict_calls)
         if accept_left:
             found = found.accepting_left()
         if json:

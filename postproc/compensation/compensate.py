@@ -57,6 +57,7 @@ from postproc.compensation.targets import rounded_points
 from postproc.compensation.windows import Window, lead_in, windows
 from postproc.exceptions import CellError, ProgramError
 from postproc.files import variables_of
+from postproc.language.pdl2.routines import ASSUMED_STILL
 from postproc.language.source import Replacements, Source
 from postproc.language.stamp import is_stamped
 from postproc.language.visits import Visits
@@ -390,6 +391,11 @@ def report(
         outputs=output.changed,
         record=replace(
             output.sidecar(model.id, options.told(), tell_arrivals(visits, d, files)),
+            assumed=tuple(
+                (x.file, x.line, x.message)
+                for x in reading.diagnostics
+                if x.code == ASSUMED_STILL
+            ),
             left=left_elsewhere(visits, d, files, reading.missed, reading.diagnostics),
         ),
         visits=visits,

@@ -138,6 +138,9 @@ LeftLine = tuple[str, int, str]
 """A file, a line of its source, and why what stands there was left as it is."""
 
 
+_LISTS = ("left", "assumed")  # keys of a record that are there where they hold any
+
+
 @dataclass(frozen=True)
 class Sidecar:
     """The records of a program and of the files written with it.
@@ -149,6 +152,8 @@ class Sidecar:
         left: What may hold targets, was left, and no record of a file tells: targets
             in files that were not changed, moves that are never reached, statements
             that are not understood.
+        assumed: Routines that were taken as still because the shipped list says so:
+            where the first call of each stands, and its message.
     """
 
     version: str
@@ -156,6 +161,7 @@ class Sidecar:
     files: Mapping[str, FileRecord]
     options: Mapping[str, Any] = field(default_factory=dict)
     left: tuple[LeftLine, ...] = ()
+    assumed: tuple[LeftLine, ...] = ()
 
     def left_in(self, name: str) -> tuple[LeftLine, ...]:
         """Return what was left in a file, beside what its own record tells."""
@@ -168,8 +174,7 @@ class Sidecar:
             each: How the pieces are made.
         """
         head: dict[str, Any] = {"postproc": self.version, "model": self.model}
-        if self.left:
-            head["left"] = self.left
+        head |= {key: told for key in _LISTS if (told := getattr(self, key))}
         yield json.dumps({**head, "options": dict(self.options)})[:-1] + ', "files": {'
         for number, (name, record) in enumerate(self.files.items()):
             yield (", " if number else "") + json.dumps(name) + ": "
@@ -185,12 +190,17 @@ class Sidecar:
         files = {names[name]: r for name, r in self.files.items() if name in names}
         main = next(iter(self.files), None)
         rest = not files or main in names
-        left = tuple(
-            (names.get(file, file), line, why)
-            for file, line, why in self.left
-            if file in names or (rest and file not in self.files)
+
+        def own(lines: tuple[LeftLine, ...]) -> tuple[LeftLine, ...]:
+            return tuple(
+                (names.get(file, file), line, why)
+                for file, line, why in lines
+                if file in names or (rest and file not in self.files)
+            )
+
+        return replace(
+            self, files=files, left=own(self.left), assumed=own(self.assumed)
         )
-        return replace(self, files=files, left=left)
 
 
 def read_sidecar(path: Path) -> Sidecar:
@@ -232,8 +242,11 @@ def _record(path: Path, text: bytes) -> Sidecar:
         data = json.loads(text)
         files = {name: FileRecord.read(told) for name, told in data["files"].items()}
         version, model = str(data["postproc"]), str(data["model"])
-        left = [(str(f), int(line), str(why)) for f, line, why in data.get("left", ())]
-        return Sidecar(version, model, files, data.get("options", {}), tuple(left))
+        lists = {
+            key: tuple((str(f), int(n), str(why)) for f, n, why in data.get(key, ()))
+            for key in _LISTS
+        }
+        return Sidecar(version, model, files, data.get("options", {}), **lists)
     except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
         raise ProgramError(path, "is not a record of postproc", CURE) from None
 

@@ -44,6 +44,10 @@ def test_strict_calls_ignores_the_shipped_list(desk):
         assert desk.compensate(job, "-o", alone, *strict).exit_code == code
         out = desk.folder / f"dst{code}"
         assert cli("batch", source, out, *given, "--jobs", 1, *strict).exit_code == code
+        assert cli("check", out).exit_code == code
+        checked = cli("check", out, "--strict-calls", "--accept-left")
+        assert checked.exit_code == 1 - code  # made strictly, nothing was assumed
+        assert ("assumed-still" in checked.stderr) is not bool(code)
         told = cli("explain", job, *given, "--json", "-", *strict).stdout
         assert ("spot, which is not in the files at hand" in told) is bool(code)
         planned = cli("explain", job, *given[:2], "--json", "-", *strict)

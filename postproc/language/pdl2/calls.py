@@ -35,6 +35,7 @@ from postproc.language.pdl2.machine import (
 )
 from postproc.language.pdl2.moves import move
 from postproc.language.pdl2.routines import (
+    ASSUMED_STILL,
     TRACKING,
     RoutineEffect,
     effect_of,
@@ -220,7 +221,7 @@ def opaque_call(
         case RoutineEffect.TRACKS:
             _track(here, name, arguments)
         case RoutineEffect.KNOWN:
-            _say(here, "assumed-still", name, "is not in the files at hand: it is on "
+            _say(here, ASSUMED_STILL, name, "is not in the files at hand: it is on "
                  "the list of routines known neither to move the arm nor to set frames "
                  "(docs/routines.md); if it does, say so under [routines] in the cell "
                  "file, or pass --strict-calls")  # fmt: skip

@@ -59,7 +59,7 @@ class SettingColumns:
                 self._table.setdefault(name, []).append(value)
             found = disturbance(settings, self._payload_kg)
             tool = ("tool", "tool_rmt")
-            pose = found or _unknown(settings, (*tool, "base", "uframe"))
+            pose = found or _unknown(settings, ("uframe", "base", *tool))
             self._problems.append((pose, found or _unknown(settings, tool)))
         return row
 
