@@ -7,10 +7,12 @@ import os
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Any
 
-from postproc.compensation.outcome import LEFT_ALONE
+from postproc.compensation.outcome import LEFT_ALONE, with_left
 from postproc.compensation.record import (
     FileRecord,
+    LeftLine,
     Sidecar,
     read_sidecar,
     sha256,
@@ -27,10 +29,11 @@ from postproc.files import (
     read_input,
     variables_of,
 )
+from postproc.language.pdl2.routines import ASSUMED_STILL
 from postproc.language.stamp import read_stamp
+from postproc.language.visits import line_ranges
 
 LEFT = "left-alone"  # code of targets that kept their value
-NAMED = 5  # lines of such targets that a message names
 
 Current = Callable[[str], str | None]  # program -> id of the model it should have
 
@@ -79,7 +82,10 @@ class Checked:
 
 
 def check(
-    folder: Path, current: Current = lambda place: None, source: Path | None = None
+    folder: Path,
+    current: Current = lambda place: None,
+    source: Path | None = None,
+    strict_calls: bool = False,
 ) -> Checked:
     """Check a tree of compensated programs.
 
@@ -87,6 +93,7 @@ def check(
         folder: The tree.
         current: Tells the model that a program should be made with, None: any.
         source: The tree that it was made from.
+        strict_calls: Find programs with calls that the shipped list took as still.
 
     Raises:
         ProgramError: A folder or a file cannot be read.
@@ -95,7 +102,8 @@ def check(
         if root is not None and not root.is_dir():
             raise ProgramError(root, "is no folder", "Give a tree of programs")
     places = list(_places(folder))
-    look = _Look(folder, source, current, {place.lower(): place for place in places})
+    names = {place.lower(): place for place in places}
+    look = _Look(folder, source, current, names, strict_calls)
     findings = [f for place in places for f in look.at(place)]
     if source is not None:
         findings += _absent(source, set(places))
@@ -139,12 +147,14 @@ class _Look:
         source: The tree that it was made from, or None.
         current: Tells the model that a program should be made with.
         places: All files, by their paths in lower case.
+        strict_calls: No routine is still because the shipped list says so.
     """
 
     root: Path
     source: Path | None
     current: Current
     places: Mapping[str, str]
+    strict_calls: bool = False
 
     def at(self, place: str) -> Iterator[CheckFinding]:
         """Find what is wrong with a file."""
@@ -184,6 +194,8 @@ class _Look:
             yield CheckFinding(place, "no-record", str(exc))
             return
         yield from self._model(place, sidecar)
+        if self.strict_calls:
+            yield from _assumed(place, sidecar)
         yield from self._content(place, data, sidecar)
         if values := self._existing(variables_of(place)):
             yield from self._content(values, read_input(self.root / values), sidecar)
@@ -199,12 +211,14 @@ class _Look:
         self, place: str, data: bytes, sidecar: Sidecar
     ) -> Iterator[CheckFinding]:
         """Check a file against its record, and the record against the source."""
-        record = sidecar.files.get(place.rpartition("/")[2])
+        name = place.rpartition("/")[2]
+        record = sidecar.files.get(name)
         stamp = read_stamp(data)
         if record is None:
             if stamp is not None:
                 text = "is stamped, and its record does not know it"
                 yield CheckFinding(place, "no-record", text)
+            yield from _left_alone(place, {}, sidecar.left_in(name))
             yield from self._source(place, sha256(data))
             return
         if sha256(data) != record.output_sha256:
@@ -213,7 +227,7 @@ class _Look:
             yield CheckFinding(
                 place, "no-record", "its stamp is not that of its record"
             )
-        yield from _left_alone(place, record)
+        yield from _left_alone(place, record.targets, sidecar.left_in(name))
         yield from self._source(place, record.source_sha256)
 
     def _source(self, place: str, digest: str) -> Iterator[CheckFinding]:
@@ -235,17 +249,39 @@ class _Look:
                 yield CheckFinding(place, "uncompensated", text)
 
 
-def _left_alone(place: str, record: FileRecord) -> Iterator[CheckFinding]:
+def _left_alone(
+    place: str, targets: Mapping[str, Any], left: tuple[LeftLine, ...]
+) -> Iterator[CheckFinding]:
     """Find targets that could have been compensated and kept their value."""
-    told = record.targets
+    told = with_left(targets, left) if left else targets
     codes = "".join(str(int(status)) for status in LEFT_ALONE)
-    pairs = zip(str(told.get("status", "")), told.get("line", ()), strict=False)
-    lines = [str(line) for status, line in pairs if status in codes]
-    if lines:
-        more = " .." if len(lines) > NAMED else ""
-        text = f"{len(lines)} visits were left alone, lines {', '.join(lines[:NAMED])}"
+    columns = (str(told.get("status", "")), told.get("line", ()), told.get("why", ()))
+    rows = [row for row in zip(*columns, strict=False) if row[0] in codes]
+    if rows:
+        lines = line_ranges(sorted(line for _, line, _ in rows))
+        text = f"{len(rows)} visits were left alone, lines {lines} of the source"
         cure = "look at them, then pass --accept-left"
-        yield CheckFinding(place, LEFT, f"{text}{more} of the source: {cure}")
+        yield CheckFinding(place, LEFT, f"{text}: {cure}; {_by_reason(rows, told)}")
+
+
+def _assumed(place: str, sidecar: Sidecar) -> Iterator[CheckFinding]:
+    """Find routines that were taken as still because the shipped list says so."""
+    for file, line, message in sidecar.assumed:
+        text = f"line {line} of {file}: {message}; compensate it with --strict-calls"
+        yield CheckFinding(place, ASSUMED_STILL, text)
+
+
+def _by_reason(rows: list[tuple[str, int, int]], told: Mapping[str, Any]) -> str:
+    """Say why lines were left, a reason at a time."""
+    lines: dict[int, list[int]] = {}
+    for _, line, why in rows:
+        lines.setdefault(why, []).append(line)
+    reasons = told.get("reasons", ())
+    return "; ".join(
+        f"{reasons[why]} (lines {line_ranges(sorted(own))})"
+        for why, own in lines.items()
+        if why < len(reasons)
+    )
 
 
 def _agree(source: str, model: str, record: FileRecord, sidecar: Sidecar) -> bool:

@@ -6,7 +6,7 @@ import hashlib
 import json
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -40,7 +40,7 @@ class JobSetup:
             "cell": self.cell.file.model_dump(mode="json"),
             "arm": self.cell.arm.file.model_dump(mode="json"),
             "model": self.model.id,
-            "options": asdict(self.options),
+            "options": self.options.told(),
         }
         text = json.dumps(parts, sort_keys=True)
         return hashlib.sha256(text.encode()).hexdigest()

@@ -27,8 +27,9 @@ from postproc.files import (
 # A page is a program that exactly one other program of its folder names. What several
 # programs share belongs to none of them, and is taken by itself.
 
-HEAD = 1 << 18  # bytes: declarations stand before BEGIN, far from the end of a file
+HEAD = 1 << 12  # bytes: the stamp of an output stands on its first line
 
+_WORDS = (b"import", b"exported", b"call")  # one is in every line that names a program
 _NAMED = re.compile(
     rb"^[ \t]*(?:IMPORT[ \t]*'(?P<file>[^'\r\n]*)'"
     rb"|ROUTINE\b[^\r\n]*?\bEXPORTED[ \t]+FROM[ \t]+(?P<program>\w+)"
@@ -38,11 +39,11 @@ _NAMED = re.compile(
 _OUTSIDE = re.compile(r"[/\\:\0]|^\.*$")  # folders, drives, ``..``
 
 
-def named_programs(head: bytes) -> tuple[list[str], list[str]]:
+def named_programs(text: bytes) -> tuple[list[str], list[str]]:
     r"""Find the programs that a program names.
 
     Args:
-        head: Its first bytes.
+        text: All of it: a routine may call a page behind a thousand moves.
 
     Returns:
         Lower-case base names, in order, each once; and the names, as written, that
@@ -53,7 +54,7 @@ def named_programs(head: bytes) -> tuple[list[str], list[str]]:
     """
     inside: dict[str, None] = {}
     outside: dict[str, None] = {}
-    for found in _NAMED.finditer(head):
+    for found in filter(None, map(_NAMED.match, _lines_with(_WORDS, text))):
         raw = next(group for group in found.groups() if group is not None)
         name = raw.decode("latin-1")
         if _OUTSIDE.search(name):
@@ -92,11 +93,37 @@ def of_one_arm(program: int, page: int) -> bool:
     return page in (0, program or 1)
 
 
+def _lines_with(words: Sequence[bytes], text: bytes) -> Iterator[bytes]:
+    """Yield the lines that hold one of some words, in lower case: few of many."""
+    folded = text.lower()
+    places: list[int] = []
+    for word in words:
+        at = folded.find(word)
+        while at >= 0:
+            places.append(at)
+            at = folded.find(word, at + 1)
+    end = 0
+    for at in sorted(places):
+        if at >= end:
+            begin = text.rfind(b"\n", end, at) + 1 or end
+            end = text.find(b"\n", at) + 1 or len(text)
+            yield text[begin:end]
+
+
+def names_in(path: Path) -> tuple[list[str], list[str]]:
+    """Find the programs that a file names (`named_programs`), none if unreadable."""
+    return named_programs(_read(path, -1))
+
+
 def read_head(path: Path) -> bytes:
     """Read the first bytes of a program, nothing where it cannot be read."""
+    return _read(path, HEAD)
+
+
+def _read(path: Path, size: int) -> bytes:
     try:
         with path.open("rb") as file:
-            return file.read(HEAD)
+            return file.read(size)
     except OSError:
         return b""
 
@@ -266,9 +293,8 @@ def _sort(root: Path, places: Sequence[str], plan: BatchPlan) -> _Folder:
                 part.notes.append((place, _STALE))
     named, arms = {}, {}
     for base, place in programs.items():
-        head = read_head(root / place)
-        named[base], outside = named_programs(head)
-        arms[base] = program_arm(head)
+        named[base], outside = names_in(root / place)
+        arms[base] = program_arm(read_head(root / place))
         part.notes += [
             (place, f"{n!r} is outside of its folder: not followed") for n in outside
         ]

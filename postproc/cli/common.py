@@ -49,6 +49,12 @@ OrientationOption = Annotated[
     bool,
     typer.Option("--orientation", help="Correct orientations too, not only places."),
 ]
+StrictCallsOption = Annotated[
+    bool,
+    typer.Option(
+        "--strict-calls", help="Take no routine as still that the cell does not name."
+    ),
+]
 ProcessesOption = Annotated[
     int,
     typer.Option(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Self
 
@@ -13,7 +13,7 @@ import numpy as np
 from postproc.arrays import Floats, Ints, Signs
 from postproc.cli.jobs import read_files
 from postproc.compensation.compensate import compensate
-from postproc.compensation.options import Options
+from postproc.compensation.options import AS_USUAL, Options
 from postproc.compensation.outcome import Outcome, Status
 from postproc.compensation.program import (
     Planned,
@@ -251,7 +251,7 @@ def explain(
     files: dict[str, bytes],
     cell: Cell,
     model: Model | None,
-    temperature: float | None = None,
+    options: Options = AS_USUAL,
 ) -> Explanation:
     """Plan a program; with a model, compensate it, which plans it too.
 
@@ -259,6 +259,7 @@ def explain(
         PostprocError: The program, the cell or the model cannot be used.
     """
     if model is None:
+        cell = replace(cell, strict_calls=cell.strict_calls or options.strict_calls)
         reading = read_program(files, cell)
         return Explanation.of_plan(reading, plan_visits(reading.visits, cell))
     (name, source), *rest = files.items()
@@ -270,7 +271,7 @@ def explain(
         name=name,
         variables=next(iter(values.values()), None),
         pages={n: data for n, data in rest if n not in values},
-        options=Options(temperature=temperature),
+        options=options,
     )
     return Explanation.of_outcome(outcome)
 
@@ -280,7 +281,7 @@ def explain_file(
     cell: Path,
     model: Path | None,
     lsv: Path | None,
-    temperature: float | None,
+    options: Options = AS_USUAL,
 ) -> Explanation:
     """Explain a program on disk.
 
@@ -289,4 +290,4 @@ def explain_file(
     """
     files = read_files(program, lsv)
     fitted = None if model is None else load_model(model)
-    return explain(files, load_cell(cell), fitted, temperature)
+    return explain(files, load_cell(cell), fitted, options)

@@ -10,7 +10,7 @@ from pathlib import Path
 from postproc.arrays import Map
 from postproc.batch.tree import (
     group_pages,
-    named_programs,
+    names_in,
     of_one_arm,
     program_arm,
     read_head,
@@ -66,7 +66,7 @@ def find_pages(program: Path) -> Pages:
     its own or of another arm is a program by itself: none is followed. Earlier outputs
     and symbolic links do not count.
     """
-    wanted, outside = named_programs(read_head(program))
+    wanted, outside = names_in(program)
     notes = [f"{name!r} leads out of the folder: not followed" for name in outside]
     main = base_name(program.name)
     if not set(wanted) - {main} or not program.parent.is_dir():
@@ -98,7 +98,7 @@ def _is_source(path: Path) -> bool:
 
 def _named(path: Path, main: str) -> list[str]:
     """List the programs that a program names, but for the main one."""
-    return [name for name in named_programs(read_head(path))[0] if name != main]
+    return [name for name in names_in(path)[0] if name != main]
 
 
 def _left_out(

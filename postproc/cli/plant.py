@@ -13,6 +13,7 @@ from postproc.cli.common import (
     HtmlOption,
     JsonOption,
     OrientationOption,
+    StrictCallsOption,
     TemperatureOption,
     app,
     explained,
@@ -65,6 +66,7 @@ def batch(
     clone: CloneOption = False,
     orientation: OrientationOption = False,
     temperature: TemperatureOption = None,
+    strict_calls: StrictCallsOption = False,
 ) -> None:
     """Compensate a tree of programs; what could not be compensated is not in DST."""
     with explained():
@@ -77,7 +79,7 @@ def batch(
         from postproc.compensation.options import Options
         from postproc.report.terminal import progress_bar
 
-        options = Options(clone, temperature=temperature, orientation=orientation)
+        options = Options(clone, False, temperature, orientation, strict_calls)
         made = make_plan(plan, cell, model, options)
         check_places([html], [cell, model, plan])
         order = run.Order(source, target, made, log or run.default_log(target), resume)
@@ -139,6 +141,7 @@ def check(
     accept_left: Annotated[
         bool, typer.Option("--accept-left", help="Let targets left alone pass.")
     ] = False,
+    strict_calls: StrictCallsOption = False,
     json: JsonOption = None,
 ) -> None:
     """Tell whether a tree may be uploaded: exit 0 yes, 1 no, 2 trouble.
@@ -149,7 +152,8 @@ def check(
     from postproc.batch.check import check as look
 
     with explained():
-        found = look(folder, _current_model(folder, model, plan), source)
+        current = _current_model(folder, model, plan)
+        found = look(folder, current, source, strict_calls)
         if accept_left:
             found = found.accepting_left()
         if json:

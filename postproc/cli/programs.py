@@ -18,6 +18,7 @@ from postproc.cli.common import (
     ModelOption,
     OrientationOption,
     ProcessesOption,
+    StrictCallsOption,
     TemperatureOption,
     app,
     as_path,
@@ -68,6 +69,7 @@ def compensate(
     ] = False,
     orientation: OrientationOption = False,
     temperature: TemperatureOption = None,
+    strict_calls: StrictCallsOption = False,
     processes: ProcessesOption = 0,
 ) -> None:
     """Rewrite a program so that the tool lands where its targets say."""
@@ -79,7 +81,7 @@ def compensate(
 
     given = None if is_stream(program) else Path(program)
     with explained(given, lsv):
-        options = Options(clone, shared, temperature, orientation)
+        options = Options(clone, shared, temperature, orientation, strict_calls)
         if report == Path(STREAM) and given is None and output is None:
             raise PostprocError("--report -: stdout holds the program. Name a file")
         check_places([output, report, html, lsv_out], [given, lsv, cell, model])
@@ -182,15 +184,18 @@ def explain(
         int | None, typer.Option("--line", help="Only the visits of this line.")
     ] = None,
     temperature: TemperatureOption = None,
+    strict_calls: StrictCallsOption = False,
     json: JsonOption = None,
 ) -> None:
     """Show why every target moves: from where it is reached, and what that costs."""
     from postproc.cli.explain import explain_file
+    from postproc.compensation.options import Options
 
     with explained(program, lsv):
         check_places([as_path(json)], [program, cell, model, lsv])
+        options = Options(temperature=temperature, strict_calls=strict_calls)
         with busy("plan"):
-            found = explain_file(program, cell, model, lsv, temperature)
+            found = explain_file(program, cell, model, lsv, options)
         for finding in found.findings(line):
             say(finding)
         if json:

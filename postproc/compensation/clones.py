@@ -235,7 +235,9 @@ def give_own_points(reading: Reading, proposal: Proposal, cell: Cell) -> Reading
         text = "clones would change what the program does: nothing is cloned"
         found = Diagnostic(reading.sources[0].name, 1, "not-cloned", text)
         return replace(reading, diagnostics=(*reading.diagnostics, found))
-    return Reading(again.texts, visits, notes, cloned, reading.sources)
+    return Reading(
+        again.texts, visits, notes, cloned, reading.sources, missed=reading.missed
+    )
 
 
 def _stops(visits: Visits) -> dict[MoveSlot, Ints]:

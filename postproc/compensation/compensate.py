@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, fields, replace
+from dataclasses import dataclass, fields, replace
 from types import MappingProxyType
 
 import numpy as np
@@ -39,6 +39,7 @@ from postproc.compensation.outcome import (
     Decisions,
     Outcome,
     largest_motion,
+    left_elsewhere,
     tell_arrivals,
 )
 from postproc.compensation.parallel import in_processes, map_with, rounded
@@ -46,9 +47,9 @@ from postproc.compensation.program import (
     Planned,
     Reading,
     plan_visits,
+    prepared,
     read_program,
     states_of,
-    with_measured_play,
 )
 from postproc.compensation.rewrite import (
     Output,
@@ -60,6 +61,7 @@ from postproc.compensation.targets import rounded_points
 from postproc.compensation.windows import Window, lead_in, windows
 from postproc.exceptions import CellError, ProgramError
 from postproc.files import variables_of
+from postproc.language.pdl2.routines import ASSUMED_STILL
 from postproc.language.source import Replacements, Source
 from postproc.language.stamp import is_stamped
 from postproc.language.visits import Visits, told_once
@@ -310,7 +312,7 @@ def compensate(
     """
     files = name_files(name, source, variables, pages)
     refuse(files, cell, model)
-    cell = with_measured_play(cell, model)
+    cell = prepared(cell, model, options)
     setting = Setting(cell, model, options, Clock(progress), processes)
     with setting.clock("parse"):
         reading = read_program(files, cell, each=map_with(processes))
@@ -391,12 +393,19 @@ def report(
     """Say what came of every visit, and what error the model expects now."""
     cell, model, options = setting.cell, setting.model, setting.options
     d, rows, visits = kept.decisions, kept.corrected, reading.visits
+    files = tuple(output.records)
     return Outcome(
         program=name,
         model=model.id,
         outputs=output.changed,
-        record=output.sidecar(
-            model.id, asdict(options), tell_arrivals(visits, d, tuple(output.records))
+        record=replace(
+            output.sidecar(model.id, options.told(), tell_arrivals(visits, d, files)),
+            assumed=tuple(
+                (x.file, x.line, x.message)
+                for x in reading.diagnostics
+                if x.code == ASSUMED_STILL
+            ),
+            left=left_elsewhere(visits, d, files, reading.missed, reading.diagnostics),
         ),
         visits=visits,
         decisions=d,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 from time import perf_counter
 from typing import TYPE_CHECKING
@@ -26,12 +26,21 @@ class Options:
         shared: Edit variables that other programs may read too.
         orientation: Correct the orientation of targets as well as their position.
         temperature: Arm temperature [deg C]; default: the cell's.
+        strict_calls: Take no routine as still because the shipped list says so.
     """
 
     clone: bool = False
     shared: bool = False
     temperature: float | None = None
     orientation: bool = False
+    strict_calls: bool = False
+
+    def told(self) -> dict[str, object]:
+        """Return them for a record: a strict reading of calls only if asked for."""
+        said = asdict(self)
+        if not self.strict_calls:
+            del said["strict_calls"]
+        return said
 
 
 AS_USUAL = Options()

@@ -13,13 +13,18 @@ from numpy.typing import NDArray
 
 from postproc.arrays import Floats, Ints, Signs
 from postproc.compensation.record import (
+    LeftLine,
     Sidecar,
     file_sha256,
     read_without_edits,
     sidecar_path,
 )
 from postproc.exceptions import ProgramError
-from postproc.language.pdl2.effects import NOT_FOLLOWED
+from postproc.language.pdl2.effects import (
+    MOTION_UNKNOWN,
+    NEVER_REACHED,
+    NOT_FOLLOWED,
+)
 from postproc.language.visits import Diagnostic, Visits
 from postproc.model.statistics import ErrorStatistics
 from postproc.robot.pose import MM
@@ -350,6 +355,56 @@ def tell_arrivals(
     return told
 
 
+def left_elsewhere(
+    visits: Visits,
+    decisions: Decisions,
+    files: Sequence[str],
+    missed: Mapping[str, Ints],
+    diagnostics: Iterable[Diagnostic],
+) -> tuple[LeftLine, ...]:
+    """List what may hold targets and was left, where `tell_arrivals` cannot say so.
+
+    Args:
+        visits: Every arrival.
+        decisions: What was decided for it.
+        files: Names of the files that are written.
+        missed: Lines of moves that are never reached, by file.
+        diagnostics: What else was found: statements that are not understood.
+    """
+    v, d = visits, decisions
+    rows = np.isin(d.status, LEFT_ALONE)
+    literal = np.where(v.literal >= 0, v.literal, 0)
+    written = np.isin(v.files, [*files])
+    told = written[v.file]
+    if len(v.literals):
+        told |= (v.literal >= 0) & written[v.literals.file[literal]]
+    found = [
+        (v.files[v.file[i]], int(v.line[i]), d.reasons[d.why[i]])
+        for i in np.flatnonzero(rows & ~told).tolist()
+    ]
+    for name, lines in missed.items():
+        found += [(name, line, NEVER_REACHED) for line in lines.tolist()]
+    found += [(x.file, x.line, x.code) for x in diagnostics if x.code == MOTION_UNKNOWN]
+    return tuple(found)
+
+
+def with_left(told: Mapping[str, Any], left: Sequence[LeftLine]) -> dict[str, Any]:
+    """Add lines that were left to what `tell_arrivals` says of their file."""
+    whys = list(dict.fromkeys(why for _, _, why in left))
+    known = list(told.get("reasons", ()))
+    return {
+        "line": [*told.get("line", ()), *(line for _, line, _ in left)],
+        "status": str(told.get("status", "")) + str(int(Status.DISPLAY)) * len(left),
+        "direction": str(told.get("direction", "")) + SIGNS[1] * 6 * len(left),
+        "correction_mm": [*told.get("correction_mm", ()), *[0.0] * len(left)],
+        "why": [
+            *told.get("why", ()),
+            *(len(known) + whys.index(why) for _, _, why in left),
+        ],
+        "reasons": [*known, *whys],
+    }
+
+
 def read_arrivals(
     compensated: Path, pairs: Iterable[tuple[Path, Path]]
 ) -> dict[str, LineOutcomes]:
@@ -369,12 +424,16 @@ def read_arrivals(
         return {}
     told = {}
     for original, output in pairs:
-        mine = record.files.get(output.name)
-        if mine is None or not mine.targets:
+        mine, left = record.files.get(output.name), record.left_in(output.name)
+        if (mine is None or not mine.targets) and not left:
             continue
-        same = file_sha256(original) == mine.source_sha256
-        if same and file_sha256(output) == mine.output_sha256:
-            told[original.name] = _read(mine.targets)
+        before, after = file_sha256(original), file_sha256(output)
+        source, result = before, before  # of a file that was not changed
+        if mine is not None:
+            source, result = mine.source_sha256, mine.output_sha256
+        if (before, after) == (source, result):
+            targets = mine.targets if mine is not None else {}
+            told[original.name] = _read(with_left(targets, left) if left else targets)
     return {name: arrivals for name, arrivals in told.items() if arrivals is not None}
 
 

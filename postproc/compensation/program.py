@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -14,10 +14,11 @@ from postproc.compensation.eligibility import (
     mark_configuration_flags,
     mark_orientation_interpolation,
 )
+from postproc.compensation.options import Options
 from postproc.compensation.targets import targets_from_visits
 from postproc.exceptions import ProgramError
 from postproc.files import base_name, is_variables
-from postproc.language.pdl2.effects import dead_moves
+from postproc.language.pdl2.effects import dead_lines, dead_moves
 from postproc.language.pdl2.interpreter import resolve
 from postproc.language.pdl2.job import Start
 from postproc.language.pdl2.program import Program, parse
@@ -45,6 +46,7 @@ class Reading:
         cloned: Edits, file by file, that gave `sources` clones of variables; empty
             where there are none. Lines of visits are those before these edits.
         given: The files as they were before that; empty where nothing was cloned.
+        missed: Lines of moves that are never reached, by file.
         begins: The first visit of every program.
         programs: What was parsed of the files that hold no number of a target: they
             come out as they went in, and need not be parsed again.
@@ -57,6 +59,7 @@ class Reading:
     given: tuple[Source, ...] = ()
     begins: tuple[int, ...] = (0,)
     programs: tuple[Program, ...] = ()
+    missed: Mapping[str, Ints] = field(default_factory=dict)
 
     @property
     def sources(self) -> tuple[Source, ...]:
@@ -115,6 +118,10 @@ def start_of(cell: Cell) -> Start:
         base=cell.base.record,
         uframe=cell.uframe.record,
         routines=dict(cell.routines),
+        still=cell.still,
+        constant=cell.constant,
+        strict_calls=cell.strict_calls,
+        payload_kg=cell.payload_mass,
         frame_tables=tables,
         aux=dict(cell.aux),
         taught=cell.taught,
@@ -126,6 +133,12 @@ def with_measured_play(cell: Cell, model: Model) -> Cell:
     """Let directions be told by the gaps that the model found, not by a guess."""
     arm = replace(cell.arm, play=measured_play(model, cell.arm))
     return replace(cell, arm=arm)
+
+
+def prepared(cell: Cell, model: Model, options: Options) -> Cell:
+    """Let a cell know the model's play, and how strictly calls are taken."""
+    strict = cell.strict_calls or options.strict_calls
+    return with_measured_play(replace(cell, strict_calls=strict), model)
 
 
 def read_program(
@@ -169,7 +182,8 @@ def read_program(
     visits, parsed = resolved.visits, (program, *pages)
     corrected = {visits.files[k] for k in np.unique(visits.literals.file).tolist()}
     kept = tuple(p for p in parsed if p.lines.source.name not in corrected)
-    return Reading(tuple(texts), visits, found, programs=kept)
+    lost = dead_lines([program, *pages], visits)
+    return Reading(tuple(texts), visits, found, programs=kept, missed=lost)
 
 
 def _refuse_other_arm(program: Program, cell: Cell) -> None:

@@ -137,14 +137,38 @@ def _rows(edits: Replacements) -> str:
     return text[:-2].decode("ascii")
 
 
+LeftLine = tuple[str, int, str]
+"""A file, a line of its source, and why what stands there was left as it is."""
+
+
+_LISTS = ("left", "assumed")  # keys of a record that are there where they hold any
+
+
 @dataclass(frozen=True)
 class Sidecar:
-    """The records of a program and of the files written with it."""
+    """The records of a program and of the files written with it.
+
+    Attributes:
+        version, model: What wrote it, and the model's id.
+        files: The record of every file that was written, by name.
+        options: What the user asked for.
+        left: What may hold targets, was left, and no record of a file tells: targets
+            in files that were not changed, moves that are never reached, statements
+            that are not understood.
+        assumed: Routines that were taken as still because the shipped list says so:
+            where the first call of each stands, and its message.
+    """
 
     version: str
     model: str
     files: Mapping[str, FileRecord]
     options: Mapping[str, Any] = field(default_factory=dict)
+    left: tuple[LeftLine, ...] = ()
+    assumed: tuple[LeftLine, ...] = ()
+
+    def left_in(self, name: str) -> tuple[LeftLine, ...]:
+        """Return what was left in a file, beside what its own record tells."""
+        return tuple(line for line in self.left if line[0] == name)
 
     def to_json(self, each: Map = map) -> Iterator[str]:
         """Write the record as JSON text, piece by piece.
@@ -152,7 +176,8 @@ class Sidecar:
         Args:
             each: How the pieces are made.
         """
-        head = {"postproc": self.version, "model": self.model}
+        head: dict[str, Any] = {"postproc": self.version, "model": self.model}
+        head |= {key: told for key in _LISTS if (told := getattr(self, key))}
         yield json.dumps({**head, "options": dict(self.options)})[:-1] + ', "files": {'
         for number, (name, record) in enumerate(self.files.items()):
             yield (", " if number else "") + json.dumps(name) + ": "
@@ -166,7 +191,19 @@ class Sidecar:
             names: New names by old ones; files that have none are left out.
         """
         files = {names[name]: r for name, r in self.files.items() if name in names}
-        return replace(self, files=files)
+        main = next(iter(self.files), None)
+        rest = not files or main in names
+
+        def own(lines: tuple[LeftLine, ...]) -> tuple[LeftLine, ...]:
+            return tuple(
+                (names.get(file, file), line, why)
+                for file, line, why in lines
+                if file in names or (rest and file not in self.files)
+            )
+
+        return replace(
+            self, files=files, left=own(self.left), assumed=own(self.assumed)
+        )
 
 
 def read_sidecar(path: Path) -> Sidecar:
@@ -210,7 +247,11 @@ def _record(path: Path, text: bytes) -> Sidecar:
         if not all(map(_is_name, files)):
             raise ValueError("a name that no file has")
         version, model = str(data["postproc"]), str(data["model"])
-        return Sidecar(version, model, files, data.get("options", {}))
+        lists = {
+            key: tuple((str(f), int(n), str(why)) for f, n, why in data.get(key, ()))
+            for key in _LISTS
+        }
+        return Sidecar(version, model, files, data.get("options", {}), **lists)
     except (
         *(ValueError, KeyError, TypeError, AttributeError),
         *(RecursionError, OverflowError),

@@ -23,7 +23,7 @@ from postproc.compensation.compensate import (
 )
 from postproc.compensation.options import Clock, Options, Setting, silent
 from postproc.compensation.outcome import Outcome
-from postproc.compensation.program import Reading, read_program, with_measured_play
+from postproc.compensation.program import Reading, prepared, read_program
 from postproc.compensation.windows import concatenate, first_visits, offsets
 from postproc.model.model import Model
 from postproc.robot.cell import Cell
@@ -59,7 +59,7 @@ def compensate_batch(
         For every program what `compensate` returns, or else what it raises. `stages` is
         the time of all programs that were worked on.
     """
-    cell = with_measured_play(cell, model)
+    cell = prepared(cell, model, options)
     setting = Setting(cell, model, options, Clock(silent))
     readings = [_tried(_read, program, setting) for program in programs]
     readable = [found for found in readings if isinstance(found, Reading)]

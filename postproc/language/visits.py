@@ -6,7 +6,7 @@ What a language hands to everything else; nothing after it knows how a program i
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from enum import IntEnum
 from functools import cached_property
@@ -242,6 +242,19 @@ class Visits:
         first = self.pred[np.minimum(self.pred_start[:-1], len(self.pred) - 1)]
         before = np.where(single & (first >= 0), first, -1)
         return np.where((before >= 0) & self.fly[before], before, -1)
+
+
+def line_ranges(lines: Ints | Sequence[int]) -> str:
+    """Name every one of some lines, ascending, those that follow each other as one.
+
+    >>> line_ranges([2, 5, 6, 7, 7, 9])
+    '2, 5-7, 9'
+    """
+    found = np.unique(np.asarray(lines, dtype=np.int64))
+    first = np.flatnonzero(np.diff(found, prepend=-1) != 1)
+    last = np.append(first[1:], len(found)) - 1
+    pairs = zip(found[first].tolist(), found[last].tolist(), strict=True)
+    return ", ".join(str(a) if a == b else f"{a}-{b}" for a, b in pairs)
 
 
 # What a user's program can contain is no exception: it is collected and reported.

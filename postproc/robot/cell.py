@@ -13,6 +13,7 @@ from pydantic import (
     NonNegativeFloat,
     PositiveFloat,
     PositiveInt,
+    field_validator,
     model_validator,
 )
 
@@ -25,6 +26,7 @@ from postproc.robot.pose import MM, pose_from_record, rotation_from_zyz
 Source = Literal["cad", "tracker", "taught"]
 Effect = Literal["still", "moves", "sets-frames"]
 ArmNumber = PositiveInt  # which arm of its controller
+STILL = "still"  # beside names: the key whose value lists patterns
 
 NO_ANGLES = [0.0, 0.0, 0.0]
 TAUGHT_POINTS = ("the origin", "a point on +x", "a point at +y")
@@ -113,6 +115,12 @@ Limits = Annotated[list[PositiveFloat], Field(min_length=6, max_length=6)]
 JOINT_DEG = [5.0, 5.0, 5.0, 10.0, 10.0, 10.0]
 
 
+class VariablesSection(Strict):
+    """What other programs do to variables that they share with ours."""
+
+    constant: list[str] = Field(default_factory=list)
+
+
 class LimitSection(Strict):
     """When a correction is not trusted.
 
@@ -165,9 +173,22 @@ class CellFile(Strict):
     survey: SurveySection | None = None
     aux: dict[str, Literal["gun", "track", "positioner"]] = Field(default_factory=dict)
     limits: LimitSection = LimitSection()
-    routines: dict[str, Effect] = Field(default_factory=dict)
+    routines: dict[str, Effect | list[str]] = Field(default_factory=dict)
     frames: FramesSection = FramesSection()
+    variables: VariablesSection = VariablesSection()
     taught: list[str] = Field(default_factory=list)
+
+    @field_validator("routines")
+    @classmethod
+    def _one_list(cls, said: dict[str, Effect | list[str]]) -> dict[str, object]:
+        """Take a list of patterns under `still` alone."""
+        for name, what in said.items():
+            if isinstance(what, list) and name != STILL:
+                raise ValueError(
+                    f"{name} has a list: only `{STILL}` lists routines, such as "
+                    f'{STILL} = ["spot", "lrobot.*"]'
+                )
+        return dict(said)
 
 
 @dataclass(frozen=True)
@@ -202,10 +223,15 @@ class Cell:
         aux: Kind of every declared auxiliary axis.
         limits: Guards, in the units of their names.
         routines: What outside routines do, by lower-case name.
+        still: Lower-case patterns of outside routines, ``name`` or ``program.name``,
+            that neither move the arm nor set frames.
         frame_tables: Frames set by routines, by lower-case name, then arguments.
         taught: Lower-case names of points that were taught with the robot.
         taught_frames: Records of the frames that were taught with the robot, with the
             joint angles of their three points, (3, 6) [rad], or None.
+        constant: Lower-case patterns of exported variables, ``name`` or
+            ``program.name``, that no other program changes.
+        strict_calls: The shipped list of still routines does not count.
     """
 
     path: Path
@@ -229,6 +255,9 @@ class Cell:
     frame_tables: Mapping[str, Mapping[str, FrameTableEntry]]
     taught: frozenset[str]
     taught_frames: Mapping[tuple[float, ...], Floats | None]
+    still: tuple[str, ...] = ()
+    constant: tuple[str, ...] = ()
+    strict_calls: bool = False
 
 
 def _frame(section: FrameSection | None) -> Frame:
@@ -269,11 +298,22 @@ def load_cell(path: str | Path) -> Cell:
         mounting=_mounting(file),
         aux=_aux(file, path),
         limits=file.limits,
-        routines={name.lower(): what for name, what in file.routines.items()},
+        routines={
+            name.lower(): what
+            for name, what in file.routines.items()
+            if not isinstance(what, list)
+        },
+        still=_patterns(file.routines.get(STILL)),
+        constant=_patterns(file.variables.constant),
         frame_tables={k.lower(): v for k, v in file.frames.routines.items()},
         taught=frozenset(name.lower() for name in file.taught),
         taught_frames=_taught_frames(file),
     )
+
+
+def _patterns(said: object) -> tuple[str, ...]:
+    """Return the patterns of a list, none of anything else."""
+    return tuple(map(str.lower, said)) if isinstance(said, list) else ()
 
 
 def _taught_frames(file: CellFile) -> dict[tuple[float, ...], Floats | None]:

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from postproc.batch.tree import named_programs
 from postproc.cli.jobs import find_pages
 from postproc.compensation.program import read_program
 from postproc.exceptions import ProgramError
@@ -118,3 +119,21 @@ def test_pages_without_a_name_keep_their_numbers(job_cell):
     assert [source.name for source in reading.sources] == list(reading.visits.files)
     assert reading.visits.values[:, 0].tolist() == [1.0, 2.0]
     assert reading.visits.literals.file.tolist() == [1, 2]
+
+
+def test_pages_that_are_named_far_behind_the_declarations_are_followed(tmp_path):
+    moves = "  MOVE JOINT TO {1, 2, 3, 4, 5, 6}\n" * 20_000
+    main = tmp_path / "main.pdl"
+    text = f"PROGRAM main\nBEGIN\n{moves}  Call Late\nEND main\n"
+    main.write_text(text)
+    (tmp_path / "late.pdl").write_text("PROGRAM late\nBEGIN\nEND late\n")
+    other = tmp_path / "other.pdl"
+    other.write_text(text.replace("main", "other").replace("Call Late", ""))
+    assert names(main) == ["late.pdl"]
+    other.write_text(text.replace("main", "other"))  # as far behind, it names it too
+    assert names(main) == []
+
+
+def test_the_programs_that_a_text_names():
+    text = b"IMPORT 'a'\rIMPORT 'x'\r\nCALL b\ncall b -- call c\nMOVE recall\n CALL d"
+    assert named_programs(text) == (["a", "b", "d"], [])

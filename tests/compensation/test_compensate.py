@@ -150,10 +150,57 @@ def test_guarded_targets_keep_their_value(run, line, said):
 
 def test_unknown_frame_is_not_compensated(run):
     outcome = run(JOINTS, "$UFRAME := frame_from_vision()", POSE, NEXT)
-    assert statuses(outcome) == ["SAFE", "GUARDED", "SAFE"] or statuses(outcome) == [
-        "SAFE", "DISPLAY", "SAFE",
-    ]  # fmt: skip
+    assert statuses(outcome) == ["SAFE", "DISPLAY", "DISPLAY"]
     assert "$UFRAME" in whys(outcome)[1]
+
+
+UNREAD = ("FROBNICATE p WITH 3", "SPLINE TO POS(1, 2, 3, 0, 0, 0, '') 3",
+          "WAIT FOR tracker(1) ?? 3", "$ARM_DATA[1].TOOL := POS(1 1)")  # fmt: skip
+
+
+@pytest.mark.parametrize("line", UNREAD)
+def test_targets_after_what_is_not_understood_are_left(run, line):
+    outcome = run(JOINTS, line, POSE, NEXT)
+    assert statuses(outcome) == ["SAFE", "DISPLAY", "DISPLAY"]
+    assert "not understood" in whys(outcome)[1]
+    assert outcome.exit_code == 1
+    alone = run(JOINTS, POSE, NEXT, line)  # it may hold a target itself
+    assert statuses(alone) == ["SAFE"] * 3 and alone.exit_code == 1
+
+
+@pytest.mark.parametrize("line", ["WAIT FOR $DIN[1] ?? 3", "PULSE ?? 3", "n := 3 3"])
+def test_what_cannot_move_the_arm_leaves_targets_alone(run, line):
+    outcome = run(JOINTS, line, POSE, NEXT)
+    assert statuses(outcome) == ["SAFE"] * 3 and outcome.exit_code == 0
+
+
+DISTURBED = {
+    "SENSOR_TRK(TRUE)": "SENSOR_TRK(FALSE)",
+    "SENSOR_TRK(mode)": "SENSOR_TRK(OFF)",
+    "$SENSOR_ENBL := TRUE": "$SENSOR_ENBL := FALSE",
+    "$ARM_DATA[1].SENSOR_ENBL := ON": "$SENSOR_ENBL := OFF",
+    "$CONV_ENBL := TRUE": "$CONV_ENBL := FALSE",
+    "$CAL_SYS[2] := 3.0": "",
+    "$ARM_DATA[1].CAL_SYS[2] := 3.0": "",
+    "$CAL_SYS := {0, 0, -90, 0, 60, 0}": "",
+    "$TOOL_MASS := 55.0": "",
+    "$TOOL_MASS := mass": "",
+}
+
+
+@pytest.mark.parametrize("line", DISTURBED)
+def test_targets_are_left_where_the_arm_does_not_go_as_written(run, line):
+    outcome = run(JOINTS, line, POSE, *filter(None, [DISTURBED[line]]), NEXT)
+    assert statuses(outcome)[:2] == ["SAFE", "DISPLAY"]
+    assert (statuses(outcome)[2] == "SAFE") is bool(DISTURBED[line])
+    assert outcome.exit_code == 1
+
+
+def test_settings_that_disturb_nothing(run):
+    lines = ("$SENSOR_ENBL := FALSE", "$SENSOR_ENBL[2] := FALSE", "$CONV_ENBL := OFF",
+             "SENSOR_TRK(FALSE)", "$ARM_DATA[2].SENSOR_ENBL := TRUE",
+             "$ARM_DATA[2].CAL_SYS[1] := 3.0")  # fmt: skip
+    assert statuses(run(JOINTS, *lines, POSE)) == ["SAFE"] * 2
 
 
 def test_a_tool_far_from_the_survey_is_guarded(run):

@@ -31,6 +31,9 @@ xyz_mm = [3000.0, 1000.0, 1200.0]
 correction_mm = 4.0
 [routines]
 Dock = "moves"
+still = ["Spot", "LRobot.*"]
+[variables]
+constant = ["VI_style", "Lib.*"]
 [frames.routines.TF]
 "1,2" = {tool = {xyz_mm = [1.0, 2.0, 3.0]}, uframe = [4.0, 5.0, 6.0, 0.0, 90.0, 0.0]}
 """
@@ -51,9 +54,17 @@ def test_full_cell(tmp_path):
     assert cell.aux == {1: "gun"}
     assert cell.limits.correction_mm == 4.0 and cell.limits.agree_mm == 0.02
     assert cell.routines == {"dock": "moves"}
+    assert cell.constant == ("vi_style", "lib.*")
+    assert cell.still == ("spot", "lrobot.*")
     assert cell.frame_tables["tf"]["1,2"].uframe.record() == (4, 5, 6, 0, 90, 0)
     assert cell.taught == {"p_dock"}
     np.testing.assert_allclose(cell.tracker, [3.0, 1.0, 1.2])
+
+
+def test_a_routine_has_no_list_of_its_own(tmp_path):
+    text = '[robot]\narm = "nj220-2.7"\n[routines]\nspot = ["a"]\n'
+    with pytest.raises(CellError, match="only `still` lists routines"):
+        load_cell(write(tmp_path, text))
 
 
 def test_only_the_robot_is_required(tmp_path):

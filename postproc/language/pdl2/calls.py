@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import replace
 
 from postproc.language.pdl2 import syntax as ast
+from postproc.language.pdl2.disturbances import DISTURBING
 from postproc.language.pdl2.effects import (
     CHANGING,
     FRAMES,
-    HANDS_OVER,
     PURE,
     CallGraph,
     call_graph_of,
@@ -31,8 +31,16 @@ from postproc.language.pdl2.machine import (
     escape_names,
     invalidate,
     invalidate_names,
+    let_others_run,
 )
 from postproc.language.pdl2.moves import move
+from postproc.language.pdl2.routines import (
+    ASSUMED_STILL,
+    TRACKING,
+    RoutineEffect,
+    effect_of,
+    report_unknown_routine,
+)
 from postproc.language.pdl2.store import Store
 from postproc.language.pdl2.values import (
     Alias,
@@ -197,7 +205,6 @@ def opaque_call(
     here: Execution, name: str, arguments: tuple[ast.Expression | None, ...]
 ) -> None:
     """Take in what a routine that the job does not hold is said, or assumed, to do."""
-    start = here.world.start
     built_in = name in CHANGING or name in PURE
     why = f"{name.upper()} computes with it" if built_in else f"{name} is given it"
     for given in arguments:
@@ -208,30 +215,53 @@ def opaque_call(
         invalidate(here, argument, f"{name} may change it (arguments go by reference)")
     if built_in:
         return
-    said = start.routines.get(name)
-    if name in start.frame_tables:
-        _frames_from_table(here, name, arguments)
-    elif name.startswith(HANDS_OVER):
-        here.store.last = frozenset({ELSEWHERE})
-        _say(here, "position-unknown", name, "hands the arm over to a sensor or an "
-             "outside stream: the next move comes from an unknown place")  # fmt: skip
-    elif said is None:
-        _say(here, "assumed-still", name, "is not in the files at hand: assumed "
-             "neither to move the arm nor to set frames; if it does, say so under "
-             f"[routines] or [frames.routines.{name}] in the cell file")  # fmt: skip
-    if said == "moves":
-        here.store.last = frozenset({ELSEWHERE})
-    elif said == "sets-frames" and name not in start.frame_tables:
-        _unknown_frames(here, f"{name} sets it; give its table under "
-                        f"[frames.routines.{name}] in the cell file")  # fmt: skip
+    let_others_run(here)
+    match effect_of(here.world, here.place.program, name):
+        case RoutineEffect.TABLE:
+            _frames_from_table(here, name, arguments)
+        case RoutineEffect.MOVES:
+            here.store.last = frozenset({ELSEWHERE})
+        case RoutineEffect.SETS_FRAMES:
+            _unknown_frames(here, f"{name} sets it; give its table under "
+                            f"[frames.routines.{name}] in the cell file")  # fmt: skip
+        case RoutineEffect.TRACKS:
+            _track(here, name, arguments)
+        case RoutineEffect.KNOWN:
+            _say(here, ASSUMED_STILL, name, "is not in the files at hand: it is on "
+                 "the list of routines known neither to move the arm nor to set frames "
+                 "(docs/routines.md); if it does, say so under [routines] in the cell "
+                 "file, or pass --strict-calls")  # fmt: skip
+        case RoutineEffect.UNKNOWN:
+            report_unknown_routine(here.world, here.place.program, here.row, name)
+            forget_surroundings(here, f"{name}, which is not in the files at hand, may "
+                                "set it: say under [routines] in the cell file what it "
+                                "does")  # fmt: skip
 
 
 def _say(here: Execution, code: str, name: str, text: str) -> None:
     here.world.report_once(here.place.program, here.row, code, name, f"{name} {text}")
 
 
+def _track(
+    here: Execution, name: str, arguments: tuple[ast.Expression | None, ...]
+) -> None:
+    """Let a sensor lead the arm, or no longer: only an absolute move ends it."""
+    on = here.value(arguments[0]) if arguments else Nothing("")
+    here.store.set(**{TRACKING: on})
+    here.store.last = frozenset({ELSEWHERE})
+    _say(here, "position-unknown", name, "lets a sensor lead the arm, or ends that: "
+         "the next move comes from an unknown place")  # fmt: skip
+
+
 def _unknown_frames(here: Execution, why: str) -> None:
     here.store.set(**{frame: Nothing(why) for frame in FRAMES})
+
+
+def forget_surroundings(here: Execution, why: str) -> None:
+    """Forget where the arm is, its frames, and all motion settings of the program."""
+    names = (*FRAMES, *here.store.settings)
+    here.store.set(**dict.fromkeys(names, Nothing(why)))
+    here.store.last = frozenset({ELSEWHERE})
 
 
 def _frames_from_table(
@@ -338,6 +368,10 @@ def _setting(here: Execution, reference: ast.Reference, value: Value) -> None:
     """Change a frame or motion variable of our arm."""
     name = here.setting_name(reference)
     if name is None:
+        part = _disturbing_part(here, reference)
+        off = value is False and here.store.settings.get(part, False) is False
+        if part and not off:
+            here.store.set(**{part: Nothing("a part of it is assigned")})
         if reference.name[1:] in FRAME_NAMES or not reference.steps:
             said = f"a part of {reference.name.upper()} is assigned"
             why = said if reference.steps else here.other_default()
@@ -350,6 +384,14 @@ def _setting(here: Execution, reference: ast.Reference, value: Value) -> None:
     if f"${name}" in here.volatile:
         value = Nothing("a condition handler changes it")
     here.store.set(**{name: value})
+
+
+def _disturbing_part(here: Execution, reference: ast.Reference) -> str:
+    """Return the disturbing setting that a part belongs to, "" for any other."""
+    name = reference.name[1:]
+    if name == "arm_data" and _whose(here, reference) in (None, here.world.arm):
+        name = str((*reference.steps, "")[1]).lstrip("$")
+    return name if name in DISTURBING else ""
 
 
 def _frame_part(

@@ -10,7 +10,7 @@ from typing import Protocol
 import numpy as np
 
 from postproc.arrays import Bools, Indices, Ints, spans
-from postproc.language.pdl2.columns import Collector, VisitColumns
+from postproc.language.pdl2.columns import Collector, SettingColumns, VisitColumns
 from postproc.language.pdl2.context import Point
 from postproc.language.pdl2.job import World
 from postproc.language.pdl2.machine import Key, Machine, MoveRun
@@ -202,7 +202,8 @@ def collect(machine: Machine) -> Visits:
     numbering = Numbering.of(machine.world)
     axes = _most_axes(runs, machine.world)
     columns = VisitColumns(int(offsets[-1]), axes, len(numbering.start))
-    collector = Collector(machine, columns)
+    settings = SettingColumns(machine.world.start.payload_kg)
+    collector = Collector(machine, columns, settings)
     collector.fill(zip(offsets.tolist(), runs, strict=False))
     c, world = collector.columns, machine.world
     if machine.exhausted:

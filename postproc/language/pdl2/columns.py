@@ -11,6 +11,7 @@ import numpy as np
 
 from postproc.arrays import Interned, Ints, spans
 from postproc.language.pdl2 import syntax as ast
+from postproc.language.pdl2.disturbances import disturbance
 from postproc.language.pdl2.job import base_variable
 from postproc.language.pdl2.machine import WRITTEN, Goal, Machine, MoveForm, MoveRun
 from postproc.language.pdl2.program import Program
@@ -36,7 +37,8 @@ _WITHOUT_UFRAME = (Meaning.JOINTS, Meaning.HOME, Meaning.CALIBRATION, Meaning.BY
 class SettingColumns:
     """Each distinct state of the settings becomes one row, read off once."""
 
-    def __init__(self) -> None:
+    def __init__(self, payload_kg: float) -> None:
+        self._payload_kg = payload_kg
         self._kept: list[Settings] = []
         self._rows = Interned[int]()
         self._problems: list[tuple[str, str]] = []
@@ -50,10 +52,10 @@ class SettingColumns:
             self._kept.append(settings)  # keeps its id from being used again
             for name, value in _row(settings, self._frame).items():
                 self._table.setdefault(name, []).append(value)
-            tool = _unknown(settings, ("tool", "tool_rmt"))
-            self._problems.append(
-                (tool or _unknown(settings, ("base", "uframe")), tool)
-            )
+            found = disturbance(settings, self._payload_kg)
+            tool = ("tool", "tool_rmt")
+            pose = found or _unknown(settings, ("uframe", "base", *tool))
+            self._problems.append((pose, found or _unknown(settings, tool)))
         return row
 
     def kept(self, row: int) -> Settings:
@@ -138,18 +140,28 @@ def _override(settings: Settings) -> float:
 
 
 def _unknown(settings: Settings, names: tuple[str, ...]) -> str:
-    """Say which of some settings is not known, and why."""
+    """Say which of some settings are not known, and why, "" where all are."""
+    alike: dict[str, list[str]] = {}
     for name in names:
-        value = settings.get(name)
-        if isinstance(value, Nothing):
-            return f"${name.upper()} is not known here: {value.why}"
-        if name in _FRAMES and not (
-            isinstance(value, Position) and value.complete and not value.joints
-        ):
-            partly = isinstance(value, Position) and not value.joints
-            why = "a part of it is not known" if partly else "it is no known position"
-            return f"${name.upper()} is not known here: {why}"
-    return ""
+        if why := _why_not_known(settings, name):
+            alike.setdefault(why, []).append(f"${name.upper()}")
+    return "; ".join(
+        f"{', '.join(some)} {'is' if len(some) == 1 else 'are'} not known here: {why}"
+        for why, some in alike.items()
+    )
+
+
+def _why_not_known(settings: Settings, name: str) -> str:
+    """Say why a setting is not known, "" where it is."""
+    value = settings.get(name)
+    if isinstance(value, Nothing):
+        return value.why
+    if name not in _FRAMES or (
+        isinstance(value, Position) and value.complete and not value.joints
+    ):
+        return ""
+    partly = isinstance(value, Position) and not value.joints
+    return "a part of it is not known" if partly else "it is no known position"
 
 
 # Columns of visits: those of all moves of a program in a few array passes.
@@ -254,7 +266,7 @@ class Collector:
 
     machine: Machine
     columns: VisitColumns
-    settings: SettingColumns = field(default_factory=SettingColumns)
+    settings: SettingColumns
     configs: Interned[str] = field(default_factory=lambda: Interned([""]))
     names: Interned[str] = field(default_factory=lambda: Interned([""]))
     reasons: Interned[str] = field(default_factory=lambda: Interned([""]))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
@@ -9,10 +10,16 @@ from typing import get_args
 
 import numpy as np
 
+from postproc.arrays import Ints
 from postproc.language.pdl2 import syntax as ast
 from postproc.language.pdl2.job import Place, World
 from postproc.language.pdl2.program import Body, Program
-from postproc.language.visits import Diagnostic, Visits
+from postproc.language.pdl2.routines import (
+    RoutineEffect,
+    effect_of,
+    report_unknown_routine,
+)
+from postproc.language.visits import Diagnostic, Visits, line_ranges
 
 # What a statement or a routine may do, read off its text.
 
@@ -31,6 +38,47 @@ CHANGING = frozenset(
     "bit_assign node_app node_del node_ins err_trap_on err_trap_off".split()
 )
 """Built-in routines: they may change their arguments, nothing else."""
+
+
+FRAMES = ("tool", "base", "uframe")
+
+# What text may do that is not understood.
+
+_WORD = re.compile(r"\$?[A-Za-z_]\w*")
+_CALL = re.compile(r"(?<![\w$.])([A-Za-z_]\w*)\s*\(")
+_HARMLESS = re.compile(
+    r"(?:(?:IF|ELSE|ENDIF|SELECT|CASE|ENDSELECT|FOR|ENDFOR|WHILE|ENDWHILE|REPEAT|UNTIL|"
+    r"WAIT|SIGNAL|DELAY|PULSE|WRITE|READ|ENCODE|DECODE|OPEN|CLOSE|ENABLE|DISABLE)\b|"
+    r"\$?\w+(?:\[[^\]]*\]|\.\$?\w+)*\s*:=)",
+    re.I,
+)
+_MOVING = re.compile(r"\b(?:MOVE|MOVEFLY|SYNCMOVE|SYNCMOVEFLY)\b|\$ARM_DATA\b", re.I)
+_NO_CALLS = frozenset(
+    "if select case for while until wait write read encode decode open and or not div "
+    "mod then do of to downto step xor condition event".split()
+)
+
+
+def words_in(text: str) -> frozenset[str]:
+    """Return the names in a text, in lower case, system variables with ``$``."""
+    return frozenset(word.lower() for word in _WORD.findall(text))
+
+
+def is_harmless(text: str) -> bool:
+    """Tell whether a statement that is not understood does nothing to the arm.
+
+    It must begin like one that cannot move the arm or set frames (an assignment sets
+    what it names), and call nothing but built-in functions.
+
+    >>> is_harmless("WAIT FOR $DIN[1] ?? 3"), is_harmless("WAIT FOR f(1) ?? 3")
+    (True, False)
+    >>> is_harmless("n := abs(3 3)"), is_harmless("FROBNICATE p WITH 3")
+    (True, False)
+    """
+    if not _HARMLESS.match(text) or _MOVING.search(text):
+        return False
+    called = {name.lower() for name in _CALL.findall(text)}
+    return called <= PURE | CHANGING | _NO_CALLS
 
 
 @dataclass(frozen=True)
@@ -152,8 +200,12 @@ def _direct(statement: ast.Statement) -> Effects:
                 inner = _direct(then)
                 moves, assigned = inner.moves, set(inner.assigned)
                 calls |= inner.calls
-        case ast.Move() | ast.Unknown():
+        case ast.Move():
             moves = True
+        case ast.Unknown(text):
+            moves, assigned = True, set(words_in(text))
+            if not is_harmless(text):
+                assigned |= {f"${frame}" for frame in FRAMES}
         case ast.Assign(target):
             assigned.add(_assigned_name(target))
         case ast.For(name):
@@ -179,9 +231,6 @@ def _assigned_name(reference: ast.Reference) -> str:
 
 
 # What a call or a handler may do, through all files of the job.
-
-HANDS_OVER = ("sensor_", "c5gopen", "c4gopen", "open_controller", "opencontrol")
-FRAMES = ("tool", "base", "uframe")
 
 
 @dataclass(frozen=True)
@@ -241,15 +290,27 @@ def live_rows(world: World, place: Place, first: int, last: int) -> CallGraph:
             rows = (one.body.first, one.body.last)
             parts.append(LiveRows(one, _own_effects(one.program, *rows)))
             waiting += _called(world, one, *rows)
-    outside = frozenset().union(*(part.effects.calls for part in parts))
-    said = {world.start.routines.get(name) for name in outside}
+    outside = {effect for part in parts for effect in _outside(world, part)}
+    moves = {RoutineEffect.MOVES, RoutineEffect.TRACKS, RoutineEffect.UNKNOWN}
     return CallGraph(
         tuple(parts),
-        any(part.effects.moves for part in parts)
-        or "moves" in said
-        or any(name.startswith(HANDS_OVER) for name in outside),
-        "sets-frames" in said or not outside.isdisjoint(world.start.frame_tables),
+        any(part.effects.moves for part in parts) or not outside.isdisjoint(moves),
+        not outside.isdisjoint(
+            {RoutineEffect.SETS_FRAMES, RoutineEffect.TABLE, RoutineEffect.UNKNOWN}
+        ),
     )
+
+
+def _outside(world: World, part: LiveRows) -> Iterator[RoutineEffect]:
+    """Yield what the routines do that some rows call and the job does not hold."""
+    program = part.place.program
+    for name in sorted(part.effects.calls):
+        inside = world.find_routine(program, name) or world.find_program(program, name)
+        if inside is None:
+            effect = effect_of(world, program, name)
+            if effect is RoutineEffect.UNKNOWN:
+                report_unknown_routine(world, program, part.place.body.first, name)
+            yield effect
 
 
 def _called(world: World, place: Place, first: int, last: int) -> Iterator[Place]:
@@ -320,8 +381,9 @@ def _names(statement: ast.Statement) -> Iterator[tuple[str, bool]]:
 
 NEVER_REACHED = "never-reached"
 OTHER_ARM = "other-arm"  # a target that is another arm's
-NOT_FOLLOWED = frozenset({NEVER_REACHED, OTHER_ARM})
-"""Findings that tell of targets without a visit: they keep their values."""
+MOTION_UNKNOWN = "motion-unknown"
+NOT_FOLLOWED = frozenset({NEVER_REACHED, MOTION_UNKNOWN, OTHER_ARM})
+"""Findings that tell of targets without a visit, or may: they keep their values."""
 
 
 def dead_moves(programs: Sequence[Program], visits: Visits) -> list[Diagnostic]:
@@ -335,7 +397,22 @@ def dead_moves(programs: Sequence[Program], visits: Visits) -> list[Diagnostic]:
         programs: The files of a job.
         visits: Every arrival in them.
     """
-    found = []
+    return [
+        Diagnostic(
+            name,
+            int(lines[0]),
+            NEVER_REACHED,
+            f"{len(lines)} moves, lines {line_ranges(lines)}, are never reached from "
+            "the start: they are not compensated. Give the program that calls them, "
+            "or remove them",
+        )
+        for name, lines in dead_lines(programs, visits).items()
+    ]
+
+
+def dead_lines(programs: Sequence[Program], visits: Visits) -> dict[str, Ints]:
+    """Return the lines of such moves, (k,) ascending, of files that hold any."""
+    found = {}
     for program in programs:
         name = program.lines.source.name
         moves = program.statements.which(_has_target)
@@ -343,12 +420,7 @@ def dead_moves(programs: Sequence[Program], visits: Visits) -> list[Diagnostic]:
         own = visits.file == visits.files.index(name)
         missed = lines[~np.isin(lines, visits.line[own])]
         if len(missed):
-            text = (
-                f"{len(missed)} moves, the first here, are never reached from the "
-                "start: they are not compensated. Give the program that calls them, "
-                "or remove them"
-            )
-            found.append(Diagnostic(name, int(missed[0]), NEVER_REACHED, text))
+            found[name] = missed
     return found
 
 

@@ -14,18 +14,27 @@ from postproc.language.pdl2.calls import (
     assign,
     call_statement,
     calls_in_expressions,
+    forget_surroundings,
     frame_value,
     list_moves,
 )
 from postproc.language.pdl2.collect import collect
 from postproc.language.pdl2.context import HANDLED, Context
-from postproc.language.pdl2.effects import changed_arguments, live_rows, rows_effects
+from postproc.language.pdl2.effects import (
+    MOTION_UNKNOWN,
+    changed_arguments,
+    is_harmless,
+    live_rows,
+    rows_effects,
+    words_in,
+)
 from postproc.language.pdl2.entries import POSITIONS, Entries, Entry
 from postproc.language.pdl2.evaluate import ProgramPoint
 from postproc.language.pdl2.job import FilePoints, Place, Start, World, base_variable
 from postproc.language.pdl2.machine import (
     MAX_ROWS,
     MAX_STEPS,
+    OTHERS_WRITE,
     Execution,
     Goal,
     Machine,
@@ -33,10 +42,16 @@ from postproc.language.pdl2.machine import (
     escape_names,
     invalidate,
     invalidate_names,
+    let_others_run,
     single,
 )
 from postproc.language.pdl2.moves import move
 from postproc.language.pdl2.program import Program, Variable, Variables, recovered
+from postproc.language.pdl2.sharing import (
+    IMPORTED,
+    changing_variables,
+    imported_points,
+)
 from postproc.language.pdl2.store import Store, root_of
 from postproc.language.pdl2.stretches import MoveBlocks
 from postproc.language.pdl2.values import (
@@ -153,19 +168,24 @@ def end_round(machine: Machine, here: Execution) -> None:
 
 # What each statement does to the store, and which way the program goes on.
 
-_WORD = re.compile(r"\$?[A-Za-z_]\w*")
-_CANNOT_MOVE = re.compile(
-    r"(?:IF|ELSE|ENDIF|SELECT|CASE|ENDSELECT|FOR|ENDFOR|WHILE|ENDWHILE|REPEAT|UNTIL|"
-    r"WAIT|SIGNAL|DELAY|PULSE|WRITE|READ|ENCODE|DECODE|OPEN|CLOSE|ENABLE|DISABLE|"
-    r"\$?\w+(?:\[[^\]]*\]|\.\$?\w+)*\s*:=)",
-    re.I,
-)
 _MOVES = re.compile(r".*\b(?:MOVE|MOVEFLY|SYNCMOVE|SYNCMOVEFLY)\b", re.I)
+
+
+_OTHERS_RUN = (
+    ast.Still, ast.Transfer, ast.Condition, ast.Cycle, ast.While, ast.Until, ast.Goto
+)  # fmt: skip
+"""Statements that take time, or that a program may wait with."""
 
 
 def step(machine: Machine, here: Execution, statement: ast.Statement) -> bool:
     """Run one statement; tell whether the next row follows."""
+    text = statement.text if isinstance(statement, ast.Unknown) else ""
     statement = recovered(statement)
+    if isinstance(statement, _OTHERS_RUN) or text:
+        let_others_run(here)
+    if text and not isinstance(statement, ast.Unknown):
+        if not _is_harmless(here, text):
+            _forget_by_text(here, _why_unknown(here))
     if not isinstance(statement, ast.Label | ast.Else | ast.When):
         calls_in_expressions(machine, here, statement)
     match statement:
@@ -280,17 +300,41 @@ def _fits(here: Execution, row: int, case: ast.Case, value: Value) -> bool | Non
 
 def _unknown(machine: Machine, here: Execution, statement: ast.Unknown) -> None:
     """Forget all that unknown text could influence."""
-    line = int(here.place.program.lines.line[here.row])
-    why = f"line {line}, which is not understood, may change it"
-    names = frozenset(word.lower() for word in _WORD.findall(statement.text))
-    invalidate_names(here, names, why)
+    why = _why_unknown(here)
+    invalidate_names(here, words_in(statement.text), why)
+    arrived = frozenset[int]()
     if _MOVES.match(statement.text):
         goal = Goal(Meaning.UNKNOWN, reason="the move statement is not understood")
         form, come = MoveForm(Motion.JOINT), machine.predecessors(here)
         arrival = single(here, form, come, here.store.settings, goal)
-        here.store.last = frozenset({machine.record(here, 1, arrival), ELSEWHERE})
-    elif not _CANNOT_MOVE.match(statement.text):
-        here.store.last |= {ELSEWHERE}
+        arrived = frozenset({machine.record(here, 1, arrival)})
+    if not _is_harmless(here, statement.text):
+        _forget_by_text(here, why)
+        here.store.last |= arrived
+
+
+def _why_unknown(here: Execution) -> str:
+    line = int(here.place.program.lines.line[here.row])
+    return f"line {line}, which is not understood, may change it"
+
+
+def _is_harmless(here: Execution, text: str) -> bool:
+    """Tell whether unknown text does nothing to the arm and calls no function."""
+    called = (here.world.is_function(here.place, name) for name in words_in(text))
+    return is_harmless(text) and not any(called)
+
+
+def _forget_by_text(here: Execution, why: str) -> None:
+    """Forget what only a statement that may move the arm could change."""
+    forget_surroundings(here, why)
+    here.world.report(
+        here.place.program,
+        here.row,
+        MOTION_UNKNOWN,
+        "where the arm is, its frames and its motion settings are not known after "
+        "this statement, which is not understood: targets after it are left as they "
+        "are until these are set again",
+    )
 
 
 def run_broken(machine: Machine, here: Execution) -> None:
@@ -318,6 +362,8 @@ def run_broken(machine: Machine, here: Execution) -> None:
 
 def fill_initial(world: World) -> None:
     """Enter declared initial values, constants and the variable file's values."""
+    world.changing = changing_variables(world)
+    world.imported = imported_points(world)
     for place, seen in world.declarations():
         _declared(world, place, seen)
     if world.variables is not None and world.main.main is not None:
@@ -373,6 +419,9 @@ def _declared(world: World, place: Place, seen: Variables) -> None:
         key = world.root(place, variable.name.lower())
         if variable.initial is None or key in world.initial:
             continue
+        if why := _why_untrusted(world, key):
+            world.initial[key] = Nothing(why)
+            continue
         value = ProgramPoint(world, place, variable.row, store).value(variable.initial)
         if variable.arm not in (0, world.arm):
             value = Nothing(points_of(variable.arm))
@@ -412,7 +461,11 @@ def _enter_all(world: World, place: Place, file: ValueFile) -> None:
         )
         if known[row] and declared.exported:
             own[row] = False
-            other[world.root(place, root) + name[len(root) :]] = row
+            key = world.root(place, root)
+            if key in world.imported:
+                world.initial[key + name[len(root) :]] = Nothing(IMPORTED)
+            else:
+                other[key + name[len(root) :]] = row
     for row in named[~known[named]].tolist():
         name = entries.name[row].lower()
         root = root_of(name)
@@ -452,7 +505,15 @@ def _enter(world: World, file: ValueFile, entry: Entry, key: str, arm: int) -> N
     if arm or entry.arm not in (0, world.arm):
         value = Nothing(points_of(arm or entry.arm))
     if value is not None:
-        world.initial[key] = value
+        why = _why_untrusted(world, root_of(key))
+        world.initial[key] = Nothing(why) if why else value
+
+
+def _why_untrusted(world: World, root: str) -> str:
+    """Say why the first value of a variable is not taken from a file, else ""."""
+    if root in world.imported:
+        return IMPORTED
+    return OTHERS_WRITE if root in world.changing else ""
 
 
 # From a parsed program to its visits: what it moves to, and from where.
@@ -520,7 +581,7 @@ def _listed(world: World) -> Machine:
 def _start(machine: Machine) -> None:
     world = machine.world
     program, start = world.main, world.start
-    store = Store(world.initial.find, last=frozenset({START}))
+    store = Store(world.initial.find, last=frozenset({START}), changing=world.changing)
     why = "the cell file does not say what it is"
     store.set(
         tool=frame_value(start.tool, why),
@@ -538,6 +599,7 @@ def _handlers(machine: Machine, store: Store) -> None:
     world = machine.world
     nothing = Nothing("a condition handler runs at any time")
     unknown = Store(lambda key: nothing, last=frozenset({ELSEWHERE}))
+    unknown.changing = world.changing
     unknown.set(tool=nothing, base=nothing, uframe=nothing)
     for program in world.programs():
         for body in (program.main, *program.routines.values()):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -152,6 +153,12 @@ class Start:
     Attributes:
         tool, base, uframe: Position records (6,) [mm, deg], None where unknown.
         routines: Outside routine to ``still``, ``moves`` or ``sets-frames``.
+        still: Patterns of outside routines, ``name`` or ``program.name``, that neither
+            move the arm nor set frames.
+        constant: Patterns of exported variables, ``name`` or ``program.name``, that no
+            other program changes.
+        payload_kg: What the arm carries, NaN where that is not known.
+        strict_calls: The shipped list of such routines does not count.
         frame_tables: Outside routine to arguments (``"1,2"``) to the records of the
             frames (``tool``, ``base``, ``uframe``) that it sets.
         aux: Auxiliary axis to ``gun``, ``track`` or ``positioner``.
@@ -163,6 +170,10 @@ class Start:
     base: Record = (0.0,) * 6
     uframe: Record = (0.0,) * 6
     routines: Mapping[str, str] = field(default_factory=dict)
+    still: tuple[str, ...] = ()
+    strict_calls: bool = False
+    constant: tuple[str, ...] = ()
+    payload_kg: float = math.nan
     frame_tables: Mapping[str, Mapping[str, Mapping[str, Record]]] = field(
         default_factory=dict
     )
@@ -174,6 +185,8 @@ class Start:
         """PDL2 does not tell cases apart: keep names in lower case."""
         lower = {name.lower(): said for name, said in self.routines.items()}
         object.__setattr__(self, "routines", lower)
+        object.__setattr__(self, "still", tuple(map(str.lower, self.still)))
+        object.__setattr__(self, "constant", tuple(map(str.lower, self.constant)))
         tables = {name.lower(): table for name, table in self.frame_tables.items()}
         object.__setattr__(self, "frame_tables", tables)
         taught = frozenset(name.lower() for name in self.taught)
@@ -205,6 +218,9 @@ class World:
         start: What the cell says.
         slot_base: First global number index of each file, by file name.
         initial: What variables hold before the program assigns them, by key.
+        changing: Exported variables, by key, that another program may write at any
+            time: numbers, texts and switches, no positions.
+        imported: Positions of other programs, by key, whose file values may be old.
         taught_lines: Lines marked ``-- TAUGHT``, by file name.
         diagnostics: What was found; a message is kept once.
         loose: Variables, by key, that are used where it is not known what they hold,
@@ -227,6 +243,8 @@ class World:
     pinned: dict[int, str] = field(default_factory=dict)
     taught_lines: dict[str, frozenset[int]] = field(default_factory=dict)
     reached: dict[int, object] = field(default_factory=dict)
+    changing: frozenset[str] = frozenset()
+    imported: frozenset[str] = frozenset()
     _said: set[tuple[str, str]] = field(default_factory=set)
     _kept: set[frozenset[int]] = field(default_factory=set)
     _first: dict[str, list[str]] | None = None

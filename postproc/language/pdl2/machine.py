@@ -350,6 +350,11 @@ def _invalidate_locals(here: Execution) -> None:
         here.store.drop(here.world.root(here.place, name))
 
 
+OTHERS_WRITE = (
+    "another program may write it (it is exported); if none does, name it under "
+    "[variables] constant in the cell file"
+)
+
 # What is no longer known, and what must stay because something may depend on it.
 
 
@@ -369,6 +374,13 @@ def escape_names(here: Execution, names: frozenset[str], why: str) -> None:
             for key in here.locate(ast.Reference(name)).keys:
                 for part in (key, *parts_under(here, key)):
                     here.world.pin(here.store.read(part), why)
+
+
+def let_others_run(here: Execution) -> None:
+    """Forget variables that another program may have written by now."""
+    for key in here.store.exposed:
+        invalidate_key(here, key, OTHERS_WRITE)
+    here.store.exposed = frozenset()
 
 
 def invalidate(here: Execution, reference: ast.Reference, why: str) -> None:

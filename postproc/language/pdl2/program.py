@@ -620,8 +620,7 @@ def _report_unknown(reader: _Reader, row: int) -> None:
     reader.report(
         row,
         "unknown-statement",
-        f"this statement is not understood and is kept as it is: {text[:60]!r}; "
-        "moves that it may influence are not compensated",
+        f"this statement is not understood and is kept as it is: {text[:60]!r}",
     )
 
 

@@ -98,6 +98,8 @@ class Store:
         logs: Elements and fields that a key has been given since it was forgotten,
             by key; some of them may hold nothing any more.
         compound: Keys that ever had elements or fields; shared by all copies.
+        changing: Variables, by key, that another program may write at any time.
+        exposed: Those of them that hold what this program has given them.
     """
 
     initial: Callable[[str], Value | None]
@@ -106,6 +108,8 @@ class Store:
     settings: Settings = field(default_factory=dict)
     last: frozenset[int] = frozenset()
     compound: set[str] = field(default_factory=set)
+    changing: frozenset[str] = frozenset()
+    exposed: frozenset[str] = frozenset()
 
     def copy(self) -> Store:
         """Return a store that can change on its own."""
@@ -116,6 +120,8 @@ class Store:
             self.settings,
             self.last,
             self.compound,
+            self.changing,
+            self.exposed,
         )
 
     def read(self, key: str) -> Value:
@@ -143,6 +149,8 @@ class Store:
 
     def write(self, key: str, value: Value) -> None:
         """Let a key hold a value."""
+        if self.changing and (root := root_of(key)) in self.changing:
+            self.exposed |= {root}
         if self.values.get(key) is None:
             self._log(key)
         self.values[key] = value

@@ -14,7 +14,6 @@ from postproc.language.pdl2 import syntax as ast
 from postproc.language.pdl2.calls import call_statement, calls_in_expressions
 from postproc.language.pdl2.effects import (
     CHANGING,
-    HANDS_OVER,
     PURE,
     invocations,
     references,
@@ -30,6 +29,7 @@ from postproc.language.pdl2.machine import (
     MoveRun,
 )
 from postproc.language.pdl2.moves import UNSURE, from_value, motion_of
+from postproc.language.pdl2.routines import stays_still
 from postproc.language.pdl2.values import Nothing
 from postproc.language.shapes import alike, lower, name_index, numbered_in_order
 from postproc.robot.trajectory import Motion
@@ -327,14 +327,12 @@ class _Variants:
 
     def _does_nothing(self, call: ast.Invoke) -> bool:
         """Tell whether a call neither moves the arm nor sets what moves depend on."""
-        start, name = self.world.start, call.name
+        name = call.name
         if self.world.find_routine(self.place.program, name) is not None:
             return False
-        if name in start.frame_tables or name.startswith(HANDS_OVER):
-            return False
-        if start.routines.get(name) not in (None, "still"):
-            return False
         bare = name not in CHANGING and name not in PURE
+        if bare and not stays_still(self.world, self.place.program, name):
+            return False
         return all(self._keeps(a, bare) for a in call.arguments)
 
     def _keeps(self, argument: ast.Expression | None, bare: bool) -> bool:

@@ -161,10 +161,14 @@ def test_what_the_cell_says_of_outside_routines(said: str, origin: int) -> None:
     assert found.diagnostics == ()
 
 
-def test_each_assumption_is_listed_once() -> None:
-    found = body("ext(1)\next(2)\nx := ext(3)\nother")
+def test_each_routine_that_is_not_at_hand_is_listed_once() -> None:
+    found = body("ext(1)\next(2)\nx := ext(3)\nother\nspot(1)\nspot(2)")
     lines = [(d.line, d.code) for d in found.diagnostics]
-    assert lines == [(4, "assumed-still"), (7, "assumed-still")]
+    assert lines == [
+        (4, "unknown-routine"),
+        (7, "unknown-routine"),
+        (8, "assumed-still"),
+    ]
 
 
 def test_a_loop_too_long_to_unroll_is_reported() -> None:

@@ -24,6 +24,7 @@ END go
 BEGIN
 """
 UNKNOWN = -1
+CELL = Start(aux={1: "gun"}, routines={"outside": "still"})
 
 
 def place(x: float) -> str:
@@ -46,7 +47,7 @@ def read(text: str) -> VariableFile:
 def followed(values: str, *lines: str) -> Resolved:
     text = HEAD + "\n".join([*lines, "END job"])
     program = parse(source_from_bytes("job.pdl", text.encode()))
-    return resolve(program, Start(aux={1: "gun"}), read(values))
+    return resolve(program, CELL, read(values))
 
 
 def known(found: Resolved) -> list[float | int]:
