@@ -11,6 +11,7 @@ import pytest
 from postproc.compensation import windows as cuts
 from postproc.compensation.windows import SHARED, cut_points, lead_in, windows
 from postproc.language.pdl2.interpreter import resolve
+from postproc.language.pdl2.job import Start
 from postproc.language.pdl2.program import parse
 from postproc.language.source import source_from_bytes
 from postproc.language.visits import Visits
@@ -22,7 +23,8 @@ HEAD += "  MOVE LINEAR TO POS(900, 0, 900, 0, 180, 0, '')\nEND there\nBEGIN\n"
 
 
 def read(text: str) -> Visits:
-    return resolve(parse(source_from_bytes("job.pdl", text.encode("latin-1")))).visits
+    program = parse(source_from_bytes("job.pdl", text.encode("latin-1")))
+    return resolve(program, Start(still=("drill_*", "tool_change"))).visits
 
 
 def stop(x: float) -> str:
