@@ -164,7 +164,10 @@ NO_START = (
 )
 PATH_REACH = "the path to it leaves the reach: add a point between, or use JOINT"
 PATH_JUMP = "the path to it passes through a singularity: lead it round, or use JOINT"
-NO_CIRCLE = "the three points of the arc lie on one line: move VIA, or use LINEAR"
+NO_CIRCLE = (
+    "the three points of the arc lie on one line, or two of them are one: move VIA, "
+    "or use LINEAR"
+)
 ARC_END = "where the arc through it ends is not known"
 AMBIGUOUS = "its predecessors lead to different joint angles"
 OTHER_BRANCH = "the path to it arrives on another branch or turn than its joint angles"

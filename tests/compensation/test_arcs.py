@@ -117,3 +117,9 @@ def test_points_that_all_move_alike_make_the_same_circle(job_cell, job_model):
     source = job(SET, "MOVE LINEAR TO p", f"MOVE LINEAR TO {point(*START)}", arc)
     found = whys(compensate(source, job_cell, job_model, name="job.pdl"))
     assert found[1] == found[2] == found[4] == "", found
+
+
+def test_an_arc_whose_point_on_the_way_is_its_end_says_so(job_cell, job_model):
+    lines = [SET, f"MOVE LINEAR TO {point(*START)}", "MOVE CIRCULAR TO p VIA p"]
+    found = whys(compensate(job(*lines), job_cell, job_model, name="job.pdl"))
+    assert "two of them are one" in found[2] and "two of them are one" in found[3]

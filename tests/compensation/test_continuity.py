@@ -153,3 +153,18 @@ def test_a_guarded_fly_point_takes_its_neighbours_along(job_cell, job_model):
     assert "outside the surveyed" in why[5]
     assert why[3] == why[4] == BENT.format(STEP_MM)
     assert why[0] == "", "a stop does not bend"
+
+
+def test_a_weld_that_joints_lead_to_is_not_held_back_by_a_step(job_cell, job_model):
+    """370 mm behind a fly point whose correction differs by more than 0.5 mm."""
+    limits = job_cell.limits.model_copy(update={"step_mm": 0.001})
+    cell = replace(job_cell, limits=limits)
+    lines = [
+        f"MOVEFLY JOINT TO {point(300, 450, 420)} ADVANCE",
+        f"MOVE JOINT TO {point(300, 100, 300)}",
+        f"MOVEFLY JOINT TO {point(300, 450, 420)} ADVANCE",
+    ]
+    done = compensate(job(*lines), cell, job_model, name="job.pdl")
+    step = np.diff(done.decisions.correction[1:3], axis=0)
+    assert np.linalg.norm(step) > 0.2e-3, "there is a step to hold it back for"
+    assert done.decisions.status[:4].tolist() == [Status.SAFE] * 4
