@@ -29,15 +29,16 @@ BENT = (
 def on_path(visits: Visits) -> Ints:
     """Return the visit before on a continuous path, (n,), -1 where there is none.
 
-    A path is continuous through a fly point; a stop behind a JOINT move is not on it.
+    A line or an arc goes on from a fly point. Nothing runs along a JOINT move: where it
+    stops, and how it swings round its fly points, is no path.
     """
     if len(visits) == 0:
         return np.empty(0, dtype=np.int64)
     single = np.diff(visits.pred_start) == 1
     first = visits.pred[np.minimum(visits.pred_start[:-1], len(visits.pred) - 1)]
     before = np.where(single & (first >= 0), first, -1)
-    ends = (visits.motion == Motion.JOINT) & ~visits.fly
-    return np.where(visits.fly[before] & ~ends, before, -1)
+    goes_on = visits.fly[before] & (visits.motion != Motion.JOINT)
+    return np.where(goes_on, before, -1)
 
 
 # How much the correction may change on the way.

@@ -43,7 +43,8 @@ def stop(trajectory, x):
     ("first", "second", "continuous"),
     [
         (fly("LINEAR", 1000), stop("LINEAR", 1100), True),
-        (fly("JOINT", 1000), fly("JOINT", 1100), True),
+        (fly("JOINT", 1000), fly("JOINT", 1100), False),
+        (fly("JOINT", 1000), stop("LINEAR", 1100), True),
         (fly("JOINT", 1000), stop("JOINT", 1100), False),
         (stop("LINEAR", 1000), stop("LINEAR", 1100), False),
     ],
