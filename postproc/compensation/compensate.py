@@ -19,6 +19,7 @@ from postproc.compensation.frames import correct_taught
 from postproc.compensation.iterate import AT_START, Converged, EndState, iterate
 from postproc.compensation.notes import (
     assumed_off,
+    flank_steps,
     followed_pages,
     listing_cost,
     missing_file,
@@ -422,6 +423,9 @@ def report(
                 *untimed_runs(visits, kept.untimed),
                 *rounded_points(visits, kept.away),
                 *unsure_sides(visits, rows, d.side, d.std_error),
+                *flank_steps(
+                    visits, rows, kept.position, d.side, setting.gap, cell.arm
+                ),
                 *listing_cost(visits, rows, d.q, cell.arm),
                 assumed_off(name, cell),
             )

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from postproc.arrays import Bools, Floats, in_chunks
+from postproc.compensation.continuity import on_path
 from postproc.files import is_variables, variables_of
 from postproc.language.visits import NO_VALUE, Diagnostic, Meaning, Visits
 from postproc.robot.arm import Arm
@@ -89,6 +90,45 @@ def untimed_runs(visits: Visits, rows: Bools) -> list[Diagnostic]:
     """List targets in runs that no time law was found for, rows (n,)."""
     text = "no time law was found for this run: times and speeds are estimates"
     return _each(visits, rows, "no-time-law", text)
+
+
+def flank_steps(
+    visits: Visits, corrected: Bools, place: Floats, side: Floats, gap: Floats, arm: Arm
+) -> list[Diagnostic]:
+    """Tell where a change of flank asks for more acceleration than an axis has.
+
+    On a path the correction makes up for the gap on the way to one fly point. To turn
+    by it and stand still again takes 4 gap / T^2 at least, T being the time for that
+    way at the programmed speed.
+
+    Args:
+        visits: Every arrival.
+        corrected: Visits whose target moves, (n,).
+        place: Where the program wants the TCP, (n, 3) [m].
+        side: Where every joint lies in its play, (n, 6) from -1 to 1.
+        gap: Half the fitted gap between the flanks of every joint, (6,) [rad].
+        arm: Its accelerations may be guesses of the arm file.
+    """
+    before = on_path(visits)
+    rows = np.flatnonzero(corrected & (before >= 0) & (visits.lin_spd > 0.0))
+    last = before[rows]
+    way = np.linalg.norm(place[rows] - place[last], axis=1)
+    time = way / (visits.lin_spd[rows] * visits.override[rows])
+    with np.errstate(divide="ignore", invalid="ignore"):
+        asked = 4.0 * np.abs(side[rows] - side[last]) * gap / time[:, None] ** 2
+        over = np.where(time[:, None] > 0.0, asked / arm.acceleration, 0.0)
+    found = []
+    for j in np.flatnonzero((over > 1.0).any(axis=0)).tolist():
+        count, i = int((over[:, j] > 1.0).sum()), int(over[:, j].argmax())
+        text = (
+            f"axis {j + 1} changes its flank on the way to {count} fly points faster "
+            f"than its acceleration allows (here {over[i, j]:.1f} times, as far as the "
+            "arm file knows it): the controller may slow down or round the step off"
+        )
+        line = int(visits.line[rows[i]])
+        name = visits.files[visits.file[rows[i]]]
+        found.append(Diagnostic(name, line, "flank-acceleration", text))
+    return found
 
 
 def listing_cost(

@@ -15,6 +15,7 @@ from postproc.compensation.continuity import (
     on_path,
     path_correction,
 )
+from postproc.compensation.notes import flank_steps
 from postproc.compensation.outcome import Status
 from postproc.compensation.program import read_program
 from postproc.model.model import MARGIN
@@ -169,3 +170,22 @@ def test_a_weld_that_joints_lead_to_is_not_held_back_by_a_step(job_cell, job_mod
     step = np.diff(done.decisions.correction[1:3], axis=0)
     assert np.linalg.norm(step) > 0.2e-3, "there is a step to hold it back for"
     assert done.decisions.status[:4].tolist() == [Status.SAFE] * 4
+
+
+@pytest.mark.parametrize(("speed", "axes"), [(0.001, 0), (1.0, 6)])
+def test_a_change_of_flank_that_is_too_fast_is_told(job_cell, speed, axes):
+    """1 mm at 1 m/s is 1 ms: a gap of 2 mrad asks for 8,000 rad/s^2."""
+    visits = read(
+        job_cell, f"$LIN_SPD := {speed}", fly("LINEAR", 1000), fly("LINEAR", 1001)
+    )
+    place = np.array([[1.0, 0.1, 1.2], [1.001, 0.1, 1.2]])
+    side = np.array([[1.0] * 6, [-1.0] * 6])
+    corrected = np.ones(2, dtype=bool)
+    found = flank_steps(visits, corrected, place, side, np.full(6, 1e-3), ARM)
+    assert [d.code for d in found] == ["flank-acceleration"] * axes
+    assert all(d.line == 5 for d in found)
+    if found:
+        times = 8000.0 / ARM.acceleration[0]
+        assert f"here {times:.1f} times" in found[0].message
+    still = flank_steps(visits, corrected, place, side * 0, np.full(6, 1e-3), ARM)
+    assert still == []
