@@ -110,12 +110,13 @@ def fixed(values: Floats, decimals: int) -> ByteColumn:
     >>> joined([fixed(np.array([-0.0625, 12345.678, np.nan]), 3), b" "])
     b'-0.062 12345.678 null '
     """
+    few = min(decimals, EXACT)
     with np.errstate(invalid="ignore", over="ignore"):
-        scaled = np.abs(values) * 10.0**decimals
+        scaled = np.abs(values) * 10.0**few
         sure = (scaled < MOST) & (np.abs(scaled - np.floor(scaled) - 0.5) > TIE)
-    sure &= decimals <= EXACT
+    sure &= decimals == few
     rounded = np.rint(np.where(sure, scaled, 0.0)).astype(np.int64)
-    rows = _written(rounded, decimals, np.signbit(values))
+    rows = _written(rounded, few, np.signbit(values))
     rows = blanked(rows, np.isnan(values), b"null")
     return _by_python(
         rows, values, ~(sure | np.isnan(values)), f"%.{decimals}f".__mod__

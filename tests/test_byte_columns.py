@@ -49,3 +49,11 @@ def test_rows_are_json() -> None:
     texts = named(("a", 'é "b"'), np.array([1, 0]), json.dumps)
     told = [json.loads(line) for line in lines(listed([rows, texts]))]
     assert told == [[[1, 0.5], 'é "b"'], [[], "a"]]
+
+
+@pytest.mark.parametrize("decimals", [8, 9, 18, 19, 25, 400])
+def test_any_number_of_decimals_is_written_as_python_does(decimals):
+    values = np.array([0.0, -1.5, 1234.0625, 1 / 3, np.nan])
+    text = joined([fixed(values, decimals), b" "]).decode()
+    wanted = [f"{v:.{decimals}f}" for v in values[:4].tolist()]
+    assert text.split() == [*wanted, "null"]
