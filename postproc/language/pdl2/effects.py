@@ -15,6 +15,7 @@ from postproc.language.pdl2 import syntax as ast
 from postproc.language.pdl2.job import Place, World
 from postproc.language.pdl2.program import Body, Program
 from postproc.language.pdl2.routines import (
+    TRACKING,
     RoutineEffect,
     effect_of,
     report_unknown_routine,
@@ -219,6 +220,8 @@ def _direct(statement: ast.Statement) -> Effects:
         if call.name not in PURE:
             changed = changed_arguments(call.arguments)
             assigned |= {_assigned_name(a) for a in changed}
+    if TRACKING in calls:
+        assigned.add(f"${TRACKING}")
     read = frozenset(reference.name for reference in references(statement))
     called = frozenset(calls - PURE - CHANGING)
     return Effects(moves, frozenset(assigned), read, called)

@@ -8,7 +8,7 @@ import pytest
 
 from postproc.language.pdl2.disturbances import disturbance
 from postproc.language.pdl2.values import Nothing
-from tests.language.pdl2.test_routines import FIRST, followed, handler, reasons
+from tests.language.pdl2.test_routines import FIRST, followed, handler, reasons, routine
 
 
 @pytest.mark.parametrize(
@@ -33,6 +33,13 @@ def test_what_a_way_around_may_leave_on_counts() -> None:
 
 def test_what_a_handler_may_switch_on_counts() -> None:
     assert "$CONV_ENBL" in reasons(followed(*handler("$CONV_ENBL := ON"), FIRST))[0]
+
+
+@pytest.mark.parametrize("inner", ["SENSOR_TRK(TRUE)", "$CAL_SYS[1] := 3"])
+def test_what_a_function_switches_on_counts(inner: str) -> None:
+    head = ["VAR n : INTEGER", *routine("f", inner, "RETURN(1)", takes=": INTEGER")]
+    assert reasons(followed(FIRST, "n := f", FIRST, head=head))[1]
+    assert reasons(followed(*handler(inner), FIRST))[0]
 
 
 def test_what_is_set_for_one_move_counts_for_it() -> None:
