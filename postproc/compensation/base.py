@@ -134,11 +134,7 @@ def _beside(visits: Visits) -> tuple[Ints, Ints]:
     known = ~np.isnan(visits.values).any(axis=1)
     pose = known & (visits.target == Meaning.POSE)
     joints = known & (visits.target == Meaning.JOINTS)
-    first = visits.pred_start[:-1]
-    after = (np.diff(visits.pred_start) == 1) & (
-        visits.pred[np.minimum(first, len(visits.pred) - 1)]
-        == np.arange(len(visits)) - 1
-    )
+    after = visits.before == np.arange(len(visits)) - 1
     into = np.flatnonzero(after[1:] & pose[1:] & joints[:-1]) + 1
     out = np.flatnonzero(after[1:] & joints[1:] & pose[:-1])
     return np.concatenate([into, out]), np.concatenate([into - 1, out + 1])

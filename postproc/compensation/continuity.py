@@ -32,13 +32,7 @@ def on_path(visits: Visits) -> Ints:
     A line or an arc goes on from a fly point. Nothing runs along a JOINT move: where it
     stops, and how it swings round its fly points, is no path.
     """
-    if len(visits) == 0:
-        return np.empty(0, dtype=np.int64)
-    single = np.diff(visits.pred_start) == 1
-    first = visits.pred[np.minimum(visits.pred_start[:-1], len(visits.pred) - 1)]
-    before = np.where(single & (first >= 0), first, -1)
-    goes_on = visits.fly[before] & (visits.motion != Motion.JOINT)
-    return np.where(goes_on, before, -1)
+    return np.where(visits.motion != Motion.JOINT, visits.run_mates, -1)
 
 
 # How much the correction may change on the way.

@@ -234,13 +234,18 @@ class Visits:
         return self.pred[self.pred_start[visit] : self.pred_start[visit + 1]]
 
     @cached_property
-    def run_mates(self) -> Ints:
-        """The visit before in the same fly run, (n,), -1 where there is none."""
+    def before(self) -> Ints:
+        """The only visit that leads to each, (n,), -1 where none or several do."""
         if len(self) == 0:
             return np.empty(0, dtype=np.int64)
         single = np.diff(self.pred_start) == 1
         first = self.pred[np.minimum(self.pred_start[:-1], len(self.pred) - 1)]
-        before = np.where(single & (first >= 0), first, -1)
+        return np.where(single & (first >= 0), first, -1)
+
+    @cached_property
+    def run_mates(self) -> Ints:
+        """The visit before in the same fly run, (n,), -1 where there is none."""
+        before = self.before
         return np.where((before >= 0) & self.fly[before], before, -1)
 
 
