@@ -18,6 +18,7 @@ from postproc.simulation import (
     virtual_arm,
     write_measurements,
 )
+from tests.pipes import made_device, made_pipe
 
 ROOT = Path(__file__).parents[1]
 SEED = 4
@@ -105,3 +106,16 @@ def desk(job_folder, tmp_path):
     from tests.written import Desk
 
     return Desk(tmp_path, job_folder / "cell.toml", job_folder / "model.json")
+
+
+@pytest.fixture
+def pipe(tmp_path):
+    """A pipe of our own, with a name."""
+    return made_pipe(tmp_path / "pipe")
+
+
+@pytest.fixture
+def device():
+    """A device of our own."""
+    with made_device() as path:
+        yield path

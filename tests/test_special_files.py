@@ -12,19 +12,8 @@ import pytest
 from postproc.batch.run import TargetTree
 from postproc.exceptions import OutputError
 from postproc.files import check_places, is_stream, write_all
-from tests.pipes import made_device, made_pipe, reading
+from tests.pipes import reading
 from tests.written import cli
-
-
-@pytest.fixture
-def pipe(tmp_path):
-    return made_pipe(tmp_path / "pipe")
-
-
-@pytest.fixture
-def device():
-    with made_device() as path:
-        yield path
 
 
 def test_a_device_stays_a_device(device, tmp_path):

@@ -9,22 +9,11 @@ import sys
 
 import pytest
 
-from tests.pipes import feed, made_device, made_pipe, reading
+from tests.pipes import feed, made_pipe, reading
 from tests.written import FIRST, LISTED, POSE, cli, entry, program
 
 TOOL = [sys.executable, "-c", "from postproc.cli import main; main()"]
 VALUED = program(FIRST, "MOVE LINEAR TO a", declared="a : XTNDPOS")
-
-
-@pytest.fixture
-def pipe(tmp_path):
-    return made_pipe(tmp_path / "pipe")
-
-
-@pytest.fixture
-def device():
-    with made_device() as path:
-        yield path
 
 
 def test_the_place_of_a_program_may_be_a_device(desk, device):
