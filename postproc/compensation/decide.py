@@ -345,7 +345,6 @@ def _steps(planned: Planned) -> Iterator[tuple[int, Ints]]:
 
 SOLVED = 1e-6  # [m] model against wanted pose
 ROUNDING = 1e-9  # [rad] and [m]
-OTHER_BRANCH = "corrected, the arm would stand on another branch"
 
 
 def guard_solutions(
@@ -401,14 +400,13 @@ def guard_motion(reasons: Reasons, limits: LimitSection, moved: Departure) -> No
         limits: The cell's guards.
         moved: What the corrections do there, n visits.
     """
-    reasons.mark(moved.branch, OTHER_BRANCH)
     for text, far in swings(limits, moved).items():
         reasons.mark(far, f"corrected, {text}")
 
 
 def swings(limits: LimitSection, moved: Departure) -> dict[str, Bools]:
     """Say what is beyond the limits, and in which of n rows, (n,) each."""
-    found = {}
+    found = {"the arm would stand on another branch": moved.branch}
     with np.errstate(invalid="ignore"):
         for j, most in enumerate(limits.joint_deg):
             text = f"axis {j + 1} would turn by more than joint_deg = {most:g}"

@@ -204,7 +204,7 @@ class Iteration:
         if found is None:
             return np.zeros(n, dtype=bool)
         limits, targets = self.setting.cell.limits, self.planned.targets
-        far = np.any([found.moved.branch, *swings(limits, found.moved).values()], 0)
+        far = np.any([*swings(limits, found.moved).values()], axis=0)
         rows = np.flatnonzero(far)
         before = spans(targets.pred_start[rows], np.diff(targets.pred_start)[rows])
         sources = targets.pred[before]

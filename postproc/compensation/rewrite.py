@@ -255,8 +255,7 @@ def check_motion(visits: Visits, moved: Departure, limits: LimitSection) -> None
         VerificationError: A joint, the elbow or the wrist centre would swing too far,
             or the arm would stand on another branch.
     """
-    found = {"the arm would be on another branch": moved.branch}
-    for text, far in (found | swings(limits, moved)).items():
+    for text, far in swings(limits, moved).items():
         for row in np.flatnonzero(far)[:1].tolist():
             raise VerificationError(
                 f"{visits.files[visits.file[row]]}:{visits.line[row]}: {text} on the "
