@@ -39,29 +39,32 @@ _NAMED = re.compile(
 _OUTSIDE = re.compile(r"[/\\:\0]|^\.*$")  # folders, drives, ``..``
 
 
-def named_programs(text: bytes) -> tuple[list[str], list[str]]:
+def named_programs(text: bytes) -> tuple[dict[str, int], dict[str, int]]:
     r"""Find the programs that a program names.
 
     Args:
         text: All of it: a routine may call a page behind a thousand moves.
 
     Returns:
-        Lower-case base names, in order, each once; and the names, as written, that
-        lead out of the folder and are not followed.
+        Lower-case base names, in order, each with the line that names it first; and
+        likewise the names, as written, that lead out of the folder.
 
     >>> named_programs(b"PROGRAM m\nIMPORT 'Page1'\nIMPORT '../x'\nBEGIN\nEND m")
-    (['page1'], ['../x'])
+    ({'page1': 2}, {'../x': 3})
     """
-    inside: dict[str, None] = {}
-    outside: dict[str, None] = {}
-    for found in filter(None, map(_NAMED.match, _lines_with(_WORDS, text))):
+    inside: dict[str, int] = {}
+    outside: dict[str, int] = {}
+    for line, text_of_line in _lines_with(_WORDS, text):
+        found = _NAMED.match(text_of_line)
+        if found is None:
+            continue
         raw = next(group for group in found.groups() if group is not None)
         name = raw.decode("latin-1")
         if _OUTSIDE.search(name):
-            outside[name] = None
+            outside.setdefault(name, line)
         else:
-            inside[base_name(name)] = None
-    return list(inside), list(outside)
+            inside.setdefault(base_name(name), line)
+    return inside, outside
 
 
 _PROGRAM_ARM = re.compile(
@@ -93,8 +96,8 @@ def of_one_arm(program: int, page: int) -> bool:
     return page in (0, program or 1)
 
 
-def _lines_with(words: Sequence[bytes], text: bytes) -> Iterator[bytes]:
-    """Yield the lines that hold one of some words, in lower case: few of many."""
+def _lines_with(words: Sequence[bytes], text: bytes) -> Iterator[tuple[int, bytes]]:
+    """Yield the lines that hold one of some words, in lower case, with their number."""
     folded = text.lower()
     places: list[int] = []
     for word in words:
@@ -102,15 +105,16 @@ def _lines_with(words: Sequence[bytes], text: bytes) -> Iterator[bytes]:
         while at >= 0:
             places.append(at)
             at = folded.find(word, at + 1)
-    end = 0
+    line, begin, end = 1, 0, 0
     for at in sorted(places):
         if at >= end:
-            begin = text.rfind(b"\n", end, at) + 1 or end
+            before, begin = begin, text.rfind(b"\n", end, at) + 1 or end
+            line += text.count(b"\n", before, begin)
             end = text.find(b"\n", at) + 1 or len(text)
-            yield text[begin:end]
+            yield line, text[begin:end]
 
 
-def names_in(path: Path) -> tuple[list[str], list[str]]:
+def names_in(path: Path) -> tuple[dict[str, int], dict[str, int]]:
     """Find the programs that a file names (`named_programs`), none if unreadable."""
     return named_programs(_read(path, -1))
 
@@ -315,7 +319,7 @@ def _by_base(places: Iterable[str], part: _Folder) -> dict[str, str]:
 
 
 def _joined(
-    named: Mapping[str, Sequence[str]],
+    named: Mapping[str, Iterable[str]],
     variables: Mapping[str, str],
     arms: Mapping[str, int],
 ) -> dict[str, tuple[str, ...]]:

@@ -56,7 +56,7 @@ class Pages:
     """
 
     paths: tuple[Path, ...] = ()
-    notes: tuple[str, ...] = ()
+    notes: tuple[Diagnostic, ...] = ()
 
 
 def find_pages(program: Path) -> Pages:
@@ -67,7 +67,10 @@ def find_pages(program: Path) -> Pages:
     and symbolic links do not count.
     """
     wanted, outside = names_in(program)
-    notes = [f"{name!r} leads out of the folder: not followed" for name in outside]
+    notes = [
+        _not_followed(program, line, f"{name!r} leads out of the folder: not followed")
+        for name, line in outside.items()
+    ]
     main = base_name(program.name)
     if not set(wanted) - {main} or not program.parent.is_dir():
         return Pages((), tuple(notes))
@@ -89,6 +92,10 @@ def find_pages(program: Path) -> Pages:
     return Pages(tuple(programs[page] for page in pages), tuple(notes))
 
 
+def _not_followed(program: Path, line: int, text: str) -> Diagnostic:
+    return Diagnostic(program.name, line, "not-followed", text)
+
+
 def _is_source(path: Path) -> bool:
     """Tell whether a file is a program, and no output of ours."""
     if not (is_program(path.name) and path.is_file()):
@@ -96,34 +103,39 @@ def _is_source(path: Path) -> bool:
     return read_stamp(read_head(path)) is None
 
 
-def _named(path: Path, main: str) -> list[str]:
-    """List the programs that a program names, but for the main one."""
-    return [name for name in names_in(path)[0] if name != main]
+def _named(path: Path, main: str) -> dict[str, int]:
+    """Return the programs that a program names, but for the main one, and the line."""
+    return {name: line for name, line in names_in(path)[0].items() if name != main}
 
 
 def _left_out(
     programs: Mapping[str, Path],
-    named: Mapping[str, Sequence[str]],
+    named: Mapping[str, Mapping[str, int]],
     followed: Sequence[str],
     apart: Mapping[str, str],
-) -> list[str]:
-    """Say which programs are there and named, and not followed.
+) -> list[Diagnostic]:
+    """Say which programs are there and named, and not followed, where they are named.
 
     Args:
         programs: The programs of the folder.
-        named: Those that each of them names.
+        named: Those that each of them names, and the line.
         followed: The main program and its pages.
         apart: Why some are programs by themselves.
     """
+    first: dict[str, str] = {}
+    for base in followed:
+        for other in named[base]:
+            first.setdefault(other, base)
     notes = []
-    for other in dict.fromkeys(name for base in followed for name in named[base]):
+    for other, base in first.items():
         if other in followed or other not in programs:
             continue
         why = apart.get(other, "")
         if not why:
             users = [base for base in named if other in named[base] and base != other]
             why = f"{' and '.join(programs[user].name for user in users)} name it"
-        notes.append(f"{programs[other].name} is not followed: {why}")
+        text = f"{programs[other].name} is not followed: {why}"
+        notes.append(_not_followed(programs[base], named[base][other], text))
     return notes
 
 
@@ -140,7 +152,7 @@ class Job:
         source: Its bytes.
         variables: Path and bytes of its variable file, or None.
         pages: Paths and bytes of its pages.
-        notes: What it names and is not followed.
+        notes: What it or a page names and is not followed.
         cell: The cell.
         model: The model.
         inputs: Every file that was read.
@@ -151,7 +163,7 @@ class Job:
     source: bytes
     variables: tuple[Path, bytes] | None
     pages: tuple[tuple[Path, bytes], ...]
-    notes: tuple[str, ...]
+    notes: tuple[Diagnostic, ...]
     cell: Cell
     model: Model
     inputs: tuple[Path, ...]
@@ -204,8 +216,7 @@ class Job:
             progress=progress,
             processes=processes,
         )
-        left = (Diagnostic(self.name, 1, "not-followed", text) for text in self.notes)
-        return replace(outcome, diagnostics=(*outcome.diagnostics, *left))
+        return replace(outcome, diagnostics=(*outcome.diagnostics, *self.notes))
 
     def write(
         self,

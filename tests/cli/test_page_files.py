@@ -71,7 +71,8 @@ def test_what_is_not_followed_is_said(tmp_path):
     main = put("main", "IMPORT 'own'", "IMPORT 'shared'", "IMPORT '../far'",
                "IMPORT 'valued'", "IMPORT 'gone'")  # fmt: skip
     put("own", "IMPORT 'inner'", "IMPORT 'main'")
-    put("inner")
+    put("inner", "IMPORT 'apart'")
+    put("apart, PROG_ARM = 2").rename(tmp_path / "apart.pdl")
     put("shared")
     put("other", "IMPORT 'shared'")
     put("valued")
@@ -80,11 +81,14 @@ def test_what_is_not_followed_is_said(tmp_path):
     (tmp_path / "linked.pdl").symlink_to(tmp_path.parent / "far.pdl")
     found = find_pages(main)
     assert [path.name for path in found.paths] == ["own.pdl", "inner.pdl"]
-    assert found.notes == (
-        "'../far' leads out of the folder: not followed",
-        "shared.pdl is not followed: main.pdl and other.pdl name it",
-        "valued.pdl is not followed: it has a variable file of its own",
-    )
+    assert [(note.file, note.line, note.message) for note in found.notes] == [
+        ("main.pdl", 4, "'../far' leads out of the folder: not followed"),
+        ("main.pdl", 3, "shared.pdl is not followed: main.pdl and other.pdl name it"),
+        ("main.pdl", 5, "valued.pdl is not followed: it has a variable file of its "
+         "own"),
+        ("inner.pdl", 2, "apart.pdl is not followed: it is a program of arm 2 "
+         "(PROG_ARM)"),
+    ]  # fmt: skip
     assert names(put("plain")) == []
 
 
@@ -136,4 +140,4 @@ def test_pages_that_are_named_far_behind_the_declarations_are_followed(tmp_path)
 
 def test_the_programs_that_a_text_names():
     text = b"IMPORT 'a'\rIMPORT 'x'\r\nCALL b\ncall b -- call c\nMOVE recall\n CALL d"
-    assert named_programs(text) == (["a", "b", "d"], [])
+    assert named_programs(text) == ({"a": 1, "b": 2, "d": 5}, {})
