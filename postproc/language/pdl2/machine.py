@@ -138,7 +138,7 @@ def single(
 
 MAX_ROWS = 20_000  # rows of unrolled loops and of calls, each time they are run
 DEEP = 64  # calls within calls, from where on it pays to know which call themselves
-MAX_STEPS = 2_000_000  # times a configuration is run again, all in all
+MAX_STEPS = 8_000_000  # configurations run, calls and unrolled rows, all in all
 
 Key = tuple[Context, int, int]
 

@@ -151,7 +151,7 @@ def _is_plain(move: ast.Move) -> bool:
     """Tell whether a move goes to numbers or a variable; WITH may set numbers."""
     if move.how != "TO" or move.trajectory not in ("JOINT", "LINEAR", ""):
         return False
-    if move.arm or move.via or move.til or move.sync:
+    if move.arm or move.via or move.til is not None or move.sync:
         return False
     for reference, value in move.settings:
         plain = reference.name.startswith("$") and not reference.steps
@@ -388,6 +388,7 @@ class MoveBlocks:
     machine: Machine
     quiet: dict[int, PlainMoves] = field(default_factory=dict)
     _may_be: dict[int, Bools] = field(default_factory=dict)
+    _written: dict[tuple[int, int], MoveRun] = field(default_factory=dict)
 
     def run(self, here: Execution) -> bool:
         """Run the stretch that begins at a row; tell whether there is one.
@@ -402,13 +403,32 @@ class MoveBlocks:
         end = quiet.end(here.row)
         if end == here.row:
             return False
-        rows = np.arange(here.row, end)
-        variant = quiet.variant[rows - quiet.first]
-        forms = self._run_one_of_each(here, quiet, rows, variant)
-        moves = np.isin(variant, np.array([*forms], dtype=np.int64))
-        self._record(here, quiet, rows[moves], variant[moves], forms)
+        first = (id(here.place.body), here.row)
+        run = self._written.get(first)
+        if run is None or run.settings is not here.store.settings:
+            rows = np.arange(here.row, end)
+            variant = quiet.variant[rows - quiet.first]
+            run = self._run_all(here, quiet, rows, variant)
+            calls = np.array(quiet.calls)[variant].any()
+            if not calls and (run.point == WRITTEN).all():
+                self._written[first] = run
+        self._record(here, run)
         here.row = end
         return True
+
+    def _run_all(
+        self, here: Execution, quiet: PlainMoves, rows: Ints, variant: Ints
+    ) -> MoveRun:
+        """Run the lines of a stretch; return its moves."""
+        forms = self._run_one_of_each(here, quiet, rows, variant)
+        moves = np.isin(variant, np.array([*forms], dtype=np.int64))
+        rows, variant = rows[moves], variant[moves]
+        here.row = int(rows[0])
+        point, goals = _points(here, quiet, rows, variant)
+        settings, nowhere = here.store.settings, frozenset[int]()
+        return MoveRun(
+            here.place, rows, variant, forms, nowhere, settings, point, goals
+        )
 
     def _quiet(self, here: Execution) -> PlainMoves:
         program, body = here.place.program, here.place.body
@@ -443,23 +463,17 @@ class MoveBlocks:
                 forms[number] = replace(form, motion=motion, reason=reason)
         return forms
 
-    def _record(
-        self,
-        here: Execution,
-        quiet: PlainMoves,
-        rows: Ints,
-        variant: Ints,
-        forms: dict[int, MoveForm],
-    ) -> None:
-        """Record the moves and let the arm stand at the end of the last."""
-        here.row = int(rows[0])
-        point, goals = _points(here, quiet, rows, variant)
-        come, settings = self.machine.predecessors(here), here.store.settings
-        run = MoveRun(
-            here.place, rows, variant, forms, come, settings, point, goals, here.reason
-        )
+    def _record(self, here: Execution, run: MoveRun) -> None:
+        """Record moves and let the arm stand at the end of the last.
+
+        Moves to written numbers are the same ones again under the same settings: what
+        differs is where the arm comes from.
+        """
+        here.row = int(run.rows[0])
+        come = self.machine.predecessors(here)
+        run = replace(run, predecessors=come, reason=here.reason)
         base = self.machine.record(here, 0, run)
-        here.store.last = frozenset({base + len(rows) - 1})
+        here.store.last = frozenset({base + len(run) - 1})
 
 
 def _points(
