@@ -284,8 +284,8 @@ def move(machine: Machine, here: Execution, statement: ast.Move) -> None:
     store.last = frozenset({arrived})
     if several and goal.target in _FROM_HERE:
         store.last |= {ELSEWHERE}
-    if statement.til or whose is None:
-        store.last |= {ELSEWHERE} if statement.til else predecessors
+    if statement.til is not None or whose is None:
+        store.last |= predecessors if statement.til is None else {ELSEWHERE}
 
 
 def _beside(machine: Machine, here: Execution, statement: ast.Move) -> None:

@@ -12,7 +12,7 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cache, lru_cache
 from io import BytesIO
-from itertools import count
+from itertools import count, zip_longest
 from pathlib import Path
 from typing import Any, cast
 
@@ -59,8 +59,16 @@ class BesidePart(tuple[Any, ...]):
     """One WITH item that names a condition handler."""
 
 
-class TilPart:
-    """A TIL clause."""
+class TilPart(tuple[Any, ...]):
+    """A TIL clause: what its condition calls."""
+
+
+class GroupPart(tuple[Any, ...]):
+    """What stands between brackets of text that is not understood."""
+
+
+class RoundPart(GroupPart):
+    """What stands between round brackets of it: arguments, if a name is before."""
 
 
 class SyncPart(tuple[Any, ...]):
@@ -158,7 +166,7 @@ def _move(fly: bool, c: Children) -> ast.Move:
         frame=frame,
         settings=tuple((s[0], s[1]) for s in _of(c, SettingPart)),
         conditions=tuple(b[0] for b in _of(c, BesidePart)),
-        til=bool(_of(c, TilPart)),
+        til=(_of(c, TilPart) or (None,))[0],
         sync=tuple(replace(s[0], fly=fly) for s in _of(c, SyncPart)),
     )
 
@@ -181,7 +189,31 @@ def _destination(c: Children) -> DestinationPart:
 
 
 def _clause(c: Children) -> Any:
-    return TilPart() if c and isinstance(c[0], ast.Still) else None
+    return TilPart(c[0].terms) if c and isinstance(c[0], ast.Still) else None
+
+
+_CONDITION_WORDS = frozenset(
+    "and at before by condition div error event for in mod not of or percent segment "
+    "signal time to until via when with xor after distance end start".split()
+)
+"""Words of the language that brackets may follow without being called."""
+
+
+def _terms(c: Children) -> tuple[ast.Reference | ast.Invoke, ...]:
+    """Return the names in text that is not understood; those with arguments call."""
+    found: list[ast.Reference | ast.Invoke] = []
+    for part, after in zip_longest(c, c[1:]):
+        if isinstance(part, ast.Reference):
+            calls = type(after) is RoundPart and part.name not in _CONDITION_WORDS
+            found.append(ast.Invoke(part.name, ()) if calls else part)
+        elif isinstance(part, GroupPart):
+            found += _terms(part)
+    return tuple(found)
+
+
+def _soup_word(c: Children) -> ast.Reference | None:
+    name = type(c[0]) is Mark and c[0].kind == "NAME" if c else False
+    return ast.Reference(_name(c[0])) if name else None
 
 
 def _reference(c: Children) -> ast.Reference:
@@ -259,7 +291,7 @@ RULES: dict[str, Rule] = {
     "goto": lambda c: ast.Goto(_name(c[0])),
     "return": lambda c: ast.Return(c[0] if c else None),
     "condition": lambda c: ast.Condition(),
-    "when": lambda c: ast.When(_statement(c[1:])),
+    "when": lambda c: ast.When(_statement(c[1:]), c[0].terms),
     "endcondition": lambda c: ast.EndCondition(),
     "motion": _motion,
     "arm": lambda c: ArmPart((c[0].subscripts[0],)),
@@ -277,11 +309,12 @@ RULES: dict[str, Rule] = {
     "format": lambda c: c[0],
     "open": lambda c: ast.Still("OPEN"),
     "open_clause": lambda c: None,
-    "still": lambda c: ast.Still(c[0]),
+    "still": lambda c: ast.Still(c[0], _terms(c[1:])),
     "still_word": lambda c: "",
-    "soup": lambda c: ast.Still("soup"),
-    "soup_word": lambda c: None,
-    "group": lambda c: None,
+    "soup": lambda c: ast.Still("soup", _terms(c)),
+    "soup_word": _soup_word,
+    "group": GroupPart,
+    "round_group": RoundPart,
     "binary": lambda c: ast.Binary(str(c[1]).upper(), c[0], c[2]),
     "unary": lambda c: ast.Unary(str(c[0]).upper(), c[1]),
     "parenthesised": lambda c: (

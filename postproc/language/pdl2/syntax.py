@@ -213,7 +213,7 @@ class Move(Statement):
         frame: TOOL, BASE, UFRAME after IN, else "".
         settings: ``WITH $X = value`` of this move alone.
         conditions: ``WITH CONDITION[..]``: what runs beside the move.
-        til: The move may end before its target.
+        til: What the condition names on which the move ends before its target.
         sync: Moves of other arms that run along (SYNCMOVE).
     """
 
@@ -226,7 +226,7 @@ class Move(Statement):
     frame: str = ""
     settings: tuple[tuple[Reference, Expression], ...] = ()
     conditions: tuple[Expression | Index, ...] = ()
-    til: bool = False
+    til: tuple[Reference | Invoke, ...] | None = None
     sync: tuple[Move, ...] = ()
 
 
@@ -258,9 +258,15 @@ class Transfer(Statement):
 
 @dataclass(frozen=True, slots=True)
 class Still(Statement):
-    """A statement that neither moves the arm nor changes a value: WAIT, DELAY, .."""
+    """A statement that neither moves the arm nor changes a value: WAIT, DELAY, ..
+
+    Attributes:
+        word: The first word.
+        terms: Names in the rest, which is not understood; functions that it calls.
+    """
 
     word: str
+    terms: tuple[Reference | Invoke, ...] = ()
 
 
 # Statements that decide what runs next.
@@ -384,9 +390,10 @@ class Condition(Statement):
 
 @dataclass(frozen=True, slots=True)
 class When(Statement):
-    """``WHEN event DO action``."""
+    """``WHEN event DO action``; `terms` are the names that the event tells."""
 
     then: Statement | None
+    terms: tuple[Reference | Invoke, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

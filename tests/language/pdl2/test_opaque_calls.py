@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import pytest
+
 from postproc.language.pdl2.interpreter import Resolved, resolve
 from postproc.language.pdl2.program import parse
 from postproc.language.source import Source
@@ -122,3 +124,34 @@ def test_a_point_given_to_a_function_keeps_its_numbers():
     body = [f"p := {AT}", "MOVE LINEAR TO p", "n := f(p)"]
     found = resolved(program("job", ["VAR p : POSITION", "n : INTEGER", *head], body))
     assert found.visits.literals.pinned == ("f may move to it",)
+
+
+WAITS = [
+    "WAIT FOR sets(1)",
+    "WAIT FOR NOT ($DIN[1] AND sets(1) = 2)",
+    "WAIT FOR sets",
+    "MOVE JOINT TO {0, 0, -90, 0, 90, 0} TIL sets(1)",
+]
+
+
+@pytest.mark.parametrize("wait", WAITS)
+def test_a_function_in_a_condition_has_its_effects(wait):
+    takes = "(n : INTEGER) : BOOLEAN" if "(1)" in wait else " : BOOLEAN"
+    sets = routine("sets", "$TOOL := POS(0, 0, 9, 0, 0, 0, '')", takes=takes)
+    target, _, reason = last(
+        resolved(program("job", sets, [wait, f"MOVE LINEAR TO {AT}"]))
+    )
+    assert target == Meaning.UNKNOWN or "$TOOL is not known here" in reason
+
+
+@pytest.mark.parametrize("wait", ["WAIT FOR tf(1, 1) = 3", "MOVE TO {0} TIL x > rtf()"])
+def test_a_function_from_elsewhere_in_a_condition_may_set_frames(wait):
+    found = resolved(program("job", [], [wait, f"MOVE LINEAR TO {AT}"]))
+    assert "$TOOL" in last(found)[2]
+
+
+def test_words_before_brackets_in_a_condition_call_nothing():
+    body = ["WAIT FOR ($DIN[1] OR (NOT ($DIN[2])))", f"MOVE LINEAR TO {AT}"]
+    assert codes(resolved(program("job", [], body))) == codes(
+        resolved(program("job", [], body[1:]))
+    )
