@@ -14,7 +14,8 @@
 # make accuracy    held-out errors, coverage, real and blind data: docs/accuracy.md
 # make undeclared  undeclared effects traced on virtual arms, 1,400 of them: docs/undeclared.md
 # make blind       effects traced in the blind campaigns and on a real arm: docs/blind.md
-# make native      lint and tests of the native kernels, for who changes them (needs Rust)
+# make wheel       a wheel for every Python from 3.11 on, tried in a new environment, in dist
+# make native      lint and tests of the native core by itself, for who changes it
 # make docs     run every command of the documentation, write it as a site to build/docs
 # make pictures remake the pictures of the documentation (needs chromium, chromium-driver)
 # Each target first creates the environment .venv when it is missing or out of date.
@@ -28,13 +29,13 @@ export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
 
 .PHONY: help demo test lint format bench evidence reproduce accuracy undeclared blind chaos fuzz docs clean
-.PHONY: plant-bench generated growth native golden pictures lock
+.PHONY: plant-bench generated growth native golden pictures lock wheel
 .DELETE_ON_ERROR:
 
 help:
 	@sed -n 's/^# //p' Makefile
 
-$(STAMP): pyproject.toml .ci/venv $(wildcard requirements/*.txt native/*.toml native/*.rs native/src/*.rs)
+$(STAMP): pyproject.toml .ci/venv $(wildcard requirements/*.txt native/* native/src/*.rs)
 	@bash .ci/venv $(VENV)
 	@touch $@
 
@@ -89,7 +90,12 @@ native: $(STAMP)
 	@cd native && PATH="$$PATH:$$HOME/.cargo/bin" && cargo fmt --check && \
 		cargo clippy --release -- -D warnings && \
 		PYO3_PYTHON=$(abspath $(PYTHON_BIN)) cargo test --release --no-default-features
-	@$(PYTHON_BIN) -m pytest tests/test_kernels.py
+	@$(PYTHON_BIN) -m pytest tests/test_native.py
+
+wheel: $(STAMP)
+	@$(PYTHON_BIN) -m pip --quiet --disable-pip-version-check wheel --no-deps \
+		--no-build-isolation -w dist .
+	@bash .ci/try-wheel dist/postproc-*-abi3-*.whl
 
 docs: $(STAMP)
 	@PATH="$(abspath $(VENV))/bin:$$PATH" python docs/tools/build.py $(UPDATE)

@@ -18,6 +18,11 @@ Signs = NDArray[np.int8]  # -1, 0, +1
 Bytes = NDArray[np.uint8]
 
 
+def floats(rows: Floats) -> Floats:
+    """Return numbers as the core takes them, row behind row."""
+    return np.ascontiguousarray(rows, dtype=float)
+
+
 def read_only(columns: object) -> None:
     """Refuse to have the arrays of a dataclass changed."""
     for column in vars(columns).values():

@@ -4,7 +4,7 @@ use numpy::{PyArray2, PyArray3, PyReadonlyArray2};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
-use crate::rows::{array, blocks, rows, Six, Three};
+use crate::rows::{array, blocks, each, rows, Six, Three};
 use crate::trig::sin_cos;
 
 pub struct Link {
@@ -103,14 +103,11 @@ pub fn placed<'py>(
     point: PyReadonlyArray2<'py, f64>,
 ) -> PyResult<Bound<'py, PyArray2<f64>>> {
     let (chain, q, point) = (Chain::new(&parameters)?, rows::<6>(&q)?, rows::<3>(&point)?);
-    let out = match point {
-        [one] => q.iter().map(|q| chain.placed(q, one)).collect(),
-        _ if point.len() == q.len() => {
-            q.iter().zip(point).map(|(q, p)| chain.placed(q, p)).collect()
-        }
-        _ => return Err(PyValueError::new_err("as many points as poses, or one")),
-    };
-    Ok(array(py, out))
+    if point.len() != 1 && point.len() != q.len() {
+        return Err(PyValueError::new_err("as many points as poses, or one"));
+    }
+    let of = |i: usize| if point.len() == 1 { &point[0] } else { &point[i] };
+    Ok(array(py, each(py, q.len(), |i| chain.placed(&q[i], of(i)))?))
 }
 
 /// Place the flange, (n, 4, 4) [m].
@@ -121,6 +118,6 @@ pub fn flange<'py>(
     q: PyReadonlyArray2<'py, f64>,
 ) -> PyResult<Bound<'py, PyArray3<f64>>> {
     let (chain, q) = (Chain::new(&parameters)?, rows::<6>(&q)?);
-    let poses: Vec<f64> = q.iter().flat_map(|q| chain.flange(q)).collect();
-    Ok(blocks(py, q.len(), (4, 4), poses))
+    let poses = each(py, q.len(), |i| chain.flange(&q[i]))?;
+    Ok(blocks(py, q.len(), (4, 4), poses.into_flattened()))
 }

@@ -5,7 +5,7 @@ use pyo3::prelude::*;
 
 use crate::chain::{Chain, Parameters};
 use crate::edges::{Edges, Paths, Way};
-use crate::rows::{array, dot, flat, minus, rows, same_length, Six, Three};
+use crate::rows::{array, dot, each, flat, minus, rows, same_length, Six, Three};
 
 const GRID: usize = 8; // steps of the first search for the nearest point
 const ROUNDS: usize = 5; // of Newton's method
@@ -172,16 +172,12 @@ pub fn passed<'py>(
 ) -> PyResult<(Column<'py>, Column<'py>, Column<'py>, Block<'py>, Block<'py>, Block<'py>)> {
     let (chain, paths) = (Chain::new(&parameters)?, Paths::of(&edges, &q)?);
     let (tool, point, within) = (rows::<3>(&tool)?, rows::<3>(&point)?, flat(&within)?);
-    let corners = zones.corners(&paths)?;
-    same_length(&[corners.len(), tool.len(), point.len(), within.len()])?;
-    let found: Vec<Passed> = corners
-        .into_iter()
-        .enumerate()
-        .map(|(c, mut corner)| {
-            let look = Look { chain: &chain, tool: &tool[c], point: &point[c] };
-            corner.pass(&look, within[c])
-        })
-        .collect();
+    let mut corners = zones.corners(&paths)?;
+    let n = same_length(&[corners.len(), tool.len(), point.len(), within.len()])?;
+    let found = each(py, n, |c| {
+        let look = Look { chain: &chain, tool: &tool[c], point: &point[c] };
+        corners[c].pass(&look, within[c])
+    })?;
     let column = |value: fn(&Passed) -> f64| -> Column<'py> {
         found.iter().map(value).collect::<Vec<_>>().into_pyarray(py)
     };
@@ -193,4 +189,26 @@ pub fn passed<'py>(
         array(py, found.iter().map(|p| p.aside).collect()),
         array(py, found.iter().map(|p| p.bend).collect()),
     ))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{dot, nearest_on_parabola, on_parabola, Three};
+
+    #[test]
+    fn the_nearest_point_is_as_near_as_a_fine_search_finds() {
+        let mut state = 1_u64;
+        let mut random = || {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+            (state >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
+        };
+        for _ in 0..200 {
+            let [b, e]: [Three; 2] =
+                [[random(), random(), random()], [random(), random(), random()]];
+            let away = |s: f64| dot(&on_parabola(&b, &e, s), &on_parabola(&b, &e, s)).sqrt();
+            let least =
+                (0..=20_000).map(|i| away(f64::from(i) / 20_000.0)).fold(f64::INFINITY, f64::min);
+            assert!(away(nearest_on_parabola(&b, &e)) < least + 1e-5 * least + 1e-6);
+        }
+    }
 }

@@ -7,7 +7,7 @@ use pyo3::exceptions::PyIndexError;
 use pyo3::prelude::*;
 
 use crate::play::{ends, Clamp, Clamps, Ends};
-use crate::rows::{array, flat, row, rows, same_length, Six};
+use crate::rows::{array, detached, each, flat, row, rows, same_length, Six};
 
 const ON_FLANK: f64 = 0.999; // of half the width: as good as resting on the flank
 
@@ -60,15 +60,17 @@ impl Graph<'_> {
     }
 
     /// Compose the clamps from each chain's head to its visits.
-    fn compose(&mut self, chain_ends: &[i64]) {
+    fn compose(&mut self, py: Python<'_>, chain_ends: &[i64]) -> PyResult<()> {
         for (head, end) in self.heads.iter().zip(chain_ends) {
-            for visit in *head as usize + 1..*end as usize {
+            let first = *head as usize + 1;
+            each(py, *end as usize - first, |i| {
+                let visit = first + i;
                 let step = self.own[self.first[visit] as usize];
                 let before = self.since_head[visit - 1];
-                self.since_head[visit] =
-                    if visit == *head as usize + 1 { step } else { before.then(&step) };
-            }
+                self.since_head[visit] = if i == 0 { step } else { before.then(&step) };
+            })?;
         }
+        Ok(())
     }
 
     /// List, for each chain, the chains whose head is reached from it.
@@ -102,33 +104,36 @@ impl Graph<'_> {
     }
 
     /// Find what is known at the heads: intervals only grow, so the list runs dry.
-    fn settle(&mut self, given: Option<Clamp>) {
+    fn settle(&mut self, py: Python<'_>, given: Option<Clamp>) -> PyResult<()> {
         let followers = self.followers();
         let mut waiting: VecDeque<usize> = (0..self.heads.len()).collect();
         let mut queued = vec![true; self.heads.len()];
-        while let Some(c) = waiting.pop_front() {
-            queued[c] = false;
-            let new = if c == 0 && given.is_some() { given } else { self.at_head(c) };
-            if new.is_none() || same(&self.known[c], &new) {
-                continue;
-            }
-            self.known[c] = new;
-            for follower in &followers[c] {
-                if !queued[*follower] {
-                    queued[*follower] = true;
-                    waiting.push_back(*follower);
+        while !waiting.is_empty() {
+            each(py, waiting.len(), |_| {
+                let c = waiting.pop_front().expect("as many as there were");
+                queued[c] = false;
+                let new = if c == 0 && given.is_some() { given } else { self.at_head(c) };
+                if new.is_none() || same(&self.known[c], &new) {
+                    return;
                 }
-            }
+                self.known[c] = new;
+                for follower in &followers[c] {
+                    if !queued[*follower] {
+                        queued[*follower] = true;
+                        waiting.push_back(*follower);
+                    }
+                }
+            })?;
         }
+        Ok(())
     }
 
     /// Carry what is known at the heads on to all visits; the others know nothing.
-    fn states(&self) -> Vec<Clamp> {
-        let state = |visit: usize| match self.known[self.chain_of[visit] as usize] {
+    fn states(&self, py: Python<'_>) -> PyResult<Vec<Clamp>> {
+        each(py, self.angles.len(), |visit| match self.known[self.chain_of[visit] as usize] {
             Some(known) => known.then(&self.since_head[visit]),
             None => Clamp::passing(&self.angles[visit], &self.half),
-        };
-        (0..self.angles.len()).map(state).collect()
+        })
     }
 }
 
@@ -166,12 +171,12 @@ pub fn states<'py>(
         known: vec![None; flat(&chains.heads)?.len()],
     };
     let chain_ends = flat(&chains.ends)?;
-    if !graph.is_sound(chain_ends) {
+    if !detached(py, || graph.is_sound(chain_ends))? {
         return Err(PyIndexError::new_err("chains of visits or edges that are not there"));
     }
-    graph.compose(chain_ends);
-    graph.settle(before.list()?.first().copied());
-    Ok(ends(py, &graph.states()))
+    graph.compose(py, chain_ends)?;
+    graph.settle(py, before.list()?.first().copied())?;
+    Ok(ends(py, &graph.states(py)?))
 }
 
 /// Place every joint in its play, (n, 6).
@@ -194,9 +199,8 @@ pub fn side<'py>(
             0.0
         }
     };
-    let sides = angles
-        .iter()
-        .zip(&z)
-        .map(|(q, z)| -> Six { std::array::from_fn(|j| place(q[j], z.lo[j], z.hi[j], half[j])) });
-    Ok(array(py, sides.collect()))
+    let sides = each(py, angles.len(), |i| -> Six {
+        std::array::from_fn(|j| place(angles[i][j], z[i].lo[j], z[i].hi[j], half[j]))
+    });
+    Ok(array(py, sides?))
 }

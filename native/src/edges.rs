@@ -1,10 +1,10 @@
 //! Places on the sampled paths of edges: `postproc.motion.blending`.
 
-use numpy::{PyArray2, PyReadonlyArray1, PyReadonlyArray2};
+use numpy::{PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::exceptions::PyIndexError;
 use pyo3::prelude::*;
 
-use crate::rows::{array, flat, rows, same_length, Six};
+use crate::rows::{flat, rows, Six};
 
 /// `Edges` of the package.
 #[derive(FromPyObject)]
@@ -91,21 +91,4 @@ impl Way<'_> {
             here[j] + t * slope + t * t / 2.0 * bend
         })
     }
-}
-
-/// Interpolate joint angles on edges (m,) at fractions u (m,): (m, 6) [rad].
-#[pyfunction]
-pub fn along<'py>(
-    py: Python<'py>,
-    edges: Edges<'py>,
-    q: PyReadonlyArray2<'py, f64>,
-    edge: PyReadonlyArray1<'py, i64>,
-    u: PyReadonlyArray1<'py, f64>,
-) -> PyResult<Bound<'py, PyArray2<f64>>> {
-    let paths = Paths::of(&edges, &q)?;
-    let (edge, u) = (flat(&edge)?, flat(&u)?);
-    same_length(&[edge.len(), u.len()])?;
-    let places: PyResult<Vec<Six>> =
-        edge.iter().zip(u).map(|(e, u)| Ok(paths.way(*e)?.at(*u))).collect();
-    Ok(array(py, places?))
 }

@@ -8,7 +8,7 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
 use crate::lines::{poses, Pose};
-use crate::rows::{array, blocks, flat, same_length, Six};
+use crate::rows::{array, blocks, each, flat, same_length, Six};
 
 const WRIST: i64 = 4; // bits of a slot
 const SHOULDER: i64 = 2;
@@ -128,9 +128,8 @@ pub fn branch<'py>(
 ) -> PyResult<Bound<'py, PyArray2<f64>>> {
     let (arm, poses) = (Arm::new(flat(&parameters)?)?, poses(&flange)?);
     let slot = flat(&slot)?;
-    same_length(&[poses.len(), slot.len()])?;
-    let out = poses.iter().zip(slot).map(|(p, s)| arm.branch(p, *s)).collect();
-    Ok(array(py, out))
+    let n = same_length(&[poses.len(), slot.len()])?;
+    Ok(array(py, each(py, n, |i| arm.branch(&poses[i], slot[i]))?))
 }
 
 /// Solve for all branches of every pose (n, 4, 4) [m]: (n, 8, 6) [rad].
@@ -141,6 +140,6 @@ pub fn branches<'py>(
     flange: PyReadonlyArray3<'py, f64>,
 ) -> PyResult<Bound<'py, PyArray3<f64>>> {
     let (arm, poses) = (Arm::new(flat(&parameters)?)?, poses(&flange)?);
-    let out: Vec<f64> = poses.iter().flat_map(|p| arm.branches(p)).flatten().collect();
-    Ok(blocks(py, poses.len(), (8, 6), out))
+    let out = each(py, poses.len(), |i| arm.branches(&poses[i]))?;
+    Ok(blocks(py, poses.len(), (8, 6), out.into_flattened().into_flattened()))
 }

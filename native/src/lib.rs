@@ -1,7 +1,7 @@
-//! Kernels of postproc: what its profile is made of, row by row instead of pass by pass.
+//! The core of postproc: what is done to every row of a long program.
 //!
-//! Every function does what the function of the same name in Python does with numpy, to
-//! a few units in the last place; formulas and their sources are documented there.
+//! Functions take and give whole arrays, let other threads of Python run meanwhile and
+//! hear signals (`rows::each`). `tests/reference/` says with numpy what each computes.
 
 use pyo3::prelude::*;
 
@@ -22,15 +22,14 @@ mod variance;
 mod walk;
 mod walks;
 
-/// Names these sources: the package asks for kernels of its own.
+/// Names these sources: a test tells a core that was built from others.
 const SOURCES: &str = env!("SOURCES");
 
-#[pymodule]
-fn postproc_kernels(module: &Bound<'_, PyModule>) -> PyResult<()> {
+#[pymodule(name = "_native")]
+fn native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("SOURCES", SOURCES)?;
     module.add_function(wrap_pyfunction!(chain::placed, module)?)?;
     module.add_function(wrap_pyfunction!(chain::flange, module)?)?;
-    module.add_function(wrap_pyfunction!(edges::along, module)?)?;
     module.add_function(wrap_pyfunction!(corner::passed, module)?)?;
     module.add_function(wrap_pyfunction!(rounding::resampled, module)?)?;
     module.add_function(wrap_pyfunction!(lines::lines, module)?)?;

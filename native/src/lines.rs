@@ -7,7 +7,7 @@ use numpy::{
 use pyo3::exceptions::{PyIndexError, PyValueError};
 use pyo3::prelude::*;
 
-use crate::rows::{array, blocks, dot, flat, minus, same_length, Three};
+use crate::rows::{array, blocks, dot, each, flat, groups, minus, same_length, Three};
 
 const SMALL: f64 = 1e-3; // [rad] below which a series stands for a quotient
 
@@ -20,7 +20,7 @@ pub fn poses<'a>(array: &'a PyReadonlyArray3<'_, f64>) -> PyResult<&'a [Pose]> {
     if array.shape()[1..] != [4, 4] {
         return Err(PyValueError::new_err("poses are (n, 4, 4)"));
     }
-    Ok(flat(array)?.as_chunks().0)
+    Ok(groups(flat(array)?))
 }
 
 /// Place the TCP.
@@ -132,14 +132,15 @@ pub fn lines<'py>(
     let all = paths(&flange, &tool, &begin, &end)?;
     let mut rotations = Vec::with_capacity(9 * all.len());
     let (mut turns, mut begins, mut chords) = (Vec::new(), Vec::new(), Vec::new());
-    for path in &all {
+    each(py, all.len(), |i| {
+        let path = &all[i];
         let from = rotation(path.begin, path.tool);
         turns.push(turn(&from, &rotation(path.end, path.tool)));
         rotations.extend_from_slice(from.as_flattened());
         let start = point(path.begin, path.tool);
         chords.push(minus(&point(path.end, path.tool), &start));
         begins.push(start);
-    }
+    })?;
     let rotations = blocks(py, all.len(), (3, 3), rotations);
     Ok((rotations, array(py, turns), array(py, begins), array(py, chords)))
 }
@@ -158,5 +159,5 @@ pub fn chords<'py>(
         let chord = minus(&point(path.end, path.tool), &point(path.begin, path.tool));
         dot(&chord, &chord).sqrt()
     };
-    Ok(all.iter().map(length).collect::<Vec<_>>().into_pyarray(py))
+    Ok(each(py, all.len(), |i| length(&all[i]))?.into_pyarray(py))
 }

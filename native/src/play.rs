@@ -3,7 +3,7 @@
 use numpy::{PyArray2, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
 
-use crate::rows::{array, flat, rows, same_length, Six};
+use crate::rows::{array, each, flat, rows, same_length, Six};
 
 type Block<'py> = Bound<'py, PyArray2<f64>>;
 
@@ -94,10 +94,10 @@ pub fn prefix<'py>(
 ) -> PyResult<Ends<'py>> {
     let (mut steps, begins) = (steps.list()?, flat(&begins)?);
     same_length(&[steps.len(), begins.len()])?;
-    for i in 1..steps.len() {
-        if !begins[i] {
+    each(py, steps.len(), |i| {
+        if i > 0 && !begins[i] {
             steps[i] = steps[i - 1].then(&steps[i]);
         }
-    }
+    })?;
     Ok(ends(py, &steps))
 }

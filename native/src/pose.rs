@@ -6,7 +6,7 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
 use crate::lines::{self, poses, Pose, Rotation};
-use crate::rows::{array, blocks, flat, rows, same_length, Six};
+use crate::rows::{array, blocks, each, flat, groups, rows, same_length, Six};
 use crate::trig::sin_cos;
 
 const MM: f64 = 1e-3;
@@ -63,7 +63,8 @@ pub fn inverse<'py>(
     py: Python<'py>,
     given: PyReadonlyArray3<'py, f64>,
 ) -> PyResult<Bound<'py, PyArray3<f64>>> {
-    Ok(to_python(py, poses(&given)?.iter().map(inverted).collect()))
+    let poses = poses(&given)?;
+    Ok(to_python(py, each(py, poses.len(), |i| inverted(&poses[i]))?))
 }
 
 /// Convert position records (n, 6) [mm, deg] to poses, (n, 4, 4) [m].
@@ -72,7 +73,8 @@ pub fn pose_from_record<'py>(
     py: Python<'py>,
     record: PyReadonlyArray2<'py, f64>,
 ) -> PyResult<Bound<'py, PyArray3<f64>>> {
-    Ok(to_python(py, rows::<6>(&record)?.iter().map(from_record).collect()))
+    let records = rows::<6>(&record)?;
+    Ok(to_python(py, each(py, records.len(), |i| from_record(&records[i]))?))
 }
 
 /// Multiply poses with others, (n, 4, 4).
@@ -83,9 +85,8 @@ pub fn times<'py>(
     right: PyReadonlyArray3<'py, f64>,
 ) -> PyResult<Bound<'py, PyArray3<f64>>> {
     let (left, right) = (poses(&left)?, poses(&right)?);
-    same_length(&[left.len(), right.len()])?;
-    let pairs = left.iter().zip(right);
-    Ok(to_python(py, pairs.map(|(a, b)| product(a, b)).collect()))
+    let n = same_length(&[left.len(), right.len()])?;
+    Ok(to_python(py, each(py, n, |i| product(&left[i], &right[i]))?))
 }
 
 /// Return the rotation vectors of rotations (n, 3, 3), (n, 3) [rad].
@@ -97,6 +98,6 @@ pub fn rotation_vector<'py>(
     if given.shape()[1..] != [3, 3] {
         return Err(PyValueError::new_err("rotations are (n, 3, 3)"));
     }
-    let rotations: &[Rotation] = flat(&given)?.as_chunks().0.as_chunks().0;
-    Ok(array(py, rotations.iter().map(lines::rotation_vector).collect()))
+    let rotations: &[Rotation] = groups(groups(flat(&given)?));
+    Ok(array(py, each(py, rotations.len(), |i| lines::rotation_vector(&rotations[i]))?))
 }

@@ -6,7 +6,7 @@ use numpy::{PyArray2, PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
-use crate::rows::{array, flat, rows, same_length, Six};
+use crate::rows::{array, each, flat, groups, rows, same_length, Six};
 use crate::trig::sin_cos;
 
 const EDGE: f64 = 0.1; // share of the range over which the profile fades outside of it
@@ -87,7 +87,7 @@ pub fn profile<'py>(
                 low: lower[*at],
                 high: upper[*at],
                 mean: if constant { own[0] } else { 0.0 },
-                sizes: own[skipped..].as_chunks::<2>().0,
+                sizes: groups(&own[skipped..]),
             }
         })
         .collect();
@@ -99,5 +99,5 @@ pub fn profile<'py>(
         }
         std::array::from_fn(|j| out[j] * direction[j])
     };
-    Ok(array(py, q.iter().zip(direction).map(row).collect()))
+    Ok(array(py, each(py, q.len(), |i| row((&q[i], &direction[i])))?))
 }

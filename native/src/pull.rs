@@ -4,7 +4,7 @@ use numpy::{PyArray2, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
-use crate::rows::{array, flat, rows, same_length, Three};
+use crate::rows::{array, each, flat, rows, same_length, Three};
 
 type Column<'py, T> = PyReadonlyArray1<'py, T>;
 
@@ -29,16 +29,14 @@ pub fn to_move<'py>(
         return Err(PyValueError::new_err("a corner at a target that is none"));
     }
     let mut moved = wanted.to_vec();
-    let mut next: Vec<Three> = vec![[0.0; 3]; count];
     for _ in 0..rounds {
-        for (c, next) in next.iter_mut().enumerate() {
+        let next: Vec<Three> = each(py, count, |c| {
             let at = visit[c] as usize;
             let (aim, here) = (&wanted[at], &moved[at]);
             let (first, last) = (&moved[before[c] as usize], &moved[behind[c] as usize]);
-            for k in 0..3 {
-                next[k] = aim[k] - (v[c] * (first[k] - here[k]) + w[c] * (last[k] - here[k]));
-            }
-        }
+            let pulled = |k: usize| v[c] * (first[k] - here[k]) + w[c] * (last[k] - here[k]);
+            std::array::from_fn(|k| aim[k] - pulled(k))
+        })?;
         for (c, next) in next.iter().enumerate() {
             moved[visit[c] as usize] = *next;
         }

@@ -6,7 +6,7 @@ use pyo3::prelude::*;
 
 use crate::corner::{Corner, Zones};
 use crate::edges::{Edges, Paths};
-use crate::rows::{array, flat, rows, same_length, Six};
+use crate::rows::{array, each, flat, rows, same_length, Six};
 
 /// `Corners` of the package.
 #[derive(FromPyObject)]
@@ -107,14 +107,14 @@ pub fn resampled<'py>(
         let c = found.ok_or_else(|| lost("a corner"))?;
         Ok(Rounded { corner: &all[c], nearest: nearest[c], q: &passed[c] })
     };
-    for i in 0..e {
+    let mut sample = |i: usize| -> PyResult<()> {
         let (behind, ahead) = (corner[i], corner[e + i]);
         if behind < 0 && ahead < 0 {
             let kept = paths.span(i)?;
             out.path.extend_from_slice(paths.samples(kept.clone())?);
             let shares = share.get(kept);
             out.share.extend_from_slice(shares.ok_or_else(|| lost("a share"))?);
-            continue;
+            return Ok(());
         }
         let (leaving, middle, entering) = (count[i], count[e + i], count[2 * e + i]);
         if leaving > 0 {
@@ -129,6 +129,8 @@ pub fn resampled<'py>(
         if entering > 0 {
             out.enter(&at(ahead)?, entering);
         }
-    }
+        Ok(())
+    };
+    each(py, e, &mut sample)?.into_iter().collect::<PyResult<()>>()?;
     Ok((array(py, out.path), out.share.into_pyarray(py)))
 }

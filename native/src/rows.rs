@@ -1,11 +1,13 @@
 //! Rows of arrays, in and out.
 
+use std::panic::{catch_unwind, AssertUnwindSafe};
+
 use numpy::ndarray::{Array2, Array3, Dimension};
 use numpy::{
     Element, IntoPyArray, PyArray2, PyArray3, PyReadonlyArray, PyReadonlyArray1, PyReadonlyArray2,
     PyUntypedArrayMethods,
 };
-use pyo3::exceptions::PyValueError;
+use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 
 /// Joint angles of one pose [rad].
@@ -29,7 +31,40 @@ pub fn rows<'a, const K: usize>(array: &'a PyReadonlyArray2<'_, f64>) -> PyResul
     if given != K {
         return Err(PyValueError::new_err(format!("rows of {given}, not of {K}")));
     }
-    Ok(flat(array)?.as_chunks::<K>().0)
+    Ok(groups(flat(array)?))
+}
+
+/// See values as groups of K; what is left over is not seen.
+pub fn groups<T, const K: usize>(values: &[T]) -> &[[T; K]] {
+    // SAFETY: K values that lie behind each other are an array of K, and as many groups as
+    // are seen lie within the values.
+    unsafe { std::slice::from_raw_parts(values.as_ptr().cast(), values.len() / K) }
+}
+
+/// Rows that are worked on between two looks at signals: well below half a second.
+const BLOCK: usize = 4096;
+
+/// Work on rows one after the other, without the interpreter's lock.
+///
+/// Between blocks of them a signal that has arrived is heard; what Python makes of it, or
+/// a panic, ends the work.
+pub fn each<T: Send>(
+    py: Python<'_>,
+    n: usize,
+    mut row: impl FnMut(usize) -> T + Send,
+) -> PyResult<Vec<T>> {
+    let mut out = Vec::with_capacity(n);
+    for first in (0..n).step_by(BLOCK) {
+        py.check_signals()?;
+        detached(py, || out.extend((first..n.min(first + BLOCK)).map(&mut row)))?;
+    }
+    Ok(out)
+}
+
+/// Do something without the interpreter's lock; a panic becomes an exception.
+pub fn detached<T: Send>(py: Python<'_>, work: impl FnOnce() -> T + Send) -> PyResult<T> {
+    py.detach(|| catch_unwind(AssertUnwindSafe(work)))
+        .map_err(|_| PyRuntimeError::new_err("the native core has failed"))
 }
 
 /// Give rows to Python as an array (n, K).

@@ -10,7 +10,7 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
 use crate::chain::{Chain, Parameters};
-use crate::rows::{array, flat, rows, same_length, Three};
+use crate::rows::{array, each, flat, rows, same_length, Three};
 use crate::walk::{Base, Walk};
 
 /// Poses that are worked on side by side.
@@ -187,7 +187,8 @@ pub fn variance<'py>(
         basis: vec![[0.0; SIDE]; own],
     };
     let mut out = Vec::with_capacity(q.len());
-    for first in (0..q.len()).step_by(SIDE) {
+    each(py, q.len().div_ceil(SIDE), |at| {
+        let first = SIDE * at;
         let count = SIDE.min(q.len() - first);
         for lane in 0..count {
             let row = first + lane;
@@ -200,7 +201,7 @@ pub fn variance<'py>(
         }
         let value = form.value(&block);
         out.extend((0..count).map(|lane| value.map(|component| component[lane])));
-    }
+    })?;
     Ok(array(py, out))
 }
 

@@ -5,7 +5,7 @@ use pyo3::exceptions::PyIndexError;
 use pyo3::prelude::*;
 
 use crate::play::{ends, Clamp, Ends};
-use crate::rows::{array, flat, row, rows, same_length, Six};
+use crate::rows::{array, each, flat, row, rows, same_length, Six};
 
 /// Walk through the samples start[i] .. start[i + 1] of each edge.
 fn samples<'a>(values: &'a [Six], start: &[i64]) -> PyResult<Vec<&'a [Six]>> {
@@ -31,7 +31,7 @@ pub fn clamps<'py>(
         let steps = edge.iter().map(|q| Clamp::passing(q, &half));
         steps.reduce(|before, step| before.then(&step)).unwrap_or(Clamp::IDENTITY)
     };
-    Ok(ends(py, &all.iter().map(along).collect::<Vec<_>>()))
+    Ok(ends(py, &each(py, all.len(), |edge| along(&all[edge]))?))
 }
 
 /// Put turning values into samples.
@@ -97,10 +97,11 @@ pub fn refined<'py>(
         *found.ok_or_else(|| PyIndexError::new_err("an uneven sample is not there"))? = true;
     }
     let mut refined = Refined { out: Vec::with_capacity(values.len()), start: vec![0] };
-    for (i, edge) in samples(values, start)?.into_iter().enumerate() {
+    let edges = samples(values, start)?;
+    each(py, edges.len(), |i| {
         let from = usize::try_from(source[i]).ok().and_then(|v| angles.get(v));
         let begin = start[i] as usize;
-        refined.add(edge, from, &marked[begin..begin + edge.len()]);
-    }
+        refined.add(edges[i], from, &marked[begin..begin + edges[i].len()]);
+    })?;
     Ok((array(py, refined.out), refined.start.into_pyarray(py)))
 }

@@ -14,10 +14,10 @@ import pydantic
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, NonNegativeFloat, PositiveInt
 
+from postproc import _native
 from postproc.arrays import Bools, Floats, chunks, in_chunks
 from postproc.exceptions import ModelError
 from postproc.files import write_all
-from postproc.kernels import native
 from postproc.model.combination import Combination
 from postproc.model.effects import restore
 from postproc.model.effects.effect import JointEffect
@@ -77,15 +77,15 @@ def parameter_variance(effects: Combination, at: Batch, covariance: Floats) -> F
     """
     placing = sum(isinstance(e, Geometry) for e in effects.effects)
     turning = sum(isinstance(e, JointEffect) for e in effects.effects)
-    if native is not None and placing == 1 and 1 + turning == len(effects.effects):
-        return _natively(effects, at, covariance)
+    if placing == 1 and 1 + turning == len(effects.effects):
+        return _variance_by_joints(effects, at, covariance)
     columns = effects.columns(at)
     rows = columns.T.reshape(columns.shape[2], -1)  # one large product
     summed = np.einsum("pr,pr->r", covariance @ rows, rows)
     return np.asarray(summed.reshape(3, -1).T)
 
 
-def _natively(effects: Combination, at: Batch, covariance: Floats) -> Floats:
+def _variance_by_joints(effects: Combination, at: Batch, covariance: Floats) -> Floats:
     """Do it for one geometry and joint effects, whose columns are the Jacobian's."""
     parts = list(zip(effects.effects, effects.slices, strict=True))
     ((geometry, first),) = [(e, s) for e, s in parts if isinstance(e, Geometry)]
@@ -98,7 +98,7 @@ def _natively(effects: Combination, at: Batch, covariance: Floats) -> Floats:
     given = [np.empty((len(at), 0)), *(e.basis(at) for e, _ in turning)]
     basis = np.ascontiguousarray(np.concatenate(given, axis=1)[:, by_joint])
     tool = at.states.tool + at.deviation.tool
-    found: Floats = native.variance(
+    return _native.variance(
         deviated(at.arm.dh, at.deviation).packed(at.deviation.link[:, 4]),
         base_of(at.deviation),
         (np.ascontiguousarray(at.angles), np.ascontiguousarray(tool)),
@@ -106,7 +106,6 @@ def _natively(effects: Combination, at: Batch, covariance: Floats) -> Floats:
         (basis, np.bincount(acts_on, minlength=6).tolist()),
         np.ascontiguousarray(covariance[np.ix_(order, order)]),
     )
-    return found
 
 
 def side_variance(effects: Combination, at: Batch, values: Floats) -> Floats:

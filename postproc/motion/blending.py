@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
-from postproc.arrays import Bools, Floats, Ints, in_chunks
-from postproc.kernels import floats, native
+from postproc import _native
+from postproc.arrays import Bools, Floats, Ints, floats, in_chunks
 from postproc.motion.path import BlendCoupling
 from postproc.motion.targets import Fly, Targets
 from postproc.motion.trace import Trace
@@ -109,16 +108,7 @@ def _lengths(targets: Targets, traced: Trace, to: Ints, edge: Ints) -> Floats:
 
 def _chords(targets: Targets, flange: Floats, begin: Ints, end: Ints) -> Floats:
     """Measure the straight ways of the TCP from targets to others, (m,) [m]."""
-    if native is not None:
-        lengths: Floats = native.chords(flange, targets.tool, begin, end)
-        return lengths
-    tool = targets.tool.take(end, axis=0)[:, :3, 3]
-    chord = np.zeros((len(end), 3))
-    for sign, visit in ((1, end), (-1, begin)):
-        at = flange.take(visit, axis=0)
-        place = np.einsum("nij,nj->ni", at[:, :3, :3], tool) + at[:, :3, 3]
-        chord += sign * place
-    return np.asarray(np.sqrt(np.einsum("ni,ni->n", chord, chord)))
+    return _native.chords(flange, targets.tool, begin, end)
 
 
 def _by_distance(targets: Targets, visit: Ints, length: Floats) -> Floats:
@@ -187,73 +177,6 @@ def _ramp(arm: Arm, targets: Targets, way: _Ways) -> tuple[Floats, Floats]:
     return push, np.where(moves, lasts, 0.0)
 
 
-# Places on the sampled paths of edges, between their samples.
-
-
-def along(traced: Trace, edge: Ints, u: Floats) -> Floats:
-    """Interpolate joint angles on edges (m,) at fractions u (m,): (m, 6) [rad].
-
-    Parabolas through the three nearest of the equidistant samples, the place where the
-    edge comes from being the first one; straight where an edge has but one sample.
-    """
-    if native is not None:
-        out: Floats = native.along(traced.edges, traced.q, edge, u)
-        return out
-    return between(traced, edge)(u)
-
-
-def between(traced: Trace, edge: Ints) -> Callable[[Floats], Floats]:
-    """Prepare to interpolate on edges again and again, as `along` does once."""
-    start = traced.edges.start
-    count = start.take(edge + 1) - start.take(edge)
-    if (count == 1).all():
-        return _straight(traced, edge)
-    one = count == 1
-    straight = _straight(traced, edge[one])
-
-    def at(u: Floats) -> Floats:
-        out = np.empty((len(edge), 6))
-        out[one] = straight(u[one])
-        out[~one] = _curved(traced, edge[~one], u[~one], count[~one])
-        return out
-
-    return at
-
-
-def _straight(traced: Trace, edge: Ints) -> Callable[[Floats], Floats]:
-    """Interpolate on edges with one sample."""
-    edges = traced.edges
-    end = edges.path.take(edges.start.take(edge), axis=0)
-    way = end - traced.q.take(edges.source.take(edge), axis=0)
-
-    def at(u: Floats) -> Floats:
-        out: Floats = end + (u - 1)[:, None] * way
-        return out
-
-    return at
-
-
-def _curved(traced: Trace, edge: Ints, u: Floats, count: Ints) -> Floats:
-    """Interpolate on edges with more samples."""
-    x = u * count
-    middle = np.clip(np.rint(x), 1, np.maximum(count - 1, 1)).astype(np.int64)
-    t = (x - middle)[:, None]
-    here, after = _node(traced, edge, middle), _node(traced, edge, middle + 1)
-    before = _node(traced, edge, middle - 1)
-    bend, slope = after - 2 * here + before, (after - before) / 2
-    out: Floats = here + t * slope + t**2 / 2 * bend
-    return out
-
-
-def _node(traced: Trace, edge: Ints, i: Ints) -> Floats:
-    """Return sample i of each edge, counted from 1; 0 is where the edge comes from."""
-    edges, first = traced.edges, np.flatnonzero(i == 0)
-    sample = np.maximum(edges.start.take(edge) + i - 1, 0)
-    out: Floats = edges.path.take(sample, axis=0)
-    out[first] = traced.q[edges.source[edge[first]]]
-    return out
-
-
 # How the path runs round a fly point.
 #
 # Within the zone two moves are superposed: what the first still has to go is braked to
@@ -269,10 +192,7 @@ def _node(traced: Trace, edge: Ints, i: Ints) -> Floats:
 # joints changes the way by the square of the zone over the size of the arm: 1 um for 1
 # mm.
 
-GRID = np.linspace(0.0, 1.0, 9)  # where the search for the nearest point begins
-ROUNDS = 5  # of Newton's method
 FLAT = 4e-5  # [rad] bend below which a corner's moves are as good as straight
-REFINED, STEP = 2, 0.02  # rounds, and step in s, for the others
 
 
 @dataclass(frozen=True)
@@ -314,29 +234,7 @@ def _passed(arm: Arm, targets: Targets, traced: Trace, found: Zones) -> Corners:
     point = _tcp(traced.flange.take(found.visit, axis=0), tool)
     within = targets.rounding[found.visit] == Fly.WITHIN
     wanted = np.where(within, targets.fly_distance[found.visit], np.inf)
-    if native is not None:
-        return _passed_natively(arm, traced, found, tool, point, wanted)
-    first, last, nearest, miss = _passing(arm, traced, found, tool, point)
-    too_far = miss > wanted
-    if too_far.any():
-        shrink = np.where(too_far, wanted / np.maximum(miss, 1e-12), 1.0)
-        found = Zones(found.visit, found.into, found.out, found.before * shrink,
-                      found.behind * shrink)  # fmt: skip
-        first, last, nearest, _ = _passing(arm, traced, found, tool, point)
-    bend = first + last - 2 * traced.q.take(found.visit, axis=0)
-    sharp = np.flatnonzero(~_is_flat(bend))
-    nearest[sharp] = _refined(
-        arm, traced, found[sharp], nearest[sharp], tool[sharp], point[sharp]
-    )
-    q = parabolas(traced, found)(nearest)
-    return Corners(found, nearest, q, arm.tcp(q, tool) - point, bend)
-
-
-def _passed_natively(
-    arm: Arm, traced: Trace, found: Zones, tool: Floats, point: Floats, wanted: Floats
-) -> Corners:
-    """Do as `_passed` with the native kernel."""
-    before, behind, nearest, q, aside, bend = native.passed(
+    before, behind, nearest, q, aside, bend = _native.passed(
         arm.dh.packed(), traced.edges, traced.q, found, floats(tool), point, wanted,
     )  # fmt: skip
     found = replace(found, before=before, behind=behind)
@@ -371,80 +269,6 @@ def _joined(parts: list[Corners]) -> Corners:
     return Corners(
         zone, *(np.concatenate([getattr(p, name) for p in parts]) for name in names)
     )
-
-
-def parabolas(traced: Trace, found: Zones) -> Callable[[Floats], Floats]:
-    """Prepare to follow c corners by the formula above: s (c,) to (c, 6) [rad]."""
-    into, out = between(traced, found.into), between(traced, found.out)
-    point = traced.q.take(found.visit, axis=0)
-
-    def at(s: Floats) -> Floats:
-        before = into(1 - found.before * (1 - s) ** 2)
-        behind = out(found.behind * s**2)
-        return before + behind - point
-
-    return at
-
-
-def _passing(
-    arm: Arm, traced: Trace, found: Zones, tool: Floats, point: Floats
-) -> tuple[Floats, Floats, Floats, Floats]:
-    """Find where corners begin and end, where they pass closest, and how far off.
-
-    Args:
-        arm: The arm.
-        traced: The path without corners.
-        found: The corners' zones.
-        tool: TCP in the flange frame, (c, 3) [m].
-        point: The fly points, (c, 3) [m].
-
-    Returns:
-        Joint angles at begin and end (c, 6) [rad], s (c,), distance (c,) [m].
-    """
-    first = along(traced, found.into, 1 - found.before)
-    last = along(traced, found.out, found.behind)
-    ends = [arm.tcp(q, tool) - point for q in (first, last)]
-    nearest = nearest_on_parabola(ends[0], ends[1])
-    s = nearest[:, None]
-    off = ends[0] * (1 - s) ** 2 + ends[1] * s**2
-    return first, last, nearest, np.sqrt(np.einsum("ni,ni->n", off, off))
-
-
-def _refined(
-    arm: Arm, traced: Trace, found: Zones, s: Floats, tool: Floats, point: Floats
-) -> Floats:
-    """Improve the nearest points of corners whose moves are not straight."""
-    q = parabolas(traced, found)
-    for _ in range(REFINED):
-        s = np.clip(s, STEP, 1 - STEP)
-        before, x, after = (
-            arm.tcp(q(at), tool) - point for at in (s - STEP, s, s + STEP)
-        )
-        slope, curve = (after - before) / 2, after - 2 * x + before
-        down, curved = (x * slope).sum(axis=1), (slope**2 + x * curve).sum(axis=1)
-        s = s - STEP * np.where(curved > 0, down / np.where(curved > 0, curved, 1), 0)
-    return np.clip(s, 0.0, 1.0)
-
-
-def nearest_on_parabola(begin: Floats, end: Floats) -> Floats:
-    """Find the s at which begin (1 - s)^2 + end s^2 is shortest, (c,).
-
-    Args:
-        begin: Where the zones begin, seen from the point, (c, 3) [m].
-        end: Where they end, likewise.
-    """
-    b, e = np.ascontiguousarray(begin.T), np.ascontiguousarray(end.T)
-    away = [((b * (1 - s) ** 2 + e * s**2) ** 2).sum(axis=0) for s in GRID]
-    s = GRID[np.argmin(np.sqrt(away), axis=0)]
-    bend = 2 * (b + e)
-    for _ in range(ROUNDS):
-        x = b * (1 - s) ** 2 + e * s**2
-        slope = 2 * (e * s - b * (1 - s))
-        down = (x * slope).sum(axis=0)
-        curved = (slope * slope + x * bend).sum(axis=0)
-        step = np.where(curved > 0, down / np.where(curved > 0, curved, 1.0), 0.0)
-        s = np.clip(s - step, 0.0, 1.0)
-    return np.asarray(s)
 
 
 # Paths whose fly points are rounded: new samples, and where each point is passed.
@@ -552,67 +376,9 @@ def _resampled(traced: Trace, found: Corners, pieces: _Pieces) -> tuple[Edges, F
     """Sample all edges anew; return them and their samples' share of the way."""
     touched = np.asarray((pieces.corner >= 0).any(axis=0))
     start = np.concatenate([[0], np.cumsum(pieces.count.sum(axis=0))])
-    path, share = _samples(traced, found, pieces, touched, start)
+    path, share = _native.resampled(traced.edges, traced.share, traced.q, found, pieces)
     uneven = _uneven(pieces, touched, start)
     return replace(traced.edges, path=path, start=start, uneven=uneven), share
-
-
-def _samples(
-    traced: Trace, found: Corners, pieces: _Pieces, touched: Bools, start: Ints
-) -> tuple[Floats, Floats]:
-    """Place the samples, (s, 6) [rad], and give their shares of the way, (s,)."""
-    old = traced.edges
-    if native is not None:
-        placed: tuple[Floats, Floats] = native.resampled(
-            old, traced.share, traced.q, found, pieces
-        )
-        return placed
-    edge = np.repeat(np.arange(len(old.source)), np.diff(start))
-    nth = np.arange(len(edge)) - start[edge] + 1
-    path, share = np.empty((len(edge), 6)), np.empty(len(edge))
-    kept = ~touched[edge]
-    same = old.start[edge[kept]] + nth[kept] - 1
-    path[kept], share[kept] = old.path[same], traced.share[same]
-    split = np.cumsum(pieces.count, axis=0)[:, edge]
-    end_of_zone = ~kept & (nth <= split[0])
-    middle = ~kept & (nth > split[0]) & (nth <= split[1])
-    begin_of_zone = ~kept & (nth > split[1])
-    rows = np.flatnonzero(middle)
-    at, part = edge[rows], (nth - split[0])[rows]
-    long = (pieces.end - pieces.begin)[at] / pieces.count[1, at]
-    path[rows] = along(traced, at, pieces.begin[at] + part * long)
-    share[rows] = long
-    for side, chosen in ((0, end_of_zone), (1, begin_of_zone)):
-        rows = np.flatnonzero(chosen)
-        corner, count = (
-            pieces.corner[side, edge[rows]],
-            pieces.count[2 * side][edge[rows]],
-        )
-        part = nth[rows] - (0 if side == 0 else split[1][rows])
-        s, step = _places(found, corner, part, count, side)
-        path[rows] = found.q.take(corner, axis=0)
-        others = np.flatnonzero(s != found.nearest[corner])
-        path[rows[others]] = _on_corners(traced, found, corner[others], s[others])
-        size = (found.zones.behind, found.zones.before)[side][corner]
-        share[rows] = 2 * size * step
-    return path, share
-
-
-def _on_corners(traced: Trace, found: Corners, corner: Ints, s: Floats) -> Floats:
-    """Place samples on corners, (m, 6) [rad]."""
-    parts = in_chunks(
-        lambda rows: parabolas(traced, found.zones[corner[rows]])(s[rows]), len(s)
-    )
-    return np.concatenate([np.empty((0, 6)), *parts])
-
-
-def _places(
-    found: Corners, corner: Ints, part: Ints, count: Ints, side: int
-) -> tuple[Floats, Floats]:
-    """Give s of samples behind (side 0) or before the nearest point, and its step."""
-    nearest = found.nearest[corner]
-    step = (1 - nearest if side == 0 else nearest) / count
-    return (nearest if side == 0 else 0.0) + part * step, step
 
 
 def _uneven(pieces: _Pieces, touched: Bools, start: Ints) -> Ints:

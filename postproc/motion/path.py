@@ -7,8 +7,8 @@ from functools import cached_property
 
 import numpy as np
 
-from postproc.arrays import Bools, Floats, Ints
-from postproc.kernels import floats, native
+from postproc import _native
+from postproc.arrays import Bools, Floats, Ints, floats
 from postproc.motion.targets import Targets
 from postproc.robot.pose import inverse, rotation_from_vector, rotation_vector
 from postproc.robot.trajectory import Motion
@@ -313,15 +313,12 @@ class _Ends:
 
 def _lines(targets: Targets, flange: Floats, begin: Ints, end: Ints) -> Segments:
     """Build the straight paths from targets (m,) to others."""
-    if native is not None:
-        m, nothing = len(end), np.zeros((len(end), 3))
-        rotation, turn, centre, chord = native.lines(flange, targets.tool, begin, end)
-        return Segments(
-            rotation, turn, centre, nothing, nothing, chord,
-            angle=np.zeros(m), valid=np.ones(m, dtype=bool),
-        )  # fmt: skip
-    tool = targets.tool.take(end, axis=0)
-    return lines(flange.take(begin, axis=0) @ tool, flange.take(end, axis=0) @ tool)
+    m, nothing = len(end), np.zeros((len(end), 3))
+    rotation, turn, centre, chord = _native.lines(flange, targets.tool, begin, end)
+    return Segments(
+        rotation, turn, centre, nothing, nothing, chord,
+        angle=np.zeros(m), valid=np.ones(m, dtype=bool),
+    )  # fmt: skip
 
 
 def _begins(targets: Targets, visit: Ints, source: Ints) -> Ints:
@@ -514,25 +511,5 @@ class BlendCoupling:
 
     def to_move(self, wanted: Floats) -> Floats:
         """Move targets so that the path moves as wanted where it passes, (n, 3)."""
-        n, c = len(wanted), len(self.visit)
-        if c == 0:
-            return np.array(wanted)
-        if native is not None:
-            corners, shares = (self.visit, self.before, self.behind), (self.v, self.w)
-            found: Floats = native.to_move(floats(wanted), corners, shares, ROUNDS)
-            return found
-        others = np.ones(n, dtype=bool)
-        others[self.visit] = False
-        order = np.concatenate([self.visit, np.flatnonzero(others)])
-        place = np.empty(n, dtype=np.int64)
-        place[order] = np.arange(n)
-        before, behind = place.take(self.before), place.take(self.behind)
-        moved = np.array(wanted.take(order, axis=0).T, order="C")  # the points first
-        here, aim = moved[:, :c], np.array(moved[:, :c])
-        for _ in range(ROUNDS):
-            pulled = self.v * (moved.take(before, axis=1) - here)
-            pulled += self.w * (moved.take(behind, axis=1) - here)
-            here[:] = aim - pulled
-        out = np.empty_like(wanted)
-        out[order] = moved.T
-        return out
+        corners, shares = (self.visit, self.before, self.behind), (self.v, self.w)
+        return _native.to_move(floats(wanted), corners, shares, ROUNDS)

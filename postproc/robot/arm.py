@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from postproc.arrays import Floats, Ints
+from postproc import _native
+from postproc.arrays import Floats, Ints, floats
 from postproc.exceptions import ArmError, PlanError
-from postproc.kernels import floats, native
 from postproc.robot.arm_file import ArmFile, arm_path, read_arm_file
 from postproc.robot.inverse import Branches, Inverse, wrap
 from postproc.robot.pose import MM
@@ -44,7 +44,7 @@ class DH:
         return theta
 
     def packed(self, beta: Floats | None = None) -> Floats:
-        """Return what the native kernels know of the chain, (12, 6).
+        """Return what the core knows of the chain, (12, 6).
 
         Args:
             beta: Hayati's rotations of the links, (6,) [rad].
@@ -74,11 +74,7 @@ class DH:
 
     def flange(self, q: Floats) -> Floats:
         """Place the flange for angles (n, 6) [rad]: (n, 4, 4) [m]."""
-        if native is not None:
-            placed: Floats = native.flange(self.packed(), floats(q))
-            return placed
-        *_, last = self.frames(q)
-        return pose_of(last)
+        return _native.flange(self.packed(), floats(q))
 
     def placed(self, q: Floats, point: Floats, beta: Floats | None = None) -> Floats:
         """Express points of the flange frame in the base frame, (n, 3) [m].
@@ -91,23 +87,8 @@ class DH:
             point: Flange frame, (n, 3) [m].
             beta: Hayati's rotations of the links, (6,) [rad].
         """
-        if native is not None:
-            q, points = floats(q), np.array(point, float, ndmin=2, order="C")
-            native_placed: Floats = native.placed(self.packed(beta), q, points)
-            return native_placed
-        theta = np.ascontiguousarray(self.angles(q).T)
-        cos, sin = np.cos(theta), np.sin(theta)
-        x, y, z = np.array(np.broadcast_to(point, (len(q), 3)).T)
-        for i in reversed(range(6)):
-            if beta is not None and beta[i] != 0.0:
-                cb, sb = np.cos(beta[i]), np.sin(beta[i])
-                x, z = cb * x + sb * z, cb * z - sb * x
-            ca, sa = np.cos(self.alpha[i]), np.sin(self.alpha[i])
-            x += self.a[i]
-            y, z = ca * y - sa * z, sa * y + ca * z
-            z += self.d[i]
-            x, y = cos[i] * x - sin[i] * y, sin[i] * x + cos[i] * y
-        return np.stack([x, y, z], axis=1)
+        points = np.array(point, float, ndmin=2, order="C")
+        return _native.placed(self.packed(beta), floats(q), points)
 
 
 def pose_of(frame: Frame) -> Floats:

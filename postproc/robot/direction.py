@@ -11,13 +11,12 @@ is known where the whole interval agrees.
 
 from __future__ import annotations
 
-from collections import deque
 from dataclasses import dataclass
 
 import numpy as np
 
+from postproc import _native
 from postproc.arrays import Floats, Ints
-from postproc.kernels import native
 from postproc.robot.arm import Arm
 from postproc.robot.play import (
     NOTHING,
@@ -27,10 +26,7 @@ from postproc.robot.play import (
     VisitChains,
     chains_of,
     drive_paths,
-    identity,
     last_reversals,
-    passing,
-    prefix,
 )
 
 WIDTH_IN_PLAYS = 4.0
@@ -163,14 +159,7 @@ def _half_width(arm: Arm) -> Floats:
 
 def _side(angles: Floats, z: Clamps, half: Floats) -> Floats:
     """Place every joint in its play, (n, 6)."""
-    if native is not None:
-        placed: Floats = native.side(angles, z, half)
-        return placed
-    s = np.clip((angles - (z.lo + z.hi) / 2) / half, -1.0, 1.0)
-    on_flank = np.abs(s) > ON_FLANK
-    known = (z.hi - z.lo < half / 2) | on_flank
-    side: Floats = np.nan_to_num(np.where(known, s, 0.0))
-    return np.where(on_flank, np.sign(side), side)
+    return _native.side(angles, z, half)
 
 
 def _states(chains: VisitChains, own: Clamps, half: Floats, before: Clamps) -> Clamps:
@@ -185,84 +174,4 @@ def _states(chains: VisitChains, own: Clamps, half: Floats, before: Clamps) -> C
         half: Half of the width of the play, (6,) [rad].
         before: What is known at the first visit.
     """
-    if native is not None:
-        return Clamps(*native.states(chains, own, half, before))
-    passed = prefix(own, chains.begins()) if len(own.lo) else own
-    since_head = _since_head(chains, passed)
-    known: list[Clamps | None] = [None] * len(chains.heads)
-    followers = chains.followers()
-    waiting, queued = deque(range(len(known))), [True] * len(known)
-    while waiting:
-        c = waiting.popleft()
-        queued[c] = False
-        given = before if c == 0 else NOTHING.play
-        new = _at_head(chains, c, half, known, since_head, passed, given)
-        old = known[c]
-        if new is None or (old is not None and _same(old, new)):
-            continue
-        known[c] = new
-        for follower in followers[c]:
-            if not queued[follower]:
-                queued[follower] = True
-                waiting.append(follower)
-    return _from_heads(chains, known, since_head, half)
-
-
-def _from_heads(
-    chains: VisitChains, known: list[Clamps | None], since_head: Clamps, half: Floats
-) -> Clamps:
-    """Carry what is known at the heads on to all visits; the others know nothing."""
-    out = passing(chains.angles, half)
-    found = [(c, clamps) for c, clamps in enumerate(known) if clamps is not None]
-    if found:
-        row = np.full(len(known), -1)
-        row[[c for c, _ in found]] = np.arange(len(found))
-        lo, hi = (np.stack([getattr(s, n) for _, s in found]) for n in ("lo", "hi"))
-        at = row[chains.chain_of]
-        rows = np.flatnonzero(at >= 0)
-        arrived = Clamps(lo, hi)[at[rows]].then(since_head[rows])
-        out.lo[rows], out.hi[rows] = arrived.lo, arrived.hi
-    return out
-
-
-def _since_head(chains: VisitChains, passed: Clamps) -> Clamps:
-    """Compose the clamps from each visit's chain head (not included) to the visit."""
-    out = identity(chains.angles.shape)
-    inner = np.ones(len(chains.angles), dtype=bool)
-    inner[chains.heads] = False
-    edge = chains.first[:-1][inner]
-    out.lo[inner], out.hi[inner] = passed.lo[edge], passed.hi[edge]
-    return out
-
-
-def _at_head(
-    chains: VisitChains,
-    c: int,
-    half: Floats,
-    known: list[Clamps | None],
-    since_head: Clamps,
-    passed: Clamps,
-    given: Clamps,
-) -> Clamps | None:
-    """Take the hull of what arrives at a head; None while nothing is known to."""
-    if len(given.lo):
-        return given[0]
-    head = int(chains.heads[c])
-    found: list[Clamps] = []
-    for edge in chains.edges_to(head):
-        source = int(chains.source[edge])
-        if source < 0:
-            return passing(chains.angles[head], half)
-        before = known[chains.chain_of[source]]
-        if before is not None:
-            found.append(before.then(since_head[source]).then(passed[edge]))
-    if not found:
-        return None
-    low = np.min([f.lo for f in found], axis=0)
-    return Clamps(low, np.max([f.hi for f in found], axis=0))
-
-
-def _same(a: Clamps, b: Clamps) -> bool:
-    return all(
-        np.array_equal(x, y, equal_nan=True) for x, y in ((a.lo, b.lo), (a.hi, b.hi))
-    )
+    return Clamps(*_native.states(chains, own, half, before))

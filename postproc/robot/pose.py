@@ -2,7 +2,7 @@
 
 A *pose* is an array (..., 4, 4) with lengths in metres. A *position record* is what
 a program or a cell file holds: (..., 6) with x, y, z [mm] and a, e, r [deg] so that
-R = Rz(a) Ry(e) Rz(r). This module imports nothing of the project but its kernels: the
+R = Rz(a) Ry(e) Rz(r). This module imports nothing of the project but its core: the
 language needs it to compose frames, the robot to place them.
 """
 
@@ -10,8 +10,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from postproc.arrays import Bools, Floats, Ints
-from postproc.kernels import floats, native
+from postproc import _native
+from postproc.arrays import Bools, Floats, Ints, floats
 
 MM = 1e-3  # [m]
 SAME_ROTATION = 1e-10  # elements of a matrix that differ less are the same
@@ -72,14 +72,8 @@ def angles_near(zyz_deg: Floats, R: Floats) -> Floats:
 def pose_from_record(record: Floats) -> Floats:
     """Convert position records (..., 6) [mm, deg] to poses (..., 4, 4) [m]."""
     record = np.asarray(record, dtype=float)
-    if native is not None and record.ndim == 2:
-        poses: Floats = native.pose_from_record(floats(record))
-        return poses
-    T = np.zeros((*record.shape[:-1], 4, 4))
-    T[..., :3, :3] = rotation_from_zyz(record[..., 3:])
-    T[..., :3, 3] = record[..., :3] * MM
-    T[..., 3, 3] = 1.0
-    return T
+    poses = _native.pose_from_record(floats(record.reshape(-1, 6)))
+    return poses.reshape(*record.shape[:-1], 4, 4)
 
 
 def record_from_pose(T: Floats) -> Floats:
@@ -91,23 +85,12 @@ def record_from_pose(T: Floats) -> Floats:
 
 def inverse(T: Floats) -> Floats:
     """Invert poses (..., 4, 4)."""
-    if native is not None and T.ndim == 3:
-        inverted: Floats = native.inverse(floats(T))
-        return inverted
-    out = np.zeros_like(T)
-    Rt = np.swapaxes(T[..., :3, :3], -1, -2)
-    out[..., :3, :3] = Rt
-    out[..., :3, 3] = -(Rt @ T[..., :3, 3, None])[..., 0]
-    out[..., 3, 3] = 1.0
-    return out
+    return _native.inverse(floats(T.reshape(-1, 4, 4))).reshape(T.shape)
 
 
 def times(left: Floats, right: Floats) -> Floats:
     """Multiply poses (n, 4, 4) with others, (n, 4, 4)."""
-    if native is not None:
-        multiplied: Floats = native.times(floats(left), floats(right))
-        return multiplied
-    return np.asarray(left @ right)
+    return _native.times(floats(left), floats(right))
 
 
 def products(left: Floats, right: Floats, i: Ints, j: Ints) -> Floats:
@@ -191,36 +174,4 @@ def rotation_vector(R: Floats) -> Floats:
 
     Lengths are in [0, pi].
     """
-    if native is not None and R.ndim == 3:
-        vectors: Floats = native.rotation_vector(floats(R))
-        return vectors
-    q = _quaternion(R.reshape(-1, 3, 3))
-    x, y, z, w = np.where(q[3] < 0, -q, q)
-    angle = 2 * np.arctan2(np.sqrt(x * x + y * y + z * z), w)
-    square, small = angle * angle, angle <= SMALL
-    quotient = angle / np.where(small, 1.0, np.sin(angle / 2))
-    scale = np.where(small, 2 + square / 12 + 7 * square * square / 2880, quotient)
-    return np.stack([scale * x, scale * y, scale * z], axis=1).reshape(R.shape[:-1])
-
-
-def _quaternion(R: Floats) -> Floats:
-    """Return the unit quaternions x, y, z, w of rotations (n, 3, 3), (4, n).
-
-    Each is taken from that of four formulas whose divisor is the largest.
-    """
-    xx, yy, zz = R[:, 0, 0], R[:, 1, 1], R[:, 2, 2]
-    trace = xx + yy + zz
-    xy, xz, yz = (R[:, j, i] + R[:, i, j] for i, j in ((0, 1), (0, 2), (1, 2)))
-    xw, yw, zw = (R[:, j, i] - R[:, i, j] for i, j in ((1, 2), (2, 0), (0, 1)))
-    formulas = np.array(
-        [
-            [1 - trace + 2 * xx, xy, xz, xw],
-            [xy, 1 - trace + 2 * yy, yz, yw],
-            [xz, yz, 1 - trace + 2 * zz, zw],
-            [xw, yw, zw, 1 + trace],
-        ]
-    )
-    best = np.argmax([xx, yy, zz, trace], axis=0)
-    q = formulas[best, :, np.arange(len(R))].T
-    x, y, z, w = q
-    return np.asarray(q / np.sqrt(x * x + y * y + z * z + w * w))
+    return _native.rotation_vector(floats(R.reshape(-1, 3, 3))).reshape(R.shape[:-1])

@@ -19,7 +19,7 @@ from importlib.metadata import version
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from postproc.kernels import native
+from postproc import _native
 from tests.bench.beside import TARGETS, Beside, side_by_side
 from tests.bench.made import KINDS
 from tests.bench.memory import watched
@@ -185,7 +185,7 @@ def machine() -> str:
     libraries = ", ".join(f"{name} {version(name)}" for name in LIBRARIES)
     return (
         f"{os.cpu_count()} cores ({cpu}), Python {platform.python_version()}, "
-        f"{libraries}; {'no ' if native is None else ''}native kernels; "
+        f"{libraries}; core {_native.SOURCES}; "
         f"OMP_NUM_THREADS={os.environ.get('OMP_NUM_THREADS', 'unset')}."
     )
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from postproc.motion import blending
-from postproc.motion.blending import blend, corners, nearest_on_parabola, parabolas
+from postproc.motion.blending import blend, corners
 from postproc.motion.planner import plan
 from postproc.motion.replan import replan_all
 from postproc.motion.targets import Fly, TargetKind, Targets, make_targets
@@ -16,6 +16,7 @@ from postproc.motion.trace import trace
 from postproc.robot.arm import Arm
 from postproc.robot.direction import arrivals
 from postproc.robot.trajectory import Motion
+from tests.reference.paths import on_corner
 
 MM = 1e-3
 
@@ -61,18 +62,6 @@ def joint_run(turns_deg: np.ndarray, **given: object) -> Targets:
 SQUARE = np.array([[0, 0.1, 0], [0, 0.1, 0.1]])
 
 
-def test_nearest_point_of_parabolas() -> None:
-    rng = np.random.default_rng(1)
-    begin, end = rng.normal(size=(2, 200, 3))
-    s = np.linspace(0, 1, 20001)[:, None, None]
-    for i in range(0, 200, 20):
-        rows = slice(i, i + 20)
-        away = np.linalg.norm(begin[rows] * (1 - s) ** 2 + end[rows] * s**2, axis=2)
-        t = nearest_on_parabola(begin[rows], end[rows])[:, None]
-        ours = np.linalg.norm(begin[rows] * (1 - t) ** 2 + end[rows] * t**2, axis=1)
-        np.testing.assert_allclose(ours, away.min(axis=0), rtol=1e-5, atol=1e-6)
-
-
 def test_a_right_angle_is_cut_by_the_vertex_of_its_parabola(
     arm: Arm, tool: np.ndarray, home: np.ndarray
 ) -> None:
@@ -92,7 +81,7 @@ def test_the_arm_passes_where_the_corner_is_nearest_and_leaves_it_tangentially(
     exact = trace(arm, targets)
     found = corners(arm, targets, exact)
     s = np.linspace(0, 1, 2001)
-    q = parabolas(exact, found.zones[np.zeros(2001, dtype=np.int64)])(s)
+    q = np.array([on_corner(exact, found.zones, 0, at) for at in s])
     tcp = (arm.flange(q) @ tool)[:, :3, 3]
     away = np.linalg.norm(tcp - targets.tcp[1, :3, 3], axis=1)
     at = (arm.flange(found.q) @ tool)[0, :3, 3]

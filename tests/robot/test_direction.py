@@ -22,9 +22,9 @@ from postproc.robot.play import (
     NOTHING,
     Clamps,
     Edges,
+    _refined,
     passing,
     prefix,
-    with_turning_values,
 )
 
 
@@ -52,7 +52,7 @@ def one_joint(arm: Arm, plays: list[float], joint: int = 0) -> Arrivals:
 angles = st.floats(-3.0, 3.0, allow_nan=False)
 
 
-@given(arrays(float, st.tuples(st.integers(1, 70), st.just(2)), elements=angles))
+@given(arrays(float, st.tuples(st.integers(1, 70), st.just(6)), elements=angles))
 @settings(max_examples=60, deadline=None)
 def test_composed_clamps_are_the_sequential_operator(q: np.ndarray) -> None:
     half = 0.4
@@ -62,8 +62,8 @@ def test_composed_clamps_are_the_sequential_operator(q: np.ndarray) -> None:
 
 
 @given(
-    arrays(float, st.tuples(st.integers(1, 300), st.just(2)), elements=angles),
-    st.lists(st.integers(0, 299), max_size=12),
+    arrays(float, st.tuples(st.integers(1, 90), st.just(6)), elements=angles),
+    st.lists(st.integers(0, 89), max_size=12),
 )
 @settings(max_examples=100, deadline=None)
 def test_sequences_one_after_the_other_do_not_touch(q, begins) -> None:
@@ -131,23 +131,27 @@ def test_a_turn_between_the_last_two_samples_is_not_missed(arm: Arm) -> None:
     assert arrivals(arm, q, edges).direction[1, 0] == -1
 
 
+def refined(y):
+    """Put the turning values into one edge from the first row to the last."""
+    edges = Edges(np.array([0, 1]), np.array([0]), y[1:], np.array([0, len(y) - 1]))
+    return _refined(y[:1], edges.source, edges.path, edges).values
+
+
 def test_turning_values_are_exact_for_parabolas() -> None:
     rng = np.random.default_rng(0)
     vertex, height = rng.uniform(-0.99, 0.99, 6), rng.normal(size=6)
     t = np.array([-1.0, 0.0, 1.0])[:, None]
     y = height + 1.7 * (t - vertex) ** 2
-    out, count = with_turning_values(y[[0, 0, 1]], y, np.array([False, True, False]))
-    assert count.tolist() == [1, 3, 1]
-    found = np.where(vertex < 0, out[1], out[3])
+    out = refined(y)
+    assert len(out) == 2 + 2
+    found = np.where(vertex < 0, out[0], out[2])
     np.testing.assert_allclose(found, height, atol=1e-12)
-    np.testing.assert_array_equal(out[[0, 2, 4]], y)
+    np.testing.assert_array_equal(out[[1, 3]], y[1:])
 
 
 def test_nothing_is_inserted_where_nothing_turns() -> None:
     y = np.arange(24.0).reshape(4, 6) ** 2
-    out, count = with_turning_values(y[[0, 0, 1, 2]], y, np.array([0, 1, 1, 0]) > 0)
-    np.testing.assert_array_equal(out, y)
-    assert count.tolist() == [1, 1, 1, 1]
+    np.testing.assert_array_equal(refined(y), y[1:])
 
 
 def test_predecessors_that_agree_and_that_do_not(arm: Arm) -> None:

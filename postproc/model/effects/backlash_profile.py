@@ -8,8 +8,8 @@ from typing import ClassVar, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from postproc import _native
 from postproc.arrays import Floats
-from postproc.kernels import native
 from postproc.model.covariate import JOINTS
 from postproc.model.effects.effect import (
     FAR,
@@ -87,35 +87,17 @@ class BacklashProfile(JointEffect):
 
     def angles(self, batch: Batch, p: Floats) -> Floats:
         """Return the joint errors (n, 6) [rad], summed joint by joint."""
-        if native is not None and self.joints and self._is_ordered:
-            sizes = p.reshape(len(self.joints), -1)
-            states = batch.states.q, batch.states.direction
-            found: Floats = native.profile(
-                tuple(map(np.ascontiguousarray, states)), self._turned.tolist(),
-                self.orders, self.constant, sizes, (self.lower, self.upper),
-            )  # fmt: skip
-            return found
-        waves = batch.once(self, self._waves)
-        sizes = p.reshape(*waves.shape[:2], 1)
-        profile = np.zeros((len(self.joints), len(batch)))
-        for k in range(waves.shape[1]):
-            profile += sizes[:, k] * waves[:, k]
-        out = np.zeros((len(batch), 6))
-        out[:, self._turned] = profile.T
-        return out * batch.states.direction
+        sizes = p.reshape(len(self.joints), self.constant + 2 * len(self.orders))
+        states = batch.states.q, batch.states.direction
+        return _native.profile(
+            tuple(map(np.ascontiguousarray, states)), self._turned.tolist(),
+            self.orders, self.constant, sizes, (self.lower, self.upper),
+        )  # fmt: skip
 
     @property
     def _turned(self) -> NDArray[np.int64]:
         """Return the 0-based joints that have a profile, (j,)."""
         return np.array(self.joints, dtype=int) - 1
-
-    @property
-    def _is_ordered(self) -> bool:
-        """Tell whether every order is a harmonic, and named once."""
-        return (
-            len(set(self.orders)) == len(self.orders)
-            and min(self.orders, default=1) > 0
-        )
 
     def _waves(self, q: Floats) -> Floats:
         """Evaluate b0 and the harmonics of every joint, (j, m, n), as far as surveyed.

@@ -1,0 +1,145 @@
+"""The native core: what is done to every row of a long program, in Rust.
+
+Every function takes C-contiguous arrays and refuses others (ValueError), lets other
+threads run and hears signals while it works. `native/src` has one file for each group,
+which says what the arguments are; the callers say it with shapes and units too.
+"""
+
+from collections.abc import Sequence
+from typing import Protocol
+
+from postproc.arrays import Bools, Floats, Ints
+
+SOURCES: str
+"""Hash of the sources that it was built from."""
+
+class _Clamps(Protocol):
+    @property
+    def lo(self) -> Floats: ...
+    @property
+    def hi(self) -> Floats: ...
+
+class _Edges(Protocol):
+    @property
+    def path(self) -> Floats: ...
+    @property
+    def start(self) -> Ints: ...
+    @property
+    def source(self) -> Ints: ...
+
+class _Zones(Protocol):
+    @property
+    def visit(self) -> Ints: ...
+    @property
+    def into(self) -> Ints: ...
+    @property
+    def out(self) -> Ints: ...
+    @property
+    def before(self) -> Floats: ...
+    @property
+    def behind(self) -> Floats: ...
+
+class _Corners(Protocol):
+    @property
+    def zones(self) -> _Zones: ...
+    @property
+    def nearest(self) -> Floats: ...
+    @property
+    def q(self) -> Floats: ...
+
+class _Pieces(Protocol):
+    @property
+    def corner(self) -> Ints: ...
+    @property
+    def begin(self) -> Floats: ...
+    @property
+    def end(self) -> Floats: ...
+    @property
+    def count(self) -> Ints: ...
+
+class _Chains(Protocol):
+    @property
+    def angles(self) -> Floats: ...
+    @property
+    def first(self) -> Ints: ...
+    @property
+    def source(self) -> Ints: ...
+    @property
+    def heads(self) -> Ints: ...
+    @property
+    def ends(self) -> Ints: ...
+    @property
+    def chain_of(self) -> Ints: ...
+
+# chain.rs: the Denavit-Hartenberg chain (`postproc.robot.arm`)
+def flange(parameters: Floats, q: Floats) -> Floats: ...
+def placed(parameters: Floats, q: Floats, point: Floats) -> Floats: ...
+
+# inverse.rs: the closed-form inverse kinematics (`postproc.robot.inverse`)
+def branch(parameters: Floats, flange: Floats, slot: Ints) -> Floats: ...
+def branches(parameters: Floats, flange: Floats) -> Floats: ...
+
+# pose.rs: rigid transforms (`postproc.robot.pose`)
+def inverse(given: Floats) -> Floats: ...
+def pose_from_record(record: Floats) -> Floats: ...
+def rotation_vector(given: Floats) -> Floats: ...
+def times(left: Floats, right: Floats) -> Floats: ...
+
+# play.rs, walks.rs: the play operator (`postproc.robot.play`)
+def prefix(steps: _Clamps, begins: Bools) -> tuple[Floats, Floats]: ...
+def clamps(values: Floats, start: Ints, half: Floats) -> tuple[Floats, Floats]: ...
+def refined(
+    angles: Floats, source: Ints, values: Floats, start: Ints, uneven: Ints
+) -> tuple[Floats, Ints]: ...
+
+# direction.rs: from which side joints arrive (`postproc.robot.direction`)
+def states(
+    chains: _Chains, own: _Clamps, half: Floats, before: _Clamps
+) -> tuple[Floats, Floats]: ...
+def side(angles: Floats, z: _Clamps, half: Floats) -> Floats: ...
+
+# lines.rs, pull.rs: straight paths, how corners pull (`postproc.motion.path`)
+def lines(
+    flange: Floats, tool: Floats, begin: Ints, end: Ints
+) -> tuple[Floats, Floats, Floats, Floats]: ...
+def chords(flange: Floats, tool: Floats, begin: Ints, end: Ints) -> Floats: ...
+def to_move(
+    wanted: Floats,
+    corners: tuple[Ints, Ints, Ints],
+    shares: tuple[Floats, Floats],
+    rounds: int,
+) -> Floats: ...
+
+# corner.rs, rounding.rs: rounded fly points (`postproc.motion.blending`)
+def passed(
+    parameters: Floats,
+    edges: _Edges,
+    q: Floats,
+    zones: _Zones,
+    tool: Floats,
+    point: Floats,
+    within: Floats,
+) -> tuple[Floats, Floats, Floats, Floats, Floats, Floats]: ...
+def resampled(
+    edges: _Edges, share: Floats, q: Floats, corners: _Corners, pieces: _Pieces
+) -> tuple[Floats, Floats]: ...
+
+# profile.rs: backlash along the gear (`postproc.model.effects.backlash_profile`)
+def profile(
+    states: tuple[Floats, ...],
+    joints: Sequence[int],
+    orders: Sequence[int],
+    constant: bool,
+    sizes: Floats,
+    range: tuple[Sequence[float], Sequence[float]],
+) -> Floats: ...
+
+# variance.rs: uncertain parameters of geometry and joints (`postproc.model.model`)
+def variance(
+    parameters: Floats,
+    base: Floats,
+    states: tuple[Floats, Floats],
+    geometry: tuple[bool, Sequence[tuple[int, int]], bool],
+    basis: tuple[Floats, Sequence[int]],
+    covariance: Floats,
+) -> Floats: ...

@@ -1,0 +1,1 @@
+"""What the native core computes, written plainly: slow, and by the definition."""

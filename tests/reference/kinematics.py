@@ -1,0 +1,110 @@
+"""Chains, closed forms and poses: matrices, one pose after the other."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+NAN = np.full(6, np.nan)
+
+
+def link(a, d, alpha, theta, beta=0.0):
+    """Return Rot_z(theta) Trans(a, 0, d) Rot_x(alpha) Rot_y(beta)."""
+    turn_z = axis_rotation(2, theta)
+    shift = np.eye(4)
+    shift[:3, 3] = a, 0.0, d
+    return turn_z @ shift @ axis_rotation(0, alpha) @ axis_rotation(1, beta)
+
+
+def axis_rotation(axis, angle):
+    """Rotate about a coordinate axis, (4, 4)."""
+    i, j = (axis + 1) % 3, (axis + 2) % 3
+    out = np.eye(4)
+    out[i, i] = out[j, j] = math.cos(angle) if math.isfinite(angle) else math.nan
+    out[j, i] = math.sin(angle) if math.isfinite(angle) else math.nan
+    out[i, j] = -out[j, i]
+    return out
+
+
+def flange(dh, q, beta=None):
+    """Place the flange, (n, 4, 4)."""
+    beta = np.zeros(6) if beta is None else beta
+    out = []
+    for row in q:
+        T = np.eye(4)
+        for i, theta in enumerate(dh.offset + dh.sense * (dh.mix @ row)):
+            T = T @ link(dh.a[i], dh.d[i], dh.alpha[i], theta, beta[i])
+        out.append(T)
+    return np.reshape(out, (-1, 4, 4))
+
+
+def placed(dh, q, point, beta=None):
+    """Express points of the flange frame in the base frame, (n, 3)."""
+    T, point = flange(dh, q, beta), np.broadcast_to(point, (len(q), 3))
+    return np.einsum("nij,nj->ni", T[:, :3, :3], point) + T[:, :3, 3]
+
+
+def branch(opw, pose, slot):
+    """Solve one pose for one branch, geometric joint angles, NaN where there is none.
+
+    Brandstoetter, Angerer, Hofbaur (2014).
+    """
+    a1, a2, b, c1, c2, c3, c4 = (
+        getattr(opw, f"{name}_mm") / 1000
+        for name in ("a1", "a2", "b", "c1", "c2", "c3", "c4")
+    )
+    x, y, z = pose[:3, 3] - c4 * pose[:3, 2]
+    behind, elbow, flip = slot & 2 > 0, -1 if slot & 1 else 1, slot & 4 > 0
+    in_plane = x * x + y * y - b * b
+    if in_plane < 0:
+        return NAN
+    reach = math.sqrt(in_plane)
+    t1 = math.atan2(y, x) + (
+        math.atan2(b, reach) - math.pi if behind else -math.atan2(b, reach)
+    )
+    out, up = (-reach if behind else reach) - a1, z - c1
+    fore, far = math.hypot(a2, c3), math.hypot(out, up)
+    cosines = [(far**2 + c2**2 - fore**2) / (2 * far * c2),
+               (far**2 - c2**2 - fore**2) / (2 * c2 * fore)]  # fmt: skip
+    if max(map(abs, cosines)) > 1:
+        return NAN
+    t2 = math.atan2(out, up) - elbow * math.acos(cosines[0])
+    t3 = elbow * math.acos(cosines[1]) - math.atan2(a2, c3)
+    # What the wrist does is left over of the orientation.
+    wrist = (axis_rotation(2, t1) @ axis_rotation(1, t2 + t3))[:3, :3].T @ pose[:3, :3]
+    t4 = math.atan2(wrist[1, 2], wrist[0, 2])
+    t5 = math.atan2(math.hypot(wrist[0, 2], wrist[1, 2]), wrist[2, 2])
+    last = (axis_rotation(2, t4) @ axis_rotation(1, t5))[:3, :3].T @ wrist
+    t6 = math.atan2(last[1, 0], last[1, 1])
+    if flip:
+        t4, t5, t6 = t4 + math.pi, -t5, t6 + math.pi
+    angles = np.array([t1, t2, t3, t4, t5, t6]) + np.deg2rad(opw.offsets_deg)
+    return angles * np.where(opw.flip_axes, -1.0, 1.0)
+
+
+def pose_from_record(record):
+    """Convert one position record [mm, deg] to a pose [m]."""
+    x, y, z, a, e, r = record
+    turns = [axis_rotation(k, math.radians(t)) for k, t in ((2, a), (1, e), (2, r))]
+    out = turns[0] @ turns[1] @ turns[2]
+    out[:3, 3] = x / 1000, y / 1000, z / 1000
+    return out
+
+
+def rotation_vector(R):
+    """Return the rotation vector of one rotation, of a length in [0, pi].
+
+    The angle by atan2 of sine and cosine, the axis from the skew part, or near half a
+    turn from R + I, whose columns lie along it.
+    """
+    skew = np.array([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]])
+    sine, cosine = np.linalg.norm(skew) / 2, (np.trace(R) - 1) / 2
+    angle = math.atan2(sine, cosine)
+    if cosine > -0.5:
+        return skew / 2 * (angle / sine if sine > 0 else 1.0)
+    # exp([w]) + exp([w])^T = 2 (cos I + (1 - cos) a a^T)
+    outer = (R + R.T) / 2 - cosine * np.eye(3)
+    axis = outer[:, np.argmax(np.diag(outer))]
+    axis = axis / np.linalg.norm(axis)
+    return angle * (axis if axis @ skew >= 0 else -axis)

@@ -1,0 +1,115 @@
+"""The play operator by its definition: step by step, visit by visit."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+
+from postproc.robot.play import Clamps, VisitChains
+
+
+def prefix(steps, begins=None):
+    """Compose the steps since the last beginning up to each one."""
+    lo, hi = np.array(steps.lo), np.array(steps.hi)
+    for i in range(1, len(lo)):
+        if begins is None or not begins[i]:
+            before = Clamps(lo[i - 1], hi[i - 1]).then(Clamps(lo[i], hi[i]))
+            lo[i], hi[i] = before.lo, before.hi
+    return Clamps(lo, hi)
+
+
+def clamps(values, start, half):
+    """Compose the clamps of passing each edge."""
+    ends = []
+    for first, last in pairwise(start):
+        one = Clamps(np.full(6, -np.inf), np.full(6, np.inf))
+        for q in values[first:last]:
+            one = one.then(Clamps(q - half, q + half))
+        ends.append(one)
+    lo, hi = ([getattr(end, name) for end in ends] for name in ("lo", "hi"))
+    return Clamps(np.reshape(lo, (-1, 6)), np.reshape(hi, (-1, 6)))
+
+
+def turning(behind, middle, ahead):
+    """Tell where the parabola of one joint through three samples turns.
+
+    Returns:
+        The value there, and whether it is before the middle one (-1), behind it (1), or
+        at neither side of it (0).
+    """
+    rise, bend = (ahead - behind) / 2, (ahead + behind) / 2 - middle
+    if not (abs(rise) < 2 * abs(bend) and rise != 0):
+        return middle, 0
+    return middle - rise**2 / (4 * bend), -1 if (rise > 0) == (bend > 0) else 1
+
+
+def refined(angles, source, values, start, uneven):
+    """Put in the values at which joints turn between samples."""
+    out, begins = [], [0]
+    for e, (first, last) in enumerate(pairwise(start)):
+        for i in range(first, last):
+            behind = values[i - 1] if i > first else None
+            if i == first and source[e] >= 0:
+                behind = angles[source[e]]
+            if behind is None or i + 1 == last or i in uneven:
+                out.append(values[i])
+                continue
+            found = [turning(behind[j], *values[i : i + 2, j]) for j in range(6)]
+            value, at = np.transpose(found)
+            out += [np.where(at == -1, value, values[i])] * (-1 in at)
+            out.append(values[i])
+            out += [np.where(at == 1, value, values[i])] * (1 in at)
+        begins.append(len(out))
+    return np.reshape(out, (-1, 6)), np.array(begins)
+
+
+def states(chains: VisitChains, own, half, before):
+    """Find the hull of what may hold at every visit: sweeps until nothing changes."""
+    n = len(chains.angles)
+    known: list[Clamps | None] = [None] * n
+    changed = True
+    while changed:
+        changed = False
+        for visit in range(n):
+            new = _arrived(chains, own, half, before, known, visit)
+            if new is not None and not _same(known[visit], new):
+                known[visit], changed = new, True
+    unknown = [Clamps(q - half, q + half) for q in chains.angles]
+    at = [k or u for k, u in zip(known, unknown, strict=True)]
+    return Clamps(np.array([c.lo for c in at]), np.array([c.hi for c in at]))
+
+
+def _arrived(chains, own, half, before, known, visit):
+    if visit == 0 and len(before.lo):
+        return before[0]
+    found = []
+    for edge in range(chains.first[visit], chains.first[visit + 1]):
+        if chains.source[edge] < 0:
+            q = chains.angles[visit]
+            return Clamps(q - half, q + half)
+        state = known[chains.source[edge]]
+        if state is not None:
+            found.append(state.then(own[edge]))
+    if not found:
+        return None
+    low = np.min([f.lo for f in found], axis=0)
+    return Clamps(low, np.max([f.hi for f in found], axis=0))
+
+
+def _same(a, b):
+    ends = ((a.lo, b.lo), (a.hi, b.hi)) if a is not None else ()
+    return bool(ends) and all(np.array_equal(*two, equal_nan=True) for two in ends)
+
+
+def side(angles, z, half):
+    """Place every joint in its play."""
+    out = np.zeros_like(angles)
+    for at, q in np.ndenumerate(angles):
+        lo, hi, h = z.lo[at], z.hi[at], half[at[1]]
+        s = float(np.clip((q - (lo + hi) / 2) / h, -1.0, 1.0))
+        if abs(s) > 0.999:
+            out[at] = np.sign(s)
+        elif hi - lo < h / 2 and not np.isnan(s):
+            out[at] = s
+    return out
