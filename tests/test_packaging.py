@@ -6,10 +6,12 @@ import os
 import re
 import subprocess
 import sys
+import tarfile
 import tomllib
 import zipfile
 from importlib.util import find_spec
 from pathlib import Path
+from shutil import which
 
 import pytest
 from packaging.requirements import Requirement
@@ -63,6 +65,11 @@ def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
         pytest.skip("pip is not in this environment: nothing to build a wheel with")
     if find_spec("hatchling") is None:
         pytest.skip("hatchling is missing: pip install -e '.[dev]'")
+    if (
+        which("cargo") is None
+        and which("cargo", path=Path.home() / ".cargo/bin") is None
+    ):
+        pytest.skip("there is no cargo any more: the core was built without it staying")
     folder = tmp_path_factory.mktemp("wheel")
     pip("wheel", "--no-deps", "--no-build-isolation", "-q", "-w", str(folder), ".")
     (built,) = folder.glob("postproc-*.whl")
@@ -71,7 +78,9 @@ def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_wheel_holds_grammars_arms_and_licence(wheel: Path) -> None:
     assert wheel.name.startswith(f"postproc-{postproc.__version__}-")
+    assert "-cp311-abi3-" in wheel.name
     names = set(zipfile.ZipFile(wheel).namelist())
+    assert "postproc/_native.abi3.so" in names and "postproc/_native.pyi" in names
     for folder, pattern, inside in (
         (ROOT / "grammars", "*.lark", "postproc/grammars"),
         (ROOT / "postproc" / "robot" / "arms", "*.toml", "postproc/robot/arms"),
@@ -82,6 +91,30 @@ def test_wheel_holds_grammars_arms_and_licence(wheel: Path) -> None:
     assert "postproc/py.typed" in names
     assert any(name.endswith("licenses/LICENSE") for name in names)
     assert not any(name.startswith(("tests/", "programs/")) for name in names)
+
+
+def test_sources_hold_no_binary(tmp_path: Path) -> None:
+    if find_spec("hatchling") is None:
+        pytest.skip("hatchling is missing: pip install -e '.[dev]'")
+    command = [
+        sys.executable,
+        "-m",
+        "hatchling",
+        "build",
+        "-t",
+        "sdist",
+        "-d",
+        tmp_path,
+    ]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout + done.stderr
+    (archive,) = tmp_path.glob("postproc-*.tar.gz")
+    with tarfile.open(archive) as found:
+        names = [name.partition("/")[2] for name in found.getnames()]
+    assert {"native/src/lib.rs", "native/hatch_build.py", "native/Cargo.lock"} <= {
+        *names
+    }
+    assert not [n for n in names if n.endswith((".so", ".pyd")) or "/target/" in n]
 
 
 def test_grammar_is_found_from_a_wheel(wheel: Path, tmp_path: Path) -> None:
