@@ -8,7 +8,7 @@ which says what the arguments are; the callers say it with shapes and units too.
 from collections.abc import Sequence
 from typing import Protocol
 
-from postproc.arrays import Bools, Floats, Ints
+from postproc.arrays import Bools, Bytes, Floats, Indices, Ints
 
 SOURCES: str
 """Hash of the sources that it was built from."""
@@ -143,3 +143,22 @@ def variance(
     basis: tuple[Floats, Sequence[int]],
     covariance: Floats,
 ) -> Floats: ...
+
+# text.rs: lines of a file, but for numbers and names (`postproc.language.scan`)
+def form_of(mask: bytes) -> tuple[bytes, list[str]]: ...
+def line_starts(data: bytes) -> Ints: ...
+def scan_lines(
+    data: bytes, starts: Ints
+) -> tuple[
+    list[bytes],
+    tuple[Indices, Indices, Indices, Indices],
+    tuple[Indices, Indices, Floats],
+    tuple[list[str], Indices],
+    list[int],
+]: ...
+
+# number.rs: numbers, read and written (`postproc.language.rewrite`)
+def write_numbers(values: Floats, decimals: Ints) -> Bytes: ...
+def rewrite_numbers(
+    data: bytes, start: Ints, end: Ints, values: Floats, least: Ints
+) -> tuple[Ints, Bytes]: ...

@@ -28,7 +28,7 @@ LEAVES = {"exceptions", "arrays", "byte_columns", "files"}
 
 # What a chapter may import less than its layer allows.
 ONLY = {
-    "language": LEAVES | {"robot.pose", "robot.trajectory"},
+    "language": LEAVES | {"_native", "robot.pose", "robot.trajectory"},
     # Its truth would prove nothing if it used the kinematics under test.
     "simulation": LEAVES | {"language", "robot.trajectory"},
 }

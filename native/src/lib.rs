@@ -11,12 +11,14 @@ mod direction;
 mod edges;
 mod inverse;
 mod lines;
+mod number;
 mod play;
 mod pose;
 mod profile;
 mod pull;
 mod rounding;
 mod rows;
+mod text;
 mod trig;
 mod variance;
 mod walk;
@@ -48,5 +50,10 @@ fn native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(profile::profile, module)?)?;
     module.add_function(wrap_pyfunction!(pull::to_move, module)?)?;
     module.add_function(wrap_pyfunction!(variance::variance, module)?)?;
+    module.add_function(wrap_pyfunction!(text::form_of, module)?)?;
+    module.add_function(wrap_pyfunction!(text::line_starts, module)?)?;
+    module.add_function(wrap_pyfunction!(text::scan_lines, module)?)?;
+    module.add_function(wrap_pyfunction!(number::write_numbers, module)?)?;
+    module.add_function(wrap_pyfunction!(number::rewrite_numbers, module)?)?;
     Ok(())
 }

@@ -43,7 +43,7 @@ from postproc.compensation.outcome import (
     left_elsewhere,
     tell_arrivals,
 )
-from postproc.compensation.parallel import in_processes, map_with, rounded
+from postproc.compensation.parallel import in_processes, rounded
 from postproc.compensation.program import (
     Planned,
     Reading,
@@ -316,7 +316,7 @@ def compensate(
     cell = prepared(cell, model, options)
     setting = Setting(cell, model, options, Clock(progress), processes)
     with setting.clock("parse"):
-        reading = read_program(files, cell, each=map_with(processes))
+        reading = read_program(files, cell)
     reading, kept = correct(reading, setting)
     return finish(name, reading, kept, setting)
 
@@ -381,8 +381,7 @@ def write_and_verify(reading: Reading, kept: Correction, setting: Setting) -> Ou
     with clock("rewrite"):
         output = write_edits(reading, kept.edits, setting.model.id)
     with clock("verify"):
-        each = map_with(processes)
-        again = read_program(output.files, setting.cell, reading.programs, each)
+        again = read_program(output.files, setting.cell, reading.programs)
         values = kept.decisions.corrected
         check_output(reading, again, output, kept.edited, values, processes)
     return output

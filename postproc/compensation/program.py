@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from postproc.arrays import Floats, Ints, Map
+from postproc.arrays import Floats, Ints
 from postproc.compensation.eligibility import (
     Reasons,
     mark_arcs,
@@ -145,7 +145,6 @@ def read_program(
     files: Mapping[str, bytes],
     cell: Cell,
     known: Sequence[Program] = (),
-    each: Map = map,
 ) -> Reading:
     """Parse a program and resolve its visits.
 
@@ -154,13 +153,12 @@ def read_program(
             imports, last, where there is one, its variable file.
         cell: What holds at program start.
         known: Programs that were parsed before; those of the same bytes are not again.
-        each: How the pieces of long texts are read.
 
     Raises:
         ProgramError: A file is no program text, or the program is another arm's.
     """
     sources = [source_from_bytes(name, data) for name, data in files.items()]
-    program = _parsed(sources[0], known, each)
+    program = _parsed(sources[0], known)
     if program.main is None and not program.routines:
         problem, cure = "the file holds no BEGIN .. END", "Give a PDL2 program"
         raise ProgramError(sources[0].name, problem, cure)
@@ -170,10 +168,10 @@ def read_program(
     texts = [Skeleton.of(program.lines)]
     for source in sources[1:]:
         if is_variables(source.name):
-            variables = read_variables(source, each)
+            variables = read_variables(source)
             texts.append(Skeleton.of(variables.lines))
         else:
-            pages.append(_named(_parsed(source, known, each)))
+            pages.append(_named(_parsed(source, known)))
             texts.append(Skeleton.of(pages[-1].lines))
     others = _by_name(program, pages)
     resolved = resolve(program, start_of(cell), variables, others)
@@ -205,12 +203,12 @@ def _refuse_other_arm(program: Program, cell: Cell) -> None:
         raise ProgramError(name, problem, cure, line=program.head)
 
 
-def _parsed(source: Source, known: Sequence[Program], each: Map) -> Program:
+def _parsed(source: Source, known: Sequence[Program]) -> Program:
     """Parse a file, unless it was parsed before."""
     for program in known:
         if program.lines.source == source:
             return program
-    return parse(source, each)
+    return parse(source)
 
 
 def _named(page: Program) -> Program:

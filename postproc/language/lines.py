@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
 
-from postproc.arrays import Bools, Floats, Indices, Interned, Map
+from postproc.arrays import Bools, Floats, Indices, Interned
 from postproc.exceptions import ProgramError
-from postproc.language.scan import NAME_MARK, NUMBER_MARK, WHOLE, mark_lines, mask_of
+from postproc.language.scan import NAME_MARK, NUMBER_MARK, WHOLE, mask_of, scan_lines
 from postproc.language.shapes import (
     Shapes,
     alike,
@@ -62,7 +61,7 @@ class JoinedLines:
 
 
 def stripped(mask: bytes) -> bytes:
-    """Drop the blanks around the mask of a line, see `MarkedLines`."""
+    """Drop the blanks around the mask of a line, see `ScannedLines`."""
     if mask[:1] == WHOLE:
         own = mask.strip()
         return WHOLE + own if own else own
@@ -163,7 +162,7 @@ class LogicalRows:
     """Logical lines.
 
     Attributes:
-        masks: The distinct masks, stripped, see `MarkedLines`.
+        masks: The distinct masks, stripped, see `ScannedLines`.
         shape: Index into `masks`, (n,).
         line: Physical line, (n,).
         first: CSR offsets into the numbers, (n + 1,).
@@ -210,11 +209,7 @@ def with_block_rows(rows: LogicalRows) -> LogicalRows:
     )
 
 
-# All lines of a file, read piece by piece.
-
-"""Whole numbers, as short as the length of the file allows: there are millions."""
-
-_PIECE = 1 << 18  # bytes masked at once: array passes that fit the cache
+# All lines of a file.
 
 
 @dataclass(frozen=True)
@@ -260,147 +255,30 @@ class Lines:
                 yield row + 1, found.group(1).decode("latin-1")
 
 
-def read_lines(source: Source, each: Map = map) -> Lines:
+def read_lines(source: Source) -> Lines:
     """Split a source into logical lines with masked numbers.
-
-    Args:
-        source: The text.
-        each: How the pieces of a long text are read.
 
     Raises:
         ProgramError: A string does not end on its line.
     """
-    data = source.data
-    if data.startswith(b"\xef\xbb\xbf"):
-        data = b"   " + data[3:]  # a byte order mark is no code
-    ids, names = Interned[bytes](), Interned[str]()
-    pieces: list[_Piece] = []
-    tasks = list(_tasks(source))
-    read = each(lambda task: _read(data, source.line_starts, *task), tasks)
-    for (rows, _), piece in zip(tasks, read, strict=True):
-        if piece.unterminated:
-            _refuse(source, rows.start + 1 + piece.unterminated[0])
-        pieces.append(
-            replace(
-                piece,
-                shape=ids.of(piece.masks)[piece.shape],
-                name=names.of(piece.names),
-                names=(),
-            )
+    found = scan_lines(source.data, source.line_starts)
+    if found.unterminated:
+        raise ProgramError(
+            source.name,
+            "a string is not terminated",
+            "Close it with an apostrophe on the same line.",
+            line=1 + found.unterminated[0],
         )
-    return _logical(source, tuple(ids), names, _merged(pieces))
-
-
-def _refuse(source: Source, line: int) -> None:
-    raise ProgramError(
-        source.name,
-        "a string is not terminated",
-        "Close it with an apostrophe on the same line.",
-        line=line,
-    )
-
-
-def _tasks(source: Source) -> Iterator[tuple[slice, slice]]:
-    """Cut a text into pieces that start and end with lines: lines and bytes."""
-    starts, size = source.line_starts, len(source.data)
-    at = 0
-    while at < size:
-        row = int(np.searchsorted(starts, at))
-        last = int(np.searchsorted(starts, at + _PIECE))
-        end = int(starts[last]) if last < len(starts) else size
-        yield slice(row, last), slice(at, end)
-        at = end
-
-
-@dataclass(frozen=True)
-class _Piece:
-    """The n physical lines of a piece of a file, or of all of it.
-
-    Attributes:
-        masks: Their distinct masks, see `MarkedLines`.
-        shape: Index into `masks`, (n,).
-        comment: As in `Lines`.
-        first: CSR offsets into the numbers, (n + 1,).
-        start: Byte offsets of the numbers in the file, (m,).
-        end: Where they end, (m,).
-        value: What they are worth, (m,).
-        names: The names that are taken out of the masks, in order.
-        name: Their numbers, the same for the same name, (p,).
-        name_first: CSR offsets into them, (n + 1,).
-        unterminated: As in `MaskedLines`.
-    """
-
-    masks: tuple[bytes, ...]
-    shape: Indices
-    comment: Indices
-    first: Indices
-    start: Indices
-    end: Indices
-    value: Floats
-    names: Sequence[str]
-    name: Indices
-    name_first: Indices
-    unterminated: tuple[int, ...]
-
-
-def _read(data: bytes, starts: Indices, lines: slice, place: slice) -> _Piece:
-    """Read a piece of a text; offsets are counted from the beginning of the text."""
-    marked = mark_lines(data[place], starts[lines] - place.start)
-    piece, at = marked.masked, place.start
-    short = np.int32 if len(data) < 2**31 else np.int64
-    ids = Interned[bytes]()
-    shape = ids.of(piece.masks)
-    return _Piece(
-        tuple(ids),
-        shape,
-        np.where(piece.comment >= 0, piece.comment + at, -1).astype(short),
-        piece.first,
-        (piece.start + at).astype(short),
-        (piece.end + at).astype(short),
-        piece.value,
-        marked.name,
-        np.zeros(0, dtype=np.int32),
-        marked.name_first,
-        piece.unterminated,
-    )
-
-
-def _merged(pieces: list[_Piece]) -> _Piece:
-    def together(name: str) -> Any:
-        return np.concatenate([getattr(piece, name) for piece in pieces])
-
-    return _Piece(
-        (),
-        together("shape"),
-        together("comment"),
-        _offsets([piece.first for piece in pieces]),
-        together("start"),
-        together("end"),
-        together("value"),
-        (),
-        together("name"),
-        _offsets([piece.name_first for piece in pieces]),
-        (),
-    )
-
-
-def _offsets(parts: list[Indices]) -> Indices:
-    """Put CSR offsets one behind the other."""
-    begin = np.cumsum([0, *(int(part[-1]) for part in parts)])
-    moved = [part[:-1] + own for part, own in zip(parts, begin, strict=False)]
-    return np.concatenate([*moved, begin[-1:]])
-
-
-def _logical(
-    source: Source, masks: tuple[bytes, ...], names: Interned[str], found: _Piece
-) -> Lines:
-    """Join the continued lines and drop the empty ones."""
-    code = np.array([*map(bool, map(stripped, masks))], dtype=bool)
+    # Continued lines are joined and empty ones dropped.
+    code = np.array([*map(bool, map(stripped, found.masks))], dtype=bool)
     rows = np.flatnonzero(code[found.shape])
     at = found.name_first[rows]
-    joined = join(masks, found.shape[rows], Names(at, found.name, tuple(names)))
-    kept, short = rows[joined.rows], found.start.dtype
-    first = np.append(found.first[kept], len(found.start)).astype(short)
+    names = Interned[str](found.names)
+    joined = join(
+        found.masks, found.shape[rows], Names(at, found.name, tuple(found.names))
+    )
+    kept = rows[joined.rows]
+    first = np.append(found.first[kept], np.int32(len(found.start)))
     lines = with_block_rows(
         LogicalRows(joined.masks, joined.shape, kept + 1, first, at[joined.rows])
     )
@@ -408,8 +286,8 @@ def _logical(
     return Lines(
         source,
         shapes,
-        shape.astype(short),
-        lines.line.astype(short),
+        shape.astype(np.int32),
+        lines.line.astype(np.int32),
         lines.first,
         found.start,
         found.end,

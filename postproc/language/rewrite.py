@@ -8,11 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from postproc.arrays import Bytes, Floats, Indices, Ints, chunks
-from postproc.byte_columns import as_texts, fixed
+from postproc import _native
+from postproc.arrays import Bytes, Floats, Indices, Ints, chunks, floats
 from postproc.exceptions import ProgramError
 from postproc.language.lines import Lines, read_lines
-from postproc.language.scan import read_numbers
 from postproc.language.shapes import Shapes
 from postproc.language.source import Replacements, Source, apply
 from postproc.language.visits import Literals
@@ -154,7 +153,6 @@ def _first_difference(meant: bytes, after: Source, stamp: int) -> str:
 Texts = NDArray[np.bytes_]
 
 MM_DECIMALS, DEGREE_DECIMALS, JOINT_DECIMALS = 3, 4, 5
-_PIECE = 100_000  # numbers rewritten at a time
 _POSE_DECIMALS = (MM_DECIMALS,) * 3 + (DEGREE_DECIMALS,) * 3
 _JOINT_DECIMALS = (JOINT_DECIMALS,) * 6
 
@@ -165,17 +163,12 @@ def number_texts(values: Floats, decimals: Ints) -> Texts:
     >>> number_texts(np.array([12.34567, -0.00001]), np.array([3, 4])).tolist()
     [b'12.346', b'0.0000']
     """
-    groups = [np.flatnonzero(decimals == d) for d in np.unique(decimals).tolist()]
-    written = []
-    for rows in groups:
-        column = fixed(values[rows], int(decimals[rows[0]]))
-        nought = ~((column > ord("0")) & (column <= ord("9"))).any(axis=1)
-        column[nought & (column[:, 0] == ord("-")), 0] = 0
-        written.append(as_texts(column))
-    texts = np.zeros(len(values), np.result_type("S1", *written))
-    for rows, own in zip(groups, written, strict=True):
-        texts[rows] = own
-    return texts
+    return _as_texts(_native.write_numbers(floats(values), decimals.astype(np.int64)))
+
+
+def _as_texts(rows: Bytes) -> Texts:
+    """See rows of bytes, filled up with NUL, as texts."""
+    return np.asarray(rows.view(f"S{rows.shape[1]}")[:, 0])
 
 
 def edits(
@@ -187,7 +180,7 @@ def edits(
     """Return the edits that give literals new values, file by file.
 
     A number is edited only where it changes by more than half of its last digit as it
-    will be written.
+    will be written; a plus that it began with stays.
 
     Args:
         literals: Where the numbers stand.
@@ -212,31 +205,9 @@ def edits(
         order = np.argsort(start[written], kind="stable")
         start, end = start[written][order], end[written][order]
         values, least = new_values[mine][written][order], least[written][order]
-        parts = [
-            _edits_of(source, start[some], end[some], values[some], least[some])
-            for some in chunks(len(start), _PIECE)
-        ]
-        found.append(Replacements.joined(parts))
+        changed, new = _native.rewrite_numbers(
+            source.data, start.astype(np.int64), end.astype(np.int64),
+            floats(values), least.astype(np.int64),
+        )  # fmt: skip
+        found.append(Replacements(start[changed], end[changed], _as_texts(new)))
     return tuple(found)
-
-
-def _edits_of(
-    source: Source, start: Ints, end: Ints, values: Floats, least: Ints
-) -> Replacements:
-    """Return the edits of one file's numbers, which are in ascending order."""
-    before, had = read_numbers(source.data, start, end)
-    digits = np.maximum(had, least)
-    rows = np.flatnonzero(~(np.abs(values - before) <= 0.5 * 10.0**-digits))
-    new = number_texts(values[rows], digits[rows])
-    new = _with_plus(new, np.frombuffer(source.data, dtype=np.uint8)[start[rows]])
-    other = new.astype(float) != before[rows]
-    return Replacements(start[rows[other]], end[rows[other]], new[other])
-
-
-def _with_plus(new: Texts, before: Bytes) -> Texts:
-    """Keep the plus that numbers began with, where they are not below zero."""
-    rows = (before == ord("+")) & ~np.char.startswith(new, b"-")
-    if not rows.any():
-        return new
-    signed: Texts = np.where(rows, np.char.add(b"+", new), new)
-    return signed

@@ -13,6 +13,7 @@ from typing import NamedTuple, overload
 import numpy as np
 from numpy.typing import NDArray
 
+from postproc import _native
 from postproc.arrays import Ints, chunks
 from postproc.exceptions import FileError, PostprocError, ProgramError
 
@@ -217,12 +218,7 @@ class Source:
     @cached_property
     def line_starts(self) -> NDArray[np.int64]:
         """Return the offsets at which lines start, (n,); CR, LF and CRLF end a line."""
-        a = np.frombuffer(self.data, dtype=np.uint8)
-        feeds, returns = np.flatnonzero(a == 10), np.flatnonzero(a == 13)
-        following = a[np.minimum(returns + 1, len(a) - 1)]
-        ends = np.concatenate([feeds, returns[following != 10]])
-        ends.sort()
-        return np.concatenate([[0], ends[ends < len(a) - 1] + 1]).astype(np.int64)
+        return _native.line_starts(self.data)
 
     @cached_property
     def newline(self) -> bytes:

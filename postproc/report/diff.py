@@ -15,7 +15,7 @@ from typing import NamedTuple, Self
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
-from postproc.arrays import Bools, Bytes, Floats, Interned, Ints, chunks
+from postproc.arrays import Bools, Floats, Interned, Ints, chunks
 from postproc.compensation.outcome import (
     LEFT_ALONE,
     LineOutcomes,
@@ -26,20 +26,7 @@ from postproc.compensation.parallel import in_background, parallel_map
 from postproc.exceptions import ProgramError
 from postproc.files import find_variables, is_variables
 from postproc.language.pdl2.names import entry_names
-from postproc.language.scan import (
-    BLANKS,
-    MaskedLines,
-    PlainNumbers,
-    in_code,
-    line_of,
-    mask_lines,
-    numeric_bytes,
-    plain_numbers,
-    quotes_and_comments,
-    runs_of,
-    values,
-    with_signs,
-)
+from postproc.language.scan import BLANKS, ScannedLines, mask_of, scan_lines
 from postproc.language.stamp import read_stamp
 
 # Rows of `diff` as columns: no object a line, whatever the length of a program.
@@ -186,167 +173,9 @@ def joined_rows(file: str, parts: Sequence[DiffRows]) -> DiffRows:
     )
 
 
-# Pairs of lines whose numbers stand at the same places: read without their shapes.
-#
-# What is not a digit or a dot is compared as it is; then every run of digits of one
-# line has its partner in the other, and strings, comments and signs have to be looked
-# for in one of both only. Lines with other blanks or signs, or with anything that
-# `mask_lines` leaves to `mask_line`, are not told alike here, which does not say that
-# they are not.
-
-LONGEST = 24  # digits outside of numbers that are compared; longer: not told alike
-
-
-@dataclass(frozen=True)
-class Pairs:
-    """Pairs of lines and the numbers on those that are alike (structure of arrays).
-
-    Attributes:
-        alike: Lines that are known to differ in nothing but numbers, (n,).
-        owner: Line of every number, ascending, (m,).
-        old, new: The numbers, (m,).
-        place: Where they start in the first line of their pair, (m,).
-    """
-
-    alike: Bools
-    owner: Ints
-    old: Floats
-    new: Floats
-    place: Ints
-
-    def with_more(self, rows: Ints, more: Pairs) -> Pairs:
-        """Add what a closer look has found on some lines that are not alike here."""
-        alike = self.alike.copy()
-        alike[rows] = more.alike
-        owner = np.concatenate([self.owner, rows[more.owner]])
-        order = np.argsort(owner, kind="stable")
-        columns = ("old", "new", "place")
-        both = [np.append(getattr(self, c), getattr(more, c))[order] for c in columns]
-        return Pairs(alike, owner[order], *both)
-
-
-@dataclass(frozen=True)
-class _Text:
-    """Lines as one text, and its runs of digits and dots.
-
-    Attributes:
-        a: The bytes; every line ends with a line feed.
-        line: Where its lines begin, (n,).
-        start, end: Its runs, (r,).
-        rest: The bytes with one NUL in the place of every run.
-    """
-
-    a: Bytes
-    line: Ints
-    start: Ints
-    end: Ints
-    rest: Bytes
-
-    @classmethod
-    def of(cls, lines: Sequence[bytes]) -> Self:
-        """Join lines."""
-        a = np.frombuffer(b"\n".join([*lines, b""]), dtype=np.uint8)
-        line = np.append(0, np.flatnonzero(a == 10)[:-1] + 1)
-        numeric = numeric_bytes(a)
-        start, end = runs_of(numeric)
-        rest = a.copy()
-        rest[start] = 0
-        numeric[start] = False
-        return cls(a, line, start, end, rest[~numeric])
-
-    @property
-    def marked(self) -> bool:
-        """Tell whether every NUL in what is left of it stands for a run."""
-        return bool((self.a != 0).all())
-
-    def on(self, lines: Bools) -> Self:
-        """Return the runs on some lines only."""
-        mine = lines[line_of(self.line, self.start)]
-        return replace(self, start=self.start[mine], end=self.end[mine])
-
-
-def pair_numbers(before: Sequence[bytes], after: Sequence[bytes]) -> Pairs:
-    """Read the numbers of pairs of lines.
-
-    Args:
-        before: Lines without their endings, at least one.
-        after: As many.
-    """
-    a, b = _Text.of(before), _Text.of(after)
-    if not (a.marked and b.marked):
-        none, ints = np.empty(0), np.empty(0, dtype=np.int64)
-        return Pairs(np.zeros(len(before), dtype=bool), ints, none, none, ints)
-    if np.array_equal(a.rest, b.rest):
-        return _read(a, b, np.ones(len(before), dtype=bool))
-    same = _same_lines(a.rest, b.rest)
-    return _read(a.on(same), b.on(same), same)
-
-
-def _same_lines(a: Bytes, b: Bytes) -> Bools:
-    """Tell which of equally many lines, each with its line feed, are the same."""
-    lengths = [np.diff(np.flatnonzero(text == 10), prepend=-1) for text in (a, b)]
-    same: Bools = lengths[0] == lengths[1]
-    if not same.all():
-        both = zip((a, b), lengths, strict=True)
-        a, b = (text[np.repeat(same, length)] for text, length in both)
-    lines, ends = np.flatnonzero(same), np.cumsum(lengths[0][same])
-    same[lines[np.searchsorted(ends, np.flatnonzero(a != b), side="right")]] = False
-    return same
-
-
-def _read(a: _Text, b: _Text, alike: Bools) -> Pairs:
-    """Read the numbers on lines whose runs have partners."""
-    quotes, comment, odd = quotes_and_comments(a.a, a.line)
-    odd |= ~alike
-    code = np.flatnonzero(in_code(a.start, quotes, comment, a.line))
-    runs = plain_numbers(a.a, a.start[code], a.end[code])
-    others = plain_numbers(b.a, b.start[code], b.end[code])
-    unsure = runs.odd | others.odd | (runs.number != others.number)
-    odd[line_of(a.line, runs.first[unsure])] = True
-    bare = np.ones(len(a.start), dtype=bool)
-    bare[code[runs.number]] = False
-    other = np.flatnonzero(bare)
-    changed = other[~_same_runs(a, b, other)]
-    odd[line_of(a.line, a.start[changed])] = True
-    runs, others = runs.take(runs.number), others.take(runs.number)
-    start, far = with_signs(a.a, runs.first)
-    odd[line_of(a.line, far)] = True
-    return _numbers(a, b, runs, others, start, odd)
-
-
-def _numbers(
-    a: _Text,
-    b: _Text,
-    runs: PlainNumbers,
-    others: PlainNumbers,
-    start: Ints,
-    odd: Bools,
-) -> Pairs:
-    """Read the numbers on lines that are not odd."""
-    owner = line_of(a.line, start)
-    plain = ~odd[owner]
-    if not plain.all():
-        runs, others = runs.take(plain), others.take(plain)
-        start, owner = start[plain], owner[plain]
-    partner = others.first - (runs.first - start)  # the same sign, as far before it
-    old, new = values(a.a, runs, start), values(b.a, others, partner)
-    return Pairs(~odd, owner, old, new, start - a.line[owner])
-
-
-def _same_runs(a: _Text, b: _Text, some: Ints) -> Bools:
-    """Tell which of some runs are the same bytes in both texts."""
-    start, other = a.start[some], b.start[some]
-    length = a.end[some] - start
-    same: Bools = (length == b.end[some] - other) & (length <= LONGEST)
-    for k in range(int(length[same].max(initial=0))):
-        at = np.flatnonzero(same & (k < length))
-        same[at] = a.a[start[at] + k] == b.a[other[at] + k]
-    return same
-
-
 # Lines of the same two places in two files: which numbers differ, or what more.
 
-PIECE = 5_000  # lines that are masked at a time
+PIECE = 50_000  # lines that are compared at a time
 WIDEST = 64  # bytes of beginnings that are compared; wider: line by line
 
 _ASSIGNED = re.compile(r"\s*([A-Za-z_$][\w$.\[\]]*)\s*(?::=|:)")
@@ -392,10 +221,6 @@ def _compare(
     if not len(lines):
         return joined_rows(file, ())
     pairs = pair_numbers(before, after)
-    rest = np.flatnonzero(~pairs.alike)
-    if len(rest):
-        own = [[texts[k] for k in rest.tolist()] for texts in (before, after)]
-        pairs = pairs.with_more(rest, _by_shapes(*own))
     differ = pairs.owner[pairs.old != pairs.new]
     moved = np.bincount(differ, minlength=len(lines)) > 0
     mine = moved[pairs.owner]
@@ -412,33 +237,63 @@ def _compare(
     return DiffRows(file, lines, names, target, first, old, new, change, has, texts)
 
 
-def _by_shapes(before: Sequence[bytes], after: Sequence[bytes]) -> Pairs:
-    """Read the numbers of pairs of lines that have the same shape."""
-    a, b = _masked(before), _masked(after)
-    count = np.diff(a.first)
-    alike = _only_numbers(before, after, a, b) & (count == np.diff(b.first))
-    mine, own = (np.repeat(alike, np.diff(m.first)) for m in (a, b))
-    owner = np.repeat(np.arange(len(before)), count)[mine]
-    place = a.start[mine] - _starts(before)[owner]
-    return Pairs(alike, owner, a.value[mine], b.value[own], place)
+@dataclass(frozen=True)
+class Pairs:
+    """Pairs of lines and the numbers on those that are alike (structure of arrays).
+
+    Attributes:
+        alike: Lines that differ in nothing but numbers, (n,).
+        owner: Line of every number, ascending, (m,).
+        old, new: The numbers, (m,).
+        place: Where they start in the first line of their pair, (m,).
+    """
+
+    alike: Bools
+    owner: Ints
+    old: Floats
+    new: Floats
+    place: Ints
 
 
-def _only_numbers(
-    before: Sequence[bytes], after: Sequence[bytes], a: MaskedLines, b: MaskedLines
-) -> Bools:
-    """Tell which pairs of lines differ in nothing but numbers."""
-    same = np.array([x == y for x, y in zip(a.masks, b.masks, strict=True)])
-    if (a.comment >= 0).any() or (b.comment >= 0).any():
-        comments = zip(_comments(before, a), _comments(after, b), strict=True)
-        same &= np.array([x == y for x, y in comments])
-    same[[*a.unterminated, *b.unterminated]] = False
+def pair_numbers(before: Sequence[bytes], after: Sequence[bytes]) -> Pairs:
+    """Read the numbers of pairs of lines that have the same shape.
+
+    Args:
+        before: Lines without their endings.
+        after: As many.
+    """
+    lines, n = [*before, *after], len(before)
+    starts = _starts(lines)
+    found = scan_lines(b"\n".join([*lines, b""]), starts)
+    alike = _only_numbers(lines, starts, found)
+    count = np.diff(found.first)
+    alike &= count[:n] == count[n:]
+    (a, b), cut = (np.repeat(alike, c) for c in (count[:n], count[n:])), found.first[n]
+    owner = np.repeat(np.arange(n), count[:n])[a]
+    place = found.start[:cut][a] - starts[owner]
+    return Pairs(alike, owner, found.value[:cut][a], found.value[cut:][b], place)
+
+
+def _only_numbers(lines: list[bytes], starts: Ints, found: ScannedLines) -> Bools:
+    """Tell which lines of the first half are those of the second but for numbers."""
+    n = len(lines) // 2
+    same: Bools = found.shape[:n] == found.shape[n:]
+    said, cut = np.diff(found.name_first), found.name_first[n]
+    mine, other = np.repeat(same, said[:n]), np.repeat(same, said[n:])
+    differ = found.name[:cut][mine] != found.name[cut:][other]
+    same[np.repeat(np.arange(n), said[:n])[mine][differ]] = False
+    told = (found.comment >= 0).reshape(2, n).any(axis=0)
+    for k in np.flatnonzero(same & told).tolist():
+        before, after = (_comment(lines, starts, found, at) for at in (k, n + k))
+        same[k] = before == after
+    same[[k % n for k in found.unterminated]] = False
     return same
 
 
-def _comments(lines: Sequence[bytes], masked: MaskedLines) -> list[bytes]:
-    """Return the comment of every line, b"" where it has none."""
-    places = zip(lines, masked.comment - _starts(lines), masked.comment, strict=True)
-    return [line[own:] if at >= 0 else b"" for line, own, at in places]
+def _comment(lines: list[bytes], starts: Ints, found: ScannedLines, k: int) -> bytes:
+    """Return the comment of a line, b"" where it has none."""
+    at = int(found.comment[k])
+    return lines[k][at - int(starts[k]) :] if at >= 0 else b""
 
 
 def _changes(
@@ -526,14 +381,16 @@ def _starts(lines: Sequence[bytes]) -> Ints:
     return np.cumsum([0, *map(len, lines[:-1])]) + np.arange(len(lines))
 
 
-def _masked(lines: Sequence[bytes]) -> MaskedLines:
-    """Mask lines without their endings; at least one."""
-    return mask_lines(b"\n".join([*lines, b""]), _starts(lines))
-
-
-def shapes(lines: Sequence[bytes]) -> list[bytes]:
-    """Return the masks of all lines."""
-    return _masked(lines).masks if lines else []
+def shapes(lines: Sequence[bytes]) -> list[str]:
+    """Return the masks of all lines, with their names."""
+    found = scan_lines(b"\n".join([*lines, b""]), _starts(lines))
+    masks = [mask.decode("latin-1") for mask in found.masks]
+    ends = found.name_first.tolist()
+    names = [found.names[k] for k in found.name.tolist()]
+    return [
+        mask_of(masks[shape], tuple(names[a:b]))
+        for shape, a, b in zip(found.shape.tolist(), ends, ends[1:], strict=False)
+    ]
 
 
 # The lines of a long file, cut out of its bytes where they are asked for.

@@ -1,12 +1,14 @@
-"""Numbers written and read by arrays are those that Python writes and reads."""
+"""Numbers are written and rewritten as Python writes and reads them."""
 
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from postproc import _native
 from postproc.language.rewrite import number_texts
-from postproc.language.scan import decimals_of, number_value, read_numbers
 from postproc.language.source import Edit, Replacements, Span, apply
+from tests.reference.text import decimals_of, number_value
 
 VALUES = st.floats(-1e9, 1e9) | st.integers(-10_000, 10_000).map(lambda k: k / 2000)
 WORDS = (
@@ -29,22 +31,34 @@ def test_numbers_are_written_as_python_writes_them(rows):
     assert found == [number_text(v, d) for v, d in rows]
 
 
-@given(st.lists(st.sampled_from(WORDS) | VALUES.map("{:.3f}".format), max_size=20))
-def test_numbers_are_read_at_their_places(words):
+@given(
+    st.lists(st.sampled_from(WORDS) | VALUES.map("{:.3f}".format), max_size=20),
+    st.sampled_from([0.7, 1e-4, 0.0]),
+    st.integers(0, 4),
+)
+def test_numbers_are_rewritten_with_their_decimals(words, step, least):
     data = f"({', '.join(words)})".encode()
     start = 1 + np.cumsum([0, *(len(w) + 2 for w in words)])[:-1]
     end = start + np.array([len(w) for w in words], dtype=np.int64)
-    values, decimals = read_numbers(data, start, end)
-    assert values.tolist() == [number_value(w) for w in words]
-    assert decimals.tolist() == [decimals_of(w) for w in words]
+    old = np.array([number_value(w) for w in words], dtype=float)
+    new, atleast = old + step, np.full(len(old), least)
+    rows, texts = _native.rewrite_numbers(data, start, end, new, atleast)
+    found = {int(row): bytes(text).rstrip(b"\0") for row, text in zip(rows, texts)}  # noqa: B905
+    for k, word in enumerate(words):
+        decimals = max(decimals_of(word), least)
+        text = number_text(new[k], decimals)
+        if abs(new[k] - old[k]) <= 0.5 * 10.0**-decimals or float(text) == old[k]:
+            assert k not in found
+        else:
+            plus = "+" * (word[0] == "+" and text[0] != "-")
+            assert found[k].decode() == plus + text
 
 
-def test_a_part_of_something_is_read_by_itself():
-    data = b"1..2 x5 4 .5"
-    start, end = np.array([0, 3, 6, 8, 10]), np.array([1, 4, 7, 9, 12])
-    values, decimals = read_numbers(data, start, end)
-    assert values.tolist() == [1, 2, 5, 4, 0.5]
-    assert decimals.tolist() == [0, 0, 0, 0, 1]
+def test_numbers_outside_of_a_text_are_refused():
+    one, least = np.array([0]), np.array([3])
+    for start, end in ((5, 9), (-1, 2), (3, 2)):
+        with pytest.raises(IndexError):
+            _native.rewrite_numbers(b"1.5", one + start, one + end, one + 0.5, least)
 
 
 @given(st.data())

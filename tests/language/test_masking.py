@@ -1,4 +1,4 @@
-"""The array passes agree with the definition of `mask_line`, line by line."""
+"""Whole files are scanned as the definition masks them, line by line."""
 
 import re
 
@@ -9,8 +9,9 @@ from hypothesis import strategies as st
 
 from postproc.exceptions import ProgramError
 from postproc.language.lines import read_lines
-from postproc.language.scan import mask_line, mask_lines, number_value
+from postproc.language.scan import NAME_MARK, WHOLE, scan_lines
 from postproc.language.source import Source, source_from_bytes
+from tests.reference.text import form_of, mask_line, number_value
 
 PIECES = (
     "1 0 9 . - , ( ) [ ] { } : = * ' \" \\ x e E $ -- .. TO 5.25 -0.5 0x3F 1..n "
@@ -18,7 +19,27 @@ PIECES = (
 ).split()
 TEXT = st.lists(
     st.sampled_from(
-        [*PIECES, " ", " " * 7, " " * 70, "\t", "\n", "\r\n", "\r", "\x1a", "\xe9"]
+        [
+            *PIECES,
+            " ",
+            " " * 7,
+            " " * 70,
+            "\t",
+            "\n",
+            "\r\n",
+            "\r",
+            "\x1a",
+            "\xe9",
+            "p1",
+            "$q2",
+            "l3 ::",
+            "\xb2",
+            "\x01",
+            "0o17",
+            "0b1",
+            "1.e5",
+            "x0x1",
+        ]
     ),
     min_size=1,
     max_size=40,
@@ -30,10 +51,10 @@ TEXT = st.lists(
 @example(["'", "\\", "'"])
 @example(["{", " " * 7, "-", "1"])
 @example(["{", " " * 70, "-", " " * 70, "1"])
-def test_arrays_agree_with_lines(parts: list[str]) -> None:
+def test_files_are_scanned_as_lines_are_masked(parts: list[str]) -> None:
     data = "".join(parts).encode("latin-1")
     starts = Source("x", data).line_starts
-    masked = mask_lines(data, starts)
+    masked = scan_lines(data, starts)
     lines = re.split(rb"\r\n|\n|\r", data)
     if not lines[-1] and len(lines) > 1:
         lines.pop()
@@ -41,7 +62,12 @@ def test_arrays_agree_with_lines(parts: list[str]) -> None:
         wanted = mask_line(line.decode("latin-1"))
         at = int(starts[row])
         mine = slice(masked.first[row], masked.first[row + 1])
-        assert masked.masks[row].decode("latin-1") == wanted.mask
+        form, names = form_of(wanted.mask)
+        if NAME_MARK in wanted.mask:
+            form = WHOLE.decode() + wanted.mask
+        assert masked.masks[masked.shape[row]].decode("latin-1") == form
+        own = masked.name[masked.name_first[row] : masked.name_first[row + 1]]
+        assert tuple(masked.names[k] for k in own) == names
         assert (masked.start[mine] - at).tolist() == list(wanted.start)
         assert (masked.end[mine] - at).tolist() == list(wanted.end)
         assert masked.comment[row] == (
@@ -58,7 +84,7 @@ def test_arrays_agree_with_lines(parts: list[str]) -> None:
 def test_values_are_read_as_python_reads_them(value: float, decimals: int) -> None:
     text = f"{value:.{decimals}f}"
     data = f"p := {text}\n".encode()
-    assert mask_lines(data, np.array([0])).value.tolist() == [float(text)]
+    assert scan_lines(data, np.array([0])).value.tolist() == [float(text)]
 
 
 @pytest.mark.parametrize(
@@ -80,7 +106,23 @@ def test_what_a_number_is(line: str, numbers: list[str]) -> None:
     assert [line[a:b] for a, b in spans] == numbers
 
 
-def test_a_file_in_pieces_is_one_file() -> None:
+@pytest.mark.parametrize(
+    "text",
+    ["0x" + "F" * 40, "-0b" + "10" * 90, "0o" + "7" * 70, "9" * 400, "1e400", "1e-400",
+     "0.1000000000000000055511151231257827", "123456789012345678", "00012.50", "1.e5"],
+)  # fmt: skip
+def test_long_numbers_are_read_as_python_reads_them(text: str) -> None:
+    (value,) = scan_lines(f"x({text})".encode(), np.array([0])).value.tolist()
+    assert value == number_value(text)
+
+
+def test_lines_that_are_not_there_are_refused() -> None:
+    for starts in ([0, 9], [3, 1], [-1]):
+        with pytest.raises(IndexError):
+            scan_lines(b"abc", np.array(starts))
+
+
+def test_a_long_file_is_one_file() -> None:
     line = b"  MOVE LINEAR TO POS(1.5, -2.25, 3, 4, 5, 6, '') -- 7\r\n"
     count = 3 * (1 << 20) // len(line)
     lines = read_lines(source_from_bytes("x", line * count))

@@ -6,15 +6,10 @@ import numpy as np
 import pytest
 
 from postproc.language.lines import Lines, read_lines
-from postproc.language.scan import (
-    NAME_MARK,
-    WHOLE,
-    form_of,
-    mark_lines,
-    mask_line,
-    mask_of,
-)
+from postproc.language.scan import NAME_MARK, form_of, mask_of, scan_lines
 from postproc.language.source import Source, source_from_bytes
+from tests.reference import text as plain
+from tests.reference.text import mask_line
 
 PIECES = (
     "MOVE TO WP_1 p2 _a3b x $v1 a$b2 weld l1:: 7up 'p3' '\\'q4' \"r5\" :: , := ( ) [ ] "
@@ -34,18 +29,19 @@ def text(rng: random.Random, lines: int) -> bytes:
 
 def test_whole_files_are_read_as_line_by_line() -> None:
     data = text(random.Random(8), 4000)
-    marked = mark_lines(data, Source("x", data).line_starts)
-    masks, first = marked.masked.masks, marked.name_first
+    found = scan_lines(data, Source("x", data).line_starts)
     taken = 0
     for row, line in enumerate(data.split(b"\n")):
         wanted = mask_line(line.decode("latin-1")).mask
-        names = tuple(marked.name[first[row] : first[row + 1]])
-        if masks[row][:1] == WHOLE:
-            assert masks[row][1:].decode("latin-1") == wanted and not names
-        else:
-            assert (masks[row].decode("latin-1"), names) == form_of(wanted)
-            assert mask_of(*form_of(wanted)) == wanted
-            taken += len(names)
+        assert form_of(wanted) == plain.form_of(wanted)
+        if NAME_MARK in wanted:
+            continue
+        own = found.name[found.name_first[row] : found.name_first[row + 1]]
+        names = tuple(found.names[k] for k in own)
+        mask = found.masks[found.shape[row]].decode("latin-1")
+        assert (mask, names) == plain.form_of(wanted)
+        assert mask_of(*form_of(wanted)) == wanted
+        taken += len(names)
     assert taken > 300
 
 

@@ -8,7 +8,6 @@ from hypothesis import strategies as st
 from postproc.language.pdl2.interpreter import resolve
 from postproc.language.pdl2.program import parse
 from postproc.language.rewrite import difference, edits, number_texts
-from postproc.language.scan import decimals_of
 from postproc.language.source import (
     Edit,
     Replacements,
@@ -17,6 +16,7 @@ from postproc.language.source import (
     apply,
     source_from_bytes,
 )
+from tests.reference.text import decimals_of
 
 PROGRAM = (
     "PROGRAM a -- caf\xe9\r\n"

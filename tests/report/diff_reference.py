@@ -9,9 +9,9 @@ from collections.abc import Sequence
 from typing import TextIO
 
 from postproc.exceptions import printable
-from postproc.language.scan import mask_line, number_value
 from postproc.report.diff import DiffRow, target_name
 from postproc.report.terminal import MEASURED, arrows
+from tests.reference.text import mask_line, number_value
 
 ASSIGNED = re.compile(r"\s*([A-Za-z_$][\w$.\[\]]*)\s*(?::=|:)")
 LED = re.compile(r"(?:ELSE\s*:|CASE\s*\([^()]*\)\s*:|\w+\s*::)(.*)", re.S)

@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 
 from postproc.compensation.outcome import LineOutcomes, Status
-from postproc.language.scan import mask_line, number_value
 from postproc.report.diff import (
     Difference,
     DiffRow,
@@ -22,6 +21,7 @@ from postproc.report.diff import (
     pair_numbers,
 )
 from postproc.report.diff_output import difference_pieces, print_difference
+from tests.reference.text import mask_line, number_value
 from tests.report.diff_reference import json_of, list_rows, rows_of
 
 LINES = (

@@ -11,7 +11,7 @@ from itertools import repeat
 
 import numpy as np
 
-from postproc.arrays import Bools, Ints, Map
+from postproc.arrays import Bools, Ints
 from postproc.language.lines import Lines, read_lines
 from postproc.language.pdl2 import syntax as ast
 from postproc.language.pdl2.parser import parse_form
@@ -575,19 +575,18 @@ class _Reader:
             self.scopes[-1] = _Scope(variables=scope.variables)
 
 
-def parse(source: Source, each: Map = map) -> Program:
+def parse(source: Source) -> Program:
     """Parse a PDL2 program: every distinct shape of line once.
 
     Lines that the grammar does not know are kept and listed.
 
     Args:
         source: The program.
-        each: As in `read_lines`.
 
     Raises:
         ProgramError: A string does not end on its line.
     """
-    lines = read_lines(source, each)
+    lines = read_lines(source)
     statements = parse_shapes(lines.shapes, parse_form)
     taught = frozenset(line for line, _ in lines.marks("TAUGHT"))
     structural = statements.which(lambda said: not isinstance(said, _PLAIN))

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from postproc.arrays import Ints, Map
+from postproc.arrays import Ints
 from postproc.language.lines import Lines, read_lines
 from postproc.language.pdl2.entries import (
     NESTED,
@@ -64,17 +64,16 @@ class VariableFile:
         return self.lines.end
 
 
-def read_variables(source: Source, each: Map = map) -> VariableFile:
+def read_variables(source: Source) -> VariableFile:
     """Read a variable file; what is wrong in it is reported, not fatal.
 
     Args:
         source: The file.
-        each: As in `read_lines`.
 
     Raises:
         ProgramError: A string does not end on its line.
     """
-    lines = read_lines(source, each)
+    lines = read_lines(source)
     said = parse_shapes(lines.shapes, parse_value_form)
     head = last_head(lines, said)
     fields = find_fields(lines, said, head)

@@ -1,0 +1,207 @@
+//! Numbers in texts, read and written: `postproc.language.scan` and `.rewrite`.
+
+use std::fmt::Write;
+
+use numpy::ndarray::Array2;
+use numpy::{IntoPyArray, PyArray1, PyArray2, PyReadonlyArray1};
+use pyo3::exceptions::PyIndexError;
+use pyo3::prelude::*;
+use pyo3::types::PyBytes;
+
+use crate::rows::{each, flat, same_length};
+
+const EXACT: usize = 15; // digits of a number that is exact as a float
+const TENS: [f64; EXACT + 1] =
+    [1e0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9, 1e10, 1e11, 1e12, 1e13, 1e14, 1e15];
+
+/// Drop the sign of a number and the blanks behind it.
+fn unsigned(text: &[u8]) -> &[u8] {
+    let skipped = |b: &u8| matches!(*b, b'-' | b'+' | 1..=32 | 127);
+    &text[text.iter().take_while(|b| skipped(b)).count()..]
+}
+
+/// Return the value of a number as it is written, NaN where it is none.
+pub fn value_of(text: &[u8]) -> f64 {
+    let digits = unsigned(text);
+    let size = plain(digits).unwrap_or_else(|| match digits {
+        [b'0', b'x' | b'X', rest @ ..] => whole(rest, 16),
+        [b'0', b'o' | b'O', rest @ ..] => whole(rest, 8),
+        [b'0', b'b' | b'B', rest @ ..] => whole(rest, 2),
+        _ => std::str::from_utf8(digits).ok().and_then(|d| d.parse().ok()).unwrap_or(f64::NAN),
+    });
+    if text.first() == Some(&b'-') {
+        -size
+    } else {
+        size
+    }
+}
+
+/// Read few digits with at most one dot: an exact integer by an exact power of ten.
+fn plain(digits: &[u8]) -> Option<f64> {
+    let (mut value, mut count, mut after) = (0_u64, 0, None);
+    for byte in digits {
+        match byte {
+            b'0'..=b'9' => {
+                value = value * 10 + u64::from(byte - b'0');
+                count += 1;
+                if count > EXACT {
+                    return None;
+                }
+            }
+            b'.' if after.is_none() => after = Some(count),
+            _ => return None,
+        }
+    }
+    (count > 0).then(|| value as f64 / TENS[count - after.unwrap_or(count)])
+}
+
+/// Read a whole number to another base, rounded to the nearest float.
+fn whole(digits: &[u8], base: u32) -> f64 {
+    let (mut value, mut bits, mut rest) = (0_u128, 0_i32, false);
+    let step = base.trailing_zeros() as i32;
+    for byte in digits {
+        let Some(digit) = (*byte as char).to_digit(base) else { return f64::NAN };
+        if value >> 120 == 0 {
+            value = value << step | u128::from(digit);
+        } else {
+            (bits, rest) = (bits + step, rest || digit > 0); // only whether there is a rest
+        }
+    }
+    let rounded = (value | u128::from(rest)) as f64;
+    if digits.is_empty() {
+        f64::NAN
+    } else {
+        rounded * 2_f64.powi(bits)
+    }
+}
+
+/// Return how many decimals a number is written with.
+fn decimals_of(text: &[u8]) -> i64 {
+    let split = |at: u8| text.iter().position(|b| b.eq_ignore_ascii_case(&at));
+    if split(b'x').is_some() {
+        return 0;
+    }
+    let mantissa = &text[..split(b'e').unwrap_or(text.len())];
+    let written = mantissa.iter().rev().take_while(|b| **b != b'.').count();
+    let written = if mantissa.contains(&b'.') { written as i64 } else { 0 };
+    let exponent = split(b'e').map_or(0, |e| {
+        let text = std::str::from_utf8(&text[e + 1..]).unwrap_or("");
+        let far = if text.starts_with('-') { -i64::from(i32::MAX) } else { i64::from(i32::MAX) };
+        text.parse::<i32>().map_or(far, i64::from)
+    });
+    (written - exponent).max(0)
+}
+
+/// Numbers at places of a text.
+struct Places<'a> {
+    data: &'a [u8],
+    start: &'a [i64],
+    end: &'a [i64],
+}
+
+impl<'a> Places<'a> {
+    fn new(data: &'a [u8], start: &'a [i64], end: &'a [i64]) -> PyResult<Self> {
+        same_length(&[start.len(), end.len()])?;
+        let inside = |(a, b): (&i64, &i64)| 0 <= *a && a <= b && *b <= data.len() as i64;
+        if !start.iter().zip(end).all(inside) {
+            return Err(PyIndexError::new_err("a number that is not there"));
+        }
+        Ok(Places { data, start, end })
+    }
+
+    fn text(&self, i: usize) -> &'a [u8] {
+        &self.data[self.start[i] as usize..self.end[i] as usize]
+    }
+}
+
+type Column<'py, T> = Bound<'py, PyArray1<T>>;
+
+/// Write a number with so many decimals; a zero carries no sign.
+fn put_fixed(out: &mut String, value: f64, decimals: usize) {
+    let begin = out.len();
+    write!(out, "{value:.decimals$}").expect("a string takes all");
+    if out[begin..].starts_with('-') && !out[begin..].bytes().any(|b| (b'1'..=b'9').contains(&b)) {
+        out.remove(begin);
+    }
+}
+
+/// Texts one behind the other.
+#[derive(Default)]
+struct Texts {
+    all: String,
+    ends: Vec<usize>,
+}
+
+impl Texts {
+    /// Give texts to Python, each in a row filled up with NUL, (n, w).
+    fn rows<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<u8>> {
+        let begins = || std::iter::once(&0).chain(&self.ends);
+        let spans = || begins().zip(&self.ends).map(|(a, b)| &self.all.as_bytes()[*a..*b]);
+        let width = spans().map(<[u8]>::len).max().unwrap_or(0).max(1);
+        let mut out = vec![0_u8; width * self.ends.len()];
+        for (row, text) in out.chunks_exact_mut(width).zip(spans()) {
+            row[..text.len()].copy_from_slice(text);
+        }
+        Array2::from_shape_vec((self.ends.len(), width), out)
+            .expect("as many bytes as rows have")
+            .into_pyarray(py)
+    }
+}
+
+/// Write numbers with so many decimals each, (m,): rows filled up with NUL.
+#[pyfunction]
+pub fn write_numbers<'py>(
+    py: Python<'py>,
+    values: PyReadonlyArray1<'py, f64>,
+    decimals: PyReadonlyArray1<'py, i64>,
+) -> PyResult<Bound<'py, PyArray2<u8>>> {
+    let (values, decimals) = (flat(&values)?, flat(&decimals)?);
+    let n = same_length(&[values.len(), decimals.len()])?;
+    let mut texts = Texts::default();
+    each(py, n, |i| {
+        put_fixed(&mut texts.all, values[i], decimals[i].max(0) as usize);
+        texts.ends.push(texts.all.len());
+    })?;
+    Ok(texts.rows(py))
+}
+
+/// Write new values over numbers that stand at places of a text.
+///
+/// A number changes where its value does by more than half of its last digit as it will be
+/// written: with the decimals it had, or so many at least. A plus that it began with stays.
+///
+/// Returns: which numbers change, (k,), and their new texts: rows filled up with NUL.
+#[pyfunction]
+pub fn rewrite_numbers<'py>(
+    py: Python<'py>,
+    data: &Bound<'py, PyBytes>,
+    start: PyReadonlyArray1<'py, i64>,
+    end: PyReadonlyArray1<'py, i64>,
+    values: PyReadonlyArray1<'py, f64>,
+    least: PyReadonlyArray1<'py, i64>,
+) -> PyResult<(Column<'py, i64>, Bound<'py, PyArray2<u8>>)> {
+    let places = Places::new(data.as_bytes(), flat(&start)?, flat(&end)?)?;
+    let (values, least) = (flat(&values)?, flat(&least)?);
+    let n = same_length(&[places.start.len(), values.len(), least.len()])?;
+    let (mut texts, mut rows) = (Texts::default(), Vec::new());
+    each(py, n, |i| {
+        let (old, new) = (places.text(i), values[i]);
+        let before = value_of(old);
+        let decimals = decimals_of(old).max(least[i]);
+        if (new - before).abs() <= 0.5 * 10_f64.powi(-(decimals as i32)) {
+            return;
+        }
+        let begin = texts.all.len();
+        put_fixed(&mut texts.all, new, decimals as usize);
+        if texts.all[begin..].parse() == Ok(before) {
+            texts.all.truncate(begin);
+            return;
+        }
+        if old.first() == Some(&b'+') && !texts.all[begin..].starts_with('-') {
+            texts.all.insert(begin, '+');
+        }
+        texts.ends.push(texts.all.len());
+        rows.push(i as i64);
+    })?;
+    Ok((rows.into_pyarray(py), texts.rows(py)))
+}
