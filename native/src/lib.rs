@@ -23,6 +23,7 @@ mod trig;
 mod variance;
 mod walk;
 mod walks;
+mod weave;
 
 /// Names these sources: a test tells a core that was built from others.
 const SOURCES: &str = env!("SOURCES");
@@ -55,5 +56,8 @@ fn native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(text::scan_lines, module)?)?;
     module.add_function(wrap_pyfunction!(number::write_numbers, module)?)?;
     module.add_function(wrap_pyfunction!(number::rewrite_numbers, module)?)?;
+    module.add_function(wrap_pyfunction!(weave::weave, module)?)?;
+    module.add_function(wrap_pyfunction!(weave::is_woven, module)?)?;
+    module.add_function(wrap_pyfunction!(weave::cut, module)?)?;
     Ok(())
 }

@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from postproc import _native
-from postproc.arrays import Bytes, Floats, Indices, Ints, chunks, floats
+from postproc.arrays import Floats, Indices, Ints, chunks, floats
 from postproc.exceptions import ProgramError
 from postproc.language.lines import Lines, read_lines
 from postproc.language.shapes import Shapes
-from postproc.language.source import Replacements, Source, apply
+from postproc.language.source import Replacements, Source, apply, as_texts
 from postproc.language.visits import Literals
 
 # What new numbers must leave alone: the shapes of lines and where numbers stand.
@@ -81,7 +81,7 @@ def difference(
         What is wrong, "" where all is well.
     """
     old, new = (s.source if isinstance(s, Skeleton) else s for s in (before, after))
-    if not _is_meant(old.data, allowed, new.data, stamp):
+    if not allowed.made(old.data, new.data, stamp):
         return _first_difference(apply(old.data, allowed), new, stamp)
     try:
         a = before if isinstance(before, Skeleton) else Skeleton.read(before)
@@ -130,16 +130,6 @@ def _number_elsewhere(
     return ""
 
 
-def _is_meant(old: bytes, allowed: Replacements, new: bytes, stamp: int) -> bool:
-    """Tell whether a text is another one with edits, without making it once more."""
-    at = stamp
-    for piece in allowed.applied(old):
-        if not new.startswith(piece, at):
-            return False
-        at += len(piece)
-    return at == len(new)
-
-
 def _first_difference(meant: bytes, after: Source, stamp: int) -> str:
     length = min(len(meant), len(after.data) - stamp)
     pairs = zip(meant, after.data[stamp:], strict=False)
@@ -163,12 +153,7 @@ def number_texts(values: Floats, decimals: Ints) -> Texts:
     >>> number_texts(np.array([12.34567, -0.00001]), np.array([3, 4])).tolist()
     [b'12.346', b'0.0000']
     """
-    return _as_texts(_native.write_numbers(floats(values), decimals.astype(np.int64)))
-
-
-def _as_texts(rows: Bytes) -> Texts:
-    """See rows of bytes, filled up with NUL, as texts."""
-    return np.asarray(rows.view(f"S{rows.shape[1]}")[:, 0])
+    return as_texts(_native.write_numbers(floats(values), decimals.astype(np.int64)))
 
 
 def edits(
@@ -209,5 +194,5 @@ def edits(
             source.data, start.astype(np.int64), end.astype(np.int64),
             floats(values), least.astype(np.int64),
         )  # fmt: skip
-        found.append(Replacements(start[changed], end[changed], _as_texts(new)))
+        found.append(Replacements(start[changed], end[changed], as_texts(new)))
     return tuple(found)

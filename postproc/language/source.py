@@ -14,13 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from postproc import _native
-from postproc.arrays import Ints, chunks
+from postproc.arrays import Bytes, Ints, chunks
 from postproc.exceptions import FileError, PostprocError, ProgramError
 
 # What is to be changed in a text: single edits, or a million of them as arrays.
 
 AT_ONCE = 50_000  # edits that are Python objects at the same time
-WOVEN = 10_000  # edits made at once: array passes that fit the cache
 
 
 class Span(NamedTuple):
@@ -122,22 +121,25 @@ class Replacements(Sequence[Edit]):
         Raises:
             ValueError: An edit lies outside.
         """
-        return b"".join(self.applied(data))
+        return _native.weave(data, *self._columns())
 
-    def applied(self, data: bytes) -> Iterator[bytes]:
-        """Apply to a text; yield the result piece by piece.
+    def made(self, data: bytes, found: bytes, behind: int = 0) -> bool:
+        """Tell whether a text is what comes of these edits of another, to the byte.
+
+        Args:
+            data: The text before.
+            found: The text in question.
+            behind: Bytes of it that stand before the result.
 
         Raises:
             ValueError: An edit lies outside.
         """
-        if len(self) and not (self.start[0] >= 0 and self.end[-1] <= len(data)):
-            raise ValueError("an edit lies outside")
-        done = 0
-        for rows in chunks(len(self), WOVEN):
-            some = self[rows]
-            yield _woven(data, done, some)
-            done = int(some.end[-1])
-        yield data[done:]
+        return _native.is_woven(data, *self._columns(), found, behind)
+
+    def _columns(self) -> tuple[Ints, Ints, Bytes]:
+        """Return the edits as the core takes them."""
+        start, end = (np.ascontiguousarray(c, np.int64) for c in (self.start, self.end))
+        return start, end, as_bytes(self.new)
 
     def undone(self, data: bytes, after: int = 0) -> Replacements:
         """Return the edits of the result that give the text back.
@@ -149,47 +151,22 @@ class Replacements(Sequence[Edit]):
         length = np.char.str_len(self.new).astype(np.int64)
         growth = length - (self.end - self.start)
         start = self.start + after + np.cumsum(growth) - growth
-        old = [_cut(data, some.start, some.end) for some in self.pieces()]
-        originals = np.concatenate([np.empty(0, dtype="S1"), *old])
-        return Replacements(start, start + length, originals)
+        old, end, _ = self._columns()
+        return Replacements(
+            start, start + length, as_texts(_native.cut(data, old, end))
+        )
 
 
-def _woven(data: bytes, done: int, edits: Replacements) -> bytes:
-    """Return a text from `done` up to the end of some edits, with these made."""
-    text = np.frombuffer(data, dtype=np.uint8)[done : int(edits.end[-1])]
-    new = as_bytes(edits.new)
-    fills = new != 0
-    kept = edits.start - np.append(done, edits.end[:-1])
-    inside = _every_second(kept, edits.end - edits.start)
-    written = _every_second(kept, np.count_nonzero(fills, axis=1))
-    out = np.empty(len(written), dtype=np.uint8)
-    out[written] = new[fills]
-    out[~written] = text[~inside]
-    return out.tobytes()
-
-
-def _every_second(apart: Ints, length: Ints) -> NDArray[np.bool_]:
-    """Mark stretches of bytes of some lengths that lie so far apart from each other."""
-    marks = np.tile([False, True], len(length))
-    return np.repeat(marks, np.column_stack([apart, length]).ravel())
-
-
-def as_bytes(texts: NDArray[np.bytes_]) -> NDArray[np.uint8]:
+def as_bytes(texts: NDArray[np.bytes_]) -> Bytes:
     """See texts as rows of bytes, filled up with NUL, which no text holds."""
     rows = np.ascontiguousarray(texts).view(np.uint8)
     return rows.reshape(len(texts), texts.dtype.itemsize)
 
 
-def _cut(data: bytes, start: Ints, end: Ints) -> NDArray[np.bytes_]:
-    """Cut short pieces out of a text, which holds no NUL."""
-    length = end - start
-    width = max(int(length.max()), 1)
-    column = np.arange(width)
-    place = np.minimum(start[:, None] + column, len(data) - 1)
-    rows = np.frombuffer(data, dtype=np.uint8)[place]
-    rows[column >= length[:, None]] = 0
-    cut: NDArray[np.bytes_] = rows.view(f"S{width}")[:, 0]
-    return cut
+def as_texts(rows: Bytes) -> NDArray[np.bytes_]:
+    """See rows of bytes, filled up with NUL, as texts."""
+    texts: NDArray[np.bytes_] = rows.view(f"S{rows.shape[1]}")[:, 0]
+    return texts
 
 
 # Source text as bytes, places in it, and edits that leave every other byte alone.
