@@ -133,6 +133,23 @@ struct Texts {
 }
 
 impl Texts {
+    /// Write numbers, each in a row; NaN is ``null``.
+    fn of<'py>(
+        py: Python<'py>,
+        values: &[f64],
+        mut put: impl FnMut(&mut String, f64) + Send,
+    ) -> PyResult<Bound<'py, PyArray2<u8>>> {
+        let mut texts = Texts::default();
+        each(py, values.len(), |i| {
+            match values[i].is_nan() {
+                true => texts.all.push_str("null"),
+                false => put(&mut texts.all, values[i]),
+            }
+            texts.ends.push(texts.all.len());
+        })?;
+        Ok(texts.rows(py))
+    }
+
     /// Give texts to Python, each in a row filled up with NUL, (n, w).
     fn rows<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<u8>> {
         let begins = || std::iter::once(&0).chain(&self.ends);
@@ -163,6 +180,55 @@ pub fn write_numbers<'py>(
         texts.ends.push(texts.all.len());
     })?;
     Ok(texts.rows(py))
+}
+
+/// Write numbers with so many decimals, (k,): rows filled up with NUL; NaN is ``null``.
+#[pyfunction]
+pub fn fixed<'py>(
+    py: Python<'py>,
+    values: PyReadonlyArray1<'py, f64>,
+    decimals: usize,
+) -> PyResult<Bound<'py, PyArray2<u8>>> {
+    Texts::of(py, flat(&values)?, |out, value| {
+        write!(out, "{value:.decimals$}").expect("a string takes all");
+    })
+}
+
+/// Write numbers with as few digits as tell them from all others, as Python does, once they
+/// are rounded to so many decimals where that is asked for; NaN is ``null``.
+#[pyfunction]
+#[pyo3(signature = (values, decimals=None))]
+pub fn shortest<'py>(
+    py: Python<'py>,
+    values: PyReadonlyArray1<'py, f64>,
+    decimals: Option<usize>,
+) -> PyResult<Bound<'py, PyArray2<u8>>> {
+    let rounded = |value: f64| match decimals {
+        Some(decimals) => format!("{value:.decimals$}").parse().unwrap_or(value),
+        None => value,
+    };
+    Texts::of(py, flat(&values)?, |out, value| put_shortest(out, rounded(value)))
+}
+
+/// Write a number as `repr` of Python does: with an exponent where it is far from one.
+fn put_shortest(out: &mut String, value: f64) {
+    if !value.is_finite() {
+        write!(out, "{value}").expect("a string takes all");
+        return;
+    }
+    let begin = out.len();
+    write!(out, "{value:?}").expect("a string takes all");
+    let far = value != 0.0 && !(1e-4..1e16).contains(&value.abs());
+    if !far {
+        return; // Rust has an exponent from 1e16 on and below 1e-5 only
+    }
+    out.truncate(begin);
+    write!(out, "{value:e}").expect("a string takes all");
+    let at = begin + out[begin..].find('e').expect("an exponent") + 1;
+    let exponent: i32 = out[at..].parse().expect("a number");
+    out.truncate(at);
+    let sign = if exponent < 0 { '-' } else { '+' };
+    write!(out, "{sign}{:02}", exponent.abs()).expect("a string takes all");
 }
 
 /// Write new values over numbers that stand at places of a text.

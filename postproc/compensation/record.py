@@ -121,7 +121,7 @@ def _text(value: Any) -> str:
         return json.dumps(value)
     if not len(value):
         return "[]"
-    column = shortest(value) if value.dtype.kind == "f" else whole(value)
+    column = shortest(value, 9) if value.dtype.kind == "f" else whole(value)
     return "[" + joined([column, b", "])[:-2].decode("ascii") + "]"
 
 

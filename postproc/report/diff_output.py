@@ -181,7 +181,7 @@ def _told(rows: DiffRows, k: Ints) -> dict[str, ByteColumn | bytes]:
 def _number_lists(rows: DiffRows, values: Floats, k: Ints) -> ByteColumn:
     """Write the numbers of some rows as lists."""
     at, owner = number_places(rows.first, k)
-    return _lists(shortest(values[at], text=repr), owner, len(k))
+    return _lists(shortest(values[at]), owner, len(k))
 
 
 def _lists(cells: ByteColumn, owner: Ints, rows: int) -> ByteColumn:
@@ -192,7 +192,7 @@ def _lists(cells: ByteColumn, owner: Ints, rows: int) -> ByteColumn:
 
 def _sizes(values: Floats) -> ByteColumn:
     """Write sizes with all their digits; NaN becomes null."""
-    return shortest(values, text=repr)
+    return shortest(values)
 
 
 # The listing of `diff`: a row a line, then what was left alone, then a summary.

@@ -155,7 +155,7 @@ def _signs(values: NDArray[np.int8]) -> ByteColumn:
 
 def _as_written(values: Floats, written: NDArray[np.bool_]) -> ByteColumn:
     """Write the numbers of the file (k, 6); nothing where the file holds none."""
-    told = listed([shortest(values[:, k]) for k in range(values.shape[1])])
+    told = listed([shortest(values[:, k], 9) for k in range(values.shape[1])])
     return blanked(told, ~written, b"[]")
 
 
