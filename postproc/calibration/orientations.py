@@ -109,12 +109,18 @@ def _same_joint(
         order = np.argsort(q[:, j], kind="stable")
         place = np.empty(len(q), dtype=int)
         place[order] = np.arange(len(q))
-        offsets = np.array([-3, -2, -1, 1, 2, 3])
-        near = order[np.clip(place[rows][:, None] + offsets, 0, len(q) - 1)]
+        near = order[_places_beside(place[rows], len(q))]
         ratio = np.median(angle[near, j] * np.sign(angle[rows, j])[:, None], axis=1)
         same = ratio > AGREES * np.abs(angle[rows, j])
         agrees |= same & (explained[rows, j] > 0.5)
     return agrees
+
+
+def _places_beside(place: NDArray[np.int64], n: int) -> NDArray[np.int64]:
+    """Return the nearest other places in a row of n, (k, 6)."""
+    first = np.clip(place - NEIGHBOURS // 2, 0, n - NEIGHBOURS - 1)[:, None]
+    beside = first + np.arange(NEIGHBOURS)
+    return np.asarray(beside + (beside >= place[:, None]))
 
 
 # Measured orientations: what a 6D probe tells besides its position.

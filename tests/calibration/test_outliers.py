@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 from postproc.calibration.diagnosis.trace import trace
 from postproc.calibration.orientations import judge, student_weights
@@ -38,6 +39,16 @@ def test_a_lone_row_is_dropped_and_a_mild_one_weighed() -> None:
     assert weight[10] == 0
     assert 0 < weight[20] < 1
     assert (np.delete(weight, [10, 20]) == 1).all()
+
+
+@pytest.mark.parametrize("end", [0, -1])
+@pytest.mark.parametrize("joint", range(6))
+def test_a_lone_row_at_the_end_of_a_range_is_dropped(joint: int, end: int) -> None:
+    row = np.argsort(STATES.q[:, joint])[end]
+    residual = noise(2)
+    residual[row] = 3e-3 * J[row, :, joint] / np.linalg.norm(J[row, :, joint])
+    found = judged(residual)
+    assert found.weight[row] == 0 and not found.spared[row]
 
 
 def test_rows_at_one_angle_of_a_joint_are_spared() -> None:
