@@ -77,10 +77,11 @@ def posterior(normal: Normal, group: Ints, log_scale: Floats) -> Posterior:
     """
     s = np.exp(log_scale)[group]
     B = np.eye(len(s)) + s[:, None] * normal.gram * s
-    factor, inverse = _factor(B)
+    log_det, inverse, told = _inverted(B)
     covariance = s[:, None] * inverse * s
     mean = covariance @ normal.moment
-    log_det = 2.0 * float(np.log(np.diag(factor)).sum())
+    if told is not None:
+        mean = s * (told @ (s * normal.moment))
     fit = normal.square - float(normal.moment @ mean)
     evidence = -0.5 * (
         normal.log_noise + log_det + fit + normal.rows * np.log(2 * np.pi)
@@ -89,14 +90,28 @@ def posterior(normal: Normal, group: Ints, log_scale: Floats) -> Posterior:
     return Posterior(mean, covariance, log_scale, evidence, effective)
 
 
-def _factor(B: Floats) -> tuple[Floats, Floats]:
-    """Return the Cholesky factor and the inverse of a positive definite matrix."""
+def _inverted(B: Floats) -> tuple[float, Floats, Floats | None]:
+    """Invert 1 + C, where C has no negative eigenvalue.
+
+    Columns that are nearly the same, on scales far above what the rows tell of them,
+    leave more rounding in C than the 1. Of such directions the rows tell nothing.
+
+    Returns:
+        Log determinant, inverse, and its part in the directions that rows tell of, None
+        where that is all of it.
+    """
     factor, failed = dpotrf(B, lower=True)
-    inverse, _ = dpotri(factor, lower=True)
-    if failed:
-        raise np.linalg.LinAlgError("the normal equations are not positive definite")
-    lower = np.tril(inverse)
-    return factor, lower + np.tril(inverse, -1).T
+    rounding = len(B) * np.finfo(float).eps * float(np.diag(B).max(initial=0.0))
+    if not failed and float((np.diag(factor) ** 2).min(initial=np.inf)) > rounding:
+        inverse, _ = dpotri(factor, lower=True)
+        lower = np.tril(inverse)
+        log_det = 2.0 * float(np.log(np.diag(factor)).sum())
+        return log_det, lower + np.tril(inverse, -1).T, None
+    values, vectors = np.linalg.eigh(B)
+    told = values > rounding
+    values = np.where(told, np.maximum(values, 1.0), 1.0)
+    part = vectors[:, told] / values[told] @ vectors[:, told].T
+    return float(np.log(values).sum()), vectors / values @ vectors.T, part
 
 
 def maximise(

@@ -56,6 +56,22 @@ def test_a_group_without_effect_is_shut() -> None:
     assert found.effective < 8  # of 40
 
 
+@pytest.mark.parametrize("apart", [0.0, 1e-12, 1e-9, 1e-6])
+def test_columns_that_are_nearly_the_same_are_no_problem(apart: float) -> None:
+    """Well determined together, on scales of a thousand, they leave only rounding."""
+    rng = np.random.default_rng(2)
+    one = rng.standard_normal(2500)
+    X = 1e4 * np.stack([one + apart * rng.standard_normal(2500) for _ in range(6)], 1)
+    y = 1e-4 * X.sum(axis=1) + rng.standard_normal(2500)
+    normal = Normal(X.T @ X, X.T @ y, float(y @ y), 0.0, 2500.0)
+    group = np.array([0, 0, 1, 1, 2, 2])
+    at = posterior(normal, group, np.full(3, 7.0))
+    assert np.isfinite(at.log_evidence) and (np.diag(at.covariance) >= 0).all()
+    found = maximise(normal, group, np.full(3, 6.0))
+    fitted = X @ found.mean
+    assert np.sqrt(np.mean((fitted - 1e-4 * X.sum(axis=1)) ** 2)) < 0.1
+
+
 def test_no_groups_no_search() -> None:
     none = np.zeros(0)
     found = maximise(
