@@ -202,7 +202,7 @@ def fits(trail: Trail, steps: Sequence[Step]) -> bool:
 
 Array = NDArray[Any]
 
-SAME = 1e-12  # [rad], [m] and units of the file: sums in other blocks differ behind it
+SAME = 1e-9  # of any unit: more than sums in blocks of other lengths differ by
 
 
 def same_rows(a: Mapping[str, Array], b: Mapping[str, Array]) -> bool:

@@ -81,7 +81,8 @@ class BranchedLazily:
     def on(self, slot: int, first: int, most: int) -> Floats:
         """Solve for one branch."""
         ahead = self.flange[first : first + most]
-        return self.arm.on_branch(ahead, np.full(len(ahead), slot))
+        found = self.arm.on_branch(ahead, np.full(len(ahead), slot))
+        return self.arm.into_range(found)
 
 
 # Which of the eight solutions, on which turn: from the string, or by continuity.

@@ -499,8 +499,7 @@ def trace_stretches(work: Workspace, smooth: Bools, most: int) -> Bools:
     near, head = work.q[some.first - 1], np.cumsum(some.size) - some.size
     slot = nearest_slots(work.arm.inverse(flange[head]).q, near)
     q = work.arm.on_branch(flange, np.repeat(slot, some.size))
-    short = np.repeat(~work.long[some.first], some.size)
-    q[short] = work.arm.into_range(q[short])
+    q = work.arm.into_range(q)
     q = _unwrapped(q, near, head, some.size)
     good = _small_steps(q, near, head) & (slot >= 0)
     _settle(work, some[good], q[np.repeat(good, some.size)], slot[good])
