@@ -260,14 +260,13 @@ class Inverse:
         return self._closed.slot(q @ self._mix.T)
 
     def into_range(self, q: Floats) -> Floats:
-        """Shift angles by whole turns into the joint range where that is possible.
-
-        What lies in the range already stays as it is, to the last bit.
-        """
-        turn, q = 2 * np.pi, np.array(q)
-        around = np.flatnonzero((q > np.pi) | (q <= -np.pi))
+        """Shift angles by whole turns into the joint range where that is possible."""
+        turn = 2 * np.pi
+        below = np.pi - q
+        around = np.flatnonzero((below < 0) | (below >= turn))
         if len(around):
-            q.flat[around] = np.pi - np.mod(np.pi - q.flat[around], turn)
+            below.flat[around] = np.mod(below.flat[around], turn)
+        q = np.pi - below
         low, high = np.nonzero(q < self._lower), np.nonzero(q > self._upper)
         if len(low[0]):
             up = q[low] + turn
