@@ -324,8 +324,9 @@ def _worked(
     Args:
         reading: The visits.
         setting: What they are compensated with.
-        lead, arrived, doubtful: How they go on from others: see `iterate`, and
-            `plan_visits`.
+        lead: How they go on from others, see `iterate`.
+        arrived: How the arm arrives at the first of them, see `plan_visits`.
+        doubtful: What comes from the first one is doubtful.
         trail: See `iterate`.
     """
     cell, model, visits = setting.cell, setting.model, reading.visits

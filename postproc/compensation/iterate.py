@@ -7,7 +7,7 @@ from itertools import count, pairwise
 
 import numpy as np
 
-from postproc.arrays import Bools, Floats, spans
+from postproc.arrays import Bools, Floats, Ints, spans
 from postproc.compensation.command import (
     Commands,
     solve_again,
@@ -31,7 +31,7 @@ from postproc.compensation.targets import moved_targets
 from postproc.language.rewrite import edits as number_edits
 from postproc.language.source import Replacements
 from postproc.language.visits import Visits
-from postproc.motion.departure import Departure, path_departure
+from postproc.motion.departure import Departure, departure, path_departure
 from postproc.motion.planner import Plan
 from postproc.motion.replan import Reached, Replanned, replan, replan_all
 from postproc.motion.targets import Targets
@@ -102,6 +102,7 @@ class Iterate:
 
     Attributes:
         solved: The commands.
+        departure: How far they lead the arm from where it was.
         bent: What rounded points are moved by beyond what is foretold, (n, 3) [m].
         held: Targets that keep their values for the side they are reached from, (n,).
         swung: .. for the ways to or from them, (n,).
@@ -109,6 +110,7 @@ class Iterate:
     """
 
     solved: Commands
+    departure: Departure
     bent: Floats
     held: Bools
     swung: Bools
@@ -154,7 +156,16 @@ class Iteration:
                 setting.model, setting.cell, self.planned, self.states,
                 setting.options.orientation,
             )  # fmt: skip
-        return Iterate(solved, np.zeros_like(self.planned.plan.aside), none, none, none)
+            departed = self.departed(solved, np.arange(len(self.states)))
+        bent = np.zeros_like(self.planned.plan.aside)
+        return Iterate(solved, departed, bent, none, none, none)
+
+    def departed(self, solved: Commands, rows: Ints) -> Departure:
+        """Say how far commands lead the arm from where it was, k visits."""
+        plan, setting = self.planned.plan, self.setting
+        tool = plan.tool[rows, :3, 3]
+        arm, old, new = setting.cell.arm, plan.q[rows], solved.q[rows]
+        return departure(arm, old, new, tool, setting.offset)
 
     def next_aim(
         self, current: Iterate, moved: Bools, found: Floats, search: SecantSearch
@@ -168,16 +179,18 @@ class Iteration:
                 current.solved, moved, setting.model, setting.cell, self.planned,
                 states, setting.options.orientation,
             )  # fmt: skip
-        return replace(current, solved=solved)
+            rows = np.flatnonzero(moved)
+            departed = current.departure.with_rows(rows, self.departed(solved, rows))
+        return replace(current, solved=solved, departure=departed)
 
     def propose(self, current: Iterate) -> tuple[Proposal, Floats]:
         """Decide on numbers; return too where the path is to pass its targets."""
         with self.setting.clock("decide"):
             plan = self.planned.plan
             aside = passing_after(plan, self.wanted(current)) + current.bent
-            given = self.reading, self.planned, current.solved, aside
+            given = self.reading, self.planned, current.solved, current.departure
             left = current.held, current.swung
-            return Round(*given, *left, self.setting).propose(), aside
+            return Round(*given, aside, *left, self.setting).propose(), aside
 
     def wanted(self, current: Iterate) -> Floats:
         """Say what the path should move by at every target, (n, 3) [m]."""
@@ -357,7 +370,8 @@ def iterate(
 
     Args:
         reading: The visits.
-        planned, states: Their plan.
+        planned: Their plan.
+        states: The same in the model's terms.
         setting: What they are compensated with.
         lead: How they go on from others, if they are a window of a program.
         trail: .. and what is kept of their rounds then.

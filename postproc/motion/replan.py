@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -193,6 +193,9 @@ def replan(
     Raises:
         PlanError: The arm has no closed-form inverse kinematics.
     """
+    if not moved.any():
+        found = sides(arm, before.passed, before.passages, lead)
+        return replace(before, targets=targets, sides=found)
     part = _part(targets, moved, len(before.begin) > 0)
     if part is None:
         return replan_all(arm, targets, before.begin, lead)

@@ -121,8 +121,9 @@ def leaving(nth: int, line: str) -> str:
 
 def shared(nth: int, line: str) -> str:
     """Come to the same number of the program again, a little later."""
-    return line if nth % 50 else "\n".join([f"  p := POS({place(line)}, '')",
-        "  MOVEFLY LINEAR TO p ADVANCE", line, "  MOVEFLY LINEAR TO p ADVANCE"])  # fmt: skip
+    again = "  MOVEFLY LINEAR TO p ADVANCE"
+    value = f"  p := POS({place(line)}, '')"
+    return line if nth % 50 else "\n".join([value, again, line, again])
 
 
 def by_joints(nth: int, line: str) -> str:
