@@ -213,7 +213,7 @@ class Iteration:
         missed[sharp] = (aside - meant)[sharp]
         missed[~proposal.corrected] = 0.0
         missed[np.isnan(missed).any(axis=1)] = 0.0
-        far = (np.abs(missed) > CLOSE).any(axis=1)
+        far = np.asarray((np.abs(missed) > CLOSE).any(axis=1))
         begins = self.reading.begins
         if len(begins) > 1:  # those with a point that is not hit go on alone
             for first, end in pairwise((*begins, len(missed))):
