@@ -17,6 +17,7 @@ from postproc.compensation import windows as cuts
 from postproc.compensation.compensate import compensate
 from postproc.compensation.outcome import Outcome, Status
 from postproc.compensation.program import read_program
+from postproc.model.model import Model
 from postproc.report.json import report_pieces
 from tests.bench import made
 
@@ -159,6 +160,14 @@ def test_between_stops_windows_change_no_byte(job, joined, monkeypatch, kind) ->
         assert told(job(program, least)) == wanted
     assert told(job(program, 90, processes=2)) == wanted
     assert min(joined) > 2
+
+
+def test_time_laws_are_found_for_whole_runs(job, monkeypatch, joined) -> None:
+    monkeypatch.setattr(made, "ROWS", 3)
+    monkeypatch.setattr(Model, "needs", property(lambda _: frozenset({"speed"})))
+    program = made.milling(900)
+    wanted = told(job(program, 10_000))
+    assert told(job(program, 150)) == wanted and min(joined) > 2
 
 
 def test_a_halo_that_is_too_small_is_found_out(job, monkeypatch, joined) -> None:
