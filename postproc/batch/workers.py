@@ -23,7 +23,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from postproc import __version__
+from postproc import POOLS, __version__
 from postproc.batch.plan import JobSetup, Result, Task, Unit, failed
 from postproc.compensation.outcome import Outcome
 from postproc.compensation.parallel import end_with_parent
@@ -196,14 +196,6 @@ def _one_by_one(
 # what it needs on its own.
 
 READY = "postproc.batch.ready"
-
-# Numerical libraries and their pools: processes use the cores, not threads.
-POOLS = (
-    "OMP_NUM_THREADS",
-    "OPENBLAS_NUM_THREADS",
-    "MKL_NUM_THREADS",
-    "RAYON_NUM_THREADS",
-)
 
 
 def start_server() -> ForkServerContext:

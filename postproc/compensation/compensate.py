@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from copy import deepcopy
 from dataclasses import dataclass, fields, replace
+from itertools import pairwise
 from types import MappingProxyType
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from postproc.arrays import Bools, Floats, Interned, Ints
 from postproc.compensation import windows as cuts
@@ -16,7 +20,13 @@ from postproc.compensation.clones import give_own_points
 from postproc.compensation.decide import Proposal
 from postproc.compensation.eligibility import overruled
 from postproc.compensation.frames import correct_taught
-from postproc.compensation.iterate import AT_START, Converged, EndState, iterate
+from postproc.compensation.iterate import (
+    FROM_START,
+    Converged,
+    Lead,
+    NotAloneError,
+    iterate,
+)
 from postproc.compensation.notes import (
     assumed_off,
     flank_steps,
@@ -43,7 +53,7 @@ from postproc.compensation.outcome import (
     left_elsewhere,
     tell_arrivals,
 )
-from postproc.compensation.parallel import in_processes, rounded
+from postproc.compensation.parallel import in_processes
 from postproc.compensation.program import (
     Planned,
     Reading,
@@ -58,8 +68,17 @@ from postproc.compensation.rewrite import (
     check_output,
     write_edits,
 )
+from postproc.compensation.rounds import (
+    Glimpses,
+    Step,
+    Trail,
+    common,
+    fits,
+    same_looks,
+    same_rows,
+)
 from postproc.compensation.targets import rounded_points
-from postproc.compensation.windows import Window, lead_in, windows
+from postproc.compensation.windows import Window, cut_points, seams, windows
 from postproc.exceptions import CellError, ProgramError
 from postproc.files import variables_of
 from postproc.language.pdl2.routines import ASSUMED_STILL
@@ -68,8 +87,9 @@ from postproc.language.stamp import is_stamped
 from postproc.language.visits import Visits, told_once
 from postproc.model.model import Model
 from postproc.model.statistics import ErrorStatistics
-from postproc.motion.trace import NOWHERE, StartState
+from postproc.motion.trace import StartState
 from postproc.robot.cell import Cell
+from postproc.robot.direction import UNLED, Arrivals
 from postproc.robot.pose import MM
 from postproc.robot.state import States
 
@@ -111,6 +131,39 @@ class Correction:
     speed: Floats
     departure: Floats
 
+    def part(self, visits: Visits, own: slice) -> Correction:
+        """Keep some of these visits, which share no number with the others."""
+        moved = np.flatnonzero(self.corrected)
+        rows = slice(*np.searchsorted(moved, [own.start, own.stop]).tolist())
+        mine = np.isin(self.edited, visits.literal[own])
+        starts = visits.literals.start[self.edited[mine]]
+        edits = tuple(
+            Replacements(e.start[at], e.end[at], e.new[at])
+            for e in self.edits
+            for at in [np.isin(e.start, starts)]
+        )
+        return replace(
+            self, edited=self.edited[mine], edits=edits, before=self.before[rows],
+            after=self.after[rows], decisions=self.decisions.part(own),
+            **{name: getattr(self, name)[own] for name in BY_VISIT},
+        )  # fmt: skip
+
+    def rows(self, some: slice) -> dict[str, NDArray[Any]]:
+        """Return what is kept of some visits."""
+        decided = self.decisions.part(some)
+        found = {name: np.array(getattr(self, name)[some]) for name in BY_VISIT}
+        for f in fields(Decisions):
+            if f.name not in ("why", "reasons"):
+                found[f"decided {f.name}"] = np.array(getattr(decided, f.name))
+        why = [decided.reasons[k] for k in decided.why.tolist()]
+        return found | {"why": np.array(why, dtype=object)}
+
+
+BY_VISIT = (
+    "corrected", "position", "away", "overruled", "untimed", "travel", "speed",
+    "departure",
+)  # fmt: skip
+
 
 def correction_of(
     visits: Visits,
@@ -119,9 +172,8 @@ def correction_of(
     found: Converged,
     cell: Cell,
     model: Model,
-    seeds: int = 0,
 ) -> Correction:
-    """Keep what a report says of corrected visits, but for the first `seeds`."""
+    """Keep what a report says of corrected visits."""
     proposal, done, plan = found.proposal, found.reached, planned.plan
     moved = proposal.corrected
     new = states.with_(q=np.array(done.q), direction=np.array(done.side))[moved]
@@ -131,17 +183,17 @@ def correction_of(
     return Correction(
         edited=proposal.edited,
         edits=found.edits,
-        decisions=proposal.decisions.part(slice(seeds, None)),
-        corrected=moved[seeds:],
+        decisions=proposal.decisions,
+        corrected=moved,
         before=np.linalg.norm(before, axis=1),
         after=np.linalg.norm(after, axis=1),
-        position=(wanted - plan.aside)[seeds:],
-        away=np.linalg.norm(np.nan_to_num(plan.aside), axis=1)[seeds:] / MM,
-        overruled=overruled(planned.targets, plan).unchecked(visits)[seeds:],
-        untimed=plan.untimed[seeds:],
-        travel=plan.travel[seeds:],
-        speed=plan.speed[seeds:],
-        departure=found.moved.sizes[seeds:],
+        position=wanted - plan.aside,
+        away=np.linalg.norm(np.nan_to_num(plan.aside), axis=1) / MM,
+        overruled=overruled(planned.targets, plan).unchecked(visits),
+        untimed=plan.untimed,
+        travel=plan.travel,
+        speed=plan.speed,
+        departure=found.moved.sizes,
     )
 
 
@@ -183,23 +235,35 @@ def _one_after_another(parts: Sequence[Decisions]) -> Decisions:
 
 
 @dataclass(frozen=True)
-class WindowState:
-    """How a window leaves the program as it was, and as it is corrected."""
+class Corrected:
+    """A window that was worked through, and what its neighbours must know of it.
 
-    planned: StartState = NOWHERE
-    doubtful: bool = False
-    corrected: EndState = AT_START
+    Attributes:
+        window: The window.
+        kept: What is kept of its own visits.
+        trail: The rounds that it took.
+        left: What came of the visits beside the cut before it.
+        right: .. of those beside the cut behind, and of the next window's halo.
+        exit: Where the arm stands at the first visit of that halo.
+        arrivals: How it arrives there.
+        doubtful: Whether what comes from there is doubtful.
+    """
+
+    window: Window
+    kept: Correction
+    trail: Trail
+    left: Mapping[str, NDArray[Any]]
+    right: Mapping[str, NDArray[Any]]
+    exit: StartState
+    arrivals: Arrivals
+    doubtful: bool
 
 
 def correct(reading: Reading, setting: Setting) -> tuple[Reading, Correction]:
     """Plan a program, and correct it until its sides are those corrected for.
 
     Moves can only be given points of their own when all arrivals are at hand: with
-    --clone a program is one window, however long; so is one fly run.
-
-    A window is settled before the next one begins, while a whole program settles at
-    once: fly points may differ by what `CLOSE` allows, and the first targets behind a
-    cut within the play of joints that hardly move there.
+    --clone a program is one window, however long.
 
     Args:
         reading: The program.
@@ -208,71 +272,180 @@ def correct(reading: Reading, setting: Setting) -> tuple[Reading, Correction]:
     Returns:
         The program, with clones where they were asked for, and what came of it.
     """
-    work, clock = _WindowWork(reading, setting), setting.clock
+    clock = setting.clock
     if not setting.options.clone:
-        cut = windows(reading.visits, cuts.LEAST)
-        parts = in_processes(work, cut, WindowState(), clock, setting.processes)
-        return reading, joined(list(parts))
-    kept, proposal = work.whole(clock)
+        return reading, _in_windows(reading, setting)
+    kept, proposal = _whole(reading, setting)
     with clock("clone"):
         reading = give_own_points(reading, proposal, setting.cell)
     if reading.cloned:
-        kept, _ = replace(work, reading=reading).whole(clock)
+        kept, _ = _whole(reading, setting)
     return reading, kept
+
+
+def _in_windows(reading: Reading, setting: Setting) -> Correction:
+    """Correct a program window by window, as if it were one window.
+
+    A time law is found for a run between stops as a whole: where the model depends on
+    the speed, programs are cut at stops alone.
+    """
+    timed = "speed" in setting.model.needs
+    if len(reading.visits) < 2 * cuts.LEAST:
+        return _whole(reading, setting)[0]
+    stops = cut_points(reading.visits)
+    quiet = stops if timed else seams(reading.visits)
+    work = _WindowWork(reading, setting, quiet, stops)
+    cut = windows(quiet, cuts.LEAST)
+    if len(cut) > 1:
+        try:
+            found = in_processes(work, cut, setting.clock, setting.processes)
+            return joined([part.kept for part in found])
+        except NotAloneError:
+            pass
+    return _whole(reading, setting)[0]
+
+
+def _whole(reading: Reading, setting: Setting) -> tuple[Correction, Proposal]:
+    """Correct a program as one window; return all of its proposal."""
+    _, kept, proposal = _worked(reading, setting)
+    return kept, proposal
+
+
+def _worked(
+    reading: Reading,
+    setting: Setting,
+    lead: Lead = FROM_START,
+    arrived: Arrivals = UNLED,
+    doubtful: bool = False,
+    trail: Trail | None = None,
+) -> tuple[Planned, Correction, Proposal]:
+    """Plan and correct some visits.
+
+    Args:
+        reading: The visits.
+        setting: What they are compensated with.
+        lead: How they go on from others, see `iterate`.
+        arrived: How the arm arrives at the first of them, see `plan_visits`.
+        doubtful: What comes from the first one is doubtful.
+        trail: See `iterate`.
+    """
+    cell, model, visits = setting.cell, setting.model, reading.visits
+    timed, clock = "speed" in model.needs, setting.clock
+    with clock("plan"):
+        planned = plan_visits(visits, cell, timed, lead.begin, arrived, doubtful)
+        planned = correct_taught(planned, visits, cell, model)
+    states = states_of(planned.plan, cell, setting.temperature)
+    found = iterate(reading, planned, states, setting, lead, trail)
+    check_motion(visits, found.moved, cell.limits)
+    with clock("report"):
+        kept = correction_of(visits, planned, states, found, cell, model)
+    return planned, kept, found.proposal
 
 
 @dataclass(frozen=True)
 class _WindowWork:
-    """What it takes to correct any window of a program."""
+    """What it takes to correct any window of a program.
+
+    Attributes:
+        reading: The program.
+        setting: What it is compensated with.
+        quiet: Behind which visits it may be cut, (n,).
+        stops: .. where the arm stops, (n,).
+    """
 
     reading: Reading
     setting: Setting
-
-    def whole(self, clock: Clock) -> tuple[Correction, Proposal]:
-        """Correct the program as one window; return all of its proposal."""
-        kept, proposal, _ = self._correct(self.reading.visits, 0, WindowState(), clock)
-        return kept, proposal
+    quiet: Bools
+    stops: Bools
 
     def correct(
-        self, window: Window, begin: WindowState, clock: Clock
-    ) -> tuple[Correction, WindowState]:
-        """Correct a window; return what is kept of it, and how it ends."""
-        visits = window.of(self.reading.visits)
-        kept, _, end = self._correct(visits, window.seeds, begin, clock)
-        return kept, end
+        self,
+        own: Window,
+        before: Corrected | None,
+        pace: Sequence[Step],
+        clock: Clock,
+    ) -> Corrected:
+        """Correct a window; see `parallel.Work`.
 
-    def foretell(self, window: Window) -> WindowState | None:
-        """Tell how the windows before will end, by the last targets there alone.
-
-        Right where the joints have lost their memory of what was before these. That the
-        program begins there is an invention: what fails of it tells nothing.
+        Where the arm comes from is foretold by many targets before, if it is not known.
+        That the program begins there is an invention.
         """
-        visits = lead_in(self.reading.visits, window)
-        if visits is None:
-            return None
-        try:
-            _, _, end = self._correct(visits, 1, WindowState(), Clock(silent))
-        except Exception:
-            return None
-        return end
+        if before is None:
+            own = cuts.window(self.quiet, own.first, own.end, cuts.RUN_UP)
+        visits = own.of(self.reading.visits, known=before is not None)
+        lead, arrived, doubtful = _lead(own, before)
+        trail, after = self._trail(own, pace), self._after(own)
+        setting = self.setting.timed_by(clock)
+        part = replace(self.reading, visits=visits)
+        planned, kept, _ = _worked(part, setting, lead, arrived, doubtful, trail)
+        at, rows = after - own.begin, own.rows(after, own.end)
+        return Corrected(
+            window=own,
+            kept=kept.part(visits, own.own),
+            trail=trail,
+            left=kept.rows(trail.left),
+            right=kept.rows(trail.right),
+            exit=planned.plan.exact.at(at),
+            arrivals=deepcopy(planned.plan.lead(rows)),
+            doubtful=bool(planned.doubtful[at : at + 1].any()),
+        )
 
-    def _correct(
-        self, visits: Visits, seeds: int, begin: WindowState, clock: Clock
-    ) -> tuple[Correction, Proposal, WindowState]:
-        """Correct some visits, the first `seeds` of which are only where they begin."""
-        setting, begun = self.setting.timed_by(clock), begin.planned
-        cell, model = setting.cell, setting.model
-        part, timed = replace(self.reading, visits=visits), "speed" in model.needs
-        with clock("plan"):
-            planned = plan_visits(visits, cell, timed, begun, begin.doubtful)
-            planned = correct_taught(planned, visits, cell, model)
-        states = states_of(planned.plan, cell, setting.temperature)
-        found = iterate(part, planned, states, setting, begin.corrected)
-        check_motion(visits, found.moved, cell.limits)
-        with clock("report"):
-            kept = correction_of(visits, planned, states, found, cell, model, seeds)
-        end = rounded(WindowState(planned.plan.end, planned.doubtful, found.left))
-        return kept, found.proposal, end
+    def _after(self, own: Window) -> int:
+        """Return where the window behind one begins."""
+        n = len(self.quiet)
+        return cuts.window(self.quiet, own.end, n).begin if own.end < n else n
+
+    def _trail(self, own: Window, pace: Sequence[Step]) -> Trail:
+        """Say what is to be watched of a window."""
+        first = max(own.first - cuts.BAND, own.begin)
+        left = own.rows(first, min(own.first + cuts.BAND, own.stop))
+        if own.first == 0:
+            left = slice(0, 0)
+        right = own.rows(self._after(own), min(own.end + cuts.BAND, own.stop))
+        return Trail(own.own, left, right, pace)
+
+    def whole(self) -> list[Window]:
+        """Return the program as one window."""
+        n = len(self.quiet)
+        return [Window(0, n, 0, n)]
+
+    def fits(self, found: Corrected, steps: Sequence[Step]) -> bool:
+        """Tell whether a window comes out as if it had taken these rounds."""
+        return fits(found.trail, steps)
+
+    def steps(self, found: Sequence[Corrected]) -> Sequence[Step]:
+        """Tell which rounds all windows together take."""
+        return common([part.trail for part in found])
+
+    def joins(self, before: Corrected, after: Corrected) -> bool:
+        """Tell whether two windows found the same at the cut between them."""
+        cut, n = after.window.first, len(self.quiet)
+        first, end = max(cut - cuts.BAND, 0), min(cut + cuts.BAND, n)
+        from_left = first - self._after(before.window)
+        rows = slice(from_left, from_left + end - first)
+        looks = Glimpses(before.trail.end)[rows], Glimpses(after.trail.begin)
+        ours = {name: part[rows] for name, part in before.right.items()}
+        return same_rows(ours, after.left) and same_looks(*looks)
+
+    def merged(self, windows: Sequence[Window], cut: int) -> list[Window]:
+        """Make one window of those on both sides of a cut, up to the next stops."""
+        place = windows[cut].first
+        stops = np.flatnonzero(self.stops) + 1
+        low = stops[stops < place].max(initial=0)
+        high = stops[stops > place].min(initial=len(self.quiet))
+        ends = [w.end for w in windows[:-1]]
+        kept = [e for e in ends if e != place and not low < e < high]
+        bounds = pairwise([0, *kept, len(self.quiet)])
+        return [cuts.window(self.quiet, a, b) for a, b in bounds]
+
+
+def _lead(window: Window, before: Corrected | None) -> tuple[Lead, Arrivals, bool]:
+    """Say how a window goes on from the one before."""
+    if before is None or window.begin == 0:
+        return FROM_START, UNLED, False
+    rows = slice(0, window.first - window.begin)
+    looks = Glimpses(before.trail.end)[rows]
+    return Lead(before.exit, looks), before.arrivals, before.doubtful
 
 
 # All of it: what is given, checked, corrected, written and told.

@@ -26,7 +26,7 @@ from postproc.compensation.outcome import Decisions, Status
 from postproc.compensation.program import Planned, Reading
 from postproc.compensation.targets import moved_targets
 from postproc.language.visits import NO_TARGET, Meaning, Visits
-from postproc.motion.departure import Departure, departure
+from postproc.motion.departure import Departure
 from postproc.motion.replan import IS_STEP
 from postproc.motion.targets import TargetKind
 from postproc.robot.arm import Arm
@@ -479,6 +479,7 @@ class Round:
         reading: The program.
         planned: Its plan, n visits.
         solved: The corrected command of every visit.
+        departure: How far the commands lead the arm from where it was, n visits.
         aside: From targets to where the corrected path passes them, (n, 3) [m].
         held: Visits that must be left alone for the side they are reached from, (n,).
         swung: .. for the ways to or from them, (n,).
@@ -488,17 +489,11 @@ class Round:
     reading: Reading
     planned: Planned
     solved: Commands
+    departure: Departure
     aside: Floats
     held: Bools
     swung: Bools
     setting: Setting
-
-    @cached_property
-    def departure(self) -> Departure:
-        """How far the commands lead the arm from where it was, n visits."""
-        plan, setting = self.planned.plan, self.setting
-        arm, tool = setting.cell.arm, plan.tool[:, :3, 3]
-        return departure(arm, plan.q, self.solved.q, tool, setting.offset)
 
     @cached_property
     def path(self) -> PathCorrection:

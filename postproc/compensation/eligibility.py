@@ -138,7 +138,7 @@ def mark_configuration_flags(
     arm: Arm,
     reasons: Reasons,
     begun: bool = False,
-) -> bool:
+) -> Bools:
     """Leave alone what configuration strings make doubtful.
 
     Args:
@@ -150,16 +150,16 @@ def mark_configuration_flags(
         begun: The first visit is a place that makes what comes from there doubtful.
 
     Returns:
-        Whether what comes from the last visit is doubtful.
+        Whether what comes from a visit is doubtful, (n,).
     """
     _mark_stops(visits, overruled(targets, plan), reasons)
     doubtful = _mark_either_way(visits, targets, plan, arm, reasons)
     doubtful[:1] |= begun
     if not doubtful.any():
-        return False
+        return doubtful
     reached, on = _followers(visits, targets, doubtful)
     reasons.mark(reached, AFTER)
-    return bool(on[-1])
+    return on
 
 
 def _mark_stops(visits: Visits, path: Overruled, reasons: Reasons) -> None:

@@ -7,7 +7,7 @@ from itertools import count, pairwise
 
 import numpy as np
 
-from postproc.arrays import Bools, Floats, spans
+from postproc.arrays import Bools, Floats, Ints, spans
 from postproc.compensation.command import (
     Commands,
     solve_again,
@@ -18,16 +18,26 @@ from postproc.compensation.decide import Proposal, Round, swings, with_origins
 from postproc.compensation.options import Clock, Setting
 from postproc.compensation.program import Planned, Reading
 from postproc.compensation.rewrite import read_back
+from postproc.compensation.rounds import (
+    NO_GLIMPSES,
+    Glimpse,
+    Glimpses,
+    Look,
+    Step,
+    Trail,
+    lead_of,
+)
 from postproc.compensation.targets import moved_targets
 from postproc.language.rewrite import edits as number_edits
 from postproc.language.source import Replacements
 from postproc.language.visits import Visits
-from postproc.motion.departure import Departure, path_departure
+from postproc.motion.departure import Departure, departure, path_departure
 from postproc.motion.planner import Plan
 from postproc.motion.replan import Reached, Replanned, replan, replan_all
 from postproc.motion.targets import Targets
 from postproc.motion.trace import NOWHERE, StartState, trace
 from postproc.robot.cell import Cell
+from postproc.robot.direction import Sides
 from postproc.robot.state import States
 
 # The side at which aim and arrival agree, searched joint by joint.
@@ -92,6 +102,7 @@ class Iterate:
 
     Attributes:
         solved: The commands.
+        departure: How far they lead the arm from where it was.
         bent: What rounded points are moved by beyond what is foretold, (n, 3) [m].
         held: Targets that keep their values for the side they are reached from, (n,).
         swung: .. for the ways to or from them, (n,).
@@ -99,6 +110,7 @@ class Iterate:
     """
 
     solved: Commands
+    departure: Departure
     bent: Floats
     held: Bools
     swung: Bools
@@ -127,14 +139,14 @@ class Iteration:
         reading: The visits.
         planned, states: Their plan.
         setting: What it is compensated with.
-        given: What the first targets move by, for they are others' last, (k, 3) [m].
+        part: They are a window of a program.
     """
 
     reading: Reading
     planned: Planned
     states: States
     setting: Setting
-    given: Floats
+    part: bool
 
     def first_aim(self) -> Iterate:
         """Correct for the sides that were planned."""
@@ -144,7 +156,16 @@ class Iteration:
                 setting.model, setting.cell, self.planned, self.states,
                 setting.options.orientation,
             )  # fmt: skip
-        return Iterate(solved, np.zeros_like(self.planned.plan.aside), none, none, none)
+            departed = self.departed(solved, np.arange(len(self.states)))
+        bent = np.zeros_like(self.planned.plan.aside)
+        return Iterate(solved, departed, bent, none, none, none)
+
+    def departed(self, solved: Commands, rows: Ints) -> Departure:
+        """Say how far commands lead the arm from where it was, k visits."""
+        plan, setting = self.planned.plan, self.setting
+        tool = plan.tool[rows, :3, 3]
+        arm, old, new = setting.cell.arm, plan.q[rows], solved.q[rows]
+        return departure(arm, old, new, tool, setting.offset)
 
     def next_aim(
         self, current: Iterate, moved: Bools, found: Floats, search: SecantSearch
@@ -158,27 +179,30 @@ class Iteration:
                 current.solved, moved, setting.model, setting.cell, self.planned,
                 states, setting.options.orientation,
             )  # fmt: skip
-        return replace(current, solved=solved)
+            rows = np.flatnonzero(moved)
+            departed = current.departure.with_rows(rows, self.departed(solved, rows))
+        return replace(current, solved=solved, departure=departed)
 
     def propose(self, current: Iterate) -> tuple[Proposal, Floats]:
         """Decide on numbers; return too where the path is to pass its targets."""
         with self.setting.clock("decide"):
             plan = self.planned.plan
             aside = passing_after(plan, self.wanted(current)) + current.bent
-            given = self.reading, self.planned, current.solved, aside
+            given = self.reading, self.planned, current.solved, current.departure
             left = current.held, current.swung
-            return Round(*given, *left, self.setting).propose(), aside
+            return Round(*given, aside, *left, self.setting).propose(), aside
 
     def wanted(self, current: Iterate) -> Floats:
         """Say what the path should move by at every target, (n, 3) [m]."""
         before = self.planned.plan.tcp[:, :3, 3]
         wanted = np.nan_to_num(current.solved.command[:, :3, 3] - before)
         wanted[current.held | current.swung] = 0.0
-        wanted[: len(self.given)] = self.given
         return wanted
 
-    def missed(self, proposal: Proposal, aside: Floats, meant: Floats) -> Floats:
-        """Say by what programs with a point that is not hit miss theirs, (n, 3) [m].
+    def missed(
+        self, proposal: Proposal, aside: Floats, meant: Floats
+    ) -> tuple[Floats, Bools]:
+        """Say by what targets miss theirs, (n, 3) [m], and where by too much, (n,).
 
         Args:
             proposal: Tells which targets can make up for it.
@@ -188,17 +212,21 @@ class Iteration:
         missed, sharp = np.zeros_like(aside), self.planned.plan.pull.visit
         missed[sharp] = (aside - meant)[sharp]
         missed[~proposal.corrected] = 0.0
-        for first, end in pairwise((*self.reading.begins, len(missed))):
-            far = np.abs(missed[first:end]).max(initial=0.0) > CLOSE
-            if not far:  # nor where it is not known
-                missed[first:end] = 0.0
-        return missed
+        missed[np.isnan(missed).any(axis=1)] = 0.0
+        far = np.asarray((np.abs(missed) > CLOSE).any(axis=1))
+        begins = self.reading.begins
+        if len(begins) > 1:  # those with a point that is not hit go on alone
+            for first, end in pairwise((*begins, len(missed))):
+                if not far[first:end].any():
+                    missed[first:end] = 0.0
+        return missed, far
 
     def swung(self, proposal: Proposal, found: Converged | None) -> Bools:
         """Tell which targets must stay for the ways to or from them, (n,).
 
         Raises:
             NotConcatenableError: There are some, in programs side by side.
+            NotAloneError: They are not among these, in a window of a program.
         """
         n = len(self.states)
         if found is None:
@@ -213,6 +241,8 @@ class Iteration:
         ends = with_origins(self.reading.visits, self.planned, ends)
         ends &= proposal.corrected
         if far.any() and not ends.any():  # by what came long before
+            if self.part:
+                raise NotAloneError
             ends = np.array(proposal.corrected)
         if ends.any() and len(self.reading.begins) > 1:
             raise NotConcatenableError
@@ -230,28 +260,27 @@ def passing_after(plan: Plan, wanted: Floats) -> Floats:
 class Replanner:
     """The last course of a program, and the way to the next one."""
 
-    def __init__(self, visits: Visits, targets: Targets, cell: Cell) -> None:
+    def __init__(
+        self, visits: Visits, targets: Targets, cell: Cell, begin: StartState
+    ) -> None:
         """Begin with the program as it is.
 
         Args:
             visits: Its visits.
             targets: Where they go.
             cell: The arm and its surroundings.
+            begin: Where the arm stands at the first visit, if that is known beforehand.
         """
         self._visits, self._targets, self._cell = visits, targets, cell
+        self._begin = begin
         self._last: Replanned | None = None
 
-    @property
-    def end(self) -> StartState:
-        """Return where the last course leaves the arm; nowhere before the first."""
-        return NOWHERE if self._last is None else self._last.end
-
-    def after(self, values: Floats, begin: StartState) -> Replanned:
+    def after(self, values: Floats, lead: Sides) -> Replanned:
         """Find where the program leads with other numbers.
 
         Args:
             values: The numbers, (n, 6) in the program's units.
-            begin: Where the arm stands at the first visit, if that is known beforehand.
+            lead: What is known of the first sides, see `direction.arrivals`.
         """
         new = replace(self._visits, values=values)
         old = self._visits.values
@@ -259,10 +288,10 @@ class Replanner:
         rows = np.flatnonzero(moved)
         targets = moved_targets(self._targets, new, self._cell, rows)
         arm, last = self._cell.arm, self._last
-        if last is None or last.begin is not begin:
-            self._last = replan_all(arm, targets, begin)
+        if last is None:
+            self._last = replan_all(arm, targets, self._begin, lead)
         else:
-            self._last = replan(arm, last, targets, moved)
+            self._last = replan(arm, last, targets, moved, lead)
         self._visits, self._targets = new, targets
         return self._last
 
@@ -276,21 +305,23 @@ CORNERS = 3  # rounds for what is curved there
 
 
 @dataclass(frozen=True)
-class EndState:
-    """How the last target of some visits is left, for what comes after it.
+class Lead:
+    """How a window goes on from the one before.
 
     Attributes:
-        looked: Where the arm stands with its number as it was corrected.
-        written: .. with its number as it is written, which has less digits.
-        wanted: What it moves by, (k, 3) [m]; k is 1, or 0 where nothing was before.
+        begin: Where the arm stands at the first visit.
+        looks: What the window before looked at, at the first k visits.
     """
 
-    looked: StartState
-    written: StartState
-    wanted: Floats
+    begin: StartState = NOWHERE
+    looks: Glimpses = NO_GLIMPSES
 
 
-AT_START = EndState(NOWHERE, NOWHERE, np.empty((0, 3)))
+FROM_START = Lead()
+
+
+class NotAloneError(Exception):
+    """What comes of a window cannot be told from it alone."""
 
 
 class NotConcatenableError(Exception):
@@ -305,14 +336,12 @@ class Converged:
         proposal: What is written.
         edits: The edits that write it.
         reached: Where these numbers lead.
-        left: How the last target is left.
         moved: How far the ways lead the arm from where it was, n visits.
     """
 
     proposal: Proposal
     edits: tuple[Replacements, ...]
     reached: Reached
-    left: EndState
     moved: Departure
 
 
@@ -321,7 +350,8 @@ def iterate(
     planned: Planned,
     states: States,
     setting: Setting,
-    before: EndState = AT_START,
+    lead: Lead = FROM_START,
+    trail: Trail | None = None,
 ) -> Converged:
     """Correct and plan again, until the sides are those corrected for.
 
@@ -338,42 +368,95 @@ def iterate(
     as it is while others go on. Only what the last look finds would come rounds later
     than in a program alone, and how targets are settled depends on the round.
 
+    Args:
+        reading: The visits.
+        planned: Their plan.
+        states: The same in the model's terms.
+        setting: What they are compensated with.
+        lead: How they go on from others, if they are a window of a program.
+        trail: .. and what is kept of their rounds then.
+
     Raises:
         NotConcatenableError: The last look found something in programs side by side.
+        NotAloneError: What comes of a window cannot be told from it alone.
     """
-    iteration = Iteration(reading, planned, states, setting, before.wanted)
-    replanner = Replanner(reading.visits, planned.targets, setting.cell)
-    search, clock = SecantSearch(), setting.clock
-    current = iteration.first_aim()
+    iteration = Iteration(reading, planned, states, setting, trail is not None)
+    trail = Trail() if trail is None else trail
+    replanner = Replanner(reading.visits, planned.targets, setting.cell, lead.begin)
+    course = _Course(iteration, replanner, lead, trail)
+    search, current = SecantSearch(), iteration.first_aim()
     for number in count():  # ends: from round ROUNDS on, `settled` or `held` grows
         proposal, meant = iteration.propose(current)
-        with clock("plan again"):
-            looked = replanner.after(proposal.decisions.corrected, before.looked)
+        looked = course.look((number, False), current, proposal)
         most = SAME if number < ROUNDS else OTHER
         moved = current.turned(proposal, looked.side, most)
-        missed = iteration.missed(proposal, looked.aside, meant)
-        bend_on = number < CORNERS and bool(missed.any())
-        if not moved.any() and not bend_on:
-            found, flipped = _read_back(iteration, current, proposal, replanner, before)
+        missed, far = iteration.missed(proposal, looked.aside, meant)
+        step = trail.take(moved, missed, far & (number < CORNERS))
+        if step == Step.READ_BACK:
+            found, flipped = _read_back(course, current, proposal, number)
             swung = iteration.swung(proposal, found)
             if found is not None and not swung.any():
                 return found
             held, swung = current.held | flipped, current.swung | swung
             current = replace(current, held=held, swung=swung)
             continue
-        bent = current.bent + missed if bend_on else current.bent
+        bent = current.bent + missed if step == Step.BEND else current.bent
         settled = current.settled | moved if number >= ROUNDS else current.settled
         current = replace(current, bent=bent, settled=settled)
         current = iteration.next_aim(current, moved, looked.side, search)
     raise AssertionError("unreachable")
 
 
+@dataclass(frozen=True)
+class _Course:
+    """The way from proposals to where they lead.
+
+    Attributes:
+        iteration: What does not change.
+        replanner: Finds the way.
+        lead: How it begins.
+        trail: What is kept of it.
+    """
+
+    iteration: Iteration
+    replanner: Replanner
+    lead: Lead
+    trail: Trail
+
+    def look(self, look: Look, current: Iterate, proposal: Proposal) -> Replanned:
+        """Find where a proposal leads."""
+        values = proposal.decisions.corrected
+        with self.iteration.setting.clock("plan again"):
+            found = self.replanner.after(values, lead_of(self.lead.looks, look))
+        if self.iteration.part:
+            self.trail.see(look, _glimpse(current, proposal, found))
+        return found
+
+
+def _glimpse(current: Iterate, proposal: Proposal, found: Replanned) -> Glimpse:
+    """Put together what windows must agree on at their cuts."""
+    decided = proposal.decisions
+    return Glimpse(
+        values=decided.corrected,
+        status=decided.status,
+        why=decided.why,
+        reasons=decided.reasons,
+        correction=decided.correction,
+        aim=current.solved.direction,
+        bent=current.bent,
+        left=np.column_stack([current.held, current.swung, current.settled]),
+        q=found.exact.q,
+        passed=found.passed,
+        aside=found.aside,
+        slot=found.slot,
+        side=found.side,
+        lo=found.sides.play.lo,
+        hi=found.sides.play.hi,
+    )
+
+
 def _read_back(
-    iteration: Iteration,
-    current: Iterate,
-    proposal: Proposal,
-    replanner: Replanner,
-    before: EndState,
+    course: _Course, current: Iterate, proposal: Proposal, number: int
 ) -> tuple[Converged | None, Bools]:
     """Write the numbers, and look at them as they will be read.
 
@@ -383,24 +466,23 @@ def _read_back(
     Raises:
         NotConcatenableError: There are some, in programs side by side.
     """
-    looked, setting = replanner.end, iteration.setting
+    iteration = course.iteration
+    setting = iteration.setting
     edits, proposal = write_and_read_back(iteration.reading, proposal, setting.clock)
-    with setting.clock("plan again"):
-        last = replanner.after(proposal.decisions.corrected, before.written)
+    last = course.look((number, True), current, proposal)
     flipped = current.turned(proposal, last.side, OTHER)
     if flipped.any():
         if len(iteration.reading.begins) > 1:
             raise NotConcatenableError
         return None, flipped
-    left = EndState(looked, last.end, iteration.wanted(current)[-1:].copy())
     with setting.clock("solve"):
         model, cell = setting.model, setting.cell
         std_error = std_errors(model, cell, iteration.states, current.solved)
     decided = replace(proposal.decisions, std_error=std_error)
     proposal = replace(proposal, decisions=decided)
     with setting.clock("verify"):
-        moved = _departed(iteration, last.targets, before.written)
-    return Converged(proposal, edits, last.reached, left, moved), flipped
+        moved = _departed(iteration, last.targets, course.lead.begin)
+    return Converged(proposal, edits, last.reached, moved), flipped
 
 
 def _departed(iteration: Iteration, targets: Targets, begin: StartState) -> Departure:

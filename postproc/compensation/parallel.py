@@ -10,19 +10,17 @@ import signal
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
-from dataclasses import fields, is_dataclass, replace
 from functools import partial
 from itertools import pairwise
 from multiprocessing import parent_process
 from queue import Queue
 from threading import Thread
 from traceback import format_exc
-from typing import IO, Any, NoReturn, Protocol, TypeVar, cast
-
-import numpy as np
+from typing import IO, Any, NoReturn, Protocol, TypeVar
 
 from postproc.arrays import Map
 from postproc.compensation.options import Clock, silent
+from postproc.compensation.rounds import Step
 from postproc.exceptions import PostprocError
 
 # Work in a forked child: it sees all that was read before, and sends what it makes.
@@ -31,6 +29,7 @@ from postproc.exceptions import PostprocError
 # job can be done on another core without handing over what it works on.
 
 T = TypeVar("T")
+K = TypeVar("K")
 
 AHEAD = 16  # items that a child makes before anybody takes them
 SET_PDEATHSIG = 1  # of prctl(2): the signal that the death of the parent sends
@@ -177,47 +176,67 @@ def _taken(pipe: IO[bytes]) -> Iterator[Any]:
         yield content
 
 
-# Windows of a program worked through by several processes, to the same bytes.
+# Windows of a program worked through by several processes, to the bytes of one window.
 #
-# A window depends on those before only through where the arm stands at its beginning. A
-# process that works ahead foretells that from the targets right before: the joints take
-# up their play within a few moves, and what was before is forgotten. Whether it was
-# right, to the last bit, is seen when the windows before are done; where it was not,
-# its windows are done again from where the arm does stand. So the result is that of one
-# process.
+# A window depends on its neighbours in three ways. Forwards, over where the arm stands
+# at its beginning and what the joints remember: that is known from the window before. A
+# process that works ahead foretells it from many targets before; the joints take up
+# their play within a few moves, and what was before is forgotten. Both ways, over what
+# acts on the targets next to it: that is what halos are for. And over rounds, of which
+# a program takes as many as any target needs. All of that is checked: at every cut the
+# windows before and behind must have found the same at the targets on both sides, round
+# by round, and must have taken rounds of the same kind. Whatever rule makes a target
+# depend on the ones next to it then holds at all targets, as in one window, so that the
+# result is that of one window. Where something does not agree, a window is worked
+# through again from what is known now; where that does not help, something reaches
+# farther than a halo, and the windows on both sides become one.
 
-W_contra = TypeVar("W_contra", contravariant=True)
-K_co = TypeVar("K_co", covariant=True)
 W = TypeVar("W")
-S = TypeVar("S")
-K = TypeVar("K")
+D = TypeVar("D")
 
-DIGITS = 12  # of [rad] and [m]: sums in blocks of other lengths differ behind these
+AGAIN = 3  # times that a window is worked through again, at the most
+MERGES = 8  # times that windows become one, before all of them do
 
 
-class Work(Protocol[W_contra, S, K_co]):
-    """What is done with windows W, between stops S, for results K."""
+class Work(Protocol[W, D]):
+    """What is done with windows W, each for a result D."""
 
-    def correct(self, window: W_contra, begin: S, clock: Clock) -> tuple[K_co, S]:
-        """Work through one window; return its result, and how it ends."""
+    def correct(
+        self, window: W, before: D | None, pace: Sequence[Step], clock: Clock
+    ) -> D:
+        """Work through one window.
 
-    def foretell(self, window: W_contra) -> S | None:
-        """Tell from where a window will begin; None where that cannot be told."""
+        Args:
+            window: The window.
+            before: What came of the one before; None: not known, or it is the first.
+            pace: The rounds to take.
+            clock: Given the seconds.
+        """
+
+    def whole(self) -> list[W]:
+        """Return the program as one window."""
+
+    def fits(self, found: D, steps: Sequence[Step]) -> bool:
+        """Tell whether a window comes out as if it had taken these rounds."""
+
+    def joins(self, before: D, after: D) -> bool:
+        """Tell whether two windows found the same at the cut between them."""
+
+    def steps(self, found: Sequence[D]) -> Sequence[Step]:
+        """Tell which rounds all windows together take."""
+
+    def merged(self, windows: Sequence[W], cut: int) -> list[W]:
+        """Make one window of those on both sides of a cut, and what goes on there."""
 
 
 def in_processes(
-    work: Work[W, S, K],
-    windows: Sequence[W],
-    begin: S,
-    clock: Clock,
-    processes: int,
-) -> Iterator[K]:
-    """Work through windows, a part of them in every process; yield the results.
+    work: Work[W, D], windows: Sequence[W], clock: Clock, processes: int
+) -> list[D]:
+    """Work through windows, a part of them in every process.
 
     Args:
         work: What is to be done.
         windows: In their order.
-        begin: From where the first one begins.
         clock: Given the seconds of all processes.
         processes: How many at the most, this one included.
 
@@ -225,26 +244,24 @@ def in_processes(
         PostprocError: As the work does, for the first window that fails.
     """
     own, *others = parts_of(windows, processes if can_fork() else 1)
+    found: list[D] = []
     with ExitStack() as children:
         ahead = [
             children.enter_context(
-                in_worker(partial(_speculate, work, part), len(part) + 1)
+                in_worker(partial(_work_ahead, work, part), len(part))
             )
             for part in others
         ]
-        stop = begin
         for window in own:
-            kept, stop = work.correct(window, stop, clock)
-            yield kept
-        for part, found in zip(others, ahead, strict=True):
-            right = identical(next(found), stop)
-            for window in part:
-                if right:
-                    kept, stop, seconds = next(found)
-                    clock.add(seconds)
-                else:
-                    kept, stop = work.correct(window, stop, clock)
-                yield kept
+            before = found[-1] if found else None
+            found.append(work.correct(window, before, (), clock))
+        for part, made in zip(others, ahead, strict=True):
+            for window, (done, stages) in zip(part, made, strict=True):
+                clock.add(stages)
+                if done is None:
+                    done = work.correct(window, found[-1], (), clock)
+                found.append(done)
+    return _joined(work, list(windows), found, clock)
 
 
 def parts_of(windows: Sequence[W], processes: int) -> list[Sequence[W]]:
@@ -258,44 +275,74 @@ def parts_of(windows: Sequence[W], processes: int) -> list[Sequence[W]]:
     return [windows[a:b] for a, b in pairwise(ends)]
 
 
-def _speculate(work: Work[W, S, K], part: Sequence[W]) -> Iterator[Any]:
-    """Foretell where some windows begin, and work through them; yield both.
+def _work_ahead(
+    work: Work[W, D], part: Sequence[W]
+) -> Iterator[tuple[D | None, dict[str, float]]]:
+    """Work through windows, foretelling where the first begins; yield seconds too.
 
-    First the stop that was foretold, or None; then, for every window, its result, its
-    end and the seconds of its stages.
+    What fails of an invention tells nothing: from there on there is nothing to yield.
     """
-    stop = work.foretell(part[0])
-    yield stop
-    if stop is None:
-        return
+    before: D | None = None
+    lost = False
     for window in part:
         clock = Clock(silent)
-        kept, stop = work.correct(window, stop, clock)
-        yield kept, stop, clock.stages
+        if not lost:
+            try:
+                before = work.correct(window, before, (), clock)
+            except Exception:
+                lost = True
+        yield None if lost else before, clock.stages
 
 
-def rounded(stop: S) -> S:
-    """Round a tree of dataclasses and arrays to `DIGITS`."""
-    found: Any = stop
-    if isinstance(found, np.ndarray):
-        found = np.round(found, DIGITS)
-    elif is_dataclass(found) and not isinstance(found, type):
-        own = {f.name: rounded(getattr(found, f.name)) for f in fields(found)}
-        found = replace(found, **own)
-    return cast(S, found)
+def _joined(
+    work: Work[W, D], windows: list[W], found: list[D], clock: Clock
+) -> list[D]:
+    """Work through windows again until all of them agree."""
+    tries, merges = dict.fromkeys(windows, 0), 0
+    while True:
+        again, cut = _again(work, windows, found, tries, clock)
+        if cut is None and not again:
+            return found
+        if cut is None:
+            continue
+        merges += 1
+        old = dict(zip(windows, found, strict=True))
+        windows = work.merged(windows, cut) if merges < MERGES else work.whole()
+        tries.update({w: tries.get(w, 0) for w in windows})
+        found = []
+        for window in windows:
+            before = found[-1] if found else None
+            done = old.get(window)
+            if done is None:
+                done = work.correct(window, before, (), clock)
+            found.append(done)
 
 
-def identical(a: Any, b: Any) -> bool:
-    """Tell whether two trees of dataclasses and arrays agree, to the last bit."""
-    if type(a) is not type(b):
-        return False
-    if is_dataclass(a) and is_dataclass(b):
-        return all(identical(getattr(a, f.name), getattr(b, f.name)) for f in fields(a))
-    if isinstance(a, np.ndarray):
-        if a.dtype != b.dtype or a.shape != b.shape:
-            return False
-        return a.tobytes() == np.asarray(b).tobytes()
-    return bool(a == b)
+def _again(
+    work: Work[W, D],
+    windows: Sequence[W],
+    found: list[D],
+    tries: dict[W, int],
+    clock: Clock,
+) -> tuple[bool, int | None]:
+    """Work through those windows again that do not agree, in place.
+
+    Returns:
+        Whether there were any, and the first one that does not agree whatever is done.
+    """
+    again, steps = False, work.steps(found)
+    for k, window in enumerate(windows):
+        before = found[k - 1] if k else None
+        fits = work.fits(found[k], steps)
+        if fits and (before is None or work.joins(before, found[k])):
+            continue
+        if tries[window] == AGAIN and len(windows) > 1:
+            return again, max(k, 1)
+        tries[window] += 1
+        found[k], again = work.correct(window, before, steps, clock), True
+        if before is not None and not work.joins(before, found[k]):
+            tries[window] = AGAIN
+    return again, None
 
 
 # Long work on two cores: some of it in a forked child, the results as if it were not.

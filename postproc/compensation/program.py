@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from postproc.arrays import Floats, Ints
+from postproc.arrays import Bools, Floats, Ints
 from postproc.compensation.eligibility import (
     Reasons,
     mark_arcs,
@@ -32,6 +32,7 @@ from postproc.motion.planner import Plan, plan
 from postproc.motion.targets import Targets
 from postproc.motion.trace import NOWHERE, StartState
 from postproc.robot.cell import Cell
+from postproc.robot.direction import UNLED, Arrivals
 from postproc.robot.state import States, make_states
 
 
@@ -84,14 +85,14 @@ class Planned:
         reasons: Why visits must not be compensated.
         shift: From where the controller takes every target to be to where it is, as
             far as a frame was taught with the arm's error in it, (n, 3) [m].
-        doubtful: What comes from the last target is doubtful (see `eligibility`).
+        doubtful: What comes from these targets is doubtful (see `eligibility`), (n,).
     """
 
     targets: Targets
     plan: Plan
     reasons: Reasons
     shift: Floats
-    doubtful: bool = False
+    doubtful: Bools
 
     def wanted(self, rows: Ints) -> Floats:
         """Return the TCP poses that should be reached at visits, (k, 4, 4) [m]."""
@@ -242,6 +243,7 @@ def plan_visits(
     cell: Cell,
     timed: bool = True,
     begin: StartState = NOWHERE,
+    lead: Arrivals = UNLED,
     doubtful: bool = False,
 ) -> Planned:
     """Plan every move of a program, with the time that it takes or without.
@@ -251,6 +253,7 @@ def plan_visits(
         cell: The arm and its surroundings.
         timed: As in `plan`.
         begin: Where the arm stands at the first visit, if that is known beforehand.
+        lead: What is known of the first arrivals, see `direction.arrivals`.
         doubtful: What comes from there is doubtful (see `eligibility`).
 
     Raises:
@@ -258,7 +261,7 @@ def plan_visits(
     """
     targets, reasons = targets_from_visits(visits, cell)
     wrist = np.deg2rad(cell.limits.wrist_deg)
-    planned = plan(cell.arm, targets, wrist, timed, begin)
+    planned = plan(cell.arm, targets, wrist, timed, begin, lead)
     reasons.adopt(planned.reason, planned.reasons)
     on = mark_configuration_flags(visits, targets, planned, cell.arm, reasons, doubtful)
     mark_orientation_interpolation(visits, targets, planned, reasons)

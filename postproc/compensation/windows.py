@@ -117,14 +117,18 @@ def _literals(programs: Sequence[Visits]) -> Literals:
     return Literals(**columns)
 
 
-# Long programs in windows, cut at stops that nothing but the arm's standing crosses.
+# Long programs in windows, with halos: neighbours that are worked through with them.
 #
-# Behind such a stop the program goes on from there alone, no jump leads across it, no
-# number is used on both sides, and neither an arc nor a step begins there. Nothing
-# before it depends on what comes after, and what comes after depends on the past only
-# through where the arm stands and what its joints remember.
+# Behind a cut the program goes on from there alone, no jump leads across it, no number
+# is used on both sides, and neither an arc nor a step begins there. What lies on both
+# sides of it still acts on each other: over rounded points and steps of the correction
+# both ways, over what the joints remember forwards. So a window is worked through with
+# a halo on either side. How far things really reach is not guessed: windows must find
+# the same at the targets beside a cut, round by round (see `parallel`).
 
 LEAST = 20_000  # visits of a window; shorter programs are one
+HALO = 400  # visits on either side; a round reaches some 20, and LONG ones are long
+BAND = 32  # visits on either side of a cut that both must agree on
 RUN_UP = 2_000  # visits that tell how the arm comes to a window
 STEPS = (
     Meaning.RELATIVE_TOOL, Meaning.RELATIVE_BASE, Meaning.RELATIVE_UFRAME, Meaning.AWAY,
@@ -138,25 +142,42 @@ SHARED = {
 
 @dataclass(frozen=True)
 class Window:
-    """Visits first .. end - 1 of a program.
+    """Visits first .. end - 1 of a program, and those worked through with them.
 
     Attributes:
         first, end: The visits.
+        begin, stop: .. with both halos.
     """
 
     first: int
     end: int
+    begin: int
+    stop: int
 
     @property
     def seeds(self) -> int:
-        """Return how many visits before the first are part of it: the stop, or none."""
-        return min(self.first, 1)
+        """Return how many of its visits are only where it begins: one, or none."""
+        return min(self.begin, 1)
 
-    def of(self, visits: Visits) -> Visits:
-        """Cut a window out; its first visit is the stop, a move without a target."""
-        if self.first == 0 and self.end == len(visits):
+    @property
+    def own(self) -> slice:
+        """Return which of its visits are its own."""
+        return self.rows(self.first, self.end)
+
+    def rows(self, first: int, end: int) -> slice:
+        """Return which of its visits are first .. end - 1 of the program."""
+        return slice(first - self.begin, end - self.begin)
+
+    def of(self, visits: Visits, known: bool = True) -> Visits:
+        """Cut a window out; where it begins is a move without a target.
+
+        Args:
+            visits: The program.
+            known: It is known where the arm stands there; else it comes from anywhere.
+        """
+        if self.begin == 0 and self.stop == len(visits):
             return visits
-        rows = slice(self.first - self.seeds, self.end)
+        rows = slice(self.begin, self.stop)
         values = {
             f.name: getattr(visits, f.name)[rows]
             for f in fields(Visits)
@@ -165,54 +186,57 @@ class Window:
         for name in ("literal", "follows"):
             values[name] = np.array(values[name])
             values[name][: self.seeds] = -1
-        start = visits.pred_start[self.first : self.end + 1]
+        start = visits.pred_start[self.begin + self.seeds : self.stop + 1]
         pred = visits.pred[start[0] : start[-1]]
         pred = np.where(pred >= 0, pred - rows.start, pred)
         start = np.concatenate([np.zeros(self.seeds, dtype=np.int64), start - start[0]])
+        if self.seeds and not known:
+            start[1:] += 1
+            pred = np.append(-1, pred)
         return replace(visits, **values, pred_start=start, pred=pred)
 
 
-def windows(visits: Visits, least: int) -> list[Window]:
-    """Cut a program into windows, none shorter than `least` visits if there are two."""
-    n = len(visits)
-    if n < 2 * least:
-        return [Window(0, n)]
-    ends = [0]
-    for end in (np.flatnonzero(cut_points(visits)) + 1).tolist():
-        if end - ends[-1] >= least and n - end >= least:
-            ends.append(end)
-    ends.append(n)
-    return [Window(a, b) for a, b in pairwise(ends)]
+def windows(quiet: Bools, least: int) -> list[Window]:
+    """Cut a program into windows, none shorter than `least` visits if there are two.
 
-
-def lead_in(visits: Visits, window: Window) -> Visits | None:
-    """Cut out what leads to a window, the first target reached from anywhere.
-
-    Its first visit may be a fly point: a path on which the arm has not stopped, but
-    which nothing else crosses.
-
-    Returns:
-        At least `RUN_UP` visits, or None where there is no such place before them.
+    Args:
+        quiet: Behind which visits it may be cut, (n,).
+        least: Visits of a window.
     """
-    places = np.flatnonzero(seams(visits)[: max(window.first - RUN_UP, 0)])
-    if len(places) == 0:
-        return None
-    before = Window(int(places[-1]) + 1, window.first).of(visits)
-    start = before.pred_start + 1
-    start[0] = 0
-    return replace(before, pred_start=start, pred=np.append(-1, before.pred))
+    n, places, least = len(quiet), np.flatnonzero(quiet) + 1, max(least, HALO)
+    ends = [0]
+    while ends[-1] + 2 * least <= n:
+        later = places[np.searchsorted(places, ends[-1] + least) :]
+        if len(later) == 0 or later[0] > n - least:
+            break
+        ends.append(int(later[0]))
+    return [window(quiet, a, b) for a, b in pairwise([*ends, n])]
+
+
+def window(quiet: Bools, first: int, end: int, before: int = -1) -> Window:
+    """Give visits their halos, from one place that may be cut to another.
+
+    Args:
+        quiet: Behind which visits the program may be cut, (n,).
+        first: The first visit.
+        end: One past the last.
+        before: How many visits there must be before them; default: `HALO`.
+    """
+    lead = max(first - 1 - (HALO if before < 0 else before), 0)
+    earlier = np.flatnonzero(quiet[: lead + 1][::-1])
+    begin = lead - int(earlier[0]) if len(earlier) and first else 0
+    later = np.flatnonzero(quiet[end + HALO - 1 :])
+    stop = end + HALO + int(later[0]) if len(later) else len(quiet)
+    return Window(first, end, begin, min(stop, len(quiet)))
 
 
 def cut_points(visits: Visits) -> Bools:
-    """Tell behind which visits a program may be cut, (n,)."""
+    """Tell behind which visits a program may be cut where the arm stops, (n,)."""
     return np.asarray(seams(visits) & ~visits.fly)
 
 
 def seams(visits: Visits) -> Bools:
-    """Tell behind which visits a program goes on as if they were its beginning, (n,).
-
-    If the arm stops there, that is.
-    """
+    """Tell behind which visits a program may be cut, (n,)."""
     n = len(visits)
     to = np.repeat(np.arange(n), np.diff(visits.pred_start))
     known = visits.pred >= 0

@@ -178,7 +178,8 @@ class Loads:
         if not mass.any():
             return np.zeros((len(s), 6))
         com = np.where(np.isnan(s.payload_com), s.tool, s.payload_com)
-        loaded = self.arm.gravity_torque(s.q, mass, com)
+        # By way of both loads: the last bits of fitted models hang on it.
+        loaded = self.gravity + self.arm.payload_torque(s.q, mass, com)
         torque: Floats = loaded - self.gravity
         return torque
 

@@ -81,7 +81,8 @@ class BranchedLazily:
     def on(self, slot: int, first: int, most: int) -> Floats:
         """Solve for one branch."""
         ahead = self.flange[first : first + most]
-        return self.arm.on_branch(ahead, np.full(len(ahead), slot))
+        found = self.arm.on_branch(ahead, np.full(len(ahead), slot))
+        return self.arm.into_range(found)
 
 
 # Which of the eight solutions, on which turn: from the string, or by continuity.
@@ -125,6 +126,17 @@ def nearest_turns(q: Floats, near: Floats) -> Floats:
     return turned
 
 
+def unwrapped(q: Floats) -> Floats:
+    """Put samples (k, 6) [rad] on the turns that continue the first one.
+
+    By whole turns from where they are given: it does not matter where one begins.
+    """
+    turns = np.cumsum(np.round(np.diff(q, axis=0) / FULL), axis=0)
+    out = np.array(q)
+    out[1:] -= FULL * turns
+    return out
+
+
 def nearest_slot(branches: Floats, near: Floats) -> int:
     """Name the branch (8, 6) nearest to joint angles (6,) [rad]; -1 without any."""
     return int(nearest_slots(branches[None], near[None])[0])
@@ -154,19 +166,20 @@ class Followed:
     reached: bool
 
 
-def follow(begin: Floats, ways: Branched) -> Followed:
+def follow(begin: Floats, ways: Branched, slot: int = -1) -> Followed:
     """Follow the branch and the turns that continue a motion.
 
     Args:
         begin: Joint angles before the first sample, (6,) [rad].
         ways: The solutions at the s samples.
+        slot: The branch that is followed already; -1: that nearest to `begin`.
 
     Returns:
         The whole path, or its beginning up to where it cannot be followed.
     """
     s = len(ways)
     q, slots = np.empty((s, 6)), np.empty(s, dtype=np.int64)
-    done, last, slot, ahead = 0, begin, -1, FEW
+    done, last, ahead = 0, begin, FEW
     while done < s:
         fresh = slot < 0
         if fresh:
@@ -176,7 +189,7 @@ def follow(begin: Floats, ways: Branched) -> Followed:
         path = np.vstack([last, ways.on(slot, done, ahead)])
         step = np.abs(np.diff(path, axis=0))
         if not (step < np.pi).all():
-            path = np.unwrap(path, axis=0)
+            path = unwrapped(path)
             step = np.abs(np.diff(path, axis=0))
         step = step.max(axis=1)
         if fresh and step[0] > LOST:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 
@@ -42,6 +42,13 @@ class Departure:
     def sizes(self) -> Floats:
         """Joint [rad], elbow, wrist centre and TCP [m], (n, 4)."""
         return np.column_stack([self.joint, self.elbow, self.wrist_centre, self.tcp])
+
+    def with_rows(self, rows: Ints, new: Departure) -> Departure:
+        """Return it with other values in some rows, (k,)."""
+        found = {f.name: np.array(getattr(self, f.name)) for f in fields(self)}
+        for name, values in found.items():
+            values[rows] = getattr(new, name)
+        return Departure(**found)
 
 
 def departure(

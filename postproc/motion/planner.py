@@ -14,7 +14,8 @@ from postproc.motion.targets import CODE, REASONS, WRIST, Targets
 from postproc.motion.timing import no_time, tell_time
 from postproc.motion.trace import NOWHERE, StartState, Trace, trace
 from postproc.robot.arm import Arm
-from postproc.robot.direction import arrivals
+from postproc.robot.direction import UNLED, Arrivals, arrivals
+from postproc.robot.play import PlayState
 
 
 @dataclass(frozen=True)
@@ -39,7 +40,7 @@ class Plan:
         overruled: Continuity took another branch or turn than the string says, (n,).
         untimed: Time and speed are estimates: no time law was found, (n,).
         pull: How rounded fly points move with their neighbours.
-        end: Where the arm stands at the last arrival.
+        past: What the joints remember at the arrivals, n rows.
         exact: The ways as if the arm stopped at every target.
     """
 
@@ -58,7 +59,7 @@ class Plan:
     overruled: Bools
     untimed: Bools
     pull: BlendCoupling
-    end: StartState
+    past: PlayState
     exact: Trace
 
     def __post_init__(self) -> None:
@@ -67,6 +68,10 @@ class Plan:
     def __len__(self) -> int:
         """Return the number of arrivals."""
         return len(self.q)
+
+    def lead(self, rows: slice) -> Arrivals:
+        """Return what is known of some arrivals for who goes on from them."""
+        return Arrivals(self.direction, self.side, self.travel, self.past)[rows]
 
     def gravity_torque(self, arm: Arm, payload: float, payload_com: Floats) -> Floats:
         """Torque that gravity exerts about every joint, (n, 6) [N m].
@@ -85,6 +90,7 @@ def plan(
     wrist: float,
     timed: bool = True,
     begin: StartState = NOWHERE,
+    lead: Arrivals = UNLED,
 ) -> Plan:
     """Plan every move the way the controller moves.
 
@@ -94,14 +100,14 @@ def plan(
         wrist: Axis 5 nearer to zero than this is the wrist singularity [rad].
         timed: Find out how fast the arm passes; else speed and time stay unknown.
         begin: Where the arm stands at the first move, if that is known beforehand.
+        lead: What is known of the first arrivals, see `direction.arrivals`.
 
     Raises:
         PlanError: The arm has no closed-form inverse kinematics.
     """
     exact = trace(arm, targets, begin.known)
     traced = blend(arm, targets, exact, timed)
-    arrived = arrivals(arm, traced.q, traced.edges, begin.past)
-    end = StartState.at_end(exact.q, exact.flange, exact.slot, arrived.past)
+    arrived = arrivals(arm, traced.q, traced.edges, lead)
     clock = tell_time(arm, targets, traced) if timed else no_time(len(targets))
     tool = targets.tool
     tcp = where_passed(arm, planned_points(exact), traced.q) @ tool
@@ -109,7 +115,7 @@ def plan(
         traced.q, tcp, traced.aside, tool, arrived.direction, arrived.side,
         arrived.travel, clock.speed, clock.time, traced.slot,
         _guard(traced, wrist), REASONS, traced.overruled, clock.untimed,
-        traced.pull, end, exact,
+        traced.pull, arrived.past, exact,
     )  # fmt: skip
 
 

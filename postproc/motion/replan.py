@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -11,8 +11,8 @@ from postproc.motion.blending import blend
 from postproc.motion.targets import TargetKind, Targets
 from postproc.motion.trace import NOWHERE, Known, StartState, Trace, trace
 from postproc.robot.arm import Arm
-from postproc.robot.direction import Passages, Sides, passages, sides
-from postproc.robot.play import NOTHING, Clamps, PlayState
+from postproc.robot.direction import NO_SIDES, Passages, Sides, passages, sides
+from postproc.robot.play import Clamps
 
 # Where moved targets lead the arm: joint angles and sides, without a time law.
 
@@ -80,12 +80,6 @@ class Replanned:
         return self.sides.side
 
     @property
-    def end(self) -> StartState:
-        """Return where the arm stands at the last target; reversals are not kept."""
-        past = PlayState(self.sides.play, NOTHING.turned)
-        return StartState.at_end(self.exact.q, self.exact.flange, self.slot, past)
-
-    @property
     def reached(self) -> Reached:
         """Return where the arrivals end up."""
         flange = where_passed(self.arm, self.exact, self.passed)
@@ -93,7 +87,9 @@ class Replanned:
         return Reached(self.passed, tcp, self.aside, self.side)
 
 
-def replan_all(arm: Arm, targets: Targets, begin: StartState = NOWHERE) -> Replanned:
+def replan_all(
+    arm: Arm, targets: Targets, begin: StartState = NOWHERE, lead: Sides = NO_SIDES
+) -> Replanned:
     """Find joint angles and sides only.
 
     For targets that a correction has moved: their speeds are those of the plan.
@@ -102,6 +98,7 @@ def replan_all(arm: Arm, targets: Targets, begin: StartState = NOWHERE) -> Repla
         arm: The arm.
         targets: The moves.
         begin: Where the arm stands at the first target, if that is known beforehand.
+        lead: What is known of the first sides, see `direction.arrivals`.
 
     Raises:
         PlanError: The arm has no closed-form inverse kinematics.
@@ -109,7 +106,7 @@ def replan_all(arm: Arm, targets: Targets, begin: StartState = NOWHERE) -> Repla
     exact = trace(arm, targets, begin.known)
     traced = blend(arm, targets, exact, timed=False)
     ways = passages(arm, traced.q, traced.edges)
-    found = sides(arm, traced.q, ways, begin.past.play)
+    found = sides(arm, traced.q, ways, lead)
     return Replanned(
         arm, targets, planned_points(exact), traced.q, traced.aside, exact.slot, ways,
         found, begin,
@@ -175,7 +172,13 @@ class _Part:
     targets: Targets
 
 
-def replan(arm: Arm, before: Replanned, targets: Targets, moved: Bools) -> Replanned:
+def replan(
+    arm: Arm,
+    before: Replanned,
+    targets: Targets,
+    moved: Bools,
+    lead: Sides = NO_SIDES,
+) -> Replanned:
     """Find where targets lead of which only some have moved.
 
     The result is that of `replan_all`.
@@ -185,13 +188,17 @@ def replan(arm: Arm, before: Replanned, targets: Targets, moved: Bools) -> Repla
         before: The course before they moved.
         targets: All targets as they are now.
         moved: Which have another `tcp` or other `joints` than in `before`, (n,).
+        lead: What is known of the first sides, see `direction.arrivals`.
 
     Raises:
         PlanError: The arm has no closed-form inverse kinematics.
     """
+    if not moved.any():
+        found = sides(arm, before.passed, before.passages, lead)
+        return replace(before, targets=targets, sides=found)
     part = _part(targets, moved, len(before.begin) > 0)
     if part is None:
-        return replan_all(arm, targets, before.begin)
+        return replan_all(arm, targets, before.begin, lead)
     begins = part.rows[part.seeds]
     known = Known(
         np.flatnonzero(part.seeds), before.exact.q[begins],
@@ -202,7 +209,7 @@ def replan(arm: Arm, before: Replanned, targets: Targets, moved: Bools) -> Repla
     same = np.isclose(new, old, rtol=0, atol=SAME, equal_nan=True).all(axis=1)
     same &= exact.slot == before.slot[part.rows]
     if not same[part.lasts].all():
-        return replan_all(arm, targets, before.begin)
+        return replan_all(arm, targets, before.begin, lead)
     traced = blend(arm, part.targets, exact, timed=False)
     slot = np.array(before.slot)
     slot[part.rows[part.kept]] = exact.slot[part.kept]
@@ -215,7 +222,7 @@ def replan(arm: Arm, before: Replanned, targets: Targets, moved: Bools) -> Repla
     ways = _spliced(before.passages, part, now)
     return Replanned(
         arm, targets, at_targets, passed, _patched(before.aside, part, traced.aside),
-        slot, ways, sides(arm, passed, ways, before.begin.past.play), before.begin,
+        slot, ways, sides(arm, passed, ways, lead), before.begin,
     )  # fmt: skip
 
 

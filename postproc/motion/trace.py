@@ -19,6 +19,7 @@ from postproc.motion.branches import (
     nearest_turns,
     on_other_turns,
     on_written_turns,
+    unwrapped,
     wrist_interpolated,
 )
 from postproc.motion.path import BlendCoupling, Segments, arcs, lines, sample
@@ -40,7 +41,7 @@ from postproc.motion.targets import (
     Targets,
 )
 from postproc.robot.arm import Arm
-from postproc.robot.play import NOTHING, Edges, PlayState
+from postproc.robot.play import Edges
 from postproc.robot.pose import inverse, is_unknown
 from postproc.robot.trajectory import Motion
 
@@ -498,8 +499,7 @@ def trace_stretches(work: Workspace, smooth: Bools, most: int) -> Bools:
     near, head = work.q[some.first - 1], np.cumsum(some.size) - some.size
     slot = nearest_slots(work.arm.inverse(flange[head]).q, near)
     q = work.arm.on_branch(flange, np.repeat(slot, some.size))
-    short = np.repeat(~work.long[some.first], some.size)
-    q[short] = work.arm.into_range(q[short])
+    q = work.arm.into_range(q)
     q = _unwrapped(q, near, head, some.size)
     good = _small_steps(q, near, head) & (slot >= 0)
     _settle(work, some[good], q[np.repeat(good, some.size)], slot[good])
@@ -530,7 +530,7 @@ def _unwrapped(q: Floats, near: Floats, head: Ints, size: Ints) -> Floats:
     wraps = (_steps(q, near, head) >= np.pi).any(axis=1)
     for i in np.flatnonzero(np.logical_or.reduceat(wraps, head)).tolist():
         rows = slice(head[i], head[i] + size[i])
-        q[rows] = np.unwrap(np.vstack([near[i], q[rows]]), axis=0)[1:]
+        q[rows] = unwrapped(np.vstack([near[i], q[rows]]))[1:]
     return q
 
 
@@ -595,6 +595,11 @@ class Trace:
     aside: Floats
     pull: BlendCoupling = field(default_factory=BlendCoupling)
 
+    def at(self, v: int) -> StartState:
+        """Tell where the arm stands at a target, if it stops there."""
+        row = np.arange(v, min(v + 1, len(self.q)))
+        return StartState(self.q[row], self.flange[row], self.slot[row])
+
 
 def trace(arm: Arm, targets: Targets, known: Known | None = None) -> Trace:
     """Find the joint angles at all targets and along all paths.
@@ -636,15 +641,17 @@ def _in_order(work: Workspace, visits: Ints, smooth: Bools) -> None:
     """Go through targets in program order, smooth stretches at once."""
     late: list[int] = []
     poses = smooth & (work.targets.kind == TargetKind.POSE)
-    i = 0
+    i, followed = 0, -1
     while i < len(visits):
         v = int(visits[i])
         if smooth[v] and work.is_known(v - 1):
             breaks = ~smooth[v : v + WINDOW]
             count = int(np.argmax(breaks)) if breaks.any() else len(breaks)
-            done = _stretch(work, v, count)
+            goes_on = followed == v or bool(work.single[v - 1] and ~smooth[v - 1])
+            done = _stretch(work, v, count, goes_on)
             i += done
             if done == count:
+                followed = v + count
                 continue
         elif poses[v]:
             i += _without_pasts(work, v, poses)
@@ -655,12 +662,20 @@ def _in_order(work: Workspace, visits: Ints, smooth: Bools) -> None:
         _check_late(work, edge)
 
 
-def _stretch(work: Workspace, v: int, count: int) -> int:
-    """Follow `count` targets from v on; return how many could be followed."""
+def _stretch(work: Workspace, v: int, count: int, goes_on: bool) -> int:
+    """Follow `count` targets from v on; return how many could be followed.
+
+    Args:
+        work: The workspace.
+        v: The first target.
+        count: How many.
+        goes_on: The path has been followed up to there: it keeps its branch.
+    """
     first = int(work.targets.pred_start[v])
     start = work.samples.start
     span = slice(int(start[first]), int(start[first + count]))
-    done = follow(work.q[v - 1], work.ways(span))
+    slot = int(work.slot[v - 1]) if goes_on else -1
+    done = follow(work.q[v - 1], work.ways(span), slot)
     ends = start[first + 1 : first + count + 1] - span.start
     reached = int(np.searchsorted(ends, len(done.q), side="right"))
     at = ends[:reached] - 1
@@ -786,35 +801,26 @@ def _limits(work: Workspace, edge_of: Ints) -> None:
             work.reason[visit[row]] = CODE[text[int(np.argmax(over[row]))]]
 
 
-# Where the arm stands at a stop, and what its joints remember: enough to go on.
+# Where the arm stands somewhere: enough to go on.
 
 
 @dataclass(frozen=True)
 class StartState:
-    """One stop, or none: arrays of k = 1 or 0 rows.
+    """One place, or none: arrays of k = 1 or 0 rows.
 
     Attributes:
         q: Joint angles, (k, 6) [rad].
         flange: (k, 4, 4) [m].
         slot: Branch, (k,).
-        past: What the joints remember.
     """
 
     q: Floats
     flange: Floats
     slot: Ints
-    past: PlayState
 
     def __len__(self) -> int:
-        """Return 1 at a stop, 0 where nothing is known."""
+        """Return 1 at a place, 0 where nothing is known."""
         return len(self.q)
-
-    @classmethod
-    def at_end(
-        cls, q: Floats, flange: Floats, slot: Ints, past: PlayState
-    ) -> StartState:
-        """Keep the last of n targets, none of the others."""
-        return cls(np.array(q[-1:]), np.array(flange[-1:]), np.array(slot[-1:]), past)
 
     @property
     def known(self) -> Known:
@@ -822,6 +828,4 @@ class StartState:
         return Known(np.arange(len(self)), self.q, self.flange, self.slot)
 
 
-NOWHERE = StartState(
-    np.empty((0, 6)), np.empty((0, 4, 4)), np.empty(0, dtype=np.int64), NOTHING
-)
+NOWHERE = StartState(np.empty((0, 6)), np.empty((0, 4, 4)), np.empty(0, dtype=np.int64))

@@ -269,11 +269,18 @@ class Arm:
             rest = np.zeros((6, n), order="F")
             holding = pin.rneaInParallel(1, pool, theta, rest, rest).T
             own = -(holding * self.dh.sense) @ self.dh.mix
+        return own + self.payload_torque(q, payload, payload_com)
+
+    def payload_torque(
+        self, q: Floats, payload: Floats | float, payload_com: Floats | float
+    ) -> Floats:
+        """Give the torque of the payload alone, (n, 6) [N m]; see `gravity_torque`."""
+        n = len(q)
         if not np.any(payload):
-            return own
+            return np.zeros((n, 6))
         J = self.jacobian(q, np.broadcast_to(payload_com, (n, 3)))
         weight = -GRAVITY * np.broadcast_to(payload, (n,))
-        torque: Floats = own + weight[:, None] * J[:, 2]
+        torque: Floats = weight[:, None] * J[:, 2]
         return torque
 
     def gravity_basis(self, q: Floats) -> Floats:

@@ -22,6 +22,7 @@ from postproc.robot.play import (
     NOTHING,
     Clamps,
     Edges,
+    LastReversal,
     PlayState,
     VisitChains,
     chains_of,
@@ -30,7 +31,6 @@ from postproc.robot.play import (
 )
 
 WIDTH_IN_PLAYS = 4.0
-LAST = np.array([-1])  # copied, so that the others need not be kept
 ON_FLANK = 0.999  # of half the width: as good as resting on the flank
 
 
@@ -45,13 +45,27 @@ class Arrivals:
             middle of what is known; 0 where nothing is.
         travel: Travel since the last reversal, (n, 6) [rad]; where the last reversal is
             not known, the travel since then that is sure. NaN where q is not known.
-        past: What the joints remember at the last visit.
+        past: What the joints remember at the visits, n rows.
     """
 
     direction: Floats
     side: Floats
     travel: Floats
     past: PlayState
+
+    def __len__(self) -> int:
+        """Return the number of visits."""
+        return len(self.side)
+
+    def __getitem__(self, rows: slice) -> Arrivals:
+        """Return some of them."""
+        return Arrivals(
+            self.direction[rows], self.side[rows], self.travel[rows], self.past[rows]
+        )
+
+
+_NONE = np.empty((0, 6))
+UNLED = Arrivals(_NONE, _NONE, _NONE, NOTHING)
 
 
 @dataclass(frozen=True)
@@ -60,11 +74,22 @@ class Sides:
 
     Attributes:
         side: As in `Arrivals`, (n, 6).
-        play: What is known of the play's state at the last visit, (1, 6) [rad].
+        play: What is known of the play's state, (n, 6) [rad].
     """
 
     side: Floats
     play: Clamps
+
+    def __len__(self) -> int:
+        """Return the number of visits."""
+        return len(self.side)
+
+    def __getitem__(self, rows: slice) -> Sides:
+        """Return some of them."""
+        return Sides(self.side[rows], self.play[rows])
+
+
+NO_SIDES = Sides(_NONE, NOTHING.play)
 
 
 @dataclass(frozen=True)
@@ -79,6 +104,15 @@ class Passages:
     first: Ints
     source: Ints
     clamps: Clamps
+
+    def behind(self, visit: int) -> Passages:
+        """Return those from a visit on, by which alone they are reached."""
+        first = int(self.first[visit + 1])
+        rows = slice(first, None)
+        return Passages(
+            _first_behind(self.first, visit), self.source[rows] - visit,
+            self.clamps[rows],
+        )  # fmt: skip
 
 
 def in_row_order(n: int) -> tuple[Ints, Ints]:
@@ -102,19 +136,58 @@ def directions_of_rows(arm: Arm, q: Floats) -> Floats:
     return arrivals_of_rows(arm, q).direction
 
 
-def arrivals(
-    arm: Arm, q: Floats, edges: Edges, before: PlayState = NOTHING
-) -> Arrivals:
+def arrivals(arm: Arm, q: Floats, edges: Edges, lead: Arrivals = UNLED) -> Arrivals:
     """Run the play operator over a graph of visits.
 
     Args:
         arm: The arm; its play and coupling are used.
         q: Joint angles at the visits, (n, 6) [rad], NaN where not known.
         edges: The geometric paths between them.
-        before: What the joints remember at the first visit.
+        lead: What is known of the first k visits beforehand. By the last one of them
+            alone what follows is reached.
     """
+    if len(lead) == 0:
+        return _arrivals(arm, q, edges, NOTHING)
+    last = len(lead) - 1
+    after = _arrivals(arm, q[last:], _behind(edges, last), lead.past[last:])
+    return _one_after_another(lead[:last], after)
+
+
+def _one_after_another(a: Arrivals, b: Arrivals) -> Arrivals:
+    """Join the arrivals at some visits and at those behind."""
+    play, turned = (a.past.play, b.past.play), (a.past.turned, b.past.turned)
+    return Arrivals(
+        np.concatenate([a.direction, b.direction]),
+        np.concatenate([a.side, b.side]),
+        np.concatenate([a.travel, b.travel]),
+        PlayState(
+            Clamps(*(np.concatenate([getattr(x, k) for x in play])
+                     for k in ("lo", "hi"))),
+            LastReversal(*(np.concatenate([getattr(x, k) for x in turned])
+                           for k in ("side", "angle", "z"))),
+        ),
+    )  # fmt: skip
+
+
+def _first_behind(first: Ints, visit: int) -> Ints:
+    """Give `Edges.first` of the visits from one on, to which no edge leads."""
+    return np.append(0, first[visit + 1 :] - first[visit + 1])
+
+
+def _behind(edges: Edges, visit: int) -> Edges:
+    """Return the edges from a visit on, by which alone they are reached."""
+    e = int(edges.first[visit + 1])
+    s = int(edges.start[e])
+    return Edges(
+        _first_behind(edges.first, visit), edges.source[e:] - visit, edges.path[s:],
+        edges.start[e:] - s, edges.uneven[edges.uneven >= s] - s,
+    )  # fmt: skip
+
+
+def _arrivals(arm: Arm, q: Floats, edges: Edges, before: PlayState) -> Arrivals:
+    """Do as `arrivals`, knowing what the joints remember at the first visit."""
     if len(q) == 0:
-        return Arrivals(np.empty((0, 6)), np.empty((0, 6)), np.empty((0, 6)), NOTHING)
+        return UNLED
     chains = chains_of(q, arm.coupling, edges.first, edges.source)
     ways, half = drive_paths(chains, arm.coupling, edges), _half_width(arm)
     z = _states(chains, ways.clamps(half), half, before.play)
@@ -123,7 +196,7 @@ def arrivals(
     direction = forward.astype(float) - backward.astype(float)
     turned = last_reversals(chains, ways, arm.play, before.turned)
     travel = np.abs(chains.angles - turned.angle)
-    past = PlayState(z[LAST], turned[LAST])
+    past = PlayState(z, turned)
     return Arrivals(direction, _side(chains.angles, z, half), travel, past)
 
 
@@ -140,16 +213,27 @@ def passages(arm: Arm, q: Floats, edges: Edges) -> Passages:
     return Passages(edges.first, edges.source, ways.clamps(_half_width(arm)))
 
 
-def sides(
-    arm: Arm, q: Floats, passed: Passages, before: Clamps = NOTHING.play
-) -> Sides:
+def sides(arm: Arm, q: Floats, passed: Passages, lead: Sides = NO_SIDES) -> Sides:
     """Return the sides of `arrivals` alone, from what passing the edges does."""
+    if len(lead) == 0:
+        return _sides(arm, q, passed, NOTHING.play)
+    last = len(lead) - 1
+    after = _sides(arm, q[last:], passed.behind(last), lead.play[last:])
+    lo, hi = (
+        np.concatenate([getattr(part.play, k) for part in (lead[:last], after)])
+        for k in ("lo", "hi")
+    )
+    return Sides(np.concatenate([lead.side[:last], after.side]), Clamps(lo, hi))
+
+
+def _sides(arm: Arm, q: Floats, passed: Passages, before: Clamps) -> Sides:
+    """Do as `sides`, knowing the state of the play at the first visit."""
     if len(q) == 0:
-        return Sides(np.empty((0, 6)), NOTHING.play)
+        return NO_SIDES
     chains = chains_of(q, arm.coupling, passed.first, passed.source)
     half = _half_width(arm)
     z = _states(chains, passed.clamps, half, before)
-    return Sides(_side(chains.angles, z, half), z[LAST])
+    return Sides(_side(chains.angles, z, half), z)
 
 
 def _half_width(arm: Arm) -> Floats:

@@ -327,7 +327,7 @@ def _merged(
 
 @dataclass(frozen=True)
 class PlayState:
-    """What is known at one place, (1, 6) each; (0, 6) where nothing is.
+    """What is known at n places, (n, 6) each; (0, 6) where nothing is.
 
     Attributes:
         play: Interval that the state of every play operator lies in [rad].
@@ -336,6 +336,10 @@ class PlayState:
 
     play: Clamps
     turned: LastReversal
+
+    def __getitem__(self, rows: slice) -> PlayState:
+        """Return what is known at some of them."""
+        return PlayState(self.play[rows], self.turned[rows])
 
 
 _NONE = np.empty((0, 6))

@@ -1,4 +1,4 @@
-"""Windows of programs are cut where nothing but the arm's standing crosses."""
+"""Windows of programs are cut where no jump, number, arc or step crosses."""
 
 from __future__ import annotations
 
@@ -9,7 +9,14 @@ import numpy as np
 import pytest
 
 from postproc.compensation import windows as cuts
-from postproc.compensation.windows import SHARED, cut_points, lead_in, windows
+from postproc.compensation.windows import (
+    SHARED,
+    Window,
+    cut_points,
+    seams,
+    window,
+    windows,
+)
 from postproc.language.pdl2.interpreter import resolve
 from postproc.language.pdl2.job import Start
 from postproc.language.pdl2.program import parse
@@ -68,14 +75,23 @@ def test_numbers_that_are_used_again_are_not_cut() -> None:
     assert found[:2] == [False, False] and found[3]
 
 
+def test_inside_runs_arcs_are_kept_whole() -> None:
+    fly = stop(1010).replace("MOVE ", "MOVEFLY ").replace("\n", " ADVANCE\n")
+    arc = "  MOVEFLY CIRCULAR TO POS(1040, 0, 900, 0, 180, 0, '') "
+    arc += "VIA POS(1030, 10, 900, 0, 180, 0, '') ADVANCE\n"
+    visits = read(HEAD + stop(1000) + fly + fly + arc + fly + "END job\n")
+    assert seams(visits).tolist() == [True, True, False, False, True, False]
+
+
 @pytest.mark.parametrize("seed", range(60))
 def test_nothing_crosses(seed: int) -> None:
     visits = read(reachable(seed, exact=seed % 2 == 0, pages=False).text)
-    found = np.flatnonzero(cut_points(visits)).tolist()
+    assert not (cut_points(visits) & (~seams(visits) | visits.fly)).any()
+    found = np.flatnonzero(seams(visits)).tolist()
     to = np.repeat(np.arange(len(visits)), np.diff(visits.pred_start))
     literals = visits.literal, visits.follows
     for c in found:
-        assert not visits.fly[c] and not visits.via[c]
+        assert not visits.via[c]
         assert visits.predecessors(c + 1).tolist() == [c]
         known = visits.pred >= 0
         across = known & ((visits.pred <= c) != (to <= c))
@@ -85,58 +101,65 @@ def test_nothing_crosses(seed: int) -> None:
         assert left & right <= {-1}
 
 
-def test_windows_are_the_program() -> None:
-    visits = read(drilling(300).source.decode())
-    cut = windows(visits, 40)
+@pytest.fixture
+def small(monkeypatch) -> None:
+    """Let halos be short."""
+    monkeypatch.setattr(cuts, "HALO", 20)
+
+
+@pytest.mark.usefixtures("small")
+@pytest.mark.parametrize("make", [drilling, milling])
+def test_windows_are_the_program(make) -> None:
+    visits = read(make(300).source.decode())
+    quiet = seams(visits)
+    cut = windows(quiet, 40)
     assert len(cut) == 300 // 40
-    assert cut[0].first == 0 and cut[-1].end == len(visits)
+    assert cut[0].first == cut[0].begin == 0
+    assert cut[-1].end == cut[-1].stop == len(visits)
     for before, after in pairwise(cut):
         assert before.end == after.first
+        assert before.begin < after.begin < after.first - 20
+        assert before.end + 20 <= before.stop
     assert min(w.end - w.first for w in cut) >= 40
-    for window in cut:
-        part = window.of(visits)
-        assert len(part) == window.end - window.first + window.seeds
-        for f in fields(Visits):
-            column, whole = getattr(part, f.name), getattr(visits, f.name)
-            if f.name not in SHARED:
-                rows = slice(window.first, window.end)
-                np.testing.assert_array_equal(column[window.seeds :], whole[rows])
-        for v in range(window.seeds, len(part)):
-            wanted = visits.predecessors(v + window.first - window.seeds)
-            moved = np.where(wanted >= 0, wanted - window.first + window.seeds, wanted)
-            np.testing.assert_array_equal(part.predecessors(v), moved)
-        if window.seeds:
-            assert part.literal[0] == part.follows[0] == -1
-            assert len(part.predecessors(0)) == 0
+    for some in cut:
+        assert some.begin == 0 or quiet[some.begin]
+        assert some.stop == len(visits) or quiet[some.stop - 1]
+        same_columns(some, visits)
+
+
+def same_columns(some: Window, visits: Visits) -> None:
+    """Compare a window with its program."""
+    part = some.of(visits)
+    assert len(part) == some.stop - some.begin
+    for f in fields(Visits):
+        column, whole = getattr(part, f.name), getattr(visits, f.name)
+        if f.name not in SHARED:
+            rows = slice(some.begin + some.seeds, some.stop)
+            np.testing.assert_array_equal(column[some.seeds :], whole[rows])
+    for v in range(some.seeds, len(part)):
+        wanted = visits.predecessors(v + some.begin)
+        moved = np.where(wanted >= 0, wanted - some.begin, wanted)
+        np.testing.assert_array_equal(part.predecessors(v), moved)
+    if some.seeds:
+        assert part.literal[0] == part.follows[0] == -1
+        assert len(part.predecessors(0)) == 0
 
 
 def test_a_short_program_is_one_window() -> None:
     visits = read(drilling(79).source.decode())
-    (window,) = windows(visits, 41)
-    assert window.of(visits) is visits
+    (one,) = windows(seams(visits), 41)
+    assert one.of(visits) is visits
 
 
+@pytest.mark.usefixtures("small")
 @pytest.mark.parametrize("make", [drilling, milling])
-def test_a_run_up_is_the_last_targets_from_anywhere(monkeypatch, make) -> None:
-    monkeypatch.setattr(cuts, "RUN_UP", 30)
+def test_a_run_up_comes_from_anywhere(make) -> None:
     visits = read(make(300).source.decode())
-    window = cuts.Window(250, len(visits))
-    found = lead_in(visits, window)
-    assert found is not None and 30 <= len(found) < 40
-    first = window.first - len(found)
-    np.testing.assert_array_equal(found.values, visits.values[first : window.first])
-    np.testing.assert_array_equal(found.literal[1:], visits.literal[first + 1 : 250])
+    some = window(seams(visits), 250, len(visits), 30)
+    assert 30 <= some.first - some.begin - 1 < 40
+    found = some.of(visits, known=False)
+    np.testing.assert_array_equal(found.values, visits.values[some.begin :])
     assert found.literal[0] == -1
     before = [found.predecessors(v).tolist() for v in range(len(found))]
     assert before == [[-1], *([v] for v in range(len(found) - 1))]
-    assert lead_in(visits, cuts.Window(30, 300)) is None
-    assert lead_in(visits, cuts.Window(32, 300)) is not None
-
-
-def test_no_run_up_begins_where_something_crosses(monkeypatch) -> None:
-    monkeypatch.setattr(cuts, "RUN_UP", 2)
-    loop = "  FOR i := 1 TO 3 DO\n" + stop(1010) * 8 + "  ENDFOR\n"
-    head = HEAD.replace("VAR ", "VAR i : INTEGER\n    ")
-    visits = read(head + stop(990) + stop(1000) + loop + stop(1030) + "END job\n")
-    found = lead_in(visits, cuts.Window(8, len(visits)))
-    assert found is not None and len(found) == 7  # the loop uses its numbers again
+    assert window(seams(visits), 30, len(visits), 30).begin == 0

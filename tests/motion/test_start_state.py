@@ -12,9 +12,10 @@ from postproc.compensation.targets import targets_from_visits
 from postproc.compensation.windows import Window, cut_points
 from postproc.language.visits import Visits
 from postproc.motion.planner import plan
-from postproc.motion.replan import replan, replan_all
-from postproc.motion.trace import NOWHERE
+from postproc.motion.replan import Replanned, replan, replan_all
+from postproc.motion.trace import NOWHERE, StartState
 from postproc.robot.cell import Cell
+from postproc.robot.direction import NO_SIDES, UNLED, Sides
 from tests.bench import made
 from tests.motion.test_replan import arcs, cell, picked, shifted
 
@@ -51,7 +52,12 @@ def cut(visits: Visits) -> list[Window]:
     ends = np.flatnonzero(cut_points(visits))[2::5] + 1
     marks = [0, *ends.tolist(), len(visits)]
     assert len(marks) > 3
-    return [Window(a, b) for a, b in pairwise(marks)]
+    return [alone(a, b) for a, b in pairwise(marks)]
+
+
+def alone(first: int, end: int) -> Window:
+    """Make a window without halos but for the stop before."""
+    return Window(first, end, max(first - 1, 0), end)
 
 
 @pytest.mark.usefixtures("short_runs")
@@ -59,13 +65,11 @@ def cut(visits: Visits) -> list[Window]:
 def test_plans_go_on(cell: Cell, source) -> None:
     visits = read(cell, source())
     whole = plan(cell.arm, targets_from_visits(visits, cell)[0], 0.01)
-    begin = NOWHERE
+    begin, lead = NOWHERE, UNLED
     for window in cut(visits):
         targets, _ = targets_from_visits(window.of(visits), cell)
-        part, rows = (
-            plan(cell.arm, targets, 0.01, begin=begin),
-            slice(window.seeds, None),
-        )
+        part = plan(cell.arm, targets, 0.01, begin=begin, lead=lead)
+        rows = slice(window.seeds, None)
         own = slice(window.first, window.end)
         for name in ("q", "tcp", "aside", "travel"):
             np.testing.assert_allclose(
@@ -77,7 +81,8 @@ def test_plans_go_on(cell: Cell, source) -> None:
             )
         np.testing.assert_allclose(part.side[rows], whole.side[own], rtol=0, atol=FINE)
         np.testing.assert_allclose(part.speed[rows], whole.speed[own], atol=FINE)
-        begin = part.end
+        last = len(targets) - 1
+        begin, lead = part.exact.at(last), part.lead(slice(last, None))
 
 
 @pytest.mark.usefixtures("short_runs")
@@ -87,7 +92,7 @@ def test_courses_go_on_and_are_looked_at_again(cell: Cell, source) -> None:
     targets, _ = targets_from_visits(visits, cell)
     moved = picked(targets, 0.02, 5)
     after = replan_all(cell.arm, shifted(targets, moved, 5))
-    begin = NOWHERE
+    begin, lead = NOWHERE, NO_SIDES
     for window in cut(visits):
         whole, _ = targets_from_visits(window.of(visits), cell)
         own = slice(window.first, window.end)
@@ -97,7 +102,8 @@ def test_courses_go_on_and_are_looked_at_again(cell: Cell, source) -> None:
         new = whole.moved_to(
             rows, after.targets.tcp[there], after.targets.joints[there]
         )
-        course = replan(cell.arm, replan_all(cell.arm, whole, begin), new, mine)
+        before = replan_all(cell.arm, whole, begin, lead)
+        course = replan(cell.arm, before, new, mine, lead)
         found, kept = course.reached, slice(window.seeds, None)
         for name in ("q", "tcp", "aside"):
             wanted = getattr(after.reached, name)[own]
@@ -105,21 +111,29 @@ def test_courses_go_on_and_are_looked_at_again(cell: Cell, source) -> None:
                 getattr(found, name)[kept], wanted, rtol=0, atol=CLOSE
             )
         np.testing.assert_allclose(found.side[kept], after.side[own], rtol=0, atol=FINE)
-        begin = course.end
+        begin, lead = ended(course)
+
+
+def ended(course: Replanned) -> tuple[StartState, Sides]:
+    """Say how a course leaves the arm at its last target."""
+    last = slice(len(course.slot) - 1, None)
+    at = course.exact.q[last], course.exact.flange[last], course.slot[last]
+    return StartState(*at), course.sides[last]
 
 
 @pytest.mark.parametrize("row", [1, 2, 3, 4])
 def test_what_moves_next_to_the_stop_is_traced_from_there(cell: Cell, row: int) -> None:
     visits = read(cell, made.drilling(120).source)
-    first = replan_all(cell.arm, targets_from_visits(Window(0, 60).of(visits), cell)[0])
-    targets, _ = targets_from_visits(Window(60, len(visits)).of(visits), cell)
-    course = replan_all(cell.arm, targets, first.end)
+    first = replan_all(cell.arm, targets_from_visits(alone(0, 60).of(visits), cell)[0])
+    targets, _ = targets_from_visits(alone(60, len(visits)).of(visits), cell)
+    begin, lead = ended(first)
+    course = replan_all(cell.arm, targets, begin, lead)
     moved = np.zeros(len(targets), dtype=bool)
     moved[row] = True
     new = shifted(targets, moved, 1)
     found, wanted = (
-        replan(cell.arm, course, new, moved),
-        replan_all(cell.arm, new, first.end),
+        replan(cell.arm, course, new, moved, lead),
+        replan_all(cell.arm, new, begin, lead),
     )
     np.testing.assert_allclose(found.passed, wanted.passed, rtol=0, atol=CLOSE)
     np.testing.assert_allclose(found.side, wanted.side, rtol=0, atol=FINE)
@@ -128,6 +142,6 @@ def test_what_moves_next_to_the_stop_is_traced_from_there(cell: Cell, row: int) 
 def test_without_its_past_a_part_goes_on_otherwise(cell: Cell) -> None:
     visits = read(cell, made.drilling(120).source)
     whole = plan(cell.arm, targets_from_visits(visits, cell)[0], 0.01, timed=False)
-    targets, _ = targets_from_visits(Window(60, len(visits)).of(visits), cell)
+    targets, _ = targets_from_visits(alone(60, len(visits)).of(visits), cell)
     part = plan(cell.arm, targets, 0.01, timed=False)
     assert (part.direction[1:] != whole.direction[60:]).any()

@@ -106,7 +106,9 @@ def test_other_turns_and_other_branches(
     asked: list[int] = []
     stretch = module._stretch
     monkeypatch.setattr(
-        module, "_stretch", lambda work, v, k: asked.append(v) or stretch(work, v, k)
+        module,
+        "_stretch",
+        lambda work, v, *more: asked.append(v) or stretch(work, v, *more),
     )
     found = trace(arm, targets)
     assert_same(found, wanted)

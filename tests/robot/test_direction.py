@@ -13,13 +13,15 @@ from postproc.robot.arm import Arm, load_arm
 from postproc.robot.direction import (
     WIDTH_IN_PLAYS,
     Arrivals,
+    Sides,
     arrivals,
     arrivals_of_rows,
     directions_of_rows,
     in_row_order,
+    passages,
+    sides,
 )
 from postproc.robot.play import (
-    NOTHING,
     Clamps,
     Edges,
     _refined,
@@ -288,12 +290,16 @@ def test_a_walk_goes_on_where_it_was_cut(arm: Arm, seed: int) -> None:
     rng = np.random.default_rng(seed)
     q = np.cumsum(rng.normal(0, arm.play, (300, 6)), axis=0)
     first, source = in_row_order(len(q))
-    whole, begin, at = arrivals(arm, q, Edges(first, source, q, first)), NOTHING, 0
-    for end in (1, 2, 40, 41, 170, 300):
-        some = q[max(at - 1, 0) : end]
+    whole = arrivals(arm, q, Edges(first, source, q, first))
+    for begin, end in ((0, 1), (0, 40), (39, 41), (100, 170), (169, 300)):
+        some = q[begin:]
         first, source = in_row_order(len(some))
-        part = arrivals(arm, some, Edges(first, source, some, first), begin)
+        edges = Edges(first, source, some, first)
+        found = arrivals(arm, some, edges, whole[begin:end])
         for name in ("direction", "side", "travel"):
-            found = getattr(part, name)[min(at, 1) :]
-            np.testing.assert_array_equal(found, getattr(whole, name)[at:end])
-        begin, at = part.past, end
+            wanted = getattr(whole, name)[begin:]
+            np.testing.assert_array_equal(getattr(found, name), wanted)
+        again = sides(arm, some, passages(arm, some, edges), Sides(
+            whole.side[begin:end], whole.past.play[begin:end]))  # fmt: skip
+        np.testing.assert_array_equal(again.side, whole.side[begin:])
+        np.testing.assert_array_equal(again.play.lo, whole.past.play.lo[begin:])

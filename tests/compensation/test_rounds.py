@@ -1,0 +1,93 @@
+"""Windows take the rounds of a program, and say where they did otherwise."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from postproc.compensation.rounds import (
+    SAME,
+    Glimpse,
+    Glimpses,
+    Step,
+    Taken,
+    Trail,
+    common,
+    fits,
+    same_looks,
+)
+
+READ_BACK, AIM, BEND = Step.READ_BACK, Step.AIM, Step.BEND
+
+
+def trail(*steps: Step, moved: bool = False, missed: bool = False) -> Trail:
+    """Make the trail of a window whose last round was as told."""
+    taken = [Taken(s, s, s > READ_BACK, s == BEND) for s in steps[:-1]]
+    return Trail(taken=[*taken, Taken(steps[-1], steps[-1], moved, missed)])
+
+
+def test_all_do_what_any_of_them_needs() -> None:
+    trails = trail(AIM, READ_BACK), trail(BEND, AIM, AIM, READ_BACK), trail(READ_BACK)
+    assert common(trails) == (BEND, AIM, AIM, READ_BACK)
+
+
+@pytest.mark.parametrize(
+    ("own", "steps", "same"),
+    [
+        (trail(AIM, READ_BACK), (AIM, READ_BACK), True),
+        (trail(AIM, READ_BACK), (AIM, AIM, READ_BACK), True),  # it is at rest
+        (trail(AIM, READ_BACK, moved=True), (AIM, AIM, READ_BACK), False),
+        (trail(AIM, READ_BACK, missed=True), (AIM, AIM, READ_BACK), True),
+        (trail(AIM, READ_BACK, missed=True), (AIM, BEND, READ_BACK), False),
+        (trail(AIM, READ_BACK), (BEND, READ_BACK), True),  # nothing to bend by
+        (trail(BEND, READ_BACK), (AIM, READ_BACK), False),
+        (trail(READ_BACK, READ_BACK), (AIM, READ_BACK), False),
+        (trail(READ_BACK, missed=True), (READ_BACK, READ_BACK), True),
+    ],
+)
+def test_a_window_fits_where_other_rounds_would_change_nothing(own, steps, same):
+    assert fits(own, steps) == same
+
+
+def test_only_own_targets_vote_but_all_are_told() -> None:
+    watched = Trail(own=slice(2, 4), pace=(AIM,))
+    missed, far = np.zeros((6, 3)), np.zeros(6, dtype=bool)
+    moved = np.array([True, False, False, False, False, True])
+    assert watched.take(moved, missed, far) == AIM  # the pace
+    assert watched.taken[-1] == Taken(AIM, READ_BACK, True, False)
+    assert watched.take(moved, missed, far) == READ_BACK
+    missed[1] = far[3] = 1.0
+    assert watched.take(moved, missed, far) == BEND
+    assert watched.taken[-1] == Taken(BEND, BEND, True, True)
+
+
+def glimpse(n: int, off: float = 0.0) -> Glimpse:
+    """Make a glimpse at n visits."""
+    rows, one = np.arange(6.0 * n).reshape(n, 6) + off, np.arange(n)
+    flags = np.zeros((n, 3), dtype=bool)
+    return Glimpse(
+        values=rows, status=one, why=one % 2, reasons=("", "far"), aim=rows,
+        correction=rows[:, :3], bent=rows[:, :3], left=flags, q=rows * np.nan,
+        passed=rows, aside=rows[:, :3], slot=one, side=rows, lo=rows, hi=rows,
+    )  # fmt: skip
+
+
+def test_looks_agree_as_far_as_they_are_seen() -> None:
+    seen = Glimpses({(0, False): glimpse(4)})
+    assert same_looks(seen, Glimpses({(0, False): glimpse(4)}))
+    assert same_looks(seen, Glimpses({(0, False): glimpse(4, SAME / 2)}))
+    assert not same_looks(seen, Glimpses({(0, False): glimpse(4, 2 * SAME)}))
+    other = replace(glimpse(4), reasons=("", "near"))
+    assert not same_looks(seen, Glimpses({(0, False): other}))
+    assert same_looks(seen[1:3], Glimpses({(0, False): other[2:3]})) is False
+
+
+def test_who_has_come_to_rest_is_seen_as_then() -> None:
+    looks = {(0, False): glimpse(2), (1, False): glimpse(2, 1.0)}
+    seen = Glimpses({**looks, (1, True): glimpse(2, 2.0)})
+    assert seen.at((5, False)) is looks[1, False]
+    assert seen.at((5, True)).values[0, 0] == 2.0
+    assert seen.at((0, True)) is looks[0, False]
+    assert not same_looks(seen, Glimpses(looks))
