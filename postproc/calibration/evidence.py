@@ -17,6 +17,7 @@ from postproc.arrays import Floats, Ints
 
 LOG_BOUNDS = (-8.0, 7.0)  # of log s_g
 STEPS = 60
+ROUNDED = 16.0  # units in the last place by which sums over many rows are off
 FEWEST = 4.0  # degrees of freedom that a prior scale is credited with at least
 LOG_SPREAD = 3.0  # hyperprior of log s_g: an order of magnitude is no surprise
 
@@ -77,7 +78,7 @@ def posterior(normal: Normal, group: Ints, log_scale: Floats) -> Posterior:
     """
     s = np.exp(log_scale)[group]
     B = np.eye(len(s)) + s[:, None] * normal.gram * s
-    log_det, inverse, told = _inverted(B)
+    log_det, inverse, told = inverted(B)
     covariance = s[:, None] * inverse * s
     mean = covariance @ normal.moment
     if told is not None:
@@ -90,7 +91,7 @@ def posterior(normal: Normal, group: Ints, log_scale: Floats) -> Posterior:
     return Posterior(mean, covariance, log_scale, evidence, effective)
 
 
-def _inverted(B: Floats) -> tuple[float, Floats, Floats | None]:
+def inverted(B: Floats) -> tuple[float, Floats, Floats | None]:
     """Invert 1 + C, where C has no negative eigenvalue.
 
     Columns that are nearly the same, on scales far above what the rows tell of them,
@@ -101,7 +102,8 @@ def _inverted(B: Floats) -> tuple[float, Floats, Floats | None]:
         where that is all of it.
     """
     factor, failed = dpotrf(B, lower=True)
-    rounding = len(B) * np.finfo(float).eps * float(np.diag(B).max(initial=0.0))
+    size = float(np.diag(B).max(initial=0.0))
+    rounding = ROUNDED * len(B) * np.finfo(float).eps * size
     if not failed and float((np.diag(factor) ** 2).min(initial=np.inf)) > rounding:
         inverse, _ = dpotri(factor, lower=True)
         lower = np.tril(inverse)

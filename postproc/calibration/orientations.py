@@ -84,11 +84,21 @@ def _together(
     """Tell whether the nearest rows in joint space share a row's residual."""
     spread = np.maximum(q.std(axis=0), 1e-9)
     found = cKDTree(q / spread).query(q[rows] / spread, k=NEIGHBOURS + 1)
-    nearest = np.asarray(found[1])[:, 1:]
+    nearest = _without(rows, np.asarray(found[1]))
     own = residual[rows]
     along = np.einsum("rkj,rj->rk", residual[nearest], own)
     agrees: NDArray[np.bool_] = np.median(along, axis=1) > AGREES * (own**2).sum(axis=1)
     return agrees
+
+
+def _without(rows: NDArray[np.int64], near: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Take each row out of those that are nearest to it, (r, k + 1) to (r, k).
+
+    Where more rows are at one place it need not be the first, nor among them.
+    """
+    own = near == rows[:, None]
+    own[~own.any(axis=1), -1] = True
+    return np.asarray(near[~own].reshape(len(rows), -1))
 
 
 def _same_joint(

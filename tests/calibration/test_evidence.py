@@ -7,6 +7,7 @@ import pytest
 from scipy.optimize import approx_fprime
 from scipy.stats import multivariate_normal
 
+from postproc.calibration.diagnosis.held_out import held_out_errors
 from postproc.calibration.evidence import Normal, maximise, posterior
 
 
@@ -70,6 +71,14 @@ def test_columns_that_are_nearly_the_same_are_no_problem(apart: float) -> None:
     found = maximise(normal, group, np.full(3, 6.0))
     fitted = X @ found.mean
     assert np.sqrt(np.mean((fitted - 1e-4 * X.sum(axis=1)) ** 2)) < 0.1
+
+
+def test_folds_of_columns_that_are_the_same_are_predicted() -> None:
+    rng = np.random.default_rng(3)
+    X = 1e9 * np.repeat(rng.standard_normal((300, 1)), 4, axis=1)
+    y = 1e-9 * X[:, 0] + 1e-3 * rng.standard_normal(300)
+    errors = held_out_errors(X, y, np.arange(100) % 5)
+    assert np.sqrt(np.mean(errors**2)) < 2e-3
 
 
 def test_no_groups_no_search() -> None:

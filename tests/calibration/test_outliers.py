@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from postproc.calibration.diagnosis.trace import trace
-from postproc.calibration.orientations import judge, student_weights
+from postproc.calibration.orientations import _without, judge, student_weights
 from postproc.calibration.regression import fit_effects
 from postproc.model.effects import BASE_EFFECTS, propose
 from postproc.model.kinematics import Batch
@@ -49,6 +49,19 @@ def test_a_lone_row_at_the_end_of_a_range_is_dropped(joint: int, end: int) -> No
     residual[row] = 3e-3 * J[row, :, joint] / np.linalg.norm(J[row, :, joint])
     found = judged(residual)
     assert found.weight[row] == 0 and not found.spared[row]
+
+
+def test_a_row_is_no_neighbour_of_its_own_where_poses_repeat() -> None:
+    """The second of many readings of one pose is not the first one found there."""
+    twice = np.arange(300)
+    twice[100:110] = 100
+    residual = noise(3)[twice]
+    residual[105] = [3e-3, 0, 0]
+    distance = np.linalg.norm(residual, axis=1) / NOISE
+    found = judge(distance, residual, STATES.q[twice], J[twice])
+    assert found.weight[105] == 0
+    nearest = _without(np.array([5, 7]), np.array([[4, 5, 6], [1, 2, 3]]))
+    assert nearest.tolist() == [[4, 6], [1, 2]]
 
 
 def test_rows_at_one_angle_of_a_joint_are_spared() -> None:

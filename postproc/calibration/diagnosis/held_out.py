@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import cho_factor, cho_solve
 
 from postproc.arrays import Floats
+from postproc.calibration.evidence import inverted
 from postproc.calibration.regression import Fit
 from postproc.model.effects.effect import Candidate
 from postproc.model.kinematics import Batch
@@ -100,7 +100,8 @@ def held_out_errors(X: Floats, y: Floats, fold: NDArray[np.int64]) -> Floats:
         if not out.any():
             continue
         rest = gram - X[out].T @ X[out] + np.eye(X.shape[1])
-        p = cho_solve(cho_factor(rest), moment - X[out].T @ y[out])
+        _, inverse, told = inverted(rest)
+        p = (inverse if told is None else told) @ (moment - X[out].T @ y[out])
         errors[out] = y[out] - X[out] @ p
     return errors
 
