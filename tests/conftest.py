@@ -43,10 +43,16 @@ points_mm = [[80.0, -40.0, 150.0], [-120.0, 60.0, 180.0], [30.0, 130.0, 320.0]]
 """
 
 
-# Commands that the tests start are to hear Ctrl-C, also where the tests run in the
-# background of a shell, which lets what it starts there ignore that signal.
-if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:
-    signal.signal(signal.SIGINT, signal.default_int_handler)
+# Commands that the tests start are to hear signals, also where the tests run in the
+# background of a shell, or behind nohup, which let what they start ignore some.
+HEARD = {
+    signal.SIGINT: signal.default_int_handler,
+    signal.SIGHUP: signal.SIG_DFL,
+    signal.SIGTERM: signal.SIG_DFL,
+}
+for _number, _handler in HEARD.items():
+    if signal.getsignal(_number) == signal.SIG_IGN:
+        signal.signal(_number, _handler)
 
 
 @pytest.fixture(scope="session")
