@@ -24,17 +24,6 @@ def joined(columns: Sequence[ByteColumn | bytes]) -> bytes:
     return beside(columns).tobytes().translate(None, b"\0")
 
 
-def as_texts(column: ByteColumn) -> NDArray[np.bytes_]:
-    """Return the rows by themselves, (k,)."""
-    held = column != 0
-    length = np.count_nonzero(held, axis=1)
-    width = max(int(length.max(initial=0)), 1)
-    rows = np.zeros((len(column), width), dtype=np.uint8)
-    rows[np.arange(width) < length[:, None]] = column[held]
-    texts: NDArray[np.bytes_] = rows.view(f"S{width}")[:, 0]
-    return texts
-
-
 def beside(columns: Sequence[ByteColumn | bytes]) -> ByteColumn:
     """Put columns side by side; bytes are the same text in every row."""
     rows = max(len(c) for c in columns if isinstance(c, np.ndarray))

@@ -54,7 +54,6 @@ fn native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(text::form_of, module)?)?;
     module.add_function(wrap_pyfunction!(text::line_starts, module)?)?;
     module.add_function(wrap_pyfunction!(text::scan_lines, module)?)?;
-    module.add_function(wrap_pyfunction!(number::write_numbers, module)?)?;
     module.add_function(wrap_pyfunction!(number::fixed, module)?)?;
     module.add_function(wrap_pyfunction!(number::shortest, module)?)?;
     module.add_function(wrap_pyfunction!(number::rewrite_numbers, module)?)?;

@@ -165,23 +165,6 @@ impl Texts {
     }
 }
 
-/// Write numbers with so many decimals each, (m,): rows filled up with NUL.
-#[pyfunction]
-pub fn write_numbers<'py>(
-    py: Python<'py>,
-    values: PyReadonlyArray1<'py, f64>,
-    decimals: PyReadonlyArray1<'py, i64>,
-) -> PyResult<Bound<'py, PyArray2<u8>>> {
-    let (values, decimals) = (flat(&values)?, flat(&decimals)?);
-    let n = same_length(&[values.len(), decimals.len()])?;
-    let mut texts = Texts::default();
-    each(py, n, |i| {
-        put_fixed(&mut texts.all, values[i], decimals[i].max(0) as usize);
-        texts.ends.push(texts.all.len());
-    })?;
-    Ok(texts.rows(py))
-}
-
 /// Write numbers with so many decimals, (k,): rows filled up with NUL; NaN is ``null``.
 #[pyfunction]
 pub fn fixed<'py>(

@@ -28,21 +28,39 @@ fn spans(data: &[u8], start: &Ints<'_>, end: &Ints<'_>) -> PyResult<Vec<Range<us
     Ok(out)
 }
 
-/// Texts in rows that are filled up with NUL.
-struct Texts<'a> {
+/// Spans of a text, and the rows, filled up with NUL, of what replaces them.
+struct Edits<'a> {
+    data: &'a [u8],
+    spans: Vec<Range<usize>>,
     rows: &'a [u8],
     width: usize,
 }
 
-impl<'a> Texts<'a> {
-    fn of(array: &'a PyReadonlyArray2<'_, u8>, count: usize) -> PyResult<Self> {
-        same_length(&[array.shape()[0], count])?;
-        Ok(Texts { rows: flat(array)?, width: array.shape()[1] })
+impl<'a> Edits<'a> {
+    fn new(
+        data: &'a Bound<'_, PyBytes>,
+        (start, end): (&Ints<'_>, &Ints<'_>),
+        new: &'a PyReadonlyArray2<'_, u8>,
+    ) -> PyResult<Self> {
+        let spans = spans(data.as_bytes(), start, end)?;
+        same_length(&[new.shape()[0], spans.len()])?;
+        Ok(Edits { data: data.as_bytes(), spans, rows: flat(new)?, width: new.shape()[1] })
     }
 
-    fn get(&self, i: usize) -> &'a [u8] {
+    fn text(&self, i: usize) -> &'a [u8] {
         let row = &self.rows[i * self.width..(i + 1) * self.width];
         &row[..row.iter().rposition(|b| *b != 0).map_or(0, |last| last + 1)]
+    }
+
+    /// Pass all pieces of the text with its edits made.
+    fn pass(&self, py: Python<'_>, mut piece: impl FnMut(&[u8]) + Send) -> PyResult<()> {
+        let mut done = 0;
+        each(py, self.spans.len(), |i| {
+            piece(&self.data[done..self.spans[i].start]);
+            piece(self.text(i));
+            done = self.spans[i].end;
+        })?;
+        detached(py, || piece(&self.data[done..]))
     }
 }
 
@@ -55,24 +73,15 @@ pub fn weave<'py>(
     end: Ints<'py>,
     new: PyReadonlyArray2<'py, u8>,
 ) -> PyResult<Bound<'py, PyBytes>> {
-    let data = data.as_bytes();
-    let spans = spans(data, &start, &end)?;
-    let new = Texts::of(&new, spans.len())?;
-    let gone: usize = spans.iter().map(Range::len).sum();
-    let come: usize = detached(py, || (0..spans.len()).map(|i| new.get(i).len()).sum())?;
-    PyBytes::new_with(py, data.len() - gone + come, |out| {
-        let (mut at, mut done) = (0, 0);
-        let mut put = |text: &[u8]| {
+    let edits = Edits::new(data, (&start, &end), &new)?;
+    let mut length = 0;
+    edits.pass(py, |text| length += text.len())?;
+    PyBytes::new_with(py, length, |out| {
+        let mut at = 0;
+        edits.pass(py, |text| {
             out[at..at + text.len()].copy_from_slice(text);
             at += text.len();
-        };
-        each(py, spans.len(), |i| {
-            put(&data[done..spans[i].start]);
-            put(new.get(i));
-            done = spans[i].end;
-        })?;
-        put(&data[done..]);
-        Ok(())
+        })
     })
 }
 
@@ -87,24 +96,10 @@ pub fn is_woven<'py>(
     found: &Bound<'py, PyBytes>,
     skipped: usize,
 ) -> PyResult<bool> {
-    let (data, found) = (data.as_bytes(), found.as_bytes());
-    let spans = spans(data, &start, &end)?;
-    let new = Texts::of(&new, spans.len())?;
-    let Some(mut rest) = found.get(skipped..) else { return Ok(false) };
-    let mut done = 0;
-    let mut taken = |text: &[u8]| match rest.strip_prefix(text) {
-        Some(behind) => {
-            rest = behind;
-            true
-        }
-        None => false,
-    };
-    let all = each(py, spans.len(), |i| {
-        let same = taken(&data[done..spans[i].start]) && taken(new.get(i));
-        done = spans[i].end;
-        same
-    })?;
-    Ok(all.into_iter().all(|same| same) && taken(&data[done..]) && rest.is_empty())
+    let edits = Edits::new(data, (&start, &end), &new)?;
+    let mut rest = found.as_bytes().get(skipped..);
+    edits.pass(py, |text| rest = rest.and_then(|rest| rest.strip_prefix(text)))?;
+    Ok(rest.is_some_and(<[u8]>::is_empty))
 }
 
 /// Cut spans out of a text, in ascending order: rows filled up with NUL, (m, w).

@@ -147,15 +147,6 @@ _POSE_DECIMALS = (MM_DECIMALS,) * 3 + (DEGREE_DECIMALS,) * 3
 _JOINT_DECIMALS = (JOINT_DECIMALS,) * 6
 
 
-def number_texts(values: Floats, decimals: Ints) -> Texts:
-    """Write numbers with so many decimals each; a zero carries no sign, (m,).
-
-    >>> number_texts(np.array([12.34567, -0.00001]), np.array([3, 4])).tolist()
-    [b'12.346', b'0.0000']
-    """
-    return as_texts(_native.write_numbers(floats(values), decimals.astype(np.int64)))
-
-
 def edits(
     literals: Literals,
     sources: Sequence[Source],

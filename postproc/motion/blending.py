@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from postproc import _native
-from postproc.arrays import Bools, Floats, Ints, floats, in_chunks
+from postproc.arrays import Bools, Floats, Ints, floats
 from postproc.motion.path import BlendCoupling
 from postproc.motion.targets import Fly, Targets
 from postproc.motion.trace import Trace
@@ -216,16 +216,12 @@ class Corners:
     @property
     def flat(self) -> Bools:
         """Tell where the nearest point alone tells of the corner, (c,)."""
-        return _is_flat(self.bend)
+        return np.asarray((np.abs(self.bend) < FLAT).all(axis=1))
 
 
 def corners(arm: Arm, targets: Targets, traced: Trace) -> Corners:
     """Find all corners and where the path passes them."""
-    found = zones(arm, targets, traced)
-    parts = in_chunks(
-        lambda rows: _passed(arm, targets, traced, found[rows]), len(found.visit)
-    )
-    return _joined(parts)
+    return _passed(arm, targets, traced, zones(arm, targets, traced))
 
 
 def _passed(arm: Arm, targets: Targets, traced: Trace, found: Zones) -> Corners:
@@ -241,34 +237,10 @@ def _passed(arm: Arm, targets: Targets, traced: Trace, found: Zones) -> Corners:
     return Corners(found, nearest, q, aside, bend)
 
 
-def _is_flat(bend: Floats) -> Bools:
-    """Tell which corners are as good as straight, (c,)."""
-    return np.asarray((np.abs(bend) < FLAT).all(axis=1))
-
-
 def _tcp(flange: Floats, tool: Floats) -> Floats:
     """Place tools (c, 3) [m] at flange poses (c, 4, 4): (c, 3) [m]."""
     turned: Floats = np.einsum("nij,nj->ni", flange[:, :3, :3], tool)
     return turned + flange[:, :3, 3]
-
-
-def _joined(parts: list[Corners]) -> Corners:
-    """Put corners one after the other."""
-    if not parts:
-        none = np.empty(0, dtype=np.int64)
-        zone = Zones(none, none, none, np.empty(0), np.empty(0))
-        q, aside = np.empty((0, 6)), np.empty((0, 3))
-        return Corners(zone, np.empty(0), q, aside, q)
-    zone = Zones(
-        *(
-            np.concatenate([getattr(part.zones, f.name) for part in parts])
-            for f in fields(Zones)
-        )
-    )
-    names = ("nearest", "q", "aside", "bend")
-    return Corners(
-        zone, *(np.concatenate([getattr(p, name) for p in parts]) for name in names)
-    )
 
 
 # Paths whose fly points are rounded: new samples, and where each point is passed.
