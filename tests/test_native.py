@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 
 from postproc import _native
+from postproc.arrays import floats
 from postproc.compensation.compensate import compensate
 from postproc.model.combination import Combination
 from postproc.model.effects.backlash import Backlash
@@ -91,6 +92,33 @@ def test_the_chain(chain, random, laid_out):
     known = ~np.isnan(q).any(axis=1)
     assert np.allclose(found[known], meant[known], **CLOSE)
     assert np.isnan(found[~known, :3, 3]).any(axis=1).all()
+
+
+def test_what_is_seen_along_the_chain(chain, random, laid_out):
+    q, points = random.uniform(-7, 7, (60, 6)), random.normal(size=(60, 3))
+    packed, q, points = chain.packed(), laid_out(q), laid_out(points)
+    frames, given = kinematics.frames(chain, q), (floats(q), floats(points))
+    found = _native.frames(packed, given[0]).reshape(-1, 7, 4, 4)
+    assert np.allclose(found, frames, **CLOSE)
+    seen = _native.landmarks(packed, *given)
+    tcp = kinematics.placed(chain, q, points)
+    meant = np.stack([frames[:, 2, :3, 3], frames[:, 4, :3, 3], tcp], axis=1)
+    assert np.allclose(seen, meant, **CLOSE)
+    columns = np.swapaxes(_native.jacobian(packed, *given), 1, 2)
+    assert np.allclose(columns, kinematics.jacobian(chain, q, points), **CLOSE)
+    links, load = random.uniform(0, 300, (6, 4)), random.uniform(-1, 90, (len(q), 4))
+    torque = _native.torque(packed, given[0], links, load)
+    meant = kinematics.torque(chain, q, links, load)
+    assert np.allclose(torque, meant, rtol=1e-12, atol=1e-6)
+    one = _native.torque(packed, given[0][:1], links, load[:1])
+    assert np.array_equal(one, torque[:1])
+    for wrong in (np.ones((2, 3)), np.ones((7, 3))):
+        with pytest.raises(ValueError, match="columns of"):
+            _native.landmarks(packed, given[0], wrong)
+        with pytest.raises(ValueError, match="columns of"):
+            _native.jacobian(packed, given[0], wrong)
+    with pytest.raises(ValueError, match="columns of"):
+        _native.torque(packed, given[0], links, np.ones((7, 4)))
 
 
 def test_one_branch(bench_cell, random, laid_out):

@@ -4,8 +4,9 @@ use numpy::{PyArray2, PyArray3, PyReadonlyArray2};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
-use crate::rows::{array, blocks, each, rows, Six, Three};
+use crate::rows::{array, blocks, each, minus, rows, same_length, Six, Three};
 use crate::trig::sin_cos;
+use crate::walk::cross;
 
 pub struct Link {
     pub a: f64,
@@ -63,13 +64,15 @@ impl Chain {
         [x, y, z]
     }
 
-    /// Place the flange, without Hayati's rotations: rows of a pose (4, 4).
-    fn flange(&self, q: &Six) -> [f64; 16] {
-        let (mut x, mut y, mut z) = ([1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]);
-        let mut p = [0.0; 3];
+    /// Walk along the D-H frames 0 (base) to 6 (flange), without Hayati's rotations.
+    pub fn frames(&self, q: &Six) -> [Frame; 7] {
+        let mut at =
+            Frame { axes: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]], origin: [0.0; 3] };
         let (sin, cos) = self.sin_cos(q);
+        let mut out = [at; 7];
         for (i, link) in self.0.iter().enumerate() {
             let ((sa, ca), (st, ct)) = (link.alpha, (sin[i], cos[i]));
+            let ([x, y, z], p) = (&mut at.axes, &mut at.origin);
             for k in 0..3 {
                 p[k] += link.d * z[k];
                 let across = ct * y[k] - st * x[k];
@@ -77,13 +80,49 @@ impl Chain {
                 (y[k], z[k]) = (ca * across + sa * z[k], ca * z[k] - sa * across);
                 p[k] += link.a * x[k];
             }
+            out[i + 1] = at;
         }
+        out
+    }
+
+    /// Convert what belongs to the D-H angles to what belongs to the controller's.
+    pub fn to_controller<const K: usize>(&self, per_axis: &[[f64; K]; 6]) -> [[f64; K]; 6] {
+        let mut out = [[0.0; K]; 6];
+        for (link, axis) in self.0.iter().zip(per_axis) {
+            for (column, mix) in out.iter_mut().zip(link.mix) {
+                for k in 0..K {
+                    column[k] += mix * link.sense * axis[k];
+                }
+            }
+        }
+        out
+    }
+}
+
+/// Axes x, y, z and the origin [m].
+#[derive(Clone, Copy)]
+pub struct Frame {
+    pub axes: [Three; 3],
+    pub origin: Three,
+}
+
+impl Frame {
+    /// Rows of a pose (4, 4).
+    fn pose(&self) -> [f64; 16] {
         let mut pose = [0.0; 16];
         for k in 0..3 {
-            pose[4 * k..4 * k + 4].copy_from_slice(&[x[k], y[k], z[k], p[k]]);
+            let [x, y, z] = self.axes;
+            pose[4 * k..4 * k + 4].copy_from_slice(&[x[k], y[k], z[k], self.origin[k]]);
         }
         pose[15] = 1.0;
         pose
+    }
+
+    /// Express a point of this frame in the base frame.
+    pub fn place(&self, point: &Three) -> Three {
+        let [x, y, z] = &self.axes;
+        let turned = |k: usize| x[k] * point[0] + y[k] * point[1] + z[k] * point[2];
+        std::array::from_fn(|k| self.origin[k] + turned(k))
     }
 }
 
@@ -118,6 +157,106 @@ pub fn flange<'py>(
     q: PyReadonlyArray2<'py, f64>,
 ) -> PyResult<Bound<'py, PyArray3<f64>>> {
     let (chain, q) = (Chain::new(&parameters)?, rows::<6>(&q)?);
-    let poses = each(py, q.len(), |i| chain.flange(&q[i]))?;
+    let poses = each(py, q.len(), |i| chain.frames(&q[i])[6].pose())?;
     Ok(blocks(py, q.len(), (4, 4), poses.into_flattened()))
+}
+
+/// Place the frames 0 (base) to 6 (flange), (n, 7, 16) [m].
+#[pyfunction]
+pub fn frames<'py>(
+    py: Python<'py>,
+    parameters: Parameters<'py>,
+    q: PyReadonlyArray2<'py, f64>,
+) -> PyResult<Bound<'py, PyArray3<f64>>> {
+    let (chain, q) = (Chain::new(&parameters)?, rows::<6>(&q)?);
+    let poses = each(py, q.len(), |i| chain.frames(&q[i]).map(|f| f.pose()))?;
+    Ok(blocks(py, q.len(), (7, 16), poses.into_flattened().into_flattened()))
+}
+
+/// Place the origins of frames 2 and 4, and points of the flange frame, (n, 3, 3) [m].
+#[pyfunction]
+pub fn landmarks<'py>(
+    py: Python<'py>,
+    parameters: Parameters<'py>,
+    q: PyReadonlyArray2<'py, f64>,
+    point: PyReadonlyArray2<'py, f64>,
+) -> PyResult<Bound<'py, PyArray3<f64>>> {
+    let (chain, q, point) = (Chain::new(&parameters)?, rows::<6>(&q)?, rows::<3>(&point)?);
+    same_length(&[q.len(), point.len()])?;
+    let places = each(py, q.len(), |i| {
+        let frames = chain.frames(&q[i]);
+        [frames[2].origin, frames[4].origin, frames[6].place(&point[i])]
+    })?;
+    Ok(blocks(py, q.len(), (3, 3), places.into_flattened().into_flattened()))
+}
+
+/// Differentiate points of the flange frame by the controller's joint angles, (n, 6, 6):
+/// joint by joint the velocity of the point [m/rad] and the angular velocity.
+#[pyfunction]
+pub fn jacobian<'py>(
+    py: Python<'py>,
+    parameters: Parameters<'py>,
+    q: PyReadonlyArray2<'py, f64>,
+    point: PyReadonlyArray2<'py, f64>,
+) -> PyResult<Bound<'py, PyArray3<f64>>> {
+    let (chain, q, point) = (Chain::new(&parameters)?, rows::<6>(&q)?, rows::<3>(&point)?);
+    same_length(&[q.len(), point.len()])?;
+    let columns = each(py, q.len(), |i| {
+        let frames = chain.frames(&q[i]);
+        let place = frames[6].place(&point[i]);
+        chain.to_controller(&std::array::from_fn(|j| {
+            let axis = &frames[j].axes[2];
+            let [x, y, z] = cross(axis, &minus(&place, &frames[j].origin));
+            [x, y, z, axis[0], axis[1], axis[2]]
+        }))
+    })?;
+    Ok(blocks(py, q.len(), (6, 6), columns.into_flattened().into_flattened()))
+}
+
+/// Torque about every joint of weights on the links and on the flange, (n, 6): for a unit
+/// of acceleration along the base's z.
+///
+/// Arguments:
+///     links: Mass [kg] and centre in its D-H frame [m] of every link, (6, 4).
+///     load: The same of what the flange carries, (n, 4), or (1, 4) for all.
+#[pyfunction]
+pub fn torque<'py>(
+    py: Python<'py>,
+    parameters: Parameters<'py>,
+    q: PyReadonlyArray2<'py, f64>,
+    links: PyReadonlyArray2<'py, f64>,
+    load: PyReadonlyArray2<'py, f64>,
+) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    let (chain, q) = (Chain::new(&parameters)?, rows::<6>(&q)?);
+    let (links, load) = (rows::<4>(&links)?, rows::<4>(&load)?);
+    same_length(&[links.len(), 6])?;
+    if load.len() != 1 {
+        same_length(&[q.len(), load.len()])?;
+    }
+    let of = |i: usize| if load.len() == 1 { &load[0] } else { &load[i] };
+    Ok(array(py, each(py, q.len(), |i| chain.torque(&q[i], links, of(i)))?))
+}
+
+impl Chain {
+    /// From the flange back to the base, every joint carries what came before.
+    fn torque(&self, q: &Six, links: &[[f64; 4]], load: &[f64; 4]) -> Six {
+        let frames = self.frames(q);
+        let (mut mass, mut moment) = (0.0, [0.0; 3]);
+        let mut carry = |[m, x, y, z]: [f64; 4], frame: &Frame| {
+            let centre = frame.place(&[x, y, z]);
+            mass += m;
+            for k in 0..3 {
+                moment[k] += m * centre[k];
+            }
+            (mass, moment)
+        };
+        carry(*load, &frames[6]);
+        let mut per_axis = [[0.0]; 6];
+        for j in (0..6).rev() {
+            let (m, s) = carry(links[j], &frames[j + 1]);
+            let (axis, p) = (&frames[j].axes[2], &frames[j].origin);
+            per_axis[j] = [axis[0] * (s[1] - m * p[1]) - axis[1] * (s[0] - m * p[0])];
+        }
+        self.to_controller(&per_axis).map(|[torque]| torque)
+    }
 }

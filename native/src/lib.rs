@@ -33,6 +33,10 @@ fn native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("SOURCES", SOURCES)?;
     module.add_function(wrap_pyfunction!(chain::placed, module)?)?;
     module.add_function(wrap_pyfunction!(chain::flange, module)?)?;
+    module.add_function(wrap_pyfunction!(chain::frames, module)?)?;
+    module.add_function(wrap_pyfunction!(chain::jacobian, module)?)?;
+    module.add_function(wrap_pyfunction!(chain::landmarks, module)?)?;
+    module.add_function(wrap_pyfunction!(chain::torque, module)?)?;
     module.add_function(wrap_pyfunction!(corner::passed, module)?)?;
     module.add_function(wrap_pyfunction!(rounding::resampled, module)?)?;
     module.add_function(wrap_pyfunction!(lines::lines, module)?)?;

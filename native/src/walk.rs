@@ -64,15 +64,6 @@ impl Walk {
 
     /// Derivative of the TCP by the controller's joint angles [m/rad].
     pub fn jacobian(&self, chain: &Chain) -> [Three; 6] {
-        let mut out = [[0.0; 3]; 6];
-        for (i, link) in chain.0.iter().enumerate() {
-            let axis = self.swept(&self.turn[i], &self.pivot[i]);
-            for (column, mix) in out.iter_mut().zip(link.mix) {
-                for k in 0..3 {
-                    column[k] += mix * link.sense * axis[k];
-                }
-            }
-        }
-        out
+        chain.to_controller(&std::array::from_fn(|i| self.swept(&self.turn[i], &self.pivot[i])))
     }
 }

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -21,10 +19,6 @@ from postproc.robot.inverse import Branches, Inverse, wrap
 from postproc.robot.pose import MM
 
 # The Denavit-Hartenberg chain: frames and points along it, for many poses at once.
-
-Frame = tuple[
-    Floats, Floats, Floats, Floats
-]  # axes x, y, z and origin [m], (3, n) each
 
 
 @dataclass(frozen=True)
@@ -53,24 +47,9 @@ class DH:
         rows = self.a, self.d, self.alpha, self.offset, self.sense, beta, *self.mix.T
         return np.array(rows)
 
-    def frames(self, q: Floats) -> Iterator[Frame]:
-        """Walk along the link frames 0 (base) to 6 (flange) for angles (n, 6) [rad].
-
-        Every frame is the one before, turned and shifted along its z, then its new x.
-        """
-        theta = np.ascontiguousarray(self.angles(q).T)
-        cos, sin = np.cos(theta), np.sin(theta)
-        shape = (3, len(q))
-        x, y, z = (np.broadcast_to(axis[:, None], shape) for axis in np.eye(3))
-        p: Floats = np.zeros(shape)
-        yield x, y, z, p
-        for i in range(6):
-            ca, sa = np.cos(self.alpha[i]), np.sin(self.alpha[i])
-            p = p + self.d[i] * z
-            x, across = cos[i] * x + sin[i] * y, cos[i] * y - sin[i] * x
-            y, z = ca * across + sa * z, ca * z - sa * across
-            p = p + self.a[i] * x
-            yield x, y, z, p
+    def frames(self, q: Floats) -> Floats:
+        """Place the link frames 0 (base) to 6 (flange): (n, 6) -> (n, 7, 4, 4)."""
+        return _native.frames(self.packed(), floats(q)).reshape(len(q), 7, 4, 4)
 
     def flange(self, q: Floats) -> Floats:
         """Place the flange for angles (n, 6) [rad]: (n, 4, 4) [m]."""
@@ -91,19 +70,10 @@ class DH:
         return _native.placed(self.packed(beta), floats(q), points)
 
 
-def pose_of(frame: Frame) -> Floats:
-    """Write frames as poses, (n, 4, 4) [m]."""
-    pose = np.zeros((frame[3].shape[1], 4, 4))
-    for column, values in enumerate(frame):
-        pose[:, :3, column] = values.T
-    pose[:, 3, 3] = 1.0
-    return pose
-
-
 # The arm: forward kinematics, Jacobians, gravity torque, inverse kinematics.
 #
-# Pinocchio does the torque; no other module imports it. Angles are the
-# controller's joint angles [rad], lengths metres, the frame the arm's base frame.
+# Angles are the controller's joint angles [rad], lengths metres, the frame the arm's
+# base frame.
 
 GRAVITY = 9.80665  # [m/s^2], standard gravity
 
@@ -144,24 +114,12 @@ class Arm:
         return _build, (self.file,)
 
     @cached_property
-    def _chain(self) -> Any:
-        """Build the pinocchio model: joint i turns about z of D-H frame i - 1."""
-        import pinocchio as pin  # slow to load, and for loads alone
-
-        model, parent, placement = pin.Model(), 0, pin.SE3.Identity()
-        model.gravity.linear = np.array([0.0, 0.0, -GRAVITY])
-        for i in range(6):
-            joint = pin.JointModelRZ()
-            parent = model.addJoint(parent, joint, placement, f"joint {i + 1}")
-            placement = pin.SE3(
-                pin.utils.rotate("x", float(self.dh.alpha[i])),
-                np.array([self.dh.a[i], 0.0, self.dh.d[i]]),
-            )
-            if self.file.links is not None:
-                com = placement.act(np.array(self.file.links.com_mm[i]) * MM)
-                inertia = pin.Inertia(self.file.links.mass_kg[i], com, np.eye(3))
-                model.appendBodyToJoint(parent, inertia, pin.SE3.Identity())
-        return model
+    def _links(self) -> Floats:
+        """Masses [kg] and centres in the D-H frames [m], (6, 4); 0 where not known."""
+        links = self.file.links
+        if links is None:
+            return np.zeros((6, 4))
+        return np.column_stack([links.mass_kg, np.array(links.com_mm) * MM])
 
     @cached_property
     def _inverse(self) -> Inverse | None:
@@ -177,7 +135,7 @@ class Arm:
 
     def link_frames(self, q: Floats) -> Floats:
         """Place the D-H frames 0 (base) to 6 (flange): (n, 6) -> (n, 7, 4, 4)."""
-        return np.stack([pose_of(frame) for frame in self.dh.frames(q)], axis=1)
+        return self.dh.frames(q)
 
     def flange(self, q: Floats) -> Floats:
         """Place the flange: (n, 6) [rad] -> (n, 4, 4) [m], base frame."""
@@ -202,26 +160,7 @@ class Arm:
             q: Joint angles, (n, 6) [rad].
             tool: TCP in the flange frame, (n, 3) [m].
         """
-        points = [frame[3].T for frame in islice(self.dh.frames(q), 5)]
-        return np.stack([points[2], points[4], self.tcp(q, tool)], axis=1)
-
-    def kinematics(self, q: Floats) -> tuple[Floats, Floats]:
-        """Place the flange and give the joint screws.
-
-        Args:
-            q: Joint angles, (n, 6) [rad].
-
-        Returns:
-            Flange poses (n, 4, 4) and the Jacobian (n, 6, 6) of the body point that
-            lies in the base origin: rows 0-2 its velocity, rows 3-5 the angular
-            velocity, per unit of controller joint velocity.
-        """
-        *joints, last = self.dh.frames(q)
-        screws = np.empty((len(q), 6, 6))
-        for i, (_, _, axis, point) in enumerate(joints):
-            screws[:, :3, i] = np.cross(point, axis, axis=0).T
-            screws[:, 3:, i] = axis.T
-        return pose_of(last), (screws * self.dh.sense) @ self.dh.mix
+        return _native.landmarks(self.dh.packed(), floats(q), floats(tool))
 
     def joint_axes(self, q: Floats) -> tuple[Floats, Floats]:
         """Give every joint's rotation axis and a point on it.
@@ -229,9 +168,9 @@ class Arm:
         Returns:
             Unit axes of positive controller rotation (n, 6, 3), points (n, 6, 3) [m].
         """
-        screws = np.swapaxes(self.kinematics(q)[1], 1, 2)
-        axes = screws[..., 3:]
-        return axes, np.cross(axes, screws[..., :3])
+        screws = np.swapaxes(self.jacobian(q, np.zeros(3)), 1, 2)
+        axes, origin = screws[..., 3:], self.flange(q)[:, None, :3, 3]
+        return axes, np.cross(axes, screws[..., :3] - np.cross(axes, origin))
 
     def jacobian(self, q: Floats, tool: Floats) -> Floats:
         """Differentiate the TCP: (n, 6, 6), rows 0-2 linear [m/rad], 3-5 angular.
@@ -240,11 +179,9 @@ class Arm:
             q: Joint angles, (n, 6) [rad].
             tool: TCP in the flange frame, (3,) or (n, 3) [m].
         """
-        flange, J = self.kinematics(q)
-        tool = np.broadcast_to(tool, (len(q), 3))
-        tcp = flange[:, :3, 3] + np.einsum("nij,nj->ni", flange[:, :3, :3], tool)
-        J[:, :3] += np.cross(J[:, 3:], tcp[:, :, None], axis=1)
-        return J
+        points = floats(np.broadcast_to(tool, (len(q), 3)))
+        by_joint = _native.jacobian(self.dh.packed(), floats(q), points)
+        return np.ascontiguousarray(np.swapaxes(by_joint, 1, 2))
 
     def gravity_torque(
         self,
@@ -259,29 +196,23 @@ class Arm:
             payload: Payload mass, (n,) [kg].
             payload_com: Its centre of mass in the flange frame, (n, 3) [m].
         """
-        n = len(q)
-        own = np.zeros((n, 6))
-        if self.file.links is not None and n:
-            import pinocchio as pin
-
-            pool = pin.ModelPool(self._chain, 1)
-            theta = np.asfortranarray(self.dh.angles(q).T)
-            rest = np.zeros((6, n), order="F")
-            holding = pin.rneaInParallel(1, pool, theta, rest, rest).T
-            own = -(holding * self.dh.sense) @ self.dh.mix
+        own = self._torque(q, self._links, np.zeros((1, 4)))
         return own + self.payload_torque(q, payload, payload_com)
 
     def payload_torque(
         self, q: Floats, payload: Floats | float, payload_com: Floats | float
     ) -> Floats:
         """Give the torque of the payload alone, (n, 6) [N m]; see `gravity_torque`."""
-        n = len(q)
-        if not np.any(payload):
-            return np.zeros((n, 6))
-        J = self.jacobian(q, np.broadcast_to(payload_com, (n, 3)))
-        weight = -GRAVITY * np.broadcast_to(payload, (n,))
-        torque: Floats = weight[:, None] * J[:, 2]
-        return torque
+        load = np.empty((len(q), 4))
+        load[:, 0], load[:, 1:] = payload, payload_com
+        return self._torque(q, np.zeros((6, 4)), load)
+
+    def _torque(self, q: Floats, links: Floats, load: Floats) -> Floats:
+        """Give the torque of weights; see `_native.torque`."""
+        if not (links[:, 0].any() or load[:, 0].any()):
+            return np.zeros((len(q), 6))
+        packed = self.dh.packed()
+        return -GRAVITY * _native.torque(packed, floats(q), floats(links), load)
 
     def gravity_basis(self, q: Floats) -> Floats:
         """Give the joint torque per unit of every lumped mass parameter.

@@ -45,6 +45,39 @@ def placed(dh, q, point, beta=None):
     return np.einsum("nij,nj->ni", T[:, :3, :3], point) + T[:, :3, 3]
 
 
+def frames(dh, q):
+    """Place the frames 0 to 6, (n, 7, 4, 4)."""
+    out = np.empty((len(q), 7, 4, 4))
+    for k, row in enumerate(q):
+        out[k, 0] = np.eye(4)
+        for i, theta in enumerate(dh.offset + dh.sense * (dh.mix @ row)):
+            out[k, i + 1] = out[k, i] @ link(dh.a[i], dh.d[i], dh.alpha[i], theta)
+    return out
+
+
+def jacobian(dh, q, point):
+    """Differentiate points of the flange frame and its rotation, (n, 6, 6)."""
+    out, place = np.empty((len(q), 6, 6)), placed(dh, q, point)
+    for k, T in enumerate(frames(dh, q)):
+        axes, origins = T[:6, :3, 2], T[:6, :3, 3]
+        screws = np.hstack([np.cross(axes, place[k] - origins), axes]).T
+        out[k] = (screws * dh.sense) @ dh.mix
+    return out
+
+
+def torque(dh, q, links, load):
+    """Sum lever times weight of everything that a joint carries, (n, 6)."""
+    out, seen = np.zeros((len(q), 6)), frames(dh, q)
+    for k, T in enumerate(seen):
+        weights = [(T[i + 1], links[i]) for i in range(6)] + [(T[6], load[k])]
+        for carried, (frame, (mass, *centre)) in enumerate(weights):
+            place = (frame @ [*centre, 1.0])[:3]
+            for j in range(min(carried, 5) + 1):
+                lever = np.cross(T[j, :3, 2], place - T[j, :3, 3])[2]
+                out[k] += mass * lever * dh.sense[j] * dh.mix[j]
+    return out
+
+
 def branch(opw, pose, slot):
     """Solve one pose for one branch, geometric joint angles, NaN where there is none.
 

@@ -197,17 +197,37 @@ def test_axis_3_measured_from_axis_2(tmp_path, arm):
     np.testing.assert_allclose(found, same, atol=1e-9)
 
 
+def _pinocchio(arm):
+    """Build the arm anew: joint i turns about z of D-H frame i - 1."""
+    model, parent, placement = pin.Model(), 0, pin.SE3.Identity()
+    model.gravity.linear = np.array([0.0, 0.0, -GRAVITY])
+    dh, links = arm.dh, arm.file.links
+    for i in range(6):
+        parent = model.addJoint(parent, pin.JointModelRZ(), placement, f"joint {i}")
+        tilt, shift = float(dh.alpha[i]), np.array([dh.a[i], 0.0, dh.d[i]])
+        placement = pin.SE3(pin.utils.rotate("x", tilt), shift)
+        com = placement.act(np.array(links.com_mm[i]) * 1e-3)
+        inertia = pin.Inertia(links.mass_kg[i], com, np.eye(3))
+        model.appendBodyToJoint(parent, inertia, pin.SE3.Identity())
+    return model
+
+
 def test_kinematics_are_those_of_pinocchio(arm, q):
-    model, theta = arm._chain, arm.dh.angles(q)
-    data = model.createData()
-    flange, screws = arm.kinematics(q)
-    frames = arm.link_frames(q)
+    model, theta = _pinocchio(arm), arm.dh.angles(q)
+    data, none = model.createData(), np.zeros(6)
+    frames, columns = arm.link_frames(q), arm.jacobian(q, np.zeros(3))
+    torque = arm.gravity_torque(q)
     for k in range(len(q)):
-        J = pin.computeJointJacobians(model, data, theta[k])
+        J = np.array(pin.computeJointJacobians(model, data, theta[k]))
+        # Pinocchio's is of the point that lies in the base origin.
+        J[:3] += np.cross(J[3:], frames[k, 6, :3, 3], axisa=0).T
         np.testing.assert_allclose(
-            screws[k], (J * arm.dh.sense) @ arm.dh.mix, atol=1e-12
+            columns[k], (J * arm.dh.sense) @ arm.dh.mix, atol=1e-12
         )
+        holding = pin.rnea(model, data, theta[k], none, none)
+        given = -(holding * arm.dh.sense) @ arm.dh.mix
+        np.testing.assert_allclose(torque[k], given, rtol=1e-12, atol=1e-9)
         for i in range(1, 6):  # pinocchio's joint frame i turns about D-H axis i
             axis = data.oMi[i + 1].rotation[:, 2]
             np.testing.assert_allclose(frames[k, i, :3, 2], axis, atol=1e-12)
-    np.testing.assert_array_equal(flange, frames[:, 6])
+    np.testing.assert_array_equal(arm.flange(q), frames[:, 6])
