@@ -295,7 +295,7 @@ def _in_windows(reading: Reading, setting: Setting) -> Correction:
     stops = cut_points(reading.visits)
     quiet = stops if timed else seams(reading.visits)
     work = _WindowWork(reading, setting, quiet, stops)
-    cut = windows(quiet, cuts.LEAST)
+    cut = windows(quiet, cuts.share(len(quiet), setting.processes))
     if len(cut) > 1:
         try:
             found = in_processes(work, cut, setting.clock, setting.processes)

@@ -213,6 +213,16 @@ def windows(quiet: Bools, least: int) -> list[Window]:
     return [window(quiet, a, b) for a, b in pairwise([*ends, n])]
 
 
+def share(n: int, processes: int) -> int:
+    """Return the visits of a window of n: every process gets as many windows.
+
+    >>> [share(n, 2) for n in (40_000, 100_000, 1_000_000)]
+    [20000, 25000, 20000]
+    """
+    count = n // LEAST
+    return n // max(count - count % processes, 1)
+
+
 def window(quiet: Bools, first: int, end: int, before: int = -1) -> Window:
     """Give visits their halos, from one place that may be cut to another.
 
