@@ -413,3 +413,18 @@ def test_other_threads_run_meanwhile():
     done.set()
     thread.join()
     assert sum(began < at < ended for at in ticks) > 3
+
+
+def test_lines_that_begin_with_a_word(random):
+    words = (b"import", b"call")
+    pieces = [b"IMPORT", b"call", b"Cal", b" ", b"\t", b"\n", b"\r\n", b"x", b"\0", b""]
+    for n in (0, 1, 3, 400):
+        text = b"".join(pieces[k] for k in random.integers(0, len(pieces), n))
+        lines = [line + b"\n" for line in text.split(b"\n")]
+        lines[-1] = lines[-1][:-1]
+        meant = [
+            (number, line)
+            for number, line in enumerate(lines, 1)
+            if line.lstrip(b" \t").lower().startswith(words)
+        ]
+        assert _native.lines_beginning(text, words) == meant

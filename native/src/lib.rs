@@ -24,6 +24,7 @@ mod variance;
 mod walk;
 mod walks;
 mod weave;
+mod words;
 
 /// Names these sources: a test tells a core that was built from others.
 const SOURCES: &str = env!("SOURCES");
@@ -64,5 +65,6 @@ fn native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(weave::weave, module)?)?;
     module.add_function(wrap_pyfunction!(weave::is_woven, module)?)?;
     module.add_function(wrap_pyfunction!(weave::cut, module)?)?;
+    module.add_function(wrap_pyfunction!(words::lines_beginning, module)?)?;
     Ok(())
 }

@@ -9,6 +9,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from postproc import _native
 from postproc.batch.plan import BatchPlan, Unit
 from postproc.compensation.record import SUFFIX
 from postproc.exceptions import OutputError, ProgramError
@@ -29,7 +30,7 @@ from postproc.files import (
 
 HEAD = 1 << 12  # bytes: the stamp of an output stands on its first line
 
-_WORDS = (b"import", b"exported", b"call")  # one is in every line that names a program
+_WORDS = (b"import", b"routine", b"call")  # what names a program begins with one
 _NAMED = re.compile(
     rb"^[ \t]*(?:IMPORT[ \t]*'(?P<file>[^'\r\n]*)'"
     rb"|ROUTINE\b[^\r\n]*?\bEXPORTED[ \t]+FROM[ \t]+(?P<program>\w+)"
@@ -54,7 +55,7 @@ def named_programs(text: bytes) -> tuple[dict[str, int], dict[str, int]]:
     """
     inside: dict[str, int] = {}
     outside: dict[str, int] = {}
-    for line, text_of_line in _lines_with(_WORDS, text):
+    for line, text_of_line in _native.lines_beginning(text, _WORDS):
         found = _NAMED.match(text_of_line)
         if found is None:
             continue
@@ -94,24 +95,6 @@ def of_one_arm(program: int, page: int) -> bool:
         page: Likewise of the page, which is of its program's arm then.
     """
     return page in (0, program or 1)
-
-
-def _lines_with(words: Sequence[bytes], text: bytes) -> Iterator[tuple[int, bytes]]:
-    """Yield the lines that hold one of some words, in lower case, with their number."""
-    folded = text.lower()
-    places: list[int] = []
-    for word in words:
-        at = folded.find(word)
-        while at >= 0:
-            places.append(at)
-            at = folded.find(word, at + 1)
-    line, begin, end = 1, 0, 0
-    for at in sorted(places):
-        if at >= end:
-            before, begin = begin, text.rfind(b"\n", end, at) + 1 or end
-            line += text.count(b"\n", before, begin)
-            end = text.find(b"\n", at) + 1 or len(text)
-            yield line, text[begin:end]
 
 
 def names_in(path: Path) -> tuple[dict[str, int], dict[str, int]]:
