@@ -114,7 +114,8 @@ class Correction:
         travel: Of every joint since its last reversal, (n, 6) [rad].
         speed: Of the TCP, (n,) [m/s], NaN where nobody asked.
         departure: Largest change on the way to every visit of a joint [rad], elbow,
-            wrist centre and TCP [m], (n, 4), NaN where not known.
+            wrist centre and TCP [m], (n, 4), NaN where not known; of a part its
+            largest, one row.
     """
 
     edited: Ints
@@ -145,13 +146,15 @@ class Correction:
         return replace(
             self, edited=self.edited[mine], edits=edits, before=self.before[rows],
             after=self.after[rows], decisions=self.decisions.part(own),
-            **{name: getattr(self, name)[own] for name in BY_VISIT},
+            departure=np.fmax.reduce(self.departure[own], axis=0, keepdims=True),
+            **{name: np.array(getattr(self, name)[own]) for name in BY_VISIT},
         )  # fmt: skip
 
     def rows(self, some: slice) -> dict[str, NDArray[Any]]:
         """Return what is kept of some visits."""
         decided = self.decisions.part(some)
-        found = {name: np.array(getattr(self, name)[some]) for name in BY_VISIT}
+        names = (*BY_VISIT, "departure")
+        found = {name: np.array(getattr(self, name)[some]) for name in names}
         for f in fields(Decisions):
             if f.name not in ("why", "reasons"):
                 found[f"decided {f.name}"] = np.array(getattr(decided, f.name))
@@ -161,7 +164,6 @@ class Correction:
 
 BY_VISIT = (
     "corrected", "position", "away", "overruled", "untimed", "travel", "speed",
-    "departure",
 )  # fmt: skip
 
 
@@ -197,38 +199,41 @@ def correction_of(
     )
 
 
-def joined(parts: Sequence[Correction]) -> Correction:
-    """Put the windows of a program one after the other."""
+def joined(parts: list[Correction]) -> Correction:
+    """Put the windows of a program one after the other.
+
+    Args:
+        parts: The windows; the list is emptied, and nothing is held twice for long.
+    """
     if len(parts) == 1:
         return parts[0]
-    arrays = {
-        f.name: np.concatenate([getattr(part, f.name) for part in parts])
-        for f in fields(Correction)
-        if f.name not in ("edits", "decisions")
-    }
-    edits = zip(*(part.edits for part in parts), strict=True)
+    own = [dict(vars(part)) for part in parts]
+    decisions = [dict(vars(part.pop("decisions"))) for part in own]
+    parts.clear()
+    edits = zip(*(part.pop("edits") for part in own), strict=True)
     return Correction(
-        edits=tuple(Replacements.merged(own) for own in edits),
-        decisions=_one_after_another([part.decisions for part in parts]),
-        **arrays,
+        edits=tuple(Replacements.merged(some) for some in edits),
+        decisions=_one_after_another(decisions),
+        **{name: _column(name, own) for name in list(own[0])},
     )
 
 
-def _one_after_another(parts: Sequence[Decisions]) -> Decisions:
-    """Join decisions, and their reasons."""
-    arrays = {
-        f.name: np.concatenate([getattr(part, f.name) for part in parts])
-        for f in fields(Decisions)
-        if f.name not in ("why", "reasons")
-    }
+def _one_after_another(parts: Sequence[dict[str, Any]]) -> Decisions:
+    """Join decisions, and their reasons; the parts are emptied."""
     codes = Interned([""])
-    why = []
     for part in parts:
-        new = np.zeros(len(part.reasons), dtype=np.int64)
-        for k in np.unique(part.why).tolist():
-            new[k] = codes[part.reasons[k]]
-        why.append(new[part.why])
-    return Decisions(why=np.concatenate(why), reasons=tuple(codes), **arrays)
+        why, reasons = part["why"], part.pop("reasons")
+        new = np.zeros(len(reasons), dtype=np.int64)
+        for k in np.unique(why).tolist():
+            new[k] = codes[reasons[k]]
+        part["why"] = new[why]
+    columns = {name: _column(name, parts) for name in list(parts[0])}
+    return Decisions(reasons=tuple(codes), **columns)
+
+
+def _column(name: str, parts: Sequence[dict[str, Any]]) -> NDArray[Any]:
+    """Take a column from all parts, and join it."""
+    return np.concatenate([part.pop(name) for part in parts])
 
 
 # A program corrected window by window, so that only one is in memory at a time.
@@ -299,7 +304,9 @@ def _in_windows(reading: Reading, setting: Setting) -> Correction:
     if len(cut) > 1:
         try:
             found = in_processes(work, cut, setting.clock, setting.processes)
-            return joined([part.kept for part in found])
+            parts = [part.kept for part in found]
+            found.clear()
+            return joined(parts)
         except NotAloneError:
             pass
     return _whole(reading, setting)[0]
