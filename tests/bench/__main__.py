@@ -32,16 +32,16 @@ LENGTHS = (1_000, 10_000, 100_000, 1_000_000)
 ALWAYS = 10_000  # targets that fit into any budget
 STAGES = (
     "read", "parse", "plan", "solve", "decide", "plan again", "rewrite", "verify",
-    "report", "write", "report file",
+    "report", "write",
 )  # fmt: skip
 LIBRARIES = ("numpy", "scipy", "toppra", "ruckig", "lark", "pin")
-ABOUT_STAGES = """Seconds. `all` is from opening the files to written output, the start
-of Python and the JSON report (`report file`) not included. `parse` resolves too, `plan`
-holds the inverse kinematics, `solve` predicts, `plan again` is every round of
-corrections. Programs of 40,000 targets and more are corrected by one process for a
-core: their stages from `plan` to `plan again` are seconds of all processes, which
-together are more than `all`. MiB is the most that all of them hold, shared pages
-counted once."""
+ABOUT_STAGES = """Seconds. `all` is from opening the files to written output, record and
+JSON report; the start of Python is not in it. `unbroken` is one fly run without a stop,
+`milling` stops every 25,000 points. `parse` resolves too, `plan` holds the inverse
+kinematics, `solve` predicts, `plan again` is every round of corrections. Programs of
+40,000 targets and more are corrected by one process for a core: their stages from
+`plan` to `plan again` are seconds of all processes, which together are more than `all`.
+MiB is the most that all of them hold, shared pages counted once."""
 ABOUT_KERNELS = """toppra by itself solves the same joint angles once, a gridpoint a
 waypoint, and ruckig moves from stop to stop between them. The pipeline calls them only
 for a model with an effect that depends on the speed, which this one has not. All is of
@@ -132,8 +132,8 @@ def share_table(rows: dict[tuple[str, int], Row]) -> list[str]:
     """Write how toppra and ruckig by themselves compare, and how time grows."""
     lines = [
         "| program | toppra alone, us a waypoint | ruckig alone, us a move | pipeline, "
-        "us a target | pipeline / toppra | growth exponent |",
-        "|---|---|---|---|---|---|",
+        "us a target | pipeline / toppra | growth exponent, time | .. memory |",
+        "|---|---|---|---|---|---|---|",
     ]
     for kind in KINDS:
         own = {n: row for (k, n), row in rows.items() if k == kind}
@@ -141,16 +141,21 @@ def share_table(rows: dict[tuple[str, int], Row]) -> list[str]:
             continue
         row, largest = own[LENGTHS[1]], own[max(own)]
         each = largest["all"] / largest["targets"]
-        growth = "-"
-        if max(own) > LENGTHS[1]:
-            more = largest["targets"] / row["targets"]
-            growth = f"{math.log(largest['all'] / row['all']) / math.log(more):.2f}"
+        growth = [exponent(row, largest, key) for key in ("all", "peak_mib")]
         lines.append(
             f"| {kind} | {largest['toppra'] * 1e6:.1f} | "
             f"{largest['ruckig'] * 1e6:.1f} | {each * 1e6:.0f} | "
-            f"{each / largest['toppra']:.1f} | {growth} |"
+            f"{each / largest['toppra']:.1f} | {' | '.join(growth)} |"
         )
     return lines
+
+
+def exponent(row: Row, longer: Row, key: str) -> str:
+    """Write how what a program takes grows with its targets."""
+    if longer is row:
+        return "-"
+    more = longer["targets"] / row["targets"]
+    return f"{math.log(longer[key] / row[key]) / math.log(more):.2f}"
 
 
 def beside_lines(beside: Beside, rows: dict[tuple[str, int], Row]) -> list[str]:

@@ -1,4 +1,4 @@
-"""Programs of any length, of the four kinds that users bring, made without chance.
+"""Programs of any length, of the five kinds that users bring, made without chance.
 
 Every kind repeats what the sample program of its name does, on paths of its own: the
 same moves, number formats and layout, so that a line costs what a real one costs.
@@ -36,22 +36,36 @@ class Made:
 
 def milling(n: int) -> Made:
     """Mill a freeform blank in rows, one fly run an operation, n points."""
-    points = _milled(n)
+    k = np.arange(n) // ROW
+    y = -143.0 + 2.2 * (k % ROWS) + 0.01 * (k // ROWS % 200)
+    return _milling("milling", _milled(y), ROW * ROWS)
+
+
+def unbroken(n: int) -> Made:
+    """Mill the same blank there and back without a stop, one fly run of n points."""
+    k = np.arange(n) // ROW
+    there, passes = np.abs(k % (2 * ROWS - 2) - (ROWS - 1)), k // (2 * ROWS - 2)
+    y = -143.0 + 2.2 * there + 0.01 * (passes % 200)
+    return _milling("unbroken", _milled(y), n)
+
+
+def _milling(name: str, points: Array, run: int) -> Made:
+    """Write points (n, 6) [mm, deg] as operations of so many, a fly run each."""
     text = (
         "  MOVEFLY LINEAR TO POS(%.4f, %.4f, %.4f, %.4f, %.4f, %.4f,"
         "'W T1:0 T2:0 T3:0') ADVANCE"
     )
     lines = [text % tuple(p) for p in points.tolist()]
     body: list[str] = []
-    for a in range(0, n, ROW * ROWS):
-        own = lines[a : a + ROW * ROWS]
+    for a in range(0, len(points), run):
+        own = lines[a : a + run]
         first, last = points[a], points[a + len(own) - 1]
-        body += [f"  -- Operation {a // (ROW * ROWS) + 1}: parallel to X, zigzag"]
+        body += [f"  -- Operation {a // run + 1}: parallel to X, zigzag"]
         body += ["  $LIN_SPD := 0.2500", _retracted(first), "  $LIN_SPD := 0.0600"]
         body += [*own, "  $LIN_SPD := 0.1000", _retracted(last)]
     joints = "{11.62947, 15.45382, -130.46645, -148.98738, -74.35892, -91.72012}"
     head = [
-        "PROGRAM milling EZ, PROG_ARM=1, HOLD, STACK=5000",
+        f"PROGRAM {name} EZ, PROG_ARM=1, HOLD, STACK=5000",
         "ROUTINE SpindleOn(rpm : INTEGER) EXPORTED FROM spindle GLOBAL",
         "BEGIN",
         "  $MOVE_TYPE := JOINT",
@@ -64,16 +78,14 @@ def milling(n: int) -> Made:
         f"  MOVE TO {joints}",
         "  SpindleOn(18000)",
     ]
-    return Made("milling.pdl", _text([*head, *body, "END milling"]))
+    return Made(f"{name}.pdl", _text([*head, *body, f"END {name}"]))
 
 
-def _milled(n: int) -> Array:
-    """Points of the rows, (n, 6) [mm, deg], the spindle leaning along the surface."""
-    k = np.arange(n)
-    row, along = k // ROW, k % ROW
-    forth = row % 2 == 0
+def _milled(y: Array) -> Array:
+    """Points of rows at y [mm], (n, 6) [mm, deg], the spindle leaning as they do."""
+    k = np.arange(len(y))
+    forth, along = k // ROW % 2 == 0, k % ROW
     x = -190.0 + 2.0 * np.where(forth, along, ROW - 1 - along)
-    y = -143.0 + 2.2 * (row % ROWS) + 0.01 * (row // ROWS % 200)
     z = 45.0 + 6.0 * np.sin(x / 60.0) * np.cos(y / 50.0)
     dx = 0.10 * np.cos(x / 60.0) * np.cos(y / 50.0) + 0.20
     dy = -0.12 * np.sin(x / 60.0) * np.sin(y / 50.0) + 0.07
@@ -206,6 +218,7 @@ def _text(lines: list[str]) -> bytes:
 
 KINDS: Mapping[str, Callable[[int], Made]] = {
     "milling": milling,
+    "unbroken": unbroken,
     "spot": spot,
     "drilling": drilling,
     "handling": handling,
