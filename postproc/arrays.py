@@ -30,6 +30,36 @@ def read_only(columns: object) -> None:
             column.setflags(write=False)
 
 
+# Rows of few columns: numpy goes along rows, we go down columns, several times as fast.
+
+
+def any_in_rows(told: Bools) -> Bools:
+    """Tell which rows (n, k) hold a True, (n,).
+
+    >>> any_in_rows(np.array([[False, True], [False, False]])).tolist()
+    [True, False]
+    """
+    return np.asarray(np.logical_or.reduce(list(told.T)))
+
+
+def all_in_rows(told: Bools) -> Bools:
+    """Tell which rows (n, k) hold nothing but True, (n,).
+
+    >>> all_in_rows(np.array([[False, True], [True, True]])).tolist()
+    [False, True]
+    """
+    return np.asarray(np.logical_and.reduce(list(told.T)))
+
+
+def largest_in_rows(values: Floats) -> Floats:
+    """Return the largest value of every row (n, k), (n,); NaN where there is one.
+
+    >>> largest_in_rows(np.array([[1.0, 3.0], [2.0, np.nan]])).tolist()
+    [3.0, nan]
+    """
+    return np.asarray(np.maximum.reduce(list(values.T)))
+
+
 # Long arrays in chunks: what a chunk needs stays in the cache.
 
 K = TypeVar("K")

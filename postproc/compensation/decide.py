@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from postproc.arrays import Bools, Floats, Ints
+from postproc.arrays import Bools, Floats, Ints, any_in_rows
 from postproc.compensation.command import (
     Commands,
     change_mm,
@@ -289,7 +289,7 @@ def with_dependants(
         shift: What those with numbers of their own move by, (n, 3) [m]; else 0.
     """
     t, moves = planned.targets, np.array(shift)
-    rows = np.flatnonzero((visits.follows >= 0) & (values != visits.values).any(axis=1))
+    rows = np.flatnonzero((visits.follows >= 0) & any_in_rows(values != visits.values))
     if len(rows):
         moves[rows] = _dependant_shift(visits, planned, cell, values, rows)
     for v, sources in _steps(planned):

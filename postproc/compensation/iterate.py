@@ -7,7 +7,7 @@ from itertools import count, pairwise
 
 import numpy as np
 
-from postproc.arrays import Bools, Floats, Ints, spans
+from postproc.arrays import Bools, Floats, Ints, any_in_rows, largest_in_rows, spans
 from postproc.compensation.command import (
     Commands,
     solve_again,
@@ -127,7 +127,7 @@ class Iterate:
         off = np.abs(side - self.solved.direction)
         far = np.zeros(len(off), dtype=bool)
         rows = np.unique(np.flatnonzero(off > most) // off.shape[1])  # few
-        far[rows] = off[rows].max(axis=1) > most  # NaN is not far
+        far[rows] = largest_in_rows(off[rows]) > most  # NaN is not far
         return np.asarray(proposal.corrected & ~self.settled & far)
 
 
@@ -212,8 +212,8 @@ class Iteration:
         missed, sharp = np.zeros_like(aside), self.planned.plan.pull.visit
         missed[sharp] = (aside - meant)[sharp]
         missed[~proposal.corrected] = 0.0
-        missed[np.isnan(missed).any(axis=1)] = 0.0
-        far = np.asarray((np.abs(missed) > CLOSE).any(axis=1))
+        missed[any_in_rows(np.isnan(missed))] = 0.0
+        far = any_in_rows(np.abs(missed) > CLOSE)
         begins = self.reading.begins
         if len(begins) > 1:  # those with a point that is not hit go on alone
             for first, end in pairwise((*begins, len(missed))):
@@ -284,7 +284,7 @@ class Replanner:
         """
         new = replace(self._visits, values=values)
         old = self._visits.values
-        moved = ((values != old) & ~(np.isnan(values) & np.isnan(old))).any(axis=1)
+        moved = any_in_rows((values != old) & ~(np.isnan(values) & np.isnan(old)))
         rows = np.flatnonzero(moved)
         targets = moved_targets(self._targets, new, self._cell, rows)
         arm, last = self._cell.arm, self._last

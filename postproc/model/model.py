@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, NonNegativeFloat, PositiveInt
 
 from postproc import _native
-from postproc.arrays import Bools, Floats, chunks, in_chunks
+from postproc.arrays import Bools, Floats, all_in_rows, any_in_rows, chunks, in_chunks
 from postproc.exceptions import ModelError
 from postproc.files import write_all
 from postproc.model.combination import Combination
@@ -112,7 +112,7 @@ def side_variance(effects: Combination, at: Batch, values: Floats) -> Floats:
     """Variance that unknown directions give, (n, 3) [m^2]."""
     unknown = 1.0 - np.clip(at.states.direction, -1.0, 1.0) ** 2
     out = np.zeros((len(at), 3))
-    rows = np.flatnonzero((unknown > 0.0).any(axis=1))
+    rows = np.flatnonzero(any_in_rows(unknown > 0.0))
     if len(rows):
         slopes = effects.direction_slopes(at[rows], values)
         out[rows] = np.einsum("nij,nj->ni", slopes**2, unknown[rows])
@@ -484,7 +484,7 @@ class Model:
             arrival[rows] = model[rows] + self.noise.arrival_variance(at.jacobian)
         model, arrival = (np.sqrt(np.maximum(v, 0.0)) for v in (model, arrival))
         outside = self.ranges.outside(states, self.needs)
-        unsure = _on_flanks(states) & (model > self._sure_up_to).any(axis=1)
+        unsure = _on_flanks(states) & any_in_rows(model > self._sure_up_to)
         if unsure.any():
             outside[UNSURE] = unsure
         return Prediction(self.error(arm, states), model, arrival, outside)
@@ -517,7 +517,7 @@ class Model:
         Args:
             std_on_flanks: Of the states, (n, 3) [m], see above.
         """
-        return np.asarray((std_on_flanks > self._sure_up_to).any(axis=1))
+        return any_in_rows(std_on_flanks > self._sure_up_to)
 
     @property
     def _sure_up_to(self) -> float:
@@ -644,4 +644,4 @@ def load_model(path: str | Path) -> Model:
 
 def _on_flanks(states: States) -> Bools:
     """Tell for which states the directions of all joints are known, (n,)."""
-    return np.asarray((np.abs(states.direction) == 1).all(axis=1))
+    return all_in_rows(np.abs(states.direction) == 1)

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from postproc import _native
-from postproc.arrays import Bools, Floats, Ints, floats
+from postproc.arrays import Bools, Floats, Ints, all_in_rows, any_in_rows, floats
 from postproc.motion.path import BlendCoupling
 from postproc.motion.targets import Fly, Targets
 from postproc.motion.trace import Trace
@@ -216,7 +216,7 @@ class Corners:
     @property
     def flat(self) -> Bools:
         """Tell where the nearest point alone tells of the corner, (c,)."""
-        return np.asarray((np.abs(self.bend) < FLAT).all(axis=1))
+        return all_in_rows(np.abs(self.bend) < FLAT)
 
 
 def corners(arm: Arm, targets: Targets, traced: Trace) -> Corners:
@@ -320,7 +320,7 @@ def _one_way(arm: Arm, traced: Trace, found: Corners) -> Bools:
     into = here - traced.q.take(edges.source[zones.into], axis=0)
     out = edges.path.take(edges.start[zones.out], axis=0) - here
     back = (into @ arm.coupling.T) * (out @ arm.coupling.T) < 0
-    goes_on = one[zones.into] & one[zones.out] & ~back.any(axis=1)
+    goes_on = one[zones.into] & one[zones.out] & ~any_in_rows(back)
     before, behind = np.ones_like(one), np.zeros_like(one)
     before[zones.out], behind[zones.into] = goes_on, goes_on
     return np.asarray(before & behind)

@@ -7,7 +7,7 @@ from typing import Protocol
 
 import numpy as np
 
-from postproc.arrays import Bools, Floats, Ints
+from postproc.arrays import Bools, Floats, Ints, any_in_rows, largest_in_rows
 from postproc.robot.arm import Arm
 
 # The solutions at the samples of a path: all branches, or only those asked for.
@@ -117,7 +117,7 @@ def on_written_turns(q: Floats, turns: Floats) -> Floats:
 def on_other_turns(q: Floats, turns: Floats) -> Bools:
     """Tell which angles (n, 6) [rad] are on other turns than those written, (n,)."""
     gap = np.abs(on_written_turns(q, turns) - q)
-    return np.asarray((gap > OTHER_TURN).any(axis=1))
+    return any_in_rows(gap > OTHER_TURN)
 
 
 def nearest_turns(q: Floats, near: Floats) -> Floats:
@@ -191,7 +191,7 @@ def follow(begin: Floats, ways: Branched, slot: int = -1) -> Followed:
         if not (step < np.pi).all():
             path = unwrapped(path)
             step = np.abs(np.diff(path, axis=0))
-        step = step.max(axis=1)
+        step = largest_in_rows(step)
         if fresh and step[0] > LOST:
             return Followed(q[:done], slots[:done], True)
         # The first step is the shortest there is; go on to the next suspicious one.

@@ -6,7 +6,7 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from postproc.arrays import Bools, Floats, Ints, spans
+from postproc.arrays import Bools, Floats, Ints, any_in_rows, largest_in_rows, spans
 from postproc.motion.trace import STRAIGHT, Trace
 from postproc.robot.arm import Arm
 from postproc.robot.trajectory import Motion
@@ -36,7 +36,7 @@ class Departure:
     @property
     def joint(self) -> Floats:
         """The largest change of a joint, (n,) [rad]."""
-        return np.asarray(self.joints.max(axis=1))
+        return largest_in_rows(self.joints)
 
     @property
     def sizes(self) -> Floats:
@@ -66,7 +66,7 @@ def departure(
             moves elbow and wrist.
     """
     joints = _turned(new - old, offset)
-    known = ~(np.isnan(old).any(axis=1) | np.isnan(new).any(axis=1))
+    known = ~any_in_rows(np.isnan(old) | np.isnan(new))
     out = np.full((len(old), 3), np.nan)
     rows = np.flatnonzero(known)
     out[rows] = _displaced(arm, old[rows], new[rows], tool[rows])
@@ -172,7 +172,7 @@ def _samples(move: Ints, old: Trace, new: Trace) -> _Samples:
     step = spans(np.ones(len(edge), dtype=np.int64), count)
     part = step / np.repeat(count + 1, count)
     both = [_along(trace, of, part) for trace in (old, new)]
-    good = ~np.isnan(both[0] + both[1]).any(axis=1)
+    good = ~any_in_rows(np.isnan(both[0] + both[1]))
     return _Samples(visit[of[good]], both[0][good], both[1][good])
 
 

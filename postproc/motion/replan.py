@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from postproc.arrays import Bools, Floats, Ints, spans
+from postproc.arrays import Bools, Floats, Ints, all_in_rows, any_in_rows, spans
 from postproc.motion.blending import blend
 from postproc.motion.targets import TargetKind, Targets
 from postproc.motion.trace import NOWHERE, Known, StartState, Trace, trace
@@ -127,7 +127,7 @@ def where_passed(arm: Arm, exact: PlannedPoints, q: Floats) -> Floats:
         q: Joint angles where the path passes them, (n, 6) [rad].
     """
     flange = np.array(exact.flange)
-    beside = np.flatnonzero((q != exact.q).any(axis=1) & ~np.isnan(q).any(axis=1))
+    beside = np.flatnonzero(any_in_rows(q != exact.q) & ~any_in_rows(np.isnan(q)))
     flange[beside] = arm.flange(q[beside])
     return flange
 
@@ -206,7 +206,7 @@ def replan(
     )  # fmt: skip
     exact = trace(arm, part.targets, known)
     old, new = before.exact.q[part.rows], exact.q
-    same = np.isclose(new, old, rtol=0, atol=SAME, equal_nan=True).all(axis=1)
+    same = all_in_rows(np.isclose(new, old, rtol=0, atol=SAME, equal_nan=True))
     same &= exact.slot == before.slot[part.rows]
     if not same[part.lasts].all():
         return replan_all(arm, targets, before.begin, lead)

@@ -6,7 +6,15 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from postproc.arrays import Bools, Floats, Ints, chunks, spans
+from postproc.arrays import (
+    Bools,
+    Floats,
+    Ints,
+    any_in_rows,
+    chunks,
+    largest_in_rows,
+    spans,
+)
 from postproc.motion.branches import (
     LOST,
     SUSPICIOUS,
@@ -144,7 +152,7 @@ class Workspace:
         self.flange[targets.kind != TargetKind.POSE] = np.nan
         joints = np.flatnonzero(targets.kind == TargetKind.JOINTS)
         self.q[joints] = targets.joints[joints]
-        known = joints[~np.isnan(self.q[joints]).any(axis=1)]
+        known = joints[~any_in_rows(np.isnan(self.q[joints]))]
         self.flange[known] = self.arm.flange(self.q[known])
 
     def _settle_steps(self) -> None:
@@ -527,7 +535,7 @@ def _steps(q: Floats, near: Floats, head: Ints) -> Floats:
 
 def _unwrapped(q: Floats, near: Floats, head: Ints, size: Ints) -> Floats:
     """Put samples on the turns that continue their stretches, (s, 6) [rad]."""
-    wraps = (_steps(q, near, head) >= np.pi).any(axis=1)
+    wraps = any_in_rows(_steps(q, near, head) >= np.pi)
     for i in np.flatnonzero(np.logical_or.reduceat(wraps, head)).tolist():
         rows = slice(head[i], head[i] + size[i])
         q[rows] = unwrapped(np.vstack([near[i], q[rows]]))[1:]
@@ -539,7 +547,7 @@ def _small_steps(q: Floats, near: Floats, head: Ints) -> Bools:
 
     As in `follow`: no other branch makes it shorter.
     """
-    step = _steps(q, near, head).max(axis=1)
+    step = largest_in_rows(_steps(q, near, head))
     large = ~(step <= SUSPICIOUS)
     large[head] = ~(step[head] <= LOST)
     return ~np.logical_or.reduceat(large, head)
@@ -796,7 +804,7 @@ def _limits(work: Workspace, edge_of: Ints) -> None:
         (work.path, work.samples.visit[edge_of], PATH_LIMITS),
     ):
         over = (q < work.arm.lower - SLACK) | (q > work.arm.upper + SLACK)
-        rows = np.flatnonzero(over.any(axis=1))
+        rows = np.flatnonzero(any_in_rows(over))
         for row in rows[work.reason[visit[rows]] == 0][::-1]:
             work.reason[visit[row]] = CODE[text[int(np.argmax(over[row]))]]
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from postproc import _native
-from postproc.arrays import Bools, Floats, Ints
+from postproc.arrays import Bools, Floats, Ints, any_in_rows
 
 # The play operator: what a joint with backlash remembers of its path.
 #
@@ -124,7 +124,7 @@ def chains_of(q: Floats, coupling: Floats, first: Ints, source: Ints) -> VisitCh
         first: Edges to the visits, as in `Edges`.
         source: Where they come from, likewise.
     """
-    n, unknown = len(q), np.asarray(np.isnan(q).any(axis=1))
+    n, unknown = len(q), any_in_rows(np.isnan(q))
     source = np.array(source)
     source[unknown[np.repeat(np.arange(n), np.diff(first))]] = -1
     source[source >= 0] = np.where(
