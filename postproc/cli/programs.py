@@ -193,7 +193,9 @@ def explain(
 
     with explained(program, lsv):
         check_places([as_path(json)], [program, cell, model, lsv])
-        options = Options(temperature=temperature, strict_calls=strict_calls)
+        options = Options(
+            temperature=temperature, strict_calls=strict_calls, explained=True
+        )
         with busy("plan"):
             found = explain_file(program, cell, model, lsv, options)
         for finding in found.findings(line):

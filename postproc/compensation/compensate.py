@@ -47,6 +47,7 @@ from postproc.compensation.options import (
     silent,
 )
 from postproc.compensation.outcome import (
+    SHARED,
     Decisions,
     Outcome,
     largest_motion,
@@ -111,8 +112,9 @@ class Correction:
         overruled: The path does not follow the configuration string, and nobody said
             that it must, (n,).
         untimed: No time law was found, (n,).
-        travel: Of every joint since its last reversal, (n, 6) [rad].
-        speed: Of the TCP, (n,) [m/s], NaN where nobody asked.
+        travel: Of every joint since its last reversal, (n, 6) [rad]; empty where
+            nobody explains it.
+        speed: Of the TCP, (n,) [m/s], NaN where nobody asked; likewise.
         departure: Largest change on the way to every visit of a joint [rad], elbow,
             wrist centre and TCP [m], (n, 4), NaN where not known; of a part its
             largest, one row.
@@ -132,8 +134,14 @@ class Correction:
     speed: Floats
     departure: Floats
 
-    def part(self, visits: Visits, own: slice) -> Correction:
-        """Keep some of these visits, which share no number with the others."""
+    def part(self, visits: Visits, own: slice, explained: bool) -> Correction:
+        """Keep some of these visits, which share no number with the others.
+
+        Args:
+            visits: All visits.
+            own: Those to keep.
+            explained: Keep what explains them as well.
+        """
         moved = np.flatnonzero(self.corrected)
         rows = slice(*np.searchsorted(moved, [own.start, own.stop]).tolist())
         mine = np.isin(self.edited, visits.literal[own])
@@ -148,12 +156,16 @@ class Correction:
             after=self.after[rows], decisions=self.decisions.part(own),
             departure=np.fmax.reduce(self.departure[own], axis=0, keepdims=True),
             **{name: np.array(getattr(self, name)[own]) for name in BY_VISIT},
+            **{
+                name: np.array(getattr(self, name)[own if explained else slice(0)])
+                for name in EXPLAINING
+            },
         )  # fmt: skip
 
     def rows(self, some: slice) -> dict[str, NDArray[Any]]:
         """Return what is kept of some visits."""
         decided = self.decisions.part(some)
-        names = (*BY_VISIT, "departure")
+        names = (*BY_VISIT, *EXPLAINING, "departure")
         found = {name: np.array(getattr(self, name)[some]) for name in names}
         for f in fields(Decisions):
             if f.name not in ("why", "reasons"):
@@ -162,9 +174,8 @@ class Correction:
         return found | {"why": np.array(why, dtype=object)}
 
 
-BY_VISIT = (
-    "corrected", "position", "away", "overruled", "untimed", "travel", "speed",
-)  # fmt: skip
+BY_VISIT = ("corrected", "position", "away", "overruled", "untimed")
+EXPLAINING = ("travel", "speed")
 
 
 def correction_of(
@@ -386,9 +397,10 @@ class _WindowWork:
         part = replace(self.reading, visits=visits)
         planned, kept, _ = _worked(part, setting, lead, arrived, doubtful, trail)
         at, rows = after - own.begin, own.rows(after, own.end)
+        explained = setting.options.explained or len(self.quiet) <= SHARED
         return Corrected(
             window=own,
-            kept=kept.part(visits, own.own),
+            kept=kept.part(visits, own.own, explained),
             trail=trail,
             left=kept.rows(trail.left),
             right=kept.rows(trail.right),
@@ -613,14 +625,23 @@ def report(
         motion=largest_motion(kept.departure),
         position=kept.position,
         sources={source.name: source.data for source, _ in reading.originals},
-        arrivals=ArrivalStates(
-            visits,
-            q=d.q,
-            side=d.side,
-            travel=kept.travel,
-            speed=kept.speed,
-            temperature=setting.temperature,
-            cell=cell,
-            model=model,
-        ),
+        arrivals=_arrivals(visits, kept, setting),
+    )
+
+
+def _arrivals(
+    visits: Visits, kept: Correction, setting: Setting
+) -> ArrivalStates | None:
+    """Say what every visit is corrected for, None where nobody explains it."""
+    if len(kept.travel) < len(visits):
+        return None
+    return ArrivalStates(
+        visits,
+        q=kept.decisions.q,
+        side=kept.decisions.side,
+        travel=kept.travel,
+        speed=kept.speed,
+        temperature=setting.temperature,
+        cell=setting.cell,
+        model=setting.model,
     )

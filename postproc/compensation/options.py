@@ -27,6 +27,7 @@ class Options:
         orientation: Correct the orientation of targets as well as their position.
         temperature: Arm temperature [deg C]; default: the cell's.
         strict_calls: Take no routine as still because the shipped list says so.
+        explained: Keep what explains every target, of long programs too.
     """
 
     clone: bool = False
@@ -34,10 +35,12 @@ class Options:
     temperature: float | None = None
     orientation: bool = False
     strict_calls: bool = False
+    explained: bool = False
 
     def told(self) -> dict[str, object]:
         """Return them for a record: a strict reading of calls only if asked for."""
         said = asdict(self)
+        del said["explained"]  # it changes no output
         if not self.strict_calls:
             del said["strict_calls"]
         return said
