@@ -4,7 +4,7 @@ use numpy::{PyArray2, PyArray3, PyReadonlyArray2};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
-use crate::rows::{array, blocks, each, minus, rows, same_length, Six, Three};
+use crate::rows::{array, blocks, each, minus, rows, same_length, Lanes, Six, Three, SIDE};
 use crate::trig::sin_cos;
 use crate::walk::cross;
 
@@ -60,6 +60,24 @@ impl Chain {
             x += link.a;
             (y, z) = (ca * y - sa * z, sa * y + ca * z + link.d);
             (x, y) = (ct * x - st * y, st * x + ct * y);
+        }
+        [x, y, z]
+    }
+
+    /// The same for several poses, side by side.
+    #[inline(always)]
+    pub fn placed_side_by_side(&self, q: &[Lanes; 6], point: &[Lanes; 3]) -> [Lanes; 3] {
+        let [mut x, mut y, mut z] = *point;
+        for link in self.0.iter().rev() {
+            let ((sa, ca), (sin, cos)) = (link.alpha, sin_cos(&link.angles(q)));
+            for k in 0..SIDE {
+                if let Some((sb, cb)) = link.beta {
+                    (x[k], z[k]) = (cb * x[k] + sb * z[k], cb * z[k] - sb * x[k]);
+                }
+                x[k] += link.a;
+                (y[k], z[k]) = (ca * y[k] - sa * z[k], sa * y[k] + ca * z[k] + link.d);
+                (x[k], y[k]) = (cos[k] * x[k] - sin[k] * y[k], sin[k] * x[k] + cos[k] * y[k]);
+            }
         }
         [x, y, z]
     }
@@ -130,6 +148,17 @@ impl Link {
     fn angle(&self, q: &Six) -> f64 {
         let mixed: f64 = self.mix.iter().zip(q).map(|(m, q)| m * q).sum();
         self.offset + self.sense * mixed
+    }
+
+    #[inline(always)]
+    fn angles(&self, q: &[Lanes; 6]) -> Lanes {
+        let mut mixed = [0.0; SIDE];
+        for (m, q) in self.mix.iter().zip(q) {
+            for k in 0..SIDE {
+                mixed[k] += m * q[k];
+            }
+        }
+        mixed.map(|mixed| self.offset + self.sense * mixed)
     }
 }
 

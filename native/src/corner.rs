@@ -5,7 +5,7 @@ use pyo3::prelude::*;
 
 use crate::chain::{Chain, Parameters};
 use crate::edges::{Edges, Paths, Way};
-use crate::rows::{array, dot, each, flat, minus, rows, same_length, Six, Three};
+use crate::rows::{array, each, flat, rows, same_length, Lanes, Six, Three, SIDE};
 
 const GRID: usize = 8; // steps of the first search for the nearest point
 const ROUNDS: usize = 5; // of Newton's method
@@ -42,13 +42,6 @@ struct Passed {
     bend: Six,
 }
 
-/// What the nearest point is looked for with: the TCP at a place, seen from the point.
-struct Look<'a> {
-    chain: &'a Chain,
-    tool: &'a Three,
-    point: &'a Three,
-}
-
 impl Zones<'_> {
     /// Look up the moves at the corners.
     pub fn corners<'a>(&self, paths: &Paths<'a>) -> PyResult<Vec<Corner<'a>>> {
@@ -68,12 +61,6 @@ impl Zones<'_> {
     }
 }
 
-impl Look<'_> {
-    fn off(&self, q: &Six) -> Three {
-        minus(&self.chain.placed(q, self.tool), self.point)
-    }
-}
-
 impl Corner<'_> {
     /// Follow the superposed moves, s from 0 to 1.
     pub fn at(&self, s: f64) -> Six {
@@ -82,74 +69,231 @@ impl Corner<'_> {
         std::array::from_fn(|j| into[j] + out[j] - self.here[j])
     }
 
-    /// Find where the path passes the point within a distance: a smaller zone if need be.
-    fn pass(&mut self, look: &Look<'_>, within: f64) -> Passed {
-        let (mut bend, mut nearest, miss) = self.passing(look);
-        if miss > within {
-            let shrink = within / miss.max(1e-12);
-            self.before *= shrink;
-            self.behind *= shrink;
-            (bend, nearest, _) = self.passing(look);
-        }
-        if bend.iter().any(|b| b.abs() >= FLAT || b.is_nan()) {
-            nearest = self.refined(nearest, look);
-        }
-        let q = self.at(nearest);
-        let (before, behind) = (self.before, self.behind);
-        Passed { before, behind, nearest, q, aside: look.off(&q), bend }
+    /// Follow the moves to where the zone begins and from where it ends.
+    fn ends(&self) -> [Six; 2] {
+        [self.into.at(1.0 - self.before), self.out.at(self.behind)]
     }
 
-    /// Find how much the corner bends, where it passes closest, and how far off.
-    fn passing(&self, look: &Look<'_>) -> (Six, f64, f64) {
-        let (first, last) = (self.into.at(1.0 - self.before), self.out.at(self.behind));
-        let (begin, end) = (look.off(&first), look.off(&last));
-        let s = nearest_on_parabola(&begin, &end);
-        let off = on_parabola(&begin, &end, s);
-        let bend = std::array::from_fn(|j| first[j] + last[j] - 2.0 * self.here[j]);
-        (bend, s, dot(&off, &off).sqrt())
-    }
-
-    /// Improve the nearest point where the moves are not straight.
-    fn refined(&self, mut s: f64, look: &Look<'_>) -> f64 {
-        for _ in 0..REFINED {
-            s = s.clamp(STEP, 1.0 - STEP);
-            let [before, x, after] = [s - STEP, s, s + STEP].map(|s| look.off(&self.at(s)));
-            let slope = std::array::from_fn(|k| (after[k] - before[k]) / 2.0);
-            let curve = std::array::from_fn(|k| after[k] - 2.0 * x[k] + before[k]);
-            let curved = dot(&slope, &slope) + dot(&x, &curve);
-            if curved > 0.0 {
-                s -= STEP * dot(&x, &slope) / curved;
-            }
-        }
-        s.clamp(0.0, 1.0)
+    /// Tell how much the corner bends.
+    fn bend(&self) -> Six {
+        let [first, last] = self.ends();
+        std::array::from_fn(|j| first[j] + last[j] - 2.0 * self.here[j])
     }
 }
 
-fn on_parabola(b: &Three, e: &Three, s: f64) -> Three {
-    std::array::from_fn(|k| b[k] * (1.0 - s) * (1.0 - s) + e[k] * s * s)
+/// Up to `SIDE` corners whose nearest points are looked for side by side.
+struct Group<'a, 'b> {
+    chain: &'b Chain,
+    corners: &'b mut [Corner<'a>],
+    tool: [Lanes; 3],
+    point: [Lanes; 3],
+}
+
+impl<'a, 'b> Group<'a, 'b> {
+    fn new(
+        chain: &'b Chain,
+        corners: &'b mut [Corner<'a>],
+        tool: &[Three],
+        point: &[Three],
+    ) -> Self {
+        let (tool, point) = (side_by_side(tool), side_by_side(point));
+        Group { chain, corners, tool, point }
+    }
+
+    /// Place the TCP, seen from the points.
+    #[inline(always)]
+    fn off(&self, q: &[Lanes; 6]) -> [Lanes; 3] {
+        let mut off = self.chain.placed_side_by_side(q, &self.tool);
+        for (off, point) in off.iter_mut().zip(&self.point) {
+            for lane in 0..SIDE {
+                off[lane] -= point[lane];
+            }
+        }
+        off
+    }
+
+    /// Place the TCP on the corners.
+    #[inline(always)]
+    fn off_at(&self, s: &Lanes) -> [Lanes; 3] {
+        let mut q = [[0.0; SIDE]; 6];
+        for (lane, corner) in self.corners.iter().enumerate() {
+            put(&mut q, lane, &corner.at(s[lane]));
+        }
+        self.off(&q)
+    }
+
+    /// Find where the paths pass their points within a distance: a smaller zone if need be.
+    #[inline(always)]
+    fn pass(&mut self, within: &[f64]) -> ([Six; SIDE], Lanes, [Lanes; 3]) {
+        let (mut nearest, miss) = self.passing();
+        let mut shrunk = false;
+        for (lane, corner) in self.corners.iter_mut().enumerate() {
+            if miss[lane] > within[lane] {
+                let shrink = within[lane] / miss[lane].max(1e-12);
+                corner.before *= shrink;
+                corner.behind *= shrink;
+                shrunk = true;
+            }
+        }
+        if shrunk {
+            (nearest, _) = self.passing();
+        }
+        let mut bend = [[0.0; 6]; SIDE];
+        for (bend, corner) in bend.iter_mut().zip(self.corners.iter()) {
+            *bend = corner.bend();
+        }
+        let bent = bend.map(|own| own.iter().any(|b| b.abs() >= FLAT || b.is_nan()));
+        if bent.contains(&true) {
+            let refined = self.refined(nearest);
+            nearest = std::array::from_fn(|k| if bent[k] { refined[k] } else { nearest[k] });
+        }
+        (bend, nearest, self.off_at(&nearest))
+    }
+
+    /// Find where the corners pass closest, and how far off.
+    #[inline(always)]
+    fn passing(&self) -> (Lanes, Lanes) {
+        let (mut first, mut last) = ([[0.0; SIDE]; 6], [[0.0; SIDE]; 6]);
+        for (lane, corner) in self.corners.iter().enumerate() {
+            let ends = corner.ends();
+            put(&mut first, lane, &ends[0]);
+            put(&mut last, lane, &ends[1]);
+        }
+        let (begin, end) = (self.off(&first), self.off(&last));
+        let s = nearest_on_parabola(&begin, &end);
+        (s, far(&on_parabola(&begin, &end, &s)))
+    }
+
+    /// Improve the nearest points where the moves are not straight.
+    #[inline(always)]
+    fn refined(&self, mut s: Lanes) -> Lanes {
+        for _ in 0..REFINED {
+            s = s.map(|s| s.clamp(STEP, 1.0 - STEP));
+            let before = self.off_at(&s.map(|s| s - STEP));
+            let x = self.off_at(&s);
+            let after = self.off_at(&s.map(|s| s + STEP));
+            let slope = both(&after, &before, |after, before| (after - before) / 2.0);
+            let twice = both(&after, &x, |after, x| after - 2.0 * x);
+            let curve = both(&twice, &before, |twice, before| twice + before);
+            let (steep, bent) = (product(&slope, &slope), product(&x, &curve));
+            let way = product(&x, &slope);
+            for k in 0..SIDE {
+                let curved = steep[k] + bent[k];
+                s[k] = if curved > 0.0 { s[k] - STEP * way[k] / curved } else { s[k] };
+            }
+        }
+        s.map(|s| s.clamp(0.0, 1.0))
+    }
+}
+
+fn put<const K: usize>(columns: &mut [Lanes; K], lane: usize, row: &[f64; K]) {
+    for (column, value) in columns.iter_mut().zip(row) {
+        column[lane] = *value;
+    }
+}
+
+fn side_by_side(rows: &[Three]) -> [Lanes; 3] {
+    let mut columns = [[0.0; SIDE]; 3];
+    for (lane, row) in rows.iter().enumerate() {
+        put(&mut columns, lane, row);
+    }
+    columns
+}
+
+#[inline(always)]
+fn both(a: &[Lanes; 3], b: &[Lanes; 3], make: impl Fn(f64, f64) -> f64) -> [Lanes; 3] {
+    std::array::from_fn(|k| std::array::from_fn(|lane| make(a[k][lane], b[k][lane])))
+}
+
+#[inline(always)]
+fn product(a: &[Lanes; 3], b: &[Lanes; 3]) -> Lanes {
+    let mut sum = [0.0; SIDE];
+    for lane in 0..SIDE {
+        sum[lane] = a[0][lane] * b[0][lane] + a[1][lane] * b[1][lane] + a[2][lane] * b[2][lane];
+    }
+    sum
+}
+
+#[inline(always)]
+fn far(x: &[Lanes; 3]) -> Lanes {
+    product(x, x).map(f64::sqrt)
+}
+
+#[inline(always)]
+fn on_parabola(b: &[Lanes; 3], e: &[Lanes; 3], s: &Lanes) -> [Lanes; 3] {
+    let mut x = [[0.0; SIDE]; 3];
+    for k in 0..3 {
+        for lane in 0..SIDE {
+            let s = s[lane];
+            x[k][lane] = b[k][lane] * (1.0 - s) * (1.0 - s) + e[k][lane] * s * s;
+        }
+    }
+    x
 }
 
 /// Find the s at which begin (1 - s)^2 + end s^2 is shortest.
-fn nearest_on_parabola(b: &Three, e: &Three) -> f64 {
-    let (mut s, mut least) = (0.0, f64::INFINITY);
+#[inline(always)]
+fn nearest_on_parabola(b: &[Lanes; 3], e: &[Lanes; 3]) -> Lanes {
+    let (mut s, mut least) = ([0.0; SIDE], [f64::INFINITY; SIDE]);
     for i in 0..=GRID {
         let at = i as f64 / GRID as f64;
-        let x = on_parabola(b, e, at);
-        let away = dot(&x, &x).sqrt();
-        if away < least {
-            (s, least) = (at, away);
+        let away = far(&on_parabola(b, e, &[at; SIDE]));
+        for lane in 0..SIDE {
+            let nearer = away[lane] < least[lane];
+            s[lane] = if nearer { at } else { s[lane] };
+            least[lane] = if nearer { away[lane] } else { least[lane] };
         }
     }
-    let bend: Three = std::array::from_fn(|k| 2.0 * (b[k] + e[k]));
+    let bend = both(b, e, |b, e| 2.0 * (b + e));
     for _ in 0..ROUNDS {
-        let x = on_parabola(b, e, s);
-        let slope: Three = std::array::from_fn(|k| 2.0 * (e[k] * s - b[k] * (1.0 - s)));
-        let curved = dot(&slope, &slope) + dot(&x, &bend);
-        if curved > 0.0 {
-            s = (s - dot(&x, &slope) / curved).clamp(0.0, 1.0);
+        let x = on_parabola(b, e, &s);
+        let mut slope = [[0.0; SIDE]; 3];
+        for k in 0..3 {
+            for lane in 0..SIDE {
+                slope[k][lane] = 2.0 * (e[k][lane] * s[lane] - b[k][lane] * (1.0 - s[lane]));
+            }
+        }
+        let (steep, bent) = (product(&slope, &slope), product(&x, &bend));
+        let way = product(&x, &slope);
+        for lane in 0..SIDE {
+            let curved = steep[lane] + bent[lane];
+            let next = (s[lane] - way[lane] / curved).clamp(0.0, 1.0);
+            s[lane] = if curved > 0.0 { next } else { s[lane] };
         }
     }
     s
+}
+
+/// Find where the path passes corners.
+#[inline(always)]
+fn pass(mut group: Group<'_, '_>, within: &[f64]) -> Vec<Passed> {
+    let (bend, nearest, off) = group.pass(within);
+    let one = |(lane, corner): (usize, &Corner<'_>)| Passed {
+        before: corner.before,
+        behind: corner.behind,
+        nearest: nearest[lane],
+        q: corner.at(nearest[lane]),
+        aside: off.map(|of| of[lane]),
+        bend: bend[lane],
+    };
+    group.corners.iter().enumerate().map(one).collect()
+}
+
+/// The same with registers for four numbers.
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2")]
+unsafe fn pass_wide(group: Group<'_, '_>, within: &[f64]) -> Vec<Passed> {
+    pass(group, within)
+}
+
+/// Choose what this machine can do; the numbers are the same.
+fn pass_at_best(group: Group<'_, '_>, within: &[f64]) -> Vec<Passed> {
+    #[cfg(target_arch = "x86_64")]
+    if is_x86_feature_detected!("avx2") {
+        // SAFETY: this machine has what the function is compiled for.
+        return unsafe { pass_wide(group, within) };
+    }
+    pass(group, within)
 }
 
 type Column<'py> = Bound<'py, PyArray1<f64>>;
@@ -174,9 +318,14 @@ pub fn passed<'py>(
     let (tool, point, within) = (rows::<3>(&tool)?, rows::<3>(&point)?, flat(&within)?);
     let mut corners = zones.corners(&paths)?;
     let n = same_length(&[corners.len(), tool.len(), point.len(), within.len()])?;
-    let found = each(py, n, |c| {
-        let look = Look { chain: &chain, tool: &tool[c], point: &point[c] };
-        corners[c].pass(&look, within[c])
+    let mut found = Vec::with_capacity(n);
+    let mut rest = corners.as_mut_slice();
+    each(py, n.div_ceil(SIDE), |at| {
+        let some = SIDE * at..n.min(SIDE * at + SIDE);
+        let (own, others) = std::mem::take(&mut rest).split_at_mut(some.len());
+        rest = others;
+        let group = Group::new(&chain, own, &tool[some.clone()], &point[some.clone()]);
+        found.extend(pass_at_best(group, &within[some]));
     })?;
     let column = |value: fn(&Passed) -> f64| -> Column<'py> {
         found.iter().map(value).collect::<Vec<_>>().into_pyarray(py)
@@ -193,7 +342,7 @@ pub fn passed<'py>(
 
 #[cfg(test)]
 mod tests {
-    use super::{dot, nearest_on_parabola, on_parabola, Three};
+    use super::{far, nearest_on_parabola, on_parabola, Lanes, SIDE};
 
     #[test]
     fn the_nearest_point_is_as_near_as_a_fine_search_finds() {
@@ -202,13 +351,17 @@ mod tests {
             state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
             (state >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
         };
-        for _ in 0..200 {
-            let [b, e]: [Three; 2] =
-                [[random(), random(), random()], [random(), random(), random()]];
-            let away = |s: f64| dot(&on_parabola(&b, &e, s), &on_parabola(&b, &e, s)).sqrt();
-            let least =
-                (0..=20_000).map(|i| away(f64::from(i) / 20_000.0)).fold(f64::INFINITY, f64::min);
-            assert!(away(nearest_on_parabola(&b, &e)) < least + 1e-5 * least + 1e-6);
+        let mut any = || -> [Lanes; 3] { [0; 3].map(|_| [0; SIDE].map(|_| random())) };
+        for _ in 0..200 / SIDE {
+            let (b, e) = (any(), any());
+            let away = |s: Lanes| far(&on_parabola(&b, &e, &s));
+            let mut least = [f64::INFINITY; SIDE];
+            for i in 0..=20_000 {
+                let now = away([f64::from(i) / 20_000.0; SIDE]);
+                least = std::array::from_fn(|k| least[k].min(now[k]));
+            }
+            let found = away(nearest_on_parabola(&b, &e));
+            assert!((0..SIDE).all(|k| found[k] < least[k] + 1e-5 * least[k] + 1e-6));
         }
     }
 }

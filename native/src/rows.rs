@@ -15,6 +15,11 @@ pub type Six = [f64; 6];
 /// A place [m].
 pub type Three = [f64; 3];
 
+/// Rows that are worked on side by side.
+pub const SIDE: usize = 8;
+/// A number for each of them.
+pub type Lanes = [f64; SIDE];
+
 /// See an array as it lies in memory: row behind row, or it is refused.
 pub fn flat<'a, T: Element, D: Dimension>(
     array: &'a PyReadonlyArray<'_, T, D>,

@@ -2,9 +2,7 @@
 //!
 //! The reduction by parts of pi / 2 and the polynomials are those of fdlibm (Sun
 //! Microsystems, 1993), good to one unit in the last place; without branches, so that
-//! the compiler does several joints side by side.
-
-use crate::rows::Six;
+//! the compiler does several angles side by side.
 
 const FAR: f64 = 1e5; // [rad] beyond which the reduction is left to the system's library
 const TWO_OVER_PI: f64 = std::f64::consts::FRAC_2_PI;
@@ -30,16 +28,16 @@ const COS: [f64; 6] = [
 ];
 
 /// Return sines and cosines.
-#[inline]
-pub fn sin_cos(angles: &Six) -> (Six, Six) {
-    let (mut sin, mut cos) = ([0.0; 6], [0.0; 6]);
-    if angles.iter().any(|x| x.abs() > FAR) {
-        for j in 0..6 {
+#[inline(always)]
+pub fn sin_cos<const N: usize>(angles: &[f64; N]) -> ([f64; N], [f64; N]) {
+    let (mut sin, mut cos) = ([0.0; N], [0.0; N]);
+    if angles.iter().fold(false, |far, x| far | (x.abs() > FAR)) {
+        for j in 0..N {
             (sin[j], cos[j]) = angles[j].sin_cos();
         }
         return (sin, cos);
     }
-    for j in 0..6 {
+    for j in 0..N {
         let shifted = angles[j] * TWO_OVER_PI + ROUNDING;
         let quarters = shifted - ROUNDING;
         let x = HALF_PI.iter().fold(angles[j], |x, part| x - quarters * part);
@@ -62,7 +60,8 @@ pub fn sin_cos(angles: &Six) -> (Six, Six) {
 
 #[cfg(test)]
 mod tests {
-    use super::{sin_cos, Six};
+    use super::sin_cos;
+    use crate::rows::Six;
 
     #[test]
     fn is_as_good_as_the_system_library() {

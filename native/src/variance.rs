@@ -10,13 +10,9 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
 use crate::chain::{Chain, Parameters};
-use crate::rows::{array, each, flat, rows, same_length, Three};
+use crate::rows::{array, each, flat, rows, same_length, Lanes, Three, SIDE};
 use crate::walk::{Base, Walk};
 
-/// Poses that are worked on side by side.
-const SIDE: usize = 8;
-/// A number for each of them.
-type Lanes = [f64; SIDE];
 /// Three components of each.
 type Column = [Lanes; 3];
 
