@@ -8,7 +8,7 @@ which says what the arguments are; the callers say it with shapes and units too.
 from collections.abc import Sequence
 from typing import Protocol
 
-from postproc.arrays import Bools, Bytes, Floats, Indices, Ints
+from postproc.arrays import Bools, Bytes, Cells, Floats, Indices, Ints
 
 SOURCES: str
 """Hash of the sources that it was built from."""
@@ -167,6 +167,9 @@ def shortest(values: Floats, decimals: int | None = None) -> Bytes: ...
 def rewrite_numbers(
     data: bytes, start: Ints, end: Ints, values: Floats, least: Ints
 ) -> tuple[Ints, Bytes]: ...
+
+# table.rs: rows of reports and records as text (`postproc.arrays`)
+def table(n: int, columns: Sequence[Cells]) -> bytes: ...
 
 # weave.rs: edits of texts (`postproc.language.source`)
 def weave(data: bytes, start: Ints, end: Ints, new: Bytes) -> bytes: ...

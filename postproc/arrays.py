@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from itertools import count
-from typing import Any, Protocol, TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
+
+from postproc import _native
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -16,6 +19,7 @@ Indices = NDArray[np.signedinteger[Any]]  # Ints, or smaller ones
 Bools = NDArray[np.bool_]
 Signs = NDArray[np.int8]  # -1, 0, +1
 Bytes = NDArray[np.uint8]
+K = TypeVar("K")
 
 
 def floats(rows: Floats) -> Floats:
@@ -60,18 +64,115 @@ def largest_in_rows(values: Floats) -> Floats:
     return np.asarray(np.maximum.reduce(list(values.T)))
 
 
+# Rows of text, as the core writes them from columns.
+
+
+@dataclass(frozen=True)
+class Cells:
+    """What stands in a column of n rows of text: values of one kind, and words.
+
+    Attributes:
+        before: What stands before it in every row.
+        numbers: Numbers, (n, k); NaN is written as ``null``.
+        fixed: Decimals that they are written with, as ``%.3f`` does; None: as few
+            digits as Python writes.
+        rounded: Decimals that they are rounded to before that, None: not at all.
+        whole: Or whole numbers, (n, k).
+        names, index: Or texts, and which of them it is, (n, k).
+        quoted: Or texts of Latin-1 filled up with NUL, (n, w), as strings of JSON.
+        between: What opens the values of a row, stands between two, and closes them.
+        first: Where those of every row begin and at last end, (n + 1,), where there are
+            not as many in all; k is 1 then.
+        left: Rows without values, (n,).
+        instead: What stands there.
+    """
+
+    before: bytes = b""
+    numbers: Floats | None = None
+    fixed: int | None = None
+    rounded: int | None = None
+    whole: Ints | None = None
+    names: Sequence[bytes] = ()
+    index: Ints | None = None
+    quoted: Bytes | None = None
+    between: tuple[bytes, bytes, bytes] = (b"", b"", b"")
+    first: Ints | None = None
+    left: Bools | None = None
+    instead: bytes = b""
+
+    def behind(self, text: bytes) -> Cells:
+        """Put a text before it in every row."""
+        return replace(self, before=text + self.before)
+
+    def within(self, begin: bytes, between: bytes, end: bytes) -> Cells:
+        """Open, part and close the values of every row."""
+        return replace(self, between=(begin, between, end))
+
+    def listed(self) -> Cells:
+        """Write the values of every row as a list in square brackets."""
+        return self.within(b"[", b", ", b"]")
+
+    def unless(self, left: Bools, instead: bytes) -> Cells:
+        """Put a text in the place of some rows' values."""
+        return replace(self, left=left, instead=instead)
+
+
+def fixed(values: Floats, decimals: int) -> Cells:
+    """Write numbers, (n,) or (n, k), as ``%.3f`` does for 3 decimals.
+
+    >>> text_of(2, [fixed(np.array([-0.0625, np.nan]), 3), Cells(b" ")])
+    b'-0.062 null '
+    """
+    return Cells(numbers=floats(_in_columns(values)), fixed=decimals)
+
+
+def shortest(values: Floats, decimals: int | None = None) -> Cells:
+    """Write numbers, (n,) or (n, k), as Python does.
+
+    Args:
+        values: The numbers.
+        decimals: What they are rounded to before, None: not at all.
+
+    >>> text_of(3, [shortest(np.array([12.5, 0.1 + 0.2, 1e-5]), 9), Cells(b" ")])
+    b'12.5 0.3 1e-05 '
+    """
+    return Cells(numbers=floats(_in_columns(values)), rounded=decimals)
+
+
+def whole(values: Indices) -> Cells:
+    """Write whole numbers, (n,) or (n, k)."""
+    return Cells(whole=np.ascontiguousarray(_in_columns(values), dtype=np.int64))
+
+
+def named(texts: Sequence[K], index: Indices, text: Callable[[K], str]) -> Cells:
+    """Write one of some texts for every row, as UTF-8.
+
+    Args:
+        texts: The texts.
+        index: Which one a row has, (n,) or (n, k).
+        text: How it is written.
+    """
+    least = int(index.min(initial=len(texts)))
+    used = np.bincount(index.ravel() - least) > 0
+    wanted = (np.flatnonzero(used) + least).tolist()
+    at = (np.cumsum(used) - 1)[index - least]
+    names = tuple(text(texts[k]).encode() for k in wanted)
+    return Cells(names=names, index=np.ascontiguousarray(_in_columns(at)))
+
+
+def text_of(n: int, columns: Sequence[Cells]) -> bytes:
+    """Write n rows, one behind the other."""
+    return _native.table(n, columns)
+
+
+def _in_columns(values: NDArray[Any]) -> NDArray[Any]:
+    return values.reshape(len(values), -1) if len(values) else values.reshape(0, 1)
+
+
 # Long arrays in chunks: what a chunk needs stays in the cache.
 
-K = TypeVar("K")
 T = TypeVar("T")
 CHUNK = 2048  # rows at a time
-
-
-class Map(Protocol):
-    """How something is made of every task, in order: by `map`, or on two cores."""
-
-    def __call__(self, make: Callable[[K], T], tasks: Sequence[K], /) -> Iterator[T]:
-        """Make something of every task."""
 
 
 def in_chunks(work: Callable[[slice], T], n: int, size: int = CHUNK) -> list[T]:

@@ -18,6 +18,7 @@ mod profile;
 mod pull;
 mod rounding;
 mod rows;
+mod table;
 mod text;
 mod trig;
 mod variance;
@@ -56,6 +57,7 @@ fn native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(profile::profile, module)?)?;
     module.add_function(wrap_pyfunction!(pull::to_move, module)?)?;
     module.add_function(wrap_pyfunction!(variance::variance, module)?)?;
+    module.add_function(wrap_pyfunction!(table::table, module)?)?;
     module.add_function(wrap_pyfunction!(text::form_of, module)?)?;
     module.add_function(wrap_pyfunction!(text::line_starts, module)?)?;
     module.add_function(wrap_pyfunction!(text::scan_lines, module)?)?;

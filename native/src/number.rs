@@ -1,6 +1,6 @@
 //! Numbers in texts, read and written: `postproc.language.scan` and `.rewrite`.
 
-use std::fmt::Write;
+use std::io::Write;
 
 use numpy::ndarray::Array2;
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyReadonlyArray1};
@@ -116,19 +116,61 @@ impl<'a> Places<'a> {
 
 type Column<'py, T> = Bound<'py, PyArray1<T>>;
 
-/// Write a number with so many decimals; a zero carries no sign.
-fn put_fixed(out: &mut String, value: f64, decimals: usize) {
-    let begin = out.len();
-    write!(out, "{value:.decimals$}").expect("a string takes all");
-    if out[begin..].starts_with('-') && !out[begin..].bytes().any(|b| (b'1'..=b'9').contains(&b)) {
-        out.remove(begin);
+/// Return a number times a power of ten as a whole number, and its sign; None where that is
+/// not sure to be the nearest, or too large.
+fn scaled(value: f64, decimals: usize) -> Option<(bool, u64)> {
+    let far = value.abs() * TENS.get(decimals)?;
+    let whole = far as u64; // cut off, 0 for NaN
+    let rest = far - whole as f64;
+    // The product is off by 2^-53 of itself at most.
+    let clear = match far {
+        far if far < 1e12 => 1e-3,
+        far if far < 4e14 => 0.1,
+        _ => return None,
+    };
+    let sure = (rest - 0.5).abs() > clear;
+    sure.then_some((value.is_sign_negative(), whole + u64::from(rest > 0.5)))
+}
+
+/// Write digits, zeros before them up to so many.
+fn put_digits(out: &mut Vec<u8>, mut value: u64, least: usize) {
+    let (mut digits, mut at) = ([b'0'; 20], 20);
+    while value > 0 {
+        at -= 1;
+        digits[at] = b'0' + (value % 10) as u8;
+        value /= 10;
+    }
+    out.extend_from_slice(&digits[at.min(20 - least)..]);
+}
+
+/// Write a whole number.
+pub fn put_whole(out: &mut Vec<u8>, value: i64) {
+    if value < 0 {
+        out.push(b'-');
+    }
+    put_digits(out, value.unsigned_abs(), 1);
+}
+
+/// Write a number with so many decimals, as ``%.3f`` does.
+pub fn put_fixed(out: &mut Vec<u8>, value: f64, decimals: usize) {
+    let Some((negative, size)) = scaled(value, decimals) else {
+        return write!(out, "{value:.decimals$}").expect("a vector takes all");
+    };
+    if negative {
+        out.push(b'-');
+    }
+    let one = TENS[decimals] as u64;
+    put_digits(out, size / one, 1);
+    if decimals > 0 {
+        out.push(b'.');
+        put_digits(out, size % one, decimals);
     }
 }
 
 /// Texts one behind the other.
 #[derive(Default)]
 struct Texts {
-    all: String,
+    all: Vec<u8>,
     ends: Vec<usize>,
 }
 
@@ -137,12 +179,12 @@ impl Texts {
     fn of<'py>(
         py: Python<'py>,
         values: &[f64],
-        mut put: impl FnMut(&mut String, f64) + Send,
+        mut put: impl FnMut(&mut Vec<u8>, f64) + Send,
     ) -> PyResult<Bound<'py, PyArray2<u8>>> {
         let mut texts = Texts::default();
         each(py, values.len(), |i| {
             match values[i].is_nan() {
-                true => texts.all.push_str("null"),
+                true => texts.all.extend_from_slice(b"null"),
                 false => put(&mut texts.all, values[i]),
             }
             texts.ends.push(texts.all.len());
@@ -153,7 +195,7 @@ impl Texts {
     /// Give texts to Python, each in a row filled up with NUL, (n, w).
     fn rows<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<u8>> {
         let begins = || std::iter::once(&0).chain(&self.ends);
-        let spans = || begins().zip(&self.ends).map(|(a, b)| &self.all.as_bytes()[*a..*b]);
+        let spans = || begins().zip(&self.ends).map(|(a, b)| &self.all[*a..*b]);
         let width = spans().map(<[u8]>::len).max().unwrap_or(0).max(1);
         let mut out = vec![0_u8; width * self.ends.len()];
         for (row, text) in out.chunks_exact_mut(width).zip(spans()) {
@@ -172,9 +214,7 @@ pub fn fixed<'py>(
     values: PyReadonlyArray1<'py, f64>,
     decimals: usize,
 ) -> PyResult<Bound<'py, PyArray2<u8>>> {
-    Texts::of(py, flat(&values)?, |out, value| {
-        write!(out, "{value:.decimals$}").expect("a string takes all");
-    })
+    Texts::of(py, flat(&values)?, |out, value| put_fixed(out, value, decimals))
 }
 
 /// Write numbers with as few digits as tell them from all others, as Python does, once they
@@ -186,32 +226,64 @@ pub fn shortest<'py>(
     values: PyReadonlyArray1<'py, f64>,
     decimals: Option<usize>,
 ) -> PyResult<Bound<'py, PyArray2<u8>>> {
-    let rounded = |value: f64| match decimals {
-        Some(decimals) => format!("{value:.decimals$}").parse().unwrap_or(value),
-        None => value,
-    };
-    Texts::of(py, flat(&values)?, |out, value| put_shortest(out, rounded(value)))
+    Texts::of(py, flat(&values)?, |out, value| put_shortest(out, value, decimals))
 }
 
+/// Decimals that are tried before the search for the fewest digits.
+const USUAL: usize = 9;
+/// Least of them that is not written with an exponent: 0.0001.
+const LEAST: u64 = 100_000;
+
 /// Write a number as `repr` of Python does: with an exponent where it is far from one.
-fn put_shortest(out: &mut String, value: f64) {
-    if !value.is_finite() {
-        write!(out, "{value}").expect("a string takes all");
-        return;
+///
+/// A decimal of 15 digits has a float of its own, which no shorter one has.
+pub fn put_shortest(out: &mut Vec<u8>, value: f64, rounded: Option<usize>) {
+    let decimals = rounded.unwrap_or(USUAL).min(USUAL);
+    let told = scaled(value, decimals).and_then(|(negative, size)| {
+        let more = 10_u64.pow((USUAL - decimals) as u32);
+        let same = rounded.is_some() || size as f64 / TENS[decimals] == value.abs();
+        let size = size.checked_mul(more)?;
+        let usual = same && !(1..LEAST).contains(&size) && rounded.is_none_or(|d| d <= USUAL);
+        usual.then_some((negative, size))
+    });
+    let Some((negative, size)) = told else {
+        return put_searched(out, rounded.map_or(value, |most| nearest(value, most)));
+    };
+    if negative {
+        out.push(b'-');
     }
-    let begin = out.len();
-    write!(out, "{value:?}").expect("a string takes all");
+    let one = TENS[USUAL] as u64;
+    put_digits(out, size / one, 1);
+    out.push(b'.');
+    let begin = out.len() + 1;
+    put_digits(out, size % one, USUAL);
+    while out.len() > begin && out.ends_with(b"0") {
+        out.pop();
+    }
+}
+
+/// Round to so many decimals, as `round` of Python does.
+fn nearest(value: f64, decimals: usize) -> f64 {
+    format!("{value:.decimals$}").parse().unwrap_or(value)
+}
+
+/// Of two decimals that are equally near (of multiples of a small power of two), Python writes the
+/// even one; this does not look.
+fn put_searched(out: &mut Vec<u8>, value: f64) {
     let far = value != 0.0 && !(1e-4..1e16).contains(&value.abs());
-    if !far {
-        return; // Rust has an exponent from 1e16 on and below 1e-5 only
+    if !far || !value.is_finite() {
+        // Rust has an exponent from 1e16 on and below 1e-5 only.
+        let text = match value.is_finite() {
+            true => format!("{value:?}"),
+            false => format!("{value}"),
+        };
+        return out.extend_from_slice(text.as_bytes());
     }
-    out.truncate(begin);
-    write!(out, "{value:e}").expect("a string takes all");
-    let at = begin + out[begin..].find('e').expect("an exponent") + 1;
-    let exponent: i32 = out[at..].parse().expect("a number");
-    out.truncate(at);
+    let text = format!("{value:e}");
+    let (digits, exponent) = text.split_once('e').expect("an exponent");
+    let exponent: i32 = exponent.parse().expect("a number");
     let sign = if exponent < 0 { '-' } else { '+' };
-    write!(out, "{sign}{:02}", exponent.abs()).expect("a string takes all");
+    write!(out, "{digits}e{sign}{:02}", exponent.abs()).expect("a vector takes all");
 }
 
 /// Write new values over numbers that stand at places of a text.
@@ -242,12 +314,16 @@ pub fn rewrite_numbers<'py>(
         }
         let begin = texts.all.len();
         put_fixed(&mut texts.all, new, decimals as usize);
-        if texts.all[begin..].parse() == Ok(before) {
+        let zero = !texts.all[begin..].iter().any(|b| (b'1'..=b'9').contains(b));
+        if zero && texts.all[begin] == b'-' {
+            texts.all.remove(begin);
+        }
+        if value_of(&texts.all[begin..]) == before {
             texts.all.truncate(begin);
             return;
         }
-        if old.first() == Some(&b'+') && !texts.all[begin..].starts_with('-') {
-            texts.all.insert(begin, '+');
+        if old.first() == Some(&b'+') && texts.all[begin] != b'-' {
+            texts.all.insert(begin, b'+');
         }
         texts.ends.push(texts.all.len());
         rows.push(i as i64);

@@ -294,7 +294,7 @@ def _outputs(
             belongs.insert(0, unit.variables)
         own = {n: _file_name(b) for n, b in place_of.items() if b in belongs}
         record = outcome.record.renamed(own)
-        outputs[place + SUFFIX] = "".join(record.to_json()).encode()
+        outputs[place + SUFFIX] = b"".join(record.to_json())
         outputs |= {b: new.get(b, sources[b]) for b in belongs}
     return outputs
 

@@ -7,7 +7,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from postproc.arrays import Map
 from postproc.batch.tree import (
     group_pages,
     names_in,
@@ -19,7 +18,6 @@ from postproc.cli.common import write_stdout
 from postproc.compensation.compensate import compensate, name_files
 from postproc.compensation.options import Options, Progress, silent
 from postproc.compensation.outcome import Outcome
-from postproc.compensation.parallel import map_with
 from postproc.compensation.record import sidecar_path
 from postproc.exceptions import OutputError
 from postproc.files import (
@@ -224,7 +222,6 @@ class Job:
         output: Path | None = None,
         report: Path | None = None,
         html: Path | None = None,
-        processes: int = 1,
         values: Path | None = None,
     ) -> list[Path]:
         """Write the program, its variable file, the record and the reports.
@@ -238,7 +235,6 @@ class Job:
             output: Where the program goes.
             report: Where the report goes, None for nowhere.
             html: Where the report for a browser goes.
-            processes: How many may work at once on long texts.
             values: Where the variable file goes, changed or not; default: beside the
                 program, if it has changed.
 
@@ -250,16 +246,15 @@ class Job:
                 program has no place to go to.
         """
         check_places([output, report, html, values], self.inputs)
-        each = map_with(processes)
         files: dict[Path, Content] = {}
         if report is not None and report != Path(STREAM):
-            files[report] = map(str.encode, report_pieces(outcome, each))
+            files[report] = report_pieces(outcome)
         if html is not None:
             from postproc.report.html import program_report
 
             files[html] = program_report(outcome).encode()
         place = output or (None if self.path is None else default_output(self.path))
-        files |= self._results(outcome, place, values, each)
+        files |= self._results(outcome, place, values)
         check_places(files, self.inputs)
         write_all(files)
         if place is None:
@@ -267,7 +262,7 @@ class Job:
         return list(files)
 
     def _results(
-        self, outcome: Outcome, target: Path | None, values: Path | None, each: Map
+        self, outcome: Outcome, target: Path | None, values: Path | None
     ) -> dict[Path, Content]:
         """Name what a compensation gives, the file that users wait for last.
 
@@ -275,7 +270,6 @@ class Job:
             outcome: The compensation.
             target: Where the program goes, None for standard output.
             values: Where its variable file goes, None for beside it.
-            each: How pieces of long texts are made.
 
         Raises:
             OutputError: A part of the program has no place to go to.
@@ -284,12 +278,12 @@ class Job:
         for page, _ in reversed(self.pages):
             if page.name in outcome.outputs:
                 place = _page_place(page, _file_of(target, page))
-                files |= _with_record(outcome, {page.name: place}, place, each)
+                files |= _with_record(outcome, {page.name: place}, place)
         own = self._own_places(outcome, target, values)
         if values and self.variables and variables_of(self.name) not in own:
             files[values] = self.variables[1]
         for places in _by_folder(own):
-            files |= _with_record(outcome, places, list(places.values())[-1], each)
+            files |= _with_record(outcome, places, list(places.values())[-1])
         if target is not None and is_stream(target):
             files[target] = outcome.outputs[self.name]
         return files
@@ -338,11 +332,11 @@ def _by_folder(own: Mapping[str, Path]) -> list[dict[str, Path]]:
 
 
 def _with_record(
-    outcome: Outcome, places: Mapping[str, Path], main: Path, each: Map
+    outcome: Outcome, places: Mapping[str, Path], main: Path
 ) -> dict[Path, Content]:
     """Name the files of one program, behind the record that undoes them."""
     names = {name: place.name for name, place in places.items()}
-    record = map(str.encode, outcome.record.renamed(names).to_json(each))
+    record = outcome.record.renamed(names).to_json()
     files = {place: outcome.outputs[name] for name, place in places.items()}
     return {**({} if is_stream(main) else {sidecar_path(main): record}), **files}
 

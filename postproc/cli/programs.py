@@ -97,7 +97,7 @@ def compensate(
                 "--strict: targets were left uncompensated (listed above), nothing is "
                 "written. Mend them, or run without --strict"
             )
-        written = job.write(outcome, output, report, html, crowd, lsv_out)
+        written = job.write(outcome, output, report, html, lsv_out)
         _print_outcome(outcome)
         if report == Path(STREAM):
             write_text(STREAM, report_text(outcome))

@@ -133,7 +133,7 @@ class Outcome:
     @property
     def sidecar(self) -> str:
         """The record that `restore` needs, as JSON text."""
-        return "".join(self.record.to_json())
+        return b"".join(self.record.to_json()).decode("ascii")
 
     @property
     def reported(self) -> Outcome:

@@ -18,7 +18,6 @@ from threading import Thread
 from traceback import format_exc
 from typing import IO, Any, NoReturn, Protocol, TypeVar
 
-from postproc.arrays import Map
 from postproc.compensation.options import Clock, silent
 from postproc.compensation.rounds import Step
 from postproc.exceptions import PostprocError
@@ -350,11 +349,6 @@ def _again(
 # What is short is done here: a child would cost more than it gains.
 
 LONG = 20  # tasks from which on they are shared out
-
-
-def map_with(processes: int) -> Map:
-    """Return how to make something of every task with so many processes at most."""
-    return map if processes < 2 else parallel_map
 
 
 def parallel_map(

@@ -13,8 +13,7 @@ from typing import Any, Self
 
 import numpy as np
 
-from postproc.arrays import Map
-from postproc.byte_columns import joined, shortest, whole
+from postproc.arrays import Cells, shortest, text_of, whole
 from postproc.exceptions import ProgramError
 from postproc.files import LARGEST, check_places, read_input, write_all
 from postproc.language.source import Replacements, Source, apply, as_bytes
@@ -26,8 +25,6 @@ SUFFIX = ".postproc.json"
 EDITS, TARGETS = b'"edits": [', b'], "targets": {'
 CURE = "Restore needs the record that was written beside the program"
 BLOCK = 50  # lines per checksum: how closely a later edit can be located
-_IS_BARE = np.array([c == 0 or (32 <= c < 127 and c not in b'"\\') for c in range(256)])
-"""Bytes that stand in JSON as they are; NUL, which no text holds, fills up rows."""
 
 
 def sidecar_path(output: Path) -> Path:
@@ -102,39 +99,34 @@ class FileRecord:
             dict(told.get("targets", {})),
         )
 
-    def to_json(self, each: Map = map) -> Iterator[str]:
+    def to_json(self) -> Iterator[bytes]:
         """Write the record piece by piece: it is as long as the program."""
         told = {name: value for name, value in vars(self).items() if name != "edits"}
         targets = told.pop("targets")
-        yield json.dumps(told)[:-1] + ', "edits": ['
-        comma = ""
-        for text in each(_rows, list(self.edits.pieces())):
-            yield comma + text
-            comma = ", "
-        texts = (f"{json.dumps(key)}: {_text(told)}" for key, told in targets.items())
-        yield '], "targets": {' + ", ".join(texts) + "}}"
+        yield (json.dumps(told)[:-1] + ', "edits": [').encode()
+        comma = b""
+        for some in self.edits.pieces():
+            yield comma + _rows(some)
+            comma = b", "
+        yield b'], "targets": {'
+        for number, (key, value) in enumerate(targets.items()):
+            yield f"{', ' if number else ''}{json.dumps(key)}: ".encode() + _text(value)
+        yield b"}}"
 
 
-def _text(value: Any) -> str:
+def _text(value: Any) -> bytes:
     """Write a value as JSON; arrays are columns of numbers from 0 on."""
     if not isinstance(value, np.ndarray):
-        return json.dumps(value)
-    if not len(value):
-        return "[]"
+        return json.dumps(value).encode()
     column = shortest(value, 9) if value.dtype.kind == "f" else whole(value)
-    return "[" + joined([column, b", "])[:-2].decode("ascii") + "]"
+    return b"[" + text_of(len(value), [column, Cells(b", ")])[:-2] + b"]"
 
 
-def _rows(edits: Replacements) -> str:
+def _rows(edits: Replacements) -> bytes:
     """Write edits as JSON lists of start, end and text, with commas between."""
-    texts = as_bytes(edits.new)
-    if not _IS_BARE[texts].all():
-        told = [text.decode("latin-1") for text in edits.new.tolist()]
-        rows = zip(edits.start.tolist(), edits.end.tolist(), told, strict=True)
-        return json.dumps(list(rows))[1:-1]
-    start, end = whole(edits.start), whole(edits.end)
-    text = joined([b"[", start, b", ", end, b', "', texts, b'"], '])
-    return text[:-2].decode("ascii")
+    start, end = whole(edits.start).behind(b"["), whole(edits.end).behind(b", ")
+    text = Cells(b", ", quoted=as_bytes(edits.new))
+    return text_of(len(edits), [start, end, text, Cells(b"], ")])[:-2]
 
 
 LeftLine = tuple[str, int, str]
@@ -170,19 +162,16 @@ class Sidecar:
         """Return what was left in a file, beside what its own record tells."""
         return tuple(line for line in self.left if line[0] == name)
 
-    def to_json(self, each: Map = map) -> Iterator[str]:
-        """Write the record as JSON text, piece by piece.
-
-        Args:
-            each: How the pieces are made.
-        """
+    def to_json(self) -> Iterator[bytes]:
+        """Write the record as JSON text, piece by piece."""
         head: dict[str, Any] = {"postproc": self.version, "model": self.model}
         head |= {key: told for key in _LISTS if (told := getattr(self, key))}
-        yield json.dumps({**head, "options": dict(self.options)})[:-1] + ', "files": {'
+        head["options"] = dict(self.options)
+        yield (json.dumps(head)[:-1] + ', "files": {').encode()
         for number, (name, record) in enumerate(self.files.items()):
-            yield (", " if number else "") + json.dumps(name) + ": "
-            yield from record.to_json(each)
-        yield "}}\n"
+            yield f"{', ' if number else ''}{json.dumps(name)}: ".encode()
+            yield from record.to_json()
+        yield b"}}\n"
 
     def renamed(self, names: Mapping[str, str]) -> Sidecar:
         """Let the record speak of its files by other names.

@@ -3,23 +3,21 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import asdict
 
 import numpy as np
 from numpy.typing import NDArray
 
-from postproc.arrays import Floats, Ints, Map, chunks
-from postproc.byte_columns import (
-    ByteColumn,
-    beside,
-    blanked,
+from postproc.arrays import (
+    Cells,
+    Floats,
+    Ints,
+    chunks,
     fixed,
-    joined,
-    listed,
     named,
-    repeated,
     shortest,
+    text_of,
     whole,
 )
 from postproc.compensation.arrivals import ArrivalStates
@@ -28,135 +26,120 @@ from postproc.robot.pose import MM
 from postproc.robot.trajectory import Motion
 
 AT_ONCE = 5_000  # visits
+SIGNS = ("-1", "0", "1")
 
 
 def report_text(outcome: Outcome) -> str:
     """Write the whole report."""
-    return "".join(report_pieces(outcome))
+    return b"".join(report_pieces(outcome)).decode("ascii")
 
 
-def report_pieces(outcome: Outcome, each: Map = map) -> Iterator[str]:
-    """Write the report piece by piece.
-
-    Args:
-        outcome: What came of a program.
-        each: How the pieces are made.
-    """
+def report_pieces(outcome: Outcome) -> Iterator[bytes]:
+    """Write the report piece by piece."""
     outcome = outcome.reported
     head = {"program": outcome.program, "model": outcome.model}
-    yield json.dumps(head)[:-1] + ', "targets": ['
-    tasks = list(chunks(len(outcome.visits), AT_ONCE))
-    yield from each(lambda rows: _targets(outcome, rows), tasks)
+    yield (json.dumps(head)[:-1] + ', "targets": [').encode()
+    for rows in chunks(len(outcome.visits), AT_ONCE):
+        yield b",\n" if rows.start else b"\n"
+        yield _objects(outcome, np.arange(rows.start, rows.stop))
     tail = {
         "predicted": {"before": asdict(outcome.before), "after": asdict(outcome.after)},
         "motion": {key: round(size, 5) for key, size in outcome.motion.items()},
         "diagnostics": [asdict(d) for d in outcome.diagnostics],
         "stages_s": dict(outcome.stages),
     }
-    yield "],\n" + json.dumps(finite(tail))[1:] + "\n"
-
-
-def _targets(outcome: Outcome, rows: slice) -> str:
-    """Write some visits; a comma stands before all but the first."""
-    comma = ",\n" if rows.start else "\n"
-    text = _objects(_columns(outcome, np.arange(rows.start, rows.stop)))
-    return comma + text[: -len(",\n")]
+    yield ("],\n" + json.dumps(finite(tail))[1:] + "\n").encode()
 
 
 def target_rows(outcome: Outcome, rows: Ints) -> Iterator[dict[str, object]]:
     """Describe visits, ascending, in the keys of the report."""
     for some in chunks(len(rows), AT_ONCE):
-        text = _objects(_columns(outcome, rows[some]))
-        yield from json.loads("[" + text[: -len(",\n")] + "]")
+        yield from json.loads(b"[" + _objects(outcome, rows[some]) + b"]")
 
 
-def _objects(columns: Mapping[str, ByteColumn]) -> str:
-    """Write visits as JSON objects of the given keys, each with a comma behind it."""
-    parts: list[ByteColumn | bytes] = []
-    for number, (key, column) in enumerate(columns.items()):
-        parts += [f'{", " if number else "{"}"{key}": '.encode(), column]
-    return joined([*parts, b"},\n"]).decode("ascii")
+def _objects(outcome: Outcome, rows: Ints) -> bytes:
+    """Write visits as JSON objects with commas between them."""
+    columns: list[Cells] = []
+    for key, (first, *others) in _columns(outcome, rows).items():
+        lead = f'{", " if columns else "{"}"{key}": '
+        columns += [first.behind(lead.encode()), *others]
+    return text_of(len(rows), [*columns, Cells(b"},\n")])[: -len(b",\n")]
 
 
-def _columns(outcome: Outcome, rows: Ints) -> dict[str, ByteColumn]:
-    """Write the values of every key as JSON, for some visits."""
+def _columns(outcome: Outcome, rows: Ints) -> dict[str, list[Cells]]:
+    """Say what stands behind every key, for some visits."""
     v, d, told = outcome.visits, outcome.decisions, outcome.arrivals
     move = np.where(v.via[rows], len(Motion), v.motion[rows])
     has = v.literal[rows] >= 0
     placed, turned = len(outcome.position) > 0, len(d.turn) > 0
     degrees = (
-        {"correction_deg": _rounded(np.rad2deg(d.turn[rows]), 6)} if turned else {}
+        {"correction_deg": [_rounded(np.rad2deg(d.turn[rows]), 6)]} if turned else {}
     )
+    position = _rounded(outcome.position[rows] / MM, 4) if placed else Cells(b"[]")
     return {
-        "line": whole(v.line[rows]),
-        "file": named(v.files, v.file[rows], json.dumps),
+        "line": [whole(v.line[rows])],
+        "file": [named(v.files, v.file[rows], json.dumps)],
         "literal": _literals(outcome, rows),
-        "name": named([name or None for name in v.names], v.name[rows], json.dumps),
-        "move": named([*(m.name for m in Motion), "VIA"], move, json.dumps),
-        "q_deg": _rounded(np.rad2deg(d.q[rows]), 5),
-        "lambda": _signs(d.direction[rows]),
-        "side": _rounded(d.side[rows], 3),
-        "status": named([s.name.lower() for s in Status], d.status[rows], json.dumps),
-        "why": named(d.reasons, d.why[rows], json.dumps),
-        "original": _as_written(v.values[rows], has),
-        "corrected": _as_written(d.corrected[rows], has),
-        "position_mm": _rounded(outcome.position[rows] / MM, 4)
-        if placed
-        else repeated(b"[]", len(rows)),
-        "correction_mm": _rounded(d.correction[rows] / MM, 5),
+        "name": [named(v.names, v.name[rows], lambda name: json.dumps(name or None))],
+        "move": [named([*(m.name for m in Motion), "VIA"], move, json.dumps)],
+        "q_deg": [_rounded(np.rad2deg(d.q[rows]), 5)],
+        "lambda": [named(SIGNS, d.direction[rows].astype(np.int64) + 1, str).listed()],
+        "side": [_rounded(d.side[rows], 3)],
+        "status": [named([s.name.lower() for s in Status], d.status[rows], json.dumps)],
+        "why": [named(d.reasons, d.why[rows], json.dumps)],
+        "original": [_as_written(v.values[rows], has)],
+        "corrected": [_as_written(d.corrected[rows], has)],
+        "position_mm": [position],
+        "correction_mm": [_rounded(d.correction[rows] / MM, 5)],
         **degrees,
-        "step_mm": _steps(outcome, rows),
-        "std_error_mm": _rounded(d.std_error[rows] / MM, 5),
+        "step_mm": [_steps(outcome, rows)],
+        "std_error_mm": [_rounded(d.std_error[rows] / MM, 5)],
         **({} if told is None else {"share_mm": _shares(told, rows)}),
     }
 
 
-def _steps(outcome: Outcome, rows: Ints) -> ByteColumn:
+def _steps(outcome: Outcome, rows: Ints) -> Cells:
     """Write how far the correction moves from the fly point before, null without."""
     before, correction = outcome.visits.run_mates[rows], outcome.decisions.correction
     step = np.linalg.norm(correction[rows] - correction[before], axis=1) / MM
     return fixed(np.where(before < 0, np.nan, step), 5)
 
 
-def _shares(arrivals: ArrivalStates, rows: Ints) -> ByteColumn:
+def _shares(arrivals: ArrivalStates, rows: Ints) -> list[Cells]:
     """Write the size of every effect's share as an object."""
     sizes = arrivals.sizes(rows) / MM
-    parts: list[ByteColumn | bytes] = []
+    parts = []
     for number, name in enumerate(arrivals.effects):
-        key = f"{', ' if number else ''}{json.dumps(name)}: "
-        parts += [key.encode(), fixed(sizes[:, number], 5)]
-    return beside([b"{", *parts, repeated(b"}", len(rows))])
+        lead = f"{', ' if number else '{'}{json.dumps(name)}: "
+        parts.append(fixed(sizes[:, number], 5).behind(lead.encode()))
+    return [*parts, Cells(b"}" if parts else b"{}")]
 
 
-def _literals(outcome: Outcome, rows: Ints) -> ByteColumn:
+def _literals(outcome: Outcome, rows: Ints) -> list[Cells]:
     """Write where the numbers of every visit stand."""
     v = outcome.visits
     literal = v.literal[rows]
     has = np.flatnonzero(literal >= 0)
     if not len(has):
-        return repeated(b"null", len(rows))
-    literal[literal < 0] = literal[has[0]]
+        return [Cells(b"null")]
+    none = literal < 0
+    literal[none] = literal[has[0]]
     files = named(v.files, v.literals.file[literal], json.dumps)
     lines = whole(v.literals.line[literal])
-    told = beside([b'{"file": ', files, b', "line": ', lines, b"}"])
-    return blanked(told, v.literal[rows] < 0, b"null")
+    return [
+        files.within(b'{"file": ', b"", b', "line": ').unless(none, b"null"),
+        lines.within(b"", b"", b"}").unless(none, b""),
+    ]
 
 
-def _rounded(values: Floats, decimals: int) -> ByteColumn:
+def _rounded(values: Floats, decimals: int) -> Cells:
     """Write rows of numbers (k, p) for a person; what is not known becomes null."""
-    return listed([fixed(values[:, k], decimals) for k in range(values.shape[1])])
+    return fixed(values, decimals).listed()
 
 
-def _signs(values: NDArray[np.int8]) -> ByteColumn:
-    """Write rows of -1, 0 and 1 (k, p)."""
-    signs = values.astype(np.int64) + 1
-    return listed([named(["-1", "0", "1"], column, str) for column in signs.T])
-
-
-def _as_written(values: Floats, written: NDArray[np.bool_]) -> ByteColumn:
+def _as_written(values: Floats, written: NDArray[np.bool_]) -> Cells:
     """Write the numbers of the file (k, 6); nothing where the file holds none."""
-    told = listed([shortest(values[:, k], 9) for k in range(values.shape[1])])
-    return blanked(told, ~written, b"[]")
+    return shortest(values, 9).listed().unless(~written, b"[]")
 
 
 def finite(value: object) -> object:

@@ -40,7 +40,7 @@ def measure(kind: str, n: int, cell: Path, model: Path) -> dict[str, float]:
         pipeline = time.perf_counter() - start
         begin = time.perf_counter()
         out, told = place.with_name("out.pdl"), place.with_name("report.json")
-        job.write(outcome, out, told, processes=crowd)
+        job.write(outcome, out, told)
         write = time.perf_counter() - begin
     found = {
         "targets": len(outcome.visits), "lines": lines, "read": read,

@@ -56,7 +56,7 @@ def test_round_trip_through_files(tmp_path, record):
     program = tmp_path / "job.pdl"
     program.write_bytes(OUTPUT)
     side = Sidecar("0", "m", {"job.pdl": record}, {"clone": False})
-    sidecar_path(program).write_text("".join(side.to_json()))
+    sidecar_path(program).write_bytes(b"".join(side.to_json()))
     read = read_sidecar(sidecar_path(program)).files["job.pdl"].edits
     assert list(read) == list(EDITS)
     assert restore_file(program, tmp_path / "back.pdl") == [tmp_path / "back.pdl"]
@@ -147,7 +147,7 @@ def test_nothing_is_restored_over_the_record(tmp_path, record):
     program = tmp_path / "job.pdl"
     program.write_bytes(OUTPUT)
     side = sidecar_path(program)
-    side.write_text("".join(Sidecar("0", "m", {"job.pdl": record}).to_json()))
+    side.write_bytes(b"".join(Sidecar("0", "m", {"job.pdl": record}).to_json()))
     before = side.read_bytes()
     with pytest.raises(OutputError, match="is an input"):
         restore_file(program, side)
