@@ -108,10 +108,15 @@ def test_what_is_seen_along_the_chain(chain, random, laid_out):
     assert np.allclose(columns, kinematics.jacobian(chain, q, points), **CLOSE)
     links, load = random.uniform(0, 300, (6, 4)), random.uniform(-1, 90, (len(q), 4))
     torque = _native.torque(packed, given[0], links, load)
-    meant = kinematics.torque(chain, q, links, load)
-    assert np.allclose(torque, meant, rtol=1e-12, atol=1e-6)
+    for found, masses in zip(
+        torque, ((links, 0 * load), (0 * links, load)), strict=True
+    ):
+        meant = kinematics.torque(chain, q, *masses)
+        assert np.allclose(found, meant, rtol=1e-12, atol=1e-6)
+    unloaded = _native.torque(packed, given[0], links, np.array([[0.0, np.nan, 0, 0]]))
+    assert np.array_equal(unloaded[0], torque[0]) and not unloaded[1].any()
     one = _native.torque(packed, given[0][:1], links, load[:1])
-    assert np.array_equal(one, torque[:1])
+    assert np.array_equal(one, [found[:1] for found in torque])
     for wrong in (np.ones((2, 3)), np.ones((7, 3))):
         with pytest.raises(ValueError, match="columns of"):
             _native.landmarks(packed, given[0], wrong)

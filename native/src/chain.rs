@@ -242,20 +242,21 @@ pub fn jacobian<'py>(
     Ok(blocks(py, q.len(), (6, 6), columns.into_flattened().into_flattened()))
 }
 
-/// Torque about every joint of weights on the links and on the flange, (n, 6): for a unit
-/// of acceleration along the base's z.
+/// Torque about every joint of the links' weights, and of what the flange carries, (n, 6)
+/// each: for a unit of acceleration along the base's z.
 ///
 /// Arguments:
 ///     links: Mass [kg] and centre in its D-H frame [m] of every link, (6, 4).
 ///     load: The same of what the flange carries, (n, 4), or (1, 4) for all.
 #[pyfunction]
+#[allow(clippy::type_complexity)]
 pub fn torque<'py>(
     py: Python<'py>,
     parameters: Parameters<'py>,
     q: PyReadonlyArray2<'py, f64>,
     links: PyReadonlyArray2<'py, f64>,
     load: PyReadonlyArray2<'py, f64>,
-) -> PyResult<Bound<'py, PyArray2<f64>>> {
+) -> PyResult<(Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<f64>>)> {
     let (chain, q) = (Chain::new(&parameters)?, rows::<6>(&q)?);
     let (links, load) = (rows::<4>(&links)?, rows::<4>(&load)?);
     same_length(&[links.len(), 6])?;
@@ -263,29 +264,49 @@ pub fn torque<'py>(
         same_length(&[q.len(), load.len()])?;
     }
     let of = |i: usize| if load.len() == 1 { &load[0] } else { &load[i] };
-    Ok(array(py, each(py, q.len(), |i| chain.torque(&q[i], links, of(i)))?))
+    let both = each(py, q.len(), |i| chain.torque(&q[i], links, of(i)))?;
+    let (own, carried) = both.into_iter().unzip();
+    Ok((array(py, own), array(py, carried)))
+}
+
+/// Weights that a joint carries.
+#[derive(Default)]
+struct Weights {
+    mass: f64,
+    moment: Three,
+}
+
+impl Weights {
+    fn add(&mut self, [mass, x, y, z]: [f64; 4], frame: &Frame) {
+        if mass == 0.0 {
+            return; // its centre need not be known
+        }
+        self.mass += mass;
+        for (moment, centre) in self.moment.iter_mut().zip(frame.place(&[x, y, z])) {
+            *moment += mass * centre;
+        }
+    }
+
+    /// Torque about an axis z of a frame.
+    fn about(&self, frame: &Frame) -> [f64; 1] {
+        let (axis, p) = (&frame.axes[2], &frame.origin);
+        let lever = |k: usize| self.moment[k] - self.mass * p[k];
+        [axis[0] * lever(1) - axis[1] * lever(0)]
+    }
 }
 
 impl Chain {
     /// From the flange back to the base, every joint carries what came before.
-    fn torque(&self, q: &Six, links: &[[f64; 4]], load: &[f64; 4]) -> Six {
+    fn torque(&self, q: &Six, links: &[[f64; 4]], load: &[f64; 4]) -> (Six, Six) {
         let frames = self.frames(q);
-        let (mut mass, mut moment) = (0.0, [0.0; 3]);
-        let mut carry = |[m, x, y, z]: [f64; 4], frame: &Frame| {
-            let centre = frame.place(&[x, y, z]);
-            mass += m;
-            for k in 0..3 {
-                moment[k] += m * centre[k];
-            }
-            (mass, moment)
-        };
-        carry(*load, &frames[6]);
-        let mut per_axis = [[0.0]; 6];
+        let (mut own, mut carried) = (Weights::default(), Weights::default());
+        carried.add(*load, &frames[6]);
+        let mut per_axis = [[[0.0]; 6]; 2];
         for j in (0..6).rev() {
-            let (m, s) = carry(links[j], &frames[j + 1]);
-            let (axis, p) = (&frames[j].axes[2], &frames[j].origin);
-            per_axis[j] = [axis[0] * (s[1] - m * p[1]) - axis[1] * (s[0] - m * p[0])];
+            own.add(links[j], &frames[j + 1]);
+            (per_axis[0][j], per_axis[1][j]) = (own.about(&frames[j]), carried.about(&frames[j]));
         }
-        self.to_controller(&per_axis).map(|[torque]| torque)
+        let [own, carried] = per_axis.map(|axes| self.to_controller(&axes).map(|[t]| t));
+        (own, carried)
     }
 }

@@ -73,6 +73,8 @@ class PathCorrection:
             left: Visits that are not corrected, (n,).
             free: Visits that are, (n,).
         """
+        if not left.any():
+            return np.zeros_like(left)
         size, n = lengths(self.correction), len(self.before)
         inner = np.flatnonzero(self.before >= 0)
         pairs = np.concatenate([inner, self.before[inner]])

@@ -163,24 +163,26 @@ class Loads:
     states: States
 
     @cached_property
-    def gravity(self) -> Floats:
-        """Torque of the arm's own links, (n, 6) [N m]."""
-        return self.arm.gravity_torque(self.states.q)
-
-    @cached_property
-    def payload(self) -> Floats:
-        """Torque of the payload, (n, 6) [N m]; 0 where it is not known.
+    def _torques(self) -> tuple[Floats, Floats]:
+        """Torques of links and payload, (n, 6) [N m] each.
 
         Where no centre of mass is known, the mass is taken to sit at the TCP.
         """
         s = self.states
-        mass = np.nan_to_num(s.payload)
-        if not mass.any():
-            return np.zeros((len(s), 6))
         com = np.where(np.isnan(s.payload_com), s.tool, s.payload_com)
+        return self.arm.torques(s.q, np.nan_to_num(s.payload), com)
+
+    @property
+    def gravity(self) -> Floats:
+        """Torque of the arm's own links, (n, 6) [N m]."""
+        return self._torques[0]
+
+    @cached_property
+    def payload(self) -> Floats:
+        """Torque of the payload, (n, 6) [N m]; 0 where it is not known."""
+        own, carried = self._torques
         # By way of both loads: the last bits of fitted models hang on it.
-        loaded = self.gravity + self.arm.payload_torque(s.q, mass, com)
-        torque: Floats = loaded - self.gravity
+        torque: Floats = (own + carried) - own
         return torque
 
     @cached_property

@@ -196,23 +196,30 @@ class Arm:
             payload: Payload mass, (n,) [kg].
             payload_com: Its centre of mass in the flange frame, (n, 3) [m].
         """
-        own = self._torque(q, self._links, np.zeros((1, 4)))
-        return own + self.payload_torque(q, payload, payload_com)
+        own, carried = self.torques(q, payload, payload_com)
+        return own + carried
 
-    def payload_torque(
+    def torques(
         self, q: Floats, payload: Floats | float, payload_com: Floats | float
-    ) -> Floats:
-        """Give the torque of the payload alone, (n, 6) [N m]; see `gravity_torque`."""
+    ) -> tuple[Floats, Floats]:
+        """Give the torques of the arm's own links and of the payload.
+
+        Args:
+            q: Joint angles, (n, 6) [rad].
+            payload: Payload mass, (n,) [kg].
+            payload_com: Its centre of mass in the flange frame, (n, 3) [m]; where there
+                is no payload it need not be known.
+
+        Returns:
+            (n, 6) [N m] each.
+        """
         load = np.empty((len(q), 4))
         load[:, 0], load[:, 1:] = payload, payload_com
-        return self._torque(q, np.zeros((6, 4)), load)
-
-    def _torque(self, q: Floats, links: Floats, load: Floats) -> Floats:
-        """Give the torque of weights; see `_native.torque`."""
-        if not (links[:, 0].any() or load[:, 0].any()):
-            return np.zeros((len(q), 6))
+        if not (self._links[:, 0].any() or load[:, 0].any()):
+            return np.zeros((len(q), 6)), np.zeros((len(q), 6))
         packed = self.dh.packed()
-        return -GRAVITY * _native.torque(packed, floats(q), floats(links), load)
+        own, carried = _native.torque(packed, floats(q), floats(self._links), load)
+        return -GRAVITY * own, -GRAVITY * carried
 
     def gravity_basis(self, q: Floats) -> Floats:
         """Give the joint torque per unit of every lumped mass parameter.
