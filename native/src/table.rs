@@ -1,6 +1,8 @@
 //! Rows of reports and records as text: `postproc.arrays.Cells`.
 
 use std::io::Write;
+use std::ops::Range;
+use std::thread::{available_parallelism, scope, ScopedJoinHandle};
 
 use numpy::{PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::exceptions::{PyIndexError, PyValueError};
@@ -12,7 +14,9 @@ use crate::number::{put_fixed, put_shortest, put_whole};
 use crate::rows::{detached, flat};
 
 /// Rows that are written between two looks at signals.
-const AT_ONCE: usize = 1 << 14;
+const AT_ONCE: usize = 1 << 16;
+/// Rows that are worth a thread.
+const LEAST: usize = 2000;
 
 /// `Cells` of the package.
 #[derive(FromPyObject)]
@@ -160,6 +164,34 @@ fn put_quoted(out: &mut Vec<u8>, text: &[u8]) {
     out.push(b'"');
 }
 
+/// Write some rows, one behind the other, column by column.
+fn put_rows(columns: &[Column<'_>], rows: Range<usize>) -> Vec<u8> {
+    let (mut out, many) = (Vec::new(), rows.len());
+    for (nth, row) in rows.enumerate() {
+        columns.iter().for_each(|column| column.put(&mut out, row));
+        if nth == 0 {
+            out.reserve(many * (out.len() + 8)); // rows are about as long as each other
+        }
+    }
+    out
+}
+
+/// Write some rows, a part of them on every core.
+fn put_parts(columns: &[Column<'_>], rows: Range<usize>) -> Vec<Vec<u8>> {
+    let cores = available_parallelism().map_or(1, usize::from);
+    let parts = cores.min(rows.len() / LEAST).max(1);
+    let end = |part: usize| rows.start + rows.len() * part / parts;
+    if parts == 1 {
+        return vec![put_rows(columns, rows)];
+    }
+    scope(|crowd| {
+        let write = |part| crowd.spawn(move || put_rows(columns, end(part)..end(part + 1)));
+        let working: Vec<_> = (0..parts).map(write).collect();
+        let join = |part: ScopedJoinHandle<'_, Vec<u8>>| part.join().expect("a part of the rows");
+        working.into_iter().map(join).collect()
+    })
+}
+
 /// Write n rows, one behind the other, column by column.
 #[pyfunction]
 pub fn table<'py>(
@@ -169,14 +201,18 @@ pub fn table<'py>(
 ) -> PyResult<Bound<'py, PyBytes>> {
     let cells = columns.iter().map(|c| c.extract()).collect::<PyResult<Vec<Cells<'_>>>>()?;
     let columns = cells.iter().map(|c| Column::new(c, n)).collect::<PyResult<Vec<_>>>()?;
-    let mut out = Vec::new();
+    let mut parts = Vec::new();
     for first in (0..n).step_by(AT_ONCE) {
         py.check_signals()?;
-        detached(py, || {
-            for row in first..n.min(first + AT_ONCE) {
-                columns.iter().for_each(|column| column.put(&mut out, row));
-            }
-        })?;
+        let rows = first..n.min(first + AT_ONCE);
+        parts.append(&mut detached(py, || put_parts(&columns, rows))?);
     }
-    Ok(PyBytes::new(py, &out))
+    PyBytes::new_with(py, parts.iter().map(Vec::len).sum(), |mut out| {
+        for part in &parts {
+            let (here, behind) = out.split_at_mut(part.len());
+            here.copy_from_slice(part);
+            out = behind;
+        }
+        Ok(())
+    })
 }

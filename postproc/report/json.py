@@ -25,7 +25,7 @@ from postproc.compensation.outcome import Outcome, Status
 from postproc.robot.pose import MM
 from postproc.robot.trajectory import Motion
 
-AT_ONCE = 5_000  # visits
+AT_ONCE = 10_000  # visits
 SIGNS = ("-1", "0", "1")
 
 
