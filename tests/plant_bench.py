@@ -18,8 +18,14 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
+from unittest.mock import patch
 
+from postproc.compensation import together
+from postproc.compensation.options import AS_USUAL
 from postproc.compensation.record import restore_file
+from postproc.compensation.together import Given
+from postproc.model.model import load_model
+from postproc.robot.cell import load_cell
 from tests.batch.dask_cluster import Cluster
 from tests.chaos import Plant
 from tests.conftest import ROOT, make_job
@@ -27,6 +33,8 @@ from tests.plant import contents, grow
 from tests.plant_watch import Cost, watched
 
 TARGETS = 100
+MANY = 1000  # targets of the files that a cluster is given
+SOME = 100  # files that are compensated in this process
 ROUNDS = 2  # of runs that are compared with each other
 STEPS = 40_000_000  # of the plain loop: some seconds
 PAGE = ROOT / "docs" / "plant.md"
@@ -56,7 +64,7 @@ def many_files(plant: Plant, files: int, found: Findings) -> None:
     first = _run(plant.command(target))
     found.add(f"{files} files of {TARGETS} targets, --jobs {plant.jobs}",
               f"{first.seconds:.0f} s ({files / first.seconds:.1f} files/s, {load()})",
-              "600 s for 10,000 files on 2 cores")  # fmt: skip
+              "200 s for 10,000 files on 2 cores")  # fmt: skip
     each = 1000 * first.cpu / files
     found.add("CPU of it, all processes", f"{first.cpu:.0f} s, {each:.0f} ms a file")
     pairs = "; ".join(f"{young:.0f} -> {old:.0f}" for young, old in first.growth())
@@ -71,6 +79,26 @@ def many_files(plant: Plant, files: int, found: Findings) -> None:
     there = {p: h for p, h in contents(target).items() if not p.endswith(".json")}
     assert there == want, "restored files are not the sources"
     found.add("programs restored from their records, byte for byte", str(restored))
+
+
+def passes(plant: Plant, found: Findings) -> None:
+    """Compare programs side by side in passes with the same ones one by one."""
+    cell, model = load_cell(plant.cell), load_model(plant.model)
+    paths = sorted(plant.source.rglob("*.pdl"))[:SOME]
+    programs = [Given(path.name, path.read_bytes(), None, {}) for path in paths]
+
+    def spent(visits: int) -> float:
+        with patch.object(together, "PASS", visits):
+            start = time.process_time()
+            together.compensate_batch(programs, cell, model, AS_USUAL)
+            return time.process_time() - start
+
+    spent(together.PASS)  # every line is parsed once
+    runs = {"alone": lambda: spent(0), "beside": lambda: spent(together.PASS)}
+    took = _in_turns(runs)
+    alone, beside = (1000 * took[name] / ROUNDS / len(paths) for name in runs)
+    text = f"{alone:.0f} ms, {beside:.0f} ms ({alone / beside:.1f} times)"
+    found.add("CPU of a file, alone and beside others", text)
 
 
 def workers(plant: Plant, found: Findings) -> None:
@@ -91,9 +119,9 @@ def workers(plant: Plant, found: Findings) -> None:
 
 
 def cluster(plant: Plant, found: Findings) -> None:
-    """Compare a cluster of two workers with two local ones; kill one of them."""
-    local, there = plant.root / "two", plant.root / "cluster"
-    with Cluster(plant.root / "scratch", workers=2) as dask:
+    """Compare a cluster with as many local workers; kill one of its."""
+    local, there = plant.root / "local", plant.root / "cluster"
+    with Cluster(plant.root / "scratch", workers=plant.jobs) as dask:
         scheduler = ("--scheduler", dask.address)
         runs: dict[str, Callable[[], float]] = {
             "local": lambda: _seconds(plant.command(local)),
@@ -101,8 +129,9 @@ def cluster(plant: Plant, found: Findings) -> None:
         }
         spent = _in_turns(runs)
         share = spent["local"] / spent["cluster"]
-        found.add("Dask, 2 workers of one thread, against --jobs 2",
-                  f"{100 * share:.0f} % ({load()})", "75 %")  # fmt: skip
+        what = f"Dask, {plant.jobs} workers of one thread, against --jobs {plant.jobs}"
+        found.add(f"{what}, files of {MANY} targets",
+                  f"{100 * share:.0f} % ({load()})", "90 %")  # fmt: skip
         assert contents(there) == contents(local)
         killed = plant.root / "killed"
         quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
@@ -183,16 +212,18 @@ def main() -> None:
     found.add("before the start", load())
     with tempfile.TemporaryDirectory(prefix="postproc-plant-") as folder:
         root = make_job(Path(folder))
-        many, few = (
-            Plant(root / name, root / "cell.toml", root / "model.json", 2)
-            for name in ("many", "few")
+        many, few, long = (
+            Plant(root / name, root / "cell.toml", root / "model.json", jobs)
+            for name, jobs in (("many", 2), ("few", 2), ("long", 4))
         )
         grow(many.source, args.files, TARGETS)
         grow(few.source, args.compared, TARGETS)
+        grow(long.source, args.compared // 4, MANY)
         for part in (
             lambda: many_files(many, args.files, found),
+            lambda: passes(few, found),
             lambda: workers(few, found),
-            lambda: cluster(few, found),
+            lambda: cluster(long, found),
         ):
             part()
             command = f"--files {args.files} --compared {args.compared}"

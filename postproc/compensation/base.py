@@ -45,22 +45,23 @@ class PosePairs:
     reached: Floats
     wanted: Floats
 
-    def fit(self, base: Floats) -> tuple[Bools, Floats]:
-        """Tell which poses fit a base (4, 4) with any neighbour, (m,), and how far.
+    def fit(self, bases: Floats) -> tuple[Bools, Floats]:
+        """Tell which of m poses fit each of b bases (b, 4, 4) with any neighbour.
 
         Returns:
-            Whether each pose fits, and the distance to its nearest neighbour [m], (m,).
+            Whether each pose fits, (b, m), and the distance to its nearest neighbour
+            [m], (b, m).
         """
-        place = inverse(base[None]) @ self.wanted
-        far = lengths(place[:, :3, 3] - self.reached[:, :3, 3])
-        between = np.swapaxes(self.reached[:, :3, :3], 1, 2) @ place[:, :3, :3]
+        place = inverse(bases)[:, None] @ self.wanted
+        far = lengths(place[..., :3, 3] - self.reached[:, :3, 3])
+        between = np.swapaxes(self.reached[:, :3, :3], 1, 2) @ place[..., :3, :3]
         angle = lengths(rotation_vector(between))
         _, which = np.unique(self.visits, return_inverse=True)
-        m = which.max(initial=-1) + 1
-        fits, least = np.zeros(m, dtype=bool), np.full(m, np.inf)
-        np.logical_or.at(fits, which, (far <= NEAR) & (angle <= ALIKE))
-        np.minimum.at(least, which, far)
-        return fits, least
+        shape = which.max(initial=-1) + 1, len(bases)
+        fits, least = np.zeros(shape, dtype=bool), np.full(shape, np.inf)
+        np.logical_or.at(fits, which, ((far <= NEAR) & (angle <= ALIKE)).T)
+        np.minimum.at(least, which, far.T)
+        return fits.T, least.T
 
 
 def contradicted_base(visits: Visits, cell: Cell) -> list[Diagnostic]:
@@ -75,11 +76,14 @@ def contradicted_base(visits: Visits, cell: Cell) -> list[Diagnostic]:
             it is its own judge.
     """
     pairs = _pairs(visits, cell)
-    fits, far = pairs.fit(cell.base.pose)
-    if len(fits) == 0 or fits.any():
+    if len(pairs.visits) == 0:
         return []
-    for name, base in _others(cell.base.pose):
-        fitting, near = pairs.fit(base)
+    (fits,), (far,) = pairs.fit(cell.base.pose[None])
+    if fits.any():
+        return []
+    others = dict(_others(cell.base.pose))
+    bases = np.stack([*others.values()])
+    for name, fitting, near in zip(others, *pairs.fit(bases), strict=True):
         if fitting.sum() * 2 > len(fitting):
             first = int(np.unique(pairs.visits)[np.argmax(fitting)])
             text = (

@@ -89,7 +89,9 @@ def slim(column: NDArray[Any]) -> NDArray[Any]:
     if not len(column):
         return column
     first = column[0]
-    same = (column == first) | ((column != column) & (first != first))
+    same = column == first
+    if column.dtype.kind == "f":
+        same |= np.isnan(column) & np.isnan(first)
     return np.broadcast_to(first, column.shape) if same.all() else column
 
 

@@ -8,6 +8,7 @@ from enum import IntEnum
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from postproc.arrays import Interned, Ints, spans
 from postproc.language.pdl2 import syntax as ast
@@ -77,7 +78,8 @@ class SettingColumns:
         """Return the columns of `Visits` that come from settings."""
         frames = list(self._frames)
         columns: dict[str, Any] = {
-            name: slim(np.array(values)[rows]) for name, values in self._table.items()
+            name: _spread(np.array(values), rows)
+            for name, values in self._table.items()
         }
         if not columns:
             empty = _row({}, lambda value: -1)
@@ -85,6 +87,13 @@ class SettingColumns:
         columns["frames"] = np.array([f for f, _ in frames], float).reshape(-1, 6)
         columns["frame_taught"] = np.array([taught for _, taught in frames], bool)
         return columns
+
+
+def _spread(values: NDArray[Any], rows: Ints) -> NDArray[Any]:
+    """Return a column of settings; most programs have one row of them."""
+    if len(values) == 1:
+        return np.broadcast_to(values[0], (len(rows), *values.shape[1:]))
+    return slim(values[rows])
 
 
 def _row(settings: Settings, frame: Any) -> dict[str, Any]:
