@@ -38,7 +38,9 @@ def bare(sidecar: Sidecar) -> dict[str, object]:
 @pytest.mark.parametrize("targets", [{}, {"line": [1], "reasons": ['], "targets": {']}])
 def test_only_the_edits_are_missing(tmp_path, targets) -> None:
     path = tmp_path / "a.json"
-    path.write_text("".join(record(targets).to_json()), encoding="utf-8")
+    path.write_text(
+        b"".join(record(targets).to_json()).decode("ascii"), encoding="utf-8"
+    )
     found = read_without_edits(path)
     assert bare(found) == bare(read_sidecar(path))
     assert [len(file.edits) for file in found.files.values()] == [0, 0]
@@ -47,14 +49,14 @@ def test_only_the_edits_are_missing(tmp_path, targets) -> None:
 
 def test_a_record_that_was_laid_out_anew_is_read_whole(tmp_path) -> None:
     path = tmp_path / "a.json"
-    text = "".join(record({"line": [1]}).to_json())
+    text = b"".join(record({"line": [1]}).to_json()).decode("ascii")
     path.write_text(json.dumps(json.loads(text), indent=2), encoding="utf-8")
     assert bare(read_without_edits(path)) == bare(read_sidecar(path))
 
 
 def test_what_is_no_record_is_refused(tmp_path) -> None:
     path = tmp_path / "a.json"
-    text = "".join(record({}).to_json())
+    text = b"".join(record({}).to_json()).decode("ascii")
     for damaged in ("", "{}", text[:-3], text.replace("cd", 'cd"')):
         path.write_text(damaged, encoding="utf-8")
         with pytest.raises(ProgramError, match="is not a record"):
@@ -66,7 +68,7 @@ def test_a_record_without_edits_is_read(tmp_path) -> None:
     none = Replacements(np.empty(0, np.int64), np.empty(0, np.int64), np.array([], "S"))
     file = replace(record({}).files["a.pdl"], edits=none)
     empty = replace(record({}), files={"a.pdl": file})
-    path.write_text("".join(empty.to_json()), encoding="utf-8")
+    path.write_text(b"".join(empty.to_json()).decode("ascii"), encoding="utf-8")
     assert bare(read_without_edits(path)) == bare(read_sidecar(path))
 
 
@@ -75,7 +77,7 @@ def test_edits_are_written_as_json_lists(texts) -> None:
     start = 10 * np.arange(len(texts), dtype=np.int64)
     edits = Replacements(start, start + 3, np.array(texts, "S"))
     told = [[*span, new.decode("latin-1")] for span, new in edits]
-    text = "".join(FileRecord("ab", "cd", [], edits).to_json())
+    text = b"".join(FileRecord("ab", "cd", [], edits).to_json()).decode("ascii")
     assert f'"edits": {json.dumps(told)},' in text
 
 
@@ -87,5 +89,7 @@ def test_columns_are_written_as_lists_are() -> None:
         "reasons": ["", "far \xe9"],
     }
     lists = {k: v if k == "reasons" else v.tolist() for k, v in columns.items()}
-    assert "".join(record(columns).to_json()) == "".join(record(lists).to_json())
-    assert json.dumps(lists) in "".join(record(columns).to_json())
+    assert b"".join(record(columns).to_json()).decode("ascii") == b"".join(
+        record(lists).to_json()
+    ).decode("ascii")
+    assert json.dumps(lists) in b"".join(record(columns).to_json()).decode("ascii")

@@ -18,7 +18,7 @@ from postproc.compensation.compensate import compensate
 from postproc.compensation.outcome import Outcome, Status
 from postproc.compensation.program import read_program
 from postproc.model.model import Model
-from postproc.report.json import report_pieces
+from postproc.report.json import report_text
 from tests.bench import made
 
 LEAST, HALO, BAND, RUN_UP = 90, 80, 24, 200
@@ -61,8 +61,8 @@ def joined(monkeypatch) -> list[int]:
 
 def told(outcome: Outcome) -> tuple[object, ...]:
     """Return all that is written, but for the seconds."""
-    report = "".join(report_pieces(outcome)).partition('"stages_s"')[0]
-    return outcome.outputs, "".join(outcome.record.to_json()), report
+    report = report_text(outcome).partition('"stages_s"')[0]
+    return outcome.outputs, outcome.sidecar, report
 
 
 def run_of(n: int, change=None) -> made.Made:
