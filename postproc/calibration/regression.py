@@ -9,6 +9,7 @@ import numpy as np
 from scipy.linalg import qr, solve_triangular
 
 from postproc.arrays import Floats, Ints
+from postproc.calibration.design import DesignMatrix
 from postproc.calibration.evidence import Normal, Posterior, maximise, widened
 from postproc.calibration.orientations import RowWeights, Turns, judge, student_weights
 from postproc.model.combination import Combination
@@ -34,7 +35,7 @@ class Fit:
         noise: Estimated noise components.
         rows: Weight of every row.
         residual: Error that the effects leave, (n, 3) [m].
-        columns: Derivatives at the solution, (n, 3, p).
+        design: Derivatives at the solution.
         whitener: Rotations and variances of the rows.
         log_evidence: Log marginal likelihood of the whitened rows.
         effective: Effective number of parameters.
@@ -51,7 +52,7 @@ class Fit:
     noise: Noise
     rows: RowWeights
     residual: Floats
-    columns: Floats
+    design: DesignMatrix
     whitener: Whitener
     log_evidence: float
     effective: float
@@ -75,6 +76,11 @@ class Fit:
         return np.array([index[g] for g in self.combination.groups], dtype=np.int64)
 
     @cached_property
+    def columns(self) -> Floats:
+        """Derivatives at the solution, (n, 3, p) [m per unit of the parameter]."""
+        return self.design.dense()
+
+    @cached_property
     def row_scale(self) -> Floats:
         """What whitening multiplies the rotated components with, (n, 3) [1/m]."""
         v = self.whitener.variance(self.noise)
@@ -92,41 +98,24 @@ class Fit:
             return (turned * self.row_scale).reshape(-1)
         return (turned * self.row_scale[:, :, None]).reshape(-1, rows.shape[2])
 
-    @cached_property
-    def basis(self) -> Floats:
-        """Orthonormal basis of the whitened columns, (3 n, rank)."""
-        X = self.whiten(self.columns) * self.prior_std
-        Q, R, _ = qr(X, mode="economic", pivoting=True)
-        size = np.abs(np.diag(R))
-        known = size > max(1e-9 * float(size.max(initial=0.0)), 1e-3)
-        return np.asarray(Q[:, : int(known.sum())])
-
-    def project_out(self, whitened: Floats) -> Floats:
-        """Remove from whitened rows what the fitted effects can take up."""
-        left: Floats = whitened - self.basis @ (self.basis.T @ whitened)
-        return left
-
     def normal(self) -> Normal:
         """Write the regression, linearised at the present values, as its normal sums.
 
         Columns are scaled by the prior scales before the data rescale them.
         """
-        X = self.whiten(self.columns) * self.combination.scales
-        y = self.whiten(self.residual + self.columns @ self.values)
+        scales = self.combination.scales
+        whitened = self.design.turned(self.row_scale[:, :, None] * self.whitener.turn)
+        y = self.whiten(self.residual + self.design.times(self.values)).reshape(-1, 3)
         v = self.whitener.variance(self.noise)
         used = self.rows.weight > 0
         normal = Normal(
-            X.T @ X, X.T @ y, float(y @ y),
+            whitened.gram() * np.outer(scales, scales), whitened.moment(y) * scales,
+            float((y * y).sum()),
             float(np.log(v[used]).sum()), 3.0 * float(used.sum()),
         )  # fmt: skip
         if self.turns is None:
             return normal
-        return normal + self.turns.normal(self.values, self.combination.scales)
-
-    def stacked(self) -> Floats:
-        """Stack all whitened columns, those of orientations too, (rows, p)."""
-        X = self.whiten(self.columns)
-        return X if self.turns is None else np.vstack([X, self.turns.whitened()])
+        return normal + self.turns.normal(self.values, scales)
 
     @cached_property
     def stated(self) -> Floats:
@@ -207,8 +196,8 @@ def _begin(
     turns = None if start is None else start.turns
     return Fit(
         batch, combination, error, values, np.eye(p), log_scale, groups, noise,
-        ones if start is None else start.rows, error, np.zeros((n, 3, p)), whitener,
-        -np.inf, 0.0, turns,
+        ones if start is None else start.rows, error,
+        DesignMatrix.of(combination, batch), whitener, -np.inf, 0.0, turns,
     )  # fmt: skip
 
 
@@ -219,8 +208,8 @@ def _pass(state: Fit, heavy: bool) -> Fit:
     solved = maximise(state.normal(), state.group, state.log_scale)
     values = c.scales * solved.mean
     covariance = solved.covariance * np.outer(c.scales, c.scales)
-    residual = state.error - c.error(batch, values)
-    spread = _spread(state, covariance)
+    residual = state.error - c.error_at(_at(state, values), batch, values)
+    spread = state.design.turned(state.whitener.turn).variance(covariance)
     turned = state.whitener.rotate(residual)
     distance = np.sqrt((turned**2 / state.whitener.variance(state.noise)).sum(axis=1))
     if heavy:
@@ -243,19 +232,19 @@ def _pass(state: Fit, heavy: bool) -> Fit:
 def _linearised(state: Fit) -> Fit:
     """Take columns and residuals at the present values."""
     c, batch = state.combination, state.batch
-    at = c.at(batch, state.values)
-    residual = state.error - c.error(batch, state.values)
+    at = _at(state, state.values)
+    residual = state.error - c.error_at(at, batch, state.values)
     turns = state.turns
     if turns is not None:
         turns = turns.left(c, batch, state.values).linearised(c, at)
-    return replace(state, columns=c.columns(at), residual=residual, turns=turns)
+    design = state.design.at(c, at)
+    return replace(state, design=design, residual=residual, turns=turns)
 
 
-def _spread(state: Fit, covariance: Floats) -> Floats:
-    """Posterior variance of every rotated prediction, (n, 3) [m^2]."""
-    turned = state.whitener.rotate(state.columns)
-    spread: Floats = np.maximum(((turned @ covariance) * turned).sum(axis=2), 0.0)
-    return spread
+def _at(state: Fit, values: Floats) -> Batch:
+    """Take the kinematics at some values of the parameters."""
+    shift = state.design.shift(values)
+    return state.batch.moved(state.combination.deviation(values), shift)
 
 
 def _with_unknown_sides(state: Fit, values: Floats) -> Whitener:

@@ -182,8 +182,8 @@ def model_of(fitted: Fit, survey: Measurements) -> Model:
     left = np.linalg.norm(fitted.residual[used], axis=1) / MM
     covariance = fitted.stated
     told = fitted.combination.where(*COMPENSATED)
-    X = fitted.columns[:, :, told]  # of predictions: the set-up is no part of them
-    known = np.sqrt(np.einsum("nip,nip->ni", X @ covariance[np.ix_(told, told)], X))
+    own = np.where(np.outer(told, told), covariance, 0.0)  # no set-up in predictions
+    known = np.sqrt(fitted.design.variance(own))
     arm = fitted.batch.arm
     statistics = {
         "residual_mean_mm": float(left.mean()),

