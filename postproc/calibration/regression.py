@@ -132,12 +132,30 @@ class Fit:
 #
 # One pass linearises the arm at the present parameters (Gauss-Newton), solves the
 # Bayesian linear regression with prior scales by marginal likelihood, re-estimates the
-# two components of the noise and re-weighs the rows; passes repeat until nothing moves.
+# # components of the noise and re-weighs the rows; passes repeat until nothing moves. A
+# step so long that the arm is not linear along it tells nothing of noise and rows: they
+# wait until the arm is linearised where it led.
 
 PASSES = 30
 HEAVY_TAILED = 4  # first passes that a gross outlier must not lead astray
-SETTLED = 5e-8  # [m] change of any predicted error that ends the passes
-SETTLED_NOISE = 5e-3  # relative change of the noise that ends the passes
+BENT = 0.3  # sigma beyond which a step tells nothing of the noise
+
+
+@dataclass(frozen=True)
+class Tolerance:
+    """Changes that end the passes.
+
+    Attributes:
+        moved: Of any predicted error [m].
+        noise: Of the noise, relative.
+    """
+
+    moved: float
+    noise: float
+
+
+SETTLED = Tolerance(5e-8, 5e-3)
+NEARLY = Tolerance(3e-6, 2e-2)  # for fits that others begin with
 
 
 def fit_effects(
@@ -147,6 +165,7 @@ def fit_effects(
     origin: tuple[float, float, float] | None = None,
     start: Fit | None = None,
     turns: Turns | None = None,
+    until: Tolerance = SETTLED,
 ) -> Fit:
     """Fit effects to measured positions, and to orientations where there are any.
 
@@ -157,6 +176,7 @@ def fit_effects(
         origin: Tracker position in the base frame, where it is known.
         start: A fit of some of these effects to the same rows, to begin with.
         turns: Measured orientations of the same rows; those of `start` if None.
+        until: When the passes may end.
     """
     combination = Combination(effects)
     state = _begin(batch, position, combination, origin, start)
@@ -165,7 +185,7 @@ def fit_effects(
     heavy = HEAVY_TAILED if start is None else 0
     for number in range(PASSES):
         following = _pass(state, heavy=number < heavy)
-        if _settled(state, following) and number >= heavy:
+        if _settled(state, following, until) and number >= heavy:
             return following
         state = following
     return state
@@ -209,7 +229,27 @@ def _pass(state: Fit, heavy: bool) -> Fit:
     values = c.scales * solved.mean
     covariance = solved.covariance * np.outer(c.scales, c.scales)
     residual = state.error - c.error_at(_at(state, values), batch, values)
-    spread = state.design.turned(state.whitener.turn).variance(covariance)
+    found = replace(
+        state, values=values, covariance=covariance, log_scale=solved.log_scale,
+        residual=residual, log_evidence=solved.log_evidence, effective=solved.effective,
+    )  # fmt: skip
+    if not heavy and _bent(state, found) > BENT:
+        return found
+    return _weighed(found, heavy)
+
+
+def _bent(before: Fit, after: Fit) -> float:
+    """Tell by how much a pass went beyond where it is linear, in sigma (rms)."""
+    step = before.design.times(after.values - before.values)
+    bend = before.whitener.rotate(after.residual - before.residual + step)
+    variance = before.whitener.variance(before.noise)
+    return float(np.sqrt((bend**2 / variance).mean()))
+
+
+def _weighed(state: Fit, heavy: bool) -> Fit:
+    """Estimate the noise from what is left, and weigh the rows by it."""
+    c, batch, residual = state.combination, state.batch, state.residual
+    spread = state.design.turned(state.whitener.turn).variance(state.covariance)
     turned = state.whitener.rotate(residual)
     distance = np.sqrt((turned**2 / state.whitener.variance(state.noise)).sum(axis=1))
     if heavy:
@@ -220,13 +260,10 @@ def _pass(state: Fit, heavy: bool) -> Fit:
     noise = state.whitener.estimate(turned**2 + spread, rows.weight, state.noise)
     turns = state.turns
     if turns is not None:
-        turns = turns.left(c, batch, values).judged(covariance, rows.weight, heavy)
-    return replace(
-        state, values=values, covariance=covariance, log_scale=solved.log_scale,
-        noise=noise, rows=rows, residual=residual, turns=turns,
-        whitener=_with_unknown_sides(state, values),
-        log_evidence=solved.log_evidence, effective=solved.effective,
-    )  # fmt: skip
+        turns = turns.left(c, batch, state.values)
+        turns = turns.judged(state.covariance, rows.weight, heavy)
+    whitener = _with_unknown_sides(state, state.values)
+    return replace(state, noise=noise, rows=rows, turns=turns, whitener=whitener)
 
 
 def _linearised(state: Fit) -> Fit:
@@ -257,17 +294,17 @@ def _with_unknown_sides(state: Fit, values: Floats) -> Whitener:
     return replace(state.whitener, extra=np.repeat(square[:, None], 3, axis=1))
 
 
-def _settled(before: Fit, after: Fit) -> bool:
+def _settled(before: Fit, after: Fit, until: Tolerance) -> bool:
     """Tell whether a pass changed nothing that matters."""
     moved = np.abs(after.residual - before.residual).max(initial=0.0)
     ratio = after.whitener.variance(after.noise) / before.whitener.variance(
         before.noise
     )
-    quiet = np.abs(np.log(ratio)).max() < SETTLED_NOISE
+    quiet = np.abs(np.log(ratio)).max() < until.noise
     if before.turns is not None and after.turns is not None:
         change = np.log(after.turns.std / before.turns.std)
-        quiet = quiet and abs(change) < SETTLED_NOISE
-    return bool(moved < SETTLED and quiet)
+        quiet = quiet and abs(change) < until.noise
+    return bool(moved < until.moved and quiet)
 
 
 # What a survey can see, and the names of what it cannot.
