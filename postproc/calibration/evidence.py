@@ -11,12 +11,15 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.linalg.lapack import dpotrf, dpotri
-from scipy.optimize import minimize
 
 from postproc.arrays import Floats, Ints
 
 LOG_BOUNDS = (-8.0, 7.0)  # of log s_g
 STEPS = 60
+FIRST_STEP = 2.0  # of any log s_g
+SMALLEST_STEP = 1e-6
+LEAST_BEND = 1e-3
+SETTLED = 1e-5  # nats that a further step promises
 ROUNDED = 16.0  # units in the last place by which sums over many rows are off
 FEWEST = 4.0  # degrees of freedom that a prior scale is credited with at least
 LOG_SPREAD = 3.0  # hyperprior of log s_g: an order of magnitude is no surprise
@@ -39,6 +42,15 @@ class Normal:
     square: float
     log_noise: float
     rows: float
+
+    def root(self) -> Floats:
+        """Take rows, (p, p), that have the same sums as all the rows that there are.
+
+        They tell the size of directions down to some 1e-7 of the largest.
+        """
+        values, vectors = np.linalg.eigh(self.gram)
+        rows: Floats = np.sqrt(np.maximum(values, 0.0))[:, None] * vectors.T
+        return rows
 
     def __add__(self, other: Normal) -> Normal:
         """Put the rows of another set of measurements beside these."""
@@ -101,14 +113,13 @@ def inverted(B: Floats) -> tuple[float, Floats, Floats | None]:
         Log determinant, inverse, and its part in the directions that rows tell of, None
         where that is all of it.
     """
-    factor, failed = dpotrf(B, lower=True)
+    factor, failed = dpotrf(B.T, lower=True)  # the same, as Fortran lays it out
     size = float(np.diag(B).max(initial=0.0))
     rounding = ROUNDED * len(B) * np.finfo(float).eps * size
     if not failed and float((np.diag(factor) ** 2).min(initial=np.inf)) > rounding:
-        inverse, _ = dpotri(factor, lower=True)
-        lower = np.tril(inverse)
         log_det = 2.0 * float(np.log(np.diag(factor)).sum())
-        return log_det, lower + np.tril(inverse, -1).T, None
+        lower, _ = dpotri(factor, lower=True, overwrite_c=True)
+        return log_det, np.asarray(lower + np.tril(lower, -1).T), None
     values, vectors = np.linalg.eigh(B)
     told = values > rounding
     values = np.where(told, np.maximum(values, 1.0), 1.0)
@@ -128,23 +139,67 @@ def maximise(
         steps: Most steps of the search.
     """
     count = len(start)
-    if count == 0:
-        return posterior(normal, group, start)
+    at = _Here.of(normal, group, np.clip(start, *LOG_BOUNDS))
+    radius = FIRST_STEP
+    for _ in range(steps if count else 0):
+        step, gained = at.step(radius)
+        if gained < SETTLED or radius < SMALLEST_STEP:
+            break
+        there = _Here.of(normal, group, np.clip(at.found.log_scale + step, *LOG_BOUNDS))
+        ratio = (there.value - at.value) / gained
+        radius = radius / 4 if ratio < 0.25 else radius * (2 if ratio > 0.75 else 1)
+        if ratio > 0.0:
+            at = there
+    return at.found
 
-    def cost(u: Floats) -> tuple[float, Floats]:
-        """Negative log evidence with the hyperprior, and its gradient."""
-        at = posterior(normal, group, u)
+
+@dataclass(frozen=True, eq=False)
+class _Here:
+    """The log evidence with the hyperprior and its slopes at some prior scales.
+
+    With B = 1 + S G S, P its inverse and z = mean / s, the slope by log s_a is
+    z_a^2 - tr(1 - P)_aa, and the curvature between groups a and b
+    2 |P_ab|^2 + 4 z_a P_ab z_b, less 2 tr(P_aa) + 2 z_a^2 where a = b.
+    """
+
+    found: Posterior
+    value: float
+    slope: Floats
+    curvature: Floats
+
+    @classmethod
+    def of(cls, normal: Normal, group: Ints, u: Floats) -> _Here:
+        """Solve the regression at log scales u."""
+        found = posterior(normal, group, u)
         s = np.exp(u)[group]
-        each = at.mean**2 / s**2 - (1.0 - np.diag(at.covariance) / s**2)
-        grad = np.bincount(group, each, minlength=count)
-        prior = 0.5 * float((u**2).sum()) / LOG_SPREAD**2
-        return prior - at.log_evidence, u / LOG_SPREAD**2 - grad
+        P, z = found.covariance / np.outer(s, s), found.mean / s
+        own = np.zeros((len(u), len(s)))
+        own[group, np.arange(len(s))] = 1.0
+        told = np.diag(P)
+        slope = own @ (z**2 - 1.0 + told) - u / LOG_SPREAD**2
+        each = P * P
+        each += P * (2.0 * z[:, None]) * z
+        curvature = 2.0 * own @ each @ own.T - 2.0 * np.diag(own @ (told + z**2))
+        curvature -= np.eye(len(u)) / LOG_SPREAD**2
+        value = found.log_evidence - 0.5 * float((u**2).sum()) / LOG_SPREAD**2
+        return cls(found, value, slope, curvature)
 
-    best = minimize(
-        cost, start, jac=True, method="L-BFGS-B", bounds=[LOG_BOUNDS] * count,
-        options={"maxiter": steps, "ftol": 1e-10},
-    )  # fmt: skip
-    return posterior(normal, group, np.asarray(best.x, dtype=float))
+    def step(self, radius: float) -> tuple[Floats, float]:
+        """Take Newton's step uphill, no log scale by more than a radius.
+
+        Returns:
+            The step, and the rise that the curvature promises.
+        """
+        u, (low, high) = self.found.log_scale, LOG_BOUNDS
+        free = ~((u <= low) & (self.slope < 0) | (u >= high) & (self.slope > 0))
+        out = np.zeros(len(u))
+        bent, axes = np.linalg.eigh(self.curvature[np.ix_(free, free)])
+        along = axes.T @ self.slope[free] / np.maximum(np.abs(bent), LEAST_BEND)
+        out[free] = axes @ along
+        out *= min(1.0, radius / max(float(np.abs(out).max(initial=0.0)), 1e-300))
+        out = np.clip(u + out, low, high) - u
+        rise = float(self.slope @ out + 0.5 * out @ self.curvature @ out)
+        return out, rise
 
 
 def widened(normal: Normal, group: Ints, at: Posterior) -> Floats:

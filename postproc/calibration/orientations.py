@@ -230,7 +230,9 @@ class Turns:
             weight = np.minimum((limit / distance.clip(1e-300)) ** 4, 1.0)
             weight[weight < DROPPED] = 0.0
         weight = weight * (row_weight > 0)
-        spread = ((self.columns @ covariance) * self.columns).sum(axis=(1, 2))
+        columns = self.columns.reshape(-1, len(covariance))
+        each = np.einsum("rp,rp->r", columns @ covariance, columns)
+        spread = each.reshape(-1, 3).sum(axis=1)
         square = (self.residual**2).sum(axis=1) + np.maximum(spread, 0.0)
         variance = float((weight * square).sum()) / max(3.0 * float(weight.sum()), 1.0)
         return replace(self, weight=weight, std=max(np.sqrt(variance), SMALLEST))

@@ -9,6 +9,7 @@ import numpy as np
 from scipy.linalg import qr, solve_triangular
 
 from postproc.arrays import Floats, Ints
+from postproc.calibration.design import DesignMatrix
 from postproc.calibration.evidence import Normal, Posterior, maximise, widened
 from postproc.calibration.orientations import RowWeights, Turns, judge, student_weights
 from postproc.model.combination import Combination
@@ -34,7 +35,7 @@ class Fit:
         noise: Estimated noise components.
         rows: Weight of every row.
         residual: Error that the effects leave, (n, 3) [m].
-        columns: Derivatives at the solution, (n, 3, p).
+        design: Derivatives at the solution.
         whitener: Rotations and variances of the rows.
         log_evidence: Log marginal likelihood of the whitened rows.
         effective: Effective number of parameters.
@@ -51,7 +52,7 @@ class Fit:
     noise: Noise
     rows: RowWeights
     residual: Floats
-    columns: Floats
+    design: DesignMatrix
     whitener: Whitener
     log_evidence: float
     effective: float
@@ -75,6 +76,11 @@ class Fit:
         return np.array([index[g] for g in self.combination.groups], dtype=np.int64)
 
     @cached_property
+    def columns(self) -> Floats:
+        """Derivatives at the solution, (n, 3, p) [m per unit of the parameter]."""
+        return self.design.dense()
+
+    @cached_property
     def row_scale(self) -> Floats:
         """What whitening multiplies the rotated components with, (n, 3) [1/m]."""
         v = self.whitener.variance(self.noise)
@@ -92,41 +98,24 @@ class Fit:
             return (turned * self.row_scale).reshape(-1)
         return (turned * self.row_scale[:, :, None]).reshape(-1, rows.shape[2])
 
-    @cached_property
-    def basis(self) -> Floats:
-        """Orthonormal basis of the whitened columns, (3 n, rank)."""
-        X = self.whiten(self.columns) * self.prior_std
-        Q, R, _ = qr(X, mode="economic", pivoting=True)
-        size = np.abs(np.diag(R))
-        known = size > max(1e-9 * float(size.max(initial=0.0)), 1e-3)
-        return np.asarray(Q[:, : int(known.sum())])
-
-    def project_out(self, whitened: Floats) -> Floats:
-        """Remove from whitened rows what the fitted effects can take up."""
-        left: Floats = whitened - self.basis @ (self.basis.T @ whitened)
-        return left
-
     def normal(self) -> Normal:
         """Write the regression, linearised at the present values, as its normal sums.
 
         Columns are scaled by the prior scales before the data rescale them.
         """
-        X = self.whiten(self.columns) * self.combination.scales
-        y = self.whiten(self.residual + self.columns @ self.values)
+        scales = self.combination.scales
+        whitened = self.design.turned(self.row_scale[:, :, None] * self.whitener.turn)
+        y = self.whiten(self.residual + self.design.times(self.values)).reshape(-1, 3)
         v = self.whitener.variance(self.noise)
         used = self.rows.weight > 0
         normal = Normal(
-            X.T @ X, X.T @ y, float(y @ y),
+            whitened.gram() * np.outer(scales, scales), whitened.moment(y) * scales,
+            float((y * y).sum()),
             float(np.log(v[used]).sum()), 3.0 * float(used.sum()),
         )  # fmt: skip
         if self.turns is None:
             return normal
-        return normal + self.turns.normal(self.values, self.combination.scales)
-
-    def stacked(self) -> Floats:
-        """Stack all whitened columns, those of orientations too, (rows, p)."""
-        X = self.whiten(self.columns)
-        return X if self.turns is None else np.vstack([X, self.turns.whitened()])
+        return normal + self.turns.normal(self.values, scales)
 
     @cached_property
     def stated(self) -> Floats:
@@ -143,12 +132,30 @@ class Fit:
 #
 # One pass linearises the arm at the present parameters (Gauss-Newton), solves the
 # Bayesian linear regression with prior scales by marginal likelihood, re-estimates the
-# two components of the noise and re-weighs the rows; passes repeat until nothing moves.
+# # components of the noise and re-weighs the rows; passes repeat until nothing moves. A
+# step so long that the arm is not linear along it tells nothing of noise and rows: they
+# wait until the arm is linearised where it led.
 
 PASSES = 30
 HEAVY_TAILED = 4  # first passes that a gross outlier must not lead astray
-SETTLED = 5e-8  # [m] change of any predicted error that ends the passes
-SETTLED_NOISE = 5e-3  # relative change of the noise that ends the passes
+BENT = 0.3  # sigma beyond which a step tells nothing of the noise
+
+
+@dataclass(frozen=True)
+class Tolerance:
+    """Changes that end the passes.
+
+    Attributes:
+        moved: Of any predicted error [m].
+        noise: Of the noise, relative.
+    """
+
+    moved: float
+    noise: float
+
+
+SETTLED = Tolerance(5e-8, 5e-3)
+NEARLY = Tolerance(3e-6, 2e-2)  # for fits that others begin with
 
 
 def fit_effects(
@@ -158,6 +165,7 @@ def fit_effects(
     origin: tuple[float, float, float] | None = None,
     start: Fit | None = None,
     turns: Turns | None = None,
+    until: Tolerance = SETTLED,
 ) -> Fit:
     """Fit effects to measured positions, and to orientations where there are any.
 
@@ -168,6 +176,7 @@ def fit_effects(
         origin: Tracker position in the base frame, where it is known.
         start: A fit of some of these effects to the same rows, to begin with.
         turns: Measured orientations of the same rows; those of `start` if None.
+        until: When the passes may end.
     """
     combination = Combination(effects)
     state = _begin(batch, position, combination, origin, start)
@@ -176,7 +185,7 @@ def fit_effects(
     heavy = HEAVY_TAILED if start is None else 0
     for number in range(PASSES):
         following = _pass(state, heavy=number < heavy)
-        if _settled(state, following) and number >= heavy:
+        if _settled(state, following, until) and number >= heavy:
             return following
         state = following
     return state
@@ -207,8 +216,8 @@ def _begin(
     turns = None if start is None else start.turns
     return Fit(
         batch, combination, error, values, np.eye(p), log_scale, groups, noise,
-        ones if start is None else start.rows, error, np.zeros((n, 3, p)), whitener,
-        -np.inf, 0.0, turns,
+        ones if start is None else start.rows, error,
+        DesignMatrix.of(combination, batch), whitener, -np.inf, 0.0, turns,
     )  # fmt: skip
 
 
@@ -219,8 +228,28 @@ def _pass(state: Fit, heavy: bool) -> Fit:
     solved = maximise(state.normal(), state.group, state.log_scale)
     values = c.scales * solved.mean
     covariance = solved.covariance * np.outer(c.scales, c.scales)
-    residual = state.error - c.error(batch, values)
-    spread = _spread(state, covariance)
+    residual = state.error - c.error_at(_at(state, values), batch, values)
+    found = replace(
+        state, values=values, covariance=covariance, log_scale=solved.log_scale,
+        residual=residual, log_evidence=solved.log_evidence, effective=solved.effective,
+    )  # fmt: skip
+    if not heavy and _bent(state, found) > BENT:
+        return found
+    return _weighed(found, heavy)
+
+
+def _bent(before: Fit, after: Fit) -> float:
+    """Tell by how much a pass went beyond where it is linear, in sigma (rms)."""
+    step = before.design.times(after.values - before.values)
+    bend = before.whitener.rotate(after.residual - before.residual + step)
+    variance = before.whitener.variance(before.noise)
+    return float(np.sqrt((bend**2 / variance).mean()))
+
+
+def _weighed(state: Fit, heavy: bool) -> Fit:
+    """Estimate the noise from what is left, and weigh the rows by it."""
+    c, batch, residual = state.combination, state.batch, state.residual
+    spread = state.design.turned(state.whitener.turn).variance(state.covariance)
     turned = state.whitener.rotate(residual)
     distance = np.sqrt((turned**2 / state.whitener.variance(state.noise)).sum(axis=1))
     if heavy:
@@ -231,31 +260,28 @@ def _pass(state: Fit, heavy: bool) -> Fit:
     noise = state.whitener.estimate(turned**2 + spread, rows.weight, state.noise)
     turns = state.turns
     if turns is not None:
-        turns = turns.left(c, batch, values).judged(covariance, rows.weight, heavy)
-    return replace(
-        state, values=values, covariance=covariance, log_scale=solved.log_scale,
-        noise=noise, rows=rows, residual=residual, turns=turns,
-        whitener=_with_unknown_sides(state, values),
-        log_evidence=solved.log_evidence, effective=solved.effective,
-    )  # fmt: skip
+        turns = turns.left(c, batch, state.values)
+        turns = turns.judged(state.covariance, rows.weight, heavy)
+    whitener = _with_unknown_sides(state, state.values)
+    return replace(state, noise=noise, rows=rows, turns=turns, whitener=whitener)
 
 
 def _linearised(state: Fit) -> Fit:
     """Take columns and residuals at the present values."""
     c, batch = state.combination, state.batch
-    at = c.at(batch, state.values)
-    residual = state.error - c.error(batch, state.values)
+    at = _at(state, state.values)
+    residual = state.error - c.error_at(at, batch, state.values)
     turns = state.turns
     if turns is not None:
         turns = turns.left(c, batch, state.values).linearised(c, at)
-    return replace(state, columns=c.columns(at), residual=residual, turns=turns)
+    design = state.design.at(c, at)
+    return replace(state, design=design, residual=residual, turns=turns)
 
 
-def _spread(state: Fit, covariance: Floats) -> Floats:
-    """Posterior variance of every rotated prediction, (n, 3) [m^2]."""
-    turned = state.whitener.rotate(state.columns)
-    spread: Floats = np.maximum(((turned @ covariance) * turned).sum(axis=2), 0.0)
-    return spread
+def _at(state: Fit, values: Floats) -> Batch:
+    """Take the kinematics at some values of the parameters."""
+    shift = state.design.shift(values)
+    return state.batch.moved(state.combination.deviation(values), shift)
 
 
 def _with_unknown_sides(state: Fit, values: Floats) -> Whitener:
@@ -268,17 +294,17 @@ def _with_unknown_sides(state: Fit, values: Floats) -> Whitener:
     return replace(state.whitener, extra=np.repeat(square[:, None], 3, axis=1))
 
 
-def _settled(before: Fit, after: Fit) -> bool:
+def _settled(before: Fit, after: Fit, until: Tolerance) -> bool:
     """Tell whether a pass changed nothing that matters."""
     moved = np.abs(after.residual - before.residual).max(initial=0.0)
     ratio = after.whitener.variance(after.noise) / before.whitener.variance(
         before.noise
     )
-    quiet = np.abs(np.log(ratio)).max() < SETTLED_NOISE
+    quiet = np.abs(np.log(ratio)).max() < until.noise
     if before.turns is not None and after.turns is not None:
         change = np.log(after.turns.std / before.turns.std)
-        quiet = quiet and abs(change) < SETTLED_NOISE
-    return bool(moved < SETTLED and quiet)
+        quiet = quiet and abs(change) < until.noise
+    return bool(moved < until.moved and quiet)
 
 
 # What a survey can see, and the names of what it cannot.

@@ -81,7 +81,6 @@ def report_fit(fit: Fit, survey: Measurements) -> FitReport:
             fit.combination.effects, fit.combination.slices, strict=True
         )
     }
-    X = fit.stacked() * fit.combination.scales
     arrival = np.sqrt(fit.noise.arrival_variance(fit.batch.jacobian).mean())
     tracker = fit.noise.tracker_std(survey.position).mean()
     return FitReport(
@@ -90,7 +89,7 @@ def report_fit(fit: Fit, survey: Measurements) -> FitReport:
         correlated=_correlated(fit),
         dropped=survey.dropped + weighed_down(fit, survey),
         spared=tuple(survey.ids[i] for i in np.flatnonzero(fit.rows.spared)),
-        unseen=observe(X, fit.combination.names, floor=1.0).unseen,
+        unseen=observe(fit.normal().root(), fit.combination.names, floor=1.0).unseen,
         before=ErrorStatistics.of(fit.error[used]),
         after=ErrorStatistics.of(fit.residual[used]),
         tracker_mm=float(tracker / MM),
@@ -124,8 +123,7 @@ def report_method(model: Model, survey: Measurements, arm: Arm) -> FitReport:
 def _shares(fit: Fit) -> Floats:
     """Part of the squared error that each parameter explains, (p,)."""
     total = float((fit.error**2).sum())
-    along = np.einsum("nip,ni->p", fit.columns, fit.error)
-    shares: Floats = along * fit.values / max(total, 1e-300)
+    shares: Floats = fit.design.moment(fit.error) * fit.values / max(total, 1e-300)
     return shares
 
 

@@ -11,7 +11,7 @@ from postproc.arrays import Bools, Floats
 from postproc.calibration.evidence import LOG_SPREAD, Normal, maximise
 from postproc.calibration.measurements import Measurements
 from postproc.calibration.orientations import Turns
-from postproc.calibration.regression import Fit, fit_effects
+from postproc.calibration.regression import NEARLY, Fit, fit_effects
 from postproc.calibration.tool_groups import find_groups
 from postproc.model.covariate import DRIVERS
 from postproc.model.effects import BASE_EFFECTS, EFFECTS, propose
@@ -68,14 +68,12 @@ def fit_best(
     batch = Batch(arm, states)
     base = propose((*BASE_EFFECTS, *setup), arm, states)
     kept = base
-    fitted = fit_effects(batch, position, base, origin, turns=turns)
+    fitted = fit_effects(batch, position, base, origin, turns=turns, until=NEARLY)
     for names in (candidates(states), *((name,) for name in free_forms(states))):
         tried = (*kept, *propose(names, arm, states), *slipped(fitted))
-        fitted = fit_effects(batch, position, tried, origin, fitted)
+        fitted = fit_effects(batch, position, tried, origin, fitted, until=NEARLY)
         kept = keep_needed(fitted, always=base)
-    if kept != fitted.combination.effects:
-        fitted = fit_effects(batch, position, kept, origin, fitted)
-    return fitted
+    return fit_effects(batch, position, kept, origin, fitted)
 
 
 def slipped(fitted: Fit) -> tuple[Effect, ...]:
@@ -182,8 +180,8 @@ def model_of(fitted: Fit, survey: Measurements) -> Model:
     left = np.linalg.norm(fitted.residual[used], axis=1) / MM
     covariance = fitted.stated
     told = fitted.combination.where(*COMPENSATED)
-    X = fitted.columns[:, :, told]  # of predictions: the set-up is no part of them
-    known = np.sqrt(np.einsum("nip,nip->ni", X @ covariance[np.ix_(told, told)], X))
+    own = np.where(np.outer(told, told), covariance, 0.0)  # no set-up in predictions
+    known = np.sqrt(fitted.design.variance(own))
     arm = fitted.batch.arm
     statistics = {
         "residual_mean_mm": float(left.mean()),

@@ -16,6 +16,7 @@ from postproc.arrays import Floats
 from postproc.model.kinematics import Batch
 
 TRACKER_FIXED, TRACKER_RANGE = 1e-5, 5e-6  # [m], [m/m] a laser tracker's data sheet
+LIVELY = 0.3  # share of the other component that each begins with at least
 SMALLEST, LARGEST = 1e-7, 1e-2  # [m] bounds of both standard deviations at the TCP
 
 
@@ -138,7 +139,10 @@ class Whitener:
         from scipy.optimize import minimize  # slow to load, and for fits alone
 
         bounds = [(np.log(SMALLEST / s), np.log(LARGEST / s)) for s in (t0, r0)]
-        begin = np.clip(np.log([start.tracker, start.joint]), *np.array(bounds).T)
+        # A component of no size has no slope by its logarithm and would stay so.
+        t1 = max(start.tracker, LIVELY * start.joint * r0 / t0)
+        r1 = max(start.joint, LIVELY * start.tracker * t0 / r0)
+        begin = np.clip(np.log([t1, r1]), *np.array(bounds).T)
         best = minimize(cost, begin, jac=True, method="L-BFGS-B", bounds=bounds)
         t, r = np.exp(best.x)
         return Noise(float(t), float(r), self.origin)

@@ -7,8 +7,9 @@ import pytest
 from scipy.optimize import approx_fprime
 from scipy.stats import multivariate_normal
 
+from postproc.calibration import evidence
 from postproc.calibration.diagnosis.held_out import held_out_errors
-from postproc.calibration.evidence import Normal, maximise, posterior
+from postproc.calibration.evidence import Normal, Posterior, maximise, posterior
 
 
 def problem(seed: int = 0) -> tuple[np.ndarray, np.ndarray, np.ndarray, Normal]:
@@ -79,6 +80,23 @@ def test_folds_of_columns_that_are_the_same_are_predicted() -> None:
     y = 1e-9 * X[:, 0] + 1e-3 * rng.standard_normal(300)
     errors = held_out_errors(X, y, np.arange(100) % 5)
     assert np.sqrt(np.mean(errors**2)) < 2e-3
+
+
+def test_few_solutions_find_the_scales(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each costs as much as all else: its slopes and curvature lead to the next."""
+    _, _, group, normal = problem()
+    solved = []
+
+    def counted(normal: Normal, group: np.ndarray, scale: np.ndarray) -> Posterior:
+        solved.append(scale)
+        return posterior(normal, group, scale)
+
+    monkeypatch.setattr(evidence, "posterior", counted)
+    count = int(group.max()) + 1
+    found = maximise(normal, group, np.zeros(count))
+    assert len(solved) <= 10
+    maximise(normal, group, found.log_scale)
+    assert len(solved) <= 12
 
 
 def test_no_groups_no_search() -> None:

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
 import pytest
 from scipy.linalg import qr
 
-from postproc.calibration.regression import Fit
+from postproc.calibration import regression
+from postproc.calibration.regression import Fit, fit_effects
 from postproc.calibration.selection import fit_survey
 from postproc.model.combination import Combination
 from postproc.model.effects import BASE_EFFECTS
@@ -153,14 +155,26 @@ def test_rows_of_unknown_side_count_less() -> None:
     assert (fit.rows.weight[60:] == 1).all()
 
 
-def test_a_fit_projects_out_what_it_has_fitted() -> None:
+def test_what_a_fit_leaves_is_plain_noise() -> None:
     _, _, _, fit = case(0)
-    X = fit.whiten(fit.columns) * fit.prior_std
-    assert np.abs(fit.project_out(X)).max() < 1e-2  # of a noise standard deviation
-    Q = fit.basis
-    np.testing.assert_allclose(Q.T @ Q, np.eye(Q.shape[1]), atol=1e-10)
-    left = fit.whiten(fit.residual)
-    assert np.std(left) == pytest.approx(1.0, abs=0.1)
+    assert np.std(fit.whiten(fit.residual)) == pytest.approx(1.0, abs=0.1)
+
+
+def test_a_long_step_tells_nothing_of_the_noise(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Far off along a direction that hardly shows, the step back is not linear."""
+    _, _, measured, fit = case(0)
+    values = np.array(fit.values)
+    values[fit.combination.names.index("geometry.alpha5")] += 0.1
+    far = replace(fit, values=values)
+    effects = fit.combination.effects
+    for passes in (1, 30):
+        monkeypatch.setattr(regression, "PASSES", passes)
+        back = fit_effects(fit.batch, measured, effects, start=far)
+        assert back.noise.joint == pytest.approx(fit.noise.joint, abs=1e-7)
+        assert back.noise.tracker == pytest.approx(fit.noise.tracker, rel=0.01)
+    np.testing.assert_allclose(back.residual, fit.residual, atol=1e-6)
 
 
 def test_parameters_that_do_not_show_stay_at_their_prior() -> None:

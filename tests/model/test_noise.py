@@ -44,3 +44,15 @@ def test_rotation_keeps_lengths_and_columns() -> None:
         np.linalg.norm(turned, axis=1), np.linalg.norm(rows, axis=1)
     )
     np.testing.assert_allclose(turned[:, :, 2], whitener.rotate(rows[:, :, 2]))
+
+
+def test_a_component_that_was_thought_absent_is_found_again() -> None:
+    rng = np.random.default_rng(2)
+    batch = Batch(NJ, random_states(400, rng))
+    whitener = Whitener.build(batch, batch.walk.tcp, None)
+    truth = Noise(2.0, 3e-5)
+    squares = whitener.variance(truth) * rng.chisquare(1, (400, 3))
+    for start in (Noise(2.0, 1e-7), Noise(1e-2, 3e-5)):
+        found = whitener.estimate(squares, np.ones(400), start)
+        assert found.tracker == pytest.approx(truth.tracker, rel=0.1)
+        assert found.joint == pytest.approx(truth.joint, rel=0.1)

@@ -74,11 +74,12 @@ def held_out_gain(fit: Fit, number: int, candidate: Candidate) -> Gain:
         candidate: The candidate that the effect was.
     """
     known = fit.whiten(fit.columns) * fit.prior_std
-    target = fit.whiten(fit.residual + fit.columns @ fit.values)
+    target = fit.whiten(fit.residual + fit.design.times(fit.values))
     fold = deal(candidate.driver(fit.batch), FOLDS, seed=0)
-    after = held_out_errors(known, target, fold)
-    less = np.delete(known, fit.combination.slices[number], axis=1)
-    before = held_out_errors(less, target, fold)
+    folds = Folds.of(known, target, fold)
+    every = np.arange(known.shape[1])
+    after = folds.errors(every)
+    before = folds.errors(np.delete(every, fit.combination.slices[number]))
     used = fit.rows.weight > 0
     fall = (before**2 - after**2).reshape(-1, 3).sum(axis=1)[used]
     error = float(fall.std() / np.sqrt(max(len(fall), 1)))
@@ -93,17 +94,46 @@ def held_out_errors(X: Floats, y: Floats, fold: NDArray[np.int64]) -> Floats:
         y: Whitened target, (3 n,).
         fold: Fold of every row of three, (n,).
     """
-    gram, moment = X.T @ X, X.T @ y
-    errors = np.empty(len(y))
-    for k in range(int(fold.max(initial=0)) + 1):
-        out = np.repeat(fold == k, 3)
-        if not out.any():
-            continue
-        rest = gram - X[out].T @ X[out] + np.eye(X.shape[1])
-        _, inverse, told = inverted(rest)
-        p = (inverse if told is None else told) @ (moment - X[out].T @ y[out])
-        errors[out] = y[out] - X[out] @ p
-    return errors
+    return Folds.of(X, y, fold).errors(np.arange(X.shape[1]))
+
+
+@dataclass(frozen=True, eq=False)
+class Folds:
+    """Rows in folds, with the sums over each that predict it from the others.
+
+    Attributes:
+        rows: Scalar rows of every fold.
+        columns: Their columns, (m, p) each.
+        target: Their target, (m,) each.
+        grams, moments: Sums of products, (folds, p, p) and (folds, p).
+    """
+
+    rows: tuple[NDArray[np.int64], ...]
+    columns: tuple[Floats, ...]
+    target: tuple[Floats, ...]
+    grams: Floats
+    moments: Floats
+
+    @classmethod
+    def of(cls, X: Floats, y: Floats, fold: NDArray[np.int64]) -> Folds:
+        """Cut rows into folds, see `held_out_errors`."""
+        scalar = np.repeat(fold, 3)
+        rows = tuple(np.flatnonzero(scalar == k) for k in np.unique(fold))
+        columns, target = tuple(X[r] for r in rows), tuple(y[r] for r in rows)
+        grams = np.stack([part.T @ part for part in columns])
+        moments = np.stack([c.T @ t for c, t in zip(columns, target, strict=True)])
+        return cls(rows, columns, target, grams, moments)
+
+    def errors(self, known: NDArray[np.int64]) -> Floats:
+        """Predict every fold from the others by some of the columns, (rows,)."""
+        gram = self.grams.sum(axis=0) + np.eye(self.grams.shape[1])
+        moment = self.moments.sum(axis=0)
+        errors = np.empty(sum(len(rows) for rows in self.rows))
+        for k, rows in enumerate(self.rows):
+            _, inverse, told = inverted((gram - self.grams[k])[np.ix_(known, known)])
+            p = (inverse if told is None else told) @ (moment - self.moments[k])[known]
+            errors[rows] = self.target[k] - self.columns[k][:, known] @ p
+        return errors
 
 
 # The noise floor: how large the error of one measured row is at best.

@@ -20,7 +20,9 @@ from postproc.model.noise import Whitener
 # Under the model the whitened errors are N(0, I + X X^T), X the whitened columns times
 # their prior standard deviations. Multiplied by F = (I + X X^T)^(-1/2) they are plain
 # noise N(0, I), and so is everything that the model cannot take up; what it determines
-# well is gone.
+# well is gone. With X^T X = V diag(d) V^T and r = sqrt(1 + d)
+#
+#     F = I - X V diag(1 / (r (r + 1))) V^T X^T,   F F = I - X V diag(1 / r^2) V^T X^T.
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,16 +33,18 @@ class Projection:
         fit: The fit.
         names: Parameters that are taken out.
         at: Its states, kinematics taken at its parameters.
-        basis: Orthonormal directions that the model knows, (3 n, r).
-        shrink: What the filter takes of each, (r,) in [0, 1].
+        columns: X, (3 n, p).
+        axes: V, (p, p).
+        root: r, (p,).
         rest: Filtered residual, (3 n,): N(0, I) if the model is complete.
     """
 
     fit: Fit
     names: tuple[str, ...]
     at: Batch
-    basis: Floats
-    shrink: Floats
+    columns: Floats
+    axes: Floats
+    root: Floats
     rest: Floats
 
     @classmethod
@@ -58,11 +62,11 @@ class Projection:
         if without is not None:
             X = np.delete(X, fit.combination.slices[without], axis=1)
             del names[fit.combination.slices[without]]
-        basis, size, _ = np.linalg.svd(X, full_matrices=False)
-        shrink = 1.0 - 1.0 / np.sqrt(1.0 + size**2)
-        target = fit.whiten(fit.residual + fit.columns @ fit.values)
-        rest = target - basis @ (shrink * (basis.T @ target))
-        return cls(fit, tuple(names), at, basis, shrink, rest)
+        size, axes = np.linalg.eigh(X.T @ X)
+        root = np.sqrt(1.0 + np.maximum(size, 0.0))
+        target = fit.whiten(fit.residual + fit.design.times(fit.values))
+        made = cls(fit, tuple(names), at, X, axes, root, target)
+        return replace(made, rest=made.filter(target))
 
     @property
     def rows(self) -> int:
@@ -70,10 +74,10 @@ class Projection:
         return 3 * int((self.fit.rows.weight > 0).sum())
 
     def filter(self, whitened: Floats) -> Floats:
-        """Take the model out of whitened columns (3 n, k)."""
-        left: Floats = whitened - self.basis @ (
-            self.shrink[:, None] * (self.basis.T @ whitened)
-        )
+        """Take the model out of whitened columns, (3 n,) or (3 n, k)."""
+        along = self.axes.T @ (self.columns.T @ whitened)
+        taken = (self.axes / (self.root * (self.root + 1.0))) @ along
+        left: Floats = whitened - self.columns @ taken
         return left
 
 
@@ -104,19 +108,26 @@ def reduce_columns(
         projection: The model to take out.
         candidates: c candidates.
         columns: Their rotated, scaled columns, (3 n, c, k).
-        rows: Filtered rows, (3 n, draws).
+        rows: Rows, filtered twice: as errors, and as their columns are, (3 n, draws).
     """
     B = columns * projection.fit.row_scale.reshape(-1, 1, 1)
     count, width = B.shape[1:]
-    B = projection.filter(B.reshape(len(B), -1))
+    B = B.reshape(len(B), -1)
     along = (B.T @ rows).reshape(count, width, -1)
-    B = np.ascontiguousarray(B.T).reshape(count, width, -1)
-    gram = B @ np.swapaxes(B, 1, 2)
+    known = (projection.axes / projection.root).T @ (projection.columns.T @ B)
+    gram = _grams(B, count) - _grams(known, count)
     if width == 1:
         return ReducedCandidates(tuple(candidates), gram[:, :, 0], along)
     gain, turn = np.linalg.eigh(gram)
     along = np.swapaxes(turn, 1, 2) @ along
     return ReducedCandidates(tuple(candidates), np.maximum(gain, 0.0), along)
+
+
+def _grams(B: Floats, count: int) -> Floats:
+    """Sum products of each of some blocks of columns, (count, k, k)."""
+    blocks = np.ascontiguousarray(B.T).reshape(count, -1, len(B))
+    grams: Floats = blocks @ np.swapaxes(blocks, 1, 2)
+    return grams
 
 
 # All candidates with their columns, ready to be filtered by any fit of the rows.
@@ -183,8 +194,8 @@ class Library:
     def reduce(
         self, projection: Projection, rows: Floats
     ) -> tuple[ReducedCandidates, ...]:
-        """Filter all candidates and reduce them against rows (3 n, draws)."""
-        whitener = projection.fit.whitener
+        """Filter all candidates and reduce them against filtered rows (3 n, draws)."""
+        whitener, rows = projection.fit.whitener, projection.filter(rows)
         return tuple(
             reduce_columns(
                 projection, s.candidates, s.made(projection.at, whitener), rows
@@ -215,7 +226,7 @@ def reduce_some(
     projection: Projection, candidates: Sequence[Candidate], rows: Floats
 ) -> tuple[ReducedCandidates, ...]:
     """Filter a few candidates of any widths and reduce them against rows."""
-    whitener = projection.fit.whitener
+    whitener, rows = projection.fit.whitener, projection.filter(rows)
     return tuple(
         reduce_columns(
             projection, alike, make_columns(alike, projection.at, whitener), rows

@@ -8,6 +8,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from postproc.arrays import Floats
+from postproc.calibration.design import DesignMatrix
 from postproc.calibration.measurements import Measurements
 from postproc.calibration.regression import Fit, fit_effects
 from postproc.exceptions import PostprocError
@@ -121,7 +122,7 @@ def fold_back(fit: Fit) -> Fit:
         covariance=spread @ fit.covariance @ spread.T,
         groups=groups,
         log_scale=np.array([scale.get(g, 0.0) for g in groups]),
-        columns=combination.columns(combination.at(fit.batch, values)),
+        design=DesignMatrix.of(combination, combination.at(fit.batch, values)),
     )
 
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from postproc.arrays import Floats
 from postproc.model.effects.effect import JointEffect, Parameter, Unasked, fade
-from postproc.model.effects.smooth import smooth_columns, smooth_count
+from postproc.model.effects.smooth import smooth_columns, smooth_count, smooth_sum
 from postproc.model.kinematics import Batch
 from postproc.robot.arm import Arm
 from postproc.robot.state import States
@@ -90,3 +90,16 @@ class JointSpline(JointEffect):
             for j, length in self._parts()
         ]
         return np.concatenate(columns, axis=1)
+
+    def angles(self, batch: Batch, p: Floats) -> Floats:
+        """Return the joint errors (n, 6) [rad]: one function for every joint."""
+        q, start = batch.states.q, 0
+        inside = fade(q, np.array(self.lower), np.array(self.upper))
+        out = np.zeros((len(batch), 6))
+        for j, length in self._parts():
+            low, high = self.lower[j], self.upper[j]
+            part = slice(start, start + smooth_count(low, high, length))
+            found = smooth_sum(q[:, j], low, high, length, p[part])
+            out[:, j] += found * inside[:, j]
+            start = part.stop
+        return out

@@ -52,7 +52,18 @@ def smooth_columns(x: Floats, lower: float, upper: float, length: float) -> Floa
         upper: Upper end.
         length: Correlation length, in units of x.
     """
-    modes = _modes(*_grid(upper - lower, length))
+    return _interpolated(x, lower, upper, _modes(*_grid(upper - lower, length)))
+
+
+def smooth_sum(
+    x: Floats, lower: float, upper: float, length: float, p: Floats
+) -> Floats:
+    """Evaluate the function that the columns times p, (k,), make, (n,)."""
+    return _interpolated(x, lower, upper, _modes(*_grid(upper - lower, length)) @ p)
+
+
+def _interpolated(x: Floats, lower: float, upper: float, modes: Floats) -> Floats:
+    """Interpolate what is given on an even grid, (points,) or (points, k)."""
     grid = np.linspace(lower, upper, len(modes))
     from scipy.interpolate import CubicSpline  # slow to load, and seldom wanted
 
