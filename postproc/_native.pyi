@@ -5,7 +5,7 @@ threads run and hears signals while it works. `native/src` has one file for each
 which says what the arguments are; the callers say it with shapes and units too.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Protocol
 
 from postproc.arrays import Bools, Bytes, Cells, Floats, Indices, Ints
@@ -164,14 +164,28 @@ def scan_lines(
 ]: ...
 
 # number.rs: numbers, read and written (`postproc.language.rewrite`)
-def fixed(values: Floats, decimals: int) -> Bytes: ...
-def shortest(values: Floats, decimals: int | None = None) -> Bytes: ...
 def rewrite_numbers(
     data: bytes, start: Ints, end: Ints, values: Floats, least: Ints
 ) -> tuple[Ints, Bytes]: ...
 
 # table.rs: rows of reports and records as text (`postproc.arrays`)
-def table(n: int, columns: Sequence[Cells]) -> bytes: ...
+def table(n: int, columns: Sequence[Cells], given: Mapping[int, bytes]) -> bytes: ...
+
+# aligned.rs: tables whose columns stand below each other (`postproc.report.terminal`)
+def aligned(
+    n: int,
+    most: int,
+    columns: Sequence[Cells],
+    left: Sequence[bool],
+    gap: bytes,
+    widths: Sequence[int],
+    given: Mapping[int, Sequence[tuple[bytes, int]]],
+) -> tuple[bytes, list[int]]: ...
+
+# compare.rs: two texts line by line (`postproc.report.diff`)
+def compare_lines(
+    before: bytes, before_first: Ints, after: bytes, after_first: Ints
+) -> tuple[tuple[Ints, Ints, Ints, Bools, Bools], tuple[Floats, Floats]]: ...
 
 # weave.rs: edits of texts (`postproc.language.source`)
 def weave(data: bytes, start: Ints, end: Ints, new: Bytes) -> bytes: ...

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import count
 from typing import Any, TypeVar
@@ -112,6 +112,10 @@ class Cells:
         """Write the values of every row as a list in square brackets."""
         return self.within(b"[", b", ", b"]")
 
+    def ragged(self, first: Ints) -> Cells:
+        """Let every row have so many values: where they begin, and at last end."""
+        return replace(self, first=np.ascontiguousarray(first, dtype=np.int64))
+
     def unless(self, left: Bools, instead: bytes) -> Cells:
         """Put a text in the place of some rows' values."""
         return replace(self, left=left, instead=instead)
@@ -160,9 +164,17 @@ def named(texts: Sequence[K], index: Indices, text: Callable[[K], str]) -> Cells
     return Cells(names=names, index=np.ascontiguousarray(_in_columns(at)))
 
 
-def text_of(n: int, columns: Sequence[Cells]) -> bytes:
-    """Write n rows, one behind the other."""
-    return _native.table(n, columns)
+def text_of(
+    n: int, columns: Sequence[Cells], given: Mapping[int, bytes] | None = None
+) -> bytes:
+    """Write n rows, one behind the other.
+
+    Args:
+        n: How many there are.
+        columns: What they are made of.
+        given: Rows that are given as texts instead.
+    """
+    return _native.table(n, columns, given or {})
 
 
 def _in_columns(values: NDArray[Any]) -> NDArray[Any]:

@@ -1,10 +1,13 @@
 """Rows of text from columns are what Python writes one by one."""
 
+import ast
 import json
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from postproc import _native, arrays
 from postproc.arrays import Cells, fixed, named, shortest, text_of, whole
 
 AWKWARD = (
@@ -109,3 +112,64 @@ def test_what_does_not_fit_is_refused() -> None:
 def test_no_rows() -> None:
     empty = np.empty((0, 3))
     assert text_of(0, [fixed(empty, 2), named((), np.empty(0, int), str)]) == b""
+
+
+def below(rows, left, gap, widths):
+    """Put cells below each other, row by row; a column is as wide as what is above."""
+    widths = list(widths)
+    for row in rows:
+        pairs = zip(row, widths, left, strict=True)
+        cells = [c.ljust(w) if is_left else c.rjust(w) for c, w, is_left in pairs]
+        yield gap.join(cells).rstrip(" ")
+        widths = [max(w, len(c)) for w, c in zip(widths, row, strict=True)]
+        widths[-1] *= not left[-1]
+
+
+@pytest.mark.parametrize("left", [(True, False, True), (False, True, False)])
+def test_tables_stand_below_each_other(left: tuple[bool, ...]) -> None:
+    rng, n = np.random.default_rng(4), 9000  # more than a thread's
+    texts = ("", "a", "éà", "a longer one ", "\u2191\u2193")
+    index, size = rng.integers(0, 5, n), rng.normal(0, 10.0 ** rng.integers(-3, 5, n))
+    given = {7: ["as", "it", "is"], n - 1: ["x" * 60, "", "y "]}
+    columns = [named(texts, index, str), fixed(size, 2), whole(index)]
+    rows = [
+        given.get(k, [texts[i], f"{s:.2f}", str(i)])
+        for k, (i, s) in enumerate(zip(index.tolist(), size.tolist(), strict=True))
+    ]
+    told = {k: [(t.encode(), len(t)) for t in row] for k, row in given.items()}
+    for most in (n, 20, 0):
+        text, widths = _native.aligned(n, most, columns, left, b"|", [3, 1, 0], told)
+        wanted = [*below(rows[:most], left, "|", [3, 1, 0])]
+        assert text.decode().split("\n") == [*wanted, ""]
+        longest = [max([w, *(len(row[c]) for row in rows[:most])])
+                   for c, w in enumerate((3, 1, 0))]  # fmt: skip
+        assert widths == [*longest[:2], 0 if left[-1] else longest[2]]
+
+
+def test_tables_of_other_columns_are_refused() -> None:
+    one = whole(np.array([1]))
+    for left, widths in (((), ()), ((True,), ()), ((True, True), (0, 0))):
+        with pytest.raises(ValueError, match="a side and a width"):
+            _native.aligned(1, 1, [one], left, b"", widths, {})
+    for given in ({1: [(b"", 0)]}, {0: []}):
+        with pytest.raises(IndexError, match="a row that is not there"):
+            _native.aligned(1, 1, [one], [True], b"", [0], given)
+
+
+# Bytes are looked at in the core alone.
+
+DOORS = {"arrays.py": 1, "language/source.py": 1}  # the type, and texts as rows of it
+
+
+def test_no_array_of_bytes_is_handled_outside_the_doors() -> None:
+    root, found = Path(arrays.__file__).parent, {}
+    for path in root.rglob("*.py"):
+        names = [
+            node.attr if isinstance(node, ast.Attribute) else node.value
+            for node in ast.walk(ast.parse(path.read_text()))
+            if isinstance(node, ast.Attribute)
+            or (isinstance(node, ast.Constant) and isinstance(node.value, str))
+        ]
+        if count := sum(name in ("uint8", "ubyte", "u1", "B") for name in names):
+            found[path.relative_to(root).as_posix()] = count
+    assert found == DOORS

@@ -433,3 +433,33 @@ def test_lines_that_begin_with_a_word(random):
             if line.lstrip(b" \t").lower().startswith(words)
         ]
         assert _native.lines_beginning(text, words) == meant
+
+
+def test_lines_of_two_texts():
+    texts = [
+        (b"a := 1", b"a := 2"), (b"p(1.0)", b"p(1.00)"), (b"x", b"x"),
+        (b"{1, 2}", b"{1, 3}"), (b"{0, 2}", b"{9, 3}"), (b"q 'o", b"q 'p"),
+        (b"b 1 -- 2", b"b 3 -- 4"), (b"a := 7", b"b := 7"), (b"a := 5", b"a := 6"),
+    ]  # fmt: skip
+    pairs = [b"\n".join(text) for text in zip(*texts, strict=True)]
+    first = [np.append(0, np.cumsum([len(t) + 1 for t in text]))
+             for text in zip(*texts, strict=True)]  # fmt: skip
+    rows, numbers = _native.compare_lines(pairs[0], first[0], pairs[1], first[1])
+    row, begins, place, alike, braced = map(np.ndarray.tolist, rows)
+    assert row == [0, 1, 3, 4, 5, 6, 7, 8]
+    assert begins == [0, 1, 1, 3, 5, 5, 5, 5, 6]
+    assert place == [5, -1, 1, 1, -1, -1, -1, 5]
+    assert alike == [k in (3, 5, 6) for k in range(8)]
+    assert braced == [k in (2, 3) for k in range(8)]
+    old, new = map(np.ndarray.tolist, numbers)
+    assert old == [1, 1, 2, 0, 2, 5] and new == [2, 1, 3, 9, 3, 6]
+
+
+def test_lines_that_are_not_there():
+    for first in ([0, 9], [2, 1], [-1, 2], [0, 0]):
+        with pytest.raises(IndexError, match="lines that are not there"):
+            _native.compare_lines(b"abc", np.array(first), b"abc", np.array([0, 4]))
+    with pytest.raises(ValueError, match="columns of"):
+        _native.compare_lines(b"abc", np.array([0, 4]), b"abc", np.array([0]))
+    none = np.array([3])
+    assert len(_native.compare_lines(b"abc", none, b"", np.array([0]))[0][0]) == 0

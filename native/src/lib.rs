@@ -5,7 +5,9 @@
 
 use pyo3::prelude::*;
 
+mod aligned;
 mod chain;
+mod compare;
 mod corner;
 mod direction;
 mod edges;
@@ -57,12 +59,12 @@ fn native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(profile::profile, module)?)?;
     module.add_function(wrap_pyfunction!(pull::to_move, module)?)?;
     module.add_function(wrap_pyfunction!(variance::variance, module)?)?;
+    module.add_function(wrap_pyfunction!(aligned::aligned, module)?)?;
+    module.add_function(wrap_pyfunction!(compare::compare_lines, module)?)?;
     module.add_function(wrap_pyfunction!(table::table, module)?)?;
     module.add_function(wrap_pyfunction!(text::form_of, module)?)?;
     module.add_function(wrap_pyfunction!(text::line_starts, module)?)?;
     module.add_function(wrap_pyfunction!(text::scan_lines, module)?)?;
-    module.add_function(wrap_pyfunction!(number::fixed, module)?)?;
-    module.add_function(wrap_pyfunction!(number::shortest, module)?)?;
     module.add_function(wrap_pyfunction!(number::rewrite_numbers, module)?)?;
     module.add_function(wrap_pyfunction!(weave::weave, module)?)?;
     module.add_function(wrap_pyfunction!(weave::is_woven, module)?)?;

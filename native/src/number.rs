@@ -175,23 +175,6 @@ struct Texts {
 }
 
 impl Texts {
-    /// Write numbers, each in a row; NaN is ``null``.
-    fn of<'py>(
-        py: Python<'py>,
-        values: &[f64],
-        mut put: impl FnMut(&mut Vec<u8>, f64) + Send,
-    ) -> PyResult<Bound<'py, PyArray2<u8>>> {
-        let mut texts = Texts::default();
-        each(py, values.len(), |i| {
-            match values[i].is_nan() {
-                true => texts.all.extend_from_slice(b"null"),
-                false => put(&mut texts.all, values[i]),
-            }
-            texts.ends.push(texts.all.len());
-        })?;
-        Ok(texts.rows(py))
-    }
-
     /// Give texts to Python, each in a row filled up with NUL, (n, w).
     fn rows<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<u8>> {
         let begins = || std::iter::once(&0).chain(&self.ends);
@@ -205,28 +188,6 @@ impl Texts {
             .expect("as many bytes as rows have")
             .into_pyarray(py)
     }
-}
-
-/// Write numbers with so many decimals, (k,): rows filled up with NUL; NaN is ``null``.
-#[pyfunction]
-pub fn fixed<'py>(
-    py: Python<'py>,
-    values: PyReadonlyArray1<'py, f64>,
-    decimals: usize,
-) -> PyResult<Bound<'py, PyArray2<u8>>> {
-    Texts::of(py, flat(&values)?, |out, value| put_fixed(out, value, decimals))
-}
-
-/// Write numbers with as few digits as tell them from all others, as Python does, once they
-/// are rounded to so many decimals where that is asked for; NaN is ``null``.
-#[pyfunction]
-#[pyo3(signature = (values, decimals=None))]
-pub fn shortest<'py>(
-    py: Python<'py>,
-    values: PyReadonlyArray1<'py, f64>,
-    decimals: Option<usize>,
-) -> PyResult<Bound<'py, PyArray2<u8>>> {
-    Texts::of(py, flat(&values)?, |out, value| put_shortest(out, value, decimals))
 }
 
 /// Decimals that are tried before the search for the fewest digits.

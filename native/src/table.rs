@@ -1,5 +1,6 @@
 //! Rows of reports and records as text: `postproc.arrays.Cells`.
 
+use std::collections::HashMap;
 use std::io::Write;
 use std::ops::Range;
 use std::thread::{available_parallelism, scope, ScopedJoinHandle};
@@ -46,7 +47,7 @@ enum Values<'a> {
 }
 
 /// A column as the bytes and numbers that it is made of.
-struct Column<'a> {
+pub struct Column<'a> {
     before: &'a [u8],
     values: Values<'a>,
     names: Vec<&'a [u8]>,
@@ -62,7 +63,7 @@ struct Column<'a> {
 
 impl<'a> Column<'a> {
     /// Look whether the arrays fit n rows and each other.
-    fn new(cells: &'a Cells<'_>, n: usize) -> PyResult<Self> {
+    pub fn new(cells: &'a Cells<'_>, n: usize) -> PyResult<Self> {
         let (values, rows, width) = match cells {
             Cells { numbers: Some(a), .. } => {
                 (Values::Numbers(flat(a)?), a.shape()[0], a.shape()[1])
@@ -109,7 +110,7 @@ impl<'a> Column<'a> {
         })
     }
 
-    fn put(&self, out: &mut Vec<u8>, row: usize) {
+    pub fn put(&self, out: &mut Vec<u8>, row: usize) {
         out.extend_from_slice(self.before);
         if self.left.is_some_and(|left| left[row]) {
             out.extend_from_slice(self.instead);
@@ -164,11 +165,17 @@ fn put_quoted(out: &mut Vec<u8>, text: &[u8]) {
     out.push(b'"');
 }
 
+/// Rows that are given as texts instead.
+type Given = HashMap<usize, PyBackedBytes>;
+
 /// Write some rows, one behind the other, column by column.
-fn put_rows(columns: &[Column<'_>], rows: Range<usize>) -> Vec<u8> {
+fn put_rows(columns: &[Column<'_>], given: &Given, rows: Range<usize>) -> Vec<u8> {
     let (mut out, many) = (Vec::new(), rows.len());
     for (nth, row) in rows.enumerate() {
-        columns.iter().for_each(|column| column.put(&mut out, row));
+        match given.get(&row) {
+            Some(text) => out.extend_from_slice(text),
+            None => columns.iter().for_each(|column| column.put(&mut out, row)),
+        }
         if nth == 0 {
             out.reserve(many * (out.len() + 8)); // rows are about as long as each other
         }
@@ -177,15 +184,15 @@ fn put_rows(columns: &[Column<'_>], rows: Range<usize>) -> Vec<u8> {
 }
 
 /// Write some rows, a part of them on every core.
-fn put_parts(columns: &[Column<'_>], rows: Range<usize>) -> Vec<Vec<u8>> {
+fn put_parts(columns: &[Column<'_>], given: &Given, rows: Range<usize>) -> Vec<Vec<u8>> {
     let cores = available_parallelism().map_or(1, usize::from);
     let parts = cores.min(rows.len() / LEAST).max(1);
     let end = |part: usize| rows.start + rows.len() * part / parts;
     if parts == 1 {
-        return vec![put_rows(columns, rows)];
+        return vec![put_rows(columns, given, rows)];
     }
     scope(|crowd| {
-        let write = |part| crowd.spawn(move || put_rows(columns, end(part)..end(part + 1)));
+        let write = |part| crowd.spawn(move || put_rows(columns, given, end(part)..end(part + 1)));
         let working: Vec<_> = (0..parts).map(write).collect();
         let join = |part: ScopedJoinHandle<'_, Vec<u8>>| part.join().expect("a part of the rows");
         working.into_iter().map(join).collect()
@@ -193,11 +200,16 @@ fn put_parts(columns: &[Column<'_>], rows: Range<usize>) -> Vec<Vec<u8>> {
 }
 
 /// Write n rows, one behind the other, column by column.
+///
+/// Arguments:
+///     columns: What the rows are made of.
+///     given: Rows that are given as texts instead.
 #[pyfunction]
 pub fn table<'py>(
     py: Python<'py>,
     n: usize,
     columns: Vec<Bound<'py, PyAny>>,
+    given: Given,
 ) -> PyResult<Bound<'py, PyBytes>> {
     let cells = columns.iter().map(|c| c.extract()).collect::<PyResult<Vec<Cells<'_>>>>()?;
     let columns = cells.iter().map(|c| Column::new(c, n)).collect::<PyResult<Vec<_>>>()?;
@@ -205,10 +217,15 @@ pub fn table<'py>(
     for first in (0..n).step_by(AT_ONCE) {
         py.check_signals()?;
         let rows = first..n.min(first + AT_ONCE);
-        parts.append(&mut detached(py, || put_parts(&columns, rows))?);
+        parts.append(&mut detached(py, || put_parts(&columns, &given, rows))?);
     }
+    concatenated(py, &parts)
+}
+
+/// Give texts to Python as one.
+pub fn concatenated<'py>(py: Python<'py>, parts: &[Vec<u8>]) -> PyResult<Bound<'py, PyBytes>> {
     PyBytes::new_with(py, parts.iter().map(Vec::len).sum(), |mut out| {
-        for part in &parts {
+        for part in parts {
             let (here, behind) = out.split_at_mut(part.len());
             here.copy_from_slice(part);
             out = behind;

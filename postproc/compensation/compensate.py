@@ -569,13 +569,13 @@ def write_and_verify(reading: Reading, kept: Correction, setting: Setting) -> Ou
     Raises:
         VerificationError: The output is not what was meant.
     """
-    clock, processes = setting.clock, setting.processes
+    clock = setting.clock
     with clock("rewrite"):
         output = write_edits(reading, kept.edits, setting.model.id)
     with clock("verify"):
         again = read_program(output.files, setting.cell, reading.programs)
         values = kept.decisions.corrected
-        check_output(reading, again, output, kept.edited, values, processes)
+        check_output(reading, again, output, kept.edited, values)
     return output
 
 

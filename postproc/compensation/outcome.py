@@ -298,20 +298,20 @@ def _places(text: str, letters: str) -> Signs:
     Raises:
         ValueError: A character is none of them.
     """
-    codes = np.frombuffer(text.encode("latin-1", "replace"), dtype=np.uint8)
-    table = np.full(256, -1, dtype=np.int8)
-    table[[ord(c) for c in letters]] = range(len(letters))
-    places: Signs = table[codes]
-    if (places < 0).any():
+    missing = len(letters)
+    table = bytearray([missing]) * 256
+    for place, letter in enumerate(letters):
+        table[ord(letter)] = place
+    places = np.frombuffer(text.encode("latin-1", "replace").translate(table), np.int8)
+    if (places == missing).any():
         raise ValueError(f"a character is none of {letters}")
     return places
 
 
 def _letters(places: NDArray[np.integer], letters: str) -> str:
     """Return the text of the letters at some places, as `_places` reads it."""
-    table = np.frombuffer(letters.encode("ascii"), dtype=np.uint8)
-    chosen: NDArray[np.uint8] = table[places]
-    return chosen.tobytes().decode("ascii")
+    table = letters.encode("ascii").ljust(256)
+    return places.astype(np.int8).tobytes().translate(table).decode("ascii")
 
 
 def tell_arrivals(

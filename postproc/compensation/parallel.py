@@ -9,6 +9,7 @@ import pickle
 import signal
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from concurrent.futures import Future
 from contextlib import ExitStack, contextmanager
 from functools import partial
 from itertools import pairwise
@@ -344,46 +345,22 @@ def _again(
     return again, None
 
 
-# Long work on two cores: some of it in a forked child, the results as if it were not.
-#
-# What is short is done here: a child would cost more than it gains.
-
-LONG = 20  # tasks from which on they are shared out
+# Work beside other work that leaves the interpreter's lock alone.
 
 
-def parallel_map(
-    make: Callable[[K], T], tasks: Sequence[K], every: int = 2
-) -> Iterator[T]:
-    """Make something of every task, in order.
-
-    Both processes go through the tasks together, so that neither holds much of what
-    the other has to wait for.
-
-    Args:
-        make: Makes it; a child does so for most tasks, and sends what it made.
-        tasks: Each is worth some milliseconds.
-        every: Every second, third.. task is done here; more of them leave more time
-            here for what is done with the results.
-    """
-    if len(tasks) < LONG or available() < 2:
-        yield from map(make, tasks)
-        return
-    theirs = [task for number, task in enumerate(tasks) if number % every]
-    with in_worker(lambda: map(make, theirs)) as made:
-        for number, task in enumerate(tasks):
-            yield next(made) if number % every else make(task)
-
-
-@contextmanager
-def in_background(work: Callable[[], T], *, worth: bool) -> Iterator[Callable[[], T]]:
-    """Begin work that nothing waits for yet; yield how to ask for its result, once.
+def in_background(work: Callable[[], T]) -> Callable[[], T]:
+    """Begin work that nothing waits for yet; return how to ask for its result.
 
     Args:
         work: What to do; what it raises is raised when its result is asked for.
-        worth: It takes long enough for a process of its own.
     """
-    if not worth or available() < 2:
-        yield work
-        return
-    with in_worker(lambda: [work()]) as made:
-        yield lambda: next(made)
+    future = Future[T]()
+
+    def run() -> None:
+        try:
+            future.set_result(work())
+        except BaseException as problem:
+            future.set_exception(problem)
+
+    Thread(target=run, daemon=True).start()
+    return future.result

@@ -186,8 +186,6 @@ def _among(column: Ints, edited: Ints) -> tuple[Ints, Ints]:
 
 # Our own output, read again: nothing but the intended numbers may differ.
 
-WORTH = 40_000  # visits from which on a second process compares the texts
-
 
 class VerificationError(PostprocError):
     """The output is not the program that was meant; nothing may be written."""
@@ -199,7 +197,6 @@ def check_output(
     output: Output,
     edited: Ints,
     values: Floats,
-    processes: int = 1,
 ) -> None:
     """Check that a rewritten program differs in the numbers of edited targets only.
 
@@ -209,15 +206,13 @@ def check_output(
         output: What was written.
         edited: Literals that were given new numbers, (m,).
         values: The numbers of all visits as they should be read, (n, 6).
-        processes: How many may work at once on a long program.
 
     Raises:
         VerificationError: Another byte differs, or the program reads differently.
     """
-    worth = processes > 1 and len(before.visits) > WORTH
-    with in_background(lambda: _in_texts(before, after, output), worth=worth) as ask:
-        in_visits = equivalent(before.visits, after.visits, edited, values)
-        problem = ask() or (in_visits and f"{before.visits.files[0]}: {in_visits}")
+    ask = in_background(lambda: _in_texts(before, after, output))
+    in_visits = equivalent(before.visits, after.visits, edited, values)
+    problem = ask() or (in_visits and f"{before.visits.files[0]}: {in_visits}")
     if problem:
         raise VerificationError(problem)
 

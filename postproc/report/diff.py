@@ -3,30 +3,29 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from difflib import SequenceMatcher
 from functools import cached_property, partial
-from itertools import compress, islice
-from operator import ne
+from itertools import islice
 from pathlib import Path
 from typing import NamedTuple, Self
 
 import numpy as np
-from numpy.lib.stride_tricks import sliding_window_view
 
-from postproc.arrays import Bools, Floats, Interned, Ints, chunks
+from postproc import _native
+from postproc.arrays import Bools, Floats, Interned, Ints
 from postproc.compensation.outcome import (
     LEFT_ALONE,
     LineOutcomes,
     Status,
     read_arrivals,
 )
-from postproc.compensation.parallel import in_background, parallel_map
+from postproc.compensation.parallel import in_background
 from postproc.exceptions import ProgramError
 from postproc.files import find_variables, is_variables
 from postproc.language.pdl2.names import entry_names
-from postproc.language.scan import BLANKS, ScannedLines, mask_of, scan_lines
+from postproc.language.scan import BLANKS, mask_of, scan_lines
 from postproc.language.stamp import read_stamp
 
 # Rows of `diff` as columns: no object a line, whatever the length of a program.
@@ -175,9 +174,6 @@ def joined_rows(file: str, parts: Sequence[DiffRows]) -> DiffRows:
 
 # Lines of the same two places in two files: which numbers differ, or what more.
 
-PIECE = 50_000  # lines that are compared at a time
-WIDEST = 64  # bytes of beginnings that are compared; wider: line by line
-
 _ASSIGNED = re.compile(r"\s*([A-Za-z_$][\w$.\[\]]*)\s*(?::=|:)")
 _TWO_WORDS = re.compile(r"\s*([A-Za-z_]+)\s+([A-Za-z_]+)")
 _WORD = re.compile(r"[A-Za-z_]+")
@@ -191,165 +187,68 @@ _AS_BLANKS = bytes(32 if chr(c) in BLANKS else c for c in range(256))
 
 
 def changed_rows(
-    file: str, lines: Sequence[int], before: Sequence[bytes], after: Sequence[bytes]
+    file: str, before: TextLines, after: TextLines, lead: int = 0
 ) -> DiffRows:
     """Describe those of equally many lines that differ.
 
     Args:
         file: Name of the original.
-        lines: Numbers of its lines.
-        before: Its lines, without their endings.
+        before: Its lines.
         after: Those of the other file.
+        lead: How many lines of the original stand before them.
     """
-
-    def compare(some: slice) -> DiffRows:
-        old, new = before[some], after[some]
-        differ = np.fromiter(map(ne, old, new), bool, len(old))
-        numbers = np.array(lines[some], dtype=np.int64)[differ]
-        if not differ.all():
-            old, new = (list(compress(texts, differ)) for texts in (old, new))
-        return _compare(file, numbers, old, new)
-
-    tasks = list(chunks(len(before), PIECE))
-    return joined_rows(file, list(parallel_map(compare, tasks)))
-
-
-def _compare(
-    file: str, lines: Ints, before: Sequence[bytes], after: Sequence[bytes]
-) -> DiffRows:
-    """Describe how pairs of lines differ."""
-    if not len(lines):
-        return joined_rows(file, ())
-    pairs = pair_numbers(before, after)
-    differ = pairs.owner[pairs.old != pairs.new]
-    moved = np.bincount(differ, minlength=len(lines)) > 0
-    mine = moved[pairs.owner]
-    owner, old, new = pairs.owner[mine], pairs.old[mine], pairs.new[mine]
-    first = np.append(np.searchsorted(owner, np.arange(len(lines))), len(owner))
-    has, change = _changes(first, old, new, before)
-    begins = np.full(len(lines), -1)
-    begins[moved] = pairs.place[mine][first[:-1][moved]]
-    names, target = _targets(before, begins)
-    texts = {
-        k: f"{before[k].decode('latin-1')} -> {after[k].decode('latin-1')}"
-        for k in np.flatnonzero(~moved).tolist()
-    }
-    return DiffRows(file, lines, names, target, first, old, new, change, has, texts)
-
-
-@dataclass(frozen=True)
-class Pairs:
-    """Pairs of lines and the numbers on those that are alike (structure of arrays).
-
-    Attributes:
-        alike: Lines that differ in nothing but numbers, (n,).
-        owner: Line of every number, ascending, (m,).
-        old, new: The numbers, (m,).
-        place: Where they start in the first line of their pair, (m,).
-    """
-
-    alike: Bools
-    owner: Ints
-    old: Floats
-    new: Floats
-    place: Ints
-
-
-def pair_numbers(before: Sequence[bytes], after: Sequence[bytes]) -> Pairs:
-    """Read the numbers of pairs of lines that have the same shape.
-
-    Args:
-        before: Lines without their endings.
-        after: As many.
-    """
-    lines, n = [*before, *after], len(before)
-    starts = _starts(lines)
-    found = scan_lines(b"\n".join([*lines, b""]), starts)
-    alike = _only_numbers(lines, starts, found)
-    count = np.diff(found.first)
-    alike &= count[:n] == count[n:]
-    (a, b), cut = (np.repeat(alike, c) for c in (count[:n], count[n:])), found.first[n]
-    owner = np.repeat(np.arange(n), count[:n])[a]
-    place = found.start[:cut][a] - starts[owner]
-    return Pairs(alike, owner, found.value[:cut][a], found.value[cut:][b], place)
-
-
-def _only_numbers(lines: list[bytes], starts: Ints, found: ScannedLines) -> Bools:
-    """Tell which lines of the first half are those of the second but for numbers."""
-    n = len(lines) // 2
-    same: Bools = found.shape[:n] == found.shape[n:]
-    said, cut = np.diff(found.name_first), found.name_first[n]
-    mine, other = np.repeat(same, said[:n]), np.repeat(same, said[n:])
-    differ = found.name[:cut][mine] != found.name[cut:][other]
-    same[np.repeat(np.arange(n), said[:n])[mine][differ]] = False
-    told = (found.comment >= 0).reshape(2, n).any(axis=0)
-    for k in np.flatnonzero(same & told).tolist():
-        before, after = (_comment(lines, starts, found, at) for at in (k, n + k))
-        same[k] = before == after
-    same[[k % n for k in found.unterminated]] = False
-    return same
-
-
-def _comment(lines: list[bytes], starts: Ints, found: ScannedLines, k: int) -> bytes:
-    """Return the comment of a line, b"" where it has none."""
-    at = int(found.comment[k])
-    return lines[k][at - int(starts[k]) :] if at >= 0 else b""
-
-
-def _changes(
-    first: Ints, old: Floats, new: Floats, before: Sequence[bytes]
-) -> tuple[Bools, Floats]:
-    """Return which lines hold a position, and how far it moved, NaN elsewhere."""
-    has = np.diff(first) >= 3
-    text = np.frombuffer(b"\n".join(before), dtype=np.uint8)
-    braces = np.flatnonzero(text == ord("{"))
-    has[np.searchsorted(_starts(before), braces, side="right") - 1] = False
+    rows, (old, new) = _native.compare_lines(
+        before.data, before.first, after.data, after.first
+    )
+    row, first, begin, alike, braced = rows
+    has = (np.diff(first) >= 3) & ~braced
     at = first[:-1][has, None] + np.arange(3)
-    change = np.full(len(has), np.nan)
+    change = np.full(len(row), np.nan)
     with np.errstate(invalid="ignore"):  # numbers too long for a float are infinite
         change[has] = np.linalg.norm(new[at] - old[at], axis=1)
-    return has, change
+    texts = {
+        k: f"{before[line].decode('latin-1')} -> {after[line].decode('latin-1')}"
+        for k, line in _pairs(np.flatnonzero(begin < 0), row)
+    }
+    names, target = _targets(before, row, begin, alike)
+    told = row + lead + 1
+    return DiffRows(file, told, names, target, first, old, new, change, has, texts)
 
 
-def _targets(before: Sequence[bytes], begins: Ints) -> tuple[list[str], Ints]:
+def _pairs(rows: Ints, lines: Ints) -> Iterator[tuple[int, int]]:
+    """Return some rows with the line of each."""
+    return zip(rows.tolist(), lines[rows].tolist(), strict=True)
+
+
+def _targets(
+    before: TextLines, lines: Ints, begins: Ints, alike: Bools
+) -> tuple[list[str], Ints]:
     """Name what the numbers of lines belong to, once for lines that begin alike.
 
     Args:
-        before: The lines.
-        begins: Where their first number starts, -1 for a line without a name.
+        before: All lines.
+        lines: The ones in question, (n,).
+        begins: Where their first number starts, -1 for a line without a name, (n,).
+        alike: What stands before it is the same as in the one above, (n,).
 
     Returns:
         Names, and the index of each line's, (n,).
     """
-    lead = np.flatnonzero(~_begin_as_before(before, begins))
+    lead = np.flatnonzero(~alike)
     known: dict[bytes, str | None] = {}
     told: list[str | None] = []
-    for k, length in zip(lead.tolist(), begins[lead].tolist(), strict=True):
-        begin = before[k][: max(length, 0)]
+    for k, line in _pairs(lead, lines):
+        begin = before[line][: max(int(begins[k]), 0)]
         if begin not in known:
             known[begin] = _told_by(begin.translate(_AS_BLANKS).decode("latin-1"))
-        told.append(known[begin] if length >= 0 else "")
+        told.append(known[begin] if begins[k] >= 0 else "")
     names = Interned[str]()
     code = [-1 if t is None else names[t] for t in told]
-    index = np.repeat(code, np.diff(lead, append=len(before)))
-    for k in np.flatnonzero(index < 0).tolist():
-        index[k] = names[target_name(before[k].decode("latin-1"))]
+    codes = np.array(code, dtype=np.int64)
+    index = np.repeat(codes, np.diff(lead, append=len(lines)))
+    for k, line in _pairs(np.flatnonzero(index < 0), lines):
+        index[k] = names[target_name(before[line].decode("latin-1"))]
     return list(names), index
-
-
-def _begin_as_before(lines: Sequence[bytes], length: Ints) -> Bools:
-    """Tell which lines begin with the same so many bytes as the one before them."""
-    same: Bools = np.diff(length, prepend=-2) == 0
-    width = int(length.max(initial=0))
-    if width > WIDEST:
-        return np.zeros_like(same)
-    if not width:
-        return same
-    text = np.frombuffer(b"\n".join([*lines, bytes(width)]), dtype=np.uint8)
-    begin = sliding_window_view(text, width)[_starts(lines)]
-    other = (begin[1:] != begin[:-1]) & (np.arange(width) < length[1:, None])
-    same[1:] &= ~other.any(axis=1)
-    return same
 
 
 def _told_by(begin: str) -> str | None:
@@ -376,26 +275,7 @@ def target_name(line: str) -> str:
     return " ".join(found.group() for found in islice(_WORD.finditer(line), 2))
 
 
-def _starts(lines: Sequence[bytes]) -> Ints:
-    """Return where lines begin once they are joined."""
-    return np.cumsum([0, *map(len, lines[:-1])]) + np.arange(len(lines))
-
-
-def shapes(lines: Sequence[bytes]) -> list[str]:
-    """Return the masks of all lines, with their names."""
-    found = scan_lines(b"\n".join([*lines, b""]), _starts(lines))
-    masks = [mask.decode("latin-1") for mask in found.masks]
-    ends = found.name_first.tolist()
-    names = [found.names[k] for k in found.name.tolist()]
-    return [
-        mask_of(masks[shape], tuple(names[a:b]))
-        for shape, a, b in zip(found.shape.tolist(), ends, ends[1:], strict=False)
-    ]
-
-
 # The lines of a long file, cut out of its bytes where they are asked for.
-
-AT_ONCE = 1_000_000  # bytes in which line feeds are looked for
 
 
 @dataclass(frozen=True, eq=False)
@@ -420,13 +300,24 @@ class TextLines(Sequence[bytes]):
         >>> list(TextLines.of(b"a\n\nb\n", 1))
         [b'', b'b', b'']
         """
-        a = np.frombuffer(data, dtype=np.uint8)
-        found = (
-            np.flatnonzero(a[some] == 10) + some.start
-            for some in chunks(len(a), AT_ONCE)
-        )
-        ends = np.concatenate([*found, np.array([len(a)])])
-        return cls(data, np.append(0, ends + 1)[skipped:])
+        starts = _native.line_starts(data)
+        last = [len(data), len(data) + 1] if data[-1:] == b"\n" else [len(data) + 1]
+        return cls(data, np.append(starts, last)[skipped:])
+
+    def part(self, begin: int, end: int) -> TextLines:
+        """Return lines begin .. end - 1."""
+        return TextLines(self.data, self.first[begin : end + 1])
+
+    def shapes(self) -> list[str]:
+        """Return the masks of all lines, with their names."""
+        found = scan_lines(b"\n".join([*self, b""]), self.first[:-1] - self.first[0])
+        masks = [mask.decode("latin-1") for mask in found.masks]
+        ends = found.name_first.tolist()
+        names = [found.names[k] for k in found.name.tolist()]
+        return [
+            mask_of(masks[shape], tuple(names[a:b]))
+            for shape, a, b in zip(found.shape.tolist(), ends, ends[1:], strict=False)
+        ]
 
     def __len__(self) -> int:
         """Count the lines."""
@@ -502,19 +393,15 @@ def compare_files(original: Path, compensated: Path) -> Compared:
     return Compared(original, compensated, before, rows, stamped)
 
 
-def _rows(
-    file: str, before: Sequence[bytes], after: Sequence[bytes]
-) -> Iterator[DiffRows]:
+def _rows(file: str, before: TextLines, after: TextLines) -> Iterator[DiffRows]:
     """Describe the lines that differ, in order."""
     if len(before) == len(after):
-        yield changed_rows(file, range(1, len(before) + 1), before, after)
+        yield changed_rows(file, before, after)
         return
-    masks = shapes(before), shapes(after)
-    matcher = SequenceMatcher(None, *masks, autojunk=False)
+    matcher = SequenceMatcher(None, before.shapes(), after.shapes(), autojunk=False)
     for kind, a0, a1, b0, b1 in matcher.get_opcodes():
         if kind == "equal":
-            lines = range(a0 + 1, a1 + 1)
-            yield changed_rows(file, lines, before[a0:a1], after[b0:b1])
+            yield changed_rows(file, before.part(a0, a1), after.part(b0, b1), a0)
             continue
         gone = np.arange(a0 + 1, a1 + 1)
         yield _text_rows(file, gone, "- ", before[a0:a1])
@@ -536,8 +423,6 @@ def _named_by_entries(rows: DiffRows, lines: Sequence[bytes]) -> DiffRows:
 
 
 # Two programs, with the variable files beside them.
-
-LONG = 10_000_000  # bytes of a file whose record is read beside it
 
 
 @dataclass(frozen=True)
@@ -598,19 +483,13 @@ def diff(original: Path, compensated: Path) -> Difference:
     old, new = map(find_variables, pairs[0])
     if not is_variables(original.name) and old is not None and new is not None:
         pairs.append((old, new))
-    told_by = partial(read_arrivals, compensated, pairs)
-    with in_background(told_by, worth=_long(pairs)) as ask:
-        files = [compare_files(*pair) for pair in pairs]
-        told = ask()
+    ask = in_background(partial(read_arrivals, compensated, pairs))
+    files = [compare_files(*pair) for pair in pairs]
+    told = ask()
     found = [(f, told.get(f.original.name)) for f in files]
     rows = tuple(f.rows.with_told(own) for f, own in found)
     left = tuple(_left(f, own) for f, own in found if own is not None)
     return Difference(rows, files[0].stamped, left, _counts(told))
-
-
-def _long(pairs: Iterable[tuple[Path, Path]]) -> bool:
-    """Tell whether reading the record takes long."""
-    return any(old.is_file() and old.stat().st_size > LONG for old, _ in pairs)
 
 
 def _left(file: Compared, told: LineOutcomes) -> DiffRows:

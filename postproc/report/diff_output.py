@@ -9,22 +9,18 @@ from dataclasses import dataclass
 from typing import TextIO
 
 import numpy as np
-from numpy.typing import NDArray
 
-from postproc.arrays import Floats, Ints, chunks
-from postproc.byte_columns import (
-    ByteColumn,
-    beside,
-    blanked,
+from postproc.arrays import (
+    Cells,
+    Floats,
+    Ints,
+    chunks,
     fixed,
-    joined,
     named,
-    repeated,
     shortest,
+    text_of,
     whole,
 )
-from postproc.byte_columns import ByteColumn as Bytes
-from postproc.compensation.parallel import parallel_map
 from postproc.files import is_variables
 from postproc.report.diff import STATUSES, Difference, DiffRow, DiffRows
 from postproc.report.terminal import (
@@ -38,13 +34,13 @@ from postproc.report.terminal import (
     status_colour,
 )
 
-# Numbers of the rows of `diff` as columns of bytes, some thousand at a time.
+# The rows of `diff`, many at a time.
 #
 # Rows with text, with many numbers, with visits of several statuses or with names that
 # cannot be printed are few: whoever writes rows writes them one by one, as `DiffRow`,
 # and asks here which they are.
 
-AT_ONCE = 5_000  # rows
+AT_ONCE = 50_000  # rows
 MOST = 12  # numbers of a row that is written with others
 
 
@@ -64,49 +60,17 @@ def single_rows(rows: DiffRows) -> Ints:
     return np.flatnonzero(many)
 
 
-def blocks_of(rows: DiffRows) -> Iterator[tuple[Ints, Ints]]:
-    """Cut rows: yield the rows of each block, and those that are written one by one."""
-    single = single_rows(rows)
-    for some in chunks(len(rows), AT_ONCE):
-        here = (single >= some.start) & (single < some.stop)
-        yield np.arange(some.start, some.stop), single[here]
+def blocks_of(parts: Sequence[DiffRows]) -> Iterator[tuple[DiffRows, slice, list[int]]]:
+    """Cut rows: yield each block, and those that are written one by one."""
+    for rows in parts:
+        single = single_rows(rows)
+        for some in chunks(len(rows), AT_ONCE):
+            here = (single >= some.start) & (single < some.stop)
+            yield rows, some, single[here].tolist()
 
 
-def number_places(first: Ints, k: Ints) -> tuple[Ints, Ints]:
-    """Return where the numbers of some rows stand, and the row (from 0) of each.
+# The rows of `diff` as JSON.
 
-    Args:
-        first: CSR offsets of all rows.
-        k: Rows.
-    """
-    count = first[k + 1] - first[k]
-    owner = np.repeat(np.arange(len(k)), count)
-    before = np.cumsum(count) - count
-    return np.arange(len(owner)) + (first[k] - before)[owner], owner
-
-
-def strung(cells: ByteColumn, owner: Ints, rows: int, between: bytes) -> ByteColumn:
-    """Put the texts of every row beside each other.
-
-    Args:
-        cells: Texts, row by row.
-        owner: The row of each, ascending.
-        rows: How many rows there are.
-        between: What stands between two texts.
-    """
-    count = np.bincount(owner, minlength=rows)
-    at = np.arange(len(owner)) - (np.cumsum(count) - count)[owner]
-    width = cells.shape[1] + len(between)
-    out = np.zeros((rows, int(count.max(initial=0)), width), dtype=np.uint8)
-    out[owner, at, len(between) :] = cells
-    later = at > 0
-    out[owner[later], at[later], : len(between)] = np.frombuffer(between, np.uint8)
-    return out.reshape(rows, -1)
-
-
-# The rows of `diff` as JSON, some thousand at a time.
-
-END = b"\x01"  # behind a row; no JSON text holds it
 SIGN_NUMBERS = tuple(map(str, range(-1, 3)))
 
 
@@ -116,89 +80,72 @@ def difference_pieces(found: Difference) -> Iterator[str]:
     yield json.dumps(head, indent=1)[: -len("\n}")]
     for key, parts in (("rows", found.differing), ("left", found.untouched)):
         yield f',\n "{key}": ['
-        comma = ""
-        tasks = [(rows, *block) for rows in parts for block in blocks_of(rows)]
-        for piece in parallel_map(lambda task: _piece(*task), tasks):
-            yield comma + piece
-            comma = ","
-        yield "\n ]" if comma else "]"
+        comma = len(",")
+        for block in blocks_of(parts):
+            yield _objects(*block).decode("ascii")[comma:]
+            comma = 0
+        yield "]" if comma else "\n ]"
     yield "\n}\n"
 
 
-def _piece(rows: DiffRows, k: Ints, single: Ints) -> str:
-    """Write some rows with commas between them."""
-    begin = int(k[0])
-    texts = np.empty(len(k), dtype=object)
-    plain = np.setdiff1d(k, single, assume_unique=True)
-    if len(plain):
-        texts[plain - begin] = _objects(rows, plain)
-    for row in single.tolist():
-        told = json.dumps(rows.row(row)._asdict(), indent=1)
-        texts[row - begin] = "\n  " + told.replace("\n", "\n  ")
-    return ",".join(texts.tolist())
-
-
-def _objects(rows: DiffRows, k: Ints) -> list[str]:
-    """Write some rows as JSON objects."""
+def _objects(rows: DiffRows, some: slice, single: Sequence[int]) -> bytes:
+    """Write some rows as JSON objects, a comma before each."""
+    sizes = np.where(rows.has_change[some], rows.change_mm[some], np.nan)
     columns = {
-        "file": json.dumps(rows.file).encode(),
-        "line": whole(rows.line[k]),
-        "target": named(rows.targets, rows.target[k], json.dumps),
-        "original": _number_lists(rows, rows.original, k),
-        "compensated": _number_lists(rows, rows.compensated, k),
-        "change_mm": _sizes(np.where(rows.has_change[k], rows.change_mm[k], np.nan)),
-        "text": b'""',
-        **_told(rows, k),
-        "visits": b"{}",
+        "file": Cells(json.dumps(rows.file).encode()),
+        "line": whole(rows.line[some]),
+        "target": named(rows.targets, rows.target[some], json.dumps),
+        "original": _number_list(rows, rows.original, some),
+        "compensated": _number_list(rows, rows.compensated, some),
+        "change_mm": shortest(sizes),
+        "text": Cells(b'""'),
+        **_told(rows, some),
+        "visits": Cells(b"{}"),
     }
-    parts: list[ByteColumn | bytes] = []
-    for number, (key, column) in enumerate(columns.items()):
-        lead = "," if number else "\n  {"
-        parts += [f'{lead}\n   "{key}": '.encode(), column]
-    return joined([*parts, b"\n  }" + END]).decode("ascii").split(END.decode())[:-1]
+    cells, lead = [], ",\n  {"
+    for key, column in columns.items():
+        cells.append(column.behind(f'{lead}\n   "{key}": '.encode()))
+        lead = ","
+    given = {row - some.start: _object(rows.row(row)) for row in single}
+    return text_of(some.stop - some.start, [*cells, Cells(b"\n  }")], given)
 
 
-def _told(rows: DiffRows, k: Ints) -> dict[str, ByteColumn | bytes]:
+def _object(row: DiffRow) -> bytes:
+    """Write a row as a JSON object, a comma before it."""
+    told = json.dumps(row._asdict(), indent=1)
+    return (",\n  " + told.replace("\n", "\n  ")).encode("ascii")
+
+
+def _told(rows: DiffRows, some: slice) -> dict[str, Cells]:
     """Write what a record says of some rows."""
     told = rows.told
     none = {"status": b'""', "why": b'""', "direction": b"[]", "correction_mm": b"null"}
     if told is None or not len(told.line):
-        return dict(none)
-    entry = rows.entry[k]
+        return {key: Cells(text) for key, text in none.items()}
+    entry = rows.entry[some]
+    signs = named(SIGN_NUMBERS, told.direction[entry] + 1, str)
     columns = {
         "status": named(STATUSES, told.status[entry], json.dumps),
         "why": named(told.reasons, told.why[entry], json.dumps),
-        "direction": _lists(
-            named(SIGN_NUMBERS, told.direction[entry].ravel() + 1, str),
-            np.repeat(np.arange(len(k)), 6),
-            len(k),
-        ),
-        "correction_mm": _sizes(told.correction_mm[entry]),
+        "direction": signs.within(*LIST),
+        "correction_mm": shortest(told.correction_mm[entry]),
     }
-    return {key: blanked(columns[key], entry < 0, none[key]) for key in columns}
+    return {key: columns[key].unless(entry < 0, none[key]) for key in columns}
 
 
-def _number_lists(rows: DiffRows, values: Floats, k: Ints) -> ByteColumn:
+LIST = (b"[\n    ", b",\n    ", b"\n   ]")  # an item a line
+
+
+def _number_list(rows: DiffRows, values: Floats, some: slice) -> Cells:
     """Write the numbers of some rows as lists."""
-    at, owner = number_places(rows.first, k)
-    return _lists(shortest(values[at]), owner, len(k))
-
-
-def _lists(cells: ByteColumn, owner: Ints, rows: int) -> ByteColumn:
-    """Write lists, an item a line."""
-    column = beside([b"[\n    ", strung(cells, owner, rows, b",\n    "), b"\n   ]"])
-    return blanked(column, np.bincount(owner, minlength=rows) == 0, b"[]")
-
-
-def _sizes(values: Floats) -> ByteColumn:
-    """Write sizes with all their digits; NaN becomes null."""
-    return shortest(values)
+    first = rows.first[some.start : some.stop + 1]
+    cells = shortest(values[first[0] : first[-1]]).within(*LIST)
+    return cells.ragged(first - first[0]).unless(np.diff(first) == 0, b"[]")
 
 
 # The listing of `diff`: a row a line, then what was left alone, then a summary.
 
 DECIMALS = 4
-HERE = 4  # every fourth block is made where all of them are laid out
 STATUS = "status"
 PLACE = (Column("file", "left"), Column("line"), Column("target", "left"))
 NUMBERS = (Column("original"), Column("", "left"), Column("compensated"))
@@ -242,48 +189,41 @@ class _Writer:
         self, parts: Sequence[DiffRows], shown: Sequence[int]
     ) -> Iterator[Block]:
         """Write the rows of all files, some columns of them."""
-        tasks = [(rows, *block) for rows in parts for block in blocks_of(rows)]
-        return parallel_map(lambda task: self._block(*task, shown), tasks, HERE)
+        return (self._block(*block, shown) for block in blocks_of(parts))
 
     def _block(
-        self, rows: DiffRows, k: Ints, single: Ints, shown: Sequence[int]
+        self, rows: DiffRows, some: slice, single: Sequence[int], shown: Sequence[int]
     ) -> Block:
         """Write some rows."""
-        plain = ~np.isin(k, single)
-        cells = [
-            *_place(rows, k),
-            *_number_changes(rows, k, plain),
-            self._size(rows, k),
-        ]
-        if self.told:
-            cells += self._told(rows, k)
-        texts = {row - int(k[0]): self._texts(rows.row(row)) for row in single.tolist()}
+        cells = [*_place(rows, some), *_number_changes(rows, some)]
+        cells += [self._size(rows, some), *self._told(rows, some)]
+        texts = {row - some.start: self._texts(rows.row(row)) for row in single}
         return Block(
-            [_masked(cells[c], plain) for c in shown],
-            np.column_stack([_lengths(cells[c]) * plain for c in shown]),
+            some.stop - some.start,
+            [cells[c] for c in shown],
             {at: [row[c] for c in shown] for at, row in texts.items()},
         )
 
-    def _size(self, rows: DiffRows, k: Ints) -> Bytes:
+    def _size(self, rows: DiffRows, some: slice) -> Cells:
         """Write how far the TCP is moved, or else by how much the numbers changed."""
-        size, has = rows.change_mm[k], rows.has_change[k]
+        size, has = rows.change_mm[some], rows.has_change[some]
         if self.told and rows.told is not None and len(rows.told.line):
-            entry = rows.entry[k]
+            entry = rows.entry[some]
             size = np.where(entry < 0, size, rows.told.correction_mm[entry])
             has = has | (entry >= 0)
-        return blanked(fixed(np.where(has, size, 0.0), 3), ~has, b"")
+        return fixed(size, 3).unless(~has, b"")
 
-    def _told(self, rows: DiffRows, k: Ints) -> list[Bytes]:
+    def _told(self, rows: DiffRows, some: slice) -> list[Cells]:
         """Say how the targets are reached, and what came of them."""
         told = rows.told
         if told is None or not len(told.line):
-            return [repeated(b"", len(k))] * 2
-        entry = rows.entry[k]
-        signs = named(SIGN_ARROWS, told.direction[entry].ravel() + 1, str)
+            return [Cells()] * 2
+        entry = rows.entry[some]
+        signs = named(SIGN_ARROWS, told.direction[entry] + 1, str)
         what = told.status[entry] * len(told.reasons) + told.why[entry]
         said = [_said(s, why) for s in STATUSES for why in told.reasons]
-        both = signs.reshape(len(k), -1), named(said, what, self._painted)
-        return [blanked(cells, entry < 0, b"") for cells in both]
+        both = signs, named(said, what, self._painted)
+        return [cells.unless(entry < 0, b"") for cells in both]
 
     def _painted(self, status: str) -> str:
         return paint(status, status_colour(status)) if self.coloured else status
@@ -307,44 +247,27 @@ def _said(status: str, why: str, visits: Mapping[str, int] | None = None) -> str
     return f"{status}: {why}" if why else status
 
 
-def _place(rows: DiffRows, k: Ints) -> list[Bytes]:
+def _place(rows: DiffRows, some: slice) -> list[Cells]:
     """Say where rows stand."""
-    file = repeated(rows.file.encode(errors="replace"), len(k))
-    line = rows.line[k]
-    names = named(rows.targets, rows.target[k], str)
-    return [file, blanked(whole(line), line == 0, b""), names]
+    line = rows.line[some]
+    names = named(rows.targets, rows.target[some], str)
+    file = Cells(rows.file.encode(errors="replace"))
+    return [file, whole(line).unless(line == 0, b""), names]
 
 
-def _number_changes(rows: DiffRows, k: Ints, plain: NDArray[np.bool_]) -> list[Bytes]:
+def _number_changes(rows: DiffRows, some: slice) -> list[Cells]:
     """Write the numbers that changed."""
-    at, owner = number_places(rows.first, k)
-    old, new = rows.original[at], rows.compensated[at]
-    moved = (old != new) & plain[owner]
-    owner = owner[moved]
-    if not len(owner):
-        return [repeated(b"", len(k))] * 3
+    first = rows.first[some.start : some.stop + 1]
+    mine = slice(*first[[0, -1]].tolist())
+    old, new = rows.original[mine], rows.compensated[mine]
+    moved = old != new
+    first = np.append(0, np.cumsum(moved))[first - first[0]]
     both = [
-        strung(fixed(values[moved], DECIMALS), owner, len(k), b", ")
+        fixed(values[moved], DECIMALS).within(b"", b", ", b"").ragged(first)
         for values in (old, new)
     ]
-    arrow = blanked(
-        repeated(b"->", len(k)), np.bincount(owner, minlength=len(k)) == 0, b""
-    )
+    arrow = Cells().within(b"->", b"", b"").unless(np.diff(first) == 0, b"")
     return [both[0], arrow, both[1]]
-
-
-def _masked(cells: Bytes, plain: NDArray[np.bool_]) -> Bytes:
-    """Leave out the rows that are written by themselves."""
-    return cells if plain.all() else np.where(plain[:, None], cells, 0).astype(np.uint8)
-
-
-def _lengths(cells: Bytes) -> Ints:
-    """Count the characters of UTF-8 texts."""
-    shown = cells != 0
-    if (cells >= 0x80).any():
-        shown &= cells & 0xC0 != 0x80
-    lengths: Ints = np.count_nonzero(shown, axis=1)
-    return lengths
 
 
 def _written(row: DiffRow) -> tuple[str, str]:

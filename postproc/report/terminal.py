@@ -25,9 +25,8 @@ from rich.progress import (
 )
 from rich.text import Text
 
-from postproc.arrays import Ints
-from postproc.byte_columns import ByteColumn as Bytes
-from postproc.byte_columns import joined
+from postproc import _native
+from postproc.arrays import Cells, named
 from postproc.exceptions import printable
 
 # Tables: aligned, row by row, never held whole.
@@ -59,14 +58,14 @@ class Block:
     """Some rows of a table.
 
     Attributes:
-        cells: The texts of every column as UTF-8, (k, w) each; coloured in the last
-            column where colours are wanted.
-        lengths: How many characters they have, (k, columns).
+        rows: How many.
+        cells: What stands in every column; coloured in a last column on the left, where
+            colours are wanted.
         single: Rows that are given as texts instead, which may be of any kind.
     """
 
-    cells: Sequence[Bytes]
-    lengths: Ints
+    rows: int
+    cells: Sequence[Cells]
     single: Mapping[int, Sequence[str]] = field(default_factory=dict)
 
     @classmethod
@@ -77,12 +76,9 @@ class Block:
             for k, row in enumerate(rows)
             if coloured or not "".join(row).isprintable()
         }
-        plain = [[""] * len(row) if k in single else row for k, row in enumerate(rows)]
-        columns = [*zip(*plain, strict=True)]
-        encoded = [np.array([t.encode() for t in texts]) for texts in columns]
-        cells = [texts.view(np.uint8).reshape(len(rows), -1) for texts in encoded]
-        lengths = np.array([[*map(len, texts)] for texts in columns]).T
-        return cls(cells, lengths, single)
+        each = np.arange(len(rows))
+        cells = [named(texts, each, str) for texts in zip(*rows, strict=True)]
+        return cls(len(rows), cells, single)
 
 
 def print_table(
@@ -127,7 +123,7 @@ def print_blocks(
     first, rows = [], 0
     while rows < MEASURED and (block := next(given, None)):
         first.append(block)
-        rows += len(block.lengths)
+        rows += block.rows
     titles = [c.title for c in columns]
     left = [c.justify == "left" for c in columns]
     layout = _Layout(left, [shown.get(t) for t in titles])
@@ -136,7 +132,16 @@ def print_blocks(
     print(_Layout(left, bold).line(titles, widths), file=out)
     for block in chain(first, given):
         text, widths = layout.text(block, widths)
-        out.write(text)
+        put(text, out)
+
+
+def put(text: bytes, out: TextIO) -> None:
+    """Write UTF-8, without a way round where a stream takes it as it is."""
+    if isinstance(out, io.TextIOWrapper) and out.encoding.lower() == "utf-8":
+        out.flush()
+        out.buffer.write(text)
+    else:
+        out.write(text.decode())
 
 
 def table_text(columns: Sequence[Column], rows: Iterable[Sequence[str]]) -> str:
@@ -208,53 +213,41 @@ class _Layout:
     left: Sequence[bool]
     colours: Sequence[Callable[[str], str] | None]
 
-    def measured(self, titles: Sequence[str], blocks: Sequence[Block]) -> Ints:
+    def measured(self, titles: Sequence[str], blocks: Sequence[Block]) -> list[int]:
         """Return the widths that titles and the first rows ask for."""
-        lengths = [np.array([[len(title) for title in titles]])]
-        for block in blocks:
-            lengths.append(block.lengths.copy())
-            for k, row in block.single.items():
-                lengths[-1][k] = [len(cell) for cell in row]
-        widths: Ints = np.concatenate(lengths)[: MEASURED + 1].max(axis=0)
+        widths, most = [*map(len, titles)], MEASURED
         widths[-1] *= not self.left[-1]
+        for block in blocks:
+            _, widths = self.text(block, widths, most)
+            most = max(most - block.rows, 0)
         return widths
 
-    def text(self, block: Block, widths: Ints) -> tuple[str, Ints]:
-        """Write rows; return the widths from there on, too."""
-        lengths = block.lengths.copy()
-        for k, row in block.single.items():
-            lengths[k] = [len(printable(cell)) for cell in row]
-        lengths[:, -1] *= not self.left[-1]
-        wide = np.maximum.accumulate(np.concatenate([widths[None], lengths]))
-        parts: list[Bytes | bytes] = []
-        for number, cells in enumerate(block.cells):
-            parts += [GAP.encode()] if number else []
-            blanks = _blanks(wide[:-1, number] - lengths[:, number])
-            parts += [cells, blanks] if self.left[number] else [blanks, cells]
-        text = joined([*parts, b"\n"]).decode()
-        if block.single or " \n" in text:
-            lines = [*map(str.rstrip, text.split("\n"))]
-            for k, row in block.single.items():
-                lines[k] = self.line(row, wide[k])
-            text = "\n".join(lines)
-        return text, wide[-1]
+    def text(
+        self, block: Block, widths: Sequence[int], most: int | None = None
+    ) -> tuple[bytes, list[int]]:
+        """Write rows, or so many of them; return the widths from there on, too."""
+        return _native.aligned(
+            block.rows,
+            block.rows if most is None else most,
+            block.cells,
+            self.left,
+            GAP.encode(),
+            widths,
+            {k: self.cells(row) for k, row in block.single.items()},
+        )
 
-    def line(self, row: Sequence[str], widths: Ints) -> str:
-        """Write a row of texts."""
+    def cells(self, row: Sequence[str]) -> list[tuple[bytes, int]]:
+        """Write the cells of a row, and how many characters each shows."""
         texts = [printable(cell) for cell in row]
-        cells = []
-        for text, width, left, colour in zip(
-            texts, widths.tolist(), self.left, self.colours, strict=True
-        ):
-            cell = text.ljust(width) if left else text.rjust(width)
-            cells.append(paint(cell, colour(text)) if colour else cell)
-        return GAP.join(cells).rstrip()
+        return [
+            (paint(text, colour(text) if colour else "").encode(), len(text))
+            for text, colour in zip(texts, self.colours, strict=True)
+        ]
 
-
-def _blanks(count: Ints) -> Bytes:
-    """Return so many blanks a row; none for less than one."""
-    most = int(count.max(initial=0))
-    return np.where(np.arange(most) < count[:, None], 32, 0).astype(np.uint8)
+    def line(self, row: Sequence[str], widths: Sequence[int]) -> str:
+        """Write one row of texts."""
+        block = Block(1, [Cells()] * len(row), {0: row})
+        return self.text(block, widths)[0].decode().removesuffix("\n")
 
 
 # How far something is.

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from postproc import cli as command_line
+from postproc.compensation import rewrite
 from postproc.compensation.program import Reading, read_program
 from postproc.compensation.rewrite import (
     Output,
@@ -116,3 +117,16 @@ def test_no_defect_of_ours_shows_a_trace(desk, monkeypatch, capsys, error) -> No
     assert "another byte differs" in told and "Traceback" not in told
     assert ("internal error" in told) == (error is ValueError)
     assert desk.names() == {"job.pdl"}
+
+
+def test_what_is_wrong_with_a_text_is_told_before_what_is_wrong_with_visits(
+    job_cell: Cell, monkeypatch
+) -> None:
+    reading, output, rows = written(job_cell)
+    after = read_program(output.files, job_cell)
+    monkeypatch.setattr(rewrite, "equivalent", lambda *given: "visits")
+    with pytest.raises(VerificationError, match=r"\.pdl: visits$"):
+        check(reading, after, output, rows)
+    monkeypatch.setattr(rewrite, "_in_text", lambda *given: "texts")
+    with pytest.raises(VerificationError, match="texts; nothing is written"):
+        check(reading, after, output, rows)

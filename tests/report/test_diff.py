@@ -6,7 +6,7 @@ import json
 
 import pytest
 
-from postproc.report.diff import changed_rows, diff, target_name
+from postproc.report.diff import TextLines, changed_rows, diff, target_name
 from tests.written import FIRST, LISTED, NEXT, POSE, cli, entry, program
 
 
@@ -166,11 +166,16 @@ LINES = (
 )  # fmt: skip
 
 
+def lines_of(text: str) -> TextLines:
+    return TextLines.of(text.encode("latin-1"))
+
+
 @pytest.mark.parametrize("line", LINES)
 def test_a_line_is_named_as_it_is_by_itself(line) -> None:
     before, after = [line.format(text) for text in ("1.5", "2.25")]
-    texts = [[text.encode("latin-1")] * 2 for text in (before, after)]
-    rows = list(changed_rows("a.pdl", [7, 8], *texts))
+    texts = [lines_of("\n".join([text] * 2)) for text in (before, after)]
+    rows = list(changed_rows("a.pdl", *texts, 6))
+    assert [row.line for row in rows] == [7, 8]
     assert [row.target for row in rows] == [target_name(before)] * 2
     assert all(row.original != row.compensated for row in rows)
 
@@ -197,5 +202,5 @@ POS = "POS({0}, 2, 3, 4, 5, 6, '')"
 )
 def test_a_target_is_named_by_its_own_statement(line, name) -> None:
     before, after = [line.format(text) for text in ("1.5", "2.25")]
-    (row,) = changed_rows("a.pdl", [7], [before.encode()], [after.encode()])
+    (row,) = changed_rows("a.pdl", *map(lines_of, (before, after)), 6)
     assert row.target == target_name(before) == name

@@ -15,10 +15,10 @@ from postproc.report.diff import (
     Difference,
     DiffRow,
     DiffRows,
+    TextLines,
     changed_rows,
     diff,
     joined_rows,
-    pair_numbers,
 )
 from postproc.report.diff_output import difference_pieces, print_difference
 from tests.reference.text import mask_line, number_value
@@ -68,8 +68,8 @@ def texts(seed: int, n: int) -> tuple[list[str], list[str]]:
     return before, after
 
 
-def as_bytes(lines: list[str]) -> list[bytes]:
-    return [line.encode("latin-1") for line in lines]
+def as_lines(lines: list[str]) -> TextLines:
+    return TextLines.of("\n".join(lines).encode("latin-1"))
 
 
 def told_of(rng: np.random.Generator, lines: int) -> LineOutcomes:
@@ -117,7 +117,7 @@ def same(rows: list[DiffRow], wanted: list[DiffRow]) -> bool:
 @pytest.mark.parametrize("seed", range(6))
 def test_rows_are_those_made_line_by_line(seed: int) -> None:
     before, after = texts(seed, 700)
-    found = changed_rows("a.pdl", range(1, 701), as_bytes(before), as_bytes(after))
+    found = changed_rows("a.pdl", as_lines(before), as_lines(after))
     wanted = rows_of("a.pdl", before, after)
     assert len(wanted) > 300 and {bool(row.text) for row in wanted} == {True, False}
     assert same(list(found), wanted)
@@ -133,8 +133,7 @@ def test_listing_and_json_are_those_made_row_by_row(seed: int, told: bool) -> No
     record = told_of(np.random.default_rng(seed), n) if told else None
     parts, wanted = [], []
     for name, old, new in files[: 1 + seed % 2]:
-        lines = range(1, len(old) + 1)
-        rows = changed_rows(name, lines, as_bytes(old), as_bytes(new))
+        rows = changed_rows(name, as_lines(old), as_lines(new))
         parts.append(rows.with_told(record))
         own = rows_of(name, old, new)
         wanted += [with_told(row, record) for row in own] if record else own
@@ -160,13 +159,13 @@ def test_what_was_left_alone_is_in_the_json_too() -> None:
 
 def test_rows_of_parts_are_those_of_all() -> None:
     before, after = texts(9, 400)
-    old, new = as_bytes(before), as_bytes(after)
+    old, new = as_lines(before), as_lines(after)
     cuts = [0, 1, 7, 200, 200, 400]
     parts = [
-        changed_rows("a.pdl", range(a + 1, b + 1), old[a:b], new[a:b])
+        changed_rows("a.pdl", old.part(a, b), new.part(a, b), a)
         for a, b in pairwise(cuts)
     ]
-    whole = changed_rows("a.pdl", range(1, 401), old, new)
+    whole = changed_rows("a.pdl", old, new)
     assert same(list(joined_rows("a.pdl", parts)), list(whole))
 
 
@@ -189,24 +188,3 @@ def test_files_that_also_came_and_went(tmp_path, ending: str) -> None:
         masked = mask_line(text)
         spans = zip(masked.start, masked.end, strict=True)
         assert row.original == tuple(number_value(text[a:b]) for a, b in spans)
-
-
-@pytest.mark.parametrize("seed", range(4))
-def test_pairs_are_alike_where_the_definition_says_so(seed: int) -> None:
-    before, after = texts(seed, 500)
-    before.append("p := \0 1")  # a mark of our own in a text is no number
-    after.append("p := 5 1")
-    pairs = pair_numbers(as_bytes(before), as_bytes(after))
-    assert not pairs.alike[-1]
-    found = pair_numbers(as_bytes(before[:-1]), as_bytes(after[:-1]))
-    assert 0.2 < found.alike.mean() < 1.0  # signs differ in many
-    for line in np.flatnonzero(found.alike).tolist():
-        own = found.owner == line
-        masks = mask_line(before[line]), mask_line(after[line])
-        assert masks[0].mask == masks[1].mask
-        assert found.place[own].tolist() == list(masks[0].start)
-        numbers = zip((before, after), masks, (found.old, found.new), strict=True)
-        for lines, masked, values in numbers:
-            spans = zip(masked.start, masked.end, strict=True)
-            wanted = [number_value(lines[line][a:b]) for a, b in spans]
-            assert values[own].tolist() == wanted

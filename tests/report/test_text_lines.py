@@ -4,14 +4,11 @@ from __future__ import annotations
 
 import pytest
 
-from postproc.report import diff
 from postproc.report.diff import TextLines
 
 
 @pytest.mark.parametrize("data", [b"", b"\n", b"one", b"a\nbc\n\nd\n", b"\n\n\nlast"])
-@pytest.mark.parametrize("at_once", [2, 1_000_000])
-def test_lines_are_those_of_a_split(monkeypatch, data: bytes, at_once: int) -> None:
-    monkeypatch.setattr(diff, "AT_ONCE", at_once)
+def test_lines_are_those_of_a_split(data: bytes) -> None:
     wanted = data.split(b"\n")
     lines = TextLines.of(data)
     assert len(lines) == len(wanted) and list(lines) == wanted
@@ -22,3 +19,5 @@ def test_lines_are_those_of_a_split(monkeypatch, data: bytes, at_once: int) -> N
     with pytest.raises(IndexError):
         lines[len(wanted)]
     assert list(TextLines.of(data, 1)) == wanted[1:]
+    for begin, end in ((0, 0), (0, len(wanted)), (1, max(len(wanted), 1))):
+        assert list(lines.part(begin, end)) == wanted[begin:end]
