@@ -17,6 +17,8 @@ from postproc.arrays import Floats
 from postproc.exceptions import PlanError
 from postproc.robot.arm import Arm
 
+MOMENTS = 33  # at which a move is looked at
+
 
 @dataclass(frozen=True, eq=False)
 class JointMove:
@@ -24,10 +26,18 @@ class JointMove:
 
     Attributes:
         duration: [s].
+        peaks: Largest velocities [rad/s] and accelerations [rad/s^2], (2, 6).
     """
 
     duration: float
     _trajectory: Any
+
+    @property
+    def peaks(self) -> Floats:
+        """Sample the whole move: jerk changes at a few moments alone."""
+        times = np.linspace(0.0, self.duration, MOMENTS)
+        told = np.array([self._trajectory.at_time(t)[1:] for t in times.tolist()])
+        return np.asarray(np.abs(told).max(axis=0))
 
     def at(self, time: float) -> tuple[Floats, Floats, Floats]:
         """Return joint angles, velocities and accelerations, (6,) each, at a time."""

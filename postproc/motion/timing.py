@@ -163,17 +163,76 @@ class ArrivalTimes:
         speed: TCP speed at the target, (n,) [m/s], 0 where the arm stops.
         untimed: No time law was found; time and speed are as if the arm kept to the
             programmed speed or to full joint speed, (n,).
+        velocity, acceleration: Largest share of its limit that every joint uses on the
+            way there, (n, 6); of the acceleration only where a time law was found.
+        allowed: Least share of the programmed speed that the joints' velocities allow
+            on the way there, (n,); 1 where they allow all of it.
+        runs: The trajectory of the runs of moves that are not lone JOINT moves.
     """
 
     time: Floats
     speed: Floats
     untimed: Bools
+    velocity: Floats
+    acceleration: Floats
+    allowed: Floats
+    runs: Trajectory
+
+
+@dataclass(frozen=True)
+class Trajectory:
+    """Runs of moves in time at their k waypoints (structure of arrays).
+
+    Attributes:
+        q: Joint angles, (k, 6) [rad].
+        slope: Their derivatives by the path length, (k, 6).
+        s: Path length, which goes on from run to run, (k,) [s].
+        rate: ds/dt, (k,).
+        since: Time since the run began, (k,) [s].
+        begins: True at the first waypoint of each run, (k,).
+        visit: The move that each waypoint belongs to, (k,).
+    """
+
+    q: Floats
+    slope: Floats
+    s: Floats
+    rate: Floats
+    since: Floats
+    begins: Bools
+    visit: Ints
+
+    def sampled(self, step: float) -> tuple[Floats, Ints]:
+        """Sample the runs at least so often, up to the end of each interval.
+
+        Args:
+            step: Time between two samples [s].
+
+        Returns:
+            Joint angles, (m, 6) [rad], and the move of each sample, (m,).
+        """
+        i = np.flatnonzero(~self.begins[1:])  # intervals by the waypoint they begin at
+        lasts = self.since[i + 1] - self.since[i]
+        count = np.maximum(np.ceil(lasts / step), 1).astype(np.int64)
+        own = np.repeat(np.arange(len(i)), count)
+        nth = np.arange(len(own)) - np.repeat(np.cumsum(count) - count, count) + 1
+        t, i = nth / count[own], i[own]
+        h = self.s[i + 1] - self.s[i]
+        push = (self.rate[i + 1] ** 2 - self.rate[i] ** 2) / (2 * h)
+        dt = t * lasts[own]
+        u = np.clip((dt * self.rate[i] + push * dt**2 / 2) / h, 0, 1)[:, None]
+        a, b, h = self.q[i], self.q[i + 1], h[:, None]
+        q = a + (3 - 2 * u) * u**2 * (b - a)
+        q += h * u * (1 - u) * ((1 - u) * self.slope[i] - u * self.slope[i + 1])
+        return np.asarray(q), self.visit[i + 1]
 
 
 def no_time(n: int) -> ArrivalTimes:
     """Leave the times of n arrivals unknown."""
-    unknown = np.full(n, np.nan)
-    return ArrivalTimes(unknown, unknown, np.zeros(n, dtype=bool))
+    unknown, joints = np.full(n, np.nan), np.full((n, 6), np.nan)
+    no = np.zeros(n, dtype=bool)
+    none, nowhere = np.empty(0), np.empty((0, 6))
+    runs = Trajectory(nowhere, nowhere, none, none, none, no[:0], np.empty(0, int))
+    return ArrivalTimes(unknown, unknown, no, joints, joints, unknown, runs)
 
 
 def tell_time(arm: Arm, targets: Targets, traced: Trace) -> ArrivalTimes:
@@ -182,27 +241,45 @@ def tell_time(arm: Arm, targets: Targets, traced: Trace) -> ArrivalTimes:
     first, end = runs(targets, source)
     lone = (end - first == 1) & (targets.move[first] == Motion.JOINT)
     points = waypoints(arm, targets, traced, edge, source, first[~lone], end[~lone])
-    since, velocity, failed = _run_times(arm, points)
+    law = _run_laws(arm, points)
     inside = points.at >= 0
     at = points.at[inside]
-    duration, joint_velocity = np.zeros(len(targets)), np.zeros((len(targets), 6))
-    duration[inside] = since[at]
+    n = len(targets)
+    duration, joint_velocity = np.zeros(n), np.zeros((n, 6))
+    duration[inside] = law.since[at]
     goes_on = np.flatnonzero(inside)
     goes_on = goes_on[~np.isin(goes_on, first)]
-    duration[goes_on] -= since[points.at[goes_on - 1]]
-    joint_velocity[inside] = velocity[at]
-    untimed = np.zeros(len(targets), dtype=bool)
-    untimed[inside] = failed[at]
+    duration[goes_on] -= law.since[points.at[goes_on - 1]]
+    joint_velocity[inside] = law.velocity[at]
+    untimed = np.zeros(n, dtype=bool)
+    untimed[inside] = law.failed[at]
+    visit = _visits(points)
+    used = law.used(arm, points, visit, n)
     moves = JointMoves(arm)
     for v in first[lone].tolist():
         begin, override = traced.q[source[v]], float(targets.override[v])
         try:
-            duration[v] = moves.move(begin, traced.q[v], override).duration
+            move = moves.move(begin, traced.q[v], override)
+            duration[v] = move.duration
+            used[0][v], used[1][v] = move.peaks / [arm.velocity, arm.acceleration]
         except PlanError:
             full = np.abs(traced.q[v] - begin) / arm.velocity
             duration[v], untimed[v] = full.max() / override, True
     speed = _speeds(arm, targets, traced, joint_velocity)
-    return ArrivalTimes(_times(targets, duration), speed, untimed)
+    trajectory = Trajectory(
+        points.q, law.slope, np.cumsum(points.ds), law.rate, law.since, points.begins,
+        visit,
+    )  # fmt: skip
+    return ArrivalTimes(_times(targets, duration), speed, untimed, *used, trajectory)
+
+
+def _visits(points: Waypoints) -> Ints:
+    """Return the move that each waypoint belongs to, (k,)."""
+    inside = np.flatnonzero(points.at >= 0)
+    if not len(inside):
+        return inside
+    nth = np.searchsorted(points.at[inside], np.arange(len(points.ds)))
+    return np.asarray(inside[np.minimum(nth, len(inside) - 1)])
 
 
 def main_edges(targets: Targets, traced: Trace) -> tuple[Ints, Ints]:
@@ -234,18 +311,51 @@ def runs(targets: Targets, source: Ints) -> tuple[Ints, Ints]:
     return first[timed], end[timed]
 
 
-def _run_times(arm: Arm, points: Waypoints) -> tuple[Floats, Floats, Bools]:
-    """Time all waypoints.
+@dataclass(frozen=True)
+class _Laws:
+    """The time laws of all runs at their k waypoints.
 
-    Returns:
-        Times since their run began, (k,) [s], joint velocities, (k, 6) [rad/s], and
-        where no time law was found, (k,).
+    Attributes:
+        since: Time since the run began, (k,) [s].
+        slope, rate: As in `Trajectory`.
+        velocity, acceleration: Of the joints, (k, 6) [rad/s], [rad/s^2].
+        fastest: ds/dt that the joints' velocities allow, (k,).
+        failed: Where no time law was found, (k,).
     """
+
+    since: Floats
+    slope: Floats
+    rate: Floats
+    velocity: Floats
+    acceleration: Floats
+    fastest: Floats
+    failed: Bools
+
+    def used(
+        self, arm: Arm, points: Waypoints, visit: Ints, n: int
+    ) -> tuple[Floats, Floats, Floats]:
+        """Return what `ArrivalTimes` says of the joints, given each waypoint's move."""
+        velocity, acceleration = np.zeros((2, n, 6))
+        allowed = np.ones(n)
+        if len(visit):
+            np.maximum.at(velocity, visit, np.abs(self.velocity) / arm.velocity)
+            pushed = np.abs(self.acceleration) / arm.acceleration
+            np.maximum.at(acceleration, visit, pushed)
+            limit = points.limit()
+            share = np.where(np.isfinite(limit), self.fastest / limit, 1.0)
+            np.minimum.at(allowed, visit, np.where(limit > 0, share, 1.0))
+        return velocity, acceleration, allowed
+
+
+def _run_laws(arm: Arm, points: Waypoints) -> _Laws:
+    """Find the time laws of all runs."""
     k = len(points.ds)
-    since, velocity = np.zeros(k), np.zeros((k, 6))
-    failed = np.zeros(k, dtype=bool)
+    laws = _Laws(
+        np.zeros(k), np.zeros((k, 6)), np.zeros(k), np.zeros((k, 6)), np.zeros((k, 6)),
+        np.full(k, np.inf), np.zeros(k, dtype=bool),
+    )  # fmt: skip
     if k == 0:
-        return since, velocity, failed
+        return laws
     from postproc.motion import toppra  # slow to load: it brings a plotting library
 
     begins = np.flatnonzero(points.begins)
@@ -261,15 +371,31 @@ def _run_times(arm: Arm, points: Waypoints) -> tuple[Floats, Floats, Bools]:
             law = toppra.time_laws(
                 arm, points.q[rows], s[rows], limit[rows], points.begins[rows]
             )
-            since[rows] = law.time / points.override[rows]
-            velocity[rows] = law.velocity * points.override[rows, None]
         except PlanError:
             if b - a > 1:
                 todo += [(a, (a + b) // 2), ((a + b) // 2, b)]
                 continue
-            since[rows], velocity[rows] = _estimate(points, rows)
-            failed[rows] = True
-    return since, velocity, failed
+            laws.since[rows], laws.velocity[rows] = _estimate(points, rows)
+            _go_evenly(laws, points, rows)
+            continue
+        override = points.override[rows, None]
+        laws.since[rows] = law.time / override[:, 0]
+        laws.slope[rows], laws.rate[rows] = law.slope, law.rate * override[:, 0]
+        laws.velocity[rows] = law.velocity * override
+        laws.acceleration[rows] = law.acceleration * override**2
+        with np.errstate(divide="ignore"):
+            laws.fastest[rows] = (arm.velocity / np.abs(law.slope)).min(axis=1)
+    return laws
+
+
+def _go_evenly(laws: _Laws, points: Waypoints, rows: slice) -> None:
+    """Let one run without a time law go from waypoint to waypoint in straight lines."""
+    laws.failed[rows] = True
+    lasts, ds = np.diff(laws.since[rows]), points.ds[rows][1:]
+    chord = np.diff(points.q[rows], axis=0) / np.maximum(ds, SHORTEST)[:, None]
+    laws.slope[rows] = np.vstack([chord[:1], chord])
+    rate = ds / np.maximum(lasts, SHORTEST)
+    laws.rate[rows] = np.append(rate[:1], rate)
 
 
 def _estimate(points: Waypoints, rows: slice) -> tuple[Floats, Floats]:

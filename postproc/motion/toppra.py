@@ -3,19 +3,43 @@
 from __future__ import annotations
 
 import logging
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
+from types import ModuleType
 from typing import Any
 
 import numpy as np
-import toppra
-import toppra.algorithm
-import toppra.constraint
 from scipy.interpolate import CubicHermiteSpline
 from scipy.linalg import solve_banded
 
 from postproc.arrays import Bools, Floats
 from postproc.exceptions import PlanError
 from postproc.robot.arm import Arm
+
+PLOTS = ("matplotlib", "matplotlib.pyplot")
+
+
+@contextmanager
+def _without_plots() -> Iterator[None]:
+    """Let an import do without the plotting library that only its plots would need.
+
+    It takes longer to load than all that is used of it.
+    """
+    absent = [name for name in PLOTS if name not in sys.modules]
+    sys.modules.update({name: ModuleType(name) for name in absent})
+    try:
+        yield
+    finally:
+        for name in absent:
+            del sys.modules[name]
+
+
+with _without_plots():
+    import toppra
+    import toppra.algorithm
+    import toppra.constraint
 
 # Natural cubic splines through the waypoints of many runs at once.
 
@@ -78,7 +102,7 @@ class Runs:
     Attributes:
         s: Path positions, (k,).
         q: Joint angles, (k, 6) [rad].
-        slope: dq/ds, (k, 6).
+        slope, curve: dq/ds and its derivative, (k, 6) each.
         rate: ds/dt, (k,), 0 at both ends of each run.
         time: Time since the run began, (k,) [s].
     """
@@ -86,8 +110,18 @@ class Runs:
     s: Floats
     q: Floats
     slope: Floats
+    curve: Floats
     rate: Floats
     time: Floats
+
+    @property
+    def acceleration(self) -> Floats:
+        """Joint accelerations behind the waypoints, (k, 6) [rad/s^2]."""
+        squares, ds = np.diff(self.rate**2), np.diff(self.s)
+        push = np.zeros((len(self.s), 1))
+        moves = np.flatnonzero(ds > 0)  # from a run to the next nothing does
+        push[moves, 0] = squares[moves] / (2 * ds[moves])
+        return np.asarray(self.curve * self.rate[:, None] ** 2 + self.slope * push)
 
     @property
     def velocity(self) -> Floats:
@@ -180,7 +214,7 @@ def time_laws(arm: Arm, q: Floats, s: Floats, limit: Floats, begins: Bools) -> R
     lasts[~begins] = 2 * step[~begins] / between
     total = np.cumsum(lasts)
     since = total - total[np.maximum.accumulate(np.where(begins, np.arange(len(s)), 0))]
-    return Runs(s, q, first, rate, since)
+    return Runs(s, q, first, second, rate, since)
 
 
 def _in_windows(arm: Arm, along: Floats, orders: Orders, bound: Floats) -> Floats:

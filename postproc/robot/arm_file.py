@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 import tomllib
 from pathlib import Path
-from typing import Annotated, TypeVar
+from typing import Annotated, Literal, TypeVar
 
 import pydantic
 from pydantic import BaseModel, ConfigDict, Field, PositiveFloat, model_validator
@@ -136,6 +136,7 @@ class ArmJointSection(Strict):
     velocity_deg_s: Sextuple
     acceleration_deg_s2: Sextuple
     jerk_deg_s3: Sextuple
+    guessed: list[Literal["velocity", "acceleration", "jerk"]] = []
     play_deg: Sextuple = [0.01] * 6
     gear_ratio: Sextuple | None = None
     drive_coupling: (

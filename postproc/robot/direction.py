@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from postproc import _native
-from postproc.arrays import Floats, Ints
+from postproc.arrays import Bools, Floats, Ints
 from postproc.robot.arm import Arm
 from postproc.robot.play import (
     NOTHING,
@@ -28,6 +28,8 @@ from postproc.robot.play import (
     chains_of,
     drive_paths,
     last_reversals,
+    passing,
+    prefix,
 )
 
 WIDTH_IN_PLAYS = 4.0
@@ -234,6 +236,29 @@ def _sides(arm: Arm, q: Floats, passed: Passages, before: Clamps) -> Sides:
     half = _half_width(arm)
     z = _states(chains, passed.clamps, half, before)
     return Sides(_side(chains.angles, z, half), z)
+
+
+def sides_along(
+    arm: Arm, q: Floats, begins: Bools, play: Clamps
+) -> tuple[Floats, Floats]:
+    """Place every joint in its play along some ways.
+
+    Args:
+        arm: The arm; its play and coupling are used.
+        q: Samples of the ways, one after the other, (s, 6) [rad]; the first one of each
+            is where it begins.
+        begins: The first samples, (s,).
+        play: What is known of the play's state there, one row each, (k, 6) [rad].
+
+    Returns:
+        The least and the largest side that it may be, (s, 6) each from -1 to 1; equal
+        where the side is known.
+    """
+    angles, half = q @ arm.coupling.T, _half_width(arm)
+    passed = prefix(passing(angles, half), begins)
+    way = np.cumsum(begins) - 1
+    lo, hi = passed(play.lo[way]), passed(play.hi[way])
+    return (angles - hi) / half, (angles - lo) / half
 
 
 def _half_width(arm: Arm) -> Floats:
