@@ -98,6 +98,9 @@ def simulate(
         Path | None,
         typer.Option("--wanted", help="Original program: print the true error."),
     ] = None,
+    path: Annotated[
+        bool, typer.Option("--path", help="Score the paths between targets as well.")
+    ] = False,
     json: JsonOption = None,
 ) -> None:
     """Let the virtual arm run a program or a survey, and measure it."""
@@ -106,7 +109,7 @@ def simulate(
     with explained():
         check_places([output, as_path(json)], [program, cell, wanted])
         with busy("run on the virtual arm"):
-            found = simulate_file(program, cell, seed, effects, wanted)
+            found = simulate_file(program, cell, seed, effects, wanted, path)
         if output is not None:
             found.write(output)
         if json:

@@ -14,6 +14,7 @@ from postproc.language.visits import Visits
 from postproc.model.statistics import ErrorStatistics
 from postproc.report.json import finite
 from postproc.robot.cell import Cell, load_cell
+from postproc.robot.pose import MM
 from postproc.simulation import (
     DEFAULT,
     Campaign,
@@ -29,6 +30,7 @@ from postproc.simulation import (
     virtual_arm,
     write_measurements,
 )
+from postproc.simulation.path import PathScores, score_paths
 
 
 @dataclass(frozen=True)
@@ -39,11 +41,15 @@ class Simulation:
         name: The program or survey.
         campaign: What the tracker read.
         true_error: Where the tool landed against the wanted program, or None.
+        paths: How far the tool was from the paths of the wanted program, or None.
+        lines: Line of every visit of that program.
     """
 
     name: str
     campaign: Campaign
     true_error: ErrorStatistics | None
+    paths: PathScores | None = None
+    lines: tuple[int, ...] = ()
 
     def write(self, path: Path) -> None:
         """Write the readings as a measurement file.
@@ -56,7 +62,36 @@ class Simulation:
     def to_json(self) -> str:
         """Return the true error as JSON text."""
         error = None if self.true_error is None else asdict(self.true_error)
-        return json.dumps(finite({"program": self.name, "true_error": error})) + "\n"
+        told: dict[str, object] = {"program": self.name, "true_error": error}
+        if self.paths is not None:
+            told |= {"path_accuracy": asdict(self.path_accuracy), "path": self._moves()}
+        return json.dumps(finite(told)) + "\n"
+
+    @property
+    def path_accuracy(self) -> ErrorStatistics:
+        """Return the statistics of AT_p over the moves."""
+        sizes = np.empty(0) if self.paths is None else self.paths.largest
+        return ErrorStatistics.of_sizes(sizes)
+
+    def _moves(self) -> list[dict[str, object]]:
+        """Describe how far the tool was from the path of each move."""
+        paths = self.paths
+        if paths is None:
+            return []
+        moves: list[dict[str, object]] = []
+        for k, visit in enumerate(paths.visit.tolist()):
+            own = slice(*paths.first[k : k + 2].tolist())
+            largest = own.start + int(paths.across[own].argmax())
+            moves.append(
+                {
+                    "line": self.lines[visit],
+                    "visit": visit,
+                    "max_mm": round(float(paths.across[largest]) / MM, 5),
+                    "at_mm": round(float(paths.way[largest]) / MM, 3),
+                    "along_mm": round(float(np.abs(paths.along[own]).max()) / MM, 5),
+                }
+            )
+        return moves
 
     def summary(self) -> str:
         """Say in one line what was measured or missed."""
@@ -65,9 +100,16 @@ class Simulation:
         e = self.true_error
         if e.n == 0:
             return f"{self.name}: no target of it is known, so no error either"
-        return (
+        said = (
             f"{self.name}: true error mean {e.mean_mm:.4f} mm, std {e.std_mm:.4f}, "
             f"95 % {e.p95_mm:.4f}, max {e.max_mm:.4f} over {e.n} visits"
+        )
+        if self.paths is None:
+            return said
+        p = self.path_accuracy
+        return (
+            f"{said}; path accuracy AT_p (systematic part) mean {p.mean_mm:.4f} mm, "
+            f"95 % {p.p95_mm:.4f}, max {p.max_mm:.4f} over {p.n} moves"
         )
 
 
@@ -98,6 +140,7 @@ def simulate_file(
     seed: int = 1,
     effects: str | None = None,
     wanted: Path | None = None,
+    path: bool = False,
 ) -> Simulation:
     """Run a program or a survey on the virtual arm.
 
@@ -107,6 +150,7 @@ def simulate_file(
         seed: Which virtual arm.
         effects: Effects beyond geometry, tool and backlash, comma separated.
         wanted: The program that says where the tool should have landed.
+        path: Score the paths between the targets as well.
 
     Raises:
         PostprocError: A file cannot be used, or an effect is not known.
@@ -129,8 +173,16 @@ def simulate_file(
         tool=setup.tool,
     )
     campaign = measure_program(arm, setup, visits)
-    error = None if wanted is None else true_error(arm, setup, visits, wanted, cell)
-    return Simulation(program.name, campaign, error)
+    if wanted is None and not path:
+        return Simulation(program.name, campaign, None)
+    original = visits if wanted is None else visits_of(wanted, cell)
+    error = true_error(arm, setup, visits, original)
+    if not path:
+        return Simulation(program.name, campaign, error)
+    scores = score_paths(arm, setup, original, visits)
+    return Simulation(
+        program.name, campaign, error, scores, tuple(original.line.tolist())
+    )
 
 
 def visits_of(program: Path, cell: Cell) -> Visits:
@@ -139,10 +191,9 @@ def visits_of(program: Path, cell: Cell) -> Visits:
 
 
 def true_error(
-    arm: VirtualArm, setup: VirtualCell, executed: Visits, wanted: Path, cell: Cell
+    arm: VirtualArm, setup: VirtualCell, executed: Visits, original: Visits
 ) -> ErrorStatistics:
-    """Compare where the tool landed with where the wanted program says."""
-    original = visits_of(wanted, cell)
+    """Compare where the tool landed with where the original program says."""
     landing = land(arm, setup, original, executed)
     targets = original.literal[landing.visit] >= 0
     return ErrorStatistics.of(landing.error[targets])

@@ -156,6 +156,15 @@ def move(gears: Gears, state: GearState, path: Floats) -> GearState:
     return state
 
 
+def follow(gears: Gears, state: GearState, path: Floats) -> list[GearState]:
+    """Follow a joint path (m, 6) as `move` does; return the state at every place."""
+    states = []
+    for angle in path @ gears.coupling.T:
+        state = _step(gears.gap, state, angle)
+        states.append(state)
+    return states
+
+
 def turning_points(path: Floats) -> Floats:
     """Return the points (k, 6) of a path (m, 6) where a joint turns, and its end."""
     steps = np.diff(path, axis=0)

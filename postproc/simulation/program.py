@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -65,7 +66,20 @@ def run_program(arm: VirtualArm, setup: VirtualCell, visits: Visits) -> ProgramR
         setup: Its cell.
         visits: The program.
     """
-    poses = pose_of_record(visits.frames) if len(visits.frames) else np.eye(4)[None]
+    poses = _poses(visits)
+    places = [place for _, _, place in _places(arm, setup, visits, poses)]
+    return _collect(arm, setup, visits, poses, places)
+
+
+def _poses(visits: Visits) -> Floats:
+    """Return the frames of a program, (k, 4, 4)."""
+    return pose_of_record(visits.frames) if len(visits.frames) else np.eye(4)[None]
+
+
+def _places(
+    arm: VirtualArm, setup: VirtualCell, visits: Visits, poses: Floats
+) -> Iterator[tuple[Drive, _ProgramPlace, _ProgramPlace]]:
+    """Run move after move: yield the way, and the arm before and behind it."""
     start = _start(arm, setup)
     drives = plan_drives(setup, visits, poses, start.joints)
     places: list[_ProgramPlace] = []
@@ -75,7 +89,52 @@ def run_program(arm: VirtualArm, setup: VirtualCell, visits: Visits) -> ProgramR
             gears = at_start(arm.gears, drive.begin, start.gears.side)
             place = _ProgramPlace(drive.begin, gears)
         places.append(_go(arm, setup, visits, i, drive, place))
-    return _collect(arm, setup, visits, poses, places)
+        yield drive, place, places[-1]
+
+
+@dataclass(frozen=True)
+class DrivenMove:
+    """One move as it is run.
+
+    Attributes:
+        visit: Index of the visit.
+        path: Joints on the way, from where the arm stands, (m, 6) [rad].
+        gears: Where the gears are before.
+        tool: Flange to TCP, (4, 4) [m].
+        speed: Of the TCP [m/s].
+        begins, lasted: When it begins, and how long it takes [s].
+        why: Why the visit was not reached, or "".
+    """
+
+    visit: int
+    path: Floats
+    gears: GearState
+    tool: Floats
+    speed: float
+    begins: float
+    lasted: float
+    why: str
+
+
+def run_moves(
+    arm: VirtualArm, setup: VirtualCell, visits: Visits
+) -> Iterator[DrivenMove]:
+    """Run a program as `run_program` does, and tell of every move.
+
+    Args:
+        arm: Whose gears and clock.
+        setup: Its cell.
+        visits: The program.
+    """
+    poses, time = _poses(visits), 0.0
+    for i, (drive, before, after) in enumerate(_places(arm, setup, visits, poses)):
+        path = np.vstack([before.joints, drive.path])
+        tool = poses[visits.tool[i]]
+        moves = after.lasted - SETTLE
+        yield DrivenMove(
+            i, path, before.gears, tool, after.speed, time, moves, after.why
+        )
+        time += after.lasted
 
 
 def _start(arm: VirtualArm, setup: VirtualCell) -> _ProgramPlace:

@@ -1,0 +1,170 @@
+"""How the tool really goes between the targets when the virtual arm runs a program."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from postproc.arrays import Floats, Ints
+from postproc.language.visits import Visits
+from postproc.robot.trajectory import Motion
+from postproc.simulation.arm import GearState, VirtualArm, follow
+from postproc.simulation.controller import VirtualCell
+from postproc.simulation.program import run_moves
+from postproc.simulation.state import make_arrivals
+
+STEP = 1e-3  # [m] between places that are looked at
+AROUND = 40  # pieces of the wanted path in which the nearest place is looked for
+
+
+@dataclass(frozen=True)
+class PathScores:
+    """How far the TCP is from m wanted paths, s samples in all (structure of arrays).
+
+    Attributes:
+        visit: Index of the visit at the end of each LINEAR or CIRCULAR move, (m,).
+        first: Its samples are first[k] .. first[k + 1] - 1, (m + 1,).
+        way: Length of the wanted path up to every sample, (s,) [m].
+        across: Distance from the wanted path, (s,) [m].
+        along: How far the TCP is ahead of the same share of the way, (s,) [m].
+    """
+
+    visit: Ints
+    first: Ints
+    way: Floats
+    across: Floats
+    along: Floats
+
+    @property
+    def largest(self) -> Floats:
+        """Path accuracy AT_p of every move, its systematic part, (m,) [m]."""
+        if not len(self.visit):
+            return np.empty(0)
+        return np.asarray(np.maximum.reduceat(self.across, self.first[:-1]))
+
+
+@dataclass(frozen=True)
+class _Track:
+    """One move as it is run: the nominal TCP and the real one, (k, 3) [m] each."""
+
+    nominal: Floats
+    real: Floats
+
+
+def score_paths(
+    arm: VirtualArm,
+    setup: VirtualCell,
+    original: Visits,
+    executed: Visits | None = None,
+) -> PathScores:
+    """Run a program and compare its paths with those that the original asks for.
+
+    Args:
+        arm: The arm that runs it.
+        setup: Its cell.
+        original: The program as it came from the drawing.
+        executed: The compensated program; default the original itself.
+    """
+    wanted = dict(_tracks(arm, setup, original))
+    done = wanted if executed is None else dict(_tracks(arm, setup, executed))
+    visit, parts = [], []
+    for i in sorted(wanted.keys() & done.keys()):
+        visit.append(i)
+        parts.append(_apart(done[i], wanted[i].nominal))
+    count = [len(way) for way, _, _ in parts]
+    columns = [np.concatenate([*c, np.empty(0)]) for c in zip(*parts, strict=True)]
+    first = np.append(0, np.cumsum(count)).astype(np.int64)
+    return PathScores(
+        np.array(visit, dtype=np.int64), first, *(columns or [np.empty(0)] * 3)
+    )
+
+
+def _tracks(
+    arm: VirtualArm, setup: VirtualCell, visits: Visits
+) -> Iterator[tuple[int, _Track]]:
+    """Follow every Cartesian move, with the gears at every sample."""
+    for run in run_moves(arm, setup, visits):
+        if run.why or visits.motion[run.visit] == Motion.JOINT:
+            continue
+        q = _finer(run.path, arm.nominal.flange(run.path)[:, :3, 3])
+        gears = [run.gears, *follow(arm.gears, run.gears, q[1:])]
+        part = np.linspace(0.0, 1.0, len(q))
+        arrivals = make_arrivals(
+            q,
+            _column(gears, "side"),
+            run.tool,
+            travel=_column(gears, "travel"),
+            loop=_column(gears, "loop"),
+            speed=run.speed,
+            time=run.begins + part * run.lasted,
+            temperature=arm.temperature(
+                run.begins + part * run.lasted, setup.temperature
+            ),
+            payload=setup.payload,
+            payload_com=setup.payload_com,
+        )
+        yield run.visit, _Track(arm.nominal_tcp(arrivals), arm.tcp(arrivals))
+
+
+def _column(gears: list[GearState], name: str) -> Floats:
+    return np.array([getattr(state, name) for state in gears])
+
+
+def _finer(path: Floats, flange: Floats) -> Floats:
+    """Sample a joint path (m, 6) every millimetre of its flange (m, 3)."""
+    moved = np.any(np.diff(path, axis=0) != 0.0, axis=1)
+    path = path[np.append(True, moved)]
+    if len(path) < 2:
+        return path
+    length = float(np.linalg.norm(np.diff(flange, axis=0), axis=1).sum())
+    joints = np.linalg.norm(np.diff(path, axis=0), axis=1)
+    marks = np.append(0.0, np.cumsum(joints))
+    count = max(int(np.ceil(length / STEP)), len(path)) + 1
+    return np.asarray(CubicSpline(marks, path)(np.linspace(0.0, marks[-1], count)))
+
+
+def _apart(done: _Track, wanted: Floats) -> tuple[Floats, Floats, Floats]:
+    """Compare a move with its wanted path, (n, 3).
+
+    The ends of the wanted path go on straight: what is only late or early there is no
+    distance from it.
+
+    Returns:
+        Length of the wanted path, distance from it, and how far the TCP is ahead,
+        (k,) [m] each.
+    """
+    step = np.diff(wanted, axis=0)
+    size = np.linalg.norm(step, axis=1)
+    keep = size > 1e-9
+    begin, step, size = wanted[:-1][keep], step[keep], size[keep]
+    if not len(size):
+        off = np.linalg.norm(done.real - wanted[-1], axis=1)
+        return np.zeros(len(off)), off, np.zeros(len(off))
+    way = np.append(0.0, np.cumsum(size))
+    where, across = _project(done.real, begin, step, size, way)
+    moved = np.linalg.norm(np.diff(done.nominal, axis=0), axis=1)
+    run = np.append(0.0, np.cumsum(moved))
+    return where, across, where - way[-1] * run / max(run[-1], 1e-12)
+
+
+def _project(
+    points: Floats, begin: Floats, step: Floats, size: Floats, way: Floats
+) -> tuple[Floats, Floats]:
+    """Find the nearest places on a path: its length up to there, and the distance."""
+    n, k = len(size), len(points)
+    middle = np.linspace(0, n - 1, k).round().astype(int)
+    near = middle[:, None] + np.arange(-AROUND, AROUND + 1)
+    near = np.clip(near, 0, n - 1)
+    off = points[:, None] - begin[near]
+    t = np.einsum("kni,kni->kn", off, step[near]) / size[near] ** 2
+    t = np.clip(
+        t, np.where(near == 0, -np.inf, 0.0), np.where(near == n - 1, np.inf, 1)
+    )
+    distance = np.linalg.norm(off - t[..., None] * step[near], axis=2)
+    best = distance.argmin(axis=1)
+    rows = np.arange(k)
+    at = near[rows, best]
+    return way[at] + t[rows, best] * size[at], distance[rows, best]
