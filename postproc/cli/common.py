@@ -61,6 +61,13 @@ ProcessesOption = Annotated[
         "--jobs", "-j", min=0, help="Processes; 0: one for a core, 8 at the most."
     ),
 ]
+TimingOption = Annotated[
+    bool | None,
+    typer.Option(
+        "--timing/--no-timing",
+        help="Run the program in time; default: if it has up to 5,000 targets.",
+    ),
+]
 TemperatureOption = Annotated[
     float | None, typer.Option("--temperature", help="Arm temperature [deg C].")
 ]

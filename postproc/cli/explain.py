@@ -13,6 +13,7 @@ import numpy as np
 from postproc.arrays import Floats, Ints, Signs
 from postproc.cli.jobs import read_files
 from postproc.compensation.compensate import compensate
+from postproc.compensation.in_time import InTime
 from postproc.compensation.options import AS_USUAL, Options
 from postproc.compensation.outcome import Outcome, Status
 from postproc.compensation.program import (
@@ -48,6 +49,7 @@ COLUMNS = (
     Column("+- x, y, z [mm]"),
     Column(STATUS, "left"),
 )
+IN_TIME = (Column("v [mm/s]"), Column("AT_p [mm]"))  # where it was run in time
 PLANNED = (*COLUMNS[:5], Column(STATUS, "left"))  # without a model
 SHARES = (Column("effect", "left"), *map(Column, ("share mm", "x", "y", "z")))
 WHOLE = "predicted error"  # the sum of the shares
@@ -140,7 +142,9 @@ class Explanation:
         """
         rows = self._chosen(line)
         cells = (self._cells(i) for i in rows.tolist())
-        columns = PLANNED if self.outcome is None else COLUMNS
+        columns: Sequence[Column] = PLANNED if self.outcome is None else COLUMNS
+        if self._in_time is not None:
+            columns = (*COLUMNS[:-1], *IN_TIME, COLUMNS[-1])
         print_table(columns, cells, {STATUS: status_colour})
         if line is None:
             print(self.summary())
@@ -163,7 +167,10 @@ class Explanation:
     def summary(self) -> str:
         """Say in one line what came of the program."""
         if self.outcome is not None:
-            return printable(self.outcome.summary())
+            said = [self.outcome.summary()]
+            if self.outcome.in_time is not None:
+                said.append(self.outcome.in_time.summary())
+            return "\n".join(map(printable, said))
         known = np.isfinite(self.q).all(axis=1)
         return f"{len(self.visits)} visits, {int((~known).sum())} of them not planned"
 
@@ -181,7 +188,23 @@ class Explanation:
         sure = " ".join(_told(s, 5, 3) for s in d.std_error[i] / MM)
         status = Status(d.status[i]).name.lower()
         why = d.reasons[d.why[i]]
-        return [*cells, moved, sure, f"{status}: {why}" if why else status]
+        said = f"{status}: {why}" if why else status
+        return [*cells, moved, sure, *self._timed(i), said]
+
+    @property
+    def _in_time(self) -> InTime | None:
+        """The program run in time, None where nobody asked."""
+        return None if self.outcome is None else self.outcome.in_time
+
+    def _timed(self, i: int) -> list[str]:
+        """Write how fast visit i is passed, and how well the way there is kept to."""
+        told = self._in_time
+        if told is None:
+            return []
+        speed = float(told.after.clock.speed[i]) / MM
+        at = np.flatnonzero(told.paths.visit == i)
+        sizes = [f"{size:.3f}" for size in (told.paths.after.sizes[at] / MM).tolist()]
+        return [_told(speed, 7, 1), *(sizes or [""])]
 
     def _from(self, i: int) -> str:
         """Name the lines that visit i is reached from."""

@@ -67,6 +67,9 @@ def batch(
     orientation: OrientationOption = False,
     temperature: TemperatureOption = None,
     strict_calls: StrictCallsOption = False,
+    timing: Annotated[
+        bool, typer.Option("--timing", help="Run every program in time.")
+    ] = False,
 ) -> None:
     """Compensate a tree of programs; what could not be compensated is not in DST."""
     with explained():
@@ -79,7 +82,9 @@ def batch(
         from postproc.compensation.options import Options
         from postproc.report.terminal import progress_bar
 
-        options = Options(clone, False, temperature, orientation, strict_calls)
+        options = Options(
+            clone, False, temperature, orientation, strict_calls, timing=timing
+        )
         made = make_plan(plan, cell, model, options)
         check_places([html], [cell, model, plan])
         order = run.Order(source, target, made, log or run.default_log(target), resume)

@@ -20,6 +20,7 @@ from postproc.cli.common import (
     ProcessesOption,
     StrictCallsOption,
     TemperatureOption,
+    TimingOption,
     app,
     as_path,
     busy,
@@ -70,6 +71,7 @@ def compensate(
     orientation: OrientationOption = False,
     temperature: TemperatureOption = None,
     strict_calls: StrictCallsOption = False,
+    timing: TimingOption = None,
     processes: ProcessesOption = 0,
 ) -> None:
     """Rewrite a program so that the tool lands where its targets say."""
@@ -81,7 +83,9 @@ def compensate(
 
     given = None if is_stream(program) else Path(program)
     with explained(given, lsv):
-        options = Options(clone, shared, temperature, orientation, strict_calls)
+        options = Options(
+            clone, shared, temperature, orientation, strict_calls, timing=timing
+        )
         if report == Path(STREAM) and given is None and output is None:
             raise PostprocError("--report -: stdout holds the program. Name a file")
         check_places([output, report, html, lsv_out], [given, lsv, cell, model])
@@ -134,6 +138,8 @@ def _print_outcome(outcome: Outcome) -> None:
         if source:
             say(source)
     say(outcome.summary())
+    if outcome.in_time is not None:
+        say(outcome.in_time.summary())
 
 
 @app.command()
@@ -185,6 +191,7 @@ def explain(
     ] = None,
     temperature: TemperatureOption = None,
     strict_calls: StrictCallsOption = False,
+    timing: TimingOption = None,
     json: JsonOption = None,
 ) -> None:
     """Show why every target moves: from where it is reached, and what that costs."""
@@ -194,7 +201,10 @@ def explain(
     with explained(program, lsv):
         check_places([as_path(json)], [program, cell, model, lsv])
         options = Options(
-            temperature=temperature, strict_calls=strict_calls, explained=True
+            temperature=temperature,
+            strict_calls=strict_calls,
+            explained=True,
+            timing=timing,
         )
         with busy("plan"):
             found = explain_file(program, cell, model, lsv, options)

@@ -20,6 +20,7 @@ from postproc.compensation.clones import give_own_points
 from postproc.compensation.decide import Proposal
 from postproc.compensation.eligibility import overruled
 from postproc.compensation.frames import correct_taught
+from postproc.compensation.in_time import InTime, load_time_laws, run_in_time
 from postproc.compensation.iterate import (
     FROM_START,
     Converged,
@@ -54,7 +55,7 @@ from postproc.compensation.outcome import (
     left_elsewhere,
     tell_arrivals,
 )
-from postproc.compensation.parallel import in_processes
+from postproc.compensation.parallel import in_background, in_processes
 from postproc.compensation.program import (
     Planned,
     Reading,
@@ -509,6 +510,8 @@ def compensate(
     setting = Setting(cell, model, options, Clock(progress), processes)
     with setting.clock("parse"):
         reading = read_program(files, cell)
+    if options.times(len(reading.visits)):
+        in_background(load_time_laws)
     reading, kept = correct(reading, setting)
     return finish(name, reading, kept, setting)
 
@@ -558,13 +561,19 @@ def finish(name: str, reading: Reading, kept: Correction, setting: Setting) -> O
     Raises:
         VerificationError: The output is not what was meant.
     """
-    output = write_and_verify(reading, kept, setting)
+    output, again = write_and_verify(reading, kept, setting)
+    in_time = None
+    if setting.options.times(len(reading.visits)):
+        with setting.clock("time"):
+            in_time = run_in_time(reading, again, kept.position, setting)
     with setting.clock("report"):
-        return report(name, reading, kept, output, setting)
+        return report(name, reading, kept, output, setting, in_time)
 
 
-def write_and_verify(reading: Reading, kept: Correction, setting: Setting) -> Output:
-    """Write the numbers, and read what was written.
+def write_and_verify(
+    reading: Reading, kept: Correction, setting: Setting
+) -> tuple[Output, Reading]:
+    """Write the numbers, and read what was written; return both.
 
     Raises:
         VerificationError: The output is not what was meant.
@@ -576,11 +585,16 @@ def write_and_verify(reading: Reading, kept: Correction, setting: Setting) -> Ou
         again = read_program(output.files, setting.cell, reading.programs)
         values = kept.decisions.corrected
         check_output(reading, again, output, kept.edited, values)
-    return output
+    return output, again
 
 
 def report(
-    name: str, reading: Reading, kept: Correction, output: Output, setting: Setting
+    name: str,
+    reading: Reading,
+    kept: Correction,
+    output: Output,
+    setting: Setting,
+    in_time: InTime | None,
 ) -> Outcome:
     """Say what came of every visit, and what error the model expects now."""
     cell, model, options = setting.cell, setting.model, setting.options
@@ -618,6 +632,7 @@ def report(
                     visits, rows, kept.position, d.side, setting.gap, cell.arm
                 ),
                 *listing_cost(visits, rows, d.q, cell.arm),
+                *(in_time.findings(visits) if in_time is not None else ()),
                 assumed_off(name, cell),
             )
         ),
@@ -626,6 +641,7 @@ def report(
         position=kept.position,
         sources={source.name: source.data for source, _ in reading.originals},
         arrivals=_arrivals(visits, kept, setting),
+        in_time=in_time,
     )
 
 

@@ -28,6 +28,8 @@ class Options:
         temperature: Arm temperature [deg C]; default: the cell's.
         strict_calls: Take no routine as still because the shipped list says so.
         explained: Keep what explains every target, of long programs too.
+        timing: Run the program in time, before and after; None: if it is no longer than
+            `IN_TIME`.
     """
 
     clone: bool = False
@@ -36,16 +38,22 @@ class Options:
     orientation: bool = False
     strict_calls: bool = False
     explained: bool = False
+    timing: bool | None = False
 
     def told(self) -> dict[str, object]:
         """Return them for a record: a strict reading of calls only if asked for."""
         said = asdict(self)
-        del said["explained"]  # it changes no output
+        del said["explained"], said["timing"]  # they change no output
         if not self.strict_calls:
             del said["strict_calls"]
         return said
 
+    def times(self, visits: int) -> bool:
+        """Tell whether a program of so many visits is run in time."""
+        return visits <= IN_TIME if self.timing is None else self.timing
 
+
+IN_TIME = 5_000  # visits
 AS_USUAL = Options()
 
 # Seconds spent in every stage.

@@ -31,6 +31,7 @@ from postproc.robot.pose import MM
 
 if TYPE_CHECKING:  # it loads all of the planning, which a record does not want
     from postproc.compensation.arrivals import ArrivalStates
+    from postproc.compensation.in_time import InTime
 
 # What came of a program: every visit with its status, and the exit code.
 
@@ -113,6 +114,7 @@ class Outcome:
         sources: The bytes of the source files by name, for showing lines.
         arrivals: The states that the visits are corrected for, with the shares of the
             effects in their errors; None where nobody knows.
+        in_time: The program run in time, before and after; None where nobody asked.
     """
 
     program: str
@@ -129,6 +131,7 @@ class Outcome:
     position: Floats = field(default_factory=lambda: np.empty((0, 3)))
     sources: Mapping[str, bytes] = field(default_factory=dict)
     arrivals: ArrivalStates | None = None
+    in_time: InTime | None = None
 
     @property
     def sidecar(self) -> str:
@@ -146,9 +149,13 @@ class Outcome:
 
     @property
     def exit_code(self) -> int:
-        """Return 1 where a target could have been compensated and was not."""
+        """Return 1 where a target could have been compensated and was not.
+
+        Also where the compensated program does not run as the original does.
+        """
         left = (Status.UNSAFE, Status.DISPLAY, Status.GUARDED)
         missed = any(d.code in NOT_FOLLOWED for d in self.diagnostics)
+        missed |= self.in_time is not None and self.in_time.is_worse
         return NOT_ALL if missed or np.isin(self.decisions.status, left).any() else DONE
 
     def summary(self) -> str:

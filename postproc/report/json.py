@@ -22,6 +22,7 @@ from postproc.arrays import (
 )
 from postproc.compensation.arrivals import ArrivalStates
 from postproc.compensation.outcome import Outcome, Status
+from postproc.report.in_time import told_in_time
 from postproc.robot.pose import MM
 from postproc.robot.trajectory import Motion
 
@@ -45,10 +46,18 @@ def report_pieces(outcome: Outcome) -> Iterator[bytes]:
     tail = {
         "predicted": {"before": asdict(outcome.before), "after": asdict(outcome.after)},
         "motion": {key: round(size, 5) for key, size in outcome.motion.items()},
+        **in_time_of(outcome),
         "diagnostics": [asdict(d) for d in outcome.diagnostics],
         "stages_s": dict(outcome.stages),
     }
     yield ("],\n" + json.dumps(finite(tail))[1:] + "\n").encode()
+
+
+def in_time_of(outcome: Outcome) -> dict[str, object]:
+    """Describe the program in time, and its paths; nothing where nobody asked."""
+    if outcome.in_time is None:
+        return {}
+    return told_in_time(outcome.in_time, outcome.visits)
 
 
 def target_rows(outcome: Outcome, rows: Ints) -> Iterator[dict[str, object]]:
@@ -95,7 +104,15 @@ def _columns(outcome: Outcome, rows: Ints) -> dict[str, list[Cells]]:
         "step_mm": [_steps(outcome, rows)],
         "std_error_mm": [_rounded(d.std_error[rows] / MM, 5)],
         **({} if told is None else {"share_mm": _shares(told, rows)}),
+        **_speed(outcome, rows),
     }
+
+
+def _speed(outcome: Outcome, rows: Ints) -> dict[str, list[Cells]]:
+    """Say how fast the TCP passes, where the program was run in time."""
+    if outcome.in_time is None:
+        return {}
+    return {"speed_mm_s": [fixed(outcome.in_time.after.clock.speed[rows] / MM, 3)]}
 
 
 def _steps(outcome: Outcome, rows: Ints) -> Cells:

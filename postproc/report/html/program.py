@@ -13,6 +13,7 @@ from postproc.arrays import Floats, Ints
 from postproc.compensation.outcome import Outcome, Status
 from postproc.language.source import Source
 from postproc.report.html.page import render, short, visible
+from postproc.report.json import in_time_of
 from postproc.robot.pose import MM
 from postproc.robot.trajectory import Motion
 
@@ -109,6 +110,7 @@ class ProgramPage:
         sources: Bytes by file name; empty where they are not at hand.
         shares: What the effects do; none where the report does not say.
         motion: Largest changes of joints, elbow and wrist centre; empty likewise.
+        in_time: The keys of the report that tell of time and paths; empty likewise.
     """
 
     name: str
@@ -120,6 +122,7 @@ class ProgramPage:
     sources: Mapping[str, bytes]
     shares: PageShares
     motion: Mapping[str, float]
+    in_time: Mapping[str, Any]
 
 
 def columns_of(outcome: Outcome) -> PageColumns:
@@ -522,7 +525,19 @@ def finite(value: Any) -> Any:
 
 # The page of a compensated program: what moved, by how much, and what did not.
 
-SCRIPTS = ("page.js", "columns.js", "view.js", "table.js", "source.js", "program.js")
+IN_TIME = ("timing", "path_accuracy", "path")  # keys of the report
+
+
+def worst_paths(in_time: Mapping[str, Any]) -> list[Mapping[str, Any]]:
+    """Choose the moves that leave their path the most and whose curve is told."""
+    told = [path for path in in_time.get("path", ()) if "curve" in path]
+    return sorted(told, key=lambda path: -path["max_mm"]["after"])
+
+
+SCRIPTS = (
+    "page.js", "columns.js", "view.js", "table.js", "source.js", "paths.js",
+    "program.js",
+)  # fmt: skip
 
 
 def program_report(outcome: Outcome, sources: Mapping[str, bytes] | None = None) -> str:
@@ -542,6 +557,7 @@ def program_report(outcome: Outcome, sources: Mapping[str, bytes] | None = None)
         sources=outcome.sources if sources is None else sources,
         shares=shares_of(outcome),
         motion=outcome.motion,
+        in_time=in_time_of(outcome),
     )
     return _page(program)
 
@@ -568,6 +584,7 @@ def program_report_from_json(
         sources=sources or {},
         shares=shares_from(data["targets"]),
         motion=data.get("motion", {}),
+        in_time={key: data[key] for key in IN_TIME if key in data},
     )
     return _page(program)
 
@@ -581,6 +598,7 @@ def _page(program: ProgramPage) -> str:
         "listing": listing(program.sources, carried),
         "histogram": histogram(columns),
         "predicted": finite(program.predicted),
+        "paths": worst_paths(program.in_time),
     }
     return render(
         "program.html.j2",
@@ -595,5 +613,6 @@ def _page(program: ProgramPage) -> str:
         sigma=uncertainty(columns),
         stages=seconds(program.stages),
         shown=len(carried),
+        paths=worst_paths(program.in_time),
         placed=bool(np.isfinite(columns.position_mm).all(axis=1).any()),
     )

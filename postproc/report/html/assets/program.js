@@ -21,6 +21,7 @@ class ProgramPage {
     if (this.view) this.controls();
     this.histogram(data.histogram);
     this.predicted(data.predicted);
+    if (data.paths.length) new Paths(document.getElementById("path-rows"), data.paths);
     window.addEventListener("hashchange", () => this.follow());
     const idle = window.requestIdleCallback || ((f) => setTimeout(f, 200));
     idle(() => this.table.haystack());

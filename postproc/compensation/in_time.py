@@ -1,0 +1,164 @@
+"""A program as it was written and as it is compensated, run in time and compared."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from importlib import import_module
+
+import numpy as np
+
+from postproc.arrays import Bools, Floats, Ints
+from postproc.compensation.options import Setting
+from postproc.compensation.path_accuracy import PathAccuracy, predict_paths
+from postproc.compensation.program import Reading
+from postproc.compensation.targets import targets_from_visits
+from postproc.language.visits import Diagnostic, Visits
+from postproc.motion.cycle import ProgramCycle, run
+from postproc.motion.sampled import disagreements
+from postproc.motion.targets import CODE, LIMITS, PATH_LIMITS
+from postproc.robot.arm import Arm
+from postproc.robot.cell import Cell
+from postproc.robot.pose import MM
+
+SLOWER = "slower"
+BEYOND_LIMIT = "beyond-limit"
+SLOWED = "slowed-down"  # codes of findings
+OTHER_SIDE = "side-in-time"
+MOST_SLOWER = 0.03  # of the cycle time
+FEW = 5  # lines that a finding names
+_LIMITS = [CODE[text] for text in (*LIMITS, *PATH_LIMITS)]
+
+
+@dataclass(frozen=True)
+class InTime:
+    """n visits, run once.
+
+    Attributes:
+        before, after: The program as it was written, and as it is compensated.
+        paths: How far it leaves its paths, as the model says.
+        guessed: Which limits of the joints the arm file guesses.
+        other_side: Where a joint arrives otherwise in time than along the path, (n, 6).
+    """
+
+    before: ProgramCycle
+    after: ProgramCycle
+    paths: PathAccuracy
+    guessed: tuple[str, ...]
+    other_side: Bools
+
+    def summary(self) -> str:
+        """Say in one line how long it takes, and how well it keeps to its paths."""
+        if not self.before.seconds:
+            return "no move leads from one known place to another: no time to tell"
+        said = f"cycle {self.before.seconds:.1f} -> {self.after.seconds:.1f} s"
+        if self.guessed:
+            said += f" (from guessed limits: {', '.join(self.guessed)})"
+        if not len(self.paths):
+            return said
+        before, after = self.paths.before.sizes / MM, self.paths.after.sizes / MM
+        return (
+            f"{said}; predicted path accuracy AT_p (systematic part) mean "
+            f"{before.mean():.3f} -> {after.mean():.3f} mm, max {before.max():.3f} -> "
+            f"{after.max():.3f} mm over {len(before)} moves"
+        )
+
+    @property
+    def is_worse(self) -> bool:
+        """Tell whether it is slower than it was, or leaves a limit that it kept."""
+        return self._is_slower or len(self._beyond) > 0
+
+    @property
+    def _is_slower(self) -> bool:
+        return self.after.seconds > (1 + MOST_SLOWER) * self.before.seconds
+
+    @property
+    def _beyond(self) -> Ints:
+        """Visits at which a joint comes beyond a limit that it kept before."""
+        before, after = (
+            np.isin(c.path.reason, _LIMITS) for c in (self.before, self.after)
+        )
+        return np.flatnonzero(after & ~before)
+
+    def findings(self, visits: Visits) -> Iterator[Diagnostic]:
+        """Say where the program does not run as it did, and where it cannot."""
+        if self._is_slower:
+            text = (
+                f"the compensated program takes {self.after.seconds:.1f} s instead of "
+                f"{self.before.seconds:.1f} s"
+            )
+            yield Diagnostic(visits.files[0], 1, SLOWER, text)
+        for v in self._beyond.tolist():
+            text = "a joint comes beyond its limit, which the original program keeps"
+            file = visits.files[visits.file[v]]
+            yield Diagnostic(file, int(visits.line[v]), BEYOND_LIMIT, text)
+        yield from self._slowed(visits)
+        yield from self._other_sides(visits)
+
+    def _other_sides(self, visits: Visits) -> Iterator[Diagnostic]:
+        """Say where joints arrive otherwise in time than along the path."""
+        for v in np.flatnonzero(self.other_side.any(axis=1)).tolist():
+            joints = (np.flatnonzero(self.other_side[v]) + 1).tolist()
+            text = (
+                f"joint {' and '.join(map(str, joints))} arrives from the other side "
+                "in the trajectory in time than along the path: it turns at a sharp "
+                "bend just before; the correction is that of the path"
+            )
+            file = visits.files[visits.file[v]]
+            yield Diagnostic(file, int(visits.line[v]), OTHER_SIDE, text)
+
+    def _slowed(self, visits: Visits) -> Iterator[Diagnostic]:
+        """Say where the joints cannot follow the programmed speed."""
+        rows = self.after.slowed
+        if not len(rows):
+            return
+        lines = dict.fromkeys(visits.line[rows].tolist())
+        more = f" and {len(lines) - FEW} more" if len(lines) > FEW else ""
+        least = 100 * self.after.clock.allowed[rows].min()
+        text = (
+            f"the joints reach {least:.0f} % of the programmed speed at the least: the "
+            "controller slows down or stops there, near a singularity as a rule "
+            f"(lines {', '.join(map(str, [*lines][:FEW]))}{more})"
+        )
+        place = visits.files[visits.file[rows[0]]], int(visits.line[rows[0]])
+        yield Diagnostic(*place, SLOWED, text)
+
+
+def load_time_laws() -> None:
+    """Load the library of time laws, which takes half a second, before it is needed."""
+    import_module("postproc.motion.toppra")
+
+
+def run_in_time(
+    reading: Reading, again: Reading, position: Floats, setting: Setting
+) -> InTime:
+    """Run a program in time, as it was written and as it is compensated.
+
+    Args:
+        reading: The program.
+        again: The output, parsed again.
+        position: Where the program wants the TCP, (n, 3) [m]; see `Correction`.
+        setting: What it was compensated with.
+
+    Raises:
+        PlanError: The arm has no inverse kinematics.
+    """
+    cell = setting.cell
+    before, after = (_run(part.visits, cell) for part in (reading, again))
+    passed = cell.arm.tcp(before.path.q, before.targets.tool[:, :3, 3])
+    shift = np.nan_to_num(position + before.path.aside - passed)
+    paths = predict_paths(
+        before, after, shift, cell, setting.model, setting.temperature
+    )
+    guessed, other = guessed_limits(cell.arm), disagreements(cell.arm, after)
+    return InTime(before, after, paths, guessed, other)
+
+
+def _run(visits: Visits, cell: Cell) -> ProgramCycle:
+    targets, _ = targets_from_visits(visits, cell)
+    return run(cell.arm, targets)
+
+
+def guessed_limits(arm: Arm) -> tuple[str, ...]:
+    """Name the limits of the joints that the arm file guesses."""
+    return tuple(arm.file.joints.guessed)

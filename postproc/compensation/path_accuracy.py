@@ -1,0 +1,391 @@
+"""How far the TCP leaves the programmed path between the targets, as the model says.
+
+On its way to a target every joint goes from the flank on which it arrived at the place
+before to that on which it arrives now: its drive crosses the gap while the joint rests.
+Along dense samples of the planned joint path the play operator tells where each joint
+lies in its play, and the model the error there. What is predicted is the systematic
+part of the path accuracy AT_p of ISO 9283, chapter 8: the largest distance from the
+programmed path, across it; what lags along the path is told apart.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from postproc.arrays import Bools, Floats, Ints, any_in_rows, spans
+from postproc.model.model import Model
+from postproc.motion.cycle import ProgramCycle
+from postproc.robot.cell import Cell
+from postproc.robot.direction import sides_along
+from postproc.robot.pose import lengths
+from postproc.robot.state import make_states
+from postproc.robot.trajectory import Motion
+
+FINE = 8  # parts of an interval in which a joint changes its flank
+CHANGED = 0.02  # of half the play: less between two samples is looked at no closer
+UNSURE = 1e-3  # likewise: a side that is known
+NO_FLANK = 1e-6  # [m] no joint's flank makes so little a difference
+
+
+@dataclass(frozen=True)
+class Deviations:
+    """How a program leaves m paths (structure of arrays), s samples in all.
+
+    Attributes:
+        across: Distance from the path at the samples, (s,) [m].
+        along: How far the TCP is ahead along it, (s,) [m].
+        unsure: How much farther it may be where a joint's flank is not known, (s,) [m].
+        largest: Sample of the largest distance of each path, (m,).
+        joint: Joint (1 to 6) whose flank makes most of it there, (m,), 0: none.
+    """
+
+    across: Floats
+    along: Floats
+    unsure: Floats
+    largest: Ints
+    joint: Ints
+
+    @property
+    def sizes(self) -> Floats:
+        """Return the largest distance from each path, (m,) [m]."""
+        return self.across[self.largest]
+
+
+@dataclass(frozen=True)
+class PathAccuracy:
+    """Predicted path accuracy of m LINEAR and CIRCULAR moves (structure of arrays).
+
+    Attributes:
+        visit: The visit at the end of each, (m,).
+        first: Its samples are first[k] .. first[k + 1] - 1, (m + 1,).
+        way: Path length up to every sample since the move began, (s,) [m].
+        before, after: Deviations of the program as it was written and compensated.
+        unknown: Cartesian moves that nothing is predicted for.
+    """
+
+    visit: Ints
+    first: Ints
+    way: Floats
+    before: Deviations
+    after: Deviations
+    unknown: int
+
+    def __len__(self) -> int:
+        """Return the number of paths."""
+        return len(self.visit)
+
+    def samples(self, k: int) -> slice:
+        """Return the samples of a path."""
+        return slice(int(self.first[k]), int(self.first[k + 1]))
+
+
+@dataclass(frozen=True)
+class _PathSamples:
+    """The ways of m moves, one after the other, each from where it begins on.
+
+    Attributes:
+        visit, source: Of each way, (m,).
+        q: Joint angles at the samples, (s, 6) [rad].
+        first: As in `PathAccuracy`, (m + 1,).
+    """
+
+    visit: Ints
+    source: Ints
+    q: Floats
+    first: Ints
+
+    @property
+    def begins(self) -> Bools:
+        """The first sample of each way, (s,)."""
+        out = np.zeros(len(self.q), dtype=bool)
+        out[self.first[:-1]] = True
+        return out
+
+    @property
+    def way(self) -> Ints:
+        """The way that every sample belongs to, (s,)."""
+        return np.repeat(np.arange(len(self.visit)), np.diff(self.first))
+
+    def as_many(self, other: _PathSamples) -> _PathSamples:
+        """Take as many samples of every way as there are of another one's."""
+        count = np.diff(other.first)
+        rows = np.flatnonzero(np.diff(self.first) != count)
+        if not len(rows):
+            return self
+        parts = np.split(self.q, self.first[1:-1])
+        for k in rows.tolist():
+            n = len(parts[k])
+            at = np.linspace(0, n - 1, count[k])
+            step = np.minimum(at.astype(int), max(n - 2, 0))
+            begins = np.zeros(n, dtype=bool)
+            begins[0] = True
+            parts[k] = _between(parts[k], begins, step, at - step)
+        return replace(self, q=np.concatenate(parts), first=other.first)
+
+    def refined(self, after: Ints, share: Floats) -> _PathSamples:
+        """Insert samples at a share of the way from some samples to the next ones."""
+        new = _between(self.q, self.begins, after, share)
+        at = np.append(np.arange(len(self.q)), after + share)
+        order = np.argsort(at, kind="stable")
+        more = np.bincount(self.way[after], minlength=len(self.visit))
+        first = self.first + np.append(0, np.cumsum(more))
+        return replace(self, q=np.concatenate([self.q, new])[order], first=first)
+
+
+def _ways(cycle: ProgramCycle, rows: Ints) -> _PathSamples:
+    """Take the ways by which some visits are reached."""
+    edge, source = (found[rows] for found in cycle.ways)
+    edges = cycle.path.edges
+    count = edges.start[edge + 1] - edges.start[edge]
+    first = np.append(0, np.cumsum(count + 1))
+    q = np.empty((first[-1], 6))
+    inner = np.ones(len(q), dtype=bool)
+    inner[first[:-1]] = False
+    q[first[:-1]] = cycle.path.q[source]
+    q[inner] = edges.path[spans(edges.start[edge], count)]
+    return _PathSamples(rows, source, q, first)
+
+
+def _between(q: Floats, begins: Bools, after: Ints, share: Floats) -> Floats:
+    """Interpolate ways at a share of the way from samples to the next ones, (k, 6).
+
+    Cubic Hermite pieces in the distance of the joints, their slopes by the parabola
+    through three neighbours; at both ends of a way by the chord.
+    """
+    ends = np.append(begins[1:], True)
+    chord = np.diff(q, axis=0, append=q[-1:])
+    step = np.linalg.norm(chord, axis=1)
+    step[ends] = 0.0
+    slope = chord / np.maximum(step, 1e-12)[:, None]
+    before, h = np.roll(slope, 1, axis=0), np.roll(step, 1)
+    both = (h * ~begins + step)[:, None]
+    mixed = (before * step[:, None] + slope * h[:, None]) / np.maximum(both, 1e-12)
+    tangent = np.where(begins[:, None], slope, np.where(ends[:, None], before, mixed))
+    t, width = share[:, None], step[after][:, None]
+    a, b = q[after], q[np.minimum(after + 1, len(q) - 1)]
+    out = (2 * t**3 - 3 * t**2 + 1) * a + (3 * t**2 - 2 * t**3) * b
+    out += width * (t**3 - 2 * t**2 + t) * tangent[after]
+    out += width * (t**3 - t**2) * tangent[np.minimum(after + 1, len(q) - 1)]
+    return np.asarray(out)
+
+
+@dataclass(frozen=True)
+class _Run:
+    """One of the two programs along its ways.
+
+    Attributes:
+        cycle: The program.
+        ways: Its ways.
+        least, most: Sides of the joints' plays, see `sides_along`, (s, 6) each.
+    """
+
+    cycle: ProgramCycle
+    ways: _PathSamples
+    least: Floats
+    most: Floats
+
+    @classmethod
+    def of(cls, cell: Cell, cycle: ProgramCycle, ways: _PathSamples) -> _Run:
+        """Follow the joints' plays along the ways."""
+        play = cycle.arrived.past.play[ways.source]
+        return cls(cycle, ways, *sides_along(cell.arm, ways.q, ways.begins, play))
+
+    @property
+    def side(self) -> Floats:
+        """Where each joint lies in its play, the middle of what is known, (s, 6)."""
+        return (self.least + self.most) / 2
+
+    def changes(self) -> Bools:
+        """Tell behind which samples a joint changes its flank, (s,)."""
+        moved = np.maximum(
+            np.abs(np.diff(self.least, axis=0, append=self.least[-1:])),
+            np.abs(np.diff(self.most, axis=0, append=self.most[-1:])),
+        )
+        return any_in_rows(moved > CHANGED)
+
+
+@dataclass(frozen=True)
+class _Error:
+    """The error of the arm along ways.
+
+    Attributes:
+        cell: The arm and its payload.
+        model: The arm's error.
+        temperature: [deg C], NaN where not known.
+    """
+
+    cell: Cell
+    model: Model
+    temperature: float
+
+    def __call__(self, run: _Run, rows: Ints | slice, side: Floats) -> Floats:
+        """Predict it at samples (k,) with joints on some sides (k, 6): (k, 3) [m]."""
+        ways, targets = run.ways, run.cycle.targets
+        visit = ways.visit[ways.way[rows]]
+        states = make_states(
+            ways.q[rows],
+            side,
+            targets.tool[visit, :3, 3],
+            travel=_travel(run)[rows] if "travel" in self.model.needs else np.nan,
+            speed=targets.linear_speed[visit] * targets.override[visit],
+            temperature=self.temperature,
+            payload=self.cell.payload_mass,
+            payload_com=self.cell.payload_com,
+        )
+        return self.model.error(self.cell.arm, states)
+
+
+def _travel(run: _Run) -> Floats:
+    """Travel of every joint since its last reversal, along the ways, (s, 6) [rad]."""
+    ways, arrived = run.ways, run.cycle.arrived
+    moved = np.diff(ways.q, axis=0, prepend=ways.q[:1])
+    sense = np.sign(moved)
+    sense[ways.first[:-1]] = arrived.direction[ways.source]
+    rows = np.arange(len(sense))[:, None]
+    begin = ways.first[ways.way][:, None]
+    last = np.maximum.accumulate(np.where(sense != 0, rows, 0), axis=0)
+    sense = np.take_along_axis(sense, np.maximum(last, begin), axis=0)
+    turned = np.zeros(sense.shape, dtype=bool)
+    turned[1:] = sense[1:] != sense[:-1]
+    turned[ways.first[:-1]] = False
+    since = np.maximum.accumulate(np.where(turned, rows - 1, 0), axis=0)
+    here = since >= begin
+    place = np.take_along_axis(ways.q, np.maximum(since, begin), axis=0)
+    known = np.nan_to_num(arrived.travel[ways.source])[ways.way]
+    return np.asarray(np.abs(ways.q - place) + np.where(here, 0.0, known))
+
+
+def predict_paths(
+    before: ProgramCycle,
+    after: ProgramCycle,
+    shift: Floats,
+    cell: Cell,
+    model: Model,
+    temperature: float,
+) -> PathAccuracy:
+    """Predict how far a program leaves its paths, as written and as compensated.
+
+    Args:
+        before: The program as it was written, n visits.
+        after: The same program, compensated.
+        shift: From where the controller takes every target to be to where it is,
+            (n, 3) [m]; see `Planned`.
+        cell: The arm, its play as wide as its gaps, and its payload.
+        model: The arm's error.
+        temperature: Of the arm [deg C], NaN where not known.
+    """
+    cartesian = before.targets.move != Motion.JOINT
+    known = cartesian & (before.ways[1] >= 0) & (after.ways[1] == before.ways[1])
+    rows = np.flatnonzero(known)
+    ours = _ways(before, rows)
+    pair = [ours, _ways(after, rows).as_many(ours)]
+    cycles = before, after
+    if len(rows):
+        pair = _refined(cell, cycles, pair)
+    runs = [_Run.of(cell, c, w) for c, w in zip(cycles, pair, strict=True)]
+    error = _Error(cell, model, temperature)
+    tools = before.targets.tool[rows, :3, 3][pair[0].way]
+    wanted, commanded = (cell.arm.tcp(w.q, tools) for w in pair)
+    way, tangent = _along(wanted, pair[0])
+    off = _shift(shift, pair[0], way)
+    return PathAccuracy(
+        rows, pair[0].first, way,
+        _deviations(runs[0], error, -off, tangent, way),
+        _deviations(runs[1], error, commanded - wanted - off, tangent, way),
+        int((cartesian & ~known).sum()),
+    )  # fmt: skip
+
+
+def _refined(
+    cell: Cell, cycles: tuple[ProgramCycle, ProgramCycle], pair: list[_PathSamples]
+) -> list[_PathSamples]:
+    """Look closer where a joint changes its flank, before or after."""
+    changes = np.zeros(len(pair[0].q), dtype=bool)
+    for cycle, ways in zip(cycles, pair, strict=True):
+        own = _Run.of(cell, cycle, ways).changes()
+        changes |= own | np.append(own[1:], False) | np.append(False, own[:-1])
+    changes &= ~np.append(pair[0].begins[1:], True)
+    after = np.repeat(np.flatnonzero(changes), FINE - 1)
+    share = np.tile(np.arange(1, FINE) / FINE, int(changes.sum()))
+    return [ways.refined(after, share) for ways in pair]
+
+
+def _along(p: Floats, ways: _PathSamples) -> tuple[Floats, Floats]:
+    """Measure the path up to every place (s, 3), (s,) [m], and its directions."""
+    step = np.diff(p, axis=0, prepend=p[:1])
+    step[ways.first[:-1]] = 0.0
+    total = np.cumsum(lengths(step))
+    tangent = step + np.append(step[1:], np.zeros((1, 3)), axis=0)
+    size = lengths(tangent)[:, None]
+    return total - total[ways.first[:-1]][ways.way], np.where(
+        size > 0, tangent / np.maximum(size, 1e-12), 0.0
+    )
+
+
+def _shift(shift: Floats, ways: _PathSamples, way: Floats) -> Floats:
+    """Interpolate what taught frames are off along ways, (s, 3) [m]."""
+    whole = way[ways.first[1:] - 1][ways.way]
+    u = np.where(whole > 0, way / np.maximum(whole, 1e-12), 1.0)[:, None]
+    begin, end = shift[ways.source][ways.way], shift[ways.visit][ways.way]
+    return np.asarray((1 - u) * begin + u * end)
+
+
+def _deviations(
+    run: _Run, error: _Error, moved: Floats, tangent: Floats, way: Floats
+) -> Deviations:
+    """Tell how far the TCP is from where it should be, as the model says.
+
+    Args:
+        run: The program.
+        error: The arm's error.
+        moved: From the wanted to the commanded places, (s, 3) [m].
+        tangent: Directions of the wanted path, (s, 3).
+        way: Its length up to every sample, (s,) [m].
+    """
+    side = run.side
+    off = moved + error(run, slice(None), side)
+    along = np.einsum("si,si->s", off, tangent)
+    across = lengths(off - along[:, None] * tangent)
+    unsure, starts = _unsure(run, error), run.ways.first[:-1]
+    if not len(starts):
+        return Deviations(across, along, unsure, starts, starts)
+    top = np.maximum.reduceat(across, starts)[run.ways.way]
+    hit = np.flatnonzero(across == top)
+    largest = hit[np.searchsorted(run.ways.way[hit], np.arange(len(starts)))]
+    return Deviations(across, along, unsure, largest, _joints(run, error, largest, way))
+
+
+def _unsure(run: _Run, error: _Error) -> Floats:
+    """Half of what flanks that are not known make, all joints added up, (s,) [m]."""
+    out = np.zeros(len(run.least))
+    for joint in range(6):
+        open_ = run.most[:, joint] - run.least[:, joint] > UNSURE
+        rows = np.flatnonzero(open_)
+        if not len(rows):
+            continue
+        low, high = np.array([run.side[rows]] * 2)
+        low[:, joint], high[:, joint] = run.least[rows, joint], run.most[rows, joint]
+        out[rows] += lengths(error(run, rows, high) - error(run, rows, low)) / 2
+    return out
+
+
+def _joints(run: _Run, error: _Error, rows: Ints, way: Floats) -> Ints:
+    """Name the joint whose flank makes the most of what stands at samples (m,).
+
+    That is how much the error changes if the joint went from the side on which it
+    arrived at the place before to that on which it arrives evenly, as the corrections
+    of both places do.
+    """
+    ways, side = run.ways, run.side[rows]
+    last = ways.first[1:] - 1
+    u = (way[rows] / np.maximum(way[last], 1e-12))[:, None]
+    even = (1 - u) * run.side[ways.first[:-1]] + u * run.side[last]
+    here, size = error(run, rows, side), np.zeros((len(rows), 6))
+    for joint in range(6):
+        other = np.array(side)
+        other[:, joint] = even[:, joint]
+        size[:, joint] = lengths(here - error(run, rows, other))
+    told = size.argmax(axis=1)
+    return np.where(size.max(axis=1) > NO_FLANK, told + 1, 0)

@@ -1,0 +1,111 @@
+"""A program run in time, and how it keeps to its paths, in the keys of the report."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import asdict
+
+import numpy as np
+
+from postproc.arrays import Floats, Ints
+from postproc.compensation.in_time import InTime
+from postproc.compensation.path_accuracy import Deviations, PathAccuracy
+from postproc.language.visits import Visits
+from postproc.model.statistics import ErrorStatistics
+from postproc.motion.cycle import ProgramCycle
+from postproc.robot.pose import MM
+from postproc.robot.trajectory import Motion
+
+CURVES = 200  # moves whose curve is told: those that leave their path the most
+POINTS = 40  # of a curve
+
+
+def told_in_time(told: InTime, visits: Visits) -> dict[str, object]:
+    """Describe how a program runs, and how it keeps to its paths."""
+    return {
+        "timing": _timing(told, visits),
+        "path_accuracy": {
+            "before": asdict(ErrorStatistics.of_sizes(told.paths.before.sizes)),
+            "after": asdict(ErrorStatistics.of_sizes(told.paths.after.sizes)),
+            "unknown": told.paths.unknown,
+        },
+        "path": paths_of(told.paths, visits),
+    }
+
+
+def _timing(told: InTime, visits: Visits) -> dict[str, object]:
+    """Describe the cycle, what it uses of the joints, and where it is slowed down."""
+    pair = {"before": told.before, "after": told.after}
+    slowed = told.after.slowed
+    share = told.after.clock.allowed[slowed].tolist()
+
+    def of(use: Callable[[ProgramCycle], tuple[Floats, Ints]]) -> dict[str, object]:
+        return {key: _uses(*use(cycle), visits) for key, cycle in pair.items()}
+
+    return {
+        "cycle_s": {key: round(cycle.seconds, 3) for key, cycle in pair.items()},
+        "guessed": list(told.guessed),
+        "velocity_use": of(lambda cycle: cycle.velocity_use),
+        "acceleration_use": of(lambda cycle: cycle.acceleration_use),
+        "slowed": [
+            {"line": line, "share": round(least, 4)}
+            for line, least in zip(visits.line[slowed].tolist(), share, strict=True)
+        ],
+        "untimed": int(told.after.clock.untimed.sum()),
+    }
+
+
+def _uses(shares: Floats, rows: Ints, visits: Visits) -> list[dict[str, object]]:
+    """Say how much of a limit every joint uses, and on the way to which line."""
+    return [
+        {"share": round(share, 4), "line": int(visits.line[row]) if row >= 0 else None}
+        for share, row in zip(shares.tolist(), rows.tolist(), strict=True)
+    ]
+
+
+def paths_of(paths: PathAccuracy, visits: Visits) -> list[dict[str, object]]:
+    """Describe how every move keeps to its path; of some the curve as well."""
+    worst = set(np.argsort(-paths.after.sizes, kind="stable")[:CURVES].tolist())
+    return [
+        _path(paths, k, visits) | ({"curve": _curve(paths, k)} if k in worst else {})
+        for k in range(len(paths))
+    ]
+
+
+def _path(paths: PathAccuracy, k: int, visits: Visits) -> dict[str, object]:
+    """Describe how a move keeps to its path."""
+    visit, samples = int(paths.visit[k]), paths.samples(k)
+    pair = {"before": paths.before, "after": paths.after}
+
+    def of(value: Callable[[Deviations], float]) -> dict[str, float]:
+        return {key: round(value(told) / MM, 5) for key, told in pair.items()}
+
+    return {
+        "line": int(visits.line[visit]),
+        "visit": visit,
+        "move": Motion(visits.motion[visit]).name,
+        "length_mm": round(float(paths.way[samples.stop - 1]) / MM, 3),
+        "max_mm": of(lambda told: float(told.across[told.largest[k]])),
+        "at_mm": of(lambda told: float(paths.way[told.largest[k]])),
+        "along_mm": of(lambda told: float(np.abs(told.along[samples]).max())),
+        "unsure_mm": of(lambda told: float(told.unsure[samples].max())),
+        "joint": {key: int(told.joint[k]) for key, told in pair.items()},
+        "inserted": 0,
+        "points": [],
+    }
+
+
+def _curve(paths: PathAccuracy, k: int) -> dict[str, list[float]]:
+    """Tell the distance from the path along it, its largest values among them."""
+    samples = paths.samples(k)
+    n = samples.stop - samples.start
+    at = np.unique(np.linspace(0, n - 1, min(n, POINTS)).astype(int))
+    pair = {"before": paths.before, "after": paths.after}
+    peaks = [int(told.largest[k]) - samples.start for told in pair.values()]
+    rows = samples.start + np.union1d(at, peaks)
+    across = {key: told.across for key, told in pair.items()}
+    columns = {"way": paths.way, **across}
+    return {
+        f"{key}_mm": np.round(column[rows] / MM, 4).tolist()
+        for key, column in columns.items()
+    }
