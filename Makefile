@@ -13,6 +13,7 @@
 # make reproduce   the published method and ours, simulated: docs/reproduction.md
 # make accuracy    held-out errors, coverage, real and blind data: docs/accuracy.md
 # make undeclared  undeclared effects traced on virtual arms, 1,400 of them: docs/undeclared.md
+# make paths       predicted and true path accuracy on virtual arms: docs/paths.md
 # make blind       effects traced in the blind campaigns and on a real arm: docs/blind.md
 # make wheel       a wheel for every Python from 3.11 on, tried in a new environment, in dist
 # make native      lint and tests of the native core by itself, for who changes it
@@ -28,7 +29,7 @@ STAMP := $(VENV)/.installed
 export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
 
-.PHONY: help demo test lint format bench evidence reproduce accuracy undeclared blind chaos fuzz docs clean
+.PHONY: help demo test lint format bench evidence reproduce accuracy undeclared paths blind chaos fuzz docs clean
 .PHONY: plant-bench generated growth native golden pictures lock wheel
 .DELETE_ON_ERROR:
 
@@ -74,6 +75,9 @@ accuracy: $(STAMP)
 
 undeclared: $(STAMP)
 	@$(PYTHON_BIN) -m tests.undeclared --seeds $(or $(SEEDS),60) --none $(or $(NONE),200)
+
+paths: $(STAMP)
+	@PYTHONPATH=. $(PYTHON_BIN) docs/studies/paths.py $(if $(SEEDS),--seeds $(SEEDS))
 
 blind: $(STAMP)
 	@PYTHONPATH=. $(PYTHON_BIN) docs/studies/diagnosed.py

@@ -46,20 +46,27 @@ for job in $jobs; do
         program=programs/$job.pdl
         [ $state = written ] || program=demo/$job.pdl
         run postproc simulate "$program" --cell $cell --seed "$seed" \
-            --wanted programs/$job.pdl --json demo/$job.$state.json
+            --wanted programs/$job.pdl --path --json demo/$job.$state.json
     done
 done
 
-title "True error of the tool, mm"
+title "True error of the tool at the targets, and of its path between them, mm"
 python - $jobs <<'TABLE'
 import json
 import sys
 
-print(f"{'program':12}{'':14}{'mean':>8}{'95 %':>8}{'max':>8}{'targets':>9}")
+def figures(e):
+    if not e["n"]:
+        return f"{'-':>8}{'-':>8}{'-':>8}{0:9d}"
+    return f"{e['mean_mm']:8.3f}{e['p95_mm']:8.3f}{e['max_mm']:8.3f}{e['n']:9d}"
+
+
+sizes = f"{'mean':>8}{'95 %':>8}{'max':>8}"
+print(f"{'program':12}{'':14}{sizes}{'targets':>9}{sizes}{'paths':>9}")
 for job in sys.argv[1:]:
     for state in ("written", "compensated"):
         with open(f"demo/{job}.{state}.json", encoding="utf-8") as file:
-            e = json.load(file)["true_error"]
-        figures = f"{e['mean_mm']:8.3f}{e['p95_mm']:8.3f}{e['max_mm']:8.3f}"
-        print(f"{job:12}{state:14}{figures}{e['n']:9d}")
+            told = json.load(file)
+        row = figures(told["true_error"]) + figures(told["path_accuracy"])
+        print(f"{job:12}{state:14}{row}")
 TABLE
