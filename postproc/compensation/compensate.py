@@ -20,7 +20,12 @@ from postproc.compensation.clones import give_own_points
 from postproc.compensation.decide import Proposal
 from postproc.compensation.eligibility import overruled
 from postproc.compensation.frames import correct_taught
-from postproc.compensation.in_time import InTime, load_time_laws, run_in_time
+from postproc.compensation.in_time import (
+    InTime,
+    load_time_laws,
+    no_advice,
+    run_in_time,
+)
 from postproc.compensation.iterate import (
     FROM_START,
     Converged,
@@ -599,6 +604,7 @@ def report(
     """Say what came of every visit, and what error the model expects now."""
     cell, model, options = setting.cell, setting.model, setting.options
     d, rows, visits = kept.decisions, kept.corrected, reading.visits
+    advice = no_advice if in_time is None else in_time.advice
     files = tuple(output.records)
     return Outcome(
         program=name,
@@ -627,7 +633,7 @@ def report(
                 *overruled_strings(visits, kept.overruled),
                 *untimed_runs(visits, kept.untimed),
                 *rounded_points(visits, kept.away),
-                *unsure_sides(visits, rows, d.side, d.std_error),
+                *unsure_sides(visits, rows, d.side, d.std_error, advice),
                 *flank_steps(
                     visits, rows, kept.position, d.side, setting.gap, cell.arm
                 ),

@@ -9,6 +9,7 @@ from importlib import import_module
 import numpy as np
 
 from postproc.arrays import Bools, Floats, Ints
+from postproc.compensation.approach import advise
 from postproc.compensation.options import Setting
 from postproc.compensation.path_accuracy import PathAccuracy, predict_paths
 from postproc.compensation.program import Reading
@@ -39,6 +40,7 @@ class InTime:
         paths: How far it leaves its paths, as the model says.
         guessed: Which limits of the joints the arm file guesses.
         other_side: Where a joint arrives otherwise in time than along the path, (n, 6).
+        arm: The arm.
     """
 
     before: ProgramCycle
@@ -46,6 +48,7 @@ class InTime:
     paths: PathAccuracy
     guessed: tuple[str, ...]
     other_side: Bools
+    arm: Arm
 
     def summary(self) -> str:
         """Say in one line how long it takes, and how well it keeps to its paths."""
@@ -79,6 +82,10 @@ class InTime:
             np.isin(c.path.reason, _LIMITS) for c in (self.before, self.after)
         )
         return np.flatnonzero(after & ~before)
+
+    def advice(self, rows: Ints) -> dict[int, str]:
+        """Say how to approach some visits so that the sides of all joints are known."""
+        return advise(self.arm, self.after, rows)
 
     def findings(self, visits: Visits) -> Iterator[Diagnostic]:
         """Say where the program does not run as it did, and where it cannot."""
@@ -124,6 +131,11 @@ class InTime:
         yield Diagnostic(*place, SLOWED, text)
 
 
+def no_advice(rows: Ints) -> dict[int, str]:
+    """Say nothing on how to approach visits: nobody knows their ways."""
+    return {}
+
+
 def load_time_laws() -> None:
     """Load the library of time laws, which takes half a second, before it is needed."""
     import_module("postproc.motion.toppra")
@@ -151,7 +163,7 @@ def run_in_time(
         before, after, shift, cell, setting.model, setting.temperature
     )
     guessed, other = guessed_limits(cell.arm), disagreements(cell.arm, after)
-    return InTime(before, after, paths, guessed, other)
+    return InTime(before, after, paths, guessed, other, cell.arm)
 
 
 def _run(visits: Visits, cell: Cell) -> ProgramCycle:

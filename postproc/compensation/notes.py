@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
+
 import numpy as np
 
-from postproc.arrays import Bools, Floats, in_chunks
+from postproc.arrays import Bools, Floats, Ints, in_chunks
 from postproc.compensation.continuity import on_path
 from postproc.files import is_variables, variables_of
 from postproc.language.visits import NO_VALUE, Diagnostic, Meaning, Visits
@@ -197,7 +199,11 @@ def _each(visits: Visits, rows: Bools, code: str, text: str) -> list[Diagnostic]
 
 
 def unsure_sides(
-    visits: Visits, corrected: Bools, side: Floats, std_error: Floats
+    visits: Visits,
+    corrected: Bools,
+    side: Floats,
+    std_error: Floats,
+    advice: Callable[[Ints], Mapping[int, str]],
 ) -> list[Diagnostic]:
     """List the corrected targets that a joint reaches from a side that is not sure.
 
@@ -209,6 +215,7 @@ def unsure_sides(
         corrected: Visits whose target moves, (n,).
         side: Where every joint lies in its play, (n, 6) from -1 to 1.
         std_error: Standard error of the correction, (n, 3) [m].
+        advice: Says how to approach some visits.
     """
     rows = np.flatnonzero(corrected & (np.abs(side) < SURE).any(axis=1))
     size = np.linalg.norm(std_error, axis=1) / MM
@@ -222,15 +229,16 @@ def unsure_sides(
             f"{lines}): {cure}"
         )
         return [Diagnostic(visits.files[0], int(visits.line[rows[0]]), CODE, text)]
+    told = advice(rows)
     return [
         Diagnostic(
             visits.files[visits.file[i]],
             int(visits.line[i]),
             CODE,
             f"{_how(side[i])}, from a side that is not sure "
-            f"(+-{size[i]:.3f} mm): {cure}",
+            f"(+-{size[i]:.3f} mm): {told.get(i, cure)}",
         )
-        for i in rows
+        for i in rows.tolist()
     ]
 
 

@@ -191,7 +191,7 @@ def _arrivals(arm: Arm, q: Floats, edges: Edges, before: PlayState) -> Arrivals:
     if len(q) == 0:
         return UNLED
     chains = chains_of(q, arm.coupling, edges.first, edges.source)
-    ways, half = drive_paths(chains, arm.coupling, edges), _half_width(arm)
+    ways, half = drive_paths(chains, arm.coupling, edges), half_width(arm)
     z = _states(chains, ways.clamps(half), half, before.play)
     forward = chains.angles - z.hi >= half / 2
     backward = chains.angles - z.lo <= -half / 2
@@ -212,7 +212,7 @@ def passages(arm: Arm, q: Floats, edges: Edges) -> Passages:
     """
     chains = chains_of(q, arm.coupling, edges.first, edges.source)
     ways = drive_paths(chains, arm.coupling, edges)
-    return Passages(edges.first, edges.source, ways.clamps(_half_width(arm)))
+    return Passages(edges.first, edges.source, ways.clamps(half_width(arm)))
 
 
 def sides(arm: Arm, q: Floats, passed: Passages, lead: Sides = NO_SIDES) -> Sides:
@@ -233,7 +233,7 @@ def _sides(arm: Arm, q: Floats, passed: Passages, before: Clamps) -> Sides:
     if len(q) == 0:
         return NO_SIDES
     chains = chains_of(q, arm.coupling, passed.first, passed.source)
-    half = _half_width(arm)
+    half = half_width(arm)
     z = _states(chains, passed.clamps, half, before)
     return Sides(_side(chains.angles, z, half), z)
 
@@ -254,14 +254,14 @@ def sides_along(
         The least and the largest side that it may be, (s, 6) each from -1 to 1; equal
         where the side is known.
     """
-    angles, half = q @ arm.coupling.T, _half_width(arm)
+    angles, half = q @ arm.coupling.T, half_width(arm)
     passed = prefix(passing(angles, half), begins)
     way = np.cumsum(begins) - 1
     lo, hi = passed(play.lo[way]), passed(play.hi[way])
     return (angles - hi) / half, (angles - lo) / half
 
 
-def _half_width(arm: Arm) -> Floats:
+def half_width(arm: Arm) -> Floats:
     """Return half the width of every joint's play on the drive side, (6,) [rad]."""
     return np.asarray(WIDTH_IN_PLAYS / 2 * arm.play)
 

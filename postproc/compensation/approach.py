@@ -1,0 +1,85 @@
+"""From where to approach a target so that the side of every joint is known there."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from postproc.arrays import Floats, Ints
+from postproc.compensation.notes import SURE
+from postproc.motion.cycle import ProgramCycle
+from postproc.robot.arm import Arm
+from postproc.robot.direction import half_width
+from postproc.robot.pose import MM
+from postproc.robot.trajectory import Motion
+
+FAR = 0.3  # [m] an approach that would have to be longer is led from elsewhere
+LOST = 1e-6  # [rad] a joint that turns less on the last piece of a way stands still
+
+
+def advise(arm: Arm, cycle: ProgramCycle, rows: Ints) -> dict[int, str]:
+    """Say how to approach targets that a joint reaches from a side that is not sure.
+
+    A joint's side is sure once its drive has gone through its play. On a straight
+    approach that begins farther back, the joints turn on as they do at its end: what is
+    missing there is the longest of what they need.
+
+    Args:
+        arm: The arm; its play and coupling are used.
+        cycle: The program in time.
+        rows: Visits to look at.
+
+    Returns:
+        What to do, by visit; only where something can be said.
+    """
+    edge, source = cycle.ways
+    told = {}
+    for v in rows.tolist():
+        if edge[v] < 0 or source[v] < 0:
+            told[v] = _from_nowhere(arm)
+            continue
+        path = cycle.path.edges
+        samples = path.path[path.start[edge[v]] : path.start[edge[v] + 1]]
+        way = np.vstack([cycle.path.q[source[v]], samples])[-2:]
+        tool = np.tile(cycle.targets.tool[v, :3, 3], (2, 1))
+        length = float(np.linalg.norm(np.diff(arm.tcp(way, tool), axis=0)))
+        turned = (arm.coupling @ np.diff(way, axis=0)[0]) if len(way) > 1 else None
+        if turned is None:
+            continue
+        missing = _missing(arm, cycle.arrived.side[v], turned)
+        if not missing.any():
+            continue  # as it is compensated now, the sides are known
+        cartesian = bool(cycle.targets.move[v] != Motion.JOINT)
+        told[v] = _said(missing, turned, length, cartesian)
+    return told
+
+
+def _missing(arm: Arm, side: Floats, turned: Floats) -> Floats:
+    """Travel that the drives lack, (6,) [rad]: 0 where the side is known."""
+    on = np.where(np.abs(turned) < LOST, 0.0, np.sign(turned))
+    lacks = (SURE - side * on) * half_width(arm)
+    return np.where(np.abs(side) < SURE, np.maximum(lacks, 0.0), 0.0)
+
+
+def _said(missing: Floats, turned: Floats, length: float, cartesian: bool) -> str:
+    """Say what to do about joints that lack some travel (6,) on their last piece."""
+    joints = np.flatnonzero(missing > 0)
+    axes = "axes" if len(joints) > 1 else "axis"
+    names = f"{axes} {' and '.join(str(j + 1) for j in joints.tolist())}"
+    angle = np.rad2deg(missing.max())
+    if (np.abs(turned[joints]) < LOST).any():
+        return (
+            f"begin it at a place from where {names} turns by {angle:.3f} deg or more"
+        )
+    back = length * float((missing[joints] / np.abs(turned[joints])).max())
+    if cartesian and 0 < back <= FAR:
+        return f"begin the approach {np.ceil(back / MM):.0f} mm farther back"
+    return f"begin the approach where {names} still turns by {angle:.3f} deg more"
+
+
+def _from_nowhere(arm: Arm) -> str:
+    """Say what to do at a first move, from a place that the program does not tell."""
+    most = np.rad2deg(2 * half_width(arm).max())
+    return (
+        f"before it, move every axis by {most:.2f} deg or more to where its side is "
+        "told, with a JOINT move from a place that is in the program"
+    )
