@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from postproc.compensation.compensate import compensate
+from postproc.compensation.options import Options
 from postproc.compensation.program import read_program
 from postproc.compensation.record import FileRecord, Sidecar, restore
 from postproc.compensation.rewrite import check_output, read_back, write_numbers
@@ -92,6 +93,7 @@ def compensated(files: Mapping[str, bytes], cell: Cell, model: Model) -> str:
             done = compensate(
                 files["job.pdl"], cell, model, name="job.pdl",
                 variables=files.get("job.lsv"), pages=pages_of(files),
+                options=Options(timing=True),
             )  # fmt: skip
     except PostprocError:
         return "refused"
