@@ -18,6 +18,7 @@ mod profile;
 mod pull;
 mod rounding;
 mod rows;
+mod statements;
 mod table;
 mod text;
 mod trig;
@@ -61,6 +62,7 @@ fn native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(text::form_of, module)?)?;
     module.add_function(wrap_pyfunction!(text::line_starts, module)?)?;
     module.add_function(wrap_pyfunction!(text::scan_lines, module)?)?;
+    module.add_function(wrap_pyfunction!(statements::scan_statements, module)?)?;
     module.add_function(wrap_pyfunction!(number::fixed, module)?)?;
     module.add_function(wrap_pyfunction!(number::shortest, module)?)?;
     module.add_function(wrap_pyfunction!(number::rewrite_numbers, module)?)?;
