@@ -1,11 +1,37 @@
 """postproc arm: the shipped arms in a table, an arm file from a URDF."""
 
+import json
+
+import numpy as np
 import pytest
 
 from postproc.robot.arm import load_arm
 from postproc.robot.arm_file import shipped_arms
+from postproc.robot.pose import record_from_pose
 from tests.robot.urdfs import NJ130_SERIAL, URDFS, urdf_text
 from tests.written import cli
+
+
+@pytest.mark.parametrize("name", sorted(set(shipped_arms()) - {"ur10"}))
+def test_a_program_is_planned_with_every_arm(tmp_path, name):
+    """Joint and linear moves to poses of known joint angles lead to these."""
+    arm = load_arm(name)
+    low, high = np.maximum(arm.lower, -2.8), np.minimum(arm.upper, 2.8)
+    home = np.where(np.arange(6) == 4, 0.7, (low + high) / 2)
+    q = home + np.random.default_rng(2).uniform(-0.15, 0.15, (4, 6))
+    moves = (
+        f"  MOVE {kind} TO POS({', '.join(f'{v:.4f}' for v in record)}, '')"
+        for kind, record in zip(
+            ("JOINT", "LINEAR") * 2, record_from_pose(arm.flange(q)), strict=True
+        )
+    )
+    job, cell = tmp_path / "job.pdl", tmp_path / "cell.toml"
+    job.write_text("\n".join(["PROGRAM job", "BEGIN", *moves, "END job", ""]))
+    joints = [round(float(v), 4) for v in np.rad2deg(home)]
+    cell.write_text(f'[robot]\narm = "{name}"\n[home]\njoints_deg = {joints}\n')
+    found = cli("explain", job, "--cell", cell, "--json", "-")
+    planned = [visit["q_deg"] for visit in json.loads(found.stdout)["visits"]]
+    np.testing.assert_allclose(planned, np.rad2deg(q), atol=0.003)
 
 
 @pytest.fixture
