@@ -259,11 +259,21 @@ DH_ZERO = (0.0, -90.0, -90.0, 0.0, 0.0, 180.0)  # [deg] D-H angles of the uprigh
 def _written(chain: UrdfChain, shape: Shape, repeatability_mm: float, name: str) -> str:
     """Fill in the arm file."""
     return TEMPLATE.format(
-        robot=json.dumps(chain.name), file=json.dumps(chain.path.name),
-        base=json.dumps(chain.base), tip=json.dumps(chain.tip),
-        name=json.dumps(name), repeatability=_number(repeatability_mm),
+        robot=_quoted(chain.name), file=_quoted(chain.path.name),
+        base=_quoted(chain.base), tip=_quoted(chain.tip),
+        name=_quoted(name), repeatability=_number(repeatability_mm),
         **_dh_parts(shape), **_joint_parts(chain), **_opw_parts(shape),
     )  # fmt: skip
+
+
+def _quoted(text: str) -> str:
+    r"""Write a basic string of TOML; what is no character becomes a question mark.
+
+    >>> _quoted('a "\x7f')
+    '"a \\"\\u007f"'
+    """
+    valid = text.encode("utf-8", "replace").decode("utf-8")
+    return json.dumps(valid, ensure_ascii=False).replace("\x7f", "\\u007f")
 
 
 def _dh_parts(shape: Shape) -> dict[str, str]:

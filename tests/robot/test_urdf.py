@@ -87,6 +87,14 @@ def test_rounded_quarter_turns_are_whole_ones_and_that_is_said(tmp_path):
     np.testing.assert_allclose(chain.flange(q), wanted, atol=1e-12)
 
 
+@pytest.mark.parametrize("name", ['a "b"\n\t\\', "\x7f\x01", "\u00e4\U0001f916", "#"])
+def test_any_name_can_be_written(tmp_path, name):
+    chain = replace(read_chain(write(tmp_path, IRB)), name=name, base=name)
+    (tmp_path / "arm.toml").write_text(arm_text(chain, 0.1), encoding="utf-8")
+    assert load_arm(tmp_path / "arm.toml").name == name
+    assert "mine?" in arm_text(chain, 0.1, "mine\udc80")
+
+
 def test_the_base_may_hang_beside_the_chain(tmp_path):
     """As base does in ROS: the controller's frame, fixed on base_link."""
     extra = (
