@@ -102,6 +102,7 @@ class _Elements:
 
 # Joints, and the chain of them from base to tip.
 
+LARGEST = 1e9  # number that a URDF can mean
 SQUARE = 1e-3  # [rad] that a rounded quarter turn (1.57, 3.1416) may be off
 MOVING = ("revolute", "continuous")
 
@@ -300,7 +301,7 @@ def _numbers(
     """Read the numbers of an attribute.
 
     Raises:
-        ArmError: They are not so many finite numbers as the default has.
+        ArmError: They are not so many sound numbers as the default has.
     """
     text = element.attributes.get(key)
     if text is None:
@@ -309,7 +310,8 @@ def _numbers(
         found = [float(word) for word in text.split()]
     except ValueError:
         found = []
-    if len(found) != len(default) or not np.isfinite(found).all():
+    sound = all(abs(number) <= LARGEST for number in found)  # nan is not
+    if len(found) != len(default) or not sound:
         wanted = f"{len(default)} numbers" if len(default) > 1 else "a number"
         problem = f"<{element.tag} {key}> is not {wanted}: {text}"
         cure = EXPAND if "$" in text else "Correct it"

@@ -152,6 +152,7 @@ def test_what_is_not_such_an_arm_is_refused_with_its_joint(tmp_path, rows, said)
         ("<robot", "<xacro:robot", ":2: <xacro:robot> is not expanded.*xacro FILE"),
         ('xyz="0.175', 'xyz="${a1}', r":.*<origin xyz> is not 3 numbers.*xacro FILE"),
         ('lower="-3.0"', 'lower="nan"', "<limit lower> is not a number: nan"),
+        ('axis xyz="0.0', 'axis xyz="1e300', "<axis xyz> is not 3 numbers: 1e300"),
         ('type="revolute"', 'type="continuous"', "joint j1 has no range.*<limit"),
         ('type="revolute"', 'type="prismatic"', "joint j1 is prismatic"),
         ('velocity="2.0"', 'velocity="0"', "joint j1 has no velocity"),
