@@ -6,12 +6,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import given
 
+from postproc.exceptions import ProgramError
 from postproc.language.rapid import syntax as said
 from postproc.language.rapid.program import read_rapid
 from postproc.language.rapid.signatures import MOTIONS, known_instructions
 from postproc.language.rapid.targets import WIDTH, RecordKind, find_literals
 from postproc.language.source import Edit, Replacements, Source, Span, apply
+from tests.language.rapid.test_statements import TEXTS
 from tests.reference.statements import statements
 
 CORPUS = Path("/work/shared/corpus")
@@ -211,6 +214,19 @@ def test_what_is_odd_is_listed_with_its_line(body, code, text):
     (found,) = read_rapid(Source("m.mod", data)).diagnostics
     assert (found.file, found.line, found.code) == ("m.mod", 3, code)
     assert re.search(text, found.message)
+
+
+@given(TEXTS)
+def test_whatever_the_text_it_is_read_or_refused(text):
+    try:
+        file = read_rapid(Source("m.mod", text.encode("latin-1")))
+    except ProgramError as refused:
+        assert refused.line is not None
+        return
+    for kind in RecordKind:
+        find_literals(file.text, kind)
+    rows = [scope for scope in (*file.modules, *file.routines)]
+    assert all(0 <= scope.first <= scope.last < len(file.text) for scope in rows)
 
 
 def test_a_record_without_an_end_hides_no_move():
