@@ -163,6 +163,17 @@ def scan_lines(
     list[int],
 ]: ...
 
+# statements.rs: statements of RAPID, as texts and numbers (`postproc.language.rapid`)
+def scan_statements(
+    data: bytes,
+) -> tuple[
+    list[bytes],
+    tuple[Indices, Indices, Indices, Indices, Indices],
+    tuple[Indices, Indices, Floats],
+    tuple[list[str], Indices],
+    list[int],
+]: ...
+
 # number.rs: numbers, read and written (`postproc.language.rewrite`)
 def rewrite_numbers(
     data: bytes, start: Ints, end: Ints, values: Floats, least: Ints

@@ -163,7 +163,26 @@ def test_each_foreign_library_is_imported_in_one_module() -> None:
     assert {name.split(".")[0] for name in pydantic} <= {"robot", "model"}
     # The command line is one door, cut by what its commands work on.
     assert {name.split(".")[0] for name in spread.pop("typer", [])} <= {"cli"}
+    # Every language has a door to its own grammar.
+    doors = {tuple(name.split(".")[::2]) for name in spread.pop("lark", [])}
+    assert doors <= {("language", "parser")}
     assert not spread, spread
+
+
+def test_a_language_knows_no_other() -> None:
+    """What two languages need is neutral; nobody but the package knows PDL2 alone."""
+    # The tables of parsers are kept for every grammar, where the first one is read.
+    known = {("rapid", "language.pdl2.parser")}
+    found = set()
+    for name, path in modules():
+        own = name.removeprefix("language.").split(".")[0]
+        if name.startswith("language.") and (PACKAGE / "language" / own).is_dir():
+            for other in ours(name, path):
+                folder = other.removeprefix("language.").split(".")[0]
+                if other.startswith("language.") and folder != own:
+                    if (PACKAGE / "language" / folder).is_dir():
+                        found.add((own, other))
+    assert found == known
 
 
 def test_there_is_one_way_to_compensate() -> None:

@@ -33,7 +33,7 @@ from postproc.robot.inverse import ClosedForm
 from postproc.robot.play import NOTHING, Clamps, Edges, chains_of, passing, prefix
 from postproc.robot.pose import rotation_from_vector
 from postproc.robot.state import make_states
-from tests.reference import kinematics, paths
+from tests.reference import kinematics, paths, statements
 from tests.reference import play as plain
 
 ROOT = Path(__file__).parent.parent
@@ -463,3 +463,30 @@ def test_lines_that_are_not_there():
         _native.compare_lines(b"abc", np.array([0, 4]), b"abc", np.array([0]))
     none = np.array([3])
     assert len(_native.compare_lines(b"abc", none, b"", np.array([0]))[0][0]) == 0
+
+
+def test_statements_of_rapid(random):
+    """What they are, `tests/language/rapid` holds; here: many, and views of bytes."""
+    pieces = [
+        b"MoveL ",
+        b"p1",
+        b"[1,-2]",
+        b";",
+        b"\n",
+        b"! c",
+        b"IF ",
+        b"THEN",
+        b'"a;"',
+    ]
+    for n in (0, 1, 20_000):
+        text = b"".join(pieces[k] for k in random.integers(0, len(pieces), n))
+        forms, by_statement, numbers, names, _ = _native.scan_statements(text)
+        meant = statements.statements(text.decode("latin-1"))
+        form, begin, end, first, _ = by_statement
+        assert [forms[k].decode("latin-1") for k in form] == [s.form for s in meant]
+        assert begin.tolist() == [s.begin for s in meant]
+        assert end.tolist() == [s.end for s in meant]
+        assert np.diff(first).tolist() == [len(s.numbers) for s in meant]
+        assert len(names[1]) == sum(len(s.names) for s in meant)
+        places = [place for s in meant for place in s.numbers]
+        assert list(zip(*(c.tolist() for c in numbers[:2]), strict=True)) == places

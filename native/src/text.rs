@@ -13,20 +13,20 @@ use pyo3::types::{PyBytes, PyList};
 use crate::number::value_of;
 use crate::rows::{detached, each, flat};
 
-const NUMBER: u8 = 0; // stands for a number, in a mask
-const NAME: u8 = 1; // for a numbered name, in a form
-const WHOLE: u8 = b'\n'; // begins a mask with its names still in it
-const MARK: &[u8] = b"\xef\xbb\xbf"; // of UTF-8
+pub const NUMBER: u8 = 0; // stands for a number, in a mask
+pub const NAME: u8 = 1; // for a numbered name, in a form
+pub const WHOLE: u8 = b'\n'; // begins a mask with its names still in it
+pub const MARK: &[u8] = b"\xef\xbb\xbf"; // of UTF-8
 
 // What a byte can be.
 const BLANK: u16 = 1;
-const DIGIT: u16 = 1 << 1;
+pub const DIGIT: u16 = 1 << 1;
 const LETTER: u16 = 1 << 2; // of the alphabet, _ and $
-const UNARY: u16 = 1 << 3; // before a sign that belongs to its number
+pub const UNARY: u16 = 1 << 3; // before a sign that belongs to its number
 const IDLE: u16 = 1 << 4; // before a blank that says nothing
 const NO_POINT: u16 = 1 << 5; // before a dot that begins no number
-const FIRST: u16 = 1 << 6; // of a name
-const IN_NAME: u16 = 1 << 7; // a letter of any language, a digit or _
+pub const FIRST: u16 = 1 << 6; // of a name
+pub const IN_NAME: u16 = 1 << 7; // a letter of any language, a digit or _
 const WORD: u16 = DIGIT | LETTER;
 
 const fn table() -> [u16; 256] {
@@ -85,7 +85,7 @@ const fn table() -> [u16; 256] {
 
 static KIND: [u16; 256] = table();
 
-fn is(byte: u8, kind: u16) -> bool {
+pub fn is(byte: u8, kind: u16) -> bool {
     KIND[byte as usize] & kind != 0
 }
 
@@ -109,7 +109,7 @@ fn string_end(line: &[u8], at: usize, strings: Strings) -> Option<usize> {
     None
 }
 
-fn while_is(line: &[u8], mut at: usize, kind: u16) -> usize {
+pub fn while_is(line: &[u8], mut at: usize, kind: u16) -> usize {
     while at < line.len() && is(line[at], kind) {
         at += 1;
     }
@@ -117,7 +117,7 @@ fn while_is(line: &[u8], mut at: usize, kind: u16) -> usize {
 }
 
 /// Return where a number ends that may begin at a digit or dot.
-fn number_end(line: &[u8], at: usize) -> Option<usize> {
+pub fn number_end(line: &[u8], at: usize) -> Option<usize> {
     let next = |i: usize| line.get(i).copied().unwrap_or(0);
     let mut end = at;
     if line[at] == b'0' {
@@ -276,13 +276,13 @@ fn is_label(mask: &[u8], end: usize) -> bool {
 
 /// Texts by number, in the order in which they are met first.
 #[derive(Default)]
-struct Interned {
+pub struct Interned {
     number: HashMap<Vec<u8>, i32>,
-    texts: Vec<Vec<u8>>,
+    pub texts: Vec<Vec<u8>>,
 }
 
 impl Interned {
-    fn of(&mut self, text: &[u8]) -> i32 {
+    pub fn of(&mut self, text: &[u8]) -> i32 {
         if let Some(found) = self.number.get(text) {
             return *found;
         }
@@ -293,7 +293,7 @@ impl Interned {
     }
 }
 
-fn latin_1(text: &[u8]) -> String {
+pub fn latin_1(text: &[u8]) -> String {
     text.iter().map(|b| *b as char).collect()
 }
 

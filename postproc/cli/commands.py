@@ -7,17 +7,22 @@ from typing import Annotated
 import typer
 
 from postproc import __version__
-from postproc.cli import loop, models, plant, programs
+from postproc.cli import arms, loop, models, plant, programs
 from postproc.cli.common import app, epilog, guarded
 
 NAME = "__name__"  # a command is called like its function
 
-__all__ = ["app", "loop", "models", "plant", "programs"]
+__all__ = ["app", "arms", "loop", "models", "plant", "programs"]
 
-for _command in app.registered_commands:
-    _command.epilog = epilog(str(_command.name or getattr(_command.callback, NAME)))
-    if _command.callback is not None:
-        _command.callback = guarded(_command.callback)
+for _group, _commands in (
+    ("", app.registered_commands),
+    ("arm ", arms.arm.registered_commands),
+):
+    for _command in _commands:
+        _name = str(_command.name or getattr(_command.callback, NAME))
+        _command.epilog = epilog(_group + _name)
+        if _command.callback is not None:
+            _command.callback = guarded(_command.callback)
 
 
 @app.callback(invoke_without_command=True)

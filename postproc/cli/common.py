@@ -252,6 +252,11 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
         "postproc batch nominal compensated --plan batch.toml --resume",
     ),
     "check": ("postproc check compensated --model model.json --source nominal",),
+    "arm list": ("postproc arm list",),
+    "arm from-urdf": (
+        "postproc arm from-urdf robot.urdf -o arm.toml",
+        "postproc arm from-urdf robot.urdf --base base_link --tip flange",
+    ),
 }
 
 

@@ -10,9 +10,11 @@ import numpy as np
 
 from postproc.cli.jobs import read_files
 from postproc.compensation.program import read_program
+from postproc.exceptions import CellError
 from postproc.language.visits import Visits
 from postproc.model.statistics import ErrorStatistics
 from postproc.report.json import finite
+from postproc.robot.arm import load_arm
 from postproc.robot.cell import Cell, load_cell
 from postproc.robot.pose import MM
 from postproc.simulation import (
@@ -31,6 +33,8 @@ from postproc.simulation import (
     write_measurements,
 )
 from postproc.simulation.path import PathScores, score_paths
+
+VIRTUAL = "nj220-2.7"  # the shipped arm whose numbers the virtual one has
 
 
 @dataclass(frozen=True)
@@ -134,6 +138,18 @@ def setup_of(cell: Cell) -> VirtualCell:
     )
 
 
+def check_arm(cell: Cell, path: Path) -> None:
+    """Refuse a cell of another arm than the virtual one.
+
+    Raises:
+        CellError: The virtual arm's chain, which is its own, is not the cell's.
+    """
+    if cell.arm.id != load_arm(VIRTUAL).id:
+        problem = f"the virtual arm is {VIRTUAL}, not {cell.arm.name}"
+        cure = f'Simulate in a cell with arm = "{VIRTUAL}"'
+        raise CellError(path, problem, cure, place="$.robot.arm")
+
+
 def simulate_file(
     program: Path,
     cell_path: Path,
@@ -156,6 +172,7 @@ def simulate_file(
         PostprocError: A file cannot be used, or an effect is not known.
     """
     cell = load_cell(cell_path)
+    check_arm(cell, cell_path)
     setup = setup_of(cell)
     names: list[str | Planted] = [*DEFAULT, *parse_effects(effects or "")]
     if program.suffix.lower() == ".csv":

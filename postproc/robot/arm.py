@@ -111,7 +111,7 @@ class Arm:
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Travel between processes as the arm file: compiled parts cannot."""
-        return _build, (self.file,)
+        return build_arm, (self.file,)
 
     @cached_property
     def _links(self) -> Floats:
@@ -325,13 +325,13 @@ def load_arm(name: str | Path, beside: Path | None = None) -> Arm:
         ArmError: Naming the file, the place and the cure.
     """
     path = arm_path(str(name), beside)
-    arm = _build(read_arm_file(path))
+    arm = build_arm(read_arm_file(path))
     if arm.has_inverse:
         _check_inverse(arm, path)
     return arm
 
 
-def _build(file: ArmFile) -> Arm:
+def build_arm(file: ArmFile) -> Arm:
     """Convert an arm file to SI."""
     dh, joints = file.dh, file.joints
     mix = np.eye(6)

@@ -43,6 +43,17 @@ def read_toml(path: Path, schema: type[Schema], error: type[FileError]) -> Schem
         ) from None
     if len(raw) > MAX_BYTES:
         raise error(path, f"is longer than {MAX_BYTES} bytes", "Check the path")
+    return parse_toml(path, raw, schema, error)
+
+
+def parse_toml(
+    path: Path, raw: bytes, schema: type[Schema], error: type[FileError]
+) -> Schema:
+    """Validate the bytes of a TOML file.
+
+    Raises:
+        FileError: Of the given type, naming the file and the first wrong place.
+    """
     try:
         data = tomllib.loads(raw.decode("utf-8-sig"))
     except UnicodeDecodeError:
@@ -205,8 +216,17 @@ def arm_path(name: str, beside: Path | None = None) -> Path:
     path = Path(name) if beside is None else beside / name
     if path.is_file():
         return path
-    known = ", ".join(sorted(p.stem for p in ARMS.glob("*.toml")))
+    known = ", ".join(shipped_arms())
     raise ArmError(name, "no such arm", f"Shipped arms: {known}; or give a path")
+
+
+def shipped_arms() -> list[str]:
+    """Name the arms that come with the package.
+
+    >>> "nj220-2.7" in shipped_arms()
+    True
+    """
+    return sorted(path.name.removesuffix(".toml") for path in ARMS.glob("*.toml"))
 
 
 def read_arm_file(path: Path) -> ArmFile:

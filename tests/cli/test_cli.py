@@ -15,6 +15,7 @@ from tests.written import FIRST, LISTED, NEXT, POSE, cli, entry, program
 COMMANDS = (
     "compensate", "diff", "restore", "explain", "survey", "simulate", "fit", "predict",
     "diagnose", "compare", "batch", "check", "report", "history",
+    "arm list", "arm from-urdf",
 )  # fmt: skip
 UNREACHED = "MOVE LINEAR TO POS(9000.0, 0.0, 0.0, 0.0, 175.0, 0.0, '')"
 STAMP = rb"-- postproc \S+ model=[0-9a-f]{16} source=[0-9a-f]{64}"
@@ -22,12 +23,15 @@ STAMP = rb"-- postproc \S+ model=[0-9a-f]{16} source=[0-9a-f]{64}"
 
 def test_every_command_of_the_interface_is_there():
     names = {c.name or c.callback.__name__ for c in app.registered_commands}
+    for group in app.registered_groups:
+        inside = group.typer_instance.registered_commands
+        names |= {f"{group.name} {c.name or c.callback.__name__}" for c in inside}
     assert set(COMMANDS) <= names
 
 
 @pytest.mark.parametrize("command", COMMANDS)
 def test_every_command_explains_itself(command):
-    found = cli(command, "--help")
+    found = cli(*command.split(), "--help")
     assert found.exit_code == 0 and "Usage:" in found.stdout
 
 

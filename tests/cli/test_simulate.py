@@ -101,3 +101,13 @@ def test_the_cell_gives_the_probe_points(desk):
     cell = load_cell(desk.cell)
     tools = setup_of(cell).tools
     np.testing.assert_allclose(tools[:, :3, 3], cell.probes)
+
+
+@pytest.mark.parametrize("name", ["irb6640-185-2.8", "nj130-2.6", "ur10"])
+def test_another_arm_than_the_virtual_one_is_refused(desk, name):
+    """Its chain is its own: readings would be those of the wrong arm."""
+    source, out = desk.put("job.pdl", program(FIRST)), desk.folder / "m.csv"
+    cell = desk.put("other.toml", f'[robot]\narm = "{name}"\n')
+    found = cli("simulate", source, "--cell", cell, "-o", out)
+    said = f"the virtual arm is nj220-2.7, not {name} @ $.robot.arm"
+    assert found.exit_code == 2 and said in found.stderr and not out.exists()

@@ -1,0 +1,229 @@
+"""The grammar of RAPID: one statement's form in, what it says out."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import lru_cache
+from itertools import count
+from typing import Any
+
+import lark
+
+from postproc.language.pdl2.parser import line_parser
+from postproc.language.rapid import syntax as said
+from postproc.language.scan import NAME_MARK, UNREADABLE
+from postproc.language.shapes import open_name
+
+# From trees to statements, rule by rule. Every function here is named after a rule of
+# ``grammars/rapid.lark`` and takes what its children gave.
+
+Children = Sequence[Any]
+
+
+class Word(str):
+    """A token: text with the name of its terminal."""
+
+    kind: str
+
+    def __new__(cls, text: str, kind: str) -> Word:
+        """Remember the terminal beside the text."""
+        word = super().__new__(cls, text)
+        word.kind = kind
+        return word
+
+
+class ScopePart(str):
+    """LOCAL or TASK."""
+
+
+class OptionPart(tuple[said.Argument, ...]):
+    """Optional arguments and what stands before them."""
+
+
+class DimensionsPart(tuple[Any, ...]):
+    """The dimensions of an array."""
+
+
+def _low(text: str) -> str:
+    return str(text).lower()
+
+
+def _scope(c: Children) -> str:
+    return _low(c[0]) if isinstance(c[0], ScopePart) else ""
+
+
+def _after_scope(c: Children) -> Children:
+    return c[1:] if isinstance(c[0], ScopePart) else c
+
+
+def _routine(kind: str) -> Callable[[Children], said.RoutineHead]:
+    def built(c: Children) -> said.RoutineHead:
+        rest = list(_after_scope(c))
+        parameters = rest.pop() if isinstance(rest[-1], tuple) else ()
+        returns = _low(rest[0]) if kind == "func" else ""
+        local = _scope(c) == "local"
+        return said.RoutineHead(kind, _low(rest[-1]), parameters, local, returns)
+
+    return built
+
+
+def _data(c: Children) -> said.DataDeclaration:
+    kind, type_, name, *rest = _after_scope(c)
+    sized = bool(rest) and isinstance(rest[0], DimensionsPart)
+    dimensions = tuple(rest[0]) if sized else ()
+    value = rest[-1] if len(rest) > sized else None
+    names = _low(kind), _low(type_), _low(name)
+    return said.DataDeclaration(*names, _scope(c), dimensions, value)
+
+
+def _branch(word: str) -> Callable[[Children], said.Branch]:
+    return lambda c: said.Branch(word, tuple(c))
+
+
+def _for(c: Children) -> said.ForLoop:
+    return said.ForLoop(_low(c[0]), c[1], c[2], c[3] if len(c) > 3 else None)
+
+
+def _part(c: Children) -> OptionPart:
+    return OptionPart(
+        x if isinstance(x, said.Argument) else said.Argument(x) for x in c
+    )
+
+
+def _option(name: str, value: Any = None, passed_on: bool = False) -> said.Argument:
+    return said.Argument(value, _low(name).lstrip("\\"), passed_on)
+
+
+def _with_arguments(
+    make: Callable[[Any, tuple[said.Argument, ...]], Any], c: Children
+) -> Any:
+    first = _low(c[0]) if isinstance(c[0], str) else c[0]
+    return make(first, c[1] if len(c) > 1 else ())
+
+
+def _operation(c: Children) -> said.Operation:
+    operator = next(x for x in c if isinstance(x, Word))
+    return said.Operation(
+        str(operator).upper(), tuple(x for x in c if not isinstance(x, Word))
+    )
+
+
+def _reference(c: Children) -> said.DataObject:
+    return said.DataObject(_low(c[0]), tuple(c[1:]))
+
+
+def _joined(c: Children) -> tuple[said.Argument, ...]:
+    return tuple(argument for part in c for argument in part)
+
+
+RULES: dict[str, Callable[[Children], Any]] = {
+    "statement": lambda c: c[0],
+    "header": lambda c: said.FileHeader(),
+    "module": lambda c: said.ModuleHead(_low(c[0]), tuple(map(_low, c[1:]))),
+    "procedure": _routine("proc"),
+    "function": _routine("func"),
+    "trap": _routine("trap"),
+    "record": lambda c: said.RecordHead(_low(_after_scope(c)[0])),
+    "end": lambda c: said.BlockWord(_low(c[0])),
+    "scope": lambda c: ScopePart(c[0]),
+    "parameters": lambda c: tuple(c),
+    "parameter": lambda c: [_low(x) for x in c if isinstance(x, Word)][-1],
+    "optional": lambda c: [_low(x) for x in c if isinstance(x, Word)][-1],
+    "mode": lambda c: None,
+    "open_dimensions": lambda c: None,
+    "data": _data,
+    "kind": lambda c: c[0],
+    "alias": lambda c: said.TypeAlias(*map(_low, _after_scope(c))),
+    "dimensions": DimensionsPart,
+    "if_then": _branch("if"),
+    "else_if": _branch("elseif"),
+    "while_do": _branch("while"),
+    "test": _branch("test"),
+    "case": _branch("case"),
+    "default": _branch("default"),
+    "compact_if": lambda c: said.CompactIf(*c),
+    "for_do": _for,
+    "label": lambda c: said.LabelMark(_low(c[0])),
+    "branch_word": lambda c: said.BlockWord(_low(c[0])),
+    "on_error": lambda c: said.ErrorHandler(tuple(c)),
+    "on_undo": lambda c: said.BlockWord("undo"),
+    "on_backward": lambda c: said.BlockWord("backward"),
+    "assignment": lambda c: said.Assignment(*c),
+    "instruction": lambda c: _with_arguments(said.Instruction, c),
+    "late_binding": lambda c: _with_arguments(said.LateCall, c),
+    "goto": lambda c: said.JumpTo(_low(c[0])),
+    "return_value": lambda c: said.Leave("return", *c),
+    "raise_error": lambda c: said.Leave("raise", *c),
+    "connect": lambda c: said.ConnectTrap(c[0], _low(c[1])),
+    "leave": lambda c: said.Leave(_low(c[0])),
+    "nothing": lambda c: said.RapidStatement(),
+    "arguments": _joined,
+    "part": _part,
+    "switch": lambda c: _option(c[0]),
+    "named": lambda c: _option(c[0], c[1]),
+    "conditional": lambda c: _option(c[0], said.DataObject(_low(c[1])), True),
+    "infix": _operation,
+    "prefix": _operation,
+    "number": lambda c: c[0],
+    "string": lambda c: said.StringLiteral(str(c[0])),
+    "function_call": lambda c: _with_arguments(said.FunctionCall, c),
+    "composite": lambda c: said.Composite(tuple(c)),
+    "reference": _reference,
+    "component": lambda c: _low(c[0]),
+    "element": lambda c: said.ElementStep(tuple(c)),
+}
+
+LONGEST = 1 << 18  # characters of a form; arrays of a thousand targets have 60,000
+DEEPEST = 200  # operators or brackets within each other; followed by recursion
+
+
+RESERVED = frozenset(
+    "alias and backward case connect const default div do else elseif endfor endfunc "
+    "endif endmodule endproc endrecord endtest endtrap endwhile error exit for from "
+    "func goto if inout local mod module not or pers proc raise record retry "
+    "return step test then to trap trynext undo var while with xor".split()
+)
+"""Words that name nothing, but for attributes of a module."""
+
+
+class _DeeperError(Exception):
+    """A statement holds more operators within each other than any program does."""
+
+
+class _ReservedError(Exception):
+    """A word of the language stands where a name must."""
+
+
+@lru_cache(maxsize=8192)
+def parse_statement(form: str) -> said.RapidStatement:
+    """Parse the form of a statement, `NotUnderstood` where the grammar cannot."""
+    if form.startswith(UNREADABLE) or len(form) > LONGEST:
+        return said.NotUnderstood(form[:80])
+    try:
+        tree = line_parser("rapid", "statement").parse(form)
+        found = _build(tree)
+    except (lark.exceptions.LarkError, _DeeperError, _ReservedError):
+        return said.NotUnderstood(form[:80])
+    return found if isinstance(found, said.RapidStatement) else said.RapidStatement()
+
+
+def _build(tree: lark.Tree[lark.Token]) -> object:
+    """Build what a tree says, counting its names and its numbers."""
+    names, slots = count(), count()
+
+    def walk(node: lark.Tree[lark.Token] | lark.Token, depth: int = 0) -> object:
+        if depth > DEEPEST:
+            raise _DeeperError
+        if isinstance(node, lark.Token):
+            if node.type == "NUMBER":
+                return said.Num(next(slots))
+            text = str(node)
+            if node.type == "NAME" and text.lower() in RESERVED:
+                raise _ReservedError
+            if NAME_MARK in text:
+                text = text.replace(NAME_MARK, open_name(next(names)))
+            return Word(text, node.type)
+        children = [walk(child, depth + 1) for child in node.children]
+        return RULES[str(node.data)](children)
+
+    return walk(tree)

@@ -1,0 +1,83 @@
+"""Instructions of RAPID by name: which move, and what their arguments are."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+from postproc.language.rapid.syntax import Argument, Operand
+
+INSTRUCTIONS = Path(__file__).parent / "instructions.txt"
+
+
+@dataclass(frozen=True)
+class Signature:
+    """Where the positions stand among an instruction's arguments that go by place.
+
+    Attributes:
+        to: The destination.
+        via: The point that an arc leads through, -1 where there is none.
+        joints: The destination is a jointtarget.
+        reaches: The move ends at its destination, not where a signal comes.
+    """
+
+    to: int = 0
+    via: int = -1
+    joints: bool = False
+    reaches: bool = True
+
+    def operands(self, arguments: Sequence[Argument]) -> tuple[Operand | None, ...]:
+        """Return destination and via point, None where one is missing."""
+        placed = [one.value for one in arguments if not one.name]
+        return tuple(
+            placed[at] if 0 <= at < len(placed) else None for at in (self.to, self.via)
+        )
+
+
+POINT, ARC = Signature(), Signature(to=1, via=0)
+JOINTS = Signature(joints=True)
+SEARCH = Signature(to=2, reaches=False)  # signal, where it came, destination
+ARC_SEARCH = Signature(to=3, via=2, reaches=False)
+
+_KINDS: Mapping[Signature, str] = {
+    POINT: """
+        MoveJ MoveL MoveJDO MoveLDO MoveJAO MoveLAO MoveJGO MoveLGO MoveJSync MoveLSync
+        TriggJ TriggL TriggJIOs TriggLIOs
+        ArcL ArcLStart ArcLEnd ArcMoveJ ArcMoveL
+        SpotJ SpotL SpotMJ SpotML PaintL DispL CapL
+    """,
+    ARC: """
+        MoveC MoveCDO MoveCAO MoveCGO MoveCSync TriggC
+        ArcC ArcCStart ArcCEnd ArcMoveC PaintC DispC CapC
+    """,
+    JOINTS: "MoveAbsJ MoveExtJ TriggAbsJ ArcMoveAbsJ ArcMoveExtJ",
+    SEARCH: "SearchL",
+    ARC_SEARCH: "SearchC",
+    Signature(to=2, joints=True, reaches=False): "SearchExtJ",
+}
+MOTIONS: Mapping[str, Signature] = {
+    name.lower(): signature
+    for signature, names in _KINDS.items()
+    for name in names.split()
+}
+
+
+@cache
+def known_instructions() -> Mapping[str, str]:
+    """Return the instructions that do not move, and of what kind each is.
+
+    Returns:
+        By name in lower case: ``still`` changes nothing of a move, ``modal`` changes
+        how the moves after it are carried out.
+
+    >>> known_instructions()["tpwrite"], known_instructions()["pdispon"]
+    ('still', 'modal')
+    """
+    found: dict[str, str] = {}
+    for line in INSTRUCTIONS.read_text(encoding="utf-8").splitlines():
+        kind, _, names = line.partition(":")
+        if not line.startswith("#"):
+            found |= dict.fromkeys(names.lower().split(), kind)
+    return found

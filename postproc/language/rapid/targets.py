@@ -1,0 +1,151 @@
+"""Targets that stand in a RAPID file as numbers: where each of them is written."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import TypeVar
+
+import numpy as np
+
+from postproc.arrays import Floats, Ints
+from postproc.language.rapid.statements import RapidText
+from postproc.language.rapid.syntax import (
+    Argument,
+    Assignment,
+    CompactIf,
+    Composite,
+    DataDeclaration,
+    FunctionCall,
+    Instruction,
+    LateCall,
+    Num,
+    Operand,
+    Operation,
+    RapidStatement,
+)
+
+
+class RecordKind(IntEnum):
+    """What numbers in nested brackets are: they are told apart by their counts."""
+
+    ROBTARGET = 0  # [[x,y,z],[q1,q2,q3,q4],[cf1,cf4,cf6,cfx],[e1..e6]]
+    JOINTTARGET = 1  # [[a1..a6],[e1..e6]]
+    POSE = 2  # [[x,y,z],[q1,q2,q3,q4]], also in tools and work objects
+
+
+COUNTS = {
+    (3, 4, 4, 6): RecordKind.ROBTARGET,
+    (6, 6): RecordKind.JOINTTARGET,
+    (3, 4): RecordKind.POSE,
+}
+WIDTH = {kind: sum(counts) for counts, kind in COUNTS.items()}
+T = TypeVar("T")
+
+
+@dataclass(frozen=True)
+class RecordLiterals:
+    """The k records of one kind in a file, each w numbers (structure of arrays).
+
+    Attributes:
+        kind: What they are; w is 17, 12 or 7.
+        row: The statement that each stands in, ascending, (k,).
+        start, stop: Byte offsets of every number, its sign included, (k, w).
+        value: [mm], quaternions, counts of quarter turns, [deg], as written, (k, w).
+    """
+
+    kind: RecordKind
+    row: Ints
+    start: Ints
+    stop: Ints
+    value: Floats
+
+    def __len__(self) -> int:
+        """Return the number of records."""
+        return len(self.row)
+
+
+def find_literals(text: RapidText, kind: RecordKind) -> RecordLiterals:
+    """Find all records of a kind whose numbers are all written out.
+
+    Statements of one form have them in the same slots.
+    """
+    rows: list[Ints] = []
+    slots: list[Ints] = []
+    by_form = text.said.form[text.shape]
+    for form, said in enumerate(text.said.said):
+        found = [one for one, of in literals_in(said) if of is kind]
+        if found:
+            here = np.flatnonzero(by_form == form)
+            for one in found:
+                rows.append(here)
+                slots.append(text.first[here][:, None] + np.array(one))
+    width = WIDTH[kind]
+    row = np.concatenate([np.empty(0, np.int64), *rows])
+    at = np.concatenate([np.empty((0, width), np.int64), *slots])
+    order = np.lexsort((at[:, 0], row))
+    row, at = row[order], at[order]
+    return RecordLiterals(kind, row, text.start[at], text.stop[at], text.value[at])
+
+
+def literals_in(said: RapidStatement) -> Iterator[tuple[list[int], RecordKind]]:
+    """Find the records in what a statement says, as slots of its numbers."""
+    for operand in operands_of(said):
+        yield from _literals(operand)
+
+
+def _literals(operand: Operand) -> Iterator[tuple[list[int], RecordKind]]:
+    if isinstance(operand, Composite):
+        parts = [_slots(part) for part in operand.items]
+        if all(part is not None for part in parts):
+            whole = [part for part in parts if part is not None]
+            kind = COUNTS.get(tuple(map(len, whole)))
+            if kind is not None:
+                yield [slot for part in whole for slot in part], kind
+                return
+    for inside in _inside(operand):
+        yield from _literals(inside)
+
+
+def _slots(operand: Operand) -> list[int] | None:
+    """Return the slots of ``[1, 2, ..]``, None where it is anything else."""
+    if not isinstance(operand, Composite):
+        return None
+    slots = [item.slot for item in operand.items if isinstance(item, Num)]
+    return slots if len(slots) == len(operand.items) else None
+
+
+def operands_of(said: RapidStatement) -> Sequence[Operand]:
+    """Return the values that a statement gives: declared, assigned, as arguments."""
+    match said:
+        case DataDeclaration(value=value):
+            return _given([value])
+        case Assignment(value=value):
+            return [value]
+        case Instruction(arguments=arguments) | LateCall(arguments=arguments):
+            return _values(arguments)
+        case CompactIf(statement=inside):
+            return operands_of(inside)
+        case _:
+            return []
+
+
+def _given(values: Sequence[T | None]) -> list[T]:
+    return [value for value in values if value is not None]
+
+
+def _values(arguments: Sequence[Argument]) -> Sequence[Operand]:
+    return _given([argument.value for argument in arguments])
+
+
+def _inside(operand: Operand) -> Sequence[Operand]:
+    match operand:
+        case Composite(items=items):
+            return items
+        case FunctionCall(arguments=arguments):
+            return _values(arguments)
+        case Operation(operands=operands):
+            return operands
+        case _:
+            return []

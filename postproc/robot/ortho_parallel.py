@@ -1,0 +1,350 @@
+"""Lengths and zeros of a six-axis arm found in its chain, and its arm file."""
+
+from __future__ import annotations
+
+import json
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from postproc.arrays import Floats
+from postproc.exceptions import ArmError
+from postproc.robot.arm import build_arm
+from postproc.robot.arm_file import ArmFile, parse_toml
+from postproc.robot.pose import MM
+from postproc.robot.urdf import MOVING, UrdfChain, turned
+
+# What the chain is: lengths and zeros of an ortho-parallel basis with a wrist.
+#
+# The closed form's own angles are 0 where the arm stands upright: all joints but 1, 4
+# and 6, which lie along z, turn about y then.
+
+EXACT = 1e-10  # [rad], [m] that axes may be off
+
+
+class Shape(NamedTuple):
+    """An ortho-parallel arm with a spherical wrist.
+
+    Attributes:
+        a1, a2, b, c1, c2, c3, c4: Lengths of the closed form [m].
+        zero: Its angles where the joints' are 0, (6,) [rad].
+        sign: Of every joint's rotation against it, (6,).
+    """
+
+    a1: float
+    a2: float
+    b: float
+    c1: float
+    c2: float
+    c3: float
+    c4: float
+    zero: Floats
+    sign: Floats
+
+
+class _Geometry:
+    """Axes and points of a chain where all joints are at 0, and complaints of them."""
+
+    def __init__(self, chain: UrdfChain) -> None:
+        """Walk along the chain."""
+        self._chain, self.joints = chain, chain.moving
+        frame, axes, points = np.linalg.inv(chain.before), [], []
+        for joint in chain.joints:
+            frame = frame @ joint.origin
+            if joint.kind in MOVING:
+                axes.append(frame[:3, :3] @ joint.axis)
+                points.append(frame[:3, 3])
+        self.axes, self.points = np.array(axes), np.array(points)
+        self.flange = frame
+
+    def need(self, k: int, gap: float, problem: str, cure: str = "") -> None:
+        """Refuse the arm where a gap is more than rounding.
+
+        Raises:
+            ArmError: Naming joint k and the gap.
+        """
+        if abs(gap) > EXACT:
+            joint = self.joints[k]
+            what = f"joint {joint.name} {problem}, off by {abs(gap):.3g}"
+            default = "Only six axes with a spherical wrist can be written"
+            raise ArmError(self._chain.path, what, cure or default, line=joint.line)
+
+
+def shape_of(chain: UrdfChain) -> Shape:
+    """Find the closed form of a chain.
+
+    Raises:
+        ArmError: It is not six axes with an ortho-parallel basis and a spherical wrist.
+    """
+    here = _Geometry(chain)
+    axes, z = here.axes, np.array([0.0, 0.0, 1.0])
+    cure = "Name the controller's base frame with --base"
+    here.need(0, _sine(axes[0], z), f"does not turn about z of {chain.base}", cure)
+    here.need(0, float(np.hypot(*here.points[0][:2])), "is beside the base's z", cure)
+    here.need(1, axes[1] @ z, "is not square to axis 1")
+    here.need(2, _sine(axes[2], axes[1]), "is not parallel to axis 2")
+    here.need(3, axes[3] @ axes[2], "is not square to axis 3")
+    here.need(4, axes[4] @ axes[3], "is not square to axis 4")
+    here.need(5, axes[5] @ axes[4], "is not square to axis 5")
+    return _wrist(here, _basis(here, _wrist_centre(here)))
+
+
+def _sine(a: Floats, b: Floats) -> float:
+    """Return the sine of the angle between two unit vectors."""
+    return float(np.linalg.norm(np.cross(a, b)))
+
+
+def _wrist_centre(here: _Geometry) -> Floats:
+    """Find where axes 4, 5 and 6 meet, (3,) [m].
+
+    Raises:
+        ArmError: They do not.
+    """
+    (p4, p5, p6), (u4, u5, u6) = here.points[3:], here.axes[3:]
+    away = p4 - p5  # the foot on axis 5 of the common normal of axes 4 and 5
+    centre = p5 + (away @ u5) * u5
+    beside = p4 - centre
+    here.need(4, _length(beside - (beside @ u4) * u4), "does not cross axis 4")
+    beside = p6 - centre
+    here.need(5, _length(beside - (beside @ u6) * u6), "misses the wrist centre")
+    found: Floats = centre
+    return found
+
+
+def _length(vector: Floats) -> float:
+    return float(np.linalg.norm(vector))
+
+
+def _turn(axis: Floats, angle: float) -> Floats:
+    """Rotate about a unit vector, (3, 3)."""
+    return turned(axis, np.array([angle]))[0, :3, :3]
+
+
+def _basis(here: _Geometry, centre: Floats) -> Shape:
+    """Find the lengths and the first three angles.
+
+    The side of axis 1 on which axis 2 lies is ahead.
+
+    Raises:
+        ArmError: Upper arm or forearm have no length.
+    """
+    up = np.array([0.0, 0.0, 1.0])
+    side = here.axes[1] if here.axes[1] @ [0.0, 1.0, 0.0] >= -EXACT else -here.axes[1]
+    if np.cross(side, up) @ here.points[1] < -EXACT:
+        side = -side
+    ahead = np.cross(side, up)
+    plane = np.array([ahead, up])
+    shoulder, elbow, wrist = (plane @ p for p in (*here.points[1:3], centre))
+    forearm = here.axes[3] * (
+        1.0 if (plane @ here.axes[3]) @ (wrist - elbow) >= 0 else -1.0
+    )
+    along = plane @ forearm
+    upper, lean = elbow - shoulder, math.atan2(*along)
+    across = np.array([along[1], -along[0]])
+    c2, c3 = _length(upper), float((wrist - elbow) @ along)
+    for k, length, what in ((2, c2, "an upper arm"), (3, c3, "a forearm")):
+        here.need(k, 0.0 if length > EXACT else 1.0, f"ends {what} of no length")
+    t1, t2 = math.atan2(ahead[1], ahead[0]), math.atan2(*upper)
+    sign = [here.axes[0] @ up, here.axes[1] @ side, here.axes[2] @ side]
+    return Shape(
+        a1=float(shoulder[0]), a2=float((wrist - elbow) @ across),
+        b=float(centre @ side), c1=float(shoulder[1]), c2=c2, c3=c3, c4=0.0,
+        zero=np.array([t1, t2, lean - t2, 0.0, 0.0, 0.0]),
+        sign=np.array([*sign, here.axes[3] @ forearm, 0.0, 0.0]),
+    )  # fmt: skip
+
+
+def _wrist(here: _Geometry, basis: Shape) -> Shape:
+    """Find the wrist's angles and the flange, given the basis.
+
+    Raises:
+        ArmError: The flange does not stand on axis 6, with z along it.
+    """
+    x, y, z = np.eye(3)
+    t1, t2, t3 = basis.zero[:3]
+    forearm = _turn(z, t1) @ _turn(y, t2 + t3)
+    u5, u6 = here.axes[4:]
+    out: Floats = np.asarray(here.flange[:3, 2])
+    place = here.flange[:3, 3] - _wrist_centre(here)
+    _check_flange(here, place, out)
+    local = forearm.T @ u5
+    t4 = math.atan2(-local[0], local[1])
+    if abs(t4) > math.pi / 2 + EXACT:  # the other half turn, with axis 5 the other way
+        t4 -= math.copysign(math.pi, t4)
+    roll = forearm @ _turn(z, t4)
+    t5 = math.atan2(out @ (roll @ x), out @ (roll @ z))
+    last = roll @ _turn(y, t5)
+    local = last.T @ here.flange[:3, 0]
+    return basis._replace(
+        c4=float(place @ out),
+        zero=np.array([t1, t2, t3, t4, t5, math.atan2(local[1], local[0])]),
+        sign=np.array([*basis.sign[:4], u5 @ (roll @ y), u6 @ out]),
+    )
+
+
+def _check_flange(here: _Geometry, place: Floats, out: Floats) -> None:
+    """Refuse a flange that does not look out of joint 6.
+
+    Args:
+        here: The chain.
+        place: The flange's origin seen from the wrist centre, (3,) [m].
+        out: Its z axis, (3,).
+
+    Raises:
+        ArmError: It is beside axis 6, or askew, or looks back into the wrist.
+    """
+    cure = "Name the flange with --tip: it stands on axis 6, its z points out of it"
+    last = here.axes[5]
+    here.need(5, _sine(out, last), "is not along the z of the flange", cure)
+    here.need(5, _length(place - (place @ last) * last), "misses the flange", cure)
+    here.need(5, min(float(place @ out), 0.0), "is behind its flange", cure)
+
+
+# The arm file.
+
+FULL_SPEED, FULL_ACCELERATION = 0.4, 0.1  # [s], guesses
+
+
+def arm_text(chain: UrdfChain, repeatability_mm: float, name: str | None = None) -> str:
+    """Write the arm file of a chain, and read it back.
+
+    Args:
+        chain: The URDF's joints.
+        repeatability_mm: Pose repeatability of the arm [mm], which no URDF states.
+        name: Name of the arm; default: the robot's.
+
+    Raises:
+        ArmError: The chain is no arm that an arm file can say.
+    """
+    text = _written(chain, shape_of(chain), repeatability_mm, name or chain.name)
+    _verify(chain, text)
+    return text
+
+
+TEMPLATE = """\
+# {robot}, from the URDF {file},
+# links {base} to {tip}.
+# Lengths in mm, angles in degrees. Compare limits with the data sheet.
+name = {name}
+repeatability_mm = {repeatability}
+
+[dh]                          # standard Denavit-Hartenberg
+a_mm = {a}
+d_mm = {d}
+alpha_deg = [-90.0, 0.0, -90.0, 90.0, -90.0, 0.0]
+# D-H angle = offset + sense * q, q the controller's joint angle
+offset_deg = {offset}
+sense = {sense}
+axis3_adds_axis2 = false      # a URDF does not tell: true where a parallelogram keeps
+                              # the forearm from following axis 2
+
+[joints]
+lower_deg = {lower}
+upper_deg = {upper}
+velocity_deg_s = {velocity}
+# Accelerations and jerks are guesses, full speed in 0.4 s, full acceleration in 0.1 s.
+# Masses, gear ratios and coupled gears are not taken over.
+guessed = ["acceleration", "jerk"]
+acceleration_deg_s2 = {acceleration}
+jerk_deg_s3 = {jerk}
+
+[opw]                         # ortho-parallel basis with spherical wrist
+{lengths}
+offsets_deg = {offsets}
+flip_axes = {flips}
+"""
+DH_ZERO = (0.0, -90.0, -90.0, 0.0, 0.0, 180.0)  # [deg] D-H angles of the upright arm
+
+
+def _written(chain: UrdfChain, shape: Shape, repeatability_mm: float, name: str) -> str:
+    """Fill in the arm file."""
+    return TEMPLATE.format(
+        robot=_quoted(chain.name), file=_quoted(chain.path.name),
+        base=_quoted(chain.base), tip=_quoted(chain.tip),
+        name=_quoted(name), repeatability=_number(repeatability_mm),
+        **_dh_parts(shape), **_joint_parts(chain), **_opw_parts(shape),
+    )  # fmt: skip
+
+
+def _quoted(text: str) -> str:
+    r"""Write a basic string of TOML; what is no character becomes a question mark.
+
+    >>> _quoted('a "\x7f')
+    '"a \\"\\u007f"'
+    """
+    valid = text.encode("utf-8", "replace").decode("utf-8")
+    return json.dumps(valid, ensure_ascii=False).replace("\x7f", "\\u007f")
+
+
+def _dh_parts(shape: Shape) -> dict[str, str]:
+    """Write the standard D-H parameters of the closed form."""
+    a = np.array([shape.a1, shape.c2, -shape.a2, 0.0, 0.0, 0.0])
+    d = np.array([shape.c1, shape.b, 0.0, shape.c3, 0.0, shape.c4])
+    offset = np.rad2deg(shape.zero) + np.array(DH_ZERO)
+    sense = [round(float(s)) for s in shape.sign]
+    wrapped = 180.0 - (180.0 - offset) % 360.0
+    return {
+        "a": _list(a / MM),
+        "d": _list(d / MM),
+        "offset": _list(wrapped),
+        "sense": str(sense),
+    }
+
+
+def _joint_parts(chain: UrdfChain) -> dict[str, str]:
+    """Write the limits, stated and guessed."""
+    limits = [(j.lower, j.upper, j.velocity) for j in chain.moving]
+    lower, upper, velocity = np.rad2deg(limits).T
+    acceleration = velocity / FULL_SPEED
+    return {
+        "lower": _list(lower),
+        "upper": _list(upper),
+        "velocity": _list(velocity),
+        "acceleration": _list(acceleration),
+        "jerk": _list(acceleration / FULL_ACCELERATION),
+    }
+
+
+def _opw_parts(shape: Shape) -> dict[str, str]:
+    """Write the closed form."""
+    lengths = (
+        f"{key}_mm = {_number(getattr(shape, key) / MM)}"
+        for key in ("a1", "a2", "b", "c1", "c2", "c3", "c4")
+    )
+    flips = ("true" if s < 0 else "false" for s in shape.sign)
+    return {
+        "lengths": "\n".join(lengths),
+        "offsets": _list(-np.rad2deg(shape.zero)),
+        "flips": f"[{', '.join(flips)}]",
+    }
+
+
+def _number(value: float) -> str:
+    """Write a number to 1e-9, without a sign of zero.
+
+    >>> _number(-0.0000000001), _number(89.9999999999)
+    ('0.0', '90.0')
+    """
+    return repr(round(float(value), 9) + 0.0)
+
+
+def _list(values: Floats) -> str:
+    return f"[{', '.join(map(_number, values))}]"
+
+
+def _verify(chain: UrdfChain, text: str) -> None:
+    """Refuse a text that does not say what the URDF says.
+
+    Raises:
+        ArmError: It places the flange elsewhere.
+    """
+    arm = build_arm(parse_toml(chain.path, text.encode(), ArmFile, ArmError))
+    q = np.linspace(-3.0, 3.0, 90).reshape(15, 6) * [1.0, -0.7, 0.5, -0.9, 0.6, 0.8]
+    wanted = chain.flange(q)
+    gap = float(np.abs(arm.flange(q) - wanted).max())
+    back = arm.flange(arm.nearest(wanted, q))
+    gap = max(gap, float(np.abs(back - wanted).max()))
+    if not gap < 1e-9:
+        problem = f"cannot be said as an arm file: flanges differ by {gap:.3g}"
+        raise ArmError(chain.path, problem, "Write the arm file by hand")

@@ -1,0 +1,91 @@
+"""postproc arm: the shipped arms in a table, an arm file from a URDF."""
+
+import json
+
+import numpy as np
+import pytest
+
+from postproc.robot.arm import load_arm
+from postproc.robot.arm_file import shipped_arms
+from postproc.robot.pose import record_from_pose
+from tests.robot.urdfs import NJ130_SERIAL, URDFS, urdf_text
+from tests.written import cli
+
+
+@pytest.mark.parametrize("name", sorted(set(shipped_arms()) - {"ur10"}))
+def test_a_program_is_planned_with_every_arm(tmp_path, name):
+    """Joint and linear moves to poses of known joint angles lead to these."""
+    arm = load_arm(name)
+    low, high = np.maximum(arm.lower, -2.8), np.minimum(arm.upper, 2.8)
+    home = np.where(np.arange(6) == 4, 0.7, (low + high) / 2)
+    q = home + np.random.default_rng(2).uniform(-0.15, 0.15, (4, 6))
+    moves = (
+        f"  MOVE {kind} TO POS({', '.join(f'{v:.4f}' for v in record)}, '')"
+        for kind, record in zip(
+            ("JOINT", "LINEAR") * 2, record_from_pose(arm.flange(q)), strict=True
+        )
+    )
+    job, cell = tmp_path / "job.pdl", tmp_path / "cell.toml"
+    job.write_text("\n".join(["PROGRAM job", "BEGIN", *moves, "END job", ""]))
+    joints = [round(float(v), 4) for v in np.rad2deg(home)]
+    cell.write_text(f'[robot]\narm = "{name}"\n[home]\njoints_deg = {joints}\n')
+    found = cli("explain", job, "--cell", cell, "--json", "-")
+    planned = [visit["q_deg"] for visit in json.loads(found.stdout)["visits"]]
+    np.testing.assert_allclose(planned, np.rad2deg(q), atol=0.003)
+
+
+@pytest.fixture
+def urdf(tmp_path):
+    path = tmp_path / "robot.urdf"
+    path.write_text(urdf_text(URDFS["irb4600-60-2.05"], "irb"))
+    return path
+
+
+def test_all_shipped_arms_are_listed_with_their_reach():
+    found = cli("arm", "list")
+    rows = {line.split()[0]: line.split()[1:] for line in found.stdout.splitlines()}
+    assert found.exit_code == 0 and set(rows) - {"arm"} == set(shipped_arms())
+    assert rows["irb4600-60-2.05"] == ["2051", "0.06", "closed", "form"]
+    assert rows["ur10"] == ["0.1", "none"]
+
+
+def test_an_arm_file_is_written_and_can_be_loaded(urdf):
+    place = urdf.with_name("arm.toml")
+    found = cli("arm", "from-urdf", urdf, "-o", place, "--repeatability", "0.06")
+    assert found.exit_code == 0 and f"written {place}" in found.stderr
+    arm = load_arm(place)
+    assert arm.name == "irb" and arm.has_inverse
+    assert arm.file.dh == load_arm("irb4600-60-2.05").file.dh
+
+
+def test_it_goes_to_standard_output_and_says_what_was_rounded(urdf):
+    urdf.write_text(urdf_text(NJ130_SERIAL).replace("-1.5707963267948966", "-1.57"))
+    found = cli("arm", "from-urdf", urdf, "--name", "nj130", "--base", "l0")
+    assert found.exit_code == 0 and 'name = "nj130"' in found.stdout
+    assert found.stderr == f"{urdf}: joint j3: -1.57 rad taken as -90 deg\n"
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("0.96", "0.96 0", ":36: <origin xyz> is not 3 numbers"),
+        ("robot name", "robot nam", "is not XML"),
+    ],
+)
+def test_what_cannot_be_written_ends_with_2(urdf, old, new, said):
+    text = urdf.read_text()
+    broken = text.replace(old, new, 1) if said[0] == ":" else text[:-20]
+    urdf.write_text(broken)
+    place = urdf.with_name("arm.toml")
+    found = cli("arm", "from-urdf", urdf, "-o", place)
+    assert found.exit_code == 2 and said in found.stderr and not place.exists()
+
+
+def test_inputs_are_never_overwritten(urdf):
+    before = urdf.read_bytes()
+    found = cli("arm", "from-urdf", urdf, "-o", urdf)
+    assert found.exit_code == 2 and "is an input" in found.stderr
+    assert urdf.read_bytes() == before
+    assert cli("arm", "from-urdf", urdf.with_name("no.urdf")).exit_code == 2
+    found = cli("arm", "from-urdf", urdf, "--repeatability", "nan")
+    assert found.exit_code == 2 and "--repeatability" in found.stderr

@@ -1,0 +1,187 @@
+"""Statements of RAPID: the core against regular expressions, and what they say."""
+
+import numpy as np
+import pytest
+from hypothesis import example, given
+from hypothesis import strategies as st
+
+from postproc import _native
+from postproc.exceptions import ProgramError
+from postproc.language.rapid import syntax as said
+from postproc.language.rapid.parser import parse_statement
+from postproc.language.rapid.statements import read_statements
+from postproc.language.source import Source
+from tests.reference.statements import BEGINNING, statements
+
+PIECES = st.sampled_from([
+    *sorted(BEGINNING), "IF", "THEN", "FOR", "DO", "WHILE", "MoveL", "p10", "a",
+    "Local", "task", "\\On", "\\", ".", ",", ";", ":", ":=", "(", ")", "[", "]", "{",
+    "}", "=", "-", "+", "-1.5", "9E+09", "1", ".5", "0x1F", "2e", "! it; \"s\"", "\n",
+    "\r\n",
+    " ", "\t", '"a;b"', '"a""b"', '"open', '""', "%%%", "%", "<", "\xe4\xb2",
+    "\x01", "\x00", "x1y", "_2", "?", "|", "*", "/", "@", "\x7f",
+])  # fmt: skip
+TEXTS = st.lists(PIECES, max_size=30).map("".join)
+
+
+def scanned(data):
+    """Return what the core reads, statement by statement."""
+    forms, by_statement, numbers, (names, name), opened = _native.scan_statements(data)
+    form, begin, end, first, name_first = by_statement
+    places = list(zip(*(column.tolist() for column in numbers[:2]), strict=True))
+    found = []
+    for k in range(len(form)):
+        own = name[name_first[k] : name_first[k + 1]]
+        found.append((
+            forms[form[k]].decode("latin-1"), int(begin[k]), int(end[k]),
+            tuple(places[first[k] : first[k + 1]]), tuple(names[n] for n in own),
+        ))  # fmt: skip
+    return found, opened
+
+
+@given(TEXTS)
+@example("LOCAL TASK PROC p1()ENDPROC")
+@example("\xef\xbb\xbfMODULE m")
+def test_the_core_reads_what_the_expressions_say(text):
+    wanted = statements(text)
+    found, opened = scanned(text.encode("latin-1"))
+    assert found == [(s.form, s.begin, s.end, s.numbers, s.names) for s in wanted]
+    assert opened == [s.open for s in wanted if s.open >= 0]
+
+
+@given(TEXTS)
+def test_between_statements_there_is_nothing_but_blanks_and_comments(text):
+    at = 3 if text.startswith("\xef\xbb\xbf") else 0
+    for _, begin, end, _, _ in [
+        *scanned(text.encode("latin-1"))[0],
+        ("", len(text), 0, (), ()),
+    ]:
+        for line in text[at:begin].replace("\r", "\n").split("\n"):
+            assert not line.partition("!")[0].strip(
+                "".join(map(chr, [*range(33), 127]))
+            )
+        at = end
+
+
+def one(text):
+    """Parse the only statement of a text."""
+    source = Source("x.mod", text.encode("latin-1"))
+    found = read_statements(source)
+    assert len(found) == 1 and found.text(0) == text
+    return found.statement(0)
+
+
+X, P10 = said.DataObject("x"), said.DataObject("p10")
+
+
+@pytest.mark.parametrize(
+    ("text", "wanted"),
+    [
+        ("MODULE Main(SYSMODULE, NOSTEPIN)",
+         said.ModuleHead("main", ("sysmodule", "nostepin"))),
+        ("LOCAL PROC weld1(num a, \\switch b | INOUT robtarget p{*}, \\VAR num c)",
+         said.RoutineHead("proc", "weld1", ("a", "b", "p", "c"), True)),
+        ("PROC weld(num a\\switch b|switch c,\\num d{*,*})",
+         said.RoutineHead("proc", "weld", ("a", "b", "c", "d"))),
+        ("FUNC robtarget near2(robtarget p)",
+         said.RoutineHead("func", "near2", ("p",), False, "robtarget")),
+        ("TRAP t_stop", said.RoutineHead("trap", "t_stop")),
+        ("LOCAL RECORD seam", said.RecordHead("seam")),
+        ("EndProc", said.BlockWord("endproc")),
+        ("TASK PERS num n{2, 3};",
+         said.DataDeclaration("pers", "num", "n", "task", (said.Num(0), said.Num(1)))),
+        ("CONST string s:=\"a;\"\"!b\";",
+         said.DataDeclaration("const", "string", "s", "", (),
+                              said.StringLiteral('"a;""!b"'))),
+        ("ALIAS num level;", said.TypeAlias("num", "level")),
+        ("IF x = 1 OR NOT y THEN", said.Branch("if", (said.Operation("OR", (
+            said.Operation("=", (X, said.Num(0))),
+            said.Operation("NOT", (said.DataObject("y"),)))),))),
+        ("IF x p10:=x;", said.CompactIf(X, said.Assignment(P10, X))),
+        ("FOR i FROM 1 TO 5 STEP -1 DO", said.ForLoop("i", said.Num(0), said.Num(1),
+            said.Operation("-", (said.Num(2),)))),
+        ("WHILE x<2 DO",
+         said.Branch("while", (said.Operation("<", (X, said.Num(0))),))),
+        ("CASE 1, 2:", said.Branch("case", (said.Num(0), said.Num(1)))),
+        ("DEFAULT:", said.Branch("default")),
+        ("again:", said.LabelMark("again")),
+        ("GOTO again;", said.JumpTo("again")),
+        ("RETURN x;", said.Leave("return", X)),
+        ("RAISE;", said.Leave("raise")),
+        ("TRYNEXT;", said.Leave("trynext")),
+        ("CONNECT i1 WITH t_stop;",
+         said.ConnectTrap(said.DataObject("i1"), "t_stop")),
+        ("ERROR (ERR_A, ERR_B)", said.ErrorHandler((
+            said.DataObject("err_a"), said.DataObject("err_b")))),
+        ("p.trans.z:=list{2}.z+1;", said.Assignment(
+            said.DataObject("p", ("trans", "z")),
+            said.Operation("+", (
+                said.DataObject("list", (said.ElementStep((said.Num(0),)), "z")),
+                said.Num(1))))),
+        ("%\"weld\"% 1;", said.LateCall(said.StringLiteral('"weld"'),
+                                        (said.Argument(said.Num(0)),))),
+        ("MoveL\\Conc,Offs(p10,0,0,-5),v100\\V:=x,fine,tool0\\WObj?w;",
+         said.Instruction("movel", (
+             said.Argument(None, "conc"),
+             said.Argument(said.FunctionCall("offs", (
+                 said.Argument(P10), said.Argument(said.Num(0)),
+                 said.Argument(said.Num(1)), said.Argument(said.Num(2))))),
+             said.Argument(said.DataObject("v100")), said.Argument(X, "v"),
+             said.Argument(said.DataObject("fine")),
+             said.Argument(said.DataObject("tool0")),
+             said.Argument(said.DataObject("w"), "wobj", True)))),
+        ("MoveL [[1,-2,3]],v1,\\Z:=x;", said.Instruction("movel", (
+            said.Argument(said.Composite((said.Composite(
+                (said.Num(0), said.Num(1), said.Num(2))),))),
+            said.Argument(said.DataObject("v1")), said.Argument(X, "z")))),
+        ("home;", said.Instruction("home")),
+        ("MoveL;x", None),
+        ("MoveL THEN", None),
+        ("p 1 2;", said.NotUnderstood("p \x00 \x00;")),
+        ("ok(1);", said.Instruction("ok", (said.Argument(said.Num(0)),))),
+    ],
+)  # fmt: skip
+def test_what_a_statement_says(text, wanted):
+    if wanted is not None:
+        assert one(text) == wanted
+
+
+def test_a_word_of_the_language_names_nothing():
+    for text in ("MoveL then, v1;", "to:=1;", "MODULE else"):
+        found = read_statements(Source("x.mod", text.encode()))
+        assert any(
+            isinstance(found.statement(k), said.NotUnderstood)
+            for k in range(len(found))
+        ), text
+
+
+def test_what_is_nested_too_deeply_is_not_understood():
+    for opening, closing in ("[]", ("f(", ")"), ("-[", "]")):
+        deep = f"x:={opening * 5000}1{closing * 5000};"
+        assert isinstance(one(deep), said.NotUnderstood)
+    brackets = f"x:={'(' * 5000}1{')' * 5000};"  # say nothing, and count as nothing
+    assert one(brackets) == said.Assignment(X, said.Num(0))
+    long = parse_statement("x:=[" + ",".join("\0" * 200_000) + "];")
+    assert isinstance(long, said.NotUnderstood)
+
+
+@pytest.mark.parametrize(
+    ("data", "said_of_it"),
+    [
+        (b'MODULE m\n  TPWrite "open;\nENDMODULE', r"m\.mod:2: a string is not term"),
+        (b"%%%\n  VERSION:1\nMODULE m", r"m\.mod:1: the header does not end.*%%%"),
+    ],
+)
+def test_what_does_not_end_is_refused(data, said_of_it):
+    with pytest.raises(ProgramError, match=said_of_it):
+        read_statements(Source("m.mod", data))
+
+
+def test_numbers_are_where_they_stand_and_what_they_are_worth():
+    text = "MoveAbsJ [[-1.50,+2,9E+09,- 3,.5,0x10],[1,1,1,1,1,1]],v5,z1,t;"
+    found = read_statements(Source("x.mod", text.encode()))
+    cut = [text[a:b] for a, b in zip(found.start, found.stop, strict=True)]
+    assert cut == ["-1.50", "+2", "9E+09", "- 3", ".5", "0x10", *"111111"]
+    np.testing.assert_array_equal(
+        found.value, [-1.5, 2.0, 9e9, -3.0, 0.5, 16.0] + [1.0] * 6
+    )
