@@ -12,6 +12,7 @@
 # make evidence    coverage of the intervals, and what direction is worth
 # make reproduce   the published method and ours, simulated: docs/reproduction.md
 # make accuracy    held-out errors, coverage, real and blind data: docs/accuracy.md
+# make intervals   coverage of a reading's intervals on two real arms: docs/intervals.md
 # make undeclared  undeclared effects traced on virtual arms, 1,400 of them: docs/undeclared.md
 # make blind       effects traced in the blind campaigns and on a real arm: docs/blind.md
 # make wheel       a wheel for every Python from 3.11 on, tried in a new environment, in dist
@@ -28,7 +29,7 @@ STAMP := $(VENV)/.installed
 export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
 
-.PHONY: help demo test lint format bench evidence reproduce accuracy undeclared blind chaos fuzz docs clean
+.PHONY: help demo test lint format bench evidence reproduce accuracy intervals undeclared blind chaos fuzz docs clean
 .PHONY: plant-bench generated growth native golden pictures lock wheel
 .DELETE_ON_ERROR:
 
@@ -71,6 +72,9 @@ reproduce: $(STAMP)
 
 accuracy: $(STAMP)
 	@PYTHONPATH=. $(PYTHON_BIN) docs/studies/accuracy.py --seeds 20
+
+intervals: $(STAMP)
+	@PYTHONPATH=. $(PYTHON_BIN) docs/studies/intervals.py --seeds $(or $(SEEDS),20)
 
 undeclared: $(STAMP)
 	@$(PYTHON_BIN) -m tests.undeclared --seeds $(or $(SEEDS),60) --none $(or $(NONE),200)

@@ -20,7 +20,7 @@ from postproc.calibration.plausibility import (
     check_survey,
 )
 from postproc.calibration.published import fit_method
-from postproc.calibration.registration import Registration, register
+from postproc.calibration.registration import register, typical_gap
 from postproc.calibration.regression import Fit
 from postproc.calibration.report import FitReport, report_fit, report_method
 from postproc.calibration.selection import fit_survey, model_of
@@ -31,6 +31,7 @@ from postproc.model.effects.placement import Placement
 from postproc.model.effects.probe import Probe
 from postproc.model.effects.tool_shift import ToolShift
 from postproc.model.model import Method, Model
+from postproc.model.registration import Registration
 from postproc.robot.arm import Arm
 from postproc.robot.cell import Cell
 from postproc.robot.pose import MM
@@ -91,6 +92,7 @@ def fit_measurements(
 ) -> Calibration:
     """Fit a model to measurements, see `fit`."""
     tracker, setup = cell.tracker, several_points(survey)
+    placed = None
     if frame == "tracker":
         survey, placed = into_base_frame(survey, cell.arm)
         tracker, setup = placed.tracker, (Placement.name,)
@@ -98,10 +100,12 @@ def fit_measurements(
     survey = check_orientations(survey, cell.arm)
     if method != "full":
         model = fit_method(method, survey, cell.arm, seed)
+        model = replace(model, registration=placed)
         return Calibration(model, report_method(model, survey, cell.arm), survey)
     fitted = fit_survey(survey, cell.arm, effects, tracker, setup)
     survey = replace(survey, warnings=(*survey.warnings, *moved_tools(fitted, survey)))
-    return Calibration(model_of(fitted, survey), report_fit(fitted, survey), survey)
+    model = replace(model_of(fitted, survey), registration=placed)
+    return Calibration(model, report_fit(fitted, survey), survey)
 
 
 def moved_tools(fitted: Fit, survey: Measurements) -> tuple[str, ...]:
@@ -147,10 +151,9 @@ def into_base_frame(
     """
     nothing = Combination(())
     found = register(arm, survey.states, survey.position, nothing, np.zeros(0))
-    ids, which = np.unique(survey.states.tool_id, return_inverse=True)
     xyz = ", ".join(f"{v / MM:.1f}" for v in found.tracker)
     notes = [f"tracker at {xyz} mm in the base frame"]
-    for k, name in enumerate(ids):
+    for k, name in enumerate(found.tool_ids):
         xyz = ", ".join(f"{v / MM:.2f}" for v in found.probes[k])
         notes.append(f"probe point {name} at {xyz} mm in the flange frame")
     turned = None
@@ -158,12 +161,13 @@ def into_base_frame(
         turned = found.base_from_tracker[:3, :3] @ survey.rotation
     registered = replace(
         survey,
-        states=survey.states.with_(tool=found.probes[which]),
+        states=found.on_probes(survey.states),
         position=found.to_base(survey.position),
         rotation=turned,
         warnings=(*survey.warnings, *notes),
     )
-    check_registered(survey, registered, arm, found.typical)
+    typical = typical_gap(found, arm, survey.states, survey.position)
+    check_registered(survey, registered, arm, typical)
     return registered, found
 
 

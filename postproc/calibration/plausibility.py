@@ -11,7 +11,7 @@ import numpy as np
 from postproc.arrays import Floats
 from postproc.calibration.measurements import Measurements
 from postproc.calibration.orientations import Turns
-from postproc.calibration.registration import register
+from postproc.calibration.registration import register, typical_gap
 from postproc.calibration.regression import observe
 from postproc.calibration.tool_groups import find_groups
 from postproc.exceptions import MeasurementError
@@ -33,7 +33,8 @@ def likely_cure(survey: Measurements, arm: Arm) -> str:
     """Name the mistake that would explain the positions, if one does."""
     few = survey[np.unique(np.linspace(0, len(survey) - 1, TRIED).astype(np.int64))]
     for cure, states, position in _guesses(few.states, few.position):
-        if register(arm, states, position, NOTHING, np.zeros(0)).typical < CLOSE:
+        found = register(arm, states, position, NOTHING, np.zeros(0))
+        if typical_gap(found, arm, states, position) < CLOSE:
             return cure
     return "Check units, joint order and signs, the tool and the frame (--frame)"
 

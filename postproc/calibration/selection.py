@@ -19,7 +19,7 @@ from postproc.model.effects.effect import Effect
 from postproc.model.effects.probe_turn import ProbeTurn
 from postproc.model.effects.tool_shift import ToolShift
 from postproc.model.kinematics import Batch
-from postproc.model.model import COMPENSATED, Model, Ranges
+from postproc.model.model import COMPENSATED, READING, Model, Ranges
 from postproc.robot.arm import Arm
 from postproc.robot.pose import MM
 from postproc.robot.state import States
@@ -190,6 +190,7 @@ def model_of(fitted: Fit, survey: Measurements) -> Model:
         "effective_parameters": fitted.effective,
         "log_evidence": fitted.log_evidence,
         "rows_dropped": float((~used).sum() + len(survey.dropped)),
+        READING: fitted.reading_spread,
     }
     if fitted.turns is not None:
         statistics["orientation_std_mrad"] = fitted.turns.std * 1e3

@@ -6,7 +6,7 @@ import csv
 import io
 import json
 from collections.abc import Sequence
-from dataclasses import asdict
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -20,15 +20,18 @@ from postproc.calibration.fit import (
     into_base_frame,
     read_surveys,
 )
-from postproc.calibration.measurements import concatenate, from_table
+from postproc.calibration.measurements import Measurements, concatenate, from_table
 from postproc.calibration.plausibility import check_survey
 from postproc.calibration.published import Comparison, compare
+from postproc.calibration.registration import predict_registered
 from postproc.calibration.report import FitReport
-from postproc.calibration.tables import DETECT, TableFormat, read_table
+from postproc.calibration.tables import DETECT, TableFormat, read_foreign
 from postproc.calibration.tables import TextTable as Cells
 from postproc.cli.diagnose import join_program
+from postproc.exceptions import MeasurementError, PostprocError
 from postproc.files import write_all
-from postproc.model.model import Model, load_model
+from postproc.model.model import Model, PredictedReading, Prediction, load_model
+from postproc.model.registration import Registration
 from postproc.model.statistics import ErrorStatistics
 from postproc.report.terminal import Column, table_text
 from postproc.robot.cell import Cell, load_cell
@@ -54,6 +57,11 @@ PREDICTED = (
     *("sx_mm", "sy_mm", "sz_mm"),  # its standard error
     *("arrival_sx_mm", "arrival_sy_mm", "arrival_sz_mm"),  # of one arrival
 )
+READINGS = (
+    *("reading_dx_mm", "reading_dy_mm", "reading_dz_mm"),  # less the nominal TCP
+    *("reading_sx_mm", "reading_sy_mm", "reading_sz_mm"),  # of one reading
+)
+WITHIN = 1.96  # standard deviations that hold 95 % of the readings
 RESIDUAL = ("rx_mm", "ry_mm", "rz_mm")
 POSITION = ("x_mm", "y_mm", "z_mm")
 
@@ -195,8 +203,45 @@ def tell_comparison(found: Comparison) -> str:
     return f"{table_text(COMPARED, rows)}\n{found.split}"
 
 
-def predict_file(path: Path, cell_path: Path, model_path: Path) -> tuple[str, str]:
+@dataclass(frozen=True)
+class Readings:
+    """What is asked of the readings of a survey's set-up.
+
+    Attributes:
+        frame: Frame of the measured positions, "base" or "tracker"; None where only
+            the error of the arm is asked for.
+        refit: What of the set-up is found from the rows themselves: "registration",
+            or None where the set-up is that of the model's survey.
+    """
+
+    frame: str | None = None
+    refit: str | None = None
+
+    def __post_init__(self) -> None:
+        if self.refit not in (None, "registration"):
+            raise PostprocError(f"--refit {self.refit!r}: write registration")
+
+    @property
+    def asked(self) -> bool:
+        """Whether readings are predicted."""
+        return self.frame is not None or self.refit is not None
+
+
+def predict_file(
+    path: Path,
+    cell_path: Path,
+    model_path: Path,
+    readings: Readings,
+    reading: TableFormat = DETECT,
+) -> tuple[str, str]:
     """Add predicted errors to the rows of a file.
+
+    Args:
+        path: The file.
+        cell_path: The cell.
+        model_path: The model.
+        readings: What is asked of the readings of the set-up.
+        reading: What the user knows of the file.
 
     Returns:
         The new file's text, and in words the residual where positions are given.
@@ -206,24 +251,121 @@ def predict_file(path: Path, cell_path: Path, model_path: Path) -> tuple[str, st
     """
     cell, model = load_cell(cell_path), load_model(model_path)
     model.check_arm(cell.arm, model_path)
-    table = read_table(path)
-    return predict_table(table, cell, model)
+    table = read_foreign(path, reading)
+    if not readings.asked:
+        return predict_table(table, cell, model)
+    return predict_readings(table, cell, model, readings)
 
 
 def predict_table(table: Cells, cell: Cell, model: Model) -> tuple[str, str]:
     """Add predicted errors to the rows of a table; lost beams get empty cells."""
     measured = from_table(table, cell.arm, cell.probes, positions=False)
     predicted = model.predict(cell.arm, measured.states)
-    parts = [predicted.error, predicted.std_model, predicted.std_arrival]
-    header, summary = list(PREDICTED), f"{len(measured)} states"
-    summary += f", {int(predicted.any_outside.sum())} outside the survey"
+    header, parts = list(PREDICTED), _told(predicted)
+    summary = _inside(predicted)
     if table.has(*POSITION):
         left = measured.position - nominal_tcp(cell, measured.states) - predicted.error
         parts.append(left)
         header += RESIDUAL
         summary += f"\nresidual {_tell(ErrorStatistics.of(left))}"
+    return written(table, measured, header, parts, predicted), summary
+
+
+def predict_readings(
+    table: Cells, cell: Cell, model: Model, readings: Readings
+) -> tuple[str, str]:
+    """Add predicted errors and what the set-up reads; lost beams get empty cells.
+
+    Raises:
+        PostprocError: The set-up is not known, and not to be found from the rows.
+    """
+    rows, read, told = read_setup(table, cell, model, readings)
+    predicted = model.predict(cell.arm, rows.states)
+    parts = [*_told(predicted), read.error, read.std]
+    header, summary = [*PREDICTED, *READINGS], _inside(predicted) + told
+    if table.has(*POSITION):
+        left = rows.position - nominal_tcp(cell, rows.states) - read.error
+        parts.append(left)
+        header += RESIDUAL
+        held = float((np.abs(left) < WITHIN * read.std).mean())
+        summary += f"\nresidual {_tell(ErrorStatistics.of(left))}"
+        summary += f"\n95 % intervals of a reading hold {held:.1%} of {left.size} "
+        summary += "coordinates" + _apart(left, read.std)
+    return written(table, rows, header, parts, predicted), summary
+
+
+def read_setup(
+    table: Cells, cell: Cell, model: Model, readings: Readings
+) -> tuple[Measurements, PredictedReading, str]:
+    """Read rows in the base frame with what their set-up would read, and tell of it.
+
+    Raises:
+        PostprocError: The set-up is not known, and not to be found from the rows.
+    """
+    found = readings.refit is not None
+    rows = from_table(table, cell.arm, cell.probes, positions=found)
+    if found:
+        placed, read = predict_registered(model, cell.arm, rows.states, rows.position)
+        at = ", ".join(f"{v / MM:.1f}" for v in placed.tracker)
+        told = f"\nregistration refitted: tracker at {at} mm in the base frame"
+        return _placed(rows, placed, table.path), read, told
+    if readings.frame == "tracker":
+        if model.registration is None:
+            problem = "the model holds no registration: it was fitted in the base frame"
+            cure = "Find it from these rows: --refit registration"
+            raise MeasurementError(table.path, problem, cure)
+        rows = _placed(rows, model.registration, table.path)
+    return rows, model.reading(cell.arm, rows.states), ""
+
+
+def _placed(rows: Measurements, placed: Registration, path: Path) -> Measurements:
+    """Put rows in the tracker's frame into the base frame, at the probe points.
+
+    Raises:
+        MeasurementError: A probe point that the registration does not know.
+    """
+    try:
+        states = placed.on_probes(rows.states)
+    except KeyError as exc:
+        problem = f"tool_id {exc} is no probe point of the model's survey"
+        cure = "Find it from these rows: --refit registration"
+        raise MeasurementError(path, problem, cure) from None
+    return replace(rows, states=states, position=placed.to_base(rows.position))
+
+
+def _apart(left: Floats, std: Floats) -> str:
+    """Tell what is between this campaign and the model's survey, where it shows.
+
+    With a further standard deviation t of every coordinate, squared residuals are as
+    large as expected: mean(r^2) = mean(s^2) + t^2.
+    """
+    more = float((left**2).mean() - (std**2).mean())
+    if more <= 0.0:
+        return ""
+    return f"; a term of {np.sqrt(more) / MM:.4f} mm per axis would explain the rest"
+
+
+def _told(predicted: Prediction) -> list[Floats]:
+    """List the columns of `PREDICTED`."""
+    return [predicted.error, predicted.std_model, predicted.std_arrival]
+
+
+def _inside(predicted: Prediction) -> str:
+    """Count states, and those outside the survey."""
+    outside = int(predicted.any_outside.sum())
+    return f"{len(predicted.error)} states, {outside} outside the survey"
+
+
+def written(
+    table: Cells,
+    rows: Measurements,
+    header: Sequence[str],
+    parts: Sequence[Floats],
+    predicted: Prediction,
+) -> str:
+    """Write a table with further columns, (n, 3) [m] each three of the header."""
     numbers = np.concatenate(parts, axis=1) / MM
-    row_of = {int(line): i for i, line in enumerate(measured.line)}
+    row_of = {int(line): i for i, line in enumerate(rows.line)}
     out = io.StringIO()
     writer = csv.writer(out, delimiter=";" if table.decimal == "," else ",")
     writer.writerow([*table.columns, *header, "outside"])
@@ -234,7 +376,7 @@ def predict_table(table: Cells, cell: Cell, model: Model) -> tuple[str, str]:
             continue
         told = [f"{v:.5f}".replace(".", table.decimal) for v in numbers[i]]
         writer.writerow([*cells, *told, "; ".join(predicted.why(i))])
-    return out.getvalue().replace("\r\n", "\n"), summary
+    return out.getvalue().replace("\r\n", "\n")
 
 
 def nominal_tcp(cell: Cell, states: States) -> Floats:

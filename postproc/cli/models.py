@@ -167,14 +167,31 @@ def predict(
     cell: CellOption,
     model: ModelOption,
     output: Annotated[Path | None, typer.Option("-o", "--output")] = None,
+    frame: Annotated[
+        MeasuredFrame | None,
+        typer.Option(
+            "--frame", help="Of the positions: predict the set-up's readings too."
+        ),
+    ] = None,
+    refit: Annotated[
+        str | None,
+        typer.Option("--refit", help="registration: find the set-up from these rows."),
+    ] = None,
+    columns: ColumnsOption = None,
+    delimiter: DelimiterOption = None,
+    decimal: DecimalOption = None,
+    encoding: EncodingOption = None,
 ) -> None:
     """Add the predicted error of every row; with positions, also the residual."""
+    from postproc.calibration.tables import TableFormat
     from postproc.cli import fit
 
     with explained():
-        check_places([output], [states, cell, model])
+        check_places([output], [states, cell, model, columns])
+        reading = TableFormat(columns, delimiter, decimal, encoding)
+        asked = fit.Readings(None if frame is None else frame.value, refit)
         with busy("predict"):
-            text, summary = fit.predict_file(states, cell, model)
+            text, summary = fit.predict_file(states, cell, model, asked, reading)
         write_text("-" if output is None else str(output), text)
         say(summary)
 
