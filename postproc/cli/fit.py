@@ -5,7 +5,8 @@ from __future__ import annotations
 import csv
 import io
 import json
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -24,7 +25,7 @@ from postproc.calibration.measurements import Measurements, concatenate, from_ta
 from postproc.calibration.plausibility import check_survey
 from postproc.calibration.published import Comparison, compare
 from postproc.calibration.registration import predict_registered
-from postproc.calibration.report import FitReport
+from postproc.calibration.report import FitReport, Found
 from postproc.calibration.tables import DETECT, TableFormat, read_foreign
 from postproc.calibration.tables import TextTable as Cells
 from postproc.cli.diagnose import join_program
@@ -46,6 +47,16 @@ COLUMNS = (
     Column("share"),
     Column("seen"),
 )
+FOUND = (
+    Column("found", "left"),
+    Column("joint"),
+    Column("rms mm"),
+    Column("max mm"),
+    Column("evidence nats"),
+    Column("", "left"),
+)
+MOST, FEW = 20, 8  # findings, and rows, that a short report lists
+ENOUGH = 3.0  # nats from which a finding is listed: 20 to 1
 COMPARED = (
     Column("method", "left"),
     Column("range mm"),
@@ -73,6 +84,7 @@ def fit_files(
     program: Path | None = None,
     html: Path | None = None,
     reading: TableFormat = DETECT,
+    everything: bool = False,
     **how: Any,
 ) -> str:
     """Fit measurement files and write the model.
@@ -84,6 +96,7 @@ def fit_files(
         program: The survey program, for files that hold ids and positions only.
         html: A page about the fit to write.
         reading: What the user knows of the measurement files.
+        everything: Whether the report lists all parameters and rows.
         how: Arguments of `postproc.calibration.fit.fit`; None stands for the default.
 
     Returns:
@@ -103,7 +116,8 @@ def fit_files(
     found.model.save(output)
     if html is not None:
         write_page(html, found, cell)
-    return tell_fit(found.report) + f"\nmodel {found.model.id} written to {output}"
+    told = tell_fit(found.report, everything)
+    return told + f"\nmodel {found.model.id} written to {output}"
 
 
 def write_page(path: Path, found: Calibration, cell: Cell) -> None:
@@ -120,8 +134,116 @@ def write_page(path: Path, found: Calibration, cell: Cell) -> None:
     write_all({path: page.encode()})
 
 
-def tell_fit(report: FitReport) -> str:
-    """Write the report of a fit for a terminal."""
+def tell_fit(report: FitReport, everything: bool = False) -> str:
+    """Write the report of a fit for a terminal.
+
+    Args:
+        report: The report.
+        everything: Whether to list every parameter, pair, direction and row.
+    """
+    if everything:
+        lines = [_tell_parameters(report), _tell_found(report.found)]
+        lines += [
+            f"{k}: {share:.1%} of the error" for k, share in report.shares.items()
+        ]
+        lines += [f"correlated {r:+.3f}: {a} and {b}" for a, b, r in report.correlated]
+        lines += [f"not determined by these rows: {d}" for d in report.unseen]
+    else:
+        lines = [_tell_found(_large(report.found)), *_tell_rest(report)]
+    lines += _tell_rows(report, len(report.dropped) if everything else FEW)
+    lines += [f"warning: {warning}" for warning in report.warnings]
+    lines += _tell_scatter(report)
+    return "\n".join(line for line in lines if line)
+
+
+def _tell_found(found: Sequence[Found]) -> str:
+    """Write what effects do, as a table; no line where nothing has a name."""
+    if not found:
+        return ""
+    cells = (
+        (
+            f.effect, str(f.joint or ""), f"{f.size_mm:.3f}", f"{f.max_mm:.3f}",
+            str(round(f.evidence)), _remark(f),
+        )
+        for f in found
+    )  # fmt: skip
+    return table_text(FOUND, cells)
+
+
+def _remark(found: Found) -> str:
+    """Say what is special about a finding."""
+    told = [f"IMPOSSIBLE: {text}" for text in found.impossible]
+    if found.setup:
+        told.append("of the set-up: not compensated")
+    return "; ".join(told)
+
+
+def _large(found: Sequence[Found]) -> list[Found]:
+    """Take the largest findings for which there is evidence, and impossible ones."""
+    shown = [f for f in found if f.evidence > ENOUGH]
+    few = shown[:MOST]
+    return few + [f for f in found if f.impossible and f not in few]
+
+
+def _tell_rest(report: FitReport) -> list[str]:
+    """Say in a line each what is small, alike, or not determined."""
+    lines, found = [], report.found
+    shown = _large(found)
+    rest = [f for f in found if f not in shown]
+    if rest:
+        size = float(np.sqrt(sum(f.size_mm**2 for f in rest)))
+        names = _counted(f.effect for f in rest)
+        lines.append(f"smaller or without evidence, {size:.3f} mm together: {names}")
+    if report.unseen:
+        names = _counted(str(u.name).partition(".")[0] for u in report.unseen)
+        count = len(report.unseen)
+        lines.append(f"not determined, left at the prior, {count} directions: {names}")
+    if report.correlated:
+        names = _counted(a.partition(".")[0] for a, _, _ in report.correlated)
+        lines.append(f"hardly told apart, {len(report.correlated)} pairs: {names}")
+    if lines:
+        lines.append("all parameters, directions and rows: --all")
+    return lines
+
+
+def _counted(names: Iterable[str]) -> str:
+    """Count names, the most frequent first.
+
+    >>> _counted(["a", "b", "b"])
+    'b 2, a 1'
+    """
+    return ", ".join(f"{name} {n}" for name, n in Counter(names).most_common())
+
+
+def _tell_rows(report: FitReport, most: int) -> list[str]:
+    """List rows that count less, and those that stand out and count all the same."""
+    rows = report.dropped
+    lines = [f"row {row.id} (line {row.line}): {row.why}" for row in rows[:most]]
+    if len(rows) > most:
+        lines.append(f"and {len(rows) - most} more rows that count less (--all)")
+    if report.spared:
+        ids = ", ".join(report.spared[: max(most, FEW)])
+        more = len(report.spared) - max(most, FEW)
+        ids += f" and {more} more" if more > 0 else ""
+        lines.append(f"suspect, but kept, for rows beside them agree: row {ids}")
+    return lines
+
+
+def _tell_scatter(report: FitReport) -> list[str]:
+    """Tell of the noise, and of the errors before and after."""
+    lines = [
+        f"tracker {report.tracker_mm:.4f} mm, repeatability "
+        f"{report.repeatability_mm:.4f} mm per axis (estimated)"
+    ]
+    if report.orientation_mrad is not None:
+        lines.append(f"orientation {report.orientation_mrad:.4f} mrad (estimated)")
+    lines.append(f"measured error  {_tell(report.before)}")
+    lines.append(f"left by the fit {_tell(report.after)}")
+    return lines
+
+
+def _tell_parameters(report: FitReport) -> str:
+    """Write the table of all parameters."""
     cells = (
         (
             p.name,
@@ -133,26 +255,7 @@ def tell_fit(report: FitReport) -> str:
         )
         for p in report.parameters
     )
-    lines = [table_text(COLUMNS, cells)]
-    for name, share in report.shares.items():
-        lines.append(f"{name}: {share:.1%} of the error")
-    for a, b, value in report.correlated:
-        lines.append(f"correlated {value:+.3f}: {a} and {b}")
-    for direction in report.unseen:
-        lines.append(f"not determined by these rows: {direction}")
-    for row in report.dropped:
-        lines.append(f"row {row.id} (line {row.line}): {row.why}")
-    for warning in report.warnings:
-        lines.append(f"warning: {warning}")
-    lines.append(
-        f"tracker {report.tracker_mm:.4f} mm, repeatability "
-        f"{report.repeatability_mm:.4f} mm per axis (estimated)"
-    )
-    if report.orientation_mrad is not None:
-        lines.append(f"orientation {report.orientation_mrad:.4f} mrad (estimated)")
-    lines.append(f"measured error  {_tell(report.before)}")
-    lines.append(f"left by the fit {_tell(report.after)}")
-    return "\n".join(lines)
+    return table_text(COLUMNS, cells)
 
 
 def _tell(spread: ErrorStatistics) -> str:
@@ -351,9 +454,12 @@ def _told(predicted: Prediction) -> list[Floats]:
 
 
 def _inside(predicted: Prediction) -> str:
-    """Count states, and those outside the survey."""
+    """Count states, and those outside the survey by what lies outside."""
     outside = int(predicted.any_outside.sum())
-    return f"{len(predicted.error)} states, {outside} outside the survey"
+    told = f"{len(predicted.error)} states, {outside} outside the survey"
+    counts = {why: int(rows.sum()) for why, rows in predicted.outside.items()}
+    most = sorted(counts, key=counts.__getitem__, reverse=True)
+    return told + "".join(f"\n  {counts[why]}: {why}" for why in most)
 
 
 def written(

@@ -136,6 +136,9 @@ def fit(
     decimal: DecimalOption = None,
     encoding: EncodingOption = None,
     unit: UnitOption = "mm",
+    everything: Annotated[
+        bool, typer.Option("--all", help="List all parameters and rows.")
+    ] = False,
 ) -> None:
     """Fit a model of the arm's error to laser-tracker measurements."""
     from postproc.calibration.tables import TableFormat
@@ -153,6 +156,7 @@ def fit(
                 program,
                 html,
                 reading,
+                everything,
                 method=method.value,
                 effects=names,
                 frame=frame.value,

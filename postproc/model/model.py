@@ -140,7 +140,8 @@ Interval = tuple[float, float]
 MARGIN = 0.05  # of a joint's surveyed range: random poses do not reach its ends
 SAME_TOOL = 1e-3  # [m] tools closer than this count as one
 REACH_OF_PLATE = 0.5  # [m] how far from three or more probe points a tool may be
-PAYLOAD_MARGIN, TEMPERATURE_MARGIN = 0.5, 0.5  # [kg], [deg C]
+PAYLOAD_MARGIN = 0.5  # [kg]
+TEMPERATURE_MARGIN = 1.0  # [K] steel of 2.5 m grows by 0.03 mm
 
 
 @dataclass(frozen=True)
