@@ -18,6 +18,7 @@ from postproc.calibration.plausibility import (
     check_orientations,
     check_registered,
     check_survey,
+    lost_without,
 )
 from postproc.calibration.published import fit_method
 from postproc.calibration.registration import register, typical_gap
@@ -98,6 +99,8 @@ def fit_measurements(
         tracker, setup = placed.tracker, (Placement.name,)
     check_survey(survey, cell.arm)
     survey = check_orientations(survey, cell.arm)
+    told = (*survey.warnings, *lost_without(cell.arm, survey))
+    survey = replace(survey, warnings=told)
     if method != "full":
         model = fit_method(method, survey, cell.arm, seed)
         model = replace(model, registration=placed)

@@ -214,6 +214,27 @@ def _rank(arm: Arm, states: States) -> int:
     return observe(X, names).rank
 
 
+def lost_without(arm: Arm, survey: Measurements) -> tuple[str, ...]:
+    """Say what a fit lacks, or a model cannot be used for, for want of the arm file."""
+    told = []
+    if arm.file.links is None:
+        told.append(
+            "the arm file has no [links]: how joints yield to the arm's own weight, "
+            "and gaps that depend on it, cannot be fitted and stay in what is left"
+        )
+    if not arm.has_inverse:
+        told.append(
+            "the arm file has no [opw]: the model serves predict and diagnose; "
+            "compensate and explain need the inverse kinematics"
+        )
+    if arm.file.joints.drive_coupling is None and survey.inferred.any():
+        told.append(
+            "the arm file has no drive_coupling: directions of joints are inferred as "
+            "if no motor turned another joint's gear"
+        )
+    return tuple(told)
+
+
 # Whether the orientations of a 6D probe can be used.
 
 TURNED = np.deg2rad(1.0)  # no flange that works is off by more

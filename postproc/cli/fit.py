@@ -195,7 +195,7 @@ def _tell_rest(report: FitReport) -> list[str]:
         names = _counted(f.effect for f in rest)
         lines.append(f"smaller or without evidence, {size:.3f} mm together: {names}")
     if report.unseen:
-        names = _counted(str(u.name).partition(".")[0] for u in report.unseen)
+        names = _grouped(u.name for u in report.unseen)
         count = len(report.unseen)
         lines.append(f"not determined, left at the prior, {count} directions: {names}")
     if report.correlated:
@@ -213,6 +213,22 @@ def _counted(names: Iterable[str]) -> str:
     'b 2, a 1'
     """
     return ", ".join(f"{name} {n}" for name, n in Counter(names).most_common())
+
+
+def _grouped(names: Iterable[str]) -> str:
+    """Name parameters by their effects; where there are more than a few, count them.
+
+    >>> _grouped(["geometry.a2", "backlash.b1", "geometry.d2"])
+    'geometry a2 d2, backlash b1'
+    """
+    groups: dict[str, list[str]] = {}
+    for name in names:
+        effect, _, own = name.partition(".")
+        groups.setdefault(effect, []).append(own)
+    return ", ".join(
+        f"{effect} {' '.join(own) if len(own) < FEW else len(own)}"
+        for effect, own in sorted(groups.items(), key=lambda g: -len(g[1]))
+    )
 
 
 def _tell_rows(report: FitReport, most: int) -> list[str]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -217,3 +218,21 @@ def test_a_report_says_what_is_suspect_in_few_lines() -> None:
         sum(line.startswith("row ") for line in tell_fit(report, True).split("\n"))
         == 50
     )
+
+
+def test_a_fit_says_what_the_arm_file_leaves_out(tmp_path: Path) -> None:
+    data = write(tmp_path / "s.csv")
+    whole = cell(tmp_path)
+    file = whole.arm.file
+    joints = file.joints.model_copy(
+        update={"velocity_deg_s": None, "acceleration_deg_s2": None}
+    )
+    bare = file.model_copy(update={"links": None, "opw": None, "joints": joints})
+    poor = replace(whole, arm=replace(whole.arm, file=bare))
+    told = fit([data], poor, effects=BASE_EFFECTS).report.warnings
+    assert [re.findall(r"no (\[?\w+\]?):", t) for t in told] == [["[links]"], ["[opw]"]]
+    assert fit([data], whole, effects=BASE_EFFECTS).report.warnings == ()
+    lines = [line.split(",") for line in data.read_text().splitlines()]
+    data.write_text("\n".join(",".join(x[:7] + x[13:]) for x in lines) + "\n")
+    told = fit([data], poor, effects=BASE_EFFECTS).report.warnings
+    assert "drive_coupling" in told[-1]
