@@ -257,10 +257,10 @@ def main() -> None:
 def study(data: dict[str, Series], seeds: int) -> list[str]:
     """Run both parts, and print rows as they come."""
     lines = ["## Rows of the same series", "", *HEAD]
-    for name in ("B", "grid", "D"):
+    for name in ("B", "grid", "D", "A"):
         lines += map(_shown, pooled(data[name], seeds))
     lines += [*LATER.splitlines(), *BETWEEN]
-    for name in ("B", "grid", "D"):
+    for name in ("B", "grid", "D", "A"):
         lines += map(_shown, last_quarter(data[name]))
     for fitted, other in (("B", "D"), ("D", "B"), ("B", "A"), ("grid", "random")):
         lines += map(_shown, another(data[fitted], data[other]))
