@@ -3,6 +3,7 @@
 # make lint    ruff and mypy
 # make lock    pin what is installed, in requirements/; UPGRADE=1: to the newest versions
 # make chaos   kill 200 batches of 300 files at random moments and resume them; end 50 long runs by signals
+# make awkward   200 drawn surveys of every awkward kind: fitted, or refused in words
 # make fuzz    20,000 damaged programs: refused, or rewritten byte for byte; the parsers by coverage
 # make plant-bench   10,000 files, a second run, memory, workers, a cluster: docs/plant.md
 # make generated    1,000 random programs: followed as they run, landing where they say
@@ -30,7 +31,7 @@ export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
 
 .PHONY: help demo test lint format bench evidence reproduce accuracy intervals undeclared blind chaos fuzz docs clean
-.PHONY: plant-bench generated growth native golden pictures lock wheel
+.PHONY: plant-bench generated growth awkward native golden pictures lock wheel
 .DELETE_ON_ERROR:
 
 help:
@@ -114,6 +115,9 @@ pictures: $(STAMP)
 
 plant-bench: $(STAMP)
 	@$(PYTHON_BIN) -m tests.plant_bench --files $(or $(FILES),10000)
+
+awkward: $(STAMP)
+	@$(PYTHON_BIN) -m tests.awkward --count $(or $(COUNT),200)
 
 generated: $(STAMP)
 	@$(PYTHON_BIN) -m tests.generated --count $(or $(COUNT),1000)

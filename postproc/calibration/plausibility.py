@@ -79,6 +79,7 @@ MANY = 0.1  # share of such rows from which the file is at fault, not the rows
 PROBES = 400  # random poses that show what could be determined at best
 ENOUGH = 0.75  # share of the determinable directions that a survey must show
 OTHER_UNIT = 50.0  # no arm's positions differ so much in size
+STILL = 1e-4  # readings move by more of what the poses do, in whatever unit
 SOME = 0.02  # share of rows in another unit that is no accident
 TOOL_APART = 1e-3  # [m] tools that differ by less are told by the fit, not refused
 
@@ -90,6 +91,7 @@ def check_survey(survey: Measurements, arm: Arm) -> None:
         MeasurementError: With the likely reason and the cure.
     """
     check_rows(survey, arm)
+    check_places(survey, arm)
     check_units(survey)
     check_tools(survey, arm)
     gap = survey.position - Batch(arm, survey.states).walk.tcp
@@ -124,6 +126,23 @@ def check_units(survey: Measurements) -> None:
         problem = f"{int(metres.sum())} of {len(survey)} rows look like metres"
         cure = "The others are in millimetres: write all of them so"
         raise MeasurementError(survey.path, problem, cure, line=line)
+
+
+def check_places(survey: Measurements, arm: Arm) -> None:
+    """Refuse readings that are one place, where the poses are not.
+
+    Raises:
+        MeasurementError: How far apart both are.
+    """
+    read = np.linalg.norm(np.ptp(survey.position, axis=0))
+    posed = np.linalg.norm(np.ptp(Batch(arm, survey.states).walk.tcp, axis=0))
+    if read < STILL * posed:
+        problem = (
+            f"all {len(survey)} positions lie within {read / MM:.3f} mm, the poses "
+            f"within {posed / MM:.0f} mm"
+        )
+        cure = "The tracker was not read at every pose, or these are other columns"
+        raise MeasurementError(survey.path, problem, cure)
 
 
 def check_tools(survey: Measurements, arm: Arm) -> None:
@@ -170,6 +189,7 @@ def check_registered(
         MeasurementError: With the likely reason and the cure.
     """
     check_rows(survey, arm)
+    check_places(survey, arm)
     check_units(survey)
     if typical > CLOSE:
         check_tools(registered, arm)

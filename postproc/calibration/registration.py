@@ -6,6 +6,8 @@ an effect of the set-up beside the arm's own (`Placement`).
 
 from __future__ import annotations
 
+import warnings
+
 import numpy as np
 
 from postproc.arrays import Floats
@@ -92,7 +94,9 @@ def _procrustes(a: Floats, b: Floats, weight: Floats) -> Floats:
 
     total = weight.sum()
     ca, cb = weight @ a / total, weight @ b / total
-    turn, _ = Rotation.align_vectors(b - cb, a - ca, weights=weight)
+    with warnings.catch_warnings():  # of points on a line any turn about it will do
+        warnings.simplefilter("ignore", UserWarning)
+        turn, _ = Rotation.align_vectors(b - cb, a - ca, weights=weight)
     T = np.eye(4)
     T[:3, :3] = turn.as_matrix()
     T[:3, 3] = cb - T[:3, :3] @ ca
