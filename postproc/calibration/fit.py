@@ -108,7 +108,8 @@ def fit_measurements(
     fitted = fit_survey(survey, cell.arm, effects, tracker, setup)
     survey = replace(survey, warnings=(*survey.warnings, *moved_tools(fitted, survey)))
     model = replace(model_of(fitted, survey), registration=placed)
-    return Calibration(model, report_fit(fitted, survey), survey)
+    report = report_fit(fitted, survey)
+    return Calibration(model, report, survey.with_states(fitted.batch.states))
 
 
 def moved_tools(fitted: Fit, survey: Measurements) -> tuple[str, ...]:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from postproc.arrays import Bools, Floats
+from postproc.calibration.directions import judge_directions
 from postproc.calibration.measurements import DroppedRow, Measurements
 from postproc.calibration.regression import Fit, Unseen, observe
 from postproc.model.kinematics import Batch
@@ -64,6 +65,41 @@ class Found:
 
 
 @dataclass(frozen=True)
+class WrongDirection:
+    """A direction of the file that is probably wrong.
+
+    Attributes:
+        id, line: The row.
+        joint: 1 to 6.
+        probability: That it is wrong.
+    """
+
+    id: str
+    line: int
+    joint: int
+    probability: float
+
+
+@dataclass(frozen=True)
+class DirectionReport:
+    """What the rows say of the directions in their file.
+
+    Attributes:
+        rate: Estimated share of wrong ones.
+        telling: How many directions the rows can tell.
+        turned: How many were fitted the other way.
+        unsure: How many were fitted as not known.
+        likeliest: Those that are likelier wrong than not, likeliest first.
+    """
+
+    rate: float
+    telling: int
+    turned: int
+    unsure: int
+    likeliest: tuple[WrongDirection, ...]
+
+
+@dataclass(frozen=True)
 class FitReport:
     """Everything worth telling about a fit.
 
@@ -81,6 +117,7 @@ class FitReport:
         warnings: What else to know.
         orientation_mrad: Estimated scatter of orientations about each axis, or None.
         found: What every effect does at every joint, largest first.
+        directions: Wrong directions, or None where the file has none.
     """
 
     parameters: tuple[ParameterRow, ...]
@@ -97,6 +134,7 @@ class FitReport:
     warnings: tuple[str, ...]
     orientation_mrad: float | None = None
     found: tuple[Found, ...] = ()
+    directions: DirectionReport | None = None
 
 
 def report_fit(fit: Fit, survey: Measurements) -> FitReport:
@@ -126,6 +164,7 @@ def report_fit(fit: Fit, survey: Measurements) -> FitReport:
         warnings=survey.warnings,
         orientation_mrad=None if fit.turns is None else fit.turns.std * 1e3,
         found=find(fit),
+        directions=report_directions(fit, survey),
     )
 
 
@@ -147,6 +186,30 @@ def report_method(model: Model, survey: Measurements, arm: Arm) -> FitReport:
         effective=float(len(model.values)),
         warnings=survey.warnings,
     )
+
+
+def report_directions(fit: Fit, survey: Measurements) -> DirectionReport | None:
+    """Tell which directions of the file the fit has not believed, if any."""
+    told, used = survey.states.direction, fit.batch.states.direction
+    if (told == used).all():
+        return None
+    judged = judge_directions(fit, told)
+    rows, joints = np.nonzero(judged.probability > 0.5)
+    order = np.argsort(-judged.probability[rows, joints], kind="stable")
+    likeliest = tuple(
+        WrongDirection(
+            survey.ids[i], int(survey.line[i]), int(j) + 1,
+            float(judged.probability[i, j]),
+        )
+        for i, j in zip(rows[order], joints[order], strict=True)
+    )  # fmt: skip
+    changed = used != told
+    turned, unsure = (
+        int((changed & (used != 0)).sum()),
+        int((changed & (used == 0)).sum()),
+    )
+    telling = int(judged.telling.sum())
+    return DirectionReport(judged.rate, telling, turned, unsure, likeliest)
 
 
 def find(fit: Fit) -> tuple[Found, ...]:

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from postproc.arrays import Bools, Floats
+from postproc.calibration.directions import mend_directions
 from postproc.calibration.evidence import LOG_SPREAD, Normal, maximise
 from postproc.calibration.measurements import Measurements
 from postproc.calibration.orientations import Turns
@@ -159,6 +160,10 @@ def fit_survey(
         tracker: Tracker position in the base frame, (3,) [m], or None.
         setup: Names of effects of the set-up, fitted besides.
 
+    Returns:
+        The fit. Where directions of the file are probably wrong, its states have them
+        the other way, or as not known.
+
     Raises:
         PostprocError: An unknown effect, or one whose covariate was not recorded.
     """
@@ -168,10 +173,20 @@ def fit_survey(
     if survey.rotation is not None and survey.mounting is not None:
         turns = Turns.of(batch, survey.rotation, survey.mounting)
         setup = (*setup, ProbeTurn.name)
-    if effects is None:
-        return fit_best(arm, states, position, origin, setup, turns)
-    chosen = propose((*effects, *setup), arm, states)
-    return fit_effects(batch, position, chosen, origin, turns=turns)
+
+    def fit(states: States) -> Fit:
+        if effects is None:
+            return fit_best(arm, states, position, origin, setup, turns)
+        chosen = propose((*effects, *setup), arm, states)
+        return fit_effects(Batch(arm, states), position, chosen, origin, turns=turns)
+
+    fitted = fit(states)
+    if survey.inferred.all():
+        return fitted
+    mended = mend_directions(fitted, position)
+    if effects is not None or mended is fitted:
+        return mended
+    return fit(mended.batch.states)
 
 
 def model_of(fitted: Fit, survey: Measurements) -> Model:
