@@ -26,7 +26,7 @@ from postproc.calibration.regression import Fit
 from postproc.calibration.report import FitReport, report_fit, report_method
 from postproc.calibration.selection import fit_survey, model_of
 from postproc.calibration.tables import DETECT, TableFormat
-from postproc.calibration.tool_groups import find_groups
+from postproc.calibration.tool_groups import find_groups, find_wrong_nest
 from postproc.model.combination import Combination
 from postproc.model.effects.placement import Placement
 from postproc.model.effects.probe import Probe
@@ -106,7 +106,8 @@ def fit_measurements(
         model = replace(model, registration=placed)
         return Calibration(model, report_method(model, survey, cell.arm), survey)
     fitted = fit_survey(survey, cell.arm, effects, tracker, setup)
-    survey = replace(survey, warnings=(*survey.warnings, *moved_tools(fitted, survey)))
+    told = (*survey.warnings, *moved_tools(fitted, survey), *wrong_nests(fitted))
+    survey = replace(survey, warnings=told)
     model = replace(model_of(fitted, survey), registration=placed)
     report = report_fit(fitted, survey)
     return Calibration(model, report, survey.with_states(fitted.batch.states))
@@ -133,6 +134,18 @@ def moved_tools(fitted: Fit, survey: Measurements) -> tuple[str, ...]:
         f"the rows look like several tools, the others at {far} from the first: if "
         "they are, add tool_id; if not, run postproc diagnose",
     )
+
+
+def wrong_nests(fitted: Fit) -> tuple[str, ...]:
+    """Tell of a nest that does not lie where the cell says."""
+    c, told = fitted.combination, []
+    for effect, part in zip(c.effects, c.slices, strict=True):
+        if isinstance(effect, Probe):
+            offset = fitted.values[part].reshape(-1, 3)
+            covariance = fitted.covariance[part, part]
+            found = find_wrong_nest(effect.tools, offset, covariance)
+            told += [] if found is None else [str(found)]
+    return tuple(told)
 
 
 def _at(survey: Measurements, order: float) -> str:
