@@ -24,7 +24,7 @@ from postproc.calibration.published import fit_method
 from postproc.calibration.registration import register, typical_gap
 from postproc.calibration.regression import Fit
 from postproc.calibration.report import FitReport, report_fit, report_method
-from postproc.calibration.selection import fit_survey, model_of
+from postproc.calibration.selection import Progress, fit_survey, model_of, silent
 from postproc.calibration.tables import DETECT, TableFormat
 from postproc.calibration.tool_groups import find_groups, find_wrong_nest
 from postproc.model.combination import Combination
@@ -58,6 +58,7 @@ def fit(
     frame: Frame = "base",
     seed: int = 0,
     reading: TableFormat = DETECT,
+    progress: Progress = silent,
 ) -> Calibration:
     """Fit a model to measurement files.
 
@@ -71,14 +72,22 @@ def fit(
             and the probe points are fitted too.
         seed: Of random layers, for methods that have one.
         reading: What the user knows of the files.
+        progress: Told what is being done.
 
     Raises:
         MeasurementError: A file that cannot be read or cannot determine the geometry.
         PostprocError: An unknown effect, or one whose covariate was not recorded.
     """
+    progress("read measurements")
     survey = read_surveys(files, cell, reading)
     return fit_measurements(
-        survey, cell, method=method, effects=effects, frame=frame, seed=seed
+        survey,
+        cell,
+        method=method,
+        effects=effects,
+        frame=frame,
+        seed=seed,
+        progress=progress,
     )
 
 
@@ -90,6 +99,7 @@ def fit_measurements(
     effects: Sequence[str] | None = None,
     frame: Frame = "base",
     seed: int = 0,
+    progress: Progress = silent,
 ) -> Calibration:
     """Fit a model to measurements, see `fit`."""
     tracker, setup = cell.tracker, several_points(survey)
@@ -105,7 +115,8 @@ def fit_measurements(
         model = fit_method(method, survey, cell.arm, seed)
         model = replace(model, registration=placed)
         return Calibration(model, report_method(model, survey, cell.arm), survey)
-    fitted = fit_survey(survey, cell.arm, effects, tracker, setup)
+    fitted = fit_survey(survey, cell.arm, effects, tracker, setup, progress)
+    progress("report")
     told = (*survey.warnings, *moved_tools(fitted, survey), *wrong_nests(fitted))
     survey = replace(survey, warnings=told)
     model = replace(model_of(fitted, survey), registration=placed)

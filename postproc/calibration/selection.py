@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,8 +31,14 @@ from postproc.robot.state import States
 # being chosen anew. Named effects are weighed first; free forms must then explain what
 # is left.
 
+Progress = Callable[[str], None]
+
 ENOUGH = 3.0  # nats that an effect must be worth: 20 to 1
 STEPS = 12  # of the search for prior scales, which start near their best
+
+
+def silent(stage: str) -> None:
+    """Tell nobody."""
 
 
 def candidates(states: States) -> tuple[str, ...]:
@@ -55,6 +61,7 @@ def fit_best(
     origin: tuple[float, float, float] | None,
     setup: tuple[str, ...] = (),
     turns: Turns | None = None,
+    progress: Progress = silent,
 ) -> Fit:
     """Fit the base effects and all others that a survey gives evidence for.
 
@@ -65,15 +72,19 @@ def fit_best(
         origin: Tracker position, where it is known.
         setup: Effects of the set-up that are always fitted.
         turns: Measured orientations, where the survey has them.
+        progress: Told what is being done.
     """
     batch = Batch(arm, states)
     base = propose((*BASE_EFFECTS, *setup), arm, states)
     kept = base
+    progress("fit " + ", ".join(e.name for e in base))
     fitted = fit_effects(batch, position, base, origin, turns=turns, until=NEARLY)
     for names in (candidates(states), *((name,) for name in free_forms(states))):
+        progress("fit and weigh " + ", ".join(names))
         tried = (*kept, *propose(names, arm, states), *slipped(fitted))
         fitted = fit_effects(batch, position, tried, origin, fitted, until=NEARLY)
         kept = keep_needed(fitted, always=base)
+    progress("fit " + ", ".join(e.name for e in kept))
     return fit_effects(batch, position, kept, origin, fitted)
 
 
@@ -150,6 +161,7 @@ def fit_survey(
     effects: Sequence[str] | None,
     tracker: Floats | None,
     setup: tuple[str, ...] = (),
+    progress: Progress = silent,
 ) -> Fit:
     """Fit effects to a survey in the base frame.
 
@@ -159,6 +171,7 @@ def fit_survey(
         effects: Names of effects; None: those that the survey gives evidence for.
         tracker: Tracker position in the base frame, (3,) [m], or None.
         setup: Names of effects of the set-up, fitted besides.
+        progress: Told what is being done.
 
     Returns:
         The fit. Where directions of the file are probably wrong, its states have them
@@ -176,13 +189,14 @@ def fit_survey(
 
     def fit(states: States) -> Fit:
         if effects is None:
-            return fit_best(arm, states, position, origin, setup, turns)
+            return fit_best(arm, states, position, origin, setup, turns, progress)
         chosen = propose((*effects, *setup), arm, states)
         return fit_effects(Batch(arm, states), position, chosen, origin, turns=turns)
 
     fitted = fit(states)
     if survey.inferred.all():
         return fitted
+    progress("look for wrong directions")
     mended = mend_directions(fitted, position)
     if effects is not None or mended is fitted:
         return mended

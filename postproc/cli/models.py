@@ -21,6 +21,7 @@ from postproc.cli.common import (
     explained,
     say,
     split_names,
+    stages,
     write_text,
 )
 from postproc.files import check_places
@@ -148,7 +149,7 @@ def fit(
     with explained():
         check_places([output, html], [*data, cell, program, columns])
         reading = TableFormat(columns, delimiter, decimal, encoding, unit)
-        with busy("fit"):
+        with stages(log=True) as progress:
             found = fit.fit_files(
                 data,
                 cell,
@@ -161,6 +162,7 @@ def fit(
                 effects=names,
                 frame=frame.value,
                 seed=seed,
+                progress=progress,
             )
         typer.echo(found)
 
