@@ -3,6 +3,7 @@
 # make lint    ruff and mypy
 # make lock    pin what is installed, in requirements/; UPGRADE=1: to the newest versions
 # make chaos   kill 200 batches of 300 files at random moments and resume them; end 50 long runs by signals
+# make awkward   200 drawn surveys of every awkward kind: fitted, or refused in words
 # make fuzz    20,000 damaged programs: refused, or rewritten byte for byte; the parsers by coverage
 # make plant-bench   10,000 files, a second run, memory, workers, a cluster: docs/plant.md
 # make generated    1,000 random programs: followed as they run, landing where they say
@@ -12,6 +13,7 @@
 # make evidence    coverage of the intervals, and what direction is worth
 # make reproduce   the published method and ours, simulated: docs/reproduction.md
 # make accuracy    held-out errors, coverage, real and blind data: docs/accuracy.md
+# make intervals   coverage of a reading's intervals on two real arms: docs/intervals.md
 # make undeclared  undeclared effects traced on virtual arms, 1,400 of them: docs/undeclared.md
 # make paths       predicted and true path accuracy on virtual arms: docs/paths.md
 # make blind       effects traced in the blind campaigns and on a real arm: docs/blind.md
@@ -29,8 +31,8 @@ STAMP := $(VENV)/.installed
 export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
 
-.PHONY: help demo test lint format bench evidence reproduce accuracy undeclared paths blind chaos fuzz docs clean
-.PHONY: plant-bench generated growth native golden pictures lock wheel
+.PHONY: help demo test lint format bench evidence reproduce accuracy intervals undeclared paths blind chaos fuzz docs clean
+.PHONY: plant-bench generated growth awkward native golden pictures lock wheel
 .DELETE_ON_ERROR:
 
 help:
@@ -73,6 +75,9 @@ reproduce: $(STAMP)
 accuracy: $(STAMP)
 	@PYTHONPATH=. $(PYTHON_BIN) docs/studies/accuracy.py --seeds 20
 
+intervals: $(STAMP)
+	@PYTHONPATH=. $(PYTHON_BIN) docs/studies/intervals.py --seeds $(or $(SEEDS),20)
+
 undeclared: $(STAMP)
 	@$(PYTHON_BIN) -m tests.undeclared --seeds $(or $(SEEDS),60) --none $(or $(NONE),200)
 
@@ -114,6 +119,9 @@ pictures: $(STAMP)
 
 plant-bench: $(STAMP)
 	@$(PYTHON_BIN) -m tests.plant_bench --files $(or $(FILES),10000)
+
+awkward: $(STAMP)
+	@$(PYTHON_BIN) -m tests.awkward --count $(or $(COUNT),200)
 
 generated: $(STAMP)
 	@$(PYTHON_BIN) -m tests.generated --count $(or $(COUNT),1000)

@@ -45,6 +45,8 @@ KNOWING = {
     "calibration.published": {"elm", "geometry", "maps"},
     # How the rows were measured decides: frame, probe points, orientations, a slip.
     "calibration.fit": {"placement", "probe", "tool_shift"},
+    # A registration is what that effect fits.
+    "calibration.registration": {"placement"},
     "calibration.selection": {"probe_turn", "tool_shift"},
     "cli.diagnose": {"placement"},
 }

@@ -137,8 +137,8 @@ def blind(folder: Path) -> list[str]:
                 error - full.error(arm, verify.states),
             )
         ]
-        gap = np.abs(error - full.error(arm, verify.states))
-        held = (gap < 1.96 * full.measured_std(arm, verify.states)).mean()
+        read = full.reading(arm, verify.states)
+        held = (np.abs(error - read.error) < 1.96 * read.std).mean()
         more = [e.name for e in full.effects.effects if e.name not in BASE_EFFECTS]
         lines.append(
             f"| {name} | {left[0].mean():.3f} | {left[1].mean():.4f} "

@@ -64,8 +64,8 @@ def against_the_limit(seeds: int) -> list[str]:
         best = informed(states, measured, held)
         theirs.append(np.linalg.norm(truth - best, axis=1).mean() / MM)
         covered.append((np.abs(truth - p.error) < 1.96 * p.std_model).mean())
-        wide = model.measured_std(NJ, held)
-        single.append((np.abs(noisy - p.error) < 1.96 * wide).mean())
+        read = model.reading(NJ, held)
+        single.append((np.abs(noisy - read.error) < 1.96 * read.std).mean())
     return [
         f"- held-out true error: ours {np.mean(ours):.4f} mm, informed least squares "
         f"{np.mean(theirs):.4f} mm, ratio {np.mean(ours) / np.mean(theirs):.3f}",

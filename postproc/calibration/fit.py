@@ -18,19 +18,21 @@ from postproc.calibration.plausibility import (
     check_orientations,
     check_registered,
     check_survey,
+    lost_without,
 )
 from postproc.calibration.published import fit_method
-from postproc.calibration.registration import Registration, register
+from postproc.calibration.registration import register, typical_gap
 from postproc.calibration.regression import Fit
 from postproc.calibration.report import FitReport, report_fit, report_method
-from postproc.calibration.selection import fit_survey, model_of
+from postproc.calibration.selection import Progress, fit_survey, model_of, silent
 from postproc.calibration.tables import DETECT, TableFormat
-from postproc.calibration.tool_groups import find_groups
+from postproc.calibration.tool_groups import find_groups, find_wrong_nest
 from postproc.model.combination import Combination
 from postproc.model.effects.placement import Placement
 from postproc.model.effects.probe import Probe
 from postproc.model.effects.tool_shift import ToolShift
 from postproc.model.model import Method, Model
+from postproc.model.registration import Registration
 from postproc.robot.arm import Arm
 from postproc.robot.cell import Cell
 from postproc.robot.pose import MM
@@ -56,6 +58,7 @@ def fit(
     frame: Frame = "base",
     seed: int = 0,
     reading: TableFormat = DETECT,
+    progress: Progress = silent,
 ) -> Calibration:
     """Fit a model to measurement files.
 
@@ -69,14 +72,22 @@ def fit(
             and the probe points are fitted too.
         seed: Of random layers, for methods that have one.
         reading: What the user knows of the files.
+        progress: Told what is being done.
 
     Raises:
         MeasurementError: A file that cannot be read or cannot determine the geometry.
         PostprocError: An unknown effect, or one whose covariate was not recorded.
     """
+    progress("read measurements")
     survey = read_surveys(files, cell, reading)
     return fit_measurements(
-        survey, cell, method=method, effects=effects, frame=frame, seed=seed
+        survey,
+        cell,
+        method=method,
+        effects=effects,
+        frame=frame,
+        seed=seed,
+        progress=progress,
     )
 
 
@@ -88,20 +99,29 @@ def fit_measurements(
     effects: Sequence[str] | None = None,
     frame: Frame = "base",
     seed: int = 0,
+    progress: Progress = silent,
 ) -> Calibration:
     """Fit a model to measurements, see `fit`."""
     tracker, setup = cell.tracker, several_points(survey)
+    placed = None
     if frame == "tracker":
         survey, placed = into_base_frame(survey, cell.arm)
         tracker, setup = placed.tracker, (Placement.name,)
     check_survey(survey, cell.arm)
     survey = check_orientations(survey, cell.arm)
+    told = (*survey.warnings, *lost_without(cell.arm, survey))
+    survey = replace(survey, warnings=told)
     if method != "full":
         model = fit_method(method, survey, cell.arm, seed)
+        model = replace(model, registration=placed)
         return Calibration(model, report_method(model, survey, cell.arm), survey)
-    fitted = fit_survey(survey, cell.arm, effects, tracker, setup)
-    survey = replace(survey, warnings=(*survey.warnings, *moved_tools(fitted, survey)))
-    return Calibration(model_of(fitted, survey), report_fit(fitted, survey), survey)
+    fitted = fit_survey(survey, cell.arm, effects, tracker, setup, progress)
+    progress("report")
+    told = (*survey.warnings, *moved_tools(fitted, survey), *wrong_nests(fitted))
+    survey = replace(survey, warnings=told)
+    model = replace(model_of(fitted, survey), registration=placed)
+    report = report_fit(fitted, survey)
+    return Calibration(model, report, survey.with_states(fitted.batch.states))
 
 
 def moved_tools(fitted: Fit, survey: Measurements) -> tuple[str, ...]:
@@ -127,6 +147,18 @@ def moved_tools(fitted: Fit, survey: Measurements) -> tuple[str, ...]:
     )
 
 
+def wrong_nests(fitted: Fit) -> tuple[str, ...]:
+    """Tell of a nest that does not lie where the cell says."""
+    c, told = fitted.combination, []
+    for effect, part in zip(c.effects, c.slices, strict=True):
+        if isinstance(effect, Probe):
+            offset = fitted.values[part].reshape(-1, 3)
+            covariance = fitted.covariance[part, part]
+            found = find_wrong_nest(effect.tools, offset, covariance)
+            told += [] if found is None else [str(found)]
+    return tuple(told)
+
+
 def _at(survey: Measurements, order: float) -> str:
     """Name the first row from a place in the visit order."""
     return f"at row {survey.ids[int(np.argmax(survey.states.order >= order))]}"
@@ -147,10 +179,9 @@ def into_base_frame(
     """
     nothing = Combination(())
     found = register(arm, survey.states, survey.position, nothing, np.zeros(0))
-    ids, which = np.unique(survey.states.tool_id, return_inverse=True)
     xyz = ", ".join(f"{v / MM:.1f}" for v in found.tracker)
     notes = [f"tracker at {xyz} mm in the base frame"]
-    for k, name in enumerate(ids):
+    for k, name in enumerate(found.tool_ids):
         xyz = ", ".join(f"{v / MM:.2f}" for v in found.probes[k])
         notes.append(f"probe point {name} at {xyz} mm in the flange frame")
     turned = None
@@ -158,12 +189,13 @@ def into_base_frame(
         turned = found.base_from_tracker[:3, :3] @ survey.rotation
     registered = replace(
         survey,
-        states=survey.states.with_(tool=found.probes[which]),
+        states=found.on_probes(survey.states),
         position=found.to_base(survey.position),
         rotation=turned,
         warnings=(*survey.warnings, *notes),
     )
-    check_registered(survey, registered, arm, found.typical)
+    typical = typical_gap(found, arm, survey.states, survey.position)
+    check_registered(survey, registered, arm, typical)
     return registered, found
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from postproc.arrays import Floats
 from postproc.calibration.measurements import Measurements
 from postproc.calibration.orientations import Turns
-from postproc.calibration.registration import register
+from postproc.calibration.registration import register, typical_gap
 from postproc.calibration.regression import observe
 from postproc.calibration.tool_groups import find_groups
 from postproc.exceptions import MeasurementError
@@ -33,7 +33,8 @@ def likely_cure(survey: Measurements, arm: Arm) -> str:
     """Name the mistake that would explain the positions, if one does."""
     few = survey[np.unique(np.linspace(0, len(survey) - 1, TRIED).astype(np.int64))]
     for cure, states, position in _guesses(few.states, few.position):
-        if register(arm, states, position, NOTHING, np.zeros(0)).typical < CLOSE:
+        found = register(arm, states, position, NOTHING, np.zeros(0))
+        if typical_gap(found, arm, states, position) < CLOSE:
             return cure
     return "Check units, joint order and signs, the tool and the frame (--frame)"
 
@@ -78,6 +79,7 @@ MANY = 0.1  # share of such rows from which the file is at fault, not the rows
 PROBES = 400  # random poses that show what could be determined at best
 ENOUGH = 0.75  # share of the determinable directions that a survey must show
 OTHER_UNIT = 50.0  # no arm's positions differ so much in size
+STILL = 1e-4  # readings move by more of what the poses do, in whatever unit
 SOME = 0.02  # share of rows in another unit that is no accident
 TOOL_APART = 1e-3  # [m] tools that differ by less are told by the fit, not refused
 
@@ -89,6 +91,7 @@ def check_survey(survey: Measurements, arm: Arm) -> None:
         MeasurementError: With the likely reason and the cure.
     """
     check_rows(survey, arm)
+    check_places(survey, arm)
     check_units(survey)
     check_tools(survey, arm)
     gap = survey.position - Batch(arm, survey.states).walk.tcp
@@ -123,6 +126,23 @@ def check_units(survey: Measurements) -> None:
         problem = f"{int(metres.sum())} of {len(survey)} rows look like metres"
         cure = "The others are in millimetres: write all of them so"
         raise MeasurementError(survey.path, problem, cure, line=line)
+
+
+def check_places(survey: Measurements, arm: Arm) -> None:
+    """Refuse readings that are one place, where the poses are not.
+
+    Raises:
+        MeasurementError: How far apart both are.
+    """
+    read = np.linalg.norm(np.ptp(survey.position, axis=0))
+    posed = np.linalg.norm(np.ptp(Batch(arm, survey.states).walk.tcp, axis=0))
+    if read < STILL * posed:
+        problem = (
+            f"all {len(survey)} positions lie within {read / MM:.3f} mm, the poses "
+            f"within {posed / MM:.0f} mm"
+        )
+        cure = "The tracker was not read at every pose, or these are other columns"
+        raise MeasurementError(survey.path, problem, cure)
 
 
 def check_tools(survey: Measurements, arm: Arm) -> None:
@@ -169,6 +189,7 @@ def check_registered(
         MeasurementError: With the likely reason and the cure.
     """
     check_rows(survey, arm)
+    check_places(survey, arm)
     check_units(survey)
     if typical > CLOSE:
         check_tools(registered, arm)
@@ -211,6 +232,27 @@ def _rank(arm: Arm, states: States) -> int:
     scales = np.array([p.scale for p in geometry.parameters()])
     X = geometry.columns(Batch(arm, states)).reshape(-1, len(names)) * scales
     return observe(X, names).rank
+
+
+def lost_without(arm: Arm, survey: Measurements) -> tuple[str, ...]:
+    """Say what a fit lacks, or a model cannot be used for, for want of the arm file."""
+    told = []
+    if arm.file.links is None:
+        told.append(
+            "the arm file has no [links]: how joints yield to the arm's own weight, "
+            "and gaps that depend on it, cannot be fitted and stay in what is left"
+        )
+    if not arm.has_inverse:
+        told.append(
+            "the arm file has no [opw]: the model serves predict and diagnose; "
+            "compensate and explain need the inverse kinematics"
+        )
+    if arm.file.joints.drive_coupling is None and survey.inferred.any():
+        told.append(
+            "the arm file has no drive_coupling: directions of joints are inferred as "
+            "if no motor turned another joint's gear"
+        )
+    return tuple(told)
 
 
 # Whether the orientations of a 6D probe can be used.

@@ -19,6 +19,9 @@ from postproc.model.noise import Noise, Whitener
 
 # What a fit has found, with all that tests of further effects need.
 
+HELD, WITHIN = 0.95, 1.96  # share of normal deviates, within as many sigma
+LEAST = 0.1  # of its noise that is left at least of a row that tells of itself alone
+
 
 @dataclass(frozen=True, eq=False)
 class Fit:
@@ -126,6 +129,26 @@ class Fit:
             self.log_scale, self.log_evidence, self.effective,
         )  # fmt: skip
         return widened(self.normal(), self.group, at) * np.outer(scales, scales)
+
+    @cached_property
+    def reading_spread(self) -> float:
+        """Factor on the standard deviation of a reading so that 1.96 hold 95 %.
+
+        Readings have heavier tails than a normal distribution. Each row is predicted
+        without itself: of its residual r, whose variance is the noise R less what it
+        told of the effects, V, r / sqrt(R - V) is that prediction's error over its
+        standard deviation (leave one out). At least 1: the noise is what it is.
+        """
+        noise = self.noise.arrival_variance(self.design.jacobian)
+        position = self.batch.walk.tcp + self.error
+        noise = noise + np.square(self.noise.tracker_std(position))[:, None]
+        noise = noise + self.whitener.extra
+        told = (1.0 - 2.0 * self.rows.weight[:, None]) * self.design.variance(
+            self.stated
+        )
+        off = np.abs(self.residual) / np.sqrt(np.maximum(noise + told, LEAST * noise))
+        level = min(HELD * (off.size + 1) / max(off.size, 1), 1.0)
+        return max(float(np.quantile(off, level)) / WITHIN, 1.0) if off.size else 1.0
 
 
 # Fitting effects to a survey: Bayesian, robust, with geometry taken exactly.

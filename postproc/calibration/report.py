@@ -7,7 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from postproc.arrays import Floats
+from postproc.arrays import Bools, Floats
+from postproc.calibration.directions import judge_directions
 from postproc.calibration.measurements import DroppedRow, Measurements
 from postproc.calibration.regression import Fit, Unseen, observe
 from postproc.model.kinematics import Batch
@@ -17,6 +18,8 @@ from postproc.robot.arm import Arm
 from postproc.robot.pose import MM
 
 CORRELATED = 0.9
+KNOWN = 1e-14  # part of its prior variance that is left at least of anything known
+EXCUSED = 2.0  # standard errors by which a value may be where physics forbids it
 SHOWN_UNITS = {"m": ("mm", 1e3), "rad": ("mrad", 1e3), "rad/(N m)": ("urad/(N m)", 1e6)}
 
 
@@ -38,6 +41,65 @@ class ParameterRow:
 
 
 @dataclass(frozen=True)
+class Found:
+    """What one effect does at one joint, or along none.
+
+    Attributes:
+        effect: Its name.
+        joint: 1 to 6, or None.
+        size_mm: Root mean square of the TCP's displacement over the rows used.
+        max_mm: The largest.
+        evidence: Log of how much likelier the rows are with it than without, all else
+            and the prior scales as they are [nats].
+        setup: Whether it is the survey's own, and never compensated.
+        impossible: Values that physics forbids, in words.
+    """
+
+    effect: str
+    joint: int | None
+    size_mm: float
+    max_mm: float
+    evidence: float
+    setup: bool
+    impossible: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class WrongDirection:
+    """A direction of the file that is probably wrong.
+
+    Attributes:
+        id, line: The row.
+        joint: 1 to 6.
+        probability: That it is wrong.
+    """
+
+    id: str
+    line: int
+    joint: int
+    probability: float
+
+
+@dataclass(frozen=True)
+class DirectionReport:
+    """What the rows say of the directions in their file.
+
+    Attributes:
+        rate: Estimated share of wrong ones.
+        telling: How many directions the rows can tell.
+        turned: How many were fitted the other way.
+        unsure: How many were fitted as not known.
+        likeliest: Those that are likelier wrong than not, likeliest first.
+    """
+
+    rate: float
+    telling: int
+    turned: int
+    unsure: int
+    likeliest: tuple[WrongDirection, ...]
+
+
+@dataclass(frozen=True)
 class FitReport:
     """Everything worth telling about a fit.
 
@@ -54,6 +116,8 @@ class FitReport:
         effective: Effective number of parameters.
         warnings: What else to know.
         orientation_mrad: Estimated scatter of orientations about each axis, or None.
+        found: What every effect does at every joint, largest first.
+        directions: Wrong directions, or None where the file has none.
     """
 
     parameters: tuple[ParameterRow, ...]
@@ -69,6 +133,8 @@ class FitReport:
     effective: float
     warnings: tuple[str, ...]
     orientation_mrad: float | None = None
+    found: tuple[Found, ...] = ()
+    directions: DirectionReport | None = None
 
 
 def report_fit(fit: Fit, survey: Measurements) -> FitReport:
@@ -97,6 +163,8 @@ def report_fit(fit: Fit, survey: Measurements) -> FitReport:
         effective=fit.effective,
         warnings=survey.warnings,
         orientation_mrad=None if fit.turns is None else fit.turns.std * 1e3,
+        found=find(fit),
+        directions=report_directions(fit, survey),
     )
 
 
@@ -118,6 +186,79 @@ def report_method(model: Model, survey: Measurements, arm: Arm) -> FitReport:
         effective=float(len(model.values)),
         warnings=survey.warnings,
     )
+
+
+def report_directions(fit: Fit, survey: Measurements) -> DirectionReport | None:
+    """Tell which directions of the file the fit has not believed, if any."""
+    told, used = survey.states.direction, fit.batch.states.direction
+    if (told == used).all():
+        return None
+    judged = judge_directions(fit, told)
+    rows, joints = np.nonzero(judged.probability > 0.5)
+    order = np.argsort(-judged.probability[rows, joints], kind="stable")
+    likeliest = tuple(
+        WrongDirection(
+            survey.ids[i], int(survey.line[i]), int(j) + 1,
+            float(judged.probability[i, j]),
+        )
+        for i, j in zip(rows[order], joints[order], strict=True)
+    )  # fmt: skip
+    changed = used != told
+    turned, unsure = (
+        int((changed & (used != 0)).sum()),
+        int((changed & (used == 0)).sum()),
+    )
+    telling = int(judged.telling.sum())
+    return DirectionReport(judged.rate, telling, turned, unsure, likeliest)
+
+
+def find(fit: Fit) -> tuple[Found, ...]:
+    """Say what every effect does at every joint, largest first."""
+    c = fit.combination
+    joint = np.array([p.joint or 0 for p in c.parameters])
+    used = fit.rows.weight > 0
+    found = []
+    for effect, part in zip(c.effects, c.slices, strict=True):
+        for j in np.unique(joint[part]):
+            own = np.zeros(len(joint), dtype=bool)
+            own[part] = joint[part] == j
+            moved = fit.design.times(np.where(own, fit.values, 0.0))[used]
+            size = np.linalg.norm(moved, axis=1) / MM
+            found.append(
+                Found(
+                    effect.name, int(j) or None, float(np.sqrt((size**2).mean())),
+                    float(size.max(initial=0.0)), evidence_of(fit, own),
+                    effect.belongs_to() == "setup", impossible(fit, own),
+                )
+            )  # fmt: skip
+    return tuple(sorted(found, key=lambda f: -f.size_mm))
+
+
+def evidence_of(fit: Fit, own: Bools) -> float:
+    """Log ratio of the likelihoods with and without some parameters [nats].
+
+    At fixed prior scales it is the density of the prior at 0 over that of the posterior
+    (Dickey, 1971), with mean m, covariance C and prior covariance S
+    (m^T C^-1 m + log |C| - log |S|) / 2.
+    """
+    scale = fit.prior_std[own]
+    C = fit.covariance[np.ix_(own, own)] / np.outer(scale, scale)
+    values, vectors = np.linalg.eigh(C)
+    values = np.clip(values, KNOWN, 1.0)
+    along = vectors.T @ (fit.values[own] / scale)
+    return float((along**2 / values + np.log(values)).sum() / 2)
+
+
+def impossible(fit: Fit, own: Bools) -> tuple[str, ...]:
+    """Name the values that physics forbids, where no doubt of the fit excuses them."""
+    std, told = np.sqrt(np.diag(fit.stated)), []
+    for k in np.flatnonzero(own):
+        p = fit.combination.parameters[k]
+        if p.positive and fit.values[k] + EXCUSED * std[k] < 0.0:
+            unit, factor = SHOWN_UNITS.get(p.unit, (p.unit, 1.0))
+            value, error = fit.values[k] * factor, std[k] * factor
+            told.append(f"{p.name} = {value:.3g} +- {error:.2g} {unit} is negative")
+    return tuple(told)
 
 
 def _shares(fit: Fit) -> Floats:
@@ -153,9 +294,10 @@ def _correlated(fit: Fit) -> tuple[tuple[str, str, float], ...]:
 
 
 def weighed_down(fit: Fit, survey: Measurements) -> tuple[DroppedRow, ...]:
-    """List the rows that count less than fully, and why."""
+    """List the rows that count less than fully, and why, worst first."""
     out = []
-    for i in np.flatnonzero(fit.rows.weight < 1.0):
+    less = np.flatnonzero(fit.rows.weight < 1.0)
+    for i in less[np.argsort(-fit.rows.distance[less], kind="stable")]:
         w, d = fit.rows.weight[i], fit.rows.distance[i]
         size = np.linalg.norm(fit.residual[i]) / MM
         what = "dropped" if w == 0 else f"weight {w:.2f}"

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from postproc.arrays import Bools, Floats
+from postproc.calibration.directions import mend_directions
 from postproc.calibration.evidence import LOG_SPREAD, Normal, maximise
 from postproc.calibration.measurements import Measurements
 from postproc.calibration.orientations import Turns
@@ -19,7 +20,7 @@ from postproc.model.effects.effect import Effect
 from postproc.model.effects.probe_turn import ProbeTurn
 from postproc.model.effects.tool_shift import ToolShift
 from postproc.model.kinematics import Batch
-from postproc.model.model import COMPENSATED, Model, Ranges
+from postproc.model.model import COMPENSATED, READING, Model, Ranges
 from postproc.robot.arm import Arm
 from postproc.robot.pose import MM
 from postproc.robot.state import States
@@ -30,8 +31,14 @@ from postproc.robot.state import States
 # being chosen anew. Named effects are weighed first; free forms must then explain what
 # is left.
 
+Progress = Callable[[str], None]
+
 ENOUGH = 3.0  # nats that an effect must be worth: 20 to 1
 STEPS = 12  # of the search for prior scales, which start near their best
+
+
+def silent(stage: str) -> None:
+    """Tell nobody."""
 
 
 def candidates(states: States) -> tuple[str, ...]:
@@ -54,6 +61,7 @@ def fit_best(
     origin: tuple[float, float, float] | None,
     setup: tuple[str, ...] = (),
     turns: Turns | None = None,
+    progress: Progress = silent,
 ) -> Fit:
     """Fit the base effects and all others that a survey gives evidence for.
 
@@ -64,15 +72,19 @@ def fit_best(
         origin: Tracker position, where it is known.
         setup: Effects of the set-up that are always fitted.
         turns: Measured orientations, where the survey has them.
+        progress: Told what is being done.
     """
     batch = Batch(arm, states)
     base = propose((*BASE_EFFECTS, *setup), arm, states)
     kept = base
+    progress("fit " + ", ".join(e.name for e in base))
     fitted = fit_effects(batch, position, base, origin, turns=turns, until=NEARLY)
     for names in (candidates(states), *((name,) for name in free_forms(states))):
+        progress("fit and weigh " + ", ".join(names))
         tried = (*kept, *propose(names, arm, states), *slipped(fitted))
         fitted = fit_effects(batch, position, tried, origin, fitted, until=NEARLY)
         kept = keep_needed(fitted, always=base)
+    progress("fit " + ", ".join(e.name for e in kept))
     return fit_effects(batch, position, kept, origin, fitted)
 
 
@@ -149,6 +161,7 @@ def fit_survey(
     effects: Sequence[str] | None,
     tracker: Floats | None,
     setup: tuple[str, ...] = (),
+    progress: Progress = silent,
 ) -> Fit:
     """Fit effects to a survey in the base frame.
 
@@ -158,6 +171,11 @@ def fit_survey(
         effects: Names of effects; None: those that the survey gives evidence for.
         tracker: Tracker position in the base frame, (3,) [m], or None.
         setup: Names of effects of the set-up, fitted besides.
+        progress: Told what is being done.
+
+    Returns:
+        The fit. Where directions of the file are probably wrong, its states have them
+        the other way, or as not known.
 
     Raises:
         PostprocError: An unknown effect, or one whose covariate was not recorded.
@@ -168,10 +186,21 @@ def fit_survey(
     if survey.rotation is not None and survey.mounting is not None:
         turns = Turns.of(batch, survey.rotation, survey.mounting)
         setup = (*setup, ProbeTurn.name)
-    if effects is None:
-        return fit_best(arm, states, position, origin, setup, turns)
-    chosen = propose((*effects, *setup), arm, states)
-    return fit_effects(batch, position, chosen, origin, turns=turns)
+
+    def fit(states: States) -> Fit:
+        if effects is None:
+            return fit_best(arm, states, position, origin, setup, turns, progress)
+        chosen = propose((*effects, *setup), arm, states)
+        return fit_effects(Batch(arm, states), position, chosen, origin, turns=turns)
+
+    fitted = fit(states)
+    if survey.inferred.all():
+        return fitted
+    progress("look for wrong directions")
+    mended = mend_directions(fitted, position)
+    if effects is not None or mended is fitted:
+        return mended
+    return fit(mended.batch.states)
 
 
 def model_of(fitted: Fit, survey: Measurements) -> Model:
@@ -190,6 +219,7 @@ def model_of(fitted: Fit, survey: Measurements) -> Model:
         "effective_parameters": fitted.effective,
         "log_evidence": fitted.log_evidence,
         "rows_dropped": float((~used).sum() + len(survey.dropped)),
+        READING: fitted.reading_spread,
     }
     if fitted.turns is not None:
         statistics["orientation_std_mrad"] = fitted.turns.std * 1e3

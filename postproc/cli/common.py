@@ -277,18 +277,21 @@ PATIENCE = 2.0  # [s] before a person is shown what is being done
 
 
 @contextmanager
-def stages(out: TextIO | None = None) -> Iterator[Callable[[str], None]]:
-    """Show what is being done when it lasts, on a terminal only.
+def stages(
+    out: TextIO | None = None, log: bool = False
+) -> Iterator[Callable[[str], None]]:
+    """Show what is being done when it lasts, on a terminal.
 
     Args:
         out: Where to; default: stderr.
+        log: Whether lines tell it where there is no terminal.
 
     Yields:
         A function to be told the name of every stage.
     """
     out = out or sys.stderr
     if not out.isatty():
-        yield lambda stage: None
+        yield _logged(out) if log else lambda stage: None
         return
     told = _Told(out)
     timer = threading.Timer(PATIENCE, told.show)
@@ -300,6 +303,13 @@ def stages(out: TextIO | None = None) -> Iterator[Callable[[str], None]]:
         timer.cancel()
         timer.join()  # it may be about to show something
         told.hide()
+
+
+def _logged(out: TextIO) -> Callable[[str], None]:
+    """Tell stages as lines."""
+    from postproc.report.terminal import StageLog
+
+    return StageLog(out)
 
 
 class _Told:

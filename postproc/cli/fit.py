@@ -5,8 +5,9 @@ from __future__ import annotations
 import csv
 import io
 import json
-from collections.abc import Sequence
-from dataclasses import asdict
+from collections import Counter
+from collections.abc import Iterable, Sequence
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -20,15 +21,18 @@ from postproc.calibration.fit import (
     into_base_frame,
     read_surveys,
 )
-from postproc.calibration.measurements import concatenate, from_table
+from postproc.calibration.measurements import Measurements, concatenate, from_table
 from postproc.calibration.plausibility import check_survey
 from postproc.calibration.published import Comparison, compare
-from postproc.calibration.report import FitReport
-from postproc.calibration.tables import DETECT, TableFormat, read_table
+from postproc.calibration.registration import predict_registered
+from postproc.calibration.report import DirectionReport, FitReport, Found
+from postproc.calibration.tables import DETECT, TableFormat, read_foreign
 from postproc.calibration.tables import TextTable as Cells
 from postproc.cli.diagnose import join_program
+from postproc.exceptions import MeasurementError, PostprocError
 from postproc.files import write_all
-from postproc.model.model import Model, load_model
+from postproc.model.model import Model, PredictedReading, Prediction, load_model
+from postproc.model.registration import Registration
 from postproc.model.statistics import ErrorStatistics
 from postproc.report.terminal import Column, table_text
 from postproc.robot.cell import Cell, load_cell
@@ -43,6 +47,17 @@ COLUMNS = (
     Column("share"),
     Column("seen"),
 )
+FOUND = (
+    Column("found", "left"),
+    Column("joint"),
+    Column("rms mm"),
+    Column("max mm"),
+    Column("evidence nats"),
+    Column("", "left"),
+)
+MOST, FEW = 20, 8  # findings, and rows, that a short report lists
+ROWS = 10**6  # directions that a long report lists
+ENOUGH = 3.0  # nats from which a finding is listed: 20 to 1
 COMPARED = (
     Column("method", "left"),
     Column("range mm"),
@@ -54,6 +69,11 @@ PREDICTED = (
     *("sx_mm", "sy_mm", "sz_mm"),  # its standard error
     *("arrival_sx_mm", "arrival_sy_mm", "arrival_sz_mm"),  # of one arrival
 )
+READINGS = (
+    *("reading_dx_mm", "reading_dy_mm", "reading_dz_mm"),  # less the nominal TCP
+    *("reading_sx_mm", "reading_sy_mm", "reading_sz_mm"),  # of one reading
+)
+WITHIN = 1.96  # standard deviations that hold 95 % of the readings
 RESIDUAL = ("rx_mm", "ry_mm", "rz_mm")
 POSITION = ("x_mm", "y_mm", "z_mm")
 
@@ -65,6 +85,7 @@ def fit_files(
     program: Path | None = None,
     html: Path | None = None,
     reading: TableFormat = DETECT,
+    everything: bool = False,
     **how: Any,
 ) -> str:
     """Fit measurement files and write the model.
@@ -76,6 +97,7 @@ def fit_files(
         program: The survey program, for files that hold ids and positions only.
         html: A page about the fit to write.
         reading: What the user knows of the measurement files.
+        everything: Whether the report lists all parameters and rows.
         how: Arguments of `postproc.calibration.fit.fit`; None stands for the default.
 
     Returns:
@@ -95,7 +117,8 @@ def fit_files(
     found.model.save(output)
     if html is not None:
         write_page(html, found, cell)
-    return tell_fit(found.report) + f"\nmodel {found.model.id} written to {output}"
+    told = tell_fit(found.report, everything)
+    return told + f"\nmodel {found.model.id} written to {output}"
 
 
 def write_page(path: Path, found: Calibration, cell: Cell) -> None:
@@ -112,8 +135,148 @@ def write_page(path: Path, found: Calibration, cell: Cell) -> None:
     write_all({path: page.encode()})
 
 
-def tell_fit(report: FitReport) -> str:
-    """Write the report of a fit for a terminal."""
+def tell_fit(report: FitReport, everything: bool = False) -> str:
+    """Write the report of a fit for a terminal.
+
+    Args:
+        report: The report.
+        everything: Whether to list every parameter, pair, direction and row.
+    """
+    if everything:
+        lines = [_tell_parameters(report), _tell_found(report.found)]
+        lines += [
+            f"{k}: {share:.1%} of the error" for k, share in report.shares.items()
+        ]
+        lines += [f"correlated {r:+.3f}: {a} and {b}" for a, b, r in report.correlated]
+        lines += [f"not determined by these rows: {d}" for d in report.unseen]
+    else:
+        lines = [_tell_found(_large(report.found)), *_tell_rest(report)]
+    lines += _tell_rows(report, len(report.dropped) if everything else FEW)
+    lines += _tell_directions(report.directions, ROWS if everything else FEW)
+    lines += [f"warning: {warning}" for warning in report.warnings]
+    lines += _tell_scatter(report)
+    return "\n".join(line for line in lines if line)
+
+
+def _tell_found(found: Sequence[Found]) -> str:
+    """Write what effects do, as a table; no line where nothing has a name."""
+    if not found:
+        return ""
+    cells = (
+        (
+            f.effect, str(f.joint or ""), f"{f.size_mm:.3f}", f"{f.max_mm:.3f}",
+            str(round(f.evidence)), _remark(f),
+        )
+        for f in found
+    )  # fmt: skip
+    return table_text(FOUND, cells)
+
+
+def _remark(found: Found) -> str:
+    """Say what is special about a finding."""
+    told = [f"IMPOSSIBLE: {text}" for text in found.impossible]
+    if found.setup:
+        told.append("of the set-up: not compensated")
+    return "; ".join(told)
+
+
+def _large(found: Sequence[Found]) -> list[Found]:
+    """Take the largest findings for which there is evidence, and impossible ones."""
+    shown = [f for f in found if f.evidence > ENOUGH]
+    few = shown[:MOST]
+    return few + [f for f in found if f.impossible and f not in few]
+
+
+def _tell_rest(report: FitReport) -> list[str]:
+    """Say in a line each what is small, alike, or not determined."""
+    lines, found = [], report.found
+    shown = _large(found)
+    rest = [f for f in found if f not in shown]
+    if rest:
+        size = float(np.sqrt(sum(f.size_mm**2 for f in rest)))
+        names = _counted(f.effect for f in rest)
+        lines.append(f"smaller or without evidence, {size:.3f} mm together: {names}")
+    if report.unseen:
+        names = _grouped(u.name for u in report.unseen)
+        count = len(report.unseen)
+        lines.append(f"not determined, left at the prior, {count} directions: {names}")
+    if report.correlated:
+        names = _counted(a.partition(".")[0] for a, _, _ in report.correlated)
+        lines.append(f"hardly told apart, {len(report.correlated)} pairs: {names}")
+    if lines:
+        lines.append("all parameters, directions and rows: --all")
+    return lines
+
+
+def _counted(names: Iterable[str]) -> str:
+    """Count names, the most frequent first.
+
+    >>> _counted(["a", "b", "b"])
+    'b 2, a 1'
+    """
+    return ", ".join(f"{name} {n}" for name, n in Counter(names).most_common())
+
+
+def _grouped(names: Iterable[str]) -> str:
+    """Name parameters by their effects; where there are more than a few, count them.
+
+    >>> _grouped(["geometry.a2", "backlash.b1", "geometry.d2"])
+    'geometry a2 d2, backlash b1'
+    """
+    groups: dict[str, list[str]] = {}
+    for name in names:
+        effect, _, own = name.partition(".")
+        groups.setdefault(effect, []).append(own)
+    return ", ".join(
+        f"{effect} {' '.join(own) if len(own) < FEW else len(own)}"
+        for effect, own in sorted(groups.items(), key=lambda g: -len(g[1]))
+    )
+
+
+def _tell_rows(report: FitReport, most: int) -> list[str]:
+    """List rows that count less, and those that stand out and count all the same."""
+    rows = report.dropped
+    lines = [f"row {row.id} (line {row.line}): {row.why}" for row in rows[:most]]
+    if len(rows) > most:
+        lines.append(f"and {len(rows) - most} more rows that count less (--all)")
+    if report.spared:
+        ids = ", ".join(report.spared[: max(most, FEW)])
+        more = len(report.spared) - max(most, FEW)
+        ids += f" and {more} more" if more > 0 else ""
+        lines.append(f"suspect, but kept, for rows beside them agree: row {ids}")
+    return lines
+
+
+def _tell_directions(found: DirectionReport | None, most: int) -> list[str]:
+    """Tell of wrong directions in the file, likeliest first; the rest is counted."""
+    if found is None:
+        return []
+    rows = found.likeliest[:most]
+    names = ", ".join(f"{w.id} joint {w.joint} ({w.probability:.2f})" for w in rows)
+    more = len(found.likeliest) - len(rows)
+    return [
+        f"directions: {found.rate:.1%} of the {found.telling} that rows can tell are "
+        f"wrong in the file (estimated); {found.turned} were fitted the other way, "
+        f"{found.unsure} as not known",
+        f"likeliest wrong: row {names}" + (f" and {more} more" if more else ""),
+    ]
+
+
+def _tell_scatter(report: FitReport) -> list[str]:
+    """Tell of the noise, and of the errors before and after."""
+    lines = [
+        f"tracker {report.tracker_mm:.4f} mm, repeatability "
+        f"{report.repeatability_mm:.4f} mm per axis (estimated)"
+    ]
+    if report.orientation_mrad is not None:
+        lines.append(f"orientation {report.orientation_mrad:.4f} mrad (estimated)")
+    lines.append(f"measured error  {_tell(report.before)}")
+    lines.append(f"left by the fit {_tell(report.after)}")
+    return lines
+
+
+def _tell_parameters(report: FitReport) -> str:
+    """Write the table of all parameters."""
     cells = (
         (
             p.name,
@@ -125,26 +288,7 @@ def tell_fit(report: FitReport) -> str:
         )
         for p in report.parameters
     )
-    lines = [table_text(COLUMNS, cells)]
-    for name, share in report.shares.items():
-        lines.append(f"{name}: {share:.1%} of the error")
-    for a, b, value in report.correlated:
-        lines.append(f"correlated {value:+.3f}: {a} and {b}")
-    for direction in report.unseen:
-        lines.append(f"not determined by these rows: {direction}")
-    for row in report.dropped:
-        lines.append(f"row {row.id} (line {row.line}): {row.why}")
-    for warning in report.warnings:
-        lines.append(f"warning: {warning}")
-    lines.append(
-        f"tracker {report.tracker_mm:.4f} mm, repeatability "
-        f"{report.repeatability_mm:.4f} mm per axis (estimated)"
-    )
-    if report.orientation_mrad is not None:
-        lines.append(f"orientation {report.orientation_mrad:.4f} mrad (estimated)")
-    lines.append(f"measured error  {_tell(report.before)}")
-    lines.append(f"left by the fit {_tell(report.after)}")
-    return "\n".join(lines)
+    return table_text(COLUMNS, cells)
 
 
 def _tell(spread: ErrorStatistics) -> str:
@@ -195,8 +339,45 @@ def tell_comparison(found: Comparison) -> str:
     return f"{table_text(COMPARED, rows)}\n{found.split}"
 
 
-def predict_file(path: Path, cell_path: Path, model_path: Path) -> tuple[str, str]:
+@dataclass(frozen=True)
+class Readings:
+    """What is asked of the readings of a survey's set-up.
+
+    Attributes:
+        frame: Frame of the measured positions, "base" or "tracker"; None where only
+            the error of the arm is asked for.
+        refit: What of the set-up is found from the rows themselves: "registration",
+            or None where the set-up is that of the model's survey.
+    """
+
+    frame: str | None = None
+    refit: str | None = None
+
+    def __post_init__(self) -> None:
+        if self.refit not in (None, "registration"):
+            raise PostprocError(f"--refit {self.refit!r}: write registration")
+
+    @property
+    def asked(self) -> bool:
+        """Whether readings are predicted."""
+        return self.frame is not None or self.refit is not None
+
+
+def predict_file(
+    path: Path,
+    cell_path: Path,
+    model_path: Path,
+    readings: Readings,
+    reading: TableFormat = DETECT,
+) -> tuple[str, str]:
     """Add predicted errors to the rows of a file.
+
+    Args:
+        path: The file.
+        cell_path: The cell.
+        model_path: The model.
+        readings: What is asked of the readings of the set-up.
+        reading: What the user knows of the file.
 
     Returns:
         The new file's text, and in words the residual where positions are given.
@@ -206,24 +387,124 @@ def predict_file(path: Path, cell_path: Path, model_path: Path) -> tuple[str, st
     """
     cell, model = load_cell(cell_path), load_model(model_path)
     model.check_arm(cell.arm, model_path)
-    table = read_table(path)
-    return predict_table(table, cell, model)
+    table = read_foreign(path, reading)
+    if not readings.asked:
+        return predict_table(table, cell, model)
+    return predict_readings(table, cell, model, readings)
 
 
 def predict_table(table: Cells, cell: Cell, model: Model) -> tuple[str, str]:
     """Add predicted errors to the rows of a table; lost beams get empty cells."""
     measured = from_table(table, cell.arm, cell.probes, positions=False)
     predicted = model.predict(cell.arm, measured.states)
-    parts = [predicted.error, predicted.std_model, predicted.std_arrival]
-    header, summary = list(PREDICTED), f"{len(measured)} states"
-    summary += f", {int(predicted.any_outside.sum())} outside the survey"
+    header, parts = list(PREDICTED), _told(predicted)
+    summary = _inside(predicted)
     if table.has(*POSITION):
         left = measured.position - nominal_tcp(cell, measured.states) - predicted.error
         parts.append(left)
         header += RESIDUAL
         summary += f"\nresidual {_tell(ErrorStatistics.of(left))}"
+    return written(table, measured, header, parts, predicted), summary
+
+
+def predict_readings(
+    table: Cells, cell: Cell, model: Model, readings: Readings
+) -> tuple[str, str]:
+    """Add predicted errors and what the set-up reads; lost beams get empty cells.
+
+    Raises:
+        PostprocError: The set-up is not known, and not to be found from the rows.
+    """
+    rows, read, told = read_setup(table, cell, model, readings)
+    predicted = model.predict(cell.arm, rows.states)
+    parts = [*_told(predicted), read.error, read.std]
+    header, summary = [*PREDICTED, *READINGS], _inside(predicted) + told
+    if table.has(*POSITION):
+        left = rows.position - nominal_tcp(cell, rows.states) - read.error
+        parts.append(left)
+        header += RESIDUAL
+        held = float((np.abs(left) < WITHIN * read.std).mean())
+        summary += f"\nresidual {_tell(ErrorStatistics.of(left))}"
+        summary += f"\n95 % intervals of a reading hold {held:.1%} of {left.size} "
+        summary += "coordinates" + _apart(left, read.std)
+    return written(table, rows, header, parts, predicted), summary
+
+
+def read_setup(
+    table: Cells, cell: Cell, model: Model, readings: Readings
+) -> tuple[Measurements, PredictedReading, str]:
+    """Read rows in the base frame with what their set-up would read, and tell of it.
+
+    Raises:
+        PostprocError: The set-up is not known, and not to be found from the rows.
+    """
+    found = readings.refit is not None
+    rows = from_table(table, cell.arm, cell.probes, positions=found)
+    if found:
+        placed, read = predict_registered(model, cell.arm, rows.states, rows.position)
+        at = ", ".join(f"{v / MM:.1f}" for v in placed.tracker)
+        told = f"\nregistration refitted: tracker at {at} mm in the base frame"
+        return _placed(rows, placed, table.path), read, told
+    if readings.frame == "tracker":
+        if model.registration is None:
+            problem = "the model holds no registration: it was fitted in the base frame"
+            cure = "Find it from these rows: --refit registration"
+            raise MeasurementError(table.path, problem, cure)
+        rows = _placed(rows, model.registration, table.path)
+    return rows, model.reading(cell.arm, rows.states), ""
+
+
+def _placed(rows: Measurements, placed: Registration, path: Path) -> Measurements:
+    """Put rows in the tracker's frame into the base frame, at the probe points.
+
+    Raises:
+        MeasurementError: A probe point that the registration does not know.
+    """
+    try:
+        states = placed.on_probes(rows.states)
+    except KeyError as exc:
+        problem = f"tool_id {exc} is no probe point of the model's survey"
+        cure = "Find it from these rows: --refit registration"
+        raise MeasurementError(path, problem, cure) from None
+    return replace(rows, states=states, position=placed.to_base(rows.position))
+
+
+def _apart(left: Floats, std: Floats) -> str:
+    """Tell what is between this campaign and the model's survey, where it shows.
+
+    With a further standard deviation t of every coordinate, squared residuals are as
+    large as expected: mean(r^2) = mean(s^2) + t^2.
+    """
+    more = float((left**2).mean() - (std**2).mean())
+    if more <= 0.0:
+        return ""
+    return f"; a term of {np.sqrt(more) / MM:.4f} mm per axis would explain the rest"
+
+
+def _told(predicted: Prediction) -> list[Floats]:
+    """List the columns of `PREDICTED`."""
+    return [predicted.error, predicted.std_model, predicted.std_arrival]
+
+
+def _inside(predicted: Prediction) -> str:
+    """Count states, and those outside the survey by what lies outside."""
+    outside = int(predicted.any_outside.sum())
+    told = f"{len(predicted.error)} states, {outside} outside the survey"
+    counts = {why: int(rows.sum()) for why, rows in predicted.outside.items()}
+    most = sorted(counts, key=counts.__getitem__, reverse=True)
+    return told + "".join(f"\n  {counts[why]}: {why}" for why in most)
+
+
+def written(
+    table: Cells,
+    rows: Measurements,
+    header: Sequence[str],
+    parts: Sequence[Floats],
+    predicted: Prediction,
+) -> str:
+    """Write a table with further columns, (n, 3) [m] each three of the header."""
     numbers = np.concatenate(parts, axis=1) / MM
-    row_of = {int(line): i for i, line in enumerate(measured.line)}
+    row_of = {int(line): i for i, line in enumerate(rows.line)}
     out = io.StringIO()
     writer = csv.writer(out, delimiter=";" if table.decimal == "," else ",")
     writer.writerow([*table.columns, *header, "outside"])
@@ -234,7 +515,7 @@ def predict_table(table: Cells, cell: Cell, model: Model) -> tuple[str, str]:
             continue
         told = [f"{v:.5f}".replace(".", table.decimal) for v in numbers[i]]
         writer.writerow([*cells, *told, "; ".join(predicted.why(i))])
-    return out.getvalue().replace("\r\n", "\n"), summary
+    return out.getvalue().replace("\r\n", "\n")
 
 
 def nominal_tcp(cell: Cell, states: States) -> Floats:

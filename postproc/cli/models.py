@@ -21,6 +21,7 @@ from postproc.cli.common import (
     explained,
     say,
     split_names,
+    stages,
     write_text,
 )
 from postproc.files import check_places
@@ -139,6 +140,9 @@ def fit(
     decimal: DecimalOption = None,
     encoding: EncodingOption = None,
     unit: UnitOption = "mm",
+    everything: Annotated[
+        bool, typer.Option("--all", help="List all parameters and rows.")
+    ] = False,
 ) -> None:
     """Fit a model of the arm's error to laser-tracker measurements."""
     from postproc.calibration.tables import TableFormat
@@ -148,7 +152,7 @@ def fit(
     with explained():
         check_places([output, html], [*data, cell, program, columns])
         reading = TableFormat(columns, delimiter, decimal, encoding, unit)
-        with busy("fit"):
+        with stages(log=True) as progress:
             found = fit.fit_files(
                 data,
                 cell,
@@ -156,10 +160,12 @@ def fit(
                 program,
                 html,
                 reading,
+                everything,
                 method=method.value,
                 effects=names,
                 frame=frame.value,
                 seed=seed,
+                progress=progress,
             )
         typer.echo(found)
 
@@ -170,14 +176,31 @@ def predict(
     cell: CellOption,
     model: ModelOption,
     output: Annotated[Path | None, typer.Option("-o", "--output")] = None,
+    frame: Annotated[
+        MeasuredFrame | None,
+        typer.Option(
+            "--frame", help="Of the positions: predict the set-up's readings too."
+        ),
+    ] = None,
+    refit: Annotated[
+        str | None,
+        typer.Option("--refit", help="registration: find the set-up from these rows."),
+    ] = None,
+    columns: ColumnsOption = None,
+    delimiter: DelimiterOption = None,
+    decimal: DecimalOption = None,
+    encoding: EncodingOption = None,
 ) -> None:
     """Add the predicted error of every row; with positions, also the residual."""
+    from postproc.calibration.tables import TableFormat
     from postproc.cli import fit
 
     with explained():
-        check_places([output], [states, cell, model])
+        check_places([output], [states, cell, model, columns])
+        reading = TableFormat(columns, delimiter, decimal, encoding)
+        asked = fit.Readings(None if frame is None else frame.value, refit)
         with busy("predict"):
-            text, summary = fit.predict_file(states, cell, model)
+            text, summary = fit.predict_file(states, cell, model, asked, reading)
         write_text("-" if output is None else str(output), text)
         say(summary)
 

@@ -172,5 +172,11 @@ def _run(visits: Visits, cell: Cell) -> ProgramCycle:
 
 
 def guessed_limits(arm: Arm) -> tuple[str, ...]:
-    """Name the limits of the joints that the arm file guesses."""
-    return tuple(arm.file.joints.guessed)
+    """Name the limits of the joints that the arm file guesses, or does not tell."""
+    told = arm.file.joints
+    absent = {
+        "acceleration": told.acceleration_deg_s2 is None,
+        "jerk": told.jerk_deg_s3 is None,
+    }
+    more = (name for name in absent if absent[name] and name not in told.guessed)
+    return (*told.guessed, *more)

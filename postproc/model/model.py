@@ -7,7 +7,7 @@ import json
 from dataclasses import asdict, dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 import pydantic
@@ -24,6 +24,7 @@ from postproc.model.effects.effect import JointEffect
 from postproc.model.effects.geometry import Geometry
 from postproc.model.kinematics import Batch, base_of, deviated
 from postproc.model.noise import Noise
+from postproc.model.registration import Registration
 from postproc.robot.arm import Arm
 from postproc.robot.pose import MM
 from postproc.robot.state import States
@@ -60,6 +61,19 @@ class Prediction:
     def why(self, row: int) -> tuple[str, ...]:
         """Give the reasons why one state lies outside."""
         return tuple(text for text, rows in self.outside.items() if rows[row])
+
+
+@dataclass(frozen=True)
+class PredictedReading:
+    """What a survey's set-up reads in n states.
+
+    Attributes:
+        error: Reading minus nominal TCP position, base frame, (n, 3) [m].
+        std: Of one reading, (n, 3) [m]: 1.96 of it hold 95 % of the readings.
+    """
+
+    error: Floats
+    std: Floats
 
 
 # How far off errors may be: parameters are not known exactly, nor are all sides.
@@ -126,7 +140,8 @@ Interval = tuple[float, float]
 MARGIN = 0.05  # of a joint's surveyed range: random poses do not reach its ends
 SAME_TOOL = 1e-3  # [m] tools closer than this count as one
 REACH_OF_PLATE = 0.5  # [m] how far from three or more probe points a tool may be
-PAYLOAD_MARGIN, TEMPERATURE_MARGIN = 0.5, 0.5  # [kg], [deg C]
+PAYLOAD_MARGIN = 0.5  # [kg]
+TEMPERATURE_MARGIN = 1.0  # [K] steel of 2.5 m grows by 0.03 mm
 
 
 @dataclass(frozen=True)
@@ -285,6 +300,40 @@ class RangesSection(ModelSection):
     oriented: bool = False
 
 
+class ProbeSection(ModelSection):
+    """A probe point in the flange frame [m]."""
+
+    tool_id: int
+    xyz_m: Annotated[tuple[float, ...], Field(min_length=3, max_length=3)]
+
+
+class RegistrationSection(ModelSection):
+    """Where the survey's tracker stood: P_base = R P_tracker + t."""
+
+    rotation: Annotated[tuple[float, ...], Field(min_length=9, max_length=9)]
+    shift_m: Annotated[tuple[float, ...], Field(min_length=3, max_length=3)]
+    probes: tuple[ProbeSection, ...]
+
+    @classmethod
+    def of(cls, found: Registration) -> RegistrationSection:
+        """Write a registration, row by row."""
+        T = found.base_from_tracker
+        rotation, shift = T[:3, :3].reshape(-1).tolist(), T[:3, 3].tolist()
+        points = zip(found.tool_ids.tolist(), found.probes.tolist(), strict=True)
+        probes = tuple(ProbeSection(tool_id=k, xyz_m=tuple(xyz)) for k, xyz in points)
+        return cls(rotation=tuple(rotation), shift_m=tuple(shift), probes=probes)
+
+    def read(self) -> Registration:
+        """Make the registration."""
+        T = np.eye(4)
+        T[:3, :3] = np.reshape(self.rotation, (3, 3))
+        T[:3, 3] = self.shift_m
+        points = sorted(self.probes, key=lambda p: p.tool_id)
+        probes = np.array([p.xyz_m for p in points]).reshape(-1, 3)
+        ids = np.array([p.tool_id for p in points], dtype=np.int64)
+        return Registration(T, probes, ids)
+
+
 class ModelFile(ModelSection):
     """A whole model file."""
 
@@ -303,6 +352,7 @@ class ModelFile(ModelSection):
     ranges: RangesSection
     statistics: dict[str, float]
     history: tuple[dict[str, Any], ...]
+    registration: RegistrationSection | None = None
 
 
 def content_id(data: dict[str, Any]) -> str:
@@ -367,6 +417,7 @@ def square_of(values: Floats, count: int) -> Floats:
 
 CHUNK = 5000  # states evaluated together: the columns stay in the cache
 COMPENSATED = ("arm", "state")
+READING = "reading_spread"  # statistic: see `Fit.reading_spread`
 UNSURE = "standard error above three times the survey's worst"
 
 
@@ -389,6 +440,7 @@ class Model:
         parent: Id of the model that this one extends.
         statistics: Figures of the fit, units in their names.
         history: What was added to the ancestors, oldest first.
+        registration: Of the survey, where it was in the tracker's frame.
     """
 
     method: Method
@@ -406,6 +458,7 @@ class Model:
     parent: str | None = None
     statistics: dict[str, float] = field(default_factory=dict)
     history: tuple[dict[str, Any], ...] = ()
+    registration: Registration | None = None
 
     @cached_property
     def id(self) -> str:
@@ -533,12 +586,40 @@ class Model:
             variance += parameter_variance(effects, at, covariance)
         return variance, at
 
-    def measured_std(self, arm: Arm, states: States) -> Floats:
-        """Standard deviation of one measured row, tracker included, (n, 3) [m]."""
-        arrival = self.predict(arm, states).std_arrival
-        tcp = Batch(arm, states).walk.tcp
-        tracker = self.noise.tracker_std(tcp)[:, None]
-        return np.asarray(np.hypot(arrival, tracker))
+    def reading(self, arm: Arm, states: States) -> PredictedReading:
+        """Predict what the survey's own set-up reads, and how sure one reading is.
+
+        All effects count, those of the set-up too: what nobody can know of base and
+        probe apart is known of their sum, which is what is read.
+        """
+        parts = in_chunks(
+            lambda rows: self._read(arm, states[rows]), len(states), CHUNK
+        )
+        nothing = PredictedReading(np.zeros((0, 3)), np.zeros((0, 3)))
+        error, std = zip(*((p.error, p.std) for p in (nothing, *parts)), strict=True)
+        return PredictedReading(np.concatenate(error), np.concatenate(std))
+
+    def _read(self, arm: Arm, states: States) -> PredictedReading:
+        """Predict some readings."""
+        batch = Batch(arm, states)
+        at = self.effects.at(batch, self.values)
+        known = side_variance(self.effects, at, self.values) + np.square(self.spread)
+        if len(self.covariance):
+            known = known + parameter_variance(self.effects, at, self.covariance)
+        error = self.effects.error_at(at, batch, self.values)
+        return PredictedReading(error, self.reading_std(at, known))
+
+    def reading_std(self, at: Batch, known: Floats) -> Floats:
+        """Standard deviation of one reading, (n, 3) [m].
+
+        Args:
+            at: n states, with the kinematics taken at the parameters.
+            known: Variance of the mean of many readings, (n, 3) [m^2].
+        """
+        tracker = self.noise.tracker_std(at.tcp)[:, None]
+        scatter = self.noise.arrival_variance(at.jacobian) + tracker**2
+        std = np.sqrt(np.maximum(known, 0.0) + scatter)
+        return np.asarray(self.statistics.get(READING, 1.0) * std)
 
     def check_arm(self, arm: Arm, path: str | Path = "model") -> None:
         """Refuse an arm that the model was not made for.
@@ -587,6 +668,9 @@ class Model:
             "statistics": self.statistics,
             "history": list(self.history),
         }
+        if self.registration is not None:
+            kept = RegistrationSection.of(self.registration)
+            data["registration"] = kept.model_dump()
         data = json.loads(json.dumps(data))
         return {"id": content_id(data), **data}
 
@@ -636,6 +720,7 @@ def load_model(path: str | Path) -> Model:
         parent=file.parent,
         statistics=file.statistics,
         history=file.history,
+        registration=None if file.registration is None else file.registration.read(),
     )
     # A file of an older release lacks keys that have been added since: it keeps its id.
     vars(model)["id"] = file.id

@@ -7,9 +7,10 @@ import os
 import sys
 import textwrap
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from itertools import chain, islice
+from time import monotonic
 from typing import Literal, TextIO
 
 import numpy as np
@@ -299,9 +300,29 @@ def progress_bar(
         yield lambda done, of: progress.update(bar, completed=done, total=of)
 
 
+LASTING = 20.0  # [s] from which a log is told the stages of a job
+
+
+class StageLog:
+    """Stages of a job as lines of a log, once the job lasts."""
+
+    def __init__(self, out: TextIO) -> None:
+        self._out, self._begun = out, monotonic()
+
+    def __call__(self, stage: str) -> None:
+        """Tell a stage that begins, where the job lasts."""
+        passed = monotonic() - self._begun
+        if passed >= LASTING:
+            with suppress(OSError):  # a log that takes nothing is no reason to stop
+                self._out.write(f"{passed:.0f} s: {printable(stage)}\n")
+                self._out.flush()
+
+
 @contextmanager
 def stage_bar(out: TextIO | None = None) -> Iterator[Callable[[str, float], None]]:
-    """Show the stage of a job and how far all of it is, on a terminal only.
+    """Show the stage of a job and how far all of it is.
+
+    Without a terminal a line tells every stage of a job that lasts.
 
     Args:
         out: Where to; default: stderr.
@@ -311,7 +332,8 @@ def stage_bar(out: TextIO | None = None) -> Iterator[Callable[[str, float], None
     """
     out = out or sys.stderr
     if not out.isatty():
-        yield lambda stage, share: None
+        log = StageLog(out)
+        yield lambda stage, share: log(stage)
         return
     columns = (BarColumn(), TextColumn("{task.description}", markup=False))
     with Progress(*columns, console=_Steady(file=out), transient=True) as progress:

@@ -75,6 +75,7 @@ class DH:
 # Angles are the controller's joint angles [rad], lengths metres, the frame the arm's
 # base frame.
 
+SPEED_UP, SPEED_UP_OF_PUSH = 0.4, 0.1  # [s] to full speed, to full acceleration
 GRAVITY = 9.80665  # [m/s^2], standard gravity
 
 
@@ -88,7 +89,6 @@ class Arm:
         id: Hash of the kinematics; models are bound to it.
         dh: Nominal Denavit-Hartenberg parameters.
         lower, upper: Joint limits, (6,) [rad].
-        velocity, acceleration, jerk: Limits, (6,) [rad/s], [rad/s^2], [rad/s^3].
         play: Width of the play operator, (6,) [rad].
         coupling: Drive-side angles = coupling @ q, (6, 6).
         gear_ratio: (6,), NaN where unknown.
@@ -101,9 +101,6 @@ class Arm:
     dh: DH
     lower: Floats
     upper: Floats
-    velocity: Floats
-    acceleration: Floats
-    jerk: Floats
     play: Floats
     coupling: Floats
     gear_ratio: Floats
@@ -112,6 +109,41 @@ class Arm:
     def __reduce__(self) -> tuple[Any, ...]:
         """Travel between processes as the arm file: compiled parts cannot."""
         return build_arm, (self.file,)
+
+    @cached_property
+    def velocity(self) -> Floats:
+        """Limits of the joints' speeds, (6,) [rad/s].
+
+        Raises:
+            ArmError: The arm file does not tell them.
+        """
+        told = self.file.joints.velocity_deg_s
+        if told is None:
+            problem, cure = "has no speeds of the joints", "Add velocity_deg_s to plan"
+            raise ArmError(self.name, problem, cure, place="$.joints")
+        return np.deg2rad(told)
+
+    @cached_property
+    def acceleration(self) -> Floats:
+        """Limits of the accelerations, (6,) [rad/s^2]; a guess where they are not told.
+
+        Raises:
+            ArmError: The arm file tells no speeds either.
+        """
+        told = self.file.joints.acceleration_deg_s2
+        return self.velocity / SPEED_UP if told is None else np.deg2rad(told)
+
+    @cached_property
+    def jerk(self) -> Floats:
+        """Limits of the jerks, (6,) [rad/s^3]; a guess where they are not told.
+
+        Raises:
+            ArmError: The arm file tells no speeds either.
+        """
+        told = self.file.joints.jerk_deg_s3
+        return (
+            self.acceleration / SPEED_UP_OF_PUSH if told is None else np.deg2rad(told)
+        )
 
     @cached_property
     def _links(self) -> Floats:
@@ -349,9 +381,6 @@ def build_arm(file: ArmFile) -> Arm:
         dh=DH(a, d, alpha, offset, sense, mix),
         lower=np.deg2rad(joints.lower_deg),
         upper=np.deg2rad(joints.upper_deg),
-        velocity=np.deg2rad(joints.velocity_deg_s),
-        acceleration=np.deg2rad(joints.acceleration_deg_s2),
-        jerk=np.deg2rad(joints.jerk_deg_s3),
         play=np.deg2rad(joints.play_deg),
         coupling=np.eye(6) if coupling is None else np.array(coupling),
         gear_ratio=np.full(6, np.nan) if ratio is None else np.array(ratio),

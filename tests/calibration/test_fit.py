@@ -3,17 +3,31 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from postproc.calibration.fit import fit
+from postproc.calibration.measurements import DroppedRow
+from postproc.calibration.report import FitReport, find, report_fit
+from postproc.calibration.selection import fit_survey
+from postproc.cli.fit import tell_fit
 from postproc.exceptions import MeasurementError, PostprocError
 from postproc.model.effects import BASE_EFFECTS
+from postproc.model.kinematics import Batch
 from postproc.model.model import load_model
+from postproc.model.statistics import ErrorStatistics
 from postproc.robot.cell import Cell, load_cell
-from tests.calibration.simulator import NJ, PLATE, TOOL, random_arm, random_states
+from tests.calibration.simulator import (
+    NJ,
+    PLATE,
+    TOOL,
+    random_arm,
+    random_states,
+    survey_of,
+)
 from tests.written import cli
 
 
@@ -117,6 +131,26 @@ def test_fit_prints_what_an_engineer_reads(tmp_path: Path) -> None:
     )  # fmt: skip
     assert found.exit_code == 0, found.stderr
     lines = found.stdout.splitlines()
+    assert lines[0].split() == ["found", "joint", "rms", "mm", "max", "mm", "evidence",
+                                "nats"]  # fmt: skip
+    rows = [line.split() for line in lines if re.match(r"(geometry|backlash) ", line)]
+    sizes = [float(row[-3]) for row in rows]
+    assert sizes == sorted(sizes, reverse=True) and sizes[0] > 0.1
+    assert min(int(row[-1]) for row in rows) > 3
+    assert "row 8 (line 9): position 0, 0, 0: beam lost" in lines
+    assert any(line.startswith("not determined, left at the prior, ") for line in lines)
+    assert len(lines) < 40
+
+
+def test_all_of_a_fit_is_told_where_it_is_asked_for(tmp_path: Path) -> None:
+    data = write(tmp_path / "s.csv")
+    cell(tmp_path)
+    found = cli(
+        "fit", data, "--cell", tmp_path / "cell.toml", "-o", tmp_path / "m.json",
+        "--effects", ",".join(BASE_EFFECTS), "--all",
+    )  # fmt: skip
+    assert found.exit_code == 0, found.stderr
+    lines = found.stdout.splitlines()
     assert lines[0].split() == ["parameter", "value", "std", "error", "unit", "share",
                                 "seen"]  # fmt: skip
     row = next(line.split() for line in lines if line.startswith("geometry.a2 "))
@@ -131,3 +165,74 @@ def test_fit_prints_what_an_engineer_reads(tmp_path: Path) -> None:
         "disagree",
         found.stdout,
     )
+
+
+def test_what_physics_forbids_is_marked(tmp_path: Path) -> None:
+    """A joint that rises under its load has no negative stiffness."""
+    rng = np.random.default_rng(5)
+    states = random_states(300, rng)
+    batch = Batch(NJ, states)
+    torque = batch.loads.gravity[:, 1]
+    told = {}
+    for sign in (1.0, -1.0):
+        lifted = sign * 2e-7 * torque[:, None] * batch.jacobian[:, :, 1]
+        noise = 2e-5 * rng.standard_normal((300, 3))
+        survey = survey_of(states, batch.walk.tcp + lifted + noise)
+        fitted = fit_survey(survey, NJ, ("geometry", "compliance"), None)
+        told[sign] = report_fit(fitted, survey)
+    assert not any(f.impossible for f in told[1.0].found)
+    bad = [f for f in told[-1.0].found if f.impossible]
+    assert [(f.effect, f.joint) for f in bad] == [("compliance", 2)]
+    assert "k2 = -0.2" in bad[0].impossible[0] and "is negative" in bad[0].impossible[0]
+    assert "IMPOSSIBLE: k2 = -0.2" in tell_fit(told[-1.0])
+
+
+def test_sizes_and_evidence_are_those_of_what_was_planted() -> None:
+    rng = np.random.default_rng(6)
+    states = random_states(300, rng)
+    batch = Batch(NJ, states)
+    gap = 1.5e-4 * states.direction[:, 2, None] * batch.jacobian[:, :, 2]
+    noise = 2e-5 * rng.standard_normal((300, 3))
+    survey = survey_of(states, batch.walk.tcp + gap + noise)
+    found = find(fit_survey(survey, NJ, BASE_EFFECTS, None))
+    planted = next(f for f in found if (f.effect, f.joint) == ("backlash", 3))
+    true = np.linalg.norm(gap, axis=1) * 1e3
+    assert planted.size_mm == pytest.approx(np.sqrt((true**2).mean()), rel=0.02)
+    assert planted.max_mm == pytest.approx(true.max(), rel=0.02)
+    assert planted.evidence > 500
+    others = [f for f in found if f.effect == "backlash" and f.joint != 3]
+    assert max(f.evidence for f in others) < 3.0
+
+
+def test_a_report_says_what_is_suspect_in_few_lines() -> None:
+    rows = tuple(DroppedRow(str(k), k, "dropped") for k in range(50))
+    spared = tuple(map(str, range(60, 80)))
+    nothing = ErrorStatistics.of(np.zeros((3, 3)))
+    report = FitReport((), {}, (), rows, spared, (), nothing, nothing, 0, 0, 0, ())
+    told = tell_fit(report).splitlines()
+    assert "and 42 more rows that count less (--all)" in told
+    assert sum(line.startswith("row ") for line in told) == 8
+    kept = next(line for line in told if line.startswith("suspect, but kept"))
+    assert kept.endswith("row 60, 61, 62, 63, 64, 65, 66, 67 and 12 more")
+    assert (
+        sum(line.startswith("row ") for line in tell_fit(report, True).split("\n"))
+        == 50
+    )
+
+
+def test_a_fit_says_what_the_arm_file_leaves_out(tmp_path: Path) -> None:
+    data = write(tmp_path / "s.csv")
+    whole = cell(tmp_path)
+    file = whole.arm.file
+    joints = file.joints.model_copy(
+        update={"velocity_deg_s": None, "acceleration_deg_s2": None}
+    )
+    bare = file.model_copy(update={"links": None, "opw": None, "joints": joints})
+    poor = replace(whole, arm=replace(whole.arm, file=bare))
+    told = fit([data], poor, effects=BASE_EFFECTS).report.warnings
+    assert [re.findall(r"no (\[?\w+\]?):", t) for t in told] == [["[links]"], ["[opw]"]]
+    assert fit([data], whole, effects=BASE_EFFECTS).report.warnings == ()
+    lines = [line.split(",") for line in data.read_text().splitlines()]
+    data.write_text("\n".join(",".join(x[:7] + x[13:]) for x in lines) + "\n")
+    told = fit([data], poor, effects=BASE_EFFECTS).report.warnings
+    assert "drive_coupling" in told[-1]

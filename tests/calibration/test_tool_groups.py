@@ -2,16 +2,27 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 
-from postproc.calibration.fit import fit_measurements
+from postproc.calibration.fit import fit_measurements, wrong_nests
+from postproc.calibration.measurements import Measurements
 from postproc.calibration.plausibility import check_survey
-from postproc.calibration.tool_groups import ToolGroups, find_groups
+from postproc.calibration.selection import fit_survey
+from postproc.calibration.tool_groups import ToolGroups, find_groups, find_wrong_nest
 from postproc.exceptions import MeasurementError
+from postproc.model.effects import BASE_EFFECTS
 from postproc.model.kinematics import Batch
 from postproc.robot.cell import Cell, load_cell
-from tests.calibration.simulator import NJ, random_arm, random_states, survey_of
+from tests.calibration.simulator import (
+    NJ,
+    PLATE,
+    random_arm,
+    random_states,
+    survey_of,
+)
 
 
 def shifted(tool: np.ndarray, by: list[float], seed: int = 0, n: int = 240):  # type: ignore[no-untyped-def]
@@ -85,3 +96,46 @@ def test_a_nest_that_slips_is_told_with_its_row(cell: Cell) -> None:
     assert found.report.after.mean_mm < 0.06
     steady = shifted(after, [0.0, 0.0, 0.0])
     assert not fit_measurements(steady, cell, effects=effects).report.warnings
+
+
+def plate_survey(seed: int, nest: int, off: list[float]) -> Measurements:
+    """Measure three nests, of which one is not where it should be."""
+    rng = np.random.default_rng(seed)
+    arm, states = random_arm(rng), random_states(300, rng, PLATE)
+    moved = np.where(states.tool_id[:, None] == nest, np.array(off), 0.0)
+    position, _ = arm.measure(states.with_(tool=states.tool + moved), rng)
+    return survey_of(states, position)
+
+
+def told_of(survey: Measurements) -> tuple[str, ...]:
+    return wrong_nests(fit_survey(survey, NJ, BASE_EFFECTS, None, ("probe",)))
+
+
+@pytest.mark.parametrize("axis", range(3))
+def test_a_nest_that_is_off_is_named_and_fitted(axis: int) -> None:
+    off = [0.0, 0.0, 0.0]
+    off[axis] = 5e-4
+    survey = plate_survey(1, 1, off)
+    fit = fit_survey(survey, NJ, BASE_EFFECTS, None, ("probe",))
+    assert (fit.rows.weight == 1).mean() > 0.99  # no row of it is weighed down
+    (told,) = wrong_nests(fit)
+    assert told.startswith("nest 1 lies (")
+    seen = [float(x) for x in re.findall(r"-?\d\.\d\d", told.split(")")[0])]
+    assert np.linalg.norm(np.array(seen) - np.array(off) * 1e3) < 0.25
+
+
+def test_a_nest_that_cannot_be_told_is_one_of_a_group() -> None:
+    (told,) = told_of(plate_survey(2, 2, [5e-4, 0.0, 0.0]))
+    assert told.startswith("one of the nests is not where the cell has it, 2 or 1")
+
+
+def test_nests_in_order_are_not_mentioned() -> None:
+    for seed in range(3):
+        assert told_of(plate_survey(seed, 0, [0.0, 0.0, 0.0])) == ()
+
+
+def test_of_two_nests_nobody_knows_which_is_off() -> None:
+    offset = np.array([[2e-4, 0, 0], [-2e-4, 0, 0]])
+    found = find_wrong_nest((4, 7), offset, 1e-10 * np.eye(6))
+    assert found is not None and set(found.tool_ids) == {4, 7}
+    assert find_wrong_nest((4,), offset[:1], 1e-10 * np.eye(3)) is None

@@ -45,6 +45,10 @@ def test_loads_and_heat_are_compared_where_they_were_recorded() -> None:
     assert list(ranges.outside(hot, NOTHING)) == [
         "temperature outside the surveyed 20 to 30 deg C"
     ]
+    tenths = states.with_(temperature=np.full(100, 30.9))
+    assert ranges.outside(tenths, NOTHING) == {}
+    warm = states.with_(temperature=np.full(100, 31.1))
+    assert len(ranges.outside(warm, NOTHING)) == 1
     unknown = states.with_(payload=np.full(100, np.nan))
     assert ranges.outside(unknown, NOTHING) == {}
     assert list(ranges.outside(unknown, frozenset({"payload"}))) == [

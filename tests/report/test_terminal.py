@@ -111,3 +111,16 @@ def test_stages_show_with_how_far_the_job_is():
         told("look for effect [2]", 0.25)
     assert "look for effect [2]" in screen.getvalue()
     assert "\u2501" in screen.getvalue()
+
+
+def test_a_log_is_told_the_stages_of_what_lasts(monkeypatch):
+    clock = iter([0.0, 5.0, 30.0, 0.0, 21.0])
+    monkeypatch.setattr("postproc.report.terminal.monotonic", lambda: next(clock))
+    log = io.StringIO()
+    with stages(log, log=True) as told:
+        told("read")
+        told("fit")
+    assert log.getvalue() == "30 s: fit\n"
+    with stage_bar(log) as share_of:
+        share_of("candidates", 0.5)
+    assert log.getvalue() == "30 s: fit\n21 s: candidates\n"

@@ -231,3 +231,29 @@ def test_kinematics_are_those_of_pinocchio(arm, q):
             axis = data.oMi[i + 1].rotation[:, 2]
             np.testing.assert_allclose(frames[k, i, :3, 2], axis, atol=1e-12)
     np.testing.assert_array_equal(arm.flange(q), frames[:, 6])
+
+
+BARE = """name = "bare"
+repeatability_mm = 0.1
+[dh]
+a_mm = [0.0, -425.0, -392.25, 0.0, 0.0, 0.0]
+d_mm = [89.159, 0.0, 0.0, 109.15, 94.65, 82.3]
+alpha_deg = [90.0, 0.0, 0.0, 90.0, -90.0, 0.0]
+[joints]
+lower_deg = [-360.0, -360.0, -360.0, -360.0, -360.0, -360.0]
+upper_deg = [360.0, 360.0, 360.0, 360.0, 360.0, 360.0]
+"""
+
+
+def test_an_arm_file_needs_only_what_is_used(tmp_path):
+    path = tmp_path / "bare.toml"
+    path.write_text(BARE)
+    bare = load_arm(str(path))
+    assert bare.flange(np.zeros((1, 6))).shape == (1, 4, 4)
+    for limit in ("velocity", "acceleration", "jerk"):
+        with pytest.raises(ArmError, match="velocity_deg_s"):
+            getattr(bare, limit)
+    path.write_text(BARE + "velocity_deg_s = [40.0, 80.0, 80.0, 80.0, 80.0, 80.0]\n")
+    paced = load_arm(str(path))
+    np.testing.assert_allclose(np.rad2deg(paced.acceleration), [100.0] + [200.0] * 5)
+    np.testing.assert_allclose(np.rad2deg(paced.jerk), [1000.0] + [2000.0] * 5)

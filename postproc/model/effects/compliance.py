@@ -91,7 +91,7 @@ class Compliance(JointEffect):
         """Name softness, and moments over stiffness, joint by joint."""
         out = []
         for j, links in zip(self.joints, self.moments, strict=True):
-            out.append(Parameter(f"k{j}", "rad/(N m)", SCALE, f"{j}", j))
+            out.append(Parameter(f"k{j}", "rad/(N m)", SCALE, f"{j}", j, True))
             for link, spread in links:
                 out += [
                     Parameter(f"k{j}_m{link}{a}", "rad kg/N", SCALE * spread, f"{j}", j)

@@ -96,7 +96,8 @@ class Curve(Effect):
         if varies(covariate(batch, f"travel {joint}")):
             names.append(f"travel {joint}")
             both = (f"travel {joint}", f"loop {joint}")  # the last two reversals
-            out.append(cls._candidate(batch, where, both, signed=True, whole=True))
+            if not np.isnan(covariate(batch, both[1])).all():
+                out.append(cls._candidate(batch, where, both, signed=True, whole=True))
         names += [name for name in ANGLES if name != where]
         out += [cls._candidate(batch, where, (name,), signed=True) for name in names]
         if np.ptp(batch.states.direction[:, joint - 1]) > 0:

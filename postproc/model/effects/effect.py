@@ -37,6 +37,7 @@ class Parameter:
         scale: Prior standard deviation in that unit, before the data rescale it.
         group: Parameters of a group share one data-driven factor on their scales.
         joint: Joint number 1 to 6 that it acts on, or None.
+        positive: Whether physics forbids a value below 0.
     """
 
     name: str
@@ -44,6 +45,7 @@ class Parameter:
     scale: float
     group: str
     joint: int | None = None
+    positive: bool = False
 
 
 @dataclass(frozen=True)

@@ -70,7 +70,7 @@ class Payload(JointEffect):
         """Name softness, and softness times the change of every lever."""
         out = []
         for j in self.joints:
-            out.append(Parameter(f"k{j}", "rad/(N m)", SCALE, f"{j}", j))
+            out.append(Parameter(f"k{j}", "rad/(N m)", SCALE, f"{j}", j, True))
             out += [
                 Parameter(f"k{j}_{name}_{a}", "rad/N", SCALE * spread, f"{j}", j)
                 for name, _, spread in self._places(j)

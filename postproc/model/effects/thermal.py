@@ -112,7 +112,7 @@ class Thermal(Effect):
             Parameter(f"{name}_{length}", unit, UNSURE * scale, group)
             for length in self.lengths
         ]
-        return (Parameter(name, unit, scale, group), *each)
+        return (Parameter(name, unit, scale, group, positive=True), *each)
 
     def warmth(self, batch: Batch) -> Floats:
         """Return temperature above the reference [K], or share of the warm-up, (n,)."""
