@@ -137,7 +137,7 @@ X, P10 = said.DataObject("x"), said.DataObject("p10")
         ("home;", said.Instruction("home")),
         ("MoveL;x", None),
         ("MoveL THEN", None),
-        ("p 1 2;", said.NotUnderstood("p \x00 \x00;")),
+        ("p 1 2;", said.NotUnderstood()),
         ("ok(1);", said.Instruction("ok", (said.Argument(said.Num(0)),))),
     ],
 )  # fmt: skip
