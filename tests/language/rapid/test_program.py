@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import example, given
+from hypothesis import example, given, settings
 
 from postproc.exceptions import ProgramError
 from postproc.language.rapid import syntax as said
@@ -216,6 +216,7 @@ def test_what_is_odd_is_listed_with_its_line(body, code, text):
     assert re.search(text, found.message)
 
 
+@settings(deadline=None)  # the first one makes the parser's tables
 @given(TEXTS)
 @example("p10\\Onp10")
 def test_whatever_the_text_it_is_read_or_refused(text):
