@@ -198,12 +198,12 @@ class _ReservedError(Exception):
 def parse_statement(form: str) -> said.RapidStatement:
     """Parse the form of a statement, `NotUnderstood` where the grammar cannot."""
     if form.startswith(UNREADABLE) or len(form) > LONGEST:
-        return said.NotUnderstood(form[:80])
+        return said.NotUnderstood()
     try:
         tree = line_parser("rapid", "statement").parse(form)
         found = _build(tree)
     except (lark.exceptions.LarkError, _DeeperError, _ReservedError):
-        return said.NotUnderstood(form[:80])
+        return said.NotUnderstood()
     return found if isinstance(found, said.RapidStatement) else said.RapidStatement()
 
 

@@ -97,8 +97,6 @@ class FileHeader(RapidStatement):
 class NotUnderstood(RapidStatement):
     """Text that the grammar has no rule for."""
 
-    text: str
-
 
 @dataclass(frozen=True, slots=True)
 class ModuleHead(RapidStatement):

@@ -1,12 +1,13 @@
 """RAPID files: round trip, statements counted, no move unseen, every number's place."""
 
+import os
 import re
 from collections import Counter
 from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given, settings
 
 from postproc.exceptions import ProgramError
 from postproc.language.rapid import syntax as said
@@ -17,9 +18,19 @@ from postproc.language.source import Edit, Replacements, Source, Span, apply
 from tests.language.rapid.test_statements import TEXTS
 from tests.reference.statements import statements
 
-CORPUS = Path("/work/shared/corpus")
+SHARED = Path(os.environ.get("POSTPROC_SHARED", Path(__file__).parents[4] / "shared"))
+CORPUS = SHARED / "corpus"
 WELDING = Path(__file__).with_name("welding.mod")
-FILES = [WELDING, *sorted(CORPUS.glob("*/*.mod")), CORPUS / "robodk" / "ABB.sys"]
+BROKEN = (
+    "Comments Fields IfStatements Modules Routines Structures Variables keywords "
+    "numbers"
+)
+FILES = [
+    WELDING,
+    *(CORPUS / "intellij-rapid" / f"{name}.mod" for name in BROKEN.split()),
+    CORPUS / "robodk" / "Program.mod",
+    CORPUS / "robodk" / "ABB.sys",
+]
 # Statements, moves, and what is listed, of every file.
 COUNTED = {
     "welding.mod": (73, 9, {"late-binding": 1, "unknown-instruction": 2}),
@@ -216,7 +227,9 @@ def test_what_is_odd_is_listed_with_its_line(body, code, text):
     assert re.search(text, found.message)
 
 
+@settings(deadline=None)  # the first one makes the parser's tables
 @given(TEXTS)
+@example("p10\\Onp10")
 def test_whatever_the_text_it_is_read_or_refused(text):
     try:
         file = read_rapid(Source("m.mod", text.encode("latin-1")))
