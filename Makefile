@@ -14,6 +14,7 @@
 # make reproduce   the published method and ours, simulated: docs/reproduction.md
 # make accuracy    held-out errors, coverage, real and blind data: docs/accuracy.md
 # make intervals   coverage of a reading's intervals on two real arms: docs/intervals.md
+# make detection   outliers, wrong directions and nests that a fit finds: docs/detection.md
 # make undeclared  undeclared effects traced on virtual arms, 1,400 of them: docs/undeclared.md
 # make paths       predicted and true path accuracy on virtual arms: docs/paths.md
 # make blind       effects traced in the blind campaigns and on a real arm: docs/blind.md
@@ -31,7 +32,7 @@ STAMP := $(VENV)/.installed
 export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
 
-.PHONY: help demo test lint format bench evidence reproduce accuracy intervals undeclared paths blind chaos fuzz docs clean
+.PHONY: help demo test lint format bench evidence reproduce accuracy intervals detection undeclared paths blind chaos fuzz docs clean
 .PHONY: plant-bench generated growth awkward native golden pictures lock wheel
 .DELETE_ON_ERROR:
 
@@ -77,6 +78,9 @@ accuracy: $(STAMP)
 
 intervals: $(STAMP)
 	@PYTHONPATH=. $(PYTHON_BIN) docs/studies/intervals.py --seeds $(or $(SEEDS),20)
+
+detection: $(STAMP)
+	@PYTHONPATH=. $(PYTHON_BIN) docs/studies/detected.py --seeds $(or $(SEEDS),40)
 
 undeclared: $(STAMP)
 	@$(PYTHON_BIN) -m tests.undeclared --seeds $(or $(SEEDS),60) --none $(or $(NONE),200)

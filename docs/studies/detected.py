@@ -67,7 +67,7 @@ def share(count: int, n: int) -> str:
         return "-"
     low = beta.ppf(0.025, count, n - count + 1) if count else 0.0
     high = beta.ppf(0.975, count + 1, n - count) if count < n else 1.0
-    return f"{count} of {n}: {100 * low:.1f} to {100 * high:.1f} %"
+    return f"{count} of {n}: {100 * low:.3g} to {100 * high:.3g} %"
 
 
 def outlier(seed: int, size: float, at_end: bool) -> Score:
