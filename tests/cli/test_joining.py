@@ -76,7 +76,7 @@ def test_fit_from_ids_and_positions_equals_fit_from_full_rows(desk, tmp_path):
     values = []
     for data, more in ((full, ()), (bare, ("--program", survey))):
         found = cli("fit", data, *cell, "-o", tmp_path / "m.json", "--effects",
-                    "geometry,backlash", *more)  # fmt: skip
+                    "geometry,backlash", "--all", *more)  # fmt: skip
         assert found.exit_code == 0, found.stderr
         line = next(t for t in found.stdout.splitlines() if "geometry.a2" in t)
         values.append(float(line.split()[1]))
