@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -164,6 +164,26 @@ def random_split(n: int, seed: int, share: float = TRAIN_SHARE) -> tuple[Rows, R
     return np.sort(order[:cut]), np.sort(order[cut:])
 
 
+@dataclass(frozen=True)
+class Trial:
+    """Rows to fit, and others to test on, in the base frame.
+
+    Attributes:
+        train, test: The rows.
+        tracker: Tracker position in the base frame, (3,) [m], or None.
+    """
+
+    train: Measurements
+    test: Measurements
+    tracker: Floats | None = None
+
+
+def blocks_of(n: int, blocks: int) -> list[tuple[Rows, Rows]]:
+    """Cut n rows into blocks in their order: each is tested by a fit of the others."""
+    parts = np.array_split(np.arange(n), blocks)
+    return [(np.setdiff1d(np.arange(n), part), part) for part in parts]
+
+
 def compare(
     survey: Measurements, arm: Arm, tracker: Floats | None = None, seed: int = 0
 ) -> Comparison:
@@ -176,11 +196,30 @@ def compare(
         seed: Of the split and of the random layers.
     """
     train, test = random_split(len(survey), seed)
-    split = (
+    trial = Trial(survey[train], survey[test], tracker)
+    return Comparison(compare_in([trial], arm, seed), random_said(train, test, seed))
+
+
+def random_said(train: Rows, test: Rows, seed: int) -> str:
+    """Say how rows were split at random."""
+    return (
         f"{len(train)} rows to fit, {len(test)} to test, drawn at random (seed {seed})"
     )
-    rows = compare_on(survey[train], survey[test], arm, tracker, seed)
-    return Comparison(rows, split)
+
+
+def compare_in(trials: Sequence[Trial], arm: Arm, seed: int) -> tuple[MethodRow, ...]:
+    """Fit every method in some trials; the errors on all test rows are put together.
+
+    Args:
+        trials: What is fitted, and tested.
+        arm: The arm.
+        seed: Of the random layers.
+    """
+    left = [errors_in(trial, arm, seed) for trial in trials]
+    return tuple(
+        _row(method, np.concatenate([errors[method] for errors in left]))
+        for method in left[0]
+    )
 
 
 def compare_on(
@@ -201,16 +240,25 @@ def compare_on(
         seed: Of the random layers.
         truth: True positions of the test rows where they are known, (n, 3) [m].
     """
+    left = errors_in(Trial(train, test, tracker), arm, seed, truth)
+    return tuple(_row(method, error) for method, error in left.items())
+
+
+def errors_in(
+    trial: Trial, arm: Arm, seed: int, truth: Floats | None = None
+) -> dict[str, Floats]:
+    """Return what every method leaves on the test rows, (n, 3) [m], by its name."""
+    train, test = trial.train, trial.test
     position = test.position if truth is None else truth
     error = position - Batch(arm, test.states).walk.tcp
-    rows = [_row("no compensation", error)]
+    left = {"no compensation": error}
     for method in ORDER:
         if method == "full":
-            model = model_of(fit_survey(train, arm, None, tracker), train)
+            model = model_of(fit_survey(train, arm, None, trial.tracker), train)
         else:
             model = fit_method(method, train, arm, seed)
-        rows.append(_row(method, error - model.measured_error(arm, test.states)))
-    return tuple(rows)
+        left[method] = error - model.measured_error(arm, test.states)
+    return left
 
 
 def _row(method: str, error: Floats) -> MethodRow:

@@ -23,7 +23,14 @@ from postproc.calibration.fit import (
 )
 from postproc.calibration.measurements import Measurements, concatenate, from_table
 from postproc.calibration.plausibility import check_survey
-from postproc.calibration.published import Comparison, compare
+from postproc.calibration.published import (
+    Comparison,
+    Trial,
+    blocks_of,
+    compare_in,
+    random_said,
+    random_split,
+)
 from postproc.calibration.registration import predict_registered
 from postproc.calibration.report import DirectionReport, FitReport, Found
 from postproc.calibration.tables import DETECT, TableFormat, read_foreign
@@ -299,25 +306,85 @@ def _tell(spread: ErrorStatistics) -> str:
     )
 
 
+@dataclass(frozen=True)
+class Held:
+    """Which rows methods are tested on: a random third, unless something else is said.
+
+    Attributes:
+        files: Measurement files of their own.
+        blocks: Or so many blocks of the rows in their order, one after the other.
+        seed: Of the random split and of the random layers.
+    """
+
+    files: Sequence[Path] = ()
+    blocks: int = 0
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        if self.files and self.blocks:
+            raise PostprocError("--test and --blocks: say one of them")
+
+    def pairs(
+        self, survey: Measurements, cell: Cell, reading: TableFormat
+    ) -> tuple[list[tuple[Measurements, Measurements]], str]:
+        """Return the rows to fit and to test, and in words what they are.
+
+        Raises:
+            PostprocError: A file cannot be used, or there are not as many rows.
+        """
+        if self.files:
+            test = read_surveys(self.files, cell, reading)
+            names = ", ".join(path.name for path in self.files)
+            return [(survey, test)], (
+                f"{len(survey)} rows to fit, {len(test)} of {names} to test"
+            )
+        if not self.blocks:
+            train, held = random_split(len(survey), self.seed)
+            pairs = [(survey[train], survey[held])]
+            return pairs, random_said(train, held, self.seed)
+        if not 2 <= self.blocks <= len(survey) // 2:
+            raise PostprocError(
+                f"--blocks {self.blocks}: {len(survey)} rows can be cut into 2 to "
+                f"{len(survey) // 2} blocks"
+            )
+        cut = blocks_of(len(survey), self.blocks)
+        return [(survey[train], survey[held]) for train, held in cut], (
+            f"{len(survey)} rows in {self.blocks} blocks in their order, each tested "
+            "by a fit of the others"
+        )
+
+
 def compare_files(
     data: Sequence[Path],
     cell_path: Path,
     frame: str,
-    seed: int,
+    held: Held,
     reading: TableFormat = DETECT,
 ) -> Comparison:
     """Fit and test every method on measurement files.
+
+    Rows in the tracker's frame are registered by those that are fitted alone.
 
     Raises:
         PostprocError: A file cannot be used.
     """
     cell = load_cell(cell_path)
-    survey, tracker = read_surveys(data, cell, reading), cell.tracker
-    if frame == "tracker":
-        survey, placed = into_base_frame(survey, cell.arm)
-        tracker = placed.tracker
-    check_survey(survey, cell.arm)
-    return compare(survey, cell.arm, tracker, seed)
+    survey = read_surveys(data, cell, reading)
+    pairs, said = held.pairs(survey, cell, reading)
+    trials = [_trial(train, test, cell, frame) for train, test in pairs]
+    for trial in trials:
+        check_survey(trial.train, cell.arm)
+    return Comparison(compare_in(trials, cell.arm, held.seed), said)
+
+
+def _trial(train: Measurements, test: Measurements, cell: Cell, frame: str) -> Trial:
+    """Take rows into the base frame."""
+    if frame != "tracker":
+        return Trial(train, test, cell.tracker)
+    train, found = into_base_frame(train, cell.arm)
+    states, position = found.on_probes(test.states), found.to_base(test.position)
+    test = replace(test, states=states, position=position)
+    return Trial(train, test, found.tracker)
 
 
 def comparison_json(found: Comparison) -> str:

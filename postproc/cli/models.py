@@ -215,6 +215,13 @@ def compare(
         Path | None, typer.Option("--plot", help="Plot (.png or .svg).")
     ] = None,
     frame: Annotated[MeasuredFrame, typer.Option("--frame")] = MeasuredFrame.BASE,
+    test: Annotated[
+        list[Path] | None,
+        typer.Option("--test", help="Files to test on; default: a third of the rows."),
+    ] = None,
+    blocks: Annotated[
+        int, typer.Option("--blocks", min=0, help="Test on so many blocks in turn.")
+    ] = 0,
     seed: SeedOption = 0,
     columns: ColumnsOption = None,
     delimiter: DelimiterOption = None,
@@ -226,10 +233,12 @@ def compare(
     from postproc.cli import fit
 
     with explained():
-        check_places([as_path(json), html, plot], [*data, cell, columns])
+        others = test or []
+        check_places([as_path(json), html, plot], [*data, *others, cell, columns])
         reading = TableFormat(columns, delimiter, decimal, encoding)
+        held = fit.Held(others, blocks, seed)
         with busy("fit every method"):
-            found = fit.compare_files(data, cell, frame.value, seed, reading)
+            found = fit.compare_files(data, cell, frame.value, held, reading)
         if json:
             write_text(json, fit.comparison_json(found))
         if html is not None:
