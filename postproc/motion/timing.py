@@ -185,7 +185,6 @@ class Trajectory:
 
     Attributes:
         q: Joint angles, (k, 6) [rad].
-        slope: Their derivatives by the path length, (k, 6).
         s: Path length, which goes on from run to run, (k,) [s].
         rate: ds/dt, (k,).
         since: Time since the run began, (k,) [s].
@@ -194,7 +193,6 @@ class Trajectory:
     """
 
     q: Floats
-    slope: Floats
     s: Floats
     rate: Floats
     since: Floats
@@ -203,6 +201,11 @@ class Trajectory:
 
     def sampled(self, step: float) -> tuple[Floats, Ints]:
         """Sample the runs at least so often, up to the end of each interval.
+
+        Between waypoints each joint goes on a cubic that does not turn there (Fritsch
+        and Butland: A method for constructing local monotone piecewise cubic
+        interpolants, SIAM J. Sci. Stat. Comput. 5, 1984): where a path bends, a smooth
+        spline would swing on by more than the play of a joint.
 
         Args:
             step: Time between two samples [s].
@@ -222,8 +225,22 @@ class Trajectory:
         u = np.clip((dt * self.rate[i] + push * dt**2 / 2) / h, 0, 1)[:, None]
         a, b, h = self.q[i], self.q[i + 1], h[:, None]
         q = a + (3 - 2 * u) * u**2 * (b - a)
-        q += h * u * (1 - u) * ((1 - u) * self.slope[i] - u * self.slope[i + 1])
+        slope = self._slopes()
+        q += h * u * (1 - u) * ((1 - u) * slope[i] - u * slope[i + 1])
         return np.asarray(q), self.visit[i + 1]
+
+    def _slopes(self) -> Floats:
+        """Slopes of the cubics at the waypoints, (k, 6)."""
+        ends = np.append(self.begins[1:], True)
+        h = np.where(ends, 1.0, np.diff(self.s, append=self.s[-1:]))[:, None]
+        after = np.diff(self.q, axis=0, append=self.q[-1:]) / h
+        before, h0 = np.roll(after, 1, axis=0), np.roll(h, 1, axis=0)
+        same = before * after > 0
+        with np.errstate(divide="ignore", invalid="ignore"):
+            mean = (2 * h + h0) / before + (h + 2 * h0) / after
+            mixed = np.where(same, 3 * (h + h0) / mean, 0.0)
+        mixed = np.where(self.begins[:, None], after, mixed)
+        return np.asarray(np.where(ends[:, None], before, mixed))
 
 
 def no_time(n: int) -> ArrivalTimes:
@@ -231,7 +248,7 @@ def no_time(n: int) -> ArrivalTimes:
     unknown, joints = np.full(n, np.nan), np.full((n, 6), np.nan)
     no = np.zeros(n, dtype=bool)
     none, nowhere = np.empty(0), np.empty((0, 6))
-    runs = Trajectory(nowhere, nowhere, none, none, none, no[:0], np.empty(0, int))
+    runs = Trajectory(nowhere, none, none, none, no[:0], np.empty(0, int))
     return ArrivalTimes(unknown, unknown, no, joints, joints, unknown, runs)
 
 
@@ -267,8 +284,7 @@ def tell_time(arm: Arm, targets: Targets, traced: Trace) -> ArrivalTimes:
             duration[v], untimed[v] = full.max() / override, True
     speed = _speeds(arm, targets, traced, joint_velocity)
     trajectory = Trajectory(
-        points.q, law.slope, np.cumsum(points.ds), law.rate, law.since, points.begins,
-        visit,
+        points.q, np.cumsum(points.ds), law.rate, law.since, points.begins, visit,
     )  # fmt: skip
     return ArrivalTimes(_times(targets, duration), speed, untimed, *used, trajectory)
 
@@ -317,14 +333,13 @@ class _Laws:
 
     Attributes:
         since: Time since the run began, (k,) [s].
-        slope, rate: As in `Trajectory`.
+        rate: As in `Trajectory`.
         velocity, acceleration: Of the joints, (k, 6) [rad/s], [rad/s^2].
         fastest: ds/dt that the joints' velocities allow, (k,).
         failed: Where no time law was found, (k,).
     """
 
     since: Floats
-    slope: Floats
     rate: Floats
     velocity: Floats
     acceleration: Floats
@@ -351,7 +366,7 @@ def _run_laws(arm: Arm, points: Waypoints) -> _Laws:
     """Find the time laws of all runs."""
     k = len(points.ds)
     laws = _Laws(
-        np.zeros(k), np.zeros((k, 6)), np.zeros(k), np.zeros((k, 6)), np.zeros((k, 6)),
+        np.zeros(k), np.zeros(k), np.zeros((k, 6)), np.zeros((k, 6)),
         np.full(k, np.inf), np.zeros(k, dtype=bool),
     )  # fmt: skip
     if k == 0:
@@ -380,7 +395,7 @@ def _run_laws(arm: Arm, points: Waypoints) -> _Laws:
             continue
         override = points.override[rows, None]
         laws.since[rows] = law.time / override[:, 0]
-        laws.slope[rows], laws.rate[rows] = law.slope, law.rate * override[:, 0]
+        laws.rate[rows] = law.rate * override[:, 0]
         laws.velocity[rows] = law.velocity * override
         laws.acceleration[rows] = law.acceleration * override**2
         with np.errstate(divide="ignore"):
@@ -389,11 +404,9 @@ def _run_laws(arm: Arm, points: Waypoints) -> _Laws:
 
 
 def _go_evenly(laws: _Laws, points: Waypoints, rows: slice) -> None:
-    """Let one run without a time law go from waypoint to waypoint in straight lines."""
+    """Let one run without a time law go evenly from waypoint to waypoint."""
     laws.failed[rows] = True
     lasts, ds = np.diff(laws.since[rows]), points.ds[rows][1:]
-    chord = np.diff(points.q[rows], axis=0) / np.maximum(ds, SHORTEST)[:, None]
-    laws.slope[rows] = np.vstack([chord[:1], chord])
     rate = ds / np.maximum(lasts, SHORTEST)
     laws.rate[rows] = np.append(rate[:1], rate)
 

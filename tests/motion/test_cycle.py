@@ -100,17 +100,17 @@ def cycle_of(files: dict[str, bytes], cell) -> ProgramCycle:
 
 
 def test_directions_in_time_are_those_along_the_path(bench_cell, bench_model) -> None:
-    """All shipped programs and generated ones: 99.9 % of all joints at arrivals."""
+    """All shipped programs and 200 generated ones: at 99.9 % of the arrivals."""
     cell = prepared(bench_cell, bench_model, AS_USUAL)
     programs = []
     for path in sorted((ROOT / "programs").glob("*.pdl")):
         beside = path.with_suffix(".lsv")
         more = {beside.name: beside.read_bytes()} if beside.exists() else {}
         programs.append({path.name: path.read_bytes(), **more})
-    programs += [dict(generated(random.Random(seed))) for seed in range(40)]
+    programs += [dict(generated(random.Random(seed))) for seed in range(200)]
     known = wrong = 0
     for files in programs:
         cycle = cycle_of(files, cell)
-        known += int((cycle.arrived.direction != 0).sum())
-        wrong += int(disagreements(cell.arm, cycle).sum())
-    assert known > 30_000 and wrong < 1e-3 * known
+        known += int((cycle.arrived.direction != 0).any(axis=1).sum())
+        wrong += int(disagreements(cell.arm, cycle).any(axis=1).sum())
+    assert known > 6_000 and wrong <= 1e-3 * known
