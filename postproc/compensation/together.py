@@ -16,13 +16,8 @@ from typing import ParamSpec, TypeVar
 
 import numpy as np
 
-from postproc.compensation.compensate import (
-    Correction,
-    correct,
-    finish,
-    name_files,
-    refuse,
-)
+from postproc.compensation.compensate import finish, name_files, refuse
+from postproc.compensation.correction import Correction, correct
 from postproc.compensation.options import Clock, Options, Setting, silent
 from postproc.compensation.outcome import Outcome
 from postproc.compensation.program import Reading, prepared, read_program
