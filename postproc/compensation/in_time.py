@@ -108,8 +108,8 @@ class InTime:
             joints = (np.flatnonzero(self.other_side[v]) + 1).tolist()
             text = (
                 f"joint {' and '.join(map(str, joints))} arrives from the other side "
-                "in the trajectory in time than along the path: it turns at a sharp "
-                "bend just before; the correction is that of the path"
+                "in the trajectory in time than along the path; the correction is "
+                "that of the path"
             )
             file = visits.files[visits.file[v]]
             yield Diagnostic(file, int(visits.line[v]), OTHER_SIDE, text)

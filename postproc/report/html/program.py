@@ -528,6 +528,18 @@ def finite(value: Any) -> Any:
 IN_TIME = ("timing", "path_accuracy", "path")  # keys of the report
 
 
+def largest_use(in_time: Mapping[str, Any]) -> str:
+    """Say how much of the joints' limits the compensated program uses at the most."""
+    if "timing" not in in_time:
+        return ""
+    told = []
+    for what in ("velocity", "acceleration"):
+        shares = [use["share"] for use in in_time["timing"][f"{what}_use"]["after"]]
+        most = max(shares)
+        told.append(f"{what} {100 * most:.0f} % (J{shares.index(most) + 1})")
+    return ", ".join(told)
+
+
 def worst_paths(in_time: Mapping[str, Any]) -> list[Mapping[str, Any]]:
     """Choose the moves that leave their path the most and whose curve is told."""
     told = [path for path in in_time.get("path", ()) if "curve" in path]
@@ -614,5 +626,6 @@ def _page(program: ProgramPage) -> str:
         stages=seconds(program.stages),
         shown=len(carried),
         paths=worst_paths(program.in_time),
+        use=largest_use(program.in_time),
         placed=bool(np.isfinite(columns.position_mm).all(axis=1).any()),
     )
