@@ -12,7 +12,7 @@ import weakref
 import numpy as np
 import pytest
 
-from postproc.compensation import compensate as compensate_module
+from postproc.compensation import correction
 from postproc.compensation import windows as cuts
 from postproc.compensation.compensate import compensate
 from postproc.compensation.outcome import Outcome, Status
@@ -49,13 +49,13 @@ def job(bench_cell, bench_model, monkeypatch):
 def joined(monkeypatch) -> list[int]:
     """Collect how many windows every program was put together from."""
     found: list[int] = []
-    original = compensate_module.joined
+    original = correction.joined
 
     def watched(parts):
         found.append(len(parts))
         return original(parts)
 
-    monkeypatch.setattr(compensate_module, "joined", watched)
+    monkeypatch.setattr(correction, "joined", watched)
     return found
 
 
@@ -205,7 +205,7 @@ def test_doubt_about_a_branch_goes_on_behind_a_cut(job, joined) -> None:
 
 
 def test_one_window_is_in_memory_at_a_time(job, monkeypatch, joined) -> None:
-    original, plans, alive = compensate_module.plan_visits, [], []
+    original, plans, alive = correction.plan_visits, [], []
 
     def watched(*given):
         gc.collect()
@@ -214,7 +214,7 @@ def test_one_window_is_in_memory_at_a_time(job, monkeypatch, joined) -> None:
         plans.extend(map(weakref.ref, (planned, planned.plan, planned.targets)))
         return planned
 
-    monkeypatch.setattr(compensate_module, "plan_visits", watched)
+    monkeypatch.setattr(correction, "plan_visits", watched)
     job(made.drilling(600))
     assert joined[-1] > 4 and len(alive) > 4 and not any(alive)
 
