@@ -130,6 +130,15 @@ def resampled(
     edges: _Edges, share: Floats, q: Floats, corners: _Corners, pieces: _Pieces
 ) -> tuple[Floats, Floats]: ...
 
+# time_law.rs: the fastest ds/dt along paths (`postproc.motion.time_law`)
+def fastest(
+    paths: tuple[Floats, Floats],
+    step: Floats,
+    bound: Floats,
+    begins: Bools,
+    acceleration: Floats,
+) -> Floats: ...
+
 # profile.rs: backlash along the gear (`postproc.model.effects.backlash_profile`)
 def profile(
     states: tuple[Floats, ...],

@@ -23,6 +23,7 @@ mod rows;
 mod statements;
 mod table;
 mod text;
+mod time_law;
 mod trig;
 mod variance;
 mod walk;
@@ -67,6 +68,7 @@ fn native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(text::line_starts, module)?)?;
     module.add_function(wrap_pyfunction!(text::scan_lines, module)?)?;
     module.add_function(wrap_pyfunction!(statements::scan_statements, module)?)?;
+    module.add_function(wrap_pyfunction!(time_law::fastest, module)?)?;
     module.add_function(wrap_pyfunction!(number::rewrite_numbers, module)?)?;
     module.add_function(wrap_pyfunction!(weave::weave, module)?)?;
     module.add_function(wrap_pyfunction!(weave::is_woven, module)?)?;

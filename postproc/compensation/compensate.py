@@ -11,7 +11,6 @@ from postproc.compensation.base import contradicted_base
 from postproc.compensation.correction import Correction, correct
 from postproc.compensation.in_time import (
     InTime,
-    load_time_laws,
     no_advice,
     run_in_time,
 )
@@ -40,7 +39,6 @@ from postproc.compensation.outcome import (
     left_elsewhere,
     tell_arrivals,
 )
-from postproc.compensation.parallel import in_background
 from postproc.compensation.program import (
     Reading,
     prepared,
@@ -104,8 +102,6 @@ def compensate(
     setting = Setting(cell, model, options, Clock(progress), processes)
     with setting.clock("parse"):
         reading = read_program(files, cell)
-    if options.times(len(reading.visits)):
-        in_background(load_time_laws)
     reading, kept = correct(reading, setting)
     return finish(name, reading, kept, setting)
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from importlib import import_module
 
 import numpy as np
 
@@ -134,11 +133,6 @@ class InTime:
 def no_advice(rows: Ints) -> dict[int, str]:
     """Say nothing on how to approach visits: nobody knows their ways."""
     return {}
-
-
-def load_time_laws() -> None:
-    """Load the library of time laws, which takes half a second, before it is needed."""
-    import_module("postproc.motion.toppra")
 
 
 def run_in_time(

@@ -10,6 +10,7 @@ from postproc.arrays import Bools, Floats, Ints
 from postproc.exceptions import PlanError
 from postproc.motion.ruckig import JointMoves
 from postproc.motion.targets import Targets
+from postproc.motion.time_law import time_laws
 from postproc.motion.trace import Trace
 from postproc.robot.arm import Arm
 from postproc.robot.trajectory import Motion
@@ -151,8 +152,6 @@ def _programmed(targets: Targets, traced: Trace, edge: Ints) -> Floats:
 
 # When the arm arrives, and how fast it passes where it does not stop.
 
-BATCH = 20_000  # waypoints solved at a time, if one run does not need more
-
 
 @dataclass(frozen=True)
 class ArrivalTimes:
@@ -253,7 +252,7 @@ def no_time(n: int) -> ArrivalTimes:
 
 
 def tell_time(arm: Arm, targets: Targets, traced: Trace) -> ArrivalTimes:
-    """Time all moves: JOINT moves between stops with ruckig, other runs with toppra."""
+    """Time all moves: JOINT moves between stops with ruckig, other runs by TOPP-RA."""
     edge, source = main_edges(targets, traced)
     first, end = runs(targets, source)
     lone = (end - first == 1) & (targets.move[first] == Motion.JOINT)
@@ -365,50 +364,35 @@ class _Laws:
 def _run_laws(arm: Arm, points: Waypoints) -> _Laws:
     """Find the time laws of all runs."""
     k = len(points.ds)
-    laws = _Laws(
-        np.zeros(k), np.zeros(k), np.zeros((k, 6)), np.zeros((k, 6)),
-        np.full(k, np.inf), np.zeros(k, dtype=bool),
-    )  # fmt: skip
     if k == 0:
-        return laws
-    from postproc.motion import toppra  # slow to load: it brings a plotting library
-
-    begins = np.flatnonzero(points.begins)
-    limit, s = points.limit(), np.cumsum(points.ds)
-    batch = begins // BATCH
-    firsts = np.flatnonzero(np.diff(batch, prepend=-1))
-    todo = list(zip(firsts.tolist(), [*firsts[1:].tolist(), len(begins)], strict=True))
-    bounds = np.append(begins, k)
-    while todo:
-        a, b = todo.pop()
-        rows = slice(int(bounds[a]), int(bounds[b]))
-        try:
-            law = toppra.time_laws(
-                arm, points.q[rows], s[rows], limit[rows], points.begins[rows]
-            )
-        except PlanError:
-            if b - a > 1:
-                todo += [(a, (a + b) // 2), ((a + b) // 2, b)]
-                continue
-            laws.since[rows], laws.velocity[rows] = _estimate(points, rows)
-            _go_evenly(laws, points, rows)
-            continue
-        override = points.override[rows, None]
-        laws.since[rows] = law.time / override[:, 0]
-        laws.rate[rows] = law.rate * override[:, 0]
-        laws.velocity[rows] = law.velocity * override
-        laws.acceleration[rows] = law.acceleration * override**2
-        with np.errstate(divide="ignore"):
-            laws.fastest[rows] = (arm.velocity / np.abs(law.slope)).min(axis=1)
-    return laws
+        none, joints = np.zeros(0), np.zeros((0, 6))
+        return _Laws(none, none, joints, joints, none, none > 0)
+    s, limit, override = np.cumsum(points.ds), points.limit(), points.override
+    law = time_laws(arm, points.q, s, limit, points.begins)
+    with np.errstate(divide="ignore"):
+        fastest = (arm.velocity / np.abs(law.slope)).min(axis=1)
+    found = _Laws(
+        law.time / override,
+        law.rate * override,
+        law.velocity * override[:, None],
+        law.acceleration * override[:, None] ** 2,
+        fastest,
+        np.isnan(law.time),
+    )
+    begins = np.append(np.flatnonzero(points.begins), k)
+    for i in np.flatnonzero(found.failed[begins[:-1]]).tolist():
+        rows = slice(int(begins[i]), int(begins[i + 1]))
+        found.since[rows], found.velocity[rows] = _estimate(points, rows)
+        found.acceleration[rows] = 0.0
+        found.fastest[rows] = np.inf
+        found.rate[rows] = _even_rate(found.since[rows], points.ds[rows])
+    return found
 
 
-def _go_evenly(laws: _Laws, points: Waypoints, rows: slice) -> None:
-    """Let one run without a time law go evenly from waypoint to waypoint."""
-    laws.failed[rows] = True
-    lasts, ds = np.diff(laws.since[rows]), points.ds[rows][1:]
-    rate = ds / np.maximum(lasts, SHORTEST)
-    laws.rate[rows] = np.append(rate[:1], rate)
+def _even_rate(since: Floats, ds: Floats) -> Floats:
+    """Go evenly from waypoint to waypoint of one run: ds/dt, (k,)."""
+    rate = ds[1:] / np.maximum(np.diff(since), SHORTEST)
+    return np.append(rate[:1], rate)
 
 
 def _estimate(points: Waypoints, rows: slice) -> tuple[Floats, Floats]:

@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from postproc.motion.toppra import derivatives
+from postproc.motion.time_law import derivatives
 
 
 def test_every_run_has_its_own_natural_spline() -> None:
