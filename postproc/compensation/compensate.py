@@ -54,10 +54,9 @@ from postproc.compensation.rewrite import (
 from postproc.compensation.targets import rounded_points
 from postproc.exceptions import CellError, ProgramError
 from postproc.files import variables_of
-from postproc.language.pdl2.routines import ASSUMED_STILL
 from postproc.language.source import Source
 from postproc.language.stamp import is_stamped
-from postproc.language.visits import Visits, told_once
+from postproc.language.visits import ASSUMED_STILL, Visits, told_once
 from postproc.model.model import Model
 from postproc.model.statistics import ErrorStatistics
 from postproc.robot.cell import Cell

@@ -24,7 +24,7 @@ from postproc.compensation.outcome import (
 from postproc.compensation.parallel import in_background
 from postproc.exceptions import ProgramError
 from postproc.files import find_variables, is_variables
-from postproc.language.pdl2.names import entry_names
+from postproc.language.languages import language_of
 from postproc.language.scan import BLANKS, mask_of, scan_lines
 from postproc.language.stamp import read_stamp
 
@@ -361,7 +361,11 @@ class Compared:
     def targets(self, lines: Ints) -> list[str]:
         """Name what the numbers on lines of the original, ascending, belong to."""
         if is_variables(self.original.name):
-            return list(entry_names(self.lines, lines.tolist()))
+            language = language_of(self.original.name)
+            names = language.target_names(
+                self.original.name, self.lines, lines.tolist()
+            )
+            return list(names)
         texts = (self.lines[line - 1].decode("latin-1") for line in lines.tolist())
         return [target_name(text) for text in texts]
 
@@ -389,7 +393,7 @@ def compare_files(original: Path, compensated: Path) -> Compared:
     after, stamped = _read_lines(compensated)
     rows = joined_rows(original.name, list(_rows(original.name, before, after)))
     if is_variables(original.name):
-        rows = _named_by_entries(rows, before)
+        rows = _named_by_entries(original.name, rows, before)
     return Compared(original, compensated, before, rows, stamped)
 
 
@@ -414,10 +418,10 @@ def _text_rows(file: str, lines: Ints, sign: str, texts: Sequence[bytes]) -> Dif
     return replace(DiffRows.bare(file, lines, [""] * len(lines)), texts=told)
 
 
-def _named_by_entries(rows: DiffRows, lines: Sequence[bytes]) -> DiffRows:
+def _named_by_entries(file: str, rows: DiffRows, lines: Sequence[bytes]) -> DiffRows:
     """Name rows of a variable file by their variables."""
     own = (rows.targets[k] for k in rows.target.tolist())
-    entries = entry_names(lines, rows.line.tolist())
+    entries = language_of(file).target_names(file, lines, rows.line.tolist())
     names = [name or target for name, target in zip(entries, own, strict=True)]
     return replace(rows, targets=names, target=np.arange(len(names)))
 

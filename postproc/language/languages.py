@@ -1,0 +1,38 @@
+"""All languages, and which one a file is written in."""
+
+from __future__ import annotations
+
+import os
+from functools import cache
+from importlib import import_module
+
+from postproc.language.interface import Language
+
+# Languages by the suffixes of their files; one is loaded when its first file is read.
+_PLACES = {
+    ".pdl": "postproc.language.pdl2.language:Pdl2",
+    ".lsv": "postproc.language.pdl2.language:Pdl2",
+}
+_USUAL = ".pdl"  # of a file with another suffix
+
+
+def language_of(file: str) -> Language:
+    """Return the language of a file, by its name.
+
+    >>> language_of("a/JOB.PDL").name
+    'PDL2'
+    """
+    suffix = os.path.splitext(file)[1].lower()
+    return _loaded(_PLACES.get(suffix, _PLACES[_USUAL]))
+
+
+def languages() -> tuple[Language, ...]:
+    """Return all languages."""
+    return tuple(_loaded(place) for place in dict.fromkeys(_PLACES.values()))
+
+
+@cache
+def _loaded(place: str) -> Language:
+    module, _, name = place.partition(":")
+    made: Language = getattr(import_module(module), name)()
+    return made
