@@ -12,6 +12,10 @@ from postproc.language.interface import Language
 _PLACES = {
     ".pdl": "postproc.language.pdl2.language:Pdl2",
     ".lsv": "postproc.language.pdl2.language:Pdl2",
+    **dict.fromkeys(
+        (".mod", ".modx", ".prg", ".sys", ".sysx"),
+        "postproc.language.rapid.language:Rapid",
+    ),
 }
 _USUAL = ".pdl"  # of a file with another suffix
 
@@ -21,6 +25,8 @@ def language_of(file: str) -> Language:
 
     >>> language_of("a/JOB.PDL").name
     'PDL2'
+    >>> language_of("Welding.modx").name
+    'RAPID'
     """
     suffix = os.path.splitext(file)[1].lower()
     return _loaded(_PLACES.get(suffix, _PLACES[_USUAL]))
