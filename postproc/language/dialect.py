@@ -99,6 +99,15 @@ class Dialect(ABC):
             not written.
         """
 
+    @abstractmethod
+    def flag_words(self, config: str, values: Floats) -> str:
+        """Spell the flags of one target as ``S E W T1:0 T2:-1 T3:0``, unsaid ones not.
+
+        Args:
+            config: Its configuration string.
+            values: Its numbers, (w,).
+        """
+
     def reflagged(self, values: Floats, q: Floats) -> Floats:
         """Write the flags anew of poses (k, w) that the arm reaches with joints (k, 6).
 

@@ -160,6 +160,10 @@ class Language(ABC):
     tells_accuracy: bool = True
 
     @abstractmethod
+    def recognises(self, text: bytes) -> bool:
+        """Tell whether a text without a name begins as programs of this language do."""
+
+    @abstractmethod
     def read(
         self, sources: Sequence[Source], start: Start, known: Sequence[Any] = ()
     ) -> JobReading:

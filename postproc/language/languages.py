@@ -32,6 +32,12 @@ def language_of(file: str) -> Language:
     return _loaded(_PLACES.get(suffix, _PLACES[_USUAL]))
 
 
+def language_of_text(text: bytes) -> Language:
+    """Return the language of a text without a name, by how it begins."""
+    usual = language_of(_USUAL)
+    return next((one for one in languages()[1:] if one.recognises(text)), usual)
+
+
 def languages() -> tuple[Language, ...]:
     """Return all languages."""
     return tuple(_loaded(place) for place in dict.fromkeys(_PLACES.values()))

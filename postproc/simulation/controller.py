@@ -23,7 +23,6 @@ from postproc.simulation.kinematics import (
     logarithm,
     nearest_turns,
     pose,
-    pose_of_record,
     require_closed_form,
     solve_branch,
     undo,
@@ -483,7 +482,7 @@ def _goal_joints(
         return _place_of(setup, kind)
     config = None
     if kind in (Meaning.POSE, Meaning.NEAR) and visits.config_given[i]:
-        config = visits.configs[visits.config[i]]
+        config = visits.dialect.flag_words(visits.configs[visits.config[i]], values)
     goal = _goal_pose(setup, visits, i, frames, here)
     free = bool(visits.nearest_turn[i])
     return joints_of_pose(setup.chain, goal @ undo(frames.tool), here, config, free)
@@ -500,7 +499,7 @@ def _goal_pose(
         return np.asarray(setup.chain.flange(joints[None])[0] @ tool)
     present = setup.chain.flange(here[None])[0] @ tool
     if kind in (Meaning.POSE, Meaning.NEAR, Meaning.FOR):
-        target = pose_of_record(_known(values))
+        target = visits.dialect.poses(_known(values)[None])[0]
         if kind is Meaning.NEAR:
             target = target @ _shift(0.0, 0.0, -visits.distance_mm[i])
         goal = flange_of(target, tool, frames.base, frames.uframe) @ tool

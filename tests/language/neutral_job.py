@@ -149,7 +149,8 @@ def rapid(job: NeutralJob) -> bytes:
         *(f"  CONST zonedata zone{m.zone_mm:g}:=[FALSE,{m.zone_mm:g},1,1,1,1,1];"
           for m in {m.zone_mm: m for m in job.moves if m.zone_mm}.values()),
         *dict.fromkeys(named),
-        "  PROC main()", "    CirPathMode\\CirPointOri;", *(_rapid_move(job, m) for m in job.moves), "  ENDPROC",
+        "  PROC main()", "    CirPathMode\\CirPointOri;",
+        *(_rapid_move(job, m) for m in job.moves), "  ENDPROC",
         "ENDMODULE",
     ]  # fmt: skip
     return "\n".join(lines).encode() + b"\n"

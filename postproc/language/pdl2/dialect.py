@@ -81,6 +81,10 @@ class SixNumbers(Dialect):
         slots, turns = configurations(configs)
         return slots[config], turns[config]
 
+    def flag_words(self, config: str, values: Floats) -> str:
+        """Return the configuration string, which says them so."""
+        return config
+
 
 PDL2_DIALECT = SixNumbers()
 

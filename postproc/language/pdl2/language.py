@@ -39,6 +39,10 @@ class Pdl2(Language):
     suffixes = (".pdl",)
     comment = "--"
 
+    def recognises(self, text: bytes) -> bool:
+        """Tell that a text may be PDL2: what begins as nothing else is taken for it."""
+        return True
+
     def read(
         self, sources: Sequence[Source], start: Start, known: Sequence[Program] = ()
     ) -> JobReading:

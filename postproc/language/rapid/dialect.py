@@ -103,6 +103,13 @@ class RapidNumbers(Dialect):
         turns[:, 0], turns[:, 1] = np.floor((cf4 + 2) / 4), np.floor((cf6 + 2) / 4)
         return slot, turns
 
+    def flag_words(self, config: str, values: Floats) -> str:
+        """Spell confdata as flags, see `Dialect.flag_words`."""
+        slot, turns = self.flags(np.zeros(1, dtype=np.int64), (config,), values[None])
+        words = [w for w, bit in (("S", 2), ("E", 1), ("W", 4)) if slot[0] & bit]
+        said = [f"T{k + 1}:{t:g}" for k, t in enumerate(turns[0]) if t == t]
+        return " ".join([*words, *said])
+
     def reflagged(self, values: Floats, q: Floats) -> Floats:
         """Count the quarter turns anew of joints that left theirs, see `Dialect`."""
         out = np.array(values)

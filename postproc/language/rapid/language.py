@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Sequence
 
 import numpy as np
@@ -33,6 +34,7 @@ from postproc.language.visits import (
 
 # What the interpreter says of a statement where it is reached, knowing all modules.
 _SAID_AGAIN = ("unknown-instruction", "late-binding")
+_BEGIN = re.compile(rb"(?:\xef\xbb\xbf)?(?:\s|![^\r\n]*[\r\n])*(?:%%%|MODULE\s)", re.I)
 _NOT_CLONED = "points of RAPID are not cloned: give the move a point of its own"
 
 
@@ -43,6 +45,10 @@ class Rapid(Language):
     suffixes = (".mod", ".modx", ".prg", ".sys", ".sysx")
     comment = "!"
     tells_accuracy = False
+
+    def recognises(self, text: bytes) -> bool:
+        """Tell whether a module begins there, behind comments and a header."""
+        return _BEGIN.match(text) is not None
 
     def read(
         self,

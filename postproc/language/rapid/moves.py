@@ -24,7 +24,7 @@ from postproc.language.rapid.task import (
     Scope,
     WrittenNumber,
 )
-from postproc.language.visits import NO_VALUE, Meaning
+from postproc.language.visits import Meaning
 from postproc.robot.pose import pose_from_record, record_from_pose
 from postproc.robot.trajectory import Motion
 
@@ -204,7 +204,7 @@ class Goals:
         if found is None:
             return "is no data of the files at hand, or of several of them"
         if found[1].declared.value is None:
-            return NO_VALUE.replace("it has", "has")
+            return "has no value in the files at hand"
         if self.task.constant(name, scope) is None:
             return f"may be changed by the program: {RUN_TIME}"
         return f"has an element or value that is not known: {RUN_TIME}"
