@@ -182,6 +182,7 @@ class Goals:
         if found is None:
             why = f"{name} {self._untold(name, scope)}" if name else RUN_TIME
             return RapidGoal(Meaning.UNKNOWN, name=name, why=why)
+        shown = name + self._element(operand, row, scope)
         main, aux = found
         file, slots = _places(main)
         values = [number.value for number in main]
@@ -192,11 +193,23 @@ class Goals:
             tuple(values),
             file,
             slots,
-            name=name,
+            name=shown,
             aux=aux,
             why=why or ("" if file >= 0 else "it is computed from other data"),
             pins=self._pinned(name, operand),
         )
+
+    def _element(self, operand: said.Operand, row: int, scope: Scope) -> str:
+        """Spell which element of an array is meant, "" where it is none."""
+        steps = operand.steps if isinstance(operand, said.DataObject) else ()
+        spelt = []
+        for step in steps:
+            if isinstance(step, str):
+                spelt.append(f".{step}")
+            else:
+                at = (self.task.number(one, row, scope) for one in step.subscripts)
+                spelt.append("{" + ",".join(f"{k:g}" for k in at) + "}")
+        return "".join(spelt)
 
     def _untold(self, name: str, scope: Scope) -> str:
         """Say why a name stands for no known point."""
