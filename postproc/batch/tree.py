@@ -7,7 +7,9 @@ import re
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
+from stat import S_ISREG
 
 from postproc import _native
 from postproc.batch.plan import BatchPlan, Unit
@@ -119,11 +121,22 @@ def names_in(path: Path) -> tuple[dict[str, int], dict[str, int]]:
 
 
 def _modules_beside(path: Path) -> Iterator[Path]:
-    """Yield the other modules of a folder, but for outputs."""
+    """Yield the other modules of a folder, but for outputs and main ones."""
     for other in sorted(path.parent.iterdir()):
-        own = other.name == path.name or other.is_symlink() or not other.is_file()
-        if is_module(other.name) and not own and read_stamp(read_head(other)) is None:
+        if other.name == path.name or not is_module(other.name) or other.is_symlink():
+            continue
+        status = other.stat()
+        if S_ISREG(status.st_mode) and _is_part(
+            other, status.st_mtime_ns, status.st_size
+        ):
             yield other
+
+
+@lru_cache(maxsize=8192)
+def _is_part(path: Path, changed: int, size: int) -> bool:
+    """Tell whether a module belongs to a task whose main routine is elsewhere."""
+    text = _read(path, -1)
+    return _MAIN.search(text) is None and read_stamp(text[:HEAD]) is None
 
 
 def read_head(path: Path) -> bytes:

@@ -182,6 +182,10 @@ class Language(ABC):
     def cloner(self, sources: Sequence[Source]) -> Cloner:
         """Parse the files of a job to clone variables in them."""
 
+    def holds_joints(self, line: str) -> bool:
+        """Tell whether the numbers of a line are joint angles, as far as it shows."""
+        return False
+
     @abstractmethod
     def target_names(
         self, file: str, lines: Sequence[bytes], wanted: Sequence[int]

@@ -81,12 +81,40 @@ class Rapid(Language):
     def target_names(
         self, file: str, lines: Sequence[bytes], wanted: Sequence[int]
     ) -> Iterator[str]:
-        """Name nothing: lines of RAPID tell their targets themselves."""
-        return ("" for _ in wanted)
+        """Name data by their declarations, and other lines by how they begin."""
+        name, seen = "", 0
+        for line in wanted:
+            if line == 0:
+                yield ""
+                continue
+            before = (_begun(lines[k]) for k in range(line - 1, seen - 1, -1))
+            name, seen = next(filter(None, before), name), line
+            yield name
+
+    def holds_joints(self, line: str) -> bool:
+        """Tell whether a line declares joint angles, or moves to some."""
+        return _JOINTS.match(line) is not None
 
     def prepare(self) -> None:
         """Load the parser of statements."""
         line_parser("rapid", "statement")
+
+
+_DECLARED = re.compile(
+    r"\s*(?:(?:LOCAL|TASK)\s+)?(?:CONST|PERS|VAR)\s+\w+\s+([A-Za-z_]\w*)", re.I
+)
+_WORDS = re.compile(r"\s*([A-Za-z_]\w*)\s*(?:\\[^,;]*,)?\s*([A-Za-z_]\w*)?")
+_JOINTS = re.compile(r"[^!\"]*?\b(?:jointtarget\s|\w+AbsJ\b|\w+ExtJ\b)", re.I)
+
+
+def _begun(line: bytes) -> str:
+    """Name what a line begins, "" where it goes on with what another began."""
+    text = line.decode("latin-1")
+    declared = _DECLARED.match(text)
+    if declared:
+        return declared[1]
+    words = _WORDS.match(text)
+    return " ".join(filter(None, words.groups())) if words else ""
 
 
 class NoClones(Cloner):
