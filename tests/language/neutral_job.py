@@ -183,7 +183,8 @@ def drawn(cell: Cell, seed: int, count: int = 40) -> NeutralJob:
     """Draw a job: joint moves, lines, arcs and zones around one pose."""
     rng = np.random.default_rng(seed)
     middle = np.deg2rad([20.0, -25.0, -110.0, 30.0, 50.0, 20.0])
-    moves = [NeutralMove(Motion.JOINT, middle, in_joints=True)]
+    begin = middle - np.deg2rad(12.0)  # all joints turn on the way from home
+    moves = [NeutralMove(Motion.JOINT, begin, in_joints=True)]
     for k in range(count):
         q = middle + np.deg2rad(rng.uniform(-9.0, 9.0, 6))
         kind = rng.choice(["joint", "line", "line", "arc", "angles"])

@@ -91,18 +91,19 @@ def _moves(found: Sequence[RapidVisit]) -> dict[str, Any]:
     """Columns of how the arm moves."""
     n = len(found)
     zone = np.array([v.zone_mm for v in found], float)
-    fly = zone >= 0.0
+    via = np.array([v.via for v in found], bool)
+    fly = (zone >= 0.0) | via  # nothing stops at the point of an arc
     pose = np.array([v.goal.target == Meaning.POSE for v in found], bool)
     return {
         "motion": slim(np.array([v.motion for v in found], np.int64)),
         "target": slim(np.array([v.goal.target for v in found], np.int64)),
-        "via": slim(np.array([v.via for v in found], bool)),
+        "via": slim(via),
         "distance_mm": slim(np.full(n, np.nan)),
         "config": slim(np.zeros(n, dtype=np.int64)),
         "configs": ("",),
         "config_given": slim(pose),
         "fly": slim(fly),
-        "zone_mm": slim(np.where(fly, zone, np.nan)),
+        "zone_mm": slim(np.where(zone >= 0.0, zone, np.nan)),
         "overlap_percent": slim(np.full(n, 100.0)),
         "blend": slim(np.where(fly, Blend.ZONE, Blend.UNSET)),
         "zone_rule": slim(np.where(fly, ZoneRule.FROM, ZoneRule.UNSET)),
