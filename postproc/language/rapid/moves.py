@@ -17,6 +17,7 @@ from postproc.language.rapid.dialect import (
 )
 from postproc.language.rapid.modes import Modes
 from postproc.language.rapid.signatures import Signature
+from postproc.language.rapid.targets import COUNTS
 from postproc.language.rapid.task import (
     SHIFTS,
     Nested,
@@ -35,6 +36,7 @@ _ZONE = re.compile(r"z(\d+)$")
 _SPEED = re.compile(r"v(\d+)$")
 USUAL_TURN = np.deg2rad(500.0)  # [rad/s] of the speeds that the controller knows
 _STEM = re.compile(r"^(move|trigg|arcmove|arc|spotm|spot|paint|disp|cap|search)")
+SHORTEST = 0.5  # length of what counts as a quaternion
 Z0 = 0.3  # [mm]
 UNKNOWN_ZONE = -1.0
 RUN_TIME = "it is known only when the program runs"
@@ -119,6 +121,11 @@ class Goals:
 
     task: RapidTask
     _frames: dict[tuple[object, ...], FrameOfMove] = field(default_factory=dict)
+    _known: dict[
+        tuple[int, Scope],
+        tuple[said.Instruction, tuple[FrameOfMove, FrameOfMove, float, float]],
+    ] = field(default_factory=dict)
+    _slots: dict[int, tuple[said.Composite, list[int]]] = field(default_factory=dict)
 
     def visits(
         self,
@@ -129,13 +136,11 @@ class Goals:
         modes: Modes,
     ) -> Iterator[RapidVisit]:
         """Read the visits of a move: the point of an arc, and its end."""
-        arguments = _Arguments(self.task, one.arguments, row, scope)
-        tool, wobj = self._tool(arguments), self._wobj(arguments)
-        zone = np.nan if one.name in AT_A_STOP else arguments.zone()
-        speed, motion = arguments.speed(), _motion(one.name, signature)
         ends = signature.operands(one.arguments)
+        tool, wobj, zone, speed = self._conditions(one, ends, row, scope)
+        motion = _motion(one.name, signature)
         why = "" if signature.reaches else "where a search ends is not known before"
-        if arguments.option("id") is not None:
+        if any(argument.name == "id" for argument in one.arguments):
             why = "it moves together with another arm (\\ID)"
         if zone == UNKNOWN_ZONE:
             why = why or "its zone is not known: no zonedata of the files at hand"
@@ -150,6 +155,32 @@ class Goals:
         yield RapidVisit(
             scope, row, motion, False, goal, tool, wobj, zone, speed, modes, why=why
         )
+
+    def _conditions(
+        self,
+        one: said.Instruction,
+        ends: Sequence[said.Operand | None],
+        row: int,
+        scope: Scope,
+    ) -> tuple[FrameOfMove, FrameOfMove, float, float]:
+        """Read tool, work object, zone [mm] and speed [m/s] of a move.
+
+        Moves of one form that only name them have the same.
+        """
+        others = [a.value for a in one.arguments if all(a.value is not e for e in ends)]
+        named = all(
+            value is None or (isinstance(value, said.DataObject) and not value.steps)
+            for value in others
+        )
+        key = id(one), scope
+        if named and key in self._known:
+            return self._known[key][1]
+        arguments = _Arguments(self.task, one.arguments, row, scope)
+        zone = np.nan if one.name in AT_A_STOP else arguments.zone()
+        found = self._tool(arguments), self._wobj(arguments), zone, arguments.speed()
+        if named:
+            self._known[key] = one, found  # it keeps its id from being used again
+        return found
 
     def goal(
         self,
@@ -178,6 +209,10 @@ class Goals:
     ) -> RapidGoal:
         """Read a point that is written or named."""
         name = operand.name if isinstance(operand, said.DataObject) else ""
+        if isinstance(operand, said.Composite):
+            plain = self._written(operand, joints, row, scope)
+            if plain is not None:
+                return plain
         found = _numbers(self.task.record(operand, row, scope), joints)
         if found is None:
             why = f"{name} {self._untold(name, scope)}" if name else RUN_TIME
@@ -187,7 +222,7 @@ class Goals:
         file, slots = _places(main)
         values = [number.value for number in main]
         values += [0.0] * (WIDTH - len(values))
-        why = "" if joints or np.linalg.norm(values[3:7]) > 0.5 else "no quaternion"
+        why = "" if joints or _is_unit(values[3:7]) else "no quaternion"
         return RapidGoal(
             Meaning.JOINTS if joints else Meaning.POSE,
             tuple(values),
@@ -198,6 +233,28 @@ class Goals:
             why=why or ("" if file >= 0 else "it is computed from other data"),
             pins=self._pinned(name, operand),
         )
+
+    def _written(
+        self, operand: said.Composite, joints: bool, row: int, scope: Scope
+    ) -> RapidGoal | None:
+        """Read a point whose numbers all stand in the move, None for others."""
+        if id(operand) not in self._slots:
+            self._slots[id(operand)] = operand, _plain_slots(operand)
+        slots = self._slots[id(operand)][1]
+        if len(slots) != (12 if joints else 17):
+            return None
+        text = self.task.files[scope.file].text
+        first = int(text.first[row])
+        places = [first + slot for slot in slots]
+        values = text.value[places].tolist()
+        count = len(slots) - 6
+        main = values[:count] + [0.0] * (WIDTH - count)
+        if any(v != v for v in values) or not (joints or _is_unit(main[3:7])):
+            return None
+        aux = tuple(np.nan if abs(v) > UNUSED else v for v in values[count:])
+        at = tuple(places[:count] + [-1] * (WIDTH - count))
+        target = Meaning.JOINTS if joints else Meaning.POSE
+        return RapidGoal(target, tuple(main), scope.file, at, aux=aux)
 
     def _element(self, operand: said.Operand, row: int, scope: Scope) -> str:
         """Spell which element of an array is meant, "" where it is none."""
@@ -395,6 +452,21 @@ def _motion(name: str, signature: Signature) -> Motion:
         return Motion.JOINT
     stem = _STEM.sub("", name)
     return Motion.JOINT if stem.startswith("j") else Motion.LINEAR
+
+
+def _is_unit(q: Sequence[float]) -> bool:
+    """Tell whether four numbers say a rotation."""
+    return sum(c * c for c in q) > SHORTEST**2
+
+
+def _plain_slots(operand: said.Composite) -> list[int]:
+    """Return the slots of ``[[1, 2, ..], ..]`` of a target, nothing for all else."""
+    parts = [part.items for part in operand.items if isinstance(part, said.Composite)]
+    if tuple(map(len, parts)) not in COUNTS or len(parts) != len(operand.items):
+        return []
+    leaves = [leaf for part in parts for leaf in part]
+    slots = [leaf.slot for leaf in leaves if isinstance(leaf, said.Num)]
+    return slots if len(slots) == len(leaves) else []
 
 
 def _numbers(
