@@ -305,6 +305,7 @@ def _reason(exc: OSError) -> str:
 # Kinds of files in a tree of programs, told by their names and contents.
 
 _PROGRAM, _VARIABLES, _COMPILED = ".pdl", ".lsv", (".cod", ".var")
+MODULES = (".mod", ".modx", ".prg", ".sys", ".sysx")  # programs that hold their values
 LARGEST = 500_000_000  # bytes of a program or variable file; a longer one is neither
 
 _TARGETS = re.compile(
@@ -315,10 +316,26 @@ _TARGETS = re.compile(
 def is_program(place: str) -> bool:
     """Tell whether a file is a program.
 
-    >>> is_program("a/JOB.PDL")
-    True
+    >>> is_program("a/JOB.PDL"), is_program("Welding.mod"), is_program("a.txt")
+    (True, True, False)
     """
-    return _suffix(place) == _PROGRAM
+    return _suffix(place) == _PROGRAM or is_module(place)
+
+
+def is_module(place: str) -> bool:
+    """Tell whether a file is a program that belongs to the modules beside it."""
+    return _suffix(place) in MODULES
+
+
+def program_key(place: str) -> str:
+    """Return what tells the programs of one folder apart, whatever their case.
+
+    >>> program_key("a/JOB.PDL"), program_key("a/Job.mod")
+    ('job', 'job.mod')
+    """
+    if not is_module(place):
+        return base_name(place)
+    return place.replace("\\", "/").rpartition("/")[2].lower()
 
 
 def is_variables(place: str) -> bool:
@@ -332,17 +349,19 @@ def is_compiled(place: str) -> bool:
 
 
 def variables_of(program: str) -> str:
-    """Name the variable file of a program.
+    """Name the variable file of a program, "" where programs hold their values.
 
-    >>> variables_of("a/JOB.PDL")
-    'a/JOB.lsv'
+    >>> variables_of("a/JOB.PDL"), variables_of("a/job.mod")
+    ('a/JOB.lsv', '')
     """
+    if is_module(program):
+        return ""
     return os.path.splitext(program)[0] + _VARIABLES
 
 
 def find_variables(program: Path) -> Path | None:
     """Find the variable file of a program: same base name, in any case."""
-    if not program.parent.is_dir():
+    if is_module(program.name) or not program.parent.is_dir():
         return None
     wanted = variables_of(program.name).lower()
     found = [p for p in program.parent.iterdir() if p.name.lower() == wanted]

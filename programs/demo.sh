@@ -50,6 +50,12 @@ for job in $jobs; do
     done
 done
 
+title "Another language: a welding task of two RAPID modules on an IRB 6640, explained"
+run postproc explain programs/welding/Welding.mod --cell programs/welding/cell.toml \
+    >demo/welding.txt
+head -n 12 demo/welding.txt
+echo "  ... all of it in demo/welding.txt"
+
 title "True error of the tool at the targets, and of its path between them, mm"
 python - $jobs <<'TABLE'
 import json

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from postproc.language.pdl2.dialect import PDL2_DIALECT
 from postproc.language.visits import Literals, Visits
 
 FRAMES = np.array(
@@ -35,11 +36,11 @@ def visits(target: list[int], values: list[list[float]], **more: object) -> Visi
         "tool": zeros, "base": zeros + 1, "uframe": zeros + 2, "frames": FRAMES,
         "frame_taught": np.zeros(3, dtype=bool), "tool_remote": no,
         "nearest_turn": no, "care": np.zeros((n, 3), dtype=np.int64), "fly": no,
-        "fly_dist_mm": nan, "fly_per": nan,
-        "fly_type": zeros, "fly_traj": zeros, "lin_spd": nan, "rot_spd": nan,
+        "zone_mm": nan, "overlap_percent": nan,
+        "blend": zeros, "zone_rule": zeros, "lin_spd": nan, "rot_spd": nan,
         "override": np.ones(n),
-        "wrist_joint": no, "ornt_type": zeros, "reason": zeros, "reasons": ("",),
+        "wrist_joint": no, "orientation_law": zeros, "reason": zeros, "reasons": ("",),
         "pred_start": np.arange(n + 1), "pred": np.arange(n) - 1,
-        "measure_id": ("",) * n, "literals": NO_LITERALS,
+        "measure_id": ("",) * n, "literals": NO_LITERALS, "dialect": PDL2_DIALECT,
     }  # fmt: skip
     return Visits(**(given | more))  # type: ignore[arg-type]

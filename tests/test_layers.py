@@ -165,16 +165,14 @@ def test_each_foreign_library_is_imported_in_one_module() -> None:
     assert {name.split(".")[0] for name in pydantic} <= {"robot", "model"}
     # The command line is one door, cut by what its commands work on.
     assert {name.split(".")[0] for name in spread.pop("typer", [])} <= {"cli"}
-    # Every language has a door to its own grammar.
-    doors = {tuple(name.split(".")[::2]) for name in spread.pop("lark", [])}
-    assert doors <= {("language", "parser")}
+    # Grammars have one door, and every language one to what comes of its own.
+    doors = {name.split(".")[-1] for name in spread.pop("lark", [])}
+    assert doors == {"grammars", "parser"}
     assert not spread, spread
 
 
 def test_a_language_knows_no_other() -> None:
-    """What two languages need is neutral; nobody but the package knows PDL2 alone."""
-    # The tables of parsers are kept for every grammar, where the first one is read.
-    known = {("rapid", "language.pdl2.parser")}
+    """What two languages need is neutral."""
     found = set()
     for name, path in modules():
         own = name.removeprefix("language.").split(".")[0]
@@ -184,7 +182,21 @@ def test_a_language_knows_no_other() -> None:
                 if other.startswith("language.") and folder != own:
                     if (PACKAGE / "language" / folder).is_dir():
                         found.add((own, other))
-    assert found == known
+    assert not found
+
+
+def test_languages_are_known_by_their_interface_alone() -> None:
+    """Outside of its folder nobody imports a language, not even the list of them."""
+    folders = {f"language.{p.parent.name}" for p in PACKAGE.glob("language/*/*.py")}
+    wrong = [
+        f"{name} imports {other}"
+        for name, path in modules()
+        if not within(name, folders)
+        for other in sorted(ours(name, path))
+        if within(other, folders)
+    ]
+    assert len(folders) > 1
+    assert not wrong, wrong
 
 
 def test_there_is_one_way_to_compensate() -> None:

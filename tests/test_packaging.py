@@ -31,7 +31,7 @@ PIN = re.compile(
 PROBE = """
 from pathlib import Path
 import postproc
-from postproc.language.pdl2.parser import grammar
+from postproc.language.grammars import grammar
 print(Path(postproc.__file__).resolve())
 print(grammar("pdl2").strip().splitlines()[0])
 """

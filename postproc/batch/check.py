@@ -29,9 +29,8 @@ from postproc.files import (
     read_input,
     variables_of,
 )
-from postproc.language.pdl2.routines import ASSUMED_STILL
 from postproc.language.stamp import read_stamp
-from postproc.language.visits import line_ranges
+from postproc.language.visits import ASSUMED_STILL, line_ranges
 
 LEFT = "left-alone"  # code of targets that kept their value
 

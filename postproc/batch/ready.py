@@ -1,6 +1,6 @@
 """All that a worker needs for its first program, loaded before workers are forked."""
 
-from postproc.language.pdl2.parser import line_parser
+from postproc.language.languages import languages
 
-for _grammar in ("pdl2", "lsv"):
-    line_parser(_grammar, "line")
+for _language in languages():
+    _language.prepare()

@@ -5,9 +5,11 @@ from __future__ import annotations
 import os
 import re
 from collections import defaultdict
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
+from stat import S_ISREG
 
 from postproc import _native
 from postproc.batch.plan import BatchPlan, Unit
@@ -19,9 +21,12 @@ from postproc.files import (
     base_name,
     holds_targets,
     is_compiled,
+    is_module,
     is_program,
     is_variables,
+    program_key,
 )
+from postproc.language.stamp import read_stamp
 
 # Which programs of a folder belong together: a main program and its pages.
 #
@@ -36,6 +41,9 @@ _NAMED = re.compile(
     rb"|ROUTINE\b[^\r\n]*?\bEXPORTED[ \t]+FROM[ \t]+(?P<program>\w+)"
     rb"|CALL[ \t]+(?P<called>\w+))",
     re.IGNORECASE | re.MULTILINE,
+)
+_MAIN = re.compile(
+    rb"^[ \t]*(?:LOCAL[ \t]+)?PROC[ \t]+main[ \t]*\(", re.IGNORECASE | re.MULTILINE
 )
 _OUTSIDE = re.compile(r"[/\\:\0]|^\.*$")  # folders, drives, ``..``
 
@@ -98,8 +106,37 @@ def of_one_arm(program: int, page: int) -> bool:
 
 
 def names_in(path: Path) -> tuple[dict[str, int], dict[str, int]]:
-    """Find the programs that a file names (`named_programs`), none if unreadable."""
-    return named_programs(_read(path, -1))
+    """Find the programs that a file names (`named_programs`), none if unreadable.
+
+    The module with the main routine of a task names all modules beside it.
+    """
+    text = _read(path, -1)
+    if not is_module(path.name):
+        return named_programs(text)
+    found = _MAIN.search(text)
+    if found is None:
+        return {}, {}
+    line = text.count(b"\n", 0, found.start()) + 1
+    return {program_key(other.name): line for other in _modules_beside(path)}, {}
+
+
+def _modules_beside(path: Path) -> Iterator[Path]:
+    """Yield the other modules of a folder, but for outputs and main ones."""
+    for other in sorted(path.parent.iterdir()):
+        if other.name == path.name or not is_module(other.name) or other.is_symlink():
+            continue
+        status = other.stat()
+        if S_ISREG(status.st_mode) and _is_part(
+            other, status.st_mtime_ns, status.st_size
+        ):
+            yield other
+
+
+@lru_cache(maxsize=8192)
+def _is_part(path: Path, changed: int, size: int) -> bool:
+    """Tell whether a module belongs to a task whose main routine is elsewhere."""
+    text = _read(path, -1)
+    return _MAIN.search(text) is None and read_stamp(text[:HEAD]) is None
 
 
 def read_head(path: Path) -> bytes:
@@ -266,8 +303,8 @@ class _Folder:
 def _sort(root: Path, places: Sequence[str], plan: BatchPlan) -> _Folder:
     """Sort the files of one folder into programs, what belongs to them, and others."""
     part = _Folder([], [], {}, [])
-    programs = _by_base(filter(is_program, places), part)
-    variables = _by_base(filter(is_variables, places), part)
+    programs = _by_base(filter(is_program, places), program_key, part)
+    variables = _by_base(filter(is_variables, places), base_name, part)
     records = {place + SUFFIX for place in programs.values()}
     for place in places:
         if place in records or place in part.refused:
@@ -291,11 +328,13 @@ def _sort(root: Path, places: Sequence[str], plan: BatchPlan) -> _Folder:
     return part
 
 
-def _by_base(places: Iterable[str], part: _Folder) -> dict[str, str]:
-    """Index files of one kind by base name; refuse those that differ in case only."""
+def _by_base(
+    places: Iterable[str], key: Callable[[str], str], part: _Folder
+) -> dict[str, str]:
+    """Index files of one kind by a name; refuse those that differ in case only."""
     found: dict[str, str] = {}
     for place in places:
-        first = found.setdefault(base_name(place), place)
+        first = found.setdefault(key(place), place)
         if first != place:
             part.refused[place] = f"has the name of {first} but for upper case"
     return found
@@ -338,7 +377,7 @@ def _add_unit(
         setup: Index of its setup, None where no rule fits.
         part: Where it is added.
     """
-    values = variables.get(base_name(program))
+    values = variables.get(program_key(program))
     if setup is not None:
         part.units.append(Unit(program, tuple(pages), values, setup))
         return

@@ -19,7 +19,7 @@ from postproc.compensation.compensate import compensate, name_files
 from postproc.compensation.options import Options, Progress, silent
 from postproc.compensation.outcome import Outcome
 from postproc.compensation.record import sidecar_path
-from postproc.exceptions import OutputError
+from postproc.exceptions import OutputError, ProgramError
 from postproc.files import (
     STREAM,
     Content,
@@ -29,12 +29,14 @@ from postproc.files import (
     is_program,
     is_stream,
     is_variables,
+    program_key,
     program_of,
     read_input,
     read_stream,
     variables_of,
     write_all,
 )
+from postproc.language.languages import language_of, language_of_text
 from postproc.language.stamp import read_stamp
 from postproc.language.visits import Diagnostic
 from postproc.model.model import Model, load_model
@@ -69,12 +71,13 @@ def find_pages(program: Path) -> Pages:
         _not_followed(program, line, f"{name!r} leads out of the folder: not followed")
         for name, line in outside.items()
     ]
-    main = base_name(program.name)
+    main = program_key(program.name)
     if not set(wanted) - {main} or not program.parent.is_dir():
         return Pages((), tuple(notes))
     files = [p for p in sorted(program.parent.iterdir()) if not p.is_symlink()]
     values = {base_name(p.name) for p in files if is_variables(p.name)}
-    programs = {base_name(p.name): p for p in files if _is_source(p)} | {main: program}
+    programs = {program_key(p.name): p for p in files if _is_source(p)}
+    programs |= {main: program}
     named = {base: _named(path, main) for base, path in programs.items()}
     arms = {base: program_arm(read_head(path)) for base, path in programs.items()}
     apart = dict.fromkeys(values, "it has a variable file of its own")
@@ -188,6 +191,10 @@ class Job:
         path = None if is_stream(program) else Path(program)
         name = program_name(program, lsv)
         source = read_program_file(program)
+        name = name_of_text(program, name, source)
+        if lsv is not None and not variables_of(name):
+            problem = f"a {language_of(name).name} program has no variable file"
+            raise ProgramError(name, problem, "Leave --lsv out")
         lsv = lsv or (None if path is None else find_variables(path))
         values = None if lsv is None else (lsv, read_input(lsv))
         found = Pages() if path is None else find_pages(path)
@@ -369,6 +376,17 @@ def program_name(program: str, lsv: Path | None) -> str:
     return program_of("stdin" if lsv is None else lsv.name)
 
 
+def name_of_text(program: str, name: str, source: bytes) -> str:
+    """Name a program without a name of its own by the language that it is written in.
+
+    >>> name_of_text("-", "stdin.pdl", b"MODULE weld")
+    'stdin.mod'
+    """
+    if not is_stream(program) or is_program(Path(program).name):
+        return name
+    return Path(name).stem + language_of_text(source).suffixes[0]
+
+
 def read_program_file(program: str) -> bytes:
     """Read a program, ``-`` for standard input.
 
@@ -390,10 +408,11 @@ def read_files(program: Path, lsv: Path | None = None) -> dict[str, bytes]:
     """
     passing = is_stream(program)
     source = read_program_file(str(program))
+    name = name_of_text(str(program), program_name(str(program), lsv), source)
     values = lsv or (None if passing else find_variables(program))
     pages = () if passing else find_pages(program).paths
     return name_files(
-        program_name(str(program), lsv),
+        name,
         source,
         None if values is None else read_input(values),
         {path.name: read_input(path) for path in pages},

@@ -124,8 +124,8 @@ def _pairs(visits: Visits, cell: Cell) -> PosePairs:
     known = known[visits.uframe[pose]] & known[visits.tool[pose]]
     some = np.flatnonzero(own & known & ~visits.tool_remote[pose])[:MOST]
     pose, joints = pose[some], joints[some]
-    flange = cell.arm.flange(np.deg2rad(visits.values[joints]))
-    numbers = pose_from_record(visits.values[pose])
+    flange = cell.arm.flange(np.deg2rad(visits.values[joints, :6]))
+    numbers = visits.dialect.poses(visits.values[pose])
     return PosePairs(
         pose,
         flange @ frames[visits.tool[pose]],

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -14,9 +13,8 @@ from postproc.compensation.decide import Proposal
 from postproc.compensation.equivalence import equivalent
 from postproc.compensation.outcome import Status
 from postproc.compensation.program import Reading, read_program
-from postproc.files import is_variables
-from postproc.language.pdl2.clones import CloneTarget, clone, free_name, named_at
-from postproc.language.pdl2.program import Program, parse
+from postproc.language.interface import Cloner, NamedPoint
+from postproc.language.languages import language_of
 from postproc.language.source import CloneError, Edit, Source, apply
 from postproc.language.visits import Diagnostic, Visits
 from postproc.robot.cell import Cell
@@ -201,7 +199,6 @@ def _origin(
 
 # Cloning what moves disagree on, group by group, and the proof that it fits.
 
-_WORD = re.compile(rb"[A-Za-z_]\w*")
 NOTHING = np.zeros(0, dtype=np.int64)  # no literal gets new numbers
 
 
@@ -269,9 +266,7 @@ class _CloneWork:
     Attributes:
         reading: The program.
         proposal: What its arrivals need.
-        programs: Its program files, parsed.
-        values: Its variable file, or None.
-        taken: All words of its files, in lower case.
+        cloner: Its files, to clone variables in them.
         stops: The visits at every place that names where to go.
         stops_at: The places that go to each literal.
         edits: Edits with the index of their file.
@@ -281,9 +276,7 @@ class _CloneWork:
 
     reading: Reading
     proposal: Proposal
-    programs: list[Program]
-    values: Source | None
-    taken: set[str]
+    cloner: Cloner
     stops: dict[MoveSlot, Ints]
     stops_at: dict[int, set[MoveSlot]]
     edits: list[tuple[int, Edit]] = field(default_factory=list)
@@ -294,23 +287,17 @@ class _CloneWork:
     def of(cls, reading: Reading, proposal: Proposal) -> _CloneWork:
         """Parse the files of a program."""
         sources = reading.sources
-        own = [s for s in sources if not is_variables(s.name)]
-        values = next((s for s in sources if s not in own), None)
-        taken = {
-            word.decode("ascii").lower()
-            for source in sources
-            for word in _WORD.findall(source.data)
-        }
-        programs, visits = [parse(s) for s in own], reading.visits
+        cloner = language_of(sources[0].name).cloner(sources)
+        visits = reading.visits
         stops, at = _stops(visits), defaultdict(set)
         for stop, rows in stops.items():
             for literal in visits.literal[rows].tolist():
                 at[literal].add(stop)
-        return cls(reading, proposal, programs, values, taken, stops, at)
+        return cls(reading, proposal, cloner, stops, at)
 
     def separate(self, literals: frozenset[int], agree_mm: float) -> None:
         """Give the moves to some literals points of their own where they need them."""
-        named: dict[MoveSlot, CloneTarget] = {}
+        named: dict[MoveSlot, NamedPoint] = {}
         members = list(self._members(literals, named, agree_mm))
         stays = not literals.isdisjoint(self.proposal.fixed.tolist())
         for group in group_arrivals(members, stays, agree_mm)[1:]:
@@ -319,7 +306,7 @@ class _CloneWork:
     def _members(
         self,
         literals: frozenset[int],
-        named: dict[MoveSlot, CloneTarget],
+        named: dict[MoveSlot, NamedPoint],
         agree_mm: float,
     ) -> Iterator[SlotArrivals]:
         """Yield all stops at some literals; also say which variable each names."""
@@ -335,7 +322,7 @@ class _CloneWork:
             }
             found = SlotArrivals(stop, "", changes, usable)
             try:
-                one = named_at(self.programs, stop.file, stop.line, stop.via, name)
+                one = self.cloner.target(stop.file, stop.line, stop.via, name)
                 if usable and not found.agree(agree_mm):
                     raise CloneError("this one move arrives in ways that disagree")
             except CloneError as problem:
@@ -346,30 +333,24 @@ class _CloneWork:
                 found = replace(found, variable=one.key)
             yield found
 
-    def _clone(self, named: list[CloneTarget], group: SharedPoint) -> None:
+    def _clone(self, named: list[NamedPoint], group: SharedPoint) -> None:
         """Clone one variable, or say why not."""
-        visits, variable = self.reading.visits, named[0].variable
+        visits, variable = self.reading.visits, named[0]
         file = group.stops[0].file
-        declared = int(self.programs[file].lines.line[variable.row])
+        declared = self.cloner.declared(variable)
         lines = ", ".join(str(stop.line) for stop in group.stops)
         try:
-            name = free_name(variable.name, self.taken)
-            self.edits += clone(
-                self.programs,
-                self.values,
-                visits.literals,
-                named,
-                sorted(group.bounds),
-                name,
-            )
+            rows = sorted(group.bounds)
+            name, edits = self.cloner.clone(visits.literals, named, rows)
+            self.edits += edits
         except CloneError as problem:
             text = f"{variable.name} keeps its moves (lines {lines}): {problem}"
             self._note(file, declared, "not-cloned", text)
             return
         text = f"{variable.name}: the moves of lines {lines} go to {name} now"
         self._note(file, declared, "cloned", text)
-        rows = np.concatenate([self.stops[stop] for stop in group.stops])
-        self.names |= dict.fromkeys(rows.tolist(), name)
+        separated = np.concatenate([self.stops[stop] for stop in group.stops])
+        self.names |= dict.fromkeys(separated.tolist(), name)
 
     def _note(self, file: int, line: int, code: str, text: str) -> None:
         name = self.reading.sources[file].name

@@ -20,14 +20,12 @@ from postproc.robot.arm import Arm
 from postproc.robot.cell import Cell
 from postproc.robot.pose import (
     MM,
-    angles_near,
     has_unknown,
     inverse,
     is_unknown,
     lengths,
     products,
     rotation_from_vector,
-    rotation_from_zyz,
     rotation_vector,
     times,
 )
@@ -355,26 +353,26 @@ def _mark(
 
 
 def new_numbers(visits: Visits, plan: Plan, solved: Commands, aside: Floats) -> Floats:
-    """Express commands in the numbers of the file, (n, 6).
+    """Express commands in the numbers of the file, (n, w).
 
     P = inverse(UFRAME) . BASE . command. A fly point is moved so that the path passes
-    it where it should. An orientation that does not change keeps its written angles.
+    it where it should. An orientation that does not change keeps its written numbers.
     """
     numbers = np.array(visits.values)
     joints = visits.target == Meaning.JOINTS
-    numbers[joints] += np.rad2deg(solved.q[joints] - plan.q[joints])
+    numbers[joints, :6] += np.rad2deg(solved.q[joints] - plan.q[joints])
     poses = np.flatnonzero(visits.target == Meaning.POSE)
     placed = base_in_uframe(visits, poses)
     command = np.array(solved.command[poses, :, 3])
     command[:, :3] -= aside[poses]
     point = np.einsum("nij,nj->ni", placed, command)
     numbers[poses, :3] = point[:, :3] / MM
-    rows = solved.turned[visits.target[solved.turned] == Meaning.POSE]
-    if len(rows) == 0:
-        return numbers
-    by = rotation_from_vector(turns_in_file(visits, solved)[rows])
-    written = numbers[rows, 3:]
-    numbers[rows, 3:] = angles_near(written, by @ rotation_from_zyz(written))
+    rows, dialect = solved.turned, visits.dialect
+    rows = rows[visits.target[rows] == Meaning.POSE]
+    if len(rows):
+        by = rotation_from_vector(turns_in_file(visits, solved)[rows])
+        numbers[rows] = dialect.turned(numbers[rows], by)
+    numbers[poses] = dialect.reflagged(numbers[poses], solved.q[poses])
     return numbers
 
 

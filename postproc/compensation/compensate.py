@@ -52,10 +52,10 @@ from postproc.compensation.rewrite import (
 from postproc.compensation.targets import rounded_points
 from postproc.exceptions import CellError, ProgramError
 from postproc.files import variables_of
-from postproc.language.pdl2.routines import ASSUMED_STILL
+from postproc.language.languages import language_of
 from postproc.language.source import Source
 from postproc.language.stamp import is_stamped
-from postproc.language.visits import Visits, told_once
+from postproc.language.visits import ASSUMED_STILL, Visits, told_once
 from postproc.model.model import Model
 from postproc.model.statistics import ErrorStatistics
 from postproc.robot.cell import Cell
@@ -124,7 +124,7 @@ def refuse(files: Mapping[str, bytes], cell: Cell, model: Model) -> None:
 
     Raises:
         ProgramError: A file is stamped.
-        CellError: The controller's absolute accuracy is on.
+        CellError: The controller's absolute accuracy is on, or nothing is said of it.
         ModelError: The model was made for another arm.
     """
     for name, data in files.items():
@@ -140,6 +140,16 @@ def refuse(files: Mapping[str, bytes], cell: Cell, model: Model) -> None:
             cell.path,
             "the controller compensates on its own: this would do it twice",
             "Switch that option off on the controller, then here",
+            place="$.robot.absolute_accuracy",
+        )
+    language = language_of(next(iter(files)))
+    said = "absolute_accuracy" in cell.file.robot.model_fields_set
+    if not (language.tells_accuracy or said):
+        raise CellError(
+            cell.path,
+            f"{language.name} programs do not show whether the controller compensates "
+            "on its own (Absolute Accuracy)",
+            "Write absolute_accuracy = false under [robot] once it is off",
             place="$.robot.absolute_accuracy",
         )
     model.check_arm(cell.arm)

@@ -46,7 +46,7 @@ class Agreement:
         usable: Every arrival can be corrected, (m,).
         spread_mm: Largest distance between two arrivals' corrections, (m,) [mm],
             bounded from above by the diagonal of their bounding box.
-        values: The mean of the arrivals' corrected numbers, (m, 6).
+        values: The mean of the arrivals' corrected numbers, (m, w).
         change_mm: The mean of what must agree, (m, 3) [mm].
         arrivals: Number of arrivals, (m,).
     """
@@ -68,7 +68,7 @@ def agree(
     Args:
         literal: Literal of every visit, (n,), -1 where it has none.
         usable: The visit can be corrected, (n,).
-        corrected: Numbers that this visit would write, (n, 6) in the file's units.
+        corrected: Numbers that this visit would write, (n, w) in the file's units.
         correction_mm: What must agree: the change of the target in its own frame,
             (n, k) [mm], of which the first three are that of its place.
     """
@@ -91,7 +91,7 @@ def agree(
     low, high = np.full(width, np.inf), np.full(width, -np.inf)
     np.minimum.at(low, inverse, correction_mm[rows])
     np.maximum.at(high, inverse, correction_mm[rows])
-    total, moved = np.zeros((m, 6)), np.zeros((m, 3))
+    total, moved = np.zeros((m, corrected.shape[1])), np.zeros((m, 3))
     np.add.at(total, inverse, corrected[rows])
     np.add.at(moved, inverse, correction_mm[rows, :3])
     spread = np.linalg.norm(high - low, axis=1)
@@ -157,14 +157,14 @@ def move_dependants(
         visits: n arrivals.
         agreement: What the m literals change by.
         chosen: Literals that do change, (m,).
-        values: Numbers of every visit, (n, 6).
+        values: Numbers of every visit, (n, w).
     """
     rows, at = dependants(visits, agreement)
     rows, at = rows[chosen[at]], at[chosen[at]]
     if len(rows) == 0:
         return
     direct = np.flatnonzero(visits.literal >= 0)
-    written = np.zeros((len(visits.literals), 6))
+    written = np.zeros((len(visits.literals), values.shape[1]))
     written[visits.literal[direct]] = visits.values[direct]
     values[rows] += agreement.values[at] - written[agreement.literal[at]]
 
@@ -285,7 +285,7 @@ def with_dependants(
         visits: n arrivals.
         planned: Their plan.
         cell: The robot's surroundings.
-        values: Numbers of every visit after the correction, (n, 6).
+        values: Numbers of every visit after the correction, (n, w).
         shift: What those with numbers of their own move by, (n, 3) [m]; else 0.
     """
     t, moves = planned.targets, np.array(shift)
@@ -453,7 +453,7 @@ class Proposal:
 
     Attributes:
         edited: Literals that get new numbers, (m,).
-        values: Their numbers, (m, 6) in the file's units.
+        values: Their numbers, (m, w) in the file's units.
         corrected: Visits whose target moves, (n,).
         decisions: What was decided for every visit.
         usable: Visits that could be corrected if they had their points alone, (n,).

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from postproc.arrays import Bools, Floats, Interned, Ints
-from postproc.language.visits import OrntType, Switch, Visits
+from postproc.language.dialect import Terms
+from postproc.language.visits import OrientationLaw, Switch, Visits
 from postproc.motion.branches import OTHER_TURN, nearest_turns, on_other_turns
 from postproc.motion.path import NEAR, arcs_of
 from postproc.motion.planner import Plan
@@ -66,7 +67,7 @@ class Reasons:
         return self.texts[int(self.index[visit])]
 
 
-# How far configuration strings count: $CNFG_CARE, $TURN_CARE and $JNT_MTURN.
+# How far configuration flags count.
 #
 # On a line or an arc the path decides where the arm arrives, and the string is checked
 # (likely): where it is and says otherwise, the controller stops. A JOINT move takes
@@ -80,26 +81,6 @@ SAID = {
     Switch.OFF: "FALSE",
     Switch.UNKNOWN: "not known",
 }
-STOPS = (
-    "${} is TRUE, and the path arrives on another {} than the configuration string "
-    "says: the controller stops here"
-)
-MAY_STOP = (
-    "${} is not known here, and the path arrives on another {} than the configuration "
-    "string says"
-)
-BRANCH = (
-    "the configuration string says another branch than the arm is on: whether it "
-    "counts is not sure with $CNFG_CARE {}"
-)
-NEAREST = (
-    "the configuration string says another turn than the nearest: which of them counts "
-    "is not sure with $TURN_CARE {} and $JNT_MTURN {}"
-)
-WRIST = (
-    "the configuration string says another branch or turn than the nearest: whether a "
-    "line with $ORNT_TYPE WRIST_JNT leads there is not sure"
-)
 AFTER = "it comes from a move whose branch or turn is not sure"
 
 
@@ -153,6 +134,7 @@ def mark_configuration_flags(
         Whether what comes from a visit is doubtful, (n,).
     """
     _mark_stops(visits, overruled(targets, plan), reasons)
+    _mark_misses(visits, targets, plan, reasons)
     doubtful = _mark_either_way(visits, targets, plan, arm, reasons)
     doubtful[:1] |= begun
     if not doubtful.any():
@@ -163,14 +145,29 @@ def mark_configuration_flags(
 
 
 def _mark_stops(visits: Visits, path: Overruled, reasons: Reasons) -> None:
-    """Leave alone where the controller checks a string that the path contradicts."""
-    for rows, name, what, column in (
-        (path.branch, "CNFG_CARE", "branch", CNFG),
-        (path.turn, "TURN_CARE", "turn", TURN),
+    """Leave alone where the controller checks flags that the path contradicts."""
+    terms = visits.dialect.terms
+    for rows, stops, may_stop, column in (
+        (path.branch, terms.branch_stops, terms.branch_may_stop, CNFG),
+        (path.turn, terms.turn_stops, terms.turn_may_stop, TURN),
     ):
         care = visits.care[:, column]
-        reasons.mark(rows & (care == Switch.ON), STOPS.format(name, what))
-        reasons.mark(rows & (care == Switch.UNKNOWN), MAY_STOP.format(name, what))
+        reasons.mark(rows & (care == Switch.ON), stops)
+        reasons.mark(rows & (care == Switch.UNKNOWN), may_stop)
+
+
+def _mark_misses(
+    visits: Visits, targets: Targets, plan: Plan, reasons: Reasons
+) -> None:
+    """Leave alone where finer flags than branch and turn are not those of the plan."""
+    rows = np.flatnonzero((targets.kind == TargetKind.POSE) & (targets.slot >= 0))
+    missed = visits.dialect.misses(visits.values[rows], plan.q[rows])
+    if missed is None:
+        return
+    off, terms = np.zeros(len(visits), dtype=bool), visits.dialect.terms
+    off[rows] = missed & ~np.isnan(plan.q[rows, 0])
+    off &= visits.care[:, CNFG] != Switch.OFF
+    reasons.mark(off, terms.branch_stops)
 
 
 def _mark_either_way(
@@ -187,13 +184,14 @@ def _mark_either_way(
         branch &= _from_other_branch(visits, targets, plan, arm, branch)
     if turn.any():
         turn &= _other_turn(visits, targets, plan, arm)
-    reasons.mark(wrist & (branch | turn), WRIST)
+    terms = visits.dialect.terms
+    reasons.mark(wrist & (branch | turn), terms.wrist)
     for value in Switch:
         rows = branch & (visits.care[:, CNFG] == value)
-        reasons.mark(rows, BRANCH.format(SAID[value]))
+        reasons.mark(rows, terms.branch.format(SAID[value]))
     for pair in np.unique(visits.care[turn][:, [TURN, MULTI]], axis=0):
         rows = turn & (visits.care[:, [TURN, MULTI]] == pair).all(axis=1)
-        reasons.mark(rows, NEAREST.format(*(SAID[Switch(v)] for v in pair)))
+        reasons.mark(rows, terms.nearest.format(*(SAID[Switch(v)] for v in pair)))
     return np.asarray(branch | turn)
 
 
@@ -291,12 +289,6 @@ def _followers(
 
 PLAY = np.deg2rad(0.01)  # [rad] what a joint may be off without another side
 LEAST = 3e-4  # sine below which e is 0 or 180 deg
-UNKNOWN = "$ORNT_TYPE is not known here: how the tool turns on the way is not sure"
-ANGLES = (
-    "with $ORNT_TYPE {} how the tool turns on the way is not sure: use RS_WORLD, or "
-    "turn it in smaller steps"
-)
-ARC = "with $ORNT_TYPE {} how the tool turns on this arc is not sure: use RS_WORLD"
 
 
 def mark_orientation_interpolation(
@@ -310,17 +302,25 @@ def mark_orientation_interpolation(
         plan: Where they lead.
         reasons: Why visits must not be compensated; more are added.
     """
-    kind, cartesian = visits.ornt_type, targets.move != Motion.JOINT
-    reasons.mark(cartesian & (kind == OrntType.UNKNOWN), UNKNOWN)
+    kind, cartesian = visits.orientation_law, targets.move != Motion.JOINT
+    law, terms = OrientationLaw, visits.dialect.terms
+    reasons.mark(cartesian & (kind == law.UNKNOWN), terms.law_unknown)
     arc = targets.move == Motion.CIRCULAR
-    reasons.mark(arc & targets.wrist_joint, ARC.format("WRIST_JNT"))
-    for rows, text in (
-        (arc & (kind == OrntType.RS_TRAJ), ARC.format("RS_TRAJ")),
-        (cartesian & (kind == OrntType.EUL_WORLD), ANGLES.format("EUL_WORLD")),
-        (cartesian & (kind == OrntType.RPY_WORLD), ANGLES.format("RPY_WORLD")),
+    reasons.mark(arc & targets.wrist_joint, _said(terms, terms.arc, law.WRIST_JOINTS))
+    for rows, text, said in (
+        (arc, terms.arc, law.ALONG_PATH),
+        (cartesian, terms.angles, law.EULER_ANGLES),
+        (cartesian, terms.angles, law.ROLL_PITCH_YAW),
     ):
+        rows = rows & (kind == said)
         if rows.any():
-            reasons.mark(_may_be_off(visits, targets, plan, rows), text)
+            off = _may_be_off(visits, targets, plan, rows)
+            reasons.mark(off, _said(terms, text, said))
+
+
+def _said(terms: Terms, text: str, law: OrientationLaw) -> str:
+    """Name a law in a message, where the language has a name for it."""
+    return text.format(terms.laws[law] if law < len(terms.laws) else law.name)
 
 
 def _may_be_off(visits: Visits, targets: Targets, plan: Plan, rows: Bools) -> Bools:
@@ -337,13 +337,13 @@ def _may_be_off(visits: Visits, targets: Targets, plan: Plan, rows: Bools) -> Bo
     begin = (plan.tcp[source] @ to_flange @ targets.tool[edge])[:, :3, :3]
     end = plan.tcp[edge][:, :3, :3]
     turn = np.linalg.norm(rotation_vector(np.swapaxes(begin, 1, 2) @ end), axis=1)
-    kind = visits.ornt_type[edge]
+    kind = visits.orientation_law[edge]
     world = pose_from_record(visits.frames)[visits.base[edge]][:, :3, :3]
     sine = np.minimum(_sine(world @ begin, kind), _sine(world @ end, kind))
     off = np.minimum(turn**2 / (8.0 * np.maximum(sine, LEAST)), turn)
     both = np.maximum(_sine(world @ begin, kind), _sine(world @ end, kind))
-    same = (both < LEAST) & (kind == OrntType.EUL_WORLD)
-    off = np.where(kind == OrntType.RS_TRAJ, turn, np.where(same, 0.0, off))
+    same = (both < LEAST) & (kind == OrientationLaw.EULER_ANGLES)
+    off = np.where(kind == OrientationLaw.ALONG_PATH, turn, np.where(same, 0.0, off))
     found[edge[off > PLAY]] = True
     return found
 
@@ -354,7 +354,7 @@ def _sine(R: Floats, kind: Ints) -> Floats:
     Sine of the Euler angle e, or cosine of the pitch, of orientations (k, 3, 3).
     """
     euler, pitch = np.hypot(R[:, 0, 2], R[:, 1, 2]), np.hypot(R[:, 0, 0], R[:, 1, 0])
-    return np.asarray(np.where(kind == OrntType.RPY_WORLD, pitch, euler))
+    return np.asarray(np.where(kind == OrientationLaw.ROLL_PITCH_YAW, pitch, euler))
 
 
 # Arcs whose circle hangs by a hair: their points are left alone.

@@ -279,7 +279,7 @@ class Replanner:
         """Find where the program leads with other numbers.
 
         Args:
-            values: The numbers, (n, 6) in the program's units.
+            values: The numbers, (n, w) in the program's units.
             lead: What is known of the first sides, see `direction.arrivals`.
         """
         new = replace(self._visits, values=values)
@@ -499,7 +499,10 @@ def write_and_read_back(
     """Write the numbers; return the edits, and the proposal as it will be read."""
     with clock("rewrite"):
         literals, edited = reading.visits.literals, proposal.edited
-        edits = number_edits(literals, reading.sources, edited, proposal.values)
+        dialect = reading.visits.dialect
+        edits = number_edits(
+            literals, reading.sources, edited, proposal.values, dialect
+        )
         values = read_back(reading.visits, edited, edits)
     decisions = replace(proposal.decisions, corrected=values)
     return edits, replace(proposal, decisions=decisions)

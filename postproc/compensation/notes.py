@@ -81,10 +81,7 @@ def overruled_strings(visits: Visits, rows: Bools) -> list[Diagnostic]:
     Where the program says whether strings are checked, it is as the program wants it,
     or the target is left alone.
     """
-    text = (
-        "the path arrives on another branch or turn than the configuration string "
-        "says: the string is kept, the path decides"
-    )
+    text = visits.dialect.terms.overruled
     return _each(visits, rows, "configuration-overruled", text)
 
 

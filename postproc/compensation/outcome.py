@@ -20,12 +20,13 @@ from postproc.compensation.record import (
     sidecar_path,
 )
 from postproc.exceptions import ProgramError
-from postproc.language.pdl2.effects import (
+from postproc.language.visits import (
     MOTION_UNKNOWN,
     NEVER_REACHED,
     NOT_FOLLOWED,
+    Diagnostic,
+    Visits,
 )
-from postproc.language.visits import Diagnostic, Visits
 from postproc.model.statistics import ErrorStatistics
 from postproc.robot.pose import MM
 
@@ -60,7 +61,7 @@ class Decisions:
         q: Commanded joint angles of the original program, (n, 6) [rad].
         direction: Arrival direction, (n, 6): +1, -1, or 0 where not known.
         side: Where every joint lies in its play, (n, 6) from -1 to 1.
-        corrected: The six numbers in the file after correction, (n, 6).
+        corrected: The numbers in the file after correction, (n, w).
         correction: Change of the commanded TCP, base frame, (n, 3) [m].
         std_error: Standard error of the model there, per axis, (n, 3) [m].
         turn: Rotation of the commanded tool, base frame, (n, 3) [rad]; empty where

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
@@ -16,13 +17,8 @@ from postproc.compensation.eligibility import (
 )
 from postproc.compensation.options import Options
 from postproc.compensation.targets import targets_from_visits
-from postproc.exceptions import ProgramError
-from postproc.files import base_name, is_variables
-from postproc.language.pdl2.effects import dead_lines, dead_moves
-from postproc.language.pdl2.interpreter import resolve
-from postproc.language.pdl2.job import Start
-from postproc.language.pdl2.program import Program, parse
-from postproc.language.pdl2.variable_file import VariableFile, read_variables
+from postproc.language.interface import Start
+from postproc.language.languages import language_of
 from postproc.language.rewrite import Skeleton
 from postproc.language.source import Edit, Source, source_from_bytes
 from postproc.language.visits import Diagnostic, Visits
@@ -59,7 +55,7 @@ class Reading:
     cloned: tuple[tuple[Edit, ...], ...] = ()
     given: tuple[Source, ...] = ()
     begins: tuple[int, ...] = (0,)
-    programs: tuple[Program, ...] = ()
+    programs: tuple[Any, ...] = ()
     missed: Mapping[str, Ints] = field(default_factory=dict)
 
     @property
@@ -127,6 +123,7 @@ def start_of(cell: Cell) -> Start:
         aux=dict(cell.aux),
         taught=cell.taught,
         arm=cell.arm_number,
+        source=str(cell.path),
     )
 
 
@@ -145,7 +142,7 @@ def prepared(cell: Cell, model: Model, options: Options) -> Cell:
 def read_program(
     files: Mapping[str, bytes],
     cell: Cell,
-    known: Sequence[Program] = (),
+    known: Sequence[Any] = (),
 ) -> Reading:
     """Parse a program and resolve its visits.
 
@@ -159,83 +156,15 @@ def read_program(
         ProgramError: A file is no program text, or the program is another arm's.
     """
     sources = [source_from_bytes(name, data) for name, data in files.items()]
-    program = _parsed(sources[0], known)
-    if program.main is None and not program.routines:
-        problem, cure = "the file holds no BEGIN .. END", "Give a PDL2 program"
-        raise ProgramError(sources[0].name, problem, cure)
-    _refuse_other_arm(program, cell)
-    pages: list[Program] = []
-    variables: VariableFile | None = None
-    texts = [Skeleton.of(program.lines)]
-    for source in sources[1:]:
-        if is_variables(source.name):
-            variables = read_variables(source)
-            texts.append(Skeleton.of(variables.lines))
-        else:
-            pages.append(_named(_parsed(source, known)))
-            texts.append(Skeleton.of(pages[-1].lines))
-    others = _by_name(program, pages)
-    resolved = resolve(program, start_of(cell), variables, others)
-    missed = dead_moves([program, *pages], resolved.visits)
-    found = (*resolved.diagnostics, *missed)
-    visits, parsed = resolved.visits, (program, *pages)
-    corrected = {visits.files[k] for k in np.unique(visits.literals.file).tolist()}
-    kept = tuple(p for p in parsed if p.lines.source.name not in corrected)
-    lost = dead_lines([program, *pages], visits)
-    return Reading(tuple(texts), visits, found, programs=kept, missed=lost)
-
-
-def _refuse_other_arm(program: Program, cell: Cell) -> None:
-    """Refuse a program that says it is another arm's than the cell's.
-
-    Raises:
-        ProgramError: It is.
-    """
-    if program.arm not in (0, cell.arm_number):
-        problem = (
-            f"PROG_ARM = {program.arm}: it is a program of arm {program.arm}, and the "
-            f"cell ({cell.path}) is of arm {cell.arm_number}"
-        )
-        cure = (
-            f"Give the cell of that arm, with arm_number = {program.arm} under "
-            "[robot], and its model"
-        )
-        name = program.lines.source.name
-        raise ProgramError(name, problem, cure, line=program.head)
-
-
-def _parsed(source: Source, known: Sequence[Program]) -> Program:
-    """Parse a file, unless it was parsed before."""
-    for program in known:
-        if program.lines.source == source:
-            return program
-    return parse(source)
-
-
-def _named(page: Program) -> Program:
-    """Name a page whose PROGRAM line is not understood after its file."""
-    return page if page.name else replace(page, name=_file(page))
-
-
-def _file(program: Program) -> str:
-    return base_name(program.lines.source.name)
-
-
-def _by_name(program: Program, pages: list[Program]) -> dict[str, Program]:
-    """Find pages by the names of their files and programs, in their order.
-
-    Raises:
-        ProgramError: A name means two of them: their variables could not be told apart.
-    """
-    own = {_file(program): program, program.name: program}
-    found = {_file(page): page for page in pages}
-    for page in pages:
-        file = _file(page)
-        same = [own.get(page.name, page), own.get(file, page), found[file]]
-        if any(one is not page for one in (*same, found.setdefault(page.name, page))):
-            problem, cure = "its program has the name of another file", "Rename one"
-            raise ProgramError(page.lines.source.name, problem, cure)
-    return found
+    language = language_of(sources[0].name)
+    found = language.read(sources, start_of(cell), known)
+    return Reading(
+        found.texts,
+        found.visits,
+        found.diagnostics,
+        programs=found.programs,
+        missed=found.missed,
+    )
 
 
 def plan_visits(

@@ -15,6 +15,7 @@ from postproc.compensation.parallel import in_background
 from postproc.compensation.program import Reading
 from postproc.compensation.record import FileRecord, Sidecar, block_checksums, sha256
 from postproc.exceptions import PostprocError
+from postproc.language.languages import language_of
 from postproc.language.rewrite import Skeleton, difference
 from postproc.language.rewrite import edits as number_edits
 from postproc.language.source import (
@@ -89,10 +90,11 @@ def write_numbers(
     Args:
         reading: The program.
         literals: Literals that get new numbers, (m,).
-        values: Their numbers, (m, 6) in the file's units.
+        values: Their numbers, (m, w) in the file's units.
         model: Id of the model, for the stamp.
     """
-    found = number_edits(reading.visits.literals, reading.sources, literals, values)
+    v = reading.visits
+    found = number_edits(v.literals, reading.sources, literals, values, v.dialect)
     return write_edits(reading, found, model)
 
 
@@ -102,13 +104,14 @@ def write_edits(
     """Make edits of numbers, file by file; as `write_numbers`."""
     nothing = not any(edits) and not any(reading.cloned)
     files, records = {}, {}
+    comment = language_of(reading.sources[0].name).comment
     for number, (source, cloned) in enumerate(reading.originals):
         own = edits[number]
         if cloned:
             own = Replacements.of(compose(cloned, own))
         files[source.name] = source.data
         if own or (number == 0 and nothing):
-            stamp = stamp_line(__version__, model, source)
+            stamp = stamp_line(__version__, model, source, comment)
             files[source.name] = stamp + apply(source.data, own)
             records[source.name] = record(source, stamp, own, files[source.name])
     return Output(files, records, edits)
@@ -128,7 +131,7 @@ def record(
 
 
 def read_back(visits: Visits, edited: Ints, edits: Sequence[Replacements]) -> Floats:
-    """Give the numbers of all visits once the edits are made, (n, 6).
+    """Give the numbers of all visits once the edits are made, (n, w).
 
     Those of edited literals come out bit by bit, those of targets computed from them
     but for what adding constants rounds off.
@@ -142,7 +145,7 @@ def read_back(visits: Visits, edited: Ints, edits: Sequence[Replacements]) -> Fl
     new, changed = edited_numbers(visits.literals, edited, edits)
     rows, at = _among(visits.literal, edited)
     values[rows] = np.where(changed[at], new[at], values[rows])
-    moved = np.zeros((len(edited), 6))
+    moved = np.zeros((len(edited), visits.values.shape[1]))
     moved[at] = values[rows] - visits.values[rows]
     rows, at = _among(visits.follows, edited)
     values[rows] += moved[at]
@@ -152,15 +155,15 @@ def read_back(visits: Visits, edited: Ints, edits: Sequence[Replacements]) -> Fl
 def edited_numbers(
     literals: Literals, edited: Ints, edits: Sequence[Replacements]
 ) -> tuple[Floats, Bools]:
-    """Read the new numbers of some literals, (m, 6), and tell which there are.
+    """Read the new numbers of some literals, (m, w), and tell which there are.
 
     Args:
         literals: All literals of a program.
         edited: Those to look at, (m,).
         edits: The edits of numbers, file by file.
     """
-    new = np.zeros((len(edited), 6))
-    changed = np.zeros((len(edited), 6), dtype=bool)
+    shape = len(edited), literals.start.shape[1]
+    new, changed = np.zeros(shape), np.zeros(shape, dtype=bool)
     for file, own in enumerate(edits):
         mine = np.flatnonzero(literals.file[edited] == file)
         if len(own) == 0:
@@ -205,7 +208,7 @@ def check_output(
         after: The output, parsed again.
         output: What was written.
         edited: Literals that were given new numbers, (m,).
-        values: The numbers of all visits as they should be read, (n, 6).
+        values: The numbers of all visits as they should be read, (n, w).
 
     Raises:
         VerificationError: Another byte differs, or the program reads differently.

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import re
 from dataclasses import dataclass
 
 import numpy as np
 
 from postproc.arrays import Bools, Floats, Ints
 from postproc.compensation.eligibility import Reasons
-from postproc.language.visits import Diagnostic, FlyTrajectory, FlyType, Meaning, Visits
+from postproc.language.visits import Blend, Diagnostic, Meaning, Visits, ZoneRule
 from postproc.motion.path import arc_per_start
 from postproc.motion.targets import Fly, TargetKind, Targets
 from postproc.robot.cell import Cell
@@ -26,20 +25,22 @@ from postproc.robot.trajectory import Motion
 
 # What a program says of its fly points, and what it leaves to be assumed.
 
-USUAL_DISTANCE = 5.0  # [mm] where $FLY_DIST is not set, as simulation systems take it
-USUAL_OVERLAP = 100.0  # [%] where $FLY_PER is not set
+USUAL_DISTANCE = (
+    5.0  # [mm] where no size of a zone is set, as simulation systems take it
+)
+USUAL_OVERLAP = 100.0  # [%] where no overlap is set
 FAR = 0.1  # [mm] passing a point farther away than this is worth a note
 
 
 def rounding_of(visits: Visits) -> tuple[Ints, Floats, Floats]:
     """Tell how fly points are rounded: `Fly`, distances [m] and overlaps, (n,) each."""
-    cartesian = visits.fly_type == FlyType.FLY_CART
-    passing = cartesian & (visits.fly_traj == FlyTrajectory.FLY_PASS)
-    within = visits.fly_traj == FlyTrajectory.FLY_TOL
+    cartesian = visits.blend == Blend.ZONE
+    passing = cartesian & (visits.zone_rule == ZoneRule.PASS)
+    within = visits.zone_rule == ZoneRule.WITHIN
     rounding = np.where(cartesian, np.where(within, Fly.WITHIN, Fly.FROM), Fly.OVERLAP)
-    rounding[passing | (visits.fly_dist_mm < 0)] = Fly.EXACT
-    distance = np.nan_to_num(visits.fly_dist_mm, nan=USUAL_DISTANCE) * MM
-    overlap = np.nan_to_num(visits.fly_per, nan=USUAL_OVERLAP) / 100.0
+    rounding[passing | (visits.zone_mm < 0)] = Fly.EXACT
+    distance = np.nan_to_num(visits.zone_mm, nan=USUAL_DISTANCE) * MM
+    overlap = np.nan_to_num(visits.overlap_percent, nan=USUAL_OVERLAP) / 100.0
     return rounding, np.maximum(distance, 0.0), np.clip(overlap, 0.0, 1.0)
 
 
@@ -60,8 +61,7 @@ def rounded_points(visits: Visits, away: Floats) -> list[Diagnostic]:
         worst = int(far[np.argmax(away[far])])
         text = (
             f"the path passes {len(far)} fly points by more than {FAR:g} mm, this one "
-            f"by {away[worst]:.2f} mm, as $FLY_TYPE, $FLY_DIST and $FLY_PER say: it is "
-            "corrected for where the path passes; to hit it, stop there (MOVE)"
+            f"by {away[worst]:.2f} mm, {visits.dialect.terms.corner}"
         )
         found.append(_note(visits, worst, "fly-corner", text))
     return found
@@ -69,15 +69,15 @@ def rounded_points(visits: Visits, away: Floats) -> list[Diagnostic]:
 
 def _assumed(visits: Visits, rows: Ints) -> str:
     """List what fly points take for granted."""
-    cartesian = visits.fly_type[rows] == FlyType.FLY_CART
+    cartesian = visits.blend[rows] == Blend.ZONE
     overlap = ~cartesian | (visits.motion[rows] == Motion.JOINT)
+    type_, percent, size, rule = visits.dialect.terms.blend
     untold = [
-        ("$FLY_TYPE FLY_NORM", visits.fly_type[rows] == FlyType.UNSET),
-        (f"$FLY_PER {USUAL_OVERLAP:g}", overlap & np.isnan(visits.fly_per[rows])),
-        (f"$FLY_DIST {USUAL_DISTANCE:g}",
-         cartesian & np.isnan(visits.fly_dist_mm[rows])),
-        ("$FLY_TRAJ FLY_FROM",
-         cartesian & (visits.fly_traj[rows] == FlyTrajectory.UNSET)),
+        (type_, visits.blend[rows] == Blend.UNSET),
+        (percent.format(USUAL_OVERLAP),
+         overlap & np.isnan(visits.overlap_percent[rows])),
+        (size.format(USUAL_DISTANCE), cartesian & np.isnan(visits.zone_mm[rows])),
+        (rule, cartesian & (visits.zone_rule[rows] == ZoneRule.UNSET)),
     ]  # fmt: skip
     taken = ", ".join(text for text, where in untold if where.any())
     return taken and f"fly points are rounded as with {taken}: not set in the program"
@@ -92,7 +92,6 @@ def _note(visits: Visits, row: int, code: str, text: str) -> Diagnostic:
 # World . BASE . FK(q) . TOOL = UFRAME . P, so that the TCP in the arm's base frame is
 # inverse(BASE) . UFRAME . P.
 
-FLAG = re.compile(r"([SEW])|T([123])\s*:\s*([+-]?\d+)", re.IGNORECASE)
 JOINTS = (Meaning.JOINTS, Meaning.HOME, Meaning.CALIBRATION)
 PLACED = (
     TargetKind.POSE,
@@ -129,7 +128,7 @@ def targets_from_visits(visits: Visits, cell: Cell) -> tuple[Targets, Reasons]:
 
     Args:
         visits: What the program says.
-        cell: $HOME and the kinds of auxiliary axes.
+        cell: Home, calibration pose and the kinds of auxiliary axes.
 
     Returns:
         The targets, and why visits must not be compensated as far as frames, tools,
@@ -143,7 +142,7 @@ def targets_from_visits(visits: Visits, cell: Cell) -> tuple[Targets, Reasons]:
     _explain(visits, values, poses, reasons)
     lost = (outside | visits.tool_remote) & (kind != TargetKind.JOINTS)
     lost |= _unplaced(kind, tcp, joints, frames)
-    slot, turns = configurations(visits.configs)
+    slot, turns = visits.dialect.flags(visits.config, visits.configs, values)
     rounding, distance, overlap = rounding_of(visits)
     pred_start, pred = arc_per_start(
         visits.motion, visits.via, visits.pred_start, visits.pred
@@ -158,8 +157,8 @@ def targets_from_visits(visits: Visits, cell: Cell) -> tuple[Targets, Reasons]:
         ),
         joints=joints,
         tool=frames.tool,
-        slot=np.where(visits.config_given & poses, slot[visits.config], -1),
-        turns=turns[visits.config],
+        slot=np.where(visits.config_given & poses, slot, -1),
+        turns=turns,
         nearest_turn=visits.nearest_turn,
         fly=visits.fly,
         rounding=rounding,
@@ -197,27 +196,6 @@ def moved_targets(targets: Targets, visits: Visits, cell: Cell, rows: Ints) -> T
     return targets.moved_to(rows, tcp, joints)
 
 
-def configurations(configs: tuple[str, ...]) -> tuple[Ints, Floats]:
-    """Read configuration strings.
-
-    Returns:
-        Slots 4 W + 2 S + E, (k,), and turns T1, T2, T3, (k, 3), NaN where not written.
-
-    >>> slot, turns = configurations(("S W T1:0 T2:-1",))
-    >>> int(slot[0]), turns[0].tolist()
-    (6, [0.0, -1.0, nan])
-    """
-    slots = np.zeros(len(configs), dtype=np.int64)
-    turns = np.full((len(configs), 3), np.nan)
-    for k, text in enumerate(configs):
-        for flag, axis, turn in FLAG.findall(text):
-            if flag:
-                slots[k] |= {"W": 4, "S": 2, "E": 1}[flag.upper()]
-            else:
-                turns[k, int(axis) - 1] = int(turn)
-    return slots, turns
-
-
 def _frames(visits: Visits) -> Frames:
     """Look up the frames of visits."""
     return Frames(few_frames(visits)[visits.tool], _user_frames(visits, ALL))
@@ -236,7 +214,7 @@ def few_frames(visits: Visits) -> Floats:
 
 
 def _values(visits: Visits, cell: Cell, rows: Rows = ALL) -> Floats:
-    """Fill in $HOME and $CAL_SYS where the program does not tell them."""
+    """Fill in home and calibration pose where the program does not tell them."""
     values, goal = np.array(visits.values[rows]), visits.target[rows]
     untold = np.isnan(values).any(axis=1)
     for target, joints in (
@@ -244,7 +222,8 @@ def _values(visits: Visits, cell: Cell, rows: Rows = ALL) -> Floats:
         (Meaning.CALIBRATION, cell.calibration),
     ):
         if joints is not None:
-            values[untold & (goal == target)] = np.rad2deg(joints)
+            rows_there = np.flatnonzero(untold & (goal == target))
+            values[rows_there, :6] = np.rad2deg(joints)
     return values
 
 
@@ -255,7 +234,7 @@ def _places(
     target = visits.target[rows]
     n = len(target)
     if (target == Meaning.POSE).all():  # most programs are nothing else
-        tcp = times(user, pose_from_record(values))
+        tcp = times(user, visits.dialect.poses(values))
         return np.full(n, int(TargetKind.POSE)), tcp, np.full((n, 6), np.nan)
     kind = np.full(n, int(TargetKind.UNKNOWN))
     tcp, joints = np.full((n, 4, 4), np.nan), np.full((n, 6), np.nan)
@@ -265,12 +244,12 @@ def _places(
         TargetKind.JOINT_STEP,
     )
     in_joints |= target == Meaning.BY
-    joints[in_joints] = np.deg2rad(values[in_joints])
+    joints[in_joints] = np.deg2rad(values[in_joints, :6])
     poses = np.isin(target, (Meaning.POSE, Meaning.NEAR, Meaning.FOR))
     kind[poses] = np.where(
         target[poses] == Meaning.FOR, TargetKind.TOWARDS, TargetKind.POSE
     )
-    tcp[poses] = times(user[poses], pose_from_record(values[poses]))
+    tcp[poses] = times(user[poses], visits.dialect.poses(values[poses]))
     near = target == Meaning.NEAR
     tcp[near] = tcp[near] @ _along_approach(-visits.distance_mm[rows][near])
     away = target == Meaning.AWAY
@@ -329,16 +308,17 @@ def _auxiliary(visits: Visits, cell: Cell, reasons: Reasons) -> Bools:
 
 def _explain(visits: Visits, values: Floats, poses: Bools, reasons: Reasons) -> None:
     """Say why visits are not compensated."""
-    reasons.mark(visits.tool_remote, "$TOOL_RMT: the arm holds the part")
+    terms = visits.dialect.terms
+    reasons.mark(visits.tool_remote, terms.tool_remote)
     reasons.mark(
         np.isnan(values).any(axis=1) & (poses | np.isin(visits.target, JOINTS)),
         "a value is not known",
     )
     unknown = is_unknown(few_frames(visits))
     for name, which, who in (
-        ("$TOOL", visits.tool, np.ones(len(visits), dtype=bool)),
-        ("$BASE", visits.base, poses),
-        ("$UFRAME", visits.uframe, poses),
+        (terms.tool, visits.tool, np.ones(len(visits), dtype=bool)),
+        (terms.base, visits.base, poses),
+        (terms.uframe, visits.uframe, poses),
     ):
         reasons.mark(
             unknown[which] & who,

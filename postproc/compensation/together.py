@@ -101,12 +101,13 @@ def _tried(work: Callable[P, T], *args: P.args, **named: P.kwargs) -> T | Except
 
 
 def _passes(readings: Sequence[Reading]) -> Iterator[list[Reading]]:
-    """Put programs into passes, one after the other; an empty one goes alone."""
+    """Put programs of one language into passes; an empty one goes alone."""
     waiting: list[Reading] = []
     size = 0
     for reading in readings:
         n = len(reading.visits)
-        if waiting and (n == 0 or size == 0 or size + n > PASS):
+        full = n == 0 or size == 0 or size + n > PASS
+        if waiting and (full or waiting[0].visits.dialect != reading.visits.dialect):
             yield waiting
             waiting, size = [], 0
         waiting.append(reading)

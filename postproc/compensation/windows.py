@@ -36,16 +36,17 @@ NOTHING_FIRST = ("names", "reasons")  # tables whose first row means that there 
 
 
 def concatenate(programs: Sequence[Visits]) -> Visits:
-    """Put the visits of programs one after the other, each a program of its own."""
+    """Put the visits of programs of one dialect one after the other."""
     columns = {
         f.name: _joined(f.name, programs)
         for f in fields(Visits)
-        if f.name not in ("literals", "aux", "pred_start")
+        if f.name not in ("literals", "aux", "pred_start", "dialect")
     }
     return Visits(
         literals=_literals(programs),
         aux=_aux(programs),
         pred_start=_starts(programs),
+        dialect=programs[0].dialect,
         **columns,
     )
 
@@ -136,7 +137,7 @@ STEPS = (
 )  # fmt: skip
 SHARED = {
     "files", "configs", "names", "frames", "frame_taught", "reasons", "pred_start",
-    "pred", "literals",
+    "pred", "literals", "dialect",
 }  # fmt: skip
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from postproc import _native
 from postproc.arrays import Floats, Indices, Ints, chunks, floats
 from postproc.exceptions import ProgramError
+from postproc.language.dialect import Dialect
 from postproc.language.lines import Lines, read_lines
 from postproc.language.shapes import Shapes
 from postproc.language.source import Replacements, Source, apply, as_texts
@@ -33,6 +34,7 @@ class Skeleton:
         shape: Index into `shapes`, (n,).
         line: 1-based physical lines, (n,).
         start, end: Byte offsets of the numbers, (m,).
+        reread: Reads another text of the same language.
     """
 
     source: Source
@@ -41,6 +43,7 @@ class Skeleton:
     line: Indices
     start: Indices
     end: Indices
+    reread: Callable[[Source], Skeleton] | None = None
 
     @classmethod
     def of(cls, lines: Lines) -> Skeleton:
@@ -85,7 +88,7 @@ def difference(
         return _first_difference(apply(old.data, allowed), new, stamp)
     try:
         a = before if isinstance(before, Skeleton) else Skeleton.read(before)
-        b = after if isinstance(after, Skeleton) else Skeleton.read(after)
+        b = after if isinstance(after, Skeleton) else (a.reread or Skeleton.read)(after)
     except ProgramError as problem:
         return str(problem)
     if len(a.shape) != len(b.shape) or len(a.start) != len(b.start):
@@ -142,16 +145,13 @@ def _first_difference(meant: bytes, after: Source, stamp: int) -> str:
 
 Texts = NDArray[np.bytes_]
 
-MM_DECIMALS, DEGREE_DECIMALS, JOINT_DECIMALS = 3, 4, 5
-_POSE_DECIMALS = (MM_DECIMALS,) * 3 + (DEGREE_DECIMALS,) * 3
-_JOINT_DECIMALS = (JOINT_DECIMALS,) * 6
-
 
 def edits(
     literals: Literals,
     sources: Sequence[Source],
     rows: Ints | Sequence[int],
     new_values: Floats | Sequence[Floats],
+    dialect: Dialect,
 ) -> tuple[Replacements, ...]:
     """Return the edits that give literals new values, file by file.
 
@@ -162,12 +162,13 @@ def edits(
         literals: Where the numbers stand.
         sources: The files that `literals.file` means.
         rows: Literals to change, (r,).
-        new_values: Their new numbers, (r, 6) [mm, deg].
+        new_values: Their new numbers, (r, w).
+        dialect: How many decimals they have.
 
     Raises:
         ValueError: A new value is not finite.
     """
-    new_values = np.asarray(new_values, dtype=float).reshape(-1, 6)
+    new_values = np.asarray(new_values, dtype=float).reshape(-1, dialect.width)
     if not np.isfinite(new_values).all():
         raise ValueError("a new value of a target is not finite")
     rows = np.asarray(rows, dtype=np.int64)
@@ -176,7 +177,7 @@ def edits(
         mine = np.flatnonzero(literals.file[rows] == file)
         start, end = literals.start[rows[mine]], literals.end[rows[mine]]
         joints = literals.joints[rows[mine], None]
-        least = np.where(joints, _JOINT_DECIMALS, _POSE_DECIMALS)
+        least = np.where(joints, dialect.joint_decimals, dialect.pose_decimals)
         written = start >= 0
         order = np.argsort(start[written], kind="stable")
         start, end = start[written][order], end[written][order]

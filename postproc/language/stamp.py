@@ -10,13 +10,15 @@ from postproc.language.source import UTF8_MARK, Source
 
 _INDENT = 400  # blanks before a stamp that an editor has moved
 _STAMP = re.compile(
-    rb"[ \t]*--[ \t]*postproc[ \t]+(?P<version>\S+)[ \t]+"
+    rb"[ \t]*(?:--|!)[ \t]*postproc[ \t]+(?P<version>\S+)[ \t]+"
     rb"model[ \t]*=[ \t]*(?P<model>\S+)"
     rb"[ \t]+source[ \t]*=[ \t]*(?P<source>[0-9a-f]{64})\b(?P<rest>[^\r\n]*)"
     rb"(?:\r\n|\n|\r|\Z)",
     re.IGNORECASE,  # an editor may have changed the case, and blanks
 )
-_BEGINS = re.compile(rb"--[ \t]*postproc[ \t]+\S+[ \t]+model[ \t]*=", re.IGNORECASE)
+_BEGINS = re.compile(  # "--" or "!", said so that searching it is fast
+    rb"[-!](?:-|(?<=!))[ \t]*postproc[ \t]+\S+[ \t]+model[ \t]*=", re.IGNORECASE
+)
 
 
 @dataclass(frozen=True)
@@ -35,12 +37,12 @@ class Stamp:
     source: str
 
 
-def stamp_line(version: str, model: str, source: Source) -> bytes:
-    """Return the stamp of a source, in its own line ending.
+def stamp_line(version: str, model: str, source: Source, comment: str = "--") -> bytes:
+    """Return the stamp of a source, in its own line ending, behind a comment's begin.
 
     It holds no date, so that the same input gives the same bytes.
     """
-    text = f"-- postproc {version} model={model} source={source_hash(source)}"
+    text = f"{comment} postproc {version} model={model} source={source_hash(source)}"
     return text.encode("ascii", "replace") + source.newline
 
 

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from postproc.arrays import Bools, Floats, Ints, read_only
+from postproc.language.dialect import Dialect
 
 START = -1  # predecessor: wherever the arm stands when the program starts
 NO_VALUE = "it has no value in the program or its variable file"  # ends a reason
@@ -24,12 +25,12 @@ ELSEWHERE = -2  # predecessor: a place that the program text does not tell
 
 
 class Meaning(IntEnum):
-    """What the six numbers of a visit mean."""
+    """What the numbers of a visit mean."""
 
-    POSE = 0  # x, y, z [mm], a, e, r [deg] of the tool in the user frame
-    JOINTS = 1  # controller joint angles [deg]
-    HOME = 2  # $HOME: the numbers are in the cell file
-    CALIBRATION = 3  # $CAL_SYS
+    POSE = 0  # x, y, z [mm] and orientation of the tool in the user frame
+    JOINTS = 1  # the first six: controller joint angles [deg]
+    HOME = 2  # the arm's home: the numbers are in the cell file
+    CALIBRATION = 3  # its calibration pose, likewise
     RELATIVE_TOOL = 4  # x, y, z [mm] from where the arm is, in the tool frame
     RELATIVE_BASE = 5  # .. in the base frame
     RELATIVE_UFRAME = 6  # .. in the user frame
@@ -50,34 +51,34 @@ class Switch(IntEnum):
     UNKNOWN = 3  # it is set, to what only the run tells
 
 
-class FlyType(IntEnum):
-    """$FLY_TYPE."""
+class Blend(IntEnum):
+    """How a point that is passed without stopping is rounded."""
 
     UNSET = 0
-    FLY_NORM = 1
-    FLY_CART = 2
+    OVERLAP = 1  # the next move begins before this one ends
+    ZONE = 2  # a curve replaces the corner inside of a zone
 
 
-class OrntType(IntEnum):
-    """$ORNT_TYPE: how the tool turns on its way along a line or an arc."""
+class OrientationLaw(IntEnum):
+    """How the tool turns on its way along a line or an arc."""
 
     UNSET = 0
-    RS_WORLD = 1
-    RS_TRAJ = 2
-    EUL_WORLD = 3
-    RPY_WORLD = 4
-    WRIST_JNT = 5
+    ONE_AXIS = 1  # about one axis that stands still
+    ALONG_PATH = 2  # with the direction of the path
+    EULER_ANGLES = 3  # three angles in proportion
+    ROLL_PITCH_YAW = 4  # .. other ones
+    WRIST_JOINTS = 5  # the wrist's joints in proportion
     UNKNOWN = 6  # it is set, to what only the run tells
 
 
-class FlyTrajectory(IntEnum):
-    """$FLY_TRAJ."""
+class ZoneRule(IntEnum):
+    """What the size of a zone is."""
 
     UNSET = 0
-    FLY_AUTO = 1
-    FLY_PASS = 2
-    FLY_TOL = 3
-    FLY_FROM = 4
+    AUTO = 1
+    PASS = 2  # the point is passed exactly
+    WITHIN = 3  # the path passes the point at this distance
+    FROM = 4  # the path is left at this distance from the point
 
 
 def slim(column: NDArray[Any]) -> NDArray[Any]:
@@ -102,8 +103,8 @@ class Literals:
     Attributes:
         file: Index into `Visits.files`, (m,).
         line: 1-based line of the first number, (m,).
-        start, end: Byte offsets of each number in its file, (m, 6); -1 where the
-            component is not written as a number.
+        start, end: Byte offsets of each number in its file, (m, w); -1 where the
+            component is not written as a number. w as in `Visits.values`.
         joints: True where the numbers are joint angles, (m,).
         name: Variable or array element, or "" for an inline literal; m strings.
         shared: True where another program may read it too (exported), (m,).
@@ -150,37 +151,40 @@ class Visits:
         motion: `Motion`, (n,).
         target: `Meaning`, (n,).
         via: True at the VIA point of an arc, (n,).
-        values: The six numbers, (n, 6), NaN where not known.
+        values: The numbers of the target as `dialect` spells them, (n, w), NaN where
+            not known.
         distance_mm: For NEAR and FOR, (n,).
         aux: Auxiliary axis values, (n, k), NaN where there is none.
         config: Index into `configs`, (n,).
         configs: Configuration strings verbatim; "" where none was written.
-        config_given: True where a configuration string was written, (n,).
+        config_given: True where configuration flags were written, (n,).
         literal: Index into `literals`, (n,), -1 where no number may be edited.
         follows: Literal that a computed target moves along with (its numbers are those
             of the literal plus constants), (n,), -1 where there is none.
         name: Index into `names`, (n,); names[0] is "" (inline literal).
         tool, base, uframe: Index into `frames`, (n,), -1 where not known.
-        frames: Position records (k, 6) [mm, deg].
+        frames: Position records (k, 6) [mm, deg], as cell files hold them.
         frame_taught: True where the text marks the frame as taught, (k,).
-        tool_remote: $TOOL_RMT is TRUE: the arm holds the part, (n,).
-        nearest_turn: $JNT_MTURN is FALSE, (n,).
-        care: $CNFG_CARE, $TURN_CARE and $JNT_MTURN as `Switch`, (n, 3).
-        fly: True for MOVEFLY, (n,).
-        fly_dist_mm: $FLY_DIST, (n,), NaN where unset; negative: off.
-        fly_per: $FLY_PER [%], (n,), NaN where unset.
-        fly_type, fly_traj: `FlyType` and `FlyTrajectory`, (n,).
-        lin_spd: $LIN_SPD [m/s], (n,), NaN where unset.
-        rot_spd: $ROT_SPD [rad/s], (n,), NaN where unset.
+        tool_remote: The tool stands still and the arm holds the part, (n,).
+        nearest_turn: Joints go to the nearest turn, whatever the flags say, (n,).
+        care: Whether branch and turn are checked, and turns may be far, `Switch`,
+            (n, 3).
+        fly: True where the arm passes the target without stopping, (n,).
+        zone_mm: Size of the zone, (n,), NaN where unset; negative: none.
+        overlap_percent: Overlap of moves [%], (n,), NaN where unset.
+        blend, zone_rule: `Blend` and `ZoneRule`, (n,).
+        lin_spd: Speed along a path [m/s], (n,), NaN where unset.
+        rot_spd: Speed of turning [rad/s], (n,), NaN where unset.
         override: Product of the speed overrides that hold, (n,) in (0, 1].
-        wrist_joint: $ORNT_TYPE is WRIST_JNT, (n,).
-        ornt_type: `OrntType`, (n,).
+        wrist_joint: On a line the wrist turns joint by joint, (n,).
+        orientation_law: `OrientationLaw`, (n,).
         reason: Index into `reasons`, (n,); 0 means that the visit may be compensated.
         reasons: Why a visit is display only; reasons[0] is "".
         pred_start: Offsets into `pred`, (n + 1,).
         pred: Predecessor visits; START or ELSEWHERE where it is no visit.
-        measure_id: Ids of `-- MEASURE <id>` comments, n strings or "" where none.
+        measure_id: Ids of ``MEASURE <id>`` comments, n strings or "" where none.
         literals: The places in the text.
+        dialect: What numbers and flags of the program mean, and its words.
     """
 
     files: tuple[str, ...]
@@ -208,21 +212,22 @@ class Visits:
     nearest_turn: Bools
     care: Ints
     fly: Bools
-    fly_dist_mm: Floats
-    fly_per: Floats
-    fly_type: Ints
-    fly_traj: Ints
+    zone_mm: Floats
+    overlap_percent: Floats
+    blend: Ints
+    zone_rule: Ints
     lin_spd: Floats
     rot_spd: Floats
     override: Floats
     wrist_joint: Bools
-    ornt_type: Ints
+    orientation_law: Ints
     reason: Ints
     reasons: tuple[str, ...]
     pred_start: Ints
     pred: Ints
     measure_id: tuple[str, ...]
     literals: Literals
+    dialect: Dialect
 
     def __post_init__(self) -> None:
         read_only(self)
@@ -265,6 +270,13 @@ def line_ranges(lines: Ints | Sequence[int]) -> str:
 
 
 # What a user's program can contain is no exception: it is collected and reported.
+
+NEVER_REACHED = "never-reached"  # moves that no way from the start leads to
+OTHER_ARM = "other-arm"  # a target that is another arm's
+MOTION_UNKNOWN = "motion-unknown"  # a statement that may move and is not understood
+NOT_FOLLOWED = frozenset({NEVER_REACHED, MOTION_UNKNOWN, OTHER_ARM})
+"""Findings that tell of targets without a visit, or may: they keep their values."""
+ASSUMED_STILL = "assumed-still"  # a routine that is taken to move nothing
 
 
 @dataclass(frozen=True, order=True)

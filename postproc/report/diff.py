@@ -23,8 +23,8 @@ from postproc.compensation.outcome import (
 )
 from postproc.compensation.parallel import in_background
 from postproc.exceptions import ProgramError
-from postproc.files import find_variables, is_variables
-from postproc.language.pdl2.names import entry_names
+from postproc.files import find_variables, is_module, is_variables
+from postproc.language.languages import language_of
 from postproc.language.scan import BLANKS, mask_of, scan_lines
 from postproc.language.stamp import read_stamp
 
@@ -360,10 +360,19 @@ class Compared:
 
     def targets(self, lines: Ints) -> list[str]:
         """Name what the numbers on lines of the original, ascending, belong to."""
-        if is_variables(self.original.name):
-            return list(entry_names(self.lines, lines.tolist()))
+        if is_named_by_file(self.original.name):
+            language = language_of(self.original.name)
+            names = language.target_names(
+                self.original.name, self.lines, lines.tolist()
+            )
+            return list(names)
         texts = (self.lines[line - 1].decode("latin-1") for line in lines.tolist())
         return [target_name(text) for text in texts]
+
+
+def is_named_by_file(place: str) -> bool:
+    """Tell whether a line alone does not tell which target it belongs to."""
+    return is_variables(place) or is_module(place)
 
 
 def _read_lines(path: Path) -> tuple[TextLines, bool]:
@@ -388,8 +397,8 @@ def compare_files(original: Path, compensated: Path) -> Compared:
     before, _ = _read_lines(original)
     after, stamped = _read_lines(compensated)
     rows = joined_rows(original.name, list(_rows(original.name, before, after)))
-    if is_variables(original.name):
-        rows = _named_by_entries(rows, before)
+    if is_named_by_file(original.name):
+        rows = _named_by_language(original.name, rows, before)
     return Compared(original, compensated, before, rows, stamped)
 
 
@@ -414,12 +423,21 @@ def _text_rows(file: str, lines: Ints, sign: str, texts: Sequence[bytes]) -> Dif
     return replace(DiffRows.bare(file, lines, [""] * len(lines)), texts=told)
 
 
-def _named_by_entries(rows: DiffRows, lines: Sequence[bytes]) -> DiffRows:
-    """Name rows of a variable file by their variables."""
+def _named_by_language(file: str, rows: DiffRows, lines: Sequence[bytes]) -> DiffRows:
+    """Name rows as the language of their file does; joint angles are no distance."""
     own = (rows.targets[k] for k in rows.target.tolist())
-    entries = entry_names(lines, rows.line.tolist())
+    language, numbers = language_of(file), rows.line.tolist()
+    entries = language.target_names(file, lines, numbers)
     names = [name or target for name, target in zip(entries, own, strict=True)]
-    return replace(rows, targets=names, target=np.arange(len(names)))
+    texts = (lines[k - 1].decode("latin-1") if k else "" for k in numbers)
+    joints = np.fromiter(map(language.holds_joints, texts), bool, len(numbers))
+    return replace(
+        rows,
+        targets=names,
+        target=np.arange(len(names)),
+        change_mm=np.where(joints, np.nan, rows.change_mm),
+        has_change=rows.has_change & ~joints,
+    )
 
 
 # Two programs, with the variable files beside them.

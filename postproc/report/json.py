@@ -7,7 +7,6 @@ from collections.abc import Iterator
 from dataclasses import asdict
 
 import numpy as np
-from numpy.typing import NDArray
 
 from postproc.arrays import (
     Cells,
@@ -22,12 +21,14 @@ from postproc.arrays import (
 )
 from postproc.compensation.arrivals import ArrivalStates
 from postproc.compensation.outcome import Outcome, Status
+from postproc.language.visits import Meaning, Visits
 from postproc.report.in_time import told_in_time
 from postproc.robot.pose import MM
 from postproc.robot.trajectory import Motion
 
 AT_ONCE = 10_000  # visits
 SIGNS = ("-1", "0", "1")
+JOINTS = 6  # numbers of a joint target; a pose may have more
 
 
 def report_text(outcome: Outcome) -> str:
@@ -79,7 +80,6 @@ def _columns(outcome: Outcome, rows: Ints) -> dict[str, list[Cells]]:
     """Say what stands behind every key, for some visits."""
     v, d, told = outcome.visits, outcome.decisions, outcome.arrivals
     move = np.where(v.via[rows], len(Motion), v.motion[rows])
-    has = v.literal[rows] >= 0
     placed, turned = len(outcome.position) > 0, len(d.turn) > 0
     degrees = (
         {"correction_deg": [_rounded(np.rad2deg(d.turn[rows]), 6)]} if turned else {}
@@ -96,8 +96,8 @@ def _columns(outcome: Outcome, rows: Ints) -> dict[str, list[Cells]]:
         "side": [_rounded(d.side[rows], 3)],
         "status": [named([s.name.lower() for s in Status], d.status[rows], json.dumps)],
         "why": [named(d.reasons, d.why[rows], json.dumps)],
-        "original": [_as_written(v.values[rows], has)],
-        "corrected": [_as_written(d.corrected[rows], has)],
+        "original": [_as_written(v, v.values, rows)],
+        "corrected": [_as_written(v, d.corrected, rows)],
         "position_mm": [position],
         "correction_mm": [_rounded(d.correction[rows] / MM, 5)],
         **degrees,
@@ -154,9 +154,12 @@ def _rounded(values: Floats, decimals: int) -> Cells:
     return fixed(values, decimals).listed()
 
 
-def _as_written(values: Floats, written: NDArray[np.bool_]) -> Cells:
-    """Write the numbers of the file (k, 6); nothing where the file holds none."""
-    return shortest(values, 9).listed().unless(~written, b"[]")
+def _as_written(visits: Visits, values: Floats, rows: Ints) -> Cells:
+    """Write the numbers of the file (k, w); nothing where the file holds none."""
+    values, none = values[rows], visits.literal[rows] < 0
+    if values.shape[1] > JOINTS:
+        values[visits.target[rows] == Meaning.JOINTS, JOINTS:] = np.nan
+    return shortest(values, 9).listed().unless(none, b"[]")
 
 
 def finite(value: object) -> object:

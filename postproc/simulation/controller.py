@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from postproc.arrays import Floats
 from postproc.exceptions import PlanError, PostprocError
-from postproc.language.visits import START, FlyTrajectory, FlyType, Meaning, Visits
+from postproc.language.visits import START, Blend, Meaning, Visits, ZoneRule
 from postproc.robot.trajectory import Motion
 from postproc.simulation.kinematics import (
     ELBOW,
@@ -23,7 +23,6 @@ from postproc.simulation.kinematics import (
     logarithm,
     nearest_turns,
     pose,
-    pose_of_record,
     require_closed_form,
     solve_branch,
     undo,
@@ -476,14 +475,14 @@ def _goal_joints(
 ) -> Floats:
     kind, values = Meaning(visits.target[i]), visits.values[i]
     if kind is Meaning.JOINTS:
-        return _known(np.radians(values))
+        return _known(np.radians(values[:6]))
     if kind is Meaning.BY:
-        return here + _known(np.radians(values))
+        return here + _known(np.radians(values[:6]))
     if kind in (Meaning.HOME, Meaning.CALIBRATION):
         return _place_of(setup, kind)
     config = None
     if kind in (Meaning.POSE, Meaning.NEAR) and visits.config_given[i]:
-        config = visits.configs[visits.config[i]]
+        config = visits.dialect.flag_words(visits.configs[visits.config[i]], values)
     goal = _goal_pose(setup, visits, i, frames, here)
     free = bool(visits.nearest_turn[i])
     return joints_of_pose(setup.chain, goal @ undo(frames.tool), here, config, free)
@@ -500,7 +499,7 @@ def _goal_pose(
         return np.asarray(setup.chain.flange(joints[None])[0] @ tool)
     present = setup.chain.flange(here[None])[0] @ tool
     if kind in (Meaning.POSE, Meaning.NEAR, Meaning.FOR):
-        target = pose_of_record(_known(values))
+        target = visits.dialect.poses(_known(values)[None])[0]
         if kind is Meaning.NEAR:
             target = target @ _shift(0.0, 0.0, -visits.distance_mm[i])
         goal = flange_of(target, tool, frames.base, frames.uframe) @ tool
@@ -678,7 +677,7 @@ NO_WAY = 1e-9  # [m], [rad]
 def in_space(visits: Visits, i: int, j: int) -> bool:
     """Tell whether the corner between moves i and j is a Cartesian one."""
     cartesian = Motion.JOINT not in (visits.motion[i], visits.motion[j])
-    return bool(cartesian and visits.fly_type[i] == FlyType.FLY_CART)
+    return bool(cartesian and visits.blend[i] == Blend.ZONE)
 
 
 def shares(
@@ -690,9 +689,9 @@ def shares(
     passes at $FLY_DIST (FLY_TOL), or nothing (FLY_PASS); at most half of the shorter
     move. FLY_NORM: the last $FLY_PER % of the braking time.
     """
-    kind, trajectory = visits.fly_type[i], visits.fly_traj[i]
-    passing = kind == FlyType.FLY_CART and trajectory == FlyTrajectory.FLY_PASS
-    if not visits.fly[i] or visits.via[i] or passing or visits.fly_dist_mm[i] < 0:
+    kind, trajectory = visits.blend[i], visits.zone_rule[i]
+    passing = kind == Blend.ZONE and trajectory == ZoneRule.PASS
+    if not visits.fly[i] or visits.via[i] or passing or visits.zone_mm[i] < 0:
         return 0.0, 0.0
     if not in_space(visits, i, j):
         return _overlapping(chain, visits, (i, j), ways)
@@ -700,8 +699,8 @@ def shares(
     if min(lengths) < NO_WAY:
         return 0.0, 0.0
     zone = 0.5 * min(lengths)
-    distance = _given(visits.fly_dist_mm[i], USUAL_DISTANCE) * 1e-3
-    if trajectory == FlyTrajectory.FLY_TOL:
+    distance = _given(visits.zone_mm[i], USUAL_DISTANCE) * 1e-3
+    if trajectory == ZoneRule.WITHIN:
         # The parabola's vertex is half as far from the point as the middle of its ends.
         turn = np.linalg.norm(_heading(ways[1], 0) - _heading(ways[0], -1))
         distance = distance * 4 / max(float(turn), NO_WAY)
@@ -713,7 +712,9 @@ def _overlapping(
     chain: Chain, visits: Visits, moves: tuple[int, int], ways: tuple[Way, Way]
 ) -> tuple[float, float]:
     """Brake the first move and start the second at the same time."""
-    percent = np.clip(_given(visits.fly_per[moves[0]], USUAL_PERCENT), 0.0, 100.0)
+    percent = np.clip(
+        _given(visits.overlap_percent[moves[0]], USUAL_PERCENT), 0.0, 100.0
+    )
     pushes, times = [], []
     for move, way in zip(moves, ways, strict=True):
         most = np.abs(way.joints[-1] - way.joints[0]) / chain.speed

@@ -13,8 +13,8 @@ from scipy.optimize import least_squares
 from postproc.compensation.command import solve
 from postproc.compensation.compensate import compensate
 from postproc.compensation.program import plan_visits, read_program, states_of
+from postproc.language.grammars import line_parser
 from postproc.language.lines import read_lines
-from postproc.language.pdl2.parser import line_parser
 from postproc.language.pdl2.program import parse
 from postproc.language.source import source_from_bytes
 from postproc.model.model import Model, load_model

@@ -13,8 +13,8 @@ from tests.generated.landing import program
 SEEDS = range(40)
 TOLD = (  # columns that mean the same wherever they stand
     "line", "motion", "target", "via", "distance_mm", "config_given", "tool_remote",
-    "nearest_turn", "care", "fly", "fly_dist_mm", "fly_per", "fly_type", "fly_traj",
-    "lin_spd", "rot_spd", "override", "wrist_joint", "ornt_type",
+    "nearest_turn", "care", "fly", "zone_mm", "overlap_percent", "blend", "zone_rule",
+    "lin_spd", "rot_spd", "override", "wrist_joint", "orientation_law",
 )  # fmt: skip
 LOOKED_UP = (
     ("file", "files"), ("config", "configs"), ("name", "names"), ("reason", "reasons"),

@@ -17,8 +17,8 @@ from postproc.compensation.windows import (
     window,
     windows,
 )
+from postproc.language.interface import Start
 from postproc.language.pdl2.interpreter import resolve
-from postproc.language.pdl2.job import Start
 from postproc.language.pdl2.program import parse
 from postproc.language.source import source_from_bytes
 from postproc.language.visits import Visits

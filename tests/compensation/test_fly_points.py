@@ -6,33 +6,33 @@ import numpy as np
 import pytest
 
 from postproc.compensation.targets import rounding_of
-from postproc.language.visits import FlyTrajectory, FlyType
+from postproc.language.visits import Blend, ZoneRule
 from postproc.motion.path import BlendCoupling
 from postproc.motion.targets import Fly
 from tests.made_visits import visits
 
 NAN = float("nan")
-NORM, CART = FlyType.FLY_NORM, FlyType.FLY_CART
+NORM, CART = Blend.OVERLAP, Blend.ZONE
 
 
 @pytest.mark.parametrize(
     ("type_", "trajectory", "distance", "percent", "expected"),
     [
-        (CART, FlyTrajectory.FLY_FROM, 3.0, NAN, (Fly.FROM, 3e-3, 1.0)),
-        (CART, FlyTrajectory.UNSET, NAN, NAN, (Fly.FROM, 5e-3, 1.0)),
-        (CART, FlyTrajectory.FLY_TOL, 2.0, NAN, (Fly.WITHIN, 2e-3, 1.0)),
-        (CART, FlyTrajectory.FLY_PASS, 2.0, NAN, (Fly.EXACT, 2e-3, 1.0)),
-        (CART, FlyTrajectory.UNSET, -1.0, NAN, (Fly.EXACT, 0.0, 1.0)),
-        (NORM, FlyTrajectory.UNSET, NAN, 70.0, (Fly.OVERLAP, 5e-3, 0.7)),
-        (FlyType.UNSET, FlyTrajectory.UNSET, NAN, NAN, (Fly.OVERLAP, 5e-3, 1.0)),
-        (NORM, FlyTrajectory.UNSET, -1.0, 70.0, (Fly.EXACT, 0.0, 0.7)),
+        (CART, ZoneRule.FROM, 3.0, NAN, (Fly.FROM, 3e-3, 1.0)),
+        (CART, ZoneRule.UNSET, NAN, NAN, (Fly.FROM, 5e-3, 1.0)),
+        (CART, ZoneRule.WITHIN, 2.0, NAN, (Fly.WITHIN, 2e-3, 1.0)),
+        (CART, ZoneRule.PASS, 2.0, NAN, (Fly.EXACT, 2e-3, 1.0)),
+        (CART, ZoneRule.UNSET, -1.0, NAN, (Fly.EXACT, 0.0, 1.0)),
+        (NORM, ZoneRule.UNSET, NAN, 70.0, (Fly.OVERLAP, 5e-3, 0.7)),
+        (Blend.UNSET, ZoneRule.UNSET, NAN, NAN, (Fly.OVERLAP, 5e-3, 1.0)),
+        (NORM, ZoneRule.UNSET, -1.0, 70.0, (Fly.EXACT, 0.0, 0.7)),
     ],
 )
 def test_settings(type_, trajectory, distance, percent, expected) -> None:
     one = visits(
-        [0], [[0.0] * 6], fly=np.array([True]), fly_dist_mm=np.array([distance]),
-        fly_per=np.array([percent]), fly_type=np.array([int(type_)]),
-        fly_traj=np.array([int(trajectory)]),
+        [0], [[0.0] * 6], fly=np.array([True]), zone_mm=np.array([distance]),
+        overlap_percent=np.array([percent]), blend=np.array([int(type_)]),
+        zone_rule=np.array([int(trajectory)]),
     )  # fmt: skip
     rounding, metres, overlap = rounding_of(one)
     assert (rounding[0], metres[0], overlap[0]) == pytest.approx(expected)

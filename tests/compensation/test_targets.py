@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from postproc.compensation.targets import configurations, targets_from_visits
+from postproc.compensation.targets import targets_from_visits
+from postproc.language.pdl2.dialect import configurations
 from postproc.language.visits import Meaning
 from postproc.motion.targets import TargetKind
 from postproc.robot.cell import Cell, load_cell

@@ -5,6 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from postproc.language.pdl2.dialect import PDL2_DIALECT
 from postproc.language.pdl2.interpreter import resolve
 from postproc.language.pdl2.program import parse
 from postproc.language.rewrite import difference, edits
@@ -33,7 +34,7 @@ def test_new_numbers_have_enough_digits_and_nothing_else_changes() -> None:
     new = np.array(
         [[1.25, 2.5, 3.0001, -0.5, 45.1234561, 10.5], [1.000006, 2.5, -3, 4, 5, 6]]
     )
-    (mine,) = edits(literals, (source,), np.array([0, 1]), new)
+    (mine,) = edits(literals, (source,), np.array([0, 1]), new, PDL2_DIALECT)
     out = apply(source.data, mine)
     assert out == PROGRAM.replace(b"1.5,- 2.25 ", b"1.250,2.500 ").replace(
         b"-0.00000", b"-0.50000"
@@ -58,7 +59,7 @@ def test_a_value_that_is_none_is_refused() -> None:
     source = source_from_bytes("a.pdl", PROGRAM)
     literals = resolve(parse(source)).visits.literals
     with pytest.raises(ValueError, match="not finite"):
-        edits(literals, (source,), np.array([0]), np.full((1, 6), np.nan))
+        edits(literals, (source,), np.array([0]), np.full((1, 6), np.nan), PDL2_DIALECT)
 
 
 @given(st.floats(-1e4, 1e4), st.integers(0, 8))
@@ -77,7 +78,7 @@ def test_a_plus_belongs_to_its_number_and_stays_while_it_is_not_below_zero() -> 
     visits = resolve(parse(source)).visits
     assert visits.values[0].tolist() == [1500.0, 2.0, 0.01, 90.0, -45.0, 15.0]
     wanted = np.array([[1501.25, 3.5, -0.02, 91.0, 44.0, 16.0]])
-    (mine,) = edits(visits.literals, (source,), np.array([0]), wanted)
+    (mine,) = edits(visits.literals, (source,), np.array([0]), wanted, PDL2_DIALECT)
     out = apply(source.data, mine)
     assert b"POS(+1501.250, +3.500, -0.020, +91.0000, 44.0000, +16.0000, '')" in out
     again = resolve(parse(source_from_bytes("a.pdl", out))).visits

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from postproc.language.pdl2.dialect import PDL2_DIALECT
 from postproc.language.visits import Literals, Meaning, Visits
 from postproc.robot.trajectory import Motion
 
@@ -35,9 +36,9 @@ class Program:
             "wrist": False,
             "fly": False,
             "fly_dist": np.nan,
-            "fly_per": np.nan,
-            "fly_type": 0,
-            "fly_traj": 0,
+            "overlap_percent": np.nan,
+            "blend": 0,
+            "zone_rule": 0,
         }
         assert set(more) <= set(row)
         self.rows.append({**row, **more})
@@ -71,17 +72,18 @@ class Program:
             frame_taught=np.zeros(len(self.frames), dtype=bool),
             tool_remote=no.copy(), nearest_turn=column("nearest", bool),
             care=np.zeros((n, 3), dtype=np.int64),
-            fly=column("fly", bool), fly_dist_mm=column("fly_dist", float),
-            fly_per=column("fly_per", float), fly_type=column("fly_type", np.int64),
-            fly_traj=column("fly_traj", np.int64), lin_spd=column("speed", float),
+            fly=column("fly", bool), zone_mm=column("fly_dist", float),
+            overlap_percent=column("overlap_percent", float),
+            blend=column("blend", np.int64),
+            zone_rule=column("zone_rule", np.int64), lin_spd=column("speed", float),
             rot_spd=nan.copy(),
             override=np.ones(n), wrist_joint=column("wrist", bool),
-            ornt_type=nothing.copy(),
+            orientation_law=nothing.copy(),
             reason=nothing.copy(), reasons=("",),
             pred_start=np.cumsum([0] + [len(p) for p in preds]),
             pred=np.array([p for each in preds for p in each], dtype=np.int64),
             measure_id=tuple(r["id"] for r in self.rows),
-            literals=_no_literals(),
+            literals=_no_literals(), dialect=PDL2_DIALECT,
         )  # fmt: skip
 
 

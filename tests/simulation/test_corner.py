@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from postproc.compensation.targets import targets_from_visits
-from postproc.language.visits import FlyTrajectory, FlyType, Visits
+from postproc.language.visits import Blend, Visits, ZoneRule
 from postproc.motion.planner import plan
 from postproc.robot.cell import load_cell
 from postproc.robot.trajectory import Motion
@@ -39,7 +39,7 @@ def miss(visits: Visits) -> float:
     return float(np.linalg.norm(at - CORNER))
 
 
-CART = {"fly": True, "fly_type": int(FlyType.FLY_CART)}
+CART = {"fly": True, "blend": int(Blend.ZONE)}
 
 
 @pytest.mark.parametrize(
@@ -49,8 +49,8 @@ CART = {"fly": True, "fly_type": int(FlyType.FLY_CART)}
         (CART | {"fly_dist": 10.0}, 10 * np.sqrt(2) / 4),
         (CART | {"fly_dist": 500.0}, 50 * np.sqrt(2) / 4),
         (CART, 5 * np.sqrt(2) / 4),
-        (CART | {"fly_dist": 2.0, "fly_traj": int(FlyTrajectory.FLY_TOL)}, 2.0),
-        (CART | {"fly_dist": 9.0, "fly_traj": int(FlyTrajectory.FLY_PASS)}, 0.0),
+        (CART | {"fly_dist": 2.0, "zone_rule": int(ZoneRule.WITHIN)}, 2.0),
+        (CART | {"fly_dist": 9.0, "zone_rule": int(ZoneRule.PASS)}, 0.0),
         (CART | {"fly_dist": -1.0}, 0.0),
     ],
 )
@@ -60,14 +60,14 @@ def test_the_path_passes_the_corner(given: dict, expected: float) -> None:
 
 def test_less_overlap_passes_closer_by_its_square() -> None:
     whole, half = (
-        miss(square(fly=True, fly_type=int(FlyType.FLY_NORM), fly_per=percent))
+        miss(square(fly=True, blend=int(Blend.OVERLAP), overlap_percent=percent))
         for percent in (100.0, 50.0)
     )
     assert half == pytest.approx(whole / 4, rel=0.01) and whole > 0.1
 
 
-@pytest.mark.parametrize("kind", list(FlyType))
-def test_planner_and_controller_agree(tmp_path: Path, kind: FlyType) -> None:
+@pytest.mark.parametrize("kind", list(Blend))
+def test_planner_and_controller_agree(tmp_path: Path, kind: Blend) -> None:
     """Two codes of one law: in space here, joint by joint there."""
     path = tmp_path / "cell.toml"
     home = "[home]\njoints_deg = [0, 0, -90, 0, 45, 0]\n"
@@ -79,8 +79,8 @@ def test_planner_and_controller_agree(tmp_path: Path, kind: FlyType) -> None:
         xyz = CORNER + rng.uniform(-150, 150, 3)
         turn = [rng.uniform(-10, 10), rng.uniform(140, 160), rng.uniform(-10, 10)]
         motion = Motion.LINEAR if k % 3 else Motion.JOINT
-        fly = {"fly": k % 7 > 0, "fly_type": int(kind), "fly_dist": 8.0}
-        program.add([*xyz, *turn], motion, fly_per=80.0, **fly)
+        fly = {"fly": k % 7 > 0, "blend": int(kind), "fly_dist": 8.0}
+        program.add([*xyz, *turn], motion, overlap_percent=80.0, **fly)
     visits = program.visits()
     run = run_program(virtual_arm(1), VirtualCell(home=cell.home), visits)
     planned = plan(cell.arm, targets_from_visits(visits, cell)[0], 0.01)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from postproc.language.interface import Record
 from postproc.language.pdl2 import syntax as ast
 from postproc.language.pdl2.disturbances import DISTURBING
 from postproc.language.pdl2.effects import (
@@ -24,7 +25,7 @@ from postproc.language.pdl2.evaluate import (
     owned,
     parts_of,
 )
-from postproc.language.pdl2.job import Place, Record
+from postproc.language.pdl2.job import Place
 from postproc.language.pdl2.machine import (
     Execution,
     Machine,
@@ -35,7 +36,6 @@ from postproc.language.pdl2.machine import (
 )
 from postproc.language.pdl2.moves import move
 from postproc.language.pdl2.routines import (
-    ASSUMED_STILL,
     TRACKING,
     RoutineEffect,
     effect_of,
@@ -51,7 +51,7 @@ from postproc.language.pdl2.values import (
     Value,
     points_of,
 )
-from postproc.language.visits import ELSEWHERE
+from postproc.language.visits import ASSUMED_STILL, ELSEWHERE
 
 # Routines that cannot be followed: their moves are listed, what they change forgotten.
 #

@@ -51,6 +51,11 @@ class CloneTarget:
         """Return a text that tells variables apart."""
         return f"{self.file}:{self.scope}/{self.variable.name.lower()}"
 
+    @property
+    def name(self) -> str:
+        """Return its name as it is written."""
+        return self.variable.name
+
 
 def named_at(
     programs: Sequence[Program], file: int, line: int, via: bool, name: str

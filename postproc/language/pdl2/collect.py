@@ -12,6 +12,7 @@ import numpy as np
 from postproc.arrays import Bools, Indices, Ints, spans
 from postproc.language.pdl2.columns import Collector, SettingColumns, VisitColumns
 from postproc.language.pdl2.context import Point
+from postproc.language.pdl2.dialect import PDL2_DIALECT
 from postproc.language.pdl2.job import World
 from postproc.language.pdl2.machine import Key, Machine, MoveRun
 from postproc.language.pdl2.store import MANY
@@ -246,6 +247,7 @@ def collect(machine: Machine) -> Visits:
         pred=pred,
         measure_id=tuple(c.measure_id),
         literals=literals,
+        dialect=PDL2_DIALECT,
         **collector.settings.columns(c.setting),
     )
 

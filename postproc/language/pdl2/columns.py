@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
-from enum import IntEnum
 from typing import Any
 
 import numpy as np
@@ -19,11 +18,11 @@ from postproc.language.pdl2.program import Program
 from postproc.language.pdl2.store import Settings
 from postproc.language.pdl2.values import Nothing, Position, Value
 from postproc.language.visits import (
-    FlyTrajectory,
-    FlyType,
+    Blend,
     Meaning,
-    OrntType,
+    OrientationLaw,
     Switch,
+    ZoneRule,
     slim,
 )
 
@@ -32,6 +31,20 @@ from postproc.language.visits import (
 _FRAMES = ("tool", "base", "uframe")
 _CARE = ("cnfg_care", "turn_care", "jnt_mturn")
 _OVERRIDES = ("arm_spd_ovr", "prog_spd_ovr", "gen_ovr")
+_BLENDS = {"FLY_NORM": Blend.OVERLAP, "FLY_CART": Blend.ZONE}
+_ZONE_RULES = {
+    "FLY_AUTO": ZoneRule.AUTO,
+    "FLY_PASS": ZoneRule.PASS,
+    "FLY_TOL": ZoneRule.WITHIN,
+    "FLY_FROM": ZoneRule.FROM,
+}
+_LAWS = {
+    "RS_WORLD": OrientationLaw.ONE_AXIS,
+    "RS_TRAJ": OrientationLaw.ALONG_PATH,
+    "EUL_WORLD": OrientationLaw.EULER_ANGLES,
+    "RPY_WORLD": OrientationLaw.ROLL_PITCH_YAW,
+    "WRIST_JNT": OrientationLaw.WRIST_JOINTS,
+}
 _WITHOUT_UFRAME = (Meaning.JOINTS, Meaning.HOME, Meaning.CALIBRATION, Meaning.BY)
 
 
@@ -102,15 +115,15 @@ def _row(settings: Settings, frame: Any) -> dict[str, Any]:
         "tool_remote": settings.get("tool_rmt") is True,
         "nearest_turn": settings.get("jnt_mturn") is False,
         "care": [_switch(settings.get(name)) for name in _CARE],
-        "fly_dist_mm": _number(settings, "fly_dist"),
-        "fly_per": _number(settings, "fly_per"),
-        "fly_type": _word(settings, "fly_type", FlyType),
-        "fly_traj": _word(settings, "fly_traj", FlyTrajectory),
+        "zone_mm": _number(settings, "fly_dist"),
+        "overlap_percent": _number(settings, "fly_per"),
+        "blend": _word(settings, "fly_type", _BLENDS),
+        "zone_rule": _word(settings, "fly_traj", _ZONE_RULES),
         "lin_spd": _number(settings, "lin_spd"),
         "rot_spd": _number(settings, "rot_spd"),
         "override": _override(settings),
         "wrist_joint": settings.get("ornt_type") == "wrist_jnt",
-        "ornt_type": _ornt_type(settings),
+        "orientation_law": _orientation_law(settings),
     }
 
 
@@ -119,16 +132,16 @@ def _number(settings: Settings, name: str) -> float:
     return value if isinstance(value, float) else np.nan
 
 
-def _word(settings: Settings, name: str, words: type[IntEnum]) -> int:
-    """Return the number of a predefined word, 0 where it is not set or not known."""
-    said = str(settings.get(name)).upper()
-    return int(words[said]) if said in words.__members__ else 0
+def _word(settings: Settings, name: str, words: Mapping[str, int]) -> int:
+    """Return what a predefined word means, 0 where it is not set or not known."""
+    return words.get(str(settings.get(name)).upper(), 0)
 
 
-def _ornt_type(settings: Settings) -> OrntType:
+def _orientation_law(settings: Settings) -> OrientationLaw:
     if "ornt_type" not in settings:
-        return OrntType.UNSET
-    return OrntType(_word(settings, "ornt_type", OrntType) or OrntType.UNKNOWN)
+        return OrientationLaw.UNSET
+    said = _word(settings, "ornt_type", _LAWS)
+    return OrientationLaw(said or OrientationLaw.UNKNOWN)
 
 
 def _switch(value: Value | None) -> Switch:

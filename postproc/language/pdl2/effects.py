@@ -20,7 +20,7 @@ from postproc.language.pdl2.routines import (
     effect_of,
     report_unknown_routine,
 )
-from postproc.language.visits import Diagnostic, Visits, line_ranges
+from postproc.language.visits import NEVER_REACHED, Diagnostic, Visits, line_ranges
 
 # What a statement or a routine may do, read off its text.
 
@@ -381,12 +381,6 @@ def _names(statement: ast.Statement) -> Iterator[tuple[str, bool]]:
 
 
 # Moves that a program never comes to: their targets keep their values.
-
-NEVER_REACHED = "never-reached"
-OTHER_ARM = "other-arm"  # a target that is another arm's
-MOTION_UNKNOWN = "motion-unknown"
-NOT_FOLLOWED = frozenset({NEVER_REACHED, MOTION_UNKNOWN, OTHER_ARM})
-"""Findings that tell of targets without a visit, or may: they keep their values."""
 
 
 def dead_moves(programs: Sequence[Program], visits: Visits) -> list[Diagnostic]:

@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from postproc.language.interface import Start
 from postproc.language.pdl2 import syntax as ast
 from postproc.language.pdl2.calls import (
     assign,
@@ -21,7 +22,6 @@ from postproc.language.pdl2.calls import (
 from postproc.language.pdl2.collect import collect
 from postproc.language.pdl2.context import HANDLED, Context
 from postproc.language.pdl2.effects import (
-    MOTION_UNKNOWN,
     changed_arguments,
     is_harmless,
     live_rows,
@@ -30,7 +30,7 @@ from postproc.language.pdl2.effects import (
 )
 from postproc.language.pdl2.entries import POSITIONS, Entries, Entry
 from postproc.language.pdl2.evaluate import ProgramPoint
-from postproc.language.pdl2.job import FilePoints, Place, Start, World, base_variable
+from postproc.language.pdl2.job import FilePoints, Place, World, base_variable
 from postproc.language.pdl2.machine import (
     MAX_ROWS,
     MAX_STEPS,
@@ -64,7 +64,14 @@ from postproc.language.pdl2.values import (
 from postproc.language.pdl2.variable_file import VariableFile
 from postproc.language.pdl2.variable_file import VariableFile as ValueFile
 from postproc.language.shapes import lower
-from postproc.language.visits import ELSEWHERE, START, Diagnostic, Meaning, Visits
+from postproc.language.visits import (
+    ELSEWHERE,
+    MOTION_UNKNOWN,
+    START,
+    Diagnostic,
+    Meaning,
+    Visits,
+)
 from postproc.robot.trajectory import Motion
 
 # FOR loops: round by round where the bounds are constant, else over and over.

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import chain, repeat
@@ -12,6 +11,7 @@ import numpy as np
 
 from postproc.arrays import Bools, Ints
 from postproc.files import base_name
+from postproc.language.interface import Start
 from postproc.language.pdl2 import syntax as ast
 from postproc.language.pdl2.entries import Entries
 from postproc.language.pdl2.program import Body, Program, Variable, Variables
@@ -142,62 +142,6 @@ class InitialValues:
 
 
 # The files together: what a name means where, and what must stay.
-
-Record = tuple[float, ...] | None
-
-
-@dataclass(frozen=True)
-class Start:
-    """What the cell says about the moment at which the program starts.
-
-    Attributes:
-        tool, base, uframe: Position records (6,) [mm, deg], None where unknown.
-        routines: Outside routine to ``still``, ``moves`` or ``sets-frames``.
-        still: Patterns of outside routines, ``name`` or ``program.name``, that neither
-            move the arm nor set frames.
-        constant: Patterns of exported variables, ``name`` or ``program.name``, that no
-            other program changes.
-        payload_kg: What the arm carries, NaN where that is not known.
-        strict_calls: The shipped list of such routines does not count.
-        frame_tables: Outside routine to arguments (``"1,2"``) to the records of the
-            frames (``tool``, ``base``, ``uframe``) that it sets.
-        aux: Auxiliary axis to ``gun``, ``track`` or ``positioner``.
-        taught: Names of points that were taught with the robot.
-        arm: Number of our arm.
-    """
-
-    tool: Record = (0.0,) * 6
-    base: Record = (0.0,) * 6
-    uframe: Record = (0.0,) * 6
-    routines: Mapping[str, str] = field(default_factory=dict)
-    still: tuple[str, ...] = ()
-    strict_calls: bool = False
-    constant: tuple[str, ...] = ()
-    payload_kg: float = math.nan
-    frame_tables: Mapping[str, Mapping[str, Mapping[str, Record]]] = field(
-        default_factory=dict
-    )
-    aux: Mapping[int, str] = field(default_factory=dict)
-    taught: Collection[str] = frozenset()
-    arm: int = 1
-
-    def __post_init__(self) -> None:
-        """PDL2 does not tell cases apart: keep names in lower case."""
-        lower = {name.lower(): said for name, said in self.routines.items()}
-        object.__setattr__(self, "routines", lower)
-        object.__setattr__(self, "still", tuple(map(str.lower, self.still)))
-        object.__setattr__(self, "constant", tuple(map(str.lower, self.constant)))
-        tables = {name.lower(): table for name, table in self.frame_tables.items()}
-        object.__setattr__(self, "frame_tables", tables)
-        taught = frozenset(name.lower() for name in self.taught)
-        object.__setattr__(self, "taught", taught)
-
-    @property
-    def records(self) -> frozenset[Record]:
-        """Return all frames that the cell gives."""
-        tables = [e for table in self.frame_tables.values() for e in table.values()]
-        given = [record for entry in tables for record in entry.values()]
-        return frozenset([self.tool, self.base, self.uframe, *given])
 
 
 @dataclass(frozen=True)

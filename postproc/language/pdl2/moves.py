@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from postproc.language.pdl2 import syntax as ast
-from postproc.language.pdl2.effects import OTHER_ARM, goes_to_target, references
+from postproc.language.pdl2.effects import goes_to_target, references
 from postproc.language.pdl2.evaluate import SINGLE, parts_under
 from postproc.language.pdl2.machine import (
     Execution,
@@ -17,7 +17,7 @@ from postproc.language.pdl2.machine import (
 )
 from postproc.language.pdl2.store import Settings
 from postproc.language.pdl2.values import Nothing, Position, Value, Vector, unsure
-from postproc.language.visits import ELSEWHERE, NO_TARGET, Meaning
+from postproc.language.visits import ELSEWHERE, NO_TARGET, OTHER_ARM, Meaning
 from postproc.robot.trajectory import Motion
 
 # Nodes of paths as destinations: where the one position of a node stands.

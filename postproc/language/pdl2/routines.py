@@ -27,9 +27,6 @@ _BUILT_IN = frozenset(
 )
 """Built-in routines that no cell needs to speak of: they change their arguments."""
 
-ASSUMED_STILL = "assumed-still"
-"""Code of the message about a routine that the shipped list knows as still."""
-
 TRACKING = "sensor_trk"
 """Built-in routine that lets a sensor lead the arm, or ends that."""
 

@@ -9,7 +9,7 @@ from typing import Any
 
 import lark
 
-from postproc.language.pdl2.parser import line_parser
+from postproc.language.grammars import line_parser
 from postproc.language.rapid import syntax as said
 from postproc.language.scan import NAME_MARK, UNREADABLE
 from postproc.language.shapes import open_name

@@ -245,7 +245,7 @@ class _Outline:
             self.routines.append(RapidScope(said, begun, row))
 
     def _complain(self, row: int, what: str) -> None:
-        message = f"{_shown(self.text, row)} {what}"
+        message = f"{shown(self.text, row)} {what}"
         self.diagnostics.append(_diagnostic(self.text, row, "open-block", message))
 
 
@@ -299,11 +299,11 @@ class _Calls:
             self._complain(row, "unknown-instruction", what)
 
     def _complain(self, row: int, code: str, what: str) -> None:
-        message = f"{_shown(self.text, row)} {what}"
+        message = f"{shown(self.text, row)} {what}"
         self.diagnostics.append(_diagnostic(self.text, row, code, message))
 
 
-def _shown(text: RapidText, row: int) -> str:
+def shown(text: RapidText, row: int) -> str:
     """Quote the beginning of a statement, on one line."""
     words = " ".join(text.text(row).split())
     return words if len(words) <= SHOWN else f"{words[:SHOWN]} .."

@@ -81,3 +81,29 @@ def known_instructions() -> Mapping[str, str]:
         if not line.startswith("#"):
             found |= dict.fromkeys(names.lower().split(), kind)
     return found
+
+
+READING = frozenset(
+    """
+    tperase tpwrite uimsgwrite set reset setdo setgo setao setdosync pulsedo invertdo
+    waittime waitdi waitdo waitai waitao waitgi waitgo waituntil waitrob errlog errwrite
+    confj confl singarea cirpathmode accset velset speedrefresh worldacclim pathacclim
+    motionsup pdispon pdispset pdispoff eoffson eoffsset eoffsoff gripload
+    mechunitload actunit deactunit softact softdeact stopmove startmove
+    corrcon corrdiscon write open close isleep iwatch idelete
+    """.split()
+)
+"""Instructions that change none of the data that they are given."""
+
+BUILT_IN_FUNCTIONS = frozenset(
+    """
+    abs acos asin atan atan2 cos sin tan exp pow round sqrt trunc dim
+    offs reltool distance dotprod normalize posemult poseinv posevect orientzyx eulerzyx
+    defframe defaccframe defdframe mirpos crobt cjointt cpos ctool cwobj calcrobt
+    calcjointt numtostr strlen strpart strtoval valtostr ctime cdate clkread gettime
+    doutput dinput goutput testdi valid present ispers isvar opmode runmode execlevel
+    isstopmoveact isstopstateevent ismechunitactive bitand bitor bitxor bitneg bitcheck
+    stringmatch strfind strmap strmatch strorder gettaskname robos max min
+    """.split()
+)
+"""Functions that neither move nor change the data that they are given."""

@@ -38,7 +38,7 @@ class PageColumns:
         why: Index into `reasons`, (n,).
         direction: Of every joint's arrival: -1, 0 (not known), 1, (n, 6).
         q_deg: Joint angles, (n, 6).
-        original, corrected: Numbers of the target in its file, (n, 6).
+        original, corrected: Numbers of the target in its file, (n, w).
         position_mm: Where the target lies, base frame, (n, 3).
         correction_mm: Change of the commanded TCP, base frame, (n, 3).
         std_mm: Standard error of the correction, per axis, (n, 3).
@@ -202,6 +202,7 @@ def columns_from(targets: Sequence[Mapping[str, Any]]) -> PageColumns:
     """
     files, names, reasons = Texts(), Texts(), Texts()
     literals = [t["literal"] or {"file": "", "line": -1} for t in targets]
+    width = max([6, *(len(t.get("original") or ()) for t in targets)])
     place = files.index([p["file"] for p in literals])
     statuses = {s.name.lower(): int(s) for s in Status}
     moves = {name: k for k, name in enumerate(MOVES)}
@@ -217,8 +218,8 @@ def columns_from(targets: Sequence[Mapping[str, Any]]) -> PageColumns:
         why=reasons.index([t["why"] for t in targets]),
         direction=_numbers(targets, "lambda", 6).astype(np.int64),
         q_deg=_numbers(targets, "q_deg", 6),
-        original=_numbers(targets, "original", 6),
-        corrected=_numbers(targets, "corrected", 6),
+        original=_numbers(targets, "original", width),
+        corrected=_numbers(targets, "corrected", width),
         position_mm=_numbers(targets, "position_mm", 3),
         correction_mm=_numbers(targets, "correction_mm", 3),
         std_mm=_numbers(targets, "std_error_mm", 3),
@@ -303,7 +304,10 @@ def pack(columns: PageColumns, shares: PageShares) -> dict[str, Any]:
         shares: Of all visits.
     """
     effects = [visible(name) for name in shares.effects]
-    width = {"original": 6, "change": 6, "q_deg": 6, "share_mm": len(effects)}
+    written = columns.original.shape[1]
+    width = {
+        "original": written, "change": written, "q_deg": 6, "share_mm": len(effects),
+    }  # fmt: skip
     numbers = {
         "original": columns.original,
         "change": columns.corrected - columns.original,

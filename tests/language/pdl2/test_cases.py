@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from postproc.language.pdl2.dialect import PDL2_DIALECT
 from postproc.language.pdl2.interpreter import resolve
 from postproc.language.pdl2.program import parse
 from postproc.language.rewrite import difference, edits
@@ -23,7 +24,7 @@ def test_case(path: Path, newline: bytes) -> None:
     rows = np.arange(len(visits.literals))
     first = [int(np.flatnonzero(visits.literal == row)[0]) for row in rows]
     new = visits.values[first] + [1.25, 1.25, 1.25, 0, 0, 0]
-    (mine,) = edits(visits.literals, (source,), rows, new)
+    (mine,) = edits(visits.literals, (source,), rows, new, PDL2_DIALECT)
     out = apply(given, mine)
     assert out == wanted
     assert difference(source, Source(path.name, out), mine) == ""

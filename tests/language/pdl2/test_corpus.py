@@ -4,8 +4,9 @@ from pathlib import Path
 
 import pytest
 
+from postproc.language.interface import Start
+from postproc.language.pdl2.dialect import PDL2_DIALECT
 from postproc.language.pdl2.interpreter import Resolved, resolve
-from postproc.language.pdl2.job import Start
 from postproc.language.pdl2.program import parse
 from postproc.language.pdl2.variable_file import read_variables
 from postproc.language.rewrite import edits
@@ -84,6 +85,6 @@ def test_chapter(title: str, program: str, expected: str, newline: str) -> None:
     resolved = resolve(parse(source), CELL, variables)
     assert described(resolved, *(file.text for file in files)) == expected
     visits = resolved.visits
-    same = edits(visits.literals, files, [], [])
+    same = edits(visits.literals, files, [], [], PDL2_DIALECT)
     for file, own in zip(files, same, strict=True):
         assert apply(file.data, own) == file.data

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from postproc.language.pdl2.effects import NEVER_REACHED, dead_moves
+from postproc.language.pdl2.effects import dead_moves
 from postproc.language.pdl2.interpreter import resolve
 from postproc.language.pdl2.program import parse
 from postproc.language.source import Source
+from postproc.language.visits import NEVER_REACHED
 
 POINT = "MOVE LINEAR TO POS(1, 2, 3, 0, 180, 0, '')"
 

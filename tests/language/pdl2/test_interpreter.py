@@ -2,11 +2,11 @@
 
 import pytest
 
+from postproc.language.interface import Start
 from postproc.language.pdl2.interpreter import Resolved, resolve
-from postproc.language.pdl2.job import Start
 from postproc.language.pdl2.program import Program, parse
 from postproc.language.source import source_from_bytes
-from postproc.language.visits import START, FlyTrajectory, FlyType, OrntType, Switch
+from postproc.language.visits import START, Blend, OrientationLaw, Switch, ZoneRule
 
 
 def program(text: str, name: str = "job") -> Program:
@@ -91,10 +91,10 @@ def test_settings_become_columns() -> None:
     assert v.lin_spd.tolist() == [0.25, 0.1, 0.25]
     assert v.override.tolist() == [0.25] * 3
     assert v.fly.tolist() == [True, False, False]
-    assert v.fly_dist_mm.tolist() == [5, -1, -1]
-    assert v.fly_per.tolist() == [80] * 3
-    assert (v.fly_type == FlyType.FLY_CART).all()
-    assert (v.fly_traj == FlyTrajectory.FLY_TOL).all()
+    assert v.zone_mm.tolist() == [5, -1, -1]
+    assert v.overlap_percent.tolist() == [80] * 3
+    assert (v.blend == Blend.ZONE).all()
+    assert (v.zone_rule == ZoneRule.WITHIN).all()
     assert v.nearest_turn.all() and v.wrist_joint.all()
     assert v.tool_remote.tolist() == [True, False, False]
     assert v.config_given.tolist() == [True, False, False]
@@ -113,8 +113,13 @@ def test_switches_and_orientation_types_are_told_from_what_is_not_known() -> Non
     assert found.visits.care.tolist() == [
         [unset] * 3, [on, off, unknown], [off, off, unknown], [on, unknown, unknown],
     ]  # fmt: skip
-    euler, either = OrntType.EUL_WORLD, OrntType.UNKNOWN
-    assert found.visits.ornt_type.tolist() == [OrntType.UNSET, euler, euler, either]
+    euler, either = OrientationLaw.EULER_ANGLES, OrientationLaw.UNKNOWN
+    assert found.visits.orientation_law.tolist() == [
+        OrientationLaw.UNSET,
+        euler,
+        euler,
+        either,
+    ]
 
 
 def test_a_variable_used_twice_is_one_literal() -> None:

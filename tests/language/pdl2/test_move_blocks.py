@@ -5,8 +5,8 @@ import random
 import numpy as np
 import pytest
 
+from postproc.language.interface import Start
 from postproc.language.pdl2.interpreter import resolve
-from postproc.language.pdl2.job import Start
 from postproc.language.pdl2.program import parse
 from postproc.language.pdl2.stretches import MoveBlocks
 from postproc.language.pdl2.variable_file import read_variables
@@ -122,7 +122,7 @@ def told(visits: Visits) -> list[object]:
         *(
             repr(getattr(v, name).tolist())
             for name in "line motion target via values distance_mm aux config_given "
-            "literal follows fly fly_dist_mm lin_spd pred_start pred".split()
+            "literal follows fly zone_mm lin_spd pred_start pred".split()
         ),
         v.measure_id,
         *(repr(getattr(v.literals, n)) for n in ("line", "start", "name", "pinned")),

@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 
+from postproc.language.interface import Start
 from postproc.language.pdl2.clones import copied_entry
+from postproc.language.pdl2.dialect import PDL2_DIALECT
 from postproc.language.pdl2.interpreter import Resolved, resolve
-from postproc.language.pdl2.job import Start
 from postproc.language.pdl2.program import parse
 from postproc.language.pdl2.variable_file import VariableFile, read_variables
 from postproc.language.rewrite import edits
@@ -266,7 +267,7 @@ def test_edits_hit_their_node_and_nothing_else():
     files = (source_from_bytes("job.pdl", HEAD.encode()),
              source_from_bytes("job.lsv", values.encode()))  # fmt: skip
     new = found.values + np.array([0.5, 0, 0, 0, 0, 0])
-    _, own = edits(found.literals, files, found.literal, new)
+    _, own = edits(found.literals, files, found.literal, new, PDL2_DIALECT)
     assert apply(values.encode(), own) == values.replace("X: 2.00", "X: 2.500").encode()
 
 

@@ -8,8 +8,9 @@ from pathlib import Path
 import lark
 import pytest
 
+from postproc.language import grammars
 from postproc.language.lines import read_lines
-from postproc.language.pdl2 import parser
+from postproc.language.scan import form_of
 from postproc.language.source import source_from_bytes
 
 ROOT = Path(__file__).parents[3]
@@ -19,9 +20,9 @@ ROOT = Path(__file__).parents[3]
 def cache(tmp_path, monkeypatch):
     """An empty cache folder; no parser in memory, now and afterwards."""
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
-    parser.line_parser.cache_clear()
+    grammars.line_parser.cache_clear()
     yield tmp_path / "cache" / "postproc"
-    parser.line_parser.cache_clear()
+    grammars.line_parser.cache_clear()
 
 
 @pytest.fixture
@@ -34,14 +35,14 @@ def made(monkeypatch):
             count.append(options["start"])
             super().__init__(*given, **options)
 
-    monkeypatch.setattr(parser.lark, "Lark", Counting)
+    monkeypatch.setattr(grammars.lark, "Lark", Counting)
     return count
 
 
 def again(name: str = "lsv") -> lark.Lark:
     """Ask for a parser as a new process does."""
-    parser.line_parser.cache_clear()
-    return parser.line_parser(name, "line")
+    grammars.line_parser.cache_clear()
+    return grammars.line_parser(name, "line")
 
 
 def read(with_: lark.Lark, form: str) -> object:
@@ -56,7 +57,7 @@ def forms() -> list[str]:
     found: dict[str, None] = {}
     for path in sorted((ROOT / "programs").glob("*.pdl")):
         masks = read_lines(source_from_bytes(path.name, path.read_bytes())).shapes
-        found |= dict.fromkeys(parser.form_of(mask)[0] for mask in masks)
+        found |= dict.fromkeys(form_of(mask)[0] for mask in masks)
     return [*found, *(f[: len(f) // 2] + ") ::" + f[len(f) // 2 :] for f in found)]
 
 
@@ -72,8 +73,8 @@ def test_tables_read_back_parse_alike(cache, made):
 
 def test_each_grammar_has_its_own_tables(cache, made, monkeypatch):
     again("lsv")
-    text = parser.grammar("lsv")
-    monkeypatch.setattr(parser, "grammar", lambda name: text + "\n// changed\n")
+    text = grammars.grammar("lsv")
+    monkeypatch.setattr(grammars, "grammar", lambda name: text + "\n// changed\n")
     again("lsv")
     assert len(made) == len(list(cache.iterdir())) == 2
 
@@ -86,13 +87,13 @@ def test_a_damaged_file_is_made_anew(cache, made, keep):
     file.write_bytes(whole[:keep])
     assert read(again(), "A: \0") == read(again(), "A: \0")
     assert len(made) == 2
-    assert file.read_bytes()[parser.SIZE :] != b""
+    assert file.read_bytes()[grammars.SIZE :] != b""
 
 
 def test_what_is_no_table_is_made_anew(cache, made):
     again()
     (file,) = cache.iterdir()
-    parser.keep(file.name, b"whole, but no table")
+    grammars.keep(file.name, b"whole, but no table")
     again()
     again()
     assert len(made) == 2
@@ -141,7 +142,7 @@ def test_no_folder_is_no_error(tmp_path, monkeypatch, made):
     assert len(made) == 2
     monkeypatch.delenv("XDG_CACHE_HOME")
     monkeypatch.setattr(Path, "home", no_home)
-    assert parser.folder() is None
+    assert grammars.folder() is None
     again()
     assert len(made) == 3
 
@@ -163,7 +164,7 @@ def full(*_: object) -> None:
 def test_a_relative_folder_is_none_of_ours(monkeypatch, tmp_path):
     monkeypatch.setenv("XDG_CACHE_HOME", "relative")
     monkeypatch.setenv("HOME", str(tmp_path))
-    assert parser.folder() == tmp_path / ".cache" / "postproc"
+    assert grammars.folder() == tmp_path / ".cache" / "postproc"
     for home in ("relative", str(tmp_path / "not there")):
         monkeypatch.setenv("HOME", home)
-        assert parser.folder() is None
+        assert grammars.folder() is None

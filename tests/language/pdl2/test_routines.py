@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
+from postproc.language.interface import Start
 from postproc.language.pdl2.interpreter import Resolved, resolve
-from postproc.language.pdl2.job import Start
 from postproc.language.pdl2.program import parse
 from postproc.language.pdl2.routines import known_still
 from postproc.language.source import Source

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
+from postproc.language.interface import Start
 from postproc.language.pdl2.interpreter import Resolved, resolve
-from postproc.language.pdl2.job import Start
 from postproc.language.pdl2.program import parse
 from postproc.language.pdl2.variable_file import read_variables
 from postproc.language.source import Source, source_from_bytes

@@ -2,8 +2,9 @@
 
 import numpy as np
 
+from postproc.language.interface import Start
+from postproc.language.pdl2.dialect import PDL2_DIALECT
 from postproc.language.pdl2.interpreter import resolve
-from postproc.language.pdl2.job import Start
 from postproc.language.pdl2.program import parse
 from postproc.language.pdl2.variable_file import read_variables
 from postproc.language.rewrite import edits
@@ -95,7 +96,9 @@ def test_edits_fall_into_the_variable_file() -> None:
     v = found.visits
     program = source_from_bytes("job.pdl", PDL)
     new = v.values[:1] + np.array([0.5, 0, 0, 0, 0, 0])
-    pdl, lsv = edits(v.literals, (program, variables.source), v.literal[:1], new)
+    pdl, lsv = edits(
+        v.literals, (program, variables.source), v.literal[:1], new, PDL2_DIALECT
+    )
     assert not pdl
     assert apply(LSV, lsv) == LSV.replace(b"1093.44", b"1093.940")
 

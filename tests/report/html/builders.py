@@ -8,6 +8,7 @@ import numpy as np
 
 from postproc.compensation.outcome import Decisions, Outcome, Status
 from postproc.compensation.record import Sidecar
+from postproc.language.pdl2.dialect import PDL2_DIALECT
 from postproc.language.visits import Diagnostic, Literals, Visits
 from postproc.model.statistics import ErrorStatistics
 
@@ -86,21 +87,22 @@ def visits_of(n: int, name: str, names: tuple[str, ...]) -> Visits:
         nearest_turn=no,
         care=np.zeros((n, 3), dtype=np.int64),
         fly=~no,
-        fly_dist_mm=nan,
-        fly_per=nan,
-        fly_type=index * 0,
-        fly_traj=index * 0,
+        zone_mm=nan,
+        overlap_percent=nan,
+        blend=index * 0,
+        zone_rule=index * 0,
         lin_spd=nan,
         rot_spd=nan,
         override=np.ones(n),
         wrist_joint=no,
-        ornt_type=index * 0,
+        orientation_law=index * 0,
         reason=index * 0,
         reasons=("",),
         pred_start=np.arange(n + 1),
         pred=index - 1,
         measure_id=("",) * n,
         literals=literals,
+        dialect=PDL2_DIALECT,
     )
 
 

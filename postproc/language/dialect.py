@@ -1,0 +1,123 @@
+"""What the numbers and flags of a language's targets mean, and the words it uses."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+
+from postproc.arrays import Bools, Floats, Ints
+
+
+@dataclass(frozen=True)
+class Terms:
+    """How a language names what messages speak of.
+
+    Attributes:
+        tool, base, uframe: Its frames.
+        tool_remote: Says that the arm holds the part.
+        blend: Names of `Blend.OVERLAP`, its percentage, the zone's size and its rule,
+            with the values that are assumed where nothing is set.
+        corner: What decides how far a point is passed, and how to hit it.
+        branch_stops, branch_may_stop: Why a controller stops, or may, where a path
+            arrives on another branch than the flags say.
+        turn_stops, turn_may_stop: .. on another turn.
+        branch, nearest: Why flags that need not count are doubtful; the settings are
+            filled in.
+        wrist: .. on a line whose wrist turns joint by joint.
+        overruled: Says that flags are kept which the path does not follow.
+        law_unknown, angles, arc: Why the way between is not sure; the law's name is
+            filled in.
+        laws: Names of the `OrientationLaw` members, by their number.
+    """
+
+    tool: str
+    base: str
+    uframe: str
+    tool_remote: str
+    blend: tuple[str, str, str, str]
+    corner: str
+    branch_stops: str
+    branch_may_stop: str
+    turn_stops: str
+    turn_may_stop: str
+    branch: str
+    nearest: str
+    wrist: str
+    overruled: str
+    law_unknown: str
+    angles: str
+    arc: str
+    laws: tuple[str, ...] = ()
+
+
+class Dialect(ABC):
+    """What the w numbers of a target mean.
+
+    The first three of a pose are its position [mm]. The first six of a joint target are
+    the joint angles [deg], the others count for nothing.
+
+    Attributes:
+        terms: Its words.
+        pose_decimals, joint_decimals: Least decimals of every written number, w each.
+    """
+
+    terms: Terms
+    pose_decimals: tuple[int, ...]
+    joint_decimals: tuple[int, ...]
+
+    @property
+    def width(self) -> int:
+        """Return how many numbers a target has."""
+        return len(self.pose_decimals)
+
+    @abstractmethod
+    def poses(self, values: Floats) -> Floats:
+        """Return the poses (k, 4, 4) [m] that numbers (k, w) say."""
+
+    @abstractmethod
+    def turned(self, values: Floats, by: Floats) -> Floats:
+        """Turn targets, and write them next to what is written.
+
+        Args:
+            values: Numbers of poses, (k, w).
+            by: Rotations in the frame of the numbers, (k, 3, 3).
+        """
+
+    @abstractmethod
+    def flags(
+        self, config: Ints, configs: tuple[str, ...], values: Floats
+    ) -> tuple[Ints, Floats]:
+        """Read the configuration flags of targets.
+
+        Args:
+            config: Index into `configs`, (n,).
+            configs: Configuration strings.
+            values: Numbers of the targets, (n, w).
+
+        Returns:
+            Slots 4 W + 2 S + E, (n,), and turns of axes 4, 6 and 3, (n, 3), NaN where
+            not written.
+        """
+
+    @abstractmethod
+    def flag_words(self, config: str, values: Floats) -> str:
+        """Spell the flags of one target as ``S E W T1:0 T2:-1 T3:0``, unsaid ones not.
+
+        Args:
+            config: Its configuration string.
+            values: Its numbers, (w,).
+        """
+
+    def reflagged(self, values: Floats, q: Floats) -> Floats:
+        """Write the flags anew of poses (k, w) that the arm reaches with joints (k, 6).
+
+        Flags that go on being true, or that do not depend on small moves, are kept.
+        """
+        return values
+
+    def misses(self, values: Floats, q: Floats) -> Bools | None:
+        """Tell which poses (k, w) say other flags than joints (k, 6) [rad] have.
+
+        None where branch and turns say all that the flags do.
+        """
+        return None

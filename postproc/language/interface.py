@@ -1,0 +1,202 @@
+"""What a language does for all else: files to visits, and back; one class each."""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, Protocol
+
+from postproc.arrays import Ints
+from postproc.language.rewrite import Skeleton
+from postproc.language.source import Edit, Source
+from postproc.language.visits import Diagnostic, Literals, Visits
+
+Record = tuple[float, ...] | None
+
+
+@dataclass(frozen=True)
+class Start:
+    """What the cell says about the moment at which the program starts.
+
+    Attributes:
+        tool, base, uframe: Position records (6,) [mm, deg], None where unknown.
+        routines: Outside routine to ``still``, ``moves`` or ``sets-frames``.
+        still: Patterns of outside routines, ``name`` or ``program.name``, that neither
+            move the arm nor set frames.
+        constant: Patterns of exported variables, ``name`` or ``program.name``, that no
+            other program changes.
+        payload_kg: What the arm carries, NaN where that is not known.
+        strict_calls: The shipped list of such routines does not count.
+        frame_tables: Outside routine to arguments (``"1,2"``) to the records of the
+            frames (``tool``, ``base``, ``uframe``) that it sets.
+        aux: Auxiliary axis to ``gun``, ``track`` or ``positioner``.
+        taught: Names of points that were taught with the robot.
+        arm: Number of our arm.
+        source: The cell file, for messages.
+    """
+
+    tool: Record = (0.0,) * 6
+    base: Record = (0.0,) * 6
+    uframe: Record = (0.0,) * 6
+    routines: Mapping[str, str] = field(default_factory=dict)
+    still: tuple[str, ...] = ()
+    strict_calls: bool = False
+    constant: tuple[str, ...] = ()
+    payload_kg: float = math.nan
+    frame_tables: Mapping[str, Mapping[str, Mapping[str, Record]]] = field(
+        default_factory=dict
+    )
+    aux: Mapping[int, str] = field(default_factory=dict)
+    taught: Collection[str] = frozenset()
+    arm: int = 1
+    source: str = ""
+
+    def __post_init__(self) -> None:
+        """No language tells cases apart: keep names in lower case."""
+        lower = {name.lower(): said for name, said in self.routines.items()}
+        object.__setattr__(self, "routines", lower)
+        object.__setattr__(self, "still", tuple(map(str.lower, self.still)))
+        object.__setattr__(self, "constant", tuple(map(str.lower, self.constant)))
+        tables = {name.lower(): table for name, table in self.frame_tables.items()}
+        object.__setattr__(self, "frame_tables", tables)
+        taught = frozenset(name.lower() for name in self.taught)
+        object.__setattr__(self, "taught", taught)
+
+    @property
+    def records(self) -> frozenset[Record]:
+        """Return all frames that the cell gives."""
+        tables = [e for table in self.frame_tables.values() for e in table.values()]
+        given = [record for entry in tables for record in entry.values()]
+        return frozenset([self.tool, self.base, self.uframe, *given])
+
+
+@dataclass(frozen=True)
+class JobReading:
+    """The files of a job as its language understands them.
+
+    Attributes:
+        texts: Every file as it was read, in the order of `Visits.files`.
+        visits: Every arrival at a target.
+        diagnostics: What else was found.
+        programs: What was parsed of the files that hold no number of a target.
+        missed: Lines of moves that are never reached, by file.
+    """
+
+    texts: tuple[Skeleton, ...]
+    visits: Visits
+    diagnostics: tuple[Diagnostic, ...]
+    programs: tuple[Any, ...] = ()
+    missed: Mapping[str, Ints] = field(default_factory=dict)
+
+
+class NamedPoint(Protocol):
+    """A variable that a move names as its destination."""
+
+    @property
+    def key(self) -> str:
+        """Return a text that tells variables apart."""
+
+    @property
+    def name(self) -> str:
+        """Return its name as it is written."""
+
+
+class Cloner(ABC):
+    """The files of a job, to give variables of their own to moves that share one."""
+
+    @abstractmethod
+    def target(self, file: int, line: int, via: bool, name: str) -> NamedPoint:
+        """Find the variable that a move goes to, as far as it can be cloned.
+
+        Args:
+            file: Where the move stands.
+            line: Its line there.
+            via: Its VIA point is meant, not its end.
+            name: Owner of the value that it goes to.
+
+        Raises:
+            CloneError: The move names no variable that can be.
+        """
+
+    @abstractmethod
+    def declared(self, named: NamedPoint) -> int:
+        """Return the 1-based line that declares a variable."""
+
+    @abstractmethod
+    def clone(
+        self, literals: Literals, named: Sequence[NamedPoint], rows: Sequence[int]
+    ) -> tuple[str, list[tuple[int, Edit]]]:
+        """Give some moves a variable of their own with the value of the one they share.
+
+        Args:
+            literals: Where the values stand.
+            named: Where the moves name the old variable; all mean the same one.
+            rows: Literals that it may hold there.
+
+        Returns:
+            The new name, and edits with the index of their file.
+
+        Raises:
+            CloneError: A value stands where it cannot be given twice.
+        """
+
+
+class Language(ABC):
+    """A language of robot programs.
+
+    Attributes:
+        name: As its users call it.
+        suffixes: Of program files, in lower case, the usual one first.
+        comment: What a comment begins with.
+        tells_accuracy: Programs or controllers show whether the controller compensates
+            on its own; else the cell must say so itself.
+    """
+
+    name: str
+    suffixes: tuple[str, ...]
+    comment: str
+    tells_accuracy: bool = True
+
+    @abstractmethod
+    def recognises(self, text: bytes) -> bool:
+        """Tell whether a text without a name begins as programs of this language do."""
+
+    @abstractmethod
+    def read(
+        self, sources: Sequence[Source], start: Start, known: Sequence[Any] = ()
+    ) -> JobReading:
+        """Parse the files of a job and resolve its visits.
+
+        Args:
+            sources: First the program itself, then those that belong to it.
+            start: What the cell says.
+            known: What was parsed before; files of the same bytes are not parsed again.
+
+        Raises:
+            ProgramError: A file is no program text, or the program is another arm's.
+        """
+
+    @abstractmethod
+    def cloner(self, sources: Sequence[Source]) -> Cloner:
+        """Parse the files of a job to clone variables in them."""
+
+    def holds_joints(self, line: str) -> bool:
+        """Tell whether the numbers of a line are joint angles, as far as it shows."""
+        return False
+
+    @abstractmethod
+    def target_names(
+        self, file: str, lines: Sequence[bytes], wanted: Sequence[int]
+    ) -> Iterator[str]:
+        """Name the targets on some lines of a file, "" for those without a name.
+
+        Args:
+            file: Its name.
+            lines: All of them.
+            wanted: 1-based lines, ascending but for 0: those that it does not have.
+        """
+
+    def prepare(self) -> None:  # noqa: B027 - most have nothing to load
+        """Load what reading the first program takes."""

@@ -1,0 +1,50 @@
+"""All languages, and which one a file is written in."""
+
+from __future__ import annotations
+
+import os
+from functools import cache
+from importlib import import_module
+
+from postproc.language.interface import Language
+
+# Languages by the suffixes of their files; one is loaded when its first file is read.
+_PLACES = {
+    ".pdl": "postproc.language.pdl2.language:Pdl2",
+    ".lsv": "postproc.language.pdl2.language:Pdl2",
+    **dict.fromkeys(
+        (".mod", ".modx", ".prg", ".sys", ".sysx"),
+        "postproc.language.rapid.language:Rapid",
+    ),
+}
+_USUAL = ".pdl"  # of a file with another suffix
+
+
+def language_of(file: str) -> Language:
+    """Return the language of a file, by its name.
+
+    >>> language_of("a/JOB.PDL").name
+    'PDL2'
+    >>> language_of("Welding.modx").name
+    'RAPID'
+    """
+    suffix = os.path.splitext(file)[1].lower()
+    return _loaded(_PLACES.get(suffix, _PLACES[_USUAL]))
+
+
+def language_of_text(text: bytes) -> Language:
+    """Return the language of a text without a name, by how it begins."""
+    usual = language_of(_USUAL)
+    return next((one for one in languages()[1:] if one.recognises(text)), usual)
+
+
+def languages() -> tuple[Language, ...]:
+    """Return all languages."""
+    return tuple(_loaded(place) for place in dict.fromkeys(_PLACES.values()))
+
+
+@cache
+def _loaded(place: str) -> Language:
+    module, _, name = place.partition(":")
+    made: Language = getattr(import_module(module), name)()
+    return made

@@ -1,0 +1,180 @@
+"""PDL2 behind the interface of all languages."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import cast
+
+import numpy as np
+
+from postproc.exceptions import ProgramError
+from postproc.files import base_name, is_variables
+from postproc.language.grammars import line_parser
+from postproc.language.interface import (
+    Cloner,
+    JobReading,
+    Language,
+    NamedPoint,
+    Start,
+)
+from postproc.language.pdl2.clones import CloneTarget, clone, free_name, named_at
+from postproc.language.pdl2.effects import dead_lines, dead_moves
+from postproc.language.pdl2.interpreter import resolve
+from postproc.language.pdl2.names import entry_names
+from postproc.language.pdl2.program import Program, parse
+from postproc.language.pdl2.variable_file import VariableFile, read_variables
+from postproc.language.rewrite import Skeleton
+from postproc.language.source import Edit, Source
+from postproc.language.visits import Literals
+
+_WORD = re.compile(rb"[A-Za-z_]\w*")
+
+
+class Pdl2(Language):
+    """The language of Comau controllers."""
+
+    name = "PDL2"
+    suffixes = (".pdl",)
+    comment = "--"
+
+    def recognises(self, text: bytes) -> bool:
+        """Tell that a text may be PDL2: what begins as nothing else is taken for it."""
+        return True
+
+    def read(
+        self, sources: Sequence[Source], start: Start, known: Sequence[Program] = ()
+    ) -> JobReading:
+        """Parse a program, its pages and its variable file; see `Language.read`."""
+        program = _parsed(sources[0], known)
+        if program.main is None and not program.routines:
+            problem, cure = "the file holds no BEGIN .. END", "Give a PDL2 program"
+            raise ProgramError(sources[0].name, problem, cure)
+        _refuse_other_arm(program, start)
+        pages: list[Program] = []
+        variables: VariableFile | None = None
+        texts = [Skeleton.of(program.lines)]
+        for source in sources[1:]:
+            if is_variables(source.name):
+                variables = read_variables(source)
+                texts.append(Skeleton.of(variables.lines))
+            else:
+                pages.append(_named(_parsed(source, known)))
+                texts.append(Skeleton.of(pages[-1].lines))
+        others = _by_name(program, pages)
+        resolved = resolve(program, start, variables, others)
+        missed = dead_moves([program, *pages], resolved.visits)
+        found = (*resolved.diagnostics, *missed)
+        visits, parsed = resolved.visits, (program, *pages)
+        corrected = {visits.files[k] for k in np.unique(visits.literals.file).tolist()}
+        kept = tuple(p for p in parsed if p.lines.source.name not in corrected)
+        lost = dead_lines([program, *pages], visits)
+        return JobReading(tuple(texts), visits, found, kept, lost)
+
+    def cloner(self, sources: Sequence[Source]) -> Cloner:
+        """Parse the files of a job to clone variables in them."""
+        own = [source for source in sources if not is_variables(source.name)]
+        values = next((source for source in sources if source not in own), None)
+        taken = {
+            word.decode("ascii").lower()
+            for source in sources
+            for word in _WORD.findall(source.data)
+        }
+        return Pdl2Cloner([parse(source) for source in own], values, taken)
+
+    def target_names(
+        self, file: str, lines: Sequence[bytes], wanted: Sequence[int]
+    ) -> Iterator[str]:
+        """Name the variables that lines of a variable file belong to."""
+        return entry_names(lines, wanted)
+
+    def prepare(self) -> None:
+        """Load the parsers of programs and variable files."""
+        for grammar in ("pdl2", "lsv"):
+            line_parser(grammar, "line")
+
+
+@dataclass
+class Pdl2Cloner(Cloner):
+    """The files of a job, to clone variables in them.
+
+    Attributes:
+        programs: Its program files, parsed.
+        values: Its variable file, or None.
+        taken: All words of its files, in lower case.
+    """
+
+    programs: list[Program]
+    values: Source | None
+    taken: set[str]
+
+    def target(self, file: int, line: int, via: bool, name: str) -> CloneTarget:
+        """Find the variable that a move goes to, as far as it can be cloned."""
+        return named_at(self.programs, file, line, via, name)
+
+    def declared(self, named: NamedPoint) -> int:
+        """Return the 1-based line that declares a variable."""
+        target = cast(CloneTarget, named)
+        return int(self.programs[target.file].lines.line[target.variable.row])
+
+    def clone(
+        self, literals: Literals, named: Sequence[NamedPoint], rows: Sequence[int]
+    ) -> tuple[str, list[tuple[int, Edit]]]:
+        """Give some moves a variable of their own, see `Cloner.clone`."""
+        own = [cast(CloneTarget, one) for one in named]
+        name = free_name(own[0].variable.name, self.taken)
+        return name, clone(self.programs, self.values, literals, own, rows, name)
+
+
+def _refuse_other_arm(program: Program, start: Start) -> None:
+    """Refuse a program that says it is another arm's than the cell's.
+
+    Raises:
+        ProgramError: It is.
+    """
+    if program.arm not in (0, start.arm):
+        problem = (
+            f"PROG_ARM = {program.arm}: it is a program of arm {program.arm}, and the "
+            f"cell ({start.source}) is of arm {start.arm}"
+        )
+        cure = (
+            f"Give the cell of that arm, with arm_number = {program.arm} under "
+            "[robot], and its model"
+        )
+        name = program.lines.source.name
+        raise ProgramError(name, problem, cure, line=program.head)
+
+
+def _parsed(source: Source, known: Sequence[Program]) -> Program:
+    """Parse a file, unless it was parsed before."""
+    for program in known:
+        if program.lines.source == source:
+            return program
+    return parse(source)
+
+
+def _named(page: Program) -> Program:
+    """Name a page whose PROGRAM line is not understood after its file."""
+    return page if page.name else replace(page, name=_file(page))
+
+
+def _file(program: Program) -> str:
+    return base_name(program.lines.source.name)
+
+
+def _by_name(program: Program, pages: list[Program]) -> dict[str, Program]:
+    """Find pages by the names of their files and programs, in their order.
+
+    Raises:
+        ProgramError: A name means two of them: their variables could not be told apart.
+    """
+    own = {_file(program): program, program.name: program}
+    found = {_file(page): page for page in pages}
+    for page in pages:
+        file = _file(page)
+        same = [own.get(page.name, page), own.get(file, page), found[file]]
+        if any(one is not page for one in (*same, found.setdefault(page.name, page))):
+            problem, cure = "its program has the name of another file", "Rename one"
+            raise ProgramError(page.lines.source.name, problem, cure)
+    return found

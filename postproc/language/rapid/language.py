@@ -1,0 +1,192 @@
+"""RAPID behind the interface of all languages."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from postproc.arrays import Ints
+from postproc.exceptions import ProgramError
+from postproc.language.grammars import line_parser
+from postproc.language.interface import (
+    Cloner,
+    JobReading,
+    Language,
+    NamedPoint,
+    Start,
+)
+from postproc.language.rapid.collect import visits_of
+from postproc.language.rapid.interpreter import RapidMachine
+from postproc.language.rapid.moves import Goals
+from postproc.language.rapid.program import RapidFile, read_rapid
+from postproc.language.rapid.statements import RapidText
+from postproc.language.rapid.task import RapidTask
+from postproc.language.rewrite import Skeleton
+from postproc.language.source import CloneError, Edit, Source
+from postproc.language.visits import (
+    NEVER_REACHED,
+    Diagnostic,
+    Literals,
+    line_ranges,
+)
+
+# What the interpreter says of a statement where it is reached, knowing all modules.
+_SAID_AGAIN = ("unknown-instruction", "late-binding")
+_BEGIN = re.compile(rb"(?:\xef\xbb\xbf)?(?:\s|![^\r\n]*[\r\n])*(?:%%%|MODULE\s)", re.I)
+_NOT_CLONED = "points of RAPID are not cloned: give the move a point of its own"
+
+
+class Rapid(Language):
+    """The language of ABB controllers."""
+
+    name = "RAPID"
+    suffixes = (".mod", ".modx", ".prg", ".sys", ".sysx")
+    comment = "!"
+    tells_accuracy = False
+
+    def recognises(self, text: bytes) -> bool:
+        """Tell whether a module begins there, behind comments and a header."""
+        return _BEGIN.match(text) is not None
+
+    def read(
+        self,
+        sources: Sequence[Source],
+        start: Start,
+        known: Sequence[RapidFile] = (),
+    ) -> JobReading:
+        """Read the modules of a task, the one with main first; see `Language.read`."""
+        files = [_read(source, known) for source in sources]
+        if not files[0].routines:
+            problem, cure = "the file holds no routine", "Give a RAPID module"
+            raise ProgramError(sources[0].name, problem, cure)
+        task = RapidTask(files)
+        machine = RapidMachine(task, start, Goals(task))
+        machine.run()
+        visits = visits_of(machine)
+        missed = _missed(files, machine)
+        own = (d for file in files for d in file.diagnostics)
+        found = [d for d in own if d.code not in _SAID_AGAIN]
+        found += [*machine.diagnostics, *_never_reached(missed)]
+        corrected = {visits.files[k] for k in np.unique(visits.literals.file).tolist()}
+        kept = tuple(f for f in files if f.text.source.name not in corrected)
+        texts = tuple(skeleton_of(file.text) for file in files)
+        return JobReading(texts, visits, tuple(sorted(found)), kept, missed)
+
+    def cloner(self, sources: Sequence[Source]) -> Cloner:
+        """Say that nothing is cloned."""
+        return NoClones()
+
+    def target_names(
+        self, file: str, lines: Sequence[bytes], wanted: Sequence[int]
+    ) -> Iterator[str]:
+        """Name data by their declarations, and other lines by how they begin."""
+        name, seen = "", 0
+        for line in wanted:
+            if line == 0:
+                yield ""
+                continue
+            before = (_begun(lines[k]) for k in range(line - 1, seen - 1, -1))
+            name, seen = next(filter(None, before), name), line
+            yield name
+
+    def holds_joints(self, line: str) -> bool:
+        """Tell whether a line declares joint angles, or moves to some."""
+        return _JOINTS.match(line) is not None
+
+    def prepare(self) -> None:
+        """Load the parser of statements."""
+        line_parser("rapid", "statement")
+
+
+_DECLARED = re.compile(
+    r"\s*(?:(?:LOCAL|TASK)\s+)?(?:CONST|PERS|VAR)\s+\w+\s+([A-Za-z_]\w*)", re.I
+)
+_WORDS = re.compile(r"\s*([A-Za-z_]\w*)\s*(?:\\[^,;]*,)?\s*([A-Za-z_]\w*)?")
+_JOINTS = re.compile(r"[^!\"]*?\b(?:jointtarget\s|\w+AbsJ\b|\w+ExtJ\b)", re.I)
+
+
+def _begun(line: bytes) -> str:
+    """Name what a line begins, "" where it goes on with what another began."""
+    text = line.decode("latin-1")
+    declared = _DECLARED.match(text)
+    if declared:
+        return declared[1]
+    words = _WORDS.match(text)
+    return " ".join(filter(None, words.groups())) if words else ""
+
+
+class NoClones(Cloner):
+    """Nothing is cloned."""
+
+    def target(self, file: int, line: int, via: bool, name: str) -> NamedPoint:
+        """Refuse to clone what a move goes to."""
+        raise CloneError(_NOT_CLONED)
+
+    def declared(self, named: NamedPoint) -> int:
+        """Return no line."""
+        raise CloneError(_NOT_CLONED)
+
+    def clone(
+        self, literals: Literals, named: Sequence[NamedPoint], rows: Sequence[int]
+    ) -> tuple[str, list[tuple[int, Edit]]]:
+        """Refuse to clone."""
+        raise CloneError(_NOT_CLONED)
+
+
+def skeleton_of(text: RapidText) -> Skeleton:
+    """Take over what the statements of a text tell, for comparing it with another."""
+    starts = text.source.line_starts
+    line = np.searchsorted(starts, text.begin, side="right").astype(np.int32)
+    return Skeleton(
+        text.source,
+        text.said.shapes,
+        text.shape,
+        line,
+        text.start,
+        text.stop,
+        reread=lambda source: skeleton_of(read_rapid(source).text),
+    )
+
+
+def _read(source: Source, known: Sequence[RapidFile]) -> RapidFile:
+    """Read a file, unless it was read before.
+
+    Raises:
+        ProgramError: Its blocks do not close: what runs when is not known.
+    """
+    for file in known:
+        if file.text.source == source:
+            return file
+    file = read_rapid(source)
+    for found in file.diagnostics:
+        if found.code == "open-block":
+            cure = "Close it: what runs when is not known without"
+            raise ProgramError(source.name, found.message, cure, line=found.line)
+    return file
+
+
+def _missed(files: Sequence[RapidFile], machine: RapidMachine) -> dict[str, Ints]:
+    """Return the lines of moves that no way leads to, by file."""
+    found = {}
+    for number, file in enumerate(files):
+        rows = {m.row for m in file.moves if (number, m.row) not in machine.reached}
+        if rows:
+            lines = sorted({file.text.line(row) for row in rows})
+            found[file.text.source.name] = np.array(lines, dtype=np.int64)
+    return found
+
+
+def _never_reached(missed: dict[str, Ints]) -> list[Diagnostic]:
+    return [
+        Diagnostic(
+            name,
+            int(lines[0]),
+            NEVER_REACHED,
+            f"{len(lines)} moves, lines {line_ranges(lines)}, are never reached from "
+            "main: they are not compensated. Give the module that calls them, or "
+            "remove them",
+        )
+        for name, lines in missed.items()
+    ]

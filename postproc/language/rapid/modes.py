@@ -1,0 +1,151 @@
+"""What moves are carried out with: displacement, checks, singularities, sensors."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, fields, replace
+
+from postproc.language.rapid import syntax as said
+from postproc.language.visits import OrientationLaw, Switch
+
+NO_SHIFT = (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)  # position [mm] and quaternion
+UNKNOWN_SHIFT: tuple[float, ...] = ()
+
+
+@dataclass(frozen=True)
+class Modes:
+    """What holds until another instruction changes it.
+
+    Attributes:
+        shift: Program displacement, position [mm] and quaternion; empty: not known.
+        confl, confj: Whether confdata is checked on lines and on joint moves.
+        law: How the tool turns on lines.
+        arc_law: .. on arcs.
+        wrist: Lines with the wrist's joints in proportion.
+        override: Share of the programmed speed, NaN where not known.
+        blocked: Why no target can be compensated; more than one reason.
+    """
+
+    shift: tuple[float, ...] = NO_SHIFT
+    confl: Switch = Switch.ON
+    confj: Switch = Switch.ON
+    law: OrientationLaw = OrientationLaw.ONE_AXIS
+    arc_law: OrientationLaw = OrientationLaw.ALONG_PATH
+    wrist: bool = False
+    override: float = 1.0
+    blocked: frozenset[str] = frozenset()
+
+    def joined(self, other: Modes) -> Modes:
+        """Keep what is the same on another way here."""
+        differing = {
+            f.name: getattr(LOST, f.name)
+            for f in fields(self)
+            if getattr(self, f.name) != getattr(other, f.name)
+        }
+        differing["blocked"] = self.blocked | other.blocked
+        return replace(self, **differing)
+
+
+AT_START = Modes()
+LOST = Modes(
+    shift=UNKNOWN_SHIFT,
+    confl=Switch.UNKNOWN,
+    confj=Switch.UNKNOWN,
+    law=OrientationLaw.UNKNOWN,
+    arc_law=OrientationLaw.UNKNOWN,
+    override=0.0,
+)
+
+# Instructions that let the arm go elsewhere than targets say, and those that end it.
+BLOCKING = {
+    "softact": ("softdeact", "an axis is soft (SoftAct)"),
+    "corrcon": ("corrdiscon corrclear", "a sensor may correct the path (CorrCon)"),
+    "syncmoveon": ("syncmoveoff", "it moves together with another arm (SyncMoveOn)"),
+    "waitwobj": ("dropwobj", "the work object is on a conveyor (WaitWObj)"),
+}
+_ENDING = {name: why for ends, why in BLOCKING.values() for name in ends.split()}
+PAYLOAD = "GripLoad names a load: the model's sag holds for that of the cell file"
+# They change nothing of where a target is and from which side it is reached.
+HARMLESS = frozenset(
+    """
+    accset speedrefresh worldacclim pathacclim pathresol motionsup eoffson eoffsset
+    eoffsoff mechunitload actunit deactunit corrwrite tuneservo tunereset stopmove
+    startmove
+    """.split()
+)
+
+
+def changed_modes(
+    name: str,
+    arguments: Sequence[said.Argument],
+    modes: Modes,
+    number: Callable[[said.Operand | None], float],
+    pose: Callable[[said.Operand | None], tuple[float, ...]],
+) -> Modes:
+    """Carry out an instruction that changes how the moves after it are.
+
+    Args:
+        name: The instruction, in lower case.
+        arguments: Its arguments.
+        modes: What holds before it.
+        number: Evaluates a number, NaN where it is not known.
+        pose: Evaluates a pose, empty where it is not known.
+    """
+    switches = {one.name for one in arguments if one.name and one.value is None}
+    placed = [one.value for one in arguments if not one.name]
+    match name:
+        case "confl" | "confj":
+            checked = _switched(switches)
+            if name == "confl":
+                return replace(modes, confl=checked)
+            return replace(modes, confj=checked)
+        case "pdispoff":
+            return replace(modes, shift=NO_SHIFT)
+        case "pdispset":
+            return replace(modes, shift=pose(placed[0] if placed else None))
+        case "pdispon":
+            return replace(modes, shift=UNKNOWN_SHIFT)
+        case "singarea":
+            return _singular(switches, modes)
+        case "cirpathmode":
+            return replace(modes, arc_law=_ARC_LAWS.get(frozenset(switches), LOST.law))
+        case "velset":
+            share = number(placed[0] if placed else None) / 100.0
+            return replace(modes, override=share if 0.0 < share <= 1.0 else 0.0)
+        case "gripload":
+            return _loaded(placed, modes)
+    if name in BLOCKING:
+        return replace(modes, blocked=modes.blocked | {BLOCKING[name][1]})
+    if name in _ENDING:
+        return replace(modes, blocked=modes.blocked - {_ENDING[name]})
+    return modes if name in HARMLESS else LOST
+
+
+# Only \CirPointOri takes the tool through the orientation of the circle's point.
+_ARC_LAWS = {
+    frozenset[str](): OrientationLaw.ALONG_PATH,
+    frozenset(["pathframe"]): OrientationLaw.ALONG_PATH,
+    frozenset(["objectframe"]): OrientationLaw.ALONG_PATH,
+    frozenset(["cirpointori"]): OrientationLaw.ONE_AXIS,
+}
+
+
+def _switched(switches: set[str]) -> Switch:
+    if switches == {"off"}:
+        return Switch.OFF
+    return Switch.ON if switches <= {"on"} else Switch.UNKNOWN
+
+
+def _singular(switches: set[str], modes: Modes) -> Modes:
+    laws = {"off": OrientationLaw.ONE_AXIS, "wrist": OrientationLaw.WRIST_JOINTS}
+    (word,) = switches if len(switches) == 1 else ("",)
+    law = laws.get(word, OrientationLaw.UNKNOWN)
+    return replace(modes, law=law, wrist=word == "wrist")
+
+
+def _loaded(placed: Sequence[said.Operand | None], modes: Modes) -> Modes:
+    """GripLoad: nothing in the hand is what the cell describes."""
+    names = [one.name for one in placed if isinstance(one, said.DataObject)]
+    if names == ["load0"]:
+        return replace(modes, blocked=modes.blocked - {PAYLOAD})
+    return replace(modes, blocked=modes.blocked | {PAYLOAD})

@@ -1,0 +1,575 @@
+"""What a move of RAPID says: destination, tool, work object, zone and speed."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from functools import cache
+
+import numpy as np
+
+from postproc.language.rapid import syntax as said
+from postproc.language.rapid.dialect import (
+    RAPID_DIALECT,
+    WIDTH,
+    rotation_from_quaternion,
+)
+from postproc.language.rapid.modes import Modes
+from postproc.language.rapid.signatures import Signature
+from postproc.language.rapid.targets import COUNTS
+from postproc.language.rapid.task import (
+    SHIFTS,
+    Nested,
+    RapidTask,
+    Scope,
+    WrittenNumber,
+)
+from postproc.language.visits import Meaning
+from postproc.robot.pose import pose_from_record, record_from_pose
+from postproc.robot.trajectory import Motion
+
+UNUSED = 1e8  # values of external axes from here on (9E9) say that there is none
+NOTHING = (np.nan,) * WIDTH
+NO_SLOTS = (-1,) * WIDTH
+_ZONE = re.compile(r"z(\d+)$")
+_SPEED = re.compile(r"v(\d+)$")
+USUAL_TURN = np.deg2rad(500.0)  # [rad/s] of the speeds that the controller knows
+_STEM = re.compile(r"^(move|trigg|arcmove|arc|spotm|spot|paint|disp|cap|search)")
+SHORTEST = 0.5  # length of what counts as a quaternion
+Z0 = 0.3  # [mm]
+UNKNOWN_ZONE = -1.0
+RUN_TIME = "it is known only when the program runs"
+AT_A_STOP = ("spotl", "spotj", "spotml", "spotmj")  # they weld standing still
+
+
+@dataclass(frozen=True)
+class FrameOfMove:
+    """A tool or a work object.
+
+    Attributes:
+        record: Where it is [mm, deg], empty where that is not known.
+        held: Robhold: the arm holds it.
+        why: Why targets with it cannot be compensated, "" where they can.
+    """
+
+    record: tuple[float, ...]
+    held: bool
+    why: str = ""
+
+
+@dataclass(frozen=True)
+class RapidGoal:
+    """Where a move goes.
+
+    Attributes:
+        target: What the numbers mean.
+        values: w numbers, NaN where not known.
+        file: Index of the file that holds them.
+        slots: Which numbers of that file they are, -1 for those that are computed.
+        follows: Likewise of the point that it is shifted from.
+        name: Of the point, "" where it is written in the move.
+        aux: External axes, NaN where there is none.
+        why: Why it cannot be compensated, "" where it can.
+        pins: Why the numbers must stay, "" where they need not.
+    """
+
+    target: Meaning
+    values: tuple[float, ...] = NOTHING
+    file: int = -1
+    slots: tuple[int, ...] = NO_SLOTS
+    follows: tuple[int, ...] = NO_SLOTS
+    name: str = ""
+    aux: tuple[float, ...] = (np.nan,) * 6
+    why: str = ""
+    pins: str = ""
+
+
+@dataclass
+class RapidVisit:
+    """One arrival, as it is found.
+
+    Attributes:
+        scope, row: The move.
+        motion, via: `Motion`, and whether it is the point of an arc.
+        goal: Where it goes.
+        tool, wobj: Its frames.
+        zone_mm: Size of its zone, NaN where it stops.
+        speed: Along the path [m/s], NaN where not known.
+        modes: What holds there.
+        origins: Where it may come from.
+        why: Why it cannot be compensated, "" where it can.
+    """
+
+    scope: Scope
+    row: int
+    motion: Motion
+    via: bool
+    goal: RapidGoal
+    tool: FrameOfMove
+    wobj: FrameOfMove
+    zone_mm: float
+    speed: float
+    modes: Modes
+    origins: frozenset[int] = frozenset()
+    why: str = ""
+
+
+@dataclass
+class Goals:
+    """Reads the arguments of moves; frames by name are read once."""
+
+    task: RapidTask
+    _frames: dict[tuple[object, ...], FrameOfMove] = field(default_factory=dict)
+    _known: dict[
+        tuple[int, Scope],
+        tuple[said.Instruction, tuple[FrameOfMove, FrameOfMove, float, float]],
+    ] = field(default_factory=dict)
+    _slots: dict[int, tuple[said.Composite, list[int]]] = field(default_factory=dict)
+
+    def visits(
+        self,
+        one: said.Instruction,
+        signature: Signature,
+        row: int,
+        scope: Scope,
+        modes: Modes,
+    ) -> Iterator[RapidVisit]:
+        """Read the visits of a move: the point of an arc, and its end."""
+        ends = signature.operands(one.arguments)
+        tool, wobj, zone, speed = self._conditions(one, ends, row, scope)
+        motion = _motion(one.name, signature)
+        why = "" if signature.reaches else "where a search ends is not known before"
+        if any(argument.name == "id" for argument in one.arguments):
+            why = "it moves together with another arm (\\ID)"
+        if zone == UNKNOWN_ZONE:
+            why = why or "its zone is not known: no zonedata of the files at hand"
+        if signature.via >= 0:
+            goal = self.goal(ends[1], signature, row, scope)
+            yield RapidVisit(
+                scope, row, motion, True, goal, tool, wobj, zone, speed, modes, why=why
+            )
+        goal = self.goal(ends[0], signature, row, scope)
+        if not signature.reaches:
+            goal = RapidGoal(Meaning.UNKNOWN, NOTHING, why=why, name=goal.name)
+        yield RapidVisit(
+            scope, row, motion, False, goal, tool, wobj, zone, speed, modes, why=why
+        )
+
+    def _conditions(
+        self,
+        one: said.Instruction,
+        ends: Sequence[said.Operand | None],
+        row: int,
+        scope: Scope,
+    ) -> tuple[FrameOfMove, FrameOfMove, float, float]:
+        """Read tool, work object, zone [mm] and speed [m/s] of a move.
+
+        Moves of one form that only name them have the same.
+        """
+        others = [a.value for a in one.arguments if all(a.value is not e for e in ends)]
+        named = all(
+            value is None or (isinstance(value, said.DataObject) and not value.steps)
+            for value in others
+        )
+        key = id(one), scope
+        if named and key in self._known:
+            return self._known[key][1]
+        arguments = _Arguments(self.task, one.arguments, row, scope)
+        zone = np.nan if one.name in AT_A_STOP else arguments.zone()
+        found = self._tool(arguments), self._wobj(arguments), zone, arguments.speed()
+        if named:
+            self._known[key] = one, found  # it keeps its id from being used again
+        return found
+
+    def goal(
+        self,
+        operand: said.Operand | None,
+        signature: Signature,
+        row: int,
+        scope: Scope,
+    ) -> RapidGoal:
+        """Read a destination."""
+        match operand:
+            case said.Composite() | said.DataObject():
+                return self._point(operand, signature.joints, row, scope)
+            case said.FunctionCall(name=name, arguments=arguments) if (
+                name in SHIFTS and not signature.joints
+            ):
+                return self._shifted(name, arguments, row, scope)
+            case _:
+                return RapidGoal(Meaning.UNKNOWN, why=RUN_TIME)
+
+    def _point(
+        self,
+        operand: said.Composite | said.DataObject,
+        joints: bool,
+        row: int,
+        scope: Scope,
+    ) -> RapidGoal:
+        """Read a point that is written or named."""
+        name = operand.name if isinstance(operand, said.DataObject) else ""
+        if isinstance(operand, said.Composite):
+            plain = self._written(operand, joints, row, scope)
+            if plain is not None:
+                return plain
+        found = _numbers(self.task.record(operand, row, scope), joints)
+        if found is None:
+            why = f"{name} {self._untold(name, scope)}" if name else RUN_TIME
+            return RapidGoal(Meaning.UNKNOWN, name=name, why=why)
+        shown = name + self._element(operand, row, scope)
+        main, aux = found
+        file, slots = _places(main)
+        values = [number.value for number in main]
+        values += [0.0] * (WIDTH - len(values))
+        why = "" if joints or _is_unit(values[3:7]) else "no quaternion"
+        return RapidGoal(
+            Meaning.JOINTS if joints else Meaning.POSE,
+            tuple(values),
+            file,
+            slots,
+            name=shown,
+            aux=aux,
+            why=why or ("" if file >= 0 else "it is computed from other data"),
+            pins=self._pinned(name, operand),
+        )
+
+    def _written(
+        self, operand: said.Composite, joints: bool, row: int, scope: Scope
+    ) -> RapidGoal | None:
+        """Read a point whose numbers all stand in the move, None for others."""
+        if id(operand) not in self._slots:
+            self._slots[id(operand)] = operand, _plain_slots(operand)
+        slots = self._slots[id(operand)][1]
+        if len(slots) != (12 if joints else 17):
+            return None
+        text = self.task.files[scope.file].text
+        first = int(text.first[row])
+        places = [first + slot for slot in slots]
+        values = text.value[places].tolist()
+        count = len(slots) - 6
+        main = values[:count] + [0.0] * (WIDTH - count)
+        if any(v != v for v in values) or not (joints or _is_unit(main[3:7])):
+            return None
+        aux = tuple(np.nan if abs(v) > UNUSED else v for v in values[count:])
+        at = tuple(places[:count] + [-1] * (WIDTH - count))
+        target = Meaning.JOINTS if joints else Meaning.POSE
+        return RapidGoal(target, tuple(main), scope.file, at, aux=aux)
+
+    def _element(self, operand: said.Operand, row: int, scope: Scope) -> str:
+        """Spell which element of an array is meant, "" where it is none."""
+        steps = operand.steps if isinstance(operand, said.DataObject) else ()
+        spelt = []
+        for step in steps:
+            if isinstance(step, str):
+                spelt.append(f".{step}")
+            else:
+                at = (self.task.number(one, row, scope) for one in step.subscripts)
+                spelt.append("{" + ",".join(f"{k:g}" for k in at) + "}")
+        return "".join(spelt)
+
+    def _untold(self, name: str, scope: Scope) -> str:
+        """Say why a name stands for no known point."""
+        found = self.task.datum(name, scope)
+        if found is None:
+            return "is no data of the files at hand, or of several of them"
+        if found[1].declared.value is None:
+            return "has no value in the files at hand"
+        if self.task.constant(name, scope) is None:
+            return f"may be changed by the program: {RUN_TIME}"
+        return f"has an element or value that is not known: {RUN_TIME}"
+
+    def _pinned(self, name: str, operand: said.Operand) -> str:
+        """Say why a point must keep its numbers."""
+        if not name:
+            return ""
+        if name in self.task.twins:
+            return (
+                f"{name} stands beside its original (o_): the controller limits how "
+                "far apart they may be"
+            )
+        if name in self.task.read:
+            return f"{name} is used otherwise than as a destination too"
+        return ""
+
+    def _shifted(
+        self, name: str, arguments: Sequence[said.Argument], row: int, scope: Scope
+    ) -> RapidGoal:
+        """Read Offs and RelTool: the point is moved along, the shift stays."""
+        placed = [one.value for one in arguments if not one.name]
+        turns = {one.name: one.value for one in arguments if one.name}
+        if len(placed) != 4 or not isinstance(
+            placed[0], said.DataObject | said.Composite
+        ):
+            return RapidGoal(Meaning.UNKNOWN, why=RUN_TIME)
+        base = self._point(placed[0], False, row, scope)
+        shift = [self.task.number(one, row, scope) for one in placed[1:]]
+        angles = [
+            self.task.number(turns[axis], row, scope) if axis in turns else 0.0
+            for axis in ("rx", "ry", "rz")
+        ]
+        if base.target != Meaning.POSE or np.isnan([*shift, *angles]).any():
+            pins = base.pins or f"{name} shifts it by what {RUN_TIME}"
+            return RapidGoal(Meaning.UNKNOWN, name=base.name, why=base.why or RUN_TIME,
+                        file=base.file, follows=base.slots, pins=pins)  # fmt: skip
+        values = _moved(np.array(base.values), name, shift, angles)
+        turned = any(angles)
+        pins = base.pins or (f"{name} turns it" if turned else "")
+        return RapidGoal(
+            Meaning.POSE, values, base.file, NO_SLOTS, base.slots, base.name, base.aux,
+            base.why, pins,
+        )  # fmt: skip
+
+    # Tools and work objects.
+
+    def _tool(self, arguments: _Arguments) -> FrameOfMove:
+        operand = arguments.of_type("tooldata")
+        if operand is None:
+            return FrameOfMove((), True, "its tool is declared in no file at hand")
+        return self._frame("tool", operand, arguments)
+
+    def _wobj(self, arguments: _Arguments) -> FrameOfMove:
+        operand = arguments.option("wobj")
+        if operand is None:
+            return WORLD
+        return self._frame("wobj", operand, arguments)
+
+    def _frame(
+        self, kind: str, operand: said.Operand, arguments: _Arguments
+    ) -> FrameOfMove:
+        """Read a tool or a work object, by name once for each place it may mean."""
+        scope = arguments.scope
+        if isinstance(operand, said.DataObject) and not operand.steps:
+            if operand.name == f"{kind}0":
+                return FLANGE if kind == "tool" else WORLD
+            key = kind, operand.name, scope.file, scope.module, scope.routine
+            if key not in self._frames:
+                self._frames[key] = self._read_frame(kind, operand, arguments)
+            return self._frames[key]
+        return self._read_frame(kind, operand, arguments)
+
+    def _read_frame(
+        self, kind: str, operand: said.Operand, arguments: _Arguments
+    ) -> FrameOfMove:
+        name = operand.name if isinstance(operand, said.DataObject) else f"the {kind}"
+        found = self.task.record(operand, arguments.row, arguments.scope)
+        read = _tool_of(found) if kind == "tool" else _wobj_of(found)
+        if read is None:
+            why = f"{name} {self._untold(name, arguments.scope)}"
+            return FrameOfMove((), kind == "tool", why)
+        return read
+
+
+WORLD = FrameOfMove((0.0,) * 6, False)
+FLANGE = FrameOfMove((0.0,) * 6, True)
+
+
+@dataclass
+class _Arguments:
+    """The arguments of a move.
+
+    Attributes:
+        task: The modules.
+        arguments: All of them.
+        row, scope: Where the move stands.
+    """
+
+    task: RapidTask
+    arguments: Sequence[said.Argument]
+    row: int
+    scope: Scope
+
+    def option(self, name: str) -> said.Operand | None:
+        r"""Return the value of ``\name:=value``, None where it is not there."""
+        found = (one for one in self.arguments if one.name == name)
+        return next((one.value for one in found), None)
+
+    def of_type(self, type_: str) -> said.Operand | None:
+        """Return the only argument by place that is data of a type."""
+        found = [
+            one.value
+            for one in self.arguments
+            if not one.name and self._type(one.value) == type_
+        ]
+        return found[0] if len(found) == 1 else None
+
+    def _type(self, operand: said.Operand | None) -> str:
+        if not isinstance(operand, said.DataObject):
+            return ""
+        found = self.task.datum(operand.name, self.scope)
+        if found is not None:
+            return found[1].declared.type
+        if operand.name == "tool0":
+            return "tooldata"
+        if operand.name == "fine" or _ZONE.match(operand.name):
+            return "zonedata"
+        return "speeddata" if _SPEED.match(operand.name) else ""
+
+    def zone(self) -> float:
+        """Return the size of the zone [mm], NaN for a stop, -1 where not known."""
+        size = self.option("z")
+        if size is not None:
+            own = self.task.number(size, self.row, self.scope)
+            return own if own >= 0.0 else UNKNOWN_ZONE
+        operand = self.of_type("zonedata")
+        if not isinstance(operand, said.DataObject):
+            return UNKNOWN_ZONE
+        if operand.name == "fine":
+            return np.nan
+        usual = _ZONE.match(operand.name)
+        if usual and self.task.datum(operand.name, self.scope) is None:
+            return float(usual[1]) or Z0
+        found = self.task.record(operand, self.row, self.scope)
+        if isinstance(found, tuple) and len(found) >= 2:
+            stops, tcp = found[:2]
+            if isinstance(stops, WrittenNumber) and isinstance(tcp, WrittenNumber):
+                return np.nan if stops.value else tcp.value
+        return UNKNOWN_ZONE
+
+    def speed(self) -> float:
+        """Return the speed along a path [m/s], NaN where it is not known."""
+        own = self.option("v")
+        if own is not None:
+            return self.task.number(own, self.row, self.scope) / 1000.0
+        operand = self.of_type("speeddata")
+        if not isinstance(operand, said.DataObject):
+            return np.nan
+        usual = _SPEED.match(operand.name)
+        if usual and self.task.datum(operand.name, self.scope) is None:
+            return float(usual[1]) / 1000.0
+        found = self.task.record(operand, self.row, self.scope)
+        if isinstance(found, tuple) and found and isinstance(found[0], WrittenNumber):
+            return found[0].value / 1000.0
+        return np.nan
+
+
+@cache
+def _motion(name: str, signature: Signature) -> Motion:
+    """Tell how an instruction moves, by its signature and the end of its name."""
+    if signature.via >= 0:
+        return Motion.CIRCULAR
+    if signature.joints:
+        return Motion.JOINT
+    stem = _STEM.sub("", name)
+    return Motion.JOINT if stem.startswith("j") else Motion.LINEAR
+
+
+def _is_unit(q: Sequence[float]) -> bool:
+    """Tell whether four numbers say a rotation."""
+    return sum(c * c for c in q) > SHORTEST**2
+
+
+def _plain_slots(operand: said.Composite) -> list[int]:
+    """Return the slots of ``[[1, 2, ..], ..]`` of a target, nothing for all else."""
+    parts = [part.items for part in operand.items if isinstance(part, said.Composite)]
+    if tuple(map(len, parts)) not in COUNTS or len(parts) != len(operand.items):
+        return []
+    leaves = [leaf for part in parts for leaf in part]
+    slots = [leaf.slot for leaf in leaves if isinstance(leaf, said.Num)]
+    return slots if len(slots) == len(leaves) else []
+
+
+def _numbers(
+    found: Nested | None, joints: bool
+) -> tuple[list[WrittenNumber], tuple[float, ...]] | None:
+    """Take a robtarget or jointtarget apart: its numbers, and the external axes."""
+    counts = (6, 6) if joints else (3, 4, 4, 6)
+    if not isinstance(found, tuple) or len(found) != len(counts):
+        return None
+    parts: list[list[WrittenNumber]] = []
+    for part, count in zip(found, counts, strict=True):
+        if not isinstance(part, tuple) or len(part) != count:
+            return None
+        own = [one for one in part if isinstance(one, WrittenNumber)]
+        if len(own) != count or any(one.value != one.value for one in own):
+            return None
+        parts.append(own)
+    last = (one.value for one in parts[-1])
+    outside = tuple(np.nan if abs(value) > UNUSED else value for value in last)
+    return [one for part in parts[:-1] for one in part], outside
+
+
+def _places(numbers: Sequence[WrittenNumber]) -> tuple[int, tuple[int, ...]]:
+    """Return the file of numbers and their places, -1 where one is computed."""
+    files = {one.file if one.slot >= 0 else -1 for one in numbers}
+    if len(files) != 1 or -1 in files:
+        return -1, NO_SLOTS
+    slots = [one.slot for one in numbers]
+    return files.pop(), tuple(slots + [-1] * (WIDTH - len(slots)))
+
+
+def _moved(
+    base: np.ndarray, name: str, shift: Sequence[float], angles: Sequence[float]
+) -> tuple[float, ...]:
+    """Shift a point: Offs in its work object, RelTool along and about its own axes."""
+    out = np.array(base)
+    rotation = rotation_from_quaternion(base[3:7])
+    out[:3] += shift if name == "offs" else rotation @ np.array(shift)
+    if any(angles):
+        cos, sin = np.cos(np.deg2rad(angles)), np.sin(np.deg2rad(angles))
+        about_x = np.array([[1, 0, 0], [0, cos[0], -sin[0]], [0, sin[0], cos[0]]])
+        about_y = np.array([[cos[1], 0, sin[1]], [0, 1, 0], [-sin[1], 0, cos[1]]])
+        about_z = np.array([[cos[2], -sin[2], 0], [sin[2], cos[2], 0], [0, 0, 1]])
+        by = rotation @ about_x @ about_y @ about_z @ rotation.T
+        out = RAPID_DIALECT.turned(out[None], by[None])[0]
+    return tuple(out.tolist())
+
+
+def _pose_numbers(found: Nested | None) -> list[float] | None:
+    """Return the seven numbers of a pose, None where it is none."""
+    if not isinstance(found, tuple) or len(found) != 2:
+        return None
+    numbers = [
+        one.value
+        for part in found
+        if isinstance(part, tuple)
+        for one in part
+        if isinstance(one, WrittenNumber)
+    ]
+    return numbers if len(numbers) == 7 and np.linalg.norm(numbers[3:]) > 0.5 else None
+
+
+def pose_of(found: Nested | None) -> tuple[float, ...]:
+    """Return the seven numbers of a pose, nothing where it is none."""
+    return tuple(_pose_numbers(found) or ())
+
+
+def pose_record(numbers: Sequence[float]) -> tuple[float, ...]:
+    """Convert the seven numbers of a pose to a position record [mm, deg]."""
+    pose = RAPID_DIALECT.poses(np.array([*numbers, 0.0, 0.0, 0.0, 0.0])[None])
+    record: list[float] = record_from_pose(pose)[0].tolist()
+    return tuple(record)
+
+
+def composed(first: Sequence[float], second: Sequence[float]) -> tuple[float, ...]:
+    """Compose two position records."""
+    both = pose_from_record(np.array([first, second]))
+    record: list[float] = record_from_pose((both[0] @ both[1])[None])[0].tolist()
+    return tuple(record)
+
+
+def _tool_of(found: Nested | None) -> FrameOfMove | None:
+    """Read ``[robhold, [[x,y,z],[q1..q4]], [load]]``."""
+    if not isinstance(found, tuple) or len(found) < 2:
+        return None
+    held, pose = found[0], _pose_numbers(found[1])
+    if pose is None or not isinstance(held, WrittenNumber):
+        return None
+    return FrameOfMove(pose_record(pose), bool(held.value))
+
+
+def _wobj_of(found: Nested | None) -> FrameOfMove | None:
+    """Read ``[robhold, ufprog, "ufmec", [uframe], [oframe]]``."""
+    if not isinstance(found, tuple) or len(found) != 5:
+        return None
+    held, fixed, unit = found[:3]
+    user, object_ = _pose_numbers(found[3]), _pose_numbers(found[4])
+    if user is None or object_ is None or not isinstance(held, WrittenNumber):
+        return None
+    why = ""
+    if (isinstance(unit, str) and unit.strip('"')) or not (
+        isinstance(fixed, WrittenNumber) and fixed.value
+    ):
+        why = "its work object is moved by a mechanical unit (ufmec, ufprog)"
+    record = composed(pose_record(user), pose_record(object_))
+    return FrameOfMove(record, bool(held.value), why)

@@ -1,0 +1,386 @@
+"""All modules of a task: what its names mean, and which data never change."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+
+from postproc.language.rapid import syntax as said
+from postproc.language.rapid.program import Datum, RapidFile, RapidScope
+from postproc.language.rapid.signatures import BUILT_IN_FUNCTIONS, MOTIONS, READING
+from postproc.language.rapid.targets import operands_of
+
+TARGETS = ("robtarget", "jointtarget")
+SHIFTS = ("offs", "reltool")  # functions whose first argument is a target
+CONSTANTS = {"true": 1.0, "false": 0.0, "pi": 3.141592653589793}
+
+
+@dataclass(frozen=True)
+class Scope:
+    """Where a statement stands, and what loop variables hold there.
+
+    Attributes:
+        file: Index of its file.
+        module, routine: Names, "" outside of all.
+        parameters: Of the routine.
+        loops: Values of loop variables that are known.
+    """
+
+    file: int
+    module: str
+    routine: str
+    parameters: frozenset[str] = frozenset()
+    loops: tuple[tuple[str, float], ...] = ()
+
+
+@dataclass(frozen=True)
+class WrittenNumber:
+    """A number of a record: its value, and where it is written.
+
+    Attributes:
+        value: Its value.
+        file, slot: Where it stands; slot -1 where it is computed.
+    """
+
+    value: float
+    file: int = -1
+    slot: int = -1
+
+
+Nested = WrittenNumber | str | tuple["Nested", ...]
+
+
+@dataclass
+class RapidTask:
+    """The modules of a task.
+
+    Attributes:
+        files: Its files, the one with the main routine first.
+    """
+
+    files: Sequence[RapidFile]
+    _local: dict[tuple[int, str, str], dict[str, Datum]] = field(default_factory=dict)
+    _global: dict[str, list[tuple[int, Datum]]] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        """Index data by the scopes that declare them."""
+        for number, file in enumerate(self.files):
+            for datum in file.data:
+                place = number, datum.module, datum.routine
+                self._local.setdefault(place, {})[datum.declared.name] = datum
+                if not datum.routine and datum.declared.scope != "local":
+                    known = self._global.setdefault(datum.declared.name, [])
+                    known.append((number, datum))
+
+    @cached_property
+    def routines(self) -> Mapping[str, list[tuple[int, str, RapidScope]]]:
+        """Routines by name: file, module and place of each."""
+        found: dict[str, list[tuple[int, str, RapidScope]]] = defaultdict(list)
+        for number, file in enumerate(self.files):
+            for scope in file.routines:
+                around = (m for m in file.modules if m.first < scope.first < m.last)
+                module = next((m.head.name for m in around), "")
+                found[scope.head.name].append((number, module, scope))
+        return found
+
+    def routine(self, name: str, here: Scope) -> tuple[int, str, RapidScope] | None:
+        """Find the routine that a name means, None where it is not sure."""
+        known = self.routines.get(name, [])
+        own = [one for one in known if one[:2] == (here.file, here.module)]
+        if own:
+            return own[0] if len(own) == 1 else None
+        shared = [one for one in known if not getattr(one[2].head, "local", False)]
+        return shared[0] if len(shared) == 1 else None
+
+    def datum(self, name: str, here: Scope) -> tuple[int, Datum] | None:
+        """Find the data that a name means, None where nothing sure is known."""
+        if name in here.parameters:
+            return None
+        for routine in (here.routine, ""):
+            found = self._local.get((here.file, here.module, routine), {}).get(name)
+            if found is not None:
+                return here.file, found
+        shared = self._global.get(name, [])
+        return shared[0] if len(shared) == 1 else None
+
+    def constant(self, name: str, here: Scope) -> tuple[int, Datum] | None:
+        """Find data that hold what they were declared with for as long as it runs."""
+        found = self.datum(name, here)
+        if found is None or found[1].declared.value is None:
+            return None
+        fixed = found[1].declared.kind == "const" or name not in self.written
+        return found if fixed else None
+
+    @cached_property
+    def written(self) -> frozenset[str]:
+        """Names of data that something may change."""
+        return self._uses[0]
+
+    @cached_property
+    def read(self) -> frozenset[str]:
+        """Names of data that something but the destination of a move takes."""
+        return self._uses[1]
+
+    @cached_property
+    def twins(self) -> frozenset[str]:
+        """Names of points beside which the controller keeps their originals."""
+        names = {d.declared.name for file in self.files for d in file.data}
+        pairs = {name for name in names if f"o_{name}" in names}
+        return frozenset(pairs | {f"o_{name}" for name in pairs})
+
+    @cached_property
+    def _uses(self) -> tuple[frozenset[str], frozenset[str]]:
+        written: set[str] = set()
+        read: set[str] = set()
+        for file in self.files:
+            for statement in file.text.said:
+                _note_uses(statement, written, read)
+        return frozenset(written), frozenset(read)
+
+    def scope_of(self, number: int, module: str, routine: RapidScope) -> Scope:
+        """Return where the statements of a routine stand."""
+        head = routine.head
+        given = frozenset(getattr(head, "parameters", ()))
+        return Scope(number, module, head.name, given)
+
+    # Values.
+
+    def number(self, operand: said.Operand | None, row: int, here: Scope) -> float:
+        """Evaluate a number, NaN where it is not known before the program runs."""
+        match operand:
+            case said.Num(slot=slot):
+                text = self.files[here.file].text
+                return float(text.value[int(text.first[row]) + slot])
+            case said.Operation(operator=operator, operands=operands):
+                parts = [self.number(one, row, here) for one in operands]
+                return _computed(operator, parts)
+            case said.DataObject(name=name, steps=()):
+                loops = dict(here.loops)
+                if name in loops:
+                    return loops[name]
+                found = self.constant(name, here)
+                if found is None:
+                    return CONSTANTS.get(name, float("nan"))
+                return self._declared_number(*found)
+            case _:
+                return float("nan")
+
+    def _declared_number(self, file: int, datum: Datum) -> float:
+        if datum.declared.dimensions:
+            return float("nan")
+        there = Scope(file, datum.module, datum.routine)
+        value = datum.declared.value
+        if isinstance(value, said.DataObject) and value.name == datum.declared.name:
+            return float("nan")
+        return self.number(value, datum.row, there)
+
+    def record(
+        self, operand: said.Operand | None, row: int, here: Scope, depth: int = 0
+    ) -> Nested | None:
+        """Evaluate a record or array, None where it is not known."""
+        match operand:
+            case said.Composite(items=items):
+                parts = [self.record(one, row, here, depth) for one in items]
+                known = tuple(part for part in parts if part is not None)
+                return known if len(known) == len(parts) else None
+            case said.StringLiteral(text=text):
+                return text
+            case said.Num(slot=slot):
+                file = self.files[here.file].text
+                at = int(file.first[row]) + slot
+                return WrittenNumber(float(file.value[at]), here.file, at)
+            case said.DataObject(name=name, steps=steps) if name not in CONSTANTS:
+                return self._data_object(name, steps, row, here, depth)
+            case _:
+                value = self.number(operand, row, here)
+                return None if value != value else WrittenNumber(value)
+
+    def _data_object(
+        self,
+        name: str,
+        steps: Sequence[str | said.ElementStep],
+        row: int,
+        here: Scope,
+        depth: int,
+    ) -> Nested | None:
+        loops = dict(here.loops)
+        if name in loops and not steps:
+            return WrittenNumber(loops[name])
+        found = self.constant(name, here)
+        if found is None or depth > DEEPEST:
+            return None
+        file, datum = found
+        there = Scope(file, datum.module, datum.routine)
+        value = self.record(datum.declared.value, datum.row, there, depth + 1)
+        for step in steps:
+            indices = self._indices(step, row, here)
+            for index in indices or [-1]:
+                if not isinstance(value, tuple) or not 0 <= index < len(value):
+                    return None
+                value = value[index]
+        return value
+
+    def _indices(
+        self, step: str | said.ElementStep, row: int, here: Scope
+    ) -> list[int]:
+        """Return the indices from 0 of a step, nothing where they are not known."""
+        if isinstance(step, str):
+            return [FIELDS[step]] if step in FIELDS else []
+        values = [self.number(one, row, here) for one in step.subscripts]
+        whole = [v for v in values if v == v and v == int(v)]
+        return [int(v) - 1 for v in whole] if len(whole) == len(values) else []
+
+
+DEEPEST = 20  # names that stand for names
+FIELDS = {"trans": 0, "rot": 1, "robconf": 2, "extax": 3, "x": 0, "y": 1, "z": 2}
+
+
+def _computed(operator: str, parts: Sequence[float]) -> float:
+    """Compute what an operator gives, NaN where that is no number."""
+    match operator, parts:
+        case "-", [a]:
+            return -a
+        case "+", [a]:
+            return a
+        case "+", [a, b]:
+            return a + b
+        case "-", [a, b]:
+            return a - b
+        case "*", [a, b]:
+            return a * b
+        case "/", [a, b] if b:
+            return a / b
+    return float("nan")
+
+
+# What statements take and change.
+
+
+def _note_uses(one: said.RapidStatement, written: set[str], read: set[str]) -> None:
+    """Note the names that a statement may change, and those that it takes."""
+    match one:
+        case said.DataDeclaration(value=value, dimensions=dimensions):
+            for operand in (value, *dimensions):
+                _note_operand(operand, written, read)
+        case said.Assignment(target=target, value=value):
+            written.add(target.name)
+            _note_operand(value, written, read)
+        case said.Branch(values=values):
+            for operand in values:
+                _note_operand(operand, written, read)
+        case said.CompactIf(condition=condition, statement=inside):
+            _note_operand(condition, written, read)
+            _note_uses(inside, written, read)
+        case said.ForLoop(name=name, first=first, last=last, step=step):
+            written.add(name)
+            for operand in (first, last, step):
+                _note_operand(operand, written, read)
+        case said.Leave(value=value):
+            _note_operand(value, written, read)
+        case said.ConnectTrap(interrupt=interrupt):
+            written.add(interrupt.name)
+        case said.Instruction(name=name, arguments=arguments):
+            _note_call(name, arguments, written, read)
+        case said.LateCall(arguments=arguments):
+            _note_arguments(arguments, written, read)
+        case said.NotUnderstood():
+            pass  # what it may change is said with it: nothing is known behind it
+
+
+def _note_call(
+    name: str, arguments: Sequence[said.Argument], written: set[str], read: set[str]
+) -> None:
+    signature = MOTIONS.get(name)
+    if signature is not None:
+        ends = signature.operands(arguments)
+        for argument in arguments:
+            if any(argument.value is end for end in ends):
+                _note_destination(argument.value, written, read)
+            elif signature.reaches:
+                _note_operand(argument.value, written, read)
+            else:
+                _note_arguments([argument], written, read)
+    elif name in READING:
+        for argument in arguments:
+            _note_operand(argument.value, written, read)
+    else:
+        _note_arguments(arguments, written, read)
+
+
+def _note_destination(
+    operand: said.Operand | None, written: set[str], read: set[str]
+) -> None:
+    """Note what the destination of a move takes besides the point itself."""
+    match operand:
+        case said.DataObject(steps=steps):
+            _note_steps(steps, written, read)
+        case said.FunctionCall(name=name, arguments=arguments) if name in SHIFTS:
+            if arguments and isinstance(arguments[0].value, said.DataObject):
+                _note_steps(arguments[0].value.steps, written, read)
+                arguments = arguments[1:]
+            for argument in arguments:
+                _note_operand(argument.value, written, read)
+        case _:
+            _note_operand(operand, written, read)
+
+
+def _note_steps(
+    steps: Sequence[str | said.ElementStep], written: set[str], read: set[str]
+) -> None:
+    for step in steps:
+        if isinstance(step, said.ElementStep):
+            for subscript in step.subscripts:
+                _note_operand(subscript, written, read)
+
+
+def _note_arguments(
+    arguments: Sequence[said.Argument], written: set[str], read: set[str]
+) -> None:
+    """Note arguments that a routine may change."""
+    for argument in arguments:
+        if isinstance(argument.value, said.DataObject):
+            written.add(argument.value.name)
+        _note_operand(argument.value, written, read)
+
+
+def _note_operand(
+    operand: said.Operand | None, written: set[str], read: set[str]
+) -> None:
+    match operand:
+        case said.DataObject(name=name, steps=steps):
+            read.add(name)
+            _note_steps(steps, written, read)
+        case said.Composite(items=items) | said.Operation(operands=items):
+            for item in items:
+                _note_operand(item, written, read)
+        case said.FunctionCall(name=name, arguments=arguments):
+            if name in BUILT_IN_FUNCTIONS:
+                for argument in arguments:
+                    _note_operand(argument.value, written, read)
+            else:
+                _note_arguments(arguments, written, read)
+
+
+def functions_in(one: said.RapidStatement) -> Iterator[str]:
+    """Yield the names of the functions that a statement calls."""
+    match one:
+        case said.Branch(values=values):
+            operands: Sequence[said.Operand | None] = values
+        case said.CompactIf(condition=condition, statement=inside):
+            operands = (condition, *operands_of(inside))
+        case said.ForLoop(first=first, last=last, step=step):
+            operands = (first, last, step)
+        case said.Leave(value=value):
+            operands = (value,)
+        case _:
+            operands = operands_of(one)
+    waiting = list(operands)
+    while waiting:
+        match waiting.pop():
+            case said.FunctionCall(name=name, arguments=arguments):
+                yield name
+                waiting += [argument.value for argument in arguments]
+            case said.Composite(items=items) | said.Operation(operands=items):
+                waiting += items

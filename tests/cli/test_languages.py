@@ -1,0 +1,133 @@
+"""Every command in every language, as docs/languages.md says."""
+
+from __future__ import annotations
+
+import re
+import shutil
+from pathlib import Path
+
+import pytest
+
+from tests.language.neutral_job import LANGUAGES, drawn
+from tests.written import Desk, cli
+
+ROOT = Path(__file__).parents[2]
+NAMES = dict(zip(("PDL2", "RAPID"), LANGUAGES, strict=True))
+SAID = "absolute_accuracy = false"
+
+
+def cells():
+    """Read the table: command, language, what is said."""
+    text = (ROOT / "docs/languages.md").read_text(encoding="utf-8")
+    part = text.split("## Command by language")[1].split("\n## ")[0]
+    rows = [line.strip("|").split("|") for line in part.splitlines() if line[:1] == "|"]
+    head, _, *body = [[cell.strip() for cell in row] for row in rows]
+    return [
+        (row[0], language, cell)
+        for row in body
+        for language, cell in zip(head[1:], row[1:], strict=True)
+    ]
+
+
+@pytest.fixture
+def place(job_folder, job_cell, tmp_path):
+    """A desk with a cell that says what RAPID needs, and a job in every language."""
+    text = (job_folder / "cell.toml").read_text().replace("[tool]", f"{SAID}\n[tool]")
+    (tmp_path / "cell.toml").write_text(text)
+    shutil.copy(job_folder / "model.json", tmp_path)
+    for name, write in LANGUAGES.items():
+        folder = tmp_path / "tree" / name
+        folder.mkdir(parents=True)
+        (folder / name).write_bytes(write(drawn(job_cell, 5, 12)))
+    return Desk(tmp_path, tmp_path / "cell.toml", tmp_path / "model.json")
+
+
+def source(place, name):
+    return place.folder / "tree" / name / name
+
+
+def out(place, name):
+    """Compensate a job; return the output."""
+    made = place.folder / "made" / name
+    made.parent.mkdir(exist_ok=True)
+    assert place.compensate(source(place, name), "-o", made).exit_code in (0, 1)
+    return made
+
+
+def batch(place):
+    given = ["--cell", place.cell, "--model", place.model, "--jobs", "1"]
+    return cli("batch", place.folder / "tree", place.folder / "new", *given)
+
+
+def run(command, place, name):
+    """Run the command of a cell."""
+    given, to = source(place, name), place.folder / f"out{Path(name).suffix}"
+    pair = ["--report", place.folder / "r.json", "--html", place.folder / "r.html"]
+    match command:
+        case "compensate":
+            return place.compensate(given, "-o", to)
+        case "compensate - (standard input)":
+            return place.compensate("-", stdin=given.read_bytes())
+        case "compensate --report --html":
+            return place.compensate(given, "-o", to, *pair)
+        case "compensate --orientation" | "compensate --clone":
+            return place.compensate(given, "-o", to, command.split()[1])
+        case "compensate --lsv":
+            values = place.put("v.lsv", "--$$\r\n")
+            return place.compensate(given, "-o", to, "--lsv", values)
+        case "compensate without absolute_accuracy":
+            place.cell.write_text(place.cell.read_text().replace(SAID, ""))
+            return place.compensate(given, "-o", to)
+        case "diff":
+            return cli("diff", given, out(place, name))
+        case "explain":
+            return cli("explain", given, "--cell", place.cell, "--model", place.model)
+        case "restore":
+            return cli("restore", out(place, name), "-o", to)
+        case "check":
+            assert batch(place).exit_code in (0, 1)
+            return cli("check", place.folder / "new", "--model", place.model)
+        case "batch (one tree for both)":
+            return batch(place)
+        case "simulate":
+            return cli("simulate", given, "--cell", place.cell, "-o", to)
+        case "report":
+            place.compensate(given, "-o", to, *pair)
+            return cli("report", pair[1], "-o", place.folder / "page.html")
+    raise AssertionError(command)
+
+
+@pytest.mark.parametrize(("command", "language", "said"), cells())
+def test_a_cell_of_the_table(place, command, language, said):
+    name = NAMES[language]
+    found = run(command, place, name)
+    if said == "yes":
+        assert found.exit_code in (0, 1), found.output
+    else:
+        assert found.exit_code == 2 and said in re.sub(r"\s+", " ", found.stderr)
+
+
+def test_a_restored_module_is_what_it_was(place):
+    name = NAMES["RAPID"]
+    run("restore", place, name)
+    assert (place.folder / "out.mod").read_bytes() == source(place, name).read_bytes()
+
+
+def test_the_filter_writes_what_the_file_has(place):
+    name = NAMES["RAPID"]
+    piped = run("compensate - (standard input)", place, name)
+    assert piped.stdout_bytes == out(place, name).read_bytes()
+
+
+def test_a_batch_joins_the_modules_of_a_task(place):
+    job = source(place, NAMES["RAPID"])
+    lines = job.read_text().splitlines(keepends=True)
+    points = [line for line in lines if "robtarget p" in line]
+    job.write_text("".join(line for line in lines if line not in points))
+    never = 'PROC never()\nTPWrite "x";\nENDPROC\n'
+    job.with_name("points.mod").write_text(
+        "MODULE points\n" + "".join(points) + never + "ENDMODULE\n"
+    )
+    assert batch(place).exit_code in (0, 1)
+    made = place.folder / "new" / job.parent.name / "points.mod"
+    assert points and made.read_bytes().startswith(b"! postproc")

@@ -1,0 +1,295 @@
+"""What a RAPID task does: visits, where they come from, and what is left."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from postproc.exceptions import ProgramError
+from postproc.language.interface import Start
+from postproc.language.rapid.dialect import (
+    RAPID_DIALECT,
+    quaternion_from_rotation,
+    rotation_from_quaternion,
+)
+from postproc.language.rapid.language import Rapid
+from postproc.language.source import Source
+from postproc.language.visits import ELSEWHERE, START, Meaning, OrientationLaw
+
+END = "[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]]"
+DATA = f"""
+  TASK PERS tooldata t:=[TRUE,[[10,20,300],[1,0,0,0]],[1,[0,0,1],[1,0,0,0],0,0,0]];
+  TASK PERS wobjdata w:=[FALSE,TRUE,"",[[1000,0,500],[1,0,0,0]],[[0,100,0],[0,0,0,1]]];
+  CONST robtarget p1:=[[1,2,3],[1,0,0,0],{END};
+  CONST robtarget p2:=[[4,5,6],[0,1,0,0],{END};
+  VAR robtarget list{{3}}:=[[[1,0,0],[1,0,0,0],{END},[[2,0,0],[1,0,0,0],{END},
+    [[3,0,0],[1,0,0,0],{END}];
+  CONST jointtarget j:=[[1,2,3,4,5,6],[9E9,9E9,9E9,9E9,9E9,9E9]];
+"""
+L = "MoveL {},v200,fine,t\\WObj:=w;"
+
+
+def task(*lines, more="", data=DATA, start=None, others=()):
+    text = f"MODULE m\n{data}\n{more}\nPROC main()\n" + "\n".join(lines)
+    sources = [Source("m.mod", (text + "\nENDPROC\nENDMODULE\n").encode())]
+    sources += [Source(f"o{k}.mod", o.encode()) for k, o in enumerate(others)]
+    return Rapid().read(sources, start or Start())
+
+
+def names(found):
+    v = found.visits
+    return [v.names[k] for k in v.name.tolist()]
+
+
+def origins(found):
+    v = found.visits
+    return [v.predecessors(k).tolist() for k in range(len(v))]
+
+
+def reasons(found):
+    v = found.visits
+    return [v.reasons[k] for k in v.reason.tolist()]
+
+
+def codes(found):
+    return {d.code for d in found.diagnostics}
+
+
+def test_frames_zone_and_speed_of_a_move():
+    found = task(
+        "MoveJ p1,v200,z10,t\\WObj:=w;", L.format("p2"), "MoveAbsJ j,v5,fine,t;"
+    )
+    v = found.visits
+    assert reasons(found) == [""] * 3 and names(found) == ["p1", "p2", "j"]
+    assert v.target.tolist() == [Meaning.POSE, Meaning.POSE, Meaning.JOINTS]
+    np.testing.assert_allclose(v.frames[v.tool[0]], [10, 20, 300, 0, 0, 0])
+    np.testing.assert_allclose(v.frames[v.uframe[0], :3], [1000, 100, 500])
+    assert v.fly.tolist() == [True, False, False] and v.zone_mm[0] == 10.0
+    np.testing.assert_allclose(v.lin_spd, [0.2, 0.2, 0.005])
+    assert origins(found) == [[START], [0], [1]]
+
+
+@pytest.mark.parametrize(
+    ("lines", "why"),
+    [
+        (["SoftAct 1,20;", L.format("p1")], "soft"),
+        (["CorrCon id1;", L.format("p1")], "sensor"),
+        (["SyncMoveOn a,b;", L.format("p1")], "another arm"),
+        (["GripLoad part;", L.format("p1")], "GripLoad"),
+        (["PDispOn p2,t;", L.format("p1")], "displacement"),
+        (["other;", L.format("p1")], "displacement"),
+        (["MoveL p1,v200,fine,unknown\\WObj:=w;"], "tool"),
+        (["MoveL p1,v200,fine,t\\WObj:=nowhere;"], "nowhere"),
+        (["MoveL p1,v200,odd,t\\WObj:=w;"], "zone"),
+        (["MoveL p1\\ID:=10,v200,fine,t\\WObj:=w;"], "another arm"),
+        (["SearchL di1,p2,p1,v20,t\\WObj:=w;"], "search"),
+        ([L.format("nobody")], "nobody"),
+        (["p3.trans.x:=5;", L.format("p3")], "may be changed"),
+        ([L.format("list{n}")], "run"),
+        (["MoveL Offs(p1,n,0,0),v200,fine,t\\WObj:=w;"], "run"),
+        (["MoveL CRobT(),v200,fine,t\\WObj:=w;"], "run"),
+        (["MoveL p1,v200,fine,t\\WObj:=moved;"], "mechanical unit"),
+        (["MoveL Offs(p1,0,0,9),v200,fine,t\\WObj:=w;"], "no move goes to"),
+    ],
+)
+def test_what_is_not_known_is_left(lines, why):
+    more = f"""VAR num n;
+      VAR robtarget p3:=[[1,2,3],[1,0,0,0],{END};
+      PERS wobjdata moved:=[FALSE,FALSE,"STN1",[[0,0,0],[1,0,0,0]],
+        [[0,0,0],[1,0,0,0]]];"""
+    found = task(*lines, "n:=n+1;", more=more)
+    assert why in reasons(found)[-1]
+
+
+@pytest.mark.parametrize(
+    "lines",
+    [
+        ["SoftAct 1,20;", "SoftDeact;"],
+        ["PDispOn p2,t;", "PDispOff;"],
+        ["GripLoad part;", "GripLoad load0;"],
+        ["ConfL\\Off;", "VelSet 50,1000;", "Set do1;", "WaitTime 1;", 'TPWrite "x";'],
+    ],
+)
+def test_what_is_known_again_is_not(lines):
+    assert reasons(task(*lines, L.format("p1"))) == [""]
+
+
+def test_a_known_displacement_is_part_of_the_frame():
+    found = task("PDispSet [[0,0,7],[1,0,0,0]];", L.format("p1"))
+    assert reasons(found) == [""]
+    assert found.visits.frames[found.visits.uframe[0], 2] == pytest.approx(507.0)
+
+
+def test_lines_at_singularities_and_arcs():
+    arc = f"MoveC p2,[[9,9,9],[1,0,0,0],{END},v200,fine,t\\WObj:=w;"
+    found = task(
+        L.format("p1"), arc, "CirPathMode\\CirPointOri;", arc, "SingArea\\Wrist;",
+        L.format("p1"), "SingArea\\LockAxis4;", L.format("p1"),
+    )  # fmt: skip
+    law = OrientationLaw
+    assert found.visits.orientation_law.tolist() == [
+        law.ONE_AXIS, law.ALONG_PATH, law.ALONG_PATH, law.ONE_AXIS, law.ONE_AXIS,
+        law.WRIST_JOINTS, law.UNKNOWN,
+    ]  # fmt: skip
+    assert found.visits.via.tolist() == [False, True, False, True, False, False, False]
+
+
+def test_branches_meet():
+    found = task(
+        L.format("p1"), "IF a THEN", L.format("p2"), "ELSEIF b THEN", L.format("p1"),
+        "ENDIF", L.format("p2"),
+    )  # fmt: skip
+    assert origins(found) == [[START], [0], [0], [0, 1, 2]]
+    found = task(
+        L.format("p1"), "TEST n", "CASE 1:", L.format("p2"), "DEFAULT:", L.format("p1"),
+        "ENDTEST", L.format("p2"),
+    )  # fmt: skip
+    assert origins(found) == [[START], [0], [0], [1, 2]]
+
+
+def test_loops_and_jumps():
+    found = task(
+        "WHILE a DO", L.format("p1"), L.format("p2"), "ENDWHILE", L.format("p1")
+    )
+    assert origins(found) == [[START, 1], [0], [START, 1]]
+    found = task("again:", L.format("p1"), "IF a GOTO again;", L.format("p2"))
+    assert origins(found) == [[START, 0], [0]]
+
+
+def test_rounds_of_a_loop_are_told_apart():
+    found = task("FOR i FROM 3 TO 1 STEP -1 DO", L.format("list{i}"), "ENDFOR")
+    assert names(found) == ["list{3}", "list{2}", "list{1}"]
+    assert found.visits.values[:, 0].tolist() == [3.0, 2.0, 1.0]
+    assert origins(found) == [[START], [0], [1]]
+    assert len(np.unique(found.visits.literal)) == 3
+
+
+def test_calls_are_followed_across_modules():
+    other = f"MODULE o\nPROC weld()\n{L.format('p2')}\nENDPROC\nENDMODULE\n"
+    found = task("weld;", L.format("p1"), "weld;", others=[other])
+    assert names(found) == ["p2", "p1", "p2"] and origins(found) == [[START], [0], [1]]
+    assert reasons(found) == [""] * 3
+    assert found.visits.literal.tolist() == [0, 1, 0]
+
+
+def test_a_routine_of_another_module_does_not_see_local_data():
+    other = f"MODULE o\nPROC weld()\n{L.format('p2')}\nENDPROC\nENDMODULE\n"
+    data = DATA.replace("CONST robtarget p2", "LOCAL CONST robtarget p2")
+    assert "p2" in reasons(task("weld;", data=data, others=[other]))[0]
+
+
+def test_what_may_move_forgets_where_the_arm_is():
+    found = task(L.format("p1"), "grip;", "PDispOff;", L.format("p2"))
+    assert origins(found)[1] == [ELSEWHERE] and "motion-unknown" in codes(found)
+    still = Start(routines={"Grip": "still"})
+    found = task(L.format("p1"), "grip;", L.format("p2"), start=still)
+    assert origins(found) == [[START], [0]] and codes(found) == set()
+    moves = Start(routines={"grip": "moves"})
+    found = task(L.format("p1"), "grip;", L.format("p2"), start=moves)
+    assert origins(found)[1] == [ELSEWHERE] and reasons(found) == ["", ""]
+
+
+@pytest.mark.parametrize("line", ['%"weld"%;', "EGMMoveL p1;", "n:=ours();", "?? x;"])
+def test_statements_that_may_move_are_listed(line):
+    found = task(L.format("p1"), line, L.format("p2"))
+    assert "motion-unknown" in codes(found) and reasons(found)[1]
+
+
+def test_shifted_points_follow_theirs():
+    found = task(
+        L.format("p1"), "MoveL Offs(p1,0,0,50),v200,fine,t\\WObj:=w;",
+        L.format("p2"), "MoveL RelTool(p2,0,0,50),v200,fine,t\\WObj:=w;",
+    )  # fmt: skip
+    v = found.visits
+    assert v.literal.tolist() == [0, -1, 1, -1] and v.follows.tolist() == [-1, 0, -1, 1]
+    assert v.values[1, :3].tolist() == [1, 2, 53]
+    np.testing.assert_allclose(v.values[3, :3], [4, 5, -44])  # p2 looks down
+    assert set(v.literals.pinned) == {""}
+
+
+@pytest.mark.parametrize(
+    ("lines", "more", "why"),
+    [
+        (["MoveL RelTool(p1,0,0,5\\Rz:=9),v200,fine,t\\WObj:=w;"], "", "turns it"),
+        (["far:=Distance(p1.trans,p2.trans);"], "VAR num far;", "otherwise"),
+        ([], f"CONST robtarget o_p1:=[[1,2,3],[1,0,0,0],{END};", "original"),
+    ],
+)
+def test_points_that_must_keep_their_numbers(lines, more, why):
+    found = task(L.format("p1"), *lines, more=more)
+    assert why in found.visits.literals.pinned[0]
+
+
+def test_external_axes_are_told():
+    p = "[[1,2,3],[1,0,0,0],[0,0,0,0],[9E9,12.5,9E9,9E9,9E9,9E9]]"
+    aux = task(L.format(p)).visits.aux
+    assert np.isnan(aux[0, 0]) and aux[0, 1] == 12.5 and aux.shape == (1, 2)
+
+
+def test_a_trap_that_moves_leaves_everything():
+    trap = f"TRAP stop\n{L.format('p2')}\nENDTRAP"
+    assert "TRAP" in reasons(task(L.format("p1"), more=trap))[0]
+
+
+def test_an_error_handler_that_moves_leaves_its_routine():
+    found = task(L.format("p1"), "ERROR", L.format("p2"), "RETRY;")
+    assert "error handler" in reasons(found)[0] and "never-reached" in codes(found)
+    assert reasons(task(L.format("p1"), "ERROR", "RETRY;")) == [""]
+
+
+def test_without_main_nothing_is_sure():
+    text = f"MODULE m\n{DATA}\nPROC weld()\n{L.format('p1')}\nENDPROC\nENDMODULE\n"
+    found = Rapid().read([Source("m.mod", text.encode())], Start())
+    assert "no-main" in codes(found) and reasons(found)[0]
+
+
+def test_a_block_without_end_is_refused():
+    with pytest.raises(ProgramError, match=r"m\.mod:\d+: .*ENDIF"):
+        task("IF a THEN", L.format("p1"))
+
+
+def test_routines_that_call_themselves_are_not_followed():
+    again = f"PROC again()\n{L.format('p1')}\nagain;\nENDPROC"
+    assert "motion-unknown" in codes(task("again;", more=again))
+
+
+# Numbers.
+
+
+def test_quaternions_are_normalised_and_keep_their_sign():
+    rng = np.random.default_rng(0)
+    written = rng.normal(size=(200, 4))
+    values = np.zeros((200, 11))
+    values[:, 3:7] = written
+    turned = RAPID_DIALECT.turned(values, np.tile(np.eye(3), (200, 1, 1)))[:, 3:7]
+    unit = written / np.linalg.norm(written, axis=1, keepdims=True)
+    np.testing.assert_allclose(turned, unit, atol=1e-12)
+    R = rotation_from_quaternion(written)
+    np.testing.assert_allclose(
+        R @ np.swapaxes(R, 1, 2), np.eye(3)[None] + 0 * R, atol=1e-12
+    )
+    again = rotation_from_quaternion(quaternion_from_rotation(R))
+    np.testing.assert_allclose(again, R, atol=1e-12)
+
+
+def test_quarter_turns_are_written_anew_where_they_are_left():
+    values = np.zeros((4, 11))
+    q = np.zeros((4, 6))
+    q[:, 0] = np.deg2rad([89.0, 90.01, 90.5, -0.5])
+    assert RAPID_DIALECT.reflagged(values, q)[:, 7].tolist() == [0, 0, 1, -1]
+    assert RAPID_DIALECT.misses(values, q).tolist() == [False, False, True, True]
+
+
+@pytest.mark.parametrize(
+    ("cf", "slot", "turns"),
+    [
+        ([0, 0, 0, 0], 0, [0, 0]),
+        ([0, 2, -3, 1], 4, [1, -1]),
+        ([0, 1, -2, 6], 3, [0, 0]),
+    ],
+)
+def test_confdata_as_slot_and_turns(cf, slot, turns):
+    values = np.zeros((1, 11))
+    values[0, 7:] = cf
+    found = RAPID_DIALECT.flags(np.zeros(1, dtype=int), ("",), values)
+    assert found[0].tolist() == [slot] and found[1][0, :2].tolist() == turns
