@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import json
+import math
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass, replace
@@ -92,9 +93,8 @@ def fit_files(
     program: Path | None = None,
     html: Path | None = None,
     reading: TableFormat = DETECT,
-    everything: bool = False,
     **how: Any,
-) -> str:
+) -> Calibration:
     """Fit measurement files and write the model.
 
     Args:
@@ -104,11 +104,10 @@ def fit_files(
         program: The survey program, for files that hold ids and positions only.
         html: A page about the fit to write.
         reading: What the user knows of the measurement files.
-        everything: Whether the report lists all parameters and rows.
         how: Arguments of `postproc.calibration.fit.fit`; None stands for the default.
 
     Returns:
-        The report of the fit, in words.
+        The fit.
 
     Raises:
         PostprocError: A file cannot be used, or the rows cannot determine the model.
@@ -124,8 +123,37 @@ def fit_files(
     found.model.save(output)
     if html is not None:
         write_page(html, found, cell)
+    return found
+
+
+def tell_fit_files(found: Calibration, output: Path, everything: bool = False) -> str:
+    """Write the report of a fit, and where its model is, for a terminal.
+
+    Args:
+        found: The fit.
+        output: The file its model was written to.
+        everything: Whether the report lists all parameters and rows.
+    """
     told = tell_fit(found.report, everything)
     return told + f"\nmodel {found.model.id} written to {output}"
+
+
+def fit_json(found: Calibration) -> str:
+    """Return the whole report of a fit, parameters and findings, as JSON text.
+
+    A figure that is not known is null: JSON has no word for it.
+    """
+    said = {"model": found.model.id, **asdict(found.report)}
+    return json.dumps(_known(said), indent=1, allow_nan=False) + "\n"
+
+
+def _known(said: Any) -> Any:
+    """Replace numbers that are not finite by None."""
+    if isinstance(said, dict):
+        return {key: _known(value) for key, value in said.items()}
+    if isinstance(said, list | tuple):
+        return [_known(value) for value in said]
+    return None if isinstance(said, float) and not math.isfinite(said) else said
 
 
 def write_page(path: Path, found: Calibration, cell: Cell) -> None:

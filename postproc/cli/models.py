@@ -134,6 +134,7 @@ def fit(
         Path | None,
         typer.Option("--program", help="The survey program, for id, x, y, z files."),
     ] = None,
+    json: JsonOption = None,
     html: HtmlOption = None,
     columns: ColumnsOption = None,
     delimiter: DelimiterOption = None,
@@ -150,7 +151,7 @@ def fit(
 
     names = None if effects is None else split_names(effects)
     with explained():
-        check_places([output, html], [*data, cell, program, columns])
+        check_places([output, html, as_path(json)], [*data, cell, program, columns])
         reading = TableFormat(columns, delimiter, decimal, encoding, unit)
         with stages(log=True) as progress:
             found = fit.fit_files(
@@ -160,14 +161,16 @@ def fit(
                 program,
                 html,
                 reading,
-                everything,
                 method=method.value,
                 effects=names,
                 frame=frame.value,
                 seed=seed,
                 progress=progress,
             )
-        typer.echo(found)
+        if json:
+            write_text(json, fit.fit_json(found))
+        if json != "-":
+            typer.echo(fit.tell_fit_files(found, output, everything))
 
 
 @app.command()

@@ -10,6 +10,7 @@ import pytest
 from postproc import __version__
 from postproc.cli.commands import app
 from postproc.language.source import source_from_bytes
+from postproc.model.model import load_model
 from tests.written import FIRST, LISTED, NEXT, POSE, cli, entry, program
 
 COMMANDS = (
@@ -307,6 +308,13 @@ def test_survey_simulate_fit_predict(desk, tmp_path):
     found = cli("fit", rows, *cell, "-o", tmp_path / "m.json", "--effects",
                 "geometry,backlash")  # fmt: skip
     assert found.exit_code == 0 and "\nbacklash " in found.stdout
+    whole = cli("fit", rows, *cell, "-o", tmp_path / "n.json", "--effects",
+                "geometry,backlash", "--json", "-")  # fmt: skip
+    told = json.loads(whole.stdout)
+    model = load_model(tmp_path / "n.json")
+    assert told["model"] == model.id and model.id in found.stdout
+    assert [one["name"] for one in told["parameters"]] == list(model.effects.names)
+    assert {"geometry", "backlash"} <= {one["effect"] for one in told["found"]}
     predicted = cli("predict", rows, *cell, "--model", tmp_path / "m.json")
     assert predicted.exit_code == 0
     header, first = predicted.stdout.splitlines()[:2]
