@@ -47,8 +47,8 @@ class SplitSection(Strict):
         draw: How rows of the same series are drawn.
         share: Share of the rows that are tested.
         seeds: One draw each.
-        rows: First eight digits of the hash of the tested rows, one for every draw: other
-            draws than these are refused.
+        rows: First eight digits of the hash of the tested rows, for every draw: others
+            than these are refused.
         registered: Whether another series is in the set-up of the fitted one, or its
             tracker and probe are found anew from its own rows.
     """
