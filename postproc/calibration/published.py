@@ -76,13 +76,21 @@ TRAINERS: dict[Method, Trainer] = {
 
 
 def fit_method(method: Method, survey: Measurements, arm: Arm, seed: int) -> Model:
-    """Fit a method of the source to a survey in the base frame."""
+    """Fit a method of the source to a survey in the base frame, and cross-validate."""
+    model = train_method(method, survey, arm, seed)
+    batch = Batch(arm, survey.states)
+    error = survey.position - batch.walk.tcp
+    return replace(model, spread=_spread(method, batch, error, seed))
+
+
+def train_method(method: Method, survey: Measurements, arm: Arm, seed: int) -> Model:
+    """Fit a method of the source to a survey in the base frame, its spread unknown."""
     batch = Batch(arm, survey.states)
     error = survey.position - batch.walk.tcp
     effects, values = TRAINERS[method](batch, error, seed)
     combination = Combination(effects)
     left = np.linalg.norm(error - combination.error(batch, values), axis=1) / MM
-    model = Model(
+    return Model(
         method=method,
         arm_name=arm.name,
         arm_id=arm.id,
@@ -99,7 +107,6 @@ def fit_method(method: Method, survey: Measurements, arm: Arm, seed: int) -> Mod
             "residual_max_mm": float(left.max()),
         },
     )
-    return replace(model, spread=_spread(method, batch, error, seed))
 
 
 def _spread(
@@ -256,7 +263,7 @@ def errors_in(
         if method == "full":
             model = model_of(fit_survey(train, arm, None, trial.tracker), train)
         else:
-            model = fit_method(method, train, arm, seed)
+            model = train_method(method, train, arm, seed)
         left[method] = error - model.measured_error(arm, test.states)
     return left
 

@@ -7,14 +7,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from postproc.arrays import Floats
 from postproc.calibration.published import (
     ORDER,
     TRAINERS,
+    Trained,
     compare,
     fit_method,
     random_split,
 )
 from postproc.model.effects.elm import HiddenLayer
+from postproc.model.kinematics import Batch
 from postproc.model.model import load_model
 from postproc.robot.state import make_states
 from tests.calibration.simulator import NJ, random_arm, random_states, survey_of
@@ -104,3 +107,17 @@ def test_a_layer_ignores_joints_that_never_moved() -> None:
     assert layer(make_states(q)).shape == (5, 7)
     with pytest.raises(ValueError, match="activation"):
         HiddenLayer(weights=(), bias=(), activation="step")
+
+
+def test_a_comparison_does_not_cross_validate(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its rows are errors on test rows; ten further fits of a method tell it nothing."""
+    calls: list[int] = []
+    plain = TRAINERS["interpolation"]
+
+    def counted(batch: Batch, error: Floats, seed: int) -> Trained:
+        calls.append(len(batch))
+        return plain(batch, error, seed)
+
+    monkeypatch.setitem(TRAINERS, "interpolation", counted)
+    compare(survey(60)[2], NJ, seed=1)
+    assert calls == [40]
