@@ -23,6 +23,7 @@ from postproc.model.model import Method, Model, Ranges
 from postproc.model.noise import Noise
 from postproc.robot.arm import Arm
 from postproc.robot.pose import MM
+from postproc.robot.state import States
 
 # The methods of the source, as models that predict like ours.
 #
@@ -129,6 +130,50 @@ def _spread(
     return float(x), float(y), float(z)
 
 
+# How far the joints may reach for a method to follow.
+#
+# A random layer of 40 neurons follows the kinematics in a working volume, not over the
+# whole range of the joints: there it leaves more than geometry alone does.
+
+VOLUME_DEG = 40.0  # that the layer follows about as well as a model of the arm
+
+
+def span_of(states: States) -> tuple[float, ...]:
+    """Return how far every joint ranges over some states [deg]."""
+    return tuple(float(v) for v in np.rad2deg(np.ptp(states.q, axis=0)))
+
+
+def too_wide(model: Model, survey: Measurements, arm: Arm) -> tuple[str, ...]:
+    """Tell of rows that span more than a published method can follow.
+
+    Beyond a working volume it is what the method leaves of rows that it has not seen
+    that counts, against what a fit of the geometry alone leaves.
+
+    Args:
+        model: Of a published method.
+        survey: The rows that it was fitted to, base frame.
+        arm: The arm.
+    """
+    span = span_of(survey.states)
+    if max(span) <= VOLUME_DEG:
+        return ()
+    batch = Batch(arm, survey.states)
+    geometry = fit_effects(
+        batch, survey.position, (Geometry.propose(arm, batch.states),)
+    )
+    left = float(np.sqrt((geometry.residual**2).sum(axis=1).mean()))
+    unseen = float(np.linalg.norm(model.spread))
+    if unseen <= left:
+        return ()
+    widest = int(np.argmax(span))
+    return (
+        f"the rows span up to {span[widest]:.0f} deg (joint {widest + 1}), more than "
+        f"{model.method} follows: ten folds of cross-validation leave "
+        f"{unseen / MM:.3f} mm, geometry alone {left / MM:.3f} mm. Fit rows of one "
+        f"working volume (about {VOLUME_DEG:.0f} deg), or use --method full",
+    )
+
+
 # The source's five rows and ours, on the same data and split.
 
 Rows = NDArray[np.int64]
@@ -158,10 +203,17 @@ class MethodRow:
 
 @dataclass(frozen=True)
 class Comparison:
-    """All methods on one split."""
+    """All methods on one split.
+
+    Attributes:
+        rows: A row a method.
+        split: Which rows are fitted and which are tested, in words.
+        span_deg: How far the joints of the fitted rows range.
+    """
 
     rows: tuple[MethodRow, ...]
     split: str
+    span_deg: tuple[float, ...]
 
 
 def random_split(n: int, seed: int, share: float = TRAIN_SHARE) -> tuple[Rows, Rows]:
@@ -204,7 +256,8 @@ def compare(
     """
     train, test = random_split(len(survey), seed)
     trial = Trial(survey[train], survey[test], tracker)
-    return Comparison(compare_in([trial], arm, seed), random_said(train, test, seed))
+    rows = compare_in([trial], arm, seed)
+    return Comparison(rows, random_said(train, test, seed), span_of(survey.states))
 
 
 def random_said(train: Rows, test: Rows, seed: int) -> str:
