@@ -17,6 +17,7 @@
 # make detection   outliers, wrong directions and nests that a fit finds: docs/detection.md
 # make undeclared  undeclared effects traced on virtual arms, 1,400 of them: docs/undeclared.md
 # make paths       predicted and true path accuracy on virtual arms: docs/paths.md
+# make real DATA=folder   fits of real arms on rows they have not seen: docs/real-arms.md
 # make blind       effects traced in the blind campaigns and on a real arm: docs/blind.md
 # make wheel       a wheel for every Python from 3.11 on, tried in a new environment, in dist
 # make native      lint and tests of the native core by itself, for who changes it
@@ -32,7 +33,7 @@ STAMP := $(VENV)/.installed
 export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
 
-.PHONY: help demo test lint format bench evidence reproduce accuracy intervals detection undeclared paths blind chaos fuzz docs clean
+.PHONY: help demo test lint format bench evidence reproduce accuracy intervals detection undeclared paths blind real chaos fuzz docs clean
 .PHONY: plant-bench generated growth awkward native golden pictures lock wheel
 .DELETE_ON_ERROR:
 
@@ -90,6 +91,10 @@ paths: $(STAMP)
 
 blind: $(STAMP)
 	@PYTHONPATH=. $(PYTHON_BIN) docs/studies/diagnosed.py
+
+real: $(STAMP)
+	@test -n "$(DATA)" || { echo "make real DATA=folder: see docs/real-arms.md" >&2; exit 2; }
+	@PYTHONPATH=. $(PYTHON_BIN) docs/studies/real_arms.py "$(DATA)" --jobs $(or $(JOBS),1) $(if $(QUICK),--quick -o build/real-arms.md)
 
 chaos: $(STAMP)
 	@$(PYTHON_BIN) -m tests.chaos --runs $(or $(RUNS),200) --files $(or $(FILES),300) --signals $(or $(SIGNALS),50)

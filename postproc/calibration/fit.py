@@ -20,7 +20,7 @@ from postproc.calibration.plausibility import (
     check_survey,
     lost_without,
 )
-from postproc.calibration.published import fit_method
+from postproc.calibration.published import fit_method, too_wide
 from postproc.calibration.registration import register, typical_gap
 from postproc.calibration.regression import Fit
 from postproc.calibration.report import FitReport, report_fit, report_method
@@ -113,6 +113,8 @@ def fit_measurements(
     survey = replace(survey, warnings=told)
     if method != "full":
         model = fit_method(method, survey, cell.arm, seed)
+        told = (*survey.warnings, *too_wide(model, survey, cell.arm))
+        survey = replace(survey, warnings=told)
         model = replace(model, registration=placed)
         return Calibration(model, report_method(model, survey, cell.arm), survey)
     fitted = fit_survey(survey, cell.arm, effects, tracker, setup, progress)

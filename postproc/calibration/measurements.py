@@ -231,9 +231,9 @@ def read_points(path: str | Path, reading: TableFormat = DETECT) -> TextTable:
     if table.has("id", *POSITION):
         return table
     name, axes = _columns(table)
-    scaled = {ours: (axis, reading.mm_per_unit)
+    scaled = {ours: ((axis, reading.mm_per_unit),)
               for ours, axis in zip(POSITION, axes, strict=True)}  # fmt: skip
-    return translate(table, Format({"id": (name, 1.0), **scaled}))
+    return translate(table, Format({"id": ((name, 1.0),), **scaled}))
 
 
 def _columns(table: TextTable) -> tuple[str, tuple[str, str, str]]:

@@ -23,6 +23,7 @@ from postproc.model.model import Method, Model, Ranges
 from postproc.model.noise import Noise
 from postproc.robot.arm import Arm
 from postproc.robot.pose import MM
+from postproc.robot.state import States
 
 # The methods of the source, as models that predict like ours.
 #
@@ -76,13 +77,21 @@ TRAINERS: dict[Method, Trainer] = {
 
 
 def fit_method(method: Method, survey: Measurements, arm: Arm, seed: int) -> Model:
-    """Fit a method of the source to a survey in the base frame."""
+    """Fit a method of the source to a survey in the base frame, and cross-validate."""
+    model = train_method(method, survey, arm, seed)
+    batch = Batch(arm, survey.states)
+    error = survey.position - batch.walk.tcp
+    return replace(model, spread=_spread(method, batch, error, seed))
+
+
+def train_method(method: Method, survey: Measurements, arm: Arm, seed: int) -> Model:
+    """Fit a method of the source to a survey in the base frame, its spread unknown."""
     batch = Batch(arm, survey.states)
     error = survey.position - batch.walk.tcp
     effects, values = TRAINERS[method](batch, error, seed)
     combination = Combination(effects)
     left = np.linalg.norm(error - combination.error(batch, values), axis=1) / MM
-    model = Model(
+    return Model(
         method=method,
         arm_name=arm.name,
         arm_id=arm.id,
@@ -99,7 +108,6 @@ def fit_method(method: Method, survey: Measurements, arm: Arm, seed: int) -> Mod
             "residual_max_mm": float(left.max()),
         },
     )
-    return replace(model, spread=_spread(method, batch, error, seed))
 
 
 def _spread(
@@ -120,6 +128,50 @@ def _spread(
         left[outside] = error[outside] - Combination(effects).error(test, values)
     x, y, z = np.sqrt((left**2).mean(axis=0))
     return float(x), float(y), float(z)
+
+
+# How far the joints may reach for a method to follow.
+#
+# A random layer of 40 neurons follows the kinematics in a working volume, not over the
+# whole range of the joints: there it leaves more than geometry alone does.
+
+VOLUME_DEG = 40.0  # that the layer follows about as well as a model of the arm
+
+
+def span_of(states: States) -> tuple[float, ...]:
+    """Return how far every joint ranges over some states [deg]."""
+    return tuple(float(v) for v in np.rad2deg(np.ptp(states.q, axis=0)))
+
+
+def too_wide(model: Model, survey: Measurements, arm: Arm) -> tuple[str, ...]:
+    """Tell of rows that span more than a published method can follow.
+
+    Beyond a working volume it is what the method leaves of rows that it has not seen
+    that counts, against what a fit of the geometry alone leaves.
+
+    Args:
+        model: Of a published method.
+        survey: The rows that it was fitted to, base frame.
+        arm: The arm.
+    """
+    span = span_of(survey.states)
+    if max(span) <= VOLUME_DEG:
+        return ()
+    batch = Batch(arm, survey.states)
+    geometry = fit_effects(
+        batch, survey.position, (Geometry.propose(arm, batch.states),)
+    )
+    left = float(np.sqrt((geometry.residual**2).sum(axis=1).mean()))
+    unseen = float(np.linalg.norm(model.spread))
+    if unseen <= left:
+        return ()
+    widest = int(np.argmax(span))
+    return (
+        f"the rows span up to {span[widest]:.0f} deg (joint {widest + 1}), more than "
+        f"{model.method} follows: ten folds of cross-validation leave "
+        f"{unseen / MM:.3f} mm, geometry alone {left / MM:.3f} mm. Fit rows of one "
+        f"working volume (about {VOLUME_DEG:.0f} deg), or use --method full",
+    )
 
 
 # The source's five rows and ours, on the same data and split.
@@ -151,10 +203,17 @@ class MethodRow:
 
 @dataclass(frozen=True)
 class Comparison:
-    """All methods on one split."""
+    """All methods on one split.
+
+    Attributes:
+        rows: A row a method.
+        split: Which rows are fitted and which are tested, in words.
+        span_deg: How far the joints of the fitted rows range.
+    """
 
     rows: tuple[MethodRow, ...]
     split: str
+    span_deg: tuple[float, ...]
 
 
 def random_split(n: int, seed: int, share: float = TRAIN_SHARE) -> tuple[Rows, Rows]:
@@ -197,7 +256,8 @@ def compare(
     """
     train, test = random_split(len(survey), seed)
     trial = Trial(survey[train], survey[test], tracker)
-    return Comparison(compare_in([trial], arm, seed), random_said(train, test, seed))
+    rows = compare_in([trial], arm, seed)
+    return Comparison(rows, random_said(train, test, seed), span_of(survey.states))
 
 
 def random_said(train: Rows, test: Rows, seed: int) -> str:
@@ -256,7 +316,7 @@ def errors_in(
         if method == "full":
             model = model_of(fit_survey(train, arm, None, trial.tracker), train)
         else:
-            model = fit_method(method, train, arm, seed)
+            model = train_method(method, train, arm, seed)
         left[method] = error - model.measured_error(arm, test.states)
     return left
 

@@ -402,14 +402,14 @@ class TableFormat:
     """What a user knows of a file; None is detected.
 
     Attributes:
-        columns: A column-map file, see `postproc.calibration.tables`.
+        columns: A column-map file, see `postproc.calibration.tables`, or its content.
         delimiter: Between cells, itself or by name (tab, space, comma, semicolon).
         decimal: "." or ",".
         encoding: Name of a Python codec.
         unit: Of coordinates in files that do not say it: mm, m or inch.
     """
 
-    columns: Path | None = None
+    columns: Path | Format | None = None
     delimiter: str | None = None
     decimal: str | None = None
     encoding: str | None = None
@@ -448,6 +448,7 @@ DETECT = TableFormat()
 #     [columns]
 #     q1_deg = "A1"                                 # the same unit
 #     x_mm = { column = "X measured", factor = 1000.0 }
+#     y_mm = [ "Y target", { column = "Y difference", factor = -1.0 } ]   # their sum
 #     [file]
 #     delimiter = ";"                               # optional, as are the next three
 #     decimal = ","
@@ -464,16 +465,21 @@ class Format:
     """How a foreign file's columns become ours.
 
     Attributes:
-        columns: Our column: (the file's column, factor).
+        columns: Our column: the sum of the file's columns, each times its factor.
         reading: Options of `read_table`.
     """
 
-    columns: Mapping[str, tuple[str, float]]
+    columns: Mapping[str, tuple[tuple[str, float], ...]]
     reading: Mapping[str, str] = field(default_factory=dict)
 
     def fits(self, table: TextTable) -> bool:
         """Tell whether a table has all columns of the format."""
-        return table.has(*(name for name, _ in self.columns.values()))
+        return table.has(*self.sources)
+
+    @property
+    def sources(self) -> tuple[str, ...]:
+        """The file's columns."""
+        return tuple(name for terms in self.columns.values() for name, _ in terms)
 
 
 UR_JOINTS = (
@@ -486,10 +492,10 @@ UR_JOINTS = (
 )
 IPA = Format(  # Fraunhofer IPA, UR10 series: joints in rad, T-Mac positions in mm
     {
-        **{f"q{j + 1}_deg": (name, DEGREES) for j, name in enumerate(UR_JOINTS)},
-        **{f"{a}_mm": (f"measurement_{a}", 1.0) for a in "xyz"},
-        **{f"r{a}_deg": (f"measurement_r{a}", 1.0) for a in "xyz"},
-        "temperature_c": ("measurement_temperature", 1.0),
+        **{f"q{j + 1}_deg": ((name, DEGREES),) for j, name in enumerate(UR_JOINTS)},
+        **{f"{a}_mm": ((f"measurement_{a}", 1.0),) for a in "xyz"},
+        **{f"r{a}_deg": ((f"measurement_r{a}", 1.0),) for a in "xyz"},
+        "temperature_c": (("measurement_temperature", 1.0),),
     }
 )
 KNOWN = (IPA,)
@@ -506,9 +512,11 @@ def read_foreign(path: str | Path, reading: TableFormat = DETECT) -> TextTable:
         MeasurementError: The file or the column map cannot be used.
     """
     if reading.columns is not None:
-        form = read_column_map(reading.columns)
+        form = reading.columns
+        if not isinstance(form, Format):
+            form = read_column_map(form)
         table = read_table(path, **{**form.reading, **reading.given})  # type: ignore[arg-type]
-        table.require(*(name for name, _ in form.columns.values()))
+        table.require(*form.sources)
         return translate(table, form)
     table = read_headed(path, **reading.given)
     for form in KNOWN:
@@ -520,11 +528,12 @@ def read_foreign(path: str | Path, reading: TableFormat = DETECT) -> TextTable:
 def translate(table: TextTable, form: Format) -> TextTable:
     """Rename and scale columns; a file without ids gets its line numbers."""
     cells = []
-    for column, (source, factor) in form.columns.items():
+    for column, terms in form.columns.items():
         if column == "id":
-            cells.append([text.strip("'\" ") for text in table.text(source)])
+            cells.append([text.strip("'\" ") for text in table.text(terms[0][0])])
         else:
-            values = table.numbers(source) * factor
+            added = [table.numbers(source) * factor for source, factor in terms]
+            values = np.sum(added, axis=0)
             cells.append([repr(float(v)) for v in values])
     names = tuple(form.columns)
     if "id" not in names:
@@ -548,11 +557,24 @@ def read_column_map(path: str | Path) -> Format:
     except (OSError, ValueError) as exc:  # no UTF-8, no TOML, a number beyond all sizes
         problem = f"cannot be read as TOML ({exc})"
         raise MeasurementError(path, problem, "Correct the column map") from None
+    return column_map(path, data)
+
+
+def column_map(path: str | Path, data: Mapping[str, Any]) -> Format:
+    """Interpret what a file says of columns.
+
+    Args:
+        path: The file, for messages.
+        data: Its tables ``columns`` and ``file``.
+
+    Raises:
+        MeasurementError: A key or value is wrong, or no column is mapped.
+    """
     _refuse_unknown(path, data, MAP_KEYS, "$")
     reading = data.get("file", {})
     _refuse_unknown(path, reading, FILE_KEYS, "$.file")
     columns = {
-        ours: _source(path, ours, given)
+        ours: _terms(path, ours, given)
         for ours, given in data.get("columns", {}).items()
     }
     if not columns:
@@ -561,20 +583,30 @@ def read_column_map(path: str | Path) -> Format:
     return Format(columns, reading)
 
 
-def _source(path: str | Path, ours: str, given: Any) -> tuple[str, float]:
-    """Read one entry of a map."""
+def _terms(path: str | Path, ours: str, given: Any) -> tuple[tuple[str, float], ...]:
+    """Read one entry of a map: a column, or several that are added."""
+    several = isinstance(given, list) and len(given) > 0 and ours != "id"
+    terms = [_term(one) for one in (given if several else [given])]
+    found = tuple(term for term in terms if term is not None)
+    if len(found) == len(terms):
+        return found
+    raise MeasurementError(
+        path,
+        "neither a column name nor { column = .., factor = .. }, nor a list of them",
+        "Correct the entry",
+        place=f"$.columns.{ours}",
+    )
+
+
+def _term(given: Any) -> tuple[str, float] | None:
+    """Read one column with its factor, or None."""
     if isinstance(given, str):
         return given, 1.0
     if isinstance(given, dict) and isinstance(given.get("column"), str):
         factor = given.get("factor", 1.0)
         if set(given) <= {"column", "factor"} and isinstance(factor, int | float):
             return given["column"], float(factor)
-    raise MeasurementError(
-        path,
-        "neither a column name nor { column = .., factor = .. }",
-        "Correct the entry",
-        place=f"$.columns.{ours}",
-    )
+    return None
 
 
 def _refuse_unknown(

@@ -25,12 +25,14 @@ from postproc.calibration.fit import (
 from postproc.calibration.measurements import Measurements, concatenate, from_table
 from postproc.calibration.plausibility import check_survey
 from postproc.calibration.published import (
+    VOLUME_DEG,
     Comparison,
     Trial,
     blocks_of,
     compare_in,
     random_said,
     random_split,
+    span_of,
 )
 from postproc.calibration.registration import predict_registered
 from postproc.calibration.report import DirectionReport, FitReport, Found
@@ -402,7 +404,8 @@ def compare_files(
     trials = [_trial(train, test, cell, frame) for train, test in pairs]
     for trial in trials:
         check_survey(trial.train, cell.arm)
-    return Comparison(compare_in(trials, cell.arm, held.seed), said)
+    rows = compare_in(trials, cell.arm, held.seed)
+    return Comparison(rows, said, span_of(survey.states))
 
 
 def _trial(train: Measurements, test: Measurements, cell: Cell, frame: str) -> Trial:
@@ -431,7 +434,11 @@ def tell_comparison(found: Comparison) -> str:
         )
         for r in found.rows
     )
-    return f"{table_text(COMPARED, rows)}\n{found.split}"
+    span = ", ".join(f"{v:.0f}" for v in found.span_deg)
+    told = f"joints 1 to 6 span {span} deg"
+    if max(found.span_deg) > VOLUME_DEG:
+        told += f"; the ELMs follow about {VOLUME_DEG:.0f}"
+    return f"{table_text(COMPARED, rows)}\n{found.split}\n{told}"
 
 
 @dataclass(frozen=True)

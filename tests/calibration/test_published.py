@@ -2,22 +2,33 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from postproc.arrays import Floats
+from postproc.calibration.fit import fit_measurements
+from postproc.calibration.measurements import Measurements
 from postproc.calibration.published import (
     ORDER,
     TRAINERS,
+    Trained,
     compare,
     fit_method,
     random_split,
+    span_of,
+    too_wide,
 )
 from postproc.model.effects.elm import HiddenLayer
+from postproc.model.kinematics import Batch
 from postproc.model.model import load_model
+from postproc.robot.cell import load_cell
 from postproc.robot.state import make_states
 from tests.calibration.simulator import NJ, random_arm, random_states, survey_of
+
+ROOT = Path(__file__).parents[2]
 
 
 def survey(n: int = 120, seed: int = 0) -> tuple:  # type: ignore[type-arg]
@@ -104,3 +115,59 @@ def test_a_layer_ignores_joints_that_never_moved() -> None:
     assert layer(make_states(q)).shape == (5, 7)
     with pytest.raises(ValueError, match="activation"):
         HiddenLayer(weights=(), bias=(), activation="step")
+
+
+def test_a_comparison_does_not_cross_validate(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its rows are errors on test rows, of one fit of every method."""
+    calls: list[int] = []
+    plain = TRAINERS["interpolation"]
+
+    def counted(batch: Batch, error: Floats, seed: int) -> Trained:
+        calls.append(len(batch))
+        return plain(batch, error, seed)
+
+    monkeypatch.setitem(TRAINERS, "interpolation", counted)
+    compare(survey(60)[2], NJ, seed=1)
+    assert calls == [40]
+
+
+def within(half_deg: float, n: int = 300) -> Measurements:
+    """Measure an arm in a working volume of its joints."""
+    rng = np.random.default_rng(4)
+    arm = random_arm(rng)
+    states = random_states(n, rng)
+    middle = np.deg2rad([20.0, 10.0, -100.0, 40.0, 50.0, -60.0])
+    unit = (states.q - states.q.min(axis=0)) / np.ptp(states.q, axis=0)
+    states = states.with_(q=middle + np.deg2rad(half_deg) * (2 * unit - 1))
+    measured, _ = arm.measure(states, rng)
+    return survey_of(states, measured)
+
+
+@pytest.mark.parametrize("method", ["eja-elm", "elm"])
+def test_a_fit_says_when_the_rows_span_more_than_a_method_follows(method: str) -> None:
+    """Where it leaves more of unseen rows than the geometry alone of its own."""
+    small, large = within(5.0), within(90.0)
+    assert span_of(large.states) == pytest.approx([180.0] * 6)
+    for rows, told in ((small, False), (large, True)):
+        model = fit_method(method, rows, NJ, 0)  # type: ignore[arg-type]
+        said = too_wide(model, rows, NJ)
+        assert bool(said) is told, said
+    assert re.fullmatch(
+        rf"the rows span up to 180 deg \(joint \d\), more than {method} follows: ten "
+        r"folds of cross-validation leave \d\.\d+ mm, geometry alone \d\.\d+ mm\. Fit "
+        r"rows of one working volume \(about 40 deg\), or use --method full",
+        said[0],
+    )
+
+
+def test_a_fit_of_a_method_tells_of_its_span() -> None:
+    cell = load_cell(ROOT / "programs" / "cell.toml")
+    found = fit_measurements(within(90.0), cell, method="eja-elm")
+    assert any("more than eja-elm follows" in w for w in found.report.warnings)
+    found = fit_measurements(within(5.0), cell, method="eja-elm")
+    assert not any("follows" in w for w in found.report.warnings)
+
+
+def test_a_comparison_tells_the_span_of_its_rows() -> None:
+    found = compare(within(20.0, 60), NJ, seed=1)
+    assert found.span_deg == pytest.approx((40.0,) * 6)

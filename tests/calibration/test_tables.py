@@ -96,3 +96,45 @@ def test_what_the_user_says_wins_over_what_is_detected(tmp_path: Path) -> None:
         TableFormat(decimal="x")
     with pytest.raises(PostprocError, match="mm, m, inch"):
         TableFormat(unit="feet")
+
+
+MAPPED = """[columns]
+{q}
+x_mm = ["xt", {{ column = "xd", factor = -1.0 }}]
+y_mm = {{ column = "yt", factor = 1000.0 }}
+z_mm = "zt"
+"""
+
+
+def mapped(folder: Path, **other: str) -> tuple[Path, Path]:
+    """Write a file of targets and differences, and a map of its columns."""
+    text = MAPPED.format(q="\n".join(f'q{j}_deg = "A{j}"' for j in range(1, 7)))
+    for old, new in other.items():
+        text = text.replace(f'{old} = "zt"', f"{old} = {new}")
+    (folder / "map.toml").write_text(text)
+    head = ",".join([*(f"A{j}" for j in range(1, 7)), "xt,xd,yt,zt"])
+    (folder / "t.csv").write_text(f"{head}\n1,2,3,4,5,6,100.5,-0.25,0.02,7\n")
+    return folder / "t.csv", folder / "map.toml"
+
+
+def test_a_column_may_be_a_sum(tmp_path: Path) -> None:
+    path, columns = mapped(tmp_path)
+    found = read_measurements(path, NJ, TOOL[None], reading=TableFormat(columns))
+    np.testing.assert_allclose(found.position, [[0.10075, 0.020, 0.007]], atol=1e-15)
+
+
+@pytest.mark.parametrize("wrong", ["[]", "7", '["zt", 7]', '{ column = "zt", x = 1 }'])
+def test_an_entry_of_a_map_that_means_nothing_is_refused(
+    tmp_path: Path, wrong: str
+) -> None:
+    path, columns = mapped(tmp_path, z_mm=wrong)
+    with pytest.raises(
+        MeasurementError, match=r"map\.toml.*list of them @ \$\.columns\.z_mm"
+    ):
+        read_measurements(path, NJ, TOOL[None], reading=TableFormat(columns))
+
+
+def test_every_column_of_a_sum_must_be_there(tmp_path: Path) -> None:
+    path, columns = mapped(tmp_path, z_mm='["zt", "zz"]')
+    with pytest.raises(MeasurementError, match="zz"):
+        read_measurements(path, NJ, TOOL[None], reading=TableFormat(columns))

@@ -14,7 +14,7 @@ def comparison():
         MethodRow("full", 0.01, 0.2, 0.05, 0.02, 100),
         MethodRow("elm", 0.2, 4.0, 1.4, 0.6, 100),
     )
-    return Comparison(rows, "200 rows to fit, 100 to test")
+    return Comparison(rows, "200 rows to fit, 100 to test", (40.0,) * 6)
 
 
 @pytest.mark.parametrize("suffix", [".svg", ".png"])

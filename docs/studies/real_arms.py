@@ -1,0 +1,434 @@
+"""Write docs/real-arms.md: what a fit leaves of real arms, on rows it has not seen.
+
+PYTHONPATH=. python docs/studies/real_arms.py DATA [--jobs 2] [--quick]
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+from collections.abc import Iterator
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass, replace
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+from data_sets import SHIPPED, DataSet, Rows, Split, descriptions, read_set
+
+from postproc import __version__
+from postproc.arrays import Floats
+from postproc.calibration.diagnosis.diagnose import Extension, diagnose
+from postproc.calibration.diagnosis.result import Diagnosis, Finding
+from postproc.calibration.fit import Calibration, fit_measurements
+from postproc.calibration.measurements import Measurements
+from postproc.calibration.registration import predict_registered
+from postproc.exceptions import PostprocError
+from postproc.model.combination import Combination
+from postproc.model.effects.maps import MOST_CENTRES
+from postproc.model.effects.placement import Placement
+from postproc.model.kinematics import Batch
+from postproc.model.model import Method, Model
+from postproc.model.statistics import ErrorStatistics
+
+OUT = Path(__file__).parents[1] / "real-arms.md"
+WITHIN = 1.96
+QUICK = 150  # rows that are fitted in a quick run
+NOMINAL, GEOMETRY, DEFAULT = "registered only", "geometry alone", "fit"
+TRACED = "fit, then diagnose"
+PUBLISHED: tuple[Method, ...] = (
+    "eja-elm",
+    "elm",
+    "interpolation",
+    "kinematic-elm",
+    "kriging",
+)
+ORDER = (NOMINAL, GEOMETRY, *PUBLISHED, DEFAULT, TRACED)
+MOST_FINDINGS = 20  # told of one series
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """Residuals of tested rows [m], and their stated deviations (NaN: not stated)."""
+
+    left: Floats
+    std: Floats
+
+    def row(self, name: str) -> str:
+        """Write a row of a table."""
+        e = ErrorStatistics.of(self.left)
+        held = "-"
+        if not np.isnan(self.std).any():
+            held = f"{100 * (np.abs(self.left) < WITHIN * self.std).mean():.1f} %"
+        return (
+            f"| {name} | {e.mean_mm:.3f} | {e.p95_mm:.3f} | {e.max_mm:.3f} | {held} "
+            f"| {e.n} |"
+        )
+
+    @property
+    def mean_mm(self) -> float:
+        """Mean length of the residuals [mm]."""
+        return ErrorStatistics.of(self.left).mean_mm
+
+
+@dataclass(frozen=True)
+class Trial:
+    """Rows of one set that are fitted, and all splits that do so.
+
+    Attributes:
+        path, base: Of the set, see `read_set`.
+        draws: Numbers of the splits and of their draws, all of which fit the same rows.
+        quick: Whether few rows are fitted, and none diagnosed.
+    """
+
+    path: Path
+    base: Path
+    draws: tuple[tuple[int, int], ...]
+    quick: bool
+
+
+@dataclass(frozen=True)
+class Tried:
+    """What a trial came to.
+
+    Attributes:
+        trial: The trial.
+        outcomes: By split, draw and method.
+        diagnosis: Of the fitted rows, or None.
+        fitted: How many rows were fitted.
+        seconds: Processor time.
+    """
+
+    trial: Trial
+    outcomes: dict[tuple[int, int], dict[str, Outcome]]
+    diagnosis: Diagnosis | None
+    fitted: int
+    seconds: float
+
+
+read_once = cache(read_set)
+
+
+def trials_of(path: Path, base: Path, quick: bool) -> list[Trial]:
+    """List what is fitted for a set, every choice of rows once."""
+    data = read_once(path, base)
+    fits: dict[tuple[str, bytes], list[tuple[int, int]]] = {}
+    for k, split in enumerate(() if data is None else data.splits):
+        for number, (rows, _) in enumerate(split.draws):
+            fits.setdefault((split.fit, rows.tobytes()), []).append((k, number))
+    return [Trial(path, base, tuple(draws), quick) for draws in fits.values()]
+
+
+def run(trial: Trial) -> Tried:
+    """Fit rows with every method, and judge the rows that are tested."""
+    began = time.process_time()
+    data = read_once(trial.path, trial.base)
+    assert data is not None
+    number, draw = trial.draws[0]
+    split = data.splits[number]
+    inside = split.draws[draw][0]
+    rows = data.series[split.fit][thinned(inside, QUICK) if trial.quick else inside]
+    fits = {name: fitted(data, rows, name) for name in ORDER[1:-1]}
+    models = {NOMINAL: without_effects(fits[GEOMETRY].model)}
+    models |= {name: found.model for name, found in fits.items()}
+    found = None if trial.quick else traced(data, fits[DEFAULT])
+    if found is not None:
+        models[TRACED] = found.model
+    outcomes = {
+        (k, n): {name: judged(m, data, data.splits[k], n) for name, m in models.items()}
+        for k, n in trial.draws
+    }
+    seconds = time.process_time() - began
+    told = None if found is None else found.diagnosis
+    return Tried(trial, outcomes, told, len(rows), seconds)
+
+
+def thinned(rows: Rows, most: int) -> Rows:
+    """Take at most so many rows, evenly."""
+    some = np.linspace(0, len(rows) - 1, min(len(rows), most))
+    thin: Rows = rows[np.unique(some.astype(np.int64))]
+    return thin
+
+
+def fitted(data: DataSet, rows: Measurements, name: str) -> Calibration:
+    """Fit rows with a method, as `postproc fit` does."""
+    frame = data.about.frame
+    if name == "kriging":  # the work grows with the cube of the rows
+        rows = rows[thinned(np.arange(len(rows)), MOST_CENTRES)]
+    for method in PUBLISHED:
+        if name == method:
+            return fit_measurements(rows, data.cell, method=method, frame=frame)
+    effects = ("geometry",) if name == GEOMETRY else None
+    return fit_measurements(rows, data.cell, effects=effects, frame=frame)
+
+
+def without_effects(model: Model) -> Model:
+    """Leave nothing of a model but where the tracker stood."""
+    return replace(
+        model,
+        effects=Combination(()),
+        values=np.zeros(0),
+        covariance=np.zeros((0, 0)),
+        prior_std=np.zeros(0),
+        spread=(np.nan,) * 3,
+    )
+
+
+def traced(data: DataSet, found: Calibration) -> Extension:
+    """Diagnose the rows that were fitted, as `postproc diagnose` does."""
+    placed = found.model.registration
+    tracker = data.cell.tracker if placed is None else placed.tracker
+    setup = () if placed is None else (Placement.name,)
+    more = diagnose(
+        found.survey, data.cell.arm, found.model, tracker=tracker, setup=setup
+    )
+    model = replace(more.model, registration=placed)
+    return replace(more, model=model)
+
+
+def judged(model: Model, data: DataSet, split: Split, draw: int) -> Outcome:
+    """Compare readings with what a model says of them.
+
+    In the set-up of the fitted rows the registration is theirs; in another one it is
+    found from the tested rows themselves, with the arm as the model knows it.
+    """
+    rows = data.series[split.test][split.draws[draw][1]]
+    arm, placed = data.cell.arm, model.registration
+    states, position = rows.states, rows.position
+    if not split.same:
+        placed, read = predict_registered(model, arm, states, position)
+        states = placed.on_probes(states)
+    else:
+        states = states if placed is None else placed.on_probes(states)
+        read = model.reading(arm, states)
+    position = position if placed is None else placed.to_base(position)
+    return Outcome(position - Batch(arm, states).walk.tcp - read.error, read.std)
+
+
+def pooled(draws: list[dict[str, Outcome]]) -> dict[str, Outcome]:
+    """Put the tested rows of several draws together, method by method."""
+    out = {}
+    for name in draws[0]:
+        left, std = (
+            np.concatenate([getattr(found[name], k) for found in draws])
+            for k in ("left", "std")
+        )
+        out[name] = Outcome(left, std)
+    return out
+
+
+# The page.
+
+TEXT = """# Real arms
+
+Written by `make real DATA=folder`{quick} with postproc {version} and numpy {numpy}, in
+{minutes:.0f} minutes of processor time, from public measurements of real arms. The data
+are not part of the project; every set below says where they come from.
+
+- **Nothing that is counted was seen by what is judged on it**: not by the fit, not by
+  the diagnosis, not by the registration. Only where another series is *registered
+  anew*, its tracker and its probe (nine numbers) are found from the tested rows, with
+  the arm as the model knows it; this flatters all methods alike, small series more.
+- **Nothing is tuned**: every method runs with its defaults. The splits, with a hash of
+  the rows that they draw, stand in descriptions (`docs/studies/real/*.toml`) that were
+  committed before the first fit.
+- **Every tested row counts**, also those that are no measurements.
+
+*{nominal}* is the arm as its maker gives it; *{geometry}* has its
+lengths and angles fitted; the next five are [published methods](reproduction.md)
+(40 neurons, seed 0; kriging of {centres} rows at the most, evenly taken);
+*{default}* is `postproc fit`; *{traced}* is what `postproc diagnose` makes of the
+fitted rows afterwards. Errors are distances in mm. *Intervals hold* is the share of
+coordinates in the 95 % interval that is stated for them (of a published method: by
+ten folds of cross-validation). Published maps of the position error hold for the
+probe that they were fitted with, at its place; another series may have another.
+
+## In short: mean error of the tested rows, mm
+
+{short}
+
+## Another arm
+
+A set is one TOML file, and its data. Put both in a folder as
+`FOLDER/dataset-NAME.toml`, and run `make real DATA=FOLDER`; a set whose data are public
+is welcome in `docs/studies/real`, where its `folder` names the data's place in
+`DATA`. What a description says:
+
+```toml
+name = "UR5"
+arm = "ur5.toml"              # a shipped arm, or an arm file beside this one
+frame = "tracker"             # or "base", with tool_mm = [..] of the reflector
+licence = "MIT"
+source = "who measured it, and where it was published"
+get = "where others get it"   # optional, as are notes = [..]
+[columns]                     # as for fit --columns; left out where the header is known
+q1_deg = "joint_1"            # .. q6_deg
+x_mm = ["x_t", {{ column = "x_dif", factor = -1.0 }}]   # y_mm, z_mm; a list is a sum
+[[series]]                    # a file: one set-up, rows in the order of visits
+name = "grid"
+file = "grid.csv"
+sha256 = "3de6.."             # optional: another file is refused
+[[split]]                     # random, blocks (of 30) or last rows of a series
+fit = "grid"
+draw = "random"
+share = 0.3
+seeds = [0, 1, 2]
+[[split]]                     # all of another series, registered "anew" or "as fitted"
+fit = "grid"
+test = "random"
+registered = "as fitted"
+[[published]]                 # figures of the source, optional
+what = "their hybrid method"
+rows = "20 poses"
+mean_mm = 0.155
+```
+"""
+HEAD = [
+    "| method | mean | 95 % | max | intervals hold | rows |",
+    "|---|---|---|---|---|---|",
+]
+
+
+def page(sets: list[tuple[DataSet, list[Tried]]], quick: bool) -> str:
+    """Write the page."""
+    seconds = sum(t.seconds for _, tries in sets for t in tries)
+    text = TEXT.format(
+        quick=" with `--quick`" if quick else "",
+        version=__version__,
+        numpy=np.__version__,
+        minutes=seconds / 60,
+        nominal=NOMINAL,
+        geometry=GEOMETRY,
+        default=DEFAULT,
+        traced=TRACED,
+        centres=MOST_CENTRES,
+        short="\n".join(short(sets)),
+    )
+    return "\n".join([text, *(line for s in sets for line in section(*s)), ""])
+
+
+def short(sets: list[tuple[DataSet, list[Tried]]]) -> Iterator[str]:
+    """Write the first table: a row a split, a column a method."""
+    names = [n for n in ORDER if any(n in by_split(t)[0] for _, t in sets)]
+    yield f"| rows tested | {' | '.join(names)} |"
+    yield "|---" * (len(names) + 1) + "|"
+    for data, tries in sets:
+        found = by_split(tries)
+        for k, split in enumerate(data.splits):
+            means = " | ".join(f"{found[k][name].mean_mm:.3f}" for name in names)
+            yield f"| {data.about.name} {split.title} | {means} |"
+
+
+def by_split(tries: list[Tried]) -> dict[int, dict[str, Outcome]]:
+    """Put the draws of every split together."""
+    found: dict[int, list[dict[str, Outcome]]] = {}
+    for tried in tries:
+        for (k, _), outcomes in sorted(tried.outcomes.items()):
+            found.setdefault(k, []).append(outcomes)
+    return {k: pooled(draws) for k, draws in sorted(found.items())}
+
+
+def section(data: DataSet, tries: list[Tried]) -> Iterator[str]:
+    """Write what is told of one set."""
+    about = data.about
+    yield f"## {about.name}"
+    yield ""
+    yield f"{about.source}. Licence: {about.licence}."
+    yield f"To be had from {about.get}." if about.get else "To be had from the author."
+    yield ""
+    yield from (f"- {note}" for note in about.notes)
+    series = ", ".join(f"{name} {len(rows)}" for name, rows in data.series.items())
+    yield f"- Rows: {series}."
+    yield ""
+    if about.published:
+        yield "What the source says of its own rows and methods:"
+        yield ""
+        for f in about.published:
+            yield f"- {f.what}: mean {f.mean_mm} mm ({f.rows})"
+        yield ""
+    for k, outcomes in by_split(tries).items():
+        yield f"### {about.name}: {data.splits[k].title}"
+        yield ""
+        yield from HEAD
+        yield from (outcomes[n].row(n) for n in ORDER if n in outcomes)
+        yield ""
+    yield from found_in(data, tries)
+
+
+def found_in(data: DataSet, tries: list[Tried]) -> Iterator[str]:
+    """Write what the diagnosis found: of every series in the fit of most rows."""
+    most: dict[str, Tried] = {}
+    for tried in tries:
+        series = data.splits[tried.trial.draws[0][0]].fit
+        before = most.get(series)
+        if before is None or tried.fitted > before.fitted:
+            most[series] = tried
+    for series, tried in most.items():
+        found = tried.diagnosis
+        if found is None:
+            continue
+        yield f"### {data.about.name}: what is found in {tried.fitted} rows of {series}"
+        yield ""
+        yield f"Beyond what `fit` takes by itself; verdict: {found.verdict}."
+        yield ""
+        yield from (f"- {told(f)}" for f in found.findings[:MOST_FINDINGS])
+        yield "" if found.findings else "- nothing\n"
+
+
+def told(f: Finding) -> str:
+    """Write a finding in a few words."""
+    where = "" if f.joint is None else f" of joint {f.joint}"
+    settings = "".join(
+        f", {name} {value[0]:.4g} {value[2]}"
+        for name, value in f.parameters.items()
+        if name in ("row", "order", "centre", "t0")
+    )
+    others = [e + (f" {j}" if j else "") for e, j in f.confusable_with]
+    either = f"; or as well {', '.join(others)}" if others else ""
+    return (
+        f"**{f.effect}**{where}{settings} (p = {f.p_value:.0e}, share {f.share:.0%}, "
+        f"peak {f.peak_mm:.2f} mm{either})"
+    )
+
+
+def main() -> None:
+    """Run all sets that are there, and write the page."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("data", type=Path, help="folder of the data")
+    parser.add_argument("--described", type=Path, default=SHIPPED)
+    parser.add_argument("--jobs", type=int, default=1)
+    parser.add_argument("--quick", action="store_true", help="few rows, no diagnosis")
+    parser.add_argument("-o", "--output", type=Path, default=OUT)
+    given = parser.parse_args()
+    try:
+        found = list(descriptions(given.data, given.described))
+        trials = {at: trials_of(*at, given.quick) for at in found}
+    except PostprocError as exc:
+        raise SystemExit(f"not run: {exc}") from None
+    work = [t for some in trials.values() for t in some]
+    if not work:
+        raise SystemExit(f"not run: no described data in {given.data}")
+    tried = list(tried_by(work, given.jobs))
+    sets = []
+    for at in found:
+        data, mine = (
+            read_once(*at),
+            [t for t in tried if (t.trial.path, t.trial.base) == at],
+        )
+        sets += [(data, mine)] if data is not None else []
+    given.output.write_text(page(sets, given.quick), encoding="utf-8")
+    print(f"{given.output}")
+
+
+def tried_by(work: list[Trial], jobs: int) -> Iterator[Tried]:
+    """Run trials, several at a time, and tell of each."""
+    with ProcessPoolExecutor(jobs) as pool:
+        for tried in pool.map(run, work):
+            trial = tried.trial
+            name = f"{trial.path.stem} {trial.draws}: {tried.fitted} rows"
+            print(f"{name} in {tried.seconds:.0f} s", flush=True)
+            yield tried
+
+
+if __name__ == "__main__":
+    main()
