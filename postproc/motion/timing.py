@@ -10,7 +10,6 @@ from postproc.arrays import Bools, Floats, Ints
 from postproc.exceptions import PlanError
 from postproc.motion.ruckig import JointMoves
 from postproc.motion.targets import Targets
-from postproc.motion.time_law import time_laws
 from postproc.motion.trace import Trace
 from postproc.robot.arm import Arm
 from postproc.robot.trajectory import Motion
@@ -367,6 +366,8 @@ def _run_laws(arm: Arm, points: Waypoints) -> _Laws:
     if k == 0:
         none, joints = np.zeros(0), np.zeros((0, 6))
         return _Laws(none, none, joints, joints, none, none > 0)
+    from postproc.motion.time_law import time_laws  # it brings solvers along
+
     s, limit, override = np.cumsum(points.ds), points.limit(), points.override
     law = time_laws(arm, points.q, s, limit, points.begins)
     with np.errstate(divide="ignore"):
