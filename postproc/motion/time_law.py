@@ -10,7 +10,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.interpolate import CubicHermiteSpline
 from scipy.linalg import solve_banded
 
 from postproc import _native
@@ -100,6 +99,8 @@ class Runs:
         Returns:
             Joint angles, velocities and accelerations, (m, 6) each, at times (m,).
         """
+        from scipy.interpolate import CubicHermiteSpline  # half a second to load
+
         i = np.searchsorted(self.time, time, side="right") - 1
         i = np.clip(i, 0, len(self.s) - 2)
         squares = self.rate**2
