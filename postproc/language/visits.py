@@ -6,7 +6,7 @@ What a language hands to everything else; nothing after it knows how a program i
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import IntEnum
 from functools import cached_property
@@ -309,3 +309,30 @@ def told_once(found: Iterable[Diagnostic]) -> tuple[Diagnostic, ...]:
         one if times == 1 else replace(one, message=f"{one.message} ({times} times)")
         for one, times in Counter(found).items()
     )
+
+
+def never_reached(
+    missed: Mapping[str, Ints], begin: str, caller: str
+) -> list[Diagnostic]:
+    """List the files with moves to targets that no way from the start leads to.
+
+    Such a move stands in a routine that nobody calls, or behind a jump. From where it
+    is reached cannot be known, so that it is not compensated; what calls the routine
+    from elsewhere would run it uncompensated.
+
+    Args:
+        missed: Lines of such moves, ascending, by file.
+        begin: Where ways begin, in the words of the language.
+        caller: What may call the routine from elsewhere.
+    """
+    return [
+        Diagnostic(
+            name,
+            int(lines[0]),
+            NEVER_REACHED,
+            f"{len(lines)} moves, lines {line_ranges(lines)}, are never reached from "
+            f"{begin}: they are not compensated. Give the {caller} that calls them, "
+            "or remove them",
+        )
+        for name, lines in missed.items()
+    ]

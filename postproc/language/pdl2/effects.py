@@ -20,7 +20,7 @@ from postproc.language.pdl2.routines import (
     effect_of,
     report_unknown_routine,
 )
-from postproc.language.visits import NEVER_REACHED, Diagnostic, Visits, line_ranges
+from postproc.language.visits import Visits
 
 # What a statement or a routine may do, read off its text.
 
@@ -383,32 +383,13 @@ def _names(statement: ast.Statement) -> Iterator[tuple[str, bool]]:
 # Moves that a program never comes to: their targets keep their values.
 
 
-def dead_moves(programs: Sequence[Program], visits: Visits) -> list[Diagnostic]:
-    """List the files with moves to targets that no way from the start leads to.
-
-    Such a move stands in a routine that nobody calls, or behind a jump. From where it
-    is reached cannot be known, so that it is not compensated; a program that calls
-    the routine from elsewhere would run it uncompensated.
+def dead_lines(programs: Sequence[Program], visits: Visits) -> dict[str, Ints]:
+    """Return the lines of moves that no way leads to, by file, (k,) ascending.
 
     Args:
         programs: The files of a job.
         visits: Every arrival in them.
     """
-    return [
-        Diagnostic(
-            name,
-            int(lines[0]),
-            NEVER_REACHED,
-            f"{len(lines)} moves, lines {line_ranges(lines)}, are never reached from "
-            "the start: they are not compensated. Give the program that calls them, "
-            "or remove them",
-        )
-        for name, lines in dead_lines(programs, visits).items()
-    ]
-
-
-def dead_lines(programs: Sequence[Program], visits: Visits) -> dict[str, Ints]:
-    """Return the lines of such moves, (k,) ascending, of files that hold any."""
     found = {}
     for program in programs:
         name = program.lines.source.name

@@ -20,14 +20,14 @@ from postproc.language.interface import (
     Start,
 )
 from postproc.language.pdl2.clones import CloneTarget, clone, free_name, named_at
-from postproc.language.pdl2.effects import dead_lines, dead_moves
+from postproc.language.pdl2.effects import dead_lines
 from postproc.language.pdl2.interpreter import resolve
 from postproc.language.pdl2.names import entry_names
 from postproc.language.pdl2.program import Program, parse
 from postproc.language.pdl2.variable_file import VariableFile, read_variables
 from postproc.language.rewrite import Skeleton
 from postproc.language.source import Edit, Source
-from postproc.language.visits import Literals
+from postproc.language.visits import Literals, never_reached
 
 _WORD = re.compile(rb"[A-Za-z_]\w*")
 
@@ -64,13 +64,13 @@ class Pdl2(Language):
                 texts.append(Skeleton.of(pages[-1].lines))
         others = _by_name(program, pages)
         resolved = resolve(program, start, variables, others)
-        missed = dead_moves([program, *pages], resolved.visits)
-        found = (*resolved.diagnostics, *missed)
         visits, parsed = resolved.visits, (program, *pages)
+        missed = dead_lines(parsed, visits)
+        told = never_reached(missed, "the start", "program")
+        found = (*resolved.diagnostics, *told)
         corrected = {visits.files[k] for k in np.unique(visits.literals.file).tolist()}
         kept = tuple(p for p in parsed if p.lines.source.name not in corrected)
-        lost = dead_lines([program, *pages], visits)
-        return JobReading(tuple(texts), visits, found, kept, lost)
+        return JobReading(tuple(texts), visits, found, kept, missed)
 
     def cloner(self, sources: Sequence[Source]) -> Cloner:
         """Parse the files of a job to clone variables in them."""

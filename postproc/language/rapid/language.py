@@ -25,12 +25,7 @@ from postproc.language.rapid.statements import RapidText
 from postproc.language.rapid.task import RapidTask
 from postproc.language.rewrite import Skeleton
 from postproc.language.source import CloneError, Edit, Source
-from postproc.language.visits import (
-    NEVER_REACHED,
-    Diagnostic,
-    Literals,
-    line_ranges,
-)
+from postproc.language.visits import Literals, never_reached
 
 # What the interpreter says of a statement where it is reached, knowing all modules.
 _SAID_AGAIN = ("unknown-instruction", "late-binding")
@@ -66,9 +61,10 @@ class Rapid(Language):
         machine.run()
         visits = visits_of(machine)
         missed = _missed(files, machine)
+        told = never_reached(missed, "main", "module")
         own = (d for file in files for d in file.diagnostics)
         found = [d for d in own if d.code not in _SAID_AGAIN]
-        found += [*machine.diagnostics, *_never_reached(missed)]
+        found += [*machine.diagnostics, *told]
         corrected = {visits.files[k] for k in np.unique(visits.literals.file).tolist()}
         kept = tuple(f for f in files if f.text.source.name not in corrected)
         texts = tuple(skeleton_of(file.text) for file in files)
@@ -176,17 +172,3 @@ def _missed(files: Sequence[RapidFile], machine: RapidMachine) -> dict[str, Ints
             lines = sorted({file.text.line(row) for row in rows})
             found[file.text.source.name] = np.array(lines, dtype=np.int64)
     return found
-
-
-def _never_reached(missed: dict[str, Ints]) -> list[Diagnostic]:
-    return [
-        Diagnostic(
-            name,
-            int(lines[0]),
-            NEVER_REACHED,
-            f"{len(lines)} moves, lines {line_ranges(lines)}, are never reached from "
-            "main: they are not compensated. Give the module that calls them, or "
-            "remove them",
-        )
-        for name, lines in missed.items()
-    ]

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from postproc.language.pdl2.effects import dead_moves
+from postproc.language.pdl2.effects import dead_lines
 from postproc.language.pdl2.interpreter import resolve
 from postproc.language.pdl2.program import parse
 from postproc.language.source import Source
-from postproc.language.visits import NEVER_REACHED
+from postproc.language.visits import NEVER_REACHED, never_reached
 
 POINT = "MOVE LINEAR TO POS(1, 2, 3, 0, 180, 0, '')"
 
@@ -14,7 +14,9 @@ POINT = "MOVE LINEAR TO POS(1, 2, 3, 0, 180, 0, '')"
 def lines(*body, routine=()):
     text = "\n".join(["PROGRAM a", *routine, "BEGIN", *body, "END a", ""])
     program = parse(Source("a.pdl", text.encode()))
-    found = dead_moves([program], resolve(program).visits)
+    found = never_reached(
+        dead_lines([program], resolve(program).visits), "the start", "program"
+    )
     assert {d.code for d in found} <= {NEVER_REACHED}
     return [(d.line, int(d.message.split()[0])) for d in found]
 
