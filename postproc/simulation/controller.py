@@ -23,6 +23,7 @@ from postproc.simulation.kinematics import (
     logarithm,
     nearest_turns,
     pose,
+    pose_of_numbers,
     require_closed_form,
     solve_branch,
     undo,
@@ -499,7 +500,7 @@ def _goal_pose(
         return np.asarray(setup.chain.flange(joints[None])[0] @ tool)
     present = setup.chain.flange(here[None])[0] @ tool
     if kind in (Meaning.POSE, Meaning.NEAR, Meaning.FOR):
-        target = visits.dialect.poses(_known(values)[None])[0]
+        target = pose_of_numbers(_known(values))
         if kind is Meaning.NEAR:
             target = target @ _shift(0.0, 0.0, -visits.distance_mm[i])
         goal = flange_of(target, tool, frames.base, frames.uframe) @ tool

@@ -286,6 +286,20 @@ def pose_of_record(record: Floats) -> Floats:
     return pose(about_z(a) @ about_y(e) @ about_z(r), record[..., :3] * 1e-3)
 
 
+def pose_of_numbers(values: Floats) -> Floats:
+    """Convert the numbers of a target (w,) to a pose (4, 4) [m].
+
+    x, y, z [mm] and a, e, r [deg]; or x, y, z and a quaternion, scalar first, of any
+    length, with what else there is behind it.
+    """
+    if len(values) == 6:
+        return pose_of_record(values)
+    sine = float(np.linalg.norm(values[4:7]))
+    about = values[4:7] / max(sine, 1e-300)
+    turned = exponential(2 * np.arctan2(sine, values[3]) * about)
+    return pose(turned, values[:3] * 1e-3)
+
+
 def undo(T: Floats) -> Floats:
     """Invert poses (..., 4, 4)."""
     back = np.swapaxes(T[..., :3, :3], -1, -2)

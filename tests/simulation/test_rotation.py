@@ -7,6 +7,7 @@ from scipy.spatial.transform import Rotation
 from postproc.simulation.kinematics import (
     exponential,
     logarithm,
+    pose_of_numbers,
     pose_of_record,
     small_motion,
     undo,
@@ -40,6 +41,16 @@ def test_record_is_euler_zyz() -> None:
     wanted = Rotation.from_euler("ZYZ", record[3:], degrees=True).as_matrix()
     np.testing.assert_allclose(T[:3, :3], wanted, atol=1e-15)
     np.testing.assert_allclose(T[:3, 3], [0.1, -0.2, 0.3])
+
+
+def test_numbers_are_a_record_or_hold_a_quaternion_of_any_length() -> None:
+    record = np.array([100.0, -200.0, 300.0, 40.0, 50.0, -60.0])
+    np.testing.assert_array_equal(pose_of_numbers(record), pose_of_record(record))
+    for q in (*np.random.default_rng(3).normal(size=(50, 4)), *np.eye(4)):
+        T = pose_of_numbers(np.array([100.0, -200.0, 300.0, *q, 0.0, -1.0, 1.0, 0.0]))
+        wanted = Rotation.from_quat(q, scalar_first=True).as_matrix()
+        np.testing.assert_allclose(T[:3, :3], wanted, atol=1e-14)
+        np.testing.assert_allclose(T[:3, 3], [0.1, -0.2, 0.3])
 
 
 def test_undo_is_the_inverse() -> None:
