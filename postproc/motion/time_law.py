@@ -70,6 +70,7 @@ class Runs:
         rate: ds/dt, (k,), 0 at both ends of each run.
         time: Time since the run began, (k,) [s]; NaN in a run that stands still
             on the way.
+        fastest: ds/dt that the joints' velocities allow, (k,).
     """
 
     s: Floats
@@ -78,6 +79,7 @@ class Runs:
     curve: Floats
     rate: Floats
     time: Floats
+    fastest: Floats
 
     @property
     def acceleration(self) -> Floats:
@@ -93,25 +95,6 @@ class Runs:
         """Joint velocities at the waypoints, (k, 6) [rad/s]."""
         return self.slope * self.rate[:, None]
 
-    def at(self, time: Floats) -> tuple[Floats, Floats, Floats]:
-        """Follow the first and only run.
-
-        Returns:
-            Joint angles, velocities and accelerations, (m, 6) each, at times (m,).
-        """
-        from scipy.interpolate import CubicHermiteSpline  # half a second to load
-
-        i = np.searchsorted(self.time, time, side="right") - 1
-        i = np.clip(i, 0, len(self.s) - 2)
-        squares = self.rate**2
-        push = (squares[i + 1] - squares[i]) / (2 * (self.s[i + 1] - self.s[i]))
-        dt = time - self.time[i]
-        s = self.s[i] + dt * self.rate[i] + push * dt**2 / 2
-        rate = (self.rate[i] + push * dt)[:, None]
-        path = CubicHermiteSpline(self.s, self.q, self.slope)
-        first, second = path(s, 1), path(s, 2)
-        return path(s), first * rate, second * rate**2 + first * push[:, None]
-
 
 def time_laws(arm: Arm, q: Floats, s: Floats, limit: Floats, begins: Bools) -> Runs:
     """Find the fastest time laws along paths, from stop to stop.
@@ -126,15 +109,15 @@ def time_laws(arm: Arm, q: Floats, s: Floats, limit: Floats, begins: Bools) -> R
     first, second = derivatives(s, q, begins)
     step = np.diff(s, prepend=s[0])
     with np.errstate(divide="ignore"):
-        joints = (arm.velocity / np.abs(first)).min(axis=1)
-    bound = np.minimum(np.minimum(limit, joints), FASTEST)
+        fastest = (arm.velocity / np.abs(first)).min(axis=1)
+    bound = np.minimum(np.minimum(limit, fastest), FASTEST)
     paths, most = (first, second), np.asarray(arm.acceleration, dtype=float)
     rate = _native.fastest(paths, step, bound, begins, most)
     inner = np.flatnonzero(~begins)
     lasts = np.zeros(len(s))
     with np.errstate(divide="ignore"):
         lasts[inner] = 2 * step[inner] / (rate[inner] + rate[inner - 1])
-    return Runs(s, q, first, second, rate, _since(lasts, begins))
+    return Runs(s, q, first, second, rate, _since(lasts, begins), fastest)
 
 
 def _since(lasts: Floats, begins: Bools) -> Floats:

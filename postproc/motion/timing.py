@@ -370,14 +370,12 @@ def _run_laws(arm: Arm, points: Waypoints) -> _Laws:
 
     s, limit, override = np.cumsum(points.ds), points.limit(), points.override
     law = time_laws(arm, points.q, s, limit, points.begins)
-    with np.errstate(divide="ignore"):
-        fastest = (arm.velocity / np.abs(law.slope)).min(axis=1)
     found = _Laws(
         law.time / override,
         law.rate * override,
         law.velocity * override[:, None],
         law.acceleration * override[:, None] ** 2,
-        fastest,
+        law.fastest,
         np.isnan(law.time),
     )
     begins = np.append(np.flatnonzero(points.begins), k)
