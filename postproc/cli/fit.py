@@ -5,7 +5,6 @@ from __future__ import annotations
 import csv
 import io
 import json
-import math
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass, replace
@@ -145,17 +144,10 @@ def fit_json(found: Calibration) -> str:
 
     A figure that is not known is null: JSON has no word for it.
     """
+    from postproc.report.json import finite
+
     said = {"model": found.model.id, **asdict(found.report)}
-    return json.dumps(_known(said), indent=1, allow_nan=False) + "\n"
-
-
-def _known(said: Any) -> Any:
-    """Replace numbers that are not finite by None."""
-    if isinstance(said, dict):
-        return {key: _known(value) for key, value in said.items()}
-    if isinstance(said, list | tuple):
-        return [_known(value) for value in said]
-    return None if isinstance(said, float) and not math.isfinite(said) else said
+    return json.dumps(finite(said), indent=1, allow_nan=False) + "\n"
 
 
 def write_page(path: Path, found: Calibration, cell: Cell) -> None:

@@ -166,6 +166,6 @@ def finite(value: object) -> object:
     """Replace NaN, which JSON does not have, by null."""
     if isinstance(value, dict):
         return {k: finite(v) for k, v in value.items()}
-    if isinstance(value, list):
+    if isinstance(value, list | tuple):
         return [finite(v) for v in value]
     return None if isinstance(value, float) and not np.isfinite(value) else value
