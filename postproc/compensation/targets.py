@@ -25,9 +25,7 @@ from postproc.robot.trajectory import Motion
 
 # What a program says of its fly points, and what it leaves to be assumed.
 
-USUAL_DISTANCE = (
-    5.0  # [mm] where no size of a zone is set, as simulation systems take it
-)
+USUAL_DISTANCE = 5.0  # [mm] where no zone is set, as simulation systems take it
 USUAL_OVERLAP = 100.0  # [%] where no overlap is set
 FAR = 0.1  # [mm] passing a point farther away than this is worth a note
 

@@ -6,16 +6,14 @@ import os
 from functools import cache
 from importlib import import_module
 
+from postproc.files import MODULES
 from postproc.language.interface import Language
 
 # Languages by the suffixes of their files; one is loaded when its first file is read.
 _PLACES = {
     ".pdl": "postproc.language.pdl2.language:Pdl2",
     ".lsv": "postproc.language.pdl2.language:Pdl2",
-    **dict.fromkeys(
-        (".mod", ".modx", ".prg", ".sys", ".sysx"),
-        "postproc.language.rapid.language:Rapid",
-    ),
+    **dict.fromkeys(MODULES, "postproc.language.rapid.language:Rapid"),
 }
 _USUAL = ".pdl"  # of a file with another suffix
 

@@ -18,7 +18,6 @@ QUARTER = np.pi / 2
 # [rad] beyond a quarter's border a count still holds: axes at 0 or 90 deg are common,
 # and what rounding moves a joint by is far less.
 BORDER = np.deg2rad(0.02)
-_SHORTEST = 0.5  # length of what counts as a quaternion
 
 _FLAGS_SAY = (
     "confdata counts other quarter turns, or names another configuration, than where "
@@ -134,11 +133,6 @@ def _beyond(count: Floats, q: Floats) -> Bools:
     """Tell which joints (k,) [rad] lie outside of the quarter turns counted, (k,)."""
     low = count * QUARTER
     return np.asarray((q < low - BORDER) | (q > low + QUARTER + BORDER))
-
-
-def is_quaternion(values: Floats) -> Bools:
-    """Tell which four numbers (k, 4) say a rotation, (k,)."""
-    return np.asarray(np.linalg.norm(values, axis=-1) > _SHORTEST)
 
 
 def rotation_from_quaternion(q: Floats) -> Floats:

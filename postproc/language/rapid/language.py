@@ -9,6 +9,7 @@ import numpy as np
 
 from postproc.arrays import Ints
 from postproc.exceptions import ProgramError
+from postproc.files import MODULES
 from postproc.language.grammars import line_parser
 from postproc.language.interface import (
     Cloner,
@@ -37,7 +38,7 @@ class Rapid(Language):
     """The language of ABB controllers."""
 
     name = "RAPID"
-    suffixes = (".mod", ".modx", ".prg", ".sys", ".sysx")
+    suffixes = MODULES
     comment = "!"
     tells_accuracy = False
 

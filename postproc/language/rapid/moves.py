@@ -526,7 +526,7 @@ def _pose_numbers(found: Nested | None) -> list[float] | None:
         for one in part
         if isinstance(one, WrittenNumber)
     ]
-    return numbers if len(numbers) == 7 and np.linalg.norm(numbers[3:]) > 0.5 else None
+    return numbers if len(numbers) == 7 and _is_unit(numbers[3:]) else None
 
 
 def pose_of(found: Nested | None) -> tuple[float, ...]:
