@@ -130,6 +130,9 @@ def resampled(
     edges: _Edges, share: Floats, q: Floats, corners: _Corners, pieces: _Pieces
 ) -> tuple[Floats, Floats]: ...
 
+# spline.rs: splines through the waypoints of runs (`postproc.motion.time_law`)
+def splines(s: Floats, q: Floats, begins: Bools) -> tuple[Floats, Floats]: ...
+
 # time_law.rs: the fastest ds/dt along paths (`postproc.motion.time_law`)
 def fastest(
     paths: tuple[Floats, Floats],

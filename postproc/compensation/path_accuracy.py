@@ -110,19 +110,15 @@ class _PathSamples:
 
     def as_many(self, other: _PathSamples) -> _PathSamples:
         """Take as many samples of every way as there are of another one's."""
-        count = np.diff(other.first)
-        rows = np.flatnonzero(np.diff(self.first) != count)
-        if not len(rows):
+        if np.array_equal(self.first, other.first):
             return self
-        parts = np.split(self.q, self.first[1:-1])
-        for k in rows.tolist():
-            n = len(parts[k])
-            at = np.linspace(0, n - 1, count[k])
-            step = np.minimum(at.astype(int), max(n - 2, 0))
-            begins = np.zeros(n, dtype=bool)
-            begins[0] = True
-            parts[k] = _between(parts[k], begins, step, at - step)
-        return replace(self, q=np.concatenate(parts), first=other.first)
+        way = other.way
+        has, wants = (np.diff(samples.first)[way] - 1 for samples in (self, other))
+        share = (np.arange(len(way)) - other.first[way]) / np.maximum(wants, 1)
+        at = share * has
+        step = np.minimum(at.astype(int), np.maximum(has - 1, 0))
+        q = _between(self.q, self.begins, self.first[way] + step, at - step)
+        return replace(self, q=q, first=other.first)
 
     def refined(self, after: Ints, share: Floats) -> _PathSamples:
         """Insert samples at a share of the way from some samples to the next ones."""

@@ -16,6 +16,7 @@ from postproc.robot.arm import Arm
 from postproc.robot.direction import Arrivals, arrivals
 
 SLOWED = 0.99  # of the programmed speed: what the joints allow is less
+SAME_USE = 1e-6  # shares that differ by less are the same
 
 
 @dataclass(frozen=True)
@@ -69,11 +70,14 @@ class ProgramCycle:
 
 
 def _largest(use: Floats) -> tuple[Floats, Ints]:
-    """Return the largest value of every column (n, 6), and its row; 0, -1 of none."""
+    """Return the largest value of every column (n, 6), and its row; 0, -1 of none.
+
+    Of rows that differ by rounding alone (limits are reached often) it is the first.
+    """
     if not len(use):
         return np.zeros(6), np.full(6, -1)
-    at = np.asarray(use.argmax(axis=0))
-    return use[at, np.arange(use.shape[1])], at
+    most = use.max(axis=0)
+    return most, np.asarray((use >= most - SAME_USE).argmax(axis=0))
 
 
 def run(arm: Arm, targets: Targets) -> ProgramCycle:

@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from postproc.motion.time_law import derivatives
+from postproc import _native
 
 
 def test_every_run_has_its_own_natural_spline() -> None:
@@ -12,7 +12,7 @@ def test_every_run_has_its_own_natural_spline() -> None:
     parts = [np.cumsum(rng.uniform(0.1, 1, size)) for size in sizes]
     q = rng.normal(size=(sum(sizes), 6))
     begins = np.concatenate([np.arange(size) == 0 for size in sizes])
-    first, second = derivatives(np.concatenate(parts), q, begins)
+    first, second = _native.splines(np.concatenate(parts), q, begins)
     row = 0
     for s in parts:
         rows = slice(row, row + len(s))
