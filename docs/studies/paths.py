@@ -16,6 +16,7 @@ import subprocess
 import sys
 import tempfile
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -39,6 +40,18 @@ xyz_mm = [3000.0, -2000.0, 1500.0]
 points_mm = [[-212.5, 96.0, 331.0], [148.0, -121.5, 268.0], [-58.0, 42.5, 514.0]]
 """
 LINES, ARCS = 40, 20
+PROGRAMS: dict[str, tuple[str, ...]] = {
+    "job": (),
+    "plain": (),
+    "points": ("--path-mm", "0.1"),
+    "stops": ("--path-mm", "0.1", "--take-up"),
+}
+STATES = {
+    "job": "as written",
+    "plain": "compensated",
+    "points": "with points",
+    "stops": "with points and stops",
+}
 RUN = "from postproc.cli import main; main()"
 START = (
     "  MOVE JOINT TO {4.0, -6.0, -84.0, 9.0, 53.0, -12.0}",
@@ -105,23 +118,40 @@ def study(seed: int, folder: Path) -> None:
     done("survey", *at, "--poses", 300, "-o", folder / "survey.pdl")
     done("simulate", folder / "survey.pdl", *at, *arm, "-o", folder / "survey.csv")
     done("fit", folder / "survey.csv", *at, "-o", folder / "model.json")
-    done("compensate", folder / "job.pdl", *at, "--model", folder / "model.json",
-         "-o", folder / "out.pdl", "--report", folder / "report.json")  # fmt: skip
-    told = json.loads((folder / "report.json").read_bytes())["path"]
-    for key, name in (("before", "job"), ("after", "out")):
+    for name, more in PROGRAMS.items():
+        if name != "job":
+            done("compensate", folder / "job.pdl", *at, "--model",
+                 folder / "model.json", "-o", folder / f"{name}.pdl",
+                 "--report", folder / f"{name}.json", *more)  # fmt: skip
+    for name in PROGRAMS:
         done("simulate", folder / f"{name}.pdl", *at, *arm, "--path", "--wanted",
              folder / "job.pdl", "--json", folder / "true.json")  # fmt: skip
-        true = json.loads((folder / "true.json").read_bytes())
-        real = {move["visit"]: move["max_mm"] for move in true["path"]}
-        pairs = [(real[p["visit"]], p["max_mm"][key]) for p in told]
-        found, predicted = np.array(pairs).T
-        off = np.abs(found - predicted)
-        print(
-            f"{seed:4d}  {key:6}  {len(found):5d}  {found.mean():.3f}  "
-            f"{np.percentile(found, 95):.3f}  {found.max():.3f}  "
-            f"{off.mean():.4f}  {np.percentile(off, 95):.4f}  {off.max():.4f}",
-            flush=True,
-        )
+        report = folder / ("plain.json" if name == "job" else f"{name}.json")
+        told = json.loads(report.read_bytes())["path"]
+        true = json.loads((folder / "true.json").read_bytes())["path"]
+        for move in ("LINEAR", "CIRCULAR"):
+            if move == "LINEAR" or name in ("job", "plain"):  # arcs get no points
+                own = [path for path in told if path["move"] == move]
+                tell(f"{seed:4d}  {STATES[name]:21}  {move:8}", own, true,
+                     "before" if name == "job" else "after")  # fmt: skip
+
+
+def tell(
+    head: str, told: list[dict[str, Any]], true: list[dict[str, Any]], key: str
+) -> None:
+    """Print how far the arm leaves its paths, and how far that is from predicted."""
+    real = {move["visit"]: move for move in true}
+    found, along, predicted = np.array([
+        (real[p["visit"]]["max_mm"], real[p["visit"]]["p95_mm"], p["max_mm"][key])
+        for p in told
+    ]).T  # fmt: skip
+    off, points = np.abs(found - predicted), [p["inserted"] for p in told]
+    print(
+        f"{head}  {len(found):3d}  {found.mean():.3f}  {np.percentile(found, 95):.3f}"
+        f"  {found.max():.3f}  {along.mean():.3f}  {off.mean():.4f}  {off.max():.4f}"
+        f"  {np.median(points):.0f}  {max(points)}",
+        flush=True,
+    )
 
 
 def main() -> None:
@@ -129,7 +159,10 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--seeds", type=int, nargs=2, default=(41, 45))
     first, last = parser.parse_args().seeds
-    print(" arm  state   moves   mean   95 %    max   off: mean   95 %    max   [mm]")
+    print(
+        " arm  program                move        n   mean   95 %    max   95 % along "
+        "a move  off: mean   max  [mm]  points: median  max"
+    )
     for seed in range(first, last + 1):
         with tempfile.TemporaryDirectory() as folder:
             study(seed, Path(folder))

@@ -68,6 +68,23 @@ TimingOption = Annotated[
         help="Run the program in time; default: if it has up to 5,000 targets.",
     ),
 ]
+PathOption = Annotated[
+    float | None,
+    typer.Option(
+        "--path-mm",
+        help="Insert points where a path is predicted to be left farther [mm].",
+    ),
+]
+MaxInsertedOption = Annotated[
+    int, typer.Option("--max-inserted", min=0, help="The most points to insert.")
+]
+TakeUpOption = Annotated[
+    bool,
+    typer.Option(
+        "--take-up",
+        help="With --path-mm: stop once more where a move begins, to take up play.",
+    ),
+]
 TemperatureOption = Annotated[
     float | None, typer.Option("--temperature", help="Arm temperature [deg C].")
 ]

@@ -201,7 +201,7 @@ class Explanation:
         told = self._in_time
         if told is None:
             return []
-        speed = float(told.after.clock.speed[i]) / MM
+        speed = float(told.after.clock.speed[told.own[i]]) / MM
         at = np.flatnonzero(told.paths.visit == i)
         sizes = [f"{size:.3f}" for size in (told.paths.after.sizes[at] / MM).tolist()]
         return [_told(speed, 7, 1), *(sizes or [""])]

@@ -15,10 +15,13 @@ from postproc.cli.common import (
     HtmlOption,
     JsonOption,
     LsvOption,
+    MaxInsertedOption,
     ModelOption,
     OrientationOption,
+    PathOption,
     ProcessesOption,
     StrictCallsOption,
+    TakeUpOption,
     TemperatureOption,
     TimingOption,
     app,
@@ -28,6 +31,7 @@ from postproc.cli.common import (
     say,
     write_text,
 )
+from postproc.compensation.options import MAX_INSERTED
 from postproc.exceptions import PostprocError
 from postproc.files import STREAM, check_places, is_stream
 
@@ -72,6 +76,9 @@ def compensate(
     temperature: TemperatureOption = None,
     strict_calls: StrictCallsOption = False,
     timing: TimingOption = None,
+    path_mm: PathOption = None,
+    max_inserted: MaxInsertedOption = MAX_INSERTED,
+    take_up: TakeUpOption = False,
     processes: ProcessesOption = 0,
 ) -> None:
     """Rewrite a program so that the tool lands where its targets say."""
@@ -84,8 +91,17 @@ def compensate(
     given = None if is_stream(program) else Path(program)
     with explained(given, lsv):
         options = Options(
-            clone, shared, temperature, orientation, strict_calls, timing=timing
+            clone,
+            shared,
+            temperature,
+            orientation,
+            strict_calls,
+            timing=timing,
+            path_mm=path_mm,
+            max_inserted=max_inserted,
+            take_up=take_up,
         )
+        options.check()
         if report == Path(STREAM) and given is None and output is None:
             raise PostprocError("--report -: stdout holds the program. Name a file")
         check_places([output, report, html, lsv_out], [given, lsv, cell, model])

@@ -8,9 +8,11 @@ from pathlib import Path
 
 import numpy as np
 
+from postproc.arrays import Ints
 from postproc.cli.jobs import read_files
 from postproc.compensation.program import read_program
 from postproc.exceptions import CellError
+from postproc.language.languages import language_of
 from postproc.language.visits import Visits
 from postproc.model.statistics import ErrorStatistics
 from postproc.report.json import finite
@@ -68,8 +70,18 @@ class Simulation:
         error = None if self.true_error is None else asdict(self.true_error)
         told: dict[str, object] = {"program": self.name, "true_error": error}
         if self.paths is not None:
-            told |= {"path_accuracy": asdict(self.path_accuracy), "path": self._moves()}
+            told |= {
+                "path_accuracy": asdict(self.path_accuracy),
+                "path_all_along": asdict(self.all_along),
+                "path": self._moves(),
+            }
         return json.dumps(finite(told)) + "\n"
+
+    @property
+    def all_along(self) -> ErrorStatistics:
+        """Distance from the path at all places on the way, a millimetre apart."""
+        sizes = np.empty(0) if self.paths is None else self.paths.across
+        return ErrorStatistics.of_sizes(sizes)
 
     @property
     def path_accuracy(self) -> ErrorStatistics:
@@ -92,6 +104,9 @@ class Simulation:
                     "visit": visit,
                     "max_mm": round(float(paths.across[largest]) / MM, 5),
                     "at_mm": round(float(paths.way[largest]) / MM, 3),
+                    "p95_mm": round(
+                        float(np.percentile(paths.across[own], 95)) / MM, 5
+                    ),
                     "along_mm": round(float(np.abs(paths.along[own]).max()) / MM, 5),
                 }
             )
@@ -110,10 +125,13 @@ class Simulation:
         )
         if self.paths is None:
             return said
+        if not len(self.paths.visit):
+            return f"{said}; no LINEAR or CIRCULAR move: no path to score"
         p = self.path_accuracy
         return (
             f"{said}; path accuracy AT_p (systematic part) mean {p.mean_mm:.4f} mm, "
-            f"95 % {p.p95_mm:.4f}, max {p.max_mm:.4f} over {p.n} moves"
+            f"95 % {p.p95_mm:.4f}, max {p.max_mm:.4f} over {p.n} moves; of all places "
+            f"on the way 95 % within {self.all_along.p95_mm:.4f}"
         )
 
 
@@ -181,7 +199,7 @@ def simulate_file(
             seed, names, coupling=setup.coupling, rows=len(rows.ids), tool=setup.tool
         )
         return Simulation(program.name, measure_rows(arm, setup, rows), None)
-    visits = visits_of(program, cell)
+    visits, own = _read(program, cell)
     arm = virtual_arm(
         seed,
         names,
@@ -193,10 +211,11 @@ def simulate_file(
     if wanted is None and not path:
         return Simulation(program.name, campaign, None)
     original = visits if wanted is None else visits_of(wanted, cell)
-    error = true_error(arm, setup, visits, original)
+    own = own if wanted is not None else np.arange(len(visits))
+    error = true_error(arm, setup, visits, original, own)
     if not path:
         return Simulation(program.name, campaign, error)
-    scores = score_paths(arm, setup, original, visits)
+    scores = score_paths(arm, setup, original, visits, own)
     return Simulation(
         program.name, campaign, error, scores, tuple(original.line.tolist())
     )
@@ -207,10 +226,27 @@ def visits_of(program: Path, cell: Cell) -> Visits:
     return read_program(read_files(program), cell).visits
 
 
+def _read(program: Path, cell: Cell) -> tuple[Visits, Ints]:
+    """Read a program, and tell which of its visits no points on ways are."""
+    reading = read_program(read_files(program), cell)
+    visits = reading.visits
+    inserted = np.zeros(len(visits), dtype=bool)
+    for file, source in enumerate(reading.sources):
+        language, rows = language_of(source.name), np.flatnonzero(visits.file == file)
+        for row in rows.tolist():
+            line = source.line_text(int(visits.line[row])).encode("latin-1")
+            inserted[row] = language.is_inserted(line)
+    return visits, np.flatnonzero(~inserted)
+
+
 def true_error(
-    arm: VirtualArm, setup: VirtualCell, executed: Visits, original: Visits
+    arm: VirtualArm,
+    setup: VirtualCell,
+    executed: Visits,
+    original: Visits,
+    own: Ints | None = None,
 ) -> ErrorStatistics:
     """Compare where the tool landed with where the original program says."""
-    landing = land(arm, setup, original, executed)
+    landing = land(arm, setup, original, executed, own)
     targets = original.literal[landing.visit] >= 0
     return ErrorStatistics.of(landing.error[targets])

@@ -6,14 +6,12 @@ from collections.abc import Mapping
 from dataclasses import replace
 from types import MappingProxyType
 
+import numpy as np
+
 from postproc.compensation.arrivals import ArrivalStates
 from postproc.compensation.base import contradicted_base
 from postproc.compensation.correction import Correction, correct
-from postproc.compensation.in_time import (
-    InTime,
-    no_advice,
-    run_in_time,
-)
+from postproc.compensation.in_time import no_advice, run_in_time
 from postproc.compensation.notes import (
     assumed_off,
     flank_steps,
@@ -39,6 +37,7 @@ from postproc.compensation.outcome import (
     left_elsewhere,
     tell_arrivals,
 )
+from postproc.compensation.path_correction import Draft, correct_paths
 from postproc.compensation.program import (
     Reading,
     prepared,
@@ -165,9 +164,15 @@ def finish(name: str, reading: Reading, kept: Correction, setting: Setting) -> O
     in_time = None
     if setting.options.times(len(reading.visits)):
         with setting.clock("time"):
-            in_time = run_in_time(reading, again, kept.position, setting)
+            own = np.arange(len(reading.visits))
+            in_time = run_in_time(
+                reading, again, kept.position, setting,
+                own if setting.options.path_mm is not None else None,
+            )  # fmt: skip
+    draft = Draft(reading, kept, output, in_time)
+    draft = correct_paths(draft, setting, write_and_verify)
     with setting.clock("report"):
-        return report(name, reading, kept, output, setting, in_time)
+        return report(name, reading, draft, setting)
 
 
 def write_and_verify(
@@ -191,12 +196,18 @@ def write_and_verify(
 def report(
     name: str,
     reading: Reading,
-    kept: Correction,
-    output: Output,
+    draft: Draft,
     setting: Setting,
-    in_time: InTime | None,
 ) -> Outcome:
-    """Say what came of every visit, and what error the model expects now."""
+    """Say what came of every visit, and what error the model expects now.
+
+    Args:
+        name: The program's.
+        reading: The program, without points on its ways.
+        draft: What is to be written.
+        setting: What it was compensated with.
+    """
+    kept, output, in_time = draft.kept, draft.output, draft.in_time
     cell, model, options = setting.cell, setting.model, setting.options
     d, rows, visits = kept.decisions, kept.corrected, reading.visits
     advice = no_advice if in_time is None else in_time.advice

@@ -11,6 +11,7 @@ from postproc.arrays import Bools, Floats, Ints
 from postproc.compensation.approach import advise
 from postproc.compensation.options import Setting
 from postproc.compensation.path_accuracy import PathAccuracy, predict_paths
+from postproc.compensation.path_points import Insertions
 from postproc.compensation.program import Reading
 from postproc.compensation.targets import targets_from_visits
 from postproc.language.visits import Diagnostic, Visits
@@ -25,6 +26,8 @@ SLOWER = "slower"
 BEYOND_LIMIT = "beyond-limit"
 SLOWED = "slowed-down"  # codes of findings
 OTHER_SIDE = "side-in-time"
+PATH_POINTS = "path-points"
+PATH_LEFT = "path-left"
 MOST_SLOWER = 0.03  # of the cycle time
 FEW = 5  # lines that a finding names
 _LIMITS = [CODE[text] for text in (*LIMITS, *PATH_LIMITS)]
@@ -40,6 +43,7 @@ class InTime:
         guessed: Which limits of the joints the arm file guesses.
         other_side: Where a joint arrives otherwise in time than along the path, (n, 6).
         arm: The arm.
+        inserted: The points that were put on its ways; None where nobody asked.
     """
 
     before: ProgramCycle
@@ -48,6 +52,17 @@ class InTime:
     guessed: tuple[str, ...]
     other_side: Bools
     arm: Arm
+    inserted: Insertions | None = None
+
+    @property
+    def own(self) -> Ints:
+        """The visits of the compensated program that the source makes, (n,)."""
+        told = self.inserted
+        return np.arange(len(self.before)) if told is None else told.own
+
+    def source(self, rows: Ints) -> Ints:
+        """Return the visits of the source that those of the compensated one lead to."""
+        return np.where(rows < 0, rows, np.searchsorted(self.own, rows))
 
     def summary(self) -> str:
         """Say in one line how long it takes, and how well it keeps to its paths."""
@@ -66,9 +81,22 @@ class InTime:
         )
 
     @property
-    def is_worse(self) -> bool:
-        """Tell whether it is slower than it was, or leaves a limit that it kept."""
-        return self._is_slower or len(self._beyond) > 0
+    def falls_short(self) -> bool:
+        """Tell whether it does not run as it did, or keeps not to its paths as asked.
+
+        It is slower than it was, leaves a limit that it kept, or leaves a path farther
+        than was asked for.
+        """
+        return self._is_slower or len(self._beyond) > 0 or len(self._too_far) > 0
+
+    @property
+    def _too_far(self) -> Ints:
+        """The paths that are left farther than was asked for, the worst first."""
+        if self.inserted is None:
+            return np.empty(0, dtype=np.int64)
+        sizes = self.paths.after.sizes
+        order = np.argsort(-sizes, kind="stable")
+        return np.asarray(order[sizes[order] > self.inserted.tolerance])
 
     @property
     def _is_slower(self) -> bool:
@@ -80,11 +108,12 @@ class InTime:
         before, after = (
             np.isin(c.path.reason, _LIMITS) for c in (self.before, self.after)
         )
-        return np.flatnonzero(after & ~before)
+        return self.source(np.flatnonzero(after & ~before[self.source(_all(after))]))
 
     def advice(self, rows: Ints) -> dict[int, str]:
         """Say how to approach some visits so that the sides of all joints are known."""
-        return advise(self.arm, self.after, rows)
+        found = advise(self.arm, self.after, self.own[rows])
+        return {int(self.source(np.array([v]))[0]): text for v, text in found.items()}
 
     def findings(self, visits: Visits) -> Iterator[Diagnostic]:
         """Say where the program does not run as it did, and where it cannot."""
@@ -99,7 +128,28 @@ class InTime:
             file = visits.files[visits.file[v]]
             yield Diagnostic(file, int(visits.line[v]), BEYOND_LIMIT, text)
         yield from self._slowed(visits)
+        if self.inserted is not None:
+            yield from self._points(visits, self.inserted)
         yield from self._other_sides(visits)
+
+    def _points(self, visits: Visits, told: Insertions) -> Iterator[Diagnostic]:
+        """Say what was put on the ways, and which moves still leave their paths."""
+        if told.points:
+            first = min(told.points)
+            text = (
+                f"{told.count} points are put on the ways of {len(told.points)} moves; "
+                "a model that was fitted at stops is unverified in motion until a "
+                "measured path confirms it"
+            )
+            place = visits.files[visits.file[first]], int(visits.line[first])
+            yield Diagnostic(*place, PATH_POINTS, text)
+        for k in self._too_far.tolist():
+            v = int(self.paths.visit[k])
+            far = self.paths.after.sizes[k] / MM
+            why = told.left.get(v, "more points on its way do not help")
+            text = f"the move is predicted to leave its path by {far:.3f} mm: {why}"
+            place = visits.files[visits.file[v]], int(visits.line[v])
+            yield Diagnostic(*place, PATH_LEFT, text)
 
     def _other_sides(self, visits: Visits) -> Iterator[Diagnostic]:
         """Say where joints arrive otherwise in time than along the path."""
@@ -115,12 +165,13 @@ class InTime:
 
     def _slowed(self, visits: Visits) -> Iterator[Diagnostic]:
         """Say where the joints cannot follow the programmed speed."""
-        rows = self.after.slowed
-        if not len(rows):
+        slowed = self.after.slowed
+        if not len(slowed):
             return
+        rows = self.source(slowed)
         lines = dict.fromkeys(visits.line[rows].tolist())
         more = f" and {len(lines) - FEW} more" if len(lines) > FEW else ""
-        least = 100 * self.after.clock.allowed[rows].min()
+        least = 100 * self.after.clock.allowed[slowed].min()
         text = (
             f"the joints reach {least:.0f} % of the programmed speed at the least: the "
             "controller slows down or stops there, near a singularity as a rule "
@@ -130,13 +181,21 @@ class InTime:
         yield Diagnostic(*place, SLOWED, text)
 
 
+def _all(column: Bools) -> Ints:
+    return np.arange(len(column))
+
+
 def no_advice(rows: Ints) -> dict[int, str]:
     """Say nothing on how to approach visits: nobody knows their ways."""
     return {}
 
 
 def run_in_time(
-    reading: Reading, again: Reading, position: Floats, setting: Setting
+    reading: Reading,
+    again: Reading,
+    position: Floats,
+    setting: Setting,
+    owner: Ints | None = None,
 ) -> InTime:
     """Run a program in time, as it was written and as it is compensated.
 
@@ -145,6 +204,8 @@ def run_in_time(
         again: The output, parsed again.
         position: Where the program wants the TCP, (n, 3) [m]; see `Correction`.
         setting: What it was compensated with.
+        owner: The move of the source that every visit belongs to, (n,), where points
+            were put on ways.
 
     Raises:
         PlanError: The arm has no inverse kinematics.
@@ -154,7 +215,7 @@ def run_in_time(
     passed = cell.arm.tcp(before.path.q, before.targets.tool[:, :3, 3])
     shift = np.nan_to_num(position + before.path.aside - passed)
     paths = predict_paths(
-        before, after, shift, cell, setting.model, setting.temperature
+        before, after, shift, cell, setting.model, setting.temperature, owner
     )
     guessed, other = guessed_limits(cell.arm), disagreements(cell.arm, after)
     return InTime(before, after, paths, guessed, other, cell.arm)

@@ -9,12 +9,16 @@ from functools import cached_property
 from time import perf_counter
 from typing import TYPE_CHECKING
 
+from postproc.exceptions import PostprocError
+
 if TYPE_CHECKING:  # the command line needs options only, and must start at once
     from postproc.arrays import Floats
     from postproc.model.model import Model
     from postproc.robot.cell import Cell
 
 # What the user asked for.
+
+MAX_INSERTED = 1_000  # points on the ways of a program
 
 
 @dataclass(frozen=True)
@@ -30,6 +34,10 @@ class Options:
         explained: Keep what explains every target, of long programs too.
         timing: Run the program in time, before and after; None: if it is no longer than
             `IN_TIME`.
+        path_mm: Put points on the ways of moves that leave their paths farther [mm],
+            which runs the program in time; None: on none.
+        max_inserted: The most points.
+        take_up: Let the arm stop once more where a move begins, to take up play.
     """
 
     clone: bool = False
@@ -39,6 +47,22 @@ class Options:
     strict_calls: bool = False
     explained: bool = False
     timing: bool | None = False
+    path_mm: float | None = None
+    max_inserted: int = MAX_INSERTED
+    take_up: bool = False
+
+    def check(self) -> None:
+        """Refuse options that do not go together.
+
+        Raises:
+            PostprocError: They do not.
+        """
+        if self.path_mm is None and self.take_up:
+            raise PostprocError("--take-up: give the tolerance of paths, --path-mm")
+        if self.path_mm is not None and not self.path_mm > 0:
+            raise PostprocError("--path-mm: give a distance of more than 0 mm")
+        if self.path_mm is not None and self.timing is False:
+            raise PostprocError("--path-mm runs the program in time: no --no-timing")
 
     def told(self) -> dict[str, object]:
         """Return them for a record: a strict reading of calls only if asked for."""
@@ -46,10 +70,14 @@ class Options:
         del said["explained"], said["timing"]  # they change no output
         if not self.strict_calls:
             del said["strict_calls"]
+        if self.path_mm is None:
+            del said["path_mm"], said["max_inserted"], said["take_up"]
         return said
 
     def times(self, visits: int) -> bool:
         """Tell whether a program of so many visits is run in time."""
+        if self.path_mm is not None:
+            return True
         return visits <= IN_TIME if self.timing is None else self.timing
 
 

@@ -79,12 +79,12 @@ class Decisions:
     std_error: Floats
     turn: Floats = field(default_factory=lambda: np.empty((0, 3)))
 
-    def part(self, rows: slice) -> Decisions:
+    def part(self, rows: slice | Ints) -> Decisions:
         """Take the decisions for some visits."""
+        columns = {f.name: getattr(self, f.name) for f in fields(self)}
+        del columns["reasons"]
         own = {
-            f.name: getattr(self, f.name)[rows]
-            for f in fields(self)
-            if f.name != "reasons"
+            k: column[rows] if len(column) else column for k, column in columns.items()
         }
         return replace(self, **own)
 
@@ -156,7 +156,7 @@ class Outcome:
         """
         left = (Status.UNSAFE, Status.DISPLAY, Status.GUARDED)
         missed = any(d.code in NOT_FOLLOWED for d in self.diagnostics)
-        missed |= self.in_time is not None and self.in_time.is_worse
+        missed |= self.in_time is not None and self.in_time.falls_short
         return NOT_ALL if missed or np.isin(self.decisions.status, left).any() else DONE
 
     def summary(self) -> str:

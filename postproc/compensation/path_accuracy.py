@@ -63,6 +63,9 @@ class PathAccuracy:
         way: Path length up to every sample since the move began, (s,) [m].
         before, after: Deviations of the program as it was written and compensated.
         unknown: Cartesian moves that nothing is predicted for.
+        crossing: Where a joint of the compensated program changes its flank, (s,).
+        otherwise: Distance of the compensated program's path if such a joint had stayed
+            on one of its flanks, (s,) [m]; empty where nobody asked.
     """
 
     visit: Ints
@@ -71,6 +74,8 @@ class PathAccuracy:
     before: Deviations
     after: Deviations
     unknown: int
+    crossing: Bools
+    otherwise: Floats
 
     def __len__(self) -> int:
         """Return the number of paths."""
@@ -79,6 +84,30 @@ class PathAccuracy:
     def samples(self, k: int) -> slice:
         """Return the samples of a path."""
         return slice(int(self.first[k]), int(self.first[k + 1]))
+
+    def joined(self, owner: Ints) -> PathAccuracy:
+        """Take the ways to points that were inserted as parts of the source's moves.
+
+        Args:
+            owner: The move of the source that every visit belongs to, (n,).
+        """
+        lead, group = _groups(owner[self.visit])
+        length = self.way[self.first[1:] - 1]
+        begin = np.cumsum(length) - length
+        offset = begin - begin[lead][group]
+
+        def whole(told: Deviations) -> Deviations:
+            part = _largest_in(told.sizes, group, lead)
+            return replace(told, largest=told.largest[part], joint=told.joint[part])
+
+        return replace(
+            self,
+            visit=owner[self.visit][lead],
+            first=np.append(self.first[lead], self.first[-1]),
+            way=self.way + np.repeat(offset, np.diff(self.first)),
+            before=whole(self.before),
+            after=whole(self.after),
+        )
 
 
 @dataclass(frozen=True)
@@ -260,6 +289,7 @@ def predict_paths(
     cell: Cell,
     model: Model,
     temperature: float,
+    owner: Ints | None = None,
 ) -> PathAccuracy:
     """Predict how far a program leaves its paths, as written and as compensated.
 
@@ -271,6 +301,8 @@ def predict_paths(
         cell: The arm, its play as wide as its gaps, and its payload.
         model: The arm's error.
         temperature: Of the arm [deg C], NaN where not known.
+        owner: The move of the source that every visit belongs to, (n,), where points
+            were inserted on its way; each move is then one path.
     """
     cartesian = before.targets.move != Motion.JOINT
     known = cartesian & (before.ways[1] >= 0) & (after.ways[1] == before.ways[1])
@@ -286,12 +318,65 @@ def predict_paths(
     wanted, commanded = (cell.arm.tcp(w.q, tools) for w in pair)
     way, tangent = _along(wanted, pair[0])
     off = _shift(shift, pair[0], way)
-    return PathAccuracy(
+    moved = commanded - wanted - off
+    found = PathAccuracy(
         rows, pair[0].first, way,
         _deviations(runs[0], error, -off, tangent, way),
-        _deviations(runs[1], error, commanded - wanted - off, tangent, way),
-        int((cartesian & ~known).sum()),
+        _deviations(runs[1], error, moved, tangent, way),
+        int((cartesian & ~known).sum()), runs[1].changes(), np.empty(0),
     )  # fmt: skip
+    if owner is None or not len(rows):
+        return found
+    lead, _ = _groups(owner[rows])
+    otherwise = _otherwise(runs[1], error, moved, tangent, pair[0].first[lead])
+    return replace(found, otherwise=otherwise).joined(owner)
+
+
+def _groups(owner: Ints) -> tuple[Ints, Ints]:
+    """Find where groups of equal neighbours begin, (g,), and each one's group, (m,)."""
+    begins = np.diff(owner, prepend=-1) != 0
+    return np.flatnonzero(begins), np.cumsum(begins) - 1
+
+
+def _largest_in(sizes: Floats, group: Ints, starts: Ints) -> Ints:
+    """Find the first of the largest values of every group, (g,)."""
+    if not len(starts):
+        return starts
+    top = np.maximum.reduceat(sizes, starts)[group]
+    hit = np.flatnonzero(sizes == top)
+    return np.asarray(hit[np.searchsorted(group[hit], np.arange(len(starts)))])
+
+
+def _otherwise(
+    run: _Run, error: _Error, moved: Floats, tangent: Floats, starts: Ints
+) -> Floats:
+    """Tell how far the path is if a joint that changes its flank did not, (s,) [m].
+
+    Whatever moment it changes at, it stands on one of its two flanks before and behind.
+
+    Args:
+        run: The program.
+        error: The arm's error.
+        moved: From the wanted to the commanded places, (s, 3) [m].
+        tangent: Directions of the wanted path, (s, 3).
+        starts: The first sample of every move, (g,).
+    """
+    count = np.diff(np.append(starts, len(moved)))
+    low, high = (
+        np.repeat(f.reduceat(sides, starts, axis=0), count, axis=0)
+        for f, sides in ((np.minimum, run.least), (np.maximum, run.most))
+    )
+    side, out = run.side, np.zeros(len(moved))
+    for joint in range(6):
+        rows = np.flatnonzero(high[:, joint] - low[:, joint] > CHANGED)
+        for flank in (low, high):
+            other = np.array(side[rows])
+            other[:, joint] = flank[rows, joint]
+            off = moved[rows] + error(run, rows, other)
+            along = np.einsum("si,si->s", off, tangent[rows])
+            far = lengths(off - along[:, None] * tangent[rows])
+            out[rows] = np.maximum(out[rows], far)
+    return out
 
 
 def _refined(
@@ -347,9 +432,7 @@ def _deviations(
     unsure, starts = _unsure(run, error), run.ways.first[:-1]
     if not len(starts):
         return Deviations(across, along, unsure, starts, starts)
-    top = np.maximum.reduceat(across, starts)[run.ways.way]
-    hit = np.flatnonzero(across == top)
-    largest = hit[np.searchsorted(run.ways.way[hit], np.arange(len(starts)))]
+    largest = _largest_in(across, run.ways.way, starts)
     return Deviations(across, along, unsure, largest, _joints(run, error, largest, way))
 
 

@@ -8,7 +8,7 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
-from postproc.arrays import Ints
+from postproc.arrays import Floats, Ints
 from postproc.language.rewrite import Skeleton
 from postproc.language.source import Edit, Source
 from postproc.language.visits import Diagnostic, Literals, Visits
@@ -143,6 +143,47 @@ class Cloner(ABC):
         """
 
 
+class Splitter(ABC):
+    """The files of a job, to put points on the ways of its moves."""
+
+    @abstractmethod
+    def hinders(self, file: int, line: int) -> str:
+        """Say what in the text of a move forbids points on its way, "" for nothing.
+
+        Args:
+            file: Where the move stands.
+            line: Its line there.
+        """
+
+    @abstractmethod
+    def stops(self, file: int, line: int) -> bool:
+        """Tell whether the arm may stop once more before a move.
+
+        Nothing that may begin a process stands between it and the move before.
+
+        Args:
+            file: Where the move stands.
+            line: Its line there.
+        """
+
+    @abstractmethod
+    def points(
+        self, file: int, line: int, numbers: Floats, config: str, stop: bool
+    ) -> Edit:
+        """Write moves to points in front of a LINEAR move, which they lead up to.
+
+        Args:
+            file: Where the move stands.
+            line: Its line there.
+            numbers: Of the points, one behind the other, (k, w).
+            config: Their configuration flags.
+            stop: The arm stops at the first of them.
+
+        Raises:
+            CloneError: They cannot be written there.
+        """
+
+
 class Language(ABC):
     """A language of robot programs.
 
@@ -181,6 +222,17 @@ class Language(ABC):
     @abstractmethod
     def cloner(self, sources: Sequence[Source]) -> Cloner:
         """Parse the files of a job to clone variables in them."""
+
+    def splitter(self, sources: Sequence[Source]) -> Splitter | None:
+        """Parse the files of a job to put points on ways, None where nobody knows how.
+
+        Only where the language passes them for certain.
+        """
+        return None
+
+    def is_inserted(self, line: bytes) -> bool:
+        """Tell whether a line is a point that `Splitter.points` wrote."""
+        return False
 
     def holds_joints(self, line: str) -> bool:
         """Tell whether the numbers of a line are joint angles, as far as it shows."""

@@ -407,6 +407,10 @@ def _rows(file: str, before: TextLines, after: TextLines) -> Iterator[DiffRows]:
     if len(before) == len(after):
         yield changed_rows(file, before, after)
         return
+    inserted = _inserted(file, after)
+    if len(inserted):
+        yield from _beside_points(file, before, after, inserted)
+        return
     matcher = SequenceMatcher(None, before.shapes(), after.shapes(), autojunk=False)
     for kind, a0, a1, b0, b1 in matcher.get_opcodes():
         if kind == "equal":
@@ -415,6 +419,35 @@ def _rows(file: str, before: TextLines, after: TextLines) -> Iterator[DiffRows]:
         gone = np.arange(a0 + 1, a1 + 1)
         yield _text_rows(file, gone, "- ", before[a0:a1])
         yield _text_rows(file, np.zeros(b1 - b0, dtype=int), "+ ", after[b0:b1])
+
+
+def _inserted(file: str, lines: TextLines) -> Ints:
+    """Find the lines that are points on the ways of moves, from 0, (k,)."""
+    language = language_of(file)
+    return np.flatnonzero([language.is_inserted(line) for line in lines])
+
+
+def _beside_points(
+    file: str, before: TextLines, after: TextLines, inserted: Ints
+) -> Iterator[DiffRows]:
+    """Describe the lines that differ, and points on ways where they stand."""
+    kept = np.delete(np.arange(len(after)), inserted)
+    others = TextLines.of(b"".join(after[k] + b"\n" for k in kept.tolist()))
+    others = others.part(0, len(kept))
+    place = np.searchsorted(kept, inserted)  # lines of the original before each
+    if len(others) != len(before):  # more differs: the points come last
+        yield from _rows(file, before, others)
+        place[:] = len(before)
+    done = 0
+    for at in np.unique(place).tolist():
+        if len(others) == len(before):
+            yield changed_rows(file, before.part(done, at), others.part(done, at), done)
+        done = at
+        texts = [after[k] for k in inserted[place == at].tolist()]
+        yield _text_rows(file, np.zeros(len(texts), dtype=int), "+ ", texts)
+    if len(others) == len(before):
+        rest = len(before)
+        yield changed_rows(file, before.part(done, rest), others.part(done, rest), done)
 
 
 def _text_rows(file: str, lines: Ints, sign: str, texts: Sequence[bytes]) -> DiffRows:

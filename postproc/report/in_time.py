@@ -10,6 +10,7 @@ import numpy as np
 from postproc.arrays import Floats, Ints
 from postproc.compensation.in_time import InTime
 from postproc.compensation.path_accuracy import Deviations, PathAccuracy
+from postproc.compensation.path_points import Insertions
 from postproc.language.visits import Visits
 from postproc.model.statistics import ErrorStatistics
 from postproc.motion.cycle import ProgramCycle
@@ -29,7 +30,7 @@ def told_in_time(told: InTime, visits: Visits) -> dict[str, object]:
             "after": asdict(ErrorStatistics.of_sizes(told.paths.after.sizes)),
             "unknown": told.paths.unknown,
         },
-        "path": paths_of(told.paths, visits),
+        "path": paths_of(told.paths, visits, told.inserted),
     }
 
 
@@ -38,9 +39,13 @@ def _timing(told: InTime, visits: Visits) -> dict[str, object]:
     pair = {"before": told.before, "after": told.after}
     slowed = told.after.slowed
     share = told.after.clock.allowed[slowed].tolist()
+    lines = visits.line[told.source(slowed)]
 
     def of(use: Callable[[ProgramCycle], tuple[Floats, Ints]]) -> dict[str, object]:
-        return {key: _uses(*use(cycle), visits) for key, cycle in pair.items()}
+        before, (shares, rows) = use(told.before), use(told.after)
+        after = shares, told.source(rows)
+        pairs = zip(pair, (before, after), strict=True)
+        return {key: _uses(*used, visits) for key, used in pairs}
 
     return {
         "cycle_s": {key: round(cycle.seconds, 3) for key, cycle in pair.items()},
@@ -49,7 +54,7 @@ def _timing(told: InTime, visits: Visits) -> dict[str, object]:
         "acceleration_use": of(lambda cycle: cycle.acceleration_use),
         "slowed": [
             {"line": line, "share": round(least, 4)}
-            for line, least in zip(visits.line[slowed].tolist(), share, strict=True)
+            for line, least in zip(lines.tolist(), share, strict=True)
         ],
         "untimed": int(told.after.clock.untimed.sum()),
     }
@@ -63,11 +68,15 @@ def _uses(shares: Floats, rows: Ints, visits: Visits) -> list[dict[str, object]]
     ]
 
 
-def paths_of(paths: PathAccuracy, visits: Visits) -> list[dict[str, object]]:
+def paths_of(
+    paths: PathAccuracy, visits: Visits, inserted: Insertions | None = None
+) -> list[dict[str, object]]:
     """Describe how every move keeps to its path; of some the curve as well."""
     worst = set(np.argsort(-paths.after.sizes, kind="stable")[:CURVES].tolist())
     return [
-        _path(paths, k, visits) | ({"curve": _curve(paths, k)} if k in worst else {})
+        _path(paths, k, visits)
+        | _points(paths, k, inserted)
+        | ({"curve": _curve(paths, k)} if k in worst else {})
         for k in range(len(paths))
     ]
 
@@ -90,9 +99,28 @@ def _path(paths: PathAccuracy, k: int, visits: Visits) -> dict[str, object]:
         "along_mm": of(lambda told: float(np.abs(told.along[samples]).max())),
         "unsure_mm": of(lambda told: float(told.unsure[samples].max())),
         "joint": {key: int(told.joint[k]) for key, told in pair.items()},
-        "inserted": 0,
-        "points": [],
     }
+
+
+def _points(
+    paths: PathAccuracy, k: int, inserted: Insertions | None
+) -> dict[str, object]:
+    """Describe the points that were put on a way, or why there are none."""
+    visit, length = int(paths.visit[k]), float(paths.way[paths.samples(k).stop - 1])
+    if inserted is None:
+        return {"inserted": 0, "points": []}
+    shares = inserted.points.get(visit, ())
+    told: dict[str, object] = {
+        "inserted": len(shares),
+        "points": [{"at_mm": round(share * length / MM, 3)} for share in shares],
+        "not_split": inserted.left.get(visit),
+    }
+    for key, far in (
+        ("without_mm", inserted.without),
+        ("otherwise_mm", inserted.otherwise),
+    ):
+        told[key] = round(far[visit] / MM, 5) if visit in far else None
+    return told
 
 
 def _curve(paths: PathAccuracy, k: int) -> dict[str, list[float]]:

@@ -110,9 +110,10 @@ def _columns(outcome: Outcome, rows: Ints) -> dict[str, list[Cells]]:
 
 def _speed(outcome: Outcome, rows: Ints) -> dict[str, list[Cells]]:
     """Say how fast the TCP passes, where the program was run in time."""
-    if outcome.in_time is None:
+    told = outcome.in_time
+    if told is None:
         return {}
-    return {"speed_mm_s": [fixed(outcome.in_time.after.clock.speed[rows] / MM, 3)]}
+    return {"speed_mm_s": [fixed(told.after.clock.speed[told.own[rows]] / MM, 3)]}
 
 
 def _steps(outcome: Outcome, rows: Ints) -> Cells:

@@ -59,6 +59,7 @@ def score_paths(
     setup: VirtualCell,
     original: Visits,
     executed: Visits | None = None,
+    own: Ints | None = None,
 ) -> PathScores:
     """Run a program and compare its paths with those that the original asks for.
 
@@ -67,9 +68,13 @@ def score_paths(
         setup: Its cell.
         original: The program as it came from the drawing.
         executed: The compensated program; default the original itself.
+        own: Its visits that the original makes, (n,), where points were put on ways:
+            the pieces of a move are compared with its whole path.
     """
     wanted = dict(_tracks(arm, setup, original))
     done = wanted if executed is None else dict(_tracks(arm, setup, executed))
+    if own is not None and executed is not None:
+        done = _whole(done, own)
     visit, parts = [], []
     for i in sorted(wanted.keys() & done.keys()):
         visit.append(i)
@@ -80,6 +85,19 @@ def score_paths(
     return PathScores(
         np.array(visit, dtype=np.int64), first, *(columns or [np.empty(0)] * 3)
     )
+
+
+def _whole(tracks: dict[int, _Track], own: Ints) -> dict[int, _Track]:
+    """Join the pieces of moves, by the visit of the original that they lead to."""
+    pieces: dict[int, list[_Track]] = {}
+    for visit in sorted(tracks):
+        at = int(np.searchsorted(own, visit))
+        pieces.setdefault(at, []).append(tracks[visit])
+    return {
+        at: _Track(*(np.concatenate([getattr(t, name) for t in some])
+                     for name in ("nominal", "real")))
+        for at, some in pieces.items()
+    }  # fmt: skip
 
 
 def _tracks(
@@ -144,18 +162,33 @@ def _apart(done: _Track, wanted: Floats) -> tuple[Floats, Floats, Floats]:
         off = np.linalg.norm(done.real - wanted[-1], axis=1)
         return np.zeros(len(off)), off, np.zeros(len(off))
     way = np.append(0.0, np.cumsum(size))
-    where, across = _project(done.real, begin, step, size, way)
     moved = np.linalg.norm(np.diff(done.nominal, axis=0), axis=1)
     run = np.append(0.0, np.cumsum(moved))
-    return where, across, where - way[-1] * run / max(run[-1], 1e-12)
+    there = way[-1] * run / max(run[-1], 1e-12)
+    where, across = _project(done.real, begin, step, size, way, there)
+    return where, across, where - there
 
 
 def _project(
-    points: Floats, begin: Floats, step: Floats, size: Floats, way: Floats
+    points: Floats,
+    begin: Floats,
+    step: Floats,
+    size: Floats,
+    way: Floats,
+    there: Floats,
 ) -> tuple[Floats, Floats]:
-    """Find the nearest places on a path: its length up to there, and the distance."""
+    """Find the nearest places on a path: its length up to there, and the distance.
+
+    Args:
+        points: Places to find, (k, 3).
+        begin: Where the pieces of the path begin, (n, 3).
+        step: Where they lead, (n, 3).
+        size: Their lengths, (n,).
+        way: Length of the path where they begin, and of all of it, (n + 1,).
+        there: About where on the path the places are, (k,).
+    """
     n, k = len(size), len(points)
-    middle = np.linspace(0, n - 1, k).round().astype(int)
+    middle = np.searchsorted(way, there, side="right") - 1
     near = middle[:, None] + np.arange(-AROUND, AROUND + 1)
     near = np.clip(near, 0, n - 1)
     off = points[:, None] - begin[near]

@@ -242,6 +242,7 @@ def land(
     setup: VirtualCell,
     original: Visits,
     executed: Visits | None = None,
+    own: Ints | None = None,
 ) -> Landing:
     """Run a program and compare it with what the original asks for, visit by visit.
 
@@ -250,6 +251,7 @@ def land(
         setup: Its cell.
         original: The program as it came from the drawing.
         executed: The compensated program; default the original itself.
+        own: Its visits that the original makes, (n,), where points were put on ways.
 
     Raises:
         PostprocError: The two programs do not have the same visits.
@@ -258,13 +260,18 @@ def land(
     if executed is None or executed is original:
         done = asked
     else:
-        if len(executed) != len(original):
+        rows = np.arange(len(executed)) if own is None else own
+        if len(rows) != len(original):
             raise PostprocError(
-                f"the executed program makes {len(executed)} visits, the original "
+                f"the executed program makes {len(rows)} visits, the original "
                 f"{len(original)}: they are not two versions of one program"
             )
         done = run_program(arm, setup, executed)
-    visit, here, there = np.intersect1d(asked.visit, done.visit, return_indices=True)
+    reached = done.visit
+    if own is not None and done is not asked:
+        at = np.searchsorted(own, done.visit)
+        reached = np.where(own[np.minimum(at, len(own) - 1)] == done.visit, at, -1)
+    visit, here, there = np.intersect1d(asked.visit, reached, return_indices=True)
     wanted = arm.nominal_tcp(asked.arrivals)[here]
     landed = arm.tcp(done.arrivals)[there]
     return Landing(visit, wanted, landed)

@@ -17,12 +17,14 @@ from postproc.language.interface import (
     JobReading,
     Language,
     NamedPoint,
+    Splitter,
     Start,
 )
 from postproc.language.pdl2.clones import CloneTarget, clone, free_name, named_at
 from postproc.language.pdl2.effects import dead_lines
 from postproc.language.pdl2.interpreter import resolve
 from postproc.language.pdl2.names import entry_names
+from postproc.language.pdl2.path_points import MARK, Pdl2Splitter
 from postproc.language.pdl2.program import Program, parse
 from postproc.language.pdl2.variable_file import VariableFile, read_variables
 from postproc.language.rewrite import Skeleton
@@ -82,6 +84,15 @@ class Pdl2(Language):
             for word in _WORD.findall(source.data)
         }
         return Pdl2Cloner([parse(source) for source in own], values, taken)
+
+    def splitter(self, sources: Sequence[Source]) -> Splitter:
+        """Parse the files of a job to put points on the ways of its moves."""
+        own = [source for source in sources if not is_variables(source.name)]
+        return Pdl2Splitter([parse(source) for source in own])
+
+    def is_inserted(self, line: bytes) -> bool:
+        """Tell by the comment that such lines end with."""
+        return MARK.search(line) is not None
 
     def target_names(
         self, file: str, lines: Sequence[bytes], wanted: Sequence[int]

@@ -1,0 +1,196 @@
+"""Points put on the ways of moves: their numbers, their text, and that no more changed.
+
+They lie on the programmed path; what corrects them is what corrects all targets.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Collection, Sequence
+from dataclasses import fields, replace
+from typing import Any
+
+import numpy as np
+
+from postproc.arrays import Bools, Floats, Ints
+from postproc.compensation.equivalence import equivalent
+from postproc.compensation.path_points import Points
+from postproc.compensation.program import Reading, read_program
+from postproc.compensation.rewrite import VerificationError
+from postproc.compensation.windows import SHARED
+from postproc.language.interface import Splitter
+from postproc.language.source import Edit, Source, apply, compose
+from postproc.language.visits import Literals, Visits
+from postproc.robot.cell import Cell
+from postproc.robot.pose import rotation_from_vector, rotation_vector
+
+
+def insert(
+    reading: Reading,
+    points: Points,
+    stops: Collection[int],
+    splitter: Splitter,
+    cell: Cell,
+) -> tuple[Reading, Ints]:
+    """Put points on the ways of a program.
+
+    Args:
+        reading: The program, n visits.
+        points: Where.
+        stops: Moves whose first point is a stop.
+        splitter: Its files.
+        cell: What holds at program start.
+
+    Returns:
+        The program with points, proven to make the same moves otherwise, and those of
+        its visits that the source makes, (n,).
+
+    Raises:
+        VerificationError: It would make other moves.
+        CloneError: A point cannot be written.
+    """
+    edits = _edits(reading, points, stops, splitter, cell)
+    sources = [
+        Source(source.name, apply(source.data, own))
+        for source, own in zip(reading.sources, edits, strict=True)
+    ]
+    again = read_program({s.name: s.data for s in sources}, cell)
+    new = _inserted(again.visits, sources, edits)
+    _prove(reading.visits, again.visits, new, points)
+    cloned = tuple(
+        tuple(compose(one, own))
+        for one, own in zip(reading.cloned or [()] * len(edits), edits, strict=True)
+    )
+    given = reading.given or reading.sources
+    with_points = replace(again, cloned=cloned, given=given, missed=reading.missed)
+    told = replace(with_points, diagnostics=reading.diagnostics)
+    return told, np.flatnonzero(~new)
+
+
+def _edits(
+    reading: Reading,
+    points: Points,
+    stops: Collection[int],
+    splitter: Splitter,
+    cell: Cell,
+) -> list[list[Edit]]:
+    """Write the points, file by file."""
+    visits, found = reading.visits, defaultdict[int, list[Edit]](list)
+    lines = lines_in_files(reading, cell)
+    for visit in sorted(points):
+        numbers = between(visits, visit, np.array(points[visit]))
+        config = visits.configs[visits.config[visit]]
+        file, line = int(visits.file[visit]), int(lines[visit])
+        found[file].append(splitter.points(file, line, numbers, config, visit in stops))
+    return [sorted(found[k], key=lambda e: e.span) for k in range(len(reading.sources))]
+
+
+def lines_in_files(reading: Reading, cell: Cell) -> Ints:
+    """Return the lines of visits in the files as they are, clones included, (n,)."""
+    if not reading.cloned:
+        return reading.visits.line
+    return read_program({s.name: s.data for s in reading.sources}, cell).visits.line
+
+
+def between(visits: Visits, visit: int, share: Floats) -> Floats:
+    """Write points on the line that leads to a visit.
+
+    The tool turns about one axis that stands still.
+
+    Args:
+        visits: The program.
+        visit: Where the line ends.
+        share: Of the way, (k,).
+
+    Returns:
+        Their numbers, (k, w).
+    """
+    ends = visits.values[[visits.before[visit], visit]]
+    turn = visits.dialect.poses(ends)[:, :3, :3]
+    axis = rotation_vector((turn[1] @ turn[0].T)[None])[0]
+    out = np.tile(ends[0], (len(share), 1))
+    out[:, :3] += share[:, None] * (ends[1, :3] - ends[0, :3])
+    return visits.dialect.turned(out, rotation_from_vector(share[:, None] * axis))
+
+
+# The proof that a program with points makes the same moves otherwise.
+
+
+def _inserted(
+    visits: Visits, sources: Sequence[Source], edits: Sequence[Sequence[Edit]]
+) -> Bools:
+    """Tell which visits of a program with points are those points, (m,)."""
+    found = np.zeros(len(visits), dtype=bool)
+    for file, (source, own) in enumerate(zip(sources, edits, strict=True)):
+        size = np.array([len(edit.new) for edit in own], dtype=np.int64)
+        begin = np.array([e.span.start for e in own], dtype=np.int64)
+        begin += np.cumsum(size) - size
+        lines = source.line_starts[visits.line - 1]
+        at = np.searchsorted(begin, lines, side="right") - 1
+        inside = (at >= 0) & (visits.file == file)
+        if len(own):
+            inside &= lines < (begin + size)[at]
+        found |= inside
+    return found
+
+
+def _prove(before: Visits, after: Visits, new: Bools, points: Points) -> None:
+    """Hold a program with points to be the same but for them.
+
+    Raises:
+        VerificationError: It is not.
+    """
+    count = sum(map(len, points.values()))
+    problem = f"{int(new.sum())} of {count} points are found again"
+    if int(new.sum()) == count:
+        nothing = np.zeros(0, dtype=np.int64)
+        problem = equivalent(before, without(after, new), nothing, before.values)
+    if problem:
+        raise VerificationError(
+            f"{before.files[0]}: points on the ways would change what the program "
+            f"does ({problem}); nothing is written"
+        )
+
+
+def without(visits: Visits, rows: Bools) -> Visits:
+    """Leave out visits that are reached from one place each, and their numbers.
+
+    Args:
+        visits: A program, m visits.
+        rows: Which of them, (m,).
+    """
+    own, number = np.flatnonzero(~rows), np.cumsum(~rows) - 1
+    values: dict[str, Any] = {
+        f.name: _some(getattr(visits, f.name), own)
+        for f in fields(Visits)
+        if f.name not in SHARED
+    }
+    count = np.diff(visits.pred_start)
+    pred = visits.pred[np.repeat(~rows, count)]
+    while len(at := np.flatnonzero((pred >= 0) & rows[pred])):
+        pred[at] = visits.pred[visits.pred_start[pred[at]]]
+    gone = np.zeros(len(visits.literals) + 1, dtype=bool)
+    gone[visits.literal[rows]] = True
+    gone[-1] = False  # that is no literal
+    for name in ("literal", "follows"):
+        values[name] -= np.cumsum(gone)[values[name]] * (values[name] >= 0)
+    return replace(
+        visits,
+        **values,
+        pred_start=np.append(0, np.cumsum(count[own])),
+        pred=np.where(pred >= 0, number[pred], pred),
+        literals=_kept(visits.literals, np.flatnonzero(~gone[:-1])),
+    )
+
+
+def _kept(literals: Literals, rows: Ints) -> Literals:
+    """Take some literals."""
+    own = {f.name: _some(getattr(literals, f.name), rows) for f in fields(Literals)}
+    return Literals(**own)
+
+
+def _some(column: Any, rows: Ints) -> Any:
+    """Take some rows of a column, which is an array or a tuple."""
+    if isinstance(column, tuple):
+        return tuple(column[k] for k in rows.tolist())
+    return column[rows]

@@ -1,0 +1,39 @@
+"""What was put on the ways of a program, for all who tell of it."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, field
+
+from postproc.arrays import Ints
+
+Points = Mapping[int, Sequence[float]]
+"""Shares of the way, ascending in (0, 1), by the visit that the move leads to."""
+
+
+@dataclass(frozen=True)
+class Insertions:
+    """What was put on the ways of a program of n visits.
+
+    Attributes:
+        own: The visits of the program with points that the source makes, (n,).
+        points: The points.
+        stops: Moves whose first point is a stop, where play is taken up.
+        left: Why moves that leave their path too far got none, by visit.
+        without: How far each move leaves its path without points, by visit [m].
+        otherwise: .. with them, if a joint's flank does not change as predicted [m].
+        tolerance: Asked for [m].
+    """
+
+    own: Ints
+    tolerance: float
+    points: Points = field(default_factory=dict)
+    stops: Collection[int] = ()
+    left: Mapping[int, str] = field(default_factory=dict)
+    without: Mapping[int, float] = field(default_factory=dict)
+    otherwise: Mapping[int, float] = field(default_factory=dict)
+
+    @property
+    def count(self) -> int:
+        """Return the number of points."""
+        return sum(map(len, self.points.values()))

@@ -1,0 +1,95 @@
+"""Which moves may be split: what forbids points on their ways, and how close they lie.
+
+A point may not change what a program does besides where the tool is: nothing that is
+counted, timed or enabled along a move may depend on it.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from postproc.arrays import Bools, Floats, Ints
+from postproc.compensation.outcome import Decisions, Status
+from postproc.language.interface import Splitter
+from postproc.language.source import CloneError
+from postproc.language.visits import Meaning, OrientationLaw, Visits
+from postproc.motion.cycle import ProgramCycle
+from postproc.robot.pose import MM, has_unknown
+from postproc.robot.trajectory import Motion
+
+SHORTEST = 0.05  # [s] that a piece of a split move lasts at the programmed speed
+CLOSEST = 1e-3  # [m] .. and its length
+CLEAR = 0.02  # [m] from a rounded end: how large its corner is depends on the moves
+WIDEST = -99999.9  # no number of a point is longer as it is written
+ALIKE = 1e-6  # a tool whose axes turn by less keeps its orientation
+
+
+def hindrances(v: Visits, decisions: Decisions, cycle: ProgramCycle) -> dict[int, str]:
+    """Say why moves of a program must stay in one piece, by their visit."""
+    status, before = decisions.status, np.maximum(v.before, 0)
+    corrected = (status == Status.SAFE) | (status == Status.UNCHANGED)
+    ends = (v.literal >= 0) & (v.target == Meaning.POSE) & corrected
+    frames = [v.tool, v.base, v.uframe, v.config]
+    alike = np.all([column == column[before] for column in frames], axis=0)
+    found: dict[int, str] = {}
+    for rows, why in (
+        (v.motion != Motion.LINEAR, "arcs are not split"),
+        (v.before < 0, "where it comes from is not one known place"),
+        (_several(v), "it is reached several times"),
+        (~(ends & ends[before]), "its ends are not both corrected poses"),
+        (~alike, "it begins with other frames or configuration flags"),
+        (~np.isnan(v.aux).all(axis=1), "auxiliary axes move along"),
+        (v.tool_remote, "the arm holds the part"),
+        (_turns_otherwise(v, before), "how the tool turns on its way is not sure"),
+        (has_unknown(cycle.targets.linear_speed[:, None]), "its speed is not known"),
+        (v.reason > 0, "it is left"),
+    ):
+        for row in np.flatnonzero(rows).tolist():
+            found.setdefault(row, why)
+    return found
+
+
+def unwritable(splitter: Splitter, visits: Visits, v: int, file: int, line: int) -> str:
+    """Say what in the text of a move hinders points on its way, "" for nothing."""
+    widest = np.full((1, visits.dialect.width), WIDEST)
+    try:
+        said = splitter.hinders(file, line)
+        said or splitter.points(
+            file, line, widest, visits.configs[visits.config[v]], False
+        )
+    except CloneError as problem:
+        return str(problem)
+    return said
+
+
+def _several(visits: Visits) -> Bools:
+    """Tell which moves are reached more than once, (n,)."""
+    rows = np.stack([visits.file, visits.line, visits.via])
+    _, at, count = np.unique(rows, axis=1, return_inverse=True, return_counts=True)
+    return np.asarray(count[at.ravel()] > 1)
+
+
+def _turns_otherwise(visits: Visits, before: Ints) -> Bools:
+    """Tell where the tool may turn otherwise than about one axis, (n,)."""
+    law = visits.orientation_law
+    known = (law == OrientationLaw.UNSET) | (law == OrientationLaw.ONE_AXIS)
+    turn = visits.dialect.poses(visits.values)[:, :3, :3]
+    same = np.abs(turn - turn[before]).max(axis=(1, 2)) < ALIKE
+    return np.asarray((~known | visits.wrist_joint) & ~same)
+
+
+def shortest_pieces(
+    visits: Visits, cycle: ProgramCycle
+) -> list[tuple[float, float, float]]:
+    """Return the shortest piece of every move, and what stays clear at its ends [m].
+
+    A piece lasts `SHORTEST` at the programmed speed. Beside a rounded end it is longer
+    than the corner, which must stay as it is.
+    """
+    speed = np.nan_to_num(cycle.targets.linear_speed)
+    least: Floats = np.maximum(SHORTEST * speed, CLOSEST)
+    size = np.maximum(2 * np.nan_to_num(np.abs(visits.zone_mm) * MM), CLEAR)
+    round_ = np.where(visits.fly, np.maximum(size, least), least)
+    clear = np.where(visits.before >= 0, round_[np.maximum(visits.before, 0)], least)
+    columns = least, np.maximum(clear, least), np.maximum(round_, least)
+    return list(zip(*(column.tolist() for column in columns), strict=True))

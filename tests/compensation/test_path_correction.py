@@ -1,0 +1,163 @@
+"""Points on ways: the virtual arm keeps to its paths, and nothing else is touched."""
+
+from __future__ import annotations
+
+import json
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from postproc.compensation.path_correction import AIM
+from postproc.compensation.splitting import SHORTEST
+from tests.compensation.test_path_accuracy import CELL, SEED, done, job
+from tests.written import cli
+
+TOLERANCE = 0.1  # [mm]
+SPEED = 50.0  # [mm/s] in the job
+
+
+@cache
+def timed() -> str:
+    """The job at a speed that it says itself."""
+    lines = job().split("\r\n")
+    return "\r\n".join([*lines[:4], "  $LIN_SPD := 0.05", *lines[4:]])
+
+
+@pytest.fixture(scope="module")
+def shop(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """An arm surveyed, and a job with points on its ways, with and without stops."""
+    folder = tmp_path_factory.mktemp("points")
+    (folder / "job.pdl").write_bytes(timed().encode())
+    survey, measured = folder / "survey.pdl", folder / "survey.csv"
+    done("survey", "--cell", CELL, "--poses", 250, "--seed", 9, "-o", survey)
+    done("simulate", survey, "--cell", CELL, "--seed", SEED, "-o", measured)
+    done("fit", measured, "--cell", CELL, "-o", folder / "model.json")
+    for name, more in (("plain", ()), ("points", ("--path-mm", TOLERANCE)),
+                       ("stops", ("--path-mm", TOLERANCE, "--take-up"))):  # fmt: skip
+        compensated(folder, "job.pdl", name, *more)
+        done("simulate", folder / f"{name}.pdl", "--cell", CELL, "--seed", SEED,
+             "--wanted", folder / "job.pdl", "--path",
+             "--json", folder / f"{name}.true.json")  # fmt: skip
+    return folder
+
+
+def compensated(folder: Path, source: str, name: str, *more: object) -> dict[str, Any]:
+    done("compensate", folder / source, "--cell", CELL, "--model",
+         folder / "model.json", "-o", folder / f"{name}.pdl",
+         "--report", folder / f"{name}.json", *more)  # fmt: skip
+    return told(folder, name)
+
+
+def told(folder: Path, name: str) -> dict[str, Any]:
+    found: dict[str, Any] = json.loads((folder / f"{name}.json").read_bytes())
+    return found
+
+
+def lines_of(report: dict[str, Any]) -> list[dict[str, Any]]:
+    return [path for path in report["path"] if path["move"] == "LINEAR"]
+
+
+def real(folder: Path, name: str) -> dict[int, dict[str, Any]]:
+    return {move["visit"]: move for move in told(folder, f"{name}.true")["path"]}
+
+
+def test_the_virtual_arm_keeps_closer_to_its_lines(shop: Path) -> None:
+    sizes = {}
+    for name in ("plain", "points", "stops"):
+        true, own = real(shop, name), lines_of(told(shop, name))
+        sizes[name] = np.array([true[path["visit"]]["max_mm"] for path in own])
+        predicted = np.array([path["max_mm"]["after"] for path in own])
+        assert np.abs(sizes[name] - predicted).max() < 0.1
+    assert (sizes["points"] < sizes["plain"] + 0.05).all()
+    assert sizes["points"].mean() < 0.85 * sizes["plain"].mean()
+    assert sizes["stops"].mean() < 0.5 * sizes["plain"].mean()
+    assert sizes["stops"].max() < 0.5 * sizes["plain"].max()
+
+
+def test_points_are_few_far_apart_and_told(shop: Path) -> None:
+    report = told(shop, "points")
+    for path in lines_of(report):
+        at = [0.0, *(point["at_mm"] for point in path["points"]), path["length_mm"]]
+        assert (np.diff(at) >= SHORTEST * SPEED - 1e-3).all()
+        assert path["inserted"] == len(path["points"]) <= 10
+        assert path["max_mm"]["after"] <= path["without_mm"]
+        if path["without_mm"] <= TOLERANCE:
+            assert not path["points"]
+        if path["max_mm"]["after"] > TOLERANCE:
+            assert path["not_split"] or path["points"]
+    assert sum(path["inserted"] for path in lines_of(report)) > 5
+    assert all(p["not_split"] == "arcs are not split" for p in report["path"]
+               if p["move"] == "CIRCULAR" and p["without_mm"] > TOLERANCE)  # fmt: skip
+    findings = [d["code"] for d in report["diagnostics"]]
+    assert "path-points" in findings and "path-left" in findings
+    assert AIM < 1
+
+
+def test_targets_are_those_of_the_source(shop: Path) -> None:
+    plain, points = told(shop, "plain"), told(shop, "points")
+    names = ("line", "visit", "move", "original", "status")
+    for one, other in zip(plain["targets"], points["targets"], strict=True):
+        assert [one.get(n) for n in names] == [other.get(n) for n in names]
+    true = real(shop, "points")
+    assert [p["line"] for p in points["path"]] == [p["line"] for p in plain["path"]]
+    assert set(true) == set(real(shop, "plain"))
+
+
+def test_all_bytes_come_back(shop: Path) -> None:
+    done("restore", shop / "stops.pdl", "-o", shop / "back.pdl")
+    assert (shop / "back.pdl").read_bytes() == (shop / "job.pdl").read_bytes()
+    again = cli("compensate", shop / "stops.pdl", "--cell", CELL, "--model",
+                shop / "model.json", "-o", shop / "twice.pdl")  # fmt: skip
+    assert again.exit_code == 2 and "compensated already" in again.stderr
+
+
+def test_diff_tells_points_apart(shop: Path) -> None:
+    shown = cli("diff", shop / "job.pdl", shop / "stops.pdl").stdout.splitlines()
+    points = [line for line in shown if "postproc: inserted" in line]
+    count = sum(path["inserted"] for path in told(shop, "stops")["path"])
+    assert len(points) == count and all("+ " in line for line in points)
+    plain = cli("diff", shop / "job.pdl", shop / "plain.pdl").stdout.splitlines()
+    assert len(shown) == len(plain) + count
+
+
+def test_a_budget_holds(shop: Path) -> None:
+    report = compensated(shop, "job.pdl", "few", "--path-mm", TOLERANCE,
+                         "--max-inserted", 2)  # fmt: skip
+    assert sum(path["inserted"] for path in report["path"]) <= 2
+    assert any("max-inserted" in d["message"] for d in report["diagnostics"])
+    none = compensated(shop, "job.pdl", "none", "--path-mm", TOLERANCE,
+                       "--max-inserted", 0)  # fmt: skip
+    assert sum(path["inserted"] for path in none["path"]) == 0
+    same = [(shop / f"{n}.pdl").read_bytes() for n in ("plain", "none")]
+    assert same[0] == same[1]
+
+
+def test_where_events_may_count_segments_nothing_is_split(shop: Path) -> None:
+    handler = ("CONDITION[1] :", "  WHEN TIME 100 BEFORE END DO", "    $DOUT[1] := ON",
+               "ENDCONDITION")  # fmt: skip
+    lines = timed().split("\r\n")
+    text = "\r\n".join([*lines[:2], *handler, *lines[2:]])
+    (shop / "events.pdl").write_bytes(text.encode())
+    report = compensated(shop, "events.pdl", "event", "--path-mm", TOLERANCE)
+    assert sum(path["inserted"] for path in report["path"]) == 0
+    assert any("events along a move" in d["message"] for d in report["diagnostics"])
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (("--path-mm", 0.0), "more than 0"),
+        (("--path-mm", 0.1, "--no-timing"), "--no-timing"),
+        (("--take-up",), "--path-mm"),
+    ],
+)
+def test_options_that_do_not_fit(
+    shop: Path, options: tuple[object, ...], said: str
+) -> None:
+    found = cli("compensate", shop / "job.pdl", "--cell", CELL, "--model",
+                shop / "model.json", "-o", shop / "no.pdl", *options)  # fmt: skip
+    assert found.exit_code == 2 and said in found.stderr
+    assert not (shop / "no.pdl").exists()
