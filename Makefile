@@ -15,6 +15,7 @@
 # make accuracy    held-out errors, coverage, real and blind data: docs/accuracy.md
 # make intervals   coverage of a reading's intervals on two real arms: docs/intervals.md
 # make detection   outliers, wrong directions and nests that a fit finds: docs/detection.md
+# make languages   where arms land that run one job in every language: docs/languages.md
 # make undeclared  undeclared effects traced on virtual arms, 1,400 of them: docs/undeclared.md
 # make paths       predicted and true path accuracy on virtual arms: docs/paths.md
 # make real DATA=folder   fits of real arms on rows they have not seen: docs/real-arms.md
@@ -34,7 +35,7 @@ export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
 
 .PHONY: help demo test lint format bench evidence reproduce accuracy intervals detection undeclared paths blind real chaos fuzz docs clean
-.PHONY: plant-bench generated growth awkward native golden pictures lock wheel
+.PHONY: languages plant-bench generated growth awkward native golden pictures lock wheel
 .DELETE_ON_ERROR:
 
 help:
@@ -82,6 +83,9 @@ intervals: $(STAMP)
 
 detection: $(STAMP)
 	@PYTHONPATH=. $(PYTHON_BIN) docs/studies/detected.py --seeds $(or $(SEEDS),40)
+
+languages: $(STAMP)
+	@$(PYTHON_BIN) -m tests.language.true_error
 
 undeclared: $(STAMP)
 	@$(PYTHON_BIN) -m tests.undeclared --seeds $(or $(SEEDS),60) --none $(or $(NONE),200)
