@@ -58,10 +58,12 @@ class Dialect(ABC):
 
     Attributes:
         terms: Its words.
+        heads: What tables head the numbers of a pose with, w words.
         pose_decimals, joint_decimals: Least decimals of every written number, w each.
     """
 
     terms: Terms
+    heads: tuple[str, ...]
     pose_decimals: tuple[int, ...]
     joint_decimals: tuple[int, ...]
 

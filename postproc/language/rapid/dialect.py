@@ -11,7 +11,8 @@ from postproc.language.dialect import Dialect, Terms
 from postproc.robot.pose import MM
 
 MM_DECIMALS, QUATERNION_DECIMALS, JOINT_DECIMALS = 3, 6, 5
-WIDTH = 11  # x, y, z, q1..q4, cf1, cf4, cf6, cfx
+HEADS = ("x", "y", "z", "q1", "q2", "q3", "q4", "cf1", "cf4", "cf6", "cfx")
+WIDTH = len(HEADS)
 ORIENTATION, FLAGS = slice(3, 7), slice(7, 11)
 COUNTED = (0, 3, 5)  # joints whose quarter turns are counted
 QUARTER = np.pi / 2
@@ -61,6 +62,7 @@ class RapidNumbers(Dialect):
     """Position [mm], quaternion and confdata of a robtarget, or six joint angles."""
 
     terms: Terms = TERMS
+    heads: tuple[str, ...] = HEADS
     pose_decimals: tuple[int, ...] = (
         *(MM_DECIMALS,) * 3,
         *(QUATERNION_DECIMALS,) * 4,
