@@ -4,7 +4,7 @@
 # make lock    pin what is installed, in requirements/; UPGRADE=1: to the newest versions
 # make chaos   kill 200 batches of 300 files at random moments and resume them; end 50 long runs by signals
 # make awkward   200 drawn surveys of every awkward kind: fitted, or refused in words
-# make fuzz    20,000 damaged programs: refused, or rewritten byte for byte; the parsers by coverage
+# make fuzz    20,000 damaged programs, PDL2 and RAPID: refused, or rewritten byte for byte; the parsers by coverage
 # make plant-bench   10,000 files, a second run, memory, workers, a cluster: docs/plant.md
 # make generated    1,000 random programs: followed as they run, landing where they say
 # make golden  what the commands write, here and at BASE=<commit>: a changed byte fails
