@@ -3,10 +3,18 @@
 from __future__ import annotations
 
 import itertools
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from postproc.cli.simulate import setup_of
+from postproc.compensation.compensate import compensate
+from postproc.compensation.outcome import Status
+from postproc.compensation.program import read_program
+from postproc.language.visits import Meaning
+from postproc.simulation import run_program, virtual_arm
+from tests.conftest import SEED
 from tests.language.neutral_job import LANGUAGES, drawn
 from tests.language.true_error import ARMS, MAX_MM, MEAN_MM, differing, driven, fitted
 from tests.language.true_error import landed as landed_on
@@ -53,3 +61,42 @@ def test_a_record_that_is_no_target_is_seen(bench_cell):
     assert moved != source
     assert differing("job.pdl", source, stamp + source) == (None, ())
     assert differing("job.pdl", source, stamp + moved)[0] is not None
+
+
+def near_a_border(cell, seed: int):
+    """Draw a job whose stops lie where axes 1, 4 and 6 leave a quarter turn."""
+    rng = np.random.default_rng(seed)
+    job = drawn(cell, seed)
+    moves = []
+    for move in job.moves:
+        q = np.array(move.q)
+        if not move.in_joints and not move.zone_mm and move.via is None:
+            q[[0, 3, 5]] = np.deg2rad(rng.uniform(-0.1, 0.1, 3))
+        moves.append(replace(move, q=q))
+    return replace(job, moves=tuple(moves))
+
+
+def test_confdata_is_that_of_the_rounded_numbers(bench_cell, bench_model):
+    """The virtual controller solves what is written, and counts its quarter turns."""
+    anew = 0
+    for seed in range(1, 5):
+        source = LANGUAGES["job.mod"](near_a_border(bench_cell, seed))
+        found = compensate(source, bench_cell, bench_model, name="job.mod")
+        output = found.outputs["job.mod"]
+        other, flags = differing("job.mod", source, output)
+        assert other is None
+        anew += len(flags)
+        setup = setup_of(bench_cell)
+        made = read_program({"job.mod": output}, bench_cell).visits
+        run = run_program(virtual_arm(SEED, tool=setup.tool), setup, made)
+        rows = run.visit
+        stops = (found.decisions.status[rows] == Status.SAFE) & (
+            made.target[rows] == Meaning.POSE
+        )
+        stops &= ~made.fly[rows]
+        assert stops.sum() > 5
+        turns = np.rad2deg(run.arrivals.q[stops][:, [0, 3, 5]])
+        count = made.values[rows[stops], 7:10]
+        beyond = np.maximum(90.0 * count - turns, turns - 90.0 * (count + 1.0))
+        assert beyond.max() <= 0.02 + 1e-4  # [deg] nearer than that flags are kept
+    assert anew > 5
