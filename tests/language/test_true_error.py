@@ -98,5 +98,5 @@ def test_confdata_is_that_of_the_rounded_numbers(bench_cell, bench_model):
         turns = np.rad2deg(run.arrivals.q[stops][:, [0, 3, 5]])
         count = made.values[rows[stops], 7:10]
         beyond = np.maximum(90.0 * count - turns, turns - 90.0 * (count + 1.0))
-        assert beyond.max() <= 0.02 + 1e-4  # [deg] nearer than that flags are kept
+        assert beyond.max() <= 0.001  # [deg]
     assert anew > 5

@@ -19,6 +19,7 @@ QUARTER = np.pi / 2
 # [rad] beyond a quarter's border a count still holds: axes at 0 or 90 deg are common,
 # and what rounding moves a joint by is far less.
 BORDER = np.deg2rad(0.02)
+SURE = np.deg2rad(0.0005)  # [rad] more than the last digits of a target move a joint by
 
 _FLAGS_SAY = (
     "confdata counts other quarter turns, or names another configuration, than where "
@@ -63,6 +64,7 @@ class RapidNumbers(Dialect):
 
     terms: Terms = TERMS
     heads: tuple[str, ...] = HEADS
+    reflags: bool = True
     pose_decimals: tuple[int, ...] = (
         *(MM_DECIMALS,) * 3,
         *(QUATERNION_DECIMALS,) * 4,
@@ -111,11 +113,18 @@ class RapidNumbers(Dialect):
         said = [f"T{k + 1}:{t:g}" for k, t in enumerate(turns[0]) if t == t]
         return " ".join([*words, *said])
 
-    def reflagged(self, values: Floats, q: Floats) -> Floats:
-        """Count the quarter turns anew of joints that left theirs, see `Dialect`."""
+    def reflagged(self, values: Floats, q: Floats, before: Floats) -> Floats:
+        """Count the quarter turns anew of joints that left theirs, see `Dialect`.
+
+        A count that was beside its quarter by no more than the border is kept where it
+        still is.
+        """
         out = np.array(values)
         for column, joint in zip((7, 8, 9), COUNTED, strict=True):
-            off = _beyond(out[:, column], q[:, joint])
+            count = out[:, column]
+            off = _beyond(count, q[:, joint], SURE)
+            was = _beyond(count, before[:, joint], SURE)
+            off &= ~was | _beyond(count, q[:, joint])
             out[off, column] = np.floor(q[off, joint] / QUARTER)
         return out
 
@@ -131,10 +140,10 @@ class RapidNumbers(Dialect):
 RAPID_DIALECT = RapidNumbers()
 
 
-def _beyond(count: Floats, q: Floats) -> Bools:
+def _beyond(count: Floats, q: Floats, by: float = BORDER) -> Bools:
     """Tell which joints (k,) [rad] lie outside of the quarter turns counted, (k,)."""
     low = count * QUARTER
-    return np.asarray((q < low - BORDER) | (q > low + QUARTER + BORDER))
+    return np.asarray((q < low - by) | (q > low + QUARTER + by))
 
 
 def rotation_from_quaternion(q: Floats) -> Floats:

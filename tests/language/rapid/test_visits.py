@@ -276,7 +276,9 @@ def test_quarter_turns_are_written_anew_where_they_are_left():
     values = np.zeros((4, 11))
     q = np.zeros((4, 6))
     q[:, 0] = np.deg2rad([89.0, 90.01, 90.5, -0.5])
-    assert RAPID_DIALECT.reflagged(values, q)[:, 7].tolist() == [0, 0, 1, -1]
+    inside = np.full((4, 6), np.deg2rad(45.0))
+    assert RAPID_DIALECT.reflagged(values, q, inside)[:, 7].tolist() == [0, 1, 1, -1]
+    assert RAPID_DIALECT.reflagged(values, q, q)[:, 7].tolist() == [0, 0, 1, -1]
     assert RAPID_DIALECT.misses(values, q).tolist() == [False, False, True, True]
 
 
