@@ -4,7 +4,7 @@
 # make lock    pin what is installed, in requirements/; UPGRADE=1: to the newest versions
 # make chaos   kill 200 batches of 300 files at random moments and resume them; end 50 long runs by signals
 # make awkward   200 drawn surveys of every awkward kind: fitted, or refused in words
-# make fuzz    20,000 damaged programs: refused, or rewritten byte for byte; the parsers by coverage
+# make fuzz    20,000 damaged programs, PDL2 and RAPID: refused, or rewritten byte for byte; the parsers by coverage
 # make plant-bench   10,000 files, a second run, memory, workers, a cluster: docs/plant.md
 # make generated    1,000 random programs: followed as they run, landing where they say
 # make golden  what the commands write, here and at BASE=<commit>: a changed byte fails
@@ -15,6 +15,7 @@
 # make accuracy    held-out errors, coverage, real and blind data: docs/accuracy.md
 # make intervals   coverage of a reading's intervals on two real arms: docs/intervals.md
 # make detection   outliers, wrong directions and nests that a fit finds: docs/detection.md
+# make languages   where arms land that run one job in every language: docs/languages.md
 # make undeclared  undeclared effects traced on virtual arms, 1,400 of them: docs/undeclared.md
 # make paths       predicted and true path accuracy on virtual arms: docs/paths.md
 # make real DATA=folder   fits of real arms on rows they have not seen: docs/real-arms.md
@@ -34,7 +35,7 @@ export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
 
 .PHONY: help demo test lint format bench evidence reproduce accuracy intervals detection undeclared paths blind real chaos fuzz docs clean
-.PHONY: plant-bench generated growth awkward native golden pictures lock wheel
+.PHONY: languages plant-bench generated growth awkward native golden pictures lock wheel
 .DELETE_ON_ERROR:
 
 help:
@@ -82,6 +83,9 @@ intervals: $(STAMP)
 
 detection: $(STAMP)
 	@PYTHONPATH=. $(PYTHON_BIN) docs/studies/detected.py --seeds $(or $(SEEDS),40)
+
+languages: $(STAMP)
+	@$(PYTHON_BIN) -m tests.language.true_error
 
 undeclared: $(STAMP)
 	@$(PYTHON_BIN) -m tests.undeclared --seeds $(or $(SEEDS),60) --none $(or $(NONE),200)

@@ -74,12 +74,12 @@ def bench_model(tmp_path_factory) -> Model:
     return load_model(make_job(tmp_path_factory.mktemp("job"), text) / "model.json")
 
 
-def make_job(folder: Path, text: str = CELL) -> Path:
-    """Write a cell, a survey of virtual arm SEED, and the model fitted to it."""
+def make_job(folder: Path, text: str = CELL, seed: int = SEED) -> Path:
+    """Write a cell, a survey of a virtual arm, and the model fitted to it."""
     (folder / "cell.toml").write_text(text)
     cell = load_cell(folder / "cell.toml")
     rows = folder / "rows.csv"
-    targets = sample_survey(virtual_arm(SEED), POSES, seed=SEED)
+    targets = sample_survey(virtual_arm(seed), POSES, seed=seed)
     with rows.open("w") as out:
         names = [f"q{j}_deg" for j in range(1, 7)]
         sides = [f"lambda{j}" for j in range(1, 7)]
@@ -89,7 +89,7 @@ def make_job(folder: Path, text: str = CELL) -> Path:
             out.write(f"{i + 1}," + ",".join(f"{c:.5f}" for c in cells) + "\n")
     from postproc.cli.simulate import setup_of
 
-    arm = virtual_arm(SEED)
+    arm = virtual_arm(seed)
     campaign = measure_rows(arm, setup_of(cell), read_rows(rows))
     write_measurements(campaign, folder / "survey.csv")
     effects = BASE_EFFECTS  # all that this arm has: a search takes long

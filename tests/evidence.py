@@ -137,7 +137,7 @@ def solved_and_written(cell: Cell, model: Model) -> tuple[np.ndarray, np.ndarray
     exact = solve_visits(model, cell, planned, at)
     rows = (done.decisions.status == Status.SAFE) & (done.visits.target == Meaning.POSE)
     shift = done.decisions.corrected - new_numbers(
-        reading.visits, planned.plan, exact, planned.plan.aside
+        reading.visits, cell.arm, planned.plan, exact, planned.plan.aside
     )
     added = np.linalg.norm(shift[rows, :3], axis=1) * 1e3
     return exact.residual[rows] * 1e6, added

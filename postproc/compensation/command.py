@@ -352,11 +352,14 @@ def _mark(
 # Commands in the numbers of the file, and how far those change.
 
 
-def new_numbers(visits: Visits, plan: Plan, solved: Commands, aside: Floats) -> Floats:
+def new_numbers(
+    visits: Visits, arm: Arm, plan: Plan, solved: Commands, aside: Floats
+) -> Floats:
     """Express commands in the numbers of the file, (n, w).
 
     P = inverse(UFRAME) . BASE . command. A fly point is moved so that the path passes
     it where it should. An orientation that does not change keeps its written numbers.
+    Flags that small moves decide are those of the numbers as they are rounded.
     """
     numbers = np.array(visits.values)
     joints = visits.target == Meaning.JOINTS
@@ -372,8 +375,29 @@ def new_numbers(visits: Visits, plan: Plan, solved: Commands, aside: Floats) -> 
     if len(rows):
         by = rotation_from_vector(turns_in_file(visits, solved)[rows])
         numbers[rows] = dialect.turned(numbers[rows], by)
-    numbers[poses] = dialect.reflagged(numbers[poses], solved.q[poses])
+    if dialect.reflags:
+        q = _written_joints(visits, arm, poses, numbers[poses], solved.q[poses])
+        numbers[poses] = dialect.reflagged(numbers[poses], q, plan.q[poses])
     return numbers
+
+
+def _written_joints(
+    visits: Visits, arm: Arm, rows: Ints, numbers: Floats, near: Floats
+) -> Floats:
+    """Solve the numbers (k, w) of some poses as they will be rounded, (k, 6) [rad].
+
+    Where they cannot be solved the joints `near` stay.
+    """
+    scale = 10.0 ** np.array(visits.dialect.pose_decimals)
+    pose = visits.dialect.poses(np.rint(numbers * scale) / scale)
+    from_tcp = inverse(few_frames(visits))[visits.tool[rows]]
+    flange = inverse(base_in_uframe(visits, rows)) @ pose @ from_tcp
+    found = np.array(near)
+    known = np.isfinite(near).all(axis=1) & np.isfinite(flange).all(axis=(1, 2))
+    own = arm.branch(near[known]) if arm.has_inverse else None
+    q = _nearest(arm, np.ascontiguousarray(flange[known]), near[known], own)
+    found[known] = np.where(np.isnan(q), near[known], q)
+    return found
 
 
 def base_in_uframe(visits: Visits, rows: Ints) -> Floats:

@@ -608,7 +608,8 @@ class Round:
             are turned, (n, k) [mm].
         """
         visits, solved = self.reading.visits, self.solved
-        numbers = new_numbers(visits, self.planned.plan, solved, self.aside)
+        plan, arm = self.planned.plan, self.setting.cell.arm
+        numbers = new_numbers(visits, arm, plan, solved, self.aside)
         change = change_mm(visits, numbers, self.correction)
         both = change
         if len(solved.turned):

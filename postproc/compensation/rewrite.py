@@ -27,7 +27,7 @@ from postproc.language.source import (
     apply,
     compose,
 )
-from postproc.language.stamp import stamp_length, stamp_line
+from postproc.language.stamp import stamp_line, stamp_place, stamp_span, strip_stamp
 from postproc.language.visits import Literals, Visits
 from postproc.motion.departure import Departure
 from postproc.robot.cell import LimitSection
@@ -112,17 +112,21 @@ def write_edits(
         files[source.name] = source.data
         if own or (number == 0 and nothing):
             stamp = stamp_line(__version__, model, source, comment)
-            files[source.name] = stamp + apply(source.data, own)
-            records[source.name] = record(source, stamp, own, files[source.name])
+            at = stamp_place(source.data)
+            text = apply(source.data, own)  # its header is as it was
+            files[source.name] = text[:at] + stamp + text[at:]
+            added = Span(at, at + len(stamp))
+            records[source.name] = record(source, added, own, files[source.name])
     return Output(files, records, edits)
 
 
 def record(
-    source: Source, stamp: bytes, edits: Replacements, output: bytes
+    source: Source, stamp: Span, edits: Replacements, output: bytes
 ) -> FileRecord:
     """Record how an output differs from its source, in the output's offsets."""
-    stamped = Replacements.of([Edit(Span(0, len(stamp)), b"")])
-    undone = Replacements.joined([stamped, edits.undone(source.data, len(stamp))])
+    stamped = Replacements.of([Edit(stamp, b"")])
+    length = stamp.end - stamp.start
+    undone = Replacements.joined([stamped, edits.undone(source.data, length)])
     checksums = block_checksums(output)
     return FileRecord(sha256(source.data), sha256(output), checksums, undone)
 
@@ -230,12 +234,12 @@ def _in_texts(before: Reading, after: Reading, output: Output) -> str:
 
 
 def _in_text(old: Skeleton, new: Skeleton, edits: Replacements, stamped: bool) -> str:
-    """Compare two texts as they were read; the second may begin with a stamp line."""
-    length = stamp_length(new.source.data) if stamped else 0
-    if old.source.data.startswith(UTF8_MARK):  # it is no code on line 1 alone
-        text = new.source.data[length:]
+    """Compare two texts as they were read; the second may have a stamp line."""
+    stamp = stamp_span(new.source.data) if stamped else Span(0, 0)
+    if stamp.start or old.source.data.startswith(UTF8_MARK):  # a mark is no code
+        text = strip_stamp(new.source.data) if stamped else new.source.data
         return difference(old, Source(new.source.name, text), edits)
-    return difference(old, new, edits, length)
+    return difference(old, new, edits, stamp.end)
 
 
 # Our own output, planned again: the same motion, to the limits of the cell.

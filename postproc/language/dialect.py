@@ -58,10 +58,14 @@ class Dialect(ABC):
 
     Attributes:
         terms: Its words.
+        reflags: Flags depend on small moves, and are written anew.
+        heads: What tables head the numbers of a pose with, w words.
         pose_decimals, joint_decimals: Least decimals of every written number, w each.
     """
 
     terms: Terms
+    heads: tuple[str, ...]
+    reflags: bool = False
     pose_decimals: tuple[int, ...]
     joint_decimals: tuple[int, ...]
 
@@ -108,10 +112,16 @@ class Dialect(ABC):
             values: Its numbers, (w,).
         """
 
-    def reflagged(self, values: Floats, q: Floats) -> Floats:
+    def reflagged(self, values: Floats, q: Floats, before: Floats) -> Floats:
         """Write the flags anew of poses (k, w) that the arm reaches with joints (k, 6).
 
-        Flags that go on being true, or that do not depend on small moves, are kept.
+        Flags that go on being as true as they were, or that do not depend on small
+        moves, are kept.
+
+        Args:
+            values: Numbers of the poses.
+            q: Joints that reach them as they are rounded [rad].
+            before: Joints that the source reaches them with.
         """
         return values
 

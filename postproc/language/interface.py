@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from typing import Any, Protocol
 
 from postproc.arrays import Floats, Ints
+from postproc.language.dialect import Dialect
 from postproc.language.rewrite import Skeleton
 from postproc.language.source import Edit, Source
 from postproc.language.visits import Diagnostic, Literals, Visits
@@ -191,6 +192,7 @@ class Language(ABC):
         name: As its users call it.
         suffixes: Of program files, in lower case, the usual one first.
         comment: What a comment begins with.
+        dialect: What the numbers of its targets mean.
         tells_accuracy: Programs or controllers show whether the controller compensates
             on its own; else the cell must say so itself.
     """
@@ -198,6 +200,7 @@ class Language(ABC):
     name: str
     suffixes: tuple[str, ...]
     comment: str
+    dialect: Dialect
     tells_accuracy: bool = True
 
     @abstractmethod

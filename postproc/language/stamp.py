@@ -1,4 +1,4 @@
-"""The stamp: line 1 of an output says what made it, from what."""
+"""The stamp: a line in front of an output says what made it, from what."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import hashlib
 import re
 from dataclasses import dataclass
 
-from postproc.language.source import UTF8_MARK, Source
+from postproc.language.source import UTF8_MARK, Source, Span
 
 _INDENT = 400  # blanks before a stamp that an editor has moved
 _STAMP = re.compile(
@@ -18,6 +18,10 @@ _STAMP = re.compile(
 )
 _BEGINS = re.compile(  # "--" or "!", said so that searching it is fast
     rb"[-!](?:-|(?<=!))[ \t]*postproc[ \t]+\S+[ \t]+model[ \t]*=", re.IGNORECASE
+)
+_HEADER = re.compile(  # of a module file: it stands before all else
+    rb"(?:\xef\xbb\xbf)?(?:\s|![^\r\n]*(?=[\r\n]))*%%%.*?%%%(?:[ \t]*(?:\r\n|\n|\r))?",
+    re.DOTALL,
 )
 
 
@@ -51,14 +55,21 @@ def source_hash(source: Source) -> str:
     return hashlib.sha256(source.data).hexdigest()
 
 
+def stamp_place(data: bytes) -> int:
+    """Return the offset at which a stamp goes into a text: behind a file header."""
+    found = _HEADER.match(data)
+    return found.end() if found else 0
+
+
 def stamped(version: str, model: str, source: Source, data: bytes) -> bytes:
-    """Put the stamp of a source before its rewritten bytes."""
-    return stamp_line(version, model, source) + data
+    """Put the stamp of a source into its rewritten bytes."""
+    at = stamp_place(data)
+    return data[:at] + stamp_line(version, model, source) + data[at:]
 
 
 def read_stamp(data: bytes) -> Stamp | None:
-    """Return the stamp on line 1, None where there is none."""
-    found = _STAMP.match(data.removeprefix(UTF8_MARK))
+    """Return the stamp on line 1 or behind a file header, None where there is none."""
+    found = _found(data) or _STAMP.match(data.removeprefix(UTF8_MARK))
     if found is None:
         return None
     return Stamp(
@@ -76,18 +87,24 @@ def is_stamped(source: Source) -> bool:
 
 
 def _leads(data: bytes, at: int) -> bool:
-    """Tell whether nothing but blanks stands on a line before an offset."""
+    """Tell whether but blanks, or a header's end, nothing leads a line to an offset."""
     before = data[:at] if at < _INDENT else data[at - _INDENT : at]
     before = before.rstrip(b" \t").removesuffix(UTF8_MARK)
-    return not before or before.endswith((b"\n", b"\r"))
+    return not before or before.endswith((b"\n", b"\r", b"%%%"))
 
 
 def strip_stamp(data: bytes) -> bytes:
-    """Return the bytes after the stamp line; all of them where there is none."""
-    return data[stamp_length(data) :]
+    """Return the bytes without the stamp line; all of them where there is none."""
+    begin, end = stamp_span(data)
+    return data[:begin] + data[end:]
 
 
-def stamp_length(data: bytes) -> int:
-    """Count the bytes of the stamp line; 0 where there is none."""
-    found = _STAMP.match(data)
-    return found.end() if found else 0
+def stamp_span(data: bytes) -> Span:
+    """Return where the stamp line stands; nothing at 0 where there is none."""
+    found = _found(data)
+    return Span(*found.span()) if found else Span(0, 0)
+
+
+def _found(data: bytes) -> re.Match[bytes] | None:
+    """Find the stamp behind the file header, or on line 1."""
+    return _STAMP.match(data, stamp_place(data)) or _STAMP.match(data)

@@ -26,7 +26,7 @@ from postproc.exceptions import ProgramError
 from postproc.files import find_variables, is_module, is_variables
 from postproc.language.languages import language_of
 from postproc.language.scan import BLANKS, mask_of, scan_lines
-from postproc.language.stamp import read_stamp
+from postproc.language.stamp import read_stamp, stamp_span, strip_stamp
 
 # Rows of `diff` as columns: no object a line, whatever the length of a program.
 
@@ -383,9 +383,12 @@ def _read_lines(path: Path) -> tuple[TextLines, bool]:
         problem = f"cannot be read ({exc.strerror})"
         raise ProgramError(path, problem, "Check the path") from None
     stamped = read_stamp(data) is not None
+    span = stamp_span(data)
+    if span.start:  # it stands behind a header
+        data = strip_stamp(data)
     if b"\r" in data:
         data = data.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
-    return TextLines.of(data, stamped), stamped
+    return TextLines.of(data, stamped and not span.start), stamped
 
 
 def compare_files(original: Path, compensated: Path) -> Compared:

@@ -131,3 +131,20 @@ def test_a_batch_joins_the_modules_of_a_task(place):
     assert batch(place).exit_code in (0, 1)
     made = place.folder / "new" / job.parent.name / "points.mod"
     assert points and made.read_bytes().startswith(b"! postproc")
+
+
+def test_the_stamp_of_a_module_with_a_header_stands_behind_it(place):
+    job, header = source(place, NAMES["RAPID"]), b"%%%\n VERSION:1\n%%%\n"
+    job.write_bytes(header + job.read_bytes())
+    given = job.read_bytes()
+    made = out(place, NAMES["RAPID"])
+    assert made.read_bytes().startswith(header + b"! postproc ")
+    again = place.compensate(made, "-o", place.folder / "again.mod")
+    assert again.exit_code == 2 and "postproc" in again.stderr
+    told = cli("diff", job, made).output
+    assert "lines with other numbers" in told and "other text" not in told
+    assert cli("restore", made, "-o", place.folder / "back.mod").exit_code == 0
+    assert (place.folder / "back.mod").read_bytes() == given
+    assert batch(place).exit_code in (0, 1)
+    checked = cli("check", place.folder / "new", "--model", place.model)
+    assert checked.exit_code == 0 and "0 findings" in checked.output

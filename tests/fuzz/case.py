@@ -22,7 +22,7 @@ from postproc.robot.cell import Cell
 
 LIMIT = 2.0  # [s] of processor time, for files of up to
 SIZE = 100_000  # bytes
-SHIFT = (0.25, -1.75, 3.125, 0.0, 0.0, 0.0)
+SHIFT = (0.25, -1.75, 3.125)  # of a position, or of the first three joints
 _NUMBER = re.compile(rb"-?\d+(?:\.\d+)?")
 
 
@@ -71,7 +71,9 @@ def rewrite(files: Mapping[str, bytes], cell: Cell) -> str:
     known = np.isfinite(visits.values[example]).all(axis=1)
     known &= np.array([not why for why in visits.literals.pinned], dtype=bool)
     rows, example = rows[known], example[known]
-    output = write_numbers(reading, rows, visits.values[example] + SHIFT, "0" * 12)
+    new = visits.values[example]
+    new[:, : len(SHIFT)] += SHIFT
+    output = write_numbers(reading, rows, new, "0" * 12)
     values = read_back(visits, rows, output.edits)
     check_output(reading, read_program(output.files, cell), output, rows, values)
     check_bytes(files, output.files, output.records, visits)
@@ -88,10 +90,11 @@ def compensated(files: Mapping[str, bytes], cell: Cell, model: Model) -> str:
         AssertionError: A byte outside of the targets changed, or is not given back.
         HangError: It took too long.
     """
+    main = next(iter(files))
     try:
         with limited(files):
             done = compensate(
-                files["job.pdl"], cell, model, name="job.pdl",
+                files[main], cell, model, name=main,
                 variables=files.get("job.lsv"), pages=pages_of(files),
                 options=Options(timing=True),
             )  # fmt: skip
@@ -106,7 +109,8 @@ def compensated(files: Mapping[str, bytes], cell: Cell, model: Model) -> str:
 
 def pages_of(files: Mapping[str, bytes]) -> dict[str, bytes]:
     """Return the pages of a job, which are neither its program nor its values."""
-    return {n: data for n, data in files.items() if not n.startswith("job.")}
+    first = next(iter(files))
+    return {n: data for n, data in files.items() if n not in (first, "job.lsv")}
 
 
 def records_of(sidecar: str) -> dict[str, FileRecord]:
@@ -139,8 +143,7 @@ def check_bytes(
         mine = literals.file == number
         places = np.stack([literals.start[mine], literals.end[mine]], axis=-1)
         spans = sorted({(a, b) for a, b in places.reshape(-1, 2).tolist() if a >= 0})
-        stamp, ending, rest = _first_line(after[name])
-        assert stamp.startswith(b"-- postproc ") and ending
+        rest = _without_stamp(name, after[name])
         at = end = 0
         for start, stop in spans:
             piece = before[name][end:start]
@@ -158,10 +161,15 @@ def check_bytes(
         assert rest[at:] == before[name][end:], f"{name}: after byte {end}"
 
 
-def _first_line(data: bytes) -> tuple[bytes, bytes, bytes]:
-    found = re.search(rb"\r\n|\n|\r", data)
-    assert found
-    return data[: found.start()], found.group(), data[found.end() :]
+def _without_stamp(name: str, data: bytes) -> bytes:
+    """Take out the stamp: line 1, or the line behind the header of a module."""
+    if name.endswith(".pdl") or name.endswith(".lsv"):
+        found = re.match(rb"-- postproc [^\r\n]*(?:\r\n|\n|\r)", data)
+    else:
+        line = rb"! postproc \S+ model=\S+ source=[0-9a-f]{64}(?:\r\n|\n|\r)"
+        found = re.match(line, data) or re.search(rb"(?<=[\r\n%])[ \t]*" + line, data)
+    assert found, f"{name}: no stamp"
+    return data[: found.start()] + data[found.end() :]
 
 
 __all__ = ["HangError", "Sidecar", "check_bytes", "compensated", "limited", "rewrite"]

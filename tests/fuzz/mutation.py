@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import random
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
+Kind = Callable[[random.Random, bytes], bytes]
 ENCODINGS = ("utf-8", "utf-8-sig", "cp437", "utf-16-le")
 WORDS = (
     b"IF", b"THEN", b"ENDIF", b"FOR", b"TO", b"DO", b"ENDFOR", b"END", b"BEGIN",
@@ -12,6 +13,14 @@ WORDS = (
     b"ENDMOVE", b"VAR", b"POS(", b"{", b"}", b"[", b"]", b"(", b")", b"'", b'"',
     b"--", b"::", b":=", b"..", b",", b"\\", b"0x", b"1e9", b"1e308", b"999999999",
     b"-", b".", b"\xef\xbb\xbf", b"$TOOL", b"$UFRAME", b"RELATIVE", b"ADVANCE",
+)  # fmt: skip
+
+RAPID_WORDS = (
+    b"MODULE", b"PROC", b"ENDPROC", b"MoveL", b"MoveC", b"SearchL", b"Offs(",
+    b"RelTool(", b"CONST robtarget", b"VAR num", b"IF", b"THEN", b"ENDIF", b"FOR",
+    b"DO", b"ENDFOR", b"GOTO", b"ERROR", b"PDispOn", b"ConfL\\Off;", b"%%%", b"!",
+    b'"', b";", b":=", b"\\", b"\\WObj:=", b"[", b"]", b"{", b"}", b"9E9", b"0x1F",
+    b"1e308", b"-", b",", b"o_p1", b"\xef\xbb\xbf",
 )  # fmt: skip
 
 
@@ -95,15 +104,26 @@ def stretch(rng: random.Random, data: bytes) -> bytes:
     return b"".join(lines)
 
 
-KINDS: tuple[Callable[[random.Random, bytes], bytes], ...] = (
+KINDS: tuple[Kind, ...] = (
     flip, flip, drop, double, shuffle, cut, recode, endings, insert, insert, number,
     stretch,
 )  # fmt: skip
 
 
-def mutated(rng: random.Random, data: bytes, most: int = 4) -> bytes:
+def insert_rapid(rng: random.Random, data: bytes) -> bytes:
+    """Put a word of RAPID where it does not belong."""
+    at = rng.randrange(len(data) + 1)
+    return data[:at] + b" " * rng.randrange(2) + rng.choice(RAPID_WORDS) + data[at:]
+
+
+RAPID_KINDS = tuple(insert_rapid if kind is insert else kind for kind in KINDS)
+
+
+def mutated(
+    rng: random.Random, data: bytes, most: int = 4, kinds: Sequence[Kind] = KINDS
+) -> bytes:
     """Damage a text one to `most` times."""
     for _ in range(rng.randint(1, most)):
         if data:
-            data = rng.choice(KINDS)(rng, data)
+            data = rng.choice(kinds)(rng, data)
     return data

@@ -7,7 +7,9 @@ from collections.abc import Mapping
 from functools import cache
 from pathlib import Path
 
-from tests.fuzz.mutation import mutated
+from postproc.robot.cell import Cell, load_cell
+from tests.fuzz.mutation import RAPID_KINDS, mutated
+from tests.language import neutral_job
 from tests.language.pdl2.generator import POINTS, Generator
 from tests.language.pdl2.generator.rarer import Rarer
 from tests.language.pdl2.reachable import Reachable, ReachableJob
@@ -91,3 +93,68 @@ def damaged(seed: int, number: int) -> Files:
         if len(files) == 1 or rng.random() < 0.7:
             files[name] = mutated(rng, files[name])
     return files
+
+
+# Tasks of RAPID.
+
+HEADER = b"%%%\n  VERSION:1\n  LANGUAGE:ENGLISH\n%%%\n"
+HELPER = b"""MODULE points
+  CONST robtarget pHelp:=[[-605,876,1590],[-0.2549,-0.164,-0.6405,0.7056],[0,0,0,0],
+    [9E9,9E9,9E9,9E9,9E9,9E9]];
+  LOCAL PERS robtarget aSome{2}:=[
+    [[-610,870,1580],[-0.2549,-0.164,-0.6405,0.7056],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]],
+    [[-600,880,1600],[-0.2549,-0.164,-0.6405,0.7056],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]]];
+  PROC help(num n)
+    FOR i FROM 1 TO 2 DO
+      MoveL Offs(aSome{i},0,0,10*i),vWork,fine,tWork\\WObj:=wPart;
+    ENDFOR
+    IF n>1 THEN
+      MoveJ RelTool(pHelp,0,0,-20),vWork,fine,tWork\\WObj:=wPart;
+    ENDIF
+    MoveL pHelp,vWork,fine,tWork\\WObj:=wPart;
+  ENDPROC
+ENDMODULE
+"""
+
+
+@cache
+def cell() -> Cell:
+    """Load the cell of the shipped programs, whose arm the drawn jobs are for."""
+    return load_cell(ROOT / "programs" / "cell.toml")
+
+
+@cache
+def tasks() -> tuple[Mapping[str, bytes], ...]:
+    """Return the tasks that lie in this project, the module with main first."""
+    welding = ROOT / "programs" / "welding"
+    test = ROOT / "tests" / "language" / "rapid" / "welding.mod"
+    names = ("Welding.mod", "Seams.mod")
+    shipped = {name: (welding / name).read_bytes() for name in names}
+    return shipped, {"job.mod": test.read_bytes()}
+
+
+def task(rng: random.Random) -> Files:
+    """Write a task at random, often with a header, and with a module of points."""
+    job = neutral_job.drawn(cell(), rng.randrange(1 << 30), rng.randrange(3, 25))
+    text = neutral_job.rapid(job)
+    if rng.random() < 0.5:
+        text = HEADER + text
+    if rng.random() < 0.5:
+        return {"job.mod": text}
+    text = text.replace(b"  ENDPROC", b"    help 2;\n  ENDPROC")
+    return {"job.mod": text, "points.mod": HELPER}
+
+
+def damaged_task(seed: int, number: int) -> Files:
+    """Return damaged modules of a task; the same for the same two numbers."""
+    rng = random.Random(f"rapid:{seed}:{number}")
+    files = dict(rng.choice(tasks())) if rng.random() < 0.3 else task(rng)
+    for name in list(files):
+        if len(files) == 1 or rng.random() < 0.7:
+            files[name] = mutated(rng, files[name], kinds=RAPID_KINDS)
+    return files
+
+
+def damaged_of(seed: int, number: int) -> Files:
+    """Return damaged files: every fourth is a task of RAPID, the others are PDL2."""
+    return (damaged_task if number % 4 == 3 else damaged)(seed, number)

@@ -8,6 +8,7 @@ from postproc.language.stamp import (
     is_stamped,
     read_stamp,
     source_hash,
+    stamp_line,
     stamped,
     strip_stamp,
 )
@@ -62,3 +63,26 @@ def test_a_stamp_is_known_in_any_case_and_spacing(change) -> None:
 )
 def test_what_is_no_stamp(line) -> None:
     assert not is_stamped(source_from_bytes("a", b"PROGRAM a\n" + line + b"\nEND a"))
+
+
+HEADER = b"%%%\r\n  VERSION:1\r\n  LANGUAGE:ENGLISH\r\n%%%"
+MODULE = b"MODULE a\r\nENDMODULE\r\n"
+
+
+@pytest.mark.parametrize("before", [b"", b"\xef\xbb\xbf", b"\r\n! made by hand\r\n"])
+@pytest.mark.parametrize("behind", [b"\r\n", b" \t\r\n", b"", b"  "])
+def test_a_stamp_goes_behind_the_header_of_a_module(before, behind) -> None:
+    source = source_from_bytes("a.mod", before + HEADER + behind + MODULE)
+    out = stamped("1.0", "abc", source, source.data)
+    assert out.startswith(before + HEADER)
+    assert len(out.splitlines()) == len(source.data.splitlines()) + 1
+    assert read_stamp(out) == Stamp("1.0", "abc", source_hash(source))
+    assert is_stamped(source_from_bytes("a.mod", out))
+    assert strip_stamp(out) == source.data
+
+
+def test_a_stamp_in_front_of_a_header_is_known() -> None:
+    source = source_from_bytes("a.mod", HEADER + b"\r\n" + MODULE)
+    out = stamp_line("1.0", "abc", source, "!") + source.data
+    assert read_stamp(out) == Stamp("1.0", "abc", source_hash(source))
+    assert strip_stamp(out) == source.data

@@ -61,6 +61,7 @@ class SixNumbers(Dialect):
     """x, y, z [mm] and Euler angles a, e, r [deg], or six joint angles [deg]."""
 
     terms: Terms = TERMS
+    heads: tuple[str, ...] = tuple("123456")  # of poses and joint angles alike
     pose_decimals: tuple[int, ...] = (MM_DECIMALS,) * 3 + (DEGREE_DECIMALS,) * 3
     joint_decimals: tuple[int, ...] = (JOINT_DECIMALS,) * 6
 

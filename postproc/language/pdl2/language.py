@@ -21,6 +21,7 @@ from postproc.language.interface import (
     Start,
 )
 from postproc.language.pdl2.clones import CloneTarget, clone, free_name, named_at
+from postproc.language.pdl2.dialect import PDL2_DIALECT
 from postproc.language.pdl2.effects import dead_lines
 from postproc.language.pdl2.interpreter import resolve
 from postproc.language.pdl2.names import entry_names
@@ -40,6 +41,7 @@ class Pdl2(Language):
     name = "PDL2"
     suffixes = (".pdl",)
     comment = "--"
+    dialect = PDL2_DIALECT
 
     def recognises(self, text: bytes) -> bool:
         """Tell that a text may be PDL2: what begins as nothing else is taken for it."""

@@ -11,13 +11,15 @@ from postproc.language.dialect import Dialect, Terms
 from postproc.robot.pose import MM
 
 MM_DECIMALS, QUATERNION_DECIMALS, JOINT_DECIMALS = 3, 6, 5
-WIDTH = 11  # x, y, z, q1..q4, cf1, cf4, cf6, cfx
+HEADS = ("x", "y", "z", "q1", "q2", "q3", "q4", "cf1", "cf4", "cf6", "cfx")
+WIDTH = len(HEADS)
 ORIENTATION, FLAGS = slice(3, 7), slice(7, 11)
 COUNTED = (0, 3, 5)  # joints whose quarter turns are counted
 QUARTER = np.pi / 2
 # [rad] beyond a quarter's border a count still holds: axes at 0 or 90 deg are common,
 # and what rounding moves a joint by is far less.
 BORDER = np.deg2rad(0.02)
+SURE = np.deg2rad(0.0005)  # [rad] more than the last digits of a target move a joint by
 
 _FLAGS_SAY = (
     "confdata counts other quarter turns, or names another configuration, than where "
@@ -61,6 +63,8 @@ class RapidNumbers(Dialect):
     """Position [mm], quaternion and confdata of a robtarget, or six joint angles."""
 
     terms: Terms = TERMS
+    heads: tuple[str, ...] = HEADS
+    reflags: bool = True
     pose_decimals: tuple[int, ...] = (
         *(MM_DECIMALS,) * 3,
         *(QUATERNION_DECIMALS,) * 4,
@@ -109,11 +113,18 @@ class RapidNumbers(Dialect):
         said = [f"T{k + 1}:{t:g}" for k, t in enumerate(turns[0]) if t == t]
         return " ".join([*words, *said])
 
-    def reflagged(self, values: Floats, q: Floats) -> Floats:
-        """Count the quarter turns anew of joints that left theirs, see `Dialect`."""
+    def reflagged(self, values: Floats, q: Floats, before: Floats) -> Floats:
+        """Count the quarter turns anew of joints that left theirs, see `Dialect`.
+
+        A count that was beside its quarter by no more than the border is kept where it
+        still is.
+        """
         out = np.array(values)
         for column, joint in zip((7, 8, 9), COUNTED, strict=True):
-            off = _beyond(out[:, column], q[:, joint])
+            count = out[:, column]
+            off = _beyond(count, q[:, joint], SURE)
+            was = _beyond(count, before[:, joint], SURE)
+            off &= ~was | _beyond(count, q[:, joint])
             out[off, column] = np.floor(q[off, joint] / QUARTER)
         return out
 
@@ -129,10 +140,10 @@ class RapidNumbers(Dialect):
 RAPID_DIALECT = RapidNumbers()
 
 
-def _beyond(count: Floats, q: Floats) -> Bools:
+def _beyond(count: Floats, q: Floats, by: float = BORDER) -> Bools:
     """Tell which joints (k,) [rad] lie outside of the quarter turns counted, (k,)."""
     low = count * QUARTER
-    return np.asarray((q < low - BORDER) | (q > low + QUARTER + BORDER))
+    return np.asarray((q < low - by) | (q > low + QUARTER + by))
 
 
 def rotation_from_quaternion(q: Floats) -> Floats:

@@ -19,6 +19,7 @@ from postproc.language.interface import (
     Start,
 )
 from postproc.language.rapid.collect import visits_of
+from postproc.language.rapid.dialect import RAPID_DIALECT
 from postproc.language.rapid.interpreter import RapidMachine
 from postproc.language.rapid.moves import Goals
 from postproc.language.rapid.program import RapidFile, read_rapid
@@ -40,6 +41,7 @@ class Rapid(Language):
     name = "RAPID"
     suffixes = MODULES
     comment = "!"
+    dialect = RAPID_DIALECT
     tells_accuracy = False
 
     def recognises(self, text: bytes) -> bool:

@@ -11,9 +11,11 @@ from numpy.typing import NDArray
 
 from postproc.arrays import Floats, Ints
 from postproc.compensation.outcome import Outcome, Status
+from postproc.language.languages import language_of
 from postproc.language.source import Source
+from postproc.language.visits import Meaning
 from postproc.report.html.page import render, short, visible
-from postproc.report.json import in_time_of
+from postproc.report.json import JOINTS, in_time_of
 from postproc.robot.pose import MM
 from postproc.robot.trajectory import Motion
 
@@ -29,6 +31,7 @@ class PageColumns:
 
     Attributes:
         files, names, reasons: Texts that the indices point into.
+        heads: Of the numbers of a pose, none where no file tells its language.
         visit: 1-based number of the visit, (n,).
         file, line: Where the move stands, (n,), line 1-based.
         literal_file, literal_line: Where its numbers stand, (n,), -1 where nowhere.
@@ -47,6 +50,7 @@ class PageColumns:
     files: tuple[str, ...]
     names: tuple[str, ...]
     reasons: tuple[str, ...]
+    heads: tuple[str, ...]
     visit: Ints
     file: Ints
     line: Ints
@@ -135,11 +139,14 @@ def columns_of(outcome: Outcome) -> PageColumns:
     place = (nowhere, nowhere) if empty else (v.literals.file, v.literals.line)
     known = len(outcome.position) == n
     position = outcome.position / MM if known else np.full((n, 3), np.nan)
-    blank = np.where(has, 0.0, np.nan)[:, None]
+    blank = np.where(np.arange(v.values.shape[1]) < JOINTS, 0.0, np.nan)
+    blank = np.where((v.target == Meaning.JOINTS)[:, None], blank, 0.0)
+    blank[~has] = np.nan
     return PageColumns(
         files=v.files,
         names=v.names,
         reasons=d.reasons,
+        heads=v.dialect.heads,
         visit=np.arange(1, n + 1),
         file=v.file,
         line=v.line,
@@ -226,7 +233,13 @@ def columns_from(targets: Sequence[Mapping[str, Any]]) -> PageColumns:
         files=files.all,
         names=names.all,
         reasons=reasons.all,
+        heads=_heads(targets),
     )
+
+
+def _heads(targets: Sequence[Mapping[str, Any]]) -> tuple[str, ...]:
+    """Return what the language of targets heads the numbers of a pose with."""
+    return language_of(str(targets[0]["file"])).dialect.heads if targets else ()
 
 
 def shares_from(targets: Sequence[Mapping[str, Any]]) -> PageShares:
@@ -333,6 +346,7 @@ def pack(columns: PageColumns, shares: PageShares) -> dict[str, Any]:
         "moves": list(MOVES),
         "statuses": [s.name.lower() for s in Status],
         "effects": effects,
+        "heads": list(columns.heads),
         "index": {k: getattr(columns, k).tolist() for k in (*indices, "status", "why")},
         "direction": _signs(columns.direction),
         "numbers": packed,

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from postproc.compensation.program import read_program
 from postproc.exceptions import ProgramError
 from postproc.language.interface import Start
 from postproc.language.rapid.dialect import (
@@ -276,7 +277,9 @@ def test_quarter_turns_are_written_anew_where_they_are_left():
     values = np.zeros((4, 11))
     q = np.zeros((4, 6))
     q[:, 0] = np.deg2rad([89.0, 90.01, 90.5, -0.5])
-    assert RAPID_DIALECT.reflagged(values, q)[:, 7].tolist() == [0, 0, 1, -1]
+    inside = np.full((4, 6), np.deg2rad(45.0))
+    assert RAPID_DIALECT.reflagged(values, q, inside)[:, 7].tolist() == [0, 1, 1, -1]
+    assert RAPID_DIALECT.reflagged(values, q, q)[:, 7].tolist() == [0, 0, 1, -1]
     assert RAPID_DIALECT.misses(values, q).tolist() == [False, False, True, True]
 
 
@@ -293,3 +296,21 @@ def test_confdata_as_slot_and_turns(cf, slot, turns):
     values[0, 7:] = cf
     found = RAPID_DIALECT.flags(np.zeros(1, dtype=int), ("",), values)
     assert found[0].tolist() == [slot] and found[1][0, :2].tolist() == turns
+
+
+def test_a_point_in_a_record_is_left_and_listed(bench_cell):
+    point = "[[-605,876,1590],[1,0,0,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]]"
+    text = f"""MODULE m
+RECORD station
+robtarget p;
+num n;
+ENDRECORD
+CONST station s:=[{point},3];
+PROC main()
+MoveL s.p,v100,fine,tool0;
+ENDPROC
+ENDMODULE
+"""
+    visits = read_program({"m.mod": text.encode()}, bench_cell).visits
+    assert visits.line.tolist() == [8] and visits.literal.tolist() == [-1]
+    assert "known only when the program runs" in visits.reasons[visits.reason[0]]

@@ -12,6 +12,7 @@ import pytest
 
 from postproc.compensation.compensate import compensate
 from postproc.compensation.outcome import Status
+from postproc.language.visits import Meaning
 from postproc.report.html import program, program_report, program_report_from_json
 from postproc.report.html.program import (
     columns_from,
@@ -22,6 +23,7 @@ from postproc.report.html.program import (
     stretches,
 )
 from postproc.report.json import report_text
+from tests.language.neutral_job import drawn, rapid
 from tests.report.html.builders import FIRST_LINE, outcome_of
 from tests.written import FIRST, POSE
 from tests.written import program as written
@@ -244,3 +246,19 @@ def test_a_page_of_100_000_targets_stays_small() -> None:
     text = program_report(outcome_of(100_000))
     assert len(text.encode()) < 30e6
     assert re.search(r"<td class=\"number\">2500</td>", text)
+
+
+def test_all_numbers_of_a_rapid_target_have_a_head(bench_cell, bench_model) -> None:
+    source = rapid(drawn(bench_cell, 1, 8))
+    outcome = compensate(source, bench_cell, bench_model, name="job.mod")
+    written = json.loads(report_text(outcome))
+    for page in (program_report(outcome), program_report_from_json(written)):
+        packed = Elements(page).payload()["columns"]
+        heads = "x y z q1 q2 q3 q4 cf1 cf4 cf6 cfx".split()
+        assert packed["heads"] == heads
+        numbers = packed["numbers"]["original"]
+        assert numbers["width"] == len(heads)
+        rows = np.array(numbers["values"], dtype=float).reshape(-1, len(heads))
+        joints = outcome.visits.target == Meaning.JOINTS
+        assert joints.any() and not joints.all()
+        assert np.isnan(rows[joints, 6:]).all() and np.isfinite(rows[~joints]).all()

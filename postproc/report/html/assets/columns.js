@@ -9,6 +9,7 @@ class Columns {
     this.moves = packed.moves;
     this.statuses = packed.statuses;
     this.effects = packed.effects;
+    this.heads = packed.heads;
     Object.assign(this, packed.index);
     this.length = this.visit.length;
     this.direction = packed.direction;

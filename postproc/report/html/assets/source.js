@@ -111,9 +111,13 @@ class Detail {
 
   numbers(i) {
     const c = this.columns;
-    const original = [...c.of("original", i)], change = [...c.of("change", i)];
+    let original = [...c.of("original", i)], change = [...c.of("change", i)];
     if (original.every(Number.isNaN)) return "";
-    return Detail.table("Numbers in the file", ["", "1", "2", "3", "4", "5", "6"], [
+    // Of joint angles there are six, whatever a pose takes.
+    const pose = original.slice(6).some(Number.isFinite) || original.length === 6;
+    if (!pose) [original, change] = [original.slice(0, 6), change.slice(0, 6)];
+    const heads = pose && c.heads.length === original.length ? c.heads : original.map((_, k) => String(k + 1));
+    return Detail.table("Numbers in the file", ["", ...heads], [
       ["original", ...original.map((v) => Page.number(v, 4))],
       ["corrected", ...original.map((v, k) => Page.number(v + change[k], 4))],
       ["change", ...change.map((v) => Page.number(v, 4))],

@@ -1,0 +1,34 @@
+"""How many lines a language costs: python -m tests.language.cost."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+ROOT = Path(__file__).parents[2]
+GRAMMARS = {"PDL2": ("pdl2", "lsv"), "RAPID": ("rapid",)}
+FOLDERS = {"PDL2": "pdl2/", "RAPID": "rapid/", "all languages": ""}
+
+
+def lines(path: Path) -> int:
+    """Count the lines of a file."""
+    return len(path.read_text(encoding="utf-8").splitlines())
+
+
+def table() -> list[str]:
+    """Write the table of docs/languages.md, Python to the hundred lines."""
+    rows = ["| | grammar | Python |", "|---|---|---|"]
+    for name, folder in FOLDERS.items():
+        names = [f"{part}.lark" for part in GRAMMARS.get(name, ())]
+        count = sum(lines(ROOT / "grammars" / one) for one in names)
+        grammar = f"{count} lines ({', '.join(f'`{one}`' for one in names)})"
+        place = f"postproc/language/{folder}"
+        code = round(sum(lines(p) for p in (ROOT / place).glob("*.py")), -2)
+        told = f"`{place}`" if folder else f"`{place}*.py`"
+        rows.append(
+            f"| {name} | {grammar if names else ''} | {code:,} lines ({told}) |"
+        )
+    return [row.replace("|  |", "| |") for row in rows]
+
+
+if __name__ == "__main__":
+    print("\n".join(table()))
