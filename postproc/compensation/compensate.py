@@ -20,6 +20,7 @@ from postproc.compensation.notes import (
     missing_file,
     overruled_strings,
     tool_in_metres,
+    unsure_frames,
     unsure_sides,
     untimed_runs,
 )
@@ -240,6 +241,7 @@ def report(
                 *untimed_runs(visits, kept.untimed),
                 *rounded_points(visits, kept.away),
                 *unsure_sides(visits, rows, d.side, d.std_error, advice),
+                *unsure_frames(visits, rows, d.std_error, cell),
                 *flank_steps(
                     visits, rows, kept.position, d.side, setting.gap, cell.arm
                 ),

@@ -6,7 +6,7 @@ takes them to be where its nominal arm says; the tool really was where the arm l
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -16,7 +16,7 @@ from postproc.exceptions import CellError
 from postproc.language.visits import Meaning, Visits
 from postproc.model.model import Model
 from postproc.robot.cell import Cell
-from postproc.robot.pose import MM, inverse, pose_from_record
+from postproc.robot.pose import MM, pose_from_record
 from postproc.robot.state import make_states
 
 APART_MM, APART_DEG = 1.0, 0.1  # a frame of three points may differ by rounding only
@@ -48,7 +48,7 @@ def correct_taught(
     if len(taught) == 0:
         return planned
     poses = np.isin(visits.target, (Meaning.POSE, Meaning.NEAR))
-    shift = np.array(planned.shift)
+    shift, variance = np.array(planned.shift), np.array(planned.shift_variance)
     for frame in taught.tolist():
         for column, name in ((visits.tool, "tool"), (visits.base, "base")):
             planned.reasons.mark(column == frame, _OTHER.format(name))
@@ -57,20 +57,58 @@ def correct_taught(
         if joints is None:
             planned.reasons.mark(rows, _NO_POINTS)
             continue
-        moved, inside = moved_frame(joints, records[frame], cell, model)
+        really, inside = moved_frame(joints, records[frame], cell, model)
         if not inside:
             planned.reasons.mark(rows, _OUTSIDE)
-        base = cell.base.pose
-        away = inverse(base[None])[0] @ moved @ base
-        tcp = planned.plan.tcp[rows]
-        shift[rows] = (away @ tcp - tcp)[:, :3, 3]
-    return replace(planned, shift=shift)
+        shift[rows], variance[rows] = really.shift(planned.plan.tcp[rows, :3, 3])
+    return replace(planned, shift=shift, shift_variance=variance)
+
+
+@dataclass(frozen=True)
+class TaughtFrame:
+    """A taught frame, as the controller has it and as its points really span it.
+
+    Attributes:
+        spanned: As the controller has it, in the arm's base frame, (4, 4) [m].
+        points: Where its points really were, in the base frame, (3, 3) [m].
+        std: Standard error of that, (3, 3) [m]: what the model does not know, and the
+            backlash of joints whose side is not known.
+    """
+
+    spanned: Floats
+    points: Floats
+    std: Floats
+
+    def shift(self, tcp: Floats) -> tuple[Floats, Floats]:
+        """Tell how far positions in the frame are from where the controller has them.
+
+        The points are taken to be off independently of each other.
+
+        Args:
+            tcp: Positions, (n, 3) [m], in the base frame.
+
+        Returns:
+            The shift (n, 3) [m], and its variance (n, 3) [m^2].
+        """
+        inside = (tcp - self.spanned[:3, 3]) @ self.spanned[:3, :3]
+        at, variance = self._place(self.points, inside), np.zeros_like(tcp)
+        for k in np.ndindex(3, 3):
+            points = self.points.copy()
+            points[k] += self.std[k]
+            variance += np.square(self._place(points, inside) - at)
+        return at - tcp, variance
+
+    @staticmethod
+    def _place(points: Floats, inside: Floats) -> Floats:
+        """Place positions of a frame where three points have it, (n, 3) [m]."""
+        pose = frame_of_points(points)
+        return np.asarray(inside @ pose[:3, :3].T + pose[:3, 3])
 
 
 def moved_frame(
     joints: Floats, record: tuple[float, ...], cell: Cell, model: Model
-) -> tuple[Floats, bool]:
-    """Find how a taught frame differs from the one that its points really span.
+) -> tuple[TaughtFrame, bool]:
+    """Find the frame that the points of a taught frame really span.
 
     Args:
         joints: Joint angles at its three points, (3, 6) [rad].
@@ -79,8 +117,7 @@ def moved_frame(
         model: The arm's error.
 
     Returns:
-        The motion from the frame of the controller to the real one, in the world,
-        (4, 4) [m], and whether the points lie inside of what was surveyed.
+        The frame, and whether the points lie inside of what was surveyed.
 
     Raises:
         CellError: The points do not give the frame.
@@ -89,17 +126,18 @@ def moved_frame(
     nominal = (arm.flange(joints) @ cell.tool.pose)[:, :3, 3]
     states = make_states(
         joints,
+        cell.taught_sides.get(record),
         tool=cell.tool.pose[:3, 3],
         temperature=cell.temperature,
         payload=cell.payload_mass,
         payload_com=cell.payload_com,
     )
     predicted = model.predict(arm, states)
-    spanned = base @ frame_of_points(nominal)
-    _check(spanned, pose_from_record(np.array([record]))[0], cell)
-    really = base @ frame_of_points(nominal + predicted.error)
+    spanned = frame_of_points(nominal)
+    _check(base @ spanned, pose_from_record(np.array([record]))[0], cell)
+    really = TaughtFrame(spanned, nominal + predicted.error, predicted.std_arrival)
     inside = not any(mask.any() for mask in predicted.outside.values())
-    return np.asarray(really @ inverse(spanned[None])[0]), inside
+    return really, inside
 
 
 def frame_of_points(points: Floats) -> Floats:

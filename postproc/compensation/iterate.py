@@ -478,6 +478,7 @@ def _read_back(
     with setting.clock("solve"):
         model, cell = setting.model, setting.cell
         std_error = std_errors(model, cell, iteration.states, current.solved)
+        std_error = iteration.planned.with_frame(std_error)
     decided = replace(proposal.decisions, std_error=std_error)
     proposal = replace(proposal, decisions=decided)
     with setting.clock("verify"):

@@ -195,6 +195,37 @@ def _each(visits: Visits, rows: Bools, code: str, text: str) -> list[Diagnostic]
     ]
 
 
+def unsure_frames(
+    visits: Visits, corrected: Bools, std_error: Floats, cell: Cell
+) -> list[Diagnostic]:
+    """Say how unsure targets in taught frames are, and what makes them surer.
+
+    Args:
+        visits: Every arrival.
+        corrected: Visits whose target moves, (n,).
+        std_error: Standard error of the correction, (n, 3) [m].
+        cell: Says which frames were taught, and from which sides.
+    """
+    found, poses = [], np.isin(visits.target, (Meaning.POSE, Meaning.NEAR))
+    for frame, record in enumerate(map(tuple, visits.frames.tolist())):
+        sides = cell.taught_sides.get(record)
+        rows = np.flatnonzero(corrected & poses & (visits.uframe == frame))
+        if cell.taught_frames.get(record) is None or len(rows) == 0:
+            continue
+        if sides is not None and sides.all():
+            continue
+        size = float(np.linalg.norm(std_error[rows], axis=1).max()) / MM
+        text = (
+            f"{len(rows)} targets stand in a user frame that was taught from sides "
+            f"that are not known (up to +-{size:.3f} mm): teach its three points far "
+            "apart, each reached by a move of all joints in one direction, and write "
+            "these directions as taught_lambda in the cell file"
+        )
+        where = visits.files[visits.file[rows[0]]], int(visits.line[rows[0]])
+        found.append(Diagnostic(*where, CODE, text))
+    return found
+
+
 def unsure_sides(
     visits: Visits,
     corrected: Bools,

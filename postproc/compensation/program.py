@@ -81,6 +81,7 @@ class Planned:
         reasons: Why visits must not be compensated.
         shift: From where the controller takes every target to be to where it is, as
             far as a frame was taught with the arm's error in it, (n, 3) [m].
+        shift_variance: Of it, (n, 3) [m^2].
         doubtful: What comes from these targets is doubtful (see `eligibility`), (n,).
     """
 
@@ -88,6 +89,7 @@ class Planned:
     plan: Plan
     reasons: Reasons
     shift: Floats
+    shift_variance: Floats
     doubtful: Bools
 
     def wanted(self, rows: Ints) -> Floats:
@@ -95,6 +97,12 @@ class Planned:
         poses = self.plan.tcp[rows]
         poses[:, :3, 3] += self.shift[rows]
         return poses
+
+    def with_frame(self, std_error: Floats) -> Floats:
+        """Add how unsure taught frames are to standard errors, (n, 3) [m]."""
+        if not self.shift_variance.any():
+            return std_error
+        return np.asarray(np.sqrt(np.square(std_error) + self.shift_variance))
 
 
 def start_of(cell: Cell) -> Start:
@@ -195,7 +203,8 @@ def plan_visits(
     on = mark_configuration_flags(visits, targets, planned, cell.arm, reasons, doubtful)
     mark_orientation_interpolation(visits, targets, planned, reasons)
     mark_arcs(targets, planned, reasons)
-    return Planned(targets, planned, reasons, np.zeros((len(visits), 3)), on)
+    none = np.zeros((len(visits), 3))
+    return Planned(targets, planned, reasons, none, none, on)
 
 
 def states_of(planned: Plan, cell: Cell, temperature: float) -> States:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -40,6 +40,7 @@ class FrameSection(Strict):
     euler_zyz_deg: Triple = NO_ANGLES
     source: Source = "cad"
     taught_deg: list[Sextuple] | None = None
+    taught_lambda: list[Sextuple] | None = None
 
     @model_validator(mode="before")
     @classmethod
@@ -60,7 +61,16 @@ class FrameSection(Strict):
                 raise ValueError('taught_deg needs source = "taught"')
             if len(self.taught_deg) != len(TAUGHT_POINTS):
                 raise ValueError(f"taught_deg needs {', '.join(TAUGHT_POINTS)}")
+        if self.taught_lambda is not None:
+            self._check_sides(self.taught_lambda)
         return self
+
+    def _check_sides(self, sides: list[Sextuple]) -> None:
+        """Refuse sides of other points than those of taught_deg."""
+        if self.taught_deg is None or len(sides) != len(self.taught_deg):
+            raise ValueError("taught_lambda needs a row for each row of taught_deg")
+        if any(side not in (-1.0, 0.0, 1.0) for row in sides for side in row):
+            raise ValueError("taught_lambda holds -1, 0 (not known) or 1 per joint")
 
     def record(self) -> tuple[float, ...]:
         """Return x, y, z [mm], a, e, r [deg]."""
@@ -227,6 +237,8 @@ class Cell:
             that neither move the arm nor set frames.
         frame_tables: Frames set by routines, by lower-case name, then arguments.
         taught: Lower-case names of points that were taught with the robot.
+        taught_sides: From which side the joints arrived at the three points of taught
+            frames, where that is stated, (3, 6) from -1 to 1.
         taught_frames: Records of the frames that were taught with the robot, with the
             joint angles of their three points, (3, 6) [rad], or None.
         constant: Lower-case patterns of exported variables, ``name`` or
@@ -258,6 +270,7 @@ class Cell:
     still: tuple[str, ...] = ()
     constant: tuple[str, ...] = ()
     strict_calls: bool = False
+    taught_sides: Mapping[tuple[float, ...], Floats] = field(default_factory=dict)
 
 
 def _frame(section: FrameSection | None) -> Frame:
@@ -308,6 +321,7 @@ def load_cell(path: str | Path) -> Cell:
         frame_tables={k.lower(): v for k, v in file.frames.routines.items()},
         taught=frozenset(name.lower() for name in file.taught),
         taught_frames=_taught_frames(file),
+        taught_sides=_taught_sides(file),
     )
 
 
@@ -318,15 +332,29 @@ def _patterns(said: object) -> tuple[str, ...]:
 
 def _taught_frames(file: CellFile) -> dict[tuple[float, ...], Floats | None]:
     """Collect the taught frames of the cell and of its tables."""
+    return {
+        frame.record(): np.deg2rad(frame.taught_deg) if frame.taught_deg else None
+        for frame in _frames_of(file)
+        if frame.source == "taught"
+    }
+
+
+def _taught_sides(file: CellFile) -> dict[tuple[float, ...], Floats]:
+    """Collect from which sides the joints arrived at the points of taught frames."""
+    return {
+        frame.record(): np.array(frame.taught_lambda, dtype=float)
+        for frame in _frames_of(file)
+        if frame.taught_lambda is not None
+    }
+
+
+def _frames_of(file: CellFile) -> list[FrameSection]:
+    """List the frames of the cell and of its tables."""
     tables = file.frames.routines.values()
     frames = [file.tool, file.base, file.uframe]
     for entry in (entry for table in tables for entry in table.values()):
         frames += [entry.tool, entry.base, entry.uframe]
-    return {
-        frame.record(): np.deg2rad(frame.taught_deg) if frame.taught_deg else None
-        for frame in frames
-        if frame is not None and frame.source == "taught"
-    }
+    return [frame for frame in frames if frame is not None]
 
 
 def _angles(

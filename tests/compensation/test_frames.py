@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from postproc.cli.simulate import setup_of
 from postproc.compensation.compensate import compensate
-from postproc.compensation.frames import frame_of_points
+from postproc.compensation.frames import frame_of_points, moved_frame
 from postproc.compensation.outcome import Status
 from postproc.compensation.program import read_program
 from postproc.exceptions import CellError
@@ -18,6 +20,7 @@ from tests.compensation.shared_points import SWEEP
 from tests.conftest import CELL, SEED
 from tests.written import FIRST, POSE, program
 
+ALL_UP = (1.0,) * 6
 TRUE = (1600.0, -300.0, 900.0, 3.0, 2.0, -1.0)
 UFRAME = "[uframe]\nxyz_mm = [1600.0, -300.0, 900.0]\n"
 
@@ -33,11 +36,11 @@ def section(record, more=""):
     return f"[uframe]\nxyz_mm = {numbers[:3]}\neuler_zyz_deg = {numbers[3:]}\n{more}\n"
 
 
-def teach(arm, cell, feature):
+def teach(arm, cell, feature, sides=ALL_UP):
     """Drive the virtual arm until its tool is at a point of the part, (6,) [rad]."""
     q = np.radians([-5.0, 10.0, -95.0, 10.0, 50.0, 10.0])
     for _ in range(30):
-        arrived = make_arrivals(q[None], np.ones((1, 6)), cell.tool.pose)
+        arrived = make_arrivals(q[None], np.array([sides]), cell.tool.pose)
         J = cell.arm.jacobian(q[None], cell.tool.pose[None, :3, 3])[0, :3]
         q = q - np.linalg.pinv(J) @ (arm.tcp(arrived)[0] - feature)
     assert np.linalg.norm(arm.tcp(arrived)[0] - feature) < 1e-9
@@ -82,10 +85,61 @@ def test_targets_in_a_taught_frame_land_on_the_part(tmp_path, taught, job_model)
     _, misled = errors(source, naive, part, job_model)
     assert misled.mean() > 0.8
     assert error.mean() < 0.25 * misled.mean()
-    assert (
-        error.max() < 0.3
-    )  # the backlash of the three points, whose sides are unknown
+    assert error.max() < 0.3  # backlash of the three points: their sides are unknown
     assert outcome.after.max_mm < 0.01
+    stated = 1e3 * np.linalg.norm(outcome.decisions.std_error, axis=1)[3:]
+    assert np.sqrt(np.mean(error**2)) < 2.0 * np.sqrt(np.mean(stated**2))
+    assert any("taught_lambda" in d.message for d in outcome.diagnostics)
+    text += f"\ntaught_lambda = {[[1] * 6] * 3}"
+    stated_sides = with_uframe(tmp_path, "sides", section(record, text))
+    outcome, surer = errors(source, stated_sides, part, job_model)
+    assert surer.max() < 0.5 * error.max()
+    assert not any("taught_lambda" in d.message for d in outcome.diagnostics)
+
+
+def taught_points(seed, sides, cell):
+    """Teach three points of the part from some sides; the controller's frame too."""
+    arm, true = virtual_arm(seed), pose_from_record(np.array([TRUE]))[0]
+    corners = np.array([[0, 0, 0, 1], [0.35, 0, 0, 1], [0.1, 0.4, 0, 1]])
+    pairs = zip(corners, sides, strict=True)
+    joints = np.array([teach(arm, cell, (true @ c)[:3], s) for c, s in pairs])
+    points = (cell.arm.flange(joints) @ cell.tool.pose)[:, :3, 3]
+    return joints, tuple(record_from_pose(frame_of_points(points)).tolist())
+
+
+def test_taught_frames_say_how_unsure_they_are(job_cell, job_model):
+    """Stated against true error, the sides at the points drawn; a model of the arm."""
+    true, rng = pose_from_record(np.array([TRUE]))[0], np.random.default_rng(3)
+    inside = np.array([[0.1, 0.1, 0.1], [0.3, 0.2, 0.05], [0.0, 0.4, 0.2]])
+    real = inside @ true[:3, :3].T + true[:3, 3]
+    off, told = {False: [], True: []}, {False: [], True: []}
+    for _ in range(40):
+        sides = rng.choice([-1.0, 1.0], (3, 6))
+        joints, record = taught_points(SEED, sides, job_cell)
+        for known in (False, True):
+            stated = {record: sides} if known else {}
+            cell = replace(job_cell, taught_sides=stated)
+            frame, _ = moved_frame(joints, record, cell, job_model)
+            nominal = inside @ frame.spanned[:3, :3].T + frame.spanned[:3, 3]
+            shift, variance = frame.shift(nominal)
+            off[known].append(nominal + shift - real)
+            told[known].append(variance)
+    for known in (False, True):
+        ratio = np.mean(np.square(off[known])) / np.mean(told[known])
+        assert ratio < 1.4  # nobody teaches without scatter: stated, but not drawn
+        assert known or ratio > 0.7
+    assert np.square(off[True]).mean() < 0.1 * np.square(off[False]).mean()
+
+
+def test_stated_sides_stand_for_every_point(tmp_path, taught):
+    joints, record = taught
+    rows = np.round(np.degrees(joints), 6).tolist()
+    text = f'source = "taught"\ntaught_deg = {rows}\ntaught_lambda = '
+    for wrong in ("[[1, 1, 1, 1, 1, 1]]", f"{[[2] * 6] * 3}"):
+        with pytest.raises(CellError, match="taught_lambda"):
+            with_uframe(tmp_path, "wrong", section(record, text + wrong))
+    cell = with_uframe(tmp_path, "right", section(record, text + f"{[[1] * 6] * 3}"))
+    assert [s.tolist() for s in cell.taught_sides.values()] == [[[1.0] * 6] * 3]
 
 
 def test_joint_targets_do_not_depend_on_the_frame(tmp_path, taught, job_model):
