@@ -130,8 +130,7 @@ class Simulation:
         p = self.path_accuracy
         return (
             f"{said}; path accuracy AT_p (systematic part) mean {p.mean_mm:.4f} mm, "
-            f"95 % {p.p95_mm:.4f}, max {p.max_mm:.4f} over {p.n} moves; of all places "
-            f"on the way 95 % within {self.all_along.p95_mm:.4f}"
+            f"95 % {p.p95_mm:.4f}, max {p.max_mm:.4f} over {p.n} moves"
         )
 
 
