@@ -16,7 +16,7 @@ from postproc.language.visits import Meaning
 from postproc.simulation import run_program, virtual_arm
 from tests.conftest import SEED
 from tests.language.neutral_job import LANGUAGES, drawn
-from tests.language.true_error import ARMS, MAX_MM, MEAN_MM, differing, driven, fitted
+from tests.language.true_error import ARMS, MAX_MM, differing, driven, fitted
 from tests.language.true_error import landed as landed_on
 
 
@@ -29,8 +29,21 @@ def test_an_arm_lands_at_corrected_stops(arm, tmp_path):
             assert one.other is None
             assert len(one.after) > 20 > 5 * one.left
             assert one.before.mean() > 1.0  # there was something to correct
-            assert one.after.mean() <= MEAN_MM and one.after.max() <= MAX_MM
+            assert one.holds and one.after.max() <= MAX_MM
+            assert one.sure.mean() > 0.9
         np.testing.assert_allclose(found[0].after, found[1].after, rtol=0, atol=0.001)
+
+
+@pytest.mark.parametrize("number", [0, 12, 19])
+def test_behind_a_move_that_cannot_be_driven(bench_cell, bench_model, number):
+    """The virtual controller stays where it is, and goes on from there."""
+    job, setup = drawn(bench_cell, number), setup_of(bench_cell)
+    text = {"job.pdl": LANGUAGES["job.pdl"](job)}
+    body = virtual_arm(SEED, tool=setup.tool)
+    run = run_program(body, setup, read_program(text, bench_cell).visits)
+    assert any(run.why)
+    one = landed_on(SEED, bench_cell, bench_model, job, number, "job.pdl")
+    assert one.holds and one.left
 
 
 def test_what_else_differs_is_seen(bench_cell):
