@@ -14,7 +14,7 @@ from postproc.motion.path import NEAR, arcs_of
 from postproc.motion.planner import Plan
 from postproc.motion.targets import STRANDS, TargetKind, Targets
 from postproc.robot.arm import Arm
-from postproc.robot.pose import MM, inverse, pose_from_record, rotation_vector
+from postproc.robot.pose import MM, inverse, rotation_vector
 from postproc.robot.trajectory import Motion
 
 # Why something did not happen, for many visits at once.
@@ -355,7 +355,7 @@ def _may_be_off(visits: Visits, targets: Targets, plan: Plan, rows: Bools) -> Bo
     end = plan.tcp[edge][:, :3, :3]
     turn = np.linalg.norm(rotation_vector(np.swapaxes(begin, 1, 2) @ end), axis=1)
     kind = visits.orientation_law[edge]
-    world = pose_from_record(visits.frames)[visits.base[edge]][:, :3, :3]
+    world = visits.frames[visits.base[edge]][:, :3, :3]
     sine = np.minimum(_sine(world @ begin, kind), _sine(world @ end, kind))
     off = np.minimum(turn**2 / (8.0 * np.maximum(sine, LEAST)), turn)
     both = np.maximum(_sine(world @ begin, kind), _sine(world @ end, kind))

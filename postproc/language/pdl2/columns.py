@@ -25,6 +25,7 @@ from postproc.language.visits import (
     ZoneRule,
     slim,
 )
+from postproc.robot.pose import pose_from_record
 
 # Frames and motion variables of visits as columns.
 
@@ -97,7 +98,8 @@ class SettingColumns:
         if not columns:
             empty = _row({}, lambda value: -1)
             columns = {name: np.array([value])[:0] for name, value in empty.items()}
-        columns["frames"] = np.array([f for f, _ in frames], float).reshape(-1, 6)
+        records = np.array([f for f, _ in frames], float).reshape(-1, 6)
+        columns["frames"] = pose_from_record(records)
         columns["frame_taught"] = np.array([taught for _, taught in frames], bool)
         return columns
 

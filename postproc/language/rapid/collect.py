@@ -16,7 +16,8 @@ from postproc.language.rapid.moves import (
     FrameOfMove,
     RapidVisit,
     composed,
-    pose_record,
+    flat,
+    pose_of_numbers,
 )
 from postproc.language.rapid.program import RapidFile
 from postproc.language.visits import (
@@ -27,6 +28,7 @@ from postproc.language.visits import (
     ZoneRule,
     slim,
 )
+from postproc.robot.pose import pose_from_record
 from postproc.robot.trajectory import Motion
 
 TOO_COMPLEX = "the program is too complex to be followed"
@@ -43,8 +45,8 @@ class _Tables:
     reasons: Interned[str]
     names: Interned[str]
 
-    def frame(self, record: tuple[float, ...]) -> int:
-        return self.frames[record] if record else _NO_FRAME
+    def frame(self, pose: tuple[float, ...]) -> int:
+        return self.frames[pose] if pose else _NO_FRAME
 
 
 def visits_of(machine: RapidMachine) -> Visits:
@@ -59,7 +61,8 @@ def visits_of(machine: RapidMachine) -> Visits:
         reasons[k] = reasons[k] or _ONLY_SHIFTED
     follows[follows == _NO_LITERAL] = -1
     pred_start, pred = _predecessors(machine, order)
-    base = tables.frame(tuple(map(float, machine.start.base or ())))
+    base = tables.frame(flat(pose_from_record(np.array(machine.start.base, float)))
+                        if machine.start.base else ())  # fmt: skip
     n = len(found)
     return Visits(
         files=tuple(file.text.source.name for file in files),
@@ -77,7 +80,7 @@ def visits_of(machine: RapidMachine) -> Visits:
         **_frames(found, tables),
         names=tuple(tables.names),
         reasons=tuple(tables.reasons),
-        frames=np.array([*tables.frames], float).reshape(-1, 6),
+        frames=np.array([*tables.frames], float).reshape(-1, 4, 4),
         frame_taught=np.zeros(len(tables.frames), dtype=bool),
         pred_start=pred_start,
         pred=pred,
@@ -144,7 +147,7 @@ def _frames(found: Sequence[RapidVisit], tables: _Tables) -> dict[str, Any]:
             placed[key] = _displaced(*key)
         uframe.append(tables.frame(placed[key]))
     return {
-        "tool": slim(np.array([tables.frame(v.tool.record) for v in found], np.int64)),
+        "tool": slim(np.array([tables.frame(v.tool.pose) for v in found], np.int64)),
         "uframe": slim(np.array(uframe, np.int64)),
         "tool_remote": slim(np.array(remote, bool)),
     }
@@ -152,11 +155,11 @@ def _frames(found: Sequence[RapidVisit], tables: _Tables) -> dict[str, Any]:
 
 def _displaced(wobj: FrameOfMove, shift: tuple[float, ...]) -> tuple[float, ...]:
     """Place a work object with the program displacement in it."""
-    if shift == UNKNOWN_SHIFT or not wobj.record:
+    if shift == UNKNOWN_SHIFT or not wobj.pose:
         return ()
     if shift == NO_SHIFT:
-        return wobj.record
-    return composed(wobj.record, pose_record(shift))
+        return wobj.pose
+    return composed(wobj.pose, pose_of_numbers(shift))
 
 
 def _reason(v: RapidVisit, exhausted: bool) -> str:

@@ -9,6 +9,7 @@ from functools import cache
 
 import numpy as np
 
+from postproc.arrays import Floats
 from postproc.language.rapid import syntax as said
 from postproc.language.rapid.dialect import (
     RAPID_DIALECT,
@@ -26,7 +27,6 @@ from postproc.language.rapid.task import (
     WrittenNumber,
 )
 from postproc.language.visits import Meaning
-from postproc.robot.pose import pose_from_record, record_from_pose
 from postproc.robot.trajectory import Motion
 
 UNUSED = 1e8  # values of external axes from here on (9E9) say that there is none
@@ -48,12 +48,13 @@ class FrameOfMove:
     """A tool or a work object.
 
     Attributes:
-        record: Where it is [mm, deg], empty where that is not known.
+        pose: Where it is, the rows of (4, 4) [m] one after the other; empty where that
+            is not known.
         held: Robhold: the arm holds it.
         why: Why targets with it cannot be compensated, "" where they can.
     """
 
-    record: tuple[float, ...]
+    pose: tuple[float, ...]
     held: bool
     why: str = ""
 
@@ -360,8 +361,9 @@ class Goals:
         return read
 
 
-WORLD = FrameOfMove((0.0,) * 6, False)
-FLANGE = FrameOfMove((0.0,) * 6, True)
+_IDENTITY = (1.0, *(0.0,) * 4, 1.0, *(0.0,) * 4, 1.0, *(0.0,) * 4, 1.0)
+WORLD = FrameOfMove(_IDENTITY, False)
+FLANGE = FrameOfMove(_IDENTITY, True)
 
 
 @dataclass
@@ -534,18 +536,20 @@ def pose_of(found: Nested | None) -> tuple[float, ...]:
     return tuple(_pose_numbers(found) or ())
 
 
-def pose_record(numbers: Sequence[float]) -> tuple[float, ...]:
-    """Convert the seven numbers of a pose to a position record [mm, deg]."""
-    pose = RAPID_DIALECT.poses(np.array([*numbers, 0.0, 0.0, 0.0, 0.0])[None])
-    record: list[float] = record_from_pose(pose)[0].tolist()
-    return tuple(record)
+def pose_of_numbers(numbers: Sequence[float]) -> tuple[float, ...]:
+    """Convert the seven numbers of a pose; see `FrameOfMove.pose`."""
+    return flat(RAPID_DIALECT.poses(np.array([*numbers, 0.0, 0.0, 0.0, 0.0])[None]))
 
 
 def composed(first: Sequence[float], second: Sequence[float]) -> tuple[float, ...]:
-    """Compose two position records."""
-    both = pose_from_record(np.array([first, second]))
-    record: list[float] = record_from_pose((both[0] @ both[1])[None])[0].tolist()
-    return tuple(record)
+    """Compose two poses."""
+    one, other = np.array([first, second]).reshape(2, 4, 4)
+    return flat(one @ other)
+
+
+def flat(pose: Floats) -> tuple[float, ...]:
+    """Write the rows of a pose, (4, 4) [m], one after the other."""
+    return tuple(pose.ravel().tolist())
 
 
 def _tool_of(found: Nested | None) -> FrameOfMove | None:
@@ -555,7 +559,7 @@ def _tool_of(found: Nested | None) -> FrameOfMove | None:
     held, pose = found[0], _pose_numbers(found[1])
     if pose is None or not isinstance(held, WrittenNumber):
         return None
-    return FrameOfMove(pose_record(pose), bool(held.value))
+    return FrameOfMove(pose_of_numbers(pose), bool(held.value))
 
 
 def _wobj_of(found: Nested | None) -> FrameOfMove | None:
@@ -571,5 +575,5 @@ def _wobj_of(found: Nested | None) -> FrameOfMove | None:
         isinstance(fixed, WrittenNumber) and fixed.value
     ):
         why = "its work object is moved by a mechanical unit (ufmec, ufprog)"
-    record = composed(pose_record(user), pose_record(object_))
-    return FrameOfMove(record, bool(held.value), why)
+    pose = composed(pose_of_numbers(user), pose_of_numbers(object_))
+    return FrameOfMove(pose, bool(held.value), why)

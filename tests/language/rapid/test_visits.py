@@ -63,8 +63,10 @@ def test_frames_zone_and_speed_of_a_move():
     v = found.visits
     assert reasons(found) == [""] * 3 and names(found) == ["p1", "p2", "j"]
     assert v.target.tolist() == [Meaning.POSE, Meaning.POSE, Meaning.JOINTS]
-    np.testing.assert_allclose(v.frames[v.tool[0]], [10, 20, 300, 0, 0, 0])
-    np.testing.assert_allclose(v.frames[v.uframe[0], :3], [1000, 100, 500])
+    tool, uframe = v.frames[v.tool[0]], v.frames[v.uframe[0]]
+    np.testing.assert_allclose(tool[:3, :3], np.eye(3))
+    np.testing.assert_allclose(tool[:3, 3], [0.01, 0.02, 0.3])
+    np.testing.assert_allclose(uframe[:3, 3], [1, 0.1, 0.5])
     assert v.fly.tolist() == [True, False, False] and v.zone_mm[0] == 10.0
     np.testing.assert_allclose(v.lin_spd, [0.2, 0.2, 0.005])
     assert origins(found) == [[START], [0], [1]]
@@ -118,7 +120,7 @@ def test_what_is_known_again_is_not(lines):
 def test_a_known_displacement_is_part_of_the_frame():
     found = task("PDispSet [[0,0,7],[1,0,0,0]];", L.format("p1"))
     assert reasons(found) == [""]
-    assert found.visits.frames[found.visits.uframe[0], 2] == pytest.approx(507.0)
+    assert found.visits.frames[found.visits.uframe[0], 2, 3] == pytest.approx(0.507)
 
 
 def test_lines_at_singularities_and_arcs():
