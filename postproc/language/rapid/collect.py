@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 
 from postproc.arrays import Interned, Ints
-from postproc.language.rapid.dialect import RAPID_DIALECT, WIDTH
+from postproc.language.marks import MEASURE
+from postproc.language.rapid.dialect import COMMENTS, RAPID_DIALECT, WIDTH
 from postproc.language.rapid.interpreter import RapidMachine
 from postproc.language.rapid.modes import NO_SHIFT, UNKNOWN_SHIFT
 from postproc.language.rapid.moves import (
@@ -20,6 +21,7 @@ from postproc.language.rapid.moves import (
     pose_of_numbers,
 )
 from postproc.language.rapid.program import RapidFile
+from postproc.language.rapid.task import RapidTask, WrittenNumber
 from postproc.language.visits import (
     Blend,
     Literals,
@@ -41,12 +43,12 @@ _NO_FRAME = -1
 class _Tables:
     """What columns point into."""
 
-    frames: Interned[tuple[float, ...]]
+    frames: Interned[tuple[tuple[float, ...], bool]]
     reasons: Interned[str]
     names: Interned[str]
 
-    def frame(self, pose: tuple[float, ...]) -> int:
-        return self.frames[pose] if pose else _NO_FRAME
+    def frame(self, pose: tuple[float, ...], taught: bool = False) -> int:
+        return self.frames[pose, taught] if pose else _NO_FRAME
 
 
 def visits_of(machine: RapidMachine) -> Visits:
@@ -55,7 +57,7 @@ def visits_of(machine: RapidMachine) -> Visits:
     found = [machine.visits[k] for k in order]
     files = machine.task.files
     tables = _Tables(Interned(), Interned([""]), Interned([""]))
-    literals, literal, follows = _literals(found, files, tables)
+    literals, literal, follows = _literals(found, machine.task)
     reasons = [_reason(v, machine.exhausted) for v in found]
     for k in np.flatnonzero(follows == _NO_LITERAL).tolist():
         reasons[k] = reasons[k] or _ONLY_SHIFTED
@@ -80,14 +82,28 @@ def visits_of(machine: RapidMachine) -> Visits:
         **_frames(found, tables),
         names=tuple(tables.names),
         reasons=tuple(tables.reasons),
-        frames=np.array([*tables.frames], float).reshape(-1, 4, 4),
-        frame_taught=np.zeros(len(tables.frames), dtype=bool),
+        frames=np.array([f for f, _ in tables.frames], float).reshape(-1, 4, 4),
+        frame_taught=np.array([taught for _, taught in tables.frames], bool),
         pred_start=pred_start,
         pred=pred,
-        measure_id=("",) * n,
+        measure_id=tuple(_measured(found, files)),
         literals=literals,
         dialect=RAPID_DIALECT,
     )
+
+
+def _measured(found: Sequence[RapidVisit], files: Sequence[RapidFile]) -> list[str]:
+    """Return the id that a comment gives to every visit, "" where none does."""
+    ids: dict[tuple[int, int], str] = {}
+    for k, file in enumerate(files):
+        rows = np.array([move.row for move in file.moves], np.int64)
+        last = np.array([file.text.source.line_of(file.text.span(row).end)
+                         for row in rows.tolist()], np.int64)  # fmt: skip
+        for line, mark in COMMENTS.marks(file.text.source, MEASURE):
+            at = int(np.searchsorted(last, line))
+            if at < len(rows):
+                ids.setdefault((k, int(rows[at])), mark)
+    return ["" if v.via else ids.get((v.scope.file, v.row), "") for v in found]
 
 
 def _moves(found: Sequence[RapidVisit]) -> dict[str, Any]:
@@ -145,9 +161,10 @@ def _frames(found: Sequence[RapidVisit], tables: _Tables) -> dict[str, Any]:
         key = v.wobj, v.modes.shift
         if key not in placed:
             placed[key] = _displaced(*key)
-        uframe.append(tables.frame(placed[key]))
+        uframe.append(tables.frame(placed[key], v.wobj.taught))
+    tool = [tables.frame(v.tool.pose, v.tool.taught) for v in found]
     return {
-        "tool": slim(np.array([tables.frame(v.tool.pose) for v in found], np.int64)),
+        "tool": slim(np.array(tool, np.int64)),
         "uframe": slim(np.array(uframe, np.int64)),
         "tool_remote": slim(np.array(remote, bool)),
     }
@@ -188,7 +205,7 @@ _NO_LITERAL = -2  # follows numbers that are no literal
 
 
 def _literals(
-    found: Sequence[RapidVisit], files: Sequence[RapidFile], tables: _Tables
+    found: Sequence[RapidVisit], task: RapidTask
 ) -> tuple[Literals, Ints, Ints]:
     """Find the distinct literals; also those of visits, and those they follow."""
     index: dict[tuple[int, int], int] = {}
@@ -211,11 +228,11 @@ def _literals(
             follows[k] = (at if at >= 0 else _NO_LITERAL) if known else -1
         if at >= 0:
             pinned[at] = pinned[at] or v.goal.pins
-    return _places(rows, files, pinned), literal, follows
+    return _places(rows, task, pinned), literal, follows
 
 
 def _places(
-    rows: Sequence[RapidVisit], files: Sequence[RapidFile], pinned: Sequence[str]
+    rows: Sequence[RapidVisit], task: RapidTask, pinned: Sequence[str]
 ) -> Literals:
     """Say where the numbers of literals stand."""
     m = len(rows)
@@ -223,14 +240,16 @@ def _places(
     slots = np.array([v.goal.slots for v in rows], np.int64).reshape(m, WIDTH)
     start, end = np.full((m, WIDTH), -1), np.full((m, WIDTH), -1)
     line = np.zeros(m, dtype=np.int64)
-    for number, one in enumerate(files):
+    for number, one in enumerate(task.files):
         mine = np.flatnonzero(file == number)
         own, written = slots[mine], slots[mine] >= 0
         start[mine] = np.where(written, np.append(one.text.start, -1)[own], -1)
         end[mine] = np.where(written, np.append(one.text.stop, -1)[own], -1)
         starts = one.text.source.line_starts
         line[mine] = np.searchsorted(starts, start[mine, 0], side="right")
-    none = np.zeros(m, dtype=bool)
+    first = [WrittenNumber(0.0, v.goal.file, v.goal.slots[0]) for v in rows]
+    taught = [task.is_taught(v.goal.name, one)
+              for v, one in zip(rows, first, strict=True)]  # fmt: skip
     return Literals(
         file=file,
         line=line,
@@ -238,8 +257,8 @@ def _places(
         end=end,
         joints=np.array([v.goal.target == Meaning.JOINTS for v in rows], bool),
         name=tuple(v.goal.name for v in rows),
-        shared=none,
-        taught=none.copy(),
+        shared=np.zeros(m, dtype=bool),
+        taught=np.array(taught, bool),
         pinned=tuple(pinned),
     )
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cache
 
 import numpy as np
@@ -52,11 +52,13 @@ class FrameOfMove:
             is not known.
         held: Robhold: the arm holds it.
         why: Why targets with it cannot be compensated, "" where they can.
+        taught: It was taught with the arm, and contains its error.
     """
 
     pose: tuple[float, ...]
     held: bool
     why: str = ""
+    taught: bool = False
 
 
 @dataclass(frozen=True)
@@ -358,7 +360,7 @@ class Goals:
         if read is None:
             why = f"{name} {self._untold(name, arguments.scope)}"
             return FrameOfMove((), kind == "tool", why)
-        return read
+        return replace(read, taught=self.task.is_taught(name, found))
 
 
 _IDENTITY = (1.0, *(0.0,) * 4, 1.0, *(0.0,) * 4, 1.0, *(0.0,) * 4, 1.0)

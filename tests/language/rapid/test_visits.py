@@ -316,3 +316,43 @@ ENDMODULE
     visits = read_program({"m.mod": text.encode()}, bench_cell).visits
     assert visits.line.tolist() == [8] and visits.literal.tolist() == [-1]
     assert "known only when the program runs" in visits.reasons[visits.reason[0]]
+
+
+def taught(found):
+    v = found.visits
+    return [bool(v.literals.taught[k]) for k in v.literal.tolist()]
+
+
+LINES = L.format("p1"), L.format("p2"), L.format("list{2}")
+
+
+def test_what_was_taught_is_known_by_the_cell_or_a_comment():
+    assert taught(task(*LINES)) == [False] * 3
+    listed = Start(taught=("P2", "List"))
+    assert taught(task(*LINES, start=listed)) == [False, True, True]
+    marked = DATA.replace(f"[0,1,0,0],{END};", f"[0,1,0,0],{END};  ! TAUGHT in spring")
+    assert taught(task(*LINES, data=marked)) == [False, True, False]
+    inline = L.format(f"[[1,2,3],[1,0,0,0],{END}")
+    assert taught(task(inline, inline + " ! taught", L.format("p1"))) == [0, 1, 0]
+
+
+def test_frames_that_were_taught():
+    def frames(found):
+        v = found.visits
+        return bool(v.frame_taught[v.tool[0]]), bool(v.frame_taught[v.uframe[0]])
+
+    assert frames(task(L.format("p1"))) == (False, False)
+    named = Start(taught=frozenset({"w"}))
+    assert frames(task(L.format("p1"), start=named)) == (False, True)
+    lines = DATA.splitlines()
+    lines[1] += " ! TAUGHT"
+    assert frames(task(L.format("p1"), data="\n".join(lines))) == (True, False)
+
+
+def test_measured_moves_carry_their_ids():
+    arc = f"MoveC p2,[[7,8,9],[1,0,0,0],{END},v200,fine,t\\WObj:=w;"
+    found = task(
+        "! MEASURE h1", L.format("p1"), L.format("p2"),
+        L.format("p1") + " ! MEASURE h2", "! MEASURE h3", "x:=1;", arc, "! MEASURE h4",
+    )  # fmt: skip
+    assert found.visits.measure_id == ("h1", "", "h2", "", "h3")
