@@ -91,6 +91,8 @@ def run(command, place, name):
         case "compensate --clone":
             shared = place.put(name, shared_point(place, name))
             return place.compensate(shared, "-o", to, "--clone")
+        case "compensate --path-mm":
+            return place.compensate(given, "-o", to, "--path-mm", "0.1")
         case "compensate --lsv":
             values = place.put("v.lsv", "--$$\r\n")
             return place.compensate(given, "-o", to, "--lsv", values)
@@ -123,8 +125,8 @@ def test_a_cell_of_the_table(place, command, language, said):
     if said == "yes":
         assert found.exit_code in (0, 1), found.output
     else:
-        refused = 1 if command == "compensate --clone" else 2
-        assert found.exit_code == refused
+        left = command in ("compensate --clone", "compensate --path-mm")
+        assert found.exit_code == (1 if left else 2)
         assert said in re.sub(r"\s+", " ", found.stderr)
 
 
