@@ -9,6 +9,7 @@ from functools import cache
 
 import numpy as np
 
+from postproc.language.machine import Scope
 from postproc.language.rapid import syntax as said
 from postproc.language.rapid.dialect import (
     RAPID_DIALECT,
@@ -22,7 +23,6 @@ from postproc.language.rapid.task import (
     SHIFTS,
     Nested,
     RapidTask,
-    Scope,
     WrittenNumber,
 )
 from postproc.language.visits import Meaning

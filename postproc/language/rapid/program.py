@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from postproc.language.flow import HeadedRows
 from postproc.language.rapid.signatures import MOTIONS, Signature, known_instructions
 from postproc.language.rapid.statements import RapidText, read_statements
 from postproc.language.rapid.syntax import (
@@ -27,23 +28,6 @@ from postproc.language.rapid.syntax import (
 )
 from postproc.language.source import Source
 from postproc.language.visits import Diagnostic
-
-SHOWN = 60  # characters of a statement in a message
-
-
-@dataclass(frozen=True)
-class RapidScope:
-    """A module or a routine: the statements from its head to its end.
-
-    Attributes:
-        head: What it begins with.
-        first, last: Rows of its head and of its end; of the file's last statement
-            where no end is.
-    """
-
-    head: ModuleHead | RoutineHead
-    first: int
-    last: int
 
 
 @dataclass(frozen=True)
@@ -98,8 +82,8 @@ class RapidFile:
     """
 
     text: RapidText
-    modules: tuple[RapidScope, ...]
-    routines: tuple[RapidScope, ...]
+    modules: tuple[HeadedRows, ...]
+    routines: tuple[HeadedRows, ...]
     data: tuple[Datum, ...]
     moves: tuple[MotionCall, ...]
     diagnostics: tuple[Diagnostic, ...]
@@ -163,8 +147,8 @@ class _Outline:
     """Modules, routines, records and blocks of a file, as they are met."""
 
     text: RapidText
-    modules: list[RapidScope] = field(default_factory=list)
-    routines: list[RapidScope] = field(default_factory=list)
+    modules: list[HeadedRows] = field(default_factory=list)
+    routines: list[HeadedRows] = field(default_factory=list)
     data: list[Datum] = field(default_factory=list)
     diagnostics: list[Diagnostic] = field(default_factory=list)
     _open: list[tuple[str, int, RapidStatement]] = field(default_factory=list)
@@ -240,13 +224,13 @@ class _Outline:
     def _closed(self, block: tuple[str, int, RapidStatement], row: int) -> None:
         _, begun, said = block
         if isinstance(said, ModuleHead):
-            self.modules.append(RapidScope(said, begun, row))
+            self.modules.append(HeadedRows(said, begun, row))
         elif isinstance(said, RoutineHead):
-            self.routines.append(RapidScope(said, begun, row))
+            self.routines.append(HeadedRows(said, begun, row))
 
     def _complain(self, row: int, what: str) -> None:
-        message = f"{shown(self.text, row)} {what}"
-        self.diagnostics.append(_diagnostic(self.text, row, "open-block", message))
+        message = f"{self.text.shown(row)} {what}"
+        self.diagnostics.append(self.text.diagnostic(row, "open-block", message))
 
 
 def _last_scope(kinds: Sequence[str]) -> int:
@@ -299,15 +283,5 @@ class _Calls:
             self._complain(row, "unknown-instruction", what)
 
     def _complain(self, row: int, code: str, what: str) -> None:
-        message = f"{shown(self.text, row)} {what}"
-        self.diagnostics.append(_diagnostic(self.text, row, code, message))
-
-
-def shown(text: RapidText, row: int) -> str:
-    """Quote the beginning of a statement, on one line."""
-    words = " ".join(text.text(row).split())
-    return words if len(words) <= SHOWN else f"{words[:SHOWN]} .."
-
-
-def _diagnostic(text: RapidText, row: int, code: str, message: str) -> Diagnostic:
-    return Diagnostic(text.source.name, text.line(row), code, message)
+        message = f"{self.text.shown(row)} {what}"
+        self.diagnostics.append(self.text.diagnostic(row, code, message))

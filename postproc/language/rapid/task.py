@@ -7,32 +7,16 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
+from postproc.language.flow import HeadedRows
+from postproc.language.machine import Scope
 from postproc.language.rapid import syntax as said
-from postproc.language.rapid.program import Datum, RapidFile, RapidScope
+from postproc.language.rapid.program import Datum, RapidFile
 from postproc.language.rapid.signatures import BUILT_IN_FUNCTIONS, MOTIONS, READING
 from postproc.language.rapid.targets import operands_of
 
 TARGETS = ("robtarget", "jointtarget")
 SHIFTS = ("offs", "reltool")  # functions whose first argument is a target
 CONSTANTS = {"true": 1.0, "false": 0.0, "pi": 3.141592653589793}
-
-
-@dataclass(frozen=True)
-class Scope:
-    """Where a statement stands, and what loop variables hold there.
-
-    Attributes:
-        file: Index of its file.
-        module, routine: Names, "" outside of all.
-        parameters: Of the routine.
-        loops: Values of loop variables that are known.
-    """
-
-    file: int
-    module: str
-    routine: str
-    parameters: frozenset[str] = frozenset()
-    loops: tuple[tuple[str, float], ...] = ()
 
 
 @dataclass(frozen=True)
@@ -75,9 +59,9 @@ class RapidTask:
                     known.append((number, datum))
 
     @cached_property
-    def routines(self) -> Mapping[str, list[tuple[int, str, RapidScope]]]:
+    def routines(self) -> Mapping[str, list[tuple[int, str, HeadedRows]]]:
         """Routines by name: file, module and place of each."""
-        found: dict[str, list[tuple[int, str, RapidScope]]] = defaultdict(list)
+        found: dict[str, list[tuple[int, str, HeadedRows]]] = defaultdict(list)
         for number, file in enumerate(self.files):
             for scope in file.routines:
                 around = (m for m in file.modules if m.first < scope.first < m.last)
@@ -85,7 +69,7 @@ class RapidTask:
                 found[scope.head.name].append((number, module, scope))
         return found
 
-    def routine(self, name: str, here: Scope) -> tuple[int, str, RapidScope] | None:
+    def routine(self, name: str, here: Scope) -> tuple[int, str, HeadedRows] | None:
         """Find the routine that a name means, None where it is not sure."""
         known = self.routines.get(name, [])
         own = [one for one in known if one[:2] == (here.file, here.module)]
@@ -139,7 +123,7 @@ class RapidTask:
                 _note_uses(statement, written, read)
         return frozenset(written), frozenset(read)
 
-    def scope_of(self, number: int, module: str, routine: RapidScope) -> Scope:
+    def scope_of(self, number: int, module: str, routine: HeadedRows) -> Scope:
         """Return where the statements of a routine stand."""
         head = routine.head
         given = frozenset(getattr(head, "parameters", ()))
