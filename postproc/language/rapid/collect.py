@@ -2,14 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any
-
-import numpy as np
-
-from postproc.arrays import Interned, Ints
-from postproc.language.rapid.dialect import RAPID_DIALECT, WIDTH
+from postproc.language import collect
+from postproc.language.collect import Conditions, Record
+from postproc.language.rapid.dialect import RAPID_DIALECT
 from postproc.language.rapid.interpreter import RapidMachine
 from postproc.language.rapid.modes import NO_SHIFT, UNKNOWN_SHIFT
 from postproc.language.rapid.moves import (
@@ -18,136 +13,41 @@ from postproc.language.rapid.moves import (
     composed,
     pose_record,
 )
-from postproc.language.rapid.program import RapidFile
-from postproc.language.visits import (
-    Blend,
-    Literals,
-    Meaning,
-    Visits,
-    ZoneRule,
-    slim,
-)
+from postproc.language.visits import Meaning, Visits
 from postproc.robot.trajectory import Motion
 
-TOO_COMPLEX = "the program is too complex to be followed"
-_ONLY_SHIFTED = "it is shifted from a point that no move goes to: what to correct?"
 _SHIFT = "the program displacement (PDispOn, PDispSet) is not known here"
-_NO_FRAME = -1
-
-
-@dataclass
-class _Tables:
-    """What columns point into."""
-
-    frames: Interned[tuple[float, ...]]
-    reasons: Interned[str]
-    names: Interned[str]
-
-    def frame(self, record: tuple[float, ...]) -> int:
-        return self.frames[record] if record else _NO_FRAME
 
 
 def visits_of(machine: RapidMachine) -> Visits:
     """Put the arrivals into the order of the program, as columns."""
-    order = sorted(range(len(machine.visits)), key=machine.order.__getitem__)
-    found = [machine.visits[k] for k in order]
-    files = machine.task.files
-    tables = _Tables(Interned(), Interned([""]), Interned([""]))
-    literals, literal, follows = _literals(found, files, tables)
-    reasons = [_reason(v, machine.exhausted) for v in found]
-    for k in np.flatnonzero(follows == _NO_LITERAL).tolist():
-        reasons[k] = reasons[k] or _ONLY_SHIFTED
-    follows[follows == _NO_LITERAL] = -1
-    pred_start, pred = _predecessors(machine, order)
-    base = tables.frame(tuple(map(float, machine.start.base or ())))
-    n = len(found)
-    return Visits(
-        files=tuple(file.text.source.name for file in files),
-        file=slim(np.array([v.scope.file for v in found], np.int64)),
-        line=np.array([files[v.scope.file].text.line(v.row) for v in found], np.int64),
-        values=np.array([v.goal.values for v in found], float).reshape(n, WIDTH),
-        aux=_aux(found),
-        literal=literal,
-        follows=slim(follows),
-        name=slim(np.array(tables.names.of([v.goal.name for v in found]), np.int64)),
-        base=slim(np.full(n, base)),
-        reason=slim(np.array(tables.reasons.of(reasons), np.int64)),
-        **_moves(found),
-        **_settings(found),
-        **_frames(found, tables),
-        names=tuple(tables.names),
-        reasons=tuple(tables.reasons),
-        frames=np.array([*tables.frames], float).reshape(-1, 6),
-        frame_taught=np.zeros(len(tables.frames), dtype=bool),
-        pred_start=pred_start,
-        pred=pred,
-        measure_id=("",) * n,
-        literals=literals,
-        dialect=RAPID_DIALECT,
-    )
+    base = tuple(map(float, machine.start.base or ()))
+    placed: dict[tuple[FrameOfMove, Record], Record] = {}
 
-
-def _moves(found: Sequence[RapidVisit]) -> dict[str, Any]:
-    """Columns of how the arm moves."""
-    n = len(found)
-    zone = np.array([v.zone_mm for v in found], float)
-    via = np.array([v.via for v in found], bool)
-    fly = (zone >= 0.0) | via  # nothing stops at the point of an arc
-    pose = np.array([v.goal.target == Meaning.POSE for v in found], bool)
-    return {
-        "motion": slim(np.array([v.motion for v in found], np.int64)),
-        "target": slim(np.array([v.goal.target for v in found], np.int64)),
-        "via": slim(via),
-        "distance_mm": slim(np.full(n, np.nan)),
-        "config": slim(np.zeros(n, dtype=np.int64)),
-        "configs": ("",),
-        "config_given": slim(pose),
-        "fly": slim(fly),
-        "zone_mm": slim(np.where(zone >= 0.0, zone, np.nan)),
-        "overlap_percent": slim(np.full(n, 100.0)),
-        "blend": slim(np.where(fly, Blend.ZONE, Blend.UNSET)),
-        "zone_rule": slim(np.where(fly, ZoneRule.FROM, ZoneRule.UNSET)),
-        "lin_spd": slim(np.array([v.speed for v in found], float)),
-        "rot_spd": slim(np.full(n, np.nan)),
-    }
-
-
-def _settings(found: Sequence[RapidVisit]) -> dict[str, Any]:
-    """Columns of what holds at moves."""
-    joint = [v.motion == Motion.JOINT for v in found]
-    check = [
-        v.modes.confj if v.motion == Motion.JOINT else v.modes.confl for v in found
-    ]
-    law = [
-        v.modes.arc_law if v.motion == Motion.CIRCULAR else v.modes.law for v in found
-    ]
-    share = np.array([v.modes.override for v in found], float)
-    wrist = np.array([bool(v.modes.wrist) for v in found], bool)
-    care = np.repeat(np.array(check, np.int64)[:, None], 3, axis=1)
-    return {
-        "nearest_turn": slim(np.zeros(len(found), dtype=bool)),
-        "care": care.reshape(-1, 3),
-        "override": slim(np.where(share > 0.0, share, 1.0)),
-        "wrist_joint": slim(wrist & ~np.array(joint, bool)),
-        "orientation_law": slim(np.array(law, np.int64)),
-    }
-
-
-def _frames(found: Sequence[RapidVisit], tables: _Tables) -> dict[str, Any]:
-    """Columns of tools and work objects."""
-    remote = [not v.tool.held or v.wobj.held for v in found]
-    placed: dict[tuple[FrameOfMove, tuple[float, ...]], tuple[float, ...]] = {}
-    uframe = []
-    for v in found:
+    def conditions(v: RapidVisit) -> Conditions:
         key = v.wobj, v.modes.shift
         if key not in placed:
             placed[key] = _displaced(*key)
-        uframe.append(tables.frame(placed[key]))
-    return {
-        "tool": slim(np.array([tables.frame(v.tool.record) for v in found], np.int64)),
-        "uframe": slim(np.array(uframe, np.int64)),
-        "tool_remote": slim(np.array(remote, bool)),
-    }
+        return _conditions(v, base, placed[key])
+
+    return collect.visits_of(machine, RAPID_DIALECT, conditions)
+
+
+def _conditions(v: RapidVisit, base: Record, uframe: Record) -> Conditions:
+    """Say what an arrival is carried out with."""
+    joint = v.motion == Motion.JOINT
+    return Conditions(
+        tool=v.tool.record,
+        base=base,
+        uframe=uframe,
+        remote=not v.tool.held or v.wobj.held,
+        reasons=_reasons(v),
+        flags=v.modes.confj if joint else v.modes.confl,
+        flagged=v.goal.target == Meaning.POSE,
+        law=v.modes.arc_law if v.motion == Motion.CIRCULAR else v.modes.law,
+        wrist=bool(v.modes.wrist) and not joint,
+        override=v.modes.override,
+    )
 
 
 def _displaced(wobj: FrameOfMove, shift: tuple[float, ...]) -> tuple[float, ...]:
@@ -159,94 +59,10 @@ def _displaced(wobj: FrameOfMove, shift: tuple[float, ...]) -> tuple[float, ...]
     return composed(wobj.record, pose_record(shift))
 
 
-def _reason(v: RapidVisit, exhausted: bool) -> str:
-    """Say why a visit cannot be compensated, "" where it can."""
-    if exhausted:
-        return TOO_COMPLEX
+def _reasons(v: RapidVisit) -> tuple[str, ...]:
+    """Say why a visit cannot be compensated."""
     given = (*sorted(v.modes.blocked), v.why, v.goal.why, v.tool.why)
-    placed = v.goal.target != Meaning.JOINTS
-    if placed:
-        given += (v.wobj.why,)
-        if v.modes.shift == UNKNOWN_SHIFT:
-            given += (_SHIFT,)
-    return next((why for why in given if why), "")
-
-
-def _aux(found: Sequence[RapidVisit]) -> np.ndarray:
-    """External axes that have a value, (n, k): up to the last that is used."""
-    aux = np.array([v.goal.aux for v in found], float).reshape(len(found), 6)
-    used = np.flatnonzero(~np.isnan(aux).all(axis=0))
-    return aux[:, : int(used.max(initial=-1)) + 1]
-
-
-# Where the numbers stand.
-
-_NO_LITERAL = -2  # follows numbers that are no literal
-
-
-def _literals(
-    found: Sequence[RapidVisit], files: Sequence[RapidFile], tables: _Tables
-) -> tuple[Literals, Ints, Ints]:
-    """Find the distinct literals; also those of visits, and those they follow."""
-    index: dict[tuple[int, int], int] = {}
-    rows: list[RapidVisit] = []
-    literal = np.full(len(found), -1, dtype=np.int64)
-    for k, v in enumerate(found):
-        key = v.goal.file, v.goal.slots[0]
-        if key[1] >= 0:
-            if key not in index:
-                index[key] = len(rows)
-                rows.append(v)
-            literal[k] = index[key]
-    follows = np.full(len(found), -1, dtype=np.int64)
-    pinned = [""] * len(rows)
-    for k, v in enumerate(found):
-        key = v.goal.file, max(v.goal.slots[0], v.goal.follows[0])
-        at = index.get(key, -1)
-        if v.goal.slots[0] < 0 <= v.goal.follows[0]:
-            known = v.goal.target == Meaning.POSE
-            follows[k] = (at if at >= 0 else _NO_LITERAL) if known else -1
-        if at >= 0:
-            pinned[at] = pinned[at] or v.goal.pins
-    return _places(rows, files, pinned), literal, follows
-
-
-def _places(
-    rows: Sequence[RapidVisit], files: Sequence[RapidFile], pinned: Sequence[str]
-) -> Literals:
-    """Say where the numbers of literals stand."""
-    m = len(rows)
-    file = np.array([v.goal.file for v in rows], np.int64)
-    slots = np.array([v.goal.slots for v in rows], np.int64).reshape(m, WIDTH)
-    start, end = np.full((m, WIDTH), -1), np.full((m, WIDTH), -1)
-    line = np.zeros(m, dtype=np.int64)
-    for number, one in enumerate(files):
-        mine = np.flatnonzero(file == number)
-        own, written = slots[mine], slots[mine] >= 0
-        start[mine] = np.where(written, np.append(one.text.start, -1)[own], -1)
-        end[mine] = np.where(written, np.append(one.text.stop, -1)[own], -1)
-        starts = one.text.source.line_starts
-        line[mine] = np.searchsorted(starts, start[mine, 0], side="right")
-    none = np.zeros(m, dtype=bool)
-    return Literals(
-        file=file,
-        line=line,
-        start=start,
-        end=end,
-        joints=np.array([v.goal.target == Meaning.JOINTS for v in rows], bool),
-        name=tuple(v.goal.name for v in rows),
-        shared=none,
-        taught=none.copy(),
-        pinned=tuple(pinned),
-    )
-
-
-def _predecessors(machine: RapidMachine, order: Sequence[int]) -> tuple[Ints, Ints]:
-    """Translate origins to visits in program order, in CSR form."""
-    place = {number: k for k, number in enumerate(order)}
-    found = [
-        sorted(place[p] if p >= 0 else p for p in machine.visits[k].origins)
-        for k in order
-    ]
-    start = np.concatenate([[0], np.cumsum([len(f) for f in found])]).astype(np.int64)
-    return start, np.array([p for f in found for p in f], dtype=np.int64)
+    if v.goal.target == Meaning.JOINTS:
+        return given
+    unknown = v.modes.shift == UNKNOWN_SHIFT
+    return (*given, v.wobj.why, _SHIFT if unknown else "")

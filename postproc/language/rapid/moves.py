@@ -9,6 +9,7 @@ from functools import cache
 
 import numpy as np
 
+from postproc.language.collect import FoundGoal, FoundVisit
 from postproc.language.machine import Scope
 from postproc.language.rapid import syntax as said
 from postproc.language.rapid.dialect import (
@@ -58,61 +59,16 @@ class FrameOfMove:
     why: str = ""
 
 
-@dataclass(frozen=True)
-class RapidGoal:
-    """Where a move goes.
-
-    Attributes:
-        target: What the numbers mean.
-        values: w numbers, NaN where not known.
-        file: Index of the file that holds them.
-        slots: Which numbers of that file they are, -1 for those that are computed.
-        follows: Likewise of the point that it is shifted from.
-        name: Of the point, "" where it is written in the move.
-        aux: External axes, NaN where there is none.
-        why: Why it cannot be compensated, "" where it can.
-        pins: Why the numbers must stay, "" where they need not.
-    """
-
-    target: Meaning
-    values: tuple[float, ...] = NOTHING
-    file: int = -1
-    slots: tuple[int, ...] = NO_SLOTS
-    follows: tuple[int, ...] = NO_SLOTS
-    name: str = ""
-    aux: tuple[float, ...] = (np.nan,) * 6
-    why: str = ""
-    pins: str = ""
-
-
 @dataclass
-class RapidVisit:
+class RapidVisit(FoundVisit):
     """One arrival, as it is found.
 
     Attributes:
-        scope, row: The move.
-        motion, via: `Motion`, and whether it is the point of an arc.
-        goal: Where it goes.
         tool, wobj: Its frames.
-        zone_mm: Size of its zone, NaN where it stops.
-        speed: Along the path [m/s], NaN where not known.
-        modes: What holds there.
-        origins: Where it may come from.
-        why: Why it cannot be compensated, "" where it can.
     """
 
-    scope: Scope
-    row: int
-    motion: Motion
-    via: bool
-    goal: RapidGoal
-    tool: FrameOfMove
-    wobj: FrameOfMove
-    zone_mm: float
-    speed: float
-    modes: Modes
-    origins: frozenset[int] = frozenset()
-    why: str = ""
+    tool: FrameOfMove = field(kw_only=True)
+    wobj: FrameOfMove = field(kw_only=True)
 
 
 @dataclass
@@ -147,14 +103,16 @@ class Goals:
         if signature.via >= 0:
             goal = self.goal(ends[1], signature, row, scope)
             yield RapidVisit(
-                scope, row, motion, True, goal, tool, wobj, zone, speed, modes, why=why
-            )
+                scope, row, motion, True, goal, zone, speed, modes, why=why,
+                tool=tool, wobj=wobj,
+            )  # fmt: skip
         goal = self.goal(ends[0], signature, row, scope)
         if not signature.reaches:
-            goal = RapidGoal(Meaning.UNKNOWN, NOTHING, why=why, name=goal.name)
+            goal = FoundGoal(Meaning.UNKNOWN, NOTHING, why=why, name=goal.name)
         yield RapidVisit(
-            scope, row, motion, False, goal, tool, wobj, zone, speed, modes, why=why
-        )
+            scope, row, motion, False, goal, zone, speed, modes, why=why,
+            tool=tool, wobj=wobj,
+        )  # fmt: skip
 
     def _conditions(
         self,
@@ -188,7 +146,7 @@ class Goals:
         signature: Signature,
         row: int,
         scope: Scope,
-    ) -> RapidGoal:
+    ) -> FoundGoal:
         """Read a destination."""
         match operand:
             case said.Composite() | said.DataObject():
@@ -198,7 +156,7 @@ class Goals:
             ):
                 return self._shifted(name, arguments, row, scope)
             case _:
-                return RapidGoal(Meaning.UNKNOWN, why=RUN_TIME)
+                return FoundGoal(Meaning.UNKNOWN, NOTHING, why=RUN_TIME)
 
     def _point(
         self,
@@ -206,7 +164,7 @@ class Goals:
         joints: bool,
         row: int,
         scope: Scope,
-    ) -> RapidGoal:
+    ) -> FoundGoal:
         """Read a point that is written or named."""
         name = operand.name if isinstance(operand, said.DataObject) else ""
         if isinstance(operand, said.Composite):
@@ -216,14 +174,14 @@ class Goals:
         found = _numbers(self.task.record(operand, row, scope), joints)
         if found is None:
             why = f"{name} {self._untold(name, scope)}" if name else RUN_TIME
-            return RapidGoal(Meaning.UNKNOWN, name=name, why=why)
+            return FoundGoal(Meaning.UNKNOWN, NOTHING, name=name, why=why)
         shown = name + self._element(operand, row, scope)
         main, aux = found
         file, slots = _places(main)
         values = [number.value for number in main]
         values += [0.0] * (WIDTH - len(values))
         why = "" if joints or _is_unit(values[3:7]) else "no quaternion"
-        return RapidGoal(
+        return FoundGoal(
             Meaning.JOINTS if joints else Meaning.POSE,
             tuple(values),
             file,
@@ -236,7 +194,7 @@ class Goals:
 
     def _written(
         self, operand: said.Composite, joints: bool, row: int, scope: Scope
-    ) -> RapidGoal | None:
+    ) -> FoundGoal | None:
         """Read a point whose numbers all stand in the move, None for others."""
         if id(operand) not in self._slots:
             self._slots[id(operand)] = operand, _plain_slots(operand)
@@ -254,7 +212,7 @@ class Goals:
         aux = tuple(np.nan if abs(v) > UNUSED else v for v in values[count:])
         at = tuple(places[:count] + [-1] * (WIDTH - count))
         target = Meaning.JOINTS if joints else Meaning.POSE
-        return RapidGoal(target, tuple(main), scope.file, at, aux=aux)
+        return FoundGoal(target, tuple(main), scope.file, at, aux=aux)
 
     def _element(self, operand: said.Operand, row: int, scope: Scope) -> str:
         """Spell which element of an array is meant, "" where it is none."""
@@ -294,14 +252,14 @@ class Goals:
 
     def _shifted(
         self, name: str, arguments: Sequence[said.Argument], row: int, scope: Scope
-    ) -> RapidGoal:
+    ) -> FoundGoal:
         """Read Offs and RelTool: the point is moved along, the shift stays."""
         placed = [one.value for one in arguments if not one.name]
         turns = {one.name: one.value for one in arguments if one.name}
         if len(placed) != 4 or not isinstance(
             placed[0], said.DataObject | said.Composite
         ):
-            return RapidGoal(Meaning.UNKNOWN, why=RUN_TIME)
+            return FoundGoal(Meaning.UNKNOWN, NOTHING, why=RUN_TIME)
         base = self._point(placed[0], False, row, scope)
         shift = [self.task.number(one, row, scope) for one in placed[1:]]
         angles = [
@@ -310,12 +268,12 @@ class Goals:
         ]
         if base.target != Meaning.POSE or np.isnan([*shift, *angles]).any():
             pins = base.pins or f"{name} shifts it by what {RUN_TIME}"
-            return RapidGoal(Meaning.UNKNOWN, name=base.name, why=base.why or RUN_TIME,
+            return FoundGoal(Meaning.UNKNOWN, NOTHING, name=base.name, why=base.why or RUN_TIME,
                         file=base.file, follows=base.slots, pins=pins)  # fmt: skip
         values = _moved(np.array(base.values), name, shift, angles)
         turned = any(angles)
         pins = base.pins or (f"{name} turns it" if turned else "")
-        return RapidGoal(
+        return FoundGoal(
             Meaning.POSE, values, base.file, NO_SLOTS, base.slots, base.name, base.aux,
             base.why, pins,
         )  # fmt: skip
