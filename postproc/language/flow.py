@@ -50,13 +50,15 @@ class HeadedRows:
 
     Attributes:
         head: What it begins with; it has a name.
-        first, last: Rows of its head and of its end; of the file's last statement
-            where no end is.
+        first, last: Rows of its head and of its end; of the last statement that
+            can be its own where no end is.
+        ended: It has its end.
     """
 
     head: Any
     first: int
     last: int
+    ended: bool = True
 
 
 def _nothing(one: said.SourceStatement) -> bool:

@@ -268,8 +268,10 @@ class Goals:
         ]
         if base.target != Meaning.POSE or np.isnan([*shift, *angles]).any():
             pins = base.pins or f"{name} shifts it by what {RUN_TIME}"
-            return FoundGoal(Meaning.UNKNOWN, NOTHING, name=base.name, why=base.why or RUN_TIME,
-                        file=base.file, follows=base.slots, pins=pins)  # fmt: skip
+            return FoundGoal(
+                Meaning.UNKNOWN, NOTHING, base.file, follows=base.slots,
+                name=base.name, why=base.why or RUN_TIME, pins=pins,
+            )  # fmt: skip
         values = _moved(np.array(base.values), name, shift, angles)
         turned = any(angles)
         pins = base.pins or (f"{name} turns it" if turned else "")
