@@ -306,6 +306,7 @@ def _reason(exc: OSError) -> str:
 
 _PROGRAM, _VARIABLES, _COMPILED = ".pdl", ".lsv", (".cod", ".var")
 MODULES = (".mod", ".modx", ".prg", ".sys", ".sysx")  # programs that hold their values
+KRL_PROGRAMS, KRL_DATA = (".src",), ".dat"  # sources, and the lists of their data
 LARGEST = 500_000_000  # bytes of a program or variable file; a longer one is neither
 
 _TARGETS = re.compile(

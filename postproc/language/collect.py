@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -46,6 +46,7 @@ class FoundGoal:
         aux: External axes, NaN where there is none.
         why: Why it cannot be compensated, "" where it can.
         pins: Why the numbers must stay, "" where they need not.
+        shared: Other programs may read it too.
     """
 
     target: Meaning
@@ -57,6 +58,7 @@ class FoundGoal:
     aux: tuple[float, ...] = (math.nan,) * 6
     why: str = ""
     pins: str = ""
+    shared: bool = False
 
 
 @dataclass
@@ -67,8 +69,6 @@ class FoundVisit:
         scope, row: The move.
         motion, via: `Motion`, and whether it is the point of an arc.
         goal: Where it goes.
-        zone_mm: Size of its zone, NaN where it stops.
-        speed: Along the path [m/s], NaN where not known.
         modes: What holds there.
         origins: Where it may come from.
         why: Why it cannot be compensated, "" where it can.
@@ -79,8 +79,6 @@ class FoundVisit:
     motion: Motion
     via: bool
     goal: FoundGoal
-    zone_mm: float
-    speed: float
     modes: Any
     origins: frozenset[int] = frozenset()
     why: str = ""
@@ -97,6 +95,8 @@ class Conditions:
         flags: Whether its configuration flags are checked.
         flagged: It has such flags.
         law: How the tool turns on the way.
+        zone_mm: Size of its zone, NaN where it stops.
+        speed: Along the path [m/s], NaN where not known.
         wrist: On a line the wrist turns joint by joint.
         override: Share of the programmed speed, 0 or NaN where not known.
         overlap: Of moves that begin before the last has ended [%], NaN for a zone.
@@ -110,6 +110,8 @@ class Conditions:
     flags: Switch
     flagged: bool
     law: OrientationLaw
+    zone_mm: float
+    speed: float
     wrist: bool = False
     override: float = 1.0
     overlap: float = math.nan
@@ -148,7 +150,9 @@ def visits_of(
     held = [conditions(v) for v in found]
     texts, n = machine.texts, len(found)
     tables = _Tables(Interned(), Interned([""]), Interned([""]))
-    literals, literal, follows = _literals(found, texts, dialect.width)
+    literals, literal, follows = _literals(
+        found, texts, dialect.width, machine.start.taught
+    )
     reasons = [_reason(c, machine.exhausted) for c in held]
     for k in np.flatnonzero(follows == _NO_LITERAL).tolist():
         reasons[k] = reasons[k] or ONLY_SHIFTED
@@ -193,7 +197,7 @@ def _reason(held: Conditions, exhausted: bool) -> str:
 def _moves(found: Sequence[FoundVisit], held: Sequence[Conditions]) -> dict[str, Any]:
     """Columns of how the arm moves."""
     n = len(found)
-    zone = np.array([v.zone_mm for v in found], float)
+    zone = np.array([c.zone_mm for c in held], float)
     via = np.array([v.via for v in found], bool)
     overlap = np.array([c.overlap for c in held], float)
     overlaps = overlap >= 0.0
@@ -212,7 +216,7 @@ def _moves(found: Sequence[FoundVisit], held: Sequence[Conditions]) -> dict[str,
         "overlap_percent": slim(np.where(overlaps, overlap, 100.0)),
         "blend": slim(np.where(fly, rounded, Blend.UNSET)),
         "zone_rule": slim(np.where(fly & ~overlaps, ZoneRule.FROM, ZoneRule.UNSET)),
-        "lin_spd": slim(np.array([v.speed for v in found], float)),
+        "lin_spd": slim(np.array([c.speed for c in held], float)),
         "rot_spd": slim(np.full(n, np.nan)),
     }
 
@@ -244,7 +248,10 @@ _NO_LITERAL = -2  # follows numbers that are no literal
 
 
 def _literals(
-    found: Sequence[FoundVisit], texts: Sequence[StatementText[Any]], width: int
+    found: Sequence[FoundVisit],
+    texts: Sequence[StatementText[Any]],
+    width: int,
+    taught: Collection[str],
 ) -> tuple[Literals, Ints, Ints]:
     """Find the distinct literals; also those of visits, and those they follow."""
     index: dict[tuple[int, int], int] = {}
@@ -267,7 +274,7 @@ def _literals(
             follows[k] = (at if at >= 0 else _NO_LITERAL) if known else -1
         if at >= 0:
             pinned[at] = pinned[at] or v.goal.pins
-    return _places(rows, texts, pinned, width), literal, follows
+    return _places(rows, texts, pinned, width, taught), literal, follows
 
 
 def _places(
@@ -275,6 +282,7 @@ def _places(
     texts: Sequence[StatementText[Any]],
     pinned: Sequence[str],
     width: int,
+    taught: Collection[str],
 ) -> Literals:
     """Say where the numbers of literals stand."""
     m = len(rows)
@@ -289,7 +297,6 @@ def _places(
         end[mine] = np.where(written, np.append(one.stop, -1)[own], -1)
         starts = one.source.line_starts
         line[mine] = np.searchsorted(starts, start[mine, 0], side="right")
-    none = np.zeros(m, dtype=bool)
     return Literals(
         file=file,
         line=line,
@@ -297,8 +304,8 @@ def _places(
         end=end,
         joints=np.array([v.goal.target == Meaning.JOINTS for v in rows], bool),
         name=tuple(v.goal.name for v in rows),
-        shared=none,
-        taught=none.copy(),
+        shared=np.array([v.goal.shared for v in rows], bool),
+        taught=np.array([v.goal.name.lower() in taught for v in rows], bool),
         pinned=tuple(pinned),
     )
 

@@ -45,6 +45,8 @@ def _conditions(v: RapidVisit, base: Record, uframe: Record) -> Conditions:
         flags=v.modes.confj if joint else v.modes.confl,
         flagged=v.goal.target == Meaning.POSE,
         law=v.modes.arc_law if v.motion == Motion.CIRCULAR else v.modes.law,
+        zone_mm=v.zone_mm,
+        speed=v.speed,
         wrist=bool(v.modes.wrist) and not joint,
         override=v.modes.override,
     )

@@ -14,7 +14,7 @@ from postproc.language.interface import (
     Cloner,
     JobReading,
     Language,
-    NamedPoint,
+    NoClones,
     Start,
 )
 from postproc.language.rapid.collect import visits_of
@@ -24,8 +24,8 @@ from postproc.language.rapid.program import RapidFile, read_rapid
 from postproc.language.rapid.statements import RapidText
 from postproc.language.rapid.task import RapidTask
 from postproc.language.rewrite import Skeleton
-from postproc.language.source import CloneError, Edit, Source
-from postproc.language.visits import Literals, never_reached
+from postproc.language.source import Source
+from postproc.language.visits import never_reached
 
 # What the interpreter says of a statement where it is reached, knowing all modules.
 _SAID_AGAIN = ("unknown-instruction", "late-binding")
@@ -74,7 +74,7 @@ class Rapid(Language):
 
     def cloner(self, sources: Sequence[Source]) -> Cloner:
         """Say that nothing is cloned."""
-        return NoClones()
+        return NoClones(_NOT_CLONED)
 
     def target_names(
         self, file: str, lines: Sequence[bytes], wanted: Sequence[int]
@@ -113,24 +113,6 @@ def _begun(line: bytes) -> str:
         return declared[1]
     words = _WORDS.match(text)
     return " ".join(filter(None, words.groups())) if words else ""
-
-
-class NoClones(Cloner):
-    """Nothing is cloned."""
-
-    def target(self, file: int, line: int, via: bool, name: str) -> NamedPoint:
-        """Refuse to clone what a move goes to."""
-        raise CloneError(_NOT_CLONED)
-
-    def declared(self, named: NamedPoint) -> int:
-        """Return no line."""
-        raise CloneError(_NOT_CLONED)
-
-    def clone(
-        self, literals: Literals, named: Sequence[NamedPoint], rows: Sequence[int]
-    ) -> tuple[str, list[tuple[int, Edit]]]:
-        """Refuse to clone."""
-        raise CloneError(_NOT_CLONED)
 
 
 def skeleton_of(text: RapidText) -> Skeleton:

@@ -65,10 +65,14 @@ class RapidVisit(FoundVisit):
 
     Attributes:
         tool, wobj: Its frames.
+        zone_mm: Size of its zone, NaN where it stops.
+        speed: Along the path [m/s], NaN where not known.
     """
 
     tool: FrameOfMove = field(kw_only=True)
     wobj: FrameOfMove = field(kw_only=True)
+    zone_mm: float = field(kw_only=True)
+    speed: float = field(kw_only=True)
 
 
 @dataclass
@@ -103,15 +107,15 @@ class Goals:
         if signature.via >= 0:
             goal = self.goal(ends[1], signature, row, scope)
             yield RapidVisit(
-                scope, row, motion, True, goal, zone, speed, modes, why=why,
-                tool=tool, wobj=wobj,
+                scope, row, motion, True, goal, modes, why=why,
+                tool=tool, wobj=wobj, zone_mm=zone, speed=speed,
             )  # fmt: skip
         goal = self.goal(ends[0], signature, row, scope)
         if not signature.reaches:
             goal = FoundGoal(Meaning.UNKNOWN, NOTHING, why=why, name=goal.name)
         yield RapidVisit(
-            scope, row, motion, False, goal, zone, speed, modes, why=why,
-            tool=tool, wobj=wobj,
+            scope, row, motion, False, goal, modes, why=why,
+            tool=tool, wobj=wobj, zone_mm=zone, speed=speed,
         )  # fmt: skip
 
     def _conditions(
