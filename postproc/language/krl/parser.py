@@ -2,35 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from functools import lru_cache
-from itertools import count
 from typing import Any
 
-import lark
-
 from postproc.language.flow import EXIT
-from postproc.language.grammars import line_parser
 from postproc.language.krl import syntax as said
-from postproc.language.scan import NAME_MARK, UNREADABLE
-from postproc.language.shapes import open_name
+from postproc.language.parser import Children, FormParser, Word
 
 # From trees to statements, rule by rule. Every function here is named after a rule of
 # ``grammars/krl.lark`` and takes what its children gave.
-
-Children = Sequence[Any]
-
-
-class Token(str):
-    """A token: text with the name of its terminal."""
-
-    kind: str
-
-    def __new__(cls, text: str, kind: str) -> Token:
-        """Remember the terminal beside the text."""
-        token = super().__new__(cls, text)
-        token.kind = kind
-        return token
 
 
 class FlagPart(str):
@@ -54,7 +35,7 @@ def _low(text: str) -> str:
 
 
 def _tokens(c: Children, kind: str) -> list[str]:
-    return [_low(x) for x in c if isinstance(x, Token) and x.kind == kind]
+    return [_low(x) for x in c if isinstance(x, Word) and x.kind == kind]
 
 
 def _routine(kind: str) -> Callable[[Children], said.KrlRoutine]:
@@ -112,13 +93,13 @@ def _block_word(c: Children) -> said.BlockWord:
 
 
 def _operation(c: Children) -> said.Operation:
-    operator = next(x for x in c if isinstance(x, Token))
-    operands = tuple(x for x in c if not isinstance(x, Token))
+    operator = next(x for x in c if isinstance(x, Word))
+    operands = tuple(x for x in c if not isinstance(x, Word))
     return said.Operation(str(operator).upper(), operands)
 
 
 def _move(c: Children) -> said.KrlMove:
-    word = next(_low(x) for x in c if isinstance(x, Token))
+    word = next(_low(x) for x in c if isinstance(x, Word))
     operands = [x for x in c if isinstance(x, said.Operand)]
     arc = word.split("_")[0] in ("circ", "scirc")
     via, to = operands[:2] if arc else (None, operands[0])
@@ -239,50 +220,16 @@ RESERVED = frozenset(
 """Words that name nothing."""
 _NAMES_ONLY = ("ext", "extp", "extfct", "extfctp", "signal", "enum", "struc", "import")
 
-
-class _DeeperError(Exception):
-    """A statement holds more operators within each other than any program does."""
-
-
-class _ReservedError(Exception):
-    """A word of the language stands where a name must."""
+_PARSER = FormParser("krl", RULES, RESERVED, LONGEST, DEEPEST)
 
 
 @lru_cache(maxsize=8192)
 def parse_statement(form: str) -> said.SourceStatement:
     """Parse the form of a statement, `NotUnderstood` where the grammar cannot."""
-    if form.startswith(UNREADABLE) or len(form) > LONGEST:
-        return said.NotUnderstood()
     words = form.lower().split(" ", 2)
     if words[0] == "global" and len(words) > 1:
         words = words[1:]
     if words[0] in _NAMES_ONLY and len(words) > 1:
         return said.OutsideName()
-    try:
-        tree = line_parser("krl", "statement").parse(form)
-        found = _build(tree)
-    except (lark.exceptions.LarkError, _DeeperError, _ReservedError):
-        return said.NotUnderstood()
+    found = _PARSER.parse(form)
     return found if isinstance(found, said.SourceStatement) else said.NotUnderstood()
-
-
-def _build(tree: lark.Tree[lark.Token]) -> object:
-    """Build what a tree says, counting its names and its numbers."""
-    names, slots = count(), count()
-
-    def walk(node: lark.Tree[lark.Token] | lark.Token, depth: int = 0) -> object:
-        if depth > DEEPEST:
-            raise _DeeperError
-        if isinstance(node, lark.Token):
-            if node.type == "NUMBER":
-                return said.Num(next(slots))
-            text = str(node)
-            if node.type == "NAME" and text.lower() in RESERVED:
-                raise _ReservedError
-            if NAME_MARK in text:
-                text = text.replace(NAME_MARK, open_name(next(names)))
-            return Token(text, node.type)
-        children = [walk(child, depth + 1) for child in node.children]
-        return RULES[str(node.data)](children)
-
-    return walk(tree)
