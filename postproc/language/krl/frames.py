@@ -32,6 +32,7 @@ class KrlFrame:
 ZERO = KrlFrame((0.0,) * 6)
 NUMBERS = {"$tool": "tool_no", "$base": "base_no"}  # in FDAT
 TABLES = {"$tool": "tool_data", "$base": "base_data"}
+_WHICH = "which entry of {} it takes is known only when the program runs"
 _CHAINED = "its base moves with another axis or arm ({})"
 
 
@@ -65,7 +66,9 @@ class FrameReader:
                 steps=(said.ElementStep() as step,),
             ):
                 number = self.task.index(step, self.row, self.here)
-                return self.entry(table, number[0] if number else -1)
+                if number is None or len(number) != 1:
+                    return KrlFrame((), _WHICH.format(table.upper()))
+                return self.entry(table, number[0])
             case said.Operation(operator=":", operands=(first, second)):
                 return self._product(self.frame(first), self.frame(second))
             case said.FunctionCall(name=name, arguments=arguments):

@@ -173,7 +173,8 @@ class KrlMachine(TaskMachine):
             if isinstance(part, said.FunctionCall):
                 here = self._function(context, row, part.name, here)
             elif isinstance(part, said.DataObject) and part.name.startswith("$"):
-                if isinstance(one, said.KrlMove) or part.name in PLANNED:
+                given = isinstance(one, said.Assignment) and part is one.target
+                if given or isinstance(one, said.KrlMove) or part.name in PLANNED:
                     continue
                 here = _halted(here, True if part.name in HALTING else None)
         return here

@@ -105,7 +105,7 @@ PLANNED = frozenset(
     $act_base $act_tool_c $act_base_c $collmon_tol_pro $act_ex_ax $h_pos $ov_pro
     $ov_app $torqmon $torqmon_def $torqmon_com $torqmon_com_def $tech $red_vel $spl_tech
     $load_a1 $load_a2 $load_a3 $cp_vel_type $cp_statmon $nullframe $world $ex_ax_ignore
-    $spl_ori_joint_auto $eko_mode $gear_jerk_def
+    $spl_ori_joint_auto $eko_mode $gear_jerk_def $abs_accur $abs_convert
     """.split()
 )
 HALTING = frozenset("$out $anout $in $anin $pos_act $axis_act $axis_act_meas".split())
