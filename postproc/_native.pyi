@@ -175,8 +175,17 @@ def scan_lines(
     list[int],
 ]: ...
 
-# statements.rs: statements of RAPID, as texts and numbers (`postproc.language.rapid`)
+# statements.rs: statements as texts and numbers (`postproc.language.statements`)
 def scan_statements(
+    data: bytes,
+) -> tuple[
+    list[bytes],
+    tuple[Indices, Indices, Indices, Indices, Indices],
+    tuple[Indices, Indices, Floats],
+    tuple[list[str], Indices],
+    list[int],
+]: ...
+def scan_krl(
     data: bytes,
 ) -> tuple[
     list[bytes],

@@ -306,6 +306,8 @@ def _reason(exc: OSError) -> str:
 
 _PROGRAM, _VARIABLES, _COMPILED = ".pdl", ".lsv", (".cod", ".var")
 MODULES = (".mod", ".modx", ".prg", ".sys", ".sysx")  # programs that hold their values
+KRL_PROGRAMS, KRL_DATA = (".src",), ".dat"  # sources, and the lists of their data
+SHARED_LIST, ARCHIVE_DEPTH = "$config.dat", 4
 LARGEST = 500_000_000  # bytes of a program or variable file; a longer one is neither
 
 _TARGETS = re.compile(
@@ -318,13 +320,85 @@ def is_program(place: str) -> bool:
 
     >>> is_program("a/JOB.PDL"), is_program("Welding.mod"), is_program("a.txt")
     (True, True, False)
+    >>> is_program("job.src"), is_program("job.dat")
+    (True, False)
     """
-    return _suffix(place) == _PROGRAM or is_module(place)
+    return _suffix(place) in (_PROGRAM, *MODULES, *KRL_PROGRAMS)
 
 
 def is_module(place: str) -> bool:
     """Tell whether a file is a program that belongs to the modules beside it."""
     return _suffix(place) in MODULES
+
+
+def is_data_list(place: str) -> bool:
+    """Tell whether a file may be the data list of a source beside it, or is a system's.
+
+    >>> is_data_list("a/Job.dat"), is_data_list("$config.dat")
+    (True, True)
+    """
+    return _suffix(place) == KRL_DATA
+
+
+def is_shared_list(place: str) -> bool:
+    """Tell whether a file is a list that all programs of a controller share.
+
+    >>> is_shared_list("R1/System/$config.dat"), is_shared_list("a/Job.dat")
+    (True, False)
+    """
+    return is_data_list(place) and base_name(place).startswith("$")
+
+
+def data_list_of(program: str) -> str:
+    """Name the data list of a source, "" where programs have none.
+
+    >>> data_list_of("a/Job.src"), data_list_of("a/job.pdl")
+    ('a/Job.dat', '')
+    """
+    stem, suffix = os.path.splitext(program)
+    return stem + KRL_DATA if suffix.lower() in KRL_PROGRAMS else ""
+
+
+def find_data_list(program: Path) -> Path | None:
+    """Find the data list of a source: same base name, in any case."""
+    return _beside(program, data_list_of(program.name))
+
+
+def find_shared_list(program: Path, within: Path | None = None) -> Path | None:
+    """Find ``$config.dat``: beside a source, or where a controller keeps it.
+
+    In an archive programs stand in ``R1/Program``, at any depth, and the list in
+    ``R1/System``.
+
+    Args:
+        program: The source.
+        within: A folder that nothing outside of is looked at.
+    """
+    if not data_list_of(program.name):
+        return None
+    found = _beside(program, SHARED_LIST)
+    for folder in list(program.parent.parents)[:ARCHIVE_DEPTH]:
+        if found is not None or (within is not None and not _is_below(folder, within)):
+            break
+        found = _beside(folder / "System" / program.name, SHARED_LIST)
+    return found
+
+
+def _is_below(folder: Path, root: Path) -> bool:
+    return folder == root or root in folder.parents
+
+
+def _beside(place: Path, name: str) -> Path | None:
+    """Find a file of a name, in any case, in the folder of another."""
+    if not name or not place.parent.is_dir():
+        return None
+    found = [p for p in place.parent.iterdir() if p.name.lower() == name.lower()]
+    return min(found, default=None)
+
+
+def holds_values(place: str) -> bool:
+    """Tell whether a file is of a language that has no variable files."""
+    return _suffix(place) in (*MODULES, *KRL_PROGRAMS, KRL_DATA)
 
 
 def program_key(place: str) -> str:
@@ -333,7 +407,7 @@ def program_key(place: str) -> str:
     >>> program_key("a/JOB.PDL"), program_key("a/Job.mod")
     ('job', 'job.mod')
     """
-    if not is_module(place):
+    if not holds_values(place):
         return base_name(place)
     return place.replace("\\", "/").rpartition("/")[2].lower()
 
@@ -354,18 +428,14 @@ def variables_of(program: str) -> str:
     >>> variables_of("a/JOB.PDL"), variables_of("a/job.mod")
     ('a/JOB.lsv', '')
     """
-    if is_module(program):
+    if holds_values(program):
         return ""
     return os.path.splitext(program)[0] + _VARIABLES
 
 
 def find_variables(program: Path) -> Path | None:
     """Find the variable file of a program: same base name, in any case."""
-    if is_module(program.name) or not program.parent.is_dir():
-        return None
-    wanted = variables_of(program.name).lower()
-    found = [p for p in program.parent.iterdir() if p.name.lower() == wanted]
-    return min(found, default=None)
+    return _beside(program, variables_of(program.name))
 
 
 def program_of(place: str) -> str:

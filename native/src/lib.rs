@@ -69,6 +69,7 @@ fn native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(text::line_starts, module)?)?;
     module.add_function(wrap_pyfunction!(text::scan_lines, module)?)?;
     module.add_function(wrap_pyfunction!(statements::scan_statements, module)?)?;
+    module.add_function(wrap_pyfunction!(statements::scan_krl, module)?)?;
     module.add_function(wrap_pyfunction!(spline::splines, module)?)?;
     module.add_function(wrap_pyfunction!(time_law::fastest, module)?)?;
     module.add_function(wrap_pyfunction!(number::rewrite_numbers, module)?)?;

@@ -27,6 +27,8 @@ pub fn value_of(text: &[u8]) -> f64 {
         [b'0', b'x' | b'X', rest @ ..] => whole(rest, 16),
         [b'0', b'o' | b'O', rest @ ..] => whole(rest, 8),
         [b'0', b'b' | b'B', rest @ ..] => whole(rest, 2),
+        [b'\'', b'h' | b'H', rest @ .., b'\''] => whole(rest, 16),
+        [b'\'', b'b' | b'B', rest @ .., b'\''] => whole(rest, 2),
         _ => std::str::from_utf8(digits).ok().and_then(|d| d.parse().ok()).unwrap_or(f64::NAN),
     });
     if text.first() == Some(&b'-') {
@@ -78,7 +80,7 @@ fn whole(digits: &[u8], base: u32) -> f64 {
 /// Return how many decimals a number is written with.
 fn decimals_of(text: &[u8]) -> i64 {
     let split = |at: u8| text.iter().position(|b| b.eq_ignore_ascii_case(&at));
-    if split(b'x').is_some() {
+    if split(b'x').is_some() || text.first() == Some(&b'\'') {
         return 0;
     }
     let mantissa = &text[..split(b'e').unwrap_or(text.len())];

@@ -1,6 +1,7 @@
-//! Statements of RAPID, but for their numbers and numbered names: `postproc.language.rapid`.
+//! Statements, but for their numbers and numbered names: `postproc.language.statements`.
 //!
-//! `tests/reference/statements.py` defines with regular expressions where a statement ends.
+//! `tests/reference/statements.py` defines with regular expressions where a statement of
+//! RAPID ends, `tests/reference/krl_lines.py` where one of KRL does.
 
 use numpy::{IntoPyArray, PyArray1};
 use pyo3::exceptions::PyIndexError;
@@ -75,6 +76,12 @@ fn is_space(byte: u8) -> bool {
     (1..=32).contains(&byte) || byte == 127
 }
 
+/// Cuts a text into statements.
+trait Cutting {
+    /// Read the next statement; tell whether there is one.
+    fn read(&mut self, out: &mut Statement) -> bool;
+}
+
 /// One statement.
 #[derive(Default)]
 struct Statement {
@@ -87,6 +94,38 @@ struct Statement {
     end: usize,
     /// Where a string or a header begins that does not end.
     open: Option<usize>,
+}
+
+impl Statement {
+    fn clear(&mut self, at: usize) {
+        self.form.clear();
+        self.names.clear();
+        self.numbers.clear();
+        self.open = None;
+        (self.begin, self.end) = (at, at);
+    }
+
+    /// Take a token over; a blank tells words and numbers apart.
+    fn push(&mut self, text: &[u8], end: usize) {
+        let wordy = |b: u8| b <= NAME || b == b'"' || is(b, IN_NAME);
+        if self.form.last().is_some_and(|last| wordy(*last) && wordy(text[0])) {
+            self.form.push(b' ');
+        }
+        self.form.extend_from_slice(text);
+        self.end = end;
+    }
+
+    /// Keep the whole text as the form where that holds what stands for numbers and names.
+    fn finish(&mut self, data: &[u8]) {
+        let text = &data[self.begin..self.end];
+        if text.iter().any(|b| matches!(*b, NUMBER | NAME)) {
+            self.form.clear();
+            self.names.clear();
+            self.numbers.clear();
+            self.form.push(WHOLE);
+            self.form.extend_from_slice(text);
+        }
+    }
 }
 
 /// What is known of the statement that is being read.
@@ -125,34 +164,6 @@ impl Reader<'_> {
             }
         }
         ended
-    }
-
-    /// Read the next statement; tell whether there is one.
-    fn read(&mut self, out: &mut Statement) -> bool {
-        out.form.clear();
-        out.names.clear();
-        out.numbers.clear();
-        out.open = None;
-        self.pass();
-        out.begin = self.at;
-        out.end = self.at;
-        if self.at == self.data.len() {
-            return false;
-        }
-        if self.data[self.at..].starts_with(HEADER) {
-            self.header(out);
-        } else {
-            let mut now = Progress::default();
-            while self.token(out, &mut now) {}
-        }
-        if self.data[out.begin..out.end].iter().any(|b| matches!(*b, NUMBER | NAME)) {
-            out.form.clear();
-            out.names.clear();
-            out.numbers.clear();
-            out.form.push(WHOLE);
-            out.form.extend_from_slice(&self.data[out.begin..out.end]);
-        }
-        true
     }
 
     /// Read the lines between two `%%%`.
@@ -289,17 +300,172 @@ impl Reader<'_> {
         at
     }
 
-    /// Take a token over; a blank tells words and numbers apart.
+    /// Take a token over.
     fn push(&mut self, out: &mut Statement, now: &mut Progress, text: &[u8], end: usize) {
-        let wordy = |b: u8| b <= NAME || b == b'"' || is(b, IN_NAME);
-        if out.form.last().is_some_and(|last| wordy(*last) && wordy(text[0])) {
-            out.form.push(b' ');
-        }
-        out.form.extend_from_slice(text);
+        out.push(text, end);
         now.before = text[text.len() - 1];
         now.tokens += 1;
         self.at = end;
-        out.end = end;
+    }
+}
+
+impl Cutting for Reader<'_> {
+    fn read(&mut self, out: &mut Statement) -> bool {
+        self.pass();
+        out.clear(self.at);
+        if self.at == self.data.len() {
+            return false;
+        }
+        if self.data[self.at..].starts_with(HEADER) {
+            self.header(out);
+        } else {
+            let mut now = Progress::default();
+            while self.token(out, &mut now) {}
+        }
+        out.finish(self.data);
+        true
+    }
+}
+
+/// Words of KRL that hold a digit and are no names of a user's.
+const KRL_WORDS: [&[u8]; 15] = [
+    b"E6POS", b"E6AXIS", b"A1", b"A2", b"A3", b"A4", b"A5", b"A6", b"E1", b"E2", b"E3", b"E4",
+    b"E5", b"E6", b"STOOL2",
+];
+
+/// Reads KRL, where a statement ends with its line.
+struct KrlReader<'a> {
+    data: &'a [u8],
+    at: usize,
+    /// Brackets that are open.
+    open: Vec<u8>,
+    /// The last token is the name of a component in an aggregate.
+    component: bool,
+    before: u8,
+    sign: Option<(usize, usize)>,
+}
+
+impl KrlReader<'_> {
+    /// Pass blanks and comments, and line ends between statements.
+    fn pass(&mut self, lines: bool) {
+        while let Some(byte) = self.data.get(self.at).copied() {
+            let ends = matches!(byte, b'\r' | b'\n');
+            if byte == b';' {
+                self.pass_line();
+            } else if (is_space(byte) && !ends) || (ends && lines) {
+                self.at += 1;
+            } else {
+                break;
+            }
+        }
+    }
+
+    fn pass_line(&mut self) {
+        let rest = &self.data[self.at..];
+        self.at += rest.iter().position(|b| matches!(b, b'\r' | b'\n')).unwrap_or(rest.len());
+    }
+
+    fn push(&mut self, out: &mut Statement, text: &[u8], end: usize) {
+        out.push(text, end);
+        self.before = text[text.len() - 1];
+        self.at = end;
+    }
+
+    /// Read one token of a statement; tell whether there was one.
+    fn token(&mut self, out: &mut Statement) -> bool {
+        self.pass(false);
+        let Some(byte) = self.data.get(self.at).copied() else { return false };
+        if matches!(byte, b'\r' | b'\n') {
+            return false;
+        }
+        let at = self.at;
+        if let Some(end) = self.number(byte) {
+            let (start, length) = self.sign.take().unwrap_or((at, out.form.len()));
+            out.form.truncate(length);
+            self.push(out, &[NUMBER], end);
+            out.numbers.push((start, end));
+            self.component = false;
+        } else if is(byte, IN_NAME) {
+            self.word(out);
+        } else {
+            self.other(out, byte);
+        }
+        true
+    }
+
+    /// Return where a number ends, quoted ones (`'B010'`, `'HFF'`) included.
+    fn number(&self, byte: u8) -> Option<usize> {
+        if is(byte, DIGIT) || byte == b'.' {
+            return number_end(self.data, self.at);
+        }
+        let inside = self.data[self.at..].strip_prefix(b"'")?;
+        let length = inside.iter().position(|b| !b.is_ascii_hexdigit() && !b"hH".contains(b))?;
+        let whole = &self.data[self.at..self.at + length + 1];
+        let closed = inside[length] == b'\'' && !value_of(&[whole, b"'"].concat()).is_nan();
+        closed.then_some(self.at + length + 2)
+    }
+
+    fn word(&mut self, out: &mut Statement) {
+        let (at, data) = (self.at, self.data);
+        let end = while_is(data, at, IN_NAME);
+        let word = &data[at..end];
+        let named = matches!(self.before, b'{' | b',' | b':') && self.open.last() == Some(&b'{');
+        let numbered =
+            is(word[0], FIRST) && word.iter().any(u8::is_ascii_digit) && !one_of(word, &KRL_WORDS);
+        if numbered {
+            self.push(out, &[NAME], end);
+            out.names.push((at, end));
+        } else {
+            self.push(out, word, end);
+        }
+        (self.sign, self.component) = (None, named);
+    }
+
+    fn other(&mut self, out: &mut Statement, byte: u8) {
+        let at = self.at;
+        let signs = matches!(byte, b'-' | b'+') && (self.component || is(self.before, UNARY));
+        self.sign = signs.then_some((at, out.form.len()));
+        match byte {
+            b'{' | b'[' | b'(' => self.open.push(byte),
+            b'}' | b']' | b')' => drop(self.open.pop()),
+            _ => {}
+        }
+        let inside = &self.data[at + 1..];
+        let end = match byte {
+            b'"' => inside.iter().position(|b| matches!(b, b'"' | b'\r' | b'\n')),
+            _ => None,
+        };
+        let closed = end.is_some_and(|k| inside[k] == b'"');
+        let end = match (byte, end) {
+            (b'"', Some(k)) => at + 1 + k + usize::from(closed),
+            (b'"', None) => self.data.len(),
+            _ => at + 1,
+        };
+        if byte == b'"' && !closed {
+            out.open.get_or_insert(at);
+        }
+        let text = &self.data[at..end];
+        self.push(out, text, end);
+        self.component = false;
+    }
+}
+
+impl Cutting for KrlReader<'_> {
+    fn read(&mut self, out: &mut Statement) -> bool {
+        self.pass(true);
+        out.clear(self.at);
+        let Some(byte) = self.data.get(self.at).copied() else { return false };
+        self.open.clear();
+        (self.component, self.before, self.sign) = (false, 0, None);
+        if byte == b'&' {
+            self.pass_line();
+            out.form.push(b'&');
+            out.end = self.at;
+        } else {
+            while self.token(out) {}
+        }
+        out.finish(self.data);
+        true
     }
 }
 
@@ -308,25 +474,47 @@ type Column<'py, T> = Bound<'py, PyArray1<T>>;
 /// Statements that are read between two looks at signals.
 const AT_ONCE: usize = 4096;
 
-/// Read the statements of a text.
+type Scanned<'py> = (
+    Bound<'py, PyList>,
+    (Column<'py, i32>, Column<'py, i32>, Column<'py, i32>, Column<'py, i32>, Column<'py, i32>),
+    (Column<'py, i32>, Column<'py, i32>, Column<'py, f64>),
+    (Vec<String>, Column<'py, i32>),
+    Vec<usize>,
+);
+
+/// Read the statements of a text in RAPID.
 ///
 /// Returns: the distinct forms; of every statement its form, where it begins and ends, and
 /// from which number and name on those are its own, (n + 1,); where numbers start and end
 /// and what they are worth, (m,); the distinct names and those of the statements, (p,);
 /// where strings and headers begin that do not end.
 #[pyfunction]
-#[allow(clippy::type_complexity)]
-pub fn scan_statements<'py>(
-    py: Python<'py>,
-    data: &Bound<'py, PyBytes>,
-) -> PyResult<(
-    Bound<'py, PyList>,
-    (Column<'py, i32>, Column<'py, i32>, Column<'py, i32>, Column<'py, i32>, Column<'py, i32>),
-    (Column<'py, i32>, Column<'py, i32>, Column<'py, f64>),
-    (Vec<String>, Column<'py, i32>),
-    Vec<usize>,
-)> {
+pub fn scan_statements<'py>(py: Python<'py>, data: &Bound<'py, PyBytes>) -> PyResult<Scanned<'py>> {
     let data = data.as_bytes();
+    scanned(py, data, Reader { data, at: after_mark(data) })
+}
+
+/// Read the statements of a text in KRL; as `scan_statements`.
+#[pyfunction]
+pub fn scan_krl<'py>(py: Python<'py>, data: &Bound<'py, PyBytes>) -> PyResult<Scanned<'py>> {
+    let (data, open) = (data.as_bytes(), Vec::new());
+    let at = after_mark(data);
+    scanned(py, data, KrlReader { data, at, open, component: false, before: 0, sign: None })
+}
+
+fn after_mark(data: &[u8]) -> usize {
+    if data.starts_with(MARK) {
+        MARK.len()
+    } else {
+        0
+    }
+}
+
+fn scanned<'py, R: Cutting + Send>(
+    py: Python<'py>,
+    data: &[u8],
+    mut reader: R,
+) -> PyResult<Scanned<'py>> {
     if data.len() > i32::MAX as usize {
         return Err(PyIndexError::new_err("a text of more than 2 GB"));
     }
@@ -335,7 +523,6 @@ pub fn scan_statements<'py>(
     let (mut first, mut name_first) = (vec![0_i32], vec![0_i32]);
     let (mut start, mut end, mut value) = (Vec::new(), Vec::new(), Vec::new());
     let (mut name, mut open) = (Vec::new(), Vec::new());
-    let mut reader = Reader { data, at: if data.starts_with(MARK) { MARK.len() } else { 0 } };
     let mut one = Statement::default();
     let mut more = true;
     while more {

@@ -20,9 +20,12 @@ from postproc.compensation.record import (
 )
 from postproc.exceptions import ProgramError
 from postproc.files import (
+    KRL_DATA,
+    KRL_PROGRAMS,
     TEMPORARY,
     holds_targets,
     is_compiled,
+    is_data_list,
     is_program,
     is_variables,
     program_of,
@@ -159,7 +162,7 @@ class _Look:
         """Find what is wrong with a file."""
         if place.endswith(TEMPORARY):
             yield CheckFinding(place, "unfinished", "was left by a run that was killed")
-        elif is_program(place):
+        elif is_program(place) or self._is_own_list(place):
             yield from self._program(place)
         elif is_variables(place) and not self._existing(program_of(place)):
             if holds_targets(read_input(self.root / place)):
@@ -172,6 +175,13 @@ class _Look:
     def _existing(self, place: str) -> str | None:
         """Return the file of a name, whatever its case."""
         return self.places.get(place.lower())
+
+    def _is_own_list(self, place: str) -> bool:
+        """Tell whether a file is the data list of a source beside it."""
+        if not is_data_list(place):
+            return False
+        stem = place[: -len(KRL_DATA)]
+        return any(self._existing(stem + suffix) for suffix in KRL_PROGRAMS)
 
     def _program(self, place: str) -> Iterator[CheckFinding]:
         """Check a program and the variable file that was written with it."""

@@ -225,12 +225,14 @@ class Unit:
         pages: Programs that it imports and nobody else does, in order.
         variables: Its variable file, or None.
         setup: Index of its cell and model in the plan.
+        reads: Files that it reads and other programs too: they are not rewritten.
     """
 
     program: str
     pages: tuple[str, ...]
     variables: str | None
     setup: int
+    reads: tuple[str, ...] = ()
 
     @property
     def programs(self) -> tuple[str, ...]:
@@ -240,8 +242,13 @@ class Unit:
     @property
     def files(self) -> tuple[str, ...]:
         """Return all files, the main program first."""
-        own = () if self.variables is None else (self.variables,)
-        return (*self.programs, *own)
+        return (*self.own, *self.reads)
+
+    @property
+    def own(self) -> tuple[str, ...]:
+        """Return the files that nobody else reads, the main program first."""
+        values = () if self.variables is None else (self.variables,)
+        return (*self.programs, *values)
 
 
 @dataclass(frozen=True)

@@ -244,7 +244,7 @@ class TargetTree:
 
 def places_of(unit: Unit) -> tuple[str, ...]:
     """Name all that a unit may have in the target tree."""
-    return (*unit.files, *(program + SUFFIX for program in unit.programs))
+    return (*unit.own, *(program + SUFFIX for program in unit.programs))
 
 
 def file_hash(path: str | Path) -> str:

@@ -16,11 +16,15 @@ from postproc.batch.plan import BatchPlan, Unit
 from postproc.compensation.record import SUFFIX
 from postproc.exceptions import OutputError, ProgramError
 from postproc.files import (
+    KRL_PROGRAMS,
     LARGEST,
     TEMPORARY,
     base_name,
+    data_list_of,
+    find_shared_list,
     holds_targets,
     is_compiled,
+    is_data_list,
     is_module,
     is_program,
     is_variables,
@@ -111,13 +115,31 @@ def names_in(path: Path) -> tuple[dict[str, int], dict[str, int]]:
     The module with the main routine of a task names all modules beside it.
     """
     text = _read(path, -1)
+    if data_list_of(path.name):
+        return _named_by_source(path.name, text), {}
     if not is_module(path.name):
-        return named_programs(text)
+        return ({}, {}) if is_data_list(path.name) else named_programs(text)
     found = _MAIN.search(text)
     if found is None:
         return {}, {}
     line = text.count(b"\n", 0, found.start()) + 1
     return {program_key(other.name): line for other in _modules_beside(path)}, {}
+
+
+_CALLED = re.compile(  # a routine of KRL, alone on its line or by an interrupt
+    rb"(?:^|\bDO)[ \t]*(?:GLOBAL[ \t]+)?(?:EXT[ \t]+)?(\w+)[ \t]*\(",
+    re.IGNORECASE | re.MULTILINE,
+)
+
+
+def _named_by_source(name: str, text: bytes) -> dict[str, int]:
+    """Name the data list of a source, and those sources that it may call."""
+    found = {program_key(data_list_of(name)): 1}
+    for call in _CALLED.finditer(text):
+        called = f"{call[1].decode('latin-1').lower()}{KRL_PROGRAMS[0]}"
+        if called not in found:
+            found[called] = text.count(b"\n", 0, call.start()) + 1
+    return found
 
 
 def _modules_beside(path: Path) -> Iterator[Path]:
@@ -303,7 +325,9 @@ class _Folder:
 def _sort(root: Path, places: Sequence[str], plan: BatchPlan) -> _Folder:
     """Sort the files of one folder into programs, what belongs to them, and others."""
     part = _Folder([], [], {}, [])
-    programs = _by_base(filter(is_program, places), program_key, part)
+    sources = {data_list_of(place).lower() for place in places}
+    ours = [p for p in places if is_program(p) or p.lower() in sources]
+    programs = _by_base(ours, program_key, part)
     variables = _by_base(filter(is_variables, places), base_name, part)
     records = {place + SUFFIX for place in programs.values()}
     for place in places:
@@ -311,7 +335,7 @@ def _sort(root: Path, places: Sequence[str], plan: BatchPlan) -> _Folder:
             continue  # a record of an earlier output would be taken for ours
         if is_variables(place) and base_name(place) not in programs:
             _lone_variables(root, place, part)
-        elif not (is_program(place) or is_variables(place)):
+        elif not (place in ours or is_variables(place)):
             part.copies.append(place)
             if is_compiled(place) and base_name(place) in programs:
                 part.notes.append((place, _STALE))
@@ -324,8 +348,16 @@ def _sort(root: Path, places: Sequence[str], plan: BatchPlan) -> _Folder:
         ]
     for main, pages in _joined(named, variables, arms).items():
         setup = plan.setup_of(programs[main], arms[main])
-        _add_unit(programs[main], [programs[p] for p in pages], variables, setup, part)
+        own = [programs[page] for page in pages]
+        reads = _shared_list(root, programs[main])
+        _add_unit(programs[main], own, reads, variables, setup, part)
     return part
+
+
+def _shared_list(root: Path, program: str) -> tuple[str, ...]:
+    """Return the place of the list that a program shares with others, if it is here."""
+    found = find_shared_list(root / program, within=root)
+    return () if found is None else (found.relative_to(root).as_posix(),)
 
 
 def _by_base(
@@ -364,6 +396,7 @@ def _joined(
 def _add_unit(
     program: str,
     pages: Sequence[str],
+    reads: tuple[str, ...],
     variables: Mapping[str, str],
     setup: int | None,
     part: _Folder,
@@ -373,13 +406,14 @@ def _add_unit(
     Args:
         program: Its place.
         pages: Places of its pages.
+        reads: Places of what it reads, and others too.
         variables: Places of variable files, by base name.
         setup: Index of its setup, None where no rule fits.
         part: Where it is added.
     """
     values = variables.get(program_key(program))
     if setup is not None:
-        part.units.append(Unit(program, tuple(pages), values, setup))
+        part.units.append(Unit(program, tuple(pages), values, setup, reads))
         return
     for place in (program, *pages, *([values] if values else [])):
         part.refused[place] = "no rule of the plan fits: add one, or --cell and --model"

@@ -254,7 +254,7 @@ def _given(task: Task) -> Given:
         name=_file_name(unit.program),
         source=task.sources[0],
         variables=None if unit.variables is None else sources[unit.variables],
-        pages={_file_name(page): sources[page] for page in unit.pages},
+        pages={_file_name(page): sources[page] for page in (*unit.pages, *unit.reads)},
     )
 
 

@@ -25,8 +25,11 @@ from postproc.files import (
     Content,
     base_name,
     check_places,
+    find_shared_list,
     find_variables,
+    is_data_list,
     is_program,
+    is_shared_list,
     is_stream,
     is_variables,
     program_key,
@@ -53,10 +56,12 @@ class Pages:
     Attributes:
         paths: Its pages, in the order in which they are named.
         notes: What it names and what is not followed, and why.
+        reads: What it reads, and other programs too: it is not rewritten.
     """
 
     paths: tuple[Path, ...] = ()
     notes: tuple[Diagnostic, ...] = ()
+    reads: tuple[Path, ...] = ()
 
 
 def find_pages(program: Path) -> Pages:
@@ -72,8 +77,10 @@ def find_pages(program: Path) -> Pages:
         for name, line in outside.items()
     ]
     main = program_key(program.name)
+    shared = find_shared_list(program)
+    reads = () if shared is None else (shared,)
     if not set(wanted) - {main} or not program.parent.is_dir():
-        return Pages((), tuple(notes))
+        return Pages((), tuple(notes), reads)
     files = [p for p in sorted(program.parent.iterdir()) if not p.is_symlink()]
     values = {base_name(p.name) for p in files if is_variables(p.name)}
     programs = {program_key(p.name): p for p in files if _is_source(p)}
@@ -90,7 +97,7 @@ def find_pages(program: Path) -> Pages:
     }
     pages = group_pages(alone).get(main, ())
     notes += _left_out(programs, named, (main, *pages), apart)
-    return Pages(tuple(programs[page] for page in pages), tuple(notes))
+    return Pages(tuple(programs[page] for page in pages), tuple(notes), reads)
 
 
 def _not_followed(program: Path, line: int, text: str) -> Diagnostic:
@@ -98,8 +105,9 @@ def _not_followed(program: Path, line: int, text: str) -> Diagnostic:
 
 
 def _is_source(path: Path) -> bool:
-    """Tell whether a file is a program, and no output of ours."""
-    if not (is_program(path.name) and path.is_file()):
+    """Tell whether a file is a program or a data list, and no output of ours."""
+    ours = is_program(path.name) or is_data_list(path.name)
+    if not (ours and path.is_file()) or is_shared_list(path.name):
         return False
     return read_stamp(read_head(path)) is None
 
@@ -153,6 +161,7 @@ class Job:
         source: Its bytes.
         variables: Path and bytes of its variable file, or None.
         pages: Paths and bytes of its pages.
+        reads: .. of what it reads and other programs too.
         notes: What it or a page names and is not followed.
         cell: The cell.
         model: The model.
@@ -164,6 +173,7 @@ class Job:
     source: bytes
     variables: tuple[Path, bytes] | None
     pages: tuple[tuple[Path, bytes], ...]
+    reads: tuple[tuple[Path, bytes], ...]
     notes: tuple[Diagnostic, ...]
     cell: Cell
     model: Model
@@ -199,11 +209,13 @@ class Job:
         values = None if lsv is None else (lsv, read_input(lsv))
         found = Pages() if path is None else find_pages(path)
         pages = tuple((page, read_input(page)) for page in found.paths)
-        given = (path, lsv, cell, model, *found.paths)
+        reads = tuple((page, read_input(page)) for page in found.reads)
+        given = (path, lsv, cell, model, *found.paths, *found.reads)
         inputs = tuple(p for p in given if p is not None)
         return cls(
-            path, name, source, values, pages, found.notes, loaded, fitted, inputs
-        )
+            path, name, source, values, pages, reads, found.notes, loaded, fitted,
+            inputs,
+        )  # fmt: skip
 
     def run(
         self, options: Options, progress: Progress = silent, processes: int = 1
@@ -216,7 +228,7 @@ class Job:
             self.model,
             name=self.name,
             variables=variables,
-            pages={page.name: data for page, data in self.pages},
+            pages={p.name: data for p, data in (*self.pages, *self.reads)},
             options=options,
             progress=progress,
             processes=processes,
@@ -410,10 +422,10 @@ def read_files(program: Path, lsv: Path | None = None) -> dict[str, bytes]:
     source = read_program_file(str(program))
     name = name_of_text(str(program), program_name(str(program), lsv), source)
     values = lsv or (None if passing else find_variables(program))
-    pages = () if passing else find_pages(program).paths
+    found = Pages() if passing else find_pages(program)
     return name_files(
         name,
         source,
         None if values is None else read_input(values),
-        {path.name: read_input(path) for path in pages},
+        {path.name: read_input(path) for path in (*found.paths, *found.reads)},
     )

@@ -438,6 +438,7 @@ def guard_turn(reasons: Reasons, limits: LimitSection, turn: Floats) -> None:
 # Which targets move, where to, and why the others do not.
 
 LEVER_MM = 100.0  # from the TCP, by which turns count where arrivals must agree
+FLAG_MM = 1e6  # [mm] that a flag counts for where arrivals must agree
 NONE = np.empty((0, 3))
 KNOWN = 0.5  # part of its play that a joint must have left behind to be on a side
 HELD = "its direction of arrival would change with the correction"
@@ -587,10 +588,21 @@ class Round:
         guard_turn(reasons, limits, solved.turn)
         guard_size(reasons, limits, self.correction, solved.residual)
         guard_size(reasons, limits, self.shift, solved.residual)
+        self._guard_flags(reasons)
         reasons.mark(self.held, HELD)
         reasons.mark(self.swung, SWUNG)
         reasons.mark(strays, STRAYS)
         keep_whole(reasons, self.path, visits, given, limits.step_mm)
+
+    def _guard_flags(self, reasons: Reasons) -> None:
+        """Mark corrections that end where flags are not sure."""
+        visits = self.reading.visits
+        near = visits.dialect.near_border(self.solved.q)
+        if near is None:
+            return
+        rows = visits.config_given & (visits.target == Meaning.POSE)
+        for axis, found in enumerate(near.T, start=1):
+            reasons.mark(rows & found, visits.dialect.terms.border.format(axis))
 
     @property
     def _trusted(self) -> Bools:
@@ -615,6 +627,11 @@ class Round:
         if len(solved.turned):
             turn = turns_in_file(visits, solved)
             both = np.concatenate([change, turn * LEVER_MM], axis=1)
+        flags = list(visits.dialect.flag_columns)
+        if flags:  # arrivals with different flags have no mean
+            poses = (visits.target == Meaning.POSE)[:, None]
+            anew = np.where(poses, numbers[:, flags] - visits.values[:, flags], 0.0)
+            both = np.concatenate([both, anew * FLAG_MM], axis=1)
         return agree(visits.literal, usable, numbers, both), change, both
 
     def _decisions(self, status: Ints, reasons: Reasons, values: Floats) -> Decisions:

@@ -9,7 +9,7 @@ import numpy as np
 from postproc.arrays import Bools, Floats, Ints, in_chunks
 from postproc.compensation.continuity import on_path
 from postproc.compensation.frames import taught_records
-from postproc.files import is_variables, variables_of
+from postproc.files import is_shared_list, is_variables, variables_of
 from postproc.language.visits import NO_VALUE, Diagnostic, Meaning, Visits
 from postproc.robot.arm import Arm
 from postproc.robot.cell import Cell
@@ -52,9 +52,12 @@ def tool_in_metres(visits: Visits) -> list[Diagnostic]:
 
 def followed_pages(visits: Visits) -> list[Diagnostic]:
     """List the files that are one job with the program."""
-    text = "is followed, and rewritten, as a page of this program"
+    texts = (
+        "is followed, and rewritten, as a page of this program",
+        "is read, and not rewritten: all programs share it",
+    )
     return [
-        Diagnostic(visits.files[0], 1, "page", f"{name} {text}")
+        Diagnostic(visits.files[0], 1, "page", f"{name} {texts[is_shared_list(name)]}")
         for name in visits.files[1:]
         if not is_variables(name)
     ]

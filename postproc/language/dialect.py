@@ -28,6 +28,8 @@ class Terms:
         law_unknown, angles, arc: Why the way between is not sure; the law's name is
             filled in.
         laws: Names of the `OrientationLaw` members, by their number.
+        border: Why flags of a joint so near a border must not be trusted; its number is
+            filled in.
     """
 
     tool: str
@@ -48,6 +50,7 @@ class Terms:
     angles: str
     arc: str
     laws: tuple[str, ...] = ()
+    border: str = ""
 
 
 class Dialect(ABC):
@@ -59,6 +62,7 @@ class Dialect(ABC):
     Attributes:
         terms: Its words.
         reflags: Flags depend on small moves, and are written anew.
+        flag_columns: Which numbers of a pose are flags.
         heads: What tables head the numbers of a pose with, w words.
         pose_decimals, joint_decimals: Least decimals of every written number, w each.
     """
@@ -66,6 +70,7 @@ class Dialect(ABC):
     terms: Terms
     heads: tuple[str, ...]
     reflags: bool = False
+    flag_columns: tuple[int, ...] = ()
     pose_decimals: tuple[int, ...]
     joint_decimals: tuple[int, ...]
 
@@ -100,12 +105,14 @@ class Dialect(ABC):
 
         Returns:
             Slots 4 W + 2 S + E, (n,), and turns of axes 4, 6 and 3, (n, 3), NaN where
-            not written.
+            not written: the angle is within half a turn of so many turns.
         """
 
     @abstractmethod
     def flag_words(self, config: str, values: Floats) -> str:
         """Spell the flags of one target as ``S E W T1:0 T2:-1 T3:0``, unsaid ones not.
+
+        Where only the sign of an axis is said, that is ``T1:>0`` or ``T1:<0``.
 
         Args:
             config: Its configuration string.
@@ -129,5 +136,12 @@ class Dialect(ABC):
         """Tell which poses (k, w) say other flags than joints (k, 6) [rad] have.
 
         None where branch and turns say all that the flags do.
+        """
+        return None
+
+    def near_border(self, q: Floats) -> Bools | None:
+        """Tell which joints (k, 6) [rad] are too near a border of flags, (k, 6).
+
+        None where flags there do no harm.
         """
         return None

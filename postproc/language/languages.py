@@ -6,7 +6,7 @@ import os
 from functools import cache
 from importlib import import_module
 
-from postproc.files import MODULES
+from postproc.files import KRL_DATA, KRL_PROGRAMS, MODULES
 from postproc.language.interface import Language
 
 # Languages by the suffixes of their files; one is loaded when its first file is read.
@@ -14,6 +14,7 @@ _PLACES = {
     ".pdl": "postproc.language.pdl2.language:Pdl2",
     ".lsv": "postproc.language.pdl2.language:Pdl2",
     **dict.fromkeys(MODULES, "postproc.language.rapid.language:Rapid"),
+    **dict.fromkeys((*KRL_PROGRAMS, KRL_DATA), "postproc.language.krl.language:Krl"),
 }
 _USUAL = ".pdl"  # of a file with another suffix
 
@@ -25,6 +26,8 @@ def language_of(file: str) -> Language:
     'PDL2'
     >>> language_of("Welding.modx").name
     'RAPID'
+    >>> language_of("job.src").name
+    'KRL'
     """
     suffix = os.path.splitext(file)[1].lower()
     return _loaded(_PLACES.get(suffix, _PLACES[_USUAL]))

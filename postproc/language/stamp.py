@@ -10,17 +10,19 @@ from postproc.language.source import UTF8_MARK, Source, Span
 
 _INDENT = 400  # blanks before a stamp that an editor has moved
 _STAMP = re.compile(
-    rb"[ \t]*(?:--|!)[ \t]*postproc[ \t]+(?P<version>\S+)[ \t]+"
+    rb"[ \t]*(?:--|!|;)[ \t]*postproc[ \t]+(?P<version>\S+)[ \t]+"
     rb"model[ \t]*=[ \t]*(?P<model>\S+)"
     rb"[ \t]+source[ \t]*=[ \t]*(?P<source>[0-9a-f]{64})\b(?P<rest>[^\r\n]*)"
     rb"(?:\r\n|\n|\r|\Z)",
     re.IGNORECASE,  # an editor may have changed the case, and blanks
 )
-_BEGINS = re.compile(  # "--" or "!", said so that searching it is fast
-    rb"[-!](?:-|(?<=!))[ \t]*postproc[ \t]+\S+[ \t]+model[ \t]*=", re.IGNORECASE
+_BEGINS = re.compile(  # "--", "!" or ";", said so that searching it is fast
+    rb"[-!;](?:-|(?<=[!;]))[ \t]*postproc[ \t]+\S+[ \t]+model[ \t]*=", re.IGNORECASE
 )
-_HEADER = re.compile(  # of a module file: it stands before all else
-    rb"(?:\xef\xbb\xbf)?(?:\s|![^\r\n]*(?=[\r\n]))*%%%.*?%%%(?:[ \t]*(?:\r\n|\n|\r))?",
+_HEADER = re.compile(  # of a module or a source: it stands before all else
+    rb"(?:\xef\xbb\xbf)?(?:(?:\s|![^\r\n]*(?=[\r\n]))*%%%.*?%%%"
+    rb"(?:[ \t]*(?:\r\n|\n|\r))?"
+    rb"|(?:[ \t]*+(?:\r\n?+|\n))*+(?:[ \t]*+&[^\r\n]*+(?:\r\n?+|\n))++)",
     re.DOTALL,
 )
 

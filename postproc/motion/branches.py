@@ -99,16 +99,19 @@ def on_written_turns(q: Floats, turns: Floats) -> Floats:
     """Put solutions on the turns of their configuration strings.
 
     T1 counts the turns of axis 4, T2 of axis 6, T3 of axis 3: floor((q + 180) / 360).
-    A missing T1 or T2 is 0; without T3 axis 3 stays where its range allows it.
+    A missing T1 or T2 is 0; without T3 axis 3 stays where its range allows it. Turns
+    between whole ones mean the angle within half a turn of them.
 
     Args:
         q: Joint angles, (n, 6) [rad].
         turns: T1, T2, T3, (n, 3), NaN where not written.
     """
     out = np.array(q)
-    rest = np.mod(q[:, TURN_AXES] + np.pi, FULL) - np.pi
     written = ~np.isnan(turns)
-    moved = rest + FULL * np.where(written, turns, 0.0)
+    whole = np.floor(np.where(written, turns, 0.0) + 0.5)
+    middle = FULL * (np.where(written, turns, 0.0) - whole)
+    rest = np.mod(q[:, TURN_AXES] - middle + np.pi, FULL) - np.pi + middle
+    moved = rest + FULL * whole
     moved[:, 2] = np.where(written[:, 2], moved[:, 2], q[:, 2])
     out[:, TURN_AXES] = moved
     return out

@@ -23,7 +23,12 @@ from postproc.compensation.outcome import (
 )
 from postproc.compensation.parallel import in_background
 from postproc.exceptions import ProgramError
-from postproc.files import find_variables, is_module, is_variables
+from postproc.files import (
+    find_data_list,
+    find_variables,
+    holds_values,
+    is_variables,
+)
 from postproc.language.languages import language_of
 from postproc.language.scan import BLANKS, mask_of, scan_lines
 from postproc.language.stamp import read_stamp, stamp_span, strip_stamp
@@ -372,7 +377,7 @@ class Compared:
 
 def is_named_by_file(place: str) -> bool:
     """Tell whether a line alone does not tell which target it belongs to."""
-    return is_variables(place) or is_module(place)
+    return is_variables(place) or holds_values(place)
 
 
 def _read_lines(path: Path) -> tuple[TextLines, bool]:
@@ -534,7 +539,7 @@ def diff(original: Path, compensated: Path) -> Difference:
         ProgramError: A file cannot be read.
     """
     pairs = [(original, compensated)]
-    old, new = map(find_variables, pairs[0])
+    old, new = (find_variables(p) or find_data_list(p) for p in pairs[0])
     if not is_variables(original.name) and old is not None and new is not None:
         pairs.append((old, new))
     ask = in_background(partial(read_arrivals, compensated, pairs))

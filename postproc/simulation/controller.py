@@ -34,6 +34,7 @@ from postproc.simulation.kinematics import (
 FLAGS = {"W": WRIST, "S": SHOULDER, "E": ELBOW}
 SINGULAR = np.radians(0.1)  # of axis 5: both wrist branches are tried from here
 TURNING = (3, 5)  # joints 4 and 6 may turn more than once
+SIGN_ROUNDING = 1e-6  # [rad] around 0 where an axis has any sign
 TURN_NAMES = {"T1": 3, "T2": 5, "T3": 2}
 
 
@@ -135,10 +136,17 @@ def _branch_of_flags(config: str) -> int:
 def _on_turns(q: Floats, config: str) -> Floats:
     """Put axes 4, 6 and 3 on the turns T1, T2, T3 = floor((q + 180 deg) / 360 deg).
 
-    What is not written is 0 for axes 4 and 6; axis 3 stays in its range.
+    What is not written is 0 for axes 4 and 6; axis 3 stays in its range. ``T1:>0`` and
+    ``T1:<0`` say the sign of axis 4 alone.
     """
     out = q.copy()
     for name, joint in TURN_NAMES.items():
+        sign = re.search(rf"\b{name}\s*:\s*([<>])0", config, re.IGNORECASE)
+        if sign:
+            ahead = np.remainder(q[:, joint] + SIGN_ROUNDING, 2 * np.pi) - SIGN_ROUNDING
+            near_zero = np.abs(ahead) <= SIGN_ROUNDING
+            back = (sign[1] == "<") & ~near_zero
+            out[:, joint] = ahead - 2 * np.pi * back
         match = re.search(rf"\b{name}\s*:\s*(-?\d+)", config, re.IGNORECASE)
         if match:
             rest = np.remainder(q[:, joint] + np.pi, 2 * np.pi) - np.pi

@@ -289,11 +289,16 @@ def pose_of_record(record: Floats) -> Floats:
 def pose_of_numbers(values: Floats) -> Floats:
     """Convert the numbers of a target (w,) to a pose (4, 4) [m].
 
-    x, y, z [mm] and a, e, r [deg]; or x, y, z and a quaternion, scalar first, of any
-    length, with what else there is behind it.
+    x, y, z [mm] and a, e, r [deg]; or x, y, z and A, B, C about z, y, x with two flags;
+    or x, y, z and a quaternion, scalar first, of any length, with what else there is
+    behind it.
     """
     if len(values) == 6:
         return pose_of_record(values)
+    if len(values) == 8:
+        a, b, c = np.radians(values[3:6])
+        turned = about_z(a) @ about_y(b) @ exponential(np.array([c, 0.0, 0.0]))
+        return pose(turned, values[:3] * 1e-3)
     sine = float(np.linalg.norm(values[4:7]))
     about = values[4:7] / max(sine, 1e-300)
     turned = exponential(2 * np.arctan2(sine, values[3]) * about)

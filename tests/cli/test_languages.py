@@ -16,7 +16,7 @@ from tests.language.neutral_job import LANGUAGES, NeutralMove, drawn
 from tests.written import Desk, cli
 
 ROOT = Path(__file__).parents[2]
-NAMES = dict(zip(("PDL2", "RAPID"), LANGUAGES, strict=True))
+NAMES = dict(zip(("PDL2", "RAPID", "KRL"), LANGUAGES, strict=True))
 SAID = "absolute_accuracy = false"
 
 
@@ -42,7 +42,8 @@ def place(job_folder, job_cell, tmp_path):
     for name, write in LANGUAGES.items():
         folder = tmp_path / "tree" / name
         folder.mkdir(parents=True)
-        (folder / name).write_bytes(write(drawn(job_cell, 5, 12)))
+        for part, data in write(drawn(job_cell, 5, 12)).items():
+            (folder / part).write_bytes(data)
     return Desk(tmp_path, tmp_path / "cell.toml", tmp_path / "model.json")
 
 
@@ -89,8 +90,9 @@ def run(command, place, name):
         case "compensate --orientation":
             return place.compensate(given, "-o", to, "--orientation")
         case "compensate --clone":
-            shared = place.put(name, shared_point(place, name))
-            return place.compensate(shared, "-o", to, "--clone")
+            for page, data in shared_point(place, name).items():
+                place.put(page, data)
+            return place.compensate(place.folder / name, "-o", to, "--clone")
         case "compensate --path-mm":
             return place.compensate(given, "-o", to, "--path-mm", "0.1")
         case "compensate --lsv":
@@ -108,7 +110,7 @@ def run(command, place, name):
         case "check":
             assert batch(place).exit_code in (0, 1)
             return cli("check", place.folder / "new", "--model", place.model)
-        case "batch (one tree for both)":
+        case "batch (one tree for all)":
             return batch(place)
         case "simulate":
             return cli("simulate", given, "--cell", place.cell, "-o", to)

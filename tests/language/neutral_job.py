@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from postproc.compensation.compensate import compensate
+from postproc.compensation.outcome import Outcome
+from postproc.model.model import Model
 from postproc.robot.cell import Cell
 from postproc.robot.pose import MM, record_from_pose
 from postproc.robot.trajectory import Motion
@@ -176,7 +179,77 @@ def _rapid_point(job: NeutralJob, q: np.ndarray, in_joints: bool, name: str) -> 
     return f"[{place(pose)},{quaternion(pose)},{confdata(job, q)},{OUTSIDE}]"
 
 
-LANGUAGES = {"job.pdl": pdl2, "job.mod": rapid}
+def krl(job: NeutralJob) -> dict[str, bytes]:
+    """Write a job in KRL: a source and its data list."""
+    named = {
+        f"DECL E6POS X{m.name}={_krl_point(job, m.q, False, '')}": None
+        for m in job.moves
+        if m.name and not m.in_joints
+    }
+    interpolate = "{ORI #INTERPOLATE}"
+    lines = [
+        "&ACCESS RVP", "&REL 1", "DEF job ( )",
+        f"$TOOL={_krl_frame(job.tool)}", f"$BASE={_krl_frame(job.uframe)}",
+        f"$VEL.CP={job.speed:g} ; m/s",
+        f"$CIRC_MODE={{AUX_PT {interpolate},TARGET_PT {interpolate}}}",
+        *(_krl_move(job, m) for m in job.moves), "END",
+    ]  # fmt: skip
+    data = ["&ACCESS RVP", "DEFDAT job", *named, "ENDDAT"]
+    texts = {"job.src": lines, "job.dat": data}
+    return {name: "\r\n".join([*text, ""]).encode() for name, text in texts.items()}
+
+
+def _krl_frame(pose: np.ndarray) -> str:
+    x, y, z = (pose[:3, 3] / MM).tolist()
+    a, b, c = Rotation.from_matrix(pose[:3, :3]).as_euler("ZYX", True).tolist()
+    place, angles = (
+        f"X {x:.3f},Y {y:.3f},Z {z:.3f}",
+        f"A {a:.10f},B {b:.10f},C {c:.10f}",
+    )
+    return f"{{{place},{angles}}}"
+
+
+def status(job: NeutralJob, q: np.ndarray) -> str:
+    """Write S and T of joint angles."""
+    slot = int(job.cell.arm.branch(q[None])[0])
+    s = bool(slot & 2) + 2 * (not slot & 1) + 4 * bool(slot & 4)
+    return f"S {s},T {sum(2**k for k in range(6) if q[k] < 0)}"
+
+
+def _krl_move(job: NeutralJob, move: NeutralMove) -> str:
+    word = {Motion.JOINT: "SPTP", Motion.LINEAR: "SLIN", Motion.CIRCULAR: "SCIRC"}
+    to = _krl_point(job, move.q, move.in_joints, move.name)
+    via = "" if move.via is None else _krl_point(job, move.via, False, "") + ","
+    text = f"{word[move.motion]} {via}{to}"
+    if move.zone_mm:
+        return f"$APO.CDIS={move.zone_mm:g}\r\n{text} C_SPL"
+    return text
+
+
+def _krl_point(job: NeutralJob, q: np.ndarray, in_joints: bool, name: str) -> str:
+    if in_joints:
+        angles = zip("123456", np.rad2deg(q), strict=True)
+        return "{" + ",".join(f"A{k} {v:.5f}" for k, v in angles) + "}"
+    if name:
+        return f"X{name}"
+    frame = _krl_frame(job.pose(q))[:-1]
+    return f"{frame},{status(job, q)},E1 0.0,E2 0.0,E3 0.0,E4 0.0,E5 0.0,E6 0.0}}"
+
+
+Writer = Callable[[NeutralJob], dict[str, bytes]]
+LANGUAGES: dict[str, Writer] = {
+    "job.pdl": lambda job: {"job.pdl": pdl2(job)},
+    "job.mod": lambda job: {"job.mod": rapid(job)},
+    "job.src": krl,
+}
+
+
+def compensated(
+    name: str, files: Mapping[str, bytes], cell: Cell, model: Model
+) -> Outcome:
+    """Compensate the files of a job, the one of a name first."""
+    pages = {page: data for page, data in files.items() if page != name}
+    return compensate(files[name], cell, model, name=name, pages=pages)
 
 
 def drawn(cell: Cell, seed: int, count: int = 40) -> NeutralJob:

@@ -7,11 +7,12 @@ import pytest
 
 from postproc.cli.simulate import setup_of
 from postproc.compensation.compensate import compensate
+from postproc.compensation.eligibility import STRANDED
 from postproc.compensation.program import plan_visits, read_program
 from postproc.simulation import virtual_arm
 from postproc.simulation.program import land
 from tests.conftest import SEED
-from tests.language.neutral_job import LANGUAGES, drawn
+from tests.language.neutral_job import LANGUAGES, compensated, drawn, rapid
 
 SAME = {
     "motion", "target", "via", "fly", "pred_start", "pred", "reason",
@@ -22,12 +23,17 @@ STOP_MM = 0.1
 
 def readings(cell, seed):
     job = drawn(cell, seed)
-    return [read_program({name: write(job)}, cell) for name, write in LANGUAGES.items()]
+    return [read_program(write(job), cell) for write in LANGUAGES.values()]
 
 
 @pytest.mark.parametrize("seed", range(6))
 def test_visits_and_states_are_the_same(bench_cell, seed):
-    one, two = (reading.visits for reading in readings(bench_cell, seed))
+    one, *others = (reading.visits for reading in readings(bench_cell, seed))
+    for two in others:
+        assert_same_visits(one, two, bench_cell)
+
+
+def assert_same_visits(one, two, bench_cell):
     assert len(one) == len(two) > 40
     for name in SAME:
         a, b = getattr(one, name), getattr(two, name)
@@ -38,20 +44,32 @@ def test_visits_and_states_are_the_same(bench_cell, seed):
         np.testing.assert_array_equal(a, b)
     np.testing.assert_allclose(one.lin_spd, two.lin_spd)
     plans = [plan_visits(v, bench_cell) for v in (one, two)]
-    assert np.array_equal(*(planned.reasons.none for planned in plans))
+    # Lines of KRL have no flags: behind a target out of reach more of them is in doubt.
+    assert np.array_equal(*(told(planned) for planned in plans))
     assert plans[0].reasons.none.mean() > 0.9
     a, b = (planned.plan for planned in plans)
     np.testing.assert_allclose(a.q, b.q, rtol=0, atol=1e-9)
     np.testing.assert_allclose(a.side, b.side, rtol=0, atol=1e-6)
 
 
+def told(planned):
+    """Tell which visits are left, but for what comes from out of reach, (n,)."""
+    stranded = [text == STRANDED for text in planned.reasons.texts]
+    return ~planned.reasons.none & ~np.array(stranded)[planned.reasons.index]
+
+
 @pytest.mark.parametrize("seed", range(3))
 def test_corrections_are_the_same(bench_cell, bench_model, seed):
     job = drawn(bench_cell, seed)
-    one, two = (
-        compensate(write(job), bench_cell, bench_model, name=name)
+    one, *others = (
+        compensated(name, write(job), bench_cell, bench_model)
         for name, write in LANGUAGES.items()
     )
+    for two in others:
+        assert_same_corrections(one, two)
+
+
+def assert_same_corrections(one, two):
     a, b = one.decisions, two.decisions
     assert (a.status == b.status).all() and (a.status == 0).mean() > 0.8
     np.testing.assert_allclose(a.correction, b.correction, rtol=0, atol=1e-9)
@@ -62,7 +80,7 @@ def test_corrections_are_the_same(bench_cell, bench_model, seed):
 
 
 def test_only_numbers_of_targets_differ(bench_cell, bench_model):
-    source = LANGUAGES["job.mod"](drawn(bench_cell, 1))
+    source = rapid(drawn(bench_cell, 1))
     found = compensate(source, bench_cell, bench_model, name="job.mod")
     lines = found.outputs["job.mod"].splitlines()
     assert lines[0].startswith(b"! postproc ")
@@ -75,10 +93,10 @@ def test_only_numbers_of_targets_differ(bench_cell, bench_model):
 @pytest.mark.parametrize("name", LANGUAGES)
 def test_the_tool_lands_at_stops(bench_cell, bench_model, name):
     source = LANGUAGES[name](drawn(bench_cell, 2))
-    found = compensate(source, bench_cell, bench_model, name=name)
+    found = compensated(name, source, bench_cell, bench_model)
     given, made = (
-        read_program({name: data}, bench_cell).visits
-        for data in (source, found.outputs[name])
+        read_program(files, bench_cell).visits
+        for files in (source, {**source, **found.outputs})
     )
     arm = virtual_arm(SEED, tool=setup_of(bench_cell).tool)
     landing = land(arm, setup_of(bench_cell), given, made)

@@ -21,14 +21,13 @@ from pathlib import Path
 import numpy as np
 
 from postproc.cli.simulate import setup_of
-from postproc.compensation.compensate import compensate
 from postproc.compensation.outcome import Status
 from postproc.compensation.program import read_program
 from postproc.model.model import Model, load_model
 from postproc.robot.cell import Cell, load_cell
 from postproc.simulation import land, run_program, virtual_arm
 from tests.conftest import ROOT, make_job
-from tests.language.neutral_job import LANGUAGES, NeutralJob, drawn
+from tests.language.neutral_job import LANGUAGES, NeutralJob, compensated, drawn
 
 ARMS = (56, 57, 58)
 MEAN_MM, MAX_MM = 0.02, 0.1  # at corrected stops
@@ -36,13 +35,22 @@ MEAN_MM, MAX_MM = 0.02, 0.1  # at corrected stops
 _NUMBER = r"[-+]?[0-9.]+(?:E[-+]?\d+)?"
 _SIX = rf"{_NUMBER}(?:,\s*{_NUMBER}){{5}}"
 _PLACE = rf"\[{_NUMBER}(?:,{_NUMBER}){{2}}\],\[{_NUMBER}(?:,{_NUMBER}){{3}}\]"
+_ABC = ",".join(f"{name} {_NUMBER}" for name in "XYZABC")
+_ANGLES = ",".join(f"A{k} {_NUMBER}" for k in range(1, 7))
+_KRL = (
+    rf"(?P<numbers>(?<=[ ,=]{{){_ABC}(?=,S )|(?<=SPTP {{){_ANGLES}(?=}}))"
+    r"(?:,(?P<flags>S \d+,T \d+))?"
+)
 # The numbers of a target, and its flags where a language may write them anew.
 TARGETS = {
     ".pdl": rf"(?P<numbers>(?<=TO POS\(){_SIX}|(?<=VIA POS\(){_SIX}"
     rf"|(?<=p\d := POS\(){_SIX}|(?<=p\d\d := POS\(){_SIX}|(?<=TO \{{){_SIX})",
     ".mod": rf"(?P<numbers>(?<=\[){_PLACE}(?=,\[-?\d,-?\d,-?\d,\d\],\[9E9)"
     rf"|(?<=\[)\[{_SIX}\](?=,\[9E9))(?:,\[(?P<flags>-?\d,-?\d,-?\d),\d\])?",
+    ".src": _KRL,
+    ".dat": _KRL,
 }
+NAMES = {".pdl": "PDL2", ".mod": "RAPID", ".src": "KRL"}
 
 
 @dataclass(frozen=True)
@@ -92,7 +100,7 @@ def driven(arm: int, cell: Cell) -> Iterator[tuple[int, NeutralJob]]:
     setup = setup_of(cell)
     for number in itertools.count():
         job = drawn(cell, number)
-        text = {"job.pdl": LANGUAGES["job.pdl"](job)}
+        text = LANGUAGES["job.pdl"](job)
         body = virtual_arm(arm, tool=setup.tool)
         if not any(run_program(body, setup, read_program(text, cell).visits).why):
             yield number, job
@@ -103,9 +111,9 @@ def landed(
 ) -> Landed:
     """Compensate a job in one language, and let the arm run both texts."""
     source = LANGUAGES[file](job)
-    found = compensate(source, cell, model, name=file)
-    texts = (source, found.outputs[file])
-    given, made = (read_program({file: text}, cell).visits for text in texts)
+    found = compensated(file, source, cell, model)
+    output = {**source, **found.outputs}
+    given, made = (read_program(files, cell).visits for files in (source, output))
     setup = setup_of(cell)
     body = virtual_arm(arm, tool=setup.tool)
     misses = []
@@ -119,7 +127,9 @@ def landed(
     before, after = (miss[mended] for miss in misses)
     sure = found.decisions.direction[rows[mended]].all(axis=1)
     left = int(stops.sum() - mended.sum())
-    text, flags = differing(file, *texts)
+    found_in = [differing(name, source[name], output[name]) for name in source]
+    text = next((line for line, _ in found_in if line is not None), None)
+    flags = tuple(one for _, some in found_in for one in some)
     return Landed(arm, number, file, before, after, sure, left, text, flags)
 
 
@@ -134,10 +144,14 @@ def differing(
     """
     target = re.compile(TARGETS[Path(file).suffix])
     old, stamped = source.decode().splitlines(), output.decode().splitlines()
-    if "postproc" not in stamped[0] or len(stamped) != len(old) + 1:
+    if Path(file).suffix == ".dat" and stamped == old:  # it holds no corrected point
+        return None, ()
+    header = sum(line.startswith("&") for line in old)
+    if "postproc" not in stamped[header] or len(stamped) != len(old) + 1:
         return 1, ()
     flags: list[tuple[int, str, str]] = []
-    for line, (a, b) in enumerate(zip(old, stamped[1:], strict=True), start=1):
+    del stamped[header]
+    for line, (a, b) in enumerate(zip(old, stamped, strict=True), start=1):
         if target.sub("#", a) != target.sub("#", b):
             return line, tuple(flags)
         for one, two in zip(target.finditer(a), target.finditer(b), strict=True):
@@ -160,7 +174,7 @@ def table(found: Sequence[Landed]) -> list[str]:
         before = np.concatenate([one.before for one in some])
         sure = np.concatenate([one.sure for one in some])
         rest = f"{after[~sure].max():.4f}" if not sure.all() else "-"
-        language = {".pdl": "PDL2", ".mod": "RAPID"}[Path(file).suffix]
+        language = NAMES[Path(file).suffix]
         lines.append(
             f"| {arm} | {language} | {sure.sum()} | {after[sure].mean():.4f} | "
             f"{after[sure].max():.4f} | {(~sure).sum()} | {rest} | "

@@ -7,7 +7,6 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from postproc.arrays import Ints
 from postproc.exceptions import ProgramError
 from postproc.files import MODULES
 from postproc.language.grammars import line_parser
@@ -15,19 +14,18 @@ from postproc.language.interface import (
     Cloner,
     JobReading,
     Language,
-    NamedPoint,
+    NoClones,
     Start,
 )
 from postproc.language.rapid.collect import visits_of
 from postproc.language.rapid.dialect import RAPID_DIALECT
 from postproc.language.rapid.interpreter import RapidMachine
-from postproc.language.rapid.moves import Goals
 from postproc.language.rapid.program import RapidFile, read_rapid
 from postproc.language.rapid.statements import RapidText
 from postproc.language.rapid.task import RapidTask
 from postproc.language.rewrite import Skeleton
-from postproc.language.source import CloneError, Edit, Source
-from postproc.language.visits import Literals, never_reached
+from postproc.language.source import Source
+from postproc.language.visits import never_reached
 
 # What the interpreter says of a statement where it is reached, knowing all modules.
 _SAID_AGAIN = ("unknown-instruction", "late-binding")
@@ -60,10 +58,11 @@ class Rapid(Language):
             problem, cure = "the file holds no routine", "Give a RAPID module"
             raise ProgramError(sources[0].name, problem, cure)
         task = RapidTask(files, start.taught)
-        machine = RapidMachine(task, start, Goals(task))
+        machine = RapidMachine.of(task, start)
         machine.run()
-        visits = visits_of(machine)
-        missed = _missed(files, machine)
+        moves = {k: [m.row for m in file.moves] for k, file in enumerate(files)}
+        visits = visits_of(machine, moves)
+        missed = machine.missed(moves)
         told = never_reached(missed, "main", "module")
         own = (d for file in files for d in file.diagnostics)
         found = [d for d in own if d.code not in _SAID_AGAIN]
@@ -75,7 +74,7 @@ class Rapid(Language):
 
     def cloner(self, sources: Sequence[Source]) -> Cloner:
         """Say that nothing is cloned."""
-        return NoClones()
+        return NoClones(_NOT_CLONED)
 
     def target_names(
         self, file: str, lines: Sequence[bytes], wanted: Sequence[int]
@@ -116,37 +115,9 @@ def _begun(line: bytes) -> str:
     return " ".join(filter(None, words.groups())) if words else ""
 
 
-class NoClones(Cloner):
-    """Nothing is cloned."""
-
-    def target(self, file: int, line: int, via: bool, name: str) -> NamedPoint:
-        """Refuse to clone what a move goes to."""
-        raise CloneError(_NOT_CLONED)
-
-    def declared(self, named: NamedPoint) -> int:
-        """Return no line."""
-        raise CloneError(_NOT_CLONED)
-
-    def clone(
-        self, literals: Literals, named: Sequence[NamedPoint], rows: Sequence[int]
-    ) -> tuple[str, list[tuple[int, Edit]]]:
-        """Refuse to clone."""
-        raise CloneError(_NOT_CLONED)
-
-
 def skeleton_of(text: RapidText) -> Skeleton:
     """Take over what the statements of a text tell, for comparing it with another."""
-    starts = text.source.line_starts
-    line = np.searchsorted(starts, text.begin, side="right").astype(np.int32)
-    return Skeleton(
-        text.source,
-        text.said.shapes,
-        text.shape,
-        line,
-        text.start,
-        text.stop,
-        reread=lambda source: skeleton_of(read_rapid(source).text),
-    )
+    return text.skeleton(lambda source: skeleton_of(read_rapid(source).text))
 
 
 def _read(source: Source, known: Sequence[RapidFile]) -> RapidFile:
@@ -164,14 +135,3 @@ def _read(source: Source, known: Sequence[RapidFile]) -> RapidFile:
             cure = "Close it: what runs when is not known without"
             raise ProgramError(source.name, found.message, cure, line=found.line)
     return file
-
-
-def _missed(files: Sequence[RapidFile], machine: RapidMachine) -> dict[str, Ints]:
-    """Return the lines of moves that no way leads to, by file."""
-    found = {}
-    for number, file in enumerate(files):
-        rows = {m.row for m in file.moves if (number, m.row) not in machine.reached}
-        if rows:
-            lines = sorted({file.text.line(row) for row in rows})
-            found[file.text.source.name] = np.array(lines, dtype=np.int64)
-    return found

@@ -45,6 +45,10 @@ class Modes:
         differing["blocked"] = self.blocked | other.blocked
         return replace(self, **differing)
 
+    def lost(self) -> Modes:
+        """Forget all but why targets cannot be compensated."""
+        return replace(LOST, blocked=self.blocked)
+
 
 AT_START = Modes()
 LOST = Modes(

@@ -9,7 +9,9 @@ from functools import cache
 
 import numpy as np
 
-from postproc.arrays import Floats
+from postproc.language.collect import FoundGoal, FoundVisit
+from postproc.language.machine import Scope
+from postproc.language.placed import IDENTITY, Pose, composed, flat
 from postproc.language.rapid import syntax as said
 from postproc.language.rapid.dialect import (
     RAPID_DIALECT,
@@ -23,7 +25,6 @@ from postproc.language.rapid.task import (
     SHIFTS,
     Nested,
     RapidTask,
-    Scope,
     WrittenNumber,
 )
 from postproc.language.visits import Meaning
@@ -48,74 +49,32 @@ class FrameOfMove:
     """A tool or a work object.
 
     Attributes:
-        pose: Where it is, the rows of (4, 4) [m] one after the other; empty where that
-            is not known.
+        pose: Where it is, empty where that is not known.
         held: Robhold: the arm holds it.
         why: Why targets with it cannot be compensated, "" where they can.
         taught: It was taught with the arm, and contains its error.
     """
 
-    pose: tuple[float, ...]
+    pose: Pose
     held: bool
     why: str = ""
     taught: bool = False
 
 
-@dataclass(frozen=True)
-class RapidGoal:
-    """Where a move goes.
-
-    Attributes:
-        target: What the numbers mean.
-        values: w numbers, NaN where not known.
-        file: Index of the file that holds them.
-        slots: Which numbers of that file they are, -1 for those that are computed.
-        follows: Likewise of the point that it is shifted from.
-        name: Of the point, "" where it is written in the move.
-        aux: External axes, NaN where there is none.
-        why: Why it cannot be compensated, "" where it can.
-        pins: Why the numbers must stay, "" where they need not.
-    """
-
-    target: Meaning
-    values: tuple[float, ...] = NOTHING
-    file: int = -1
-    slots: tuple[int, ...] = NO_SLOTS
-    follows: tuple[int, ...] = NO_SLOTS
-    name: str = ""
-    aux: tuple[float, ...] = (np.nan,) * 6
-    why: str = ""
-    pins: str = ""
-
-
 @dataclass
-class RapidVisit:
+class RapidVisit(FoundVisit):
     """One arrival, as it is found.
 
     Attributes:
-        scope, row: The move.
-        motion, via: `Motion`, and whether it is the point of an arc.
-        goal: Where it goes.
         tool, wobj: Its frames.
         zone_mm: Size of its zone, NaN where it stops.
         speed: Along the path [m/s], NaN where not known.
-        modes: What holds there.
-        origins: Where it may come from.
-        why: Why it cannot be compensated, "" where it can.
     """
 
-    scope: Scope
-    row: int
-    motion: Motion
-    via: bool
-    goal: RapidGoal
-    tool: FrameOfMove
-    wobj: FrameOfMove
-    zone_mm: float
-    speed: float
-    modes: Modes
-    origins: frozenset[int] = frozenset()
-    why: str = ""
+    tool: FrameOfMove = field(kw_only=True)
+    wobj: FrameOfMove = field(kw_only=True)
+    zone_mm: float = field(kw_only=True)
+    speed: float = field(kw_only=True)
 
 
 @dataclass
@@ -150,14 +109,16 @@ class Goals:
         if signature.via >= 0:
             goal = self.goal(ends[1], signature, row, scope)
             yield RapidVisit(
-                scope, row, motion, True, goal, tool, wobj, zone, speed, modes, why=why
-            )
+                scope, row, motion, True, goal, modes, why=why,
+                tool=tool, wobj=wobj, zone_mm=zone, speed=speed,
+            )  # fmt: skip
         goal = self.goal(ends[0], signature, row, scope)
         if not signature.reaches:
-            goal = RapidGoal(Meaning.UNKNOWN, NOTHING, why=why, name=goal.name)
+            goal = FoundGoal(Meaning.UNKNOWN, NOTHING, why=why, name=goal.name)
         yield RapidVisit(
-            scope, row, motion, False, goal, tool, wobj, zone, speed, modes, why=why
-        )
+            scope, row, motion, False, goal, modes, why=why,
+            tool=tool, wobj=wobj, zone_mm=zone, speed=speed,
+        )  # fmt: skip
 
     def _conditions(
         self,
@@ -191,7 +152,7 @@ class Goals:
         signature: Signature,
         row: int,
         scope: Scope,
-    ) -> RapidGoal:
+    ) -> FoundGoal:
         """Read a destination."""
         match operand:
             case said.Composite() | said.DataObject():
@@ -201,7 +162,7 @@ class Goals:
             ):
                 return self._shifted(name, arguments, row, scope)
             case _:
-                return RapidGoal(Meaning.UNKNOWN, why=RUN_TIME)
+                return FoundGoal(Meaning.UNKNOWN, NOTHING, why=RUN_TIME)
 
     def _point(
         self,
@@ -209,7 +170,7 @@ class Goals:
         joints: bool,
         row: int,
         scope: Scope,
-    ) -> RapidGoal:
+    ) -> FoundGoal:
         """Read a point that is written or named."""
         name = operand.name if isinstance(operand, said.DataObject) else ""
         if isinstance(operand, said.Composite):
@@ -219,14 +180,14 @@ class Goals:
         found = _numbers(self.task.record(operand, row, scope), joints)
         if found is None:
             why = f"{name} {self._untold(name, scope)}" if name else RUN_TIME
-            return RapidGoal(Meaning.UNKNOWN, name=name, why=why)
+            return FoundGoal(Meaning.UNKNOWN, NOTHING, name=name, why=why)
         shown = name + self._element(operand, row, scope)
         main, aux = found
         file, slots = _places(main)
         values = [number.value for number in main]
         values += [0.0] * (WIDTH - len(values))
         why = "" if joints or _is_unit(values[3:7]) else "no quaternion"
-        return RapidGoal(
+        return FoundGoal(
             Meaning.JOINTS if joints else Meaning.POSE,
             tuple(values),
             file,
@@ -239,7 +200,7 @@ class Goals:
 
     def _written(
         self, operand: said.Composite, joints: bool, row: int, scope: Scope
-    ) -> RapidGoal | None:
+    ) -> FoundGoal | None:
         """Read a point whose numbers all stand in the move, None for others."""
         if id(operand) not in self._slots:
             self._slots[id(operand)] = operand, _plain_slots(operand)
@@ -257,7 +218,7 @@ class Goals:
         aux = tuple(np.nan if abs(v) > UNUSED else v for v in values[count:])
         at = tuple(places[:count] + [-1] * (WIDTH - count))
         target = Meaning.JOINTS if joints else Meaning.POSE
-        return RapidGoal(target, tuple(main), scope.file, at, aux=aux)
+        return FoundGoal(target, tuple(main), scope.file, at, aux=aux)
 
     def _element(self, operand: said.Operand, row: int, scope: Scope) -> str:
         """Spell which element of an array is meant, "" where it is none."""
@@ -297,14 +258,14 @@ class Goals:
 
     def _shifted(
         self, name: str, arguments: Sequence[said.Argument], row: int, scope: Scope
-    ) -> RapidGoal:
+    ) -> FoundGoal:
         """Read Offs and RelTool: the point is moved along, the shift stays."""
         placed = [one.value for one in arguments if not one.name]
         turns = {one.name: one.value for one in arguments if one.name}
         if len(placed) != 4 or not isinstance(
             placed[0], said.DataObject | said.Composite
         ):
-            return RapidGoal(Meaning.UNKNOWN, why=RUN_TIME)
+            return FoundGoal(Meaning.UNKNOWN, NOTHING, why=RUN_TIME)
         base = self._point(placed[0], False, row, scope)
         shift = [self.task.number(one, row, scope) for one in placed[1:]]
         angles = [
@@ -313,12 +274,14 @@ class Goals:
         ]
         if base.target != Meaning.POSE or np.isnan([*shift, *angles]).any():
             pins = base.pins or f"{name} shifts it by what {RUN_TIME}"
-            return RapidGoal(Meaning.UNKNOWN, name=base.name, why=base.why or RUN_TIME,
-                        file=base.file, follows=base.slots, pins=pins)  # fmt: skip
+            return FoundGoal(
+                Meaning.UNKNOWN, NOTHING, base.file, follows=base.slots,
+                name=base.name, why=base.why or RUN_TIME, pins=pins,
+            )  # fmt: skip
         values = _moved(np.array(base.values), name, shift, angles)
         turned = any(angles)
         pins = base.pins or (f"{name} turns it" if turned else "")
-        return RapidGoal(
+        return FoundGoal(
             Meaning.POSE, values, base.file, NO_SLOTS, base.slots, base.name, base.aux,
             base.why, pins,
         )  # fmt: skip
@@ -363,9 +326,8 @@ class Goals:
         return replace(read, taught=self.task.is_taught(name, found))
 
 
-_IDENTITY = (1.0, *(0.0,) * 4, 1.0, *(0.0,) * 4, 1.0, *(0.0,) * 4, 1.0)
-WORLD = FrameOfMove(_IDENTITY, False)
-FLANGE = FrameOfMove(_IDENTITY, True)
+WORLD = FrameOfMove(IDENTITY, False)
+FLANGE = FrameOfMove(IDENTITY, True)
 
 
 @dataclass
@@ -538,20 +500,9 @@ def pose_of(found: Nested | None) -> tuple[float, ...]:
     return tuple(_pose_numbers(found) or ())
 
 
-def pose_of_numbers(numbers: Sequence[float]) -> tuple[float, ...]:
+def pose_of_numbers(numbers: Sequence[float]) -> Pose:
     """Convert the seven numbers of a pose; see `FrameOfMove.pose`."""
     return flat(RAPID_DIALECT.poses(np.array([*numbers, 0.0, 0.0, 0.0, 0.0])[None]))
-
-
-def composed(first: Sequence[float], second: Sequence[float]) -> tuple[float, ...]:
-    """Compose two poses."""
-    one, other = np.array([first, second]).reshape(2, 4, 4)
-    return flat(one @ other)
-
-
-def flat(pose: Floats) -> tuple[float, ...]:
-    """Write the rows of a pose, (4, 4) [m], one after the other."""
-    return tuple(pose.ravel().tolist())
 
 
 def _tool_of(found: Nested | None) -> FrameOfMove | None:

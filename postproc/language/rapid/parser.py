@@ -2,34 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from functools import lru_cache
-from itertools import count
 from typing import Any
 
-import lark
-
-from postproc.language.grammars import line_parser
+from postproc.language.parser import Children, FormParser, Word
 from postproc.language.rapid import syntax as said
-from postproc.language.scan import NAME_MARK, UNREADABLE
-from postproc.language.shapes import open_name
 
 # From trees to statements, rule by rule. Every function here is named after a rule of
 # ``grammars/rapid.lark`` and takes what its children gave.
-
-Children = Sequence[Any]
-
-
-class Word(str):
-    """A token: text with the name of its terminal."""
-
-    kind: str
-
-    def __new__(cls, text: str, kind: str) -> Word:
-        """Remember the terminal beside the text."""
-        word = super().__new__(cls, text)
-        word.kind = kind
-        return word
 
 
 class ScopePart(str):
@@ -185,45 +166,13 @@ RESERVED = frozenset(
 )
 """Words that name nothing, but for attributes of a module."""
 
-
-class _DeeperError(Exception):
-    """A statement holds more operators within each other than any program does."""
-
-
-class _ReservedError(Exception):
-    """A word of the language stands where a name must."""
+_PARSER = FormParser("rapid", RULES, RESERVED, LONGEST, DEEPEST)
 
 
 @lru_cache(maxsize=8192)
 def parse_statement(form: str) -> said.RapidStatement:
     """Parse the form of a statement, `NotUnderstood` where the grammar cannot."""
-    if form.startswith(UNREADABLE) or len(form) > LONGEST:
-        return said.NotUnderstood()
-    try:
-        tree = line_parser("rapid", "statement").parse(form)
-        found = _build(tree)
-    except (lark.exceptions.LarkError, _DeeperError, _ReservedError):
+    found = _PARSER.parse(form)
+    if found is None:
         return said.NotUnderstood()
     return found if isinstance(found, said.RapidStatement) else said.RapidStatement()
-
-
-def _build(tree: lark.Tree[lark.Token]) -> object:
-    """Build what a tree says, counting its names and its numbers."""
-    names, slots = count(), count()
-
-    def walk(node: lark.Tree[lark.Token] | lark.Token, depth: int = 0) -> object:
-        if depth > DEEPEST:
-            raise _DeeperError
-        if isinstance(node, lark.Token):
-            if node.type == "NUMBER":
-                return said.Num(next(slots))
-            text = str(node)
-            if node.type == "NAME" and text.lower() in RESERVED:
-                raise _ReservedError
-            if NAME_MARK in text:
-                text = text.replace(NAME_MARK, open_name(next(names)))
-            return Word(text, node.type)
-        children = [walk(child, depth + 1) for child in node.children]
-        return RULES[str(node.data)](children)
-
-    return walk(tree)

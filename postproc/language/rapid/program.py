@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
 
+from postproc.language.flow import HeadedRows
+from postproc.language.outline import BlockWords, Outline
 from postproc.language.rapid.signatures import MOTIONS, Signature, known_instructions
 from postproc.language.rapid.statements import RapidText, read_statements
 from postproc.language.rapid.syntax import (
@@ -27,23 +29,6 @@ from postproc.language.rapid.syntax import (
 )
 from postproc.language.source import Source
 from postproc.language.visits import Diagnostic
-
-SHOWN = 60  # characters of a statement in a message
-
-
-@dataclass(frozen=True)
-class RapidScope:
-    """A module or a routine: the statements from its head to its end.
-
-    Attributes:
-        head: What it begins with.
-        first, last: Rows of its head and of its end; of the file's last statement
-            where no end is.
-    """
-
-    head: ModuleHead | RoutineHead
-    first: int
-    last: int
 
 
 @dataclass(frozen=True)
@@ -98,8 +83,8 @@ class RapidFile:
     """
 
     text: RapidText
-    modules: tuple[RapidScope, ...]
-    routines: tuple[RapidScope, ...]
+    modules: tuple[HeadedRows, ...]
+    routines: tuple[HeadedRows, ...]
     data: tuple[Datum, ...]
     moves: tuple[MotionCall, ...]
     diagnostics: tuple[Diagnostic, ...]
@@ -112,21 +97,20 @@ def read_rapid(source: Source) -> RapidFile:
         ProgramError: A string or the header does not end.
     """
     text = read_statements(source)
-    outline = _Outline(text)
-    for row in _rows(text, _is_outline):
-        outline.take(row, text.statement(row))
-    outline.close()
-    routines = {scope.head.name for scope in outline.routines}
-    calls = _Calls(text, routines)
+    outline, data = _outline(text)
+    routines = outline.of(*_ROUTINES)
+    # Without its end, calls may stand behind a record.
+    records = [range(r.first, r.last + 1) for r in outline.of("record") if r.ended]
+    calls = _Calls(text, {scope.head.name for scope in routines})
     for row in _rows(text, _is_call):
-        if not outline.in_record(row):
+        if not any(row in rows for rows in records):
             calls.take(row, text.statement(row))
     found = sorted({*outline.diagnostics, *calls.diagnostics})
     return RapidFile(
         text,
-        tuple(outline.modules),
-        tuple(outline.routines),
-        tuple(outline.data),
+        tuple(outline.of("module")),
+        tuple(routines),
+        tuple(data),
         tuple(calls.moves),
         tuple(found),
     )
@@ -149,109 +133,41 @@ def _is_outline(said: RapidStatement) -> bool:
 
 # Blocks: every head has its end.
 
-_ENDS = {
-    "endmodule": "module", "endproc": "proc", "endfunc": "func", "endtrap": "trap",
-    "endrecord": "record", "endif": "if", "endfor": "for", "endwhile": "while",
-    "endtest": "test",
-}  # fmt: skip
-_WITHIN = {"elseif": "if", "else": "if", "case": "test", "default": "test"}
-_SCOPES = ("module", "proc", "func", "trap", "record")
+_WORDS = BlockWords(
+    ends={
+        "endmodule": "module", "endproc": "proc", "endfunc": "func", "endtrap": "trap",
+        "endrecord": "record", "endif": "if", "endfor": "for", "endwhile": "while",
+        "endtest": "test",
+    },
+    within={"elseif": "if", "else": "if", "case": "test", "default": "test"},
+    scopes=("module", "proc", "func", "trap", "record"),
+    outer=("module",),
+)  # fmt: skip
+_ROUTINES = ("proc", "func", "trap")
 
 
-@dataclass
-class _Outline:
-    """Modules, routines, records and blocks of a file, as they are met."""
-
-    text: RapidText
-    modules: list[RapidScope] = field(default_factory=list)
-    routines: list[RapidScope] = field(default_factory=list)
-    data: list[Datum] = field(default_factory=list)
-    diagnostics: list[Diagnostic] = field(default_factory=list)
-    _open: list[tuple[str, int, RapidStatement]] = field(default_factory=list)
-    _record_rows: list[range] = field(default_factory=list)
-
-    def take(self, row: int, said: RapidStatement) -> None:
-        """Take the next statement that opens or closes something, or declares."""
-        match said:
+def _outline(text: RapidText) -> tuple[Outline, list[Datum]]:
+    """Find modules, routines, records, blocks and data of a file."""
+    outline, data = Outline(text, _WORDS), list[Datum]()
+    for row in _rows(text, _is_outline):
+        match said := text.statement(row):
             case DataDeclaration():
-                module, routine = self._name("module"), self._name(*_SCOPES[1:4])
-                self.data.append(Datum(said, row, module, routine))
+                module, routine = outline.name("module"), outline.name(*_ROUTINES)
+                data.append(Datum(said, row, module, routine))
             case ModuleHead():
-                self._begin("module", row, said)
+                outline.begin("module", row, said)
             case RoutineHead(kind=kind):
-                self._begin(kind, row, said)
+                outline.begin(kind, row, said)
             case RecordHead():
-                self._begin("record", row, said)
+                outline.begin("record", row, said)
             case ForLoop():
-                self._open.append(("for", row, said))
+                outline.open("for", row, said)
+            case Branch(word="if" | "while" | "test" as word):
+                outline.open(word, row, said)
             case Branch(word=word) | BlockWord(word=word):
-                self._word(word, row, said)
-
-    def close(self) -> None:
-        """Close what the file leaves open."""
-        self._close_until(0, len(self.text) - 1)
-
-    def in_record(self, row: int) -> bool:
-        """Tell whether a statement is a component of a record's declaration."""
-        return any(row in rows for rows in self._record_rows)
-
-    def _name(self, *kinds: str) -> str:
-        """Return the name of the innermost open scope of some kinds."""
-        heads = (said for kind, _, said in reversed(self._open) if kind in kinds)
-        return getattr(next(heads, None), "name", "")
-
-    def _begin(self, kind: str, row: int, said: RapidStatement) -> None:
-        """Open a scope: routines and records stand in modules only."""
-        kinds = [kind for kind, _, _ in self._open]
-        if kind == "module":
-            self._close_until(0, row - 1)
-        elif any(one != "module" for one in kinds):
-            self._close_until(kinds.count("module"), row - 1)
-        self._open.append((kind, row, said))
-
-    def _word(self, word: str, row: int, said: RapidStatement) -> None:
-        kinds = [kind for kind, _, _ in self._open]
-        if word in ("if", "while", "test"):
-            self._open.append((word, row, said))
-        elif word in _WITHIN:
-            if kinds[-1:] != [_WITHIN[word]]:
-                self._complain(row, f"stands in no {_WITHIN[word].upper()}")
-        elif word in _ENDS:
-            self._end(_ENDS[word], row, kinds)
-
-    def _end(self, kind: str, row: int, kinds: Sequence[str]) -> None:
-        inner = kinds if kind in _SCOPES else kinds[_last_scope(kinds) :]
-        if kind not in inner:
-            self._complain(row, f"ends no {kind.upper()}")
-            return
-        at = len(kinds) - 1 - list(reversed(kinds)).index(kind)
-        self._close_until(at + 1, row - 1)
-        if kind == "record":  # without its end, calls may stand behind it
-            self._record_rows.append(range(self._open[-1][1], row + 1))
-        self._closed(self._open.pop(), row)
-
-    def _close_until(self, depth: int, row: int) -> None:
-        """Close what stands open deeper than a depth, with a message."""
-        while len(self._open) > depth:
-            kind, begun, said = self._open.pop()
-            self._complain(begun, f"has no END{kind.upper()}")
-            self._closed((kind, begun, said), row)
-
-    def _closed(self, block: tuple[str, int, RapidStatement], row: int) -> None:
-        _, begun, said = block
-        if isinstance(said, ModuleHead):
-            self.modules.append(RapidScope(said, begun, row))
-        elif isinstance(said, RoutineHead):
-            self.routines.append(RapidScope(said, begun, row))
-
-    def _complain(self, row: int, what: str) -> None:
-        message = f"{shown(self.text, row)} {what}"
-        self.diagnostics.append(_diagnostic(self.text, row, "open-block", message))
-
-
-def _last_scope(kinds: Sequence[str]) -> int:
-    """Return the place behind the innermost module, routine or record."""
-    return max((k + 1 for k, kind in enumerate(kinds) if kind in _SCOPES), default=0)
+                outline.word(word, row)
+    outline.close()
+    return outline, data
 
 
 # Calls: what moves, what does not, and what nobody can tell.
@@ -299,15 +215,5 @@ class _Calls:
             self._complain(row, "unknown-instruction", what)
 
     def _complain(self, row: int, code: str, what: str) -> None:
-        message = f"{shown(self.text, row)} {what}"
-        self.diagnostics.append(_diagnostic(self.text, row, code, message))
-
-
-def shown(text: RapidText, row: int) -> str:
-    """Quote the beginning of a statement, on one line."""
-    words = " ".join(text.text(row).split())
-    return words if len(words) <= SHOWN else f"{words[:SHOWN]} .."
-
-
-def _diagnostic(text: RapidText, row: int, code: str, message: str) -> Diagnostic:
-    return Diagnostic(text.source.name, text.line(row), code, message)
+        message = f"{self.text.shown(row)} {what}"
+        self.diagnostics.append(self.text.diagnostic(row, code, message))

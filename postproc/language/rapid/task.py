@@ -7,33 +7,18 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
+from postproc.language.collect import Taught
+from postproc.language.flow import HeadedRows
+from postproc.language.machine import Scope
 from postproc.language.rapid import syntax as said
 from postproc.language.rapid.dialect import COMMENTS
-from postproc.language.rapid.program import Datum, RapidFile, RapidScope
+from postproc.language.rapid.program import Datum, RapidFile
 from postproc.language.rapid.signatures import BUILT_IN_FUNCTIONS, MOTIONS, READING
 from postproc.language.rapid.targets import operands_of
 
 TARGETS = ("robtarget", "jointtarget")
 SHIFTS = ("offs", "reltool")  # functions whose first argument is a target
 CONSTANTS = {"true": 1.0, "false": 0.0, "pi": 3.141592653589793}
-
-
-@dataclass(frozen=True)
-class Scope:
-    """Where a statement stands, and what loop variables hold there.
-
-    Attributes:
-        file: Index of its file.
-        module, routine: Names, "" outside of all.
-        parameters: Of the routine.
-        loops: Values of loop variables that are known.
-    """
-
-    file: int
-    module: str
-    routine: str
-    parameters: frozenset[str] = frozenset()
-    loops: tuple[tuple[str, float], ...] = ()
 
 
 @dataclass(frozen=True)
@@ -78,9 +63,9 @@ class RapidTask:
                     known.append((number, datum))
 
     @cached_property
-    def routines(self) -> Mapping[str, list[tuple[int, str, RapidScope]]]:
+    def routines(self) -> Mapping[str, list[tuple[int, str, HeadedRows]]]:
         """Routines by name: file, module and place of each."""
-        found: dict[str, list[tuple[int, str, RapidScope]]] = defaultdict(list)
+        found: dict[str, list[tuple[int, str, HeadedRows]]] = defaultdict(list)
         for number, file in enumerate(self.files):
             for scope in file.routines:
                 around = (m for m in file.modules if m.first < scope.first < m.last)
@@ -89,29 +74,27 @@ class RapidTask:
         return found
 
     @cached_property
-    def taught_lines(self) -> list[frozenset[int]]:
-        """Lines of every file that a comment marks as taught."""
-        return [COMMENTS.taught(file.text.source) for file in self.files]
+    def own_taught(self) -> Taught:
+        """What was taught with the arm."""
+        return Taught(self.taught, [file.text for file in self.files], COMMENTS)
 
     def is_taught(self, name: str, found: Nested | None) -> bool:
-        """Tell whether data were taught, by the cell or a comment on their line.
+        """Tell whether a tool or a work object was taught, by the cell or a comment.
 
         Args:
-            name: Of the data, with an index where it has one; "" for numbers in a move.
+            name: Of the data.
             found: What they hold.
         """
-        if name.split("{")[0].strip().lower() in self.taught:
-            return True
         one = found
         while isinstance(one, tuple) and one:
             one = next((part for part in one if isinstance(part, tuple)), one[0])
         if not isinstance(one, WrittenNumber) or one.slot < 0:
-            return False
+            return name in self.taught
         text = self.files[one.file].text
         line = text.source.line_of(int(text.start[one.slot]))
-        return line in self.taught_lines[one.file]
+        return self.own_taught.holds(name, one.file, line)
 
-    def routine(self, name: str, here: Scope) -> tuple[int, str, RapidScope] | None:
+    def routine(self, name: str, here: Scope) -> tuple[int, str, HeadedRows] | None:
         """Find the routine that a name means, None where it is not sure."""
         known = self.routines.get(name, [])
         own = [one for one in known if one[:2] == (here.file, here.module)]
@@ -165,7 +148,7 @@ class RapidTask:
                 _note_uses(statement, written, read)
         return frozenset(written), frozenset(read)
 
-    def scope_of(self, number: int, module: str, routine: RapidScope) -> Scope:
+    def scope_of(self, number: int, module: str, routine: HeadedRows) -> Scope:
         """Return where the statements of a routine stand."""
         head = routine.head
         given = frozenset(getattr(head, "parameters", ()))

@@ -1,0 +1,372 @@
+"""From the arrivals that a `TaskMachine` has found to `Visits`."""
+
+from __future__ import annotations
+
+import math
+import re
+from bisect import bisect_left
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from postproc.arrays import Interned, Ints
+from postproc.language.dialect import Dialect
+from postproc.language.machine import Scope, TaskMachine
+from postproc.language.marks import MEASURE, Comments
+from postproc.language.placed import PlacedFrame
+from postproc.language.statements import StatementText
+from postproc.language.visits import (
+    Blend,
+    Literals,
+    Meaning,
+    OrientationLaw,
+    Switch,
+    Visits,
+    ZoneRule,
+    slim,
+)
+from postproc.robot.trajectory import Motion
+
+TOO_COMPLEX = "the program is too complex to be followed"
+ONLY_SHIFTED = "it is shifted from a point that no move goes to: what to correct?"
+_NO_FRAME = -1
+
+
+@dataclass(frozen=True)
+class FoundGoal:
+    """Where a move goes.
+
+    Attributes:
+        target: What the numbers mean.
+        values: w numbers, NaN where not known.
+        file: Index of the file that holds them.
+        slots: Which numbers of that file they are, -1 for those that are computed;
+            the first one tells literals apart.
+        follows: Likewise of the point that it is shifted from.
+        name: Of the point, "" where it is written in the move.
+        aux: External axes, NaN where there is none.
+        why: Why it cannot be compensated, "" where it can.
+        pins: Why the numbers must stay, "" where they need not.
+        shared: Other programs may read it too.
+    """
+
+    target: Meaning
+    values: tuple[float, ...]
+    file: int = -1
+    slots: tuple[int, ...] = (-1,)
+    follows: tuple[int, ...] = (-1,)
+    name: str = ""
+    aux: tuple[float, ...] = (math.nan,) * 6
+    why: str = ""
+    pins: str = ""
+    shared: bool = False
+
+
+@dataclass
+class FoundVisit:
+    """One arrival, as it is found.
+
+    Attributes:
+        scope, row: The move.
+        motion, via: `Motion`, and whether it is the point of an arc.
+        goal: Where it goes.
+        modes: What holds there.
+        origins: Where it may come from.
+        why: Why it cannot be compensated, "" where it can.
+    """
+
+    scope: Scope
+    row: int
+    motion: Motion
+    via: bool
+    goal: FoundGoal
+    modes: Any
+    origins: frozenset[int] = frozenset()
+    why: str = ""
+
+
+@dataclass(frozen=True)
+class Conditions:
+    """What an arrival is carried out with, in neutral terms.
+
+    Attributes:
+        tool, base, uframe: Its frames.
+        remote: The tool stands still, and the arm holds the part.
+        reasons: Why it cannot be compensated; empty texts do not count.
+        flags: Whether its configuration flags are checked.
+        flagged: It has such flags.
+        law: How the tool turns on the way.
+        zone_mm: Size of its zone, NaN where it stops.
+        speed: Along the path [m/s], NaN where not known.
+        wrist: On a line the wrist turns joint by joint.
+        override: Share of the programmed speed, 0 or NaN where not known.
+        overlap: Of moves that begin before the last has ended [%], NaN for a zone.
+    """
+
+    tool: PlacedFrame
+    base: PlacedFrame
+    uframe: PlacedFrame
+    remote: bool
+    reasons: Sequence[str]
+    flags: Switch
+    flagged: bool
+    law: OrientationLaw
+    zone_mm: float
+    speed: float
+    wrist: bool = False
+    override: float = 1.0
+    overlap: float = math.nan
+
+
+@dataclass
+class _Tables:
+    """What columns point into."""
+
+    frames: Interned[PlacedFrame]
+    reasons: Interned[str]
+    names: Interned[str]
+
+    def frame(self, frame: PlacedFrame) -> int:
+        return self.frames[frame] if frame.pose else _NO_FRAME
+
+    def frames_of(self, frames: Sequence[PlacedFrame]) -> Ints:
+        found = np.array([self.frame(frame) for frame in frames], np.int64)
+        return slim(found)
+
+
+def visits_of(
+    machine: TaskMachine,
+    dialect: Dialect,
+    comments: Comments,
+    moves: Mapping[int, Sequence[int]],
+    conditions: Callable[[Any], Conditions],
+) -> Visits:
+    """Put the arrivals into the order of the program, as columns.
+
+    Args:
+        machine: It has followed all ways.
+        dialect: What the numbers mean.
+        comments: How comments are written.
+        moves: Rows of all moves, by file.
+        conditions: Says what an arrival is carried out with.
+    """
+    order = sorted(range(len(machine.visits)), key=machine.order.__getitem__)
+    found = [machine.visits[k] for k in order]
+    held = [conditions(v) for v in found]
+    texts, n = machine.texts, len(found)
+    tables = _Tables(Interned(), Interned([""]), Interned([""]))
+    taught = Taught(machine.start.taught, texts, comments)
+    literals, literal, follows = _literals(found, texts, dialect.width, taught)
+    reasons = [_reason(c, machine.exhausted) for c in held]
+    for k in np.flatnonzero(follows == _NO_LITERAL).tolist():
+        reasons[k] = reasons[k] or ONLY_SHIFTED
+    follows[follows == _NO_LITERAL] = -1
+    pred_start, pred = _predecessors(machine, order)
+    base = tables.frames_of([c.base for c in held])
+    return Visits(
+        files=tuple(text.source.name for text in texts),
+        file=slim(np.array([v.scope.file for v in found], np.int64)),
+        line=np.array([texts[v.scope.file].line(v.row) for v in found], np.int64),
+        values=np.array([v.goal.values for v in found], float).reshape(n, -1)
+        if n else np.empty((0, dialect.width)),
+        aux=_aux(found),
+        literal=literal,
+        follows=slim(follows),
+        name=slim(np.array(tables.names.of([v.goal.name for v in found]), np.int64)),
+        base=base,
+        tool=tables.frames_of([c.tool for c in held]),
+        uframe=tables.frames_of([c.uframe for c in held]),
+        reason=slim(np.array(tables.reasons.of(reasons), np.int64)),
+        **_moves(found, held),
+        **_settings(held),
+        names=tuple(tables.names),
+        reasons=tuple(tables.reasons),
+        frames=np.array([f.pose for f in tables.frames], float).reshape(-1, 4, 4),
+        frame_taught=np.array([f.taught for f in tables.frames], bool),
+        pred_start=pred_start,
+        pred=pred,
+        measure_id=_measured(found, texts, comments, moves),
+        literals=literals,
+        dialect=dialect,
+    )  # fmt: skip
+
+
+def _measured(
+    found: Sequence[FoundVisit],
+    texts: Sequence[StatementText[Any]],
+    comments: Comments,
+    moves: Mapping[int, Sequence[int]],
+) -> tuple[str, ...]:
+    """Return the id that a comment gives to every visit, "" where none does."""
+    ids: dict[tuple[int, int], str] = {}
+    for k, rows in moves.items():
+        text = texts[k]
+        last = [text.source.line_of(text.span(row).end) for row in rows]
+        for line, mark in comments.marks(text.source, MEASURE):
+            at = bisect_left(last, line)
+            if at < len(rows):
+                ids.setdefault((k, rows[at]), mark)
+    return tuple("" if v.via else ids.get((v.scope.file, v.row), "") for v in found)
+
+
+@dataclass(frozen=True)
+class Taught:
+    """What was taught with the arm.
+
+    Attributes:
+        names: Of data, in lower case, by the cell.
+        texts: The files.
+        comments: How comments are written.
+    """
+
+    names: Collection[str]
+    texts: Sequence[StatementText[Any]]
+    comments: Comments
+
+    @cached_property
+    def lines(self) -> list[frozenset[int]]:
+        """Lines of every file that a comment marks."""
+        return [self.comments.taught(text.source) for text in self.texts]
+
+    def holds(self, name: str, file: int, line: int) -> bool:
+        """Tell whether data of a name, whose numbers stand on a line, were taught."""
+        root = re.split(r"[{\[]", name, maxsplit=1)[0].strip().lower()
+        return root in self.names or line in self.lines[file]
+
+
+def _reason(held: Conditions, exhausted: bool) -> str:
+    """Say why a visit cannot be compensated, "" where it can."""
+    if exhausted:
+        return TOO_COMPLEX
+    return next((why for why in held.reasons if why), "")
+
+
+def _moves(found: Sequence[FoundVisit], held: Sequence[Conditions]) -> dict[str, Any]:
+    """Columns of how the arm moves."""
+    n = len(found)
+    zone = np.array([c.zone_mm for c in held], float)
+    via = np.array([v.via for v in found], bool)
+    overlap = np.array([c.overlap for c in held], float)
+    overlaps = overlap >= 0.0
+    fly = (zone >= 0.0) | via | overlaps  # nothing stops at the point of an arc
+    rounded = np.where(overlaps, Blend.OVERLAP, Blend.ZONE)
+    return {
+        "motion": slim(np.array([v.motion for v in found], np.int64)),
+        "target": slim(np.array([v.goal.target for v in found], np.int64)),
+        "via": slim(via),
+        "distance_mm": slim(np.full(n, np.nan)),
+        "config": slim(np.zeros(n, dtype=np.int64)),
+        "configs": ("",),
+        "config_given": slim(np.array([c.flagged for c in held], bool)),
+        "fly": slim(fly),
+        "zone_mm": slim(np.where(zone >= 0.0, zone, np.nan)),
+        "overlap_percent": slim(np.where(overlaps, overlap, 100.0)),
+        "blend": slim(np.where(fly, rounded, Blend.UNSET)),
+        "zone_rule": slim(np.where(fly & ~overlaps, ZoneRule.FROM, ZoneRule.UNSET)),
+        "lin_spd": slim(np.array([c.speed for c in held], float)),
+        "rot_spd": slim(np.full(n, np.nan)),
+    }
+
+
+def _settings(held: Sequence[Conditions]) -> dict[str, Any]:
+    """Columns of what holds at moves."""
+    share = np.array([c.override for c in held], float)
+    care = np.repeat(np.array([c.flags for c in held], np.int64)[:, None], 3, axis=1)
+    return {
+        "nearest_turn": slim(np.zeros(len(held), dtype=bool)),
+        "care": care.reshape(-1, 3),
+        "override": slim(np.where(share > 0.0, share, 1.0)),
+        "wrist_joint": slim(np.array([c.wrist for c in held], bool)),
+        "orientation_law": slim(np.array([c.law for c in held], np.int64)),
+        "tool_remote": slim(np.array([c.remote for c in held], bool)),
+    }
+
+
+def _aux(found: Sequence[FoundVisit]) -> np.ndarray:
+    """External axes that have a value, (n, k): up to the last that is used."""
+    aux = np.array([v.goal.aux for v in found], float).reshape(len(found), 6)
+    used = np.flatnonzero(~np.isnan(aux).all(axis=0))
+    return aux[:, : int(used.max(initial=-1)) + 1]
+
+
+# Where the numbers stand.
+
+_NO_LITERAL = -2  # follows numbers that are no literal
+
+
+def _literals(
+    found: Sequence[FoundVisit],
+    texts: Sequence[StatementText[Any]],
+    width: int,
+    taught: Taught,
+) -> tuple[Literals, Ints, Ints]:
+    """Find the distinct literals; also those of visits, and those they follow."""
+    index: dict[tuple[int, int], int] = {}
+    rows: list[FoundVisit] = []
+    literal = np.full(len(found), -1, dtype=np.int64)
+    for k, v in enumerate(found):
+        key = v.goal.file, v.goal.slots[0]
+        if key[1] >= 0:
+            if key not in index:
+                index[key] = len(rows)
+                rows.append(v)
+            literal[k] = index[key]
+    follows = np.full(len(found), -1, dtype=np.int64)
+    pinned = [""] * len(rows)
+    for k, v in enumerate(found):
+        key = v.goal.file, max(v.goal.slots[0], v.goal.follows[0])
+        at = index.get(key, -1)
+        if v.goal.slots[0] < 0 <= v.goal.follows[0]:
+            known = v.goal.target == Meaning.POSE
+            follows[k] = (at if at >= 0 else _NO_LITERAL) if known else -1
+        if at >= 0:
+            pinned[at] = pinned[at] or v.goal.pins
+    return _places(rows, texts, pinned, width, taught), literal, follows
+
+
+def _places(
+    rows: Sequence[FoundVisit],
+    texts: Sequence[StatementText[Any]],
+    pinned: Sequence[str],
+    width: int,
+    taught: Taught,
+) -> Literals:
+    """Say where the numbers of literals stand."""
+    m = len(rows)
+    file = np.array([v.goal.file for v in rows], np.int64)
+    slots = np.array([v.goal.slots for v in rows], np.int64).reshape(m, width)
+    start, end = np.full((m, width), -1), np.full((m, width), -1)
+    line = np.zeros(m, dtype=np.int64)
+    for number, one in enumerate(texts):
+        mine = np.flatnonzero(file == number)
+        own, written = slots[mine], slots[mine] >= 0
+        start[mine] = np.where(written, np.append(one.start, -1)[own], -1)
+        end[mine] = np.where(written, np.append(one.stop, -1)[own], -1)
+        starts = one.source.line_starts
+        line[mine] = np.searchsorted(starts, start[mine, 0], side="right")
+    return Literals(
+        file=file,
+        line=line,
+        start=start,
+        end=end,
+        joints=np.array([v.goal.target == Meaning.JOINTS for v in rows], bool),
+        name=tuple(v.goal.name for v in rows),
+        shared=np.array([v.goal.shared for v in rows], bool),
+        taught=np.array([taught.holds(v.goal.name, v.goal.file, at)
+                         for v, at in zip(rows, line.tolist(), strict=True)], bool),
+        pinned=tuple(pinned),
+    )  # fmt: skip
+
+
+def _predecessors(machine: TaskMachine, order: Sequence[int]) -> tuple[Ints, Ints]:
+    """Translate origins to visits in program order, in CSR form."""
+    place = {number: k for k, number in enumerate(order)}
+    found = [
+        sorted(place[p] if p >= 0 else p for p in machine.visits[k].origins)
+        for k in order
+    ]
+    start = np.concatenate([[0], np.cumsum([len(f) for f in found])]).astype(np.int64)
+    return start, np.array([p for f in found for p in f], dtype=np.int64)

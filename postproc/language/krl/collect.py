@@ -1,0 +1,173 @@
+"""From the arrivals of a KRL job to `Visits`."""
+
+from __future__ import annotations
+
+import math
+from collections import defaultdict
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from postproc.language import collect
+from postproc.language.collect import Conditions, FoundGoal
+from postproc.language.krl.dialect import COMMENTS, KRL_DIALECT
+from postproc.language.krl.interpreter import KrlMachine
+from postproc.language.krl.modes import UNKNOWN, KrlModes, ModeReader
+from postproc.language.krl.moves import NO_SLOTS, NOTHING, KrlVisit
+from postproc.language.placed import PlacedFrame, from_record
+from postproc.language.visits import Meaning, OrientationLaw, Switch, Visits
+from postproc.robot.trajectory import Motion
+
+UNKNOWN_ZONE = -1.0
+STOP, PASS, MAYBE = "stop", "pass", "maybe"
+_MAYBE = (
+    "whether it is passed or the arm stops there is not known: what comes behind may "
+    "stop what is planned ahead"
+)
+_UNSIZED = "how early it is blended ($APO) is not known here"
+_IPO = "$IPO_MODE is not known here"
+_STATUS = "bit 2 of S and bit 4 of T disagree, otherwise than at the other points"
+_STILL_TOOL = "$ORI_TYPE = #CONSTANT: the tool keeps the orientation it comes with"
+_NOT_SET = "an inline setting (WITH) is not known"
+
+
+def visits_of(machine: KrlMachine, moves: Mapping[int, Sequence[int]]) -> Visits:
+    """Put the arrivals into the order of the program, as columns."""
+    found: Sequence[KrlVisit] = machine.visits
+    _keep_orientation(machine, found)
+    ends, odd = _ends(found), _odd_status(found)
+    base = PlacedFrame(from_record(machine.start.base))
+    number = {id(v): k for k, v in enumerate(found)}
+
+    def conditions(v: KrlVisit) -> Conditions:
+        at = number[id(v)]
+        return _conditions(machine, v, base, ends[at], at in odd)
+
+    return collect.visits_of(machine, KRL_DIALECT, COMMENTS, moves, conditions)
+
+
+def _effective(machine: KrlMachine, v: KrlVisit) -> tuple[KrlModes, str]:
+    """Add what a move sets for itself; say where that is not known."""
+    modes: KrlModes = v.modes
+    reader = ModeReader(machine.task, v.row, v.scope, machine.start.payload_kg)
+    for setting in v.move.settings:
+        after = reader.assigned(modes, setting)
+        if after is None:
+            return modes, f"{_NOT_SET}: {setting.target.name.upper()}"
+        modes = after
+    return modes, ""
+
+
+@dataclass(frozen=True)
+class _Blending:
+    """How a point is passed: size of the zone [mm], overlap [%], what is not known."""
+
+    zone_mm: float = math.nan
+    overlap: float = math.nan
+    why: str = ""
+
+
+def _conditions(
+    machine: KrlMachine, v: KrlVisit, base: PlacedFrame, end: str, odd: bool
+) -> Conditions:
+    """Say what an arrival is carried out with."""
+    modes, unset = _effective(machine, v)
+    joint = v.motion == Motion.JOINT
+    blending = _blending(v, modes, end)
+    given = (*sorted(modes.blocked), v.why, v.goal.why, unset, modes.tool.why)
+    if v.goal.target != Meaning.JOINTS:
+        given += (modes.base.why, "" if modes.interpolation else _IPO)
+    given += (_STATUS if odd else "", blending.why)
+    return Conditions(
+        tool=modes.tool.placed,
+        base=base,
+        uframe=modes.base.placed,
+        remote=modes.interpolation == "#tcp",
+        reasons=given,
+        flags=Switch.ON if joint else Switch.OFF,
+        flagged=joint and v.goal.target == Meaning.POSE,
+        law=_law(v, modes),
+        zone_mm=blending.zone_mm,
+        speed=modes.speed if modes.speed > 0 else math.nan,
+        wrist=modes.law == OrientationLaw.WRIST_JOINTS and not joint,
+        override=modes.share if joint else 1.0,
+        overlap=blending.overlap,
+    )
+
+
+def _law(v: KrlVisit, modes: KrlModes) -> OrientationLaw:
+    """Tell how the tool turns on the way."""
+    if v.motion != Motion.CIRCULAR or modes.orientation != "#var":
+        return modes.law
+    through = modes.through and v.by_spline_planner
+    return OrientationLaw.ONE_AXIS if through else OrientationLaw.ALONG_PATH
+
+
+def _blending(v: KrlVisit, modes: KrlModes, end: str) -> _Blending:
+    """Tell how a point is passed."""
+    if v.via or not v.blends or end == STOP or modes.ahead is False:
+        return _Blending()
+    if end == MAYBE or modes.ahead is None:
+        return _Blending(zone_mm=UNKNOWN_ZONE, why=_MAYBE)
+    words = v.move.words
+    by_share = "c_ptp" in words and "c_dis" not in words
+    if by_share:
+        if modes.overlap == UNKNOWN:
+            return _Blending(zone_mm=UNKNOWN_ZONE, why=_UNSIZED)
+        return _Blending(overlap=modes.overlap)
+    by_distance = "c_dis" in words or "c_spl" in words
+    if not by_distance or modes.distance == UNKNOWN:
+        return _Blending(zone_mm=UNKNOWN_ZONE, why=_UNSIZED)
+    return _Blending(zone_mm=modes.distance)
+
+
+# What stands behind a point decides whether it is passed.
+
+
+def _ends(found: Sequence[KrlVisit]) -> Sequence[str]:
+    """Tell of every visit whether the arm stops there, as far as what follows tells.
+
+    The old planner and that of splines do not blend into each other, statements that
+    wait for what runs ahead stop the arm, and so does the end of the program.
+    """
+    after: dict[int, list[KrlVisit]] = defaultdict(list)
+    for v in found:
+        for origin in v.origins:
+            after[origin].append(v)
+    return [_end(v, after[k]) for k, v in enumerate(found)]
+
+
+def _end(v: KrlVisit, after: Sequence[KrlVisit]) -> str:
+    """Tell whether the arm stops at a visit, by those behind it."""
+    stops = [
+        True if one.by_spline_planner != v.by_spline_planner else one.modes.halted
+        for one in after
+    ]
+    if all(stop is True for stop in stops):
+        return STOP
+    return PASS if all(stop is False for stop in stops) else MAYBE
+
+
+def _keep_orientation(machine: KrlMachine, found: Sequence[KrlVisit]) -> None:
+    """Forget targets whose orientation the tool does not take."""
+    for v in found:
+        modes, _ = _effective(machine, v)
+        if modes.orientation == "#constant" and v.motion != Motion.JOINT:
+            v.goal = FoundGoal(
+                Meaning.UNKNOWN, NOTHING, slots=NO_SLOTS, name=v.goal.name,
+                why=v.goal.why or _STILL_TOOL,
+            )  # fmt: skip
+
+
+def _odd_status(found: Sequence[KrlVisit]) -> set[int]:
+    """Find joint moves whose S says another side of axis 5 than T does.
+
+    What bit 2 of S means is told by most of the program's own points; where they do
+    not agree at all, all are odd.
+    """
+    agree: Mapping[bool, set[int]] = {True: set(), False: set()}
+    for k, v in enumerate(found):
+        if v.motion == Motion.JOINT and v.goal.target == Meaning.POSE:
+            s, t = v.goal.values[6:]
+            agree[bool(int(s) & 4) == bool(int(t) & 16)].add(k)
+    more, less = sorted(agree.values(), key=len, reverse=True)
+    return more | less if len(more) == len(less) else less

@@ -1,0 +1,182 @@
+"""Frames of KRL: ``$TOOL``, ``$BASE``, entries of ``TOOL_DATA``, products."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from postproc.language.krl import syntax as said
+from postproc.language.krl.dialect import COMPONENTS, KRL_DIALECT
+from postproc.language.krl.task import CONFIG, KrlRecord, KrlTask
+from postproc.language.machine import Scope
+from postproc.language.placed import IDENTITY, PlacedFrame, Pose, composed, flat
+
+
+@dataclass(frozen=True)
+class KrlFrame:
+    """A tool or a base.
+
+    Attributes:
+        pose: Where it is, empty where that is not known.
+        why: Why targets with it cannot be compensated, "" where they can.
+        taught: It was taught with the arm, and contains its error.
+    """
+
+    pose: Pose
+    why: str = ""
+    taught: bool = False
+
+    @property
+    def placed(self) -> PlacedFrame:
+        """Return it for the visits."""
+        return PlacedFrame(self.pose, self.taught)
+
+
+ZERO = KrlFrame(IDENTITY)
+NUMBERS = {"$tool": "tool_no", "$base": "base_no"}  # in FDAT
+TABLES = {"$tool": "tool_data", "$base": "base_data"}
+_WHICH = "which entry of {} it takes is known only when the program runs"
+_CHAINED = "its base moves with another axis or arm ({})"
+
+
+@dataclass(frozen=True)
+class FrameReader:
+    """Reads frames where a statement stands.
+
+    Attributes:
+        task: The files of the job.
+        row, here: The statement.
+        tool, base: What ``$TOOL`` and ``$BASE`` are there.
+    """
+
+    task: KrlTask
+    row: int
+    here: Scope
+    tool: KrlFrame
+    base: KrlFrame
+
+    def frame(self, operand: said.Operand) -> KrlFrame:
+        """Read a frame."""
+        match operand:
+            case said.DataObject(name="$nullframe" | "$world", steps=()):
+                return ZERO
+            case said.DataObject(name="$tool", steps=()):
+                return self.tool
+            case said.DataObject(name="$base", steps=()):
+                return self.base
+            case said.DataObject(
+                name="tool_data" | "base_data" as table,
+                steps=(said.ElementStep() as step,),
+            ):
+                number = self.task.index(step, self.row, self.here)
+                if number is None or len(number) != 1:
+                    return KrlFrame((), _WHICH.format(table.upper()))
+                return self.entry(table, number[0])
+            case said.Operation(operator=":", operands=(first, second)):
+                return self._product(self.frame(first), self.frame(second))
+            case said.FunctionCall(name=name, arguments=arguments):
+                return self._call(name, [one.value for one in arguments])
+            case _:
+                return self._record(operand)
+
+    def _call(self, name: str, arguments: Sequence[said.Operand | None]) -> KrlFrame:
+        """Read a frame that one of the functions of modern inline forms gives."""
+        first = arguments[0] if arguments else None
+        value = self.task.value(first, self.row, self.here)
+        match name:
+            case "stool2" if isinstance(value, KrlRecord):
+                return self.numbered("$tool", value.number("tool_no"))
+            case "stool":
+                return self.numbered(
+                    "$tool", self.task.number(first, self.row, self.here)
+                )
+            case "sbase":
+                return self.numbered(
+                    "$base", self.task.number(first, self.row, self.here)
+                )
+            case "ek" | "lk" | "ey":
+                return KrlFrame((), _CHAINED.format(name.upper()))
+        return KrlFrame((), f"what {name.upper()} gives is not known")
+
+    def numbered(self, name: str, number: float) -> KrlFrame:
+        """Return the tool or the base of a number; 0 is none."""
+        if number != number or number != int(number):
+            return KrlFrame((), f"the number of its {name.upper()} is not known")
+        return ZERO if number == 0 else self.entry(TABLES[name], int(number))
+
+    def entry(self, table: str, number: int) -> KrlFrame:
+        """Read an entry of TOOL_DATA or BASE_DATA."""
+        shown = f"{table.upper()}[{number}]"
+        if number <= 0:
+            return KrlFrame((), f"{shown} is no frame that is known")
+        if table == "base_data" and self._is_chained(number):
+            return KrlFrame((), _CHAINED.format(f"MACHINE_FRAME_DAT[{number}]"))
+        found = self._element(table, number)
+        return found or KrlFrame((), self._unknown(shown, table))
+
+    def _element(self, table: str, number: int) -> KrlFrame | None:
+        """Read an element of an array of frames, None where it is not known."""
+        if table in self.task.written:
+            return None
+        found = self.task.datum(table, self.here, (number,))
+        if found is None or found[1].value is None:
+            return None
+        file, datum = found
+        there = Scope(file, self.task.files[file].name, "")
+        pose = pose_of(self.task.value(datum.value, datum.row, there))
+        if not pose:
+            return None
+        line = self.task.files[file].text.line(datum.row)
+        taught = self.task.own_taught.holds(f"{table}[{number}]", file, line)
+        return KrlFrame(pose, taught=taught)
+
+    def _is_chained(self, number: int) -> bool:
+        """Tell whether a base hangs on an external axis."""
+        found = self.task.datum("machine_frame_dat", self.here, (number,))
+        if found is None:
+            return False
+        file, datum = found
+        there = Scope(file, self.task.files[file].name, "")
+        value = self.task.value(datum.value, datum.row, there)
+        known = value.number("mach_def_index") if isinstance(value, KrlRecord) else 1.0
+        return not known == 0.0
+
+    def _unknown(self, shown: str, name: str) -> str:
+        why = self.task.untold(name, self.here)
+        where = f" ({CONFIG}.dat)" if "declared" in why else ""
+        return f"{shown} {why}{where}"
+
+    def _record(self, operand: said.Operand) -> KrlFrame:
+        """Read a frame that is written or named."""
+        value = self.task.value(operand, self.row, self.here)
+        pose = pose_of(value)
+        if pose:
+            return KrlFrame(pose)
+        if isinstance(operand, said.DataObject):
+            return KrlFrame((), self._unknown(operand.name.upper(), operand.name))
+        return KrlFrame((), "a frame is not written whole")
+
+    @staticmethod
+    def _product(first: KrlFrame, second: KrlFrame) -> KrlFrame:
+        if first.why or second.why or not (first.pose and second.pose):
+            return KrlFrame((), first.why or second.why)
+        pose = composed(first.pose, second.pose)
+        return KrlFrame(pose, taught=first.taught or second.taught)
+
+
+def pose_of(value: object) -> Pose:
+    """Convert a frame to a pose, empty where it is none."""
+    if not isinstance(value, KrlRecord):
+        return ()
+    numbers = [value.number(name) for name in COMPONENTS[:6]]
+    if any(map(math.isnan, numbers)):
+        return ()
+    return pose_of_numbers(numbers)
+
+
+def pose_of_numbers(numbers: Sequence[float]) -> Pose:
+    """Convert X, Y, Z, A, B, C to a pose."""
+    return flat(KRL_DIALECT.poses(np.array([*numbers, 0.0, 0.0])[None]))

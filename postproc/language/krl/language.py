@@ -1,0 +1,159 @@
+"""KRL behind the interface of all languages."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from postproc.exceptions import ProgramError
+from postproc.files import KRL_PROGRAMS
+from postproc.language.grammars import line_parser
+from postproc.language.interface import (
+    Cloner,
+    JobReading,
+    Language,
+    NoClones,
+    Start,
+)
+from postproc.language.krl import syntax as said
+from postproc.language.krl.collect import visits_of
+from postproc.language.krl.dialect import KRL_DIALECT
+from postproc.language.krl.interpreter import KrlMachine
+from postproc.language.krl.program import KrlFile, read_krl
+from postproc.language.krl.statements import KrlText
+from postproc.language.krl.task import KrlTask
+from postproc.language.rewrite import Skeleton
+from postproc.language.source import Source
+from postproc.language.visits import never_reached
+
+_BEGIN = re.compile(
+    rb"(?:\xef\xbb\xbf)?(?:\s|;[^\r\n]*[\r\n])*(?:&\w|(?:GLOBAL\s+)?DEF\s)", re.I
+)
+_ACCURACY = ("$abs_accur", "$abs_convert")
+_NOT_CLONED = "points of KRL are not cloned: give the move a point of its own"
+
+
+class Krl(Language):
+    """The language of KUKA controllers."""
+
+    name = "KRL"
+    suffixes = KRL_PROGRAMS
+    comment = ";"
+    dialect = KRL_DIALECT
+    tells_accuracy = False
+
+    def recognises(self, text: bytes) -> bool:
+        """Tell whether a source begins there, behind comments."""
+        return _BEGIN.match(text) is not None
+
+    def read(
+        self,
+        sources: Sequence[Source],
+        start: Start,
+        known: Sequence[KrlFile] = (),
+    ) -> JobReading:
+        """Read the files of a job, the source that runs first; see `Language.read`."""
+        files = [_read(source, known) for source in sources]
+        if not files[0].routines:
+            problem, cure = "the file holds no routine", "Give the .src of a program"
+            raise ProgramError(sources[0].name, problem, cure)
+        _refuse_own_accuracy(files)
+        machine = KrlMachine.of(KrlTask(files, start.taught), start)
+        machine.run()
+        moves = {k: file.moves for k, file in enumerate(files)}
+        visits = visits_of(machine, moves)
+        missed = machine.missed(moves)
+        told = never_reached(missed, f"DEF {files[0].routines[0].head.name}", "program")
+        own = (d for file in files for d in file.diagnostics)
+        found = [*own, *machine.diagnostics, *told]
+        corrected = {visits.files[k] for k in np.unique(visits.literals.file).tolist()}
+        kept = tuple(f for f in files if f.text.source.name not in corrected)
+        texts = tuple(skeleton_of(file.text) for file in files)
+        return JobReading(texts, visits, tuple(sorted(set(found))), kept, missed)
+
+    def cloner(self, sources: Sequence[Source]) -> Cloner:
+        """Say that nothing is cloned."""
+        return NoClones(_NOT_CLONED)
+
+    def target_names(
+        self, file: str, lines: Sequence[bytes], wanted: Sequence[int]
+    ) -> Iterator[str]:
+        """Name data by their declarations, and other lines by how they begin."""
+        for line in wanted:
+            yield _begun(lines[line - 1]) if line else ""
+
+    def holds_joints(self, line: str) -> bool:
+        """Tell whether a line holds joint angles."""
+        return _JOINTS.match(line) is not None
+
+    def prepare(self) -> None:
+        """Load the parser of statements."""
+        line_parser("krl", "statement")
+
+
+_DECLARED = re.compile(
+    r"\s*(?:DECL\s+)?(?:GLOBAL\s+)?(?:CONST\s+)?(?:DECL\s+)?"
+    r"(?:E6POS|POS|FRAME|E6AXIS|AXIS)\s+([A-Za-z_$]\w*(?:\[[^\]]*\])?)",
+    re.I,
+)
+_GIVEN = re.compile(r"\s*([A-Za-z_$]\w*(?:\[[^\]]*\])?)\s*=")
+_MOVED = re.compile(r"\s*([A-Za-z_]\w*)\s+([A-Za-z_$]\w*(?:\[[^\]]*\])?)?")
+_JOINTS = re.compile(r"[^;\"]*?\{\s*(?:(?:E6)?AXIS\s*:\s*)?A1\s", re.I)
+
+
+def _begun(line: bytes) -> str:
+    """Name what a line declares, gives a value to or moves to."""
+    text = line.decode("latin-1")
+    found = _DECLARED.match(text) or _GIVEN.match(text)
+    if found:
+        return found[1]
+    words = _MOVED.match(text)
+    return " ".join(filter(None, words.groups())) if words else ""
+
+
+def skeleton_of(text: KrlText) -> Skeleton:
+    """Take over what the statements of a text tell, for comparing it with another."""
+    return text.skeleton(lambda source: skeleton_of(read_krl(source).text))
+
+
+def _read(source: Source, known: Sequence[KrlFile]) -> KrlFile:
+    """Read a file, unless it was read before.
+
+    Raises:
+        ProgramError: Its blocks do not close: what runs when is not known.
+    """
+    for file in known:
+        if file.text.source == source:
+            return file
+    file = read_krl(source)
+    for found in file.diagnostics:
+        if found.code == "open-block":
+            cure = "Close it: what runs when is not known without"
+            raise ProgramError(source.name, found.message, cure, line=found.line)
+    return file
+
+
+def _refuse_own_accuracy(files: Sequence[KrlFile]) -> None:
+    """Refuse a program that switches the controller's own accuracy model.
+
+    Raises:
+        ProgramError: It does.
+    """
+    for file in files:
+        for row in range(len(file.text)):
+            one = file.text.statement(row)
+            if isinstance(one, said.Assignment) and one.target.name in _ACCURACY:
+                if not _is_off(one.value):
+                    problem = f"sets {one.target.name.upper()}: the controller "
+                    problem += "compensates on its own, this would do it twice"
+                    cure = "Switch that off, here and on the controller"
+                    line = file.text.line(row)
+                    raise ProgramError(file.text.source.name, problem, cure, line=line)
+
+
+def _is_off(value: said.Operand) -> bool:
+    if isinstance(value, said.EnumValue):
+        return value.name in ("#none", "#off")
+    return isinstance(value, said.DataObject) and value.name == "false"

@@ -1,0 +1,383 @@
+"""What moves are carried out with: frames, speeds, blending, orientation."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, fields, replace
+from typing import Any
+
+from postproc.language.krl import syntax as said
+from postproc.language.krl.frames import NUMBERS, FrameReader, KrlFrame
+from postproc.language.krl.task import KrlRecord, KrlTask, KrlValue
+from postproc.language.machine import Scope
+from postproc.language.visits import OrientationLaw
+
+UNKNOWN = -1.0  # a number that is not known
+LOST_FRAME = KrlFrame((), "")
+
+
+@dataclass(frozen=True)
+class KrlModes:
+    """What holds until another statement changes it.
+
+    Attributes:
+        tool, base: ``$TOOL`` and ``$BASE``.
+        interpolation: ``$IPO_MODE``: #base, #tcp or "" where not known.
+        speed: ``$VEL.CP`` [m/s].
+        share: Of the speed of joints, by ``$VEL_AXIS``.
+        distance: ``$APO.CDIS`` [mm].
+        overlap: ``$APO.CPTP`` [%].
+        orientation: ``$ORI_TYPE``: #var, #constant, #joint or "" where not known.
+        through: Arcs of the spline planner take the tool through the orientation of
+            their points (``$CIRC_MODE``).
+        ahead: ``$ADVANCE`` is not 0; None where that is not known.
+        fdat, pdat, ldat: ``FDAT_ACT``, ``PDAT_ACT`` and ``LDAT_ACT``.
+        halted: The arm has stopped since the last move; None where that is not known.
+        goes_on: ``CONTINUE`` stands before.
+        blocked: Why no target can be compensated; more than one reason.
+    """
+
+    tool: KrlFrame
+    base: KrlFrame
+    interpolation: str = "#base"
+    speed: float = UNKNOWN
+    share: float = UNKNOWN
+    distance: float = UNKNOWN
+    overlap: float = UNKNOWN
+    orientation: str = "#var"
+    through: bool = False
+    ahead: bool | None = True
+    fdat: KrlValue | None = None
+    pdat: KrlValue | None = None
+    ldat: KrlValue | None = None
+    halted: bool | None = False
+    goes_on: bool = False
+    blocked: frozenset[str] = frozenset()
+
+    def joined(self, other: KrlModes) -> KrlModes:
+        """Keep what is the same on another way here."""
+        differing = {
+            f.name: getattr(LOST, f.name)
+            for f in fields(self)
+            if getattr(self, f.name) != getattr(other, f.name)
+        }
+        differing["blocked"] = self.blocked | other.blocked
+        return replace(self, **differing)
+
+    def lost(self) -> KrlModes:
+        """Forget all but why targets cannot be compensated."""
+        return replace(LOST, blocked=self.blocked)
+
+    def with_(self, **changed: Any) -> KrlModes:
+        """Return it with other values."""
+        return replace(self, **changed)
+
+    @property
+    def law(self) -> OrientationLaw:
+        """Return how the tool turns on lines."""
+        return _LAWS.get(self.orientation, OrientationLaw.UNKNOWN)
+
+
+LOST = KrlModes(
+    tool=LOST_FRAME,
+    base=LOST_FRAME,
+    interpolation="",
+    orientation="",
+    ahead=None,
+    halted=None,
+)
+_LAWS = {
+    "#var": OrientationLaw.ONE_AXIS,
+    "#constant": OrientationLaw.ONE_AXIS,  # the end is not what is written: see collect
+    "#joint": OrientationLaw.WRIST_JOINTS,
+}
+INITIAL = "BAS(#INITMOV) may set {} anew: set it behind that"
+PAYLOAD = "$LOAD is not what the cell says that the arm carries"
+SOFT = "an axis is soft ($SOFT_PLCL)"
+MOVED_BASE = "$ROBROOT or $WORLD is set by the program"
+# System variables that change nothing of where targets are and from which side they are
+# reached; those in the first list do not stop what is planned ahead either.
+PLANNED = frozenset(
+    """
+    $vel $vel_axis $vel_extax $acc $acc_axis $acc_extax $jerk $apo $ori_type $circ_type
+    $circ_mode $ipo_mode $tool $base $load $advance $bwdstart $gear_jerk $act_tool
+    $act_base $act_tool_c $act_base_c $collmon_tol_pro $act_ex_ax $h_pos $ov_pro
+    $ov_app $torqmon $torqmon_def $torqmon_com $torqmon_com_def $tech $red_vel $spl_tech
+    $load_a1 $load_a2 $load_a3 $cp_vel_type $cp_statmon $nullframe $world $ex_ax_ignore
+    $spl_ori_joint_auto $eko_mode $gear_jerk_def $abs_accur $abs_convert
+    """.split()
+)
+HALTING = frozenset("$out $anout $in $anin $pos_act $axis_act $axis_act_meas".split())
+HARMLESS = frozenset(
+    """
+    $timer $timer_stop $timer_flag $flag $cycflag $loop_msg $loop_cont $msg_t $data_ok
+    $err $stopmess $mode_op $pro_state $pro_mode $pro_ip $pal_mode $notaus $user_saf
+    $alarm_stop $interpreter $date $rob_timer $techpar $techval $cmd $home_pos
+    $in_home $axis_home $pos_ret $axis_ret $pos_int $axis_int $pos_for $axis_for
+    $pos_back $axis_back $pos_act_mes $dist_next $motion $tsys $distance $vel_act
+    $torque_axis_act $curr_act $serv_off $move_enable $accu_state $outc
+    """.split()
+)
+
+
+@dataclass(frozen=True)
+class ModeReader:
+    """Carries out what changes how the moves after it are made.
+
+    Attributes:
+        task: The files of the job.
+        row, here: Where the statement stands.
+        payload_kg: What the cell says that the arm carries, NaN where unknown.
+    """
+
+    task: KrlTask
+    row: int
+    here: Scope
+    payload_kg: float
+
+    def assigned(self, modes: KrlModes, one: said.Assignment) -> KrlModes | None:
+        """Carry out ``$name = value``, None where nobody knows what that does."""
+        name, value = one.target.name, one.value
+        match name:
+            case "$tool" | "$base":
+                return self._frame(modes, one)
+            case "$ipo_mode":
+                return replace(modes, interpolation=self._word(value, "ipo_frame"))
+            case "$ori_type":
+                return replace(modes, orientation=self._word(value, "ori_typ"))
+            case "$circ_mode":
+                return replace(modes, through=self._goes_through(one))
+            case "$vel" | "$vel_axis" | "$apo":
+                return self._speed(modes, one)
+            case "$advance":
+                number = self._number(value)
+                ahead = None if math.isnan(number) else number > 0
+                return replace(modes, ahead=ahead)
+            case "$load":
+                return self._load(modes, one)
+            case "$soft_plcl" | "$softn":
+                return replace(modes, blocked=modes.blocked | {SOFT})
+            case "$robroot" | "$world":
+                return replace(modes, blocked=modes.blocked | {MOVED_BASE})
+            case "fdat_act" | "pdat_act" | "ldat_act":
+                return self._held(modes, one)
+        known = not name.startswith("$") or name in PLANNED | HALTING | HARMLESS
+        return modes if known else None
+
+    def _frame(self, modes: KrlModes, one: said.Assignment) -> KrlModes:
+        """``$TOOL = ..``, ``$BASE = ..``; of a component: nobody knows all of it."""
+        which = one.target.name[1:]
+        if one.target.steps:
+            why = f"a component of {one.target.name.upper()} is set by the program"
+            return modes.with_(**{which: KrlFrame((), why)})
+        found = self.frames(modes).frame(one.value)
+        return modes.with_(**{which: found})
+
+    def frames(self, modes: KrlModes) -> FrameReader:
+        """Return what reads frames here."""
+        return FrameReader(self.task, self.row, self.here, modes.tool, modes.base)
+
+    def _held(self, modes: KrlModes, one: said.Assignment) -> KrlModes:
+        """``FDAT_ACT = FP1``; of a component: the others stay what they were."""
+        name = one.target.name.removesuffix("_act")
+        if one.target.steps:
+            return modes.with_(**{name: None})
+        found = self.task.value(one.value, self.row, self.here)
+        return modes.with_(**{name: found})
+
+    def _number(self, operand: said.Operand | None) -> float:
+        return self.task.number(operand, self.row, self.here)
+
+    def _argument(self, operand: said.Operand, at: int = 0) -> said.Operand | None:
+        """Return an argument of a function, None where it is not there."""
+        if not isinstance(operand, said.FunctionCall):
+            return None
+        given = operand.arguments
+        return given[at].value if at < len(given) else None
+
+    def _record(self, operand: said.Operand | None) -> KrlRecord:
+        found = self.task.value(operand, self.row, self.here)
+        return found if isinstance(found, KrlRecord) else KrlRecord((), whole=False)
+
+    def _word(self, operand: said.Operand, field: str) -> str:
+        """Read ``#BASE``, or what ``SIPO_MODE(FP1.IPO_FRAME)`` gives, "" if unknown."""
+        found = self.task.value(operand, self.row, self.here)
+        if isinstance(operand, said.FunctionCall):
+            inside = self._argument(operand)
+            found = self.task.value(inside, self.row, self.here)
+            if isinstance(found, KrlRecord):
+                found = found.get(field)
+        return found.lower() if isinstance(found, str) else ""
+
+    def _goes_through(self, one: said.Assignment) -> bool:
+        """Tell whether both points of an arc have the orientation that they say."""
+        found = self._record(one.value)
+        if one.target.steps:
+            return False
+        ways = [found.get(name) for name in ("aux_pt", "target_pt")]
+        return all(
+            isinstance(way, KrlRecord) and way.get("ori") == "#interpolate"
+            for way in ways
+        )
+
+    def _speed(self, modes: KrlModes, one: said.Assignment) -> KrlModes:
+        """``$VEL.CP``, ``$VEL_AXIS[i]``, ``$APO.CDIS``, all of ``$VEL`` or ``$APO``."""
+        name, step = one.target.name, (*one.target.steps, "")[0]
+        number = known(self._number(one.value))
+        match name, step:
+            case "$vel", "cp":
+                return replace(modes, speed=number)
+            case "$vel", "":
+                return replace(modes, speed=self._path_speed(one.value))
+            case "$vel_axis", said.ElementStep():
+                inside = self._argument(one.value)
+                percent = number if inside is None else known(self._number(inside))
+                return replace(modes, share=percent / 100.0 if percent > 0 else UNKNOWN)
+            case "$apo", "cdis":
+                return replace(modes, distance=number)
+            case "$apo", "cptp":
+                return replace(modes, overlap=number)
+            case "$apo", "":
+                return self._blending(modes, one.value)
+        return modes
+
+    def _path_speed(self, operand: said.Operand) -> float:
+        """Read ``SVEL_CP(2, , LCPDAT1)`` or ``{CP 2.0, ..}`` [m/s]."""
+        if isinstance(operand, said.FunctionCall):
+            return known(self._number(self._argument(operand)))
+        return known(self._record(operand).number("cp"))
+
+    def _blending(self, modes: KrlModes, operand: said.Operand) -> KrlModes:
+        """Read ``SAPO(LCPDAT1)``, ``SAPO_PTP(PPDAT1)`` or ``{CDIS 5.0, ..}``."""
+        if isinstance(operand, said.FunctionCall):
+            size = known(self._record(self._argument(operand)).number("apo_dist"))
+            return replace(modes, distance=size)
+        found = self._record(operand)
+        return replace(
+            modes,
+            distance=known(found.number("cdis")),
+            overlap=known(found.number("cptp")),
+        )
+
+    def _load(self, modes: KrlModes, one: said.Assignment) -> KrlModes:
+        """``$LOAD = LOAD_DATA[n]``: where it is known, the cell must say the same."""
+        operand: said.Operand | None = one.value
+        if one.target.steps:
+            return modes
+        if isinstance(operand, said.FunctionCall):
+            number = self._number(self._argument(operand))
+            return self._loaded(modes, number)
+        return self._weighed(modes, self._record(operand).number("m"))
+
+    def _loaded(self, modes: KrlModes, number: float) -> KrlModes:
+        """Take the load of a tool's number."""
+        found = None
+        if number == number and number > 0:
+            found = self.task.datum("load_data", self.here, (int(number),))
+        if found is None or "load_data" in self.task.written:
+            return modes
+        file, datum = found
+        there = Scope(file, self.task.files[file].name, "")
+        value = self.task.value(datum.value, datum.row, there)
+        mass = value.number("m") if isinstance(value, KrlRecord) else math.nan
+        return self._weighed(modes, mass)
+
+    def _weighed(self, modes: KrlModes, mass: float) -> KrlModes:
+        """Leave targets where the arm carries another load than the cell says."""
+        cell, blocked = self.payload_kg, modes.blocked - {PAYLOAD}
+        if mass >= 0 and abs(mass - cell) > max(LOAD_KG, LOAD_SHARE * cell):
+            blocked |= {PAYLOAD}
+        return replace(modes, blocked=blocked)
+
+    # BAS(#command, value), as the controller's bas.src carries it out.
+
+    def bas(self, modes: KrlModes, arguments: Sequence[said.Argument]) -> KrlModes:
+        """Carry out ``BAS(#command, value)``."""
+        command = arguments[0].value if arguments else None
+        word = command.name if isinstance(command, said.EnumValue) else ""
+        value = self._number(arguments[1].value) if len(arguments) > 1 else math.nan
+        match word:
+            case "#initmov":
+                return self._initial(modes)
+            case "#frames":
+                return self._frames(modes)
+            case "#tool" | "#base":
+                name = f"${word[1:]}"
+                found = self.frames(modes).numbered(name, value)
+                return modes.with_(**{word[1:]: found})
+            case "#vel_ptp":
+                return replace(modes, share=_share(value))
+            case "#vel_cp":
+                return replace(modes, speed=known(value))
+            case "#ptp_dat":
+                return self._joint_data(modes)
+            case "#cp_dat":
+                return self._path_data(modes)
+            case "#ptp_params":
+                changed = self._frames(self._joint_data(modes))
+                return replace(changed, share=_share(value))
+            case "#cp_params":
+                changed = self._frames(self._path_data(modes))
+                return replace(changed, speed=known(value))
+        harmless = word in ("#acc_ptp", "#acc_cp", "#acc_gluer", "#ovrd", "#ex_bas")
+        return modes if harmless else modes.lost()
+
+    def _initial(self, modes: KrlModes) -> KrlModes:
+        """Set all to what the controller starts with, as far as that is known."""
+        return replace(
+            modes,
+            tool=KrlFrame((), INITIAL.format("$TOOL")),
+            base=KrlFrame((), INITIAL.format("$BASE")),
+            interpolation="#base",
+            speed=UNKNOWN,
+            share=UNKNOWN,
+            distance=UNKNOWN,
+            overlap=UNKNOWN,
+            orientation="#var",
+            through=False,
+            ahead=True,
+        )
+
+    def _frames(self, modes: KrlModes) -> KrlModes:
+        """Take the frames of FDAT_ACT, and the load of its tool."""
+        held = modes.fdat if isinstance(modes.fdat, KrlRecord) else KrlRecord(())
+        reader = self.frames(modes)
+        found = {
+            name[1:]: reader.numbered(name, held.number(field))
+            for name, field in NUMBERS.items()
+        }
+        word = held.get("ipo_frame")
+        modes = self._loaded(modes, held.number("tool_no"))
+        frame = word if isinstance(word, str) else ""
+        return modes.with_(interpolation=frame, **found)
+
+    def _joint_data(self, modes: KrlModes) -> KrlModes:
+        """Take the blending of PDAT_ACT."""
+        held = modes.pdat if isinstance(modes.pdat, KrlRecord) else KrlRecord(())
+        size = known(held.number("apo_dist"))
+        if held.get("apo_mode") == "#cdis":
+            return replace(modes, distance=size, overlap=UNKNOWN)
+        return replace(modes, overlap=size)
+
+    def _path_data(self, modes: KrlModes) -> KrlModes:
+        """Take blending and orientation of LDAT_ACT."""
+        held = modes.ldat if isinstance(modes.ldat, KrlRecord) else KrlRecord(())
+        word = held.get("ori_typ")
+        return replace(
+            modes,
+            distance=known(held.number("apo_dist")),
+            orientation=word if isinstance(word, str) else "",
+        )
+
+
+LOAD_KG, LOAD_SHARE = 1.0, 0.1  # that a load may be off what the cell says
+
+
+def known(value: float) -> float:
+    """Return a number from 0 on, -1 for what is not known."""
+    return value if value >= 0 else UNKNOWN
+
+
+def _share(percent: float) -> float:
+    return percent / 100.0 if percent > 0 else UNKNOWN

@@ -1,0 +1,371 @@
+"""Where a move of KRL goes: points, aggregates, products of frames, steps."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Iterator, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from postproc.language.collect import FoundGoal, FoundVisit
+from postproc.language.krl import syntax as said
+from postproc.language.krl.dialect import (
+    COMPONENTS,
+    MEASURED,
+    NOT_WRITTEN,
+    UNKNOWN_STATUS,
+    WIDTH,
+    abc_from_rotation,
+    rotation_from_abc,
+)
+from postproc.language.krl.frames import FrameReader, KrlFrame
+from postproc.language.krl.task import (
+    KrlNumber,
+    KrlRecord,
+    KrlTask,
+)
+from postproc.language.machine import Scope
+from postproc.language.placed import matrix
+from postproc.language.visits import NO_TARGET, Meaning
+from postproc.robot.pose import MM
+from postproc.robot.trajectory import Motion
+
+NOTHING = (math.nan,) * WIDTH
+NO_SLOTS = (-1,) * WIDTH
+NO_AXES = (math.nan,) * 6
+AXES = ("a1", "a2", "a3", "a4", "a5", "a6")
+OUTSIDE = ("e1", "e2", "e3", "e4", "e5", "e6")
+PLACE = COMPONENTS[:6]
+RUN_TIME = "it is known only when the program runs"
+HOMES = ("xhome", "home", "xhome1", "xhome2", "xhome3", "xhome4", "xhome5",
+         "$h_pos", "$axis_home")  # fmt: skip
+PRESENT = ("$pos_act", "$axis_act", "$axis_act_meas", "$axis_int", "$pos_int")
+SPLINE = "a point of a spline block: such blocks are corrected whole or not at all"
+PARTIAL = (
+    "numbers are missing: they stay what they were commanded before, so that it moves "
+    "along with the point before it"
+)
+NO_STATUS = "a PTP without S and T: the controller chooses the configuration"
+ACCURATE = "S says that it was taught with the controller's own accuracy model"
+ODD_STATUS = "S or T is no such number"
+ANGLE = "CA takes the arc on from its end point, or ends it before"
+
+
+@dataclass
+class KrlVisit(FoundVisit):
+    """One arrival, as it is found.
+
+    Attributes:
+        move: The move.
+    """
+
+    move: said.KrlMove = field(kw_only=True)
+
+    @property
+    def by_spline_planner(self) -> bool:
+        """Tell whether it is a move that the spline planner makes."""
+        return self.move.word.startswith("s")
+
+    @property
+    def blends(self) -> bool:
+        """Tell whether it is to be passed without stopping."""
+        return any(word.startswith("c_") for word in self.move.words)
+
+
+@dataclass(frozen=True)
+class KrlGoals:
+    """Reads the destinations of moves.
+
+    Attributes:
+        task: The files of the job.
+        aux: External axes that the cell declares.
+    """
+
+    task: KrlTask
+    aux: Collection[int] = ()
+
+    def visits(
+        self, move: said.KrlMove, row: int, here: Scope, modes: object
+    ) -> Iterator[KrlVisit]:
+        """Read the visits of a move: the point of an arc, and its end."""
+        motion = motion_of(move.word)
+        within = any(row in rows for rows in self.task.files[here.file].splines)
+        if within or move.word.startswith("spl"):
+            goal = FoundGoal(Meaning.UNKNOWN, NOTHING, why=SPLINE)
+            yield KrlVisit(here, row, motion, False, goal, modes, move=move)
+            return
+        reader = _Goal(self, move, row, here)
+        if move.via is not None:
+            goal = reader.end(move.via)
+            why = ANGLE if move.angle is not None else ""
+            yield KrlVisit(here, row, motion, True, goal, modes, why=why, move=move)
+        goal = reader.end(move.to)
+        if move.angle is not None:  # where it ends is not written
+            goal = FoundGoal(Meaning.UNKNOWN, NOTHING, name=goal.name, why=ANGLE)
+        yield KrlVisit(here, row, motion, False, goal, modes, move=move)
+
+
+def motion_of(word: str) -> Motion:
+    """Tell how a word moves."""
+    stem = word.removesuffix("_rel").lstrip("s")
+    if stem == "circ":
+        return Motion.CIRCULAR
+    return Motion.JOINT if stem.startswith("ptp") else Motion.LINEAR
+
+
+@dataclass(frozen=True)
+class _Goal:
+    """Reads the ends of one move."""
+
+    goals: KrlGoals
+    move: said.KrlMove
+    row: int
+    here: Scope
+
+    @property
+    def task(self) -> KrlTask:
+        return self.goals.task
+
+    @property
+    def _by_joints(self) -> bool:
+        return motion_of(self.move.word) == Motion.JOINT
+
+    def end(self, operand: said.Operand) -> FoundGoal:
+        """Read a destination."""
+        if self.move.word.endswith("_rel"):
+            return self._step(operand)
+        match operand:
+            case said.DataObject(name=name) if name in PRESENT:
+                return _left(f"{NO_TARGET}: it stays where it is", name=name)
+            case said.DataObject(name=name) if name in HOMES:
+                return self._home(operand)
+            case said.Operation(operator=":", operands=(first, second)):
+                return self._product(first, second)
+            case said.KrlAggregate() | said.DataObject():
+                return self._point(operand)
+            case _:
+                return _left(RUN_TIME)
+
+    # Points.
+
+    def _point(self, operand: said.KrlAggregate | said.DataObject) -> FoundGoal:
+        """Read a point that is written or named."""
+        name = operand.name if isinstance(operand, said.DataObject) else ""
+        found = self.task.value(operand, self.row, self.here)
+        if not isinstance(found, KrlRecord) or not found.whole:
+            why = f"{name} {self.task.untold(name, self.here)}" if name else RUN_TIME
+            return _left(why, name=name)
+        names = {key for key, _ in found.fields}
+        if names & set(AXES):
+            goal = self._axes(found)
+        else:
+            goal = self._pose(found)
+        if not name:
+            return goal
+        return self._named(goal, operand)
+
+    def _named(self, goal: FoundGoal, operand: said.Operand) -> FoundGoal:
+        """Say what is known of a point beside its numbers."""
+        name = operand.name if isinstance(operand, said.DataObject) else ""
+        declared = self.task.datum(name, self.here)
+        shared = declared is not None and declared[1].shared
+        return FoundGoal(
+            goal.target, goal.values, goal.file, goal.slots, NO_SLOTS,
+            name + self._element(operand), goal.aux, goal.why,
+            self._pinned(name, goal), shared,
+        )  # fmt: skip
+
+    def _pinned(self, name: str, goal: FoundGoal) -> str:
+        """Say why a point must keep its numbers."""
+        if goal.file >= 0 and self.task.files[goal.file].is_system:
+            place = self.task.files[goal.file].text.source.name
+            return f"{name} stands in {place}, which all programs share"
+        if name in self.task.read:
+            return f"{name} is used otherwise than as a destination too"
+        return ""
+
+    def _element(self, operand: said.Operand) -> str:
+        """Spell which element of an array is meant, "" where it is none."""
+        steps = operand.steps if isinstance(operand, said.DataObject) else ()
+        for step in steps:
+            index = self.task.index(step, self.row, self.here)
+            return "" if index is None else f"[{','.join(map(str, index))}]"
+        return ""
+
+    def _axes(self, found: KrlRecord) -> FoundGoal:
+        """Read six joint angles; only PTP goes to them."""
+        numbers = _numbers(found, AXES)
+        if not self._by_joints:
+            return _left("it is joint angles, and no PTP goes to them")
+        if numbers is None:
+            return _left(PARTIAL)
+        file, slots = _places(numbers)
+        values = [number.value for number in numbers]
+        why = "" if file >= 0 else "it is computed from other data"
+        return FoundGoal(
+            Meaning.JOINTS, (*values, 0.0, 0.0), file, (*slots, -1, -1), NO_SLOTS,
+            aux=self._outside(found), why=why,
+        )  # fmt: skip
+
+    def _pose(self, found: KrlRecord) -> FoundGoal:
+        """Read X, Y, Z, A, B, C with S and T."""
+        numbers = _numbers(found, PLACE)
+        if numbers is None:
+            return _left(PARTIAL)
+        flags = [found.get(name) for name in COMPONENTS[6:]]
+        written = [f if isinstance(f, KrlNumber) else KrlNumber(-1.0) for f in flags]
+        values = [one.value for one in (*numbers, *written)]
+        file, slots = _places(numbers)
+        own = tuple(one.slot if one.file == file else -1 for one in written)
+        aux, why = self._outside(found), self._status(values[6], values[7])
+        if self._by_joints and NOT_WRITTEN in values[6:]:
+            return _left(NO_STATUS)
+        if self._by_joints and why == ODD_STATUS:
+            return _left(why)
+        why = why or ("" if file >= 0 else "it is computed from other data")
+        return FoundGoal(
+            Meaning.POSE, tuple(values), file, (*slots, *own), NO_SLOTS, aux=aux,
+            why=why,
+        )  # fmt: skip
+
+    def _status(self, s: float, t: float) -> str:
+        """Say what speaks against a position's S and T, "" for nothing."""
+        if any(f != NOT_WRITTEN and (f < 0 or f != int(f)) for f in (s, t)):
+            return ODD_STATUS
+        if s >= UNKNOWN_STATUS:
+            return ODD_STATUS
+        return ACCURATE if s > 0 and int(s) & MEASURED else ""
+
+    def _outside(self, found: KrlRecord) -> tuple[float, ...]:
+        """Return the external axes that count: declared by the cell, or not 0."""
+        values = [found.number(name) for name in OUTSIDE]
+        return tuple(
+            value if value != 0.0 or axis in self.goals.aux else math.nan
+            for axis, value in enumerate(values, start=1)
+        )
+
+    def _home(self, operand: said.DataObject) -> FoundGoal:
+        """Read the home position: it holds no target of a process."""
+        goal = self._point(operand) if not operand.name.startswith("$") else None
+        if goal is None or goal.target != Meaning.JOINTS:
+            return FoundGoal(Meaning.HOME, NOTHING, name=operand.name)
+        return FoundGoal(Meaning.HOME, goal.values, name=operand.name)
+
+    # Products of frames: the point is moved along.
+
+    def _product(self, first: said.Operand, second: said.Operand) -> FoundGoal:
+        """Read ``point : {..}`` (a shift in the point's own frame) or ``{..} : point``.
+
+        What is on the right tells what comes out: a frame has no S and T.
+        """
+        behind = isinstance(first, said.DataObject) and self._is_point(first)
+        point, other = (first, second) if behind else (second, first)
+        if not isinstance(point, said.DataObject):
+            return _left(RUN_TIME)
+        base = self._point(point)
+        frames = FrameReader(self.task, self.row, self.here, _NO, _NO)
+        shift = frames.frame(other)
+        if base.target != Meaning.POSE or not shift.pose:
+            pins = base.pins or f"{base.name} is shifted by what {RUN_TIME}"
+            return FoundGoal(
+                Meaning.UNKNOWN, NOTHING, base.file, follows=base.slots,
+                name=base.name, why=base.why or RUN_TIME, pins=pins,
+            )  # fmt: skip
+        if behind and self._by_joints:
+            pins = base.pins or f"{base.name} is shifted without S and T"
+            return FoundGoal(
+                Meaning.UNKNOWN, NOTHING, base.file, follows=base.slots,
+                name=base.name, why=NO_STATUS, pins=pins,
+            )  # fmt: skip
+        values, turns = _linked(base.values, shift, behind)
+        pins = base.pins or (f"{base.name} is turned too" if turns else "")
+        return FoundGoal(
+            Meaning.POSE, values, base.file, NO_SLOTS, base.slots, base.name, base.aux,
+            base.why, pins, base.shared,
+        )  # fmt: skip
+
+    def _is_point(self, operand: said.DataObject) -> bool:
+        """Tell whether data is a position, and no frame."""
+        found = self.task.datum(operand.name, self.here)
+        return found is not None and found[1].type in ("pos", "e6pos")
+
+    # Steps.
+
+    def _step(self, operand: said.Operand) -> FoundGoal:
+        """Read ``LIN_REL {X 10}``, ``PTP_REL {A1 5}``: a step from where the arm is."""
+        found = self.task.value(operand, self.row, self.here)
+        if not isinstance(operand, said.KrlAggregate) or not isinstance(
+            found, KrlRecord
+        ):
+            return _left(RUN_TIME)
+        if not found.whole:
+            return _left(RUN_TIME)
+        names = {key for key, _ in found.fields}
+        values = {name: found.number(name) for name in names - {"s", "t"}}
+        if self._by_joints and names <= {*AXES, *OUTSIDE}:
+            steps = tuple(values.get(name, 0.0) for name in AXES)
+            return self._stepped(Meaning.BY, (*steps, 0.0, 0.0), values)
+        place = tuple(values.get(name, 0.0) for name in PLACE[:3])
+        turned = any(values.get(name, 0.0) for name in PLACE[3:])
+        if self._by_joints or turned or self.move.via is not None:
+            return _left(f"{NO_TARGET}: a step that is not followed")
+        tool = "#tool" in self.move.words
+        meaning = Meaning.RELATIVE_TOOL if tool else Meaning.RELATIVE_UFRAME
+        return self._stepped(meaning, (*place, *(0.0,) * 5), values)
+
+    def _stepped(
+        self, meaning: Meaning, values: tuple[float, ...], given: dict[str, float]
+    ) -> FoundGoal:
+        if any(given.get(name, 0.0) for name in OUTSIDE):
+            return _left(f"{NO_TARGET}: it moves an external axis")
+        why = f"{NO_TARGET}: it goes on from where the arm is"
+        return FoundGoal(meaning, values, why=why)
+
+
+_NO = KrlFrame((), RUN_TIME)
+
+
+def _left(why: str, name: str = "") -> FoundGoal:
+    """Return a destination that nobody knows."""
+    return FoundGoal(Meaning.UNKNOWN, NOTHING, name=name, why=why)
+
+
+def _numbers(found: KrlRecord, names: Sequence[str]) -> list[KrlNumber] | None:
+    """Return some components, None where one is missing."""
+    values = [found.get(name) for name in names]
+    numbers = [value for value in values if isinstance(value, KrlNumber)]
+    return numbers if len(numbers) == len(names) else None
+
+
+def _places(numbers: Sequence[KrlNumber]) -> tuple[int, tuple[int, ...]]:
+    """Return the file of numbers and their places, -1 where one is computed."""
+    files = {one.file if one.slot >= 0 else -1 for one in numbers}
+    if len(files) != 1 or -1 in files:
+        return -1, (-1,) * len(numbers)
+    return files.pop(), tuple(one.slot for one in numbers)
+
+
+def _linked(
+    values: Sequence[float], shift: KrlFrame, behind: bool
+) -> tuple[tuple[float, ...], bool]:
+    """Link a point and a frame; tell whether the frame turns.
+
+    Args:
+        values: Numbers of the point.
+        shift: The frame.
+        behind: It stands behind the point.
+    """
+    by = matrix(shift.pose)
+    point, angles = np.eye(4), np.deg2rad([values[3:6]])
+    point[:3, :3] = rotation_from_abc(angles)[0]
+    point[:3, 3] = np.array(values[:3]) * MM
+    both = point @ by if behind else by @ point
+    turns = bool(np.abs(by[:3, :3] - np.eye(3)).max() > 1e-12)
+    out = list(values)
+    out[:3] = (both[:3, 3] / MM).tolist()
+    if turns:
+        out[3:6] = np.rad2deg(abc_from_rotation(both[None, :3, :3], angles))[0].tolist()
+    if behind:
+        out[6:] = [NOT_WRITTEN, NOT_WRITTEN]
+    return tuple(out), turns

@@ -1,0 +1,235 @@
+"""The grammar of KRL: one statement's form in, what it says out."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import lru_cache
+from typing import Any
+
+from postproc.language.flow import EXIT
+from postproc.language.krl import syntax as said
+from postproc.language.parser import Children, FormParser, Word
+
+# From trees to statements, rule by rule. Every function here is named after a rule of
+# ``grammars/krl.lark`` and takes what its children gave.
+
+
+class FlagPart(str):
+    """GLOBAL or CONST."""
+
+
+class TypePart(str):
+    """The type of data, or of a function's value."""
+
+
+class SubscriptPart(tuple[Any, ...]):
+    """Indices, or the dimensions of an array."""
+
+
+class BlendPart(str):
+    """A word of blending, or the frame of a relative move."""
+
+
+def _low(text: str) -> str:
+    return str(text).lower()
+
+
+def _tokens(c: Children, kind: str) -> list[str]:
+    return [_low(x) for x in c if isinstance(x, Word) and x.kind == kind]
+
+
+def _routine(kind: str) -> Callable[[Children], said.KrlRoutine]:
+    def built(c: Children) -> said.KrlRoutine:
+        parameters = next((x for x in c if type(x) is tuple), ())
+        shared = bool(_tokens(c, "GLOBAL"))
+        return said.KrlRoutine(kind, _tokens(c, "NAME")[0], parameters, shared)
+
+    return built
+
+
+# Without DECL only these begin a declaration: other pairs of names may be commands.
+_BUILT_IN = frozenset(
+    """
+    int real bool char frame pos e6pos axis e6axis fdat pdat ldat gdat odat ctrl_in
+    load jerk_struc signal date
+    """.split()
+)
+
+
+def _declared(c: Children) -> said.KrlDeclaration:
+    flags = {_low(x) for x in c if isinstance(x, FlagPart)}
+    type_ = next(str(x) for x in c if isinstance(x, TypePart))
+    items = tuple(x for x in c if isinstance(x, said.DeclaredItem))
+    return said.KrlDeclaration(type_, items, "global" in flags, "const" in flags)
+
+
+def _built_in(c: Children) -> said.SourceStatement:
+    found = _declared(c)
+    return found if found.type in _BUILT_IN else said.NotUnderstood()
+
+
+def _item(c: Children) -> said.DeclaredItem:
+    name, *rest = c
+    sized = bool(rest) and isinstance(rest[0], SubscriptPart)
+    dimensions = tuple(rest[0]) if sized else ()
+    value = rest[-1] if len(rest) > sized else None
+    return said.DeclaredItem(_low(name), dimensions, value)
+
+
+def _branch(word: str) -> Callable[[Children], said.Branch]:
+    return lambda c: said.Branch(word, tuple(c))
+
+
+def _for(c: Children) -> said.ForLoop:
+    return said.ForLoop(_low(c[0]), c[1], c[2], c[3] if len(c) > 3 else None)
+
+
+_WORDS = {"endswitch": "endtest"}  # as neutral flow calls it
+
+
+def _block_word(c: Children) -> said.BlockWord:
+    word = _low(c[0])
+    return said.BlockWord(_WORDS.get(word, word))
+
+
+def _operation(c: Children) -> said.Operation:
+    operator = next(x for x in c if isinstance(x, Word))
+    operands = tuple(x for x in c if not isinstance(x, Word))
+    return said.Operation(str(operator).upper(), operands)
+
+
+def _move(c: Children) -> said.KrlMove:
+    word = next(_low(x) for x in c if isinstance(x, Word))
+    operands = [x for x in c if isinstance(x, said.Operand)]
+    arc = word.split("_")[0] in ("circ", "scirc")
+    via, to = operands[:2] if arc else (None, operands[0])
+    angle = operands[2] if arc and len(operands) > 2 else None
+    return said.KrlMove(word, to, via, angle, _blends(c), _settings(c))
+
+
+def _blends(c: Children) -> tuple[str, ...]:
+    return tuple(str(x) for x in c if isinstance(x, BlendPart))
+
+
+def _settings(c: Children) -> tuple[said.Assignment, ...]:
+    return tuple(one for x in c if type(x) is tuple for one in x)
+
+
+def _spline(c: Children) -> said.SplineBlock:
+    return said.SplineBlock(_low(c[0]), _blends(c), _settings(c))
+
+
+def _called(make: Callable[[str, tuple[said.Argument, ...]], Any]) -> Any:
+    def built(c: Children) -> Any:
+        given = c[1]
+        if len(given) == 1 and given[0].value is None:
+            given = ()
+        return make(_low(c[0]), given)
+
+    return built
+
+
+def _aggregate(c: Children) -> said.KrlAggregate:
+    names = _tokens(c, "NAME")
+    fields = tuple(x for x in c if isinstance(x, said.NamedField))
+    return said.KrlAggregate(names[0] if names else "", fields)
+
+
+def _field(c: Children) -> said.NamedField:
+    return said.NamedField(_low(c[0]), c[-1])
+
+
+RULES: dict[str, Callable[[Children], Any]] = {
+    "statement": lambda c: c[0],
+    "header": lambda c: said.AccessHeader(),
+    "procedure": _routine("def"),
+    "function": _routine("deffct"),
+    "data_list": lambda c: said.DataList(_low(c[0]), bool(_tokens(c, "PUBLIC"))),
+    "end": lambda c: said.BlockWord(_low(c[0])),
+    "type": lambda c: TypePart(_low(c[0])),
+    "parameters": lambda c: tuple(c),
+    "parameter": lambda c: _tokens(c, "NAME")[0],
+    "empty_dimensions": lambda c: None,
+    "declared": _declared,
+    "built_in": _built_in,
+    "flag": lambda c: FlagPart(c[0]),
+    "item": _item,
+    "if_then": _branch("if"),
+    "for_to": _for,
+    "while_do": _branch("while"),
+    "loop": _branch("loop"),
+    "repeat": _branch("repeat"),
+    "until": _branch("until"),
+    "switch": _branch("test"),
+    "case": _branch("case"),
+    "default": _branch("default"),
+    "label": lambda c: said.LabelMark(_low(c[0])),
+    "block_word": _block_word,
+    "exit_loop": lambda c: said.Leave(EXIT),
+    "goto": lambda c: said.JumpTo(_low(c[0])),
+    "return_value": lambda c: said.Leave("return", *c),
+    "halt": lambda c: said.Waiting(),
+    "continue_": lambda c: said.ContinueWord(),
+    "wait": lambda c: said.Waiting(c[0]),
+    "interrupt_declared": lambda c: said.InterruptDeclared(c[-2], c[-1]),
+    "interrupt_switched": lambda c: said.InterruptSwitched(_low(c[0])),
+    "brake": lambda c: said.InterruptSwitched("brake"),
+    "resume": lambda c: said.InterruptSwitched("resume"),
+    "trigger": lambda c: said.PathTrigger(
+        next(x for x in c if isinstance(x, said.SourceStatement))
+    ),
+    "move": _move,
+    "arc": _move,
+    "relative": _move,
+    "arc_relative": _move,
+    "spline": _spline,
+    "spline_end": _spline,
+    "blend": lambda c: BlendPart(_low(c[0])),
+    "settings": lambda c: tuple(c),
+    "setting": lambda c: said.Assignment(*c),
+    "assignment": lambda c: said.Assignment(*c),
+    "instruction": _called(said.Instruction),
+    "arguments": lambda c: tuple(c),
+    "argument": lambda c: said.Argument(c[0] if c else None),
+    "infix": _operation,
+    "prefix": _operation,
+    "number": lambda c: c[0],
+    "string": lambda c: said.StringLiteral(str(c[0])),
+    "enumerated": lambda c: said.EnumValue(_low(c[0])),
+    "function_call": _called(said.FunctionCall),
+    "aggregate": _aggregate,
+    "field": _field,
+    "reference": lambda c: said.DataObject(_low(c[0]), tuple(c[1:])),
+    "component": lambda c: _low(c[0]),
+    "element": lambda c: said.ElementStep(tuple(c[0])),
+    "subscripts": SubscriptPart,
+}
+
+LONGEST = 1 << 14  # characters of a form; a line has some hundred
+DEEPEST = 100  # operators or brackets within each other; followed by recursion
+RESERVED = frozenset(
+    """
+    and b_and b_exor b_not b_or brake case const continue decl def default defdat deffct
+    do else end enddat endfct endfor endif endloop endspline endswitch endwhile enum
+    exit exor ext extfct for global goto halt if import interrupt loop not or ptp lin
+    circ sptp slin scirc spl spline ptp_spline ptp_rel lin_rel circ_rel sptp_rel
+    slin_rel scirc_rel spl_rel repeat resume return signal struc switch then to trigger
+    until wait when while with c_ptp c_dis c_ori c_vel c_spl
+    """.split()
+)
+"""Words that name nothing."""
+_NAMES_ONLY = ("ext", "extp", "extfct", "extfctp", "signal", "enum", "struc", "import")
+
+_PARSER = FormParser("krl", RULES, RESERVED, LONGEST, DEEPEST)
+
+
+@lru_cache(maxsize=8192)
+def parse_statement(form: str) -> said.SourceStatement:
+    """Parse the form of a statement, `NotUnderstood` where the grammar cannot."""
+    words = form.lower().split(" ", 2)
+    if words[0] == "global" and len(words) > 1:
+        words = words[1:]
+    if words[0] in _NAMES_ONLY and len(words) > 1:
+        return said.OutsideName()
+    found = _PARSER.parse(form)
+    return found if isinstance(found, said.SourceStatement) else said.NotUnderstood()

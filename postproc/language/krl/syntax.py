@@ -1,0 +1,207 @@
+"""What a statement of KRL says, beyond what is neutral."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from postproc.language.syntax import (
+    Argument,
+    Assignment,
+    BlockWord,
+    Branch,
+    DataObject,
+    ElementStep,
+    ForLoop,
+    FunctionCall,
+    Instruction,
+    JumpTo,
+    LabelMark,
+    Leave,
+    NotUnderstood,
+    Num,
+    Operand,
+    Operation,
+    SourceStatement,
+    StringLiteral,
+)
+
+__all__ = [
+    "Argument",
+    "Assignment",
+    "BlockWord",
+    "Branch",
+    "DataObject",
+    "ElementStep",
+    "ForLoop",
+    "FunctionCall",
+    "Instruction",
+    "JumpTo",
+    "LabelMark",
+    "Leave",
+    "NotUnderstood",
+    "Num",
+    "Operand",
+    "Operation",
+    "SourceStatement",
+    "StringLiteral",
+]
+
+
+@dataclass(frozen=True, slots=True)
+class EnumValue(Operand):
+    """``#BASE``, with its mark."""
+
+    name: str
+
+
+@dataclass(frozen=True, slots=True)
+class NamedField:
+    """A component in an aggregate: ``X 100.0``."""
+
+    name: str
+    value: Operand
+
+
+@dataclass(frozen=True, slots=True)
+class KrlAggregate(Operand):
+    """``{E6POS: X 100.0, Y 0.0}``; the type is "" where it is not said."""
+
+    type: str
+    fields: tuple[NamedField, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class AccessHeader(SourceStatement):
+    """``&ACCESS RVP`` and the like."""
+
+
+@dataclass(frozen=True, slots=True)
+class KrlRoutine(SourceStatement):
+    """``GLOBAL DEF name(..)``, ``DEFFCT type name(..)``.
+
+    Attributes:
+        kind: def or deffct.
+        name: Its name.
+        parameters: Names of its parameters.
+        shared: Other files know it, though it is not the first of its file.
+    """
+
+    kind: str
+    name: str
+    parameters: tuple[str, ...] = ()
+    shared: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class DataList(SourceStatement):
+    """``DEFDAT name PUBLIC``."""
+
+    name: str
+    public: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class DeclaredItem:
+    """One name of a declaration.
+
+    Attributes:
+        name: What is declared.
+        dimensions: Of an array.
+        value: What it is at first, None where nothing is said.
+    """
+
+    name: str
+    dimensions: tuple[Operand, ...] = ()
+    value: Operand | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class KrlDeclaration(SourceStatement):
+    """``DECL GLOBAL E6POS XP1={..}``.
+
+    Attributes:
+        type: Of the data.
+        items: What is declared.
+        shared: Every program knows it.
+        constant: It never changes.
+    """
+
+    type: str
+    items: tuple[DeclaredItem, ...]
+    shared: bool = False
+    constant: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class OutsideName(SourceStatement):
+    """``EXT``, ``SIGNAL``, ``ENUM``, ``STRUC``, ..: names, and nothing that runs."""
+
+
+@dataclass(frozen=True, slots=True)
+class Waiting(SourceStatement):
+    """``WAIT SEC t``, ``WAIT FOR x``, ``HALT``: the arm stands still until then."""
+
+    value: Operand | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class ContinueWord(SourceStatement):
+    """``CONTINUE``: the next statement does not stop what is planned ahead."""
+
+
+@dataclass(frozen=True, slots=True)
+class InterruptDeclared(SourceStatement):
+    """``INTERRUPT DECL n WHEN condition DO statement``."""
+
+    condition: Operand
+    action: SourceStatement
+
+
+@dataclass(frozen=True, slots=True)
+class InterruptSwitched(SourceStatement):
+    """``INTERRUPT ON n``, ``OFF``, ``ENABLE``, ``DISABLE``; ``BRAKE``; ``RESUME``."""
+
+    word: str
+
+
+@dataclass(frozen=True, slots=True)
+class PathTrigger(SourceStatement):
+    """``TRIGGER WHEN .. DO statement``: it belongs to the move behind it."""
+
+    action: SourceStatement
+
+
+@dataclass(frozen=True, slots=True)
+class KrlMove(SourceStatement):
+    """A move.
+
+    Attributes:
+        word: ptp, lin, circ, sptp, slin, scirc, spl, ptp_rel, ..
+        to: Its end.
+        via: The point of an arc.
+        angle: ``CA``: how far an arc goes, whatever its end point.
+        words: Of blending, and the frame of a relative move.
+        settings: What holds for this move only.
+    """
+
+    word: str
+    to: Operand
+    via: Operand | None = None
+    angle: Operand | None = None
+    words: tuple[str, ...] = ()
+    settings: tuple[Assignment, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class SplineBlock(SourceStatement):
+    """``SPLINE``, ``PTP_SPLINE``, ``ENDSPLINE``.
+
+    Attributes:
+        word: Which of them.
+        words: Of blending.
+        settings: What holds for the block.
+    """
+
+    word: str
+    words: tuple[str, ...] = ()
+    settings: tuple[Assignment, ...] = ()

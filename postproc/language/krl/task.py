@@ -1,0 +1,402 @@
+"""All files of a KRL job: what its names mean, and which data never change."""
+
+from __future__ import annotations
+
+import math
+from collections import defaultdict
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+
+from postproc.language.collect import Taught
+from postproc.language.flow import HeadedRows
+from postproc.language.krl import syntax as said
+from postproc.language.krl.dialect import COMMENTS
+from postproc.language.krl.program import KrlDatum, KrlFile
+from postproc.language.machine import Scope
+
+CONFIG = "$config"
+DEEPEST = 20  # names that stand for names
+
+
+@dataclass(frozen=True)
+class KrlNumber:
+    """A number: its value, and where it is written.
+
+    Attributes:
+        value: Its value.
+        file, slot: Where it stands; slot -1 where it is computed.
+    """
+
+    value: float
+    file: int = -1
+    slot: int = -1
+
+
+@dataclass(frozen=True)
+class KrlRecord:
+    """The components of an aggregate by name, those that are known.
+
+    Attributes:
+        fields: Names and values.
+        whole: All that are written are known.
+    """
+
+    fields: tuple[tuple[str, KrlValue], ...]
+    whole: bool = True
+
+    def get(self, name: str) -> KrlValue | None:
+        """Return a component, None where it is not there."""
+        return next((value for key, value in self.fields if key == name), None)
+
+    def number(self, name: str) -> float:
+        """Return a component that is a number, NaN where it is none."""
+        found = self.get(name)
+        return found.value if isinstance(found, KrlNumber) else math.nan
+
+
+KrlValue = KrlNumber | KrlRecord | str
+
+# Routines and functions that neither move nor change the data that they are given.
+STILL = frozenset(
+    """
+    ir_stopm pulse clear_pulse cread cwrite sread swrite copen cclose cioctl cast_to
+    cast_from varstate strlen strdeclen strclear stradd strcomp strcopy strfind
+    msgnotify msgquit msgstate msgdialog set_kuka_msg clear_kuka_msg exists_kuka_msg
+    mbx_rec on_error_proceed err_clear err_raise timer_limit delete_backward_buffer
+    rob_timer get_decl_place m_comment setinfo lock unlock
+    """.split()
+)
+FUNCTIONS = frozenset(
+    """
+    abs sqrt sin cos tan acos atan2 frand round trunc b_not inverse forward inv_pos
+    strlen strdeclen strcomp strfind varstate cast_from_bits get_system_data
+    stool stool2 sbase sipo_mode sload svel_cp svel_joint sacc_cp sacc_joint sapo
+    sapo_ptp sori_typ scirc_typ sjerk sgear_jerk use_cm_pro_values exists_kuka_msg
+    ek lk ey euler mat_to_rpy rpy_to_mat
+    """.split()
+)
+
+
+@dataclass
+class KrlTask:
+    """The files of a job.
+
+    Attributes:
+        files: The source first.
+        taught: Lower-case names of data that were taught with the arm, by the cell.
+    """
+
+    files: Sequence[KrlFile]
+    taught: Collection[str] = frozenset()
+    _own: dict[tuple[str, str, str], dict[tuple[int, ...], tuple[int, KrlDatum]]] = (
+        field(default_factory=lambda: defaultdict(dict))
+    )
+    _shared: dict[str, set[str]] = field(default_factory=lambda: defaultdict(set))
+
+    @cached_property
+    def own_taught(self) -> Taught:
+        """What was taught with the arm."""
+        return Taught(self.taught, [file.text for file in self.files], COMMENTS)
+
+    def __post_init__(self) -> None:
+        """Index data by the scopes that declare them."""
+        for number, file in enumerate(self.files):
+            for datum in file.data:
+                place = self._own[file.name, datum.routine, datum.name]
+                if datum.index in place and place[datum.index][1].value is not None:
+                    if datum.value is None:
+                        continue
+                place[datum.index] = number, datum
+                if not datum.routine and (datum.shared or file.name == CONFIG):
+                    self._shared[datum.name].add(file.name)
+
+    # Names.
+
+    @cached_property
+    def routines(self) -> Mapping[str, list[tuple[int, HeadedRows, bool]]]:
+        """Routines by name: file, place, and whether other files know each."""
+        found = defaultdict(list)
+        for number, file in enumerate(self.files):
+            for k, scope in enumerate(file.routines):
+                shared = k == 0 or scope.head.shared
+                found[scope.head.name].append((number, scope, shared))
+        return found
+
+    def routine(self, name: str, here: Scope) -> tuple[int, str, HeadedRows] | None:
+        """Find the routine that a name means, None where it is not sure."""
+        known = self.routines.get(name, [])
+        own = [one for one in known if one[0] == here.file]
+        found = own or [one for one in known if one[2]]
+        if len(found) != 1:
+            return None
+        file, scope, _ = found[0]
+        return file, self.files[file].name, scope
+
+    def scope_of(self, file: int, module: str, routine: HeadedRows) -> Scope:
+        """Return where the statements of a routine stand."""
+        given = frozenset(getattr(routine.head, "parameters", ()))
+        return Scope(file, module, routine.head.name, given)
+
+    def place(self, name: str, here: Scope) -> tuple[str, str] | None:
+        """Find the file and the routine whose data a name means."""
+        if name in here.parameters:
+            return None
+        for place in ((here.module, here.routine), (here.module, "")):
+            if (*place, name) in self._own:
+                return place
+        shared = self._shared.get(name, set())
+        return (next(iter(shared)), "") if len(shared) == 1 else None
+
+    def datum(
+        self, name: str, here: Scope, index: tuple[int, ...] = ()
+    ) -> tuple[int, KrlDatum] | None:
+        """Find data, or an element of an array, None where nothing sure is known."""
+        place = self.place(name, here)
+        return None if place is None else self._own[(*place, name)].get(index)
+
+    def untold(self, name: str, here: Scope) -> str:
+        """Say why a name stands for no known value."""
+        if self.place(name, here) is None:
+            return "is declared in no file at hand, or in several of them"
+        if name in self.written:
+            return "may be changed by the program: it is known only when that runs"
+        return "has no value that is known before the program runs"
+
+    @cached_property
+    def written(self) -> frozenset[str]:
+        """Names of data that something may change."""
+        return self._uses[0]
+
+    @cached_property
+    def read(self) -> frozenset[str]:
+        """Names of data that something but the destination of a move takes."""
+        return self._uses[1]
+
+    @cached_property
+    def _uses(self) -> tuple[frozenset[str], frozenset[str]]:
+        uses = _Uses()
+        for file in self.files:
+            lists = file.routines == ()
+            for one in file.text.said:
+                if not (lists and isinstance(one, said.Assignment)):
+                    uses.note(one)
+                else:
+                    uses.take(one.value)
+        return frozenset(uses.written), frozenset(uses.read)
+
+    # Values.
+
+    def number(self, operand: said.Operand | None, row: int, here: Scope) -> float:
+        """Evaluate a number, NaN where it is not known before the program runs."""
+        found = self.value(operand, row, here)
+        return found.value if isinstance(found, KrlNumber) else math.nan
+
+    def value(
+        self, operand: said.Operand | None, row: int, here: Scope, depth: int = 0
+    ) -> KrlValue | None:
+        """Evaluate an operand, None where it is not known."""
+        if depth > DEEPEST:
+            return None
+        match operand:
+            case said.Num(slot=slot):
+                text = self.files[here.file].text
+                at = int(text.first[row]) + slot
+                value = float(text.value[at])
+                return None if math.isnan(value) else KrlNumber(value, here.file, at)
+            case said.EnumValue(name=name):
+                return name
+            case said.StringLiteral(text=written):
+                return written
+            case said.KrlAggregate(fields=fields):
+                return self._aggregate(fields, row, here, depth)
+            case said.Operation(operator=operator, operands=operands):
+                parts = [self.value(one, row, here, depth + 1) for one in operands]
+                return _computed(operator, parts)
+            case said.DataObject(name=name, steps=steps):
+                return self._data(name, steps, row, here, depth)
+            case _:
+                return None
+
+    def _aggregate(
+        self, fields: Sequence[said.NamedField], row: int, here: Scope, depth: int
+    ) -> KrlRecord:
+        pairs = [(f.name, self.value(f.value, row, here, depth + 1)) for f in fields]
+        known = tuple((name, value) for name, value in pairs if value is not None)
+        twice = len({name for name, _ in pairs}) < len(pairs)
+        return KrlRecord(known, len(known) == len(pairs) and not twice)
+
+    def _data(
+        self,
+        name: str,
+        steps: Sequence[str | said.ElementStep],
+        row: int,
+        here: Scope,
+        depth: int,
+    ) -> KrlValue | None:
+        """Evaluate data by name, and what the steps behind it lead to."""
+        loops, rest = dict(here.loops), list(steps)
+        if name in loops:
+            return None if rest else KrlNumber(loops[name])
+        index: tuple[int, ...] | None = ()
+        if rest and isinstance(rest[0], said.ElementStep):
+            index = self.index(rest.pop(0), row, here)
+        if index is None or name in self.written or name.startswith("$"):
+            return None
+        found = self.datum(name, here, index)
+        if found is None or found[1].value is None:
+            return None
+        file, datum = found
+        there = Scope(file, self.files[file].name, datum.routine)
+        value = self.value(datum.value, datum.row, there, depth + 1)
+        for step in rest:
+            if not (isinstance(step, str) and isinstance(value, KrlRecord)):
+                return None
+            value = value.get(step)
+        return value
+
+    def index(
+        self, step: said.ElementStep | str, row: int, here: Scope
+    ) -> tuple[int, ...] | None:
+        """Return the index of an element, None where it is not known."""
+        if isinstance(step, str):
+            return None
+        values = [self.number(one, row, here) for one in step.subscripts]
+        whole = [int(v) for v in values if v == v and v == int(v)]
+        return tuple(whole) if len(whole) == len(values) and whole else None
+
+
+def _computed(operator: str, parts: Sequence[KrlValue | None]) -> KrlNumber | None:
+    """Compute what an operator gives, None where that is no known number."""
+    numbers = [part.value for part in parts if isinstance(part, KrlNumber)]
+    if len(numbers) < len(parts):
+        return None
+    match operator, numbers:
+        case "-", [a]:
+            return KrlNumber(-a)
+        case "+", [a]:
+            return KrlNumber(a)
+        case "+", [a, b]:
+            return KrlNumber(a + b)
+        case "-", [a, b]:
+            return KrlNumber(a - b)
+        case "*", [a, b]:
+            return KrlNumber(a * b)
+    return None  # whole numbers divide otherwise than others
+
+
+# What statements take and change.
+
+
+@dataclass
+class _Uses:
+    """Names that statements may change, and those that they take."""
+
+    written: set[str] = field(default_factory=set)
+    read: set[str] = field(default_factory=set)
+
+    def note(self, one: said.SourceStatement) -> None:
+        """Note what a statement takes and changes."""
+        match one:
+            case said.Assignment(target=target, value=value):
+                self.written.add(target.name)
+                self._subscripts(target)
+                self.take(value)
+            case said.ForLoop(name=name):
+                self.written.add(name)
+            case said.Instruction(name=name, arguments=arguments):
+                self._call(name, arguments)
+            case said.KrlMove(to=to, via=via, settings=settings):
+                for end in (to, via):
+                    self._destination(end)
+                for setting in settings:
+                    self.take(setting.value)
+            case (
+                said.InterruptDeclared(action=action) | said.PathTrigger(action=action)
+            ):
+                self.note(action)
+        if not isinstance(one, said.Assignment | said.KrlMove | said.Instruction):
+            for operand in operands_of(one):
+                self.take(operand)
+
+    def take(self, operand: said.Operand | None) -> None:
+        """Note what an operand takes, and what its functions may change."""
+        match operand:
+            case said.DataObject(name=name):
+                self.read.add(name)
+                self._subscripts(operand)
+            case said.FunctionCall(name=name, arguments=arguments):
+                self._call(name, arguments)
+            case said.Operation(operands=operands):
+                for one in operands:
+                    self.take(one)
+            case said.KrlAggregate(fields=fields):
+                for part in fields:
+                    self.take(part.value)
+
+    def _subscripts(self, target: said.DataObject) -> None:
+        for step in target.steps:
+            if isinstance(step, said.ElementStep):
+                for one in step.subscripts:
+                    self.take(one)
+
+    def _call(self, name: str, arguments: Sequence[said.Argument]) -> None:
+        """Note arguments: a routine may change them, unless it is known not to."""
+        for argument in arguments:
+            if isinstance(argument.value, said.DataObject):
+                if name not in STILL | FUNCTIONS and name != "bas":
+                    self.written.add(argument.value.name)
+            self.take(argument.value)
+
+    def _destination(self, operand: said.Operand | None) -> None:
+        """Note what a destination takes besides the point itself."""
+        match operand:
+            case said.DataObject():
+                self._subscripts(operand)
+            case said.Operation(operator=":", operands=operands):
+                for one in operands:
+                    self._destination(one)
+            case _:
+                self.take(operand)
+
+
+def operands_of(one: said.SourceStatement) -> Sequence[said.Operand | None]:
+    """Return the values that a statement takes."""
+    match one:
+        case said.KrlDeclaration(items=items):
+            return [item.value for item in items]
+        case said.Assignment(target=target, value=value):
+            return [target, value]
+        case said.Branch(values=values):
+            return values
+        case said.ForLoop(first=first, last=last, step=step):
+            return [first, last, step]
+        case said.Leave(value=value) | said.Waiting(value=value):
+            return [value]
+        case said.Instruction(arguments=arguments):
+            return [argument.value for argument in arguments]
+        case said.KrlMove(to=to, via=via, angle=angle, settings=settings):
+            return [to, via, angle, *(one.value for one in settings)]
+        case said.SplineBlock(settings=settings):
+            return [one.value for one in settings]
+        case _:
+            return []
+
+
+def parts_of(operands: Sequence[said.Operand | None]) -> Iterator[said.Operand]:
+    """Yield operands with all that is in them."""
+    waiting = list(operands)
+    while waiting:
+        match one := waiting.pop():
+            case said.FunctionCall(arguments=arguments):
+                waiting += [argument.value for argument in arguments]
+            case said.Operation(operands=inside):
+                waiting += inside
+            case said.KrlAggregate(fields=fields):
+                waiting += [f.value for f in fields]
+            case said.DataObject(steps=steps):
+                for step in steps:
+                    if isinstance(step, said.ElementStep):
+                        waiting += step.subscripts
+        if one is not None:
+            yield one
