@@ -6,6 +6,7 @@ import numpy as np
 
 from postproc.language.pdl2.dialect import PDL2_DIALECT
 from postproc.language.visits import Literals, Visits
+from postproc.robot.pose import pose_from_record
 
 FRAMES = np.array(
     [
@@ -33,7 +34,8 @@ def visits(target: list[int], values: list[list[float]], **more: object) -> Visi
         "aux": np.empty((n, 0)), "config": zeros, "configs": ("S T1:1",),
         "config_given": ~no, "literal": zeros - 1,
         "follows": zeros - 1, "name": zeros, "names": ("",),
-        "tool": zeros, "base": zeros + 1, "uframe": zeros + 2, "frames": FRAMES,
+        "tool": zeros, "base": zeros + 1, "uframe": zeros + 2,
+        "frames": pose_from_record(FRAMES),
         "frame_taught": np.zeros(3, dtype=bool), "tool_remote": no,
         "nearest_turn": no, "care": np.zeros((n, 3), dtype=np.int64), "fly": no,
         "zone_mm": nan, "overlap_percent": nan,

@@ -63,17 +63,17 @@ def _missing(arm: Arm, side: Floats, turned: Floats) -> Floats:
 def _said(missing: Floats, turned: Floats, length: float, cartesian: bool) -> str:
     """Say what to do about joints that lack some travel (6,) on their last piece."""
     joints = np.flatnonzero(missing > 0)
-    axes = "axes" if len(joints) > 1 else "axis"
+    axes, turn = ("axes", "turn") if len(joints) > 1 else ("axis", "turns")
     names = f"{axes} {' and '.join(str(j + 1) for j in joints.tolist())}"
     angle = np.rad2deg(missing.max())
     if (np.abs(turned[joints]) < LOST).any():
         return (
-            f"begin it at a place from where {names} turns by {angle:.3f} deg or more"
+            f"begin it at a place from where {names} {turn} by {angle:.3f} deg or more"
         )
     back = length * float((missing[joints] / np.abs(turned[joints])).max())
     if cartesian and 0 < back <= FAR:
         return f"begin the approach {np.ceil(back / MM):.0f} mm farther back"
-    return f"begin the approach where {names} still turns by {angle:.3f} deg more"
+    return f"begin the approach where {names} still {turn} by {angle:.3f} deg more"
 
 
 def _from_nowhere(arm: Arm) -> str:

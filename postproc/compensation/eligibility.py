@@ -12,9 +12,9 @@ from postproc.language.visits import OrientationLaw, Switch, Visits
 from postproc.motion.branches import OTHER_TURN, nearest_turns, on_other_turns
 from postproc.motion.path import NEAR, arcs_of
 from postproc.motion.planner import Plan
-from postproc.motion.targets import TargetKind, Targets
+from postproc.motion.targets import STRANDS, TargetKind, Targets
 from postproc.robot.arm import Arm
-from postproc.robot.pose import MM, inverse, pose_from_record, rotation_vector
+from postproc.robot.pose import MM, inverse, rotation_vector
 from postproc.robot.trajectory import Motion
 
 # Why something did not happen, for many visits at once.
@@ -82,6 +82,7 @@ SAID = {
     Switch.UNKNOWN: "not known",
 }
 AFTER = "it comes from a move whose branch or turn is not sure"
+STRANDED = "it comes from a target that the arm cannot reach as it is written"
 
 
 @dataclass(frozen=True)
@@ -139,9 +140,35 @@ def mark_configuration_flags(
     doubtful[:1] |= begun
     if not doubtful.any():
         return doubtful
-    reached, on = _followers(visits, targets, doubtful)
+    sure = (targets.move == Motion.JOINT) & _placed(targets) & ~targets.nearest_turn
+    reached, on = _followers(visits, doubtful, sure)
     reasons.mark(reached, AFTER)
     return on
+
+
+def mark_stranded(
+    visits: Visits, targets: Targets, plan: Plan, reasons: Reasons
+) -> None:
+    """Leave alone what comes from targets that the arm cannot reach.
+
+    There the controller stops with an error, and who goes on comes from anywhere.
+
+    Args:
+        visits: What the program says.
+        targets: Its n moves.
+        plan: Where they lead.
+        reasons: Why visits must not be compensated; more are added.
+    """
+    stranded = STRANDS[plan.reason]
+    if stranded.any():
+        reached, _ = _followers(visits, stranded, _placed(targets))
+        reasons.mark(reached, STRANDED)
+
+
+def _placed(targets: Targets) -> Bools:
+    """Tell which targets are where they are wherever the arm comes from, (n,)."""
+    posed = (targets.kind == TargetKind.POSE) & (targets.slot >= 0)
+    return np.asarray((targets.kind == TargetKind.JOINTS) | posed)
 
 
 def _mark_stops(visits: Visits, path: Overruled, reasons: Reasons) -> None:
@@ -241,9 +268,7 @@ def _seen(n: int, rows: Ints) -> Bools:
     return found
 
 
-def _followers(
-    visits: Visits, targets: Targets, doubtful: Bools
-) -> tuple[Bools, Bools]:
+def _followers(visits: Visits, doubtful: Bools, sure: Bools) -> tuple[Bools, Bools]:
     """Find what comes from doubtful places, up to the next ones that are sure, (n,).
 
     A sure place is among them itself: the side that it is reached from is not sure.
@@ -251,14 +276,6 @@ def _followers(
     Returns:
         What comes from doubtful places, and which places make others doubtful.
     """
-    sure = (targets.move == Motion.JOINT) & (
-        (targets.kind == TargetKind.JOINTS)
-        | (
-            (targets.kind == TargetKind.POSE)
-            & (targets.slot >= 0)
-            & ~targets.nearest_turn
-        )
-    )
     edge = np.repeat(np.arange(len(visits)), np.diff(visits.pred_start))
     order = np.argsort(visits.pred, kind="stable")
     after, source = edge[order], visits.pred[order]
@@ -338,7 +355,7 @@ def _may_be_off(visits: Visits, targets: Targets, plan: Plan, rows: Bools) -> Bo
     end = plan.tcp[edge][:, :3, :3]
     turn = np.linalg.norm(rotation_vector(np.swapaxes(begin, 1, 2) @ end), axis=1)
     kind = visits.orientation_law[edge]
-    world = pose_from_record(visits.frames)[visits.base[edge]][:, :3, :3]
+    world = visits.frames[visits.base[edge]][:, :3, :3]
     sine = np.minimum(_sine(world @ begin, kind), _sine(world @ end, kind))
     off = np.minimum(turn**2 / (8.0 * np.maximum(sine, LEAST)), turn)
     both = np.maximum(_sine(world @ begin, kind), _sine(world @ end, kind))

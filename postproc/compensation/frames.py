@@ -19,6 +19,7 @@ from postproc.robot.cell import Cell
 from postproc.robot.pose import MM, pose_from_record
 from postproc.robot.state import make_states
 
+SAME = 1e-9  # [m] and in rotation matrices: the frame of the cell
 APART_MM, APART_DEG = 1.0, 0.1  # a frame of three points may differ by rounding only
 _NO_POINTS = (
     "its user frame was taught with the arm and contains its error: give taught_deg in "
@@ -42,26 +43,41 @@ def correct_taught(
     Raises:
         CellError: The points of a frame do not give that frame.
     """
-    records = [tuple(frame) for frame in visits.frames.tolist()]
-    listed = np.array([record in cell.taught_frames for record in records], dtype=bool)
-    taught = np.flatnonzero(listed | visits.frame_taught)
-    if len(taught) == 0:
+    listed = taught_records(visits, cell)
+    taught = sorted({*listed, *np.flatnonzero(visits.frame_taught).tolist()})
+    if not taught:
         return planned
     poses = np.isin(visits.target, (Meaning.POSE, Meaning.NEAR))
     shift, variance = np.array(planned.shift), np.array(planned.shift_variance)
-    for frame in taught.tolist():
+    for frame in taught:
         for column, name in ((visits.tool, "tool"), (visits.base, "base")):
             planned.reasons.mark(column == frame, _OTHER.format(name))
         rows = poses & (visits.uframe == frame)
-        joints = cell.taught_frames.get(records[frame])
+        record = listed.get(frame, ())
+        joints = cell.taught_frames.get(record)
         if joints is None:
             planned.reasons.mark(rows, _NO_POINTS)
             continue
-        really, inside = moved_frame(joints, records[frame], cell, model)
+        really, inside = moved_frame(joints, record, cell, model)
         if not inside:
             planned.reasons.mark(rows, _OUTSIDE)
         shift[rows], variance[rows] = really.shift(planned.plan.tcp[rows, :3, 3])
     return replace(planned, shift=shift, shift_variance=variance)
+
+
+def taught_records(visits: Visits, cell: Cell) -> dict[int, tuple[float, ...]]:
+    """Find the frames of a program that the cell lists as taught.
+
+    Returns:
+        The record that the cell has, by index into `Visits.frames`.
+    """
+    records = list(cell.taught_frames)
+    if not records or not len(visits.frames):
+        return {}
+    poses = pose_from_record(np.array(records))
+    apart = np.abs(visits.frames[:, None] - poses).max(axis=(2, 3))
+    frame, record = np.nonzero(apart <= SAME)
+    return {f: records[r] for f, r in zip(frame.tolist(), record.tolist(), strict=True)}
 
 
 @dataclass(frozen=True)

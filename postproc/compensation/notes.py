@@ -8,6 +8,7 @@ import numpy as np
 
 from postproc.arrays import Bools, Floats, Ints, in_chunks
 from postproc.compensation.continuity import on_path
+from postproc.compensation.frames import taught_records
 from postproc.files import is_shared_list, is_variables, variables_of
 from postproc.language.visits import NO_VALUE, Diagnostic, Meaning, Visits
 from postproc.robot.arm import Arm
@@ -33,7 +34,7 @@ def tool_in_metres(visits: Visits) -> list[Diagnostic]:
 
     Tools are tens of millimetres long and more; written in metres none reaches two.
     """
-    longest = np.abs(visits.frames[:, :3]).max(axis=1, initial=0.0)
+    longest = np.abs(visits.frames[:, :3, 3]).max(axis=1, initial=0.0) / MM
     short = (longest > 0.0) & (longest < SHORTEST)
     known = np.flatnonzero(visits.tool >= 0)
     first = known[short[visits.tool[known]]][:1]
@@ -178,7 +179,7 @@ def listing_cost(
 
 def _tool(visits: Visits, rows: Bools) -> Floats:
     """Return the TCP in the flange frame at some visits, (k, 3) [m]."""
-    return np.asarray(visits.frames[visits.tool[rows], :3] * MM)
+    return np.asarray(visits.frames[visits.tool[rows], :3, 3])
 
 
 def _reach(arm: Arm, q: Floats, tool: Floats) -> float:
@@ -210,10 +211,10 @@ def unsure_frames(
         cell: Says which frames were taught, and from which sides.
     """
     found, poses = [], np.isin(visits.target, (Meaning.POSE, Meaning.NEAR))
-    for frame, record in enumerate(map(tuple, visits.frames.tolist())):
+    for frame, record in taught_records(visits, cell).items():
         sides = cell.taught_sides.get(record)
         rows = np.flatnonzero(corrected & poses & (visits.uframe == frame))
-        if cell.taught_frames.get(record) is None or len(rows) == 0:
+        if cell.taught_frames[record] is None or len(rows) == 0:
             continue
         if sides is not None and sides.all():
             continue

@@ -14,6 +14,7 @@ from postproc.compensation.eligibility import (
     mark_arcs,
     mark_configuration_flags,
     mark_orientation_interpolation,
+    mark_stranded,
 )
 from postproc.compensation.options import Options
 from postproc.compensation.targets import targets_from_visits
@@ -201,6 +202,7 @@ def plan_visits(
     planned = plan(cell.arm, targets, wrist, timed, begin, lead)
     reasons.adopt(planned.reason, planned.reasons)
     on = mark_configuration_flags(visits, targets, planned, cell.arm, reasons, doubtful)
+    mark_stranded(visits, targets, planned, reasons)
     mark_orientation_interpolation(visits, targets, planned, reasons)
     mark_arcs(targets, planned, reasons)
     none = np.zeros((len(visits), 3))

@@ -16,7 +16,6 @@ from postproc.robot.pose import (
     MM,
     inverse,
     is_unknown,
-    pose_from_record,
     products,
     rotation_from_vector,
     times,
@@ -208,7 +207,7 @@ def _user_frames(visits: Visits, rows: Rows) -> Floats:
 def few_frames(visits: Visits) -> Floats:
     """Return the frames that the program uses, and last one that is not known."""
     unknown = np.full((1, 4, 4), np.nan)
-    return np.concatenate([pose_from_record(visits.frames.reshape(-1, 6)), unknown])
+    return np.concatenate([visits.frames, unknown])
 
 
 def _values(visits: Visits, cell: Cell, rows: Rows = ALL) -> Floats:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -244,15 +244,6 @@ class Lines:
     def text(self, row: int) -> str:
         """Return the mask of a logical line."""
         return self.shapes[int(self.shape[row])]
-
-    def marks(self, word: str) -> Iterator[tuple[int, str]]:
-        """Yield (physical line, next word) of comments like ``-- MEASURE P12``."""
-        pattern = re.compile(rb"--+[ \t]*" + word.encode() + rb"\b[ \t]*([^\s]*)", re.I)
-        rows = np.flatnonzero(self.comment >= 0)
-        for row, start in zip(rows.tolist(), self.comment[rows].tolist(), strict=True):
-            found = pattern.match(self.source.data, start)
-            if found:
-                yield row + 1, found.group(1).decode("latin-1")
 
 
 def read_lines(source: Source) -> Lines:

@@ -43,7 +43,7 @@ class Stamp:
     source: str
 
 
-def stamp_line(version: str, model: str, source: Source, comment: str = "--") -> bytes:
+def stamp_line(version: str, model: str, source: Source, comment: str) -> bytes:
     """Return the stamp of a source, in its own line ending, behind a comment's begin.
 
     It holds no date, so that the same input gives the same bytes.
@@ -61,12 +61,6 @@ def stamp_place(data: bytes) -> int:
     """Return the offset at which a stamp goes into a text: behind a file header."""
     found = _HEADER.match(data)
     return found.end() if found else 0
-
-
-def stamped(version: str, model: str, source: Source, data: bytes) -> bytes:
-    """Put the stamp of a source into its rewritten bytes."""
-    at = stamp_place(data)
-    return data[:at] + stamp_line(version, model, source) + data[at:]
 
 
 def read_stamp(data: bytes) -> Stamp | None:

@@ -163,7 +163,7 @@ class Visits:
             of the literal plus constants), (n,), -1 where there is none.
         name: Index into `names`, (n,); names[0] is "" (inline literal).
         tool, base, uframe: Index into `frames`, (n,), -1 where not known.
-        frames: Position records (k, 6) [mm, deg], as cell files hold them.
+        frames: Poses (k, 4, 4) [m].
         frame_taught: True where the text marks the frame as taught, (k,).
         tool_remote: The tool stands still and the arm holds the part, (n,).
         nearest_turn: Joints go to the nearest turn, whatever the flags say, (n,).

@@ -91,5 +91,5 @@ def run(arm: Arm, targets: Targets) -> ProgramCycle:
         PlanError: The arm has no closed-form inverse kinematics.
     """
     path = blend(arm, targets, trace(arm, targets))
-    arrived = arrivals(arm, path.q, path.edges)
+    arrived = arrivals(arm, path.q, path.driven)
     return ProgramCycle(targets, path, arrived, tell_time(arm, targets, path))

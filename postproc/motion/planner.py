@@ -107,7 +107,7 @@ def plan(
     """
     exact = trace(arm, targets, begin.known)
     traced = blend(arm, targets, exact, timed)
-    arrived = arrivals(arm, traced.q, traced.edges, lead)
+    arrived = arrivals(arm, traced.q, traced.driven, lead)
     clock = tell_time(arm, targets, traced) if timed else no_time(len(targets))
     tool = targets.tool
     tcp = where_passed(arm, planned_points(exact), traced.q) @ tool

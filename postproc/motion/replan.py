@@ -105,7 +105,7 @@ def replan_all(
     """
     exact = trace(arm, targets, begin.known)
     traced = blend(arm, targets, exact, timed=False)
-    ways = passages(arm, traced.q, traced.edges)
+    ways = passages(arm, traced.q, traced.driven)
     found = sides(arm, traced.q, ways, lead)
     return Replanned(
         arm, targets, planned_points(exact), traced.q, traced.aside, exact.slot, ways,
@@ -218,7 +218,7 @@ def replan(
         _patched(before.exact.q, part, exact.q),
         _patched(before.exact.flange, part, exact.flange),
     )
-    now = passages(arm, traced.q, traced.edges)
+    now = passages(arm, traced.q, traced.driven)
     ways = _spliced(before.passages, part, now)
     return Replanned(
         arm, targets, at_targets, passed, _patched(before.aside, part, traced.aside),

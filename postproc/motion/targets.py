@@ -182,3 +182,10 @@ REASONS = (
     NO_CIRCLE, ARC_END, AMBIGUOUS, OTHER_BRANCH, *LIMITS, *PATH_LIMITS, WRIST,
 )  # fmt: skip
 CODE = {reason: code for code, reason in enumerate(REASONS)}
+
+# Where the controller stops with an error: where the arm stands then nobody knows.
+_STRANDS = (
+    OUT_OF_REACH, NO_BRANCH, PATH_REACH, PATH_JUMP, NO_CIRCLE, OTHER_BRANCH, *LIMITS,
+    *PATH_LIMITS,
+)  # fmt: skip
+STRANDS = np.isin(np.arange(len(REASONS)), [CODE[reason] for reason in _STRANDS])

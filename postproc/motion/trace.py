@@ -45,6 +45,7 @@ from postproc.motion.targets import (
     PATH_JUMP,
     PATH_LIMITS,
     PATH_REACH,
+    STRANDS,
     TargetKind,
     Targets,
 )
@@ -603,6 +604,22 @@ class Trace:
     aside: Floats
     pull: BlendCoupling = field(default_factory=BlendCoupling)
 
+    @property
+    def driven(self) -> Edges:
+        """The edges, but that nobody knows how the arm leaves where it strands."""
+        edges = self.edges
+        source = np.maximum(edges.source, 0)
+        lost = (edges.source >= 0) & STRANDS[self.reason[source]]
+        if not lost.any():
+            return edges
+        count = np.diff(edges.start)
+        to = np.repeat(np.arange(len(self.q)), np.diff(edges.first))
+        path = np.array(edges.path)
+        path[spans(edges.start[:-1][lost], count[lost])] = np.repeat(
+            self.q[to[lost]], count[lost], axis=0
+        )
+        return replace(edges, source=np.where(lost, -1, edges.source), path=path)
+
     def at(self, v: int) -> StartState:
         """Tell where the arm stands at a target, if it stops there."""
         row = np.arange(v, min(v + 1, len(self.q)))
@@ -784,6 +801,7 @@ def _finished(work: Workspace) -> Trace:
     work.source[edge_of[holes]] = -1
     work.path[holes] = work.q[samples.visit[edge_of[holes]]]
     _limits(work, edge_of)
+    _arc_ends(work)
     written = (t.slot >= 0) & (t.move != Motion.JOINT) & (work.slot >= 0)
     turned = on_other_turns(work.q, t.turns)
     other = (work.slot != t.slot) | (turned & ~t.nearest_turn)
@@ -807,6 +825,13 @@ def _limits(work: Workspace, edge_of: Ints) -> None:
         rows = np.flatnonzero(any_in_rows(over))
         for row in rows[work.reason[visit[rows]] == 0][::-1]:
             work.reason[visit[row]] = CODE[text[int(np.argmax(over[row]))]]
+
+
+def _arc_ends(work: Workspace) -> None:
+    """Note ends of arcs on whose way the arm strands already."""
+    via = np.flatnonzero(work.targets.via[:-1])
+    via = via[STRANDS[work.reason[via]] & (work.reason[via + 1] == 0)]
+    work.reason[via + 1] = work.reason[via]
 
 
 # Where the arm stands somewhere: enough to go on.

@@ -14,7 +14,6 @@ from postproc.robot.trajectory import Motion
 from postproc.simulation.arm import GearState, VirtualArm, at_start, move
 from postproc.simulation.controller import Drive, VirtualCell, Way, plan_drives
 from postproc.simulation.draw import stream
-from postproc.simulation.kinematics import pose_of_record
 from postproc.simulation.state import USUAL_SPEED, VirtualArrivals, make_arrivals
 
 # Run a program on the virtual arm.
@@ -73,7 +72,7 @@ def run_program(arm: VirtualArm, setup: VirtualCell, visits: Visits) -> ProgramR
 
 def _poses(visits: Visits) -> Floats:
     """Return the frames of a program, (k, 4, 4)."""
-    return pose_of_record(visits.frames) if len(visits.frames) else np.eye(4)[None]
+    return visits.frames if len(visits.frames) else np.eye(4)[None]
 
 
 def _places(

@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import re
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
-from tests.language.neutral_job import LANGUAGES, drawn
+from postproc.robot.cell import load_cell
+from postproc.robot.trajectory import Motion
+from tests.language.neutral_job import LANGUAGES, NeutralMove, drawn
 from tests.written import Desk, cli
 
 ROOT = Path(__file__).parents[2]
@@ -47,6 +51,18 @@ def source(place, name):
     return place.folder / "tree" / name / name
 
 
+def shared_point(place, name):
+    """Write a job that comes to one point from two sides."""
+    job = drawn(load_cell(place.cell), 5, 1)
+    q = job.moves[0].q + np.deg2rad(5.0)
+    moves = [
+        NeutralMove(Motion.LINEAR, at, name=point)
+        for turn in (-4.0, 4.0)
+        for at, point in ((q + np.deg2rad(turn), ""), (q, "shared"))
+    ]
+    return LANGUAGES[name](replace(job, moves=(job.moves[0], *moves)))
+
+
 def out(place, name):
     """Compensate a job; return the output."""
     made = place.folder / "made" / name
@@ -71,8 +87,14 @@ def run(command, place, name):
             return place.compensate("-", stdin=given.read_bytes())
         case "compensate --report --html":
             return place.compensate(given, "-o", to, *pair)
-        case "compensate --orientation" | "compensate --clone":
-            return place.compensate(given, "-o", to, command.split()[1])
+        case "compensate --orientation":
+            return place.compensate(given, "-o", to, "--orientation")
+        case "compensate --clone":
+            files = shared_point(place, name)
+            shared, *_ = (place.put(part, data) for part, data in files.items())
+            return place.compensate(shared, "-o", to, "--clone")
+        case "compensate --path-mm":
+            return place.compensate(given, "-o", to, "--path-mm", "0.1")
         case "compensate --lsv":
             values = place.put("v.lsv", "--$$\r\n")
             return place.compensate(given, "-o", to, "--lsv", values)
@@ -105,7 +127,9 @@ def test_a_cell_of_the_table(place, command, language, said):
     if said == "yes":
         assert found.exit_code in (0, 1), found.output
     else:
-        assert found.exit_code == 2 and said in re.sub(r"\s+", " ", found.stderr)
+        left = command in ("compensate --clone", "compensate --path-mm")
+        assert found.exit_code == (1 if left else 2)
+        assert said in re.sub(r"\s+", " ", found.stderr)
 
 
 def test_a_restored_module_is_what_it_was(place):

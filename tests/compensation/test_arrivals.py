@@ -29,7 +29,7 @@ def outcome(job_cell, job_model):
 def test_shares_sum_to_what_is_corrected(outcome, job_cell, job_model):
     arrivals = outcome.arrivals
     rows = np.flatnonzero(outcome.decisions.status == Status.SAFE)
-    assert len(rows) == 3
+    assert len(rows) == 2
     whole = arrivals.shares(rows).sum(axis=1)
     error = job_model.error(job_cell.arm, arrivals.states(rows))
     np.testing.assert_allclose(whole, error, rtol=0, atol=1e-12)

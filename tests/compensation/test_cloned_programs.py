@@ -22,7 +22,7 @@ PROGRAMS = 12
 
 def visits_of(moves: list[Executed], cell) -> Visits:
     """Make visits of a sequence of moves, in the cell's frames."""
-    frames = np.array([cell.tool.record, cell.base.record, cell.uframe.record])
+    frames = np.array([cell.tool.pose, cell.base.pose, cell.uframe.pose])
     return visits(
         [int(Meaning.JOINTS if m.joints else Meaning.POSE) for m in moves],
         [list(m.numbers) for m in moves],

@@ -147,9 +147,3 @@ def test_statements_are_joined_up_to_endmove() -> None:
 def test_an_open_string_is_refused_with_its_line() -> None:
     with pytest.raises(ProgramError, match=r"x:2: a string is not terminated"):
         read_lines(source_from_bytes("x", b"BEGIN\n  WRITE ('hello, NL)\nEND"))
-
-
-def test_marks_are_comments_not_strings() -> None:
-    text = b"WRITE ('-- MEASURE no')\n-- MEASURE P1\nMOVE TO p --measure P2 -- x\n"
-    lines = read_lines(source_from_bytes("x", text))
-    assert list(lines.marks("MEASURE")) == [(2, "P1"), (3, "P2")]

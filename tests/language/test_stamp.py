@@ -2,16 +2,21 @@
 
 import pytest
 
-from postproc.language.source import source_from_bytes
+from postproc.language.source import Source, source_from_bytes
 from postproc.language.stamp import (
     Stamp,
     is_stamped,
     read_stamp,
     source_hash,
     stamp_line,
-    stamped,
+    stamp_place,
     strip_stamp,
 )
+
+
+def stamped(version: str, model: str, source: Source, data: bytes) -> bytes:
+    at = stamp_place(data)
+    return data[:at] + stamp_line(version, model, source, "--") + data[at:]
 
 
 def test_stamp_round_trip_in_the_files_own_line_ending() -> None:

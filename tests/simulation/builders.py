@@ -9,6 +9,7 @@ import numpy as np
 from postproc.language.pdl2.dialect import PDL2_DIALECT
 from postproc.language.visits import Literals, Meaning, Visits
 from postproc.robot.trajectory import Motion
+from postproc.simulation.kinematics import pose_of_record
 
 
 @dataclass
@@ -68,7 +69,8 @@ class Program:
             config_given=np.array([r["config"] is not None for r in self.rows]),
             literal=nothing - 1, follows=nothing - 1, name=nothing.copy(), names=("",),
             tool=column("tool", np.int64), base=column("base", np.int64),
-            uframe=column("uframe", np.int64), frames=np.array(self.frames, float),
+            uframe=column("uframe", np.int64),
+            frames=pose_of_record(np.array(self.frames, float).reshape(-1, 6)),
             frame_taught=np.zeros(len(self.frames), dtype=bool),
             tool_remote=no.copy(), nearest_turn=column("nearest", bool),
             care=np.zeros((n, 3), dtype=np.int64),

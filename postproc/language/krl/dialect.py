@@ -8,9 +8,11 @@ import numpy as np
 
 from postproc.arrays import Bools, Floats, Ints
 from postproc.language.dialect import Dialect, Terms
+from postproc.language.marks import Comments
 from postproc.robot.pose import MM
 
 MM_DECIMALS, ANGLE_DECIMALS, JOINT_DECIMALS = 3, 4, 5
+COMMENTS = Comments(";", '"')
 HEADS = ("X", "Y", "Z", "A", "B", "C", "S", "T")
 COMPONENTS = tuple(name.lower() for name in HEADS)
 WIDTH = len(HEADS)

@@ -8,12 +8,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from postproc.language.collect import Record
+from postproc.language.collect import IDENTITY, Pose, composed, flat
 from postproc.language.krl import syntax as said
 from postproc.language.krl.dialect import COMPONENTS, KRL_DIALECT
 from postproc.language.krl.task import CONFIG, KrlRecord, KrlTask
 from postproc.language.machine import Scope
-from postproc.robot.pose import pose_from_record, record_from_pose
 
 
 @dataclass(frozen=True)
@@ -21,15 +20,17 @@ class KrlFrame:
     """A tool or a base.
 
     Attributes:
-        record: Where it is [mm, deg], empty where that is not known.
+        pose: Where it is.
         why: Why targets with it cannot be compensated, "" where they can.
+        taught: It was taught with the arm, and contains its error.
     """
 
-    record: Record
+    pose: Pose
     why: str = ""
+    taught: bool = False
 
 
-ZERO = KrlFrame((0.0,) * 6)
+ZERO = KrlFrame(IDENTITY)
 NUMBERS = {"$tool": "tool_no", "$base": "base_no"}  # in FDAT
 TABLES = {"$tool": "tool_data", "$base": "base_data"}
 _WHICH = "which entry of {} it takes is known only when the program runs"
@@ -120,8 +121,9 @@ class FrameReader:
             return None
         file, datum = found
         there = Scope(file, self.task.files[file].name, "")
-        record = record_of(self.task.value(datum.value, datum.row, there))
-        return KrlFrame(record) if record else None
+        pose = pose_of(self.task.value(datum.value, datum.row, there))
+        taught = self.task.is_taught(table, file, datum.row)
+        return KrlFrame(pose, taught=taught) if pose else None
 
     def _is_chained(self, number: int) -> bool:
         """Tell whether a base hangs on an external axis."""
@@ -142,39 +144,36 @@ class FrameReader:
     def _record(self, operand: said.Operand) -> KrlFrame:
         """Read a frame that is written or named."""
         value = self.task.value(operand, self.row, self.here)
-        record = record_of(value)
-        if record:
-            return KrlFrame(record)
+        pose = pose_of(value)
+        if pose and isinstance(operand, said.DataObject):
+            return KrlFrame(pose, taught=self._is_taught(operand.name))
+        if pose:
+            return KrlFrame(
+                pose, taught=self.task.is_taught("", self.here.file, self.row)
+            )
         if isinstance(operand, said.DataObject):
             return KrlFrame((), self._unknown(operand.name.upper(), operand.name))
         return KrlFrame((), "a frame is not written whole")
 
+    def _is_taught(self, name: str) -> bool:
+        """Tell whether a named frame was taught."""
+        found = self.task.datum(name, self.here)
+        return found is not None and self.task.is_taught(name, found[0], found[1].row)
+
     @staticmethod
     def _product(first: KrlFrame, second: KrlFrame) -> KrlFrame:
-        if first.why or second.why or not (first.record and second.record):
+        if first.why or second.why or not (first.pose and second.pose):
             return KrlFrame((), first.why or second.why)
-        return KrlFrame(composed(first.record, second.record))
+        return KrlFrame(
+            composed(first.pose, second.pose), taught=first.taught or second.taught
+        )
 
 
-def record_of(value: object) -> Record:
-    """Convert a frame to a position record [mm, deg], empty where it is none."""
+def pose_of(value: object) -> Pose:
+    """Convert the components of a frame, empty where it is none."""
     if not isinstance(value, KrlRecord):
         return ()
     numbers = [value.number(name) for name in COMPONENTS[:6]]
     if any(map(math.isnan, numbers)):
         return ()
-    return record_of_numbers(numbers)
-
-
-def record_of_numbers(numbers: Sequence[float]) -> Record:
-    """Convert X, Y, Z, A, B, C to a position record [mm, deg]."""
-    pose = KRL_DIALECT.poses(np.array([*numbers, 0.0, 0.0])[None])
-    record: list[float] = record_from_pose(pose)[0].tolist()
-    return tuple(record)
-
-
-def composed(first: Sequence[float], second: Sequence[float]) -> Record:
-    """Compose two position records."""
-    both = pose_from_record(np.array([first, second]))
-    record: list[float] = record_from_pose((both[0] @ both[1])[None])[0].tolist()
-    return tuple(record)
+    return flat(KRL_DIALECT.poses(np.array([*numbers, 0.0, 0.0])))

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 
+from postproc.language.collect import cell_pose
 from postproc.language.flow import HeadedRows
 from postproc.language.interface import Start
 from postproc.language.krl import syntax as said
@@ -255,7 +256,7 @@ def _is_modal(name: str) -> bool:
 
 def _frame(record: tuple[float, ...] | None) -> KrlFrame:
     """Take a frame over from the cell."""
-    return LOST.tool if record is None else KrlFrame(tuple(map(float, record)))
+    return LOST.tool if record is None else KrlFrame(cell_pose(record))
 
 
 def _halted(here: Arrived, halted: bool | None) -> Arrived:

@@ -60,7 +60,7 @@ class Krl(Language):
             problem, cure = "the file holds no routine", "Give the .src of a program"
             raise ProgramError(sources[0].name, problem, cure)
         _refuse_own_accuracy(files)
-        machine = KrlMachine.of(KrlTask(files), start)
+        machine = KrlMachine.of(KrlTask(files, start.taught), start)
         machine.run()
         visits = visits_of(machine)
         missed = machine.missed({k: file.moves for k, file in enumerate(files)})

@@ -27,7 +27,7 @@ from postproc.language.krl.task import (
 )
 from postproc.language.machine import Scope
 from postproc.language.visits import NO_TARGET, Meaning
-from postproc.robot.pose import MM, pose_from_record
+from postproc.robot.pose import MM
 from postproc.robot.trajectory import Motion
 
 NOTHING = (math.nan,) * WIDTH
@@ -265,7 +265,7 @@ class _Goal:
         base = self._point(point)
         frames = FrameReader(self.task, self.row, self.here, _NO, _NO)
         shift = frames.frame(other)
-        if base.target != Meaning.POSE or not shift.record:
+        if base.target != Meaning.POSE or not shift.pose:
             pins = base.pins or f"{base.name} is shifted by what {RUN_TIME}"
             return FoundGoal(
                 Meaning.UNKNOWN, NOTHING, base.file, follows=base.slots,
@@ -355,7 +355,7 @@ def _linked(
         shift: The frame.
         behind: It stands behind the point.
     """
-    by = pose_from_record(np.array([shift.record]))[0]
+    by = np.array(shift.pose).reshape(4, 4)
     point, angles = np.eye(4), np.deg2rad([values[3:6]])
     point[:3, :3] = rotation_from_abc(angles)[0]
     point[:3, 3] = np.array(values[:3]) * MM

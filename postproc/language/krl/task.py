@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 from collections import defaultdict
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
 from postproc.language.flow import HeadedRows
 from postproc.language.krl import syntax as said
+from postproc.language.krl.dialect import COMMENTS
 from postproc.language.krl.program import KrlDatum, KrlFile
 from postproc.language.machine import Scope
 
@@ -82,9 +83,11 @@ class KrlTask:
 
     Attributes:
         files: The source first.
+        taught: Lower-case names of data that were taught with the arm, by the cell.
     """
 
     files: Sequence[KrlFile]
+    taught: Collection[str] = frozenset()
     _own: dict[tuple[str, str, str], dict[tuple[int, ...], tuple[int, KrlDatum]]] = (
         field(default_factory=lambda: defaultdict(dict))
     )
@@ -175,6 +178,15 @@ class KrlTask:
                 else:
                     uses.take(one.value)
         return frozenset(uses.written), frozenset(uses.read)
+
+    @cached_property
+    def _taught_lines(self) -> list[frozenset[int]]:
+        return [COMMENTS.taught(file.text.source) for file in self.files]
+
+    def is_taught(self, name: str, file: int, row: int) -> bool:
+        """Tell whether data of a statement were taught, by the cell or a comment."""
+        line = self.files[file].text.line(row)
+        return name in self.taught or line in self._taught_lines[file]
 
     # Values.
 

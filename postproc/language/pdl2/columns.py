@@ -10,7 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from postproc.arrays import Interned, Ints, spans
+from postproc.language.marks import MEASURE
 from postproc.language.pdl2 import syntax as ast
+from postproc.language.pdl2.dialect import COMMENTS
 from postproc.language.pdl2.disturbances import disturbance
 from postproc.language.pdl2.job import base_variable
 from postproc.language.pdl2.machine import WRITTEN, Goal, Machine, MoveForm, MoveRun
@@ -25,6 +27,7 @@ from postproc.language.visits import (
     ZoneRule,
     slim,
 )
+from postproc.robot.pose import pose_from_record
 
 # Frames and motion variables of visits as columns.
 
@@ -97,7 +100,8 @@ class SettingColumns:
         if not columns:
             empty = _row({}, lambda value: -1)
             columns = {name: np.array([value])[:0] for name, value in empty.items()}
-        columns["frames"] = np.array([f for f, _ in frames], float).reshape(-1, 6)
+        records = np.array([f for f, _ in frames], float).reshape(-1, 6)
+        columns["frames"] = pose_from_record(records)
         columns["frame_taught"] = np.array([taught for _, taught in frames], bool)
         return columns
 
@@ -550,7 +554,7 @@ def _measured(program: Program) -> tuple[Ints, list[str]]:
     moves = program.statements.which(lambda said: isinstance(said, ast.Move))
     rows = np.flatnonzero(moves[lines.shape])
     found: dict[int, str] = {}
-    for line, mark in lines.marks("MEASURE"):
+    for line, mark in COMMENTS.marks(lines.source, MEASURE):
         at = int(np.searchsorted(lines.line[rows], line))
         if at < len(rows):
             found.setdefault(int(rows[at]), mark)

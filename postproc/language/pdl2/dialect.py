@@ -9,9 +9,11 @@ import numpy as np
 
 from postproc.arrays import Floats, Ints
 from postproc.language.dialect import Dialect, Terms
+from postproc.language.marks import Comments
 from postproc.robot.pose import angles_near, pose_from_record, rotation_from_zyz
 
 MM_DECIMALS, DEGREE_DECIMALS, JOINT_DECIMALS = 3, 4, 5
+COMMENTS = Comments("--", "'")
 FLAG = re.compile(r"([SEW])|T([123])\s*:\s*([+-]?\d+)", re.IGNORECASE)
 
 _STOPS = (

@@ -13,6 +13,7 @@ from postproc.arrays import Bools, Ints
 from postproc.files import base_name
 from postproc.language.interface import Start
 from postproc.language.pdl2 import syntax as ast
+from postproc.language.pdl2.dialect import COMMENTS
 from postproc.language.pdl2.entries import Entries
 from postproc.language.pdl2.program import Body, Program, Variable, Variables
 from postproc.language.pdl2.store import root_of, wholes
@@ -199,9 +200,8 @@ class World:
             self.slot_base[program.lines.source.name] = base
             self.files.append(program.lines.source.name)
             base += len(program.lines.start)
-            self.taught_lines[program.lines.source.name] = frozenset(
-                line for line, _ in program.lines.marks("TAUGHT")
-            )
+            source = program.lines.source
+            self.taught_lines[source.name] = COMMENTS.taught(source)
             self.diagnostics |= dict.fromkeys(program.diagnostics)
         if self.variables is not None:
             self.slot_base[self.variables.source.name] = base

@@ -14,6 +14,7 @@ import numpy as np
 from postproc.arrays import Bools, Ints
 from postproc.language.lines import Lines, read_lines
 from postproc.language.pdl2 import syntax as ast
+from postproc.language.pdl2.dialect import COMMENTS
 from postproc.language.pdl2.parser import parse_form
 from postproc.language.shapes import ParsedShapes, lower, parse_shapes
 from postproc.language.source import Source
@@ -588,7 +589,7 @@ def parse(source: Source) -> Program:
     """
     lines = read_lines(source)
     statements = parse_shapes(lines.shapes, parse_form)
-    taught = frozenset(line for line, _ in lines.marks("TAUGHT"))
+    taught = COMMENTS.taught(source)
     structural = statements.which(lambda said: not isinstance(said, _PLAIN))
     rows = np.flatnonzero(structural[lines.shape])
     reader = _Reader(lines, statements, taught, rows)

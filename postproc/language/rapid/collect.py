@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from postproc.language import collect
-from postproc.language.collect import Conditions, Record
-from postproc.language.rapid.dialect import RAPID_DIALECT
+from postproc.language.collect import Conditions, Pose, cell_pose, composed
+from postproc.language.rapid.dialect import COMMENTS, RAPID_DIALECT
 from postproc.language.rapid.interpreter import RapidMachine
 from postproc.language.rapid.modes import NO_SHIFT, UNKNOWN_SHIFT
 from postproc.language.rapid.moves import (
     FrameOfMove,
     RapidVisit,
-    composed,
-    pose_record,
+    pose_of_numbers,
 )
 from postproc.language.visits import Meaning, Visits
 from postproc.robot.trajectory import Motion
@@ -21,8 +20,8 @@ _SHIFT = "the program displacement (PDispOn, PDispSet) is not known here"
 
 def visits_of(machine: RapidMachine) -> Visits:
     """Put the arrivals into the order of the program, as columns."""
-    base = tuple(map(float, machine.start.base or ()))
-    placed: dict[tuple[FrameOfMove, Record], Record] = {}
+    base = cell_pose(machine.start.base)
+    placed: dict[tuple[FrameOfMove, Pose], Pose] = {}
 
     def conditions(v: RapidVisit) -> Conditions:
         key = v.wobj, v.modes.shift
@@ -30,16 +29,19 @@ def visits_of(machine: RapidMachine) -> Visits:
             placed[key] = _displaced(*key)
         return _conditions(v, base, placed[key])
 
-    return collect.visits_of(machine, RAPID_DIALECT, conditions)
+    files = enumerate(machine.task.files)
+    moves = {k: [move.row for move in file.moves] for k, file in files}
+    return collect.visits_of(machine, RAPID_DIALECT, conditions, COMMENTS, moves)
 
 
-def _conditions(v: RapidVisit, base: Record, uframe: Record) -> Conditions:
+def _conditions(v: RapidVisit, base: Pose, uframe: Pose) -> Conditions:
     """Say what an arrival is carried out with."""
     joint = v.motion == Motion.JOINT
     return Conditions(
-        tool=v.tool.record,
+        tool=v.tool.pose,
         base=base,
         uframe=uframe,
+        taught=(v.tool.taught, v.wobj.taught),
         remote=not v.tool.held or v.wobj.held,
         reasons=_reasons(v),
         flags=v.modes.confj if joint else v.modes.confl,
@@ -52,13 +54,13 @@ def _conditions(v: RapidVisit, base: Record, uframe: Record) -> Conditions:
     )
 
 
-def _displaced(wobj: FrameOfMove, shift: tuple[float, ...]) -> tuple[float, ...]:
+def _displaced(wobj: FrameOfMove, shift: tuple[float, ...]) -> Pose:
     """Place a work object with the program displacement in it."""
-    if shift == UNKNOWN_SHIFT or not wobj.record:
+    if shift == UNKNOWN_SHIFT or not wobj.pose:
         return ()
     if shift == NO_SHIFT:
-        return wobj.record
-    return composed(wobj.record, pose_record(shift))
+        return wobj.pose
+    return composed(wobj.pose, pose_of_numbers(shift))
 
 
 def _reasons(v: RapidVisit) -> tuple[str, ...]:

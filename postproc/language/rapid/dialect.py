@@ -8,12 +8,14 @@ import numpy as np
 
 from postproc.arrays import Bools, Floats, Ints
 from postproc.language.dialect import Dialect, Terms
+from postproc.language.marks import Comments
 from postproc.robot.pose import MM
 
 MM_DECIMALS, QUATERNION_DECIMALS, JOINT_DECIMALS = 3, 6, 5
 HEADS = ("x", "y", "z", "q1", "q2", "q3", "q4", "cf1", "cf4", "cf6", "cfx")
 WIDTH = len(HEADS)
 ORIENTATION, FLAGS = slice(3, 7), slice(7, 11)
+COMMENTS = Comments("!", '"')
 COUNTED = (0, 3, 5)  # joints whose quarter turns are counted
 QUARTER = np.pi / 2
 # [rad] beyond a quarter's border a count still holds: axes at 0 or 90 deg are common,

@@ -57,7 +57,7 @@ class Rapid(Language):
         if not files[0].routines:
             problem, cure = "the file holds no routine", "Give a RAPID module"
             raise ProgramError(sources[0].name, problem, cure)
-        task = RapidTask(files)
+        task = RapidTask(files, start.taught)
         machine = RapidMachine.of(task, start)
         machine.run()
         visits = visits_of(machine)

@@ -4,12 +4,19 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cache
 
 import numpy as np
 
-from postproc.language.collect import FoundGoal, FoundVisit
+from postproc.language.collect import (
+    IDENTITY,
+    FoundGoal,
+    FoundVisit,
+    Pose,
+    composed,
+    flat,
+)
 from postproc.language.machine import Scope
 from postproc.language.rapid import syntax as said
 from postproc.language.rapid.dialect import (
@@ -27,7 +34,6 @@ from postproc.language.rapid.task import (
     WrittenNumber,
 )
 from postproc.language.visits import Meaning
-from postproc.robot.pose import pose_from_record, record_from_pose
 from postproc.robot.trajectory import Motion
 
 UNUSED = 1e8  # values of external axes from here on (9E9) say that there is none
@@ -49,14 +55,17 @@ class FrameOfMove:
     """A tool or a work object.
 
     Attributes:
-        record: Where it is [mm, deg], empty where that is not known.
+        pose: Where it is, the rows of (4, 4) [m] one after the other; empty where that
+            is not known.
         held: Robhold: the arm holds it.
         why: Why targets with it cannot be compensated, "" where they can.
+        taught: It was taught with the arm, and contains its error.
     """
 
-    record: tuple[float, ...]
+    pose: Pose
     held: bool
     why: str = ""
+    taught: bool = False
 
 
 @dataclass
@@ -321,11 +330,11 @@ class Goals:
         if read is None:
             why = f"{name} {self._untold(name, arguments.scope)}"
             return FrameOfMove((), kind == "tool", why)
-        return read
+        return replace(read, taught=self.task.is_taught(name, found))
 
 
-WORLD = FrameOfMove((0.0,) * 6, False)
-FLANGE = FrameOfMove((0.0,) * 6, True)
+WORLD = FrameOfMove(IDENTITY, False)
+FLANGE = FrameOfMove(IDENTITY, True)
 
 
 @dataclass
@@ -498,18 +507,9 @@ def pose_of(found: Nested | None) -> tuple[float, ...]:
     return tuple(_pose_numbers(found) or ())
 
 
-def pose_record(numbers: Sequence[float]) -> tuple[float, ...]:
-    """Convert the seven numbers of a pose to a position record [mm, deg]."""
-    pose = RAPID_DIALECT.poses(np.array([*numbers, 0.0, 0.0, 0.0, 0.0])[None])
-    record: list[float] = record_from_pose(pose)[0].tolist()
-    return tuple(record)
-
-
-def composed(first: Sequence[float], second: Sequence[float]) -> tuple[float, ...]:
-    """Compose two position records."""
-    both = pose_from_record(np.array([first, second]))
-    record: list[float] = record_from_pose((both[0] @ both[1])[None])[0].tolist()
-    return tuple(record)
+def pose_of_numbers(numbers: Sequence[float]) -> Pose:
+    """Convert the seven numbers of a pose; see `FrameOfMove.pose`."""
+    return flat(RAPID_DIALECT.poses(np.array([*numbers, 0.0, 0.0, 0.0, 0.0])[None]))
 
 
 def _tool_of(found: Nested | None) -> FrameOfMove | None:
@@ -519,7 +519,7 @@ def _tool_of(found: Nested | None) -> FrameOfMove | None:
     held, pose = found[0], _pose_numbers(found[1])
     if pose is None or not isinstance(held, WrittenNumber):
         return None
-    return FrameOfMove(pose_record(pose), bool(held.value))
+    return FrameOfMove(pose_of_numbers(pose), bool(held.value))
 
 
 def _wobj_of(found: Nested | None) -> FrameOfMove | None:
@@ -535,5 +535,5 @@ def _wobj_of(found: Nested | None) -> FrameOfMove | None:
         isinstance(fixed, WrittenNumber) and fixed.value
     ):
         why = "its work object is moved by a mechanical unit (ufmec, ufprog)"
-    record = composed(pose_record(user), pose_record(object_))
-    return FrameOfMove(record, bool(held.value), why)
+    pose = composed(pose_of_numbers(user), pose_of_numbers(object_))
+    return FrameOfMove(pose, bool(held.value), why)

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
 from postproc.language.flow import HeadedRows
 from postproc.language.machine import Scope
 from postproc.language.rapid import syntax as said
+from postproc.language.rapid.dialect import COMMENTS
 from postproc.language.rapid.program import Datum, RapidFile
 from postproc.language.rapid.signatures import BUILT_IN_FUNCTIONS, MOTIONS, READING
 from postproc.language.rapid.targets import operands_of
@@ -42,9 +43,11 @@ class RapidTask:
 
     Attributes:
         files: Its files, the one with the main routine first.
+        taught: Lower-case names of data that were taught with the arm, by the cell.
     """
 
     files: Sequence[RapidFile]
+    taught: Collection[str] = frozenset()
     _local: dict[tuple[int, str, str], dict[str, Datum]] = field(default_factory=dict)
     _global: dict[str, list[tuple[int, Datum]]] = field(default_factory=dict)
 
@@ -68,6 +71,29 @@ class RapidTask:
                 module = next((m.head.name for m in around), "")
                 found[scope.head.name].append((number, module, scope))
         return found
+
+    @cached_property
+    def taught_lines(self) -> list[frozenset[int]]:
+        """Lines of every file that a comment marks as taught."""
+        return [COMMENTS.taught(file.text.source) for file in self.files]
+
+    def is_taught(self, name: str, found: Nested | None) -> bool:
+        """Tell whether data were taught, by the cell or a comment on their line.
+
+        Args:
+            name: Of the data, with an index where it has one; "" for numbers in a move.
+            found: What they hold.
+        """
+        if name.split("{")[0].strip().lower() in self.taught:
+            return True
+        one = found
+        while isinstance(one, tuple) and one:
+            one = next((part for part in one if isinstance(part, tuple)), one[0])
+        if not isinstance(one, WrittenNumber) or one.slot < 0:
+            return False
+        text = self.files[one.file].text
+        line = text.source.line_of(int(text.start[one.slot]))
+        return line in self.taught_lines[one.file]
 
     def routine(self, name: str, here: Scope) -> tuple[int, str, HeadedRows] | None:
         """Find the routine that a name means, None where it is not sure."""

@@ -17,6 +17,7 @@ from postproc.language.visits import (
     OrientationLaw,
     Switch,
 )
+from postproc.robot.pose import record_from_pose
 
 E = "E1 0.0,E2 0.0,E3 0.0,E4 0.0,E5 0.0,E6 0.0"
 DATA = f"""
@@ -90,7 +91,8 @@ def codes(found):
 
 
 def frame(found, column, k=0):
-    return found.visits.frames[getattr(found.visits, column)[k]]
+    pose = found.visits.frames[getattr(found.visits, column)[k]]
+    return record_from_pose(pose[None])[0]
 
 
 def test_points_by_name():

@@ -40,7 +40,9 @@ def fits(visits: Visits, visit: int, executed: Executed) -> bool:
         (visits.uframe[visit], executed.uframe),
     )
     for index, actual in frames:
-        if index >= 0 and not np.allclose(visits.frames[index], actual):
+        pose = matrix(actual)
+        pose[:3, 3] /= 1000.0
+        if index >= 0 and not np.allclose(visits.frames[index], pose):
             return False
     if visits.target[visit] == Meaning.UNKNOWN or recursive(visits, visit):
         return True

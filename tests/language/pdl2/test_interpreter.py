@@ -1,5 +1,6 @@
 """What a program does, beyond the chapters of the corpus."""
 
+import numpy as np
 import pytest
 
 from postproc.language.interface import Start
@@ -7,6 +8,7 @@ from postproc.language.pdl2.interpreter import Resolved, resolve
 from postproc.language.pdl2.program import Program, parse
 from postproc.language.source import source_from_bytes
 from postproc.language.visits import START, Blend, OrientationLaw, Switch, ZoneRule
+from postproc.robot.pose import pose_from_record, record_from_pose
 
 
 def program(text: str, name: str = "job") -> Program:
@@ -62,7 +64,8 @@ def test_a_shared_frame_of_another_program_reaches_its_routines() -> None:
         "lib",
     )
     visits = resolve(main, others={"lib": lib}).visits
-    assert visits.frames[visits.tool[0]].tolist() == [1, 2, 3, 0, 0, 0]
+    wanted = pose_from_record(np.array([1.0, 2.0, 3.0, 0.0, 0.0, 0.0]))
+    assert (visits.frames[visits.tool[0]] == wanted).all()
 
 
 def test_frames_that_the_cell_does_not_know() -> None:
@@ -204,7 +207,7 @@ def test_a_condition_handler_makes_what_it_changes_unknown() -> None:
 def test_an_empty_program_has_no_visits() -> None:
     found = body("-- nothing")
     assert len(found.visits) == len(found.visits.literals) == 0
-    assert found.visits.frames.shape == (0, 6)
+    assert found.visits.frames.shape == (0, 4, 4)
 
 
 def test_long_lines_and_many_variables() -> None:
@@ -235,7 +238,7 @@ def frames_after(*lines: str, start: Start = PLAIN) -> list[list[float]]:
     text = "\n".join(["PROGRAM a", "VAR p : POSITION", "BEGIN", *lines, "END a", ""])
     source = source_from_bytes("a.pdl", text.encode())
     visits = resolve(parse(source), start).visits
-    table = [*visits.frames.tolist(), []]
+    table = [*np.round(record_from_pose(visits.frames), 9).tolist(), []]
     return [table[k] for k in visits.uframe.tolist()]
 
 

@@ -115,7 +115,7 @@ def told(visits: Visits) -> list[object]:
     """List what is said of every visit, the tables' texts instead of their indices."""
     v = visits
     texts = ((v.config, v.configs), (v.name, v.names), (v.reason, v.reasons))
-    frames = np.vstack([v.frames.reshape(-1, 6), np.full((1, 6), np.nan)])
+    frames = np.concatenate([v.frames, np.full((1, 4, 4), np.nan)])
     return [
         *([table[k] for k in column.tolist()] for column, table in texts),
         *(repr(frames[k].tolist()) for k in (v.tool, v.base, v.uframe)),

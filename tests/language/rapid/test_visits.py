@@ -63,8 +63,10 @@ def test_frames_zone_and_speed_of_a_move():
     v = found.visits
     assert reasons(found) == [""] * 3 and names(found) == ["p1", "p2", "j"]
     assert v.target.tolist() == [Meaning.POSE, Meaning.POSE, Meaning.JOINTS]
-    np.testing.assert_allclose(v.frames[v.tool[0]], [10, 20, 300, 0, 0, 0])
-    np.testing.assert_allclose(v.frames[v.uframe[0], :3], [1000, 100, 500])
+    tool, uframe = v.frames[v.tool[0]], v.frames[v.uframe[0]]
+    np.testing.assert_allclose(tool[:3, :3], np.eye(3))
+    np.testing.assert_allclose(tool[:3, 3], [0.01, 0.02, 0.3])
+    np.testing.assert_allclose(uframe[:3, 3], [1, 0.1, 0.5])
     assert v.fly.tolist() == [True, False, False] and v.zone_mm[0] == 10.0
     np.testing.assert_allclose(v.lin_spd, [0.2, 0.2, 0.005])
     assert origins(found) == [[START], [0], [1]]
@@ -118,7 +120,7 @@ def test_what_is_known_again_is_not(lines):
 def test_a_known_displacement_is_part_of_the_frame():
     found = task("PDispSet [[0,0,7],[1,0,0,0]];", L.format("p1"))
     assert reasons(found) == [""]
-    assert found.visits.frames[found.visits.uframe[0], 2] == pytest.approx(507.0)
+    assert found.visits.frames[found.visits.uframe[0], 2, 3] == pytest.approx(0.507)
 
 
 def test_lines_at_singularities_and_arcs():
@@ -314,3 +316,43 @@ ENDMODULE
     visits = read_program({"m.mod": text.encode()}, bench_cell).visits
     assert visits.line.tolist() == [8] and visits.literal.tolist() == [-1]
     assert "known only when the program runs" in visits.reasons[visits.reason[0]]
+
+
+def taught(found):
+    v = found.visits
+    return [bool(v.literals.taught[k]) for k in v.literal.tolist()]
+
+
+LINES = L.format("p1"), L.format("p2"), L.format("list{2}")
+
+
+def test_what_was_taught_is_known_by_the_cell_or_a_comment():
+    assert taught(task(*LINES)) == [False] * 3
+    listed = Start(taught=("P2", "List"))
+    assert taught(task(*LINES, start=listed)) == [False, True, True]
+    marked = DATA.replace(f"[0,1,0,0],{END};", f"[0,1,0,0],{END};  ! TAUGHT in spring")
+    assert taught(task(*LINES, data=marked)) == [False, True, False]
+    inline = L.format(f"[[1,2,3],[1,0,0,0],{END}")
+    assert taught(task(inline, inline + " ! taught", L.format("p1"))) == [0, 1, 0]
+
+
+def test_frames_that_were_taught():
+    def frames(found):
+        v = found.visits
+        return bool(v.frame_taught[v.tool[0]]), bool(v.frame_taught[v.uframe[0]])
+
+    assert frames(task(L.format("p1"))) == (False, False)
+    named = Start(taught=frozenset({"w"}))
+    assert frames(task(L.format("p1"), start=named)) == (False, True)
+    lines = DATA.splitlines()
+    lines[1] += " ! TAUGHT"
+    assert frames(task(L.format("p1"), data="\n".join(lines))) == (True, False)
+
+
+def test_measured_moves_carry_their_ids():
+    arc = f"MoveC p2,[[7,8,9],[1,0,0,0],{END},v200,fine,t\\WObj:=w;"
+    found = task(
+        "! MEASURE h1", L.format("p1"), L.format("p2"),
+        L.format("p1") + " ! MEASURE h2", "! MEASURE h3", "x:=1;", arc, "! MEASURE h4",
+    )  # fmt: skip
+    assert found.visits.measure_id == ("h1", "", "h2", "", "h3")

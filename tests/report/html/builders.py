@@ -81,7 +81,7 @@ def visits_of(n: int, name: str, names: tuple[str, ...]) -> Visits:
         tool=index * 0,
         base=index * 0,
         uframe=index * 0,
-        frames=np.zeros((1, 6)),
+        frames=np.eye(4)[None],
         frame_taught=np.zeros(1, dtype=bool),
         tool_remote=no,
         nearest_turn=no,
