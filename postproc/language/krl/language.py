@@ -43,6 +43,7 @@ class Krl(Language):
     comment = ";"
     dialect = KRL_DIALECT
     tells_accuracy = False
+    names_numbers = True
 
     def recognises(self, text: bytes) -> bool:
         """Tell whether a source begins there, behind comments."""
