@@ -216,7 +216,11 @@ def aligned(
 
 # compare.rs: two texts line by line (`postproc.report.diff`)
 def compare_lines(
-    before: bytes, before_first: Ints, after: bytes, after_first: Ints
+    before: bytes,
+    before_first: Ints,
+    after: bytes,
+    after_first: Ints,
+    named: bool = False,
 ) -> tuple[tuple[Ints, Ints, Ints, Bools, Bools], tuple[Floats, Floats]]: ...
 
 # weave.rs: edits of texts (`postproc.language.source`)

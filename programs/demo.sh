@@ -56,6 +56,12 @@ run postproc explain programs/welding/Welding.mod --cell programs/welding/cell.t
 head -n 12 demo/welding.txt
 echo "  ... all of it in demo/welding.txt"
 
+title "And another: a milling job in KRL on a KR 210, three sources with their data lists"
+run postproc explain programs/facing/Milling.src --cell programs/facing/cell.toml \
+    >demo/facing.txt
+head -n 12 demo/facing.txt
+echo "  ... all of it in demo/facing.txt"
+
 title "True error of the tool at the targets, and of its path between them, mm"
 python - $jobs <<'TABLE'
 import json

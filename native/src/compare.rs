@@ -10,6 +10,7 @@ use pyo3::types::PyBytes;
 
 use crate::number::value_of;
 use crate::rows::{detached, flat, same_length};
+use crate::statements::mask_krl_line;
 use crate::text::Masked;
 
 /// Lines that are compared between two looks at signals.
@@ -64,10 +65,11 @@ impl Found {
 }
 
 /// Compares lines one after the other.
-#[derive(Default)]
 struct Comparison {
     masked: [Masked; 2],
     found: Found,
+    /// Names stand before the numbers of positions, in braces, as KRL has them.
+    named: bool,
 }
 
 impl Comparison {
@@ -78,7 +80,7 @@ impl Comparison {
         let begin = self.numbers(before, after);
         self.found.row.push(row as i64);
         self.found.begin.push(begin.map_or(-1, |at| at as i64));
-        self.found.braced.push(before.contains(&b'{'));
+        self.found.braced.push(!self.named && before.contains(&b'{'));
         self.found.first.push(self.found.old.len() as i64);
     }
 
@@ -86,7 +88,13 @@ impl Comparison {
     /// the first one stands.
     fn numbers(&mut self, before: &[u8], after: &[u8]) -> Option<usize> {
         let [a, b] = &mut self.masked;
-        if !(a.read(before) && b.read(after)) || a.mask != b.mask {
+        if self.named {
+            mask_krl_line(before, a);
+            mask_krl_line(after, b);
+        } else if !(a.read(before) && b.read(after)) {
+            return None;
+        }
+        if a.mask != b.mask || (self.named && !drop_subscripts(before, a, after, b)) {
             return None;
         }
         let comment = |line: &Masked, text: &[u8]| line.comment.map(|at| text[at..].to_vec());
@@ -106,9 +114,18 @@ impl Comparison {
     }
 }
 
+/// Drop the numbers in front of a brace; tell whether they are the same.
+fn drop_subscripts(before: &[u8], a: &mut Masked, after: &[u8], b: &mut Masked) -> bool {
+    let brace = |line: &[u8]| line.iter().position(|byte| *byte == b'{');
+    let (Some(one), Some(two)) = (brace(before), brace(after)) else { return true };
+    a.numbers.retain(|(from, _)| *from > one);
+    b.numbers.retain(|(from, _)| *from > two);
+    before[..one] == after[..two]
+}
+
 /// Compare some lines.
-fn compared(before: &Lines<'_>, after: &Lines<'_>, rows: Range<usize>) -> Found {
-    let mut work = Comparison::default();
+fn compared(before: &Lines<'_>, after: &Lines<'_>, rows: Range<usize>, named: bool) -> Found {
+    let mut work = Comparison { masked: Default::default(), found: Found::default(), named };
     for row in rows {
         work.take(row, before.line(row), after.line(row));
     }
@@ -116,13 +133,15 @@ fn compared(before: &Lines<'_>, after: &Lines<'_>, rows: Range<usize>) -> Found 
 }
 
 /// Compare some lines, a part of them on every core.
-fn in_parts(before: &Lines<'_>, after: &Lines<'_>, rows: Range<usize>) -> Vec<Found> {
+fn in_parts(before: &Lines<'_>, after: &Lines<'_>, rows: Range<usize>, named: bool) -> Vec<Found> {
     let cores = available_parallelism().map_or(1, usize::from);
     let parts = cores.min(rows.len() / LEAST).max(1);
     let end = |part: usize| rows.start + rows.len() * part / parts;
     scope(|crowd| {
         let working: Vec<_> = (0..parts)
-            .map(|part| crowd.spawn(move || compared(before, after, end(part)..end(part + 1))))
+            .map(|part| {
+                crowd.spawn(move || compared(before, after, end(part)..end(part + 1), named))
+            })
             .collect();
         working.into_iter().map(|part| part.join().expect("a part of the lines")).collect()
     })
@@ -144,12 +163,14 @@ type Column<'py, T> = Bound<'py, PyArray1<T>>;
 /// Arguments:
 ///     `before_first`, `after_first`: Where lines begin, and one more behind the byte that
 ///     ends the last one, (n + 1,).
+///     `named`: The language names the numbers of positions, in braces.
 ///
 /// Returns: the lines (from 0) that differ, (k,), and of each: where its numbers begin,
 /// (k + 1,), which are none where more than numbers differs; where the first one stands,
 /// -1 without; whether what stands before it is the same as in the line before; whether
 /// there is a brace. Then the numbers of both texts, (m,).
 #[pyfunction]
+#[pyo3(signature = (before, before_first, after, after_first, named=false))]
 #[allow(clippy::type_complexity)]
 pub fn compare_lines<'py>(
     py: Python<'py>,
@@ -157,6 +178,7 @@ pub fn compare_lines<'py>(
     before_first: PyReadonlyArray1<'py, i64>,
     after: &Bound<'py, PyBytes>,
     after_first: PyReadonlyArray1<'py, i64>,
+    named: bool,
 ) -> PyResult<(
     (Column<'py, i64>, Column<'py, i64>, Column<'py, i64>, Column<'py, bool>, Column<'py, bool>),
     (Column<'py, f64>, Column<'py, f64>),
@@ -171,7 +193,7 @@ pub fn compare_lines<'py>(
         py.check_signals()?;
         let rows = first..n.min(first + AT_ONCE);
         detached(py, || {
-            in_parts(&before, &after, rows).into_iter().for_each(|part| found.append(part));
+            in_parts(&before, &after, rows, named).into_iter().for_each(|part| found.append(part));
         })?;
     }
     let alike = detached(py, || begin_alike(&before, &found))?;

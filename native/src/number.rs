@@ -80,7 +80,7 @@ fn whole(digits: &[u8], base: u32) -> f64 {
 /// Return how many decimals a number is written with.
 fn decimals_of(text: &[u8]) -> i64 {
     let split = |at: u8| text.iter().position(|b| b.eq_ignore_ascii_case(&at));
-    if split(b'x').is_some() || text.first() == Some(&b'\'') {
+    if split(b'x').is_some() || text.contains(&b'\'') {
         return 0;
     }
     let mantissa = &text[..split(b'e').unwrap_or(text.len())];

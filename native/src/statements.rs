@@ -11,8 +11,8 @@ use pyo3::types::{PyBytes, PyList};
 use crate::number::value_of;
 use crate::rows::detached;
 use crate::text::{
-    is, latin_1, number_end, while_is, Interned, DIGIT, FIRST, IN_NAME, MARK, NAME, NUMBER, UNARY,
-    WHOLE,
+    is, latin_1, number_end, while_is, Interned, Masked, DIGIT, FIRST, IN_NAME, MARK, NAME, NUMBER,
+    UNARY, WHOLE,
 };
 
 /// Words that begin a statement, wherever they stand: what came before has no end.
@@ -345,6 +345,12 @@ struct KrlReader<'a> {
     sign: Option<(usize, usize)>,
 }
 
+impl<'a> KrlReader<'a> {
+    fn new(data: &'a [u8], at: usize) -> Self {
+        KrlReader { data, at, open: Vec::new(), component: false, before: 0, sign: None }
+    }
+}
+
 impl KrlReader<'_> {
     /// Pass blanks and comments, and line ends between statements.
     fn pass(&mut self, lines: bool) {
@@ -474,6 +480,22 @@ type Column<'py, T> = Bound<'py, PyArray1<T>>;
 /// Statements that are read between two looks at signals.
 const AT_ONCE: usize = 4096;
 
+/// Mask the numbers of one line of KRL, and nothing else of it.
+pub fn mask_krl_line(line: &[u8], masked: &mut Masked) {
+    let mut one = Statement::default();
+    KrlReader::new(line, 0).read(&mut one);
+    masked.mask.clear();
+    masked.comment = None;
+    let mut at = 0;
+    for (from, to) in &one.numbers {
+        masked.mask.extend_from_slice(&line[at..*from]);
+        masked.mask.push(NUMBER);
+        at = *to;
+    }
+    masked.mask.extend_from_slice(&line[at..]);
+    masked.numbers = one.numbers;
+}
+
 type Scanned<'py> = (
     Bound<'py, PyList>,
     (Column<'py, i32>, Column<'py, i32>, Column<'py, i32>, Column<'py, i32>, Column<'py, i32>),
@@ -497,9 +519,8 @@ pub fn scan_statements<'py>(py: Python<'py>, data: &Bound<'py, PyBytes>) -> PyRe
 /// Read the statements of a text in KRL; as `scan_statements`.
 #[pyfunction]
 pub fn scan_krl<'py>(py: Python<'py>, data: &Bound<'py, PyBytes>) -> PyResult<Scanned<'py>> {
-    let (data, open) = (data.as_bytes(), Vec::new());
-    let at = after_mark(data);
-    scanned(py, data, KrlReader { data, at, open, component: false, before: 0, sign: None })
+    let data = data.as_bytes();
+    scanned(py, data, KrlReader::new(data, after_mark(data)))
 }
 
 fn after_mark(data: &[u8]) -> usize {

@@ -4,19 +4,16 @@ from __future__ import annotations
 
 import math
 import re
-from bisect import bisect_left
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Any
 
 import numpy as np
 
-from postproc.arrays import Interned, Ints
+from postproc.arrays import Floats, Interned, Ints
 from postproc.language.dialect import Dialect
 from postproc.language.machine import Scope, TaskMachine
 from postproc.language.marks import MEASURE, Comments
-from postproc.language.placed import PlacedFrame
 from postproc.language.statements import StatementText
 from postproc.language.visits import (
     Blend,
@@ -28,11 +25,31 @@ from postproc.language.visits import (
     ZoneRule,
     slim,
 )
+from postproc.robot.pose import pose_from_record
 from postproc.robot.trajectory import Motion
 
 TOO_COMPLEX = "the program is too complex to be followed"
 ONLY_SHIFTED = "it is shifted from a point that no move goes to: what to correct?"
 _NO_FRAME = -1
+Pose = tuple[float, ...]
+"""The rows of a pose (4, 4) [m] one after the other, empty where it is not known."""
+IDENTITY: Pose = (1.0, *(0.0,) * 4, 1.0, *(0.0,) * 4, 1.0, *(0.0,) * 4, 1.0)
+
+
+def flat(pose: Floats) -> Pose:
+    """Write the rows of a pose, (4, 4) [m], one after the other."""
+    return tuple(pose.ravel().tolist())
+
+
+def composed(first: Pose, second: Pose) -> Pose:
+    """Compose two poses."""
+    one, other = np.array([first, second]).reshape(2, 4, 4)
+    return flat(one @ other)
+
+
+def cell_pose(record: Sequence[float] | None) -> Pose:
+    """Take a position record [mm, deg] over from the cell."""
+    return flat(pose_from_record(np.array(record, float))) if record else ()
 
 
 @dataclass(frozen=True)
@@ -93,7 +110,8 @@ class Conditions:
     """What an arrival is carried out with, in neutral terms.
 
     Attributes:
-        tool, base, uframe: Its frames.
+        tool, base, uframe: Frames.
+        taught: Tool and user frame were taught with the arm, and contain its error.
         remote: The tool stands still, and the arm holds the part.
         reasons: Why it cannot be compensated; empty texts do not count.
         flags: Whether its configuration flags are checked.
@@ -106,9 +124,10 @@ class Conditions:
         overlap: Of moves that begin before the last has ended [%], NaN for a zone.
     """
 
-    tool: PlacedFrame
-    base: PlacedFrame
-    uframe: PlacedFrame
+    tool: Pose
+    base: Pose
+    uframe: Pose
+    taught: tuple[bool, bool]
     remote: bool
     reasons: Sequence[str]
     flags: Switch
@@ -125,47 +144,43 @@ class Conditions:
 class _Tables:
     """What columns point into."""
 
-    frames: Interned[PlacedFrame]
+    frames: Interned[tuple[Pose, bool]]
     reasons: Interned[str]
     names: Interned[str]
 
-    def frame(self, frame: PlacedFrame) -> int:
-        return self.frames[frame] if frame.pose else _NO_FRAME
-
-    def frames_of(self, frames: Sequence[PlacedFrame]) -> Ints:
-        found = np.array([self.frame(frame) for frame in frames], np.int64)
-        return slim(found)
+    def frames_of(self, frames: Sequence[tuple[Pose, bool]]) -> Ints:
+        found = [self.frames[frame] if frame[0] else _NO_FRAME for frame in frames]
+        return slim(np.array(found, np.int64))
 
 
 def visits_of(
     machine: TaskMachine,
     dialect: Dialect,
+    conditions: Callable[[Any], Conditions],
     comments: Comments,
     moves: Mapping[int, Sequence[int]],
-    conditions: Callable[[Any], Conditions],
 ) -> Visits:
     """Put the arrivals into the order of the program, as columns.
 
     Args:
         machine: It has followed all ways.
         dialect: What the numbers mean.
-        comments: How comments are written.
-        moves: Rows of all moves, by file.
         conditions: Says what an arrival is carried out with.
+        comments: How the language writes them.
+        moves: Rows of statements that move, by file.
     """
     order = sorted(range(len(machine.visits)), key=machine.order.__getitem__)
     found = [machine.visits[k] for k in order]
     held = [conditions(v) for v in found]
     texts, n = machine.texts, len(found)
     tables = _Tables(Interned(), Interned([""]), Interned([""]))
-    taught = Taught(machine.start.taught, texts, comments)
-    literals, literal, follows = _literals(found, texts, dialect.width, taught)
+    literals, literal, follows = _literals(found, machine, dialect.width, comments)
     reasons = [_reason(c, machine.exhausted) for c in held]
     for k in np.flatnonzero(follows == _NO_LITERAL).tolist():
         reasons[k] = reasons[k] or ONLY_SHIFTED
     follows[follows == _NO_LITERAL] = -1
     pred_start, pred = _predecessors(machine, order)
-    base = tables.frames_of([c.base for c in held])
+    base = tables.frames_of([(c.base, False) for c in held])
     return Visits(
         files=tuple(text.source.name for text in texts),
         file=slim(np.array([v.scope.file for v in found], np.int64)),
@@ -177,18 +192,18 @@ def visits_of(
         follows=slim(follows),
         name=slim(np.array(tables.names.of([v.goal.name for v in found]), np.int64)),
         base=base,
-        tool=tables.frames_of([c.tool for c in held]),
-        uframe=tables.frames_of([c.uframe for c in held]),
+        tool=tables.frames_of([(c.tool, c.taught[0]) for c in held]),
+        uframe=tables.frames_of([(c.uframe, c.taught[1]) for c in held]),
         reason=slim(np.array(tables.reasons.of(reasons), np.int64)),
         **_moves(found, held),
         **_settings(held),
         names=tuple(tables.names),
         reasons=tuple(tables.reasons),
-        frames=np.array([f.pose for f in tables.frames], float).reshape(-1, 4, 4),
-        frame_taught=np.array([f.taught for f in tables.frames], bool),
+        frames=np.array([f for f, _ in tables.frames], float).reshape(-1, 4, 4),
+        frame_taught=np.array([taught for _, taught in tables.frames], bool),
         pred_start=pred_start,
         pred=pred,
-        measure_id=_measured(found, texts, comments, moves),
+        measure_id=tuple(_measured(found, texts, comments, moves)),
         literals=literals,
         dialect=dialect,
     )  # fmt: skip
@@ -199,42 +214,17 @@ def _measured(
     texts: Sequence[StatementText[Any]],
     comments: Comments,
     moves: Mapping[int, Sequence[int]],
-) -> tuple[str, ...]:
+) -> list[str]:
     """Return the id that a comment gives to every visit, "" where none does."""
     ids: dict[tuple[int, int], str] = {}
-    for k, rows in moves.items():
-        text = texts[k]
+    for file, rows in moves.items():
+        text = texts[file]
         last = [text.source.line_of(text.span(row).end) for row in rows]
         for line, mark in comments.marks(text.source, MEASURE):
-            at = bisect_left(last, line)
+            at = int(np.searchsorted(np.array(last, np.int64), line))
             if at < len(rows):
-                ids.setdefault((k, rows[at]), mark)
-    return tuple("" if v.via else ids.get((v.scope.file, v.row), "") for v in found)
-
-
-@dataclass(frozen=True)
-class Taught:
-    """What was taught with the arm.
-
-    Attributes:
-        names: Of data, in lower case, by the cell.
-        texts: The files.
-        comments: How comments are written.
-    """
-
-    names: Collection[str]
-    texts: Sequence[StatementText[Any]]
-    comments: Comments
-
-    @cached_property
-    def lines(self) -> list[frozenset[int]]:
-        """Lines of every file that a comment marks."""
-        return [self.comments.taught(text.source) for text in self.texts]
-
-    def holds(self, name: str, file: int, line: int) -> bool:
-        """Tell whether data of a name, whose numbers stand on a line, were taught."""
-        root = re.split(r"[{\[]", name, maxsplit=1)[0].strip().lower()
-        return root in self.names or line in self.lines[file]
+                ids.setdefault((file, rows[at]), mark)
+    return ["" if v.via else ids.get((v.scope.file, v.row), "") for v in found]
 
 
 def _reason(held: Conditions, exhausted: bool) -> str:
@@ -299,9 +289,9 @@ _NO_LITERAL = -2  # follows numbers that are no literal
 
 def _literals(
     found: Sequence[FoundVisit],
-    texts: Sequence[StatementText[Any]],
+    machine: TaskMachine,
     width: int,
-    taught: Taught,
+    comments: Comments,
 ) -> tuple[Literals, Ints, Ints]:
     """Find the distinct literals; also those of visits, and those they follow."""
     index: dict[tuple[int, int], int] = {}
@@ -324,15 +314,15 @@ def _literals(
             follows[k] = (at if at >= 0 else _NO_LITERAL) if known else -1
         if at >= 0:
             pinned[at] = pinned[at] or v.goal.pins
-    return _places(rows, texts, pinned, width, taught), literal, follows
+    return _places(rows, machine, pinned, width, comments), literal, follows
 
 
 def _places(
     rows: Sequence[FoundVisit],
-    texts: Sequence[StatementText[Any]],
+    machine: TaskMachine,
     pinned: Sequence[str],
     width: int,
-    taught: Taught,
+    comments: Comments,
 ) -> Literals:
     """Say where the numbers of literals stand."""
     m = len(rows)
@@ -340,13 +330,18 @@ def _places(
     slots = np.array([v.goal.slots for v in rows], np.int64).reshape(m, width)
     start, end = np.full((m, width), -1), np.full((m, width), -1)
     line = np.zeros(m, dtype=np.int64)
-    for number, one in enumerate(texts):
+    for number, one in enumerate(machine.texts):
         mine = np.flatnonzero(file == number)
         own, written = slots[mine], slots[mine] >= 0
         start[mine] = np.where(written, np.append(one.start, -1)[own], -1)
         end[mine] = np.where(written, np.append(one.stop, -1)[own], -1)
         starts = one.source.line_starts
         line[mine] = np.searchsorted(starts, start[mine, 0], side="right")
+    lines = [comments.taught(text.source) for text in machine.texts]
+    taught = [
+        _is_named(v.goal.name, machine.start.taught) or at in lines[v.goal.file]
+        for v, at in zip(rows, line.tolist(), strict=True)
+    ]
     return Literals(
         file=file,
         line=line,
@@ -355,10 +350,14 @@ def _places(
         joints=np.array([v.goal.target == Meaning.JOINTS for v in rows], bool),
         name=tuple(v.goal.name for v in rows),
         shared=np.array([v.goal.shared for v in rows], bool),
-        taught=np.array([taught.holds(v.goal.name, v.goal.file, at)
-                         for v, at in zip(rows, line.tolist(), strict=True)], bool),
+        taught=np.array(taught, bool),
         pinned=tuple(pinned),
-    )  # fmt: skip
+    )
+
+
+def _is_named(name: str, names: Collection[str]) -> bool:
+    """Tell whether data, or an element of an array, are among some names."""
+    return re.split(r"[{\[]", name)[0].strip().lower() in names
 
 
 def _predecessors(machine: TaskMachine, order: Sequence[int]) -> tuple[Ints, Ints]:

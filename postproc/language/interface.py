@@ -220,6 +220,7 @@ class Language(ABC):
         dialect: What the numbers of its targets mean.
         tells_accuracy: Programs or controllers show whether the controller compensates
             on its own; else the cell must say so itself.
+        names_numbers: Positions stand in braces, with a name before every number.
     """
 
     name: str
@@ -227,6 +228,7 @@ class Language(ABC):
     comment: str
     dialect: Dialect
     tells_accuracy: bool = True
+    names_numbers: bool = False
 
     @abstractmethod
     def recognises(self, text: bytes) -> bool:

@@ -203,8 +203,9 @@ def changed_rows(
         lead: How many lines of the original stand before them.
     """
     rows, (old, new) = _native.compare_lines(
-        before.data, before.first, after.data, after.first
-    )
+        before.data, before.first, after.data, after.first,
+        named=language_of(file).names_numbers,
+    )  # fmt: skip
     row, first, begin, alike, braced = rows
     has = (np.diff(first) >= 3) & ~braced
     at = first[:-1][has, None] + np.arange(3)

@@ -90,9 +90,9 @@ def run(command, place, name):
         case "compensate --orientation":
             return place.compensate(given, "-o", to, "--orientation")
         case "compensate --clone":
-            for page, data in shared_point(place, name).items():
-                place.put(page, data)
-            return place.compensate(place.folder / name, "-o", to, "--clone")
+            files = shared_point(place, name)
+            shared, *_ = (place.put(part, data) for part, data in files.items())
+            return place.compensate(shared, "-o", to, "--clone")
         case "compensate --path-mm":
             return place.compensate(given, "-o", to, "--path-mm", "0.1")
         case "compensate --lsv":

@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
-GRAMMARS = {"PDL2": ("pdl2", "lsv"), "RAPID": ("rapid",)}
-FOLDERS = {"PDL2": "pdl2/", "RAPID": "rapid/", "all languages": ""}
+GRAMMARS = {"PDL2": ("pdl2", "lsv"), "RAPID": ("rapid",), "KRL": ("krl",)}
+FOLDERS = {"PDL2": "pdl2/", "RAPID": "rapid/", "KRL": "krl/", "all languages": ""}
 
 
 def lines(path: Path) -> int:

@@ -44,18 +44,16 @@ def assert_same_visits(one, two, bench_cell):
         np.testing.assert_array_equal(a, b)
     np.testing.assert_allclose(one.lin_spd, two.lin_spd)
     plans = [plan_visits(v, bench_cell) for v in (one, two)]
-    # Lines of KRL have no flags: behind a target out of reach more of them is in doubt.
-    assert np.array_equal(*(told(planned) for planned in plans))
+    more = plans[0].reasons.none & ~plans[1].reasons.none
+    # Where the arm has stranded, a line to S and T does not tell the configuration.
+    assert {plans[1].reasons[k] for k in np.flatnonzero(more)} <= {STRANDED}
+    assert (
+        more.sum() <= 2 and not (plans[1].reasons.none & ~plans[0].reasons.none).any()
+    )
     assert plans[0].reasons.none.mean() > 0.9
     a, b = (planned.plan for planned in plans)
     np.testing.assert_allclose(a.q, b.q, rtol=0, atol=1e-9)
     np.testing.assert_allclose(a.side, b.side, rtol=0, atol=1e-6)
-
-
-def told(planned):
-    """Tell which visits are left, but for what comes from out of reach, (n,)."""
-    stranded = [text == STRANDED for text in planned.reasons.texts]
-    return ~planned.reasons.none & ~np.array(stranded)[planned.reasons.index]
 
 
 @pytest.mark.parametrize("seed", range(3))

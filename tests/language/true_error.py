@@ -29,7 +29,7 @@ from postproc.simulation import land, run_program, virtual_arm
 from tests.conftest import ROOT, make_job
 from tests.language.neutral_job import LANGUAGES, NeutralJob, compensated, drawn
 
-ARMS = (56, 57, 58)
+ARMS = (56, 57, 58, 59, 60, 61)
 MEAN_MM, MAX_MM = 0.02, 0.1  # at corrected stops
 
 _NUMBER = r"[-+]?[0-9.]+(?:E[-+]?\d+)?"

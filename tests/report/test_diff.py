@@ -204,3 +204,23 @@ def test_a_target_is_named_by_its_own_statement(line, name) -> None:
     before, after = [line.format(text) for text in ("1.5", "2.25")]
     (row,) = changed_rows("a.pdl", *map(lines_of, (before, after)), 6)
     assert row.target == target_name(before) == name
+
+
+def test_numbers_of_krl_have_their_signs(tmp_path):
+    one = "DECL E6POS XP1={X 1.0,Y -2.0,Z -0.1,A 0,B 0,C 0,S 2,T 35} ; -1\n"
+    two = "XS[1]={X 1,Y 2,Z 3,A 0,B 0,C 0}\nXS[2]={X 1,Y 2,Z 3,A 0,B 0,C 0}\n"
+    joints = "PTP {A1 1,A2 -2,A3 3,A4 4,A5 5,A6 6}\n"
+    new = one.replace("Z -0.1", "Z 0.2").replace("T 35", "T 34")
+    moved = two.replace("Z 3", "Z 7").replace("XS[2]", "XS[3]")
+    turned = joints.replace("-2", "-2.5")
+    for name, text in (("a.dat", one + two + joints), ("b.dat", new + moved + turned)):
+        (tmp_path / name).write_text(text)
+    rows = diff(tmp_path / "a.dat", tmp_path / "b.dat").rows
+    assert [row.line for row in rows] == [1, 2, 3, 4]
+    assert rows[0].original == (1.0, -2.0, -0.1, 0.0, 0.0, 0.0, 2.0, 35.0)
+    assert rows[0].compensated[2] == 0.2 and rows[0].target == "XP1"
+    assert rows[0].change_mm == pytest.approx(0.3)
+    assert rows[1].original[:3] == (1.0, 2.0, 3.0)
+    assert rows[1].change_mm == pytest.approx(4.0) and rows[1].target == "XS[1]"
+    assert rows[2].text and not rows[2].original  # another element
+    assert rows[3].original[1] == -2.0 and rows[3].change_mm is None

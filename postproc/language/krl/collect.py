@@ -8,12 +8,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from postproc.language import collect
-from postproc.language.collect import Conditions, FoundGoal
+from postproc.language.collect import Conditions, FoundGoal, Pose, cell_pose
 from postproc.language.krl.dialect import COMMENTS, KRL_DIALECT
 from postproc.language.krl.interpreter import KrlMachine
 from postproc.language.krl.modes import UNKNOWN, KrlModes, ModeReader
 from postproc.language.krl.moves import NO_SLOTS, NOTHING, KrlVisit
-from postproc.language.placed import PlacedFrame, from_record
 from postproc.language.visits import Meaning, OrientationLaw, Switch, Visits
 from postproc.robot.trajectory import Motion
 
@@ -30,19 +29,20 @@ _STILL_TOOL = "$ORI_TYPE = #CONSTANT: the tool keeps the orientation it comes wi
 _NOT_SET = "an inline setting (WITH) is not known"
 
 
-def visits_of(machine: KrlMachine, moves: Mapping[int, Sequence[int]]) -> Visits:
+def visits_of(machine: KrlMachine) -> Visits:
     """Put the arrivals into the order of the program, as columns."""
     found: Sequence[KrlVisit] = machine.visits
     _keep_orientation(machine, found)
     ends, odd = _ends(found), _odd_status(found)
-    base = PlacedFrame(from_record(machine.start.base))
+    base = cell_pose(machine.start.base)
     number = {id(v): k for k, v in enumerate(found)}
 
     def conditions(v: KrlVisit) -> Conditions:
         at = number[id(v)]
         return _conditions(machine, v, base, ends[at], at in odd)
 
-    return collect.visits_of(machine, KRL_DIALECT, COMMENTS, moves, conditions)
+    moves = {k: file.moves for k, file in enumerate(machine.task.files)}
+    return collect.visits_of(machine, KRL_DIALECT, conditions, COMMENTS, moves)
 
 
 def _effective(machine: KrlMachine, v: KrlVisit) -> tuple[KrlModes, str]:
@@ -67,7 +67,7 @@ class _Blending:
 
 
 def _conditions(
-    machine: KrlMachine, v: KrlVisit, base: PlacedFrame, end: str, odd: bool
+    machine: KrlMachine, v: KrlVisit, base: Pose, end: str, odd: bool
 ) -> Conditions:
     """Say what an arrival is carried out with."""
     modes, unset = _effective(machine, v)
@@ -78,9 +78,10 @@ def _conditions(
         given += (modes.base.why, "" if modes.interpolation else _IPO)
     given += (_STATUS if odd else "", blending.why)
     return Conditions(
-        tool=modes.tool.placed,
+        tool=modes.tool.pose,
         base=base,
-        uframe=modes.base.placed,
+        uframe=modes.base.pose,
+        taught=(modes.tool.taught, modes.base.taught),
         remote=modes.interpolation == "#tcp",
         reasons=given,
         flags=Switch.ON if joint else Switch.OFF,

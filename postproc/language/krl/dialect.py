@@ -12,6 +12,7 @@ from postproc.language.marks import Comments
 from postproc.robot.pose import MM
 
 MM_DECIMALS, ANGLE_DECIMALS, JOINT_DECIMALS = 3, 4, 5
+COMMENTS = Comments(";", '"')
 HEADS = ("X", "Y", "Z", "A", "B", "C", "S", "T")
 COMPONENTS = tuple(name.lower() for name in HEADS)
 WIDTH = len(HEADS)
@@ -139,7 +140,6 @@ class KrlNumbers(Dialect):
         return np.asarray(np.abs(q) <= BORDER)
 
 
-COMMENTS = Comments(";", '"')
 KRL_DIALECT = KrlNumbers()
 
 

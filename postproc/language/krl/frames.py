@@ -8,11 +8,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from postproc.language.collect import IDENTITY, Pose, composed, flat
 from postproc.language.krl import syntax as said
 from postproc.language.krl.dialect import COMPONENTS, KRL_DIALECT
 from postproc.language.krl.task import CONFIG, KrlRecord, KrlTask
 from postproc.language.machine import Scope
-from postproc.language.placed import IDENTITY, PlacedFrame, Pose, composed, flat
 
 
 @dataclass(frozen=True)
@@ -20,7 +20,7 @@ class KrlFrame:
     """A tool or a base.
 
     Attributes:
-        pose: Where it is, empty where that is not known.
+        pose: Where it is.
         why: Why targets with it cannot be compensated, "" where they can.
         taught: It was taught with the arm, and contains its error.
     """
@@ -28,11 +28,6 @@ class KrlFrame:
     pose: Pose
     why: str = ""
     taught: bool = False
-
-    @property
-    def placed(self) -> PlacedFrame:
-        """Return it for the visits."""
-        return PlacedFrame(self.pose, self.taught)
 
 
 ZERO = KrlFrame(IDENTITY)
@@ -127,11 +122,8 @@ class FrameReader:
         file, datum = found
         there = Scope(file, self.task.files[file].name, "")
         pose = pose_of(self.task.value(datum.value, datum.row, there))
-        if not pose:
-            return None
-        line = self.task.files[file].text.line(datum.row)
-        taught = self.task.own_taught.holds(f"{table}[{number}]", file, line)
-        return KrlFrame(pose, taught=taught)
+        taught = self.task.is_taught(table, file, datum.row)
+        return KrlFrame(pose, taught=taught) if pose else None
 
     def _is_chained(self, number: int) -> bool:
         """Tell whether a base hangs on an external axis."""
@@ -153,30 +145,35 @@ class FrameReader:
         """Read a frame that is written or named."""
         value = self.task.value(operand, self.row, self.here)
         pose = pose_of(value)
+        if pose and isinstance(operand, said.DataObject):
+            return KrlFrame(pose, taught=self._is_taught(operand.name))
         if pose:
-            return KrlFrame(pose)
+            return KrlFrame(
+                pose, taught=self.task.is_taught("", self.here.file, self.row)
+            )
         if isinstance(operand, said.DataObject):
             return KrlFrame((), self._unknown(operand.name.upper(), operand.name))
         return KrlFrame((), "a frame is not written whole")
+
+    def _is_taught(self, name: str) -> bool:
+        """Tell whether a named frame was taught."""
+        found = self.task.datum(name, self.here)
+        return found is not None and self.task.is_taught(name, found[0], found[1].row)
 
     @staticmethod
     def _product(first: KrlFrame, second: KrlFrame) -> KrlFrame:
         if first.why or second.why or not (first.pose and second.pose):
             return KrlFrame((), first.why or second.why)
-        pose = composed(first.pose, second.pose)
-        return KrlFrame(pose, taught=first.taught or second.taught)
+        return KrlFrame(
+            composed(first.pose, second.pose), taught=first.taught or second.taught
+        )
 
 
 def pose_of(value: object) -> Pose:
-    """Convert a frame to a pose, empty where it is none."""
+    """Convert the components of a frame, empty where it is none."""
     if not isinstance(value, KrlRecord):
         return ()
     numbers = [value.number(name) for name in COMPONENTS[:6]]
     if any(map(math.isnan, numbers)):
         return ()
-    return pose_of_numbers(numbers)
-
-
-def pose_of_numbers(numbers: Sequence[float]) -> Pose:
-    """Convert X, Y, Z, A, B, C to a pose."""
-    return flat(KRL_DIALECT.poses(np.array([*numbers, 0.0, 0.0])[None]))
+    return flat(KRL_DIALECT.poses(np.array([*numbers, 0.0, 0.0])))

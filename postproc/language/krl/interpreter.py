@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 
+from postproc.language.collect import cell_pose
 from postproc.language.flow import HeadedRows
 from postproc.language.interface import Start
 from postproc.language.krl import syntax as said
@@ -26,7 +27,6 @@ from postproc.language.krl.task import (
     parts_of,
 )
 from postproc.language.machine import Arrived, CallContext, Scope, TaskMachine
-from postproc.language.placed import from_record
 from postproc.language.visits import START
 
 _PASSED = (
@@ -256,7 +256,7 @@ def _is_modal(name: str) -> bool:
 
 def _frame(record: tuple[float, ...] | None) -> KrlFrame:
     """Take a frame over from the cell."""
-    return KrlFrame(from_record(record)) if record else LOST.tool
+    return LOST.tool if record is None else KrlFrame(cell_pose(record))
 
 
 def _halted(here: Arrived, halted: bool | None) -> Arrived:

@@ -43,6 +43,7 @@ class Krl(Language):
     comment = ";"
     dialect = KRL_DIALECT
     tells_accuracy = False
+    names_numbers = True
 
     def recognises(self, text: bytes) -> bool:
         """Tell whether a source begins there, behind comments."""
@@ -62,9 +63,8 @@ class Krl(Language):
         _refuse_own_accuracy(files)
         machine = KrlMachine.of(KrlTask(files, start.taught), start)
         machine.run()
-        moves = {k: file.moves for k, file in enumerate(files)}
-        visits = visits_of(machine, moves)
-        missed = machine.missed(moves)
+        visits = visits_of(machine)
+        missed = machine.missed({k: file.moves for k, file in enumerate(files)})
         told = never_reached(missed, f"DEF {files[0].routines[0].head.name}", "program")
         own = (d for file in files for d in file.diagnostics)
         found = [*own, *machine.diagnostics, *told]

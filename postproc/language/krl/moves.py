@@ -26,7 +26,6 @@ from postproc.language.krl.task import (
     KrlTask,
 )
 from postproc.language.machine import Scope
-from postproc.language.placed import matrix
 from postproc.language.visits import NO_TARGET, Meaning
 from postproc.robot.pose import MM
 from postproc.robot.trajectory import Motion
@@ -356,7 +355,7 @@ def _linked(
         shift: The frame.
         behind: It stands behind the point.
     """
-    by = matrix(shift.pose)
+    by = np.array(shift.pose).reshape(4, 4)
     point, angles = np.eye(4), np.deg2rad([values[3:6]])
     point[:3, :3] = rotation_from_abc(angles)[0]
     point[:3, 3] = np.array(values[:3]) * MM

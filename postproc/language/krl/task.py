@@ -8,7 +8,6 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
-from postproc.language.collect import Taught
 from postproc.language.flow import HeadedRows
 from postproc.language.krl import syntax as said
 from postproc.language.krl.dialect import COMMENTS
@@ -93,11 +92,6 @@ class KrlTask:
         field(default_factory=lambda: defaultdict(dict))
     )
     _shared: dict[str, set[str]] = field(default_factory=lambda: defaultdict(set))
-
-    @cached_property
-    def own_taught(self) -> Taught:
-        """What was taught with the arm."""
-        return Taught(self.taught, [file.text for file in self.files], COMMENTS)
 
     def __post_init__(self) -> None:
         """Index data by the scopes that declare them."""
@@ -184,6 +178,15 @@ class KrlTask:
                 else:
                     uses.take(one.value)
         return frozenset(uses.written), frozenset(uses.read)
+
+    @cached_property
+    def _taught_lines(self) -> list[frozenset[int]]:
+        return [COMMENTS.taught(file.text.source) for file in self.files]
+
+    def is_taught(self, name: str, file: int, row: int) -> bool:
+        """Tell whether data of a statement were taught, by the cell or a comment."""
+        line = self.files[file].text.line(row)
+        return name in self.taught or line in self._taught_lines[file]
 
     # Values.
 

@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-
 from postproc.language import collect
-from postproc.language.collect import Conditions
-from postproc.language.placed import PlacedFrame, composed, from_record
+from postproc.language.collect import Conditions, Pose, cell_pose, composed
 from postproc.language.rapid.dialect import COMMENTS, RAPID_DIALECT
 from postproc.language.rapid.interpreter import RapidMachine
 from postproc.language.rapid.modes import NO_SHIFT, UNKNOWN_SHIFT
@@ -21,10 +18,10 @@ from postproc.robot.trajectory import Motion
 _SHIFT = "the program displacement (PDispOn, PDispSet) is not known here"
 
 
-def visits_of(machine: RapidMachine, moves: Mapping[int, Sequence[int]]) -> Visits:
+def visits_of(machine: RapidMachine) -> Visits:
     """Put the arrivals into the order of the program, as columns."""
-    base = PlacedFrame(from_record(machine.start.base))
-    placed: dict[tuple[FrameOfMove, tuple[float, ...]], PlacedFrame] = {}
+    base = cell_pose(machine.start.base)
+    placed: dict[tuple[FrameOfMove, Pose], Pose] = {}
 
     def conditions(v: RapidVisit) -> Conditions:
         key = v.wobj, v.modes.shift
@@ -32,16 +29,19 @@ def visits_of(machine: RapidMachine, moves: Mapping[int, Sequence[int]]) -> Visi
             placed[key] = _displaced(*key)
         return _conditions(v, base, placed[key])
 
-    return collect.visits_of(machine, RAPID_DIALECT, COMMENTS, moves, conditions)
+    files = enumerate(machine.task.files)
+    moves = {k: [move.row for move in file.moves] for k, file in files}
+    return collect.visits_of(machine, RAPID_DIALECT, conditions, COMMENTS, moves)
 
 
-def _conditions(v: RapidVisit, base: PlacedFrame, uframe: PlacedFrame) -> Conditions:
+def _conditions(v: RapidVisit, base: Pose, uframe: Pose) -> Conditions:
     """Say what an arrival is carried out with."""
     joint = v.motion == Motion.JOINT
     return Conditions(
-        tool=PlacedFrame(v.tool.pose, v.tool.taught),
+        tool=v.tool.pose,
         base=base,
         uframe=uframe,
+        taught=(v.tool.taught, v.wobj.taught),
         remote=not v.tool.held or v.wobj.held,
         reasons=_reasons(v),
         flags=v.modes.confj if joint else v.modes.confl,
@@ -54,14 +54,13 @@ def _conditions(v: RapidVisit, base: PlacedFrame, uframe: PlacedFrame) -> Condit
     )
 
 
-def _displaced(wobj: FrameOfMove, shift: tuple[float, ...]) -> PlacedFrame:
+def _displaced(wobj: FrameOfMove, shift: tuple[float, ...]) -> Pose:
     """Place a work object with the program displacement in it."""
     if shift == UNKNOWN_SHIFT or not wobj.pose:
-        return PlacedFrame(())
-    pose = wobj.pose
-    if shift != NO_SHIFT:
-        pose = composed(pose, pose_of_numbers(shift))
-    return PlacedFrame(pose, wobj.taught)
+        return ()
+    if shift == NO_SHIFT:
+        return wobj.pose
+    return composed(wobj.pose, pose_of_numbers(shift))
 
 
 def _reasons(v: RapidVisit) -> tuple[str, ...]:

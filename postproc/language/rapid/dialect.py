@@ -67,6 +67,7 @@ class RapidNumbers(Dialect):
     terms: Terms = TERMS
     heads: tuple[str, ...] = HEADS
     reflags: bool = True
+    flag_columns: tuple[int, ...] = (7, 8, 9, 10)
     pose_decimals: tuple[int, ...] = (
         *(MM_DECIMALS,) * 3,
         *(QUATERNION_DECIMALS,) * 4,

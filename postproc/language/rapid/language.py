@@ -60,8 +60,8 @@ class Rapid(Language):
         task = RapidTask(files, start.taught)
         machine = RapidMachine.of(task, start)
         machine.run()
+        visits = visits_of(machine)
         moves = {k: [m.row for m in file.moves] for k, file in enumerate(files)}
-        visits = visits_of(machine, moves)
         missed = machine.missed(moves)
         told = never_reached(missed, "main", "module")
         own = (d for file in files for d in file.diagnostics)

@@ -9,9 +9,15 @@ from functools import cache
 
 import numpy as np
 
-from postproc.language.collect import FoundGoal, FoundVisit
+from postproc.language.collect import (
+    IDENTITY,
+    FoundGoal,
+    FoundVisit,
+    Pose,
+    composed,
+    flat,
+)
 from postproc.language.machine import Scope
-from postproc.language.placed import IDENTITY, Pose, composed, flat
 from postproc.language.rapid import syntax as said
 from postproc.language.rapid.dialect import (
     RAPID_DIALECT,
@@ -49,7 +55,8 @@ class FrameOfMove:
     """A tool or a work object.
 
     Attributes:
-        pose: Where it is, empty where that is not known.
+        pose: Where it is, the rows of (4, 4) [m] one after the other; empty where that
+            is not known.
         held: Robhold: the arm holds it.
         why: Why targets with it cannot be compensated, "" where they can.
         taught: It was taught with the arm, and contains its error.

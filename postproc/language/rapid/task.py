@@ -7,7 +7,6 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
-from postproc.language.collect import Taught
 from postproc.language.flow import HeadedRows
 from postproc.language.machine import Scope
 from postproc.language.rapid import syntax as said
@@ -74,25 +73,27 @@ class RapidTask:
         return found
 
     @cached_property
-    def own_taught(self) -> Taught:
-        """What was taught with the arm."""
-        return Taught(self.taught, [file.text for file in self.files], COMMENTS)
+    def taught_lines(self) -> list[frozenset[int]]:
+        """Lines of every file that a comment marks as taught."""
+        return [COMMENTS.taught(file.text.source) for file in self.files]
 
     def is_taught(self, name: str, found: Nested | None) -> bool:
-        """Tell whether a tool or a work object was taught, by the cell or a comment.
+        """Tell whether data were taught, by the cell or a comment on their line.
 
         Args:
-            name: Of the data.
+            name: Of the data, with an index where it has one; "" for numbers in a move.
             found: What they hold.
         """
+        if name.split("{")[0].strip().lower() in self.taught:
+            return True
         one = found
         while isinstance(one, tuple) and one:
             one = next((part for part in one if isinstance(part, tuple)), one[0])
         if not isinstance(one, WrittenNumber) or one.slot < 0:
-            return name in self.taught
+            return False
         text = self.files[one.file].text
         line = text.source.line_of(int(text.start[one.slot]))
-        return self.own_taught.holds(name, one.file, line)
+        return line in self.taught_lines[one.file]
 
     def routine(self, name: str, here: Scope) -> tuple[int, str, HeadedRows] | None:
         """Find the routine that a name means, None where it is not sure."""

@@ -1,0 +1,157 @@
+"""Statements of KRL: the core against regular expressions, and what they say."""
+
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
+
+from postproc import _native
+from postproc.exceptions import ProgramError
+from postproc.language.krl import syntax as said
+from postproc.language.krl.language import skeleton_of
+from postproc.language.krl.program import read_krl
+from postproc.language.krl.statements import read_krl_statements
+from postproc.language.source import Source
+from tests.reference.krl_lines import krl_lines
+
+PIECES = st.sampled_from([
+    "DECL", "E6POS", "XP1", "E1", "A1", "STOOL2", "IF", "a", "$", "#", "&", ".", ",",
+    ";", ":", "=", "==", "(", ")", "[", "]", "{", "}", "-", "+", "-1.5", "1E+3", "1",
+    ".5", "X", "Y 2", "'B010'", "'HFF'", "'B012'", "'", "'H'", "; it \"s\"", "\n",
+    "\r\n", "\r", " ", "\t", '"a;b"', '"open', '""', "\xe4\xb2", "\x01", "\x00", "x1y",
+    "_2", "?", "|", "*", "/", "@", "\x7f", "{X ", "[i",
+])  # fmt: skip
+TEXTS = st.lists(PIECES, max_size=30).map("".join)
+SHARED = Path(os.environ.get("POSTPROC_SHARED", Path(__file__).parents[4] / "shared"))
+CORPUS = [
+    *sorted(SHARED.glob("corpus/kuka_experimental/*.src")),
+    *sorted(SHARED.glob("corpus/kuka_experimental/*.dat")),
+    *sorted(SHARED.glob("corpus/robodk/*.src")),
+]
+ROOT = Path(__file__).parents[3]
+OWN = sorted(p for p in (ROOT / "programs").rglob("*") if p.suffix in (".src", ".dat"))
+
+
+def scanned(data):
+    """Return what the core reads, statement by statement."""
+    forms, by_statement, numbers, (names, name), opened = _native.scan_krl(data)
+    form, begin, end, first, name_first = by_statement
+    places = list(zip(*(column.tolist() for column in numbers[:2]), strict=True))
+    found = []
+    for k in range(len(form)):
+        own = name[name_first[k] : name_first[k + 1]]
+        found.append((
+            forms[form[k]].decode("latin-1"), int(begin[k]), int(end[k]),
+            tuple(places[first[k] : first[k + 1]]), tuple(names[n] for n in own),
+        ))  # fmt: skip
+    return found, opened
+
+
+@settings(deadline=None, max_examples=400)
+@given(TEXTS)
+@example("\xef\xbb\xbfDEF m ( )")
+@example("{X -1,Y - 2,Z a-3} ; -4")
+@example("x=a-1\r\n&b\r\nx='B01'")
+def test_the_core_reads_what_the_expressions_say(text):
+    wanted = krl_lines(text)
+    found, opened = scanned(text.encode("latin-1"))
+    assert found == [(s.form, s.begin, s.end, s.numbers, s.names) for s in wanted]
+    assert opened == [s.open for s in wanted if s.open >= 0]
+
+
+def test_quoted_numbers():
+    text = read_krl_statements(Source("m.src", b"a={S 'B010',T 'h2F',X -'HF'}"))
+    assert text.value.tolist() == [2.0, 47.0, -15.0]
+    new = _native.rewrite_numbers(
+        b"'B010' 'HFE'", np.array([0, 7]), np.array([6, 12]), np.array([2.0, 3.0]),
+        np.array([0, 0]),
+    )  # fmt: skip
+    assert new[0].tolist() == [1] and bytes(new[1].ravel()).rstrip(b"\0") == b"3"
+
+
+def test_a_string_must_end():
+    with pytest.raises(ProgramError, match=r"m\.src:2: a string"):
+        read_krl_statements(Source("m.src", b'x=1\r\ny="a\r\n'))
+
+
+def one(text):
+    """Parse the only statement of a text."""
+    found = read_krl_statements(Source("x.src", text.encode("latin-1")))
+    assert len(found) == 1
+    return found.statement(0)
+
+
+X = said.DataObject("x")
+
+
+@pytest.mark.parametrize(
+    ("text", "wanted"),
+    [
+        ("&ACCESS RVP", said.AccessHeader()),
+        ("GLOBAL DEF Weld1(a :IN, b[] :OUT)",
+         said.KrlRoutine("def", "weld1", ("a", "b"), True)),
+        ("deffct real f ( )", said.KrlRoutine("deffct", "f")),
+        ("DEFDAT $CONFIG", said.DataList("$config")),
+        ("DEFDAT m PUBLIC", said.DataList("m", True)),
+        ("END", said.BlockWord("end")),
+        ("ENDSWITCH", said.BlockWord("endtest")),
+        ("DECL GLOBAL CONST INT N=3", said.KrlDeclaration(
+            "int", (said.DeclaredItem("n", (), said.Num(0)),), True, True)),
+        ("INT i, j[4]", said.KrlDeclaration("int", (
+            said.DeclaredItem("i"), said.DeclaredItem("j", (said.Num(0),))))),
+        ("ASYPTP XP1", said.NotUnderstood()),
+        ("EXT weld(REAL :IN)", said.OutsideName()),
+        ("GLOBAL ENUM kind a, b", said.OutsideName()),
+        ("CONTINUE", said.ContinueWord()),
+        ("WAIT SEC 0.5", said.Waiting(said.Num(0))),
+        ("HALT", said.Waiting()),
+        ("RETURN x", said.Leave("return", X)),
+        ("again:", said.LabelMark("again")),
+        ("x[2].y = x", said.Assignment(
+            said.DataObject("x", (said.ElementStep((said.Num(0),)), "y")), X)),
+        ("f(1, , #a)", said.Instruction("f", (
+            said.Argument(said.Num(0)), said.Argument(None),
+            said.Argument(said.EnumValue("#a"))))),
+        ("f( )", said.Instruction("f")),
+        ("PTP x C_PTP C_DIS", said.KrlMove("ptp", X, words=("c_ptp", "c_dis"))),
+        ("CIRC x,x,CA -90", said.KrlMove("circ", X, X, said.Operation(
+            "-", (said.Num(0),)))),
+        ("LIN_REL {X 5} #TOOL", said.KrlMove("lin_rel", said.KrlAggregate(
+            "", (said.NamedField("x", said.Num(0)),)), words=("#tool",))),
+        ("SLIN x WITH $VEL.CP=1 C_SPL", said.KrlMove("slin", X, words=("c_spl",),
+            settings=(said.Assignment(
+                said.DataObject("$vel", ("cp",)), said.Num(0)),))),
+        ("x={FRAME: X 1}", said.Assignment(X, said.KrlAggregate(
+            "frame", (said.NamedField("x", said.Num(0)),)))),
+        ("x=x:x", said.Assignment(X, said.Operation(":", (X, X)))),
+        ("INTERRUPT DECL 3 WHEN x DO f()", said.InterruptDeclared(
+            X, said.Instruction("f"))),
+        ("TRIGGER WHEN PATH=-20 DELAY=0 DO f() PRIO=-1", said.PathTrigger(
+            said.Instruction("f"))),
+        ("PTP IF", said.NotUnderstood()),
+        ("LIN", said.NotUnderstood()),
+        ("x = = 1", said.NotUnderstood()),
+    ],
+)  # fmt: skip
+def test_what_a_statement_says(text, wanted):
+    assert one(text) == wanted
+
+
+@pytest.mark.skipif(not CORPUS, reason="no KRL programs of others at hand")
+def test_programs_of_others_are_read_without_loss():
+    for path in [*CORPUS, *OWN]:
+        source = Source(path.name, path.read_bytes())
+        file = read_krl(source)
+        assert not file.diagnostics, file.diagnostics
+        at = 3 if source.data.startswith(b"\xef\xbb\xbf") else 0
+        for row in range(len(file.text)):
+            span = file.text.span(row)
+            between = source.data[at : span.start].decode("latin-1")
+            for line in between.replace("\r", "\n").split("\n"):
+                assert not line.partition(";")[0].strip()
+            at = span.end
+        again = skeleton_of(read_krl(Source(path.name, bytes(source.data))).text)
+        assert again.shapes == skeleton_of(file.text).shapes
