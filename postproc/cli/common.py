@@ -240,6 +240,7 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
     "simulate": (
         "postproc simulate survey.pdl --cell cell.toml -o measured.csv",
         "postproc simulate out/job.pdl --cell cell.toml --wanted job.pdl",
+        "postproc simulate out/job.pdl --cell cell.toml --track track.csv",
     ),
     "fit": (
         "postproc fit measured.csv --cell cell.toml -o model.json --html model.html",
@@ -256,6 +257,8 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
         "postproc diagnose fresh.csv --cell cell.toml --model model.json"
         " -o better.json --html diagnosis.html",
         "postproc diagnose points.csv --program job.pdl --cell cell.toml"
+        " --model model.json",
+        "postproc diagnose --path track.csv --program job.pdl --cell cell.toml"
         " --model model.json",
     ),
     "history": ("postproc history better.json",),

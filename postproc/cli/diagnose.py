@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -142,15 +142,28 @@ FINDINGS = (
 )
 
 
+@dataclass(frozen=True)
+class Asked:
+    """How measurements are to be diagnosed.
+
+    Attributes:
+        output: The extended model's file; default: beside the given one.
+        program: The program whose points were measured, compensated or not.
+        measured_frame: "base", "uframe" or "tracker": what positions are given in.
+        seed: Of the bootstrap.
+    """
+
+    output: Path | None = None
+    program: Path | None = None
+    measured_frame: str = "base"
+    seed: int = 0
+
+
 def diagnose_files(
     data: Sequence[Path],
     cell_path: Path,
     model_path: Path,
-    *,
-    output: Path | None = None,
-    program: Path | None = None,
-    measured_frame: str = "base",
-    seed: int = 0,
+    asked: Asked = Asked(),
     progress: Progress = silent,
 ) -> Extension:
     """Diagnose measurement files with a model, and write the extended model.
@@ -159,10 +172,7 @@ def diagnose_files(
         data: Measurement files.
         cell_path: The cell.
         model_path: The model that may lack something.
-        output: The extended model's file; default: beside the given one.
-        program: The program whose points were measured, compensated or not.
-        measured_frame: "base", "uframe" or "tracker": what positions are given in.
-        seed: Of the bootstrap.
+        asked: What the user wants.
         progress: Told what is being done.
 
     Raises:
@@ -170,21 +180,22 @@ def diagnose_files(
     """
     cell, model = load_cell(cell_path), load_model(model_path)
     model.check_arm(cell.arm, model_path)
-    if program is None:
+    if asked.program is None:
         survey = read_surveys(data, cell)
     else:
+        program = asked.program
         survey = concatenate([join_program(path, program, cell) for path in data])
     tracker, setup = cell.tracker, several_points(survey)
-    if measured_frame == "uframe":
+    if asked.measured_frame == "uframe":
         survey = from_user_frame(survey, cell)
-    elif measured_frame == "tracker":
+    elif asked.measured_frame == "tracker":
         survey, tracker = from_tracker_frame(survey, cell, model)
         setup = (Placement.name,)
     found = diagnose(
-        survey, cell.arm, model, tracker=tracker, setup=setup, seed=seed,
+        survey, cell.arm, model, tracker=tracker, setup=setup, seed=asked.seed,
         progress=progress,
     )  # fmt: skip
-    found.model.save(output or extended_path(model_path))
+    found.model.save(asked.output or extended_path(model_path))
     return found
 
 

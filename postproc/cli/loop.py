@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from enum import StrEnum
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -20,7 +20,13 @@ from postproc.cli.common import (
     say,
     write_text,
 )
+from postproc.exceptions import PostprocError
 from postproc.files import check_places
+
+if TYPE_CHECKING:
+    from postproc.calibration.diagnosis.diagnose import Extension
+    from postproc.cli.diagnose import Asked
+    from postproc.cli.diagnose_path import PathDiagnosis
 
 
 class PointFrame(StrEnum):
@@ -33,9 +39,11 @@ class PointFrame(StrEnum):
 
 @app.command()
 def diagnose(
-    data: Annotated[list[Path], typer.Argument(help="Fresh measurements (CSV).")],
     cell: CellOption,
     model: ModelOption,
+    data: Annotated[
+        list[Path] | None, typer.Argument(help="Fresh measurements (CSV).")
+    ] = None,
     output: Annotated[
         Path | None,
         typer.Option("-o", "--output", help="Default: MODEL.extended.json beside it."),
@@ -52,28 +60,27 @@ def diagnose(
     frame: Annotated[
         PointFrame, typer.Option("--measured-frame", "--frame")
     ] = PointFrame.BASE,
+    path: Annotated[
+        Path | None,
+        typer.Option("--path", help="TRACK.csv: readings while --program ran."),
+    ] = None,
     seed: SeedOption = 0,
 ) -> None:
     """Find what the model lacks, trace it to an effect, and add that effect."""
     from postproc.calibration.diagnosis.diagnose import dumped, evidence_of
     from postproc.cli import diagnose
-    from postproc.report.terminal import stage_bar
 
     with explained():
-        check_places([output, as_path(json), html, plot], [*data, cell, model, program])
-        with stage_bar() as progress:
-            found = diagnose.diagnose_files(
-                data,
-                cell,
-                model,
-                output=output,
-                program=program,
-                measured_frame=frame.value,
-                seed=seed,
-                progress=progress,
-            )
+        files = data or []
+        inputs = [*files, cell, model, program, path]
+        check_places([output, as_path(json), html, plot], inputs)
+        asked = diagnose.Asked(output, program, frame.value, seed)
+        on_the_way, found = _diagnosed(files, path, cell, model, asked)
         if json:
-            write_text(json, dumped(evidence_of(found)))
+            told = evidence_of(found)
+            if on_the_way is not None:
+                told |= {"path": on_the_way.to_dict()}
+            write_text(json, dumped(told))
         if html is not None:
             from postproc.report.html import diagnosis_report
 
@@ -84,7 +91,27 @@ def diagnose(
             for path in plot_diagnosis(found, plot):
                 say(f"plot {path}")
         if json != "-":
+            if on_the_way is not None:
+                typer.echo(on_the_way.tell())
             typer.echo(diagnose.tell(found.diagnosis))
+
+
+def _diagnosed(
+    files: list[Path], path: Path | None, cell: Path, model: Path, asked: Asked
+) -> tuple[PathDiagnosis | None, Extension]:
+    """Diagnose points, or a path."""
+    from postproc.cli import diagnose
+    from postproc.cli.diagnose_path import diagnose_path
+    from postproc.report.terminal import stage_bar
+
+    if (path is None) == (not files):
+        raise PostprocError("diagnose: give measurements, or --path and --program")
+    with stage_bar() as progress:
+        if path is None:
+            found = diagnose.diagnose_files(files, cell, model, asked, progress)
+            return None, found
+        told = diagnose_path(path, cell, model, asked, progress)
+        return told, told.extension
 
 
 @app.command()

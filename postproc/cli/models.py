@@ -102,17 +102,27 @@ def simulate(
     path: Annotated[
         bool, typer.Option("--path", help="Score the paths between targets as well.")
     ] = False,
+    track: Annotated[
+        Path | None,
+        typer.Option("--track", help="TRACK.csv: readings while the arm moves."),
+    ] = None,
+    rate: Annotated[
+        float, typer.Option("--rate", min=1.0, max=1000.0, help="Of the track [Hz].")
+    ] = 100.0,
     json: JsonOption = None,
 ) -> None:
     """Let the virtual arm run a program or a survey, and measure it."""
     from postproc.cli.simulate import simulate_file
 
     with explained():
-        check_places([output, as_path(json)], [program, cell, wanted])
+        check_places([output, track, as_path(json)], [program, cell, wanted])
         with busy("run on the virtual arm"):
-            found = simulate_file(program, cell, seed, effects, wanted, path)
+            often = rate if track is not None else 0.0
+            found = simulate_file(program, cell, seed, effects, wanted, path, often)
         if output is not None:
             found.write(output)
+        if track is not None and found.track is not None:
+            found.track.write(track)
         if json:
             write_text(json, found.to_json())
         say(found.summary())

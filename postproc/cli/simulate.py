@@ -35,6 +35,7 @@ from postproc.simulation import (
     write_measurements,
 )
 from postproc.simulation.path import PathScores, score_paths
+from postproc.simulation.track import VirtualTrack, record_track
 
 VIRTUAL = "nj220-2.7"  # the shipped arm whose numbers the virtual one has
 
@@ -49,6 +50,7 @@ class Simulation:
         true_error: Where the tool landed against the wanted program, or None.
         paths: How far the tool was from the paths of the wanted program, or None.
         lines: Line of every visit of that program.
+        track: Readings of a tracker that followed the tool, or None.
     """
 
     name: str
@@ -56,6 +58,7 @@ class Simulation:
     true_error: ErrorStatistics | None
     paths: PathScores | None = None
     lines: tuple[int, ...] = ()
+    track: VirtualTrack | None = None
 
     def write(self, path: Path) -> None:
         """Write the readings as a measurement file.
@@ -115,7 +118,10 @@ class Simulation:
     def summary(self) -> str:
         """Say in one line what was measured or missed."""
         if self.true_error is None:
-            return f"{self.name}: {len(self.campaign)} measurements"
+            followed = (
+                "" if self.track is None else f", {len(self.track.time)} on the way"
+            )
+            return f"{self.name}: {len(self.campaign)} measurements{followed}"
         e = self.true_error
         if e.n == 0:
             return f"{self.name}: no target of it is known, so no error either"
@@ -174,6 +180,7 @@ def simulate_file(
     effects: str | None = None,
     wanted: Path | None = None,
     path: bool = False,
+    rate: float = 0.0,
 ) -> Simulation:
     """Run a program or a survey on the virtual arm.
 
@@ -184,6 +191,7 @@ def simulate_file(
         effects: Effects beyond geometry, tool and backlash, comma separated.
         wanted: The program that says where the tool should have landed.
         path: Score the paths between the targets as well.
+        rate: Follow the tool with so many readings in a second [Hz]; 0: do not.
 
     Raises:
         PostprocError: A file cannot be used, or an effect is not known.
@@ -207,17 +215,17 @@ def simulate_file(
         tool=setup.tool,
     )
     campaign = measure_program(arm, setup, visits)
+    track = record_track(arm, setup, visits, rate) if rate else None
     if wanted is None and not path:
-        return Simulation(program.name, campaign, None)
+        return Simulation(program.name, campaign, None, track=track)
     original = visits if wanted is None else visits_of(wanted, cell)
     own = own if wanted is not None else np.arange(len(visits))
     error = true_error(arm, setup, visits, original, own)
     if not path:
-        return Simulation(program.name, campaign, error)
+        return Simulation(program.name, campaign, error, track=track)
     scores = score_paths(arm, setup, original, visits, own)
-    return Simulation(
-        program.name, campaign, error, scores, tuple(original.line.tolist())
-    )
+    lines = tuple(original.line.tolist())
+    return Simulation(program.name, campaign, error, scores, lines, track)
 
 
 def visits_of(program: Path, cell: Cell) -> Visits:

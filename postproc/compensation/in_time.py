@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -44,6 +44,7 @@ class InTime:
         other_side: Where a joint arrives otherwise in time than along the path, (n, 6).
         arm: The arm.
         inserted: The points that were put on its ways; None where nobody asked.
+        in_motion: What a measured path says of the joints, see `Model.in_motion`.
     """
 
     before: ProgramCycle
@@ -53,6 +54,7 @@ class InTime:
     other_side: Bools
     arm: Arm
     inserted: Insertions | None = None
+    in_motion: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def own(self) -> Ints:
@@ -138,8 +140,7 @@ class InTime:
             first = min(told.points)
             text = (
                 f"{told.count} points are put on the ways of {len(told.points)} moves; "
-                "a model that was fitted at stops is unverified in motion until a "
-                "measured path confirms it"
+                f"{verified(self.in_motion)}"
             )
             place = visits.files[visits.file[first]], int(visits.line[first])
             yield Diagnostic(*place, PATH_POINTS, text)
@@ -218,7 +219,27 @@ def run_in_time(
         before, after, shift, cell, setting.model, setting.temperature, owner
     )
     guessed, other = guessed_limits(cell.arm), disagreements(cell.arm, after)
-    return InTime(before, after, paths, guessed, other, cell.arm)
+    told = setting.model.in_motion
+    return InTime(before, after, paths, guessed, other, cell.arm, in_motion=told)
+
+
+def verified(in_motion: Mapping[str, str]) -> str:
+    """Say whether a measured path has shown what the model says of joints in motion.
+
+    >>> verified({"1": "confirmed", "2": "refuted"})
+    'a measured path confirms the flanks of joint 1, not those of 2'
+    """
+    if not in_motion:
+        return (
+            "a model that was fitted at stops is unverified in motion until a "
+            "measured path confirms it (diagnose --path)"
+        )
+    joints = {word: [j for j, said in in_motion.items() if said == word]
+              for word in set(in_motion.values())}  # fmt: skip
+    good = ", ".join(joints.pop("confirmed", [])) or "none"
+    rest = ", ".join(sorted(j for some in joints.values() for j in some))
+    said = f"a measured path confirms the flanks of joint {good}"
+    return f"{said}, not those of {rest}" if rest else said
 
 
 def _run(visits: Visits, cell: Cell) -> ProgramCycle:

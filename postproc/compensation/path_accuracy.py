@@ -380,7 +380,7 @@ def _otherwise(
 
 
 def _refined(
-    cell: Cell, cycles: tuple[ProgramCycle, ProgramCycle], pair: list[_PathSamples]
+    cell: Cell, cycles: tuple[ProgramCycle, ...], pair: list[_PathSamples]
 ) -> list[_PathSamples]:
     """Look closer where a joint changes its flank, before or after."""
     changes = np.zeros(len(pair[0].q), dtype=bool)
@@ -468,3 +468,74 @@ def _joints(run: _Run, error: _Error, rows: Ints, way: Floats) -> Ints:
         size[:, joint] = lengths(here - error(run, rows, other))
     told = size.argmax(axis=1)
     return np.where(size.max(axis=1) > NO_FLANK, told + 1, 0)
+
+
+# The ways of a program as the arm should go them: to compare with what was measured.
+
+SPACING = 2e-3  # [m] between places on the way, about
+
+
+@dataclass(frozen=True)
+class PredictedWays:
+    """Where the tool goes on m moves, as the model says, s samples in all.
+
+    Attributes:
+        visit, source: The visits at both ends of each, (m,).
+        first: Its samples are first[k] .. first[k + 1] - 1, (m + 1,).
+        q: Joint angles, (s, 6) [rad].
+        side: Where every joint lies in its play, (s, 6), 0 in the middle.
+        sure: That is known of all joints, (s,).
+        place: TCP in the arm's base frame, (s, 3) [m].
+        flank: What the TCP moves by as each joint goes from its lower flank to its
+            upper one, (s, 6, 3) [m].
+    """
+
+    visit: Ints
+    source: Ints
+    first: Ints
+    q: Floats
+    side: Floats
+    sure: Bools
+    place: Floats
+    flank: Floats
+
+
+def predicted_ways(
+    cycle: ProgramCycle, cell: Cell, model: Model, temperature: float
+) -> PredictedWays:
+    """Predict where a program leads the tool on all moves from known places.
+
+    Args:
+        cycle: The program that ran.
+        cell: The arm, its play as wide as its gaps, and its payload.
+        model: The arm's error.
+        temperature: Of the arm [deg C], NaN where not known.
+    """
+    rows = np.flatnonzero(cycle.ways[1] >= 0)
+    ways = _spaced(cell, cycle, _ways(cycle, rows))
+    (ways,) = _refined(cell, (cycle,), [ways])
+    run, error = _Run.of(cell, cycle, ways), _Error(cell, model, temperature)
+    tools = cycle.targets.tool[rows, :3, 3][ways.way]
+    place = cell.arm.tcp(ways.q, tools) + error(run, slice(None), run.side)
+    flank = np.empty((len(ways.q), 6, 3))
+    for joint in range(6):
+        ends = np.array([run.side, run.side])
+        ends[0, :, joint], ends[1, :, joint] = -1.0, 1.0
+        flank[:, joint] = error(run, slice(None), ends[1]) - error(
+            run, slice(None), ends[0]
+        )
+    sure = ~any_in_rows(run.most - run.least > UNSURE)
+    return PredictedWays(
+        rows, ways.source, ways.first, ways.q, run.side, sure, place, flank
+    )
+
+
+def _spaced(cell: Cell, cycle: ProgramCycle, ways: _PathSamples) -> _PathSamples:
+    """Put samples on ways so that the TCP moves by little between them."""
+    tools = cycle.targets.tool[ways.visit, :3, 3][ways.way]
+    step = lengths(np.diff(cell.arm.tcp(ways.q, tools), axis=0, prepend=0.0))
+    step[ways.first[:-1]] = 0.0
+    parts = np.maximum(np.ceil(step / SPACING).astype(np.int64), 1)[1:]
+    after = np.repeat(np.arange(len(parts)), parts - 1)
+    share = (spans(np.ones_like(parts), parts - 1)) / np.repeat(parts, parts - 1)
+    return ways.refined(after, share)

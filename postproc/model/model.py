@@ -466,6 +466,15 @@ class Model:
         return str(self.to_dict()["id"])
 
     @property
+    def in_motion(self) -> dict[str, str]:
+        """What the newest measured path says of joints ("1" to "6") in motion.
+
+        Empty where none was measured; the verdicts are those of `compensation.flanks`.
+        """
+        told = (r["in_motion"] for r in reversed(self.history) if "in_motion" in r)
+        return dict(next(told, {}))
+
+    @property
     def needs(self) -> frozenset[str]:
         """Covariates that the compensated effects cannot do without."""
         used = [e for e in self.effects.effects if e.belongs_to() in COMPENSATED]

@@ -17,6 +17,7 @@ from postproc.model.kinematics import Batch
 
 TRACKER_FIXED, TRACKER_RANGE = 1e-5, 5e-6  # [m], [m/m] a laser tracker's data sheet
 LIVELY = 0.3  # share of the other component that each begins with at least
+UNSEEN = 1.0  # [m] as good as not measured
 SMALLEST, LARGEST = 1e-7, 1e-2  # [m] bounds of both standard deviations at the TCP
 
 
@@ -56,6 +57,14 @@ def tracker_shape(
     return np.asarray(TRACKER_FIXED + TRACKER_RANGE * reach)
 
 
+def _along_first(heading: Floats) -> Floats:
+    """Give right-handed bases (n, 3, 3) whose first columns are unit vectors (n, 3)."""
+    aside = np.eye(3)[np.abs(heading).argmin(axis=1)]
+    second = np.cross(heading, aside)
+    second /= np.linalg.norm(second, axis=1)[:, None]
+    return np.stack([heading, second, np.cross(heading, second)], axis=2)
+
+
 @dataclass(frozen=True)
 class Whitener:
     """Rotations that make every row's covariance diagonal, and its two parts.
@@ -64,6 +73,7 @@ class Whitener:
         turn: Rotates base axes into the eigenbasis of J J^T, (n, 3, 3).
         tracker, joint: Variances per unit t^2 and r^2 in that basis, (n, 3).
         extra: Variance known beforehand (an unknown direction), (n, 3) [m^2].
+        unseen: Variance of what the reading does not tell at all, (n, 3) [m^2].
         origin: Tracker position, see `Noise`.
     """
 
@@ -71,6 +81,7 @@ class Whitener:
     tracker: Floats
     joint: Floats
     extra: Floats
+    unseen: Floats
     origin: tuple[float, float, float] | None
 
     @classmethod
@@ -90,7 +101,15 @@ class Whitener:
             extra: Additional variance of each row, (n,) [m^2].
         """
         J = batch.jacobian
-        values, vectors = np.linalg.eigh(J @ np.swapaxes(J, 1, 2))
+        square = J @ np.swapaxes(J, 1, 2)
+        values, vectors = np.linalg.eigh(square)
+        heading = batch.states.heading
+        unseen, moving = np.zeros_like(values), ~np.isnan(heading[:, 0])
+        if moving.any():
+            vectors[moving] = _along_first(heading[moving])
+            turned = np.swapaxes(vectors, 1, 2) @ square @ vectors
+            values[moving] = np.einsum("nii->ni", turned)[moving]
+            unseen[moving, 0] = UNSEEN**2
         shape = np.repeat(tracker_shape(position, origin)[:, None] ** 2, 3, axis=1)
         more = np.zeros(len(batch)) if extra is None else extra
         return cls(
@@ -98,6 +117,7 @@ class Whitener:
             tracker=shape,
             joint=np.maximum(values, 0.0),
             extra=np.repeat(more[:, None], 3, axis=1),
+            unseen=unseen,
             origin=origin,
         )
 
@@ -110,7 +130,10 @@ class Whitener:
     def variance(self, noise: Noise) -> Floats:
         """Variance of every rotated component, (n, 3) [m^2]."""
         total: Floats = (
-            noise.tracker**2 * self.tracker + noise.joint**2 * self.joint + self.extra
+            noise.tracker**2 * self.tracker
+            + noise.joint**2 * self.joint
+            + self.extra
+            + self.unseen
         )
         return total
 
@@ -126,7 +149,7 @@ class Whitener:
         r0 = float(np.median(np.sqrt(self.joint.mean(axis=1))))
         used = weight > 0
         T, R = self.tracker[used], self.joint[used]
-        E, S, w = self.extra[used], squares[used], weight[used, None]
+        E, S, w = (self.extra + self.unseen)[used], squares[used], weight[used, None]
 
         def cost(u: Floats) -> tuple[float, Floats]:
             """Negative log likelihood and its gradient by log standard deviations."""

@@ -28,6 +28,9 @@ class States:
         payload: Payload mass, (n,) [kg].
         payload_com: Payload centre of mass in the flange frame, (n, 3) [m].
         order: Position in the visit order, (n,).
+        heading: Direction in which the TCP moves, (n, 3), unit vectors in the base
+            frame, where it was read in motion: then nothing is known of its place along
+            that direction. NaN where the arm stands still.
     """
 
     q: Floats
@@ -41,6 +44,7 @@ class States:
     payload: Floats
     payload_com: Floats
     order: Floats
+    heading: Floats
 
     def __post_init__(self) -> None:
         read_only(self)
@@ -56,6 +60,12 @@ class States:
         return replace(
             self, **{f.name: getattr(self, f.name)[rows] for f in fields(self)}
         )
+
+    def across(self, vectors: Floats) -> Floats:
+        """Leave out what lies along the direction of motion, of vectors (n, 3)."""
+        heading = np.nan_to_num(self.heading)
+        along = np.einsum("ni,ni->n", vectors, heading)[:, None]
+        return np.asarray(vectors - along * heading)
 
     def with_(self, **changes: NDArray[np.generic]) -> States:
         """Return a copy with some arrays replaced."""
@@ -83,7 +93,7 @@ def make_states(
     n = len(q)
     shapes: dict[str, tuple[int, ...]] = {
         "travel": (n, 6), "speed": (n,), "time": (n,), "temperature": (n,),
-        "payload": (n,), "payload_com": (n, 3),
+        "payload": (n,), "payload_com": (n, 3), "heading": (n, 3),
     }  # fmt: skip
     values: dict[str, NDArray[np.generic]] = {
         name: np.array(

@@ -16,7 +16,7 @@ from postproc.compensation.record import (
 )
 from postproc.exceptions import OutputError, ProgramError
 from postproc.language.source import Edit, Replacements, Source, Span
-from postproc.language.stamp import stamped
+from postproc.language.stamp import stamp_line
 
 SOURCE = b"PROGRAM x\r\nMOVE TO {1.0, \xe4 2}\r\nEND x"
 OUTPUT = b"-- stamp\r\nPROGRAM x\r\nMOVE TO {1.25, \xe4 2}\r\nEND x"
@@ -117,7 +117,7 @@ def test_an_empty_record_restores_nothing_and_says_so(tmp_path):
     assert program.read_bytes() == OUTPUT and not (tmp_path / "back.pdl").exists()
 
 
-STAMPED = stamped("1.0", "m", Source("job.pdl", SOURCE), SOURCE)
+STAMPED = stamp_line("1.0", "m", Source("job.pdl", SOURCE), "--") + SOURCE
 
 
 def test_a_record_of_another_program_is_refused(tmp_path, record):

@@ -56,3 +56,34 @@ def test_a_component_that_was_thought_absent_is_found_again() -> None:
         found = whitener.estimate(squares, np.ones(400), start)
         assert found.tracker == pytest.approx(truth.tracker, rel=0.1)
         assert found.joint == pytest.approx(truth.joint, rel=0.1)
+
+
+def test_what_was_read_in_motion_tells_nothing_along_it() -> None:
+    rng = np.random.default_rng(4)
+    states = random_states(30, rng)
+    heading = rng.standard_normal((30, 3))
+    heading /= np.linalg.norm(heading, axis=1)[:, None]
+    heading[::3] = np.nan
+    batch = Batch(NJ, states.with_(heading=heading))
+    still = Whitener.build(Batch(NJ, states), batch.walk.tcp, None)
+    whitener, noise = Whitener.build(batch, batch.walk.tcp, None), Noise(1.0, 2e-5)
+    rows = rng.standard_normal((30, 3)) * 1e-4
+    moved = rows + np.nan_to_num(heading) * rng.uniform(-1e-3, 1e-3, (30, 1))
+
+    def whitened(by: Whitener, vectors: np.ndarray) -> np.ndarray:
+        return by.rotate(vectors) / np.sqrt(by.variance(noise))
+
+    np.testing.assert_allclose(
+        whitened(whitener, rows), whitened(whitener, moved), rtol=0, atol=0.01
+    )
+    at_rest = slice(None, None, 3)
+    np.testing.assert_array_equal(whitener.turn[at_rest], still.turn[at_rest])
+    np.testing.assert_array_equal(
+        whitener.variance(noise)[at_rest], still.variance(noise)[at_rest]
+    )
+    size = np.abs(np.linalg.det(whitener.turn))
+    np.testing.assert_allclose(size, 1.0, atol=1e-12)
+    np.testing.assert_allclose(
+        states.with_(heading=heading).across(moved),
+        states.with_(heading=heading).across(rows), atol=1e-18,
+    )  # fmt: skip

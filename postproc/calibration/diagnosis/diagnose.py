@@ -101,8 +101,10 @@ def hold_out(
         )
         after.append(left_by(more, base, out))
         fitted = len(inside)
+    which = np.concatenate(rows)
+    across = base.batch.states[which].across
     return HeldOut(
-        np.concatenate(rows), fitted, np.concatenate(before), np.concatenate(after)
+        which, fitted, across(np.concatenate(before)), across(np.concatenate(after))
     )
 
 
