@@ -1,4 +1,4 @@
-"""Commands on arm files: list the shipped ones, write one from a URDF."""
+"""Commands on arm files: list the shipped ones, write one of what others hold."""
 
 from __future__ import annotations
 
@@ -78,5 +78,32 @@ def from_urdf(
         write_text(output, text)
         for rounded in chain.rounded:
             say(f"{urdf}: {rounded}")
+        if output != "-":
+            say(f"written {output}")
+
+
+@arm.command("from-machine-dat")
+def from_machine_dat(
+    machine: Annotated[
+        Path, typer.Argument(help="$machine.dat, in R1/Mada of a KUKA archive.")
+    ],
+    output: Annotated[
+        str, typer.Option("-o", "--output", help="ARM.toml, - for stdout.")
+    ] = "-",
+    name: Annotated[
+        str | None,
+        typer.Option("--name", help="Of the arm, default the transformation's."),
+    ] = None,
+    repeatability: Annotated[
+        float, typer.Option("--repeatability", min=0.001, help="RP of ISO 9283 [mm].")
+    ] = 0.1,
+) -> None:
+    """Write the arm file of a KUKA arm: six axes with a spherical wrist."""
+    from postproc.robot.machine_data import machine_arm_text, read_machine_data
+
+    with explained(machine):
+        check_places([as_path(output)], [machine])
+        text = machine_arm_text(read_machine_data(machine), repeatability, name)
+        write_text(output, text)
         if output != "-":
             say(f"written {output}")

@@ -277,6 +277,9 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
         "postproc arm from-urdf robot.urdf -o arm.toml",
         "postproc arm from-urdf robot.urdf --base base_link --tip flange",
     ),
+    "arm from-machine-dat": (
+        "postproc arm from-machine-dat 'R1/Mada/$machine.dat' -o arm.toml",
+    ),
 }
 
 

@@ -2,9 +2,9 @@
 
 python -m tests.fuzz --count 20000 --seed 0        (or: make fuzz)
 
-Every fourth is a task of RAPID, the others are PDL2. Each is read and rewritten with
-other numbers in all of its targets; every ninth is compensated and restored. The same
-numbers give the same programs.
+Of four one is a task of RAPID, one a job of KRL, the others are PDL2. Each is read and
+rewritten with other numbers in all of its targets; every ninth is compensated and
+restored. The same numbers give the same programs.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from tests.conftest import CELL, make_job
 from tests.fuzz.case import HangError, compensated, rewrite
 from tests.fuzz.originals import damaged_of
 
-TOLD = "absolute_accuracy = false\n[tool]"  # without it RAPID is refused
+TOLD = "absolute_accuracy = false\n[tool]"  # without it RAPID and KRL are refused
 WHOLE = 9  # every so many are compensated, not only rewritten
 _SETUP: list[tuple[Cell, Model]] = []
 

@@ -166,7 +166,7 @@ def _without_stamp(name: str, data: bytes) -> bytes:
     if name.endswith(".pdl") or name.endswith(".lsv"):
         found = re.match(rb"-- postproc [^\r\n]*(?:\r\n|\n|\r)", data)
     else:
-        line = rb"! postproc \S+ model=\S+ source=[0-9a-f]{64}(?:\r\n|\n|\r)"
+        line = rb"[!;] postproc \S+ model=\S+ source=[0-9a-f]{64}(?:\r\n|\n|\r)"
         found = re.match(line, data) or re.search(rb"(?<=[\r\n%])[ \t]*" + line, data)
     assert found, f"{name}: no stamp"
     return data[: found.start()] + data[found.end() :]

@@ -23,6 +23,15 @@ RAPID_WORDS = (
     b"1e308", b"-", b",", b"o_p1", b"\xef\xbb\xbf",
 )  # fmt: skip
 
+KRL_WORDS = (
+    b"DEF", b"END", b"ENDFCT", b"DEFDAT", b"PTP", b"LIN", b"CIRC", b"SLIN", b"SPLINE",
+    b"ENDSPLINE", b"CA", b"C_DIS", b"LIN_REL", b"DECL E6POS", b"INT", b"IF", b"THEN",
+    b"ENDIF", b"FOR", b"TO", b"ENDFOR", b"LOOP", b"ENDLOOP", b"EXIT", b"GOTO",
+    b"WAIT SEC", b"INTERRUPT DECL 5 WHEN", b"DO", b"$TOOL=", b"$BASE=", b"BAS(#FRAMES)",
+    b"WITH", b"EK(", b"&", b";", b"'B01'", b"#TCP", b"$", b"{", b"}", b"[", b"]",
+    b":", b"\"", b"=", b"==", b"E1 5", b"S 18", b"1e308", b"-", b",", b"\xef\xbb\xbf",
+)  # fmt: skip
+
 
 def _lines(data: bytes) -> list[bytes]:
     return data.splitlines(keepends=True) or [b""]
@@ -116,6 +125,13 @@ def insert_rapid(rng: random.Random, data: bytes) -> bytes:
     return data[:at] + b" " * rng.randrange(2) + rng.choice(RAPID_WORDS) + data[at:]
 
 
+def insert_krl(rng: random.Random, data: bytes) -> bytes:
+    """Put a word of KRL where it does not belong."""
+    at = rng.randrange(len(data) + 1)
+    return data[:at] + b" " * rng.randrange(2) + rng.choice(KRL_WORDS) + data[at:]
+
+
+KRL_KINDS = tuple(insert_krl if kind is insert else kind for kind in KINDS)
 RAPID_KINDS = tuple(insert_rapid if kind is insert else kind for kind in KINDS)
 
 

@@ -8,7 +8,7 @@ from functools import cache
 from pathlib import Path
 
 from postproc.robot.cell import Cell, load_cell
-from tests.fuzz.mutation import RAPID_KINDS, mutated
+from tests.fuzz.mutation import KRL_KINDS, RAPID_KINDS, mutated
 from tests.language import neutral_job
 from tests.language.pdl2.generator import POINTS, Generator
 from tests.language.pdl2.generator.rarer import Rarer
@@ -155,6 +155,69 @@ def damaged_task(seed: int, number: int) -> Files:
     return files
 
 
+# Jobs of KRL.
+
+SUBPROGRAM = b"""DEF help (n :IN)
+DECL INT n, i
+FOR i=1 TO 2
+  LIN XS[i]:{X 0,Y 0,Z -10,A 0,B 0,C 0}
+ENDFOR
+SWITCH n
+CASE 1
+  PTP XHELP C_PTP
+DEFAULT
+  LOOP
+    LIN_REL {Z 5}
+    EXIT
+  ENDLOOP
+ENDSWITCH
+FDAT_ACT=FP1
+BAS(#CP_PARAMS,0.2)
+LIN XHELP
+END
+"""
+SUBDATA = b"""DEFDAT help
+DECL E6POS XHELP={X -605,Y 876,Z 1590,A 20,B 30,C 170,S 'B010',T 35,E1 0.0}
+DECL E6POS XS[2]
+XS[1]={X -610,Y 870,Z 1580,A 20,B 30,C 170,S 2,T 35}
+XS[2]={X -600,Y 880,Z 1600,A 20,B 30,C 170,S 2,T 35}
+DECL FDAT FP1={TOOL_NO 1,BASE_NO 1,IPO_FRAME #BASE,POINT2[] " "}
+ENDDAT
+"""
+
+
+@cache
+def jobs() -> tuple[Mapping[str, bytes], ...]:
+    """Return the jobs that lie in this project, the source that runs first."""
+    folder = ROOT / "programs" / "facing"
+    names = ("Milling", "Facing", "Holes")
+    files = [f"{name}{suffix}" for name in names for suffix in (".src", ".dat")]
+    files.append("$config.dat")
+    return ({name: (folder / name).read_bytes() for name in files},)
+
+
+def krl_job(rng: random.Random) -> Files:
+    """Write a job at random, often with a subprogram and with a list of the system."""
+    drawn = neutral_job.drawn(cell(), rng.randrange(1 << 30), rng.randrange(3, 25))
+    files = neutral_job.krl(drawn)
+    if rng.random() < 0.5:
+        files["job.src"] = files["job.src"].replace(b"END\r\n", b"help(1)\r\nEND\r\n")
+        files |= {"help.src": SUBPROGRAM, "help.dat": SUBDATA}
+        files["$config.dat"] = jobs()[0]["$config.dat"]
+    return files
+
+
+def damaged_job(seed: int, number: int) -> Files:
+    """Return damaged files of a job; the same for the same two numbers."""
+    rng = random.Random(f"krl:{seed}:{number}")
+    files = dict(rng.choice(jobs())) if rng.random() < 0.3 else krl_job(rng)
+    for name in list(files):
+        if len(files) == 1 or rng.random() < 0.7:
+            files[name] = mutated(rng, files[name], kinds=KRL_KINDS)
+    return files
+
+
 def damaged_of(seed: int, number: int) -> Files:
-    """Return damaged files: every fourth is a task of RAPID, the others are PDL2."""
-    return (damaged_task if number % 4 == 3 else damaged)(seed, number)
+    """Return damaged files: of four one is a task of RAPID, one a job of KRL."""
+    kinds = (damaged, damaged_job, damaged, damaged_task)
+    return kinds[number % 4](seed, number)

@@ -11,6 +11,7 @@ import numpy as np
 from postproc.language.collect import IDENTITY, Pose, composed, flat
 from postproc.language.krl import syntax as said
 from postproc.language.krl.dialect import COMPONENTS, KRL_DIALECT
+from postproc.language.krl.program import whole
 from postproc.language.krl.task import CONFIG, KrlRecord, KrlTask
 from postproc.language.machine import Scope
 
@@ -98,9 +99,10 @@ class FrameReader:
 
     def numbered(self, name: str, number: float) -> KrlFrame:
         """Return the tool or the base of a number; 0 is none."""
-        if number != number or number != int(number):
+        entry = whole(number)
+        if entry is None:
             return KrlFrame((), f"the number of its {name.upper()} is not known")
-        return ZERO if number == 0 else self.entry(TABLES[name], int(number))
+        return ZERO if entry == 0 else self.entry(TABLES[name], entry)
 
     def entry(self, table: str, number: int) -> KrlFrame:
         """Read an entry of TOOL_DATA or BASE_DATA."""

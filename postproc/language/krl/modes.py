@@ -9,6 +9,7 @@ from typing import Any
 
 from postproc.language.krl import syntax as said
 from postproc.language.krl.frames import NUMBERS, FrameReader, KrlFrame
+from postproc.language.krl.program import whole
 from postproc.language.krl.task import KrlRecord, KrlTask, KrlValue
 from postproc.language.machine import Scope
 from postproc.language.visits import OrientationLaw
@@ -272,10 +273,9 @@ class ModeReader:
 
     def _loaded(self, modes: KrlModes, number: float) -> KrlModes:
         """Take the load of a tool's number."""
-        found = None
-        if number == number and number > 0:
-            found = self.task.datum("load_data", self.here, (int(number),))
-        if found is None or "load_data" in self.task.written:
+        entry = whole(number)
+        found = entry and self.task.datum("load_data", self.here, (entry,))
+        if not found or "load_data" in self.task.written:
             return modes
         file, datum = found
         there = Scope(file, self.task.files[file].name, "")

@@ -20,6 +20,7 @@ from postproc.language.krl.dialect import (
     rotation_from_abc,
 )
 from postproc.language.krl.frames import FrameReader, KrlFrame
+from postproc.language.krl.program import whole
 from postproc.language.krl.task import (
     KrlNumber,
     KrlRecord,
@@ -230,7 +231,7 @@ class _Goal:
 
     def _status(self, s: float, t: float) -> str:
         """Say what speaks against a position's S and T, "" for nothing."""
-        if any(f != NOT_WRITTEN and (f < 0 or f != int(f)) for f in (s, t)):
+        if any(f != NOT_WRITTEN and (f < 0 or whole(f) is None) for f in (s, t)):
             return ODD_STATUS
         if s >= UNKNOWN_STATUS:
             return ODD_STATUS

@@ -101,6 +101,18 @@ def read_krl(source: Source) -> KrlFile:
     )
 
 
+LARGEST = 1 << 31  # whole number that counts or names anything
+
+
+def whole(value: float) -> int | None:
+    """Return a whole number, None where it is none.
+
+    >>> whole(3.0), whole(2.5), whole(float("inf"))
+    (3, None, None)
+    """
+    return int(value) if abs(value) < LARGEST and value == int(value) else None
+
+
 @dataclass
 class _KrlReader:
     """Statements of a file, as they are met."""
@@ -179,4 +191,6 @@ class _KrlReader:
         if len(slots) < len(steps[0].subscripts):
             return None
         first = int(self.text.first[row])
-        return tuple(int(self.text.value[first + slot]) for slot in slots)
+        found = [whole(float(self.text.value[first + slot])) for slot in slots]
+        known = tuple(k for k in found if k is not None)
+        return known if len(known) == len(found) else None

@@ -11,7 +11,7 @@ from functools import cached_property
 from postproc.language.flow import HeadedRows
 from postproc.language.krl import syntax as said
 from postproc.language.krl.dialect import COMMENTS
-from postproc.language.krl.program import KrlDatum, KrlFile
+from postproc.language.krl.program import KrlDatum, KrlFile, whole
 from postproc.language.machine import Scope
 
 CONFIG = "$config"
@@ -206,7 +206,7 @@ class KrlTask:
                 text = self.files[here.file].text
                 at = int(text.first[row]) + slot
                 value = float(text.value[at])
-                return None if math.isnan(value) else KrlNumber(value, here.file, at)
+                return KrlNumber(value, here.file, at) if math.isfinite(value) else None
             case said.EnumValue(name=name):
                 return name
             case said.StringLiteral(text=written):
@@ -264,28 +264,34 @@ class KrlTask:
         """Return the index of an element, None where it is not known."""
         if isinstance(step, str):
             return None
-        values = [self.number(one, row, here) for one in step.subscripts]
-        whole = [int(v) for v in values if v == v and v == int(v)]
-        return tuple(whole) if len(whole) == len(values) and whole else None
+        values = [whole(self.number(one, row, here)) for one in step.subscripts]
+        known = tuple(k for k in values if k is not None)
+        return known if len(known) == len(values) and known else None
 
 
 def _computed(operator: str, parts: Sequence[KrlValue | None]) -> KrlNumber | None:
     """Compute what an operator gives, None where that is no known number."""
     numbers = [part.value for part in parts if isinstance(part, KrlNumber)]
-    if len(numbers) < len(parts):
-        return None
+    found = math.nan
+    if len(numbers) == len(parts):
+        found = _result(operator, numbers)
+    return KrlNumber(found) if math.isfinite(found) else None
+
+
+def _result(operator: str, numbers: Sequence[float]) -> float:
+    """Compute with numbers; whole ones divide otherwise than others: that is left."""
     match operator, numbers:
         case "-", [a]:
-            return KrlNumber(-a)
+            return -a
         case "+", [a]:
-            return KrlNumber(a)
+            return a
         case "+", [a, b]:
-            return KrlNumber(a + b)
+            return a + b
         case "-", [a, b]:
-            return KrlNumber(a - b)
+            return a - b
         case "*", [a, b]:
-            return KrlNumber(a * b)
-    return None  # whole numbers divide otherwise than others
+            return a * b
+    return math.nan
 
 
 # What statements take and change.
