@@ -9,6 +9,7 @@ mod aligned;
 mod chain;
 mod compare;
 mod corner;
+mod design;
 mod direction;
 mod edges;
 mod inverse;
@@ -61,6 +62,8 @@ fn native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(pose::times, module)?)?;
     module.add_function(wrap_pyfunction!(profile::profile, module)?)?;
     module.add_function(wrap_pyfunction!(pull::to_move, module)?)?;
+    module.add_function(wrap_pyfunction!(design::gram, module)?)?;
+    module.add_function(wrap_pyfunction!(design::uncertainty, module)?)?;
     module.add_function(wrap_pyfunction!(variance::variance, module)?)?;
     module.add_function(wrap_pyfunction!(aligned::aligned, module)?)?;
     module.add_function(wrap_pyfunction!(compare::compare_lines, module)?)?;

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from postproc.arrays import Floats
 from postproc.model.covariate import covariate, varies_enough
 from postproc.model.kinematics import Batch
+from postproc.model.splines import Splines
 from postproc.robot.arm import Arm
 from postproc.robot.state import States
 
@@ -165,6 +166,14 @@ class JointEffect(Effect):
     @abstractmethod
     def basis(self, batch: Batch) -> Floats:
         """Evaluate phi: the angle of each parameter's joint, (n, p) [rad per unit]."""
+
+    def splines(self, batch: Batch) -> list[tuple[int, Splines, Floats]] | None:
+        """Write the columns as splines, in their order, where they are made of them.
+
+        Returns:
+            Joint from 0, its splines, and what of each makes every column, (m, k).
+        """
+        return None
 
     def acts_on(self) -> NDArray[np.int64]:
         """Return the 0-based joint that each parameter turns, (p,)."""
