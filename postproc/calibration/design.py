@@ -25,6 +25,8 @@ Features = tuple[
     tuple[Ints, Floats, list[int], int],
 ]
 
+BLOCK = 1024  # rows that are written out at once
+
 
 @dataclass(frozen=True, eq=False)
 class JointColumns:
@@ -103,6 +105,15 @@ class DesignMatrix:
         jacobian = np.ascontiguousarray(at.jacobian)
         return replace(self, jacobian=jacobian, direct=_direct(combination.effects, at))
 
+    def __getitem__(self, rows: Ints) -> DesignMatrix:
+        """Return some of the rows."""
+        turning = replace(self.turning, angles=self.turning.angles[rows])
+        splines = tuple(replace(c, splines=c.splines[rows]) for c in self.splines)
+        return replace(
+            self, jacobian=self.jacobian[rows], turning=turning, splines=splines,
+            direct=self.direct[rows],
+        )  # fmt: skip
+
     @property
     def size(self) -> int:
         """Number of parameters."""
@@ -134,6 +145,16 @@ class DesignMatrix:
         turned = np.einsum("nij,nj->ni", self.jacobian, self.shift(values))
         moved: Floats = turned + self.direct @ values[self.moving]
         return moved
+
+    def mixed(self, mix: Floats) -> Floats:
+        """Mix the columns, (p, k), to columns of all scalar rows, (3 n, k)."""
+        n = len(self.jacobian)
+        out = np.empty((3 * n, mix.shape[1]))
+        for first in range(0, n, BLOCK):
+            some = self[np.arange(first, min(first + BLOCK, n))]
+            rows = slice(3 * first, 3 * (first + BLOCK))
+            out[rows] = some.dense().reshape(-1, self.size) @ mix
+        return out
 
     def moment(self, rows: Floats) -> Floats:
         """Sum columns times rows (n, 3) over all rows, (p,)."""

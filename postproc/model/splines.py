@@ -36,6 +36,10 @@ class Splines:
         first = found.indices[:: ORDER + 1].astype(np.int64)
         return cls(first, found.data.reshape(-1, ORDER + 1))
 
+    def __getitem__(self, rows: Ints) -> Splines:
+        """Return them at some of the places."""
+        return Splines(self.first[rows], self.weight[rows])
+
     def faded(self, by: Floats) -> Splines:
         """Multiply all of them by a number at every place, (n,)."""
         return replace(self, weight=self.weight * by[:, None])

@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 
 from postproc.arrays import Floats
 from postproc.calibration.diagnosis.held_out import deal, multi_directional, noise_floor
-from postproc.calibration.diagnosis.library import Projection
 from postproc.calibration.diagnosis.next_poses import (
     poses_that_separate,
     poses_that_sharpen,
@@ -25,7 +24,7 @@ from postproc.calibration.diagnosis.result import (
     profile,
     statistics,
 )
-from postproc.calibration.diagnosis.search import NEAR, Progress, Search, ranking
+from postproc.calibration.diagnosis.search import NEAR, Progress, Search
 from postproc.calibration.diagnosis.trace import (
     Investigation,
     investigate,
@@ -218,7 +217,7 @@ def _conclude(
 def _places(found: Search) -> tuple[ResidualPlace, ...]:
     """Say where what is left lives, from the candidates that come closest."""
     out = []
-    for score in ranking(Projection.of(found.fit), found.library)[:PLACES]:
+    for score in found.ranking_under(found.fit)[:PLACES]:
         family = score.family
         at = family.along or family.effect
         direction = at if family.joint is None else f"joint {family.joint}"
@@ -327,7 +326,7 @@ def _seen(shown: Profile) -> Mapping[str, Any]:
 def _candidates(found: Extension) -> list[dict[str, Any]]:
     """List what the residual of the given model calls for."""
     search = found.search
-    scores = ranking(Projection.of(search.base), search.library)[:LISTED]
+    scores = search.ranking_under(search.base)[:LISTED]
     return [
         {
             "effect": s.family.effect,

@@ -208,7 +208,7 @@ def profile(fit: Fit, place: int, candidate: Candidate) -> Profile:
         candidate: The candidate that it was.
     """
     part = fit.combination.slices[place]
-    moved = fit.columns[:, :, part] @ fit.values[part]
+    moved = fit.moved(part)
     joint = candidate.family.joint
     if joint is None:
         axis = moved / np.maximum(np.linalg.norm(moved, axis=1, keepdims=True), 1e-12)

@@ -142,6 +142,14 @@ class Effect(ABC):
         moved: Floats = self.columns(batch) @ p
         return moved
 
+    def only_joint(self) -> int | None:
+        """Return the joint, from 0, that all its columns turn, None without one."""
+        return None
+
+    def turning(self, batch: Batch) -> Floats:
+        """Evaluate by what each column turns `only_joint`, (n, p) [rad per unit]."""
+        raise TypeError(f"{self.name} turns no joint alone")
+
     def zero_errors(self, p: Floats) -> Floats:
         """Return by what it turns every D-H angle wherever the arm stands, (6,) [rad].
 
@@ -183,6 +191,15 @@ class JointEffect(Effect):
     def _acts_on(self) -> NDArray[np.int64]:
         """Find them once: a program asks some hundred times."""
         return np.array([(p.joint or 1) - 1 for p in self.parameters()], dtype=int)
+
+    def only_joint(self) -> int | None:
+        """Tell from the parameters."""
+        joints = set(self.acts_on().tolist())
+        return joints.pop() if len(joints) == 1 else None
+
+    def turning(self, batch: Batch) -> Floats:
+        """Evaluate phi, (n, p)."""
+        return self.basis(batch)
 
     def columns(self, batch: Batch) -> Floats:
         """Differentiate the TCP position: (n, 3, p) [m per unit]."""
