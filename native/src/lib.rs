@@ -12,6 +12,7 @@ mod corner;
 mod design;
 mod direction;
 mod edges;
+mod evidence;
 mod inverse;
 mod lines;
 mod number;
@@ -64,6 +65,8 @@ fn native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(pull::to_move, module)?)?;
     module.add_function(wrap_pyfunction!(design::gram, module)?)?;
     module.add_function(wrap_pyfunction!(design::uncertainty, module)?)?;
+    module.add_function(wrap_pyfunction!(evidence::by_groups, module)?)?;
+    module.add_function(wrap_pyfunction!(evidence::scaled, module)?)?;
     module.add_function(wrap_pyfunction!(variance::variance, module)?)?;
     module.add_function(wrap_pyfunction!(aligned::aligned, module)?)?;
     module.add_function(wrap_pyfunction!(compare::compare_lines, module)?)?;

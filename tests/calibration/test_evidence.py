@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 from scipy.optimize import approx_fprime
 from scipy.stats import multivariate_normal
 
-from postproc.calibration import evidence
 from postproc.calibration.diagnosis.held_out import Folds
-from postproc.calibration.evidence import Normal, Posterior, maximise, posterior
+from postproc.calibration.evidence import Normal, Solved, maximise, posterior
 from tests.calibration.planted import plain_design
 
 
@@ -90,11 +91,12 @@ def test_few_solutions_find_the_scales(monkeypatch: pytest.MonkeyPatch) -> None:
     _, _, group, normal = problem()
     solved = []
 
-    def counted(normal: Normal, group: np.ndarray, scale: np.ndarray) -> Posterior:
-        solved.append(scale)
-        return posterior(normal, group, scale)
+    def counted(of: type[Solved], *given: Any) -> Solved:
+        solved.append(given)
+        return solve(*given)
 
-    monkeypatch.setattr(evidence, "posterior", counted)
+    solve = Solved.at
+    monkeypatch.setattr(Solved, "at", classmethod(counted))
     count = int(group.max()) + 1
     found = maximise(normal, group, np.zeros(count))
     assert len(solved) <= 10
