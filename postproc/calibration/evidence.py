@@ -22,6 +22,7 @@ FIRST_STEP = 2.0  # of any log s_g
 SMALLEST_STEP = 1e-6
 LEAST_BEND = 1e-3
 SETTLED = 1e-5  # nats that a further step promises
+HOPE = 5.0  # times what a step promises that a search is thought to bring
 ROUNDED = 16.0  # units in the last place by which sums over many rows are off
 FEWEST = 4.0  # degrees of freedom that a prior scale is credited with at least
 LOG_SPREAD = 3.0  # hyperprior of log s_g: an order of magnitude is no surprise
@@ -225,12 +226,40 @@ def maximise(
         start: Log prior scales to begin with, (g,).
         steps: Most steps of the search.
     """
+    return _climb(normal, group, start, steps).solved.posterior()
+
+
+def highest(
+    normal: Normal, group: Ints, start: Floats, steps: int, least: float
+) -> float:
+    """Find the log evidence with the hyperprior at its best prior scales.
+
+    Args:
+        normal: Normal equations.
+        group: Group of every parameter, (p,).
+        start: Log prior scales to begin with, (g,).
+        steps: Most steps of the search.
+        least: The search gives up where it is far from promising as much; what it
+            returns then is less.
+    """
+    return _climb(normal, group, start, steps, least).value
+
+
+def _climb(
+    normal: Normal,
+    group: Ints,
+    start: Floats,
+    steps: int,
+    least: float = -np.inf,
+) -> _Here:
+    """Take Newton's steps until they promise nothing more, or too little."""
     count, room = len(start), np.empty(normal.gram.shape)
     at = _Here.of(normal, group, np.clip(start, *LOG_BOUNDS))
     radius = FIRST_STEP
     for _ in range(steps if count else 0):
         step, gained = at.step(radius)
-        if gained < SETTLED or radius < SMALLEST_STEP:
+        done = gained < SETTLED or radius < SMALLEST_STEP
+        if done or at.value + HOPE * at.promise < least:
             break
         u = np.clip(at.solved.log_scale + step, *LOG_BOUNDS)
         there = _Here.of(normal, group, u, room)
@@ -238,7 +267,7 @@ def maximise(
         radius = radius / 4 if ratio < 0.25 else radius * (2 if ratio > 0.75 else 1)
         if ratio > 0.0:
             room, at = at.solved.lower, there
-    return at.solved.posterior()
+    return at
 
 
 @dataclass(frozen=True, eq=False)
@@ -268,6 +297,13 @@ class _Here:
         curvature -= np.diag(2.0 * both + 1.0 / LOG_SPREAD**2)
         value = solved.log_evidence - 0.5 * float((u**2).sum()) / LOG_SPREAD**2
         return cls(solved, value, slope, curvature)
+
+    @property
+    def promise(self) -> float:
+        """What Newton's step would bring if it were not too long, free of bounds."""
+        bent, axes = np.linalg.eigh(self.curvature)
+        slope = axes.T @ self.slope
+        return float(0.5 * (slope**2 / np.maximum(np.abs(bent), LEAST_BEND)).sum())
 
     def step(self, radius: float) -> tuple[Floats, float]:
         """Take Newton's step uphill, no log scale by more than a radius.

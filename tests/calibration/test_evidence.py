@@ -10,7 +10,7 @@ from scipy.optimize import approx_fprime
 from scipy.stats import multivariate_normal
 
 from postproc.calibration.diagnosis.held_out import Folds
-from postproc.calibration.evidence import Normal, Solved, maximise, posterior
+from postproc.calibration.evidence import Normal, Solved, highest, maximise, posterior
 from tests.calibration.planted import plain_design
 
 
@@ -110,3 +110,12 @@ def test_no_groups_no_search() -> None:
         Normal(np.zeros((0, 0)), none, 3.0, 0.0, 4.0), none.astype(int), none
     )
     assert found.mean.shape == (0,) and found.effective == 0
+
+
+def test_a_search_gives_up_only_below_what_is_asked_for() -> None:
+    _, _, group, normal = problem()
+    best = highest(normal, group, np.zeros(2), 60, -np.inf)
+    for least in best + np.array([-50.0, -1.0, -1e-3]):
+        assert highest(normal, group, np.zeros(2), 60, least) == best
+    for least in best + np.array([1e-3, 1.0, 50.0]):
+        assert highest(normal, group, np.zeros(2), 60, least) <= best
