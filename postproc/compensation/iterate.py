@@ -234,10 +234,10 @@ class Iteration:
         limits, targets = self.setting.cell.limits, self.planned.targets
         far = np.any([*swings(limits, found.moved).values()], axis=0)
         rows = np.flatnonzero(far)
-        before = spans(targets.pred_start[rows], np.diff(targets.pred_start)[rows])
-        sources = targets.pred[before]
+        sources = _sources(targets, rows)
+        begins = _sources(targets, sources[targets.via[sources]])  # of arcs
         ends = np.zeros(n, dtype=bool)
-        ends[rows] = ends[sources[sources >= 0]] = True
+        ends[rows] = ends[sources] = ends[begins] = True
         ends = with_origins(self.reading.visits, self.planned, ends)
         ends &= proposal.corrected
         if far.any() and not ends.any():  # by what came long before
@@ -247,6 +247,13 @@ class Iteration:
         if ends.any() and len(self.reading.begins) > 1:
             raise NotConcatenableError
         return ends
+
+
+def _sources(targets: Targets, rows: Ints) -> Ints:
+    """List the known targets that lead to some."""
+    before = spans(targets.pred_start[rows], np.diff(targets.pred_start)[rows])
+    sources = targets.pred[before]
+    return np.asarray(sources[sources >= 0])
 
 
 def passing_after(plan: Plan, wanted: Floats) -> Floats:

@@ -39,7 +39,7 @@ def test_an_arm_lands_at_corrected_stops(arm, tmp_path):
             np.testing.assert_allclose(found[0].after, one.after, rtol=0, atol=0.001)
 
 
-@pytest.mark.parametrize("number", [0, 12, 19])
+@pytest.mark.parametrize("number", [0, 7, 12, 19])
 def test_behind_a_move_that_cannot_be_driven(bench_cell, bench_model, number):
     """The virtual controller stays where it is, and goes on from there."""
     job, setup = drawn(bench_cell, number), setup_of(bench_cell)
