@@ -145,7 +145,7 @@ impl Frame {
 }
 
 impl Link {
-    fn angle(&self, q: &Six) -> f64 {
+    pub fn angle(&self, q: &Six) -> f64 {
         let mixed: f64 = self.mix.iter().zip(q).map(|(m, q)| m * q).sum();
         self.offset + self.sense * mixed
     }

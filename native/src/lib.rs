@@ -14,6 +14,7 @@ mod edges;
 mod inverse;
 mod lines;
 mod number;
+mod numeric;
 mod play;
 mod pose;
 mod profile;
@@ -50,6 +51,8 @@ fn native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(lines::chords, module)?)?;
     module.add_function(wrap_pyfunction!(inverse::branch, module)?)?;
     module.add_function(wrap_pyfunction!(inverse::branches, module)?)?;
+    module.add_function(wrap_pyfunction!(numeric::numeric_branches, module)?)?;
+    module.add_function(wrap_pyfunction!(numeric::numeric_slots, module)?)?;
     module.add_function(wrap_pyfunction!(play::prefix, module)?)?;
     module.add_function(wrap_pyfunction!(direction::states, module)?)?;
     module.add_function(wrap_pyfunction!(direction::side, module)?)?;

@@ -242,11 +242,6 @@ def lost_without(arm: Arm, survey: Measurements) -> tuple[str, ...]:
             "the arm file has no [links]: how joints yield to the arm's own weight, "
             "and gaps that depend on it, cannot be fitted and stay in what is left"
         )
-    if not arm.has_inverse:
-        told.append(
-            "the arm file has no [opw]: the model serves predict and diagnose; "
-            "compensate and explain need the inverse kinematics"
-        )
     if arm.file.joints.drive_coupling is None and survey.inferred.any():
         told.append(
             "the arm file has no drive_coupling: directions of joints are inferred as "

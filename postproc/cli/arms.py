@@ -42,7 +42,7 @@ def _row(arm: Arm) -> tuple[str, ...]:
 
     opw = arm.file.opw
     if opw is None:
-        return arm.name, "", f"{arm.repeatability / MM:g}", "none"
+        return arm.name, "", f"{arm.repeatability / MM:g}", "numeric"
     reach = opw.a1_mm + opw.c2_mm + math.hypot(opw.a2_mm, opw.c3_mm)
     return arm.name, f"{reach:.0f}", f"{arm.repeatability / MM:g}", "closed form"
 

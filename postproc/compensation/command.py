@@ -132,7 +132,7 @@ def solve(
     from_tcp = inverse(np.ascontiguousarray(tool))
     command, q = np.array(wanted), np.array(states.q)
     place = wanted[:, :3, 3]
-    branch = arm.branch(np.nan_to_num(q)) if arm.has_inverse else None
+    branch = arm.branch(np.nan_to_num(q))
     landing = place + model.error(arm, states)
     turned, allowed = np.zeros((n, 3)), np.zeros((n, 3))  # [rad] found and allowed for
     if orientation:
@@ -394,7 +394,7 @@ def _written_joints(
     flange = inverse(base_in_uframe(visits, rows)) @ pose @ from_tcp
     found = np.array(near)
     known = np.isfinite(near).all(axis=1) & np.isfinite(flange).all(axis=(1, 2))
-    own = arm.branch(near[known]) if arm.has_inverse else None
+    own = arm.branch(near[known])
     q = _nearest(arm, np.ascontiguousarray(flange[known]), near[known], own)
     found[known] = np.where(np.isnan(q), near[known], q)
     return found

@@ -207,9 +207,6 @@ def run_in_time(
         setting: What it was compensated with.
         owner: The move of the source that every visit belongs to, (n,), where points
             were put on ways.
-
-    Raises:
-        PlanError: The arm has no inverse kinematics.
     """
     cell = setting.cell
     before, after = (_run(part.visits, cell) for part in (reading, again))

@@ -193,9 +193,6 @@ def plan_visits(
         begin: Where the arm stands at the first visit, if that is known beforehand.
         lead: What is known of the first arrivals, see `direction.arrivals`.
         doubtful: What comes from there is doubtful (see `eligibility`).
-
-    Raises:
-        PlanError: The arm has no inverse kinematics.
     """
     targets, reasons = targets_from_visits(visits, cell)
     wrist = np.deg2rad(cell.limits.wrist_deg)

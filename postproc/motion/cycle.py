@@ -86,9 +86,6 @@ def run(arm: Arm, targets: Targets) -> ProgramCycle:
     Args:
         arm: The arm; its limits hold.
         targets: The moves.
-
-    Raises:
-        PlanError: The arm has no closed-form inverse kinematics.
     """
     path = blend(arm, targets, trace(arm, targets))
     arrived = arrivals(arm, path.q, path.driven)

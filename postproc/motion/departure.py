@@ -92,8 +92,6 @@ def other_branch(arm: Arm, old: Floats, new: Floats) -> Bools:
 
     A straight wrist lies on both of its own.
     """
-    if not arm.has_inverse:
-        return np.zeros(len(old), dtype=bool)
     differ = arm.branch(old) ^ arm.branch(new)
     straight = np.abs(np.minimum(old[:, 4] * new[:, 4], 0.0)) < STRAIGHT**2
     return np.asarray((differ & ~np.where(straight, 4, 0)) != 0)

@@ -101,9 +101,6 @@ def plan(
         timed: Find out how fast the arm passes; else speed and time stay unknown.
         begin: Where the arm stands at the first move, if that is known beforehand.
         lead: What is known of the first arrivals, see `direction.arrivals`.
-
-    Raises:
-        PlanError: The arm has no closed-form inverse kinematics.
     """
     exact = trace(arm, targets, begin.known)
     traced = blend(arm, targets, exact, timed)

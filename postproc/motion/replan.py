@@ -99,9 +99,6 @@ def replan_all(
         targets: The moves.
         begin: Where the arm stands at the first target, if that is known beforehand.
         lead: What is known of the first sides, see `direction.arrivals`.
-
-    Raises:
-        PlanError: The arm has no closed-form inverse kinematics.
     """
     exact = trace(arm, targets, begin.known)
     traced = blend(arm, targets, exact, timed=False)
@@ -189,9 +186,6 @@ def replan(
         targets: All targets as they are now.
         moved: Which have another `tcp` or other `joints` than in `before`, (n,).
         lead: What is known of the first sides, see `direction.arrivals`.
-
-    Raises:
-        PlanError: The arm has no closed-form inverse kinematics.
     """
     if not moved.any():
         found = sides(arm, before.passed, before.passages, lead)

@@ -633,9 +633,6 @@ def trace(arm: Arm, targets: Targets, known: Known | None = None) -> Trace:
         arm: The arm.
         targets: The moves.
         known: Targets whose joint angles are known beforehand.
-
-    Raises:
-        PlanError: The arm has no closed-form inverse kinematics.
     """
     work = Workspace(arm, targets, known)
     settled = _from_strings(work) | work.given

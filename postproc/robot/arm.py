@@ -13,9 +13,15 @@ from numpy.typing import NDArray
 
 from postproc import _native
 from postproc.arrays import Floats, Ints, floats
-from postproc.exceptions import ArmError, PlanError
+from postproc.exceptions import ArmError
 from postproc.robot.arm_file import ArmFile, arm_path, read_arm_file
-from postproc.robot.inverse import Branches, Inverse, wrap
+from postproc.robot.inverse import (
+    Branches,
+    ClosedForm,
+    Inverse,
+    NumericForm,
+    wrap,
+)
 from postproc.robot.pose import MM
 
 # The Denavit-Hartenberg chain: frames and points along it, for many poses at once.
@@ -154,16 +160,12 @@ class Arm:
         return np.column_stack([links.mass_kg, np.array(links.com_mm) * MM])
 
     @cached_property
-    def _inverse(self) -> Inverse | None:
-        """Build the closed-form inverse kinematics, or None where there is none."""
-        opw = self.file.opw
-        limits = (self.lower, self.upper)
-        return None if opw is None else Inverse(opw, self.dh.mix, *limits)
-
-    @property
-    def has_inverse(self) -> bool:
-        """Tell whether the arm file holds a closed-form inverse."""
-        return self.file.opw is not None
+    def _solver(self) -> Inverse:
+        """The inverse kinematics: by a closed form where the arm file holds one."""
+        opw, limits = self.file.opw, (self.lower, self.upper)
+        if opw is None:
+            return Inverse(NumericForm(self.dh.packed()), np.eye(6), *limits)
+        return Inverse(ClosedForm(opw), self.dh.mix, *limits)
 
     def link_frames(self, q: Floats) -> Floats:
         """Place the D-H frames 0 (base) to 6 (flange): (n, 6) -> (n, 7, 4, 4)."""
@@ -276,23 +278,8 @@ class Arm:
         flat: Floats = -GRAVITY * basis.reshape(len(q), 6, 24)
         return flat
 
-    @property
-    def _solver(self) -> Inverse:
-        """The closed-form inverse kinematics.
-
-        Raises:
-            PlanError: The arm file has none.
-        """
-        if self._inverse is None:
-            raise PlanError(f"arm {self.name} has no closed-form inverse kinematics")
-        return self._inverse
-
     def inverse(self, flange: Floats) -> Branches:
-        """Solve the inverse kinematics of flange poses (n, 4, 4) [m].
-
-        Raises:
-            PlanError: The arm file has no closed-form inverse kinematics.
-        """
+        """Solve the inverse kinematics of flange poses (n, 4, 4) [m]."""
         return self._solver.branches(flange)
 
     def on_branch(self, flange: Floats, slot: Ints) -> Floats:
@@ -304,18 +291,11 @@ class Arm:
 
         Returns:
             (n, 6) [rad], NaN where the branch does not exist.
-
-        Raises:
-            PlanError: The arm file has no closed-form inverse kinematics.
         """
         return self._solver.branch(flange, slot)
 
     def into_range(self, q: Floats) -> Floats:
-        """Shift joint angles (.., 6) [rad] by turns into the range, as `inverse` does.
-
-        Raises:
-            PlanError: The arm file has no closed-form inverse kinematics.
-        """
+        """Shift joint angles (.., 6) [rad] by turns into the range, as in `inverse`."""
         return self._solver.into_range(q)
 
     def branch(self, q: Floats) -> Ints:
@@ -358,7 +338,7 @@ def load_arm(name: str | Path, beside: Path | None = None) -> Arm:
     """
     path = arm_path(str(name), beside)
     arm = build_arm(read_arm_file(path))
-    if arm.has_inverse:
+    if arm.file.opw is not None:
         _check_inverse(arm, path)
     return arm
 

@@ -1,4 +1,7 @@
-"""Inverse kinematics of an arm: all branches or one, on turns within its range."""
+"""Inverse kinematics of an arm: all branches or one, on turns within its range.
+
+By a closed form where the arm file has one, else by Newton's method from many starts.
+"""
 
 from __future__ import annotations
 
@@ -78,12 +81,40 @@ class ClosedForm:
         return slots
 
 
+class NumericForm:
+    """The inverse kinematics of any chain with six axes, in the controller's angles.
+
+    Newton's method starts from the solutions of the pose before, then from many places
+    that fill the joints' space; what it finds is a solution to 1e-11 m and rad, what it
+    does not find counts as none. Branches are told apart by what vanishes at their
+    singularities: W: the sine of axis 5 is negative; E: the wrist comes nearer to axis
+    2 as axis 3 turns on; S: the sign of what is left of the determinant of the
+    Jacobian. Where these bits do not tell solutions apart there is none.
+    """
+
+    def __init__(self, packed: Floats) -> None:
+        """Take the chain, see `DH.packed`."""
+        self._packed = packed
+
+    def branches(self, flange: Floats) -> Floats:
+        """Solve for all branches of flange poses (n, 4, 4) [m], as `ClosedForm`."""
+        return _native.numeric_branches(self._packed, floats(flange))
+
+    def branch(self, flange: Floats, slot: Ints) -> Floats:
+        """Solve for one branch of every pose, as `ClosedForm`."""
+        return self.branches(flange)[np.arange(len(flange)), slot]
+
+    def slot(self, theta: Floats) -> Ints:
+        """Name the branch of joint angles (n, 6) [rad], (n,)."""
+        return _native.numeric_slots(self._packed, floats(theta))
+
+
 # Inverse kinematics of an arm: all branches or one, on turns within its range.
 
 
 @dataclass(frozen=True)
 class Branches:
-    """All closed-form solutions of n flange poses, in stable slots 4 W + 2 S + E.
+    """All solutions of n flange poses, in stable slots 4 W + 2 S + E.
 
     Attributes:
         q: (n, 8, 6) [rad], NaN where a branch does not exist. Axes lie in the arm's
@@ -103,16 +134,20 @@ class Inverse:
     """The inverse kinematics of one arm."""
 
     def __init__(
-        self, parameters: OpwSection, mix: Floats, lower: Floats, upper: Floats
+        self,
+        form: ClosedForm | NumericForm,
+        mix: Floats,
+        lower: Floats,
+        upper: Floats,
     ) -> None:
-        """Build it from the arm file's section, angle mixing and joint limits [rad]."""
-        self._closed = ClosedForm(parameters)
+        """Build it from a form, the angles' mixing in it, and joint limits [rad]."""
+        self._form = form
         self._mix, self._unmix = mix, np.linalg.inv(mix)
         self._lower, self._upper = lower, upper
 
     def branches(self, flange: Floats) -> Branches:
         """Solve for all branches of flange poses (n, 4, 4) [m]."""
-        q = self._closed.branches(flange) @ self._unmix.T
+        q = self._form.branches(flange) @ self._unmix.T
         return Branches(self.into_range(q))
 
     def branch(self, flange: Floats, slot: Ints) -> Floats:
@@ -121,12 +156,12 @@ class Inverse:
         Returns:
             (n, 6) [rad], NaN where the branch does not exist.
         """
-        q: Floats = self._closed.branch(flange, slot) @ self._unmix.T
+        q: Floats = self._form.branch(flange, slot) @ self._unmix.T
         return q
 
     def slot(self, q: Floats) -> Ints:
         """Name the branch (slot 4 W + 2 S + E) of joint angles (n, 6) [rad]."""
-        return self._closed.slot(q @ self._mix.T)
+        return self._form.slot(q @ self._mix.T)
 
     def into_range(self, q: Floats) -> Floats:
         """Shift angles by whole turns into the joint range where that is possible."""

@@ -1,0 +1,200 @@
+//! The inverse kinematics of any chain, by Newton's method from many starts:
+//! `postproc.robot.inverse`.
+
+use std::f64::consts::{PI, TAU};
+
+use numpy::{IntoPyArray, PyArray1, PyArray3, PyReadonlyArray2, PyReadonlyArray3};
+use pyo3::prelude::*;
+
+use crate::chain::{Chain, Parameters};
+use crate::lines::{poses, Pose};
+use crate::rows::{blocks, dot, each, minus, rows, Six, Three};
+use crate::walk::cross;
+
+const STARTS: usize = 160;
+const ROUNDS: usize = 30;
+const STEP: f64 = 0.6; // [rad] that a joint goes at once, at the most
+const CLOSE: f64 = 1e-11; // [m, rad]
+const SAME: f64 = 1e-6; // [rad] between two solutions that are one
+const UNSOLVED: Six = [f64::NAN; 6];
+
+/// A chain, and places of it to start from.
+struct Numeric {
+    chain: Chain,
+    starts: Vec<Six>,
+}
+
+impl Numeric {
+    fn new(parameters: &Parameters<'_>) -> PyResult<Numeric> {
+        // A Kronecker sequence fills the six angles evenly: powers of the root of
+        // x^7 = x + 1.
+        let root: f64 = 1.112_775_684_278_705_5;
+        let share = |i: usize, j: usize| ((i + 1) as f64 * root.powi(-(j as i32 + 1))).fract();
+        let start = |i: usize| std::array::from_fn(|j| TAU * share(i, j) - PI);
+        Ok(Numeric { chain: Chain::new(parameters)?, starts: (0..STARTS).map(start).collect() })
+    }
+
+    /// Solve for all branches, from those of a pose that may be near first.
+    fn branches(&self, pose: &Pose, before: &[Six; 8]) -> [Six; 8] {
+        let mut found = [UNSOLVED; 8];
+        let mut twice = [false; 8];
+        let near = before.iter().filter(|q| !q[0].is_nan());
+        for start in near.chain(&self.starts) {
+            let Some(q) = self.solved(pose, start) else { continue };
+            let slot = self.slot(&q);
+            if found[slot][0].is_nan() {
+                found[slot] = q;
+            } else if !same(&found[slot], &q) {
+                twice[slot] = true; // the bits do not tell them apart
+            }
+            if found.iter().all(|q| !q[0].is_nan()) {
+                break;
+            }
+        }
+        std::array::from_fn(|k| if twice[k] { UNSOLVED } else { found[k] })
+    }
+
+    /// Go from joint angles to a pose; None where that does not lead there.
+    fn solved(&self, pose: &Pose, from: &Six) -> Option<Six> {
+        let mut q = *from;
+        for _ in 0..ROUNDS {
+            let frames = self.chain.frames(&q);
+            let (off, alike) = apart(pose, &frames[6].axes, &frames[6].origin);
+            let size = off.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
+            if size < CLOSE && alike {
+                return Some(q.map(|t| t - TAU * (t / TAU).round()));
+            }
+            let step = solve(self.columns(&frames), off)?;
+            let most = step.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
+            let scale = if most > STEP { STEP / most } else { 1.0 };
+            q = std::array::from_fn(|j| q[j] + scale * step[j]);
+        }
+        None
+    }
+
+    /// Differentiate the flange by the joint angles: velocity and turn, joint by joint.
+    fn columns(&self, frames: &[crate::chain::Frame; 7]) -> [Six; 6] {
+        let place = frames[6].origin;
+        self.chain.to_controller(&std::array::from_fn(|j| {
+            let axis = &frames[j].axes[2];
+            let [x, y, z] = cross(axis, &minus(&place, &frames[j].origin));
+            [x, y, z, axis[0], axis[1], axis[2]]
+        }))
+    }
+
+    /// Name a branch by what vanishes at its singularities: 4 where the sine of axis 5 is
+    /// negative, 1 where the wrist comes nearer to axis 2 as axis 3 turns on, 2 by the sign
+    /// of what is left of the determinant.
+    fn slot(&self, q: &Six) -> usize {
+        let frames = self.chain.frames(q);
+        let wrist = self.chain.0[4].angle(q).sin();
+        let (second, third) = (frames[1].axes[2], frames[2].axes[2]);
+        let reach = minus(&frames[4].origin, &frames[1].origin);
+        let up = dot(&reach, &second);
+        let aside: Three = std::array::from_fn(|k| reach[k] - up * second[k]);
+        let moved = cross(&third, &minus(&frames[4].origin, &frames[2].origin));
+        let elbow = self.chain.0[2].sense * dot(&aside, &moved);
+        let rest = determinant(self.columns(&frames)) * wrist.signum() * elbow.signum();
+        4 * usize::from(wrist < 0.0) + 2 * usize::from(rest < 0.0) + usize::from(elbow < 0.0)
+    }
+}
+
+fn same(a: &Six, b: &Six) -> bool {
+    a.iter().zip(b).all(|(a, b)| {
+        let apart = a - b;
+        (apart - TAU * (apart / TAU).round()).abs() < SAME
+    })
+}
+
+/// From a flange to a pose: distance [m] and turn [rad], and whether it is no half turn.
+fn apart(pose: &Pose, axes: &[Three; 3], origin: &Three) -> (Six, bool) {
+    let mut turn = [0.0; 3];
+    let mut trace = 0.0;
+    for (j, axis) in axes.iter().enumerate() {
+        let wanted = [pose[j], pose[4 + j], pose[8 + j]];
+        let across = cross(axis, &wanted);
+        for k in 0..3 {
+            turn[k] += across[k] / 2.0;
+        }
+        trace += dot(axis, &wanted);
+    }
+    let off = |k: usize| pose[4 * k + 3] - origin[k];
+    ([off(0), off(1), off(2), turn[0], turn[1], turn[2]], trace > 2.0)
+}
+
+/// Eliminate: the solution of sum_j columns[j] x_j = right, None where there is none.
+fn solve(columns: [Six; 6], right: Six) -> Option<Six> {
+    let mut rows: [[f64; 7]; 6] = std::array::from_fn(|i| {
+        std::array::from_fn(|j| if j < 6 { columns[j][i] } else { right[i] })
+    });
+    eliminate(&mut rows)?;
+    let mut x = [0.0; 6];
+    for i in (0..6).rev() {
+        let known: f64 = (i + 1..6).map(|j| rows[i][j] * x[j]).sum();
+        x[i] = (rows[i][6] - known) / rows[i][i];
+    }
+    Some(x)
+}
+
+fn determinant(columns: [Six; 6]) -> f64 {
+    let mut rows: [Six; 6] = std::array::from_fn(|i| std::array::from_fn(|j| columns[j][i]));
+    match eliminate(&mut rows) {
+        Some(sign) => (0..6).map(|i| rows[i][i]).product::<f64>() * sign,
+        None => 0.0,
+    }
+}
+
+/// Bring rows into triangular form; give the sign of their order, None where they depend
+/// on each other.
+fn eliminate<const K: usize>(rows: &mut [[f64; K]; 6]) -> Option<f64> {
+    let mut sign = 1.0;
+    for i in 0..6 {
+        let pivot = (i..6).max_by(|a, b| rows[*a][i].abs().total_cmp(&rows[*b][i].abs()))?;
+        if rows[pivot][i].abs() < 1e-12 {
+            return None;
+        }
+        if pivot != i {
+            rows.swap(pivot, i);
+            sign = -sign;
+        }
+        let (above, below) = rows.split_at_mut(i + 1);
+        for row in below {
+            let share = row[i] / above[i][i];
+            for (value, pivot) in row.iter_mut().zip(&above[i]) {
+                *value -= share * pivot;
+            }
+        }
+    }
+    Some(sign)
+}
+
+/// Solve for all branches of every pose (n, 4, 4) [m]: (n, 8, 6) [rad], NaN where a
+/// branch is not found.
+#[pyfunction]
+pub fn numeric_branches<'py>(
+    py: Python<'py>,
+    parameters: Parameters<'py>,
+    flange: PyReadonlyArray3<'py, f64>,
+) -> PyResult<Bound<'py, PyArray3<f64>>> {
+    let (numeric, poses) = (Numeric::new(&parameters)?, poses(&flange)?);
+    let mut before = [UNSOLVED; 8];
+    let out = each(py, poses.len(), |i| {
+        before = match poses[i].iter().any(|x| x.is_nan()) {
+            true => [UNSOLVED; 8],
+            false => numeric.branches(&poses[i], &before),
+        };
+        before
+    })?;
+    Ok(blocks(py, poses.len(), (8, 6), out.into_flattened().into_flattened()))
+}
+
+/// Name the branches of joint angles (n, 6) [rad], (n,).
+#[pyfunction]
+pub fn numeric_slots<'py>(
+    py: Python<'py>,
+    parameters: Parameters<'py>,
+    q: PyReadonlyArray2<'py, f64>,
+) -> PyResult<Bound<'py, PyArray1<i64>>> {
+    let (numeric, q) = (Numeric::new(&parameters)?, rows::<6>(&q)?);
+    Ok(each(py, q.len(), |i| numeric.slot(&q[i]) as i64)?.into_pyarray(py))
+}
