@@ -173,3 +173,28 @@ def test_the_stamp_of_a_module_with_a_header_stands_behind_it(place):
     assert batch(place).exit_code in (0, 1)
     checked = cli("check", place.folder / "new", "--model", place.model)
     assert checked.exit_code == 0 and "0 findings" in checked.output
+
+
+def test_jobs_of_an_archive_share_a_data_list(place):
+    """``$config.dat`` is read for every job, and written by none."""
+    folder, system = place.folder / "tree/R1/Program", place.folder / "tree/R1/System"
+    shutil.move(source(place, NAMES["KRL"]).parent, folder)
+    system.mkdir()
+    job = folder / NAMES["KRL"]
+    text = job.read_text()
+    tool = re.search(r"(?m)^\$TOOL=(.*)$", text)
+    job.write_text(text.replace(tool[0], "$TOOL=TOOL_DATA[1]"))
+    for suffix in (".src", ".dat"):
+        shutil.copy(job.with_suffix(suffix), folder / f"other{suffix}")
+    shared = system / "$config.dat"
+    shared.write_text(f"DEFDAT $CONFIG\nTOOL_DATA[1]={tool[1]}\nENDDAT\n")
+    made = place.folder / "out.src"
+    assert place.compensate(job, "-o", made).exit_code in (0, 1)
+    assert "lines with other numbers" in cli("diff", job, made).output
+    assert batch(place).exit_code in (0, 1)
+    new = place.folder / "new/R1"
+    assert (new / "Program/job.src").read_bytes() == made.read_bytes()
+    assert b"; postproc" in (new / "Program/other.dat").read_bytes()
+    assert (new / "System/$config.dat").read_bytes() == shared.read_bytes()
+    checked = cli("check", place.folder / "new", "--model", place.model)
+    assert checked.exit_code == 0 and "0 findings" in checked.output

@@ -252,7 +252,9 @@ class ModeReader:
     def _blending(self, modes: KrlModes, operand: said.Operand) -> KrlModes:
         """Read ``SAPO(LCPDAT1)``, ``SAPO_PTP(PPDAT1)`` or ``{CDIS 5.0, ..}``."""
         if isinstance(operand, said.FunctionCall):
-            size = known(self._record(self._argument(operand)).number("apo_dist"))
+            held = self._record(self._argument(operand))
+            share = held.get("apo_mode") == "#cptp"  # then it is no distance
+            size = UNKNOWN if share else known(held.number("apo_dist"))
             return replace(modes, distance=size)
         found = self._record(operand)
         return replace(

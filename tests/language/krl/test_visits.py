@@ -238,6 +238,16 @@ def test_speeds_and_blending():
     np.testing.assert_allclose(v.lin_spd, 0.3)
 
 
+def test_blending_of_inline_settings():
+    """A distance that its record holds as a share of the way is not known."""
+    line, joint = "$APO=SAPO(LCPDAT1)", "$APO=SAPO_PTP(PPDAT1)"
+    found = job(
+        f"SLIN XP1 WITH {line} C_SPL", f"SPTP XP2 WITH {joint} C_SPL", "SLIN XP1"
+    )
+    assert found.visits.zone_mm[0] == 12.5 and "$APO" not in reasons(found)[0]
+    assert "$APO" in reasons(found)[1]
+
+
 @pytest.mark.parametrize(
     ("between", "fly"),
     [
