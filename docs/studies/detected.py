@@ -8,16 +8,18 @@ from __future__ import annotations
 import argparse
 import re
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 from scipy.stats import beta
 
-from postproc.calibration.fit import wrong_nests
+from postproc.calibration.fit import into_base_frame, stated_points, wrong_nests
 from postproc.calibration.measurements import Measurements
 from postproc.calibration.selection import fit_survey
 from postproc.model.effects import BASE_EFFECTS
+from postproc.model.effects.placement import Placement
 from tests.calibration.simulator import (
     NJ,
     PLATE,
@@ -28,6 +30,7 @@ from tests.calibration.simulator import (
 
 OUT = Path(__file__).parents[1] / "detection.md"
 ROWS = 300
+STAND = np.array([3.0, -2.0, 1.5])  # [m] of the tracker, where it is not known
 MM = 1e-3
 TEXT = """# Mistakes in a survey
 
@@ -38,10 +41,11 @@ One mistake is planted, the survey is fitted, and what the fit says is compared 
 Bounds are exact 95 % ones of a binomial share (Clopper and Pearson).
 
 *Found*: an outlier is dropped or weighed down; a wrong direction is fitted the other
-way or as not known; a nest is named. *Invented*: rows, directions or nests that were
-right and are treated so as well. An outlier *at the end* of a joint's range is the row
-with the largest or smallest angle of one joint, drawn; *inside* is any other. Of
-directions, those count whose gap is wide enough for its row to tell it (2 sigma).
+way or as not known; a nest is named, alone or in a group. *Invented*: rows, directions
+or nests that were right and are treated so as well. An outlier *at the end* of a
+joint's range is the row with the largest or smallest angle of one joint, drawn;
+*inside* is any other. Of directions, those count whose gap is wide enough for its row
+to tell it (2 sigma).
 """
 
 
@@ -108,8 +112,14 @@ def directions(seed: int, rate: float) -> Score:
     )  # fmt: skip
 
 
-def nest(seed: int, size: float) -> Score:
-    """Put one nest of three off in a drawn direction; ask whether it is named."""
+def nest(seed: int, size: float, tracker: bool) -> Score:
+    """Put one nest of three off in a drawn direction; ask whether it is named.
+
+    Args:
+        seed: Of the arm, its poses and the tracker's place.
+        size: [m].
+        tracker: Whether the rows are in the tracker's frame, which is not known.
+    """
     rng = np.random.default_rng(seed)
     arm, states = random_arm(rng), random_states(ROWS, rng, PLATE)
     which, way = int(rng.integers(3)), rng.standard_normal(3)
@@ -117,12 +127,26 @@ def nest(seed: int, size: float) -> Score:
     moved = states.tool + np.where(states.tool_id[:, None] == which, off, 0.0)
     position, _ = arm.measure(states.with_(tool=moved), rng)
     survey: Measurements = survey_of(states, position)
-    told = " ".join(wrong_nests(fit_survey(survey, NJ, BASE_EFFECTS, None, ("probe",))))
+    told = " ".join(_told_seen_from(survey, seed) if tracker else _told(survey))
     named = re.search(r"nest (\d) lies|has it, ([\d or]+):", told)
     ids = re.findall(r"\d", (named.group(1) or named.group(2)) if named else "")
     if size == 0.0:
         return Score(0, 0, int(bool(ids)), 1)
     return Score(int(str(which) in ids), 1, int(bool(ids) and str(which) not in ids), 1)
+
+
+def _told(survey: Measurements) -> tuple[str, ...]:
+    """Say what a fit tells of the nests."""
+    return wrong_nests(fit_survey(survey, NJ, BASE_EFFECTS, None, ("probe",)))
+
+
+def _told_seen_from(survey: Measurements, seed: int) -> tuple[str, ...]:
+    """Say it of the same rows as a tracker sees them that stands anywhere."""
+    turn = Rotation.random(random_state=seed).as_matrix()
+    seen = replace(survey, position=(survey.position - STAND) @ turn)
+    points, (placed, found) = stated_points(seen), into_base_frame(seen, NJ)
+    fit = fit_survey(placed, NJ, BASE_EFFECTS, found.tracker, (Placement.name,))
+    return wrong_nests(fit, points)
 
 
 Trial = Callable[[int], Score]
@@ -142,9 +166,10 @@ def trials() -> dict[str, Trial]:
             directions(seed, rate)
         )
     for size in (0.0, 0.2, 0.5):
-        out[f"one nest of three off by {size:g} mm"] = lambda seed, size=size: nest(
-            seed, size * MM
-        )
+        for where in ("", ", tracker frame"):
+            out[f"one nest of three off by {size:g} mm{where}"] = (
+                lambda seed, size=size, where=where: nest(seed, size * MM, bool(where))
+            )
     return out
 
 

@@ -23,6 +23,7 @@ SMALLEST_STEP = 1e-6
 LEAST_BEND = 1e-3
 SETTLED = 1e-5  # nats that a further step promises
 HOPE = 5.0  # times what a step promises that a search is thought to bring
+FAR = 1000.0  # nats that it may bring besides: it climbs out of saddles, step by step
 ROUNDED = 16.0  # units in the last place by which sums over many rows are off
 FEWEST = 4.0  # degrees of freedom that a prior scale is credited with at least
 LOG_SPREAD = 3.0  # hyperprior of log s_g: an order of magnitude is no surprise
@@ -259,7 +260,7 @@ def _climb(
     for _ in range(steps if count else 0):
         step, gained = at.step(radius)
         done = gained < SETTLED or radius < SMALLEST_STEP
-        if done or at.value + HOPE * at.promise < least:
+        if done or at.value + FAR + HOPE * at.promise < least:
             break
         u = np.clip(at.solved.log_scale + step, *LOG_BOUNDS)
         there = _Here.of(normal, group, u, room)

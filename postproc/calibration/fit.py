@@ -9,6 +9,7 @@ from typing import Literal
 
 import numpy as np
 
+from postproc.arrays import Floats
 from postproc.calibration.measurements import (
     Measurements,
     concatenate,
@@ -36,8 +37,12 @@ from postproc.model.registration import Registration
 from postproc.robot.arm import Arm
 from postproc.robot.cell import Cell
 from postproc.robot.pose import MM
+from postproc.robot.state import States
 
 Frame = Literal["base", "tracker"]
+
+SAME_POINT = 1e-4  # [m] nests that are nearer are one, or the cell has not said
+TURNED = 3e-3  # [rad] that a plate may be turned by, as far as a tracker can tell
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,8 +108,9 @@ def fit_measurements(
 ) -> Calibration:
     """Fit a model to measurements, see `fit`."""
     tracker, setup = cell.tracker, several_points(survey)
-    placed = None
+    placed, points = None, None
     if frame == "tracker":
+        points = stated_points(survey)
         survey, placed = into_base_frame(survey, cell.arm)
         tracker, setup = placed.tracker, (Placement.name,)
     check_survey(survey, cell.arm)
@@ -119,7 +125,11 @@ def fit_measurements(
         return Calibration(model, report_method(model, survey, cell.arm), survey)
     fitted = fit_survey(survey, cell.arm, effects, tracker, setup, progress)
     progress("report")
-    told = (*survey.warnings, *moved_tools(fitted, survey), *wrong_nests(fitted))
+    told = (
+        *survey.warnings,
+        *moved_tools(fitted, survey),
+        *wrong_nests(fitted, points),
+    )
     survey = replace(survey, warnings=told)
     model = replace(model_of(fitted, survey), registration=placed)
     report = report_fit(fitted, survey)
@@ -149,16 +159,52 @@ def moved_tools(fitted: Fit, survey: Measurements) -> tuple[str, ...]:
     )
 
 
-def wrong_nests(fitted: Fit) -> tuple[str, ...]:
-    """Tell of a nest that does not lie where the cell says."""
+def wrong_nests(fitted: Fit, points: Floats | None = None) -> tuple[str, ...]:
+    """Tell of a nest that does not lie where the cell says.
+
+    Args:
+        fitted: The fit.
+        points: Where the cell has the nests, flange frame, (k, 3) [m], of rows in the
+            tracker's frame, whose probe points were found with the tracker; None where
+            it does not say.
+    """
     c, told = fitted.combination, []
     for effect, part in zip(c.effects, c.slices, strict=True):
-        if isinstance(effect, Probe):
-            offset = fitted.values[part].reshape(-1, 3)
-            covariance = fitted.covariance[part, part]
-            found = find_wrong_nest(effect.tools, offset, covariance)
-            told += [] if found is None else [str(found)]
+        turned = np.zeros((1, 1))
+        if isinstance(effect, Placement) and points is not None:
+            part, turned = effect.points(part), TURNED**2 * _as_turned(points)
+            beside = _points(fitted.batch.states) - points
+        elif isinstance(effect, Probe):
+            beside = np.zeros(3)
+        else:
+            continue
+        offset = beside + fitted.values[part].reshape(-1, 3)
+        covariance = fitted.covariance[part, part] + turned
+        found = find_wrong_nest(effect.tools, offset, covariance)
+        told += [] if found is None else [str(found)]
     return tuple(told)
+
+
+def _as_turned(points: Floats) -> Floats:
+    """Covariance of points (k, 3) that turn together by 1 rad about any axis."""
+    arms = points - points.mean(axis=0)
+    moved = np.cross(np.eye(3)[:, None], arms).reshape(3, -1)
+    covariance: Floats = moved.T @ moved
+    return covariance
+
+
+def stated_points(survey: Measurements) -> Floats | None:
+    """Say where the cell has the nests, (k, 3) [m], None where it has one or none."""
+    points = _points(survey.states)
+    gaps = np.linalg.norm(points[:, None] - points, axis=2)
+    apart = gaps[np.triu_indices(len(points), 1)]
+    return points if apart.min(initial=np.inf) > SAME_POINT and len(apart) else None
+
+
+def _points(states: States) -> Floats:
+    """Take the probe point of every tool_id, flange frame, (k, 3) [m]."""
+    ids = np.unique(states.tool_id)
+    return np.stack([states.tool[states.tool_id == k].mean(axis=0) for k in ids])
 
 
 def _at(survey: Measurements, order: float) -> str:

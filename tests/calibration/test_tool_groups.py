@@ -3,11 +3,18 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
-from postproc.calibration.fit import fit_measurements, wrong_nests
+from postproc.calibration.fit import (
+    fit_measurements,
+    into_base_frame,
+    stated_points,
+    wrong_nests,
+)
 from postproc.calibration.measurements import Measurements
 from postproc.calibration.plausibility import check_survey
 from postproc.calibration.selection import fit_survey
@@ -139,3 +146,29 @@ def test_of_two_nests_nobody_knows_which_is_off() -> None:
     found = find_wrong_nest((4, 7), offset, 1e-10 * np.eye(6))
     assert found is not None and set(found.tool_ids) == {4, 7}
     assert find_wrong_nest((4,), offset[:1], 1e-10 * np.eye(3)) is None
+
+
+def told_in_tracker_frame(survey: Measurements) -> tuple[str, ...]:
+    """Fit rows that are seen by a tracker that stands anywhere."""
+    turn = Rotation.from_euler("zyx", [0.7, -0.3, 0.2]).as_matrix()
+    seen = replace(survey, position=(survey.position - [3.0, -2.0, 1.5]) @ turn)
+    points, (placed, found) = stated_points(seen), into_base_frame(seen, NJ)
+    assert points is not None
+    fit = fit_survey(placed, NJ, BASE_EFFECTS, found.tracker, ("registration",))
+    return wrong_nests(fit, points)
+
+
+def test_in_the_trackers_frame_a_nest_is_named_too() -> None:
+    (told,) = told_in_tracker_frame(plate_survey(1, 1, [1e-3, 0.0, 0.0]))
+    assert "nest 1 lies (" in told
+    for seed in (0, 7, 22):
+        assert told_in_tracker_frame(plate_survey(seed, 0, [0.0, 0.0, 0.0])) == ()
+
+
+def test_nests_that_the_cell_has_at_one_place_are_not_asked_about() -> None:
+    survey = plate_survey(1, 1, [1e-3, 0.0, 0.0])
+    tool = np.tile(PLATE[0], (len(survey), 1))
+    same = survey.with_states(survey.states.with_(tool=tool))
+    assert stated_points(same) is None
+    one = survey[np.flatnonzero(survey.states.tool_id == 0)]
+    assert stated_points(one) is None

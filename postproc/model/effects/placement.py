@@ -55,6 +55,10 @@ class Placement(Effect):
         ]
         return tuple(out)
 
+    def points(self, part: slice) -> slice:
+        """Say which of its columns are the probe points', point by point."""
+        return slice(part.start + 6, part.stop)
+
     def columns(self, batch: Batch) -> Floats:
         """Differentiate the measured position, (n, 3, 6 + 3 k)."""
         flange, which = batch.walk.flange, batch.states.tool_id
