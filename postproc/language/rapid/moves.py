@@ -222,7 +222,7 @@ class Goals:
             return RapidGoal(Meaning.UNKNOWN, name=name, why=why)
         shown = name + self._element(operand, row, scope)
         main, aux = found
-        file, slots = _places(main)
+        file, slots = self._own_places(main, operand, row, scope)
         values = [number.value for number in main]
         values += [0.0] * (WIDTH - len(values))
         why = "" if joints or _is_unit(values[3:7]) else "no quaternion"
@@ -236,6 +236,28 @@ class Goals:
             why=why or ("" if file >= 0 else "it is computed from other data"),
             pins=self._pinned(name, operand),
         )
+
+    def _own_places(
+        self,
+        numbers: Sequence[WrittenNumber],
+        operand: said.Composite | said.DataObject,
+        row: int,
+        scope: Scope,
+    ) -> tuple[int, tuple[int, ...]]:
+        """Find where numbers stand, nowhere if not all in the point's own statement.
+
+        Other data that a point is built from may serve other points and sums too.
+        """
+        file, slots = _places(numbers)
+        holder = scope.file
+        if isinstance(operand, said.DataObject):
+            found = self.task.constant(operand.name, scope)
+            holder, row = (found[0], found[1].row) if found else (-1, -1)
+        if file < 0 or file != holder:
+            return -1, NO_SLOTS
+        first, behind = self.task.files[file].text.first[row : row + 2].tolist()
+        own = all(first <= one.slot < behind for one in numbers)
+        return (file, slots) if own else (-1, NO_SLOTS)
 
     def _written(
         self, operand: said.Composite, joints: bool, row: int, scope: Scope

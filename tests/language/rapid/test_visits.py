@@ -223,6 +223,21 @@ def test_points_that_must_keep_their_numbers(lines, more, why):
     assert why in found.visits.literals.pinned[0]
 
 
+@pytest.mark.parametrize(
+    ("goal", "more"),
+    [
+        (f"[[x,2,3],[1,0,0,0],{END}", "CONST num x:=1;"),
+        (f"[p1.trans,p1.rot,{END}", ""),
+        ("q", "CONST robtarget q:=p1;"),
+        ("q", f"CONST pos a:=[1,2,3]; CONST robtarget q:=[a,[1,0,0,0],{END};"),
+    ],
+)
+def test_points_built_from_other_data_keep_their_numbers(goal, more):
+    found = task(L.format(goal), more=more)
+    assert reasons(found) == ["it is computed from other data"]
+    assert found.visits.literal.tolist() == [-1]
+
+
 def test_external_axes_are_told():
     p = "[[1,2,3],[1,0,0,0],[0,0,0,0],[9E9,12.5,9E9,9E9,9E9,9E9]]"
     aux = task(L.format(p)).visits.aux
