@@ -80,6 +80,8 @@ def test_frames_zone_and_speed_of_a_move():
         (["SyncMoveOn a,b;", L.format("p1")], "another arm"),
         (["GripLoad part;", L.format("p1")], "GripLoad"),
         (["PDispOn p2,t;", L.format("p1")], "displacement"),
+        (["EOffsSet e;", L.format("p1")], "external axes"),
+        (["SoftAct 1,20;", "StorePath;", "PDispOff;", L.format("p1")], "soft"),
         (["other;", L.format("p1")], "displacement"),
         (["MoveL p1,v200,fine,unknown\\WObj:=w;"], "tool"),
         (["MoveL p1,v200,fine,t\\WObj:=nowhere;"], "nowhere"),
@@ -109,6 +111,7 @@ def test_what_is_not_known_is_left(lines, why):
     [
         ["SoftAct 1,20;", "SoftDeact;"],
         ["PDispOn p2,t;", "PDispOff;"],
+        ["EOffsOn p2;", "EOffsOff;"],
         ["GripLoad part;", "GripLoad load0;"],
         ["ConfL\\Off;", "VelSet 50,1000;", "Set do1;", "WaitTime 1;", 'TPWrite "x";'],
     ],
