@@ -40,6 +40,13 @@ SHORTEST = 0.5  # length of what counts as a quaternion
 Z0 = 0.3  # [mm]
 UNKNOWN_ZONE = -1.0
 RUN_TIME = "it is known only when the program runs"
+# Options whose moves are left.
+_LEFT_BY = {
+    "id": "it moves together with another arm (\\ID)",
+    "corr": "a sensor may correct the path (\\Corr)",
+    "track": "a sensor may correct the path (\\Track)",
+    "tload": "\\TLoad names a load: the model's sag holds for that of the cell file",
+}
 AT_A_STOP = ("spotl", "spotj", "spotml", "spotmj")  # they weld standing still
 
 
@@ -142,9 +149,8 @@ class Goals:
         ends = signature.operands(one.arguments)
         tool, wobj, zone, speed = self._conditions(one, ends, row, scope)
         motion = _motion(one.name, signature)
-        why = "" if signature.reaches else "where a search ends is not known before"
-        if any(argument.name == "id" for argument in one.arguments):
-            why = "it moves together with another arm (\\ID)"
+        why = "" if signature.reaches else _ends_elsewhere(one.name)
+        why = next((_LEFT_BY[a.name] for a in one.arguments if a.name in _LEFT_BY), why)
         if zone == UNKNOWN_ZONE:
             why = why or "its zone is not known: no zonedata of the files at hand"
         if signature.via >= 0:
@@ -365,7 +371,7 @@ class Goals:
         """Read a tool or a work object, by name once for each place it may mean."""
         scope = arguments.scope
         if isinstance(operand, said.DataObject) and not operand.steps:
-            if operand.name == f"{kind}0":
+            if operand.name == f"{kind}0" and arguments.is_built_in(operand.name):
                 return FLANGE if kind == "tool" else WORLD
             key = kind, operand.name, scope.file, scope.module, scope.routine
             if key not in self._frames:
@@ -431,10 +437,23 @@ class _Arguments:
             return "zonedata"
         return "speeddata" if _SPEED.match(operand.name) else ""
 
+    def is_built_in(self, name: str) -> bool:
+        """Tell whether a name is the controller's: no data, no parameter has it."""
+        hidden = name in self.task.declared or name in self.scope.parameters
+        return not hidden
+
+    def _stops(self) -> bool:
+        operand = self.of_type("zonedata")
+        return isinstance(operand, said.DataObject) and operand.name == "fine"
+
     def zone(self) -> float:
         """Return the size of the zone [mm], NaN for a stop, -1 where not known."""
+        if any(one.name == "inpos" for one in self.arguments):
+            return np.nan  # stop-point data stand instead of the zone
         size = self.option("z")
         if size is not None:
+            if self._stops():
+                return UNKNOWN_ZONE
             own = self.task.number(size, self.row, self.scope)
             return own if own >= 0.0 else UNKNOWN_ZONE
         operand = self.of_type("zonedata")
@@ -443,7 +462,7 @@ class _Arguments:
         if operand.name == "fine":
             return np.nan
         usual = _ZONE.match(operand.name)
-        if usual and self.task.datum(operand.name, self.scope) is None:
+        if usual and self.is_built_in(operand.name):
             return float(usual[1]) or Z0
         found = self.task.record(operand, self.row, self.scope)
         if isinstance(found, tuple) and len(found) >= 2:
@@ -461,12 +480,19 @@ class _Arguments:
         if not isinstance(operand, said.DataObject):
             return np.nan
         usual = _SPEED.match(operand.name)
-        if usual and self.task.datum(operand.name, self.scope) is None:
+        if usual and self.is_built_in(operand.name):
             return float(usual[1]) / 1000.0
         found = self.task.record(operand, self.row, self.scope)
         if isinstance(found, tuple) and found and isinstance(found[0], WrittenNumber):
             return found[0].value / 1000.0
         return np.nan
+
+
+def _ends_elsewhere(name: str) -> str:
+    """Say why a move does not end at its target."""
+    if name.startswith("search"):
+        return "where a search ends is not known before"
+    return "only external axes move: the arm stays where it is"
 
 
 @cache

@@ -52,7 +52,8 @@ _KINDS: Mapping[Signature, str] = {
         MoveC MoveCDO MoveCAO MoveCGO MoveCSync TriggC
         ArcC ArcCStart ArcCEnd ArcMoveC PaintC DispC CapC
     """,
-    JOINTS: "MoveAbsJ MoveExtJ TriggAbsJ ArcMoveAbsJ ArcMoveExtJ",
+    JOINTS: "MoveAbsJ TriggAbsJ ArcMoveAbsJ",
+    Signature(joints=True, reaches=False): "MoveExtJ ArcMoveExtJ",  # the arm stays
     SEARCH: "SearchL",
     ARC_SEARCH: "SearchC",
     Signature(to=2, joints=True, reaches=False): "SearchExtJ",

@@ -150,10 +150,14 @@ class RapidTask:
         return self._uses[1]
 
     @cached_property
+    def declared(self) -> frozenset[str]:
+        """Names of all data."""
+        return frozenset(d.declared.name for file in self.files for d in file.data)
+
+    @cached_property
     def twins(self) -> frozenset[str]:
         """Names of points beside which the controller keeps their originals."""
-        names = {d.declared.name for file in self.files for d in file.data}
-        pairs = {name for name in names if f"o_{name}" in names}
+        pairs = {name for name in self.declared if f"o_{name}" in self.declared}
         return frozenset(pairs | {f"o_{name}" for name in pairs})
 
     @cached_property

@@ -88,6 +88,11 @@ def test_frames_zone_and_speed_of_a_move():
         (["MoveL p1,v200,odd,t\\WObj:=w;"], "zone"),
         (["MoveL p1\\ID:=10,v200,fine,t\\WObj:=w;"], "another arm"),
         (["SearchL di1,p2,p1,v20,t\\WObj:=w;"], "search"),
+        (["MoveExtJ j,v5,fine;"], "external axes"),
+        (["MoveL p1,v200,fine,t\\WObj:=w\\Corr;"], "sensor"),
+        (["MoveL p1,v200,fine,t\\WObj:=w\\TLoad:=part;"], "TLoad"),
+        (["ArcL p1,v200,sm,wd,fine,t\\WObj:=w\\Track:=tr;"], "sensor"),
+        (["MoveL p1,v200,fine\\Z:=5,t\\WObj:=w;"], "zone"),
         ([L.format("nobody")], "nobody"),
         (["p3.trans.x:=5;", L.format("p3")], "may be changed"),
         ([L.format("list{n}")], "run"),
@@ -104,6 +109,18 @@ def test_what_is_not_known_is_left(lines, why):
         [[0,0,0],[1,0,0,0]]];"""
     found = task(*lines, "n:=n+1;", more=more)
     assert why in reasons(found)[-1]
+
+
+@pytest.mark.parametrize("name", ["z10", "tool0"])
+def test_a_parameter_hides_what_the_controller_knows(name):
+    type_ = "zonedata" if name == "z10" else "PERS tooldata"
+    zone, tool = (name, "t") if name == "z10" else ("fine", name)
+    more = f"PROC go({type_} {name}) MoveL p1,v200,{zone},{tool}; ENDPROC"
+    assert reasons(task("go fine;", more=more)) != [""]
+
+
+def test_stop_point_data_stop():
+    assert not task("MoveL p1,v200,z10\\Inpos:=inpos50,t;").visits.fly[0]
 
 
 @pytest.mark.parametrize(
