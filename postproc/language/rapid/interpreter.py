@@ -18,11 +18,11 @@ from postproc.language.rapid.modes import (
 from postproc.language.rapid.moves import Goals, RapidVisit, pose_of
 from postproc.language.rapid.program import RapidScope, shown
 from postproc.language.rapid.signatures import (
-    BUILT_IN_FUNCTIONS,
     MOTIONS,
+    STILL_FUNCTIONS,
     known_instructions,
 )
-from postproc.language.rapid.task import RapidTask, Scope, functions_in
+from postproc.language.rapid.task import RapidTask, Scope, functions_in, inside
 from postproc.language.visits import ELSEWHERE, MOTION_UNKNOWN, START, Diagnostic
 
 MOST_STEPS = 4_000_000  # statements run, all in all
@@ -365,7 +365,7 @@ class RapidMachine:
         words = {
             one.word
             for row in flow.handlers
-            if isinstance(one := _opened(text.statement(row)), said.Leave)
+            if isinstance(one := inside(text.statement(row)), said.Leave)
         }
         return "return" in words or not words
 
@@ -377,10 +377,11 @@ class RapidMachine:
         """Run an instruction; None where it goes on in a routine."""
         here = self._after_functions(context, row, one, here)
         name, scope = one.name, context.scope
-        if name in MOTIONS:
-            return self._move(context, row, one, here)
         found = self.task.routine(name, scope)
+        if name in MOTIONS and name not in self.task.routines:
+            return self._move(context, row, one, here)
         if found is not None:
+            self.reached.add((scope.file, row))
             return self._enter_routine(context, row, found, here)
         if name in self.task.routines:
             return self._unknown(context, row, here, "names several routines")
@@ -478,9 +479,10 @@ class RapidMachine:
     ) -> Arrived:
         """Allow for what the functions of a statement do."""
         for name in functions_in(one):
-            if name in BUILT_IN_FUNCTIONS or self._said_still(name):
-                continue
             found = self.task.routine(name, context.scope)
+            own = name in self.task.routines
+            if not own and (name in STILL_FUNCTIONS or self._said_still(name)):
+                continue
             if found is None:
                 what = f"calls the function {name}, which is not known: it may move"
                 here = self._unknown(context, row, here, what)
@@ -520,7 +522,7 @@ class RapidMachine:
         """Tell whether some statements may move the arm."""
         text = self.task.files[scope.file].text
         for row in rows:
-            one = _opened(text.statement(row))
+            one = inside(text.statement(row))
             if isinstance(one, said.LateCall | said.NotUnderstood):
                 return True
             if isinstance(one, said.Instruction):
@@ -548,13 +550,6 @@ def _kind(routine: RapidScope) -> str:
 def _ends(one: said.RapidStatement) -> bool:
     """Tell whether a statement only ends a block, or opens none."""
     return isinstance(one, said.BlockWord) and one.word in ("endif", "endtest")
-
-
-def _opened(one: said.RapidStatement) -> said.RapidStatement:
-    """Return the statement behind a condition."""
-    while isinstance(one, said.CompactIf):
-        one = one.statement
-    return one
 
 
 def _after_block(flow: RoutineFlow, row: int) -> int:

@@ -10,7 +10,12 @@ from functools import cached_property
 from postproc.language.rapid import syntax as said
 from postproc.language.rapid.dialect import COMMENTS
 from postproc.language.rapid.program import Datum, RapidFile, RapidScope
-from postproc.language.rapid.signatures import BUILT_IN_FUNCTIONS, MOTIONS, READING
+from postproc.language.rapid.signatures import (
+    BUILT_IN_FUNCTIONS,
+    BY_STRING,
+    MOTIONS,
+    READING,
+)
 from postproc.language.rapid.targets import operands_of
 
 TARGETS = ("robtarget", "jointtarget")
@@ -136,8 +141,22 @@ class RapidTask:
         found = self.datum(name, here)
         if found is None or found[1].declared.value is None:
             return None
-        fixed = found[1].declared.kind == "const" or name not in self.written
-        return found if fixed else None
+        if name in self.loop_variables:  # it may hide the data
+            return None
+        changed = name in self.written or bool(BY_STRING & self.called)
+        return None if changed and found[1].declared.kind != "const" else found
+
+    @cached_property
+    def called(self) -> frozenset[str]:
+        """Names of all instructions."""
+        found = (inside(one) for file in self.files for one in file.text.said.said)
+        return frozenset(o.name for o in found if isinstance(o, said.Instruction))
+
+    @cached_property
+    def loop_variables(self) -> frozenset[str]:
+        """Names of all variables of loops."""
+        found = (one for file in self.files for one in file.text.said.said)
+        return frozenset(o.name for o in found if isinstance(o, said.ForLoop))
 
     @cached_property
     def written(self) -> frozenset[str]:
@@ -257,14 +276,13 @@ class RapidTask:
     ) -> list[int]:
         """Return the indices from 0 of a step, nothing where they are not known."""
         if isinstance(step, str):
-            return [FIELDS[step]] if step in FIELDS else []
+            return []  # what a record holds where is for its type to say
         values = [self.number(one, row, here) for one in step.subscripts]
         whole = [v for v in values if v == v and v == int(v)]
         return [int(v) - 1 for v in whole] if len(whole) == len(values) else []
 
 
 DEEPEST = 20  # names that stand for names
-FIELDS = {"trans": 0, "rot": 1, "robconf": 2, "extax": 3, "x": 0, "y": 1, "z": 2}
 
 
 def _computed(operator: str, parts: Sequence[float]) -> float:
@@ -393,6 +411,13 @@ def _note_operand(
                 _note_arguments(arguments, written, read)
 
 
+def inside(one: said.RapidStatement) -> said.RapidStatement:
+    """Return the statement behind a condition, the statement itself without one."""
+    while isinstance(one, said.CompactIf):
+        one = one.statement
+    return one
+
+
 def functions_in(one: said.RapidStatement) -> Iterator[str]:
     """Yield the names of the functions that a statement calls."""
     match one:
@@ -404,6 +429,8 @@ def functions_in(one: said.RapidStatement) -> Iterator[str]:
             operands = (first, last, step)
         case said.Leave(value=value):
             operands = (value,)
+        case said.Assignment(target=target, value=value):
+            operands = (target, value)
         case _:
             operands = operands_of(one)
     waiting = list(operands)
@@ -412,5 +439,8 @@ def functions_in(one: said.RapidStatement) -> Iterator[str]:
             case said.FunctionCall(name=name, arguments=arguments):
                 yield name
                 waiting += [argument.value for argument in arguments]
+            case said.DataObject(steps=steps):
+                for at in steps:
+                    waiting += at.subscripts if isinstance(at, said.ElementStep) else ()
             case said.Composite(items=items) | said.Operation(operands=items):
                 waiting += items
