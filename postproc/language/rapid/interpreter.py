@@ -17,11 +17,11 @@ from postproc.language.rapid import syntax as said
 from postproc.language.rapid.modes import AT_START, HARMLESS, changed_modes
 from postproc.language.rapid.moves import Goals, pose_of
 from postproc.language.rapid.signatures import (
-    BUILT_IN_FUNCTIONS,
     MOTIONS,
+    STILL_FUNCTIONS,
     known_instructions,
 )
-from postproc.language.rapid.task import RapidTask, functions_in
+from postproc.language.rapid.task import RapidTask, functions_in, inside
 from postproc.language.visits import START
 
 HANDLERS = ("undo", "backward")
@@ -128,7 +128,7 @@ class RapidMachine(TaskMachine):
         words = {
             one.word
             for row in flow.handlers
-            if isinstance(one := _opened(text.statement(row)), said.Leave)
+            if isinstance(one := inside(text.statement(row)), said.Leave)
         }
         return "return" in words or not words
 
@@ -163,10 +163,11 @@ class RapidMachine(TaskMachine):
         """Run an instruction; None where it goes on in a routine."""
         here = self.after_functions(context, row, one, here)
         name, scope = one.name, context.scope
-        if name in MOTIONS:
-            return self._move(context, row, one, here)
         found = self.task.routine(name, scope)
+        if name in MOTIONS and name not in self.task.routines:
+            return self._move(context, row, one, here)
         if found is not None:
+            self.reached.add((scope.file, row))
             return self.enter_routine(context, row, found, here)
         if name in self.task.routines:
             return self.unknown(context, row, here, "names several routines")
@@ -197,9 +198,10 @@ class RapidMachine(TaskMachine):
     ) -> Arrived:
         """Allow for what the functions of a statement do."""
         for name in functions_in(one):
-            if name in BUILT_IN_FUNCTIONS or self.said_still(name):
-                continue
             found = self.task.routine(name, context.scope)
+            own = name in self.task.routines
+            if not own and (name in STILL_FUNCTIONS or self.said_still(name)):
+                continue
             if found is None:
                 what = f"calls the function {name}, which is not known: it may move"
                 here = self.unknown(context, row, here, what)
@@ -224,7 +226,7 @@ class RapidMachine(TaskMachine):
         """Tell whether some statements may move the arm."""
         text = self.texts[scope.file]
         for row in rows:
-            one = _opened(text.statement(row))
+            one = inside(text.statement(row))
             if isinstance(one, said.LateCall | said.NotUnderstood):
                 return True
             if isinstance(one, said.Instruction):
@@ -247,10 +249,3 @@ _HANDLER = "the error handler of its routine may move the arm, or change its set
 
 def _kind(routine: HeadedRows) -> str:
     return getattr(routine.head, "kind", "")
-
-
-def _opened(one: said.RapidStatement) -> said.RapidStatement:
-    """Return the statement behind a condition."""
-    while isinstance(one, said.CompactIf):
-        one = one.statement
-    return one

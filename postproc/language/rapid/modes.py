@@ -60,11 +60,14 @@ LOST = Modes(
     override=0.0,
 )
 
+OFFSET = "external axes are offset (EOffsOn, EOffsSet)"
 # Instructions that let the arm go elsewhere than targets say, and those that end it.
 BLOCKING = {
     "softact": ("softdeact", "an axis is soft (SoftAct)"),
     "corrcon": ("corrdiscon corrclear", "a sensor may correct the path (CorrCon)"),
     "syncmoveon": ("syncmoveoff", "it moves together with another arm (SyncMoveOn)"),
+    "eoffson": ("eoffsoff", OFFSET),
+    "eoffsset": ("eoffsoff", OFFSET),
     "waitwobj": ("dropwobj", "the work object is on a conveyor (WaitWObj)"),
 }
 _ENDING = {name: why for ends, why in BLOCKING.values() for name in ends.split()}
@@ -72,8 +75,8 @@ PAYLOAD = "GripLoad names a load: the model's sag holds for that of the cell fil
 # They change nothing of where a target is and from which side it is reached.
 HARMLESS = frozenset(
     """
-    accset speedrefresh worldacclim pathacclim pathresol motionsup eoffson eoffsset
-    eoffsoff mechunitload actunit deactunit corrwrite tuneservo tunereset stopmove
+    accset speedrefresh worldacclim pathacclim pathresol motionsup
+    mechunitload actunit deactunit corrwrite tuneservo tunereset stopmove
     startmove
     """.split()
 )
@@ -122,7 +125,7 @@ def changed_modes(
         return replace(modes, blocked=modes.blocked | {BLOCKING[name][1]})
     if name in _ENDING:
         return replace(modes, blocked=modes.blocked - {_ENDING[name]})
-    return modes if name in HARMLESS else LOST
+    return modes if name in HARMLESS else replace(LOST, blocked=modes.blocked)
 
 
 # Only \CirPointOri takes the tool through the orientation of the circle's point.

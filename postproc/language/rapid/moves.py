@@ -47,6 +47,13 @@ SHORTEST = 0.5  # length of what counts as a quaternion
 Z0 = 0.3  # [mm]
 UNKNOWN_ZONE = -1.0
 RUN_TIME = "it is known only when the program runs"
+# Options whose moves are left.
+_LEFT_BY = {
+    "id": "it moves together with another arm (\\ID)",
+    "corr": "a sensor may correct the path (\\Corr)",
+    "track": "a sensor may correct the path (\\Track)",
+    "tload": "\\TLoad names a load: the model's sag holds for that of the cell file",
+}
 AT_A_STOP = ("spotl", "spotj", "spotml", "spotmj")  # they weld standing still
 
 
@@ -108,9 +115,8 @@ class Goals:
         ends = signature.operands(one.arguments)
         tool, wobj, zone, speed = self._conditions(one, ends, row, scope)
         motion = _motion(one.name, signature)
-        why = "" if signature.reaches else "where a search ends is not known before"
-        if any(argument.name == "id" for argument in one.arguments):
-            why = "it moves together with another arm (\\ID)"
+        why = "" if signature.reaches else _ends_elsewhere(one.name)
+        why = next((_LEFT_BY[a.name] for a in one.arguments if a.name in _LEFT_BY), why)
         if zone == UNKNOWN_ZONE:
             why = why or "its zone is not known: no zonedata of the files at hand"
         if signature.via >= 0:
@@ -190,7 +196,7 @@ class Goals:
             return FoundGoal(Meaning.UNKNOWN, NOTHING, name=name, why=why)
         shown = name + self._element(operand, row, scope)
         main, aux = found
-        file, slots = _places(main)
+        file, slots = self._own_places(main, operand, row, scope)
         values = [number.value for number in main]
         values += [0.0] * (WIDTH - len(values))
         why = "" if joints or _is_unit(values[3:7]) else "no quaternion"
@@ -204,6 +210,28 @@ class Goals:
             why=why or ("" if file >= 0 else "it is computed from other data"),
             pins=self._pinned(name, operand),
         )
+
+    def _own_places(
+        self,
+        numbers: Sequence[WrittenNumber],
+        operand: said.Composite | said.DataObject,
+        row: int,
+        scope: Scope,
+    ) -> tuple[int, tuple[int, ...]]:
+        """Find where numbers stand, nowhere if not all in the point's own statement.
+
+        Other data that a point is built from may serve other points and sums too.
+        """
+        file, slots = _places(numbers)
+        holder = scope.file
+        if isinstance(operand, said.DataObject):
+            found = self.task.constant(operand.name, scope)
+            holder, row = (found[0], found[1].row) if found else (-1, -1)
+        if file < 0 or file != holder:
+            return -1, NO_SLOTS
+        first, behind = self.task.files[file].text.first[row : row + 2].tolist()
+        own = all(first <= one.slot < behind for one in numbers)
+        return (file, slots) if own else (-1, NO_SLOTS)
 
     def _written(
         self, operand: said.Composite, joints: bool, row: int, scope: Scope
@@ -313,7 +341,7 @@ class Goals:
         """Read a tool or a work object, by name once for each place it may mean."""
         scope = arguments.scope
         if isinstance(operand, said.DataObject) and not operand.steps:
-            if operand.name == f"{kind}0":
+            if operand.name == f"{kind}0" and arguments.is_built_in(operand.name):
                 return FLANGE if kind == "tool" else WORLD
             key = kind, operand.name, scope.file, scope.module, scope.routine
             if key not in self._frames:
@@ -378,10 +406,23 @@ class _Arguments:
             return "zonedata"
         return "speeddata" if _SPEED.match(operand.name) else ""
 
+    def is_built_in(self, name: str) -> bool:
+        """Tell whether a name is the controller's: no data, no parameter has it."""
+        hidden = name in self.task.declared or name in self.scope.parameters
+        return not hidden
+
+    def _stops(self) -> bool:
+        operand = self.of_type("zonedata")
+        return isinstance(operand, said.DataObject) and operand.name == "fine"
+
     def zone(self) -> float:
         """Return the size of the zone [mm], NaN for a stop, -1 where not known."""
+        if any(one.name == "inpos" for one in self.arguments):
+            return np.nan  # stop-point data stand instead of the zone
         size = self.option("z")
         if size is not None:
+            if self._stops():
+                return UNKNOWN_ZONE
             own = self.task.number(size, self.row, self.scope)
             return own if own >= 0.0 else UNKNOWN_ZONE
         operand = self.of_type("zonedata")
@@ -390,7 +431,7 @@ class _Arguments:
         if operand.name == "fine":
             return np.nan
         usual = _ZONE.match(operand.name)
-        if usual and self.task.datum(operand.name, self.scope) is None:
+        if usual and self.is_built_in(operand.name):
             return float(usual[1]) or Z0
         found = self.task.record(operand, self.row, self.scope)
         if isinstance(found, tuple) and len(found) >= 2:
@@ -408,12 +449,19 @@ class _Arguments:
         if not isinstance(operand, said.DataObject):
             return np.nan
         usual = _SPEED.match(operand.name)
-        if usual and self.task.datum(operand.name, self.scope) is None:
+        if usual and self.is_built_in(operand.name):
             return float(usual[1]) / 1000.0
         found = self.task.record(operand, self.row, self.scope)
         if isinstance(found, tuple) and found and isinstance(found[0], WrittenNumber):
             return found[0].value / 1000.0
         return np.nan
+
+
+def _ends_elsewhere(name: str) -> str:
+    """Say why a move does not end at its target."""
+    if name.startswith("search"):
+        return "where a search ends is not known before"
+    return "only external axes move: the arm stays where it is"
 
 
 @cache

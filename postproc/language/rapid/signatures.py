@@ -52,7 +52,8 @@ _KINDS: Mapping[Signature, str] = {
         MoveC MoveCDO MoveCAO MoveCGO MoveCSync TriggC
         ArcC ArcCStart ArcCEnd ArcMoveC PaintC DispC CapC
     """,
-    JOINTS: "MoveAbsJ MoveExtJ TriggAbsJ ArcMoveAbsJ ArcMoveExtJ",
+    JOINTS: "MoveAbsJ TriggAbsJ ArcMoveAbsJ",
+    Signature(joints=True, reaches=False): "MoveExtJ ArcMoveExtJ",  # the arm stays
     SEARCH: "SearchL",
     ARC_SEARCH: "SearchC",
     Signature(to=2, joints=True, reaches=False): "SearchExtJ",
@@ -100,10 +101,16 @@ BUILT_IN_FUNCTIONS = frozenset(
     abs acos asin atan atan2 cos sin tan exp pow round sqrt trunc dim
     offs reltool distance dotprod normalize posemult poseinv posevect orientzyx eulerzyx
     defframe defaccframe defdframe mirpos crobt cjointt cpos ctool cwobj calcrobt
-    calcjointt numtostr strlen strpart strtoval valtostr ctime cdate clkread gettime
+    calcjointt numtostr strlen strpart valtostr ctime cdate clkread gettime
     doutput dinput goutput testdi valid present ispers isvar opmode runmode execlevel
     isstopmoveact isstopstateevent ismechunitactive bitand bitor bitxor bitneg bitcheck
-    stringmatch strfind strmap strmatch strorder gettaskname robos max min
+    stringmatch strfind strmap strmatch strorder gettaskname robos
     """.split()
 )
 """Functions that neither move nor change the data that they are given."""
+
+STILL_FUNCTIONS = BUILT_IN_FUNCTIONS | {"strtoval"}
+"""Functions that do not move."""
+
+BY_STRING = frozenset(["setdataval", "setalldataval"])
+"""Instructions that change data whose names they are given in strings."""

@@ -12,7 +12,12 @@ from postproc.language.machine import Scope
 from postproc.language.rapid import syntax as said
 from postproc.language.rapid.dialect import COMMENTS
 from postproc.language.rapid.program import Datum, RapidFile
-from postproc.language.rapid.signatures import BUILT_IN_FUNCTIONS, MOTIONS, READING
+from postproc.language.rapid.signatures import (
+    BUILT_IN_FUNCTIONS,
+    BY_STRING,
+    MOTIONS,
+    READING,
+)
 from postproc.language.rapid.targets import operands_of
 
 TARGETS = ("robtarget", "jointtarget")
@@ -120,8 +125,22 @@ class RapidTask:
         found = self.datum(name, here)
         if found is None or found[1].declared.value is None:
             return None
-        fixed = found[1].declared.kind == "const" or name not in self.written
-        return found if fixed else None
+        if name in self.loop_variables:  # it may hide the data
+            return None
+        changed = name in self.written or bool(BY_STRING & self.called)
+        return None if changed and found[1].declared.kind != "const" else found
+
+    @cached_property
+    def called(self) -> frozenset[str]:
+        """Names of all instructions."""
+        found = (inside(one) for file in self.files for one in file.text.said.said)
+        return frozenset(o.name for o in found if isinstance(o, said.Instruction))
+
+    @cached_property
+    def loop_variables(self) -> frozenset[str]:
+        """Names of all variables of loops."""
+        found = (one for file in self.files for one in file.text.said.said)
+        return frozenset(o.name for o in found if isinstance(o, said.ForLoop))
 
     @cached_property
     def written(self) -> frozenset[str]:
@@ -134,10 +153,14 @@ class RapidTask:
         return self._uses[1]
 
     @cached_property
+    def declared(self) -> frozenset[str]:
+        """Names of all data."""
+        return frozenset(d.declared.name for file in self.files for d in file.data)
+
+    @cached_property
     def twins(self) -> frozenset[str]:
         """Names of points beside which the controller keeps their originals."""
-        names = {d.declared.name for file in self.files for d in file.data}
-        pairs = {name for name in names if f"o_{name}" in names}
+        pairs = {name for name in self.declared if f"o_{name}" in self.declared}
         return frozenset(pairs | {f"o_{name}" for name in pairs})
 
     @cached_property
@@ -237,14 +260,13 @@ class RapidTask:
     ) -> list[int]:
         """Return the indices from 0 of a step, nothing where they are not known."""
         if isinstance(step, str):
-            return [FIELDS[step]] if step in FIELDS else []
+            return []  # what a record holds where is for its type to say
         values = [self.number(one, row, here) for one in step.subscripts]
         whole = [v for v in values if v == v and v == int(v)]
         return [int(v) - 1 for v in whole] if len(whole) == len(values) else []
 
 
 DEEPEST = 20  # names that stand for names
-FIELDS = {"trans": 0, "rot": 1, "robconf": 2, "extax": 3, "x": 0, "y": 1, "z": 2}
 
 
 def _computed(operator: str, parts: Sequence[float]) -> float:
@@ -373,6 +395,13 @@ def _note_operand(
                 _note_arguments(arguments, written, read)
 
 
+def inside(one: said.RapidStatement) -> said.RapidStatement:
+    """Return the statement behind a condition, the statement itself without one."""
+    while isinstance(one, said.CompactIf):
+        one = one.statement
+    return one
+
+
 def functions_in(one: said.RapidStatement) -> Iterator[str]:
     """Yield the names of the functions that a statement calls."""
     match one:
@@ -384,6 +413,8 @@ def functions_in(one: said.RapidStatement) -> Iterator[str]:
             operands = (first, last, step)
         case said.Leave(value=value):
             operands = (value,)
+        case said.Assignment(target=target, value=value):
+            operands = (target, value)
         case _:
             operands = operands_of(one)
     waiting = list(operands)
@@ -392,5 +423,8 @@ def functions_in(one: said.RapidStatement) -> Iterator[str]:
             case said.FunctionCall(name=name, arguments=arguments):
                 yield name
                 waiting += [argument.value for argument in arguments]
+            case said.DataObject(steps=steps):
+                for at in steps:
+                    waiting += at.subscripts if isinstance(at, said.ElementStep) else ()
             case said.Composite(items=items) | said.Operation(operands=items):
                 waiting += items

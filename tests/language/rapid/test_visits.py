@@ -80,12 +80,19 @@ def test_frames_zone_and_speed_of_a_move():
         (["SyncMoveOn a,b;", L.format("p1")], "another arm"),
         (["GripLoad part;", L.format("p1")], "GripLoad"),
         (["PDispOn p2,t;", L.format("p1")], "displacement"),
+        (["EOffsSet e;", L.format("p1")], "external axes"),
+        (["SoftAct 1,20;", "StorePath;", "PDispOff;", L.format("p1")], "soft"),
         (["other;", L.format("p1")], "displacement"),
         (["MoveL p1,v200,fine,unknown\\WObj:=w;"], "tool"),
         (["MoveL p1,v200,fine,t\\WObj:=nowhere;"], "nowhere"),
         (["MoveL p1,v200,odd,t\\WObj:=w;"], "zone"),
         (["MoveL p1\\ID:=10,v200,fine,t\\WObj:=w;"], "another arm"),
         (["SearchL di1,p2,p1,v20,t\\WObj:=w;"], "search"),
+        (["MoveExtJ j,v5,fine;"], "external axes"),
+        (["MoveL p1,v200,fine,t\\WObj:=w\\Corr;"], "sensor"),
+        (["MoveL p1,v200,fine,t\\WObj:=w\\TLoad:=part;"], "TLoad"),
+        (["ArcL p1,v200,sm,wd,fine,t\\WObj:=w\\Track:=tr;"], "sensor"),
+        (["MoveL p1,v200,fine\\Z:=5,t\\WObj:=w;"], "zone"),
         ([L.format("nobody")], "nobody"),
         (["p3.trans.x:=5;", L.format("p3")], "may be changed"),
         ([L.format("list{n}")], "run"),
@@ -104,11 +111,54 @@ def test_what_is_not_known_is_left(lines, why):
     assert why in reasons(found)[-1]
 
 
+@pytest.mark.parametrize("name", ["z10", "tool0"])
+def test_a_parameter_hides_what_the_controller_knows(name):
+    type_ = "zonedata" if name == "z10" else "PERS tooldata"
+    zone, tool = (name, "t") if name == "z10" else ("fine", name)
+    more = f"PROC go({type_} {name}) MoveL p1,v200,{zone},{tool}; ENDPROC"
+    assert reasons(task("go fine;", more=more)) != [""]
+
+
+@pytest.mark.parametrize(
+    ("lines", "more"),
+    [
+        (['ok:=StrToVal("x",p);', L.format("p")], ""),
+        (['SetDataVal "p",p1;', L.format("p")], ""),
+        (["IF n=1 SetAllDataVal \"robtarget\",p1;", L.format("p")], ""),
+        (["FOR k FROM 1 TO n DO", L.format("list{k}"), "ENDFOR"], "CONST num k:=2;"),
+        ([L.format("s.x")], "RECORD st robtarget y; robtarget x; ENDRECORD "
+         f"PERS st s:=[[[1,2,3],[1,0,0,0],{END},[[4,5,6],[1,0,0,0],{END}];"),
+    ],
+)  # fmt: skip
+def test_what_may_be_changed_unseen_is_left(lines, more):
+    point = f"VAR robtarget p:=[[1,2,3],[1,0,0,0],{END};"
+    found = task(*lines, "n:=n+1;", more=f"VAR num n; VAR bool ok; {more}{point}")
+    assert "run" in reasons(found)[0]
+
+
+def test_own_routines_hide_those_of_the_controller():
+    body = L.format("p1")
+    given = "SpotL p2;", "n:=max(1,2);", L.format("p2"), "n:=list{f(1)}.trans.x;"
+    more = f"""VAR num n;
+      PROC SpotL(robtarget p) {body} ENDPROC
+      FUNC num max(num a,num b) {body} RETURN 1; ENDFUNC
+      FUNC num f(num a) {body} RETURN 1; ENDFUNC"""
+    found = task(*given, more=more)
+    assert names(found) == ["p1", "p2"] and origins(found)[1] == [ELSEWHERE]
+    said = [d.message for d in found.diagnostics if d.code == "motion-unknown"]
+    assert len(said) == 2
+
+
+def test_stop_point_data_stop():
+    assert not task("MoveL p1,v200,z10\\Inpos:=inpos50,t;").visits.fly[0]
+
+
 @pytest.mark.parametrize(
     "lines",
     [
         ["SoftAct 1,20;", "SoftDeact;"],
         ["PDispOn p2,t;", "PDispOff;"],
+        ["EOffsOn p2;", "EOffsOff;"],
         ["GripLoad part;", "GripLoad load0;"],
         ["ConfL\\Off;", "VelSet 50,1000;", "Set do1;", "WaitTime 1;", 'TPWrite "x";'],
     ],
@@ -221,6 +271,21 @@ def test_shifted_points_follow_theirs():
 def test_points_that_must_keep_their_numbers(lines, more, why):
     found = task(L.format("p1"), *lines, more=more)
     assert why in found.visits.literals.pinned[0]
+
+
+@pytest.mark.parametrize(
+    ("goal", "more"),
+    [
+        (f"[[x,2,3],[1,0,0,0],{END}", "CONST num x:=1;"),
+        (f"[p1.trans,p1.rot,{END}", ""),
+        ("q", "CONST robtarget q:=p1;"),
+        ("q", f"CONST pos a:=[1,2,3]; CONST robtarget q:=[a,[1,0,0,0],{END};"),
+    ],
+)
+def test_points_built_from_other_data_keep_their_numbers(goal, more):
+    found = task(L.format(goal), more=more)
+    assert "other data" in reasons(found)[0] or "run" in reasons(found)[0]
+    assert found.visits.literal.tolist() == [-1]
 
 
 def test_external_axes_are_told():
