@@ -99,6 +99,7 @@ class Arrived:
         return Arrived(NOWHERE, replace(LOST, blocked=blocked))
 
 
+STOPPED = ("storepath", "clearpath", "stopmovereset")  # somewhere on its path
 NOWHERE = frozenset([ELSEWHERE])
 _NOT_FOLLOWED = "may move the arm: it is not followed"
 Place = tuple[CallContext, int]
@@ -234,7 +235,9 @@ class RapidMachine:
             case said.JumpTo(name=name):
                 self._jump(context, row, name, here)
             case said.Leave(word=word):
-                if word == "return":
+                if word == "raise" and context.flow.handlers:  # TRYNEXT goes on here
+                    self._enter(context, row + 1, here)
+                if word in ("return", "raise"):  # a caller's handler may go on there
                     self._return(context, here)
             case said.CompactIf(statement=inside):
                 self._enter(context, row + 1, here)
@@ -386,6 +389,8 @@ class RapidMachine:
         if name in self.task.routines:
             return self._unknown(context, row, here, "names several routines")
         kind = known_instructions().get(name)
+        if name in STOPPED:
+            return here.lost()
         if kind == "modal":
             modes = changed_modes(
                 name, one.arguments, here.modes,
