@@ -283,7 +283,9 @@ class TaskMachine(ABC):
             case said.JumpTo(name=name):
                 self._jump(context, row, name, here)
             case said.Leave(word=word):
-                if word == "return":
+                if word == "raise" and flow.handlers:  # one of them may go on here
+                    self.enter(context, row + 1, here)
+                if word in ("return", "raise"):  # a caller's handler may go on there
                     self._return(context, here)
                 elif word == EXIT:
                     self._exit(context, row, here)

@@ -25,6 +25,7 @@ from postproc.language.rapid.task import RapidTask, functions_in, inside
 from postproc.language.visits import START
 
 HANDLERS = ("undo", "backward")
+STOPPED = ("storepath", "clearpath", "stopmovereset")  # somewhere on its path
 _PLAIN = (
     said.FileHeader, said.DataDeclaration, said.ConnectTrap, said.Assignment,
     said.TypeAlias,
@@ -172,6 +173,8 @@ class RapidMachine(TaskMachine):
         if name in self.task.routines:
             return self.unknown(context, row, here, "names several routines")
         kind = known_instructions().get(name)
+        if name in STOPPED:
+            return here.lost()
         if kind == "modal":
             modes = changed_modes(
                 name, one.arguments, here.modes,

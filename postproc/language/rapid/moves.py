@@ -287,6 +287,8 @@ class Goals:
                 f"{name} stands beside its original (o_): the controller limits how "
                 "far apart they may be"
             )
+        if "getdataval" in self.task.called:
+            return f"GetDataVal may take {name} by a name in a string"
         if name in self.task.read:
             return f"{name} is used otherwise than as a destination too"
         return ""

@@ -136,6 +136,18 @@ def test_what_may_be_changed_unseen_is_left(lines, more):
     assert "run" in reasons(found)[0]
 
 
+def test_a_raised_error_goes_on_behind_the_call():
+    more = """VAR num n; PERS pose d:=[[0,0,9],[1,0,0,0]];
+      PROC sub() IF n>1 THEN PDispSet d; RAISE 5; ENDIF ENDPROC"""
+    found = task("sub;", L.format("p1"), "PDispOff;", "ERROR", "TRYNEXT;", more=more)
+    assert "displacement" in reasons(found)[0]
+
+
+def test_nobody_knows_where_a_cleared_path_ends():
+    found = task(L.format("p1"), "ClearPath;", "PDispOff;", L.format("p2"))
+    assert origins(found)[1] == [ELSEWHERE]
+
+
 def test_own_routines_hide_those_of_the_controller():
     body = L.format("p1")
     given = "SpotL p2;", "n:=max(1,2);", L.format("p2"), "n:=list{f(1)}.trans.x;"
@@ -265,6 +277,7 @@ def test_shifted_points_follow_theirs():
     [
         (["MoveL RelTool(p1,0,0,5\\Rz:=9),v200,fine,t\\WObj:=w;"], "", "turns it"),
         (["far:=Distance(p1.trans,p2.trans);"], "VAR num far;", "otherwise"),
+        (['GetDataVal "p1",q;'], f"VAR robtarget q:=[[1,2,3],[1,0,0,0],{END};", "Get"),
         ([], f"CONST robtarget o_p1:=[[1,2,3],[1,0,0,0],{END};", "original"),
     ],
 )
