@@ -166,6 +166,23 @@ def variance(
     covariance: Floats,
 ) -> Floats: ...
 
+# design.rs: sums over the rows of a fit (`postproc.calibration.design`)
+def gram(
+    moving: tuple[Floats, Floats],
+    turning: tuple[Floats, Sequence[int]],
+    splines: tuple[Ints, Floats, Sequence[int], int],
+) -> tuple[Floats, Floats]: ...
+def uncertainty(
+    moving: tuple[Floats, Floats],
+    turning: tuple[Floats, Sequence[int]],
+    splines: tuple[Ints, Floats, Sequence[int], int],
+    form: tuple[Floats, Floats],
+) -> Floats: ...
+
+# evidence.rs: normal equations (`postproc.calibration.evidence`)
+def scaled(gram: Floats, scale: Floats, out: Floats) -> None: ...
+def by_groups(lower: Floats, z: Floats, group: Ints, count: int) -> Floats: ...
+
 # text.rs: lines of a file, but for numbers and names (`postproc.language.scan`)
 def form_of(mask: bytes) -> tuple[bytes, list[str]]: ...
 def line_starts(data: bytes) -> Ints: ...

@@ -1,34 +1,63 @@
 """The design matrix of a fit: derivatives of positions, kept as they arise.
 
 The column of a joint effect is J_j(q) phi(covariate). Sums over rows need J and phi
-alone: a third of the numbers, and a sixth of the work.
+alone; of phi that are made of splines, the four that are not 0 at a row. The core sums
+(`native/src/design.rs`).
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 
+from postproc import _native
 from postproc.arrays import Floats, Ints
 from postproc.model.combination import Combination
 from postproc.model.effects.effect import Effect, JointEffect
 from postproc.model.kinematics import Batch
+from postproc.model.splines import Splines
+
+Features = tuple[
+    tuple[Floats, Floats],
+    tuple[Floats, list[int]],
+    tuple[Ints, Floats, list[int], int],
+]
+
+BLOCK = 1024  # rows that are written out at once
 
 
 @dataclass(frozen=True, eq=False)
 class JointColumns:
-    """Columns of all effects that turn one joint.
+    """Columns that turn joints by a number of their own at every row.
+
+    Attributes:
+        joint: The joint of each, from 0, (d,).
+        places: Their places among the parameters, (d,).
+        angles: By what they turn it, (n, d) [rad per unit].
+    """
+
+    joint: Ints
+    places: Ints
+    angles: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class SplineColumns:
+    """Columns that turn one joint and are made of splines.
 
     Attributes:
         joint: The joint, from 0.
         places: Their places among the parameters, (k,).
-        angles: By what they turn the joint, (k, n) [rad per unit].
+        splines: At the n rows.
+        mix: What of each makes every column, (m, k) [rad per unit].
     """
 
     joint: int
     places: Ints
-    angles: Floats
+    splines: Splines
+    mix: Floats
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,13 +66,15 @@ class DesignMatrix:
 
     Attributes:
         jacobian: By joint angles, (n, 3, 6) [m/rad].
-        joints: Columns of effects that turn joints, by joint.
+        turning: Columns of effects that turn joints, but for those made of splines.
+        splines: Those.
         direct: Columns of all other effects, (n, 3, m) [m per unit].
         moving: Their places among the parameters, (m,).
     """
 
     jacobian: Floats
-    joints: tuple[JointColumns, ...]
+    turning: JointColumns
+    splines: tuple[SplineColumns, ...]
     direct: Floats
     moving: Ints
 
@@ -51,49 +82,62 @@ class DesignMatrix:
     def of(cls, combination: Combination, at: Batch) -> DesignMatrix:
         """Differentiate the effects at the kinematics of a batch."""
         places = np.arange(len(combination.parameters))
-        moving = [np.zeros(0, dtype=int)]
-        turning: dict[int, tuple[list[Ints], list[Floats]]] = {}
+        moving, joint, turning = [places[:0]], [places[:0]], [places[:0]]
+        angles, splines = [np.zeros((len(at), 0))], []
         for effect, part in zip(combination.effects, combination.slices, strict=True):
             if not isinstance(effect, JointEffect):
                 moving.append(places[part])
-                continue
-            angles, joint = effect.basis(at).T, effect.acts_on()
-            for j in np.unique(joint):
-                own = turning.setdefault(int(j), ([], []))
-                own[0].append(places[part][joint == j])
-                own[1].append(angles[joint == j])
-        joints = tuple(
-            JointColumns(j, np.concatenate(own), np.concatenate(angles))
-            for j, (own, angles) in sorted(turning.items())
+            elif (made_of := effect.splines(at)) is not None:
+                splines += _splines(places[part], made_of)
+            else:
+                joint.append(effect.acts_on())
+                turning.append(places[part])
+                angles.append(effect.basis(at))
+        columns = JointColumns(
+            np.concatenate(joint), np.concatenate(turning), np.concatenate(angles, 1)
         )
         direct = _direct(combination.effects, at)
-        return cls(at.jacobian, joints, direct, np.concatenate(moving))
+        jacobian = np.ascontiguousarray(at.jacobian)
+        return cls(jacobian, columns, tuple(splines), direct, np.concatenate(moving))
 
     def at(self, combination: Combination, at: Batch) -> DesignMatrix:
         """Differentiate the same effects at other kinematics of the same states."""
+        jacobian = np.ascontiguousarray(at.jacobian)
+        return replace(self, jacobian=jacobian, direct=_direct(combination.effects, at))
+
+    def __getitem__(self, rows: Ints) -> DesignMatrix:
+        """Return some of the rows."""
+        turning = replace(self.turning, angles=self.turning.angles[rows])
+        splines = tuple(replace(c, splines=c.splines[rows]) for c in self.splines)
         return replace(
-            self, jacobian=at.jacobian, direct=_direct(combination.effects, at)
-        )
+            self, jacobian=self.jacobian[rows], turning=turning, splines=splines,
+            direct=self.direct[rows],
+        )  # fmt: skip
 
     @property
     def size(self) -> int:
         """Number of parameters."""
-        return len(self.moving) + sum(len(c.places) for c in self.joints)
+        turning = len(self.turning.places) + sum(len(c.places) for c in self.splines)
+        return len(self.moving) + turning
 
     def dense(self) -> Floats:
         """Write all columns out, (n, 3, p)."""
-        n = len(self.jacobian)
-        out = np.empty((self.size, 3, n))
+        out = np.empty((self.size, 3, len(self.jacobian)))
         out[self.moving] = self.direct.T
-        for c in self.joints:
-            out[c.places] = self.jacobian[:, :, c.joint].T * c.angles[:, None]
+        axes, t = self.jacobian.T, self.turning
+        out[t.places] = axes[t.joint] * t.angles.T[:, None]
+        for c in self.splines:
+            out[c.places] = axes[c.joint] * c.splines.mixed(c.mix).T[:, None]
         return out.T
 
     def shift(self, values: Floats) -> Floats:
         """Turn the joints by parameters, (n, 6) [rad]."""
-        out = np.zeros((len(self.jacobian), 6))
-        for c in self.joints:
-            out[:, c.joint] = values[c.places] @ c.angles
+        t = self.turning
+        by_joint = np.zeros((len(t.joint), 6))
+        by_joint[np.arange(len(t.joint)), t.joint] = values[t.places]
+        out: Floats = t.angles @ by_joint
+        for c in self.splines:
+            out[:, c.joint] += c.splines.mixed(c.mix @ values[c.places])
         return out
 
     def times(self, values: Floats) -> Floats:
@@ -102,12 +146,23 @@ class DesignMatrix:
         moved: Floats = turned + self.direct @ values[self.moving]
         return moved
 
+    def mixed(self, mix: Floats) -> Floats:
+        """Mix the columns, (p, k), to columns of all scalar rows, (3 n, k)."""
+        n = len(self.jacobian)
+        out = np.empty((3 * n, mix.shape[1]))
+        for first in range(0, n, BLOCK):
+            some = self[np.arange(first, min(first + BLOCK, n))]
+            rows = slice(3 * first, 3 * (first + BLOCK))
+            out[rows] = some.dense().reshape(-1, self.size) @ mix
+        return out
+
     def moment(self, rows: Floats) -> Floats:
         """Sum columns times rows (n, 3) over all rows, (p,)."""
-        out = np.zeros(self.size)
-        along = np.einsum("nij,ni->jn", self.jacobian, rows)
-        for c in self.joints:
-            out[c.places] = c.angles @ along[c.joint]
+        out, t = np.zeros(self.size), self.turning
+        along = np.einsum("nij,ni->nj", self.jacobian, rows)
+        out[t.places] = np.einsum("nd,nd->d", t.angles, along[:, t.joint])
+        for c in self.splines:
+            out[c.places] = c.mix.T @ c.splines.moment(along[:, c.joint], len(c.mix))
         out[self.moving] = np.einsum("nip,ni->p", self.direct, rows)
         return out
 
@@ -117,19 +172,19 @@ class DesignMatrix:
 
     def gram(self) -> Floats:
         """Sum products of columns over all rows, (p, p)."""
-        out = np.zeros((self.size, self.size))
-        J, D = self.jacobian, self.direct
-        both = np.ascontiguousarray(np.einsum("nij,nik->jkn", J, J))
-        for number, a in enumerate(self.joints):
-            for b in self.joints[number:]:
-                block = (a.angles * both[a.joint, b.joint]) @ b.angles.T
-                out[np.ix_(a.places, b.places)] = block
+        plain, splines = _native.gram(*self._features())
+        plain[: plain.shape[1]] += np.tril(plain[: plain.shape[1]], -1).T
+        out = np.empty((self.size, self.size))
+        places = self._plain_places()
+        out[np.ix_(places, places)] = plain[: len(places)]
+        for number, (a, own) in enumerate(self._sets()):
+            mixed = a.mix.T @ plain[len(places) :][own]
+            out[np.ix_(a.places, places)] = mixed
+            out[np.ix_(places, a.places)] = mixed.T
+            for b, others in self._sets()[: number + 1]:
+                block = a.mix.T @ splines[own, others] @ b.mix
                 out[np.ix_(b.places, a.places)] = block.T
-            mixed = a.angles @ np.einsum("nip,ni->np", D, J[:, :, a.joint])
-            out[np.ix_(a.places, self.moving)] = mixed
-            out[np.ix_(self.moving, a.places)] = mixed.T
-        flat = D.reshape(3 * len(D), D.shape[2])
-        out[np.ix_(self.moving, self.moving)] = flat.T @ flat
+                out[np.ix_(a.places, b.places)] = block
         return out
 
     def variance(self, covariance: Floats) -> Floats:
@@ -138,20 +193,67 @@ class DesignMatrix:
         Args:
             covariance: Of the parameters, (p, p).
         """
-        J, D, moving = self.jacobian, self.direct, self.moving
-        direct = D @ covariance[np.ix_(moving, moving)]
-        total = np.einsum("nip,nip->ni", direct, D)
-        for number, a in enumerate(self.joints):
-            along = J[:, :, a.joint]
-            for b in self.joints[number:]:
-                part = covariance[np.ix_(b.places, a.places)] @ a.angles
-                both = np.einsum("kn,kn->n", part, b.angles)
-                twice = 1.0 if a is b else 2.0
-                total += twice * both[:, None] * along * J[:, :, b.joint]
-            part = covariance[np.ix_(moving, a.places)] @ a.angles
-            total += 2.0 * np.einsum("nip,pn->ni", D, part) * along
+        places, sets = self._plain_places(), self._sets()
+        count = sum(len(a.mix) for a, _ in sets)
+        plain, splines = np.empty((len(places) + count, len(places))), []
+        plain[: len(places)] = covariance[np.ix_(places, places)]
+        for a, own in sets:
+            of_plain = a.mix @ covariance[np.ix_(a.places, places)]
+            plain[len(places) :][own] = of_plain
+            with_others = [covariance[np.ix_(a.places, b.places)] @ b.mix.T
+                           for b, _ in sets]  # fmt: skip
+            splines.append(a.mix @ np.concatenate(with_others, axis=1))
+        plain = 2.0 * np.tril(plain) - _diagonal(plain)
+        form = plain, np.concatenate([np.zeros((0, count)), *splines])
+        total = _native.uncertainty(*self._features(), form)
         variance: Floats = np.maximum(total, 0.0)
         return variance
+
+    def _plain_places(self) -> Ints:
+        """Give the places of columns that are not made of splines, as the core does."""
+        return np.concatenate([self.moving, self.turning.places])
+
+    def _sets(self) -> list[tuple[SplineColumns, slice]]:
+        """Say where the splines of every set stand among all of them."""
+        ends = np.cumsum([0, *(len(c.mix) for c in self.splines)])
+        own = [slice(int(a), int(b)) for a, b in pairwise(ends)]
+        return list(zip(self.splines, own, strict=True))
+
+    def _features(self) -> Features:
+        """Write the rows as the core takes them."""
+        n, t, sets = len(self.jacobian), self.turning, self._sets()
+        first = [c.splines.first[:, None] + own.start for c, own in sets]
+        weight = [c.splines.weight for c, _ in sets]
+        return (
+            (self.jacobian, self.direct),
+            (t.angles, t.joint.tolist()),
+            (
+                np.concatenate([np.zeros((n, 0), dtype=np.int64), *first], axis=1),
+                np.concatenate([np.zeros((n, 0)), *weight], axis=1),
+                [c.joint for c in self.splines],
+                sum(len(c.mix) for c in self.splines),
+            ),
+        )
+
+
+def _diagonal(of: Floats) -> Floats:
+    """Keep the diagonal alone."""
+    out = np.zeros_like(of)
+    np.fill_diagonal(out, np.diag(of))
+    return out
+
+
+def _splines(
+    places: Ints, made_of: list[tuple[int, Splines, Floats]]
+) -> list[SplineColumns]:
+    """Give every set of splines its places."""
+    ends = np.cumsum([mix.shape[1] for _, _, mix in made_of])[:-1]
+    return [
+        SplineColumns(joint, own, splines, mix)
+        for own, (joint, splines, mix) in zip(
+            np.split(places, ends), made_of, strict=True
+        )
+    ]
 
 
 def _direct(effects: tuple[Effect, ...], at: Batch) -> Floats:

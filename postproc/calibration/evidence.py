@@ -10,8 +10,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.linalg.blas import dsymv
 from scipy.linalg.lapack import dpotrf, dpotri
 
+from postproc import _native
 from postproc.arrays import Floats, Ints
 
 LOG_BOUNDS = (-8.0, 7.0)  # of log s_g
@@ -20,6 +22,7 @@ FIRST_STEP = 2.0  # of any log s_g
 SMALLEST_STEP = 1e-6
 LEAST_BEND = 1e-3
 SETTLED = 1e-5  # nats that a further step promises
+HOPE = 5.0  # times what a step promises that a search is thought to bring
 ROUNDED = 16.0  # units in the last place by which sums over many rows are off
 FEWEST = 4.0  # degrees of freedom that a prior scale is credited with at least
 LOG_SPREAD = 3.0  # hyperprior of log s_g: an order of magnitude is no surprise
@@ -80,6 +83,64 @@ class Posterior:
     effective: float
 
 
+@dataclass(frozen=True, eq=False)
+class Solved:
+    """The regression at given prior scales, parameters in units of them.
+
+    With S the prior scales, B = 1 + S G S, P its inverse and m the moment, the mean is
+    z = P S m.
+
+    Attributes:
+        log_scale: Log prior scale of every group, (g,).
+        s: Prior scale of every parameter, (p,).
+        lower: P, (p, p), of which the lower half counts.
+        z: (p,).
+        log_evidence: Log marginal likelihood.
+    """
+
+    log_scale: Floats
+    s: Floats
+    lower: Floats
+    z: Floats
+    log_evidence: float
+
+    @classmethod
+    def at(
+        cls, normal: Normal, group: Ints, log_scale: Floats, room: Floats | None = None
+    ) -> Solved:
+        """Solve it, see `posterior`; P is written into `room`, (p, p), if there is."""
+        s = np.exp(log_scale)[group]
+        gram = np.ascontiguousarray(normal.gram)
+        lower = np.empty(gram.shape) if room is None else room
+        _native.scaled(gram, s, lower)
+        log_det, told = _invert_lower(lower), None
+        if log_det is None:
+            _native.scaled(gram, s, lower)
+            log_det, lower, told = _of_told(_mirrored(lower))
+        moment = s * normal.moment
+        z = _times(lower, moment) if told is None else told @ moment
+        fit = normal.square - float(moment @ z)
+        evidence = -0.5 * (
+            normal.log_noise + log_det + fit + normal.rows * np.log(2 * np.pi)
+        )
+        return cls(log_scale, s, lower, z, evidence)
+
+    @property
+    def told(self) -> Floats:
+        """Diagonal of P: the share of each prior variance that is left, (p,)."""
+        return np.diag(self.lower)
+
+    def posterior(self) -> Posterior:
+        """Write it in units of the prior scales before the data rescale them."""
+        covariance = _mirrored(self.lower)
+        covariance *= self.s[:, None]
+        covariance *= self.s
+        effective = float((1.0 - self.told).sum())
+        return Posterior(
+            self.s * self.z, covariance, self.log_scale, self.log_evidence, effective
+        )
+
+
 def posterior(normal: Normal, group: Ints, log_scale: Floats) -> Posterior:
     """Compute the posterior for given prior scales.
 
@@ -88,19 +149,7 @@ def posterior(normal: Normal, group: Ints, log_scale: Floats) -> Posterior:
         group: Group of every parameter, (p,).
         log_scale: Log prior scale of every group, (g,).
     """
-    s = np.exp(log_scale)[group]
-    B = np.eye(len(s)) + s[:, None] * normal.gram * s
-    log_det, inverse, told = inverted(B)
-    covariance = s[:, None] * inverse * s
-    mean = covariance @ normal.moment
-    if told is not None:
-        mean = s * (told @ (s * normal.moment))
-    fit = normal.square - float(normal.moment @ mean)
-    evidence = -0.5 * (
-        normal.log_noise + log_det + fit + normal.rows * np.log(2 * np.pi)
-    )
-    effective = float((1.0 - np.diag(covariance) / s**2).sum())
-    return Posterior(mean, covariance, log_scale, evidence, effective)
+    return Solved.at(normal, group, log_scale).posterior()
 
 
 def inverted(B: Floats) -> tuple[float, Floats, Floats | None]:
@@ -113,18 +162,57 @@ def inverted(B: Floats) -> tuple[float, Floats, Floats | None]:
         Log determinant, inverse, and its part in the directions that rows tell of, None
         where that is all of it.
     """
-    factor, failed = dpotrf(B.T, lower=True)  # the same, as Fortran lays it out
-    size = float(np.diag(B).max(initial=0.0))
-    rounding = ROUNDED * len(B) * np.finfo(float).eps * size
-    if not failed and float((np.diag(factor) ** 2).min(initial=np.inf)) > rounding:
-        log_det = 2.0 * float(np.log(np.diag(factor)).sum())
-        lower, _ = dpotri(factor, lower=True, overwrite_c=True)
-        return log_det, np.asarray(lower + np.tril(lower, -1).T), None
+    lower = np.array(B, order="C")
+    log_det = _invert_lower(lower)
+    return _of_told(B) if log_det is None else (log_det, _mirrored(lower), None)
+
+
+def _invert_lower(lower: Floats) -> float | None:
+    """Invert 1 + C in place, lower half alone.
+
+    Returns:
+        Log determinant, None where C holds more rounding than the 1: nothing of the
+        array is left then.
+    """
+    rounding = _rounding(np.diag(lower))
+    upper = lower.T  # the same, as Fortran lays it out
+    _, failed = dpotrf(upper, lower=False, overwrite_a=True, clean=False)
+    root = np.diag(lower)
+    if failed or float((root**2).min(initial=np.inf)) <= rounding:
+        return None
+    log_det = 2.0 * float(np.log(root).sum())
+    dpotri(upper, lower=False, overwrite_c=True)
+    return log_det
+
+
+def _of_told(B: Floats) -> tuple[float, Floats, Floats | None]:
+    """Invert 1 + C by its eigenvalues, those that are rounding counting as 1."""
     values, vectors = np.linalg.eigh(B)
-    told = values > rounding
+    told = values > _rounding(np.diag(B))
     values = np.where(told, np.maximum(values, 1.0), 1.0)
     part = vectors[:, told] / values[told] @ vectors[:, told].T
     return float(np.log(values).sum()), vectors / values @ vectors.T, part
+
+
+def _rounding(diagonal: Floats) -> float:
+    """Say by how much eigenvalues may be off."""
+    size = float(diagonal.max(initial=0.0))
+    return ROUNDED * len(diagonal) * float(np.finfo(float).eps) * size
+
+
+def _mirrored(lower: Floats) -> Floats:
+    """Fill the upper half from the lower one."""
+    full: Floats = np.tril(lower)
+    full += np.tril(lower, -1).T
+    return full
+
+
+def _times(lower: Floats, x: Floats) -> Floats:
+    """Multiply a symmetric array, lower half given, (p, p), by x (p,)."""
+    if len(x) == 0:
+        return x
+    product: Floats = dsymv(1.0, lower.T, x, lower=False)
+    return product
 
 
 def maximise(
@@ -138,51 +226,84 @@ def maximise(
         start: Log prior scales to begin with, (g,).
         steps: Most steps of the search.
     """
-    count = len(start)
+    return _climb(normal, group, start, steps).solved.posterior()
+
+
+def highest(
+    normal: Normal, group: Ints, start: Floats, steps: int, least: float
+) -> float:
+    """Find the log evidence with the hyperprior at its best prior scales.
+
+    Args:
+        normal: Normal equations.
+        group: Group of every parameter, (p,).
+        start: Log prior scales to begin with, (g,).
+        steps: Most steps of the search.
+        least: The search gives up where it is far from promising as much; what it
+            returns then is less.
+    """
+    return _climb(normal, group, start, steps, least).value
+
+
+def _climb(
+    normal: Normal,
+    group: Ints,
+    start: Floats,
+    steps: int,
+    least: float = -np.inf,
+) -> _Here:
+    """Take Newton's steps until they promise nothing more, or too little."""
+    count, room = len(start), np.empty(normal.gram.shape)
     at = _Here.of(normal, group, np.clip(start, *LOG_BOUNDS))
     radius = FIRST_STEP
     for _ in range(steps if count else 0):
         step, gained = at.step(radius)
-        if gained < SETTLED or radius < SMALLEST_STEP:
+        done = gained < SETTLED or radius < SMALLEST_STEP
+        if done or at.value + HOPE * at.promise < least:
             break
-        there = _Here.of(normal, group, np.clip(at.found.log_scale + step, *LOG_BOUNDS))
+        u = np.clip(at.solved.log_scale + step, *LOG_BOUNDS)
+        there = _Here.of(normal, group, u, room)
         ratio = (there.value - at.value) / gained
         radius = radius / 4 if ratio < 0.25 else radius * (2 if ratio > 0.75 else 1)
         if ratio > 0.0:
-            at = there
-    return at.found
+            room, at = at.solved.lower, there
+    return at
 
 
 @dataclass(frozen=True, eq=False)
 class _Here:
     """The log evidence with the hyperprior and its slopes at some prior scales.
 
-    With B = 1 + S G S, P its inverse and z = mean / s, the slope by log s_a is
-    z_a^2 - tr(1 - P)_aa, and the curvature between groups a and b
-    2 |P_ab|^2 + 4 z_a P_ab z_b, less 2 tr(P_aa) + 2 z_a^2 where a = b.
+    With P and z as in `Solved`, the slope by log s_a is z_a^2 - tr(1 - P)_aa, and the
+    curvature between groups a and b 2 |P_ab|^2 + 4 z_a P_ab z_b, less
+    2 tr(P_aa) + 2 z_a^2 where a = b.
     """
 
-    found: Posterior
+    solved: Solved
     value: float
     slope: Floats
     curvature: Floats
 
     @classmethod
-    def of(cls, normal: Normal, group: Ints, u: Floats) -> _Here:
+    def of(
+        cls, normal: Normal, group: Ints, u: Floats, room: Floats | None = None
+    ) -> _Here:
         """Solve the regression at log scales u."""
-        found = posterior(normal, group, u)
-        s = np.exp(u)[group]
-        P, z = found.covariance / np.outer(s, s), found.mean / s
-        own = np.zeros((len(u), len(s)))
-        own[group, np.arange(len(s))] = 1.0
-        told = np.diag(P)
-        slope = own @ (z**2 - 1.0 + told) - u / LOG_SPREAD**2
-        each = P * P
-        each += P * (2.0 * z[:, None]) * z
-        curvature = 2.0 * own @ each @ own.T - 2.0 * np.diag(own @ (told + z**2))
-        curvature -= np.eye(len(u)) / LOG_SPREAD**2
-        value = found.log_evidence - 0.5 * float((u**2).sum()) / LOG_SPREAD**2
-        return cls(found, value, slope, curvature)
+        solved = Solved.at(normal, group, u, room)
+        z, told, count = solved.z, solved.told, len(u)
+        both = np.bincount(group, told + z**2, count)
+        slope = both - np.bincount(group, minlength=count) - u / LOG_SPREAD**2
+        curvature = 2.0 * _native.by_groups(solved.lower, z, group, count)
+        curvature -= np.diag(2.0 * both + 1.0 / LOG_SPREAD**2)
+        value = solved.log_evidence - 0.5 * float((u**2).sum()) / LOG_SPREAD**2
+        return cls(solved, value, slope, curvature)
+
+    @property
+    def promise(self) -> float:
+        """What Newton's step would bring if it were not too long, free of bounds."""
+        bent, axes = np.linalg.eigh(self.curvature)
+        slope = axes.T @ self.slope
+        return float(0.5 * (slope**2 / np.maximum(np.abs(bent), LEAST_BEND)).sum())
 
     def step(self, radius: float) -> tuple[Floats, float]:
         """Take Newton's step uphill, no log scale by more than a radius.
@@ -190,7 +311,7 @@ class _Here:
         Returns:
             The step, and the rise that the curvature promises.
         """
-        u, (low, high) = self.found.log_scale, LOG_BOUNDS
+        u, (low, high) = self.solved.log_scale, LOG_BOUNDS
         free = ~((u <= low) & (self.slope < 0) | (u >= high) & (self.slope > 0))
         out = np.zeros(len(u))
         bent, axes = np.linalg.eigh(self.curvature[np.ix_(free, free)])

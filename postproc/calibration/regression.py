@@ -78,10 +78,11 @@ class Fit:
         index = {g: i for i, g in enumerate(self.groups)}
         return np.array([index[g] for g in self.combination.groups], dtype=np.int64)
 
-    @cached_property
-    def columns(self) -> Floats:
-        """Derivatives at the solution, (n, 3, p) [m per unit of the parameter]."""
-        return self.design.dense()
+    def moved(self, part: slice) -> Floats:
+        """Move the positions by some of the parameters alone, (n, 3) [m]."""
+        own = np.zeros(len(self.values))
+        own[part] = self.values[part]
+        return self.design.times(own)
 
     @cached_property
     def row_scale(self) -> Floats:
@@ -101,14 +102,23 @@ class Fit:
             return (turned * self.row_scale).reshape(-1)
         return (turned * self.row_scale[:, :, None]).reshape(-1, rows.shape[2])
 
+    @property
+    def whitened(self) -> DesignMatrix:
+        """Derivatives at the solution, whitened."""
+        return self.design.turned(self.row_scale[:, :, None] * self.whitener.turn)
+
+    @property
+    def target(self) -> Floats:
+        """Whitened error that the columns explain, linearised here, (3 n,)."""
+        return self.whiten(self.residual + self.design.times(self.values))
+
     def normal(self) -> Normal:
         """Write the regression, linearised at the present values, as its normal sums.
 
         Columns are scaled by the prior scales before the data rescale them.
         """
         scales = self.combination.scales
-        whitened = self.design.turned(self.row_scale[:, :, None] * self.whitener.turn)
-        y = self.whiten(self.residual + self.design.times(self.values)).reshape(-1, 3)
+        whitened, y = self.whitened, self.target.reshape(-1, 3)
         v = self.whitener.variance(self.noise)
         used = self.rows.weight > 0
         normal = Normal(

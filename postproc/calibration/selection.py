@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from postproc.arrays import Bools, Floats
 from postproc.calibration.directions import mend_directions
-from postproc.calibration.evidence import LOG_SPREAD, Normal, maximise
+from postproc.calibration.evidence import Normal, highest
 from postproc.calibration.measurements import Measurements
 from postproc.calibration.orientations import Turns
 from postproc.calibration.regression import NEARLY, Fit, fit_effects
@@ -104,23 +103,35 @@ def keep_needed(fitted: Fit, always: tuple[Effect, ...]) -> tuple[Effect, ...]:
         always: Effects that are not in question.
     """
     kept = list(fitted.combination.effects)
-    normal, group = fitted.normal(), fitted.group
+    normal = fitted.normal()
     present = np.ones(len(fitted.values), dtype=bool)
-    now = _evidence(fitted, normal, group, present)
-    while True:
-        found = [
-            (_evidence(fitted, normal, group, present & ~columns), effect, columns)
-            for effect, columns in _in_question(fitted, kept, always)
-        ]
-        if not found:
-            break
-        best, effect, columns = max(found, key=lambda trial: trial[0])
-        if now - best > ENOUGH:
-            break
+    now = _evidence(fitted, normal, present)
+    while found := _least_needed(fitted, normal, kept, always, present, now):
+        effect, columns, now = found
         kept.remove(effect)
         present &= ~columns
-        now = best
     return tuple(kept)
+
+
+def _least_needed(
+    fitted: Fit,
+    normal: Normal,
+    kept: list[Effect],
+    always: tuple[Effect, ...],
+    present: Bools,
+    now: float,
+) -> tuple[Effect, Bools, float] | None:
+    """Find the effect that is missed least, its columns, and the evidence without it.
+
+    Returns:
+        None where each is worth enough.
+    """
+    best, least = None, now - ENOUGH
+    for effect, columns in _in_question(fitted, kept, always):
+        found = _evidence(fitted, normal, present & ~columns, least)
+        if found > least:
+            best, least = (effect, columns, found), found
+    return best
 
 
 def _in_question(
@@ -136,9 +147,12 @@ def _in_question(
 
 
 def _evidence(
-    fitted: Fit, normal: Normal, group: NDArray[np.int64], present: Bools
+    fitted: Fit, normal: Normal, present: Bools, least: float = -np.inf
 ) -> float:
-    """Log evidence of some of the columns, prior scales chosen anew."""
+    """Log evidence of some of the columns, prior scales chosen anew.
+
+    It is found only roughly where it is far below `least`.
+    """
     part = Normal(
         normal.gram[np.ix_(present, present)],
         normal.moment[present],
@@ -146,10 +160,8 @@ def _evidence(
         normal.log_noise,
         normal.rows,
     )
-    used, group = np.unique(group[present], return_inverse=True)
-    start = fitted.log_scale[used]
-    best = maximise(part, group, start, STEPS)
-    return best.log_evidence - 0.5 * float((best.log_scale**2).sum()) / LOG_SPREAD**2
+    used, group = np.unique(fitted.group[present], return_inverse=True)
+    return highest(part, group, fitted.log_scale[used], STEPS, least)
 
 
 # The product's own method: a survey becomes a fit of named effects, and a model.

@@ -24,6 +24,7 @@ from postproc.calibration.measurements import (
     read_points,
 )
 from postproc.calibration.registration import register
+from postproc.calibration.report import DirectionReport
 from postproc.calibration.tables import DETECT, TableFormat
 from postproc.cli.jobs import read_files
 from postproc.compensation.program import Planned, plan_visits, read_program, states_of
@@ -121,6 +122,7 @@ def _visit_of(places: dict[str, list[int]], key: str, path: Path, line: int) -> 
 
 # Diagnosing files: what is read, written and told.
 
+LIKELIEST = 8  # wrong directions that are listed
 ADDED = "added"
 HISTORY = (
     Column("model", "left"),
@@ -250,12 +252,28 @@ def tell(found: Diagnosis) -> str:
     if found.verdict == "unexplained":
         lines += _unexplained(found)
     lines += [f"row {d.id} (line {d.line}): {d.why}" for d in found.dropped]
+    lines += tell_directions(found.directions, LIKELIEST)
     lines.append(f"measure next, to {found.why_next} (q1..q6 deg):")
     lines += [
         "  " + " ".join(f"{x:9.3f}" for x in np.degrees(q))
         for q in found.next_measurements
     ]
     return "\n".join(lines)
+
+
+def tell_directions(found: DirectionReport | None, most: int) -> list[str]:
+    """Tell of wrong directions in the file, likeliest first; the rest is counted."""
+    if found is None:
+        return []
+    rows = found.likeliest[:most]
+    names = ", ".join(f"{w.id} joint {w.joint} ({w.probability:.2f})" for w in rows)
+    more = len(found.likeliest) - len(rows)
+    return [
+        f"directions: {found.rate:.1%} of the {found.telling} that rows can tell are "
+        f"wrong in the file (estimated); {found.turned} were fitted the other way, "
+        f"{found.unsure} as not known",
+        f"likeliest wrong: row {names}" + (f" and {more} more" if more else ""),
+    ]
 
 
 def _numbers(found: Diagnosis) -> range:

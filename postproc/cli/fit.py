@@ -34,10 +34,10 @@ from postproc.calibration.published import (
     span_of,
 )
 from postproc.calibration.registration import predict_registered
-from postproc.calibration.report import DirectionReport, FitReport, Found
+from postproc.calibration.report import FitReport, Found
 from postproc.calibration.tables import DETECT, TableFormat, read_foreign
 from postproc.calibration.tables import TextTable as Cells
-from postproc.cli.diagnose import join_program
+from postproc.cli.diagnose import join_program, tell_directions
 from postproc.exceptions import MeasurementError, PostprocError
 from postproc.files import write_all
 from postproc.model.model import Model, PredictedReading, Prediction, load_model
@@ -181,7 +181,7 @@ def tell_fit(report: FitReport, everything: bool = False) -> str:
     else:
         lines = [_tell_found(_large(report.found)), *_tell_rest(report)]
     lines += _tell_rows(report, len(report.dropped) if everything else FEW)
-    lines += _tell_directions(report.directions, ROWS if everything else FEW)
+    lines += tell_directions(report.directions, ROWS if everything else FEW)
     lines += [f"warning: {warning}" for warning in report.warnings]
     lines += _tell_scatter(report)
     return "\n".join(line for line in lines if line)
@@ -274,21 +274,6 @@ def _tell_rows(report: FitReport, most: int) -> list[str]:
         ids += f" and {more} more" if more > 0 else ""
         lines.append(f"suspect, but kept, for rows beside them agree: row {ids}")
     return lines
-
-
-def _tell_directions(found: DirectionReport | None, most: int) -> list[str]:
-    """Tell of wrong directions in the file, likeliest first; the rest is counted."""
-    if found is None:
-        return []
-    rows = found.likeliest[:most]
-    names = ", ".join(f"{w.id} joint {w.joint} ({w.probability:.2f})" for w in rows)
-    more = len(found.likeliest) - len(rows)
-    return [
-        f"directions: {found.rate:.1%} of the {found.telling} that rows can tell are "
-        f"wrong in the file (estimated); {found.turned} were fitted the other way, "
-        f"{found.unsure} as not known",
-        f"likeliest wrong: row {names}" + (f" and {more} more" if more else ""),
-    ]
 
 
 def _tell_scatter(report: FitReport) -> list[str]:

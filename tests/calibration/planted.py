@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from postproc.calibration.design import DesignMatrix, JointColumns
 from postproc.calibration.diagnosis.library import Projection
 from postproc.calibration.regression import Fit, fit_effects
 from postproc.model.effects import BASE_EFFECTS, propose
@@ -172,3 +173,12 @@ def _clean_fit(clean: VirtualArm, seed: int, arrivals: VirtualArrivals) -> Fit:
     effects = propose(BASE_EFFECTS, ARM, states_of(arrivals))
     batch = Batch(ARM, states_of(arrivals))
     return fit_effects(batch, position, effects, tuple(TRACKER))
+
+
+def plain_design(X: np.ndarray) -> DesignMatrix:
+    """Take columns (3 n, p) as those of effects that turn no joint."""
+    n, none = len(X) // 3, np.zeros(0, dtype=np.int64)
+    turning = JointColumns(none, none, np.zeros((n, 0)))
+    columns = X.reshape(n, 3, -1)
+    places = np.arange(X.shape[1])
+    return DesignMatrix(np.zeros((n, 3, 6)), turning, (), columns, places)

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 from scipy.optimize import approx_fprime
 from scipy.stats import multivariate_normal
 
-from postproc.calibration import evidence
-from postproc.calibration.diagnosis.held_out import held_out_errors
-from postproc.calibration.evidence import Normal, Posterior, maximise, posterior
+from postproc.calibration.diagnosis.held_out import Folds
+from postproc.calibration.evidence import Normal, Solved, highest, maximise, posterior
+from tests.calibration.planted import plain_design
 
 
 def problem(seed: int = 0) -> tuple[np.ndarray, np.ndarray, np.ndarray, Normal]:
@@ -78,7 +80,9 @@ def test_folds_of_columns_that_are_the_same_are_predicted() -> None:
     rng = np.random.default_rng(3)
     X = 1e9 * np.repeat(rng.standard_normal((300, 1)), 4, axis=1)
     y = 1e-9 * X[:, 0] + 1e-3 * rng.standard_normal(300)
-    errors = held_out_errors(X, y, np.arange(100) % 5)
+    folds = Folds.of(plain_design(X), np.ones(4), y, np.arange(100) % 5)
+    errors, less = folds.errors(slice(0, 1))
+    assert np.sqrt(np.mean(less**2)) < 2e-3
     assert np.sqrt(np.mean(errors**2)) < 2e-3
 
 
@@ -87,11 +91,12 @@ def test_few_solutions_find_the_scales(monkeypatch: pytest.MonkeyPatch) -> None:
     _, _, group, normal = problem()
     solved = []
 
-    def counted(normal: Normal, group: np.ndarray, scale: np.ndarray) -> Posterior:
-        solved.append(scale)
-        return posterior(normal, group, scale)
+    def counted(of: type[Solved], *given: Any) -> Solved:
+        solved.append(given)
+        return solve(*given)
 
-    monkeypatch.setattr(evidence, "posterior", counted)
+    solve = Solved.at
+    monkeypatch.setattr(Solved, "at", classmethod(counted))
     count = int(group.max()) + 1
     found = maximise(normal, group, np.zeros(count))
     assert len(solved) <= 10
@@ -105,3 +110,12 @@ def test_no_groups_no_search() -> None:
         Normal(np.zeros((0, 0)), none, 3.0, 0.0, 4.0), none.astype(int), none
     )
     assert found.mean.shape == (0,) and found.effective == 0
+
+
+def test_a_search_gives_up_only_below_what_is_asked_for() -> None:
+    _, _, group, normal = problem()
+    best = highest(normal, group, np.zeros(2), 60, -np.inf)
+    for least in best + np.array([-50.0, -1.0, -1e-3]):
+        assert highest(normal, group, np.zeros(2), 60, least) == best
+    for least in best + np.array([1e-3, 1.0, 50.0]):
+        assert highest(normal, group, np.zeros(2), 60, least) <= best

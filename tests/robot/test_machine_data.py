@@ -135,6 +135,6 @@ def test_the_command(tmp_path):
     place, out = written(tmp_path), tmp_path / "arm.toml"
     found = cli("arm", "from-machine-dat", place, "-o", out, "--repeatability", "0.06")
     assert found.exit_code == 0 and f"written {out}" in found.stderr
-    assert load_arm(out).has_inverse and load_arm(out).repeatability == 0.06e-3
+    assert load_arm(out).file.opw is not None and load_arm(out).repeatability == 0.06e-3
     assert cli("arm", "from-machine-dat", tmp_path / "no.dat").exit_code == 2
     assert cli("arm", "from-machine-dat", place, "-o", place).exit_code == 2

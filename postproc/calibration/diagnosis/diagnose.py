@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 
 from postproc.arrays import Floats
 from postproc.calibration.diagnosis.held_out import deal, multi_directional, noise_floor
-from postproc.calibration.diagnosis.library import Projection
 from postproc.calibration.diagnosis.next_poses import (
     poses_that_separate,
     poses_that_sharpen,
@@ -25,16 +24,17 @@ from postproc.calibration.diagnosis.result import (
     profile,
     statistics,
 )
-from postproc.calibration.diagnosis.search import NEAR, Progress, Search, ranking
+from postproc.calibration.diagnosis.search import NEAR, Progress, Search
 from postproc.calibration.diagnosis.trace import (
     Investigation,
     investigate,
     silent,
     trace,
 )
+from postproc.calibration.directions import mend_directions
 from postproc.calibration.measurements import Measurements
 from postproc.calibration.regression import Fit, fit_effects
-from postproc.calibration.report import weighed_down
+from postproc.calibration.report import report_directions, weighed_down
 from postproc.calibration.selection import model_of
 from postproc.model.combination import Combination
 from postproc.model.kinematics import Batch
@@ -70,12 +70,18 @@ class HeldOut:
 
 
 def hold_out(
-    found: Search, seed: int, progress: Progress, given: Floats | None = None
+    found: Search,
+    told: Floats,
+    seed: int,
+    progress: Progress,
+    given: Floats | None = None,
 ) -> HeldOut:
     """Repeat the search without each part of the rows.
 
     Args:
         found: The search on all rows: its first fit, its library, its threshold.
+        told: Directions of the file, (n, 6): held-out rows are predicted with these,
+            whatever their own readings make likelier.
         seed: Of the parts.
         progress: Told what is being done.
         given: Errors that the given model leaves as it is, (n, 3) [m], where it has
@@ -97,9 +103,9 @@ def hold_out(
         more = investigate(less, library, found.null, lambda *_: None).fit
         rows.append(out)
         before.append(
-            left_by(less, base, out) if given is None else np.asarray(given[out])
+            left_by(less, base, out, told) if given is None else np.asarray(given[out])
         )
-        after.append(left_by(more, base, out))
+        after.append(left_by(more, base, out, told))
         fitted = len(inside)
     which = np.concatenate(rows)
     across = base.batch.states[which].across
@@ -115,9 +121,17 @@ def _fit_of(base: Fit, rows: NDArray[np.int64]) -> Fit:
     return fit_effects(batch, position, base.combination.effects, base.noise.origin)
 
 
-def left_by(fit: Fit, every: Fit, rows: NDArray[np.int64]) -> Floats:
-    """Return what a fit leaves of the errors of other rows, (m, 3) [m]."""
-    batch = Batch(every.batch.arm, every.batch.states[rows])
+def left_by(fit: Fit, every: Fit, rows: NDArray[np.int64], told: Floats) -> Floats:
+    """Return what a fit leaves of the errors of other rows, (m, 3) [m].
+
+    Args:
+        fit: The fit.
+        every: A fit of all rows.
+        rows: The other rows.
+        told: Directions of all rows, (n, 6).
+    """
+    states = every.batch.states[rows].with_(direction=told[rows])
+    batch = Batch(every.batch.arm, states)
     predicted = Combination(fit.combination.effects).error(batch, fit.values)
     left: Floats = every.error[rows] - predicted
     return left
@@ -175,14 +189,35 @@ def diagnose(
         ModelError: A model of another arm.
     """
     base = refit(survey, arm, model, tracker, setup)
-    traced = trace(base, seed, progress)
+    traced, told = trace(base, seed, progress), survey.states.direction
+    if not survey.inferred.all():
+        traced = _with_mended_directions(traced, seed, progress)
     given = None
     if model.data_sha256 != survey.sha256:
         given = survey.position - base.batch.walk.tcp - model.error(arm, survey.states)
-    held_out = hold_out(traced.search, seed, progress, given)
+    held_out = hold_out(traced.search, told, seed, progress, given)
     diagnosis = _conclude(survey, traced, held_out, tracker, seed)
     extended = _extended(model, survey, traced.search, diagnosis)
     return Extension(diagnosis, extended, traced.search, held_out)
+
+
+def _with_mended_directions(
+    traced: Investigation, seed: int, progress: Progress
+) -> Investigation:
+    """Search again with wrong directions the other way, where there are any.
+
+    They are asked for last: what an effect does is not to be taken for them.
+    """
+    base, fit = traced.search.base, traced.search.fit
+    position = base.error + base.batch.walk.tcp
+    mended = mend_directions(fit, position)
+    if mended is fit:
+        return traced
+    states = base.batch.states.with_(direction=mended.batch.states.direction)
+    batch, effects = Batch(base.batch.arm, states), base.combination.effects
+    progress("directions mended: again", 0.0)
+    again = fit_effects(batch, position, effects, base.noise.origin, start=base)
+    return trace(again, seed, progress)
 
 
 def _conclude(
@@ -214,13 +249,14 @@ def _conclude(
         next_measurements=poses,
         why_next=why,
         dropped=weighed_down(found.fit, survey),
+        directions=report_directions(found.fit, survey),
     )
 
 
 def _places(found: Search) -> tuple[ResidualPlace, ...]:
     """Say where what is left lives, from the candidates that come closest."""
     out = []
-    for score in ranking(Projection.of(found.fit), found.library)[:PLACES]:
+    for score in found.ranking_under(found.fit)[:PLACES]:
         family = score.family
         at = family.along or family.effect
         direction = at if family.joint is None else f"joint {family.joint}"
@@ -329,7 +365,7 @@ def _seen(shown: Profile) -> Mapping[str, Any]:
 def _candidates(found: Extension) -> list[dict[str, Any]]:
     """List what the residual of the given model calls for."""
     search = found.search
-    scores = ranking(Projection.of(search.base), search.library)[:LISTED]
+    scores = search.ranking_under(search.base)[:LISTED]
     return [
         {
             "effect": s.family.effect,

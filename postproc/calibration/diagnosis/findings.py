@@ -9,6 +9,7 @@ import numpy as np
 from postproc.arrays import Floats
 from postproc.calibration.diagnosis.result import Finding
 from postproc.calibration.diagnosis.search import Addition, JudgedAddition, Search
+from postproc.calibration.regression import Fit
 from postproc.calibration.report import SHOWN_UNITS
 from postproc.model.effects.effect import Effect
 from postproc.robot.pose import MM
@@ -36,7 +37,7 @@ def _describe(
     fit, family = found.fit, addition.candidate.family
     effect = fit.combination.effects[found.place(number)]
     part = fit.combination.slices[found.place(number)]
-    moved = np.linalg.norm(fit.columns[:, :, part] @ fit.values[part], axis=1)
+    moved = np.linalg.norm(fit.moved(part), axis=1)
     confusable = tuple((s.family.effect, s.family.joint) for s in standing.confusable)
     return Finding(
         effect=family.effect,
@@ -72,22 +73,25 @@ def _shares(found: Search) -> Floats:
     fit = found.fit
     first = found.place(0)
     start = fit.combination.slices[first].start if found.additions else 0
-    keep = slice(start, None)
-    base = _without_last(fit.whiten(fit.columns) * fit.prior_std, start)
-    target = fit.whiten(fit.residual + fit.columns[:, :, keep] @ fit.values[keep])
+    base = _first_columns(fit, start)
+    target = fit.whiten(fit.residual + fit.moved(slice(start, None)))
     left = target - base @ (base.T @ target)
     total = max(float(left @ left), 1e-300)
     out = []
     for number in range(len(found.additions)):
         part = fit.combination.slices[found.place(number)]
-        moved = fit.whiten(fit.columns[:, :, part] @ fit.values[part])
+        moved = fit.whiten(fit.moved(part))
         out.append(float(left @ (moved - base @ (base.T @ moved))) / total)
     shares: Floats = np.clip(np.array(out), 0.0, 1.0)
     return shares
 
 
-def _without_last(X: Floats, count: int) -> Floats:
-    """Give an orthonormal basis of the first columns, (rows, rank)."""
-    basis, size, _ = np.linalg.svd(X[:, :count], full_matrices=False)
-    kept: Floats = basis[:, size > 1.0]
-    return kept
+def _first_columns(fit: Fit, count: int) -> Floats:
+    """Give an orthonormal basis of what the first columns determine, (rows, rank)."""
+    whitened, std = fit.whitened, fit.prior_std[:count]
+    gram = whitened.gram()[:count, :count] * np.outer(std, std)
+    size, axes = np.linalg.eigh(gram)
+    told = size > 1.0
+    mix = np.zeros((len(fit.values), int(told.sum())))
+    mix[:count] = std[:, None] * axes[:, told] / np.sqrt(size[told])
+    return whitened.mixed(mix)

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from postproc.arrays import Floats
+from postproc.calibration.design import DesignMatrix
 from postproc.calibration.evidence import inverted
 from postproc.calibration.regression import Fit
 from postproc.model.effects.effect import Candidate
@@ -73,28 +74,13 @@ def held_out_gain(fit: Fit, number: int, candidate: Candidate) -> Gain:
         number: Place of the effect in the fit.
         candidate: The candidate that the effect was.
     """
-    known = fit.whiten(fit.columns) * fit.prior_std
-    target = fit.whiten(fit.residual + fit.design.times(fit.values))
     fold = deal(candidate.driver(fit.batch), FOLDS, seed=0)
-    folds = Folds.of(known, target, fold)
-    every = np.arange(known.shape[1])
-    after = folds.errors(every)
-    before = folds.errors(np.delete(every, fit.combination.slices[number]))
+    folds = Folds.of(fit.whitened, fit.prior_std, fit.target, fold)
+    after, before = folds.errors(fit.combination.slices[number])
     used = fit.rows.weight > 0
-    fall = (before**2 - after**2).reshape(-1, 3).sum(axis=1)[used]
+    fall = (before**2 - after**2).sum(axis=1)[used]
     error = float(fall.std() / np.sqrt(max(len(fall), 1)))
     return Gain(float(fall.mean()), error)
-
-
-def held_out_errors(X: Floats, y: Floats, fold: NDArray[np.int64]) -> Floats:
-    """Predict every row from the other folds, prior N(0, I); return y - prediction.
-
-    Args:
-        X: Whitened columns times prior standard deviations, (3 n, p).
-        y: Whitened target, (3 n,).
-        fold: Fold of every row of three, (n,).
-    """
-    return Folds.of(X, y, fold).errors(np.arange(X.shape[1]))
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,38 +88,77 @@ class Folds:
     """Rows in folds, with the sums over each that predict it from the others.
 
     Attributes:
-        rows: Scalar rows of every fold.
-        columns: Their columns, (m, p) each.
-        target: Their target, (m,) each.
-        grams, moments: Sums of products, (folds, p, p) and (folds, p).
+        rows: Rows of every fold.
+        design: Whitened columns.
+        prior: Standard deviations of the parameters beforehand, (p,).
+        target: Whitened target, (n, 3).
+        grams, moments: Sums of products of prior-scaled columns, (folds, p, p) and
+            (folds, p).
     """
 
     rows: tuple[NDArray[np.int64], ...]
-    columns: tuple[Floats, ...]
-    target: tuple[Floats, ...]
+    design: DesignMatrix
+    prior: Floats
+    target: Floats
     grams: Floats
     moments: Floats
 
     @classmethod
-    def of(cls, X: Floats, y: Floats, fold: NDArray[np.int64]) -> Folds:
-        """Cut rows into folds, see `held_out_errors`."""
-        scalar = np.repeat(fold, 3)
-        rows = tuple(np.flatnonzero(scalar == k) for k in np.unique(fold))
-        columns, target = tuple(X[r] for r in rows), tuple(y[r] for r in rows)
-        grams = np.stack([part.T @ part for part in columns])
-        moments = np.stack([c.T @ t for c, t in zip(columns, target, strict=True)])
-        return cls(rows, columns, target, grams, moments)
+    def of(
+        cls, design: DesignMatrix, prior: Floats, y: Floats, fold: NDArray[np.int64]
+    ) -> Folds:
+        """Cut rows into folds.
 
-    def errors(self, known: NDArray[np.int64]) -> Floats:
-        """Predict every fold from the others by some of the columns, (rows,)."""
-        gram = self.grams.sum(axis=0) + np.eye(self.grams.shape[1])
+        Args:
+            design: Whitened columns of n rows.
+            prior: Standard deviations of the parameters beforehand, (p,).
+            y: Whitened target, (3 n,).
+            fold: Fold of every row, (n,).
+        """
+        rows = tuple(np.flatnonzero(fold == k) for k in np.unique(fold))
+        target, square = y.reshape(-1, 3), np.outer(prior, prior)
+        grams = np.stack([design[r].gram() * square for r in rows])
+        moments = np.stack([design[r].moment(target[r]) * prior for r in rows])
+        return cls(rows, design, prior, target, grams, moments)
+
+    def errors(self, without: slice = slice(0)) -> tuple[Floats, Floats]:
+        """Predict every fold from the others; return what is left, (n, 3).
+
+        Args:
+            without: Columns that are in question.
+
+        Returns:
+            With all columns, and without these.
+        """
+        gram = self.grams.sum(axis=0) + np.eye(len(self.prior))
         moment = self.moments.sum(axis=0)
-        errors = np.empty(sum(len(rows) for rows in self.rows))
+        left = np.empty_like(self.target), np.empty_like(self.target)
         for k, rows in enumerate(self.rows):
-            _, inverse, told = inverted((gram - self.grams[k])[np.ix_(known, known)])
-            p = (inverse if told is None else told) @ (moment - self.moments[k])[known]
-            errors[rows] = self.target[k] - self.columns[k][:, known] @ p
-        return errors
+            both = _with_and_without(
+                gram - self.grams[k], moment - self.moments[k], without
+            )
+            for out, p in zip(left, both, strict=True):
+                out[rows] = self.target[rows] - self.design[rows].times(self.prior * p)
+        return left
+
+
+def _with_and_without(
+    gram: Floats, moment: Floats, part: slice
+) -> tuple[Floats, Floats]:
+    """Solve normal equations for all parameters, and with some of them at 0.
+
+    With C the inverse, the others are p - C_k (C_kk)^-1 p_k where those k are 0.
+    """
+    _, inverse, told = inverted(gram)
+    if told is None:
+        p = inverse @ moment
+        own = inverse[:, part]
+        return p, p - own @ np.linalg.solve(own[part], p[part])
+    others = np.delete(np.arange(len(moment)), part)
+    _, inverse, some = inverted(gram[np.ix_(others, others)])
+    less = np.zeros_like(moment)
+    less[others] = (inverse if some is None else some) @ moment[others]
+    return told @ moment, less
 
 
 # The noise floor: how large the error of one measured row is at best.

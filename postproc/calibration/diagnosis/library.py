@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from itertools import groupby
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,9 +22,14 @@ from postproc.model.noise import Whitener
 # Under the model the whitened errors are N(0, I + X X^T), X the whitened columns times
 # their prior standard deviations. Multiplied by F = (I + X X^T)^(-1/2) they are plain
 # noise N(0, I), and so is everything that the model cannot take up; what it determines
-# well is gone. With X^T X = V diag(d) V^T and r = sqrt(1 + d)
+# well is gone. With X^T X = V diag(d) V^T, r = sqrt(1 + d) and U = X V diag(1 / r)
 #
-#     F = I - X V diag(1 / (r (r + 1))) V^T X^T,   F F = I - X V diag(1 / r^2) V^T X^T.
+#     F = I - U diag(r / (r + 1)) U^T,   F F = I - U U^T.
+#
+# Directions of which the rows tell less than what sums over them are rounded by are not
+# in U.
+
+ROUNDED = float(np.finfo(float).eps)
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,19 +40,20 @@ class Projection:
         fit: The fit.
         names: Parameters that are taken out.
         at: Its states, kinematics taken at its parameters.
-        columns: X, (3 n, p).
-        axes: V, (p, p).
-        root: r, (p,).
+        taken: U, (3 n, k).
+        root: r, (k,).
         rest: Filtered residual, (3 n,): N(0, I) if the model is complete.
+        seen: The joint last asked for: its axis (n, 3) whitened and of unit length, the
+            length (n,), and U along the axis (n, k).
     """
 
     fit: Fit
     names: tuple[str, ...]
     at: Batch
-    columns: Floats
-    axes: Floats
+    taken: Floats
     root: Floats
     rest: Floats
+    seen: dict[int, tuple[Floats, Floats, Floats]] = field(default_factory=dict)
 
     @classmethod
     def of(cls, fit: Fit, without: int | None = None) -> Projection:
@@ -57,16 +65,13 @@ class Projection:
                 holds what that effect explains.
         """
         at = fit.combination.at(fit.batch, fit.values)
-        X = fit.whiten(fit.columns) * fit.prior_std
-        names = list(fit.combination.names)
+        known = np.arange(len(fit.values))
         if without is not None:
-            X = np.delete(X, fit.combination.slices[without], axis=1)
-            del names[fit.combination.slices[without]]
-        size, axes = np.linalg.eigh(X.T @ X)
-        root = np.sqrt(1.0 + np.maximum(size, 0.0))
-        target = fit.whiten(fit.residual + fit.design.times(fit.values))
-        made = cls(fit, tuple(names), at, X, axes, root, target)
-        return replace(made, rest=made.filter(target))
+            known = np.delete(known, fit.combination.slices[without])
+        names = tuple(fit.combination.names[k] for k in known)
+        taken, root = _taken(fit, known)
+        made = cls(fit, names, at, taken, root, fit.target)
+        return replace(made, rest=made.filter(made.rest), seen={})
 
     @property
     def rows(self) -> int:
@@ -75,10 +80,66 @@ class Projection:
 
     def filter(self, whitened: Floats) -> Floats:
         """Take the model out of whitened columns, (3 n,) or (3 n, k)."""
-        along = self.axes.T @ (self.columns.T @ whitened)
-        taken = (self.axes / (self.root * (self.root + 1.0))) @ along
-        left: Floats = whitened - self.columns @ taken
+        along = (self.taken.T @ whitened).T * (self.root / (self.root + 1.0))
+        left: Floats = whitened - self.taken @ along.T
         return left
+
+    @cached_property
+    def twice(self) -> Floats:
+        """Residual filtered twice, as columns are that are not, (3 n, 1)."""
+        return self.filter(self.rest[:, None])
+
+    def view(self, joint: int | None, rows: Floats) -> View:
+        """See twice filtered rows (3 n, draws) and the model along columns of a shelf.
+
+        Args:
+            joint: Joint, from 0, that the columns turn, or None.
+            rows: The rows.
+        """
+        if joint is None:
+            return View(self.fit.row_scale.reshape(-1), self.taken, rows)
+        if joint not in self.seen:
+            self.seen.clear()  # a search asks again and again for one joint
+            axis = self.fit.whiten(self.at.jacobian[:, :, joint]).reshape(-1, 3)
+            size = np.linalg.norm(axis, axis=1)
+            axis = axis / np.maximum(size, 1e-300)[:, None]
+            self.seen[joint] = axis, size, _along(axis, self.taken)
+        axis, size, taken = self.seen[joint]
+        return View(size, taken, _along(axis, rows))
+
+
+def _along(axis: Floats, columns: Floats) -> Floats:
+    """Take columns of scalar rows (3 n, k) along an axis a row, (n, 3): (n, k)."""
+    by_row = columns.reshape(len(axis), 3, columns.shape[1])
+    along: Floats = np.einsum("nk,nkd->nd", axis, by_row)
+    return along
+
+
+def _taken(fit: Fit, known: NDArray[np.int64]) -> tuple[Floats, Floats]:
+    """Compute U (3 n, k) and r (k,) of some of the parameters."""
+    whitened, std = fit.whitened, fit.prior_std[known]
+    gram = whitened.gram()[np.ix_(known, known)] * np.outer(std, std)
+    size, axes = np.linalg.eigh(gram)
+    told = size > ROUNDED * len(size) * float(size.max(initial=0.0))
+    root = np.sqrt(1.0 + size[told])
+    mix = np.zeros((len(fit.values), len(root)))
+    mix[known] = std[:, None] * axes[:, told] / root
+    return whitened.mixed(mix), root
+
+
+@dataclass(frozen=True, eq=False)
+class View:
+    """Filtered rows, and what the model takes, along the columns of candidates.
+
+    Attributes:
+        size: What whitening multiplies the columns with, (m,).
+        taken: U of `Projection` along them, (m, k).
+        rows: Filtered rows along them, (m, draws).
+    """
+
+    size: Floats
+    taken: Floats
+    rows: Floats
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,25 +158,20 @@ class ReducedCandidates:
 
 
 def reduce_columns(
-    projection: Projection,
-    candidates: Sequence[Candidate],
-    columns: Floats,
-    rows: Floats,
+    view: View, candidates: Sequence[Candidate], columns: Floats
 ) -> ReducedCandidates:
     """Reduce candidates of one width against rows.
 
     Args:
-        projection: The model to take out.
+        view: The rows, filtered twice: as errors, and as their columns are.
         candidates: c candidates.
-        columns: Their rotated, scaled columns, (3 n, c, k).
-        rows: Rows, filtered twice: as errors, and as their columns are, (3 n, draws).
+        columns: Their whitened columns, (c, k, m), see `Shelf`.
     """
-    B = columns * projection.fit.row_scale.reshape(-1, 1, 1)
-    count, width = B.shape[1:]
-    B = B.reshape(len(B), -1)
-    along = (B.T @ rows).reshape(count, width, -1)
-    known = (projection.axes / projection.root).T @ (projection.columns.T @ B)
-    gram = _grams(B, count) - _grams(known, count)
+    count, width, m = columns.shape
+    each = columns.reshape(-1, m)
+    along = (each @ view.rows).reshape(count, width, -1)
+    known = (each @ view.taken).reshape(count, width, -1)
+    gram = _grams(columns) - _grams(known)
     if width == 1:
         return ReducedCandidates(tuple(candidates), gram[:, :, 0], along)
     gain, turn = np.linalg.eigh(gram)
@@ -123,16 +179,17 @@ def reduce_columns(
     return ReducedCandidates(tuple(candidates), np.maximum(gain, 0.0), along)
 
 
-def _grams(B: Floats, count: int) -> Floats:
-    """Sum products of each of some blocks of columns, (count, k, k)."""
-    blocks = np.ascontiguousarray(B.T).reshape(count, -1, len(B))
+def _grams(blocks: Floats) -> Floats:
+    """Sum products of each of some blocks of columns, (c, k, m): (c, k, k)."""
+    if blocks.shape[1] == 1:
+        return np.asarray(np.einsum("ckm,ckm->c", blocks, blocks))[:, None, None]
     grams: Floats = blocks @ np.swapaxes(blocks, 1, 2)
     return grams
 
 
 # All candidates with their columns, ready to be filtered by any fit of the rows.
 
-KEPT = 60_000_000  # numbers of columns that are kept rather than made again
+KEPT = 30_000_000  # numbers of columns that are kept rather than made again
 CHUNK = 5_000_000  # numbers of columns held at once while they are made
 
 
@@ -141,27 +198,45 @@ class Shelf:
     """Candidates of one width.
 
     Attributes:
+        joint: The joint, from 0, that all their columns turn, or None.
         candidates: c candidates of k columns each.
-        columns: Rotated as the rows are whitened, in units of the prior scales,
-            (3 n, c, k), or None where they are made when needed.
+        columns: In units of the prior scales: by what they turn the joint, (c, k, n);
+            without one joint, rotated as the rows are whitened, (c, k, 3 n). None where
+            they are made when needed.
     """
 
+    joint: int | None
     candidates: tuple[Candidate, ...]
     columns: Floats | None
 
-    def made(self, batch: Batch, whitener: Whitener) -> Floats:
-        """Return the columns, (3 n, c, k)."""
+    def made(self, batch: Batch, whitener: Whitener) -> Shelf:
+        """Make the columns."""
+        columns = make_columns(self.joint, self.candidates, batch, whitener)
+        return replace(self, columns=columns)
+
+    def whitened(self, projection: Projection, size: Floats) -> Floats:
+        """Return the columns times a size (m,), (c, k, m)."""
         if self.columns is not None:
-            return self.columns
-        return make_columns(self.candidates, batch, whitener)
+            return self.columns * size
+        made = self.made(projection.at, projection.fit.whitener)
+        assert made.columns is not None
+        return np.multiply(made.columns, size, out=made.columns)
+
+    def at_rows(self, rows: NDArray[np.int64]) -> Shelf:
+        """Return the columns of some of the rows."""
+        if self.columns is None:
+            return self
+        if self.joint is None:
+            rows = (3 * rows[:, None] + np.arange(3)).reshape(-1)
+        return replace(self, columns=self.columns[:, :, rows])
 
 
 @dataclass(frozen=True, eq=False)
 class Library:
-    """Shelves by width.
+    """Shelves by joint and width.
 
-    Columns are taken at the kinematics of the first fit: later fits differ by what
-    moves a column by a thousandth.
+    Columns that are kept are those at the kinematics of the first fit: later fits
+    differ by what moves a column by a thousandth.
     """
 
     shelves: tuple[Shelf, ...]
@@ -170,38 +245,26 @@ class Library:
     def of(cls, fit: Fit) -> Library:
         """List all candidates that a fit's rows can show."""
         at = fit.combination.at(fit.batch, fit.values)
-        every = candidates(at)
-        numbers = 3 * len(at) * sum(c.width for c in every)
-        shelves = []
-        for width, alike in by_width(every):
-            step = max(1, CHUNK // (3 * len(at) * width))
-            for first in range(0, len(alike), step):
-                some = tuple(alike[first : first + step])
-                keep = numbers <= KEPT
-                columns = make_columns(some, at, fit.whitener) if keep else None
-                shelves.append(Shelf(some, columns))
+        shelves = [
+            Shelf(joint, alike[first : first + step], None)
+            for joint, alike in by_joint_and_width(candidates(at))
+            for step in [max(1, CHUNK // numbers(joint, alike[:1], len(at)))]
+            for first in range(0, len(alike), step)
+        ]
+        total = sum(numbers(s.joint, s.candidates, len(at)) for s in shelves)
+        if total <= KEPT:
+            shelves = [shelf.made(at, fit.whitener) for shelf in shelves]
         return cls(tuple(shelves))
 
     def at_rows(self, rows: NDArray[np.int64]) -> Library:
         """Return the library for some of the rows."""
-        scalar = (3 * rows[:, None] + np.arange(3)).reshape(-1)
-        shelves = [
-            s if s.columns is None else replace(s, columns=s.columns[scalar])
-            for s in self.shelves
-        ]
-        return Library(tuple(shelves))
+        return Library(tuple(shelf.at_rows(rows) for shelf in self.shelves))
 
     def reduce(
         self, projection: Projection, rows: Floats
     ) -> tuple[ReducedCandidates, ...]:
         """Filter all candidates and reduce them against filtered rows (3 n, draws)."""
-        whitener, rows = projection.fit.whitener, projection.filter(rows)
-        return tuple(
-            reduce_columns(
-                projection, s.candidates, s.made(projection.at, whitener), rows
-            )
-            for s in self.shelves
-        )
+        return _reduced(projection, self.shelves, projection.filter(rows))
 
 
 def candidates(batch: Batch) -> list[Candidate]:
@@ -214,32 +277,61 @@ def candidates(batch: Batch) -> list[Candidate]:
     return sorted(every, key=lambda c: c.family.tier)
 
 
-def by_width(candidates: Sequence[Candidate]) -> list[tuple[int, list[Candidate]]]:
-    """Group candidates by their number of columns."""
-    widths: dict[int, list[Candidate]] = {}
+def numbers(joint: int | None, alike: Sequence[Candidate], rows: int) -> int:
+    """Count the numbers of the columns of candidates."""
+    return rows * (3 if joint is None else 1) * sum(c.width for c in alike)
+
+
+def by_joint_and_width(
+    candidates: Sequence[Candidate],
+) -> list[tuple[int | None, tuple[Candidate, ...]]]:
+    """Group candidates by the joint that they turn alone and their number of columns.
+
+    Those of one joint follow each other.
+    """
+    alike: dict[tuple[int, int], list[Candidate]] = {}
     for candidate in candidates:
-        widths.setdefault(candidate.width, []).append(candidate)
-    return sorted(widths.items())
+        joint = candidate.effect.only_joint()
+        key = (-1 if joint is None else joint, candidate.width)
+        alike.setdefault(key, []).append(candidate)
+    return [(None if j < 0 else j, tuple(c)) for (j, _), c in sorted(alike.items())]
 
 
 def reduce_some(
-    projection: Projection, candidates: Sequence[Candidate], rows: Floats
+    projection: Projection, candidates: Sequence[Candidate]
 ) -> tuple[ReducedCandidates, ...]:
-    """Filter a few candidates of any widths and reduce them against rows."""
-    whitener, rows = projection.fit.whitener, projection.filter(rows)
-    return tuple(
-        reduce_columns(
-            projection, alike, make_columns(alike, projection.at, whitener), rows
-        )
-        for _, alike in by_width(candidates)
-    )
+    """Filter a few candidates of any widths and reduce them against the residual."""
+    shelves = [Shelf(j, c, None) for j, c in by_joint_and_width(candidates)]
+    return _reduced(projection, shelves, projection.twice)
+
+
+def _reduced(
+    projection: Projection, shelves: Sequence[Shelf], rows: Floats
+) -> tuple[ReducedCandidates, ...]:
+    """Reduce candidates against rows that are filtered twice, (3 n, draws)."""
+    out = []
+    for joint, of_joint in groupby(shelves, key=lambda shelf: shelf.joint):
+        view = projection.view(joint, rows)
+        out += [
+            reduce_columns(view, s.candidates, s.whitened(projection, view.size))
+            for s in of_joint
+        ]
+    return tuple(out)
 
 
 def make_columns(
-    candidates: Sequence[Candidate], batch: Batch, whitener: Whitener
+    joint: int | None,
+    candidates: Sequence[Candidate],
+    batch: Batch,
+    whitener: Whitener,
 ) -> Floats:
-    """Make the rotated, scaled columns of candidates of one width, (3 n, c, k)."""
-    raw = np.concatenate([c.effect.columns(batch) for c in candidates], axis=2)
-    raw *= np.array([p.scale for c in candidates for p in c.effect.parameters()])
-    turned = whitener.rotate(raw)
-    return turned.reshape(3 * len(batch), len(candidates), -1)
+    """Make the scaled columns of candidates of one width, see `Shelf`."""
+    scale = np.array([p.scale for c in candidates for p in c.effect.parameters()])
+    if joint is not None:
+        made = np.concatenate([c.effect.turning(batch).T for c in candidates])
+    else:
+        raw = np.concatenate([c.effect.columns(batch) for c in candidates], axis=2)
+        rotated = whitener.rotate(raw).reshape(3 * len(batch), -1)
+        made = np.ascontiguousarray(rotated.T)
+    made *= scale[:, None]
+    return made.reshape(len(candidates), -1, made.shape[1])

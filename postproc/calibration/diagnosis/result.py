@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any, Literal
 
 import numpy as np
@@ -12,6 +12,7 @@ from postproc.calibration.diagnosis.library import Projection
 from postproc.calibration.diagnosis.score import Leftover
 from postproc.calibration.measurements import DroppedRow
 from postproc.calibration.regression import Fit
+from postproc.calibration.report import DirectionReport
 from postproc.model.covariate import covariate, unit
 from postproc.model.effects.effect import Candidate, Effect
 from postproc.model.kinematics import Batch
@@ -109,6 +110,7 @@ class Diagnosis:
         next_measurements: Poses to measure next, (k, 6) [rad].
         why_next: What they are for.
         dropped: Rows that count less than fully, and why.
+        directions: Wrong directions, or None where the file has none.
     """
 
     verdict: Verdict
@@ -125,6 +127,7 @@ class Diagnosis:
     next_measurements: Floats
     why_next: str
     dropped: tuple[DroppedRow, ...]
+    directions: DirectionReport | None
 
     def to_dict(self) -> dict[str, Any]:
         """Return the content of the JSON report."""
@@ -159,6 +162,7 @@ class Diagnosis:
             "rows_weighed_down": [
                 {"id": d.id, "line": d.line, "why": d.why} for d in self.dropped
             ],
+            "directions": None if self.directions is None else asdict(self.directions),
         }
 
 
@@ -208,7 +212,7 @@ def profile(fit: Fit, place: int, candidate: Candidate) -> Profile:
         candidate: The candidate that it was.
     """
     part = fit.combination.slices[place]
-    moved = fit.columns[:, :, part] @ fit.values[part]
+    moved = fit.moved(part)
     joint = candidate.family.joint
     if joint is None:
         axis = moved / np.maximum(np.linalg.norm(moved, axis=1, keepdims=True), 1e-12)

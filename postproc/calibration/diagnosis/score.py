@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.stats import f as fisher
 
 from postproc.arrays import Floats
@@ -195,9 +196,10 @@ def bootstrap(projection: Projection, library: Library, seed: int) -> Null:
     """
     rng = np.random.default_rng(seed)
     used = np.repeat(projection.fit.rows.weight > 0, 3)
-    rows = rng.standard_normal((len(projection.rest), BOOTSTRAP_DRAWS)) * used[:, None]
+    rows = rng.standard_normal((len(projection.rest), BOOTSTRAP_DRAWS))
+    rows *= used[:, None]
     reduced = library.reduce(projection, rows)
-    square = (rows**2).sum(axis=0)
+    square = np.einsum("rd,rd->d", rows, rows)
     return Null(np.sort(family_maxima(reduced, square, projection.rows)))
 
 
@@ -209,11 +211,14 @@ def bootstrap(projection: Projection, library: Library, seed: int) -> Null:
 # the scatter of a joint change with the way since its last reversal, which no mean
 # shows.
 
+Dealt = NDArray[np.int32]
+
 MAPS = 36
 FEATURES = 10
 LENGTHS = (0.5, 0.2)  # of the ranges of both joints
 LAGS = 3
 OMNIBUS_DRAWS = 400
+AT_ONCE = 50  # draws
 WAYS = np.radians([2.0, 8.0])  # over which scatter may fade after a reversal
 MAPPED_ROWS = 4000  # more rows than this are thinned for the maps
 
@@ -237,11 +242,11 @@ def leftovers(projection: Projection, seed: int) -> tuple[Leftover, ...]:
     """Ask all questions of a filtered residual, the most telling first."""
     rng = np.random.default_rng(seed)
     rest = projection.rest.reshape(-1, 3) * (projection.fit.rows.weight > 0)[:, None]
-    flipped, shuffled = _draws(rest, rng)
+    flipped, dealt = _draws(rest, rng)
     found: list[tuple[str, Floats]] = [
         *_maps(projection, flipped, rng),
         *_serial(projection, flipped),
-        *_scatter(projection, shuffled),
+        *_scatter(projection, rest, dealt),
     ]
     spread = np.array([_standardised(values) for _, values in found])
     worst = spread[:, 1:].max(axis=0)
@@ -254,7 +259,7 @@ def leftovers(projection: Projection, seed: int) -> tuple[Leftover, ...]:
     return tuple(sorted(out, key=lambda x: x.p_value))
 
 
-def _draws(rest: Floats, rng: np.random.Generator) -> tuple[Floats, Floats]:
+def _draws(rest: Floats, rng: np.random.Generator) -> tuple[Floats, Dealt]:
     """Make draws of plain noise from the rows themselves, the rows as they are first.
 
     Rows (n, 3) with signs drawn anew keep how large and how round the scatter of every
@@ -262,16 +267,18 @@ def _draws(rest: Floats, rng: np.random.Generator) -> tuple[Floats, Floats]:
     it on the whole.
 
     Returns:
-        Flipped and shuffled rows, (3 n, 1 + DRAWS) each.
+        Flipped rows, (3 n, 1 + DRAWS), and which row is dealt to each, (1 + DRAWS, n).
     """
     n = len(rest)
+    flipped = np.empty((n, 3, 1 + OMNIBUS_DRAWS))
+    flipped[:, :, 0] = rest
     signs = rng.choice([-1.0, 1.0], (n, OMNIBUS_DRAWS))
-    flipped = (rest[:, :, None] * signs[:, None, :]).reshape(3 * n, OMNIBUS_DRAWS)
-    dealt = np.stack(
-        [rest[rng.permutation(n)].reshape(-1) for _ in range(OMNIBUS_DRAWS)]
-    )
-    first = rest.reshape(-1)
-    return np.column_stack([first, flipped]), np.column_stack([first, dealt.T])
+    np.multiply(rest[:, :, None], signs[:, None], out=flipped[:, :, 1:])
+    dealt = np.empty((1 + OMNIBUS_DRAWS, n), dtype=np.int32)
+    dealt[0] = np.arange(n)
+    for order in dealt[1:]:
+        order[:] = rng.permutation(n)
+    return flipped.reshape(3 * n, -1), dealt
 
 
 def _standardised(values: Floats) -> Floats:
@@ -295,7 +302,7 @@ def _maps(
     q = at.states.q
     place = (q - q.min(axis=0)) / np.maximum(np.ptp(q, axis=0), 1e-9)
     whitened = projection.fit.whiten(at.jacobian).reshape(len(q), 3, 6)
-    keep = _thinned(len(q), rng)
+    keep, square = _thinned(len(q), rng), np.einsum("rd,rd->d", rows, rows)
     out = []
     for k in range(MAPS):
         a, b = rng.choice(6, 2, replace=False)
@@ -307,7 +314,7 @@ def _maps(
         columns = projection.filter(columns.reshape(-1, FEATURES))
         basis, size, _ = np.linalg.svd(columns, full_matrices=False)
         kept = basis[:, size > 1e-6 * max(float(size.max(initial=0.0)), 1e-9)]
-        share = ((kept.T @ rows) ** 2).sum(axis=0) / (rows**2).sum(axis=0)
+        share = ((kept.T @ rows) ** 2).sum(axis=0) / square
         what = f"joint {j + 1} errs alike where joints {min(a, b) + 1} and "
         out.append((what + f"{max(a, b) + 1} are alike", share))
     return out
@@ -324,18 +331,31 @@ def _thinned(n: int, rng: np.random.Generator) -> Floats:
 def _serial(projection: Projection, rows: Floats) -> list[tuple[str, Floats]]:
     """Correlate rows with those that follow, in the base frame and in the tool's."""
     fit = projection.fit
-    n, draws = len(fit.batch), rows.shape[1]
-    turned = np.swapaxes(fit.whitener.turn, 1, 2) @ rows.reshape(n, 3, draws)
-    turned = turned[np.argsort(fit.batch.states.order, kind="stable")]
-    total = (turned**2).sum(axis=(0, 1))
-    along = sum(
-        (turned[lag:] * turned[:-lag]).sum(axis=(0, 1)) for lag in range(1, LAGS + 1)
-    )
-    return [("rows that follow each other err alike", np.asarray(along / total))]
+    back = np.swapaxes(fit.whitener.turn, 1, 2)
+    order = np.argsort(fit.batch.states.order, kind="stable")
+    by_row = rows.reshape(len(order), 3, -1)
+    found = np.empty(rows.shape[1])
+    for first in range(0, len(found), AT_ONCE):
+        some = slice(first, first + AT_ONCE)
+        turned = (back @ by_row[:, :, some])[order]
+        along = sum(
+            np.einsum("nid,nid->d", turned[lag:], turned[:-lag])
+            for lag in range(1, LAGS + 1)
+        )
+        found[some] = along / np.einsum("nid,nid->d", turned, turned)
+    return [("rows that follow each other err alike", found)]
 
 
-def _scatter(projection: Projection, rows: Floats) -> list[tuple[str, Floats]]:
-    """Compare the scatter of every joint soon and late after a reversal."""
+def _scatter(
+    projection: Projection, rest: Floats, dealt: Dealt
+) -> list[tuple[str, Floats]]:
+    """Compare the scatter of every joint soon and late after a reversal.
+
+    Args:
+        projection: The fit.
+        rest: Rows, (n, 3).
+        dealt: Which of them stands at each place, (draws, n).
+    """
     fit = projection.fit
     travel = fit.batch.states.travel
     out = []
@@ -344,7 +364,7 @@ def _scatter(projection: Projection, rows: Floats) -> list[tuple[str, Floats]]:
             continue
         axis = fit.whiten(projection.at.jacobian[:, :, j]).reshape(-1, 3)
         axis /= np.maximum(np.linalg.norm(axis, axis=1, keepdims=True), 1e-12)
-        square = np.einsum("nk,nkd->nd", axis, rows.reshape(len(axis), 3, -1)) ** 2
+        square = np.stack([np.einsum("nk,nk->n", axis, rest[d]) ** 2 for d in dealt], 1)
         for way in WAYS:
             soon = np.exp(-travel[:, j] / way)
             soon = soon - soon.mean()

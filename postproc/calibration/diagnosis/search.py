@@ -36,7 +36,7 @@ def refine(projection: Projection, score: Score) -> Score:
         if len(effects) == 1:
             return score
         tries = [replace(score.best, effect=e, log_prior=0.0) for e in effects]
-        blocks = reduce_some(projection, tries, projection.rest[:, None])
+        blocks = reduce_some(projection, tries)
         found = rank(blocks, square, projection.rows)[0]
         gained = found.best_evidence - score.best_evidence
         if gained > 0.0:
@@ -56,7 +56,7 @@ def _plainer(projection: Projection, score: Score) -> Score:
         return score
     square = float(projection.rest @ projection.rest)
     tried = [replace(score.best, effect=plain)]
-    blocks = reduce_some(projection, tried, projection.rest[:, None])
+    blocks = reduce_some(projection, tried)
     found = rank(blocks, square, projection.rows)[0]
     if found.best_evidence < score.best_evidence - HARDLY:
         return score
@@ -218,6 +218,7 @@ class Search:
         additions: In the order of addition; they are the last effects of `fit`.
         null: Distribution of the largest evidence when there is nothing.
         refused: The candidate that the search stopped at, if there was one.
+        ranked: The last fit that the library was ranked under, and its ranking.
     """
 
     base: Fit
@@ -226,6 +227,13 @@ class Search:
     additions: tuple[Addition, ...]
     null: Null
     refused: Addition | None
+    ranked: tuple[Fit, list[Score]] | None = None
+
+    def ranking_under(self, fit: Fit) -> list[Score]:
+        """Rank the library by what a fit lacks, if that is not known already."""
+        if self.ranked is not None and self.ranked[0] is fit:
+            return self.ranked[1]
+        return ranking(Projection.of(fit), self.library)
 
     def place(self, number: int) -> int:
         """Return the place of an addition among the effects of the fit."""
@@ -255,7 +263,9 @@ def search(base: Fit, library: Library, null: Null, progress: Progress) -> Searc
 
 def _grow(found: Search) -> Search:
     """Add the best candidate, or say which one was refused."""
-    best = _best(found, ranking(Projection.of(found.fit), found.library))
+    scores = found.ranking_under(found.fit)
+    found = replace(found, ranked=(found.fit, scores))
+    best = _best(found, scores)
     p_value = found.null.p_value(best.evidence)
     if p_value > LEVEL or best.p_value > ALONE:
         return replace(found, refused=None)

@@ -66,7 +66,7 @@ def incomplete(projection: Projection, effect: JointEffect, place: int) -> float
     """
     fit = projection.fit
     part = fit.combination.slices[place]
-    moved = fit.whiten(fit.columns[:, :, part] @ fit.values[part])
+    moved = fit.whiten(fit.moved(part))
     own = projection.filter(moved[:, None]).reshape(-1, 3)
     axis = fit.whiten(fit.batch.jacobian[:, :, int(effect.acts_on()[0])])
     axis = axis.reshape(-1, 3)

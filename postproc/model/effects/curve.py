@@ -7,6 +7,7 @@ from itertools import combinations, product
 from typing import ClassVar, Self
 
 import numpy as np
+from numpy.polynomial.legendre import legvander
 
 from postproc.arrays import Floats
 from postproc.model.covariate import JOINTS, PLAIN, carrying, covariate, varies
@@ -179,8 +180,6 @@ class Curve(Effect):
 
     def shape(self, batch: Batch) -> Floats:
         """Evaluate the terms without their direction in space, (n, p)."""
-        from scipy.special import eval_legendre  # slow to load, and seldom wanted
-
         value, inside = np.ones((len(batch), len(self._orders()))), np.ones(len(batch))
         order = np.array(self._orders())
         for k, name in enumerate(self.source):
@@ -188,8 +187,21 @@ class Curve(Effect):
             x = covariate(batch, name)
             inside *= np.nan_to_num(fade(x, np.array(low), np.array(high)))
             u = np.clip((np.nan_to_num(x) - low) / max(high - low, 1e-12), 0, 1)
-            value *= eval_legendre(order[:, k], 2.0 * u[:, None] - 1.0)
+            terms = legvander(2.0 * u - 1.0, int(order[:, k].max()))
+            value *= terms[:, order[:, k]]
         return np.asarray(value * inside[:, None])
+
+    def only_joint(self) -> int | None:
+        """Tell from the direction."""
+        kind, _, which = self.direction.partition(" ")
+        return int(which) - 1 if kind == "joint" else None
+
+    def turning(self, batch: Batch) -> Floats:
+        """Evaluate the terms, with the joint's arrival direction if signed, (n, p)."""
+        shape, joint = self.shape(batch), self.only_joint()
+        if self.signed and joint is not None:
+            shape *= batch.states.direction[:, joint, None]
+        return shape
 
     def columns(self, batch: Batch) -> Floats:
         """Differentiate the TCP position, (n, 3, p)."""
@@ -204,10 +216,7 @@ class Curve(Effect):
 
     def _along(self, batch: Batch, axis: Floats) -> Floats:
         """Multiply a direction per unit (n, 3) by the terms, (n, 3, p)."""
-        if self.signed:
-            joint = int(self.direction.split()[1]) - 1
-            axis = axis * batch.states.direction[:, joint : joint + 1]
-        columns: Floats = axis[:, :, None] * self.shape(batch)[:, None, :]
+        columns: Floats = axis[:, :, None] * self.turning(batch)[:, None, :]
         return columns
 
     def _axis(self, batch: Batch) -> Floats:

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from postproc.arrays import Floats
 from postproc.model.covariate import covariate, varies_enough
 from postproc.model.kinematics import Batch
+from postproc.model.splines import Splines
 from postproc.robot.arm import Arm
 from postproc.robot.state import States
 
@@ -141,6 +142,14 @@ class Effect(ABC):
         moved: Floats = self.columns(batch) @ p
         return moved
 
+    def only_joint(self) -> int | None:
+        """Return the joint, from 0, that all its columns turn, None without one."""
+        return None
+
+    def turning(self, batch: Batch) -> Floats:
+        """Evaluate by what each column turns `only_joint`, (n, p) [rad per unit]."""
+        raise TypeError(f"{self.name} turns no joint alone")
+
     def zero_errors(self, p: Floats) -> Floats:
         """Return by what it turns every D-H angle wherever the arm stands, (6,) [rad].
 
@@ -166,6 +175,14 @@ class JointEffect(Effect):
     def basis(self, batch: Batch) -> Floats:
         """Evaluate phi: the angle of each parameter's joint, (n, p) [rad per unit]."""
 
+    def splines(self, batch: Batch) -> list[tuple[int, Splines, Floats]] | None:
+        """Write the columns as splines, in their order, where they are made of them.
+
+        Returns:
+            Joint from 0, its splines, and what of each makes every column, (m, k).
+        """
+        return None
+
     def acts_on(self) -> NDArray[np.int64]:
         """Return the 0-based joint that each parameter turns, (p,)."""
         return self._acts_on
@@ -174,6 +191,15 @@ class JointEffect(Effect):
     def _acts_on(self) -> NDArray[np.int64]:
         """Find them once: a program asks some hundred times."""
         return np.array([(p.joint or 1) - 1 for p in self.parameters()], dtype=int)
+
+    def only_joint(self) -> int | None:
+        """Tell from the parameters."""
+        joints = set(self.acts_on().tolist())
+        return joints.pop() if len(joints) == 1 else None
+
+    def turning(self, batch: Batch) -> Floats:
+        """Evaluate phi, (n, p)."""
+        return self.basis(batch)
 
     def columns(self, batch: Batch) -> Floats:
         """Differentiate the TCP position: (n, 3, p) [m per unit]."""

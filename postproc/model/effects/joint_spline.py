@@ -13,8 +13,9 @@ import numpy as np
 
 from postproc.arrays import Floats
 from postproc.model.effects.effect import JointEffect, Parameter, Unasked, fade
-from postproc.model.effects.smooth import smooth_columns, smooth_count, smooth_sum
+from postproc.model.effects.smooth import smooth, smooth_count
 from postproc.model.kinematics import Batch
+from postproc.model.splines import Splines
 from postproc.robot.arm import Arm
 from postproc.robot.state import States
 
@@ -80,26 +81,26 @@ class JointSpline(JointEffect):
                 )
         return tuple(out)
 
-    def basis(self, batch: Batch) -> Floats:
-        """Evaluate the functions, (n, p)."""
+    def splines(self, batch: Batch) -> list[tuple[int, Splines, Floats]]:
+        """Write the functions of every joint and length as splines, see `smooth`."""
         q = batch.states.q
         inside = fade(q, np.array(self.lower), np.array(self.upper))
-        columns = [
-            smooth_columns(q[:, j], self.lower[j], self.upper[j], length)
-            * inside[:, j, None]
-            for j, length in self._parts()
-        ]
+        out = []
+        for j, length in self._parts():
+            found, mix = smooth(q[:, j], self.lower[j], self.upper[j], length)
+            out.append((j, found.faded(inside[:, j]), mix))
+        return out
+
+    def basis(self, batch: Batch) -> Floats:
+        """Evaluate the functions, (n, p)."""
+        columns = [found.mixed(mix) for _, found, mix in self.splines(batch)]
         return np.concatenate(columns, axis=1)
 
     def angles(self, batch: Batch, p: Floats) -> Floats:
         """Return the joint errors (n, 6) [rad]: one function for every joint."""
-        q, start = batch.states.q, 0
-        inside = fade(q, np.array(self.lower), np.array(self.upper))
-        out = np.zeros((len(batch), 6))
-        for j, length in self._parts():
-            low, high = self.lower[j], self.upper[j]
-            part = slice(start, start + smooth_count(low, high, length))
-            found = smooth_sum(q[:, j], low, high, length, p[part])
-            out[:, j] += found * inside[:, j]
+        start, out = 0, np.zeros((len(batch), 6))
+        for j, found, mix in self.splines(batch):
+            part = slice(start, start + mix.shape[1])
+            out[:, j] += found.mixed(mix @ p[part])
             start = part.stop
         return out

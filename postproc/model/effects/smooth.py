@@ -12,6 +12,7 @@ from functools import cache
 import numpy as np
 
 from postproc.arrays import Floats
+from postproc.model.splines import ORDER, Splines
 
 PER_LENGTH = 2.0  # grid points per correlation length
 FEWEST, MOST = 6, 300  # grid points
@@ -43,28 +44,30 @@ def smooth_count(lower: float, upper: float, length: float) -> int:
     return int(_modes(*_grid(upper - lower, length)).shape[1])
 
 
-def smooth_columns(x: Floats, lower: float, upper: float, length: float) -> Floats:
-    """Evaluate the columns, (n, k), which together have unit prior variance.
+@cache
+def _mix(points: int, relative: float) -> Floats:
+    """What of every spline makes each column, (points, k)."""
+    from scipy.interpolate import make_interp_spline  # slow to load, and seldom wanted
+
+    modes = _modes(points, relative)
+    grid = np.linspace(0.0, 1.0, points)
+    mix: Floats = np.ascontiguousarray(make_interp_spline(grid, modes, k=ORDER).c)
+    return mix
+
+
+def smooth(
+    x: Floats, lower: float, upper: float, length: float
+) -> tuple[Splines, Floats]:
+    """Write the columns as splines, which together have unit prior variance.
 
     Args:
         x: (n,), clipped into the range.
         lower: Lower end of the variable's range.
         upper: Upper end.
         length: Correlation length, in units of x.
+
+    Returns:
+        The splines at x, and what of each makes every column, (points, k).
     """
-    return _interpolated(x, lower, upper, _modes(*_grid(upper - lower, length)))
-
-
-def smooth_sum(
-    x: Floats, lower: float, upper: float, length: float, p: Floats
-) -> Floats:
-    """Evaluate the function that the columns times p, (k,), make, (n,)."""
-    return _interpolated(x, lower, upper, _modes(*_grid(upper - lower, length)) @ p)
-
-
-def _interpolated(x: Floats, lower: float, upper: float, modes: Floats) -> Floats:
-    """Interpolate what is given on an even grid, (points,) or (points, k)."""
-    grid = np.linspace(lower, upper, len(modes))
-    from scipy.interpolate import CubicSpline  # slow to load, and seldom wanted
-
-    return np.asarray(CubicSpline(grid, modes)(np.clip(x, lower, upper)))
+    points, relative = _grid(upper - lower, length)
+    return Splines.at(x, lower, upper, points), _mix(points, relative)

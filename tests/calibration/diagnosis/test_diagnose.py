@@ -40,6 +40,8 @@ from postproc.robot.arm import load_arm
 from postproc.robot.state import States, make_states
 from postproc.simulation import Planted, stream, virtual_arm
 from tests.calibration.planted import ARM, BASE, TRACKER, campaign, states_of, survey
+from tests.calibration.simulator import NJ
+from tests.calibration.test_directions import flipped
 
 
 def measurements(states: States, position: np.ndarray, name: str) -> Measurements:
@@ -309,3 +311,27 @@ def test_what_has_no_name_is_told_by_where_it_lives(tmp_path: Path) -> None:
     assert "still there" not in told
     names = [p.name for p in plot_diagnosis(found, tmp_path / "n.svg")]
     assert "n-finding1.svg" in names
+
+
+def test_wrong_directions_are_listed_and_held_out_rows_keep_theirs() -> None:
+    clean, _ = flipped(2, 0.0)
+    model = model_of(fit_survey(clean, NJ, BASE_EFFECTS, None), clean)
+    rows, wrong = flipped(2, 0.05)
+    found = diagnose(rows, NJ, model)
+    listed = found.diagnosis.directions
+    assert listed is not None and listed.turned > 20
+    for likely in listed.likeliest[:20]:
+        assert wrong[rows.ids.index(likely.id), likely.joint - 1]
+    held, off = found.held_out, np.linalg.norm(found.held_out.after, axis=1)
+    turned = found.search.fit.batch.states.direction == -rows.states.direction
+    out = turned.any(axis=1)[held.rows]
+    assert out.sum() > 20
+    assert np.median(off[out]) > 4.0 * np.median(off[~out])
+    assert "likeliest wrong: row " in tell(found.diagnosis)
+    report = json.loads(dumped(evidence_of(found)))
+    assert report["directions"]["turned"] == listed.turned
+
+
+def test_right_directions_are_not_asked_about(found: Extension) -> None:
+    assert found.diagnosis.directions is None
+    assert "likeliest wrong" not in tell(found.diagnosis)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
 
-from postproc.calibration.diagnosis.held_out import deal, held_out_errors
+from postproc.calibration.diagnosis.held_out import Folds, deal
 from postproc.calibration.diagnosis.library import (
     Library,
     Projection,
@@ -24,7 +24,7 @@ from postproc.calibration.diagnosis.score import (
 )
 from postproc.model.effects.effect import NAMED, Candidate, Family
 from postproc.model.effects.scale import Scale
-from tests.calibration.planted import campaign
+from tests.calibration.planted import campaign, plain_design
 
 
 def candidate(joint: int = 1) -> Candidate:
@@ -89,7 +89,7 @@ def base() -> Projection:
 
 def test_filter_turns_draws_from_the_model_into_plain_noise(base: Projection) -> None:
     fit = base.fit
-    X = fit.whiten(fit.columns) * fit.prior_std
+    X = fit.whiten(fit.design.dense()) * fit.prior_std
     cov = np.eye(len(X)) + X @ X.T
     white = base.filter(base.filter(cov).T)
     assert np.abs(white - np.eye(len(X))).max() < 1e-6
@@ -97,7 +97,7 @@ def test_filter_turns_draws_from_the_model_into_plain_noise(base: Projection) ->
 
 def test_filter_leaves_nothing_of_what_the_model_knows(base: Projection) -> None:
     fit = base.fit
-    X = fit.whiten(fit.columns) * fit.prior_std
+    X = fit.whiten(fit.design.dense()) * fit.prior_std
     size = np.linalg.norm(X, axis=0)
     left = np.linalg.norm(base.filter(X), axis=0)
     assert (left[size > 100] < 2.0).all()
@@ -108,10 +108,10 @@ def test_evidence_with_the_base_projected_out_is_that_of_the_joint_model(
     base: Projection,
 ) -> None:
     fit = base.fit
-    X = fit.whiten(fit.columns) * fit.prior_std
+    X = fit.whiten(fit.design.dense()) * fit.prior_std
     one = candidate(4)
     b = fit.whiten(one.effect.columns(base.at))[:, 0]
-    target = fit.whiten(fit.residual + fit.columns @ fit.values)
+    target = fit.whiten(fit.residual + fit.design.times(fit.values))
     blocks = blocks_of(base.filter(b[:, None]), base.rest)
     s2 = float(SIGNALS[12] / blocks.gain[0, 0])
     zero = np.zeros(len(b))
@@ -166,11 +166,15 @@ def test_held_out_errors_come_from_the_other_rows() -> None:
     rng = np.random.default_rng(6)
     X, y = rng.standard_normal((60, 5)), rng.standard_normal(60)
     fold = np.arange(20) % 4
-    errors = held_out_errors(X, y, fold)
+    every, less = Folds.of(plain_design(X), np.ones(5), y, fold).errors(slice(1, 3))
+    errors = every.reshape(-1)
     out = np.repeat(fold == 2, 3)
     A, b = X[~out], y[~out]
     p = np.linalg.solve(A.T @ A + np.eye(5), A.T @ b)
     assert errors[out] == pytest.approx(y[out] - X[out] @ p)
+    A, B = np.delete(A, [1, 2], axis=1), np.delete(X, [1, 2], axis=1)
+    p = np.linalg.solve(A.T @ A + np.eye(3), A.T @ b)
+    assert less.reshape(-1)[out] == pytest.approx(y[out] - B[out] @ p)
 
 
 def test_library_asks_joints_and_axes_about_every_covariate(base: Projection) -> None:
