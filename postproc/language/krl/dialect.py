@@ -13,7 +13,7 @@ from postproc.robot.pose import MM
 
 MM_DECIMALS, ANGLE_DECIMALS, JOINT_DECIMALS = 3, 4, 5
 COMMENTS = Comments(";", '"')
-HEADS = ("X", "Y", "Z", "A", "B", "C", "S", "T")
+HEADS = tuple("XYZABCST")
 COMPONENTS = tuple(name.lower() for name in HEADS)
 WIDTH = len(HEADS)
 ANGLES, STATUS, TURN = slice(3, 6), 6, 7
