@@ -56,7 +56,7 @@ class KrlRecord:
 
 KrlValue = KrlNumber | KrlRecord | str
 
-# Routines and functions that neither move nor change the data that they are given.
+# Routines and functions that do not move; of these, those that change what they get.
 STILL = frozenset(
     """
     ir_stopm pulse clear_pulse cread cwrite sread swrite copen cclose cioctl cast_to
@@ -66,6 +66,7 @@ STILL = frozenset(
     rob_timer get_decl_place m_comment setinfo lock unlock
     """.split()
 )
+WRITING = frozenset("cread sread cast_from mbx_rec strcopy strclear stradd".split())
 FUNCTIONS = frozenset(
     """
     abs sqrt sin cos tan acos atan2 frand round trunc b_not inverse forward inv_pos
@@ -353,7 +354,7 @@ class _Uses:
         """Note arguments: a routine may change them, unless it is known not to."""
         for argument in arguments:
             if isinstance(argument.value, said.DataObject):
-                if name not in STILL | FUNCTIONS and name != "bas":
+                if name not in (STILL - WRITING) | FUNCTIONS and name != "bas":
                     self.written.add(argument.value.name)
             self.take(argument.value)
 

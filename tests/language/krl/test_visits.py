@@ -496,3 +496,9 @@ def test_sides_of_axis_5_that_s_and_t_tell_otherwise():
 def test_flags_are_checked_on_joint_moves_alone():
     care = job("PTP XP1", "LIN XP1").visits.care
     assert care[:, 0].tolist() == [Switch.ON, Switch.OFF]
+
+
+@pytest.mark.parametrize("line", ['CREAD(H,S,M,T,O,"%r",XP2)', "CAST_FROM(B,O,XP2)"])
+def test_what_is_read_into_a_point_changes_it(line):
+    found = job(line, "PTP XP1", "LIN XP2")
+    assert reasons(found)[0] == "" and "may be changed" in reasons(found)[1]
