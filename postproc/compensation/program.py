@@ -132,7 +132,6 @@ def start_of(cell: Cell) -> Start:
         aux=dict(cell.aux),
         taught=cell.taught,
         arm=cell.arm_number,
-        closed_form=cell.arm.file.opw is not None,
         source=str(cell.path),
     )
 

@@ -139,6 +139,7 @@ def targets_from_visits(visits: Visits, cell: Cell) -> tuple[Targets, Reasons]:
     _explain(visits, values, poses, reasons)
     lost = (outside | visits.tool_remote) & (kind != TargetKind.JOINTS)
     lost |= _unplaced(kind, tcp, joints, frames)
+    lost |= _unnamed(visits, cell, reasons)
     slot, turns = visits.dialect.flags(visits.config, visits.configs, values)
     rounding, distance, overlap = rounding_of(visits)
     pred_start, pred = arc_per_start(
@@ -169,6 +170,20 @@ def targets_from_visits(visits: Visits, cell: Cell) -> tuple[Targets, Reasons]:
         pred=pred,
     )
     return targets, reasons
+
+
+UNNAMED = (
+    "which branch its flags name is known for arms with a closed form alone: go there "
+    "by joint angles, or on a line"
+)
+
+
+def _unnamed(visits: Visits, cell: Cell, reasons: Reasons) -> Bools:
+    """Mark joint moves to poses of arms whose branches no controller's flags name."""
+    poses = np.isin(visits.target, (Meaning.POSE, Meaning.NEAR))
+    rows = poses & (visits.motion == Motion.JOINT) & (cell.arm.file.opw is None)
+    reasons.mark(rows, UNNAMED)
+    return np.asarray(rows)
 
 
 def _unplaced(kind: Ints, tcp: Floats, joints: Floats, frames: Frames) -> Bools:

@@ -29,10 +29,6 @@ from postproc.robot.pose import pose_from_record
 from postproc.robot.trajectory import Motion
 
 TOO_COMPLEX = "the program is too complex to be followed"
-NO_BRANCH = (
-    "which configuration its flags name is known for arms with a closed form alone: "
-    "go there by joint angles"
-)
 ONLY_SHIFTED = "it is shifted from a point that no move goes to: what to correct?"
 _NO_FRAME = -1
 Pose = tuple[float, ...]
@@ -175,8 +171,6 @@ def visits_of(
     """
     order = sorted(range(len(machine.visits)), key=machine.order.__getitem__)
     found = [machine.visits[k] for k in order]
-    if not machine.start.closed_form:
-        _forget_branches(found)
     held = [conditions(v) for v in found]
     texts, n = machine.texts, len(found)
     tables = _Tables(Interned(), Interned([""]), Interned([""]))
@@ -364,15 +358,6 @@ def _places(
 def _is_named(name: str, names: Collection[str]) -> bool:
     """Tell whether data, or an element of an array, are among some names."""
     return re.split(r"[{\[]", name)[0].strip().lower() in names
-
-
-def _forget_branches(found: Sequence[FoundVisit]) -> None:
-    """Forget the targets whose flags choose the configuration: joint moves to poses."""
-    for v in found:
-        if v.motion == Motion.JOINT and v.goal.target == Meaning.POSE:
-            nothing = (math.nan,) * len(v.goal.values)
-            why = v.goal.why or NO_BRANCH
-            v.goal = FoundGoal(Meaning.UNKNOWN, nothing, name=v.goal.name, why=why)
 
 
 def _predecessors(machine: TaskMachine, order: Sequence[int]) -> tuple[Ints, Ints]:

@@ -35,8 +35,6 @@ class Start:
         aux: Auxiliary axis to ``gun``, ``track`` or ``positioner``.
         taught: Names of points that were taught with the robot.
         arm: Number of our arm.
-        closed_form: The arm's configurations are those that flags are documented for:
-            its inverse kinematics has the closed form.
         source: The cell file, for messages.
     """
 
@@ -54,7 +52,6 @@ class Start:
     aux: Mapping[int, str] = field(default_factory=dict)
     taught: Collection[str] = frozenset()
     arm: int = 1
-    closed_form: bool = True
     source: str = ""
 
     def __post_init__(self) -> None:

@@ -10,6 +10,7 @@ from postproc.compensation.compensate import compensate
 from postproc.compensation.options import AS_USUAL
 from postproc.compensation.outcome import Status
 from postproc.compensation.program import plan_visits, prepared, read_program
+from postproc.compensation.targets import UNNAMED
 from postproc.robot.arm import load_arm
 from postproc.robot.cell import load_cell
 from postproc.robot.pose import record_from_pose
@@ -99,3 +100,20 @@ def test_a_line_through_a_singularity_is_left(cell, model):
     text = "\n".join(["PROGRAM job", "BEGIN", *lines, "END job"]).encode()
     done = compensate(text, cell, model, name="job.pdl")
     assert done.decisions.status[1] != Status.SAFE
+
+
+def test_flags_name_no_branch_of_such_an_arm(cell, model):
+    """Where a joint move to a pose leads is not known, nor what goes on from there."""
+    pose = (UR10.flange(np.deg2rad(HOME)[None])[0] @ cell.tool.pose)[None]
+    numbers = ", ".join(f"{v:.4f}" for v in record_from_pose(pose)[0])
+    home = f"MOVE JOINT TO {{{', '.join(map(str, HOME))}}}"
+    lines = [
+        f"MOVE JOINT TO POS({numbers}, '')",
+        home,
+        f"MOVE LINEAR TO POS({numbers}, '')",
+    ]
+    text = "\n".join(["PROGRAM job", "BEGIN", home, *lines, "END job"]).encode()
+    decided = compensate(text, cell, model, name="job.pdl").decisions
+    assert decided.status[1] != Status.SAFE
+    assert decided.reasons[decided.why[1]] == UNNAMED
+    assert (decided.status[[0, 2]] == Status.SAFE).all()

@@ -476,15 +476,6 @@ def test_routines_that_call_themselves_are_not_followed():
     assert "motion-unknown" in codes(found)
 
 
-def test_configurations_of_an_arm_without_a_closed_form():
-    """S says nothing known there; lines stay where the arm is."""
-    lines = ("PTP XP1", "PTP {A1 0,A2 -90,A3 90,A4 0,A5 10,A6 0}", "LIN XP2")
-    found = job(*lines, start=Start(closed_form=False))
-    assert "joint angles" in reasons(found)[0] and reasons(found)[1:] == ["", ""]
-    assert np.isnan(found.visits.values[0]).all()
-    assert reasons(job(*lines)) == ["", "", ""]
-
-
 def test_sides_of_axis_5_that_s_and_t_tell_otherwise():
     point = "PTP {{X 1,Y 2,Z 3,A 0,B 0,C 0,S {},T {}}}"
     lines = [point.format(2, 2), point.format(6, 18), point.format(6, 2)]
