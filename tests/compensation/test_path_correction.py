@@ -17,6 +17,7 @@ from tests.written import cli
 
 TOLERANCE = 0.1  # [mm]
 SPEED = 50.0  # [mm/s] in the job
+INSERTED = b"postproc: inserted"
 
 
 @cache
@@ -161,3 +162,28 @@ def test_options_that_do_not_fit(
                 shop / "model.json", "-o", shop / "no.pdl", *options)  # fmt: skip
     assert found.exit_code == 2 and said in found.stderr
     assert not (shop / "no.pdl").exists()
+
+
+@pytest.mark.parametrize("change", ["moved", "taken out", "put in twice"])
+def test_check_tells_a_point_that_was_touched(
+    shop: Path, tmp_path: Path, change: str
+) -> None:
+    for name in ("points.pdl", "points.pdl.postproc.json"):
+        (tmp_path / name).write_bytes((shop / name).read_bytes())
+    given = ("check", tmp_path, "--model", shop / "model.json", "--accept-left")
+    assert cli(*given).exit_code == 0
+    place = tmp_path / "points.pdl"
+    lines = place.read_bytes().split(b"\r\n")
+    row = next(
+        k for k, line in enumerate(lines) if line.endswith(b"postproc: inserted")
+    )
+    if change == "moved":
+        lines[row] = lines[row].replace(b"POS(", b"POS(1", 1)
+    elif change == "taken out":
+        del lines[row]
+    else:
+        lines.insert(row, lines[row])
+    place.write_bytes(b"\r\n".join(lines))
+    found = cli(*given)
+    assert found.exit_code == 1
+    assert "points.pdl" in found.stdout + found.stderr
