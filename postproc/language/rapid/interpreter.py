@@ -14,7 +14,13 @@ from postproc.language.machine import (
     TaskMachine,
 )
 from postproc.language.rapid import syntax as said
-from postproc.language.rapid.modes import AT_START, HARMLESS, changed_modes
+from postproc.language.rapid.modes import (
+    AT_START,
+    HARMLESS,
+    UNKNOWN_SHIFT,
+    Modes,
+    changed_modes,
+)
 from postproc.language.rapid.moves import Goals, pose_of
 from postproc.language.rapid.signatures import (
     MOTIONS,
@@ -40,10 +46,12 @@ class RapidMachine(TaskMachine):
     Attributes:
         task: Its modules.
         goals: Reads destinations, tools, work objects and zones.
+        ends: What holds where the main routine ends.
     """
 
     task: RapidTask = field(kw_only=True)
     goals: Goals = field(kw_only=True)
+    ends: list[Modes] = field(default_factory=list)
     _moving: dict[tuple[int, int], bool] = field(default_factory=dict)
 
     @classmethod
@@ -69,6 +77,24 @@ class RapidMachine(TaskMachine):
         for file, module, routine in found:
             self.call(file, module, routine, None, -1, here)
         self.follow_all()
+        again = self._next_cycle(here)
+        if len(mains) == 1 and again != here:
+            self.call(*mains[0], None, -1, again)
+            self.follow_all()
+
+    def _next_cycle(self, here: Arrived) -> Arrived:
+        """Say how main begins once more: what displaces or blocks at its end may hold.
+
+        What an unknown call leaves unknown there does not count:
+        it would leave whole programs.
+        """
+        modes, displaced = here.modes, "pdispon" in self.task.called
+        for end in self.ends:
+            joined = modes.joined(end)
+            modes = replace(modes, blocked=joined.blocked)
+            if end.shift != UNKNOWN_SHIFT or displaced:
+                modes = replace(modes, shift=joined.shift)
+        return replace(here, modes=modes)
 
     def _procedures(self) -> list[tuple[int, str, HeadedRows]]:
         routines = (one for found in self.task.routines.values() for one in found)
@@ -115,6 +141,8 @@ class RapidMachine(TaskMachine):
 
     def at_return(self, context: CallContext, here: Arrived) -> Arrived:
         """Allow for errors that end a routine early."""
+        if context.caller is None:
+            self.ends.append(here.modes)
         file, flow = context.scope.file, context.flow
         if len(flow.handlers):
             if self._any_moves(context.scope, flow.handlers):

@@ -434,3 +434,23 @@ def test_measured_moves_carry_their_ids():
         L.format("p1") + " ! MEASURE h2", "! MEASURE h3", "x:=1;", arc, "! MEASURE h4",
     )  # fmt: skip
     assert found.visits.measure_id == ("h1", "", "h2", "", "h3")
+
+
+SET = "PDispSet [[0,0,7],[1,0,0,0]];"
+
+
+@pytest.mark.parametrize(
+    ("last", "left"),
+    [
+        ([SET], True),
+        ([SET, "PDispOff;"], False),
+        (["PDispOn p2,t;"], True),
+        (["SoftAct 1,20;"], True),
+        (["SoftAct 1,20;", "SoftDeact;"], False),
+        (["NotKnown;"], False),
+    ],
+)
+def test_what_holds_at_the_end_of_main_may_hold_when_it_begins_again(last, left):
+    found = task(L.format("p1"), L.format("p2"), *last)
+    assert (reasons(found)[0] != "") is left
+    assert origins(found) == [[START], [0]]
