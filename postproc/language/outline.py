@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Protocol, TypeVar
 
+from postproc.exceptions import ProgramError
 from postproc.language.flow import HeadedRows
+from postproc.language.source import Source
 from postproc.language.statements import StatementText
 from postproc.language.syntax import SourceStatement
 from postproc.language.visits import Diagnostic
@@ -117,3 +119,37 @@ class Outline:
     def _complain(self, row: int, what: str) -> None:
         message = f"{self.text.shown(row)} {what}"
         self.diagnostics.append(self.text.diagnostic(row, "open-block", message))
+
+
+class StatementFile(Protocol):
+    """A file that was read: its statements, and what is not understood."""
+
+    @property
+    def text(self) -> StatementText[Any]:
+        """Its statements."""
+
+    @property
+    def diagnostics(self) -> Sequence[Diagnostic]:
+        """What is not understood."""
+
+
+File = TypeVar("File", bound=StatementFile)
+
+
+def read_once(
+    source: Source, known: Sequence[File], read: Callable[[Source], File]
+) -> File:
+    """Read a file, unless it was read before.
+
+    Raises:
+        ProgramError: Its blocks do not close: what runs when is not known.
+    """
+    for file in known:
+        if file.text.source == source:
+            return file
+    file = read(source)
+    for found in file.diagnostics:
+        if found.code == "open-block":
+            cure = "Close it: what runs when is not known without"
+            raise ProgramError(source.name, found.message, cure, line=found.line)
+    return file

@@ -24,6 +24,7 @@ from postproc.language.krl.interpreter import KrlMachine
 from postproc.language.krl.program import KrlFile, read_krl
 from postproc.language.krl.statements import KrlText
 from postproc.language.krl.task import KrlTask
+from postproc.language.outline import read_once
 from postproc.language.rewrite import Skeleton
 from postproc.language.source import Source
 from postproc.language.visits import never_reached
@@ -56,7 +57,7 @@ class Krl(Language):
         known: Sequence[KrlFile] = (),
     ) -> JobReading:
         """Read the files of a job, the source that runs first; see `Language.read`."""
-        files = [_read(source, known) for source in sources]
+        files = [read_once(source, known, read_krl) for source in sources]
         if not files[0].routines:
             problem, cure = "the file holds no routine", "Give the .src of a program"
             raise ProgramError(sources[0].name, problem, cure)
@@ -116,23 +117,6 @@ def _begun(line: bytes) -> str:
 def skeleton_of(text: KrlText) -> Skeleton:
     """Take over what the statements of a text tell, for comparing it with another."""
     return text.skeleton(lambda source: skeleton_of(read_krl(source).text))
-
-
-def _read(source: Source, known: Sequence[KrlFile]) -> KrlFile:
-    """Read a file, unless it was read before.
-
-    Raises:
-        ProgramError: Its blocks do not close: what runs when is not known.
-    """
-    for file in known:
-        if file.text.source == source:
-            return file
-    file = read_krl(source)
-    for found in file.diagnostics:
-        if found.code == "open-block":
-            cure = "Close it: what runs when is not known without"
-            raise ProgramError(source.name, found.message, cure, line=found.line)
-    return file
 
 
 def _refuse_own_accuracy(files: Sequence[KrlFile]) -> None:

@@ -17,6 +17,7 @@ from postproc.language.interface import (
     NoClones,
     Start,
 )
+from postproc.language.outline import read_once
 from postproc.language.rapid.collect import visits_of
 from postproc.language.rapid.dialect import RAPID_DIALECT
 from postproc.language.rapid.interpreter import RapidMachine
@@ -53,7 +54,7 @@ class Rapid(Language):
         known: Sequence[RapidFile] = (),
     ) -> JobReading:
         """Read the modules of a task, the one with main first; see `Language.read`."""
-        files = [_read(source, known) for source in sources]
+        files = [read_once(source, known, read_rapid) for source in sources]
         if not files[0].routines:
             problem, cure = "the file holds no routine", "Give a RAPID module"
             raise ProgramError(sources[0].name, problem, cure)
@@ -118,20 +119,3 @@ def _begun(line: bytes) -> str:
 def skeleton_of(text: RapidText) -> Skeleton:
     """Take over what the statements of a text tell, for comparing it with another."""
     return text.skeleton(lambda source: skeleton_of(read_rapid(source).text))
-
-
-def _read(source: Source, known: Sequence[RapidFile]) -> RapidFile:
-    """Read a file, unless it was read before.
-
-    Raises:
-        ProgramError: Its blocks do not close: what runs when is not known.
-    """
-    for file in known:
-        if file.text.source == source:
-            return file
-    file = read_rapid(source)
-    for found in file.diagnostics:
-        if found.code == "open-block":
-            cure = "Close it: what runs when is not known without"
-            raise ProgramError(source.name, found.message, cure, line=found.line)
-    return file
