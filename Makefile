@@ -73,7 +73,7 @@ evidence: $(STAMP)
 	@$(PYTHON_BIN) -m tests.evidence
 
 reproduce: $(STAMP)
-	@cd docs/studies && $(abspath $(PYTHON_BIN)) reproduction.py --seeds 20 --arms 10
+	@cd docs/studies && $(abspath $(PYTHON_BIN)) reproduction.py --centres 60 --arms 40
 
 accuracy: $(STAMP)
 	@PYTHONPATH=. $(PYTHON_BIN) docs/studies/accuracy.py --seeds 20

@@ -21,11 +21,19 @@ PAYLOADS = np.array([0.0, 40.0, 120.0])  # [kg]
 PAYLOAD_COM = np.array([0.0, 0.0, 0.2])  # [m]
 
 
-def working_angles(rng: np.random.Generator, n: int) -> Floats:
-    """Draw joint sets (n, 6) [rad] by Latin hypercube over the working range."""
+def working_angles(
+    rng: np.random.Generator, n: int, within: Floats = WORKING_RANGE
+) -> Floats:
+    """Draw joint sets (n, 6) [rad] by Latin hypercube.
+
+    Args:
+        rng: Draws.
+        n: How many.
+        within: Ends of every joint's range, (6, 2) [rad].
+    """
     strata = rng.permuted(np.tile(np.arange(n), (6, 1)), axis=1).T
     unit = (strata + rng.random((n, 6))) / n
-    low, high = WORKING_RANGE.T
+    low, high = within.T
     return np.asarray(low + unit * (high - low))
 
 

@@ -24,6 +24,7 @@ from postproc.simulation.reference import (
     MEASURED_EVERY,
     PAYLOAD_COM,
     SPEEDS,
+    WORKING_RANGE,
     log_uniform,
     working_angles,
 )
@@ -156,6 +157,7 @@ def sample_survey(
     tool: Floats | None = None,
     payload: Floats | float = 0.0,
     payload_com: Floats | None = None,
+    within: Floats = WORKING_RANGE,
 ) -> VirtualArrivals:
     """Send an arm to n joint sets, each from a drawn side and distance.
 
@@ -166,9 +168,10 @@ def sample_survey(
         tool: TCP (3,), (n, 3) or poses [m]; default a probe off the flange axis.
         payload: [kg], one value or (n,).
         payload_com: (3,) or (n, 3) in the flange frame [m].
+        within: Ends of every joint's range, (6, 2) [rad].
     """
     rng = stream(seed, "survey")
-    q = working_angles(rng, n)
+    q = working_angles(rng, n, within)
     side = rng.choice([-1.0, 1.0], (n, 6))
     way = log_uniform(rng, APPROACH, (n, 6))
     time = MEASURED_EVERY * np.arange(n) + rng.uniform(0.0, 2.0, n)

@@ -109,3 +109,11 @@ def test_an_arm_is_the_same_in_a_short_and_in_a_long_campaign() -> None:
         else:
             np.testing.assert_array_equal(one(a), two(a))
     np.testing.assert_array_equal(short.joint_noise, long.joint_noise)
+
+
+def test_a_campaign_stays_within_its_volume_and_fills_it() -> None:
+    ends = np.radians([[-20.0, 20], [0, 30], [-90, -60], [10, 50], [30, 60], [0, 5]])
+    q = sample_survey(virtual_arm(3), 100, seed=1, within=ends).q
+    places = (q - ends[:, 0]) / (ends[:, 1] - ends[:, 0]) * 100
+    strata = np.sort(np.floor(places), axis=0)  # a Latin hypercube: one row in each
+    assert (strata == np.arange(100)[:, None]).all()
