@@ -220,9 +220,10 @@ def page(given: argparse.Namespace) -> list[str]:
         *table,
         "",
         "So the errors before compensation are those of a working volume of some ±10 "
-        "to ±20 deg, in every reading but radians; what the source's EJA-ELM leaves is "
-        "what it leaves here in a volume about twice as wide (±40 deg, the lengths as "
-        "built). No volume gives all four figures.",
+        "to ±20 deg, in all readings but radians, and degrees with the lengths as "
+        "built; what the source's EJA-ELM leaves is what it leaves here in a volume "
+        "about twice as wide (±40 deg, the lengths as built). No volume "
+        "gives all four figures.",
         "",
         "## Like the experiment: 300 rows to fit, 150 to test",
         "",
