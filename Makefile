@@ -18,7 +18,7 @@
 # make languages   where arms land that run one job in every language: docs/languages.md
 # make undeclared  undeclared effects traced on virtual arms, 1,400 of them: docs/undeclared.md
 # make paths       predicted and true path accuracy on virtual arms: docs/paths.md
-# make real DATA=folder   fits of real arms on rows they have not seen: docs/real-arms.md
+# make real DATA=folder [FITS=1]   real arms, rows that nothing has seen; FITS leaves out diagnoses: docs/real-arms.md
 # make blind       effects traced in the blind campaigns and on a real arm: docs/blind.md
 # make wheel       a wheel for every Python from 3.11 on, tried in a new environment, in dist
 # make native      lint and tests of the native core by itself, for who changes it
@@ -98,7 +98,7 @@ blind: $(STAMP)
 
 real: $(STAMP)
 	@test -n "$(DATA)" || { echo "make real DATA=folder: see docs/real-arms.md" >&2; exit 2; }
-	@PYTHONPATH=. $(PYTHON_BIN) docs/studies/real_arms.py "$(DATA)" --jobs $(or $(JOBS),1) $(if $(QUICK),--quick -o build/real-arms.md)
+	@PYTHONPATH=. $(PYTHON_BIN) docs/studies/real_arms.py "$(DATA)" --jobs $(or $(JOBS),1) $(if $(QUICK),--quick -o build/real-arms.md) $(if $(FITS),--no-diagnosis)
 
 chaos: $(STAMP)
 	@$(PYTHON_BIN) -m tests.chaos --runs $(or $(RUNS),200) --files $(or $(FILES),300) --signals $(or $(SIGNALS),50)

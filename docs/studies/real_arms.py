@@ -78,13 +78,15 @@ class Trial:
     Attributes:
         path, base: Of the set, see `read_set`.
         draws: Numbers of the splits and of their draws, all of which fit the same rows.
-        quick: Whether few rows are fitted, and none diagnosed.
+        quick: Whether few rows are fitted.
+        traced: Whether what is left of the fitted rows is diagnosed.
     """
 
     path: Path
     base: Path
     draws: tuple[tuple[int, int], ...]
     quick: bool
+    traced: bool
 
 
 @dataclass(frozen=True)
@@ -109,14 +111,14 @@ class Tried:
 read_once = cache(read_set)
 
 
-def trials_of(path: Path, base: Path, quick: bool) -> list[Trial]:
+def trials_of(path: Path, base: Path, quick: bool, traced: bool) -> list[Trial]:
     """List what is fitted for a set, every choice of rows once."""
     data = read_once(path, base)
     fits: dict[tuple[str, bytes], list[tuple[int, int]]] = {}
     for k, split in enumerate(() if data is None else data.splits):
         for number, (rows, _) in enumerate(split.draws):
             fits.setdefault((split.fit, rows.tobytes()), []).append((k, number))
-    return [Trial(path, base, tuple(draws), quick) for draws in fits.values()]
+    return [Trial(path, base, tuple(d), quick, traced) for d in fits.values()]
 
 
 def run(trial: Trial) -> Tried:
@@ -131,7 +133,7 @@ def run(trial: Trial) -> Tried:
     fits = {name: fitted(data, rows, name) for name in ORDER[1:-1]}
     models = {NOMINAL: without_effects(fits[GEOMETRY].model)}
     models |= {name: found.model for name, found in fits.items()}
-    found = None if trial.quick else traced(data, fits[DEFAULT])
+    found = traced(data, fits[DEFAULT]) if trial.traced else None
     if found is not None:
         models[TRACED] = found.model
     outcomes = {
@@ -221,7 +223,7 @@ def pooled(draws: list[dict[str, Outcome]]) -> dict[str, Outcome]:
 
 TEXT = """# Real arms
 
-Written by `make real DATA=folder`{quick} with postproc {version} and numpy {numpy}, in
+Written by `make real DATA=folder`{how} with postproc {version} and numpy {numpy}, in
 {minutes:.0f} minutes of processor time, from public measurements of real arms. The data
 are not part of the project; every set below says where they come from.
 
@@ -237,11 +239,11 @@ are not part of the project; every set below says where they come from.
 *{nominal}* is the arm as its maker gives it; *{geometry}* has its
 lengths and angles fitted; the next five are [published methods](reproduction.md)
 (40 neurons, seed 0; kriging of {centres} rows at the most, evenly taken);
-*{default}* is `postproc fit`; *{traced}* is what `postproc diagnose` makes of the
-fitted rows afterwards. Errors are distances in mm. *Intervals hold* is the share of
-coordinates in the 95 % interval that is stated for them (of a published method: by
-ten folds of cross-validation). Published maps of the position error hold for the
-probe that they were fitted with, at its place; another series may have another.
+*{default}* is `postproc fit`{after}. Errors are distances in
+mm. *Intervals hold* is the share of coordinates in the 95 % interval that is stated
+for them (of a published method: by ten folds of cross-validation). Published maps
+of the position error hold for the probe that they were fitted with, at its place;
+another series may have another.
 
 ## In short: mean error of the tested rows, mm
 
@@ -283,24 +285,35 @@ rows = "20 poses"
 mean_mm = 0.155
 ```
 """
+DIAGNOSED = (
+    f"; *{TRACED}* is what `postproc diagnose` makes of the fitted rows afterwards"
+)
 HEAD = [
     "| method | mean | 95 % | max | intervals hold | rows |",
     "|---|---|---|---|---|---|",
 ]
 
 
-def page(sets: list[tuple[DataSet, list[Tried]]], quick: bool) -> str:
+def page(sets: list[tuple[DataSet, list[Tried]]], given: argparse.Namespace) -> str:
     """Write the page."""
     seconds = sum(t.seconds for _, tries in sets for t in tries)
+    traced = any(t.diagnosis is not None for _, tries in sets for t in tries)
     text = TEXT.format(
-        quick=" with `--quick`" if quick else "",
+        how="".join(
+            f" with `{option}`"
+            for option, on in (
+                ("--quick", given.quick),
+                ("--no-diagnosis", given.no_diagnosis),
+            )
+            if on
+        ),
         version=__version__,
         numpy=np.__version__,
         minutes=seconds / 60,
         nominal=NOMINAL,
         geometry=GEOMETRY,
         default=DEFAULT,
-        traced=TRACED,
+        after=DIAGNOSED if traced else "; nothing was diagnosed",
         centres=MOST_CENTRES,
         short="\n".join(short(sets)),
     )
@@ -399,10 +412,12 @@ def main() -> None:
     parser.add_argument("--jobs", type=int, default=1)
     parser.add_argument("--quick", action="store_true", help="few rows, no diagnosis")
     parser.add_argument("-o", "--output", type=Path, default=OUT)
+    parser.add_argument("--no-diagnosis", action="store_true", help="fits only")
     given = parser.parse_args()
+    traced = not (given.quick or given.no_diagnosis)
     try:
         found = list(descriptions(given.data, given.described))
-        trials = {at: trials_of(*at, given.quick) for at in found}
+        trials = {at: trials_of(*at, given.quick, traced) for at in found}
     except PostprocError as exc:
         raise SystemExit(f"not run: {exc}") from None
     work = [t for some in trials.values() for t in some]
@@ -416,7 +431,7 @@ def main() -> None:
             [t for t in tried if (t.trial.path, t.trial.base) == at],
         )
         sets += [(data, mine)] if data is not None else []
-    given.output.write_text(page(sets, given.quick), encoding="utf-8")
+    given.output.write_text(page(sets, given), encoding="utf-8")
     print(f"{given.output}")
 
 
