@@ -9,17 +9,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from postproc.arrays import Bools, Floats, Ints
+from postproc.compensation.arc_angles import ArcAngles, written_points
 from postproc.compensation.program import Planned
 from postproc.compensation.targets import few_frames
 from postproc.exceptions import ModelError
 from postproc.language.visits import Meaning, Visits
 from postproc.model.kinematics import Batch
 from postproc.model.model import UNSURE, Model
+from postproc.motion.path import circles
 from postproc.motion.planner import Plan
 from postproc.robot.arm import Arm
 from postproc.robot.cell import Cell
 from postproc.robot.pose import (
     MM,
+    cross,
     has_unknown,
     inverse,
     is_unknown,
@@ -366,9 +369,11 @@ def new_numbers(
     numbers[joints, :6] += np.rad2deg(solved.q[joints] - plan.q[joints])
     poses = np.flatnonzero(visits.target == Meaning.POSE)
     placed = base_in_uframe(visits, poses)
-    command = np.array(solved.command[poses, :, 3])
-    command[:, :3] -= aside[poses]
-    point = np.einsum("nij,nj->ni", placed, command)
+    command = np.array(solved.command[:, :, 3])
+    command[:, :3] -= aside
+    arcs, via, end = _end_at_angles(visits, plan, command)
+    command[arcs.via, :3], command[arcs.end, :3] = via, end
+    point = np.einsum("nij,nj->ni", placed, command[poses])
     numbers[poses, :3] = point[:, :3] / MM
     rows, dialect = solved.turned, visits.dialect
     rows = rows[visits.target[rows] == Meaning.POSE]
@@ -379,6 +384,58 @@ def new_numbers(
         q = _written_joints(visits, arm, poses, numbers[poses], solved.q[poses])
         numbers[poses] = dialect.reflagged(numbers[poses], q, plan.q[poses])
     return numbers
+
+
+def _end_at_angles(
+    visits: Visits, plan: Plan, command: Floats
+) -> tuple[ArcAngles, Floats, Floats]:
+    """Let arcs that end at an angle end where they should.
+
+    Args:
+        visits: n visits.
+        plan: Their plan.
+        command: Where the TCP should go, (n, 4) [m], base frame.
+
+    Returns:
+        k arcs, and what to write for the points on their ways and for their third
+        points, (k, 3) [m] each, base frame.
+    """
+    arcs = ArcAngles.of(visits)
+    arcs = arcs.among(arcs.start >= 0)
+    if len(arcs) == 0:
+        return arcs, np.empty((0, 3)), np.empty((0, 3))
+    ways = np.stack([arcs.start, arcs.via, arcs.end])
+    before = plan.tcp[ways, :3, 3] - plan.aside[ways]
+    pose = visits.dialect.poses(visits.values[arcs.end])
+    third = (inverse(base_in_uframe(visits, arcs.end)) @ pose)[:, :3, 3]
+    return arcs, *written_points(before, command[ways, :3], third)
+
+
+def angles_astray(visits: Visits, plan: Plan, solved: Commands, aside: Floats) -> Bools:
+    """Tell which points on the ways of arcs are missed by more than without us, (n,).
+
+    Start, end and angle tell an arc but for a turn about the line between both: where
+    the corrections there differ much from that of the point between, it is left aside.
+    """
+    out = np.zeros(len(visits), dtype=bool)
+    if not visits.via.any():
+        return out
+    command = np.array(solved.command[:, :, 3])
+    command[:, :3] -= aside
+    arcs, via, _ = _end_at_angles(visits, plan, command)
+    missed = _across(via - command[arcs.via, :3], plan, arcs)
+    size = lengths(solved.command[arcs.via, :3, 3] - plan.tcp[arcs.via, :3, 3])
+    out[arcs.via] = missed > size
+    return out
+
+
+def _across(off: Floats, plan: Plan, arcs: ArcAngles) -> Floats:
+    """Measure across arcs how far places lie from the points on their ways, (k,)."""
+    points = [plan.tcp[rows, :3, 3] for rows in (arcs.start, arcs.via, arcs.end)]
+    centre, normal, _ = circles(*points)
+    along = cross(normal, points[1] - centre)
+    along /= np.maximum(lengths(along), 1e-12)[:, None]
+    return lengths(off - (off * along).sum(1)[:, None] * along)
 
 
 def _written_joints(

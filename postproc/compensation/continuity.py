@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from postproc.arrays import Bools, Floats, Ints
+from postproc.compensation.arc_angles import ArcAngles
 from postproc.compensation.eligibility import Reasons
 from postproc.language.visits import Visits
 from postproc.robot.arm import Arm
@@ -17,6 +18,14 @@ LEAST_STEP = 0.1 * MM  # [m] a step that is never too large
 PER = 100.0 * MM  # [m] of path that `step_mm` is for
 TURNED = 0.5  # change of a side by which a joint has turned
 ARC = "its arc is left as a whole: its other point cannot be corrected"
+ANGLED = (
+    "its arc ends at an angle, and is left with its start as a whole: another of its "
+    "points cannot be corrected"
+)
+CURVE = (
+    "its curve is corrected whole, with the point before it, or not at all: another "
+    "point of it cannot be corrected"
+)
 STEP = "the correction steps by more than step_mm = {:g} for 100 mm of the path"
 BENT = (
     "its neighbour on the path is left: correcting this one alone would bend the path "
@@ -137,15 +146,70 @@ def path_correction(
     return PathCorrection(before, correction, allowed, flanks)
 
 
+@dataclass(frozen=True)
+class _Wholes:
+    """Points that are all corrected, or none: arcs, and curves through many points.
+
+    Attributes:
+        texts: What is said of those that are left for another's sake.
+        text: Which text a whole has, (w,).
+        whole, visit: The points of all, (p,) each.
+    """
+
+    texts: tuple[str, ...]
+    text: Ints
+    whole: Ints
+    visit: Ints
+
+    @classmethod
+    def of(cls, visits: Visits) -> _Wholes:
+        """Find them; behind the point on the way of an arc comes its end.
+
+        Where the start of an arc that ends at an angle moves, so does its end, and the
+        start of a curve is one of its points.
+        """
+        before, n = visits.before, len(visits)
+        via, arcs = np.flatnonzero(visits.via), ArcAngles.of(visits)
+        arcs = arcs.among(arcs.start >= 0)
+        inside = np.flatnonzero(visits.block >= 0)
+        heads = inside[(visits.block == np.arange(n))[inside] & (before[inside] >= 0)]
+        whole = np.concatenate(
+            [via, via, *[arcs.end + n] * 3,
+             visits.block[inside] + 2 * n, heads + 2 * n]
+        )  # fmt: skip
+        visit = np.concatenate(
+            [via, via + 1, arcs.start, arcs.via, arcs.end, inside,
+             before[heads]]
+        )  # fmt: skip
+        found, whole = np.unique(whole, return_inverse=True)
+        return cls((ARC, ANGLED, CURVE), found // max(n, 1), whole, visit)
+
+    def broken(self, moves: Bools) -> dict[str, Bools]:
+        """Say which points must stay since others of their whole do, (n,) by text.
+
+        Args:
+            moves: Which points move, (n,).
+        """
+        stays = np.zeros(len(self.text), dtype=bool)
+        stays[self.whole[~moves[self.visit]]] = True
+        out = {}
+        for kind, text in enumerate(self.texts):
+            rows = np.zeros(len(moves), dtype=bool)
+            rows[self.visit[(stays & (self.text == kind))[self.whole]]] = True
+            if rows.any():
+                out[text] = rows
+        return out
+
+
 def keep_whole(
     reasons: Reasons, path: PathCorrection, visits: Visits, given: Bools, step_mm: float
 ) -> None:
-    """Mark steps, what would be left lonely between, and the other points of arcs.
+    """Mark steps, what would be left lonely between, and what else moves as a whole.
 
     Args:
         reasons: Collects the first reason of every visit.
         path: The corrections along the path.
-        visits: n visits; behind the point on the way of an arc comes its end.
+        visits: n visits.
         given: Visits that had a reason before any guard spoke, (n,): they do not
             move, or not by us.
         step_mm: See `path_correction`.
@@ -153,13 +217,11 @@ def keep_whole(
     steps = path.steps & reasons.none
     steps[path.before[steps]] = True
     reasons.mark(steps, STEP.format(step_mm))
-    via, along = np.flatnonzero(visits.via), visits.follows >= 0
+    wholes, along = _Wholes.of(visits), visits.follows >= 0
     while True:
         moves = reasons.none | along
-        one = via[moves[via] != moves[via + 1]]
-        half = np.zeros(len(along), dtype=bool)
-        half[one] = half[one + 1] = True
-        reasons.mark(half, ARC)
+        for text, rows in wholes.broken(moves).items():
+            reasons.mark(rows, text)
         free = reasons.none
         lonely = path.bent(~free & ~given, free)
         if not lonely.any():

@@ -9,8 +9,10 @@ from functools import cached_property
 import numpy as np
 
 from postproc.arrays import Bools, Floats, Ints, any_in_rows
+from postproc.compensation.arc_angles import ASTRAY
 from postproc.compensation.command import (
     Commands,
+    angles_astray,
     change_mm,
     new_numbers,
     turns_in_file,
@@ -592,6 +594,8 @@ class Round:
         reasons.mark(self.held, HELD)
         reasons.mark(self.swung, SWUNG)
         reasons.mark(strays, STRAYS)
+        astray = angles_astray(visits, self.planned.plan, solved, self.aside)
+        reasons.mark(astray, ASTRAY)
         keep_whole(reasons, self.path, visits, given, limits.step_mm)
 
     def _guard_flags(self, reasons: Reasons) -> None:

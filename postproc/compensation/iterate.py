@@ -8,6 +8,7 @@ from itertools import count, pairwise
 import numpy as np
 
 from postproc.arrays import Bools, Floats, Ints, any_in_rows, largest_in_rows, spans
+from postproc.compensation.arc_angles import ArcAngles
 from postproc.compensation.command import (
     Commands,
     solve_again,
@@ -292,6 +293,7 @@ class Replanner:
         new = replace(self._visits, values=values)
         old = self._visits.values
         moved = any_in_rows((values != old) & ~(np.isnan(values) & np.isnan(old)))
+        moved |= ArcAngles.of(new).touched(moved)
         rows = np.flatnonzero(moved)
         targets = moved_targets(self._targets, new, self._cell, rows)
         arm, last = self._cell.arm, self._last

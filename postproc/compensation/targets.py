@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from postproc.arrays import Bools, Floats, Ints
+from postproc.compensation.arc_angles import ArcAngles, place_ends
 from postproc.compensation.eligibility import Reasons
 from postproc.language.visits import Blend, Diagnostic, Meaning, Visits, ZoneRule
 from postproc.motion.path import arc_per_start
@@ -139,6 +140,7 @@ def targets_from_visits(visits: Visits, cell: Cell) -> tuple[Targets, Reasons]:
     _explain(visits, values, poses, reasons)
     lost = (outside | visits.tool_remote) & (kind != TargetKind.JOINTS)
     lost |= _unplaced(kind, tcp, joints, frames)
+    lost |= place_ends(visits, tcp, reasons)
     lost |= _unnamed(visits, cell, reasons)
     slot, turns = visits.dialect.flags(visits.config, visits.configs, values)
     rounding, distance, overlap = rounding_of(visits)
@@ -201,11 +203,16 @@ def moved_targets(targets: Targets, visits: Visits, cell: Cell, rows: Ints) -> T
         targets: All visits as they were.
         visits: All visits as they are now.
         cell: As in `targets_from_visits`.
-        rows: Visits with other numbers, (m,).
+        rows: Visits with other numbers, and ends of arcs that move with them, (m,).
     """
     user, values = _user_frames(visits, rows), _values(visits, cell, rows)
     _, tcp, joints = _places(visits, user, values, rows)
-    return targets.moved_to(rows, tcp, joints)
+    found = targets.moved_to(rows, tcp, joints)
+    arcs = ArcAngles.of(visits)
+    arcs = arcs.among(np.isin(arcs.end, rows))
+    if len(arcs) == 0:
+        return found
+    return found.moved_to(arcs.end, arcs.ends(found.tcp), found.joints[arcs.end])
 
 
 def _frames(visits: Visits) -> Frames:

@@ -29,6 +29,7 @@ TABLES = {
     "base": "frames",
     "uframe": "frames",
     "reason": "reasons",
+    "block": "line",
     "pred": "line",
     "pred_start": "pred",
 }
@@ -187,6 +188,8 @@ class Window:
         for name in ("literal", "follows"):
             values[name] = np.array(values[name])
             values[name][: self.seeds] = -1
+        block = values["block"]
+        values["block"] = np.where(block >= 0, block - rows.start, block)
         start = visits.pred_start[self.begin + self.seeds : self.stop + 1]
         pred = visits.pred[start[0] : start[-1]]
         pred = np.where(pred >= 0, pred - rows.start, pred)
@@ -259,6 +262,8 @@ def seams(visits: Visits) -> Bools:
     quiet[visits.pred[goes_on]] = True
     begins = visits.via | np.isin(visits.target, STEPS)  # an arc, or a step
     quiet &= ~visits.via & ~np.append(begins[1:], False) & ~crossed
+    on = np.flatnonzero(visits.block >= 0)  # a curve, from where it begins
+    quiet &= ~_covered(np.maximum(visits.block[on] - 1, 0), on, n)
     return np.asarray(quiet)
 
 

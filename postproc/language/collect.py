@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Hashable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -93,6 +93,8 @@ class FoundVisit:
         modes: What holds there.
         origins: Where it may come from.
         why: Why it cannot be compensated, "" where it can.
+        arc_angle: As in `Visits` [rad].
+        block: Tells the curves apart that visits are points of, None for none.
     """
 
     scope: Scope
@@ -103,6 +105,8 @@ class FoundVisit:
     modes: Any
     origins: frozenset[int] = frozenset()
     why: str = ""
+    arc_angle: float = math.nan
+    block: Hashable = None
 
 
 @dataclass(frozen=True)
@@ -257,8 +261,18 @@ def _moves(found: Sequence[FoundVisit], held: Sequence[Conditions]) -> dict[str,
         "blend": slim(np.where(fly, rounded, Blend.UNSET)),
         "zone_rule": slim(np.where(fly & ~overlaps, ZoneRule.FROM, ZoneRule.UNSET)),
         "lin_spd": slim(np.array([c.speed for c in held], float)),
+        "arc_angle": slim(np.array([v.arc_angle for v in found], float)),
+        "block": slim(_blocks(found)),
         "rot_spd": slim(np.full(n, np.nan)),
     }
+
+
+def _blocks(found: Sequence[FoundVisit]) -> Ints:
+    """Return the first visit of the curve of each, -1 where it is on none."""
+    first: dict[Hashable, int] = {}
+    own = [-1 if v.block is None else first.setdefault(v.block, k)
+           for k, v in enumerate(found)]  # fmt: skip
+    return np.array(own, np.int64)
 
 
 def _settings(held: Sequence[Conditions]) -> dict[str, Any]:

@@ -178,6 +178,10 @@ class Visits:
         override: Product of the speed overrides that hold, (n,) in (0, 1].
         wrist_joint: On a line the wrist turns joint by joint, (n,).
         orientation_law: `OrientationLaw`, (n,).
+        arc_angle: Angle at which an arc ends instead of at the point that is written
+            as its end, the way on that its points follow, (n,) [rad]; NaN for all else.
+        block: First visit of the curve that the visit is a point of, (n,), -1 where it
+            is of none: one point alone would change all of the curve.
         reason: Index into `reasons`, (n,); 0 means that the visit may be compensated.
         reasons: Why a visit is display only; reasons[0] is "".
         pred_start: Offsets into `pred`, (n + 1,).
@@ -221,6 +225,8 @@ class Visits:
     override: Floats
     wrist_joint: Bools
     orientation_law: Ints
+    arc_angle: Floats
+    block: Ints
     reason: Ints
     reasons: tuple[str, ...]
     pred_start: Ints

@@ -96,7 +96,7 @@ def lines(begin: Floats, end: Floats) -> Segments:
 
 def arcs(begin: Floats, via: Floats, end: Floats) -> tuple[Segments, Segments]:
     """Build arcs through three TCP poses (m, 4, 4) [m]: start to VIA, VIA to end."""
-    centre, normal, valid = _circles(
+    centre, normal, valid = circles(
         begin[:, :3, 3], via[:, :3, 3], end[:, :3, 3]
     )  # fmt: skip
     return (
@@ -105,8 +105,8 @@ def arcs(begin: Floats, via: Floats, end: Floats) -> tuple[Segments, Segments]:
     )
 
 
-def _circles(a: Floats, b: Floats, c: Floats) -> tuple[Floats, Floats, Bools]:
-    """Find the circles through points (m, 3): centres, unit normals, which exist.
+def circles(a: Floats, b: Floats, c: Floats) -> tuple[Floats, Floats, Bools]:
+    """Find the circles through points (m, 3) [m]: centres, unit normals, which exist.
 
     With u = b - a, v = c - a, w = u x v the centre is
     a + (|u|^2 v - |v|^2 u) x w / (2 |w|^2), and a, b, c follow each other

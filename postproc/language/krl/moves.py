@@ -49,7 +49,7 @@ PARTIAL = (
 NO_STATUS = "a PTP without S and T: the controller chooses the configuration"
 ACCURATE = "S says that it was taught with the controller's own accuracy model"
 ODD_STATUS = "S or T is no such number"
-ANGLE = "CA takes the arc on from its end point, or ends it before"
+ANGLE = f"CA ends the arc elsewhere than at its end point: {RUN_TIME}"
 
 
 @dataclass
@@ -96,14 +96,24 @@ class KrlGoals:
             yield KrlVisit(here, row, motion, False, goal, modes, move=move)
             return
         reader = _Goal(self, move, row, here)
+        angle = self._angle(move, row, here)
+        why = ANGLE if move.angle is not None and math.isnan(angle) else ""
         if move.via is not None:
             goal = reader.end(move.via)
-            why = ANGLE if move.angle is not None else ""
             yield KrlVisit(here, row, motion, True, goal, modes, why=why, move=move)
         goal = reader.end(move.to)
-        if move.angle is not None:  # where it ends is not written
+        if why:
             goal = FoundGoal(Meaning.UNKNOWN, NOTHING, name=goal.name, why=ANGLE)
-        yield KrlVisit(here, row, motion, False, goal, modes, move=move)
+        yield KrlVisit(
+            here, row, motion, False, goal, modes, arc_angle=angle, move=move
+        )
+
+    def _angle(self, move: said.KrlMove, row: int, here: Scope) -> float:
+        """Return the angle [rad] at which an arc ends, NaN where it is not known."""
+        if move.angle is None:
+            return math.nan
+        found = self.task.value(move.angle, row, here)
+        return math.radians(found.value) if isinstance(found, KrlNumber) else math.nan
 
 
 def motion_of(word: str) -> Motion:

@@ -241,6 +241,8 @@ def collect(machine: Machine) -> Visits:
         name=slim(c.name),
         names=tuple(collector.names),
         fly=slim(c.fly),
+        arc_angle=slim(np.full(len(c.line), np.nan)),
+        block=slim(np.full(len(c.line), -1)),
         reason=slim(c.reason),
         reasons=tuple(collector.reasons),
         pred_start=pred_start,

@@ -181,7 +181,7 @@ def test_the_cell_says_what_holds_at_first():
         (["PTP {X 1,Y 2,Z 3,A 0,B 0,C 0,S 18,T 2}"], "accuracy model"),
         (["LIN {X 1,Y 2,Z 3,A 0,B 0,C 0,S 22,T 2}"], "accuracy model"),
         (["PTP {X 1,Y 2,Z 3,A 0,B 0,C 0,S 99,T 2}"], "no such number"),
-        (["CIRC XP1,XP2,CA 180"], "CA"),
+        (["CIRC XP1,XP2,CA XP1.X+$POS_ACT.X"], "CA"),
         (["LIN XNOT"], "declared in no file"),
         (["XP1.X=5", "LIN XP1"], "may be changed"),
         (["LIN XS[I]", "I=I+1"], "no value that is known"),

@@ -96,6 +96,8 @@ def visits_of(n: int, name: str, names: tuple[str, ...]) -> Visits:
         override=np.ones(n),
         wrist_joint=no,
         orientation_law=index * 0,
+        arc_angle=nan,
+        block=index * 0 - 1,
         reason=index * 0,
         reasons=("",),
         pred_start=np.arange(n + 1),

@@ -1,0 +1,69 @@
+"""KRL jobs with curves for a simulated KR 210, and where they really go."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+
+from postproc.compensation.compensate import compensate
+from postproc.compensation.options import AS_USUAL
+from postproc.compensation.program import plan_visits, prepared, read_program
+from postproc.language.krl.dialect import abc_from_rotation
+from postproc.robot.arm import load_arm
+
+KR = load_arm("kr210-r2700-extra")
+TOOL = (80.0, -40.0, 150.0)
+CELL = f"""
+[robot]
+arm = "kr210-r2700-extra"
+absolute_accuracy = false
+[tool]
+xyz_mm = {list(TOOL)}
+source = "cad"
+"""
+CENTRE = np.deg2rad([10.0, -80.0, 100.0, 20.0, 50.0, -30.0])
+HEAD = f"""DEF job ( )
+$TOOL={{X {TOOL[0]},Y {TOOL[1]},Z {TOOL[2]},A 0,B 0,C 0}}
+$BASE=$NULLFRAME
+BAS(#VEL_CP,0.2)
+PTP {{A1 0,A2 -90,A3 90,A4 0,A5 30,A6 0}}
+PTP {{A1 12,A2 -75,A3 104,A4 24,A5 54,A6 -26}}
+"""
+
+
+def tool_pose() -> np.ndarray:
+    """Return the TCP in the flange frame [m]."""
+    pose = np.eye(4)
+    pose[:3, 3] = np.array(TOOL) / 1000.0
+    return pose
+
+
+def frame(T: np.ndarray) -> str:
+    """Write a pose as KRL does."""
+    abc = np.rad2deg(abc_from_rotation(T[None, :3, :3], np.zeros((1, 3)))[0])
+    numbers = [*(T[:3, 3] * 1000.0), *abc]
+    pairs = zip("XYZABC", numbers, strict=True)
+    return "{" + ",".join(f"{name} {value:.4f}" for name, value in pairs) + "}"
+
+
+def job(*lines: str) -> bytes:
+    """Write a program."""
+    return (HEAD + "\n".join(lines) + "\nEND\n").encode()
+
+
+def points(text: bytes) -> np.ndarray:
+    """Read the places of all written poses, (k, 3) [m]."""
+    found = re.findall(rb"X ([-.\d]+),Y ([-.\d]+),Z ([-.\d]+),A", text)[1:]
+    return np.array(found, float) / 1000.0
+
+
+def plans(source: bytes, cell, model):
+    """Compensate a program; return the outcome and both plans."""
+    done = compensate(source, cell, model, name="job.src")
+    ready = prepared(cell, model, AS_USUAL)
+    both = [
+        plan_visits(read_program({"job.src": text}, ready).visits, ready).plan
+        for text in (source, done.outputs["job.src"])
+    ]
+    return done, both

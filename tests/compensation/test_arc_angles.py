@@ -1,0 +1,180 @@
+"""Arcs that end at an angle (KRL's CA) end where they should."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from postproc.calibration.selection import fit_survey, model_of
+from postproc.compensation.arc_angles import (
+    ASTRAY,
+    NO_END,
+    NO_START,
+    TILTED,
+    written_points,
+)
+from postproc.compensation.continuity import ANGLED
+from postproc.compensation.outcome import Status
+from postproc.robot.cell import load_cell
+from tests.calibration.simulator import random_arm, random_states, survey_of
+from tests.compensation.curved import (
+    CELL,
+    CENTRE,
+    KR,
+    frame,
+    job,
+    plans,
+    points,
+    tool_pose,
+)
+
+
+@pytest.fixture(scope="module")
+def cell(tmp_path_factory):
+    path = tmp_path_factory.mktemp("cell") / "cell.toml"
+    path.write_text(CELL)
+    return load_cell(path)
+
+
+@pytest.fixture(scope="module")
+def truth():
+    drawn = random_arm(np.random.default_rng(16), tool=False)
+    drawn.arm = KR
+    return drawn
+
+
+@pytest.fixture(scope="module")
+def model(truth):
+    rng = np.random.default_rng(17)
+    states = random_states(400, rng)
+    spread = np.deg2rad([40.0, 25.0, 25.0, 60.0, 35.0, 60.0])
+    states = states.with_(q=CENTRE + rng.uniform(-1.0, 1.0, (400, 6)) * spread)
+    position, _ = truth.measure(states, rng)
+    survey = survey_of(states, position)
+    return model_of(fit_survey(survey, KR, None, None), survey)
+
+
+def circle(a: np.ndarray, b: np.ndarray, c: np.ndarray, deg: float) -> np.ndarray:
+    """Go from a by an angle along the circle through a, b and c."""
+    u, v = b - a, c - a
+    normal = np.cross(u, v)
+    # The centre is as far from all three, in their plane.
+    left = np.stack([u, v, normal])
+    centre = a + np.linalg.solve(left, [u @ u / 2, v @ v / 2, 0.0])
+    turn = Rotation.from_rotvec(np.deg2rad(deg) * normal / np.linalg.norm(normal))
+    return centre + turn.apply(a - centre)
+
+
+def drawn(rng: np.random.Generator, deg: float, past: float) -> list[str]:
+    """Write a line to an arc, and the arc: its third point lies at another angle."""
+    q = CENTRE + rng.uniform(-1, 1, 6) * np.deg2rad([30, 8, 8, 30, 15, 30])
+    start = KR.flange(q[None])[0] @ tool_pose()
+    normal = rng.normal(size=3)
+    normal /= np.linalg.norm(normal)
+    radius = np.cross(normal, rng.normal(size=3))
+    radius *= rng.uniform(0.04, 0.12) / np.linalg.norm(radius)
+    via, third = np.array(start), np.array(start)
+    for pose, angle in ((via, 0.5 * deg), (third, past)):
+        turn = Rotation.from_rotvec(np.deg2rad(angle) * normal)
+        pose[:3, 3] += turn.apply(radius) - radius
+    return [
+        f"LIN {frame(start)}",
+        f"CIRC {frame(via)},{frame(third)},CA {deg}",
+    ]
+
+
+def test_arcs_end_where_they_should(cell, truth, model):
+    rng, lines, angles = np.random.default_rng(18), [], []
+    for deg, past in ((180.0, 120.0), (90.0, 150.0), (270.0, 200.0), (290.0, 230.0)):
+        lines += drawn(rng, deg, past)
+        angles.append(deg)
+    source = job(*lines)
+    done, (wanted, made) = plans(source, cell, model)
+    decided = done.decisions
+    assert (decided.status[2:11] == Status.SAFE).all()
+    assert decided.reasons[decided.why[12]] == ASTRAY  # so long an arc bends too much
+    tool = np.tile(cell.tool.pose[:3, 3], (len(made.q), 1))
+    really = truth.tcp(made.q, made.direction, tool)
+    for k, deg in enumerate(angles[:3]):
+        start, _, end = 2 + 3 * k + np.arange(3)
+        old, new = (points(t)[3 * k :][:3] for t in (source, done.outputs["job.src"]))
+        commanded = circle(*new, deg)
+        assert np.allclose(made.tcp[end, :3, 3], commanded, atol=2e-6)
+        asked = circle(*old, deg)
+        assert np.allclose(wanted.tcp[end, :3, 3], asked, atol=2e-6)
+        without = np.linalg.norm(
+            truth.tcp(wanted.q, wanted.direction, tool)[end] - asked
+        )
+        assert without > 3e-4
+        assert np.linalg.norm(really[end] - asked) < 2e-5
+        assert np.linalg.norm(really[start] - old[0]) < 2e-5
+
+
+def test_nothing_but_numbers_changes(cell, model):
+    source = job(*drawn(np.random.default_rng(19), 200.0, 150.0))
+    done, _ = plans(source, cell, model)
+    text = done.outputs["job.src"]
+    assert re.search(rb"CA 200\.0", text)
+    blank = [re.sub(rb"-?\d+(\.\d+)?", b"0", t).split(b"\n") for t in (source, text)]
+    assert blank[0] == [line for line in blank[1] if not line.startswith(b";")]
+
+
+@pytest.mark.parametrize(
+    ("change", "why"),
+    [
+        (("CA 200.0", "CA 360"), NO_END),
+        (("CA 200.0", "CA -200"), NO_END),
+        (("CA 200.0", "CA 60"), NO_END),
+        (("LIN {", "PTP {A1 1,A2 -80,A3 100,A4 1,A5 50,A6 1}\n;LIN {"), NO_START),
+        (("CIRC {", "$TOOL={X 0,Y 0,Z 0,A 0,B 0,C 0}\nCIRC {"), NO_START),
+    ],
+)
+def test_what_is_not_sure_is_left(cell, model, change, why):
+    lines = "\n".join(drawn(np.random.default_rng(19), 200.0, 150.0))
+    assert change[0] in lines
+    source = job(lines.replace(*change))
+    done, _ = plans(source, cell, model)
+    decided = done.decisions
+    assert decided.reasons[decided.why[-1]] == why
+    assert not (decided.status[-2:] == Status.SAFE).any()
+
+
+def test_a_tool_that_turns_is_left(cell, model):
+    lines = drawn(np.random.default_rng(19), 200.0, 150.0)
+    first, last = lines[1].rsplit(",A ", 1)
+    angle, rest = last.split(",", 1)
+    source = job(lines[0], f"{first},A {float(angle) + 2.0:.4f},{rest}")
+    decided = plans(source, cell, model)[0].decisions
+    assert decided.reasons[decided.why[-1]] == TILTED
+
+
+def test_the_start_stays_with_an_arc_that_is_left(cell, model):
+    lines = drawn(np.random.default_rng(19), 200.0, 150.0)
+    lines[1] += " ; TAUGHT"
+    decided = plans(job(*lines), cell, model)[0].decisions
+    assert not (decided.status[2:] == Status.SAFE).any()
+    assert decided.reasons[decided.why[2]] == ANGLED
+
+
+def test_a_similarity_keeps_the_angle():
+    rng = np.random.default_rng(20)
+    for _ in range(50):
+        before = rng.normal(size=(3, 1, 3))
+        after = before + 1e-3 * rng.normal(size=(3, 1, 3))
+        u, v = before[1, 0] - before[0, 0], before[2, 0] - before[0, 0]
+        normal = np.cross(u, v)
+        left = np.stack([u, v, normal])
+        centre = before[0, 0] + np.linalg.solve(left, [u @ u / 2, v @ v / 2, 0.0])
+        normal /= np.linalg.norm(normal)
+        a, b = before[0, 0] - centre, before[2, 0] - centre
+        angle = np.arctan2(np.cross(a, b) @ normal, a @ b) % (2 * np.pi)
+        b = before[1, 0] - centre  # the third point lies behind the one on the way
+        to_via = np.rad2deg(np.arctan2(np.cross(a, b) @ normal, a @ b)) % 360.0
+        third = circle(*before[:, 0], (to_via + 360.0) / 2)[None]
+        via, end = written_points(before, after, third)
+        found = circle(after[0, 0], via[0], end[0], np.rad2deg(angle))
+        assert np.allclose(found, after[2, 0], atol=1e-9)
+        assert np.linalg.norm(via[0] - after[1, 0]) < 0.05
