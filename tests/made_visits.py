@@ -42,7 +42,7 @@ def visits(target: list[int], values: list[list[float]], **more: object) -> Visi
         "blend": zeros, "zone_rule": zeros, "lin_spd": nan, "rot_spd": nan,
         "override": np.ones(n),
         "wrist_joint": no, "orientation_law": zeros, "arc_angle": nan,
-        "block": zeros - 1, "reason": zeros, "reasons": ("",),
+        "block": zeros - 1, "curved": no, "reason": zeros, "reasons": ("",),
         "pred_start": np.arange(n + 1), "pred": np.arange(n) - 1,
         "measure_id": ("",) * n, "literals": NO_LITERALS, "dialect": PDL2_DIALECT,
     }  # fmt: skip

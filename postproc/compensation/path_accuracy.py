@@ -304,7 +304,7 @@ def predict_paths(
         owner: The move of the source that every visit belongs to, (n,), where points
             were inserted on its way; each move is then one path.
     """
-    cartesian = before.targets.move != Motion.JOINT
+    cartesian = (before.targets.move != Motion.JOINT) & ~before.targets.curved
     known = cartesian & (before.ways[1] >= 0) & (after.ways[1] == before.ways[1])
     rows = np.flatnonzero(known)
     ours = _ways(before, rows)

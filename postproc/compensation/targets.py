@@ -168,6 +168,8 @@ def targets_from_visits(visits: Visits, cell: Cell) -> tuple[Targets, Reasons]:
         rotary_speed=visits.rot_spd,
         override=visits.override,
         wrist_joint=visits.wrist_joint,
+        block=visits.block,
+        curved=visits.curved,
         pred_start=pred_start,
         pred=pred,
     )

@@ -95,6 +95,7 @@ class FoundVisit:
         why: Why it cannot be compensated, "" where it can.
         arc_angle: As in `Visits` [rad].
         block: Tells the curves apart that visits are points of, None for none.
+        curved: As in `Visits`.
     """
 
     scope: Scope
@@ -107,6 +108,7 @@ class FoundVisit:
     why: str = ""
     arc_angle: float = math.nan
     block: Hashable = None
+    curved: bool = False
 
 
 @dataclass(frozen=True)
@@ -126,6 +128,7 @@ class Conditions:
         wrist: On a line the wrist turns joint by joint.
         override: Share of the programmed speed, 0 or NaN where not known.
         overlap: Of moves that begin before the last has ended [%], NaN for a zone.
+        exact: It is passed exactly, without stopping.
     """
 
     tool: Pose
@@ -142,6 +145,7 @@ class Conditions:
     wrist: bool = False
     override: float = 1.0
     overlap: float = math.nan
+    exact: bool = False
 
 
 @dataclass
@@ -245,8 +249,10 @@ def _moves(found: Sequence[FoundVisit], held: Sequence[Conditions]) -> dict[str,
     via = np.array([v.via for v in found], bool)
     overlap = np.array([c.overlap for c in held], float)
     overlaps = overlap >= 0.0
-    fly = (zone >= 0.0) | via | overlaps  # nothing stops at the point of an arc
+    exact = np.array([c.exact for c in held], bool)
+    fly = (zone >= 0.0) | via | overlaps | exact  # via: nothing stops on an arc
     rounded = np.where(overlaps, Blend.OVERLAP, Blend.ZONE)
+    rule = np.where(exact, ZoneRule.PASS, ZoneRule.FROM)
     return {
         "motion": slim(np.array([v.motion for v in found], np.int64)),
         "target": slim(np.array([v.goal.target for v in found], np.int64)),
@@ -259,10 +265,11 @@ def _moves(found: Sequence[FoundVisit], held: Sequence[Conditions]) -> dict[str,
         "zone_mm": slim(np.where(zone >= 0.0, zone, np.nan)),
         "overlap_percent": slim(np.where(overlaps, overlap, 100.0)),
         "blend": slim(np.where(fly, rounded, Blend.UNSET)),
-        "zone_rule": slim(np.where(fly & ~overlaps, ZoneRule.FROM, ZoneRule.UNSET)),
+        "zone_rule": slim(np.where(fly & ~overlaps, rule, ZoneRule.UNSET)),
         "lin_spd": slim(np.array([c.speed for c in held], float)),
         "arc_angle": slim(np.array([v.arc_angle for v in found], float)),
         "block": slim(_blocks(found)),
+        "curved": slim(np.array([v.curved for v in found], bool)),
         "rot_spd": slim(np.full(n, np.nan)),
     }
 

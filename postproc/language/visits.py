@@ -182,6 +182,8 @@ class Visits:
             as its end, the way on that its points follow, (n,) [rad]; NaN for all else.
         block: First visit of the curve that the visit is a point of, (n,), -1 where it
             is of none: one point alone would change all of the curve.
+        curved: The way to it is a part of a curve whose shape is the controller's own,
+            (n,).
         reason: Index into `reasons`, (n,); 0 means that the visit may be compensated.
         reasons: Why a visit is display only; reasons[0] is "".
         pred_start: Offsets into `pred`, (n + 1,).
@@ -227,6 +229,7 @@ class Visits:
     orientation_law: Ints
     arc_angle: Floats
     block: Ints
+    curved: Bools
     reason: Ints
     reasons: tuple[str, ...]
     pred_start: Ints

@@ -8,6 +8,7 @@ import numpy as np
 
 from postproc.arrays import Bools, Floats, Ints, read_only
 from postproc.motion.blending import blend
+from postproc.motion.curves import arrivals_on_curves
 from postproc.motion.path import BlendCoupling
 from postproc.motion.replan import planned_points, where_passed
 from postproc.motion.targets import CODE, REASONS, WRIST, Targets
@@ -105,6 +106,7 @@ def plan(
     exact = trace(arm, targets, begin.known)
     traced = blend(arm, targets, exact, timed)
     arrived = arrivals(arm, traced.q, traced.driven, lead)
+    arrived = arrivals_on_curves(arm, targets, traced.q, arrived)
     clock = tell_time(arm, targets, traced) if timed else no_time(len(targets))
     tool = targets.tool
     tcp = where_passed(arm, planned_points(exact), traced.q) @ tool

@@ -8,6 +8,7 @@ import numpy as np
 
 from postproc.arrays import Bools, Floats, Ints, all_in_rows, any_in_rows, spans
 from postproc.motion.blending import blend
+from postproc.motion.curves import sides_on_curves
 from postproc.motion.targets import TargetKind, Targets
 from postproc.motion.trace import NOWHERE, Known, StartState, Trace, trace
 from postproc.robot.arm import Arm
@@ -104,6 +105,7 @@ def replan_all(
     traced = blend(arm, targets, exact, timed=False)
     ways = passages(arm, traced.q, traced.driven)
     found = sides(arm, traced.q, ways, lead)
+    found = sides_on_curves(arm, targets, traced.q, found)
     return Replanned(
         arm, targets, planned_points(exact), traced.q, traced.aside, exact.slot, ways,
         found, begin,
@@ -189,6 +191,7 @@ def replan(
     """
     if not moved.any():
         found = sides(arm, before.passed, before.passages, lead)
+        found = sides_on_curves(arm, targets, before.passed, found)
         return replace(before, targets=targets, sides=found)
     part = _part(targets, moved, len(before.begin) > 0)
     if part is None:
@@ -214,9 +217,10 @@ def replan(
     )
     now = passages(arm, traced.q, traced.driven)
     ways = _spliced(before.passages, part, now)
+    found = sides(arm, passed, ways, lead)
     return Replanned(
         arm, targets, at_targets, passed, _patched(before.aside, part, traced.aside),
-        slot, ways, sides(arm, passed, ways, lead), before.begin,
+        slot, ways, sides_on_curves(arm, targets, passed, found), before.begin,
     )  # fmt: skip
 
 

@@ -57,6 +57,8 @@ class Targets:
         rotary_speed: Programmed speed of reorientation [rad/s], (n,); NaN likewise.
         override: Product of the speed overrides, (n,) in (0, 1].
         wrist_joint: The wrist axes are interpolated instead of the orientation, (n,).
+        block: Equal for the points of one curve, (n,), -1 beside curves.
+        curved: The way to it is bent so that a curve goes on smoothly, (n,).
         pred_start: Predecessors of move v are pred[pred_start[v] : pred_start[v + 1]].
         pred: Predecessors; negative for a place that is not known.
     """
@@ -79,6 +81,8 @@ class Targets:
     rotary_speed: Floats
     override: Floats
     wrist_joint: Bools
+    block: Ints
+    curved: Bools
     pred_start: Ints
     pred: Ints
 
@@ -145,6 +149,8 @@ def make_targets(
         "rotary_speed": np.full(n, np.nan),
         "override": np.ones(n),
         "wrist_joint": np.zeros(n, dtype=bool),
+        "block": np.full(n, -1),
+        "curved": np.zeros(n, dtype=bool),
         "pred_start": np.arange(n + 1),
         "pred": np.arange(n) - 1,
     }

@@ -15,7 +15,7 @@ TOLD = (  # columns that mean the same wherever they stand
     "line", "motion", "target", "via", "distance_mm", "config_given", "tool_remote",
     "nearest_turn", "care", "fly", "zone_mm", "overlap_percent", "blend", "zone_rule",
     "lin_spd", "rot_spd", "override", "wrist_joint", "orientation_law",
-    "arc_angle",
+    "arc_angle", "curved",
 )  # fmt: skip
 LOOKED_UP = (
     ("file", "files"), ("config", "configs"), ("name", "names"), ("reason", "reasons"),

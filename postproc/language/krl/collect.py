@@ -13,6 +13,7 @@ from postproc.language.krl.dialect import COMMENTS, KRL_DIALECT
 from postproc.language.krl.interpreter import KrlMachine
 from postproc.language.krl.modes import UNKNOWN, KrlModes, ModeReader
 from postproc.language.krl.moves import NO_SLOTS, NOTHING, KrlVisit
+from postproc.language.krl.syntax import SplineBlock
 from postproc.language.visits import Meaning, OrientationLaw, Switch, Visits
 from postproc.robot.trajectory import Motion
 
@@ -48,8 +49,13 @@ def visits_of(machine: KrlMachine) -> Visits:
 def _effective(machine: KrlMachine, v: KrlVisit) -> tuple[KrlModes, str]:
     """Add what a move sets for itself; say where that is not known."""
     modes: KrlModes = v.modes
-    reader = ModeReader(machine.task, v.row, v.scope, machine.start.payload_kg)
-    for setting in v.move.settings:
+    given = [(v.row, one) for one in v.move.settings]
+    if v.begin >= 0:
+        block = machine.texts[v.scope.file].statement(v.begin)
+        assert isinstance(block, SplineBlock)
+        given = [(v.begin, one) for one in block.settings] + given
+    for row, setting in given:
+        reader = ModeReader(machine.task, row, v.scope, machine.start.payload_kg)
         after = reader.assigned(modes, setting)
         if after is None:
             return modes, f"{_NOT_SET}: {setting.target.name.upper()}"
@@ -64,6 +70,7 @@ class _Blending:
     zone_mm: float = math.nan
     overlap: float = math.nan
     why: str = ""
+    exact: bool = False
 
 
 def _conditions(
@@ -92,6 +99,7 @@ def _conditions(
         wrist=modes.law == OrientationLaw.WRIST_JOINTS and not joint,
         override=modes.share if joint else 1.0,
         overlap=blending.overlap,
+        exact=blending.exact,
     )
 
 
@@ -105,6 +113,8 @@ def _law(v: KrlVisit, modes: KrlModes) -> OrientationLaw:
 
 def _blending(v: KrlVisit, modes: KrlModes, end: str) -> _Blending:
     """Tell how a point is passed."""
+    if v.inner and not v.via:
+        return _Blending(exact=True)
     if v.via or not v.blends or end == STOP or modes.ahead is False:
         return _Blending()
     if end == MAYBE or modes.ahead is None:

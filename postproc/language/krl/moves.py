@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
@@ -41,7 +42,8 @@ RUN_TIME = "it is known only when the program runs"
 HOMES = ("xhome", "home", "xhome1", "xhome2", "xhome3", "xhome4", "xhome5",
          "$h_pos", "$axis_home")  # fmt: skip
 PRESENT = ("$pos_act", "$axis_act", "$axis_act_meas", "$axis_int", "$pos_int")
-SPLINE = "a point of a spline block: such blocks are corrected whole or not at all"
+SPLINE = "a point of a spline of joint moves: how the arm goes there is not known"
+_ON_CURVES = ("spl", "slin", "scirc")
 PARTIAL = (
     "numbers are missing: they stay what they were commanded before, so that it moves "
     "along with the point before it"
@@ -58,9 +60,13 @@ class KrlVisit(FoundVisit):
 
     Attributes:
         move: The move.
+        begin: Row of the spline block that it stands in, -1 for none.
+        inner: It is a point of a spline block, but not the last one.
     """
 
     move: said.KrlMove = field(kw_only=True)
+    begin: int = -1
+    inner: bool = False
 
     @property
     def by_spline_planner(self) -> bool:
@@ -89,24 +95,46 @@ class KrlGoals:
         self, move: said.KrlMove, row: int, here: Scope, modes: object
     ) -> Iterator[KrlVisit]:
         """Read the visits of a move: the point of an arc, and its end."""
-        motion = motion_of(move.word)
-        within = any(row in rows for rows in self.task.files[here.file].splines)
-        if within or move.word.startswith("spl"):
+        motion, kind = motion_of(move.word), move.word.removesuffix("_rel")
+        block, given = self._block(row, here), dict[str, Any]()
+        if block is not None:
+            move, given = self._in_block(move, row, here, block)
+        if (kind == "spl") if block is None else (kind not in _ON_CURVES):
             goal = FoundGoal(Meaning.UNKNOWN, NOTHING, why=SPLINE)
-            yield KrlVisit(here, row, motion, False, goal, modes, move=move)
+            yield KrlVisit(here, row, motion, False, goal, modes, **given, move=move)
             return
         reader = _Goal(self, move, row, here)
         angle = self._angle(move, row, here)
         why = ANGLE if move.angle is not None and math.isnan(angle) else ""
         if move.via is not None:
             goal = reader.end(move.via)
-            yield KrlVisit(here, row, motion, True, goal, modes, why=why, move=move)
+            yield KrlVisit(
+                here, row, motion, True, goal, modes, why=why, **given, move=move
+            )
         goal = reader.end(move.to)
         if why:
             goal = FoundGoal(Meaning.UNKNOWN, NOTHING, name=goal.name, why=ANGLE)
         yield KrlVisit(
-            here, row, motion, False, goal, modes, arc_angle=angle, move=move
-        )
+            here, row, motion, False, goal, modes, arc_angle=angle,
+            curved=kind == "spl", **given, move=move,
+        )  # fmt: skip
+
+    def _block(self, row: int, here: Scope) -> range | None:
+        """Return the rows of the spline block that a move stands in."""
+        blocks = self.task.files[here.file].splines
+        return next((rows for rows in blocks if row in rows), None)
+
+    def _in_block(
+        self, move: said.KrlMove, row: int, here: Scope, rows: range
+    ) -> tuple[said.KrlMove, dict[str, Any]]:
+        """Blend the last move of a block as its end says; say what visits share."""
+        file = self.task.files[here.file]
+        inner = row != max(other for other in file.moves if other in rows)
+        end = file.text.statement(rows.stop)
+        if isinstance(end, said.SplineBlock) and not inner:
+            move = replace(move, words=(*move.words, *end.words))
+        shared = {"block": (here, rows.start), "begin": rows.start, "inner": inner}
+        return move, shared
 
     def _angle(self, move: said.KrlMove, row: int, here: Scope) -> float:
         """Return the angle [rad] at which an arc ends, NaN where it is not known."""

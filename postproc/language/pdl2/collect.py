@@ -243,6 +243,7 @@ def collect(machine: Machine) -> Visits:
         fly=slim(c.fly),
         arc_angle=slim(np.full(len(c.line), np.nan)),
         block=slim(np.full(len(c.line), -1)),
+        curved=slim(np.zeros(len(c.line), dtype=bool)),
         reason=slim(c.reason),
         reasons=tuple(collector.reasons),
         pred_start=pred_start,

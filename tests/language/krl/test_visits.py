@@ -16,6 +16,7 @@ from postproc.language.visits import (
     Meaning,
     OrientationLaw,
     Switch,
+    ZoneRule,
 )
 from postproc.robot.pose import record_from_pose
 
@@ -189,7 +190,9 @@ def test_the_cell_says_what_holds_at_first():
         (["PTP INVERSE(XP1,XA,I)"], "run"),
         (["LIN XP1:{X I,Y 0,Z 0,A 0,B 0,C 0}", "I=I+1"], "run"),
         (["LIN XP2:{X 0,Y 0,Z 9,A 0,B 0,C 0}"], "no move goes to"),
-        (["SPLINE", "SPL XP1", "SLIN XP2", "ENDSPLINE"], "whole or not at all"),
+        (["PTP_SPLINE", "SPTP XP1", "SPTP XP2", "ENDSPLINE"], "spline of joint"),
+        (["SPLINE", "SPTP XP1", "ENDSPLINE"], "spline of joint"),
+        (["SPL XP1"], "spline of joint"),
         (["$ORI_TYPE=#CONSTANT", "LIN XP1"], "#CONSTANT"),
         (["LIN XP1 C_DIS", "LIN XP2"], "$APO"),
         (["LIN XCONF"], ""),
@@ -443,10 +446,21 @@ def test_interrupts_that_move_leave_everything():
     )
 
 
-def test_a_spline_block_is_left_whole():
-    found = job("PTP XP1", "SPLINE", "SPL XP1", "SLIN XP2", "ENDSPLINE", "PTP XP2")
-    assert found.visits.target.tolist() == [0, 99, 99, 0]
-    assert [bool(why) for why in reasons(found)] == [False, True, True, False]
+def test_a_spline_block_is_a_curve_of_its_points():
+    found = job(
+        "$APO.CDIS=5", "SPTP XP1", "SPLINE WITH $VEL.CP=0.4", "SPL XP1",
+        "SPL XP2 WITH $VEL.CP=0.2", "SLIN XP1", "SCIRC XP1,XP2", "ENDSPLINE C_SPL",
+        "SLIN XP2", "SPLINE", "SPL XP1", "ENDSPLINE",
+    )  # fmt: skip
+    v = found.visits
+    assert not any(reasons(found))
+    assert v.block.tolist() == [-1, 1, 1, 1, 1, 1, -1, 7]
+    assert v.curved.tolist() == [False, True, True, *[False] * 4, True]
+    passed = ZoneRule.PASS
+    assert v.zone_rule[1:4].tolist() == [passed] * 3
+    assert v.fly.tolist() == [False, *[True] * 5, False, False]
+    assert v.zone_mm[5] == 5.0 and v.zone_rule[5] == ZoneRule.FROM
+    assert v.lin_spd[1:6].tolist() == [0.4, 0.2, 0.4, 0.4, 0.4]
 
 
 def test_dead_moves_are_listed():

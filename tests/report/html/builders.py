@@ -98,6 +98,7 @@ def visits_of(n: int, name: str, names: tuple[str, ...]) -> Visits:
         orientation_law=index * 0,
         arc_angle=nan,
         block=index * 0 - 1,
+        curved=no,
         reason=index * 0,
         reasons=("",),
         pred_start=np.arange(n + 1),
