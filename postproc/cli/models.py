@@ -38,6 +38,15 @@ class Method(StrEnum):
     KRIGING = "kriging"
 
 
+class VirtualGears(StrEnum):
+    """What the gears of the virtual arm do in their gaps."""
+
+    SHARP = "sharp"
+    ELASTIC = "elastic"
+    GRAVITY = "gravity"
+    INERTIA = "inertia"
+
+
 class MeasuredFrame(StrEnum):
     """The frame that positions were measured in."""
 
@@ -109,6 +118,9 @@ def simulate(
     rate: Annotated[
         float, typer.Option("--rate", min=1.0, max=1000.0, help="Of the track [Hz].")
     ] = 100.0,
+    gears: Annotated[
+        VirtualGears, typer.Option("--gears", help="What gears do in their gaps.")
+    ] = VirtualGears.SHARP,
     json: JsonOption = None,
 ) -> None:
     """Let the virtual arm run a program or a survey, and measure it."""
@@ -118,7 +130,9 @@ def simulate(
         check_places([output, track, as_path(json)], [program, cell, wanted])
         with busy("run on the virtual arm"):
             often = rate if track is not None else 0.0
-            found = simulate_file(program, cell, seed, effects, wanted, path, often)
+            found = simulate_file(
+                program, cell, seed, effects, wanted, path, often, gears.value
+            )
         if output is not None:
             found.write(output)
         if track is not None and found.track is not None:

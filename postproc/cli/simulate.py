@@ -22,6 +22,7 @@ from postproc.robot.pose import MM
 from postproc.simulation import (
     DEFAULT,
     Campaign,
+    GearKind,
     Planted,
     VirtualArm,
     VirtualCell,
@@ -181,6 +182,7 @@ def simulate_file(
     wanted: Path | None = None,
     path: bool = False,
     rate: float = 0.0,
+    gears: str = GearKind.SHARP.value,
 ) -> Simulation:
     """Run a program or a survey on the virtual arm.
 
@@ -192,6 +194,7 @@ def simulate_file(
         wanted: The program that says where the tool should have landed.
         path: Score the paths between the targets as well.
         rate: Follow the tool with so many readings in a second [Hz]; 0: do not.
+        gears: What the arm's gears do in their gaps.
 
     Raises:
         PostprocError: A file cannot be used, or an effect is not known.
@@ -203,8 +206,9 @@ def simulate_file(
     if program.suffix.lower() == ".csv":
         rows = read_rows(program)
         arm = virtual_arm(
-            seed, names, coupling=setup.coupling, rows=len(rows.ids), tool=setup.tool
-        )
+            seed, names, coupling=setup.coupling, rows=len(rows.ids), tool=setup.tool,
+            gears=gears,
+        )  # fmt: skip
         return Simulation(program.name, measure_rows(arm, setup, rows), None)
     visits, own = _read(program, cell)
     arm = virtual_arm(
@@ -213,6 +217,7 @@ def simulate_file(
         coupling=setup.coupling,
         rows=campaign_length(visits),
         tool=setup.tool,
+        gears=gears,
     )
     campaign = measure_program(arm, setup, visits)
     track = record_track(arm, setup, visits, rate) if rate else None

@@ -6,7 +6,7 @@ kinematic chain there cannot hide behind the same mistake here.
 
 from __future__ import annotations
 
-from postproc.simulation.arm import VirtualArm
+from postproc.simulation.arm import GearKind, VirtualArm
 from postproc.simulation.controller import VirtualCell
 from postproc.simulation.draw import stream, virtual_arm
 from postproc.simulation.kinematics import NJ220, Chain
@@ -32,6 +32,7 @@ __all__ = [
     "NJ220",
     "Campaign",
     "Chain",
+    "GearKind",
     "JointTargets",
     "Landing",
     "Planted",

@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from enum import Enum
 
 import numpy as np
 
 from postproc.arrays import Floats
-from postproc.simulation.kinematics import Chain, LinkMasses, small_motion
+from postproc.simulation.kinematics import (
+    Chain,
+    LinkMasses,
+    small_motion,
+    total_torque,
+)
 from postproc.simulation.laws import Law, Where, total
 from postproc.simulation.state import LONG_TRAVEL, VirtualArrivals
 
@@ -88,8 +94,26 @@ def _twist(
 # A gear with a gap of 2 g [rad] moves its link only when a flank touches: its place in
 # the gap is s = clip(s + dq / g, -1, 1). A joint that stands keeps its flank. The side
 # s is thus a physical state, not a sign computed from two targets.
+#
+# Three other kinds of gear are drawn from the same numbers. An elastic one gives way
+# before its flank carries all of the load: it goes from flank to flank over ELASTIC
+# times the gap, along half a sine. One that gravity preloads lies on the flank that the
+# weight of what it carries pushes it to, wherever that is more than its friction holds.
+# One that is switched by inertia runs on to the other flank when the arm brakes from
+# more than a speed of that joint, and stays there.
 
 STILL = 1e-12  # [rad] below the rounding of the inverse kinematics
+ELASTIC = 4.0  # way of an elastic flank from side to side, in gaps
+BRAKES = 0.1  # [s] before it stands an arm brakes
+
+
+class GearKind(Enum):
+    """What a gear with a gap does between its flanks."""
+
+    SHARP = "sharp"
+    ELASTIC = "elastic"
+    GRAVITY = "gravity"
+    INERTIA = "inertia"
 
 
 @dataclass(frozen=True)
@@ -99,10 +123,40 @@ class Gears:
     Attributes:
         gap: Half the gap of every gear, (6,) [rad] on the joint side.
         coupling: (6, 6), motor-side angles = coupling @ joint angles.
+        kind: What they do in their gaps.
+        body: The weights that preload them.
+        friction: Torque about every joint that holds a link between the flanks, (6,)
+            [N m].
+        runs_on: Speed of every motor from which inertia changes the flank as the arm
+            brakes, (6,) [rad/s] on the joint side.
     """
 
     gap: Floats
     coupling: Floats
+    kind: GearKind = GearKind.SHARP
+    body: LinkMasses | None = None
+    friction: Floats = field(default_factory=lambda: np.full(6, np.inf))
+    runs_on: Floats = field(default_factory=lambda: np.full(6, np.inf))
+
+    def shown(self, arrivals: VirtualArrivals) -> Floats:
+        """Return the sides that the links show, (n, 6) from -1 to 1."""
+        if self.kind is GearKind.ELASTIC:
+            return np.asarray(np.sin(np.pi / 2 * arrivals.flank))
+        if self.kind is GearKind.GRAVITY and self.body is not None:
+            torque = total_torque(
+                self.body, arrivals.q, arrivals.payload, arrivals.payload_com
+            )
+            pushed = np.abs(torque) > self.friction  # forward: ahead of its motor
+            return np.where(pushed, -np.sign(torque), arrivals.flank)
+        return arrivals.flank
+
+    def braked(self, state: GearState, rate: Floats) -> GearState:
+        """Return the state behind braking from joint speeds (6,) [rad/s]."""
+        if self.kind is not GearKind.INERTIA:
+            return state
+        speed = self.coupling @ rate
+        flank = np.where(np.abs(speed) > self.runs_on, -np.sign(speed), state.flank)
+        return replace(state, flank=flank)
 
 
 @dataclass(frozen=True)
@@ -111,7 +165,8 @@ class GearState:
 
     Attributes:
         angle: Present angle.
-        side: Place in the gap, -1 .. 1.
+        side: Place in a sharp gap by the way alone, -1 .. 1.
+        flank: Place in the gap, -1 .. 1.
         heading: Direction of the last motion that was more than the gap, +1 or -1.
         extreme: Furthest angle reached since the last reversal.
         turn: Where the last reversal was.
@@ -120,6 +175,7 @@ class GearState:
 
     angle: Floats
     side: Floats
+    flank: Floats
     heading: Floats
     extreme: Floats
     turn: Floats
@@ -140,7 +196,7 @@ def at_start(gears: Gears, q: Floats, side: Floats) -> GearState:
     """Return the state of an arm that stands at q (6,) with the given sides (6,)."""
     angle = gears.coupling @ q
     turn = angle - side * LONG_TRAVEL
-    return GearState(angle, side, side, angle, turn, turn + side * LONG_TRAVEL)
+    return GearState(angle, side, side, side, angle, turn, turn + side * LONG_TRAVEL)
 
 
 def move(gears: Gears, state: GearState, path: Floats) -> GearState:
@@ -152,7 +208,7 @@ def move(gears: Gears, state: GearState, path: Floats) -> GearState:
         path: Joint angles, (m, 6) [rad]; between two of them every joint moves one way.
     """
     for angle in turning_points(np.vstack([state.angle, path @ gears.coupling.T])):
-        state = _step(gears.gap, state, angle)
+        state = _step(gears, state, angle)
     return state
 
 
@@ -160,7 +216,7 @@ def follow(gears: Gears, state: GearState, path: Floats) -> list[GearState]:
     """Follow a joint path (m, 6) as `move` does; return the state at every place."""
     states = []
     for angle in path @ gears.coupling.T:
-        state = _step(gears.gap, state, angle)
+        state = _step(gears, state, angle)
         states.append(state)
     return states
 
@@ -175,14 +231,20 @@ def turning_points(path: Floats) -> Floats:
     return np.asarray(path[1:][keep])
 
 
-def _step(gap: Floats, state: GearState, angle: Floats) -> GearState:
+def _step(gears: Gears, state: GearState, angle: Floats) -> GearState:
     """Move every motor one way to the given angles (6,)."""
-    side = np.clip(state.side + (angle - state.angle) / gap, -1.0, 1.0)
+    gap = gears.gap
+    reach = gap * (ELASTIC if gears.kind is GearKind.ELASTIC else 1.0)
+    side, flank = (
+        np.clip(place + (angle - state.angle) / most, -1.0, 1.0)
+        for place, most in ((state.side, gap), (state.flank, reach))
+    )
     advance = state.heading * (angle - state.extreme)
     reversed_ = advance < -gap
     return GearState(
         angle=angle,
         side=side,
+        flank=flank,
         heading=np.where(reversed_, -state.heading, state.heading),
         extreme=np.where(reversed_ | (advance > 0), angle, state.extreme),
         turn=np.where(reversed_, state.extreme, state.turn),
@@ -245,6 +307,7 @@ class VirtualArm:
             arrivals: Commanded joints and all they depend on.
             joint_noise: Added to the joints, (n, 6) [rad].
         """
+        arrivals = replace(arrivals, side=self.gears.shown(arrivals))
         angles = arrivals.q + total(self.laws, Where.JOINTS, arrivals) + joint_noise
         growth = total(self.laws, Where.LENGTHS, arrivals)
         base = self.as_built.base + total(self.laws, Where.BASE, arrivals)

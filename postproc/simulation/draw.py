@@ -10,8 +10,15 @@ import numpy as np
 
 from postproc.arrays import Floats
 from postproc.exceptions import PostprocError
-from postproc.simulation.arm import AsBuilt, Gears, VirtualArm, draw_as_built, draw_body
-from postproc.simulation.kinematics import NJ220, Chain, LinkMasses
+from postproc.simulation.arm import (
+    AsBuilt,
+    GearKind,
+    Gears,
+    VirtualArm,
+    draw_as_built,
+    draw_body,
+)
+from postproc.simulation.kinematics import NJ220, Chain, LinkMasses, total_torque
 from postproc.simulation.laws import (
     AS_BUILT,
     DEFAULT,
@@ -27,6 +34,9 @@ from postproc.simulation.state import VirtualArrivals
 
 TRACKER_NOISE = (0.01e-3, 5e-6)  # [m], [m/m] per axis
 SMALL = 1e-6  # a size at which every law is linear
+HELD = 0.15  # of the largest torque of gravity about a joint, held by its friction
+LEAST_HELD = 20.0  # [N m]
+RUNS_ON = 0.25  # of the highest speed of a joint: braking from it changes the flank
 REPEATS_WITHIN = (0.02e-3, 0.05e-3)  # [m] rms of the TCP over the reference campaign
 
 
@@ -43,6 +53,7 @@ def virtual_arm(
     coupling: Floats | None = None,
     rows: int = 400,
     tool: Floats | None = None,
+    gears: GearKind | str = GearKind.SHARP,
 ) -> VirtualArm:
     """Draw an arm.
 
@@ -55,6 +66,7 @@ def virtual_arm(
             else depends on it.
         tool: TCP (3,) or pose (4, 4) [m] that sizes in mm refer to; default a probe
             that stands off in all three axes.
+        gears: What the gears do in their gaps; nothing else depends on it.
 
     Raises:
         PostprocError: An effect that does not exist.
@@ -75,7 +87,14 @@ def virtual_arm(
             stream(seed, "as built"), chain, "geometry" in names, "tool" in names
         ),
         laws=tuple(laws.values()),
-        gears=replace(perfect.gears, gap=half_gap),
+        gears=replace(
+            perfect.gears,
+            gap=half_gap,
+            kind=GearKind(gears),
+            body=body,
+            friction=_friction(body, planter.reference),
+            runs_on=RUNS_ON * chain.speed,
+        ),
         joint_noise=planter.joint_noise(rng),
         tracker_noise=TRACKER_NOISE,
         warming=(rng.uniform(3.0, 10.0), rng.uniform(1200.0, 3600.0)),
@@ -94,6 +113,12 @@ def _perfect(chain: Chain, coupling: Floats | None) -> VirtualArm:
         tracker_noise=(0.0, 0.0),
         warming=(0.0, 1.0),
     )
+
+
+def _friction(body: LinkMasses, reference: VirtualArrivals) -> Floats:
+    """Return the torques that friction holds (6,) [N m]: a part of the largest ones."""
+    torque = total_torque(body, reference.q, reference.payload, reference.payload_com)
+    return np.asarray(np.maximum(HELD * np.abs(torque).max(axis=0), LEAST_HELD))
 
 
 def _half_gap(law: Law) -> Floats:

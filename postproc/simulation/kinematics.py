@@ -349,6 +349,18 @@ def link_torque(body: LinkMasses, q: Floats) -> Floats:
     return _moments(body.chain, frames, centre, body.mass[None, :] + 0 * centre[..., 0])
 
 
+def total_torque(body: LinkMasses, q: Floats, mass: Floats, com: Floats) -> Floats:
+    """Return the torque of links and payload about the joints, (n, 6) [N m].
+
+    Args:
+        body: As in `link_torque`.
+        q: Controller joint angles, (n, 6) [rad].
+        mass: As in `payload_torque`.
+        com: Likewise.
+    """
+    return link_torque(body, q) + payload_torque(body.chain, q, mass, com)
+
+
 def payload_torque(chain: Chain, q: Floats, mass: Floats, com: Floats) -> Floats:
     """Return the torque of a payload about every joint, (n, 6) [N m].
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from postproc.arrays import Floats
 from postproc.exceptions import PostprocError
-from postproc.simulation.kinematics import LinkMasses, link_torque, payload_torque
+from postproc.simulation.kinematics import LinkMasses, payload_torque, total_torque
 from postproc.simulation.reference import DURATION, WORKING_RANGE
 from postproc.simulation.state import REST_TEMPERATURE, VirtualArrivals
 
@@ -110,12 +110,9 @@ def total(laws: Sequence[Law], where: Where, arrivals: VirtualArrivals) -> Float
 KILO = 1e3  # [N m] torques in the laws are counted in thousands
 
 
-def total_torque(draw: Draw, arrivals: VirtualArrivals) -> Floats:
+def torque_at(draw: Draw, arrivals: VirtualArrivals) -> Floats:
     """Return the torque (n, 6) [N m] of links and payload about the joints."""
-    payload = payload_torque(
-        draw.body.chain, arrivals.q, arrivals.payload, arrivals.payload_com
-    )
-    return link_torque(draw.body, arrivals.q) + payload
+    return total_torque(draw.body, arrivals.q, arrivals.payload, arrivals.payload_com)
 
 
 def compliance(draw: Draw) -> Law:
@@ -130,7 +127,7 @@ def compliance(draw: Draw) -> Law:
         softness[joint - 1] = draw.rng.uniform(0.4, 1.0)
 
     def shape(arrivals: VirtualArrivals) -> Floats:
-        return total_torque(draw, arrivals) / KILO * softness
+        return torque_at(draw, arrivals) / KILO * softness
 
     parameters = {f"softness_{j}": float(softness[j - 1]) for j in joints}
     return Law("compliance", Where.JOINTS, tuple(joints), 0, parameters, shape)
@@ -270,7 +267,7 @@ def load_backlash(draw: Draw) -> Law:
     joint, power = draw.pick([2, 3, 5]), draw.rng.uniform(0.8, 1.2)
 
     def shape(arrivals: VirtualArrivals) -> Floats:
-        load = np.abs(total_torque(draw, arrivals)[:, joint - 1] / KILO)
+        load = np.abs(torque_at(draw, arrivals)[:, joint - 1] / KILO)
         return on_joint(joint, -arrivals.side[:, joint - 1] * load**power)
 
     return Law("load_backlash", Where.JOINTS, (joint,), 0, {"power": power}, shape)
@@ -286,7 +283,7 @@ def gravity_side(draw: Draw) -> Law:
     usual = np.array([1.0, 5.0, 1.5, 0.1, 0.1, 0.01])[joint - 1]  # [kN m]
 
     def shape(arrivals: VirtualArrivals) -> Floats:
-        load = total_torque(draw, arrivals)[:, joint - 1] / KILO
+        load = torque_at(draw, arrivals)[:, joint - 1] / KILO
         return on_joint(joint, np.tanh(load / (threshold * usual)))
 
     parameters = {"t0": threshold * usual * KILO}

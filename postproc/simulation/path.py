@@ -11,9 +11,9 @@ from scipy.interpolate import CubicSpline
 from postproc.arrays import Floats, Ints
 from postproc.language.visits import Visits
 from postproc.robot.trajectory import Motion
-from postproc.simulation.arm import GearState, VirtualArm, follow
+from postproc.simulation.arm import VirtualArm
 from postproc.simulation.controller import VirtualCell
-from postproc.simulation.program import run_moves
+from postproc.simulation.program import gears_along, run_moves
 from postproc.simulation.state import make_arrivals
 
 STEP = 1e-3  # [m] between places that are looked at
@@ -108,14 +108,12 @@ def _tracks(
         if run.why or visits.motion[run.visit] == Motion.JOINT:
             continue
         q = _finer(run.path, arm.nominal.flange(run.path)[:, :3, 3])
-        gears = [run.gears, *follow(arm.gears, run.gears, q[1:])]
+        gears = gears_along(arm, run, q)
         part = np.linspace(0.0, 1.0, len(q))
         arrivals = make_arrivals(
             q,
-            _column(gears, "side"),
-            run.tool,
-            travel=_column(gears, "travel"),
-            loop=_column(gears, "loop"),
+            tool=run.tool,
+            **gears,
             speed=run.speed,
             time=run.begins + part * run.lasted,
             temperature=arm.temperature(
@@ -125,10 +123,6 @@ def _tracks(
             payload_com=setup.payload_com,
         )
         yield run.visit, _Track(arm.nominal_tcp(arrivals), arm.tcp(arrivals))
-
-
-def _column(gears: list[GearState], name: str) -> Floats:
-    return np.array([getattr(state, name) for state in gears])
 
 
 def _finer(path: Floats, flange: Floats) -> Floats:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -11,7 +11,14 @@ from postproc.arrays import Floats, Ints
 from postproc.exceptions import PostprocError
 from postproc.language.visits import Visits
 from postproc.robot.trajectory import Motion
-from postproc.simulation.arm import GearState, VirtualArm, at_start, move
+from postproc.simulation.arm import (
+    BRAKES,
+    GearState,
+    VirtualArm,
+    at_start,
+    follow,
+    move,
+)
 from postproc.simulation.controller import Drive, VirtualCell, Way, plan_drives
 from postproc.simulation.draw import stream
 from postproc.simulation.state import USUAL_SPEED, VirtualArrivals, make_arrivals
@@ -50,6 +57,7 @@ class _ProgramPlace:
     speed: float = USUAL_SPEED
     lasted: float = 0.0
     why: str = ""
+    rate: Floats = field(default_factory=lambda: np.zeros(6))
 
 
 def run_program(arm: VirtualArm, setup: VirtualCell, visits: Visits) -> ProgramRun:
@@ -102,6 +110,7 @@ class DrivenMove:
         tool: Flange to TCP, (4, 4) [m].
         speed: Of the TCP [m/s].
         begins, lasted: When it begins, and how long it takes [s].
+        rate: Joint speeds from which it brakes, (6,) [rad/s]; 0 where it goes on.
         why: Why the visit was not reached, or "".
     """
 
@@ -112,7 +121,24 @@ class DrivenMove:
     speed: float
     begins: float
     lasted: float
+    rate: Floats
     why: str
+
+
+def gears_along(arm: VirtualArm, run: DrivenMove, q: Floats) -> dict[str, Floats]:
+    """Follow the gears along a move, as columns of `VirtualArrivals`.
+
+    Args:
+        arm: Whose gears.
+        run: The move.
+        q: Joints, evenly along it, from where the arm stands, (k, 6) [rad].
+    """
+    states = [run.gears, *follow(arm.gears, run.gears, q[1:])]
+    brakes = np.linspace(0.0, run.lasted, len(q)) > run.lasted - BRAKES
+    for k in np.flatnonzero(brakes & bool(run.rate.any())).tolist():
+        states[k] = arm.gears.braked(states[k], run.rate)
+    names = ("side", "flank", "travel", "loop")
+    return {name: np.array([getattr(s, name) for s in states]) for name in names}
 
 
 def run_moves(
@@ -131,7 +157,7 @@ def run_moves(
         tool = poses[visits.tool[i]]
         moves = after.lasted - SETTLE
         yield DrivenMove(
-            i, path, before.gears, tool, after.speed, time, moves, after.why
+            i, path, before.gears, tool, after.speed, time, moves, after.rate, after.why
         )
         time += after.lasted
 
@@ -155,12 +181,27 @@ def _go(
     if drive.why:
         return replace(place, why=drive.why, lasted=0.0)
     lasted = _duration(setup, visits, i, drive.way)
+    rate = np.zeros(6) if visits.fly[i] else _last_rate(place.joints, drive, lasted)
+    gears = move(arm.gears, place.gears, drive.path)
     return _ProgramPlace(
         joints=drive.path[-1],
-        gears=move(arm.gears, place.gears, drive.path),
+        gears=arm.gears.braked(gears, rate),
         speed=max(drive.way.length / lasted, 1e-6),
         lasted=lasted + SETTLE,
+        rate=rate,
     )
+
+
+def _last_rate(begin: Floats, drive: Drive, lasted: float) -> Floats:
+    """Return the joint speeds from which a move brakes, (6,) [rad/s]."""
+    path = np.vstack([begin, drive.path])
+    step = np.diff(path, axis=0)
+    size = np.linalg.norm(step, axis=1)
+    moved = np.flatnonzero(size > 1e-9)
+    if len(moved) == 0:
+        return np.zeros(6)
+    last = moved[-1]
+    return np.asarray(step[last] / size[last] * size.sum() / lasted)
 
 
 def _duration(setup: VirtualCell, visits: Visits, i: int, way: Way) -> float:
@@ -195,6 +236,7 @@ def _collect(
         poses[visits.tool[visit]],
         travel=np.array([p.gears.travel for p in kept]).reshape(-1, 6),
         loop=np.array([p.gears.loop for p in kept]).reshape(-1, 6),
+        flank=np.array([p.gears.flank for p in kept]).reshape(-1, 6),
         speed=np.array([p.speed for p in kept]),
         time=time,
         temperature=arm.temperature(time, setup.temperature),

@@ -22,7 +22,9 @@ class VirtualArrivals:
 
     Attributes:
         q: Commanded joint angles as the controller shows them, (n, 6) [rad].
-        side: Where each gear lies in its gap, (n, 6), +1 driven forward, -1 backward.
+        side: Where each gear would lie in its gap by the way alone, (n, 6), +1 driven
+            forward, -1 backward.
+        flank: Where it really lies, (n, 6); not so where a moving arm braked.
         travel: Way of each joint since its last reversal, (n, 6) [rad].
         loop: Way between its last two reversals, (n, 6) [rad].
         speed: Speed of the TCP on the way there, (n,) [m/s].
@@ -36,6 +38,7 @@ class VirtualArrivals:
 
     q: Floats
     side: Floats
+    flank: Floats
     travel: Floats
     loop: Floats
     speed: Floats
@@ -64,6 +67,7 @@ class VirtualArrivals:
 
 _DEFAULTS: dict[str, tuple[float, tuple[int, ...]]] = {
     "side": (0.0, (6,)),
+    "flank": (0.0, (6,)),
     "travel": (LONG_TRAVEL, (6,)),
     "loop": (LONG_TRAVEL, (6,)),
     "speed": (USUAL_SPEED, ()),
@@ -93,7 +97,7 @@ def make_arrivals(
     """
     q = np.array(q, dtype=float).reshape(-1, 6)
     n = len(q)
-    given: dict[str, Floats | float] = {"side": side, **covariates}
+    given: dict[str, Floats | float] = {"side": side, "flank": side, **covariates}
     order = np.array(np.broadcast_to(given.pop("order", np.arange(n)), n), dtype=float)
     if unknown := sorted(set(given) - set(_DEFAULTS)):
         raise TypeError(f"arrivals have no {', '.join(unknown)}")

@@ -14,10 +14,10 @@ from scipy.interpolate import CubicSpline
 from postproc.arrays import Floats
 from postproc.files import write_all
 from postproc.language.visits import Visits
-from postproc.simulation.arm import GearState, VirtualArm, follow
+from postproc.simulation.arm import VirtualArm
 from postproc.simulation.controller import VirtualCell
 from postproc.simulation.draw import stream
-from postproc.simulation.program import SETTLE, DrivenMove, run_moves
+from postproc.simulation.program import SETTLE, DrivenMove, gears_along, run_moves
 from postproc.simulation.state import make_arrivals
 
 RATE = 100.0  # [Hz]
@@ -90,21 +90,16 @@ def _places(
 ) -> Floats:
     """Place the tool at every reading of a move and of the stop behind it, (k, 3)."""
     q = _in_time(run.path, max(int(run.lasted * rate), 1))
-    gears = follow(arm.gears, run.gears, q[1:])
+    gears = {name: column[1:] for name, column in gears_along(arm, run, q).items()}
     time = run.begins + np.linspace(0.0, run.lasted, len(q))[1:]
     states = make_arrivals(
-        q[1:], _column(gears, "side"), run.tool,
-        travel=_column(gears, "travel"), loop=_column(gears, "loop"), speed=run.speed,
+        q[1:], tool=run.tool, **gears, speed=run.speed,
         time=time, temperature=arm.temperature(time, setup.temperature),
         payload=setup.payload, payload_com=setup.payload_com,
     )  # fmt: skip
     places = arm.tcp(states)
     stands = 0 if flies else int(SETTLE * rate)
     return np.concatenate([places, np.repeat(places[-1:], stands, axis=0)])
-
-
-def _column(gears: list[GearState], name: str) -> Floats:
-    return np.array([getattr(state, name) for state in gears])
 
 
 def _in_time(path: Floats, count: int) -> Floats:

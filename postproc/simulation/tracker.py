@@ -199,7 +199,7 @@ def follow_rows(
     tool: Floats | None = None,
     **covariates: Floats | float,
 ) -> VirtualArrivals:
-    """Visit joint targets one after the other with JOINT moves.
+    """Visit joint targets one after the other with JOINT moves, slowly.
 
     Args:
         arm: Its gears tell the direction.
@@ -222,13 +222,16 @@ def follow_rows(
         state = move(arm.gears, state, np.array(stop))
         states.append(state)
     reached = np.array([s.side for s in states])
+    flank = np.array([s.flank for s in states])
     ways = np.array([s.travel for s in states])
     if side is not None:
         reached = np.where(side == 0, 0.0, reached)
+        flank = np.where(side == 0, 0.0, flank)
     if travel is not None:
         ways = np.where(np.isnan(travel), ways, travel)
     loop = np.array([s.loop for s in states])
-    return make_arrivals(q, reached, tool, travel=ways, loop=loop, **covariates)
+    gears = {"travel": ways, "loop": loop, "flank": flank}
+    return make_arrivals(q, reached, tool, **gears, **covariates)
 
 
 # What the laser tracker writes down: simulated campaigns as measurement files.

@@ -1,9 +1,21 @@
 """The gap in the gears by its definition: a flank that is pushed along."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from postproc.simulation.arm import Gears, at_start, move, turning_points
+from postproc.simulation import make_arrivals, virtual_arm
+from postproc.simulation.arm import (
+    ELASTIC,
+    GearKind,
+    Gears,
+    at_start,
+    follow,
+    move,
+    turning_points,
+)
+from postproc.simulation.kinematics import link_torque
 
 GAP = 1e-4
 GEARS = Gears(np.full(6, GAP), np.eye(6))
@@ -76,3 +88,67 @@ def test_the_motor_of_a_coupled_wrist_turns_when_its_joint_does_not() -> None:
     state = at_start(gears, np.zeros(6), np.ones(6))
     state = move(gears, state, np.array([[0, 0, 0, 0, 0.2, 0.0]]))
     assert state.side[5] == -1.0
+
+
+# Gears of other kinds.
+
+Q = np.radians([20.0, 30.0, -100.0, 10.0, 40.0, 0.0])
+
+
+def arm_with(kind: str):
+    return virtual_arm(7, gears=kind)
+
+
+def shown(kind: str, path: np.ndarray, gears: Gears | None = None) -> np.ndarray:
+    """Follow a path from rest on a forward flank; return what the links show."""
+    gears = gears or replace(GEARS, kind=GearKind(kind))
+    states = follow(gears, at_start(gears, path[0], np.ones(6)), path[1:])
+    flank = np.array([s.flank for s in states])
+    return gears.shown(make_arrivals(path[1:], flank=flank))
+
+
+def test_the_kind_of_the_gears_changes_nothing_else() -> None:
+    sharp, other = arm_with("sharp"), arm_with("elastic")
+    arrivals = make_arrivals(Q[None], 1.0)
+    np.testing.assert_array_equal(sharp.tcp(arrivals), other.tcp(arrivals))
+    assert sharp.gears.kind is GearKind.SHARP
+
+
+def test_an_elastic_flank_goes_over_smoothly() -> None:
+    back = -np.linspace(0.0, 2 * ELASTIC * GAP, 401)
+    found = shown("elastic", np.tile(back[:, None], (1, 6)))[:, 0]
+    wanted = np.cos(np.pi * np.arange(1, 401) / 400)
+    np.testing.assert_allclose(found, wanted, atol=1e-9)
+    closed = np.tile(np.append(back, back[::-1])[:, None], (1, 6))
+    np.testing.assert_allclose(shown("elastic", closed)[-1], 1.0)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_weight_chooses_the_flank_whichever_way_a_joint_moves(seed: int) -> None:
+    arm = virtual_arm(seed, gears="gravity")
+    gears = arm.gears
+    there = np.linspace(Q - 0.02, Q + 0.02, 50)
+    onwards, back = (shown("gravity", path, gears) for path in (there, there[::-1]))
+    torque = link_torque(gears.body, there)
+    heavy = (np.abs(torque) > 1.1 * gears.friction).all(axis=0)
+    light = (np.abs(torque) < 0.9 * gears.friction).all(axis=0)
+    assert heavy.any() and light.any()
+    pushed = -np.sign(torque[0, heavy])
+    np.testing.assert_array_equal(onwards[-1, heavy], pushed)
+    np.testing.assert_array_equal(back[-1, heavy], pushed)
+    np.testing.assert_array_equal(onwards[-1, light], 1.0)
+    np.testing.assert_array_equal(back[-1, light], -1.0)
+
+
+def test_fast_braking_changes_the_flank_and_slow_braking_does_not() -> None:
+    gears = arm_with("inertia").gears
+    path = np.linspace(Q - 0.1, Q + 0.1, 20)
+    state = move(gears, at_start(gears, path[0], np.ones(6)), path[1:])
+    slow, fast = 0.9 * gears.runs_on, 1.1 * gears.runs_on
+    np.testing.assert_array_equal(gears.braked(state, slow).flank, 1.0)
+    np.testing.assert_array_equal(gears.braked(state, fast).flank, -1.0)
+    np.testing.assert_array_equal(gears.braked(state, -fast).flank, 1.0)
+    behind = move(gears, gears.braked(state, fast), path[-1:] + 3 * gears.gap)
+    np.testing.assert_allclose(behind.flank, 1.0)
+    sharp = arm_with("sharp").gears
+    np.testing.assert_array_equal(sharp.braked(state, fast).flank, 1.0)

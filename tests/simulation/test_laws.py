@@ -45,14 +45,14 @@ COVARIATES = {
     "compliance": {"payload"}, "payload": {"payload"}, "counterbalance": set(),
     "transmission": set(), "transmission_free": set(), "scale": set(),
     "coupling": set(), "worn_spot": set(), "joint_product": set(),
-    "backlash": {"side"}, "load_backlash": {"side", "payload"},
-    "gravity_side": {"payload"}, "windup": {"side", "travel"},
-    "lag": {"side", "speed"}, "hysteresis": {"side", "travel", "loop"},
+    "backlash": {"flank"}, "load_backlash": {"flank", "payload"},
+    "gravity_side": {"payload"}, "windup": {"flank", "travel"},
+    "lag": {"flank", "speed"}, "hysteresis": {"flank", "travel", "loop"},
     "thermal": {"temperature"}, "warmup": {"time"}, "base_shift": {"order"},
     "tool_shift": {"order"}, "tracker_drift": {"time"},
 }  # fmt: skip
 OTHER = {
-    "side": -REFERENCE.side,
+    "flank": -REFERENCE.flank,
     "travel": REFERENCE.travel * 0.5,
     "loop": REFERENCE.loop * 0.5,
     "speed": REFERENCE.speed + 0.1,
