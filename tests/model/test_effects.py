@@ -32,6 +32,17 @@ def variants() -> list[Effect]:
     out.append(BY_NAME["load_backlash"](form="gravity_side"))
     out.append(BY_NAME["tool_shift"](row=20.0, turns=True))
     out.append(BY_NAME["base_shift"](row=20.0))
+    out.append(BY_NAME["joint_step"](row=20.0))
+    out.append(BY_NAME["base_tilt"](skew=True))
+    out.append(BY_NAME["windup"](form="elastic"))
+    out += [
+        BY_NAME[name](tracker=(3.0, -2.0, 1.5), **form)
+        for name, form in (
+            ("azimuth", {}),
+            ("refraction", {}),
+            ("refraction", {"form": "stretch"}),
+        )
+    ]
     out.append(BY_NAME["backlash_profile"](constant=True))
     out += [
         BY_NAME["curve"](direction=d, source=s, lower=(low,), upper=(high,))
@@ -61,8 +72,11 @@ def test_columns_are_finite_differences_of_the_error(effect: Effect) -> None:
         assert error < 2e-8, one.names[k]  # [m] at one prior scale
 
 
+UNTURNED = ("probe_turn", "azimuth", "refraction")  # of readings, not of the tool
+
+
 @pytest.mark.parametrize(
-    "effect", [e for e in variants() if e.name != "probe_turn"], ids=lambda e: e.name
+    "effect", [e for e in variants() if e.name not in UNTURNED], ids=lambda e: e.name
 )
 def test_rotation_columns_are_what_other_points_of_the_tool_show(
     effect: Effect,
@@ -107,8 +121,8 @@ def test_settings_survive_a_model_file(effect: Effect) -> None:
 def test_origins_say_what_may_be_compensated() -> None:
     origin = {e.name: e.belongs_to() for e in variants() if e.name != "curve"}
     assert {n for n, o in origin.items() if o == "setup"} == {
-        "base_shift", "tool_shift", "tracker_drift", "probe", "probe_turn",
-        "registration",
+        "base_shift", "tool_shift", "joint_step", "tracker_drift", "azimuth",
+        "refraction", "probe", "probe_turn", "registration",
     }  # fmt: skip
     assert {n for n, o in origin.items() if o == "state"} == {"payload", "thermal"}
     curve = BY_NAME["curve"]
