@@ -29,6 +29,7 @@ STATES = covariates(random_states(40, RNG, PLATE), RNG)
 def variants() -> list[Effect]:
     out = list(propose(KNOWN, NJ, STATES))
     out.append(BY_NAME["thermal"](form="time", time_constant=100.0))
+    out.append(BY_NAME["thermal"](form="time", time_constant=9.0, clock="order"))
     out.append(BY_NAME["load_backlash"](form="gravity_side"))
     out.append(BY_NAME["tool_shift"](row=20.0, turns=True))
     out.append(BY_NAME["base_shift"](row=20.0))
@@ -119,7 +120,8 @@ def test_settings_survive_a_model_file(effect: Effect) -> None:
 
 
 def test_origins_say_what_may_be_compensated() -> None:
-    origin = {e.name: e.belongs_to() for e in variants() if e.name != "curve"}
+    origin = {e.name: e.belongs_to() for e in propose(KNOWN, NJ, STATES)}
+    del origin["curve"]
     assert {n for n, o in origin.items() if o == "setup"} == {
         "base_shift", "tool_shift", "joint_step", "tracker_drift", "azimuth",
         "refraction", "probe", "probe_turn", "registration",
@@ -129,6 +131,12 @@ def test_origins_say_what_may_be_compensated() -> None:
     assert curve(source=("order",)).belongs_to() == "setup"
     assert curve(source=("joint 3", "temperature")).belongs_to() == "state"
     assert curve(source=("joint 3",)).belongs_to() == "arm"
+    assert curve(direction="tool z", source=("joint 3",)).belongs_to() == "arm"
+    # Along the base's axes it may be the tracker that errs.
+    assert curve(direction="base z", source=("joint 3",)).belongs_to() == "setup"
+    # Programs run warm; only the rows of a survey are early in their order.
+    by_order = BY_NAME["thermal"](form="time", clock="order")
+    assert by_order.belongs_to() == "setup"
     assert BY_NAME["thermal"]().requires() == ("temperature",)
     assert BY_NAME["thermal"](form="time").requires() == ()
 

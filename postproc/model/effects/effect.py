@@ -141,6 +141,10 @@ class Effect(ABC):
         """List the covariates of `States` without which it cannot be evaluated."""
         return ()
 
+    def refers_to(self) -> str:
+        """Name the state that predictions are for, where it passes with time alone."""
+        return ""
+
     @abstractmethod
     def parameters(self) -> tuple[Parameter, ...]:
         """Name the p parameters, in the order of the columns."""

@@ -68,6 +68,10 @@ class TrackerDrift(Effect):
         """Say that it is the set-up's."""
         return "setup"
 
+    def refers_to(self) -> str:
+        """Name the start, when the tracker was registered."""
+        return "the tracker as it stood at the first row"
+
     def parameters(self) -> tuple[Parameter, ...]:
         """Name shift and turn of every term."""
         out = []
