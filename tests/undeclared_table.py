@@ -96,8 +96,8 @@ def _summary(trials: Sequence[Trial], wanted: int) -> list[str]:
     seconds = np.median([t.seconds for t in trials])
     return [
         f"- {len(trials)} of {wanted} trials, seeds {seeds[0]} to {seeds[-1]}",
-        f"- named effects at 1 to 3 times the noise: {_rate([ok(t) for t in large])}",
-        f"- named effects at half the noise: {_rate([ok(t) for t in small])}",
+        f"- named effects at 1 to 2 times the noise: {_rate([ok(t) for t in large])}",
+        f"- named effects at 0.3 and 0.5 of the noise: {_rate([ok(t) for t in small])}",
         f"- two at once, both right: {_rate([ok(t) for t in two])}",
         f"- without a name: {_rate([ok(t) for t in nameless])}; given a name with "
         f"confidence: {_rate([misnamed(t) for t in nameless])}",
