@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.figure import Figure
+from scipy.stats import beta
 
 from tests.calibration.planted import NAMED, NAMELESS, SIZES
 from tests.undeclared_score import WITHIN, close, groups, laws, misnamed, ok
@@ -83,6 +84,13 @@ def _rate(hits: Sequence[bool]) -> str:
     return f"{sum(hits)} / {len(hits)}" if hits else "-"
 
 
+def _bounded(hits: Sequence[bool]) -> str:
+    """Write a rate with what it is at least, at 95 % (Clopper and Pearson, 1934)."""
+    right, n = sum(hits), len(hits)
+    least = beta.ppf(0.05, right, n - right + 1) if right else 0.0
+    return f"{_rate(hits)} (at least {least:.1%})" if n else "-"
+
+
 def _summary(trials: Sequence[Trial], wanted: int) -> list[str]:
     none = [t for t in trials if t.kind == "none"]
     named = [t for t in trials if t.kind in NAMED]
@@ -96,16 +104,18 @@ def _summary(trials: Sequence[Trial], wanted: int) -> list[str]:
     seconds = np.median([t.seconds for t in trials])
     return [
         f"- {len(trials)} of {wanted} trials, seeds {seeds[0]} to {seeds[-1]}",
-        f"- named effects at 1 to 2 times the noise: {_rate([ok(t) for t in large])}",
-        f"- named effects at 0.3 and 0.5 of the noise: {_rate([ok(t) for t in small])}",
-        f"- two at once, both right: {_rate([ok(t) for t in two])}",
-        f"- without a name: {_rate([ok(t) for t in nameless])}; given a name with "
+        "- named effects at 1 to 2 times the noise: "
+        + _bounded([ok(t) for t in large]),
+        "- named effects at 0.3 and 0.5 of the noise: "
+        + _bounded([ok(t) for t in small]),
+        f"- two at once, both right: {_bounded([ok(t) for t in two])}",
+        f"- without a name: {_bounded([ok(t) for t in nameless])}; given a name with "
         f"confidence: {_rate([misnamed(t) for t in nameless])}",
-        f"- nothing planted, verdict `noise`: {_rate([ok(t) for t in none])}; effects "
-        f"added: {_rate([bool(t.found) for t in none])}",
+        f"- nothing planted, verdict `noise`: {_bounded([ok(t) for t in none])}; "
+        f"effects added: {_rate([bool(t.found) for t in none])}",
         f"- groups: median {np.median(sizes):.0f}, largest {max(sizes)}",
         f"- true error at fresh poses within {WITHIN} times an informed fit's: "
-        f"{_rate([close(t) for t in planted])}",
+        f"{_bounded([close(t) for t in planted])}",
         f"- processor time of a search: median {seconds:.1f} s",
     ]
 
