@@ -353,9 +353,7 @@ def elastic_flank(draw: Draw) -> Law:
             before = 2 * np.exp(-arrivals.loop[:, joint - 1] / way) - 1
             place = 1 - (1 - before) * np.exp(-gone)
         else:
-            third = np.clip(
-                gone / 3, 0.0, 1.0
-            )  # the force of a cubic, flat at its ends
+            third = np.clip(gone / 3, 0.0, 1.0)  # a cubic, flat at its ends
             place = 2 * third**2 * (3 - 2 * third) - 1
         return on_joint(joint, -arrivals.side[:, joint - 1] * place)
 

@@ -17,6 +17,7 @@ from postproc.robot.state import States
 
 SCALE = 1e-8  # [rad/(N m)] softness of a usual foundation
 UNSURE = 0.1  # share of the arm's mass that sits elsewhere than its file says
+LEAST = 1.0  # [kg] of an arm whose links are not known
 DEEP = 0.5  # [m] below the base's origin that a table may turn about
 PLACES = ("", "_elbow", "_wrist")  # of the moment, and of what is unsure of it
 
@@ -43,14 +44,14 @@ class BaseTilt(Effect):
     @classmethod
     def propose(cls, arm: Arm, states: States) -> Self:
         """Take what is unsure of the arm's own weight."""
-        return cls(unsure=UNSURE * arm.mass)
+        return cls(unsure=unsure_mass(arm))
 
     @classmethod
     def candidates(cls, batch: Batch) -> list[Candidate]:
         """Try a foundation along the base's axes, and any other, where weight moves."""
         if not varies(batch.loads.tilting[:, 0]):
             return []
-        unsure = UNSURE * batch.arm.mass
+        unsure = unsure_mass(batch.arm)
         members = [(cls(skew, unsure), TILTING) for skew in (False, True)]
         return alternatives(members)
 
@@ -87,6 +88,11 @@ class BaseTilt(Effect):
             out.append(moved[:, :, 0, None] * about_y[..., :1])
             out.append(-moved[:, :, 1, None] * about_x[..., :1])
         return np.concatenate(out, axis=2)
+
+
+def unsure_mass(arm: Arm) -> float:
+    """Say how much of an arm's mass may hang elsewhere than its file says [kg]."""
+    return max(UNSURE * arm.mass, LEAST)
 
 
 def _moments(batch: Batch) -> tuple[Floats, Floats]:
