@@ -32,14 +32,16 @@ that it says it cannot tell apart; an effect without a name is answered rightly 
 `curve` on its joint or by the verdict `unexplained`. A name counts as given with
 confidence where p < 0.001 and no curve is told beside it. The true error is that of the
 arm at 200 fresh poses, without noise; the informed fit knows the shape of what was
-planted and fits its size.
+planted and fits its size. Campaigns of `elastic_flank` go straight from row to row and
+tell neither travels nor directions. Bounds hold at 95 % (Clopper and Pearson).
 
 """
 DRIFT = """A `tracker_drift` moves nothing of the arm; its own parameters are never
 compensated. What the extended model misses there is one rigid displacement: where the
 base stands cannot be told from where a drift of unknown shape began. The informed fit
 knows the shape. With that displacement taken out the arm's part is as good as the
-informed fit's (`tests/accuracy/test_diagnosis_search.py` holds it).
+informed fit's (`tests/calibration/diagnosis/test_search.py` holds it). The same is true
+of `azimuth`, whose phase the informed fit knows.
 """
 
 

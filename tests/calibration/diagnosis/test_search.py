@@ -50,10 +50,14 @@ def test_an_undeclared_effect_is_named(kind: str, seed: int, size: float) -> Non
     assert close(trial) or trial.true_mm[1] < 0.02, trial.true_mm
 
 
-def test_a_drift_leaves_only_where_the_base_stands_unsure() -> None:
-    """A drift of unknown shape begins anywhere: one rigid motion is not told apart."""
-    seed = 308
-    c = campaign(seed, ("tracker_drift",), 2.0)
+@pytest.mark.parametrize(
+    ("kind", "seed", "size"), [("tracker_drift", 308, 2.0), ("azimuth", 405, 1.0)]
+)
+def test_a_tracker_leaves_only_where_the_base_stands_unsure(
+    kind: str, seed: int, size: float
+) -> None:
+    """A drift begins, and a circle points, anywhere: one rigid motion is not told."""
+    c = campaign(seed, (kind,), size)
     after = trace(c.base_fit(), seed=0).search.fit
     fresh = survey(c.arm, seed + 10**6, 200)
     batch = Batch(ARM, states_of(fresh))
