@@ -14,16 +14,16 @@ from postproc.model.combination import Combination
 from postproc.model.effects import BASE_EFFECTS, propose
 from postproc.model.effects.effect import Effect, Parameter
 from postproc.model.kinematics import Batch
-from postproc.simulation import VirtualArm, VirtualArrivals, virtual_arm
+from postproc.simulation import VirtualArm, VirtualArrivals
 from tests.calibration.planted import (
     ARM,
-    BASE,
     NAMED,
     TRACKER,
     Campaign,
     campaign,
     displacement,
     part_sizes,
+    planted_arm,
     states_of,
     survey,
 )
@@ -191,7 +191,7 @@ def _fresh(arm: VirtualArm, seed: int, rows: int) -> VirtualArrivals:
 def _informed(c: Campaign, seed: int, fresh: VirtualArrivals, truth: np.ndarray) -> Fit:
     """Fit the base and exactly the planted effects, sizes unknown."""
     rows = len(c.states)
-    clean = virtual_arm(seed, BASE, rows=rows)
+    clean = planted_arm(seed, rows=rows)
     effects: list[Effect] = list(propose(BASE_EFFECTS, ARM, c.states))
     if c.planted:
         seen = sum(displacement(clean, seed, p, c.arrivals, rows) for p in c.planted)

@@ -128,6 +128,7 @@ def fit_measurements(
     told = (
         *survey.warnings,
         *moved_tools(fitted, survey),
+        *drifts(fitted),
         *wrong_nests(fitted, points),
     )
     survey = replace(survey, warnings=told)
@@ -157,6 +158,25 @@ def moved_tools(fitted: Fit, survey: Measurements) -> tuple[str, ...]:
         f"the rows look like several tools, the others at {far} from the first: if "
         "they are, add tool_id; if not, run postproc diagnose",
     )
+
+
+def drifts(fitted: Fit) -> tuple[str, ...]:
+    """Tell what is left with and without what passed in time, and what state counts."""
+    c, told, used = fitted.combination, [], fitted.rows.weight > 0
+    left = _mean_mm(fitted.residual[used])
+    for effect, part in zip(c.effects, c.slices, strict=True):
+        if state := effect.refers_to():
+            kept = _mean_mm((fitted.residual + fitted.moved(part))[used])
+            told.append(
+                f"{effect.name} in time: rows are left {left:.4f} mm off, {kept:.4f} "
+                f"mm with it left in. Predictions are for {state}"
+            )
+    return tuple(told)
+
+
+def _mean_mm(vectors: Floats) -> float:
+    """Average the lengths of vectors (n, 3) [m], in mm."""
+    return float(np.linalg.norm(vectors, axis=1).mean()) / MM
 
 
 def wrong_nests(fitted: Fit, points: Floats | None = None) -> tuple[str, ...]:

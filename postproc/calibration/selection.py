@@ -202,7 +202,8 @@ def fit_survey(
     def fit(states: States) -> Fit:
         if effects is None:
             return fit_best(arm, states, position, origin, setup, turns, progress)
-        chosen = propose((*effects, *setup), arm, states)
+        asked = propose((*effects, *setup), arm, states)
+        chosen = tuple(effect.seen_from(origin) for effect in asked)
         return fit_effects(Batch(arm, states), position, chosen, origin, turns=turns)
 
     fitted = fit(states)

@@ -248,6 +248,7 @@ SIDES = tuple(f"lambda{j}" for j in range(1, 7))
 TRAVELS = tuple(f"travel{j}_deg" for j in range(1, 7))
 ROTATION = ("rx_deg", "ry_deg", "rz_deg")
 JOINTS = tuple(f"q{j}_deg" for j in range(1, 7))
+DETOURS = 0.05  # share of other sides from which rows do not follow straight ways
 MANY = 20  # rows that are in order of a column by no accident
 TOOL = ("tool_x_mm", "tool_y_mm", "tool_z_mm")
 
@@ -287,12 +288,32 @@ def read_directions(
         )
         return arrived.direction, travel, np.ones(len(q), dtype=bool), warnings
     side = table.block(SIDES)
+    if not table.has(*TRAVELS):
+        travel = _of_straight_ways(travel, side, arrived.direction)
     wrong = ~np.isin(side, (-1.0, 0.0, 1.0)).all(axis=1)
     if wrong.any():
         line = int(table.line[np.argmax(wrong)])
         cure = "lambda is 1 (positive direction), -1, or 0 where not known"
         raise MeasurementError(table.path, "wrong lambda", cure, line=line)
     return side, travel, np.zeros(len(q), dtype=bool), ()
+
+
+def _of_straight_ways(travel: Floats, side: Floats, straight: Floats) -> Floats:
+    """Keep inferred travels (n, 6) where the sides told are those of straight ways.
+
+    Where many are not, the arm went from row to row by way of points that the file
+    does not hold, and nothing is known of its travels.
+
+    Args:
+        travel: As inferred from row to row [rad].
+        side: Told by the file, (n, 6).
+        straight: Inferred from row to row, (n, 6).
+    """
+    both = (side != 0) & (straight != 0)
+    other = both & (side != straight)
+    if other.sum() > DETOURS * both.sum():
+        return np.full_like(travel, np.nan)
+    return np.where(other, np.nan, travel)
 
 
 def read_tools(

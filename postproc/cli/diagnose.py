@@ -316,6 +316,7 @@ def _unexplained(found: Diagnosis) -> list[str]:
         f"no effect with a name follows {f.source}"
         + (f" at joint {f.joint}" if f.joint else "")
         + f": a curve takes up {f.share:.0%} (p = {f.p_value:.2g})"
+        + ("; it may be the set-up's: not compensated" if f.of_setup else "")
         for f in curves
     ]
     shown = [x for x in found.leftovers if x.p_value < REMAINS]

@@ -207,7 +207,7 @@ def simulate_file(
         rows = read_rows(program)
         arm = virtual_arm(
             seed, names, coupling=setup.coupling, rows=len(rows.ids), tool=setup.tool,
-            gears=gears,
+            gears=gears, tracker=setup.tracker,
         )  # fmt: skip
         return Simulation(program.name, measure_rows(arm, setup, rows), None)
     visits, own = _read(program, cell)
@@ -218,6 +218,7 @@ def simulate_file(
         rows=campaign_length(visits),
         tool=setup.tool,
         gears=gears,
+        tracker=setup.tracker,
     )
     campaign = measure_program(arm, setup, visits)
     track = record_track(arm, setup, visits, rate) if rate else None

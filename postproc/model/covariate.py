@@ -10,6 +10,7 @@ from postproc.robot.state import States
 
 JOINT_KINDS = ("joint", "lambda", "before", "travel", "loop", "torque")
 SHORTEST = 1e-4  # [rad] of a way whose logarithm is taken
+TILTING = "tilting"
 PLAIN = ("speed", "payload", "temperature", "time", "order")
 DRIVERS = (
     "torque", "joint", "lambda", "before", "travel", "loop",
@@ -26,13 +27,16 @@ def covariate(batch: Batch, name: str) -> Floats:
     Names are ``joint 5`` (its angle [rad]), ``lambda 5`` (its direction), ``before 5``
     (its direction at the visit before), ``travel 5`` (since its last reversal
     [log rad]), ``loop 5`` (between its last two reversals [log rad]), ``torque 5`` (of
-    gravity about it [N m]), ``speed``, ``payload``, ``temperature``, ``time`` and
+    gravity about it [N m]), ``tilting`` (moment of all weight about the base's
+    horizontal axes [N m]), ``speed``, ``payload``, ``temperature``, ``time`` and
     ``order`` (SI units).
 
     Raises:
         ValueError: There is no such covariate.
     """
     kind, _, number = name.partition(" ")
+    if name == TILTING:
+        return np.asarray(np.hypot(*batch.loads.tilting.T))
     if kind in PLAIN and not number:
         return np.asarray(getattr(batch.states, kind), dtype=float)
     if kind in JOINT_KINDS and number in set("123456"):
@@ -56,7 +60,7 @@ def unit(name: str) -> str:
     kind = name.partition(" ")[0]
     return {
         "joint": "rad", "lambda": "1", "before": "1", "travel": "log rad",
-        "loop": "log rad", "torque": "N m", "speed": "m/s",
+        "loop": "log rad", "torque": "N m", TILTING: "N m", "speed": "m/s",
         "payload": "kg", "temperature": "deg C", "time": "s", "order": "rows",
     }[kind]  # fmt: skip
 

@@ -164,13 +164,15 @@ class Loads:
 
     @cached_property
     def _torques(self) -> tuple[Floats, Floats]:
-        """Torques of links and payload, (n, 6) [N m] each.
-
-        Where no centre of mass is known, the mass is taken to sit at the TCP.
-        """
+        """Torques of links and payload, (n, 6) [N m] each."""
         s = self.states
-        com = np.where(np.isnan(s.payload_com), s.tool, s.payload_com)
-        return self.arm.torques(s.q, np.nan_to_num(s.payload), com)
+        return self.arm.torques(s.q, np.nan_to_num(s.payload), self._com)
+
+    @property
+    def _com(self) -> Floats:
+        """Centre of mass of the payload, (n, 3) [m]: at the TCP where none is known."""
+        s = self.states
+        return np.where(np.isnan(s.payload_com), s.tool, s.payload_com)
 
     @property
     def gravity(self) -> Floats:
@@ -190,6 +192,12 @@ class Loads:
         """Torque of links and payload, (n, 6) [N m]."""
         total: Floats = self.gravity + self.payload
         return total
+
+    @cached_property
+    def tilting(self) -> Floats:
+        """Moment of links and payload about the base's x and y axes, (n, 2) [N m]."""
+        s = self.states
+        return self.arm.tilting_moment(s.q, np.nan_to_num(s.payload), self._com)
 
     @cached_property
     def basis(self) -> Floats:

@@ -151,6 +151,11 @@ class Arm:
             self.acceleration / SPEED_UP_OF_PUSH if told is None else np.deg2rad(told)
         )
 
+    @property
+    def mass(self) -> float:
+        """Mass of all links [kg]; 0 where not known."""
+        return float(self._links[:, 0].sum())
+
     @cached_property
     def _links(self) -> Floats:
         """Masses [kg] and centres in the D-H frames [m], (6, 4); 0 where not known."""
@@ -254,6 +259,27 @@ class Arm:
         packed = self.dh.packed()
         own, carried = _native.torque(packed, floats(q), floats(self._links), load)
         return -GRAVITY * own, -GRAVITY * carried
+
+    def tilting_moment(
+        self, q: Floats, payload: Floats | float, payload_com: Floats | float
+    ) -> Floats:
+        """Give the moment of all weight about the base's horizontal axes, (n, 2) [N m].
+
+        Args:
+            q: Joint angles, (n, 6) [rad].
+            payload: Payload mass, (n,) [kg].
+            payload_com: Its centre of mass in the flange frame, (n, 3) [m].
+
+        Returns:
+            About the x and the y axis through the base's origin.
+        """
+        frames, mass = self.link_frames(q)[:, 1:], self._links[:, 0]
+        centre = np.einsum("niab,ib->nia", frames[..., :3, :3], self._links[:, 1:])
+        place = mass @ (centre + frames[..., :3, 3])
+        com = np.broadcast_to(payload_com, (len(q), 3))
+        carried = np.einsum("nab,nb->na", frames[:, 5, :3, :3], com)
+        place += np.multiply(payload, (carried + frames[:, 5, :3, 3]).T).T
+        return GRAVITY * np.column_stack([-place[:, 1], place[:, 0]])
 
     def gravity_basis(self, q: Floats) -> Floats:
         """Give the joint torque per unit of every lumped mass parameter.

@@ -28,6 +28,7 @@ from postproc.simulation.kinematics import (
     solve_branch,
     undo,
 )
+from postproc.simulation.reference import USUAL_TRACKER
 
 # How the controller turns Cartesian targets into joint angles, on its nominal arm.
 
@@ -297,8 +298,6 @@ def joints_with_wrist(
 
 # The place where the virtual arm works, as plain values.
 
-# Where a tracker stands when nobody says so: to the right in front of the arm.
-USUAL_TRACKER = np.array([4.0, -3.0, 1.5])  # [m] in the arm base frame
 SAME_POINT = 1e-6  # [m]
 
 

@@ -29,7 +29,7 @@ from postproc.simulation.laws import (
     backlash,
     parse_effects,
 )
-from postproc.simulation.reference import reference_arrivals
+from postproc.simulation.reference import USUAL_TRACKER, reference_arrivals
 from postproc.simulation.state import VirtualArrivals
 
 TRACKER_NOISE = (0.01e-3, 5e-6)  # [m], [m/m] per axis
@@ -54,6 +54,7 @@ def virtual_arm(
     rows: int = 400,
     tool: Floats | None = None,
     gears: GearKind | str = GearKind.SHARP,
+    tracker: Floats | None = None,
 ) -> VirtualArm:
     """Draw an arm.
 
@@ -67,6 +68,8 @@ def virtual_arm(
         tool: TCP (3,) or pose (4, 4) [m] that sizes in mm refer to; default a probe
             that stands off in all three axes.
         gears: What the gears do in their gaps; nothing else depends on it.
+        tracker: Where the tracker stands, (3,) [m]; only what it reads wrongly depends
+            on it.
 
     Raises:
         PostprocError: An effect that does not exist.
@@ -75,7 +78,8 @@ def virtual_arm(
     names = {item.name for item in planted}
     perfect = _perfect(chain, coupling)
     body = draw_body(stream(seed, "body"), chain)
-    planter = _Planter(seed, body, rows, reference_arrivals(rows, tool), perfect)
+    stand = USUAL_TRACKER if tracker is None else tracker
+    planter = _Planter(seed, body, rows, stand, reference_arrivals(rows, tool), perfect)
     laws = {item: planter.law(item) for item in planted if item.name not in AS_BUILT}
     gaps = [law for law in laws.values() if law.effect == "backlash"]
     half_gap = _half_gap(gaps[0] if gaps else planter.law(Planted("backlash")))
@@ -134,6 +138,7 @@ class _Planter:
         seed: Of the arm.
         body: Weights of the arm.
         rows: Length of the campaign.
+        tracker: Where the tracker stands, (3,) [m].
         reference: The campaign that sizes refer to.
         perfect: An arm without any error, to measure one law at a time.
     """
@@ -141,13 +146,14 @@ class _Planter:
     seed: int
     body: LinkMasses
     rows: int
+    tracker: Floats
     reference: VirtualArrivals
     perfect: VirtualArm
 
     def law(self, item: Planted) -> Law:
         """Draw one law and scale it to the size asked for or drawn."""
         rng = stream(self.seed, item.name)
-        draw = Draw(rng, self.body, item.joint, self.rows)
+        draw = Draw(rng, self.body, item.joint, self.rows, self.tracker)
         if item.name == "backlash":
             law = backlash(draw)
             return self.sized(law, item.peak_mm or self.peak_mm(law))

@@ -377,6 +377,24 @@ def payload_torque(chain: Chain, q: Floats, mass: Floats, com: Floats) -> Floats
     return _moments(chain, frames, np.repeat(centre[:, None], 6, axis=1), masses)
 
 
+def foundation_moment(body: LinkMasses, q: Floats, mass: Floats, com: Floats) -> Floats:
+    """Return the moment of links and payload about the arm's base point, (n, 3) [N m].
+
+    Args:
+        body: As in `link_torque`.
+        q: Controller joint angles, (n, 6) [rad].
+        mass: As in `payload_torque`.
+        com: Likewise.
+    """
+    frames = body.chain.frames(q)
+    total = np.zeros((len(q), 3))
+    for i in range(6):
+        centre = frames[:, i + 1, :3, :3] @ body.centre[i] + frames[:, i + 1, :3, 3]
+        total += np.cross(centre, body.mass[i] * GRAVITY)
+    held = frames[:, 6] @ np.append(com, np.ones((len(q), 1)), axis=1)[..., None]
+    return np.asarray(total + np.cross(held[:, :3, 0], mass[:, None] * GRAVITY))
+
+
 def _moments(chain: Chain, frames: Floats, centre: Floats, mass: Floats) -> Floats:
     """Sum the moments about every axis of the masses outward of it."""
     weight = mass[..., None] * GRAVITY

@@ -11,7 +11,12 @@ import numpy as np
 
 from postproc.arrays import Floats
 from postproc.exceptions import PostprocError
-from postproc.simulation.kinematics import LinkMasses, payload_torque, total_torque
+from postproc.simulation.kinematics import (
+    LinkMasses,
+    foundation_moment,
+    payload_torque,
+    total_torque,
+)
 from postproc.simulation.reference import DURATION, WORKING_RANGE
 from postproc.simulation.state import REST_TEMPERATURE, VirtualArrivals
 
@@ -72,12 +77,14 @@ class Draw:
         body: The weights of this arm (not the nominal ones).
         joint: The joint asked for, from 1, or 0: draw one.
         rows: How many rows the campaign has, for laws that start at one of them.
+        tracker: Where the tracker stands, (3,) [m] in the arm base frame.
     """
 
     rng: np.random.Generator
     body: LinkMasses
     joint: int
     rows: int
+    tracker: Floats
 
     def pick(self, joints: Sequence[int]) -> int:
         """Return the joint asked for, or one of the given joints."""
@@ -330,6 +337,30 @@ def hysteresis(draw: Draw) -> Law:
     return Law("", Where.JOINTS, (joint,), 0, parameters, shape)
 
 
+def elastic_flank(draw: Draw) -> Law:
+    """A gear that yields before it carries, or grease and seals that bend (Dahl).
+
+    Teeth go from flank to flank along an S over a way of some degrees. In the bristles
+    of grease the force z goes on from where the reversal left it, dz = (1 - z) ds / d0;
+    where that was follows from the way between the last two reversals.
+    """
+    joint, dahl = draw.pick(range(1, 6)), bool(draw.rng.random() < 0.5)
+    way = np.radians(draw.rng.uniform(1.0, 6.0))
+
+    def shape(arrivals: VirtualArrivals) -> Floats:
+        gone = arrivals.travel[:, joint - 1] / way
+        if dahl:
+            before = 2 * np.exp(-arrivals.loop[:, joint - 1] / way) - 1
+            place = 1 - (1 - before) * np.exp(-gone)
+        else:
+            third = np.clip(gone / 3, 0.0, 1.0)  # a cubic, flat at its ends
+            place = 2 * third**2 * (3 - 2 * third) - 1
+        return on_joint(joint, -arrivals.side[:, joint - 1] * place)
+
+    parameters = {"d0": way, "dahl": float(dahl)}
+    return Law("windup", Where.JOINTS, (joint,), 0, parameters, shape)
+
+
 # Laws that move more than a joint: heat, foundations, tool holders, the tracker.
 
 STEEL = 12e-6  # [1/K] linear expansion
@@ -379,6 +410,79 @@ def _step(draw: Draw, name: str, where: Where) -> Law:
     return Law(name, where, (), 0, {"row": float(row)}, shape)
 
 
+def joint_step(draw: Draw) -> Law:
+    """A joint loses its zero once: a crash, or a motor that was exchanged."""
+    joint, sign = draw.pick(range(1, 7)), draw.sign()
+    row = int(np.ceil(draw.rows * draw.rng.uniform(0.2, 0.8)))
+
+    def shape(arrivals: VirtualArrivals) -> Floats:
+        return on_joint(joint, np.where(arrivals.order >= row, sign, 0.0))
+
+    return Law("joint_step", Where.JOINTS, (joint,), 0, {"row": float(row)}, shape)
+
+
+def base_tilt(draw: Draw) -> Law:
+    """A table or foundation leans under the weight that hangs over it.
+
+    It is soft along two directions at right angles, anyhow round the vertical, and
+    turns about a point below the arm.
+    """
+    soft = draw.rng.uniform([0.5, 0.2], [1.5, 1.0])
+    angle, depth = draw.rng.uniform(0.0, np.pi), draw.rng.uniform(0.0, 0.8)
+    along = np.array([np.cos(angle), np.sin(angle), 0.0])
+    across = np.array([-np.sin(angle), np.cos(angle), 0.0])
+
+    def shape(arrivals: VirtualArrivals) -> Floats:
+        moment = foundation_moment(
+            draw.body, arrivals.q, arrivals.payload, arrivals.payload_com
+        )
+        turn = soft[0] * np.outer(moment @ along, along)
+        turn += soft[1] * np.outer(moment @ across, across)
+        shift = np.cross(turn, [0.0, 0.0, depth])  # the base is above what it turns on
+        return np.concatenate([shift, turn], axis=1) / KILO
+
+    parameters = {"angle": angle, "depth": depth}
+    return Law("base_tilt", Where.BASE, (), 0, parameters, shape)
+
+
+# Laws of the tracker: what it reads wrongly while nothing moves.
+
+
+def _beam(draw: Draw, arrivals: VirtualArrivals) -> Floats:
+    """Return the way from the tracker to the TCP of the drawing, (n, 3) [m]."""
+    flange = draw.body.chain.flange(arrivals.q)
+    return np.asarray((flange @ arrivals.tool)[:, :3, 3] - draw.tracker)
+
+
+def azimuth(draw: Draw) -> Law:
+    """The tracker's horizontal circle is out of centre: one wave a turn."""
+    phase = draw.phase()
+
+    def shape(arrivals: VirtualArrivals) -> Floats:
+        beam = _beam(draw, arrivals)
+        wrong = np.sin(np.arctan2(beam[:, 1], beam[:, 0]) + phase)
+        turn = np.outer(wrong, [0.0, 0.0, 1.0])  # about the tracker, not the arm
+        return np.concatenate([-np.cross(turn, draw.tracker), turn], axis=1)
+
+    return Law("azimuth", Where.TRACKER, (), 0, {"phase": phase}, shape)
+
+
+def refraction(draw: Draw) -> Law:
+    """Air that is warmer above bends the beam: it sags by half curvature x range^2."""
+    sign = draw.sign()
+
+    def shape(arrivals: VirtualArrivals) -> Floats:
+        beam = _beam(draw, arrivals)
+        reach, level = np.linalg.norm(beam, axis=1), np.hypot(beam[:, 0], beam[:, 1])
+        angle = sign * 0.5 * level  # curvature counts for the level part of the way
+        outward = np.column_stack([beam[:, 0], beam[:, 1]]) / level[:, None]
+        side = np.column_stack([-outward * beam[:, 2:], level]) / reach[:, None]
+        sag = side * (angle * reach)[:, None]
+        return np.concatenate([sag, np.zeros_like(sag)], axis=1)
+
+    return Law("refraction", Where.TRACKER, (), 0, {}, shape)
+
+
 def tracker_drift(draw: Draw) -> Law:
     """The tracker's stand moves slowly while it measures; the arm does not."""
     ends = draw.rng.normal(size=(2, 6)) * np.repeat([1.0, 0.3], 3)
@@ -424,6 +528,11 @@ KINDS = {
     "base_shift": LawKind(base_shift, 0.05, 0.5),
     "tool_shift": LawKind(tool_shift, 0.05, 0.5),
     "tracker_drift": LawKind(tracker_drift, 0.03, 0.1),
+    "joint_step": LawKind(joint_step, 0.05, 0.5),
+    "base_tilt": LawKind(base_tilt, 0.1, 1.0),
+    "elastic_flank": LawKind(elastic_flank, 0.03, 0.15),
+    "azimuth": LawKind(azimuth, 0.03, 0.1),
+    "refraction": LawKind(refraction, 0.03, 0.1),
     "worn_spot": LawKind(worn_spot, 0.05, 0.5),
     "joint_product": LawKind(joint_product, 0.05, 0.3),
     "hysteresis": LawKind(hysteresis, 0.05, 0.3),

@@ -12,6 +12,8 @@ WORKING_RANGE = np.radians(
     [[-75, 75], [-40, 60], [-150, -40], [-160, 160], [-100, 100], [-160, 160]]
 )
 PROBE = np.array([0.1, 0.05, 0.2])  # [m] off the flange axis, so that joint 6 shows
+# Where a tracker stands when nobody says so: to the right in front of the arm.
+USUAL_TRACKER = np.array([4.0, -3.0, 1.5])  # [m] in the arm base frame
 MEASURED_EVERY = 14.0  # [s] a tracker campaign's usual pace
 ROWS = 400  # and length
 DURATION = ROWS * MEASURED_EVERY  # [s]

@@ -12,11 +12,13 @@ from postproc.calibration.regression import Fit, fit_effects
 from postproc.model.effects import BASE_EFFECTS, propose
 from postproc.model.kinematics import Batch
 from postproc.robot.arm import load_arm
+from postproc.robot.direction import arrivals_of_rows
 from postproc.robot.state import States, make_states
 from postproc.simulation import (
     Planted,
     VirtualArm,
     VirtualArrivals,
+    follow_rows,
     sample_survey,
     stream,
     virtual_arm,
@@ -31,10 +33,12 @@ BASE = ("geometry", "tool", "backlash")
 NAMED = (
     "compliance", "payload", "counterbalance", "transmission", "transmission_free",
     "scale", "coupling", "load_backlash", "gravity_side", "thermal", "warmup", "windup",
-    "lag", "base_shift", "tool_shift", "tracker_drift", "worn_spot",
+    "lag", "base_shift", "tool_shift", "tracker_drift", "worn_spot", "joint_step",
+    "base_tilt", "elastic_flank", "azimuth", "refraction",
 )  # fmt: skip
 NAMELESS = ("joint_product", "hysteresis")
-SIZES = (0.5, 1.0, 2.0, 3.0)  # rms after projection on the base model over the noise
+UNTOLD = ("elastic_flank",)  # measured row by row: no travels, no directions told
+SIZES = (0.3, 0.5, 1.0, 2.0)  # rms after projection on the base model over the noise
 
 
 @dataclass(frozen=True)
@@ -75,8 +79,9 @@ def campaign(
             the usual size that was drawn.
         rows: Number of rows.
     """
-    clean = virtual_arm(seed, BASE, rows=rows)
-    arrivals = survey(clean, seed, rows)
+    clean = planted_arm(seed, rows=rows)
+    untold = not set(kinds).isdisjoint(UNTOLD)
+    arrivals = (row_by_row if untold else survey)(clean, seed, rows)
     planted = tuple(Planted(kind) for kind in kinds)
     reached = tuple(_size(clean, seed, p, arrivals, rows) for p in planted)
     if size > 0:
@@ -85,9 +90,30 @@ def campaign(
             for p, was in zip(planted, reached, strict=True)
         )
         reached = (size,) * len(kinds)
-    arm = virtual_arm(seed, (*map(Planted, BASE), *planted), rows=rows)
+    arm = planted_arm(seed, *planted, rows=rows)
     position = arm.measure(arrivals, TRACKER, stream(seed, "tracker"))
-    return Campaign(arm, planted, arrivals, states_of(arrivals), position, reached)
+    states = states_of(arrivals)
+    if untold:
+        ways = arrivals_of_rows(ARM, arrivals.q)
+        states = states.with_(direction=ways.direction, travel=ways.travel)
+    return Campaign(arm, planted, arrivals, states, position, reached)
+
+
+def planted_arm(seed: int, *planted: Planted, rows: int) -> VirtualArm:
+    """Draw the arm of a campaign."""
+    every = (*map(Planted, BASE), *planted)
+    return virtual_arm(seed, every, rows=rows, tracker=TRACKER)
+
+
+def row_by_row(arm: VirtualArm, seed: int, rows: int) -> VirtualArrivals:
+    """Send an arm straight from row to row: to where it approaches from, then there."""
+    told = survey(arm, seed, rows)
+    half = rows // 2
+    way = told.travel[:half] * np.sign(told.side[:half])
+    q = np.stack([told.q[:half] - way, told.q[:half]], axis=1).reshape(-1, 6)
+    kept = ("speed", "time", "temperature", "payload", "payload_com")
+    same = {name: getattr(told, name)[: len(q)] for name in kept}
+    return follow_rows(arm, q, tool=told.tool[: len(q)], **same)
 
 
 def survey(arm: VirtualArm, seed: int, rows: int) -> VirtualArrivals:
@@ -114,7 +140,7 @@ def displacement(
     clean: VirtualArm, seed: int, planted: Planted, arrivals: VirtualArrivals, rows: int
 ) -> np.ndarray:
     """What one undeclared effect adds to the noise-free readings, (n, 3) [m]."""
-    arm = virtual_arm(seed, (*map(Planted, BASE), planted), rows=rows)
+    arm = planted_arm(seed, planted, rows=rows)
     return seen_error(arm, arrivals) - seen_error(clean, arrivals)
 
 
@@ -153,7 +179,7 @@ def _only(law: Law, joint: int) -> Law:
 
 def _peak(seed: int, planted: Planted, rows: int) -> float:
     """The peak size [mm] that a law was drawn with."""
-    arm = virtual_arm(seed, (*map(Planted, BASE), planted), rows=rows)
+    arm = planted_arm(seed, planted, rows=rows)
     return arm.laws[-1].peak_mm
 
 

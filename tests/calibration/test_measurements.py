@@ -71,6 +71,31 @@ def test_directions_are_inferred_where_they_are_missing(tmp_path: Path) -> None:
     assert found.states.direction[2].tolist() == [1, -1, 0, 0, 0, -1]
 
 
+def test_travels_are_inferred_where_the_sides_are_those_of_straight_ways(
+    tmp_path: Path,
+) -> None:
+    told = rows()
+    bare = [",".join(c for k, c in enumerate(r.split(",")) if not 7 <= k < 13)
+            for r in told]  # fmt: skip
+    path = write(tmp_path / "bare.csv", bare, HEADER + ",x_mm,y_mm,z_mm")
+    straight = read_measurements(path, NJ, TOOL[None]).states
+    assert np.isfinite(straight.travel).all()
+
+    def with_sides(sides: np.ndarray) -> np.ndarray:
+        cells = [",".join([*r.split(",")[:7], *map(str, s), *r.split(",")[13:]])
+                 for r, s in zip(told, sides.astype(int), strict=True)]  # fmt: skip
+        path = write(tmp_path / "sides.csv", cells)
+        return read_measurements(path, NJ, TOOL[None]).states.travel
+
+    np.testing.assert_array_equal(with_sides(straight.direction), straight.travel)
+    once = straight.direction.copy()
+    once[5, 2] *= -1  # one row came another way
+    other = once != straight.direction
+    assert np.isnan(with_sides(once)[other]).all()
+    assert np.isfinite(with_sides(once)[~other]).all()
+    assert np.isnan(with_sides(-straight.direction)).all()  # by way of other points
+
+
 def test_lost_beams_are_dropped_and_listed(tmp_path: Path) -> None:
     lines = rows()
     lines[4] = ",".join([*lines[4].split(",")[:13], "0", "0", "0"])

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from postproc.calibration.fit import drifts
+from postproc.calibration.regression import fit_effects
 from postproc.calibration.selection import candidates, fit_best
-from postproc.model.effects import BASE_EFFECTS
+from postproc.model.effects import BASE_EFFECTS, propose
 from postproc.model.kinematics import Batch
 from tests.calibration.simulator import NJ, covariates, random_arm, random_states
 
@@ -41,3 +43,21 @@ def test_only_covariates_that_vary_are_candidates() -> None:
     bare = random_states(50, rng)
     assert not {"thermal", "payload", "lag"} & set(candidates(bare))
     assert {"thermal", "payload", "lag"} <= set(candidates(covariates(bare, rng)))
+    timed = bare.with_(time=60.0 * np.arange(50.0))
+    assert "thermal" in candidates(timed)  # a warm-up in time
+    assert "thermal" not in candidates(bare.with_(time=0.2 * np.arange(50.0)))
+
+
+def test_a_warm_up_in_time_is_told_with_the_state_that_predictions_are_for() -> None:
+    rng = np.random.default_rng(8)
+    arm, clock = random_arm(rng), 60.0 * np.arange(300.0)
+    states = random_states(300, rng).with_(time=clock)
+    measured, tcp = arm.measure(states, rng)
+    cold = np.exp(-clock / (0.2 * np.ptp(clock)))
+    measured = measured - 1.2e-4 * cold[:, None] * tcp
+    effects = propose((*BASE_EFFECTS, "thermal"), NJ, states)
+    (told,) = drifts(fit_effects(Batch(NJ, states), measured, effects))
+    left, kept = (float(word) for word in told.split() if word.startswith("0."))
+    assert kept > 1.5 * left
+    assert told.endswith("Predictions are for the warm arm")
+    assert not drifts(fit_effects(Batch(NJ, states), measured, effects[:-1]))

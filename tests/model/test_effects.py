@@ -29,9 +29,21 @@ STATES = covariates(random_states(40, RNG, PLATE), RNG)
 def variants() -> list[Effect]:
     out = list(propose(KNOWN, NJ, STATES))
     out.append(BY_NAME["thermal"](form="time", time_constant=100.0))
+    out.append(BY_NAME["thermal"](form="time", time_constant=9.0, clock="order"))
     out.append(BY_NAME["load_backlash"](form="gravity_side"))
     out.append(BY_NAME["tool_shift"](row=20.0, turns=True))
     out.append(BY_NAME["base_shift"](row=20.0))
+    out.append(BY_NAME["joint_step"](row=20.0))
+    out.append(BY_NAME["base_tilt"](skew=True))
+    out.append(BY_NAME["windup"](form="elastic"))
+    out += [
+        BY_NAME[name](tracker=(3.0, -2.0, 1.5), **form)
+        for name, form in (
+            ("azimuth", {}),
+            ("refraction", {}),
+            ("refraction", {"form": "stretch"}),
+        )
+    ]
     out.append(BY_NAME["backlash_profile"](constant=True))
     out += [
         BY_NAME["curve"](direction=d, source=s, lower=(low,), upper=(high,))
@@ -61,8 +73,11 @@ def test_columns_are_finite_differences_of_the_error(effect: Effect) -> None:
         assert error < 2e-8, one.names[k]  # [m] at one prior scale
 
 
+UNTURNED = ("probe_turn", "azimuth", "refraction")  # of readings, not of the tool
+
+
 @pytest.mark.parametrize(
-    "effect", [e for e in variants() if e.name != "probe_turn"], ids=lambda e: e.name
+    "effect", [e for e in variants() if e.name not in UNTURNED], ids=lambda e: e.name
 )
 def test_rotation_columns_are_what_other_points_of_the_tool_show(
     effect: Effect,
@@ -105,16 +120,23 @@ def test_settings_survive_a_model_file(effect: Effect) -> None:
 
 
 def test_origins_say_what_may_be_compensated() -> None:
-    origin = {e.name: e.belongs_to() for e in variants() if e.name != "curve"}
+    origin = {e.name: e.belongs_to() for e in propose(KNOWN, NJ, STATES)}
+    del origin["curve"]
     assert {n for n, o in origin.items() if o == "setup"} == {
-        "base_shift", "tool_shift", "tracker_drift", "probe", "probe_turn",
-        "registration",
+        "base_shift", "tool_shift", "joint_step", "tracker_drift", "azimuth",
+        "refraction", "probe", "probe_turn", "registration",
     }  # fmt: skip
     assert {n for n, o in origin.items() if o == "state"} == {"payload", "thermal"}
     curve = BY_NAME["curve"]
     assert curve(source=("order",)).belongs_to() == "setup"
     assert curve(source=("joint 3", "temperature")).belongs_to() == "state"
     assert curve(source=("joint 3",)).belongs_to() == "arm"
+    assert curve(direction="tool z", source=("joint 3",)).belongs_to() == "arm"
+    # Along the base's axes it may be the tracker that errs.
+    assert curve(direction="base z", source=("joint 3",)).belongs_to() == "setup"
+    # Programs run warm; only the rows of a survey are early in their order.
+    by_order = BY_NAME["thermal"](form="time", clock="order")
+    assert by_order.belongs_to() == "setup"
     assert BY_NAME["thermal"]().requires() == ("temperature",)
     assert BY_NAME["thermal"](form="time").requires() == ()
 

@@ -49,7 +49,9 @@ COVARIATES = {
     "gravity_side": {"payload"}, "windup": {"flank", "travel"},
     "lag": {"flank", "speed"}, "hysteresis": {"flank", "travel", "loop"},
     "thermal": {"temperature"}, "warmup": {"time"}, "base_shift": {"order"},
-    "tool_shift": {"order"}, "tracker_drift": {"time"},
+    "tool_shift": {"order"}, "tracker_drift": {"time"}, "joint_step": {"order"},
+    "base_tilt": {"payload"}, "elastic_flank": {"flank", "travel", "loop"},
+    "azimuth": set(), "refraction": set(),
 }  # fmt: skip
 OTHER = {
     "flank": -REFERENCE.flank,

@@ -43,6 +43,7 @@ def _describe(
         effect=family.effect,
         joint=family.joint,
         nameless=effect.nameless,
+        of_setup=effect.belongs_to() == "setup",
         source=addition.candidate.source,
         p_value=standing.p_value,
         evidence=standing.evidence,

@@ -247,7 +247,7 @@ class Library:
         at = fit.combination.at(fit.batch, fit.values)
         shelves = [
             Shelf(joint, alike[first : first + step], None)
-            for joint, alike in by_joint_and_width(candidates(at))
+            for joint, alike in by_joint_and_width(candidates(at, fit.noise.origin))
             for step in [max(1, CHUNK // numbers(joint, alike[:1], len(at)))]
             for first in range(0, len(alike), step)
         ]
@@ -267,13 +267,18 @@ class Library:
         return _reduced(projection, self.shelves, projection.filter(rows))
 
 
-def candidates(batch: Batch) -> list[Candidate]:
+def candidates(
+    batch: Batch, tracker: tuple[float, float, float] | None = None
+) -> list[Candidate]:
     """List what a residual may be due to: effects with grids of settings, names first.
 
     Args:
         batch: The states, kinematics taken at the parameters of a fit.
+        tracker: Where the tracker stands, base frame [m], where it is known.
     """
     every = [c for kind in EFFECTS for c in kind.candidates(batch)]
+    if tracker is not None:
+        every += [c for kind in EFFECTS for c in kind.sighted(batch, tracker)]
     return sorted(every, key=lambda c: c.family.tier)
 
 

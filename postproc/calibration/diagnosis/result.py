@@ -32,6 +32,7 @@ class Finding:
         effect: Name.
         joint: Joint 1 to 6, or None.
         nameless: Whether it only says that something is there, not what.
+        of_setup: Whether it is, or may be, the set-up's: then it is not compensated.
         source: Joint or covariate that drives it, or None.
         p_value: Probability that noise alone looks like it anywhere in the library.
         evidence: Log marginal likelihood ratio with and without it [nats].
@@ -47,6 +48,7 @@ class Finding:
     effect: str
     joint: int | None
     nameless: bool
+    of_setup: bool
     source: str | None
     p_value: float
     evidence: float

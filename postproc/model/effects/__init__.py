@@ -8,9 +8,11 @@ from typing import Any
 import numpy as np
 
 from postproc.exceptions import PostprocError
+from postproc.model.effects.azimuth import Azimuth
 from postproc.model.effects.backlash import Backlash
 from postproc.model.effects.backlash_profile import BacklashProfile
 from postproc.model.effects.base_shift import BaseShift
+from postproc.model.effects.base_tilt import BaseTilt
 from postproc.model.effects.compliance import Compliance
 from postproc.model.effects.counterbalance import Counterbalance
 from postproc.model.effects.coupling import Coupling
@@ -20,6 +22,7 @@ from postproc.model.effects.elm import Elm, ElmMap
 from postproc.model.effects.geometry import Geometry
 from postproc.model.effects.joint_map import JointMap
 from postproc.model.effects.joint_spline import JointSpline
+from postproc.model.effects.joint_step import JointStep
 from postproc.model.effects.lag import Lag
 from postproc.model.effects.load_backlash import LoadBacklash
 from postproc.model.effects.maps import Interpolation, Kriging
@@ -27,6 +30,7 @@ from postproc.model.effects.payload import Payload
 from postproc.model.effects.placement import Placement
 from postproc.model.effects.probe import Probe
 from postproc.model.effects.probe_turn import ProbeTurn
+from postproc.model.effects.refraction import Refraction
 from postproc.model.effects.scale import Scale
 from postproc.model.effects.thermal import Thermal
 from postproc.model.effects.tool_shift import ToolShift
@@ -46,6 +50,7 @@ EFFECTS: tuple[type[Effect], ...] = (
     Compliance,
     Payload,
     Counterbalance,
+    BaseTilt,
     Transmission,
     Scale,
     Coupling,
@@ -55,7 +60,10 @@ EFFECTS: tuple[type[Effect], ...] = (
     Lag,
     BaseShift,
     ToolShift,
+    JointStep,
     TrackerDrift,
+    Azimuth,
+    Refraction,
     JointMap,
     Curve,
     Probe,

@@ -143,8 +143,13 @@ class Curve(Effect):
         return cls(direction, source, lower, upper, signed, whole)
 
     def belongs_to(self) -> Origin:
-        """Follow the covariate: what only a survey has is never compensated."""
-        if any(name in ("time", "order") for name in self.source):
+        """Follow the covariate: what only a survey has is never compensated.
+
+        Nor is what lives along an axis of the base: the tracker stands in that frame,
+        and nobody knows whether the arm or the tracker errs.
+        """
+        passes = any(name in ("time", "order") for name in self.source)
+        if passes or self.direction.startswith("base"):
             return "setup"
         states = any(name in ("temperature", "payload") for name in self.source)
         return "state" if states else "arm"

@@ -96,6 +96,22 @@ class Effect(ABC):
         """
         return []
 
+    @classmethod
+    def sighted(
+        cls, batch: Batch, tracker: tuple[float, float, float]
+    ) -> list[Candidate]:
+        """List what else may be tried of it where the tracker's place is known.
+
+        Args:
+            batch: The surveyed states.
+            tracker: Where the tracker stands, base frame [m].
+        """
+        return []
+
+    def seen_from(self, tracker: tuple[float, float, float] | None) -> Self:
+        """Return it as it shows to a tracker at a place, base frame [m]."""
+        return self
+
     def refined(self, offsets: Floats, batch: Batch) -> list[Effect]:
         """Vary what is not linear in it; nothing where there is nothing finer.
 
@@ -124,6 +140,10 @@ class Effect(ABC):
     def requires(self) -> tuple[str, ...]:
         """List the covariates of `States` without which it cannot be evaluated."""
         return ()
+
+    def refers_to(self) -> str:
+        """Name the state that predictions are for, where it passes with time alone."""
+        return ""
 
     @abstractmethod
     def parameters(self) -> tuple[Parameter, ...]:

@@ -8,7 +8,7 @@ from typing import ClassVar, Literal, Self
 import numpy as np
 
 from postproc.arrays import Floats
-from postproc.model.covariate import varies
+from postproc.model.covariate import varies, varies_enough
 from postproc.model.effects.effect import (
     Candidate,
     Effect,
@@ -17,6 +17,7 @@ from postproc.model.effects.effect import (
     Unasked,
     alternatives,
 )
+from postproc.model.effects.step import moments
 from postproc.model.kinematics import Batch
 from postproc.robot.arm import Arm
 from postproc.robot.state import States
@@ -25,6 +26,7 @@ STEEL = 12e-6  # [1/K] linear expansion
 WARM_UP = 10.0  # [K] usual rise inside an arm that starts cold
 UNSURE = 0.7  # share by which a length differs from the common growth
 SHORT = 1e-3  # [m] what has no length does not grow
+SOON = 1200.0  # [s] in which no arm warms up enough to show
 WARM_UPS = (0.1, 0.2, 0.4, 0.8)  # of the campaign's length: time constants tried
 
 
@@ -37,8 +39,9 @@ class Thermal(Effect):
         form: "temperature": growth alpha * (T - reference). "time": growth
             g * (1 - exp(-(t - start) / time_constant)) - g, 0 when the arm is warm.
         reference: [deg C].
-        time_constant: [s].
-        start: When the arm was cold [s].
+        time_constant: [s], or rows.
+        start: When the arm was cold [s], or the row.
+        clock: What t is: "order" where no time was recorded.
     """
 
     name: ClassVar[str] = "thermal"
@@ -50,6 +53,14 @@ class Thermal(Effect):
     reference: float = 20.0
     time_constant: float = 3600.0
     start: float = 0.0
+    clock: Literal["time", "order"] = "time"
+
+    @classmethod
+    def may_show(cls, states: States) -> bool:
+        """Tell whether a temperature varies, or else a time long enough to warm up."""
+        if not np.isnan(states.temperature).all():
+            return varies_enough(states, cls.driven_by)
+        return varies(states.time) and float(np.ptp(states.time)) > SOON
 
     @classmethod
     def propose(cls, arm: Arm, states: States) -> Self:
@@ -57,12 +68,17 @@ class Thermal(Effect):
         lengths = growing(arm)
         if not np.isnan(states.temperature).all():
             return cls(lengths, reference=float(np.nanmean(states.temperature)))
-        time = states.time[~np.isnan(states.time)]
-        if len(time) == 0:
-            return cls(lengths, form="time")
-        span = max(float(np.ptp(time)), 1.0)
+        return cls._warming(lengths, states, WARM_UPS[1])
+
+    @classmethod
+    def _warming(cls, lengths: tuple[str, ...], states: States, part: float) -> Self:
+        """Warm up in time over a part of the campaign, in rows where none is known."""
+        clock: Literal["time", "order"] = "time" if varies(states.time) else "order"
+        passed = getattr(states, clock)
+        span = max(float(np.ptp(passed)), 1.0) if len(passed) else 1.0
+        start = float(passed.min()) if len(passed) else 0.0
         return cls(
-            lengths, form="time", time_constant=span / 4, start=float(time.min())
+            lengths, form="time", time_constant=part * span, start=start, clock=clock
         )
 
     @classmethod
@@ -73,11 +89,9 @@ class Thermal(Effect):
         if varies(states.temperature):
             middle = float(np.mean(states.temperature))
             members.append((cls(lengths, reference=middle), "temperature"))
-        if varies(states.time):
-            span = float(np.ptp(states.time))
-            cold = cls(lengths, form="time", start=float(states.time.min()))
-            warm = (replace(cold, time_constant=k * span) for k in WARM_UPS)
-            members += [(effect, "time") for effect in warm]
+        if len(moments(batch)):
+            warm = [cls._warming(lengths, states, part) for part in WARM_UPS]
+            members += [(effect, effect.clock) for effect in warm]
         return alternatives(members)
 
     def refined(self, offsets: Floats, batch: Batch) -> list[Effect]:
@@ -91,11 +105,19 @@ class Thermal(Effect):
         """Tell how fast the arm warms up."""
         if self.form == "temperature":
             return {}
-        return {"time_constant": (float(self.time_constant), "s")}
+        unit = "s" if self.clock == "time" else "rows"
+        return {"time_constant": (float(self.time_constant), unit)}
 
     def belongs_to(self) -> Origin:
-        """Say that it is of the state: the cell declares the temperature."""
-        return "state"
+        """Say that it is of the state: the cell declares the temperature.
+
+        A warm-up that only the order of rows tells is the survey's: programs run warm.
+        """
+        return "setup" if self.form == "time" and self.clock == "order" else "state"
+
+    def refers_to(self) -> str:
+        """Name the end of a warm-up in time."""
+        return "the warm arm" if self.form == "time" else ""
 
     def requires(self) -> tuple[str, ...]:
         """Need the temperature; a warm-up of unknown time is over."""
@@ -118,7 +140,8 @@ class Thermal(Effect):
         """Return temperature above the reference [K], or share of the warm-up, (n,)."""
         if self.form == "temperature":
             return np.nan_to_num(batch.states.temperature - self.reference)
-        since = np.maximum(batch.states.time - self.start, 0.0)
+        passed: Floats = getattr(batch.states, self.clock)
+        since = np.maximum(passed - self.start, 0.0)
         warm = -np.exp(-since / self.time_constant)
         return np.nan_to_num(warm)
 

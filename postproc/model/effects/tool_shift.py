@@ -2,20 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
 
 from postproc.arrays import Floats
-from postproc.model.effects.base_shift import moments, moments_near
-from postproc.model.effects.effect import (
-    Candidate,
-    Effect,
-    Origin,
-    Parameter,
-    alternatives,
-)
+from postproc.model.effects.effect import Candidate, Parameter, alternatives
+from postproc.model.effects.step import CampaignStep, moments
 from postproc.model.kinematics import Batch
 
 SHIFT, TURN = 1e-4, 2e-4  # [m], [rad]
@@ -23,20 +17,15 @@ AXES = "xyz"
 
 
 @dataclass(frozen=True)
-class ToolShift(Effect):
+class ToolShift(CampaignStep):
     """A step of the tool in the flange frame at one row.
 
-    It moves the rows before the step, see `BaseShift`.
-
     Attributes:
-        row: Place in the visit order of the first row after the step.
         turns: Whether the tool may also turn, which several probe points show.
     """
 
     name: ClassVar[str] = "tool_shift"
-    driven_by: ClassVar[str] = "order"
 
-    row: float = 0.0
     turns: bool = False
 
     @classmethod
@@ -44,19 +33,6 @@ class ToolShift(Effect):
         """Try moments all along the campaign."""
         several = len(np.unique(batch.states.tool.round(6), axis=0)) > 1
         return alternatives([(cls(float(r), several), "order") for r in moments(batch)])
-
-    def refined(self, offsets: Floats, batch: Batch) -> list[Effect]:
-        """Move the moment."""
-        rows = moments_near(self.row, offsets, batch)
-        return [replace(self, row=float(r)) for r in rows]
-
-    def nonlinear(self) -> dict[str, tuple[float, str]]:
-        """Tell the moment."""
-        return {"row": (float(self.row), "rows")}
-
-    def belongs_to(self) -> Origin:
-        """Say that it is the set-up's."""
-        return "setup"
 
     def parameters(self) -> tuple[Parameter, ...]:
         """Name shift and turn, from before to after, in the flange frame."""
@@ -67,7 +43,7 @@ class ToolShift(Effect):
 
     def columns(self, batch: Batch) -> Floats:
         """Differentiate the TCP position, (n, 3, p)."""
-        axes, before = batch.walk.flange, (batch.states.order < self.row)
+        axes, before = batch.walk.flange, self.before(batch)
         if self.turns:
             arms = np.cross(np.eye(3)[None], batch.states.tool[:, None, :])
             axes = np.concatenate([axes, axes @ np.swapaxes(arms, 1, 2)], axis=2)
@@ -77,6 +53,6 @@ class ToolShift(Effect):
         """Differentiate the tool's rotation, (n, 3, p)."""
         if not self.turns:
             return None
-        axes, before = batch.walk.flange, (batch.states.order < self.row)
+        axes, before = batch.walk.flange, self.before(batch)
         axes = np.concatenate([np.zeros_like(axes), axes], axis=2)
         return np.where(before[:, None, None], -axes, 0.0)

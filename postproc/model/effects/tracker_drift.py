@@ -8,12 +8,7 @@ from typing import ClassVar, Literal, Self
 import numpy as np
 
 from postproc.arrays import Floats
-from postproc.model.effects.base_shift import (
-    AXES,
-    moments,
-    rigid_columns,
-    rigid_rotations,
-)
+from postproc.model.effects.base_shift import AXES, rigid_columns, rigid_rotations
 from postproc.model.effects.effect import (
     Candidate,
     Effect,
@@ -22,6 +17,7 @@ from postproc.model.effects.effect import (
     Unasked,
     alternatives,
 )
+from postproc.model.effects.step import moments
 from postproc.model.kinematics import Batch
 from postproc.robot.arm import Arm
 from postproc.robot.state import States
@@ -71,6 +67,10 @@ class TrackerDrift(Effect):
     def belongs_to(self) -> Origin:
         """Say that it is the set-up's."""
         return "setup"
+
+    def refers_to(self) -> str:
+        """Name the start, when the tracker was registered."""
+        return "the tracker as it stood at the first row"
 
     def parameters(self) -> tuple[Parameter, ...]:
         """Name shift and turn of every term."""

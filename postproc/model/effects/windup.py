@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import ClassVar
+from typing import ClassVar, Literal
 
 import numpy as np
 
@@ -22,17 +22,21 @@ from postproc.model.kinematics import Batch
 SCALE = 3e-5  # [rad]
 WAYS = tuple(np.radians([0.5, 1.0, 2.0, 4.0, 7.0]))  # d0 that are tried
 LONGEST = float(np.radians(8.0))  # what fades more slowly is no wind-up
+FLANKS = tuple(np.radians([2.0, 5.0, 10.0, 18.0]))  # ways from flank to flank
+LONGEST_FLANK = float(np.radians(25.0))
 
 
 @dataclass(frozen=True)
 class Windup(JointEffect):
-    """Joint error lambda * w * (1 - 2 exp(-travel / d0)).
+    """Joint error lambda * w * s(travel), s from -1 at the reversal to 1.
 
     Where the travel since the last reversal is not known, it counts as long.
 
     Attributes:
         joints: Joints that wind up.
         d0: Way over which they do [rad].
+        form: "friction": s = 1 - 2 exp(-travel / d0). "elastic": a flank that gives way
+            before it carries, s = -cos(pi travel / d0) up to d0.
     """
 
     name: ClassVar[str] = "windup"
@@ -43,6 +47,7 @@ class Windup(JointEffect):
 
     joints: tuple[int, ...] = JOINTS
     d0: float = 0.05
+    form: Literal["friction", "elastic"] = "friction"
 
     @classmethod
     def candidates(cls, batch: Batch) -> list[Candidate]:
@@ -50,13 +55,15 @@ class Windup(JointEffect):
         out = []
         for j in JOINTS:
             if varies(batch.states.travel[:, j - 1]):
-                members = [(cls((j,), float(d0)), f"travel {j}") for d0 in WAYS]
-                out += alternatives(members, j)
+                each = [cls((j,), float(d0)) for d0 in WAYS]
+                each += [cls((j,), float(d0), "elastic") for d0 in FLANKS]
+                out += alternatives([(e, f"travel {j}") for e in each], j)
         return out
 
     def refined(self, offsets: Floats, batch: Batch) -> list[Effect]:
         """Change the way."""
-        ways = np.unique(np.minimum(self.d0 * 2.0**offsets, LONGEST))
+        longest = LONGEST if self.form == "friction" else LONGEST_FLANK
+        ways = np.unique(np.minimum(self.d0 * 2.0**offsets, longest))
         return [replace(self, d0=float(way)) for way in ways]
 
     def nonlinear(self) -> dict[str, tuple[float, str]]:
@@ -65,14 +72,17 @@ class Windup(JointEffect):
 
     def parameters(self) -> tuple[Parameter, ...]:
         """Name one size per joint."""
+        over = f"over {self.d0:.4g}" + ("" if self.form == "friction" else " elastic")
         return tuple(
-            Parameter(f"w{j}", "rad", SCALE, f"{j} over {self.d0:.4g}", j)
-            for j in self.joints
+            Parameter(f"w{j}", "rad", SCALE, f"{j} {over}", j) for j in self.joints
         )
 
     def basis(self, batch: Batch) -> Floats:
-        """Evaluate lambda (1 - 2 exp(-travel / d0)), (n, p)."""
+        """Evaluate lambda s(travel), (n, p)."""
         joint = self.acts_on()
         travel = np.nan_to_num(batch.states.travel[:, joint], nan=np.inf)
-        wound = 1.0 - 2.0 * np.exp(-travel / self.d0)
+        if self.form == "friction":
+            wound = 1.0 - 2.0 * np.exp(-travel / self.d0)
+        else:
+            wound = -np.cos(np.pi * np.minimum(travel / self.d0, 1.0))
         return np.asarray(batch.states.direction[:, joint] * wound)

@@ -1,0 +1,104 @@
+"""Base tilt: the foundation, or the table, leans with the weight that hangs over it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar, Self
+
+import numpy as np
+
+from postproc.arrays import Floats
+from postproc.model.covariate import TILTING, varies
+from postproc.model.effects.base_shift import rigid_columns, rigid_rotations
+from postproc.model.effects.effect import Candidate, Effect, Parameter, alternatives
+from postproc.model.kinematics import Batch
+from postproc.robot.arm import GRAVITY, Arm
+from postproc.robot.state import States
+
+SCALE = 1e-8  # [rad/(N m)] softness of a usual foundation
+UNSURE = 0.1  # share of the arm's mass that sits elsewhere than its file says
+LEAST = 1.0  # [kg] of an arm whose links are not known
+DEEP = 0.5  # [m] below the base's origin that a table may turn about
+PLACES = ("", "_elbow", "_wrist")  # of the moment, and of what is unsure of it
+
+
+@dataclass(frozen=True)
+class BaseTilt(Effect):
+    """The base turns about its horizontal axes by tilting moment / stiffness.
+
+    The moment is that of the nominal links and of the payload; what is unsure of the
+    links is taken to hang at the elbow and at the wrist.
+
+    Attributes:
+        skew: Whether the stiff directions may lie askew of the base's axes, and what
+            it turns about below its origin.
+        unsure: Mass that may hang elsewhere [kg].
+    """
+
+    name: ClassVar[str] = "base_tilt"
+    driven_by: ClassVar[str] = "torque"
+
+    skew: bool = False
+    unsure: float = 10.0
+
+    @classmethod
+    def propose(cls, arm: Arm, states: States) -> Self:
+        """Take what is unsure of the arm's own weight."""
+        return cls(unsure=unsure_mass(arm))
+
+    @classmethod
+    def candidates(cls, batch: Batch) -> list[Candidate]:
+        """Try a foundation along the base's axes, and any other, where weight moves."""
+        if not varies(batch.loads.tilting[:, 0]):
+            return []
+        unsure = unsure_mass(batch.arm)
+        members = [(cls(skew, unsure), TILTING) for skew in (False, True)]
+        return alternatives(members)
+
+    def parameters(self) -> tuple[Parameter, ...]:
+        """Name softness about the axes, and softness times unsure mass."""
+        names, out = ("kx", "ky", "kxy") if self.skew else ("kx", "ky"), []
+        for name in names:
+            out.append(Parameter(name, "rad/(N m)", SCALE, name, None, name != "kxy"))
+            scale = SCALE * self.unsure
+            out += [
+                Parameter(name + place, "rad kg/(N m)", scale, name)
+                for place in PLACES[1:]
+            ]
+        if self.skew:
+            unit, scale = "m/(N m)", SCALE * DEEP
+            out += [Parameter(f"h{a}", unit, scale, "pivot") for a in "xy"]
+        return tuple(out)
+
+    def columns(self, batch: Batch) -> Floats:
+        """Differentiate the TCP position, (n, 3, p)."""
+        return self._leaning(batch, rigid_columns(batch))
+
+    def rotation_columns(self, batch: Batch) -> Floats:
+        """Differentiate the tool's rotation, (n, 3, p)."""
+        return self._leaning(batch, rigid_rotations(batch))
+
+    def _leaning(self, batch: Batch, moved: Floats) -> Floats:
+        """Multiply six motions of the base (n, 3, 6) by the moments, (n, 3, p)."""
+        about_x, about_y = _moments(batch)
+        by_x, by_y = (moved[:, :, 3 + k, None] for k in range(2))
+        out = [by_x * about_x, by_y * about_y]
+        if self.skew:
+            out.append(by_x * about_y + by_y * about_x)
+            out.append(moved[:, :, 0, None] * about_y[..., :1])
+            out.append(-moved[:, :, 1, None] * about_x[..., :1])
+        return np.concatenate(out, axis=2)
+
+
+def unsure_mass(arm: Arm) -> float:
+    """Say how much of an arm's mass may hang elsewhere than its file says [kg]."""
+    return max(UNSURE * arm.mass, LEAST)
+
+
+def _moments(batch: Batch) -> tuple[Floats, Floats]:
+    """Give the moments about x and y, and those of 1 kg at each place, (n, 1, 3)."""
+    at = batch.arm.landmarks(batch.states.q, batch.states.tool)[:, :2]
+    own = batch.loads.tilting
+    about_x = np.column_stack([own[:, 0], -GRAVITY * at[:, :, 1]])
+    about_y = np.column_stack([own[:, 1], GRAVITY * at[:, :, 0]])
+    return about_x[:, None], about_y[:, None]
