@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from postproc.arrays import Floats
+from postproc.model.effects.drive import DriveEffect
 from postproc.model.effects.effect import Effect, JointEffect, Parameter
 from postproc.model.effects.geometry import Geometry
 from postproc.model.kinematics import NOMINAL, Batch, Deviation
@@ -180,4 +181,7 @@ class Combination:
         forward = self.shift(batch.arriving(ones), p)
         backward = self.shift(batch.arriving(-ones), p)
         slopes: Floats = batch.jacobian * ((forward - backward) / 2)[:, None, :]
+        for effect, part in zip(self.effects, self.slices, strict=True):
+            if isinstance(effect, DriveEffect):
+                slopes = slopes + effect.direction_slopes(batch, p[part])
         return slopes

@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from postproc.arrays import Floats
+from postproc.model.effects.drive import DriveEffect
 from postproc.model.effects.effect import JointEffect
 from postproc.model.kinematics import Batch
 from postproc.model.model import Model
@@ -36,7 +37,9 @@ def half_gap(model: Model, arm: Arm) -> Floats:
     batch = Batch(arm, make_states(q, np.ones((SAMPLES, 6))))
     angles = np.zeros((SAMPLES, 6))
     for effect, part in zip(effects.effects, effects.slices, strict=True):
-        if isinstance(effect, JointEffect) and effect.direct and not effect.requires():
+        if not effect.direct or effect.requires():
+            continue
+        if isinstance(effect, JointEffect | DriveEffect):
             angles += effect.angles(batch, values[part])
     return np.asarray(np.abs(angles).max(axis=0))
 

@@ -11,7 +11,7 @@ from postproc.calibration.diagnosis.library import Projection
 from postproc.calibration.regression import Fit, fit_effects
 from postproc.model.effects import BASE_EFFECTS, propose
 from postproc.model.kinematics import Batch
-from postproc.robot.arm import load_arm
+from postproc.robot.arm import Arm, load_arm
 from postproc.robot.state import States, make_states
 from postproc.simulation import (
     Planted,
@@ -21,7 +21,7 @@ from postproc.simulation import (
     stream,
     virtual_arm,
 )
-from postproc.simulation.laws import Law
+from postproc.simulation.laws import HOLLOW_WRIST, MOTOR_TURNS, Law
 
 ARM = load_arm("nj220-2.7")
 TRACKER = np.array([3.0, -2.0, 1.5])  # [m]
@@ -34,6 +34,7 @@ NAMED = (
     "lag", "base_shift", "tool_shift", "tracker_drift", "worn_spot",
 )  # fmt: skip
 NAMELESS = ("joint_product", "hysteresis")
+WAVES = ("motor_wave", "drive_wave", "drive_backlash")  # of an arm whose gears are told
 SIZES = (0.5, 1.0, 2.0, 3.0)  # rms after projection on the base model over the noise
 
 
@@ -47,6 +48,7 @@ class Campaign:
         arrivals, states: The survey, for the arm and for the model.
         position: Measured, (n, 3) [m].
         sizes: Size of every planted effect after projection, over the noise.
+        declared: What the arm file says.
     """
 
     arm: VirtualArm
@@ -55,11 +57,12 @@ class Campaign:
     states: States
     position: np.ndarray
     sizes: tuple[float, ...]
+    declared: Arm = ARM
 
     def base_fit(self) -> Fit:
         """Fit geometry and backlash: what a user declares."""
-        effects = propose(BASE_EFFECTS, ARM, self.states)
-        batch = Batch(ARM, self.states)
+        effects = propose(BASE_EFFECTS, self.declared, self.states)
+        batch = Batch(self.declared, self.states)
         return fit_effects(batch, self.position, effects, tuple(TRACKER))
 
 
@@ -75,7 +78,8 @@ def campaign(
             the usual size that was drawn.
         rows: Number of rows.
     """
-    clean = virtual_arm(seed, BASE, rows=rows)
+    wrist = coupling_of(kinds)
+    clean = virtual_arm(seed, BASE, coupling=wrist, rows=rows)
     arrivals = survey(clean, seed, rows)
     planted = tuple(Planted(kind) for kind in kinds)
     reached = tuple(_size(clean, seed, p, arrivals, rows) for p in planted)
@@ -85,9 +89,26 @@ def campaign(
             for p, was in zip(planted, reached, strict=True)
         )
         reached = (size,) * len(kinds)
-    arm = virtual_arm(seed, (*map(Planted, BASE), *planted), rows=rows)
+    effects = (*map(Planted, BASE), *planted)
+    arm = virtual_arm(seed, effects, coupling=wrist, rows=rows)
     position = arm.measure(arrivals, TRACKER, stream(seed, "tracker"))
-    return Campaign(arm, planted, arrivals, states_of(arrivals), position, reached)
+    states = states_of(arrivals)
+    told = declared(kinds)
+    return Campaign(arm, planted, arrivals, states, position, reached, told)
+
+
+def coupling_of(kinds: tuple[str, ...]) -> np.ndarray | None:
+    """The wrist gears of the arm that effects are planted in, None: not coupled."""
+    return HOLLOW_WRIST if any(k.startswith("drive_") for k in kinds) else None
+
+
+def declared(kinds: tuple[str, ...]) -> Arm:
+    """The arm as its file says: with gears where waves of gears are planted."""
+    if not set(kinds) & set(WAVES):
+        return ARM
+    wrist = coupling_of(kinds)
+    coupling = ARM.coupling if wrist is None else wrist
+    return replace(ARM, gear_ratio=np.array(MOTOR_TURNS), coupling=coupling)
 
 
 def survey(arm: VirtualArm, seed: int, rows: int) -> VirtualArrivals:

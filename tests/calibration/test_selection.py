@@ -39,5 +39,5 @@ def test_what_is_there_is_kept() -> None:
 def test_only_covariates_that_vary_are_candidates() -> None:
     rng = np.random.default_rng(0)
     bare = random_states(50, rng)
-    assert not {"thermal", "payload", "lag"} & set(candidates(bare))
-    assert {"thermal", "payload", "lag"} <= set(candidates(covariates(bare, rng)))
+    assert not {"thermal", "payload", "lag"} & set(candidates(NJ, bare))
+    assert {"thermal", "payload", "lag"} <= set(candidates(NJ, covariates(bare, rng)))

@@ -20,14 +20,16 @@ from postproc.model.effects.effect import (
     fade_turns,
 )
 from postproc.model.kinematics import Batch
-from tests.calibration.simulator import NJ, PLATE, covariates, random_states
+from tests.calibration.simulator import COUPLED, NJ, PLATE, covariates, random_states
 
 RNG = np.random.default_rng(5)
 STATES = covariates(random_states(40, RNG, PLATE), RNG)
 
 
 def variants() -> list[Effect]:
-    out = list(propose(KNOWN, NJ, STATES))
+    drives = [name for name in KNOWN if name.startswith("drive_")]
+    out = list(propose([name for name in KNOWN if name not in drives], NJ, STATES))
+    out += propose(drives, COUPLED, STATES)
     out.append(BY_NAME["thermal"](form="time", time_constant=100.0))
     out.append(BY_NAME["load_backlash"](form="gravity_side"))
     out.append(BY_NAME["tool_shift"](row=20.0, turns=True))
