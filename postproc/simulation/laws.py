@@ -38,7 +38,8 @@ class Law:
         effect: The name an engineer would give it; "" where no name fits.
         where: What it changes.
         joints: Joints that are moved, from 1; empty for lengths and frames.
-        source: The joint that drives another joint's error, from 1, or 0.
+        source: The joint, or the coupled drive, that drives a joint's error, from 1,
+            or 0.
         parameters: The law's own numbers, SI units, for the record.
         shape: (n,) arrivals -> (n, 6) per unit of `scale`.
         scale: Size of the law.
@@ -231,7 +232,8 @@ def _of_drive(name: str, drive: int, parameters: dict[str, float], errs: Shape) 
     def shape(arrivals: VirtualArrivals) -> Floats:
         return np.outer(errs(arrivals), moves)
 
-    return Law(name, Where.JOINTS, (drive,), 0, parameters, shape)
+    joints = tuple(int(j) + 1 for j in np.flatnonzero(moves))
+    return Law(name, Where.JOINTS, joints, drive, parameters, shape)
 
 
 def scale(draw: Draw) -> Law:

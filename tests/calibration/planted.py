@@ -145,7 +145,7 @@ def part_sizes(c: Campaign) -> dict[int, float]:
     Each is the rms of one joint's part after projection on the base model and on the
     other parts: what nothing else can absorb.
     """
-    many = [law for law in c.arm.laws[1:] if len(law.joints) > 1]
+    many = [x for x in c.arm.laws[1:] if len(x.joints) > 1 and not x.source]
     if not many:
         return {}
     (law,) = many

@@ -9,12 +9,14 @@ import numpy as np
 
 from postproc.arrays import Floats
 from postproc.calibration.diagnosis.library import Projection
-from postproc.calibration.diagnosis.score import Leftover
+from postproc.calibration.diagnosis.score import LENGTHS, Leftover
 from postproc.calibration.measurements import DroppedRow
 from postproc.calibration.regression import Fit
 from postproc.calibration.report import DirectionReport
-from postproc.model.covariate import covariate, unit
+from postproc.model.covariate import JOINTS, covariate, unit
+from postproc.model.effects.drive import following
 from postproc.model.effects.effect import Candidate, Effect
+from postproc.model.effects.transmission import ECCENTRIC, Transmission
 from postproc.model.kinematics import Batch
 from postproc.model.statistics import ErrorStatistics
 from postproc.robot.pose import MM
@@ -111,6 +113,7 @@ class Diagnosis:
         why_next: What they are for.
         dropped: Rows that count less than fully, and why.
         directions: Wrong directions, or None where the file has none.
+        not_excluded: What the rows could not have shown, in words.
     """
 
     verdict: Verdict
@@ -128,6 +131,7 @@ class Diagnosis:
     why_next: str
     dropped: tuple[DroppedRow, ...]
     directions: DirectionReport | None
+    not_excluded: tuple[str, ...] = ()
 
     def to_dict(self) -> dict[str, Any]:
         """Return the content of the JSON report."""
@@ -163,6 +167,7 @@ class Diagnosis:
                 {"id": d.id, "line": d.line, "why": d.why} for d in self.dropped
             ],
             "directions": None if self.directions is None else asdict(self.directions),
+            "not_excluded": list(self.not_excluded),
         }
 
 
@@ -174,6 +179,38 @@ def statistics(spread: ErrorStatistics) -> dict[str, float]:
         "p95_mm": spread.p95_mm,
         "max_mm": spread.max_mm,
     }
+
+
+# What rows cannot show, however large it is.
+
+
+def not_excluded(batch: Batch) -> tuple[str, ...]:
+    """Say what may hide in what looks like noise: what no candidate asked for."""
+    highest: dict[int, list[int]] = {}
+    for j in JOINTS:
+        told = Transmission.orders(batch, j).told
+        highest.setdefault(int(max(told, ECCENTRIC[-1])), []).append(j)
+    out = [
+        f"waves of more than {order} a turn of {_joints(joints)}"
+        for order, joints in sorted(highest.items())
+    ]
+    unknown = [j for j in JOINTS if np.isnan(batch.arm.gear_ratio[j - 1])]
+    if unknown:
+        out[-1] += ", those of the motors with them: no gear_ratio in the arm file"
+    if not following(batch.arm):
+        out.append(
+            "waves of drives that turn with several joints of the wrist, such as "
+            "q6 - q5: no drive_coupling in the arm file"
+        )
+    finest = max(min(LENGTHS), 1.0 / np.sqrt(max(len(batch), 1)))
+    out.append(f"functions of two joints finer than {finest:.0%} of their ranges")
+    return tuple(out)
+
+
+def _joints(numbers: list[int]) -> str:
+    """Name joints."""
+    some = ", ".join(map(str, numbers))
+    return f"joint {some}" if len(numbers) == 1 else f"joints {some}"
 
 
 # Residuals seen from where they may live: a joint, a covariate, an order per turn.

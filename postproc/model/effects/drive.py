@@ -252,6 +252,10 @@ class DriveTransmission(DriveEffect):
         """Tell the order of the first wave."""
         return self.law.nonlinear()
 
+    def amplitude(self, p: Floats, covariance: Floats) -> tuple[float, float] | None:
+        """Return that of a single wave and its standard error [rad]."""
+        return self.law.amplitude(p, covariance)
+
     @property
     def law(self) -> Transmission:
         """Waves of the drives."""

@@ -166,6 +166,15 @@ class Effect(ABC):
         """List the settings that are not linear: value and unit, as people use them."""
         return {}
 
+    def amplitude(self, p: Floats, covariance: Floats) -> tuple[float, float] | None:
+        """Return the size of a wave and its standard error [rad], None without one.
+
+        Args:
+            p: Its parameters, (p,).
+            covariance: Of them, (p, p).
+        """
+        return None
+
 
 @dataclass(frozen=True)
 class JointEffect(Effect):

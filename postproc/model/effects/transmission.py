@@ -78,6 +78,14 @@ class Transmission(JointEffect):
         """Tell the order of the first wave."""
         return {"order": (float(self.waves[0][1]), "1/turn")}
 
+    def amplitude(self, p: Floats, covariance: Floats) -> tuple[float, float] | None:
+        """Return that of a single wave and its standard error [rad]."""
+        if len(self.waves) != 1:
+            return None
+        size = float(np.hypot(*p))
+        along = p / max(size, 1e-300)
+        return size, float(np.sqrt(along @ covariance @ along))
+
     def parameters(self) -> tuple[Parameter, ...]:
         """Name sine and cosine of every wave."""
         return tuple(
