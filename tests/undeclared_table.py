@@ -12,7 +12,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from scipy.stats import beta
 
-from tests.calibration.planted import NAMED, NAMELESS, SIZES
+from tests.calibration.planted import NAMED, NAMELESS, SIZES, WAVES
 from tests.undeclared_score import WITHIN, close, groups, laws, misnamed, ok
 
 if TYPE_CHECKING:
@@ -33,7 +33,9 @@ that it says it cannot tell apart; an effect without a name is answered rightly 
 confidence where p < 0.001 and no curve is told beside it. The true error is that of the
 arm at 200 fresh poses, without noise; the informed fit knows the shape of what was
 planted and fits its size. Campaigns of `elastic_flank` go straight from row to row and
-tell neither travels nor directions. Bounds hold at 95 % (Clopper and Pearson).
+tell neither travels nor directions. Waves of motors and errors of coupled drives are
+those of an arm whose file tells its gear ratios and the coupling of its wrist. Bounds
+hold at 95 % (Clopper and Pearson).
 
 """
 DRIFT = """A `tracker_drift` moves nothing of the arm; its own parameters are never
@@ -50,7 +52,7 @@ def write_table(trials: Sequence[Trial], output: Path, wanted: int) -> None:
     by_kind: dict[str, list[Trial]] = defaultdict(list)
     for t in trials:
         by_kind[t.kind].append(t)
-    kinds = [k for k in (*NAMED, *NAMELESS, "two") if k in by_kind]
+    kinds = [k for k in (*NAMED, *WAVES, *NAMELESS, "two") if k in by_kind]
     planted = [t for t in trials if t.kind != "none"]
     lines = [
         *INTRODUCTION.splitlines(),
@@ -95,7 +97,7 @@ def _bounded(hits: Sequence[bool]) -> str:
 
 def _summary(trials: Sequence[Trial], wanted: int) -> list[str]:
     none = [t for t in trials if t.kind == "none"]
-    named = [t for t in trials if t.kind in NAMED]
+    named = [t for t in trials if t.kind in (*NAMED, *WAVES)]
     nameless = [t for t in trials if t.kind in NAMELESS]
     two = [t for t in trials if t.kind == "two"]
     planted = [*named, *nameless, *two]
@@ -131,7 +133,7 @@ def _by_size(planted: Sequence[Trial]) -> list[str]:
     for size in SIZES:
         some = [t for t in planted if t.size == size]
         cells = [
-            _rate([ok(t) for t in some if t.kind in NAMED]),
+            _rate([ok(t) for t in some if t.kind in (*NAMED, *WAVES)]),
             _rate([ok(t) for t in some if t.kind == "two"]),
             _rate([ok(t) for t in some if t.kind in NAMELESS]),
         ]
@@ -220,7 +222,7 @@ def plot(planted: Sequence[Trial], path: Path) -> Path:
     figure = Figure(figsize=(6, 4), layout="constrained")
     axes = figure.subplots()
     for label, kinds, mark in (
-        ("named", NAMED, "o-"),
+        ("named", (*NAMED, *WAVES), "o-"),
         ("two at once", ("two",), "s--"),
         ("no name", NAMELESS, "^:"),
     ):

@@ -140,7 +140,7 @@ def _hit(law: tuple[str, list[int], int], found: Sequence[dict[str, object]]) ->
     """2 where a finding names the law, 1 where one of its group does, else 0.
 
     A law without a name is hit by a curve on its joint; a coupling must name the joint
-    that drives.
+    that drives, an error of a drive the drive.
     """
     effect, joints, source = law
     effect = effect or "curve"
@@ -148,7 +148,7 @@ def _hit(law: tuple[str, list[int], int], found: Sequence[dict[str, object]]) ->
     for f in found:
         names = [[f["effect"], f["joint"]], *f["group"]]  # type: ignore[misc]
         for k, (name, joint) in enumerate(names):
-            driven = k > 0 or not source or f["source"] == f"joint {source}"
+            driven = k > 0 or not source or str(f["source"]).endswith(f" {source}")
             place = joint in joints or (joint is None and not joints)
             if name == effect and place and driven:
                 best = max(best, 1 if k else 2)

@@ -394,7 +394,7 @@ def told(f: Finding) -> str:
     settings = "".join(
         f", {name} {value[0]:.4g} {value[2]}"
         for name, value in f.parameters.items()
-        if name in ("row", "order", "centre", "t0")
+        if name in ("row", "order", "amplitude", "centre", "t0")
     )
     others = [e + (f" {j}" if j else "") for e, j in f.confusable_with]
     either = f"; or as well {', '.join(others)}" if others else ""

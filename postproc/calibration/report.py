@@ -11,6 +11,7 @@ from postproc.arrays import Bools, Floats
 from postproc.calibration.directions import judge_directions
 from postproc.calibration.measurements import DroppedRow, Measurements
 from postproc.calibration.regression import Fit, Unseen, observe
+from postproc.model.effects.effect import Effect
 from postproc.model.kinematics import Batch
 from postproc.model.model import Model
 from postproc.model.statistics import ErrorStatistics
@@ -53,6 +54,8 @@ class Found:
             and the prior scales as they are [nats].
         setup: Whether it is the survey's own, and never compensated.
         impossible: Values that physics forbids, in words.
+        wave: Order per turn of a single wave, its amplitude and the standard error of
+            that [mrad], or None.
     """
 
     effect: str
@@ -62,6 +65,7 @@ class Found:
     evidence: float
     setup: bool
     impossible: tuple[str, ...]
+    wave: tuple[float, float, float] | None = None
 
 
 @dataclass(frozen=True)
@@ -229,9 +233,21 @@ def find(fit: Fit) -> tuple[Found, ...]:
                     effect.name, int(j) or None, float(np.sqrt((size**2).mean())),
                     float(size.max(initial=0.0)), evidence_of(fit, own),
                     effect.belongs_to() == "setup", impossible(fit, own),
+                    _wave(effect, fit.values[part], fit.covariance[part, part]),
                 )
             )  # fmt: skip
     return tuple(sorted(found, key=lambda f: -f.size_mm))
+
+
+def _wave(
+    effect: Effect, values: Floats, covariance: Floats
+) -> tuple[float, float, float] | None:
+    """Return order and amplitude of a single wave."""
+    found = effect.amplitude(values, covariance)
+    if found is None:
+        return None
+    order, _ = effect.nonlinear()["order"]
+    return order, found[0] * 1e3, found[1] * 1e3
 
 
 def evidence_of(fit: Fit, own: Bools) -> float:

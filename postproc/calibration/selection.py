@@ -40,9 +40,13 @@ def silent(stage: str) -> None:
     """Tell nobody."""
 
 
-def candidates(states: States) -> tuple[str, ...]:
+def candidates(arm: Arm, states: States) -> tuple[str, ...]:
     """Name the effects that a survey may give evidence for, by what drives them."""
-    tried = [k for k in EFFECTS if k.unasked == "weighed" and k.may_show(states)]
+    tried = [
+        k for k in EFFECTS
+        if k.unasked == "weighed" and k.may_show(states)
+        and k.propose(arm, states).parameters()
+    ]  # fmt: skip
     tried.sort(key=lambda kind: DRIVERS.index(kind.driven_by))
     return tuple(kind.name for kind in tried)
 
@@ -78,7 +82,7 @@ def fit_best(
     kept = base
     progress("fit " + ", ".join(e.name for e in base))
     fitted = fit_effects(batch, position, base, origin, turns=turns, until=NEARLY)
-    for names in (candidates(states), *((name,) for name in free_forms(states))):
+    for names in (candidates(arm, states), *((name,) for name in free_forms(states))):
         progress("fit and weigh " + ", ".join(names))
         tried = (*kept, *propose(names, arm, states), *slipped(fitted))
         fitted = fit_effects(batch, position, tried, origin, fitted, until=NEARLY)

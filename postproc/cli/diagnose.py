@@ -251,6 +251,8 @@ def tell(found: Diagnosis) -> str:
         lines.append(f"vAP {found.vap_mm[0]:.4f} -> {found.vap_mm[1]:.4f} mm")
     if found.verdict == "unexplained":
         lines += _unexplained(found)
+    if found.verdict == "noise":
+        lines += [f"not excluded: {what}" for what in found.not_excluded]
     lines += [f"row {d.id} (line {d.line}): {d.why}" for d in found.dropped]
     lines += tell_directions(found.directions, LIKELIEST)
     lines.append(f"measure next, to {found.why_next} (q1..q6 deg):")

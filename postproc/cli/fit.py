@@ -204,6 +204,9 @@ def _tell_found(found: Sequence[Found]) -> str:
 def _remark(found: Found) -> str:
     """Say what is special about a finding."""
     told = [f"IMPOSSIBLE: {text}" for text in found.impossible]
+    if found.wave is not None:
+        order, size, error = found.wave
+        told.append(f"order {order:.4g}, {size:.3f} +- {error:.3f} mrad")
     if found.setup:
         told.append("of the set-up: not compensated")
     return "; ".join(told)

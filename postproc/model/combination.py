@@ -180,4 +180,8 @@ class Combination:
         forward = self.shift(batch.arriving(ones), p)
         backward = self.shift(batch.arriving(-ones), p)
         slopes: Floats = batch.jacobian * ((forward - backward) / 2)[:, None, :]
+        for effect, part in zip(self.effects, self.slices, strict=True):
+            own = effect.direction_slopes(batch, p[part])
+            if own is not None:
+                slopes = slopes + own
         return slopes

@@ -8,7 +8,7 @@ from postproc.arrays import Floats
 from postproc.model.kinematics import Batch
 from postproc.robot.state import States
 
-JOINT_KINDS = ("joint", "lambda", "before", "travel", "loop", "torque")
+JOINT_KINDS = ("joint", "drive", "lambda", "before", "travel", "loop", "torque")
 SHORTEST = 1e-4  # [rad] of a way whose logarithm is taken
 TILTING = "tilting"
 PLAIN = ("speed", "payload", "temperature", "time", "order")
@@ -24,12 +24,12 @@ LEAST = {"temperature": 1.0, "payload": 1.0, "speed": 0.05}  # [K], [kg], [m/s]
 def covariate(batch: Batch, name: str) -> Floats:
     """Look up a covariate by its name, (n,), NaN where it is not known.
 
-    Names are ``joint 5`` (its angle [rad]), ``lambda 5`` (its direction), ``before 5``
-    (its direction at the visit before), ``travel 5`` (since its last reversal
-    [log rad]), ``loop 5`` (between its last two reversals [log rad]), ``torque 5`` (of
-    gravity about it [N m]), ``tilting`` (moment of all weight about the base's
-    horizontal axes [N m]), ``speed``, ``payload``, ``temperature``, ``time`` and
-    ``order`` (SI units).
+    Names are ``joint 5`` (its angle [rad]), ``drive 5`` (that of its coupled drive
+    [rad]), ``lambda 5`` (its direction), ``before 5`` (its direction at the visit
+    before), ``travel 5`` (since its last reversal [log rad]), ``loop 5`` (between its
+    last two reversals [log rad]), ``torque 5`` (of gravity about it [N m]),
+    ``tilting`` (moment of all weight about the base's horizontal axes [N m]),
+    ``speed``, ``payload``, ``temperature``, ``time`` and ``order`` (SI units).
 
     Raises:
         ValueError: There is no such covariate.
@@ -43,6 +43,8 @@ def covariate(batch: Batch, name: str) -> Floats:
         j = int(number) - 1
         if kind == "joint":
             return np.asarray(batch.states.q[:, j])
+        if kind == "drive":
+            return np.asarray(batch.states.q @ batch.arm.coupling[j])
         if kind == "travel":
             return np.log(np.maximum(batch.states.travel[:, j], SHORTEST))
         if kind == "lambda":
@@ -59,8 +61,9 @@ def unit(name: str) -> str:
     """Name the unit of a covariate in SI."""
     kind = name.partition(" ")[0]
     return {
-        "joint": "rad", "lambda": "1", "before": "1", "travel": "log rad",
-        "loop": "log rad", "torque": "N m", TILTING: "N m", "speed": "m/s",
+        "joint": "rad", "drive": "rad", "lambda": "1", "before": "1",
+        "travel": "log rad", "loop": "log rad", "torque": "N m", TILTING: "N m",
+        "speed": "m/s",
         "payload": "kg", "temperature": "deg C", "time": "s", "order": "rows",
     }[kind]  # fmt: skip
 

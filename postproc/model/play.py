@@ -9,7 +9,6 @@ from __future__ import annotations
 import numpy as np
 
 from postproc.arrays import Floats
-from postproc.model.effects.effect import JointEffect
 from postproc.model.kinematics import Batch
 from postproc.model.model import Model
 from postproc.robot.arm import Arm
@@ -36,7 +35,7 @@ def half_gap(model: Model, arm: Arm) -> Floats:
     batch = Batch(arm, make_states(q, np.ones((SAMPLES, 6))))
     angles = np.zeros((SAMPLES, 6))
     for effect, part in zip(effects.effects, effects.slices, strict=True):
-        if isinstance(effect, JointEffect) and effect.direct and not effect.requires():
+        if effect.direct and not effect.requires():
             angles += effect.angles(batch, values[part])
     return np.asarray(np.abs(angles).max(axis=0))
 

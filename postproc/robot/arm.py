@@ -97,7 +97,8 @@ class Arm:
         lower, upper: Joint limits, (6,) [rad].
         play: Width of the play operator, (6,) [rad].
         coupling: Drive-side angles = coupling @ q, (6, 6).
-        gear_ratio: (6,), NaN where unknown.
+        gear_ratio: Turns of every motor per turn of its joint, (6,); NaN where not
+            known.
         repeatability: Pose repeatability RP of ISO 9283 [m].
     """
 
@@ -379,7 +380,8 @@ def build_arm(file: ArmFile) -> Arm:
     a, d = np.array(dh.a_mm) * MM, np.array(dh.d_mm) * MM
     alpha = np.deg2rad(dh.alpha_deg)
     digest = hashlib.sha256(dh.model_dump_json().encode()).hexdigest()[:16]
-    ratio, coupling = joints.gear_ratio, joints.drive_coupling
+    ratio = np.array(joints.gear_ratio or [0.0] * 6)
+    coupling = joints.drive_coupling
     return Arm(
         file=file,
         name=file.name,
@@ -389,7 +391,7 @@ def build_arm(file: ArmFile) -> Arm:
         upper=np.deg2rad(joints.upper_deg),
         play=np.deg2rad(joints.play_deg),
         coupling=np.eye(6) if coupling is None else np.array(coupling),
-        gear_ratio=np.full(6, np.nan) if ratio is None else np.array(ratio),
+        gear_ratio=np.where(ratio == 0.0, np.nan, ratio),
         repeatability=file.repeatability_mm * MM,
     )
 

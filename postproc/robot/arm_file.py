@@ -7,6 +7,7 @@ import tomllib
 from pathlib import Path
 from typing import Annotated, Literal, TypeVar
 
+import numpy as np
 import pydantic
 from pydantic import BaseModel, ConfigDict, Field, PositiveFloat, model_validator
 
@@ -142,6 +143,8 @@ class DhSection(Strict):
 class ArmJointSection(Strict):
     """Limits, play and gears of the six joints.
 
+    A gear ratio of 0 is one that is not known. Drive-side angles are `drive_coupling`
+    times joint angles: which motors turn when a joint of the wrist does.
     Speeds are needed to plan programs, not to fit; where accelerations and jerks are
     not given, full speed is reached in 0.4 s and full acceleration in 0.1 s.
     """
@@ -173,6 +176,9 @@ class ArmJointSection(Strict):
         ):
             if min(getattr(self, name) or [1.0]) <= 0:
                 raise ValueError(f"{name} must be positive")
+        coupling = np.array(self.drive_coupling or np.eye(6))
+        if np.linalg.matrix_rank(coupling) < 6:
+            raise ValueError("drive_coupling must be invertible")
         return self
 
 

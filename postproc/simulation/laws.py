@@ -43,7 +43,8 @@ class Law:
         effect: The name an engineer would give it; "" where no name fits.
         where: What it changes.
         joints: Joints that are moved, from 1; empty for lengths and frames.
-        source: The joint that drives another joint's error, from 1, or 0.
+        source: The joint, or the coupled drive, that drives a joint's error, from 1,
+            or 0.
         parameters: The law's own numbers, SI units, for the record.
         shape: (n,) arrivals -> (n, 6) per unit of `scale`.
         scale: Size of the law.
@@ -191,6 +192,55 @@ def _wave(draw: Draw, order: int) -> Law:
 
     parameters = {"order": float(order), "phase": phase}
     return Law("transmission", Where.JOINTS, (joint,), 0, parameters, shape)
+
+
+# Gears of the drives: their motors turn fast, and those of a hollow wrist together.
+
+MOTOR_TURNS = (121.0, 121.0, 121.0, 80.0, 80.0, 80.0)  # per turn of the joint
+HOLLOW_WRIST = np.eye(6)  # drive angles by joint angles
+HOLLOW_WRIST[4, 3], HOLLOW_WRIST[5, 3:5] = -0.02, (-0.03, -1.0)
+
+
+def motor_wave(draw: Draw) -> Law:
+    """A wave with the motor of a joint that is not coupled, or with twice its turns."""
+    joint, twice = draw.pick(range(1, 7)), draw.rng.integers(1, 3)
+    own = replace(draw, joint=joint)
+    return _wave(own, int(twice * MOTOR_TURNS[joint - 1]))
+
+
+def drive_wave(draw: Draw) -> Law:
+    """A wave of a coupled drive's angle: out of centre, its teeth, or its motor."""
+    drive, phase = draw.pick([5, 6]), draw.phase()
+    low, high = draw.rng.integers([1, 7], [3, 31]).tolist()
+    order = float(draw.rng.choice([low, high, MOTOR_TURNS[drive - 1]]))
+
+    def errs(arrivals: VirtualArrivals) -> Floats:
+        angle = arrivals.q @ HOLLOW_WRIST[drive - 1]
+        return np.asarray(np.cos(order * angle + phase))
+
+    parameters = {"order": order, "phase": phase}
+    return _of_drive("drive_transmission", drive, parameters, errs)
+
+
+def drive_backlash(draw: Draw) -> Law:
+    """A gap in the gear of a drive that drags other joints along."""
+    drive = draw.pick([5])
+
+    def errs(arrivals: VirtualArrivals) -> Floats:
+        return np.asarray(-arrivals.side[:, drive - 1])
+
+    return _of_drive("drive_backlash", drive, {}, errs)
+
+
+def _of_drive(name: str, drive: int, parameters: dict[str, float], errs: Shape) -> Law:
+    """Let an error (n,) [rad] of a drive move the joints as the gears are coupled."""
+    moves = np.linalg.solve(HOLLOW_WRIST, np.eye(6)[drive - 1])
+
+    def shape(arrivals: VirtualArrivals) -> Floats:
+        return np.outer(errs(arrivals), moves)
+
+    joints = tuple(int(j) + 1 for j in np.flatnonzero(moves))
+    return Law(name, Where.JOINTS, joints, drive, parameters, shape)
 
 
 def scale(draw: Draw) -> Law:
@@ -517,6 +567,9 @@ KINDS = {
     "counterbalance": LawKind(counterbalance, 0.1, 0.5),
     "transmission": LawKind(transmission, 0.05, 0.3),
     "transmission_free": LawKind(transmission_free, 0.05, 0.3),
+    "motor_wave": LawKind(motor_wave, 0.05, 0.3),
+    "drive_wave": LawKind(drive_wave, 0.05, 0.3),
+    "drive_backlash": LawKind(drive_backlash, 0.05, 0.3),
     "scale": LawKind(scale, 0.05, 0.3),
     "coupling": LawKind(coupling, 0.05, 0.3),
     "load_backlash": LawKind(load_backlash, 0.05, 0.3),

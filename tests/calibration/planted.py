@@ -11,7 +11,7 @@ from postproc.calibration.diagnosis.library import Projection
 from postproc.calibration.regression import Fit, fit_effects
 from postproc.model.effects import BASE_EFFECTS, propose
 from postproc.model.kinematics import Batch
-from postproc.robot.arm import load_arm
+from postproc.robot.arm import Arm, load_arm
 from postproc.robot.direction import arrivals_of_rows
 from postproc.robot.state import States, make_states
 from postproc.simulation import (
@@ -23,7 +23,7 @@ from postproc.simulation import (
     stream,
     virtual_arm,
 )
-from postproc.simulation.laws import Law
+from postproc.simulation.laws import HOLLOW_WRIST, MOTOR_TURNS, Law
 
 ARM = load_arm("nj220-2.7")
 TRACKER = np.array([3.0, -2.0, 1.5])  # [m]
@@ -38,6 +38,7 @@ NAMED = (
 )  # fmt: skip
 NAMELESS = ("joint_product", "hysteresis")
 UNTOLD = ("elastic_flank",)  # measured row by row: no travels, no directions told
+WAVES = ("motor_wave", "drive_wave", "drive_backlash")  # of an arm whose gears are told
 SIZES = (0.3, 0.5, 1.0, 2.0)  # rms after projection on the base model over the noise
 
 
@@ -51,6 +52,7 @@ class Campaign:
         arrivals, states: The survey, for the arm and for the model.
         position: Measured, (n, 3) [m].
         sizes: Size of every planted effect after projection, over the noise.
+        declared: What the arm file says.
     """
 
     arm: VirtualArm
@@ -59,11 +61,12 @@ class Campaign:
     states: States
     position: np.ndarray
     sizes: tuple[float, ...]
+    declared: Arm = ARM
 
     def base_fit(self) -> Fit:
         """Fit geometry and backlash: what a user declares."""
-        effects = propose(BASE_EFFECTS, ARM, self.states)
-        batch = Batch(ARM, self.states)
+        effects = propose(BASE_EFFECTS, self.declared, self.states)
+        batch = Batch(self.declared, self.states)
         return fit_effects(batch, self.position, effects, tuple(TRACKER))
 
 
@@ -79,7 +82,8 @@ def campaign(
             the usual size that was drawn.
         rows: Number of rows.
     """
-    clean = planted_arm(seed, rows=rows)
+    wrist = coupling_of(kinds)
+    clean = planted_arm(seed, coupling=wrist, rows=rows)
     untold = not set(kinds).isdisjoint(UNTOLD)
     arrivals = (row_by_row if untold else survey)(clean, seed, rows)
     planted = tuple(Planted(kind) for kind in kinds)
@@ -90,19 +94,22 @@ def campaign(
             for p, was in zip(planted, reached, strict=True)
         )
         reached = (size,) * len(kinds)
-    arm = planted_arm(seed, *planted, rows=rows)
+    arm = planted_arm(seed, *planted, coupling=wrist, rows=rows)
     position = arm.measure(arrivals, TRACKER, stream(seed, "tracker"))
     states = states_of(arrivals)
     if untold:
         ways = arrivals_of_rows(ARM, arrivals.q)
         states = states.with_(direction=ways.direction, travel=ways.travel)
-    return Campaign(arm, planted, arrivals, states, position, reached)
+    told = declared(kinds)
+    return Campaign(arm, planted, arrivals, states, position, reached, told)
 
 
-def planted_arm(seed: int, *planted: Planted, rows: int) -> VirtualArm:
+def planted_arm(
+    seed: int, *planted: Planted, coupling: np.ndarray | None = None, rows: int
+) -> VirtualArm:
     """Draw the arm of a campaign."""
     every = (*map(Planted, BASE), *planted)
-    return virtual_arm(seed, every, rows=rows, tracker=TRACKER)
+    return virtual_arm(seed, every, coupling=coupling, rows=rows, tracker=TRACKER)
 
 
 def row_by_row(arm: VirtualArm, seed: int, rows: int) -> VirtualArrivals:
@@ -114,6 +121,20 @@ def row_by_row(arm: VirtualArm, seed: int, rows: int) -> VirtualArrivals:
     kept = ("speed", "time", "temperature", "payload", "payload_com")
     same = {name: getattr(told, name)[: len(q)] for name in kept}
     return follow_rows(arm, q, tool=told.tool[: len(q)], **same)
+
+
+def coupling_of(kinds: tuple[str, ...]) -> np.ndarray | None:
+    """The wrist gears of the arm that effects are planted in, None: not coupled."""
+    return HOLLOW_WRIST if any(k.startswith("drive_") for k in kinds) else None
+
+
+def declared(kinds: tuple[str, ...]) -> Arm:
+    """The arm as its file says: with gears where waves of gears are planted."""
+    if not set(kinds) & set(WAVES):
+        return ARM
+    wrist = coupling_of(kinds)
+    coupling = ARM.coupling if wrist is None else wrist
+    return replace(ARM, gear_ratio=np.array(MOTOR_TURNS), coupling=coupling)
 
 
 def survey(arm: VirtualArm, seed: int, rows: int) -> VirtualArrivals:
@@ -150,7 +171,7 @@ def part_sizes(c: Campaign) -> dict[int, float]:
     Each is the rms of one joint's part after projection on the base model and on the
     other parts: what nothing else can absorb.
     """
-    many = [law for law in c.arm.laws[1:] if len(law.joints) > 1]
+    many = [x for x in c.arm.laws[1:] if len(x.joints) > 1 and not x.source]
     if not many:
         return {}
     (law,) = many

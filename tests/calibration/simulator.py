@@ -5,7 +5,7 @@ Its chain multiplies 4 x 4 matrices in a loop and shares no code with the packag
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -14,8 +14,11 @@ from scipy.spatial.transform import Rotation
 from postproc.calibration.measurements import Measurements
 from postproc.robot.arm import Arm, load_arm
 from postproc.robot.state import States, make_states
+from postproc.simulation.laws import HOLLOW_WRIST, MOTOR_TURNS
 
 NJ = load_arm("nj220-2.7")
+GEARED = replace(NJ, gear_ratio=np.array(MOTOR_TURNS))
+COUPLED = replace(GEARED, coupling=HOLLOW_WRIST)  # drive 6 turns through q6 - q5 - ..
 TOOL = np.array([0.08, -0.04, 0.15])
 PLATE = np.array([[0.08, -0.04, 0.15], [-0.06, 0.10, 0.20], [0.05, 0.09, 0.32]])
 LOW = np.deg2rad([-90.0, -45, -170, -150, -110, -150])

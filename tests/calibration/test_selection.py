@@ -41,11 +41,11 @@ def test_what_is_there_is_kept() -> None:
 def test_only_covariates_that_vary_are_candidates() -> None:
     rng = np.random.default_rng(0)
     bare = random_states(50, rng)
-    assert not {"thermal", "payload", "lag"} & set(candidates(bare))
-    assert {"thermal", "payload", "lag"} <= set(candidates(covariates(bare, rng)))
+    assert not {"thermal", "payload", "lag"} & set(candidates(NJ, bare))
+    assert {"thermal", "payload", "lag"} <= set(candidates(NJ, covariates(bare, rng)))
     timed = bare.with_(time=60.0 * np.arange(50.0))
-    assert "thermal" in candidates(timed)  # a warm-up in time
-    assert "thermal" not in candidates(bare.with_(time=0.2 * np.arange(50.0)))
+    assert "thermal" in candidates(NJ, timed)  # a warm-up in time
+    assert "thermal" not in candidates(NJ, bare.with_(time=0.2 * np.arange(50.0)))
 
 
 def test_a_warm_up_in_time_is_told_with_the_state_that_predictions_are_for() -> None:

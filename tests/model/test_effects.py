@@ -20,14 +20,16 @@ from postproc.model.effects.effect import (
     fade_turns,
 )
 from postproc.model.kinematics import Batch
-from tests.calibration.simulator import NJ, PLATE, covariates, random_states
+from tests.calibration.simulator import COUPLED, NJ, PLATE, covariates, random_states
 
 RNG = np.random.default_rng(5)
 STATES = covariates(random_states(40, RNG, PLATE), RNG)
 
 
 def variants() -> list[Effect]:
-    out = list(propose(KNOWN, NJ, STATES))
+    drives = [name for name in KNOWN if name.startswith("drive_")]
+    out = list(propose([name for name in KNOWN if name not in drives], NJ, STATES))
+    out += propose(drives, COUPLED, STATES)
     out.append(BY_NAME["thermal"](form="time", time_constant=100.0))
     out.append(BY_NAME["thermal"](form="time", time_constant=9.0, clock="order"))
     out.append(BY_NAME["load_backlash"](form="gravity_side"))
@@ -120,7 +122,7 @@ def test_settings_survive_a_model_file(effect: Effect) -> None:
 
 
 def test_origins_say_what_may_be_compensated() -> None:
-    origin = {e.name: e.belongs_to() for e in propose(KNOWN, NJ, STATES)}
+    origin = {e.name: e.belongs_to() for e in propose(KNOWN, COUPLED, STATES)}
     del origin["curve"]
     assert {n for n, o in origin.items() if o == "setup"} == {
         "base_shift", "tool_shift", "joint_step", "tracker_drift", "azimuth",

@@ -174,11 +174,18 @@ def _write_arm(tmp_path, arm, old, new):
         ("c2_mm = 1175.0", "c2_mm = 1200.0", r"\$\.opw"),
         ("a_mm =", "a_m =", "unknown key|required key"),
         ("repeatability_mm = 0.075", "repeatability_mm = nan", "repeatability_mm"),
+        ("[links]", f"drive_coupling = {[[0.0] * 6] * 6}\n[links]", "invertible"),
     ],
 )
 def test_wrong_arm_file_names_the_place(tmp_path, arm, old, new, said):
     with pytest.raises(ArmError, match=said):
         load_arm(_write_arm(tmp_path, arm, old, new))
+
+
+def test_a_gear_ratio_of_0_is_not_known(tmp_path, arm):
+    ratio = "gear_ratio = [121.0, -80.5, 0.0, 0.0, 0.0, 0.0]\n[links]"
+    read = load_arm(_write_arm(tmp_path, arm, "[links]", ratio))
+    np.testing.assert_array_equal(read.gear_ratio, [121.0, -80.5, *[np.nan] * 4])
 
 
 def test_unknown_arm_lists_the_shipped_ones():

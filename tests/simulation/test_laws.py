@@ -45,6 +45,7 @@ COVARIATES = {
     "compliance": {"payload"}, "payload": {"payload"}, "counterbalance": set(),
     "transmission": set(), "transmission_free": set(), "scale": set(),
     "coupling": set(), "worn_spot": set(), "joint_product": set(),
+    "motor_wave": set(), "drive_wave": set(), "drive_backlash": {"flank"},
     "backlash": {"flank"}, "load_backlash": {"flank", "payload"},
     "gravity_side": {"payload"}, "windup": {"flank", "travel"},
     "lag": {"flank", "speed"}, "hysteresis": {"flank", "travel", "loop"},

@@ -21,6 +21,7 @@ from postproc.calibration.diagnosis.result import (
     Diagnosis,
     Profile,
     ResidualPlace,
+    not_excluded,
     profile,
     statistics,
 )
@@ -250,6 +251,7 @@ def _conclude(
         why_next=why,
         dropped=weighed_down(found.fit, survey),
         directions=report_directions(found.fit, survey),
+        not_excluded=not_excluded(found.fit.batch),
     )
 
 

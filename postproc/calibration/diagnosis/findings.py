@@ -49,7 +49,7 @@ def _describe(
         evidence=standing.evidence,
         share=share,
         peak_mm=float(moved.max(initial=0.0) / MM),
-        parameters=_parameters(effect, fit.values[part], fit.std[part]),
+        parameters=_parameters(effect, fit.values[part], fit.covariance[part, part]),
         confusable_with=confusable,
         settings=effect.settings(),
         held_out_gain=(addition.gain.mean, addition.gain.std_error),
@@ -57,10 +57,13 @@ def _describe(
 
 
 def _parameters(
-    effect: Effect, values: Floats, std: Floats
+    effect: Effect, values: Floats, covariance: Floats
 ) -> dict[str, tuple[float, float, str]]:
-    """List value, standard error and unit of every parameter."""
+    """List value, standard error and unit of every parameter, and a wave's size."""
     out = {}
+    if (wave := effect.amplitude(values, covariance)) is not None:
+        out["amplitude"] = (wave[0] * 1e3, wave[1] * 1e3, "mrad")
+    std = np.sqrt(np.diag(covariance))
     for p, value, error in zip(effect.parameters(), values, std, strict=True):
         unit, factor = SHOWN_UNITS.get(p.unit, (p.unit, 1.0))
         out[p.name] = (float(value * factor), float(error * factor), unit)

@@ -9,11 +9,12 @@ import numpy as np
 
 from postproc.arrays import Floats
 from postproc.calibration.diagnosis.library import Projection
-from postproc.calibration.diagnosis.score import Leftover
+from postproc.calibration.diagnosis.score import LENGTHS, Leftover
 from postproc.calibration.measurements import DroppedRow
 from postproc.calibration.regression import Fit
 from postproc.calibration.report import DirectionReport
 from postproc.model.covariate import covariate, unit
+from postproc.model.effects import EFFECTS
 from postproc.model.effects.effect import Candidate, Effect
 from postproc.model.kinematics import Batch
 from postproc.model.statistics import ErrorStatistics
@@ -113,6 +114,7 @@ class Diagnosis:
         why_next: What they are for.
         dropped: Rows that count less than fully, and why.
         directions: Wrong directions, or None where the file has none.
+        not_excluded: What the rows could not have shown, in words.
     """
 
     verdict: Verdict
@@ -130,6 +132,7 @@ class Diagnosis:
     why_next: str
     dropped: tuple[DroppedRow, ...]
     directions: DirectionReport | None
+    not_excluded: tuple[str, ...] = ()
 
     def to_dict(self) -> dict[str, Any]:
         """Return the content of the JSON report."""
@@ -165,6 +168,7 @@ class Diagnosis:
                 {"id": d.id, "line": d.line, "why": d.why} for d in self.dropped
             ],
             "directions": None if self.directions is None else asdict(self.directions),
+            "not_excluded": list(self.not_excluded),
         }
 
 
@@ -176,6 +180,17 @@ def statistics(spread: ErrorStatistics) -> dict[str, float]:
         "p95_mm": spread.p95_mm,
         "max_mm": spread.max_mm,
     }
+
+
+# What rows cannot show, however large it is.
+
+
+def not_excluded(batch: Batch) -> tuple[str, ...]:
+    """Say what may hide in what looks like noise: what no candidate asked for."""
+    out = [what for kind in EFFECTS for what in kind.not_tried(batch)]
+    finest = max(min(LENGTHS), 1.0 / np.sqrt(max(len(batch), 1)))
+    out.append(f"functions of two joints finer than {finest:.0%} of their ranges")
+    return tuple(out)
 
 
 # Residuals seen from where they may live: a joint, a covariate, an order per turn.

@@ -17,6 +17,12 @@ from postproc.model.effects.compliance import Compliance
 from postproc.model.effects.counterbalance import Counterbalance
 from postproc.model.effects.coupling import Coupling
 from postproc.model.effects.curve import Curve
+from postproc.model.effects.drive import (
+    DriveBacklash,
+    DriveEffect,
+    DriveLoad,
+    DriveTransmission,
+)
 from postproc.model.effects.effect import Effect
 from postproc.model.effects.elm import Elm, ElmMap
 from postproc.model.effects.geometry import Geometry
@@ -55,6 +61,9 @@ EFFECTS: tuple[type[Effect], ...] = (
     Scale,
     Coupling,
     LoadBacklash,
+    DriveBacklash,
+    DriveTransmission,
+    DriveLoad,
     Thermal,
     Windup,
     Lag,
@@ -111,6 +120,11 @@ def _check_needs(kind: Effect, states: States) -> None:
                 f"effect {kind.name} needs the {need} of every row, which the file "
                 f"does not have. Add the column or leave the effect out"
             )
+    if isinstance(kind, DriveEffect) and not kind.parameters():
+        raise PostprocError(
+            f"effect {kind.name} is of coupled drives. Declare drive_coupling in the "
+            f"arm file, or leave the effect out"
+        )
 
 
 def restore(name: str, settings: Mapping[str, Any]) -> Effect:

@@ -112,6 +112,11 @@ class Effect(ABC):
         """Return it as it shows to a tracker at a place, base frame [m]."""
         return self
 
+    @classmethod
+    def not_tried(cls, batch: Batch) -> tuple[str, ...]:
+        """Say what of its kind is no candidate for these rows, however large it is."""
+        return ()
+
     def refined(self, offsets: Floats, batch: Batch) -> list[Effect]:
         """Vary what is not linear in it; nothing where there is nothing finer.
 
@@ -162,6 +167,17 @@ class Effect(ABC):
         moved: Floats = self.columns(batch) @ p
         return moved
 
+    def angles(self, batch: Batch, p: Floats) -> Floats:
+        """Return the errors of gears, joints or drives, (n, 6) [rad], 0 without."""
+        return np.zeros((len(batch), 6))
+
+    def direction_slopes(self, batch: Batch, p: Floats) -> Floats | None:
+        """Give its position error per unit of each direction, (n, 3, 6) [m].
+
+        None where that follows from the errors of joints, or there is none.
+        """
+        return None
+
     def only_joint(self) -> int | None:
         """Return the joint, from 0, that all its columns turn, None without one."""
         return None
@@ -185,6 +201,15 @@ class Effect(ABC):
     def nonlinear(self) -> dict[str, tuple[float, str]]:
         """List the settings that are not linear: value and unit, as people use them."""
         return {}
+
+    def amplitude(self, p: Floats, covariance: Floats) -> tuple[float, float] | None:
+        """Return the size of a wave and its standard error [rad], None without one.
+
+        Args:
+            p: Its parameters, (p,).
+            covariance: Of them, (p, p).
+        """
+        return None
 
 
 @dataclass(frozen=True)

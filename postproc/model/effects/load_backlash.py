@@ -65,10 +65,7 @@ class LoadBacklash(JointEffect):
         out = []
         for j in carrying(batch):
             t0 = max(float(typical[j - 1]), 1e-3)
-            laws = [cls((j,), "load", t0)]
-            laws += [cls((j,), "gravity_side", k * t0) for k in FLANKS]
-            laws += [cls((j,), "signed", k * t0) for k in (*FLANKS, STRAIGHT)]
-            out += alternatives([(law, f"torque {j}") for law in laws], j)
+            out += alternatives([(law, f"torque {j}") for law in laws(j, t0)], j)
         return out
 
     def refined(self, offsets: Floats, batch: Batch) -> list[Effect]:
@@ -107,3 +104,11 @@ class LoadBacklash(JointEffect):
             law = np.tanh(torque)
             law, second = sign * law, sign * (1.0 - law**2)
         return np.stack([law, second], axis=2).reshape(len(batch), 2 * len(joint))
+
+
+def laws(joint: int, typical: float) -> list[LoadBacklash]:
+    """List all forms of one joint, flanks changing about a typical torque [N m]."""
+    out = [LoadBacklash((joint,), "load", typical)]
+    out += [LoadBacklash((joint,), "gravity_side", k * typical) for k in FLANKS]
+    out += [LoadBacklash((joint,), "signed", k * typical) for k in (*FLANKS, STRAIGHT)]
+    return out

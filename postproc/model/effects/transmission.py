@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
@@ -19,12 +19,16 @@ from postproc.model.effects.effect import (
     Unasked,
 )
 from postproc.model.kinematics import Batch
+from postproc.robot.arm import Arm
 
 SCALE = 5e-5  # [rad]
 ECCENTRIC = (1.0, 2.0)  # orders of a gear or encoder out of centre
-FIRST_FREE, LAST_FREE = 3.0, 60.0  # orders of a gear's teeth
+FIRST_FREE, LAST_FREE = 3.0, 60.0  # orders of a gear's teeth, its ratio not known
+BEYOND = 20.0  # orders beyond twice the ratio, where it is known
 LOWEST = 2.5  # order that refining never falls below
 FINEST = 0.25  # step of the free orders
+ALIKE = 0.9  # correlation of two waves over the poses that are not told apart
+LOOKED_AT = 1000  # angles that are enough to see how they are spaced
 
 
 @dataclass(frozen=True)
@@ -45,33 +49,57 @@ class Transmission(JointEffect):
 
     @classmethod
     def candidates(cls, batch: Batch) -> list[Candidate]:
-        """Try every joint: half of the prior is eccentricity's, half the teeth's."""
-        half, out = float(np.log(0.5)), []
+        """Try every joint; eccentricity, the motor and the teeth share the prior."""
+        out = []
         for j in JOINTS:
-            low = [cls(((j, k),)) for k in ECCENTRIC]
-            high = [cls(((j, float(k)),)) for k in _free_orders(batch, j)]
             family = Family(cls.name, j, None, NAMED)
-            for members in (low, high):
-                share = half - float(np.log(len(members)))
-                out += [Candidate(family, e, f"joint {j}", share) for e in members]
+            for order, share in cls.orders(batch, j).tried():
+                out.append(Candidate(family, cls(((j, order),)), f"joint {j}", share))
         return out
+
+    @classmethod
+    def not_tried(cls, batch: Batch) -> tuple[str, ...]:
+        """Say which orders are too high for the spacing of the poses, or not known."""
+        highest: dict[int, list[int]] = {}
+        for j in JOINTS:
+            told = cls.orders(batch, j).told
+            highest.setdefault(int(max(told, ECCENTRIC[-1])), []).append(j)
+        out = [
+            f"waves of more than {order} a turn of {_joints(joints)}"
+            for order, joints in sorted(highest.items())
+        ]
+        if np.isnan(batch.arm.gear_ratio).any():
+            out[-1] += ", those of the motors with them: no gear_ratio in the arm file"
+        return tuple(out)
+
+    @classmethod
+    def orders(cls, batch: Batch, joint: int) -> Orders:
+        """Take the orders of a joint, from 1, that may be tried."""
+        own = tuple(float(j == joint) for j in JOINTS)
+        return orders_of(batch, own, motor_ratio(batch.arm, joint))
 
     def refined(self, offsets: Floats, batch: Batch) -> list[Effect]:
         """Change the order of one wave; those of eccentricity are what they are."""
-        (joint, order), *others = self.waves
-        if others or order <= ECCENTRIC[-1]:
-            return []
-        step = np.pi / _covered(batch, joint)
-        tries = np.unique(np.clip(order + step * offsets, LOWEST, LAST_FREE))
-        return [Transmission(((joint, float(k)),)) for k in tries]
+        (joint, _), *others = self.waves
+        orders = self.orders(batch, joint)
+        tries = [] if others else orders.near(self.waves[0][1], offsets)
+        return [Transmission(((joint, k),)) for k in tries]
 
     def plainer(self) -> Effect:
         """Return waves of whole orders: gears have whole numbers of teeth."""
-        return Transmission(tuple((j, float(round(k))) for j, k in self.waves))
+        return replace(self, waves=whole(self.waves))
 
     def nonlinear(self) -> dict[str, tuple[float, str]]:
         """Tell the order of the first wave."""
         return {"order": (float(self.waves[0][1]), "1/turn")}
+
+    def amplitude(self, p: Floats, covariance: Floats) -> tuple[float, float] | None:
+        """Return that of a single wave and its standard error [rad]."""
+        if len(self.waves) != 1:
+            return None
+        size = float(np.hypot(*p))
+        along = p / max(size, 1e-300)
+        return size, float(np.sqrt(along @ covariance @ along))
 
     def parameters(self) -> tuple[Parameter, ...]:
         """Name sine and cosine of every wave."""
@@ -90,12 +118,99 @@ class Transmission(JointEffect):
         return both.reshape(len(batch), 2 * len(self.waves))
 
 
-def _covered(batch: Batch, joint: int) -> float:
-    """Return the surveyed range of a joint, a tenth of a radian at least [rad]."""
-    return max(float(np.ptp(batch.states.q[:, joint - 1])), 0.1)
+def _joints(numbers: list[int]) -> str:
+    """Name joints."""
+    some = ", ".join(map(str, numbers))
+    return f"joint {some}" if len(numbers) == 1 else f"joints {some}"
 
 
-def _free_orders(batch: Batch, joint: int) -> Floats:
-    """Give the free orders to try: steps of half of what the range resolves."""
-    step = max(np.pi / _covered(batch, joint), FINEST)
-    return np.arange(FIRST_FREE, LAST_FREE, step)
+def whole(waves: tuple[tuple[int, float], ...]) -> tuple[tuple[int, float], ...]:
+    """Round the orders of waves."""
+    return tuple((j, float(round(k))) for j, k in waves)
+
+
+def motor_ratio(arm: Arm, joint: int) -> float:
+    """Say how often a motor turns while the joint does once; NaN where not known.
+
+    The motor of a coupled joint follows other joints too: its turns are a drive's.
+    """
+    ratio = float(abs(arm.gear_ratio[joint - 1]))
+    return ratio if turns_alone(arm, joint) else float("nan")
+
+
+def turns_alone(arm: Arm, joint: int) -> bool:
+    """Tell whether the motor of a joint follows no other one."""
+    return np.array_equal(arm.coupling[joint - 1], np.eye(6)[joint - 1])
+
+
+@dataclass(frozen=True)
+class Orders:
+    """Orders of waves of one angle that may be tried.
+
+    Attributes:
+        covered: Surveyed range, a tenth of a radian at least [rad].
+        ratio: Turns of the motor per turn; NaN where not known.
+        asked: The highest order that is worth asking for.
+        told: The highest order that the poses tell from all lower ones.
+    """
+
+    covered: float
+    ratio: float
+    asked: float
+    told: float
+
+    @classmethod
+    def of(cls, angle: Floats, ratio: float) -> Orders:
+        """Take the orders that poses can tell apart.
+
+        Args:
+            angle: Surveyed angles, (n,) [rad].
+            ratio: Turns of the motor per turn, or NaN.
+        """
+        covered = max(float(np.ptp(angle)), 0.1)
+        asked = LAST_FREE if np.isnan(ratio) else 2.0 * ratio + BEYOND
+        return cls(covered, ratio, asked, min(asked, _alias(angle, covered, asked)))
+
+    @property
+    def free(self) -> Floats:
+        """Give the free orders: steps of half of what the range resolves."""
+        return np.arange(FIRST_FREE, self.told, max(np.pi / self.covered, FINEST))
+
+    @property
+    def motor(self) -> list[float]:
+        """Give once and twice a turn of the motor, where the poses can tell."""
+        return [k * self.ratio for k in ECCENTRIC if k * self.ratio < self.told]
+
+    def tried(self) -> list[tuple[float, float]]:
+        """List the orders, each with the log of its share of the prior."""
+        sets = [list(ECCENTRIC), self.motor, self.free.tolist()]
+        sets = [some for some in sets if some]
+        return [(k, -float(np.log(len(s) * len(sets)))) for s in sets for k in s]
+
+    def near(self, order: float, offsets: Floats) -> list[float]:
+        """Vary a free order by steps of the grid; those of eccentricity stay."""
+        if order <= ECCENTRIC[-1]:
+            return []
+        step, top = np.pi / self.covered, max(self.told, LOWEST)
+        tries: list[float] = np.unique(
+            np.clip(order + step * offsets, LOWEST, top)
+        ).tolist()
+        return tries
+
+
+def orders_of(batch: Batch, row: tuple[float, ...], ratio: float) -> Orders:
+    """Take the orders that may be tried of an angle, row @ q, found once."""
+    key = ("orders", row, None if np.isnan(ratio) else ratio)
+    return batch.once(key, lambda q: Orders.of(q @ np.array(row), ratio))
+
+
+def _alias(angle: Floats, covered: float, last: float) -> float:
+    """Find the order from which waves look like lower ones, half a sampling rate.
+
+    Waves of orders k and k' are alike over the poses as far as the mean of
+    exp(i (k - k') angle) is 1; of k and -k' as far as that of k + k' is.
+    """
+    some = np.sort(angle)[:: max(len(angle) // LOOKED_AT, 1)]
+    apart = np.arange(2.0 * np.pi / covered, 2.0 * last, 1.0 / covered)
+    alike = np.abs(np.exp(1j * np.outer(apart, some)).mean(axis=1)) > ALIKE
+    return float(apart[np.argmax(alike)] / 2.0) if alike.any() else np.inf
