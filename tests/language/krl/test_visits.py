@@ -422,6 +422,12 @@ def test_calls_are_followed():
     assert "motion-unknown" in codes(found)  # own is another file's
 
 
+def test_a_point_that_is_handed_over_is_left():
+    more = "DEF weld (p:IN)\nE6POS p\nLIN p\nEND\n"
+    found = job("weld(XP1)", "PTP XP1", more=more)
+    assert "p is a parameter" in reasons(found)[0]
+
+
 def test_what_may_move_forgets_where_the_arm_is():
     found = job("LIN XP1", "grip( )", "LIN XP2")
     assert origins(found)[1] == [ELSEWHERE] and "motion-unknown" in codes(found)
