@@ -357,10 +357,10 @@ def _unchanged(program: Path, record: Sidecar, path: Path) -> bytes:
     Raises:
         ProgramError: The record speaks of no file, or the program was changed.
     """
-    if not record.files:
-        problem = f"speaks of no file: nothing was changed in {program.name} itself"
-        raise ProgramError(path, problem, OF_PAGES)
     data = read_input(program, BESIDE)
     if read_stamp(data) is not None:
         raise ProgramError(path, f"does not speak of {program.name}", CURE)
+    if not record.files:
+        problem = f"speaks of no file: nothing was changed in {program.name} itself"
+        raise ProgramError(path, problem, OF_PAGES)
     return data

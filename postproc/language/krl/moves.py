@@ -103,7 +103,7 @@ class KrlGoals:
     ) -> Iterator[KrlVisit]:
         """Read the visits of a move: the point of an arc, and its end."""
         motion, kind = motion_of(move.word), move.word.removesuffix("_rel")
-        block, given = self._block(row, here), dict[str, Any]()
+        block, given = self.block(row, here), dict[str, Any]()
         if block is not None:
             move, given = self._in_block(move, row, here, block)
         in_joints = block is not None and self._is_in_joints(block, here)
@@ -127,7 +127,7 @@ class KrlGoals:
             arc_angle=angle, curved=in_joints or kind == "spl", **given, move=move,
         )  # fmt: skip
 
-    def _block(self, row: int, here: Scope) -> range | None:
+    def block(self, row: int, here: Scope) -> range | None:
         """Return the rows of the spline block that a move stands in."""
         blocks = self.task.files[here.file].splines
         return next((rows for rows in blocks if row in rows), None)
@@ -299,7 +299,13 @@ class _Goal:
         )
 
     def _stay(self, name: str) -> FoundGoal:
-        """Read a move to where the arm is: a step of nothing."""
+        """Read a move to where the arm is: a step of nothing.
+
+        On an arc or in a spline block that is where the arc or the block begins.
+        """
+        within = self.goals.block(self.row, self.here) is not None
+        if within or self.move.via is not None:
+            return _left(f"{NO_TARGET}: {RUN_TIME}", name=name)
         meaning = Meaning.BY if self._by_joints else Meaning.RELATIVE_UFRAME
         why = f"{NO_TARGET}: it stays where it is"
         return FoundGoal(meaning, (0.0,) * WIDTH, name=name, why=why)

@@ -321,6 +321,10 @@ def test_where_the_arm_is_holds_no_target():
     assert v.target.tolist() == [Meaning.POSE, Meaning.RELATIVE_UFRAME, Meaning.BY]
     assert v.fly.tolist() == [False] * 3 and not v.values[1:].any()
     assert all("stays where it is" in why for why in reasons(found)[1:])
+    lines = ["CIRC XP1,$POS_ACT", "SPLINE", "SPL XP2", "SLIN $POS_ACT", "ENDSPLINE"]
+    goals = job("LIN XP1", *lines).visits.target.tolist()  # where arc or block began
+    known, lost = Meaning.POSE, Meaning.UNKNOWN
+    assert goals == [known, known, lost, known, lost]
 
 
 def test_home_holds_no_target():
