@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import signal
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -74,12 +75,26 @@ def bench_model(tmp_path_factory) -> Model:
     return load_model(make_job(tmp_path_factory.mktemp("job"), text) / "model.json")
 
 
-def make_job(folder: Path, text: str = CELL, seed: int = SEED) -> Path:
-    """Write a cell, a survey of a virtual arm, and the model fitted to it."""
+def make_job(
+    folder: Path,
+    text: str = CELL,
+    seed: int = SEED,
+    poses: int = POSES,
+    quiet: bool = False,
+) -> Path:
+    """Write a cell, a survey of a virtual arm, and the model fitted to it.
+
+    Args:
+        folder: Where they go.
+        text: Of the cell.
+        seed: Of the arm and its survey.
+        poses: Of the survey.
+        quiet: The survey's arm repeats exactly, and its tracker has no noise.
+    """
     (folder / "cell.toml").write_text(text)
     cell = load_cell(folder / "cell.toml")
     rows = folder / "rows.csv"
-    targets = sample_survey(virtual_arm(seed), POSES, seed=seed)
+    targets = sample_survey(virtual_arm(seed), poses, seed=seed)
     with rows.open("w") as out:
         names = [f"q{j}_deg" for j in range(1, 7)]
         sides = [f"lambda{j}" for j in range(1, 7)]
@@ -90,6 +105,8 @@ def make_job(folder: Path, text: str = CELL, seed: int = SEED) -> Path:
     from postproc.cli.simulate import setup_of
 
     arm = virtual_arm(seed)
+    if quiet:
+        arm = replace(arm, joint_noise=np.zeros(6), tracker_noise=(0.0, 0.0))
     campaign = measure_rows(arm, setup_of(cell), read_rows(rows))
     write_measurements(campaign, folder / "survey.csv")
     effects = BASE_EFFECTS  # all that this arm has: a search takes long

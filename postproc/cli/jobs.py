@@ -68,8 +68,9 @@ def find_pages(program: Path) -> Pages:
     """Find the programs that IMPORT, CALL or EXPORTED FROM name, in the same folder.
 
     A program that others name too is theirs as well, and one with a variable file of
-    its own or of another arm is a program by itself: none is followed. Earlier outputs
-    and symbolic links do not count.
+    its own or of another arm is a program by itself: none is followed. Symbolic links
+    do not count, nor do earlier outputs, unless the program is one: what was changed
+    of a job lies in its pages alone where those hold its points.
     """
     wanted, outside = names_in(program)
     notes = [
@@ -83,7 +84,8 @@ def find_pages(program: Path) -> Pages:
         return Pages((), tuple(notes), reads)
     files = [p for p in sorted(program.parent.iterdir()) if not p.is_symlink()]
     values = {base_name(p.name) for p in files if is_variables(p.name)}
-    programs = {program_key(p.name): p for p in files if _is_source(p)}
+    outputs = _is_output(program)
+    programs = {program_key(p.name): p for p in files if _is_page(p, outputs)}
     programs |= {main: program}
     named = {base: _named(path, main) for base, path in programs.items()}
     arms = {base: program_arm(read_head(path)) for base, path in programs.items()}
@@ -104,12 +106,17 @@ def _not_followed(program: Path, line: int, text: str) -> Diagnostic:
     return Diagnostic(program.name, line, "not-followed", text)
 
 
-def _is_source(path: Path) -> bool:
-    """Tell whether a file is a program or a data list, and no output of ours."""
+def _is_page(path: Path, outputs: bool) -> bool:
+    """Tell whether a file is a program or a data list, be it an output or not."""
     ours = is_program(path.name) or is_data_list(path.name)
     if not (ours and path.is_file()) or is_shared_list(path.name):
         return False
-    return read_stamp(read_head(path)) is None
+    return outputs or read_stamp(read_head(path)) is None
+
+
+def _is_output(program: Path) -> bool:
+    """Tell whether a program was written by a compensation, changed or not."""
+    return read_stamp(read_head(program)) is not None or sidecar_path(program).is_file()
 
 
 def _named(path: Path, main: str) -> dict[str, int]:

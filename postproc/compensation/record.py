@@ -260,6 +260,10 @@ def _is_name(name: str) -> bool:
 # Give a compensated program back as it was.
 
 BESIDE = "Put it beside its record"
+OF_PAGES = (
+    "A page that was changed, such as a data list, has a record of its own: restore "
+    "that"
+)
 
 
 def restore(data: bytes, record: FileRecord, name: str) -> bytes:
@@ -353,9 +357,10 @@ def _unchanged(program: Path, record: Sidecar, path: Path) -> bytes:
     Raises:
         ProgramError: The record speaks of no file, or the program was changed.
     """
-    if not record.files:
-        raise ProgramError(path, "speaks of no file", CURE)
     data = read_input(program, BESIDE)
     if read_stamp(data) is not None:
         raise ProgramError(path, f"does not speak of {program.name}", CURE)
+    if not record.files:
+        problem = f"speaks of no file: nothing was changed in {program.name} itself"
+        raise ProgramError(path, problem, OF_PAGES)
     return data

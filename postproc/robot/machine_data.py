@@ -6,6 +6,7 @@ import json
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -332,20 +333,33 @@ def _limits(data: MachineData) -> dict[str, str]:
 
 
 def _coupling(data: MachineData) -> str:
-    """Note the couplings of the wrist: with which sign they count is not known."""
-    found = []
-    for axis in AXES:
-        for other in AXES:
-            if ("COUP_COMP", (axis, other)) in data.values:
-                fields = data.fields("COUP_COMP", axis, other)
-                if fields.get("N", 0.0):
-                    said = f"{fields['N']:.0f}/{fields.get('D', 1.0):.0f}"
-                    found.append(f"axis {axis} on {other} {said}")
+    """Write how the drives of the wrist are coupled.
+
+    ``$COUP_COMP[m,n]`` is by how much axis n turns where axis m is turned by 1 and the
+    drive of n stands still (KUKA, KR C2 Machine Data, 2.1.5). So the drive of n turns
+    by the angle of its axis less that.
+
+    Raises:
+        ArmError: A coupling is no ratio.
+    """
+    found, matrix = [], np.eye(len(AXES))
+    for axis, other in product(AXES, AXES):
+        if axis == other or ("COUP_COMP", (axis, other)) not in data.values:
+            continue
+        fields = data.fields("COUP_COMP", axis, other)
+        n, d = fields.get("N", 0.0), fields.get("D", 1.0)
+        if d == 0.0:
+            raise ArmError(data.path, f"$COUP_COMP[{axis},{other}] is no ratio", CURE)
+        if n:
+            found.append(f"axis {axis} on {other} {n:.0f}/{d:.0f}")
+            matrix[other - 1, axis - 1] = -n / d
     if not found:
         return "# $COUP_COMP couples no axes.\n"
+    rows = "".join(f"    {_list(row)},\n" for row in matrix)
     return (
-        f"# $COUP_COMP: {', '.join(found)}.\n"
-        "# Not taken over as drive_coupling: with which sign they count is not known.\n"
+        f"# $COUP_COMP: {', '.join(found)}: what an axis turns by with its own drive\n"
+        "# at rest. drive-side angle = drive_coupling . joint angle\n"
+        f"drive_coupling = [\n{rows}]\n"
     )
 
 

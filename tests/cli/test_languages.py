@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 import shutil
 from dataclasses import replace
@@ -198,3 +199,39 @@ def test_jobs_of_an_archive_share_a_data_list(place):
     assert (new / "System/$config.dat").read_bytes() == shared.read_bytes()
     checked = cli("check", place.folder / "new", "--model", place.model)
     assert checked.exit_code == 0 and "0 findings" in checked.output
+
+
+def named_points(place):
+    """Write a KRL job whose points all stand in its data list; return its source."""
+    job = drawn(load_cell(place.cell), 5, 6)
+    moves = [
+        replace(move, name=f"n{k}", in_joints=False, via=None, motion=Motion.JOINT)
+        for k, move in enumerate(job.moves)
+    ]
+    folder = place.folder / "named"
+    folder.mkdir()
+    for part, data in LANGUAGES["job.src"](replace(job, moves=moves)).items():
+        (folder / part).write_bytes(data)
+    return folder / "job.src"
+
+
+def test_the_output_of_a_job_is_read_with_its_changed_data_list(place):
+    """What was changed lies in the data list alone; the source is as it was."""
+    job, made = named_points(place), place.folder / "made/job.src"
+    made.parent.mkdir()
+    assert place.compensate(job, "-o", made).exit_code == 0
+    assert made.read_bytes() == job.read_bytes()
+    changed = made.with_suffix(".dat")
+    assert changed.read_bytes() != job.with_suffix(".dat").read_bytes()
+    means = []
+    for run_ in (job, made):
+        given = ("--cell", place.cell, "--wanted", job, "--seed", 4, "--json", "-")
+        found = cli("simulate", run_, *given, "-o", place.folder / "m.csv")
+        means.append(json.loads(found.stdout)["true_error"]["mean_mm"])
+    assert means[1] < 0.1 * means[0]
+    again = place.compensate(made, "-o", place.folder / "again.src")
+    assert again.exit_code == 2 and "job.dat:1: is compensated already" in again.stderr
+    told = cli("restore", made)
+    assert told.exit_code == 2 and "has a record of its own" in told.stderr
+    assert cli("restore", changed).exit_code == 0
+    assert changed.read_bytes() == job.with_suffix(".dat").read_bytes()

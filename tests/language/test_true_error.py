@@ -16,7 +16,15 @@ from postproc.language.visits import Meaning
 from postproc.robot.trajectory import Motion
 from postproc.simulation import run_program, virtual_arm
 from tests.conftest import SEED
-from tests.language.neutral_job import LANGUAGES, compensated, drawn, krl, pdl2, rapid
+from tests.language.neutral_job import (
+    LANGUAGES,
+    NeutralMove,
+    compensated,
+    drawn,
+    krl,
+    pdl2,
+    rapid,
+)
 from tests.language.true_error import ARMS, MAX_MM, MEAN_MM, differing, driven, fitted
 from tests.language.true_error import landed as landed_on
 
@@ -145,3 +153,67 @@ def test_t_is_that_of_the_rounded_numbers(bench_cell, bench_model):
         whys = [decisions.reasons[k] for k in decisions.why[rows[ends & ~safe]]]
         near += sum("within 0.02 deg of 0" in why for why in whys)
     assert anew > 5 and near > 5
+
+
+def near_a_bound_of_s(cell, joint: int, bit: int, seed: int):
+    """Draw a job whose stops lie where the shoulder or the elbow turns over.
+
+    Args:
+        cell: The cell.
+        joint: Column of the joint that is turned to get there.
+        bit: Of the branch, that changes there.
+        seed: Of the draw.
+    """
+    rng = np.random.default_rng(seed)
+    job, moves = drawn(cell, seed, 1), []
+    begin = np.deg2rad([20.0, -40.0, -100.0, 30.0, 50.0, 20.0])
+    if joint == 2:
+        begin = np.deg2rad([20.0, 10.0, -20.0, 30.0, 50.0, 20.0])
+    for _ in range(24):
+        q = begin + np.deg2rad(rng.uniform(-5.0, 5.0, 6))
+        some = np.tile(q, (4000, 1))
+        some[:, joint] += np.linspace(-0.5, 0.5, 4000)
+        turns = np.flatnonzero(np.diff(cell.arm.branch(some) & bit))
+        middle = some[turns[0], joint] if len(turns) else q[joint]
+        q[joint] = middle + np.deg2rad(rng.choice([0.05, 0.3, 2.0]) * rng.normal())
+        moves.append(NeutralMove(Motion.JOINT, q))
+    first = NeutralMove(Motion.JOINT, begin, in_joints=True)
+    return replace(job, moves=(first, *moves))
+
+
+@pytest.mark.parametrize(("joint", "bit"), [(1, 2), (2, 1)], ids=["shoulder", "elbow"])
+def test_s_need_not_change_where_the_arm_turns_over(
+    bench_cell, bench_model, joint, bit
+):
+    """The controller solves what is written for the S that is written.
+
+    So a corrected target is on the branch of the original, or on none; where that is
+    on the other side of the bound, the arm would have to turn over, and it is left.
+    """
+    low, high = ((end,) * 6 for end in (-np.pi, np.pi))
+    everywhere = replace(bench_model.ranges, lower=low, upper=high)
+    model = replace(bench_model, ranges=everywhere)  # what counts here is the branch
+    safe, near, sides = 0, 0, set()
+    for seed in range(1, 4):
+        source = krl(near_a_bound_of_s(bench_cell, joint, bit, seed))
+        found = compensated("job.src", source, bench_cell, model)
+        output = {**source, **found.outputs}
+        for name in source:
+            other, flags = differing(name, source[name], output[name])
+            assert other is None
+            assert all(a.split(",")[0] == b.split(",")[0] for _, a, b in flags)
+        setup = setup_of(bench_cell)
+        made = read_program(output, bench_cell).visits
+        run = run_program(virtual_arm(SEED, tool=setup.tool), setup, made)
+        rows, q = run.visit, run.arrivals.q
+        good = found.decisions.status[rows] == Status.SAFE
+        good &= made.config_given[rows]
+        branch = bench_cell.arm.branch(q)
+        s = made.values[rows, 6].astype(int)
+        assert ((s & 1 > 0) == (branch & 2 > 0))[good].all()
+        assert ((s & 2 > 0) == (branch & 1 == 0))[good].all()
+        turned = np.abs(q - found.decisions.q[rows])[good]
+        assert np.rad2deg(turned.max()) < 12.0
+        safe, near = safe + good.sum(), near + (~good).sum()
+        sides |= set(s[good].tolist())
+    assert safe > 10 and near > 3 and len(sides) > 1

@@ -17,6 +17,7 @@ import tempfile
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -85,10 +86,16 @@ class Landed:
         return bool(small) and self.other is None
 
 
-def fitted(arm: int, folder: Path) -> tuple[Cell, Model]:
-    """Survey a virtual arm in the cell of the shipped programs, and fit a model."""
+def fitted(arm: int, folder: Path, **survey: Any) -> tuple[Cell, Model]:
+    """Survey a virtual arm in the cell of the shipped programs, and fit a model.
+
+    Args:
+        arm: Its seed.
+        folder: Where cell, survey and model go.
+        **survey: As `make_job` has it.
+    """
     text = (ROOT / "programs" / "cell.toml").read_text(encoding="utf-8")
-    make_job(folder, text, arm)
+    make_job(folder, text, arm, **survey)
     return load_cell(folder / "cell.toml"), load_model(folder / "model.json")
 
 

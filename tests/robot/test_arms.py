@@ -69,4 +69,6 @@ def test_every_arm_names_its_source_and_calls_guesses_guesses(name):
     assert "https://github.com/" in text.partition("name = ")[0]
     assert "not published: guesses" in text
     joints = load_arm(name).file.joints
-    assert joints.drive_coupling is None and joints.gear_ratio is None
+    known = "machine.dat of https://" in text
+    assert (joints.drive_coupling is not None) == known
+    assert (joints.gear_ratio is not None) == known

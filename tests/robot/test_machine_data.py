@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 
@@ -32,7 +34,8 @@ DECL DHART $DH_5={DHART_A 0.0,DHART_D 0.0,DHART_ALPHA -90.0000}
 INT $AXIS_DIR[12]
 DECL FRA $COUP_COMP[6,6]
 $COUP_COMP[4,5]={N -91,D 5780}
-$COUP_COMP[4,6]={N 0,D 1}
+$COUP_COMP[4,6]={N 97351,D 11765190}
+$COUP_COMP[5,6]={N -134,D 14337}
 """
 COLUMNS = {
     "AXIS_DIR": [-1, 1, 1, -1, -1, -1],
@@ -71,7 +74,8 @@ def test_it_is_the_shipped_arm(tmp_path):
     found = np.array(arm.file.joints.velocity_deg_s)
     np.testing.assert_allclose(found, shipped.file.joints.velocity_deg_s, rtol=0.005)
     assert arm.file.joints.gear_ratio[2] == -241.0
-    assert arm.file.joints.drive_coupling is None
+    np.testing.assert_allclose(arm.coupling, shipped.coupling, atol=1e-8)
+    np.testing.assert_allclose(arm.gear_ratio, shipped.gear_ratio, atol=1e-4)
 
 
 @pytest.mark.parametrize("seed", range(5))
@@ -92,13 +96,24 @@ def test_the_flange_is_where_the_machine_data_put_it(tmp_path, seed):
     np.testing.assert_allclose(arm.flange(q), wanted, atol=1e-12)
 
 
-def test_couplings_are_noted_and_not_taken_over(tmp_path):
+def test_a_drive_at_rest_lets_its_axis_turn_with_others(tmp_path):
+    """``$COUP_COMP[m,n]`` is the reaction of axis n where m is turned by 1."""
+    arm = made(tmp_path, written(tmp_path))
+    turned = np.zeros(6)
+    turned[3] = 1.0  # axis 4, the drives of 5 and 6 held
+    turned[4] = -91 / 5780
+    turned[5] = 97351 / 11765190 - 134 / 14337 * turned[4]
+    drives = arm.coupling @ turned
+    np.testing.assert_allclose(drives, [0, 0, 0, 1, 0, 0], atol=1e-8)
+
+
+def test_couplings_are_written_with_what_they_say(tmp_path):
     text = machine_arm_text(read_machine_data(written(tmp_path)), 0.1, "mine")
     assert 'name = "mine"' in text and "axis 4 on 5 -91/5780" in text
-    assert "on 6" not in text
-    none = KR210.replace("N -91", "N 0")
+    assert "5 on 6 -134/14337" in text and "on 4" not in text
+    none = re.sub(r"(COUP_COMP.*)N -?\d+", r"\1N 0", KR210)
     text = machine_arm_text(read_machine_data(written(tmp_path, none)), 0.1)
-    assert "couples no axes" in text
+    assert "couples no axes" in text and "drive_coupling" not in text
 
 
 @pytest.mark.parametrize(
@@ -115,12 +130,13 @@ def test_couplings_are_noted_and_not_taken_over(tmp_path):
         ("ALPHA -90.0000", "ALPHA 90.0000", "DH_4 + $DH_5"),
         ("REAL $LENGTH_B=1150.00", "", "LENGTH_B"),
         ("$LENGTH_A=350.000", "$LENGTH_A=far", "far"),
+        ("D 5780", "D 0", "COUP_COMP[4,5]"),
     ],
 )
 def test_what_is_no_such_arm_is_refused(tmp_path, old, new, said):
     assert old in KR210
     place = written(tmp_path, KR210.replace(old, new), ending="\n")
-    with pytest.raises(ArmError, match=said.replace("$", r"\$").replace("+", r"\+")):
+    with pytest.raises(ArmError, match=re.escape(said)):
         machine_arm_text(read_machine_data(place), 0.1)
 
 

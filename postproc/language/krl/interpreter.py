@@ -13,7 +13,6 @@ from postproc.language.krl.frames import KrlFrame
 from postproc.language.krl.modes import (
     HALTING,
     HARMLESS,
-    LOST,
     PLANNED,
     KrlModes,
     ModeReader,
@@ -31,6 +30,7 @@ from postproc.language.visits import START
 
 _PASSED = (
     said.AccessHeader, said.KrlDeclaration, said.OutsideName, said.InterruptDeclared,
+    said.SpeedPart,
 )  # fmt: skip
 _ACTING = (
     said.Assignment, said.Instruction, said.KrlMove, said.SplineBlock, said.Waiting,
@@ -175,7 +175,8 @@ class KrlMachine(TaskMachine):
                 here = self._function(context, row, part.name, here)
             elif isinstance(part, said.DataObject) and part.name.startswith("$"):
                 given = isinstance(one, said.Assignment) and part is one.target
-                if given or isinstance(one, said.KrlMove) or part.name in PLANNED:
+                known = part.name in PLANNED or isinstance(one, said.KrlMove)
+                if given or (known and part.name not in HALTING):
                     continue
                 here = _halted(here, True if part.name in HALTING else None)
         return here
@@ -256,7 +257,7 @@ def _is_modal(name: str) -> bool:
 
 def _frame(record: tuple[float, ...] | None) -> KrlFrame:
     """Take a frame over from the cell."""
-    return LOST.tool if record is None else KrlFrame(cell_pose(record))
+    return KrlFrame(() if record is None else cell_pose(record))
 
 
 def _halted(here: Arrived, halted: bool | None) -> Arrived:

@@ -15,7 +15,11 @@ from postproc.language.machine import Scope
 from postproc.language.visits import OrientationLaw
 
 UNKNOWN = -1.0  # a number that is not known
-LOST_FRAME = KrlFrame((), "")
+LOST_FRAME = KrlFrame(
+    (),
+    "which $TOOL and $BASE hold here is not known: set them anew behind what is not "
+    "followed, or on every way here",
+)
 
 
 @dataclass(frozen=True)

@@ -41,9 +41,16 @@ PLACE = COMPONENTS[:6]
 RUN_TIME = "it is known only when the program runs"
 HOMES = ("xhome", "home", "xhome1", "xhome2", "xhome3", "xhome4", "xhome5",
          "$h_pos", "$axis_home")  # fmt: skip
-PRESENT = ("$pos_act", "$axis_act", "$axis_act_meas", "$axis_int", "$pos_int")
+PRESENT = ("$pos_act", "$axis_act")
+BEFORE = ("$axis_act_meas", "$axis_int", "$pos_int")  # where it was, or nearly is
 SPLINE = "a point of a spline of joint moves: how the arm goes there is not known"
-_ON_CURVES = ("spl", "slin", "scirc")
+_ALONE = ("ptp", "lin", "circ", "sptp", "slin", "scirc")
+# Words of moves that are known in no spline block, in one of paths, in one of joints.
+_POINTS = {
+    (False, False): _ALONE,
+    (True, False): ("spl", "slin", "scirc"),
+    (True, True): ("sptp",),
+}
 PARTIAL = (
     "numbers are missing: they stay what they were commanded before, so that it moves "
     "along with the point before it"
@@ -96,10 +103,11 @@ class KrlGoals:
     ) -> Iterator[KrlVisit]:
         """Read the visits of a move: the point of an arc, and its end."""
         motion, kind = motion_of(move.word), move.word.removesuffix("_rel")
-        block, given = self._block(row, here), dict[str, Any]()
+        block, given = self.block(row, here), dict[str, Any]()
         if block is not None:
             move, given = self._in_block(move, row, here, block)
-        if (kind == "spl") if block is None else (kind not in _ON_CURVES):
+        in_joints = block is not None and self._is_in_joints(block, here)
+        if kind not in _POINTS[block is not None, in_joints]:
             goal = FoundGoal(Meaning.UNKNOWN, NOTHING, why=SPLINE)
             yield KrlVisit(here, row, motion, False, goal, modes, **given, move=move)
             return
@@ -115,14 +123,19 @@ class KrlGoals:
         if why:
             goal = FoundGoal(Meaning.UNKNOWN, NOTHING, name=goal.name, why=ANGLE)
         yield KrlVisit(
-            here, row, motion, False, goal, modes, arc_angle=angle,
-            curved=kind == "spl", **given, move=move,
+            here, row, motion, False, goal, modes, why=SPLINE if in_joints else "",
+            arc_angle=angle, curved=in_joints or kind == "spl", **given, move=move,
         )  # fmt: skip
 
-    def _block(self, row: int, here: Scope) -> range | None:
+    def block(self, row: int, here: Scope) -> range | None:
         """Return the rows of the spline block that a move stands in."""
         blocks = self.task.files[here.file].splines
         return next((rows for rows in blocks if row in rows), None)
+
+    def _is_in_joints(self, rows: range, here: Scope) -> bool:
+        """Tell whether a spline block is one of joint moves."""
+        begin = self.task.files[here.file].text.statement(rows.start)
+        return isinstance(begin, said.SplineBlock) and begin.word == "ptp_spline"
 
     def _in_block(
         self, move: said.KrlMove, row: int, here: Scope, rows: range
@@ -175,7 +188,9 @@ class _Goal:
             return self._step(operand)
         match operand:
             case said.DataObject(name=name) if name in PRESENT:
-                return _left(f"{NO_TARGET}: it stays where it is", name=name)
+                return self._stay(name)
+            case said.DataObject(name=name) if name in BEFORE:
+                return _left(f"{NO_TARGET}: {RUN_TIME}", name=name)
             case said.DataObject(name=name) if name in HOMES:
                 return self._home(operand)
             case said.Operation(operator=":", operands=(first, second)):
@@ -282,6 +297,18 @@ class _Goal:
             value if value != 0.0 or axis in self.goals.aux else math.nan
             for axis, value in enumerate(values, start=1)
         )
+
+    def _stay(self, name: str) -> FoundGoal:
+        """Read a move to where the arm is: a step of nothing.
+
+        On an arc or in a spline block that is where the arc or the block begins.
+        """
+        within = self.goals.block(self.row, self.here) is not None
+        if within or self.move.via is not None:
+            return _left(f"{NO_TARGET}: {RUN_TIME}", name=name)
+        meaning = Meaning.BY if self._by_joints else Meaning.RELATIVE_UFRAME
+        why = f"{NO_TARGET}: it stays where it is"
+        return FoundGoal(meaning, (0.0,) * WIDTH, name=name, why=why)
 
     def _home(self, operand: said.DataObject) -> FoundGoal:
         """Read the home position: it holds no target of a process."""

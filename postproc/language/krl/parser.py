@@ -171,6 +171,7 @@ RULES: dict[str, Callable[[Children], Any]] = {
     "halt": lambda c: said.Waiting(),
     "continue_": lambda c: said.ContinueWord(),
     "wait": lambda c: said.Waiting(c[0]),
+    "speed_part": lambda c: said.SpeedPart(),
     "interrupt_declared": lambda c: said.InterruptDeclared(c[-2], c[-1]),
     "interrupt_switched": lambda c: said.InterruptSwitched(_low(c[0])),
     "brake": lambda c: said.InterruptSwitched("brake"),
@@ -213,8 +214,8 @@ RESERVED = frozenset(
     do else end enddat endfct endfor endif endloop endspline endswitch endwhile enum
     exit exor ext extfct for global goto halt if import interrupt loop not or ptp lin
     circ sptp slin scirc spl spline ptp_spline ptp_rel lin_rel circ_rel sptp_rel
-    slin_rel scirc_rel spl_rel repeat resume return signal struc switch then to trigger
-    until wait when while with c_ptp c_dis c_ori c_vel c_spl
+    slin_rel scirc_rel spl_rel repeat resume return signal struc switch then time_block
+    to trigger until const_vel wait when while with c_ptp c_dis c_ori c_vel c_spl
     """.split()
 )
 """Words that name nothing."""

@@ -150,6 +150,11 @@ class ContinueWord(SourceStatement):
 
 
 @dataclass(frozen=True, slots=True)
+class SpeedPart(SourceStatement):
+    """``TIME_BLOCK START``, ``CONST_VEL END = -50``: how fast a spline is run there."""
+
+
+@dataclass(frozen=True, slots=True)
 class InterruptDeclared(SourceStatement):
     """``INTERRUPT DECL n WHEN condition DO statement``."""
 

@@ -152,6 +152,8 @@ class KrlTask:
 
     def untold(self, name: str, here: Scope) -> str:
         """Say why a name stands for no known value."""
+        if name in here.parameters:
+            return "is a parameter: what is given for it is not followed"
         if self.place(name, here) is None:
             return "is declared in no file at hand, or in several of them"
         if name in self.written:

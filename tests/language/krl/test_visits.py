@@ -303,7 +303,7 @@ def test_orientation_joint_by_joint():
 def test_steps_hold_no_target():
     found = job(
         "LIN_REL {X 5,Z -1}", "LIN_REL {X 5} #TOOL", "PTP_REL {A1 10}",
-        "SLIN_REL {Y 1}", "PTP_REL {X 5}", "LIN_REL {A 10}", "PTP $POS_ACT",
+        "SLIN_REL {Y 1}", "PTP_REL {X 5}", "LIN_REL {A 10}", "PTP $AXIS_INT",
     )  # fmt: skip
     assert found.visits.target.tolist() == [
         Meaning.RELATIVE_UFRAME, Meaning.RELATIVE_TOOL, Meaning.BY,
@@ -312,6 +312,19 @@ def test_steps_hold_no_target():
     assert all("holds no target" in why for why in reasons(found))
     assert found.visits.values[0, :3].tolist() == [5, 0, -1]
     assert found.visits.values[2, :6].tolist() == [10, 0, 0, 0, 0, 0]
+
+
+def test_where_the_arm_is_holds_no_target():
+    """It stays there, and reading that stops what is planned ahead."""
+    found = job("$APO.CDIS=5", "LIN XP1 C_DIS", "LIN $POS_ACT", "PTP $AXIS_ACT")
+    v = found.visits
+    assert v.target.tolist() == [Meaning.POSE, Meaning.RELATIVE_UFRAME, Meaning.BY]
+    assert v.fly.tolist() == [False] * 3 and not v.values[1:].any()
+    assert all("stays where it is" in why for why in reasons(found)[1:])
+    lines = ["CIRC XP1,$POS_ACT", "SPLINE", "SPL XP2", "SLIN $POS_ACT", "ENDSPLINE"]
+    goals = job("LIN XP1", *lines).visits.target.tolist()  # where arc or block began
+    known, lost = Meaning.POSE, Meaning.UNKNOWN
+    assert goals == [known, known, lost, known, lost]
 
 
 def test_home_holds_no_target():
@@ -413,6 +426,12 @@ def test_calls_are_followed():
     assert "motion-unknown" in codes(found)  # own is another file's
 
 
+def test_a_point_that_is_handed_over_is_left():
+    more = "DEF weld (p:IN)\nE6POS p\nLIN p\nEND\n"
+    found = job("weld(XP1)", "PTP XP1", more=more)
+    assert "p is a parameter" in reasons(found)[0]
+
+
 def test_what_may_move_forgets_where_the_arm_is():
     found = job("LIN XP1", "grip( )", "LIN XP2")
     assert origins(found)[1] == [ELSEWHERE] and "motion-unknown" in codes(found)
@@ -461,6 +480,31 @@ def test_a_spline_block_is_a_curve_of_its_points():
     assert v.fly.tolist() == [False, *[True] * 5, False, False]
     assert v.zone_mm[5] == 5.0 and v.zone_rule[5] == ZoneRule.FROM
     assert v.lin_spd[1:6].tolist() == [0.4, 0.2, 0.4, 0.4, 0.4]
+
+
+def test_where_a_spline_of_joint_moves_ends_is_known():
+    """Its points are left; how the joints come to them is not known."""
+    found = job("PTP_SPLINE", "SPTP XP1", "SPTP XP2", "ENDSPLINE", "SLIN XP1")
+    v = found.visits
+    assert v.target.tolist() == [Meaning.POSE] * 3 and origins(found)[2] == [1]
+    assert ["spline of joint" in why for why in reasons(found)] == [True, True, False]
+    assert v.block.tolist() == [0, 0, -1] and v.curved.tolist() == [True, True, False]
+
+
+@pytest.mark.parametrize(
+    "line",
+    ["TIME_BLOCK START", "TIME_BLOCK PART=40", "TIME_BLOCK END=2.5",
+     "CONST_VEL START=+50", "CONST_VEL END=-50.5 ONSTART"],
+)  # fmt: skip
+def test_how_fast_a_spline_is_run_changes_nothing_of_it(line):
+    found = job("SPTP XP1", "SPLINE", "SPL XP2", line, "SPL XP1", "ENDSPLINE")
+    assert reasons(found) == [""] * 3 and codes(found) == set()
+
+
+def test_a_frame_that_nobody_knows_is_told_so():
+    found = job("SLIN XP1", "grip( )", "SLIN XP2", f"SLIN XP1{NEW}")
+    assert "which $TOOL and $BASE hold here" in reasons(found)[1]
+    assert reasons(found)[2] == ""
 
 
 def test_dead_moves_are_listed():
