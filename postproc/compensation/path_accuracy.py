@@ -63,7 +63,7 @@ class PathAccuracy:
         way: Path length up to every sample since the move began, (s,) [m].
         before, after: Deviations of the program as it was written and compensated.
         unknown: Cartesian moves that nothing is predicted for.
-        crossing: Where a joint of the compensated program changes its flank, (s,).
+        crossing: Where joints of the compensated program change their flanks, (s, 6).
         otherwise: Distance of the compensated program's path if such a joint had stayed
             on one of its flanks, (s,) [m]; empty where nobody asked.
     """
@@ -223,12 +223,12 @@ class _Run:
         return (self.least + self.most) / 2
 
     def changes(self) -> Bools:
-        """Tell behind which samples a joint changes its flank, (s,)."""
+        """Tell behind which samples joints change their flanks, (s, 6)."""
         moved = np.maximum(
             np.abs(np.diff(self.least, axis=0, append=self.least[-1:])),
             np.abs(np.diff(self.most, axis=0, append=self.most[-1:])),
         )
-        return any_in_rows(moved > CHANGED)
+        return np.asarray(moved > CHANGED)
 
 
 @dataclass(frozen=True)
@@ -385,7 +385,7 @@ def _refined(
     """Look closer where a joint changes its flank, before or after."""
     changes = np.zeros(len(pair[0].q), dtype=bool)
     for cycle, ways in zip(cycles, pair, strict=True):
-        own = _Run.of(cell, cycle, ways).changes()
+        own = any_in_rows(_Run.of(cell, cycle, ways).changes())
         changes |= own | np.append(own[1:], False) | np.append(False, own[:-1])
     changes &= ~np.append(pair[0].begins[1:], True)
     after = np.repeat(np.flatnonzero(changes), FINE - 1)

@@ -41,6 +41,7 @@ AIM = 0.6  # of the tolerance: what points are to reach
 JUDGED = 4  # rounds in which points are taken back
 UNSURE = 2e-5  # [m] a flank that is less sure is no reason to put points anywhere
 WORSE = 5e-5  # [m] that the path may be worse where a flank is not as predicted
+CONFIRMED = "confirmed"  # verdict of a measured path, see `flanks`
 MOVED = 5e-6  # [m] that a rounded corner may move
 
 
@@ -165,12 +166,29 @@ class _PathWork:
                 self.left[v] = told
             elif paths.after.unsure[paths.samples(k)].max() > UNSURE:
                 self.left[v] = "the side of a joint is not sure on its way"
+            elif told := self._otherwise_in_motion(k):
+                self.left[v] = told
             else:
                 self.open[v] = pieces[v]
                 before = int(reading.visits.before[v])
                 still = self.setting.options.take_up and not reading.visits.fly[before]
                 if still and splitter.stops(file, int(lines[v])):
                     self.idle.add(v)
+
+    def _otherwise_in_motion(self, k: int) -> str:
+        """Name a joint that changes its flank on a path, and in motion not as at stops.
+
+        Joints whose changes nobody could measure make steps too small to matter.
+        """
+        found = self.setting.model.in_motion
+        changing = np.flatnonzero(
+            self.paths.crossing[self.paths.samples(k)].any(axis=0)
+        )
+        for joint in (changing + 1).tolist():
+            said = found.get(str(joint), CONFIRMED)
+            if said != CONFIRMED:
+                return f"joint {joint} changes its flank, which in motion is {said}"
+        return ""
 
     # Points where the paths are left the most, round by round.
 
@@ -232,7 +250,7 @@ class _PathWork:
         """Return a part of the way on which the first flanks of a move change."""
         paths = self.first.paths
         samples = paths.samples(int(np.flatnonzero(paths.visit == v)[0]))
-        way, crossing = paths.way[samples], paths.crossing[samples]
+        way, crossing = paths.way[samples], any_in_rows(paths.crossing[samples])
         behind = np.flatnonzero(~crossing & (np.arange(len(way)) > crossing.argmax()))
         end = float(way[behind[0]]) if len(behind) else 0.0
         return min(max(end * part, NEAREST), FARTHEST) / float(way[-1])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -12,6 +13,7 @@ import pytest
 
 from postproc.compensation.path_correction import AIM
 from postproc.compensation.splitting import SHORTEST
+from postproc.model.model import load_model
 from tests.compensation.test_path_accuracy import CELL, SEED, done, job
 from tests.written import cli
 
@@ -76,6 +78,20 @@ def test_the_virtual_arm_keeps_closer_to_its_lines(shop: Path) -> None:
     assert sizes["points"].mean() < 0.85 * sizes["plain"].mean()
     assert sizes["stops"].mean() < 0.5 * sizes["plain"].mean()
     assert sizes["stops"].max() < 0.5 * sizes["plain"].max()
+
+
+def test_flanks_that_a_measured_path_refuted_get_no_points(shop: Path) -> None:
+    model = load_model(shop / "model.json")
+    refuted = {str(joint): "refuted" for joint in range(1, 7)}
+    known = replace(model, history=({"in_motion": refuted},))
+    known.save(shop / "known.json")
+    done("compensate", shop / "job.pdl", "--cell", CELL, "--model",
+         shop / "known.json", "-o", shop / "known.pdl", "--report",
+         shop / "known.report.json", "--path-mm", TOLERANCE)  # fmt: skip
+    paths = lines_of(told(shop, "known.report"))
+    why = [p["not_split"] for p in paths if p["max_mm"]["after"] > TOLERANCE]
+    assert sum("which in motion is refuted" in (text or "") for text in why) > 5
+    assert sum(p["inserted"] for p in paths) < 5
 
 
 def test_points_are_few_far_apart_and_told(shop: Path) -> None:
