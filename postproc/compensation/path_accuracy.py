@@ -470,6 +470,28 @@ def _joints(run: _Run, error: _Error, rows: Ints, way: Floats) -> Ints:
     return np.where(size.max(axis=1) > NO_FLANK, told + 1, 0)
 
 
+LEAVING = 5e-3  # [m] behind which a move is under way
+
+
+def sides_on_leaving(cycle: ProgramCycle, cell: Cell, v: int) -> tuple[Floats, Floats]:
+    """Tell where each joint lies in its play as a move begins, and soon behind.
+
+    Args:
+        cycle: The program.
+        cell: The arm, its play as wide as its gaps.
+        v: The visit at the end of the move.
+
+    Returns:
+        Sides, (6,) each.
+    """
+    ways = _ways(cycle, np.array([v]))
+    run = _Run.of(cell, cycle, ways)
+    tool = np.broadcast_to(cycle.targets.tool[v, :3, 3], (len(ways.q), 3))
+    way, _ = _along(cell.arm.tcp(ways.q, tool), ways)
+    at = min(int(np.searchsorted(way, LEAVING)), len(way) - 1)
+    return run.side[0], run.side[at]
+
+
 # The ways of a program as the arm should go them: to compare with what was measured.
 
 SPACING = 2e-3  # [m] between places on the way, about

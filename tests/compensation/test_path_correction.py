@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from postproc.compensation.path_correction import AIM
+from postproc.compensation.path_correction import AIM, TAKEN
 from postproc.compensation.splitting import SHORTEST
 from postproc.model.model import load_model
-from tests.compensation.test_path_accuracy import CELL, SEED, done, job
+from tests.compensation.test_path_accuracy import CELL, LINES, SEED, done, job
 from tests.written import cli
 
 TOLERANCE = 0.1  # [mm]
@@ -76,8 +76,16 @@ def test_the_virtual_arm_keeps_closer_to_its_lines(shop: Path) -> None:
         assert np.abs(sizes[name] - predicted).max() < 0.1
     assert (sizes["points"] < sizes["plain"] + 0.05).all()
     assert sizes["points"].mean() < 0.85 * sizes["plain"].mean()
-    assert sizes["stops"].mean() < 0.5 * sizes["plain"].mean()
+    assert sizes["stops"].mean() < 0.3 * sizes["plain"].mean()
     assert sizes["stops"].max() < 0.5 * sizes["plain"].max()
+
+
+def test_a_stop_takes_up_all_play_at_once(shop: Path) -> None:
+    report, true = lines_of(told(shop, "stops")), real(shop, "stops")
+    early = [p for p in report if p["points"] and p["points"][0]["at_mm"] < 1.0]
+    assert len(early) > LINES / 2
+    assert all(p["points"][0]["at_mm"] <= 1e3 * max(TAKEN) + 1e-3 for p in early)
+    assert all(true[p["visit"]]["max_mm"] < 1.2 * TOLERANCE for p in early)
 
 
 def test_flanks_that_a_measured_path_refuted_get_no_points(shop: Path) -> None:
