@@ -361,7 +361,8 @@ class _WindowWork:
         lead, arrived, doubtful = _lead(own, before)
         trail, after = self._trail(own, pace), self._after(own)
         setting = self.setting.timed_by(clock)
-        part = replace(self.reading, visits=visits)
+        aims = self.reading.aims[own.begin : own.stop]
+        part = replace(self.reading, visits=visits, aims=aims)
         planned, kept, _ = _worked(part, setting, lead, arrived, doubtful, trail)
         at, rows = after - own.begin, own.rows(after, own.end)
         explained = setting.options.explained or len(self.quiet) <= SHARED

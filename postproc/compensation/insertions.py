@@ -6,7 +6,7 @@ They lie on the programmed path; what corrects them is what corrects all targets
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Collection, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import fields, replace
 from typing import Any
 
@@ -17,6 +17,7 @@ from postproc.compensation.equivalence import equivalent
 from postproc.compensation.path_points import Points
 from postproc.compensation.program import Reading, read_program
 from postproc.compensation.rewrite import VerificationError
+from postproc.compensation.taking_up import TakeUp
 from postproc.compensation.windows import SHARED
 from postproc.language.interface import Splitter
 from postproc.language.source import Edit, Source, apply, compose
@@ -28,7 +29,7 @@ from postproc.robot.pose import rotation_from_vector, rotation_vector
 def insert(
     reading: Reading,
     points: Points,
-    stops: Collection[int],
+    stops: Mapping[int, TakeUp],
     splitter: Splitter,
     cell: Cell,
 ) -> tuple[Reading, Ints]:
@@ -37,7 +38,7 @@ def insert(
     Args:
         reading: The program, n visits.
         points: Where.
-        stops: Moves whose first point is a stop.
+        stops: Moves whose first point is a stop, where play is taken up.
         splitter: Its files.
         cell: What holds at program start.
 
@@ -63,14 +64,16 @@ def insert(
     )
     given = reading.given or reading.sources
     with_points = replace(again, cloned=cloned, given=given, missed=reading.missed)
-    told = replace(with_points, diagnostics=reading.diagnostics)
-    return told, np.flatnonzero(~new)
+    own = np.flatnonzero(~new)
+    aims = _aims(len(new), own, points, stops)
+    told = replace(with_points, diagnostics=reading.diagnostics, aims=aims)
+    return told, own
 
 
 def _edits(
     reading: Reading,
     points: Points,
-    stops: Collection[int],
+    stops: Mapping[int, TakeUp],
     splitter: Splitter,
     cell: Cell,
 ) -> list[list[Edit]]:
@@ -79,6 +82,8 @@ def _edits(
     lines = lines_in_files(reading, cell)
     for visit in sorted(points):
         numbers = between(visits, visit, np.array(points[visit]))
+        if visit in stops:
+            numbers[:1] = _turned(visits, numbers[:1], stops[visit].turn)
         config = visits.configs[visits.config[visit]]
         file, line = int(visits.file[visit]), int(lines[visit])
         found[file].append(splitter.points(file, line, numbers, config, visit in stops))
@@ -111,6 +116,21 @@ def between(visits: Visits, visit: int, share: Floats) -> Floats:
     out = np.tile(ends[0], (len(share), 1))
     out[:, :3] += share[:, None] * (ends[1, :3] - ends[0, :3])
     return visits.dialect.turned(out, rotation_from_vector(share[:, None] * axis))
+
+
+def _turned(visits: Visits, numbers: Floats, turn: Floats) -> Floats:
+    """Turn the tool at places (k, w) by a rotation vector (3,) of its own [rad]."""
+    tool = visits.dialect.poses(numbers)[:, :3, :3]
+    axis = tool @ turn
+    return visits.dialect.turned(numbers, rotation_from_vector(axis))
+
+
+def _aims(m: int, own: Ints, points: Points, stops: Mapping[int, TakeUp]) -> Floats:
+    """Tell from which sides m visits are meant to be reached, (m, 6), NaN: any."""
+    out = np.full((m, 6), np.nan)
+    for visit, taken in stops.items():
+        out[own[visit] - len(points[visit])] = taken.side
+    return out
 
 
 # The proof that a program with points makes the same moves otherwise.

@@ -39,6 +39,7 @@ from postproc.motion.targets import Targets
 from postproc.motion.trace import NOWHERE, StartState, trace
 from postproc.robot.cell import Cell
 from postproc.robot.direction import Sides
+from postproc.robot.pose import has_unknown
 from postproc.robot.state import States
 
 # The side at which aim and arrival agree, searched joint by joint.
@@ -107,7 +108,8 @@ class Iterate:
         bent: What rounded points are moved by beyond what is foretold, (n, 3) [m].
         held: Targets that keep their values for the side they are reached from, (n,).
         swung: .. for the ways to or from them, (n,).
-        settled: Targets whose sides changed till the last round, and may, (n,).
+        settled: Targets whose sides changed till the last round, and may, or that are
+            meant to be reached from theirs, (n,).
     """
 
     solved: Commands
@@ -150,16 +152,21 @@ class Iteration:
     part: bool
 
     def first_aim(self) -> Iterate:
-        """Correct for the sides that were planned."""
+        """Correct for the sides that were planned, or are meant."""
         setting, none = self.setting, np.zeros(len(self.states), dtype=bool)
+        aims, states, meant = self.reading.aims, self.states, none
+        if len(aims):
+            meant = ~has_unknown(aims)
+            sides = np.where(np.isnan(aims), states.direction, aims)
+            states = states.with_(direction=sides)
         with setting.clock("solve"):
             solved = solve_visits(
-                setting.model, setting.cell, self.planned, self.states,
+                setting.model, setting.cell, self.planned, states,
                 setting.options.orientation,
             )  # fmt: skip
             departed = self.departed(solved, np.arange(len(self.states)))
         bent = np.zeros_like(self.planned.plan.aside)
-        return Iterate(solved, departed, bent, none, none, none)
+        return Iterate(solved, departed, bent, none, none, meant)
 
     def departed(self, solved: Commands, rows: Ints) -> Departure:
         """Say how far commands lead the arm from where it was, k visits."""

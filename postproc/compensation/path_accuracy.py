@@ -63,7 +63,7 @@ class PathAccuracy:
         way: Path length up to every sample since the move began, (s,) [m].
         before, after: Deviations of the program as it was written and compensated.
         unknown: Cartesian moves that nothing is predicted for.
-        crossing: Where a joint of the compensated program changes its flank, (s,).
+        crossing: Where joints of the compensated program change their flanks, (s, 6).
         otherwise: Distance of the compensated program's path if such a joint had stayed
             on one of its flanks, (s,) [m]; empty where nobody asked.
     """
@@ -223,12 +223,12 @@ class _Run:
         return (self.least + self.most) / 2
 
     def changes(self) -> Bools:
-        """Tell behind which samples a joint changes its flank, (s,)."""
+        """Tell behind which samples joints change their flanks, (s, 6)."""
         moved = np.maximum(
             np.abs(np.diff(self.least, axis=0, append=self.least[-1:])),
             np.abs(np.diff(self.most, axis=0, append=self.most[-1:])),
         )
-        return any_in_rows(moved > CHANGED)
+        return np.asarray(moved > CHANGED)
 
 
 @dataclass(frozen=True)
@@ -385,7 +385,7 @@ def _refined(
     """Look closer where a joint changes its flank, before or after."""
     changes = np.zeros(len(pair[0].q), dtype=bool)
     for cycle, ways in zip(cycles, pair, strict=True):
-        own = _Run.of(cell, cycle, ways).changes()
+        own = any_in_rows(_Run.of(cell, cycle, ways).changes())
         changes |= own | np.append(own[1:], False) | np.append(False, own[:-1])
     changes &= ~np.append(pair[0].begins[1:], True)
     after = np.repeat(np.flatnonzero(changes), FINE - 1)
@@ -468,6 +468,28 @@ def _joints(run: _Run, error: _Error, rows: Ints, way: Floats) -> Ints:
         size[:, joint] = lengths(here - error(run, rows, other))
     told = size.argmax(axis=1)
     return np.where(size.max(axis=1) > NO_FLANK, told + 1, 0)
+
+
+LEAVING = 5e-3  # [m] behind which a move is under way
+
+
+def sides_on_leaving(cycle: ProgramCycle, cell: Cell, v: int) -> tuple[Floats, Floats]:
+    """Tell where each joint lies in its play as a move begins, and soon behind.
+
+    Args:
+        cycle: The program.
+        cell: The arm, its play as wide as its gaps.
+        v: The visit at the end of the move.
+
+    Returns:
+        Sides, (6,) each.
+    """
+    ways = _ways(cycle, np.array([v]))
+    run = _Run.of(cell, cycle, ways)
+    tool = np.broadcast_to(cycle.targets.tool[v, :3, 3], (len(ways.q), 3))
+    way, _ = _along(cell.arm.tcp(ways.q, tool), ways)
+    at = min(int(np.searchsorted(way, LEAVING)), len(way) - 1)
+    return run.side[0], run.side[at]
 
 
 # The ways of a program as the arm should go them: to compare with what was measured.

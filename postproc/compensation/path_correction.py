@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
+from functools import partial
 from itertools import pairwise
 
 import numpy as np
@@ -25,22 +26,18 @@ from postproc.compensation.path_points import Insertions
 from postproc.compensation.program import Reading
 from postproc.compensation.rewrite import Output
 from postproc.compensation.splitting import hindrances, shortest_pieces, unwritable
+from postproc.compensation.taking_up import TakeUp, take_up
 from postproc.language.interface import Splitter
 from postproc.language.languages import language_of
 from postproc.robot.pose import MM, lengths
 
 ROUNDS = 16  # of points put on the ways
-TAKEN = (
-    0.15,
-    0.3,
-    0.08,
-    0.6,
-)  # of the way on which flanks change: where play is taken up
-NEAREST, FARTHEST = 5e-5, 1e-3  # [m] from where the move begins
+TAKEN = 2e-5, 1e-4, 3e-4  # [m] from where a move begins: where play is taken up
 AIM = 0.6  # of the tolerance: what points are to reach
 JUDGED = 4  # rounds in which points are taken back
 UNSURE = 2e-5  # [m] a flank that is less sure is no reason to put points anywhere
 WORSE = 5e-5  # [m] that the path may be worse where a flank is not as predicted
+CONFIRMED = "confirmed"  # verdict of a measured path, see `flanks`
 MOVED = 5e-6  # [m] that a rounded corner may move
 
 
@@ -100,7 +97,7 @@ class _PathWork:
             from both ends [m].
         points: What is on their ways.
         stops: Moves whose first point is a stop, where play is taken up.
-        idle: Moves that may have one.
+        idle: Moves that may have one, and how.
         tried: How far such a move began off, and where it stopped, try by try.
         left: Why moves that leave their path too far are not split.
         latest: The program with these points; at first the source.
@@ -114,7 +111,7 @@ class _PathWork:
     open: dict[int, tuple[float, float, float]] = field(default_factory=dict)
     points: dict[int, tuple[float, ...]] = field(default_factory=dict)
     stops: set[int] = field(default_factory=set)
-    idle: set[int] = field(default_factory=set)
+    idle: dict[int, TakeUp] = field(default_factory=dict)
     tried: dict[int, list[tuple[float, float]]] = field(default_factory=dict)
     left: dict[int, str] = field(default_factory=dict)
 
@@ -153,6 +150,7 @@ class _PathWork:
         why = hindrances(reading.visits, decided, cycle)
         lines = lines_in_files(reading, self.setting.cell)
         pieces = shortest_pieces(reading.visits, cycle)
+        taking_up = partial(take_up, self.first.after, self.setting, reading.visits)
         for k in self.too_far.tolist():
             v = int(paths.visit[k])
             file = int(reading.visits.file[v])
@@ -165,12 +163,29 @@ class _PathWork:
                 self.left[v] = told
             elif paths.after.unsure[paths.samples(k)].max() > UNSURE:
                 self.left[v] = "the side of a joint is not sure on its way"
+            elif told := self._otherwise_in_motion(k):
+                self.left[v] = told
             else:
                 self.open[v] = pieces[v]
                 before = int(reading.visits.before[v])
                 still = self.setting.options.take_up and not reading.visits.fly[before]
                 if still and splitter.stops(file, int(lines[v])):
-                    self.idle.add(v)
+                    self.idle[v] = taking_up(v)
+
+    def _otherwise_in_motion(self, k: int) -> str:
+        """Name a joint that changes its flank on a path, and in motion not as at stops.
+
+        Joints whose changes nobody could measure make steps too small to matter.
+        """
+        found = self.setting.model.in_motion
+        changing = np.flatnonzero(
+            self.paths.crossing[self.paths.samples(k)].any(axis=0)
+        )
+        for joint in (changing + 1).tolist():
+            said = found.get(str(joint), CONFIRMED)
+            if said != CONFIRMED:
+                return f"joint {joint} changes its flank, which in motion is {said}"
+        return ""
 
     # Points where the paths are left the most, round by round.
 
@@ -198,7 +213,7 @@ class _PathWork:
                 yield v, [stop, *known[v in self.stops :]]
                 self.stops.add(v)
                 continue
-            more = self._on_path(k, known, self.open[v])[: max(room, 0)]
+            more = self._on_path(k, v)[: max(room, 0)]
             room -= len(more)
             if more:
                 yield v, [*known, *more]
@@ -206,9 +221,7 @@ class _PathWork:
     def _stop(self, k: int, v: int) -> float | None:
         """Find where the arm stops to take up play before a path, as a share of it.
 
-        So near that the tool hardly moves, and so far that every joint goes on from
-        there as it does behind: some share of the way on which the first flank changes
-        does best, and which one is tried out. None where nothing is left to try.
+        How near does best is tried out. None where nothing is left to try.
         """
         paths, samples = self.paths, self.paths.samples(k)
         begin = paths.way[samples] < self.open[v][0]
@@ -222,34 +235,23 @@ class _PathWork:
             best = min(tried)[1]
             tried.append((0.0, best))
             return best if best != self.points[v][0] else None
-        return self._taken_up(v, TAKEN[len(tried)])
+        return TAKEN[len(tried)] / float(paths.way[samples][-1])
 
     def settled(self, v: int) -> bool:
         """Tell whether a move stops where it does best."""
         return len(self.tried.get(v, ())) > len(TAKEN)
 
-    def _taken_up(self, v: int, part: float) -> float:
-        """Return a part of the way on which the first flanks of a move change."""
-        paths = self.first.paths
-        samples = paths.samples(int(np.flatnonzero(paths.visit == v)[0]))
-        way, crossing = paths.way[samples], paths.crossing[samples]
-        behind = np.flatnonzero(~crossing & (np.arange(len(way)) > crossing.argmax()))
-        end = float(way[behind[0]]) if len(behind) else 0.0
-        return min(max(end * part, NEAREST), FARTHEST) / float(way[-1])
-
-    def _on_path(
-        self, k: int, known: tuple[float, ...], piece: tuple[float, float, float]
-    ) -> list[float]:
+    def _on_path(self, k: int, v: int) -> list[float]:
         """Find a point in every part of a path that is left too far, the worst first.
 
         Args:
             k: The path.
-            known: Shares of the way at which points are.
-            piece: The shortest piece, and what stays clear at both ends [m].
+            v: The visit at its end.
         """
         paths, samples = self.paths, self.paths.samples(k)
         way, far = paths.way[samples], paths.after.across[samples]
-        least, clear, behind = piece
+        known = self.points.get(v, ())
+        least, clear, behind = self.open[v]
         ends = [0.0, *(share * way[-1] for share in known), float(way[-1])]
         found = []
         for i, (a, b) in enumerate(pairwise(ends)):
@@ -271,8 +273,9 @@ class _PathWork:
             return
         cell, clock = self.setting.cell, self.setting.clock
         with clock("insert"):
+            stops = {v: self.idle[v] for v in self.stops & self.points.keys()}
             reading, own = insert(
-                self.source.reading, self.points, self.stops, splitter, cell
+                self.source.reading, self.points, stops, splitter, cell
             )
         options = replace(self.setting.options, clone=False)
         reading, kept = correct(reading, replace(self.setting, options=options))
@@ -309,20 +312,25 @@ class _PathWork:
         with_points = self._worst(told)
         other, usual = map(self._otherwise, (told.paths, self.first.paths))
         corner = self._corners_moved(told)
-        status = self.latest.kept.decisions.status
         for v in sorted(self.points):
             before = without[v]
-            first = int(self.own[v]) - len(self.points[v])
             if v not in with_points:
                 yield v, "nothing is predicted for it with points"
-            elif (status[first : self.own[v]] != Status.SAFE).any():
-                yield v, "points on its way cannot be corrected"
+            elif refused := self._refusal(v):
+                yield v, f"points on its way cannot be corrected: {refused}"
             elif with_points[v] > before:
                 yield v, "points on its way make it no better"
             elif other[v] > max(before, usual[v]) + WORSE:
                 yield v, "it would be worse if a flank is not as predicted"
             elif corner[v]:
                 yield v, "a rounded corner at one of its ends would move"
+
+    def _refusal(self, v: int) -> str:
+        """Say why points of a move cannot be corrected, "" where they can."""
+        decided, end = self.latest.kept.decisions, int(self.own[v])
+        rows = np.arange(end - len(self.points[v]), end)
+        left = rows[decided.status[rows] != Status.SAFE]
+        return decided.reasons[decided.why[left[0]]] if len(left) else ""
 
     @staticmethod
     def _sizes(paths: PathAccuracy) -> dict[int, float]:

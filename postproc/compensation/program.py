@@ -48,6 +48,8 @@ class Reading:
         begins: The first visit of every program.
         programs: What was parsed of the files that hold no number of a target: they
             come out as they went in, and need not be parsed again.
+        aims: Sides of the joints that visits are meant to be reached from, (n, 6),
+            where the search for them is to begin; NaN: as planned, as all where empty.
     """
 
     texts: tuple[Skeleton, ...]
@@ -58,6 +60,7 @@ class Reading:
     begins: tuple[int, ...] = (0,)
     programs: tuple[Any, ...] = ()
     missed: Mapping[str, Ints] = field(default_factory=dict)
+    aims: Floats = field(default_factory=lambda: np.empty((0, 6)))
 
     @property
     def sources(self) -> tuple[Source, ...]:

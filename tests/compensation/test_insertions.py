@@ -15,6 +15,7 @@ from postproc.compensation.equivalence import equivalent
 from postproc.compensation.insertions import between, insert, without
 from postproc.compensation.program import Reading, read_program
 from postproc.compensation.rewrite import VerificationError
+from postproc.compensation.taking_up import TakeUp
 from postproc.language.pdl2.language import Pdl2
 from postproc.language.pdl2.path_points import Pdl2Splitter
 from postproc.language.pdl2.program import parse
@@ -24,6 +25,9 @@ from tests.written import program
 
 CELL = load_cell(Path(__file__).parents[2] / "programs/cell.toml")
 NOTHING = np.zeros(0, dtype=np.int64)
+TURNED = TakeUp(
+    np.array([1.0, -1.0, 0.5, 0.0, 1.0, -1.0]), np.array([2e-4, 0.0, -1e-4])
+)
 ENDS = (
     (100.0, 200.0, 150.0, 80.0, 160.0, 10.0),
     (300.0, 100.0, 50.0, 120.0, 140.0, -40.0),
@@ -77,7 +81,7 @@ def test_a_program_with_points_is_the_same_without_them() -> None:
     visit = last(reading)
     points = {visit: (0.1, 0.5), 2: (0.3,)}
     splitter = Pdl2().splitter(reading.sources)
-    found, own = insert(reading, points, {visit}, splitter, CELL)
+    found, own = insert(reading, points, {visit: TURNED}, splitter, CELL)
     v, w = reading.visits, found.visits
     assert len(w) == len(v) + 3 == len(own) + 3
     new = np.setdiff1d(np.arange(len(w)), own)
@@ -89,7 +93,14 @@ def test_a_program_with_points_is_the_same_without_them() -> None:
     rounded: Floats = np.abs(
         w.values[new[1:]] - between(v, visit, np.array([0.1, 0.5]))
     )
-    assert rounded.max() < 1e-3
+    assert rounded[:, :3].max() < 1e-3 and rounded[1].max() < 1e-3
+    turn = w.dialect.poses(
+        np.vstack([between(v, visit, np.array([0.1])), w.values[new[1]]])
+    )
+    turned = Rotation.from_matrix(turn[0, :3, :3].T @ turn[1, :3, :3]).as_rotvec()
+    np.testing.assert_allclose(turned, TURNED.turn, atol=2e-6)
+    np.testing.assert_array_equal(found.aims[new[1]], TURNED.side)
+    assert np.isnan(np.delete(found.aims, new[1], axis=0)).all()
     assert found.given == reading.sources and len(found.cloned[0]) == 2
 
 
@@ -115,4 +126,4 @@ def test_what_else_changes_is_found() -> None:
     ):
         wrong = Wrong(programs, text, keeps)
         with pytest.raises(VerificationError, match=said):
-            insert(reading, {2: (0.5,)}, (), wrong, CELL)
+            insert(reading, {2: (0.5,)}, {}, wrong, CELL)

@@ -145,7 +145,8 @@ def test_it_is_what_a_slow_loop_says(ran: tuple[InTime, Setting]) -> None:
             ends = arm.tcp(q[[0, -1]], np.tile(tool, (2, 1)))
             heading = (ends[1] - ends[0]) / np.linalg.norm(ends[1] - ends[0])
             sizes.append(np.linalg.norm(error - (error @ heading) * heading))
-        assert max(sizes) == pytest.approx(paths.before.sizes[k], abs=3e-6)
+        # where a drive has crossed is a kink, which samples 8 times as dense miss
+        assert max(sizes) == pytest.approx(paths.before.sizes[k], abs=6e-6)
 
 
 def fine(q: np.ndarray) -> np.ndarray:

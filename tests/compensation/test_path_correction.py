@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -10,9 +11,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from postproc.compensation.path_correction import AIM
+from postproc.compensation.path_correction import AIM, TAKEN
 from postproc.compensation.splitting import SHORTEST
-from tests.compensation.test_path_accuracy import CELL, SEED, done, job
+from postproc.model.model import load_model
+from tests.compensation.test_path_accuracy import CELL, LINES, SEED, done, job
 from tests.written import cli
 
 TOLERANCE = 0.1  # [mm]
@@ -74,8 +76,30 @@ def test_the_virtual_arm_keeps_closer_to_its_lines(shop: Path) -> None:
         assert np.abs(sizes[name] - predicted).max() < 0.1
     assert (sizes["points"] < sizes["plain"] + 0.05).all()
     assert sizes["points"].mean() < 0.85 * sizes["plain"].mean()
-    assert sizes["stops"].mean() < 0.5 * sizes["plain"].mean()
+    assert sizes["stops"].mean() < 0.3 * sizes["plain"].mean()
     assert sizes["stops"].max() < 0.5 * sizes["plain"].max()
+
+
+def test_a_stop_takes_up_all_play_at_once(shop: Path) -> None:
+    report, true = lines_of(told(shop, "stops")), real(shop, "stops")
+    early = [p for p in report if p["points"] and p["points"][0]["at_mm"] < 1.0]
+    assert len(early) > LINES / 2
+    assert all(p["points"][0]["at_mm"] <= 1e3 * max(TAKEN) + 1e-3 for p in early)
+    assert all(true[p["visit"]]["max_mm"] < 1.2 * TOLERANCE for p in early)
+
+
+def test_flanks_that_a_measured_path_refuted_get_no_points(shop: Path) -> None:
+    model = load_model(shop / "model.json")
+    refuted = {str(joint): "refuted" for joint in range(1, 7)}
+    known = replace(model, history=({"in_motion": refuted},))
+    known.save(shop / "known.json")
+    done("compensate", shop / "job.pdl", "--cell", CELL, "--model",
+         shop / "known.json", "-o", shop / "known.pdl", "--report",
+         shop / "known.report.json", "--path-mm", TOLERANCE)  # fmt: skip
+    paths = lines_of(told(shop, "known.report"))
+    why = [p["not_split"] for p in paths if p["max_mm"]["after"] > TOLERANCE]
+    assert sum("which in motion is refuted" in (text or "") for text in why) > 5
+    assert sum(p["inserted"] for p in paths) < 5
 
 
 def test_points_are_few_far_apart_and_told(shop: Path) -> None:
