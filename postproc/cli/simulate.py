@@ -10,6 +10,7 @@ import numpy as np
 
 from postproc.arrays import Ints
 from postproc.cli.jobs import read_files
+from postproc.compensation.insertions import points_on_ways
 from postproc.compensation.program import read_program
 from postproc.exceptions import CellError
 from postproc.language.languages import language_of
@@ -248,7 +249,8 @@ def _read(program: Path, cell: Cell) -> tuple[Visits, Ints]:
         for row in rows.tolist():
             line = source.line_text(int(visits.line[row])).encode("latin-1")
             inserted[row] = language.is_inserted(line)
-    return visits, np.flatnonzero(~inserted)
+    new = points_on_ways(visits, reading.sources, inserted)
+    return visits, np.flatnonzero(~new)
 
 
 def true_error(

@@ -9,6 +9,7 @@ import numpy as np
 
 from postproc.arrays import Bools, Floats, Ints
 from postproc.compensation.approach import advise
+from postproc.compensation.arc_splitting import NO_ARCS, WantedArcs
 from postproc.compensation.options import Setting
 from postproc.compensation.path_accuracy import PathAccuracy, predict_paths
 from postproc.compensation.path_points import Insertions
@@ -197,6 +198,7 @@ def run_in_time(
     position: Floats,
     setting: Setting,
     owner: Ints | None = None,
+    arcs: WantedArcs = NO_ARCS,
 ) -> InTime:
     """Run a program in time, as it was written and as it is compensated.
 
@@ -207,13 +209,14 @@ def run_in_time(
         setting: What it was compensated with.
         owner: The move of the source that every visit belongs to, (n,), where points
             were put on ways.
+        arcs: The arcs of the source that were cut.
     """
     cell = setting.cell
     before, after = (_run(part.visits, cell) for part in (reading, again))
     passed = cell.arm.tcp(before.path.q, before.targets.tool[:, :3, 3])
     shift = np.nan_to_num(position + before.path.aside - passed)
     paths = predict_paths(
-        before, after, shift, cell, setting.model, setting.temperature, owner
+        before, after, shift, cell, setting.model, setting.temperature, owner, arcs
     )
     guessed, other = guessed_limits(cell.arm), disagreements(cell.arm, after)
     told = setting.model.in_motion

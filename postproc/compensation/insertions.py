@@ -13,16 +13,19 @@ from typing import Any
 import numpy as np
 
 from postproc.arrays import Bools, Floats, Ints
+from postproc.compensation.arc_splitting import Chords, CutArc, is_arc
 from postproc.compensation.equivalence import equivalent
 from postproc.compensation.path_points import Points
 from postproc.compensation.program import Reading, read_program
 from postproc.compensation.rewrite import VerificationError
 from postproc.compensation.windows import SHARED
 from postproc.language.interface import Splitter
+from postproc.language.languages import language_of
 from postproc.language.source import Edit, Source, apply, compose
 from postproc.language.visits import Literals, Visits
 from postproc.robot.cell import Cell
 from postproc.robot.pose import rotation_from_vector, rotation_vector
+from postproc.robot.trajectory import Motion
 
 
 def insert(
@@ -31,6 +34,7 @@ def insert(
     stops: Collection[int],
     splitter: Splitter,
     cell: Cell,
+    chords: Chords = (),
 ) -> tuple[Reading, Ints]:
     """Put points on the ways of a program.
 
@@ -40,6 +44,7 @@ def insert(
         stops: Moves whose first point is a stop.
         splitter: Its files.
         cell: What holds at program start.
+        chords: Pieces of arcs that are chords.
 
     Returns:
         The program with points, proven to make the same moves otherwise, and those of
@@ -49,14 +54,15 @@ def insert(
         VerificationError: It would make other moves.
         CloneError: A point cannot be written.
     """
-    edits = _edits(reading, points, stops, splitter, cell)
+    edits = _edits(reading, points, stops, splitter, cell, chords)
     sources = [
         Source(source.name, apply(source.data, own))
         for source, own in zip(reading.sources, edits, strict=True)
     ]
     again = read_program({s.name: s.data for s in sources}, cell)
-    new = _inserted(again.visits, sources, edits)
-    _prove(reading.visits, again.visits, new, points)
+    found = _inserted(again.visits, sources, edits)
+    new = points_on_ways(again.visits, sources, found)
+    _prove(reading.visits, again.visits, found, new, points)
     cloned = tuple(
         tuple(compose(one, own))
         for one, own in zip(reading.cloned or [()] * len(edits), edits, strict=True)
@@ -73,15 +79,22 @@ def _edits(
     stops: Collection[int],
     splitter: Splitter,
     cell: Cell,
+    chords: Chords,
 ) -> list[list[Edit]]:
     """Write the points, file by file."""
     visits, found = reading.visits, defaultdict[int, list[Edit]](list)
     lines = lines_in_files(reading, cell)
     for visit in sorted(points):
-        numbers = between(visits, visit, np.array(points[visit]))
         config = visits.configs[visits.config[visit]]
         file, line = int(visits.file[visit]), int(lines[visit])
-        found[file].append(splitter.points(file, line, numbers, config, visit in stops))
+        if visits.via[visit]:
+            pieces, via = CutArc.of(visits, points, visit, chords).pieces()
+            found[file] += splitter.arc(file, line, pieces, via, config, visit in stops)
+        elif not is_arc(visits, visit):
+            numbers = between(visits, visit, np.array(points[visit]))
+            found[file].append(
+                splitter.points(file, line, numbers, config, visit in stops)
+            )
     return [sorted(found[k], key=lambda e: e.span) for k in range(len(reading.sources))]
 
 
@@ -123,8 +136,9 @@ def _inserted(
     found = np.zeros(len(visits), dtype=bool)
     for file, (source, own) in enumerate(zip(sources, edits, strict=True)):
         size = np.array([len(edit.new) for edit in own], dtype=np.int64)
+        old = np.array([e.span.end - e.span.start for e in own], dtype=np.int64)
         begin = np.array([e.span.start for e in own], dtype=np.int64)
-        begin += np.cumsum(size) - size
+        begin += np.cumsum(size - old) - (size - old)
         lines = source.line_starts[visits.line - 1]
         at = np.searchsorted(begin, lines, side="right") - 1
         inside = (at >= 0) & (visits.file == file)
@@ -134,17 +148,53 @@ def _inserted(
     return found
 
 
-def _prove(before: Visits, after: Visits, new: Bools, points: Points) -> None:
+def points_on_ways(visits: Visits, sources: Sequence[Source], inserted: Bools) -> Bools:
+    """Tell which visits the source does not make, (m,).
+
+    Where an arc is cut, the point on its way has become the end of a piece, and what
+    stands in its place in the move is new.
+
+    Args:
+        visits: The program with points.
+        sources: Its files.
+        inserted: Visits on lines that are points, (m,).
+    """
+    new = np.array(inserted)
+    language = language_of(sources[0].name)
+    for row in np.flatnonzero(inserted & ~visits.via).tolist():
+        source = sources[visits.file[row]]
+        text = source.line_text(int(visits.line[row])).encode("latin-1")
+        if language.ends_at_via(text):
+            later = np.flatnonzero(visits.via[row:] & ~inserted[row:])
+            if len(later):
+                new[row], new[row + later[0]] = False, True
+    return new
+
+
+def _prove(
+    before: Visits, after: Visits, inserted: Bools, new: Bools, points: Points
+) -> None:
     """Hold a program with points to be the same but for them.
+
+    Args:
+        before: The program.
+        after: .. with points.
+        inserted: Visits on lines that are points, (m,).
+        new: Visits that the source does not make, (m,).
+        points: What was put in.
 
     Raises:
         VerificationError: It is not.
     """
-    count = sum(map(len, points.values()))
-    problem = f"{int(new.sum())} of {count} points are found again"
-    if int(new.sum()) == count:
+    count, found = sum(map(len, points.values())), inserted & ~after.via
+    problem = f"{int(found.sum())} of {count} points are found again"
+    if int(found.sum()) == count and len(after) - int(new.sum()) == len(before):
         nothing = np.zeros(0, dtype=np.int64)
-        problem = equivalent(before, without(after, new), nothing, before.values)
+        ends = inserted & ~new  # of pieces, which were points on ways
+        motion = np.where(ends, Motion.CIRCULAR, after.motion)
+        old = replace(after, via=after.via | ends, motion=motion)
+        same = renumbered(before, without(old, new))
+        problem = equivalent(before, same, nothing, before.values)
     if problem:
         raise VerificationError(
             f"{before.files[0]}: points on the ways would change what the program "
@@ -180,6 +230,26 @@ def without(visits: Visits, rows: Bools) -> Visits:
         pred_start=np.append(0, np.cumsum(count[own])),
         pred=np.where(pred >= 0, number[pred], pred),
         literals=_kept(visits.literals, np.flatnonzero(~gone[:-1])),
+    )
+
+
+def renumbered(before: Visits, after: Visits) -> Visits:
+    """Number the literals of a program as those of another one, where that is possible.
+
+    They are numbered as they stand in the files, and the point on the way of an arc
+    that is cut stands in front of the arc's end, not behind it.
+    """
+    has = (before.literal >= 0) & (after.literal >= 0)
+    number = np.arange(len(after.literals))
+    number[after.literal[has]] = before.literal[has]
+    if not np.array_equal(np.sort(number), np.arange(len(number))):
+        return after
+    number = np.append(number, -1)  # that is no literal
+    return replace(
+        after,
+        literal=number[after.literal],
+        follows=number[after.follows],
+        literals=_kept(after.literals, np.argsort(number[:-1])),
     )
 
 

@@ -15,6 +15,16 @@ from itertools import pairwise
 import numpy as np
 
 from postproc.arrays import Bools, Ints, any_in_rows
+from postproc.compensation.arc_splitting import (
+    STRAIGHT,
+    Cut,
+    WantedArcs,
+    flat_pieces,
+    is_arc,
+    largest_zones,
+    passed,
+    point_on_way,
+)
 from postproc.compensation.correction import BY_VISIT, EXPLAINING, Correction, correct
 from postproc.compensation.in_time import InTime, run_in_time
 from postproc.compensation.insertions import insert, lines_in_files
@@ -102,6 +112,7 @@ class _PathWork:
         stops: Moves whose first point is a stop, where play is taken up.
         idle: Moves that may have one.
         tried: How far such a move began off, and where it stopped, try by try.
+        chords: Pieces of arcs that are chords whatever they bend.
         left: Why moves that leave their path too far are not split.
         latest: The program with these points; at first the source.
         own: The visits of it that the source makes, (n,).
@@ -116,6 +127,7 @@ class _PathWork:
     stops: set[int] = field(default_factory=set)
     idle: set[int] = field(default_factory=set)
     tried: dict[int, list[tuple[float, float]]] = field(default_factory=dict)
+    chords: set[Cut] = field(default_factory=set)
     left: dict[int, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -177,31 +189,111 @@ class _PathWork:
     def improve(self, splitter: Splitter) -> None:
         """Put points on the ways until none is left too far, or none helps."""
         for _ in range(ROUNDS):
-            new = dict(self._new_points())
-            if not new:
+            new, flat = dict(self._new_points()), self._new_chords()
+            new = new or dict(self._halved())
+            if not new and not flat:
                 return
             self.points |= {v: tuple(sorted(shares)) for v, shares in new.items()}
+            self.chords |= flat
+            self._cut_at_vias()
             self._make(splitter)
+
+    def _cut_at_vias(self) -> None:
+        """Cut arcs that are cut anywhere at the points on their ways as well."""
+        visits = self.source.reading.visits
+        for v in [v for v in self.points if is_arc(visits, v)]:
+            via = point_on_way(visits, v)
+            self.points[via] = tuple(sorted({*self.points.get(via, ()), 1.0}))
+
+    def _new_chords(self) -> set[Cut]:
+        """Find pieces of arcs that are too flat for arcs, and may be chords."""
+        may = {
+            cut for cut, bent in self._flat_pieces().items() if self._chord(cut, bent)
+        }
+        return may - self.chords
+
+    def _halved(self) -> Iterator[tuple[int, list[float]]]:
+        """Yield the points of arcs with pieces that are too flat, and no chords yet."""
+        room = self.setting.options.max_inserted - sum(map(len, self.points.values()))
+        flat, found = self._flat_pieces(), dict[int, list[float]]()
+        for (v, end), bent in flat.items():
+            known = found.get(v, [*self.points.get(v, ())])
+            begin = max((s for s in known if s < end), default=0.0)
+            k = int(np.flatnonzero(self.paths.visit == v)[0])
+            size = (end - begin) * float(self.paths.way[self.paths.samples(k)][-1])
+            least = self.open[v][0] if v in self.open else np.inf
+            if room > 0 and size >= 2 * least and not self._chord((v, end), bent):
+                found[v] = [*known, (begin + end) / 2]
+                room -= 1
+        yield from found.items()
+
+    def _chord(self, cut: Cut, bent: float) -> bool:
+        """Tell whether a piece that bends so little may be a chord, but the last."""
+        last = cut[1] == 1.0 and not self.source.reading.visits.via[cut[0]]
+        return bent <= STRAIGHT * self.tolerance and not last
+
+    def _flat_pieces(self) -> dict[Cut, float]:
+        """What the pieces of arcs bend that are too flat for arcs [m]."""
+        visits = self.latest.reading.visits
+        values = self.latest.kept.decisions.corrected
+        moved = (values - visits.values)[:, :3] * MM
+        ends = {
+            row: (half, share)
+            for via in self._cut_arcs()
+            for half in (via, via + 1)
+            for row, share in zip(
+                self._ends(half), (*self.points.get(half, ()), 1.0), strict=False
+            )
+        }
+        arcs = [row - 1 for row in sorted(ends) if visits.via[row - 1]]
+        found = flat_pieces(visits, moved, np.array(arcs, dtype=np.int64))
+        return {ends[row]: bent for row, bent in found}
+
+    def _cut_arcs(self) -> list[int]:
+        """Return the points on the ways of the arcs that are cut."""
+        return sorted(v for v in self.points if self.source.reading.visits.via[v])
+
+    def _ends(self, v: int) -> list[int]:
+        """Return the visits with points at which the pieces of a move end, itself too.
+
+        Those of the program with points.
+        """
+        first = int(self.own[v - 1]) + 1 if v else 0
+        rows = np.arange(first, int(self.own[v]) + 1)
+        ends: list[int] = rows[~self.latest.reading.visits.via[rows]].tolist()
+        return ends
 
     def _new_points(self) -> Iterator[tuple[int, list[float]]]:
         """Yield the points of moves that get more of them, by their visit."""
         room = self.setting.options.max_inserted - sum(map(len, self.points.values()))
-        sizes = self.paths.after.sizes
+        sizes, whole = self.paths.after.sizes, self._whole_arcs()
         for k in np.argsort(-sizes, kind="stable").tolist():
             v = int(self.paths.visit[k])
             if v not in self.open or sizes[k] <= self.aim:
                 continue
-            known = self.points.get(v, ())
-            stop = self._stop(k, v) if v in self.idle and room > 0 else None
+            known, via = self.points.get(v, ()), v in whole
+            left = room - via  # the point on the way of an arc becomes one, too
+            stop = self._stop(k, v) if v in self.idle and left > 0 else None
             if stop is not None:
-                room -= v not in self.stops
-                yield v, [stop, *known[v in self.stops :]]
+                left -= v not in self.stops
+                more = [stop, *known[v in self.stops :]]
                 self.stops.add(v)
-                continue
-            more = self._on_path(k, known, self.open[v])[: max(room, 0)]
-            room -= len(more)
+            else:
+                new = self._on_path(k, known, self.open[v])[: max(left, 0)]
+                left -= len(new)
+                more = [*known, *new] if new else []
             if more:
-                yield v, [*known, *more]
+                room = left
+                if via:
+                    first = point_on_way(self.source.reading.visits, v)
+                    whole -= {first, first + 1}
+                yield v, more
+
+    def _whole_arcs(self) -> set[int]:
+        """Return both visits of arcs that are not cut."""
+        via = self.source.reading.visits.via
+        arcs = np.flatnonzero(via & ~np.isin(np.arange(len(via)), self._cut_arcs()))
+        return {*arcs.tolist(), *(arcs + 1).tolist()}
 
     def _stop(self, k: int, v: int) -> float | None:
         """Find where the arm stops to take up play before a path, as a share of it.
@@ -272,16 +364,23 @@ class _PathWork:
         cell, clock = self.setting.cell, self.setting.clock
         with clock("insert"):
             reading, own = insert(
-                self.source.reading, self.points, self.stops, splitter, cell
-            )
+                self.source.reading, self.points, self.stops, splitter, cell,
+                self.chords,
+            )  # fmt: skip
         options = replace(self.setting.options, clone=False)
         reading, kept = correct(reading, replace(self.setting, options=options))
         output, again = self.write(reading, kept, self.setting)
         n = len(reading.visits)
         owner = np.searchsorted(own, np.arange(n))
         with clock("time"):
-            told = run_in_time(reading, again, kept.position, self.setting, owner)
+            arcs = self._wanted_arcs()
+            told = run_in_time(reading, again, kept.position, self.setting, owner, arcs)
         self.latest, self.own = Draft(reading, kept, output, told), own
+
+    def _wanted_arcs(self) -> WantedArcs:
+        """Return the arcs that are cut."""
+        before = self.source.reading.visits.before
+        return WantedArcs.of(self.first.before, before, self._cut_arcs())
 
     # Points that do not help, or not for certain, are taken back.
 
@@ -293,11 +392,22 @@ class _PathWork:
                 return
             self.left |= bad
             for v in bad:
-                self.points.pop(v, None)
+                self._take_back(v)
             self._make(splitter)
         self.left |= dict.fromkeys(self.points, "its points do not stay put")
         self.points.clear()
         self._make(splitter)
+
+    def _take_back(self, v: int) -> None:
+        """Take back the points of a move; an arc that is cut no more stays whole."""
+        self.points.pop(v, None)
+        visits = self.source.reading.visits
+        if not is_arc(visits, v):
+            return
+        via = point_on_way(visits, v)
+        halves = self.points.pop(via, (1.0,)), self.points.get(via + 1, ())
+        if halves != ((1.0,), ()):
+            self.points[via] = halves[0]
 
     def _bad(self) -> Iterator[tuple[int, str]]:
         """Yield the moves whose points must go, and why."""
@@ -309,12 +419,15 @@ class _PathWork:
         with_points = self._worst(told)
         other, usual = map(self._otherwise, (told.paths, self.first.paths))
         corner = self._corners_moved(told)
-        status = self.latest.kept.decisions.status
+        status, flat = self.latest.kept.decisions.status, self._flat_pieces()
+        bent = {cut[0] for cut, far in flat.items() if not self._chord(cut, far)}
         for v in sorted(self.points):
             before = without[v]
-            first = int(self.own[v]) - len(self.points[v])
+            first = int(self.own[v - 1]) + 1
             if v not in with_points:
                 yield v, "nothing is predicted for it with points"
+            elif v in bent:
+                yield v, "pieces of it would bend too little for arcs"
             elif (status[first : self.own[v]] != Status.SAFE).any():
                 yield v, "points on its way cannot be corrected"
             elif with_points[v] > before:
@@ -340,38 +453,47 @@ class _PathWork:
         for k, v in enumerate(told.paths.visit.tolist()):
             samples = told.paths.samples(k)
             way, far = told.paths.way[samples], told.paths.after.across[samples]
-            for share, (half, passed) in zip(
+            for share, (half, beside) in zip(
                 self.points.get(v, ()), rounded.get(v, ()), strict=True
             ):
                 near = far[np.abs(way - share * way[-1]) <= half]
-                found[v] = max(found[v], passed + float(near.max(initial=0.0)))
+                found[v] = max(found[v], beside + float(near.max(initial=0.0)))
         return found
 
     def _rounded(self, told: InTime) -> dict[int, list[tuple[float, float]]]:
         """Size of the largest zones at points, and how far they pass them [m].
 
         No corner is larger than half of a neighbouring piece; what cuts it off straight
-        passes the point farthest.
+        passes the point farthest. On an arc it is no larger than zones are, by any law.
         """
-        cycle, found = told.after, dict[int, list[tuple[float, float]]]()
-        p = self.setting.cell.arm.tcp(cycle.path.q, cycle.targets.tool[:, :3, 3])
+        p, c = (
+            self.setting.cell.arm.tcp(cycle.path.q, cycle.targets.tool[:, :3, 3])
+            for cycle in (told.after, told.before)
+        )
+        found = dict[int, list[tuple[float, float]]]()
+        visits, arcs = self.source.reading.visits, self._wanted_arcs()
+        zone = largest_zones(self.setting.cell.arm, told.after) if len(arcs) else None
         for v, shares in self.points.items():
-            end = int(self.own[v])
-            rows = np.arange(end - len(shares), end + 1)
-            before = self.latest.reading.visits.before[rows[0]]
-            steps = np.diff(p[np.append(before, rows)], axis=0)
-            size = np.maximum(lengths(steps), 1e-9)
-            unit = steps / size[:, None]
-            bend = lengths(np.diff(unit, axis=0)) / 2  # sine of half of the angle
+            rows = [int(self.own[visits.before[v]]), *self._ends(v)]
+            if shares[-1] == 1.0:
+                rows.append(self._ends(v + 1)[0])
+            rows = rows[: len(shares) + 2]
+            size = np.maximum(lengths(np.diff(p[rows], axis=0)), 1e-9)
+            slope = np.diff((p - c)[rows], axis=0) / size[:, None]
+            bend = lengths(np.diff(slope, axis=0)) / 2  # sine of half of the angle
             half = np.minimum(size[1:], size[:-1]) / 2
-            columns = half.tolist(), (half * bend).tolist()
-            found[v] = list(zip(*columns, strict=True))
+            far = half * bend
+            if zone is not None and is_arc(visits, v):
+                half = np.minimum(half, zone[rows[1:-1]])
+                far = half * bend + passed(half, arcs.radius_of(v))
+            found[v] = list(zip(half.tolist(), far.tolist(), strict=True))
         return found
 
     def _corners_moved(self, told: InTime) -> Bools:
         """Tell at which moves a rounded corner at an end is passed otherwise, (n,)."""
         moved = told.before.path.aside[self.own] - self.first.before.path.aside
         there = any_in_rows(np.abs(np.nan_to_num(moved)) > MOVED)
+        there[self._cut_arcs()] = False  # judged as the points that they are
         before = self.source.reading.visits.before
         return np.asarray(there | (there[before] & (before >= 0)))
 

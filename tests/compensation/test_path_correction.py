@@ -57,8 +57,8 @@ def told(folder: Path, name: str) -> dict[str, Any]:
     return found
 
 
-def lines_of(report: dict[str, Any]) -> list[dict[str, Any]]:
-    return [path for path in report["path"] if path["move"] == "LINEAR"]
+def lines_of(report: dict[str, Any], move: str = "LINEAR") -> list[dict[str, Any]]:
+    return [path for path in report["path"] if path["move"] == move]
 
 
 def real(folder: Path, name: str) -> dict[int, dict[str, Any]]:
@@ -78,6 +78,33 @@ def test_the_virtual_arm_keeps_closer_to_its_lines(shop: Path) -> None:
     assert sizes["stops"].max() < 0.5 * sizes["plain"].max()
 
 
+def test_the_virtual_arm_keeps_closer_to_its_arcs(shop: Path) -> None:
+    sizes, most = {}, {}
+    for name in ("plain", "points", "stops"):
+        true, own = real(shop, name), lines_of(told(shop, name), "CIRCULAR")
+        assert len(own) == 4  # an arc is two paths
+        sizes[name] = np.array([true[path["visit"]]["p95_mm"] for path in own])
+        most[name] = np.array([true[path["visit"]]["max_mm"] for path in own])
+        predicted = np.array([path["max_mm"]["after"] for path in own])
+        assert np.abs(most[name] - predicted).max() < 0.1
+    assert (sizes["points"] < 0.5 * sizes["plain"]).all()
+    assert (most["points"] < most["plain"]).all()
+    assert (most["stops"] < 0.4 * most["plain"]).all()
+
+
+def test_arcs_are_cut_at_the_points_on_their_ways_too(shop: Path) -> None:
+    arcs = lines_of(told(shop, "points"), "CIRCULAR")
+    for first, second in zip(arcs[::2], arcs[1::2], strict=True):
+        assert first["line"] == second["line"]
+        assert first["points"][-1]["at_mm"] == pytest.approx(first["length_mm"])
+        for half in (first, second):
+            at = [0.0, *(point["at_mm"] for point in half["points"])]
+            assert (np.diff(at) >= SHORTEST * SPEED - 1e-3).all()
+            assert half["inserted"] == len(half["points"]) and not half["not_split"]
+    text = (shop / "points.pdl").read_text()
+    assert text.count("inserted (via)") == 2 and text.count("CIRCULAR") > 6
+
+
 def test_points_are_few_far_apart_and_told(shop: Path) -> None:
     report = told(shop, "points")
     for path in lines_of(report):
@@ -90,8 +117,6 @@ def test_points_are_few_far_apart_and_told(shop: Path) -> None:
         if path["max_mm"]["after"] > TOLERANCE:
             assert path["not_split"] or path["points"]
     assert sum(path["inserted"] for path in lines_of(report)) > 5
-    assert all(p["not_split"] == "arcs are not split" for p in report["path"]
-               if p["move"] == "CIRCULAR" and p["without_mm"] > TOLERANCE)  # fmt: skip
     findings = [d["code"] for d in report["diagnostics"]]
     assert "path-points" in findings and "path-left" in findings
     assert AIM < 1

@@ -96,6 +96,11 @@ class Pdl2(Language):
         """Tell by the comment that such lines end with."""
         return MARK.search(line) is not None
 
+    def ends_at_via(self, line: bytes) -> bool:
+        """Tell by that comment as well."""
+        found = MARK.search(line)
+        return found is not None and found[1] is not None
+
     def target_names(
         self, file: str, lines: Sequence[bytes], wanted: Sequence[int]
     ) -> Iterator[str]:
