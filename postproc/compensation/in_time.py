@@ -29,6 +29,7 @@ SLOWED = "slowed-down"  # codes of findings
 OTHER_SIDE = "side-in-time"
 PATH_POINTS = "path-points"
 PATH_LEFT = "path-left"
+APPROACHED = "approached-anew"
 MOST_SLOWER = 0.03  # of the cycle time
 FEW = 5  # lines that a finding names
 _LIMITS = [CODE[text] for text in (*LIMITS, *PATH_LIMITS)]
@@ -145,6 +146,14 @@ class InTime:
             )
             place = visits.files[visits.file[first]], int(visits.line[first])
             yield Diagnostic(*place, PATH_POINTS, text)
+        if told.approaches:
+            first = min(told.approaches)
+            text = (
+                f"{len(told.approaches)} targets are approached anew, from a stop on "
+                "the way already travelled"
+            )
+            place = visits.files[visits.file[first]], int(visits.line[first])
+            yield Diagnostic(*place, APPROACHED, text)
         for k in self._too_far.tolist():
             v = int(self.paths.visit[k])
             far = self.paths.after.sizes[k] / MM

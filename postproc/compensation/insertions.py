@@ -6,14 +6,16 @@ They lie on the programmed path; what corrects them is what corrects all targets
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import fields, replace
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 
 from postproc.arrays import Bools, Floats, Ints
 from postproc.compensation.arc_splitting import Chords, CutArc, is_arc
+from postproc.compensation.command import base_in_uframe
 from postproc.compensation.equivalence import equivalent
 from postproc.compensation.path_points import Points
 from postproc.compensation.program import Reading, read_program
@@ -24,7 +26,7 @@ from postproc.language.languages import language_of
 from postproc.language.source import Edit, Source, apply, compose
 from postproc.language.visits import Literals, Visits
 from postproc.robot.cell import Cell
-from postproc.robot.pose import rotation_from_vector, rotation_vector
+from postproc.robot.pose import MM, rotation_from_vector, rotation_vector
 from postproc.robot.trajectory import Motion
 
 
@@ -35,6 +37,7 @@ def insert(
     splitter: Splitter,
     cell: Cell,
     chords: Chords = (),
+    approaches: Mapping[int, Floats] = MappingProxyType({}),
 ) -> tuple[Reading, Ints]:
     """Put points on the ways of a program.
 
@@ -45,6 +48,7 @@ def insert(
         splitter: Its files.
         cell: What holds at program start.
         chords: Pieces of arcs that are chords.
+        approaches: Stops from which targets are approached anew, by visit, (w,) each.
 
     Returns:
         The program with points, proven to make the same moves otherwise, and those of
@@ -55,6 +59,12 @@ def insert(
         CloneError: A point cannot be written.
     """
     edits = _edits(reading, points, stops, splitter, cell, chords)
+    lines, visits = lines_in_files(reading, cell), reading.visits
+    for visit, numbers in approaches.items():
+        config = visits.configs[visits.config[visit]]
+        file, line = int(visits.file[visit]), int(lines[visit])
+        edits[file].append(splitter.approach(file, line, numbers, config))
+    edits = [sorted(own, key=lambda edit: edit.span) for own in edits]
     sources = [
         Source(source.name, apply(source.data, own))
         for source, own in zip(reading.sources, edits, strict=True)
@@ -62,7 +72,8 @@ def insert(
     again = read_program({s.name: s.data for s in sources}, cell)
     found = _inserted(again.visits, sources, edits)
     new = points_on_ways(again.visits, sources, found)
-    _prove(reading.visits, again.visits, found, new, points)
+    count = sum(map(len, points.values())) + len(approaches)
+    _prove(reading.visits, again.visits, found, new, count)
     cloned = tuple(
         tuple(compose(one, own))
         for one, own in zip(reading.cloned or [()] * len(edits), edits, strict=True)
@@ -95,7 +106,7 @@ def _edits(
             found[file].append(
                 splitter.points(file, line, numbers, config, visit in stops)
             )
-    return [sorted(found[k], key=lambda e: e.span) for k in range(len(reading.sources))]
+    return [found[k] for k in range(len(reading.sources))]
 
 
 def lines_in_files(reading: Reading, cell: Cell) -> Ints:
@@ -124,6 +135,15 @@ def between(visits: Visits, visit: int, share: Floats) -> Floats:
     out = np.tile(ends[0], (len(share), 1))
     out[:, :3] += share[:, None] * (ends[1, :3] - ends[0, :3])
     return visits.dialect.turned(out, rotation_from_vector(share[:, None] * axis))
+
+
+def numbers_at(visits: Visits, visit: int, pose: Floats) -> Floats:
+    """Write a TCP pose (4, 4) [m] in the arm's base as numbers of a visit, (w,)."""
+    numbers = np.array(visits.values[[visit]])
+    pose = base_in_uframe(visits, np.array([visit]))[0] @ pose
+    turn = pose[:3, :3] @ visits.dialect.poses(numbers)[0, :3, :3].T
+    numbers[0, :3] = pose[:3, 3] / MM
+    return np.asarray(visits.dialect.turned(numbers, turn[None])[0])
 
 
 # The proof that a program with points makes the same moves otherwise.
@@ -172,7 +192,7 @@ def points_on_ways(visits: Visits, sources: Sequence[Source], inserted: Bools) -
 
 
 def _prove(
-    before: Visits, after: Visits, inserted: Bools, new: Bools, points: Points
+    before: Visits, after: Visits, inserted: Bools, new: Bools, count: int
 ) -> None:
     """Hold a program with points to be the same but for them.
 
@@ -181,12 +201,12 @@ def _prove(
         after: .. with points.
         inserted: Visits on lines that are points, (m,).
         new: Visits that the source does not make, (m,).
-        points: What was put in.
+        count: How many points were put in.
 
     Raises:
         VerificationError: It is not.
     """
-    count, found = sum(map(len, points.values())), inserted & ~after.via
+    found = inserted & ~after.via
     problem = f"{int(found.sum())} of {count} points are found again"
     if int(found.sum()) == count and len(after) - int(new.sum()) == len(before):
         nothing = np.zeros(0, dtype=np.int64)

@@ -14,7 +14,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from postproc.arrays import Bools, Ints, any_in_rows
+from postproc.arrays import Bools, Floats, Ints, any_in_rows
+from postproc.compensation.approach import place_to_approach
 from postproc.compensation.arc_splitting import (
     STRAIGHT,
     Cut,
@@ -27,7 +28,8 @@ from postproc.compensation.arc_splitting import (
 )
 from postproc.compensation.correction import BY_VISIT, EXPLAINING, Correction, correct
 from postproc.compensation.in_time import InTime, run_in_time
-from postproc.compensation.insertions import insert, lines_in_files
+from postproc.compensation.insertions import insert, lines_in_files, numbers_at
+from postproc.compensation.notes import SURE
 from postproc.compensation.options import Setting
 from postproc.compensation.outcome import Status
 from postproc.compensation.path_accuracy import PathAccuracy
@@ -35,9 +37,11 @@ from postproc.compensation.path_points import Insertions
 from postproc.compensation.program import Reading
 from postproc.compensation.rewrite import Output
 from postproc.compensation.splitting import hindrances, shortest_pieces, unwritable
+from postproc.exceptions import PostprocError
 from postproc.language.interface import Splitter
 from postproc.language.languages import language_of
 from postproc.robot.pose import MM, lengths
+from postproc.robot.trajectory import Motion
 
 ROUNDS = 16  # of points put on the ways
 TAKEN = (
@@ -84,14 +88,25 @@ def correct_paths(draft: Draft, setting: Setting, write: Write) -> Draft:
 
     Returns:
         The program, `kept` speaking of the visits of the source.
+
+    Raises:
+        PostprocError: Targets cannot be approached anew in its language.
     """
     reading, first = draft.reading, draft.in_time
-    if first is None or setting.options.path_mm is None:
+    if first is None or not setting.options.inserts:
         return draft
-    splitter = language_of(reading.sources[0].name).splitter(reading.sources)
+    language = language_of(reading.sources[0].name)
+    splitter = language.splitter(reading.sources)
+    if splitter is None and setting.options.approach:
+        raise PostprocError(
+            f"--approach: targets are not approached anew in {language.name} programs. "
+            "Leave it out: side-not-sure says how to approach them"
+        )
     work = _PathWork(draft, first, setting, write)
+    if splitter is not None and setting.options.approach:
+        work.approach(splitter)
     work.find_split(splitter)
-    if splitter is not None and work.open:
+    if splitter is not None and (work.open or work.approaches):
         work.improve(splitter)
         work.judge(splitter)
     return work.result()
@@ -113,6 +128,7 @@ class _PathWork:
         idle: Moves that may have one.
         tried: How far such a move began off, and where it stopped, try by try.
         chords: Pieces of arcs that are chords whatever they bend.
+        approaches: Stops from which targets are approached anew, by visit, (w,) each.
         left: Why moves that leave their path too far are not split.
         latest: The program with these points; at first the source.
         own: The visits of it that the source makes, (n,).
@@ -128,6 +144,7 @@ class _PathWork:
     idle: set[int] = field(default_factory=set)
     tried: dict[int, list[tuple[float, float]]] = field(default_factory=dict)
     chords: set[Cut] = field(default_factory=set)
+    approaches: dict[int, Floats] = field(default_factory=dict)
     left: dict[int, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -138,7 +155,14 @@ class _PathWork:
     @property
     def tolerance(self) -> float:
         """The largest deviation that is asked for [m]."""
-        return (self.setting.options.path_mm or 0.0) * MM
+        asked = self.setting.options.path_mm
+        return np.inf if asked is None else asked * MM
+
+    @property
+    def room(self) -> int:
+        """How many more points may be put in."""
+        count = sum(map(len, self.points.values())) + len(self.approaches)
+        return self.setting.options.max_inserted - count
 
     @property
     def aim(self) -> float:
@@ -171,6 +195,8 @@ class _PathWork:
             if splitter is None:
                 name = language_of(reading.sources[0].name).name
                 self.left[v] = f"no points are put on ways in {name}"
+            elif v in self.approaches:
+                self.left[v] = "its target is approached anew"
             elif why.get(v):
                 self.left[v] = why[v]
             elif told := unwritable(splitter, reading.visits, v, file, int(lines[v])):
@@ -183,6 +209,60 @@ class _PathWork:
                 still = self.setting.options.take_up and not reading.visits.fly[before]
                 if still and splitter.stops(file, int(lines[v])):
                     self.idle.add(v)
+
+    # Stops from which targets are approached anew.
+
+    def approach(self, splitter: Splitter) -> None:
+        """Approach targets anew that a joint reaches from a side that is not sure."""
+        reading, decided = self.source.reading, self.source.kept.decisions
+        visits, why = (
+            reading.visits,
+            hindrances(reading.visits, decided, self.first.before),
+        )
+        lines = lines_in_files(reading, self.setting.cell)
+        ends = (visits.motion == Motion.LINEAR) & ~visits.fly
+        ends &= ~visits.fly[visits.before]
+        for v in np.flatnonzero(ends & self._unsure(self.source.kept)).tolist():
+            file, line = int(visits.file[v]), int(lines[v])
+            hindered = why.get(v) or unwritable(splitter, visits, v, file, line)
+            if not hindered and splitter.stops(file, line) and self.room > 0:
+                place = self._place_to_approach(v)
+                if place is not None:
+                    self.approaches[v] = place
+        if self.approaches:
+            self._make(splitter)
+
+    def _place_to_approach(self, v: int) -> Floats | None:
+        """Find the numbers of a stop from which to approach a target."""
+        cell, cycle = self.setting.cell, self.first.before
+        visits, side = self.source.reading.visits, self.source.kept.decisions.side
+        q = place_to_approach(
+            cell.arm, cycle, v, int(visits.before[v]), np.abs(side[v]) < SURE,
+            cell.limits.approach_mm * MM,
+        )  # fmt: skip
+        if q is None:
+            return None
+        pose = cell.arm.flange(q[None]) @ cycle.targets.tool[[v]]
+        return numbers_at(visits, v, pose[0])
+
+    def _unsure(self, kept: Correction) -> Bools:
+        """Tell which targets move that a joint reaches from a side that is not sure."""
+        return kept.corrected & any_in_rows(np.abs(kept.decisions.side) < SURE)
+
+    def _bad_approaches(self) -> set[int]:
+        """Find the targets that are approached anew and are no better for it."""
+        kept = of_source(self.latest.kept, self.own)
+        unsure, status = self._unsure(kept), kept.decisions.status
+        stops = self.latest.kept.decisions.status[self.own - 1]
+        others = np.flatnonzero(unsure & ~self._unsure(self.source.kept))
+        asked = np.array(sorted(self.approaches), dtype=np.int64)
+        bad = (
+            unsure[asked]
+            | (status[asked] != Status.SAFE)
+            | (stops[asked] != Status.SAFE)
+        )
+        cause = np.searchsorted(asked, others, side="right") - 1
+        return {*asked[bad].tolist(), *asked[cause[cause >= 0]].tolist()}
 
     # Points where the paths are left the most, round by round.
 
@@ -214,7 +294,7 @@ class _PathWork:
 
     def _halved(self) -> Iterator[tuple[int, list[float]]]:
         """Yield the points of arcs with pieces that are too flat, and no chords yet."""
-        room = self.setting.options.max_inserted - sum(map(len, self.points.values()))
+        room = self.room
         flat, found = self._flat_pieces(), dict[int, list[float]]()
         for (v, end), bent in flat.items():
             known = found.get(v, [*self.points.get(v, ())])
@@ -265,7 +345,7 @@ class _PathWork:
 
     def _new_points(self) -> Iterator[tuple[int, list[float]]]:
         """Yield the points of moves that get more of them, by their visit."""
-        room = self.setting.options.max_inserted - sum(map(len, self.points.values()))
+        room = self.room
         sizes, whole = self.paths.after.sizes, self._whole_arcs()
         for k in np.argsort(-sizes, kind="stable").tolist():
             v = int(self.paths.visit[k])
@@ -358,14 +438,14 @@ class _PathWork:
 
     def _make(self, splitter: Splitter) -> None:
         """Correct the program with its points, and predict it."""
-        if not self.points:
+        if not self.points and not self.approaches:
             self.__post_init__()
             return
         cell, clock = self.setting.cell, self.setting.clock
         with clock("insert"):
             reading, own = insert(
                 self.source.reading, self.points, self.stops, splitter, cell,
-                self.chords,
+                self.chords, self.approaches,
             )  # fmt: skip
         options = replace(self.setting.options, clone=False)
         reading, kept = correct(reading, replace(self.setting, options=options))
@@ -387,20 +467,22 @@ class _PathWork:
     def judge(self, splitter: Splitter) -> None:
         """Take back the points of moves that are no better for certain."""
         for _ in range(JUDGED):
-            bad = dict(self._bad())
-            if not bad:
+            bad, anew = dict(self._bad()), self._bad_approaches()
+            if not bad and not anew:
                 return
             self.left |= bad
-            for v in bad:
+            for v in (*bad, *anew):
                 self._take_back(v)
             self._make(splitter)
         self.left |= dict.fromkeys(self.points, "its points do not stay put")
         self.points.clear()
+        self.approaches.clear()
         self._make(splitter)
 
     def _take_back(self, v: int) -> None:
         """Take back the points of a move; an arc that is cut no more stays whole."""
         self.points.pop(v, None)
+        self.approaches.pop(v, None)
         visits = self.source.reading.visits
         if not is_arc(visits, v):
             return
@@ -503,7 +585,7 @@ class _PathWork:
         """Tell of the program as of the source's visits."""
         told = self.latest.in_time or self.first
         budget = "no more points may be put on ways (--max-inserted)"
-        if sum(map(len, self.points.values())) >= self.setting.options.max_inserted:
+        if self.room <= 0:
             for k in self.too_far.tolist():
                 self.left.setdefault(int(self.paths.visit[k]), budget)
         for k in self.too_far.tolist():
@@ -516,7 +598,8 @@ class _PathWork:
             self.stops & self.points.keys(),
             {v: why for v, why in self.left.items() if v not in self.points},
             self._sizes(self.first.paths),
-            self._otherwise(told.paths) if self.points else {},
+            self._otherwise(told.paths) if self.latest is not self.source else {},
+            self._approached(told),
         )
         in_time = replace(
             told,
@@ -526,6 +609,19 @@ class _PathWork:
         )
         kept = of_source(self.latest.kept, self.own)
         return replace(self.latest, kept=kept, in_time=in_time)
+
+    def _approached(self, told: InTime) -> dict[int, float]:
+        """Return the shares of the ways at which targets are approached anew."""
+        p = self.setting.cell.arm.tcp(
+            told.before.path.q, told.before.targets.tool[:, :3, 3]
+        )
+        found = {}
+        for v in self.approaches:
+            row = int(self.own[v])
+            there, back = (float(np.linalg.norm(p[row - 1] - p[k])) for k in
+                           (row - 2, row))  # fmt: skip
+            found[v] = there / (there + back)
+        return found
 
 
 def of_source(kept: Correction, own: Ints) -> Correction:

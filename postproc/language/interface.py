@@ -224,6 +224,20 @@ class Splitter(ABC):
         """
 
     @abstractmethod
+    def approach(self, file: int, line: int, numbers: Floats, config: str) -> Edit:
+        """Write a stop in front of a LINEAR move, from where it leads to its target.
+
+        Args:
+            file: Where the move stands.
+            line: Its line there.
+            numbers: Of the stop, (w,).
+            config: Its configuration flags.
+
+        Raises:
+            CloneError: It cannot be written there.
+        """
+
+    @abstractmethod
     def arc(
         self,
         file: int,
@@ -300,6 +314,10 @@ class Language(ABC):
 
     def is_inserted(self, line: bytes) -> bool:
         """Tell whether a line is a point that a `Splitter` wrote."""
+        return False
+
+    def is_approach(self, line: bytes) -> bool:
+        """Tell whether such a line is a stop from which a target is approached."""
         return False
 
     def ends_at_via(self, line: bytes) -> bool:

@@ -109,10 +109,16 @@ def _points(
     visit, length = int(paths.visit[k]), float(paths.way[paths.samples(k).stop - 1])
     if inserted is None:
         return {"inserted": 0, "points": []}
-    shares = inserted.points.get(visit, ())
+    shares: list[tuple[float, dict[str, bool]]] = [
+        (share, {}) for share in inserted.points.get(visit, ())
+    ]
+    if visit in inserted.approaches:
+        shares = [(inserted.approaches[visit], {"approach": True})]
     told: dict[str, object] = {
         "inserted": len(shares),
-        "points": [{"at_mm": round(share * length / MM, 3)} for share in shares],
+        "points": [
+            {"at_mm": round(share * length / MM, 3)} | more for share, more in shares
+        ],
         "not_split": inserted.left.get(visit),
     }
     for key, far in (

@@ -10,8 +10,15 @@ from typing import Any
 import numpy as np
 import pytest
 
+from postproc.arrays import Floats
+from postproc.cli.simulate import _read, setup_of
 from postproc.compensation.path_correction import AIM
 from postproc.compensation.splitting import SHORTEST
+from postproc.robot.cell import load_cell
+from postproc.robot.pose import MM
+from postproc.simulation import DEFAULT, virtual_arm
+from postproc.simulation.program import land
+from tests.compensation.test_approach import job as approaches
 from tests.compensation.test_path_accuracy import CELL, SEED, done, job
 from tests.written import cli
 
@@ -172,9 +179,90 @@ def test_where_events_may_count_segments_nothing_is_split(shop: Path) -> None:
     assert any("events along a move" in d["message"] for d in report["diagnostics"])
 
 
+# Targets that are approached anew.
+
+
+def holes(speed: str = "  $LIN_SPD := 0.05\n") -> bytes:
+    """Places that are reached from 0.4 mm above: within the plays of some joints."""
+    return approaches({}).replace(b"BEGIN\n", f"BEGIN\n{speed}".encode())
+
+
+@pytest.fixture(scope="module")
+def drilled(shop: Path) -> Path:
+    (shop / "holes.pdl").write_bytes(holes())
+    for name, more in (("once", ()), ("anew", ("--approach",))):
+        compensated(shop, "holes.pdl", name, *more)
+        done("simulate", shop / f"{name}.pdl", "--cell", CELL, "--seed", SEED,
+             "--wanted", shop / "holes.pdl", "--path",
+             "--json", shop / f"{name}.true.json")  # fmt: skip
+    return shop
+
+
+def landing(folder: Path, name: str) -> Floats:
+    """How far the virtual arm lands from every target, (n,) [mm]."""
+    cell = load_cell(CELL)
+    setup, own = setup_of(cell), (_read(folder / f"{n}.pdl", cell) for n in
+                                  ("holes", name))  # fmt: skip
+    (wanted, _, _), (ran, rows, _) = own
+    arm = virtual_arm(SEED, DEFAULT, coupling=setup.coupling, rows=1, tool=setup.tool)
+    found = land(arm, setup, wanted, ran, rows)
+    assert len(found.visit) == len(wanted)
+    return np.linalg.norm(found.error, axis=1) / MM
+
+
+def test_the_virtual_arm_lands_nearer_where_it_comes_anew(drilled: Path) -> None:
+    report = told(drilled, "anew")
+    moves = [p for p in report["path"] if p["inserted"]]
+    rows = [p["visit"] for p in moves]
+    assert len(rows) >= 10
+    once, anew = landing(drilled, "once"), landing(drilled, "anew")
+    assert anew[rows].mean() < 0.6 * once[rows].mean()
+    others = np.setdiff1d(np.arange(len(once)), rows)
+    assert (anew[others] < once[others] + 0.01).all()
+    codes = [[d["code"] for d in told(drilled, name)["diagnostics"]]
+             for name in ("once", "anew")]  # fmt: skip
+    assert "approached-anew" in codes[1] and "approached-anew" not in codes[0]
+    assert told(drilled, "anew.true")["path_accuracy"]["max_mm"] < 1.0
+
+
+def test_a_stop_to_come_from_is_near_and_behind(drilled: Path) -> None:
+    report, most = told(drilled, "anew"), load_cell(CELL).limits.approach_mm
+    lines = (drilled / "anew.pdl").read_text().splitlines()
+    rows = [k for k, line in enumerate(lines) if line.endswith("(approach)")]
+    assert len(rows) == sum(p["inserted"] for p in report["path"])
+    assert all(p["points"][0]["approach"] for p in report["path"] if p["inserted"])
+    for k in rows:
+        above, stop, target = (
+            np.array([float(x) for x in lines[k + i].split("POS(")[1].split(",")[:3]])
+            for i in (-1, 0, 1)
+        )
+        assert 1.0 < np.linalg.norm(stop - target) < most + 1.0
+        away = (stop - target) @ (target - above) / np.linalg.norm(target - above)
+        assert away < 1.0  # beyond by no more than corrections differ
+        assert lines[k].split()[:3] == ["MOVE", "LINEAR", "TO"]
+
+
+def test_what_was_approached_anew_comes_back(drilled: Path) -> None:
+    done("restore", drilled / "anew.pdl", "-o", drilled / "back.pdl")
+    assert (drilled / "back.pdl").read_bytes() == holes()
+    plain, anew = told(drilled, "once"), told(drilled, "anew")
+    assert [t["line"] for t in plain["targets"]] == [t["line"] for t in anew["targets"]]
+
+
+@pytest.mark.parametrize("between", ["$DOUT[2] := TRUE", "weld_on"])
+def test_nothing_is_approached_anew_where_a_process_may_run(
+    shop: Path, between: str
+) -> None:
+    text = holes().replace(b"  MOVE LINEAR", f"  {between}\n  MOVE LINEAR".encode())
+    (shop / "process.pdl").write_bytes(text)
+    report = compensated(shop, "process.pdl", "processed", "--approach")
+    assert sum(path["inserted"] for path in report["path"]) == 0
+
+
 @pytest.mark.parametrize(
     ("options", "said"),
     [
+        (("--approach", "--no-timing"), "--no-timing"),
         (("--path-mm", 0.0), "more than 0"),
         (("--path-mm", 0.1, "--no-timing"), "--no-timing"),
         (("--take-up",), "--path-mm"),

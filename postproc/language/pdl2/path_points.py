@@ -19,7 +19,8 @@ from postproc.language.source import CloneError, Edit, Source, Span, check_lengt
 
 INSERTED = "-- postproc: inserted"  # ends such a line
 AT_VIA = " (via)"  # .. where it leads to the point on the way of an arc
-MARK = re.compile(rb"-- postproc: inserted( \(via\))?[ \t]*\r?$")
+AT_APPROACH = " (approach)"  # .. where it is a stop from which a target is reached
+MARK = re.compile(rb"-- postproc: inserted( \((?:via|approach)\))?[ \t]*\r?$")
 
 _EVENT = re.compile(r"\b(AT|TIME|DISTANCE|PERCENT|SEGMENT|EVENT)\b", re.I)
 _ENABLE = re.compile(r"\bENABLE\b(?!\s+CONDITION\s*\[\s*\d+\s*\])", re.I)
@@ -93,6 +94,12 @@ class Pdl2Splitter(Splitter):
             way = f"LINEAR TO {_place(own, config)}"
             text += form.line(way, stop and number == 0)
         return form.before(text)
+
+    def approach(self, file: int, line: int, numbers: Floats, config: str) -> Edit:
+        """Write a stop to approach a target from, see `Splitter.approach`."""
+        form = _Form.of(self.programs[file], line)
+        way = f"LINEAR TO {_place(numbers, config)}"
+        return form.before(form.line(way, True, AT_APPROACH))
 
     def arc(
         self,
