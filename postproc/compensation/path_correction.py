@@ -108,6 +108,7 @@ def correct_paths(draft: Draft, setting: Setting, write: Write) -> Draft:
     work.find_split(splitter)
     if splitter is not None and (work.open or work.approaches):
         work.improve(splitter)
+        work.bend(splitter)
         work.judge(splitter)
     return work.result()
 
@@ -277,6 +278,30 @@ class _PathWork:
             self.chords |= flat
             self._cut_at_vias()
             self._make(splitter)
+
+    def bend(self, splitter: Splitter) -> None:
+        """Let pieces of arcs that are too flat go on to the next cut."""
+        for _ in range(ROUNDS):
+            joined = False
+            for v, points in self._joined().items():
+                joined |= points != self.points[v]
+                self.points[v] = points
+            self.points = {v: points for v, points in self.points.items() if points}
+            if not joined:
+                return
+            self._make(splitter)
+
+    def _joined(self) -> dict[int, tuple[float, ...]]:
+        """Return the points of arcs with such pieces, one less where one can go."""
+        found = {}
+        for (v, end), bent in self._flat_pieces().items():
+            if v in found or v not in self.points or self._chord((v, end), bent):
+                continue
+            known = self.points[v]
+            begin = max((s for s in known if s < end), default=0.0)
+            gone = end if end < 1.0 else begin
+            found[v] = tuple(s for s in known if s != gone)
+        return found
 
     def _cut_at_vias(self) -> None:
         """Cut arcs that are cut anywhere at the points on their ways as well."""
