@@ -158,7 +158,7 @@ def _print_outcome(outcome: Outcome) -> None:
             say(source)
     say(outcome.summary())
     if outcome.in_time is not None:
-        say(outcome.in_time.summary())
+        say(outcome.in_time.summary(outcome.visits))
 
 
 @app.command()

@@ -10,6 +10,7 @@ import numpy as np
 from postproc.arrays import Bools, Floats, Ints
 from postproc.compensation.approach import advise
 from postproc.compensation.arc_splitting import NO_ARCS, WantedArcs
+from postproc.compensation.corners import Corners, predict_corners
 from postproc.compensation.options import Setting
 from postproc.compensation.path_accuracy import PathAccuracy, predict_paths
 from postproc.compensation.path_points import Insertions
@@ -68,7 +69,11 @@ class InTime:
         """Return the visits of the source that those of the compensated one lead to."""
         return np.where(rows < 0, rows, np.searchsorted(self.own, rows))
 
-    def summary(self) -> str:
+    def corners(self, visits: Visits) -> Corners:
+        """Predict how far rounded corners of the program are passed."""
+        return predict_corners(visits, self.before, self.paths)
+
+    def summary(self, visits: Visits) -> str:
         """Say in one line how long it takes, and how well it keeps to its paths."""
         if not self.before.seconds:
             return "no move leads from one known place to another: no time to tell"
@@ -82,6 +87,7 @@ class InTime:
             f"{said}; predicted path accuracy AT_p (systematic part) mean "
             f"{before.mean():.3f} -> {after.mean():.3f} mm, max {before.max():.3f} -> "
             f"{after.max():.3f} mm over {len(before)} moves"
+            + _round_off(self.corners(visits))
         )
 
     @property
@@ -182,14 +188,28 @@ class InTime:
         rows = self.source(slowed)
         lines = dict.fromkeys(visits.line[rows].tolist())
         more = f" and {len(lines) - FEW} more" if len(lines) > FEW else ""
-        least = 100 * self.after.clock.allowed[slowed].min()
+        worst = slowed[self.after.clock.allowed[slowed].argmin()]
+        least = 100 * self.after.clock.allowed[worst]
+        joint = int(self.after.clock.velocity[worst].argmax()) + 1
         text = (
-            f"the joints reach {least:.0f} % of the programmed speed at the least: the "
+            f"the joints reach {least:.0f} % of the programmed speed at the least, "
+            f"axis {joint} turning the fastest for its limits: the "
             "controller slows down or stops there, near a singularity as a rule "
             f"(lines {', '.join(map(str, [*lines][:FEW]))}{more})"
         )
         place = visits.files[visits.file[rows[0]]], int(visits.line[rows[0]])
         yield Diagnostic(*place, SLOWED, text)
+
+
+def _round_off(corners: Corners) -> str:
+    """Say how far rounded corners are passed, "" where there are none."""
+    if not len(corners):
+        return ""
+    before, after = corners.before.max() / MM, corners.after.max() / MM
+    return (
+        f"; cornering round-off CR (systematic part) max {before:.3f} -> "
+        f"{after:.3f} mm at {len(corners)} corners"
+    )
 
 
 def _all(column: Bools) -> Ints:

@@ -35,13 +35,15 @@ class Deviations:
     """How a program leaves m paths (structure of arrays), s samples in all.
 
     Attributes:
-        across: Distance from the path at the samples, (s,) [m].
+        off: From the path to the TCP at the samples, (s, 3) [m].
+        across: Distance from the path there, (s,) [m].
         along: How far the TCP is ahead along it, (s,) [m].
         unsure: How much farther it may be where a joint's flank is not known, (s,) [m].
         largest: Sample of the largest distance of each path, (m,).
         joint: Joint (1 to 6) whose flank makes most of it there, (m,), 0: none.
     """
 
+    off: Floats
     across: Floats
     along: Floats
     unsure: Floats
@@ -462,9 +464,10 @@ def _deviations(
     across = lengths(off - along[:, None] * tangent)
     unsure, starts = _unsure(run, error), run.ways.first[:-1]
     if not len(starts):
-        return Deviations(across, along, unsure, starts, starts)
+        return Deviations(off, across, along, unsure, starts, starts)
     largest = _largest_in(across, run.ways.way, starts)
-    return Deviations(across, along, unsure, largest, _joints(run, error, largest, way))
+    joints = _joints(run, error, largest, way)
+    return Deviations(off, across, along, unsure, largest, joints)
 
 
 def _unsure(run: _Run, error: _Error) -> Floats:
