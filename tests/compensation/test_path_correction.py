@@ -158,7 +158,8 @@ def test_diff_tells_points_apart(shop: Path) -> None:
 
 def test_a_budget_holds(shop: Path) -> None:
     report = compensated(shop, "job.pdl", "few", "--path-mm", TOLERANCE,
-                         "--max-inserted", 2)  # fmt: skip
+                         "--max-inserted", 2, "--html", shop / "few.html")  # fmt: skip
+    assert (shop / "few.html").stat().st_size > 10_000
     assert sum(path["inserted"] for path in report["path"]) <= 2
     assert any("max-inserted" in d["message"] for d in report["diagnostics"])
     none = compensated(shop, "job.pdl", "none", "--path-mm", TOLERANCE,
