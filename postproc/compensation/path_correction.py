@@ -506,15 +506,19 @@ class _PathWork:
 
     def _take_back(self, v: int) -> None:
         """Take back the points of a move; an arc that is cut no more stays whole."""
-        self.points.pop(v, None)
+        own = self.points.pop(v, ())
         self.approaches.pop(v, None)
         visits = self.source.reading.visits
         if not is_arc(visits, v):
             return
         via = point_on_way(visits, v)
-        halves = self.points.pop(via, (1.0,)), self.points.get(via + 1, ())
-        if halves != ((1.0,), ()):
-            self.points[via] = halves[0]
+        if own in ((), (1.0,)):  # what it has is the cut at the point on the way alone
+            self.points.pop(via, None)
+            self.points.pop(via + 1, None)
+        elif v == via and via + 1 in self.points:
+            self.points[via] = (1.0,)
+        elif self.points.get(via) == (1.0,):
+            del self.points[via]
 
     def _bad(self) -> Iterator[tuple[int, str]]:
         """Yield the moves whose points must go, and why."""
@@ -528,8 +532,10 @@ class _PathWork:
         corner = self._corners_moved(told)
         status, flat = self.latest.kept.decisions.status, self._flat_pieces()
         bent = {cut[0] for cut, far in flat.items() if not self._chord(cut, far)}
-        for v in sorted(self.points):
+        for v in sorted({*self.points, *(via + 1 for via in self._cut_arcs())}):
             before = without[v]
+            if self.points.get(v, ()) in ((), (1.0,)):  # its other half is cut
+                before = max(before, self.aim)
             first = int(self.own[v - 1]) + 1
             if v not in with_points:
                 yield v, "nothing is predicted for it with points"
