@@ -60,9 +60,11 @@ def predict_corners(
     on = np.flatnonzero(lines & (visits.before >= 0))
     behind[visits.before[on]] = on
     corner = lines & visits.fly & (behind >= 0) & (visits.before >= 0)
+    p, aside = cycle.targets.tcp[:, :3, 3], cycle.path.aside
+    told = np.asarray(~np.isnan(p).any(axis=1))  # steps have no place of their own
+    corner &= told & told[visits.before] & told[behind]
     path = np.flatnonzero(corner[paths.visit])
     row = paths.visit[path]
-    p, aside = cycle.targets.tcp[:, :3, 3], cycle.path.aside
     units = [
         step / np.maximum(lengths(step), 1e-12)[:, None]
         for step in (p[row] - p[visits.before[row]], p[behind[row]] - p[row])
@@ -71,7 +73,7 @@ def predict_corners(
     along = along / np.maximum(lengths(along), 1e-12)[:, None]
     end = paths.first[path + 1] - 1
     sizes = []
-    for told in (paths.before, paths.after):
-        off = np.nan_to_num(aside[row]) + told.off[end]
+    for way in (paths.before, paths.after):
+        off = np.nan_to_num(aside[row]) + way.off[end]
         sizes.append(lengths(off - (off * along).sum(axis=1)[:, None] * along))
     return Corners(path, *sizes)
