@@ -20,7 +20,7 @@ from postproc.robot.trajectory import Motion
 
 
 @dataclass(frozen=True)
-class Corners:
+class RoundOff:
     """c fly points between two lines (structure of arrays).
 
     Attributes:
@@ -47,7 +47,7 @@ class Corners:
 
 def predict_corners(
     visits: Visits, cycle: ProgramCycle, paths: PathAccuracy
-) -> Corners:
+) -> RoundOff:
     """Predict the round-off errors of a program.
 
     Args:
@@ -76,4 +76,4 @@ def predict_corners(
     for way in (paths.before, paths.after):
         off = np.nan_to_num(aside[row]) + way.off[end]
         sizes.append(lengths(off - (off * along).sum(axis=1)[:, None] * along))
-    return Corners(path, *sizes)
+    return RoundOff(path, *sizes)

@@ -10,7 +10,7 @@ import numpy as np
 from postproc.arrays import Bools, Floats, Ints
 from postproc.compensation.approach import advise
 from postproc.compensation.arc_splitting import NO_ARCS, WantedArcs
-from postproc.compensation.corners import Corners, predict_corners
+from postproc.compensation.corners import RoundOff, predict_corners
 from postproc.compensation.options import Setting
 from postproc.compensation.path_accuracy import PathAccuracy, predict_paths
 from postproc.compensation.path_points import Insertions
@@ -69,7 +69,7 @@ class InTime:
         """Return the visits of the source that those of the compensated one lead to."""
         return np.where(rows < 0, rows, np.searchsorted(self.own, rows))
 
-    def corners(self, visits: Visits) -> Corners:
+    def corners(self, visits: Visits) -> RoundOff:
         """Predict how far rounded corners of the program are passed."""
         return predict_corners(visits, self.before, self.paths)
 
@@ -201,7 +201,7 @@ class InTime:
         yield Diagnostic(*place, SLOWED, text)
 
 
-def _round_off(corners: Corners) -> str:
+def _round_off(corners: RoundOff) -> str:
     """Say how far rounded corners are passed, "" where there are none."""
     if not len(corners):
         return ""

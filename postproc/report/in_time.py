@@ -8,7 +8,7 @@ from dataclasses import asdict
 import numpy as np
 
 from postproc.arrays import Floats, Ints
-from postproc.compensation.corners import Corners
+from postproc.compensation.corners import RoundOff
 from postproc.compensation.in_time import InTime
 from postproc.compensation.path_accuracy import Deviations, PathAccuracy
 from postproc.compensation.path_points import Insertions
@@ -74,7 +74,7 @@ def paths_of(
     paths: PathAccuracy,
     visits: Visits,
     inserted: Insertions | None = None,
-    corners: Corners | None = None,
+    corners: RoundOff | None = None,
 ) -> list[dict[str, object]]:
     """Describe how every move keeps to its path; of some the curve as well."""
     worst = set(np.argsort(-paths.after.sizes, kind="stable")[:CURVES].tolist())
@@ -108,7 +108,7 @@ def _path(paths: PathAccuracy, k: int, visits: Visits) -> dict[str, object]:
     }
 
 
-def _round_off(corners: Corners) -> dict[str, object]:
+def _round_off(corners: RoundOff) -> dict[str, object]:
     """Describe how far rounded corners are passed, where there are any."""
     if not len(corners):
         return {}
@@ -117,7 +117,7 @@ def _round_off(corners: Corners) -> dict[str, object]:
     return {"cornering_round_off": sizes}
 
 
-def _corner(k: int, corners: Corners | None) -> dict[str, object]:
+def _corner(k: int, corners: RoundOff | None) -> dict[str, object]:
     """Describe how far the corner at the end of a path is passed."""
     pair = None if corners is None else corners.of(k)
     if pair is None:
