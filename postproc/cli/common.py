@@ -85,6 +85,14 @@ TakeUpOption = Annotated[
         help="With --path-mm: stop once more where a move begins, to take up play.",
     ),
 ]
+ApproachOption = Annotated[
+    bool,
+    typer.Option(
+        "--approach",
+        help="Approach targets anew, from a stop on the way already travelled, that "
+        "a joint reaches from a side that is not sure.",
+    ),
+]
 TemperatureOption = Annotated[
     float | None, typer.Option("--temperature", help="Arm temperature [deg C].")
 ]

@@ -169,7 +169,7 @@ class Explanation:
         if self.outcome is not None:
             said = [self.outcome.summary()]
             if self.outcome.in_time is not None:
-                said.append(self.outcome.in_time.summary())
+                said.append(self.outcome.in_time.summary(self.visits))
             return "\n".join(map(printable, said))
         known = np.isfinite(self.q).all(axis=1)
         return f"{len(self.visits)} visits, {int((~known).sum())} of them not planned"

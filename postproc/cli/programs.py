@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from postproc.cli.common import (
+    ApproachOption,
     CellOption,
     CloneOption,
     HtmlOption,
@@ -79,6 +80,7 @@ def compensate(
     path_mm: PathOption = None,
     max_inserted: MaxInsertedOption = MAX_INSERTED,
     take_up: TakeUpOption = False,
+    approach: ApproachOption = False,
     processes: ProcessesOption = 0,
 ) -> None:
     """Rewrite a program so that the tool lands where its targets say."""
@@ -100,6 +102,7 @@ def compensate(
             path_mm=path_mm,
             max_inserted=max_inserted,
             take_up=take_up,
+            approach=approach,
         )
         options.check()
         if report == Path(STREAM) and given is None and output is None:
@@ -155,7 +158,7 @@ def _print_outcome(outcome: Outcome) -> None:
             say(source)
     say(outcome.summary())
     if outcome.in_time is not None:
-        say(outcome.in_time.summary())
+        say(outcome.in_time.summary(outcome.visits))
 
 
 @app.command()

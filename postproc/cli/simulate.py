@@ -10,6 +10,7 @@ import numpy as np
 
 from postproc.arrays import Ints
 from postproc.cli.jobs import read_files
+from postproc.compensation.insertions import points_on_ways
 from postproc.compensation.program import read_program
 from postproc.exceptions import CellError
 from postproc.language.languages import language_of
@@ -210,7 +211,7 @@ def simulate_file(
             gears=gears, tracker=setup.tracker,
         )  # fmt: skip
         return Simulation(program.name, measure_rows(arm, setup, rows), None)
-    visits, own = _read(program, cell)
+    visits, own, skipped = _read(program, cell)
     arm = virtual_arm(
         seed,
         names,
@@ -229,7 +230,7 @@ def simulate_file(
     error = true_error(arm, setup, visits, original, own)
     if not path:
         return Simulation(program.name, campaign, error, track=track)
-    scores = score_paths(arm, setup, original, visits, own)
+    scores = score_paths(arm, setup, original, visits, own, skipped)
     lines = tuple(original.line.tolist())
     return Simulation(program.name, campaign, error, scores, lines, track)
 
@@ -239,17 +240,24 @@ def visits_of(program: Path, cell: Cell) -> Visits:
     return read_program(read_files(program), cell).visits
 
 
-def _read(program: Path, cell: Cell) -> tuple[Visits, Ints]:
-    """Read a program, and tell which of its visits no points on ways are."""
+def _read(program: Path, cell: Cell) -> tuple[Visits, Ints, Ints]:
+    """Read a program, and tell which of its visits no points on ways are.
+
+    Told as well: which of those, counted alone, are approached anew, so that the way
+    to them is no longer that of the original.
+    """
     reading = read_program(read_files(program), cell)
     visits = reading.visits
-    inserted = np.zeros(len(visits), dtype=bool)
+    inserted, stops = np.zeros((2, len(visits)), dtype=bool)
     for file, source in enumerate(reading.sources):
         language, rows = language_of(source.name), np.flatnonzero(visits.file == file)
         for row in rows.tolist():
             line = source.line_text(int(visits.line[row])).encode("latin-1")
             inserted[row] = language.is_inserted(line)
-    return visits, np.flatnonzero(~inserted)
+            stops[row] = language.is_approach(line)
+    new = points_on_ways(visits, reading.sources, inserted)
+    own = np.flatnonzero(~new)
+    return visits, own, np.searchsorted(own, np.flatnonzero(stops))
 
 
 def true_error(

@@ -1,15 +1,19 @@
-"""From where to approach a target so that the side of every joint is known there."""
+"""From where to approach a target so that the side of every joint is known there.
+
+What to do is said of any target. Some are approached anew unasked: the arm goes back on
+the way that it came, before the last move, and from there straight to the target.
+"""
 
 from __future__ import annotations
 
 import numpy as np
 
-from postproc.arrays import Floats, Ints
+from postproc.arrays import Bools, Floats, Ints
 from postproc.compensation.notes import SURE
 from postproc.motion.cycle import ProgramCycle
 from postproc.robot.arm import Arm
 from postproc.robot.direction import half_width
-from postproc.robot.pose import MM
+from postproc.robot.pose import MM, lengths
 from postproc.robot.trajectory import Motion
 
 FAR = 0.3  # [m] an approach that would have to be longer is led from elsewhere
@@ -83,3 +87,70 @@ def _from_nowhere(arm: Arm) -> str:
         f"before it, move every axis by {most:.2f} deg or more to where its side is "
         "told, with a JOINT move from a place that is in the program"
     )
+
+
+# Targets that are approached anew: from a stop on the way already travelled.
+
+FINE = 2.5e-4  # [m] between places on that way, about
+ASIDE = 5e-4  # [m] that the new way is beside the one already travelled at the most
+AMPLE = 1.2  # of the travel that takes a drive from one flank to the other
+SHORT = 1e-3  # [m] from the target: what lies nearer is no approach
+
+
+def place_to_approach(
+    arm: Arm, cycle: ProgramCycle, row: int, before: int, unsure: Bools, most: float
+) -> Floats | None:
+    """Find a place from where the side of every joint is known at a target.
+
+    It lies on the way that led to where the last move begins, never beyond the target,
+    and nearly on the line to it: straight from there the arm passes where it was.
+
+    Args:
+        arm: The arm; its play and coupling are used.
+        cycle: The program in time.
+        row: The visit whose target is approached.
+        before: The visit at which its move begins.
+        unsure: Joints whose side is not known there, (6,).
+        most: Distance from the target [m].
+
+    Returns:
+        Joint angles there, (6,) [rad]; None where there is no such place.
+    """
+    edge, source = (int(found[before]) for found in cycle.ways)
+    if edge < 0 or source < 0:
+        return None
+    path = cycle.path.edges
+    samples = path.path[path.start[edge] : path.start[edge + 1]]
+    way = np.vstack([cycle.path.q[source], samples])[::-1]
+    tool = cycle.targets.tool[row, :3, 3]
+    way = _finely(way, arm.tcp(way, np.tile(tool, (len(way), 1))))
+    place = arm.tcp(way, np.tile(tool, (len(way), 1)))
+    target = arm.tcp(cycle.path.q[[row]], tool[None])[0]
+    turned = np.abs((cycle.path.q[row] - way) @ arm.coupling.T)
+    enough = turned >= AMPLE * 2 * half_width(arm)
+    off = place - target
+    distance = lengths(off)
+    fits = (distance <= most) & (distance >= SHORT)
+    fits &= np.maximum.accumulate(distance) <= most  # on the last stretch of the way
+    fits &= off @ (target - place[0]) <= 0.0
+    fits &= enough[:, unsure].all(axis=1)
+    for k in np.lexsort((distance, -enough.sum(axis=1))).tolist():
+        if fits[k] and _aside(place[: k + 1], target) <= ASIDE:
+            return np.asarray(way[k])
+    return None
+
+
+def _finely(way: Floats, place: Floats) -> Floats:
+    """Put samples on a way (m, 6) with the TCP at places (m, 3) so that it is fine."""
+    parts = np.maximum(np.ceil(lengths(np.diff(place, axis=0)) / FINE), 1).astype(int)
+    at = np.append(0, np.cumsum(parts))
+    rows = np.arange(at[-1] + 1)
+    return np.array([np.interp(rows, at, way[:, joint]) for joint in range(6)]).T
+
+
+def _aside(way: Floats, target: Floats) -> float:
+    """Measure how far a way (k, 3) is from the line from its end to the target."""
+    line = target - way[-1]
+    line = line / np.linalg.norm(line)
+    off = way - way[-1]
+    return float(lengths(off - (off @ line)[:, None] * line).max())

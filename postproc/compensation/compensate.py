@@ -168,7 +168,7 @@ def finish(name: str, reading: Reading, kept: Correction, setting: Setting) -> O
             own = np.arange(len(reading.visits))
             in_time = run_in_time(
                 reading, again, kept.position, setting,
-                own if setting.options.path_mm is not None else None,
+                own if setting.options.inserts else None,
             )  # fmt: skip
     draft = Draft(reading, kept, output, in_time)
     draft = correct_paths(draft, setting, write_and_verify)

@@ -9,6 +9,8 @@ import numpy as np
 
 from postproc.arrays import Bools, Floats, Ints
 from postproc.compensation.approach import advise
+from postproc.compensation.arc_splitting import NO_ARCS, WantedArcs
+from postproc.compensation.corners import RoundOff, predict_corners
 from postproc.compensation.options import Setting
 from postproc.compensation.path_accuracy import PathAccuracy, predict_paths
 from postproc.compensation.path_points import Insertions
@@ -28,6 +30,7 @@ SLOWED = "slowed-down"  # codes of findings
 OTHER_SIDE = "side-in-time"
 PATH_POINTS = "path-points"
 PATH_LEFT = "path-left"
+APPROACHED = "approached-anew"
 MOST_SLOWER = 0.03  # of the cycle time
 FEW = 5  # lines that a finding names
 _LIMITS = [CODE[text] for text in (*LIMITS, *PATH_LIMITS)]
@@ -66,7 +69,11 @@ class InTime:
         """Return the visits of the source that those of the compensated one lead to."""
         return np.where(rows < 0, rows, np.searchsorted(self.own, rows))
 
-    def summary(self) -> str:
+    def corners(self, visits: Visits) -> RoundOff:
+        """Predict how far rounded corners of the program are passed."""
+        return predict_corners(visits, self.before, self.paths)
+
+    def summary(self, visits: Visits) -> str:
         """Say in one line how long it takes, and how well it keeps to its paths."""
         if not self.before.seconds:
             return "no move leads from one known place to another: no time to tell"
@@ -80,6 +87,7 @@ class InTime:
             f"{said}; predicted path accuracy AT_p (systematic part) mean "
             f"{before.mean():.3f} -> {after.mean():.3f} mm, max {before.max():.3f} -> "
             f"{after.max():.3f} mm over {len(before)} moves"
+            + _round_off(self.corners(visits))
         )
 
     @property
@@ -144,6 +152,14 @@ class InTime:
             )
             place = visits.files[visits.file[first]], int(visits.line[first])
             yield Diagnostic(*place, PATH_POINTS, text)
+        if told.approaches:
+            first = min(told.approaches)
+            text = (
+                f"{len(told.approaches)} targets are approached anew, from a stop on "
+                "the way already travelled"
+            )
+            place = visits.files[visits.file[first]], int(visits.line[first])
+            yield Diagnostic(*place, APPROACHED, text)
         for k in self._too_far.tolist():
             v = int(self.paths.visit[k])
             far = self.paths.after.sizes[k] / MM
@@ -172,14 +188,28 @@ class InTime:
         rows = self.source(slowed)
         lines = dict.fromkeys(visits.line[rows].tolist())
         more = f" and {len(lines) - FEW} more" if len(lines) > FEW else ""
-        least = 100 * self.after.clock.allowed[slowed].min()
+        worst = slowed[self.after.clock.allowed[slowed].argmin()]
+        least = 100 * self.after.clock.allowed[worst]
+        joint = int(self.after.clock.velocity[worst].argmax()) + 1
         text = (
-            f"the joints reach {least:.0f} % of the programmed speed at the least: the "
+            f"the joints reach {least:.0f} % of the programmed speed at the least, "
+            f"axis {joint} turning the fastest for its limits: the "
             "controller slows down or stops there, near a singularity as a rule "
             f"(lines {', '.join(map(str, [*lines][:FEW]))}{more})"
         )
         place = visits.files[visits.file[rows[0]]], int(visits.line[rows[0]])
         yield Diagnostic(*place, SLOWED, text)
+
+
+def _round_off(corners: RoundOff) -> str:
+    """Say how far rounded corners are passed, "" where there are none."""
+    if not len(corners):
+        return ""
+    before, after = corners.before.max() / MM, corners.after.max() / MM
+    return (
+        f"; cornering round-off CR (systematic part) max {before:.3f} -> "
+        f"{after:.3f} mm at {len(corners)} corners"
+    )
 
 
 def _all(column: Bools) -> Ints:
@@ -197,6 +227,7 @@ def run_in_time(
     position: Floats,
     setting: Setting,
     owner: Ints | None = None,
+    arcs: WantedArcs = NO_ARCS,
 ) -> InTime:
     """Run a program in time, as it was written and as it is compensated.
 
@@ -207,13 +238,14 @@ def run_in_time(
         setting: What it was compensated with.
         owner: The move of the source that every visit belongs to, (n,), where points
             were put on ways.
+        arcs: The arcs of the source that were cut.
     """
     cell = setting.cell
     before, after = (_run(part.visits, cell) for part in (reading, again))
     passed = cell.arm.tcp(before.path.q, before.targets.tool[:, :3, 3])
     shift = np.nan_to_num(position + before.path.aside - passed)
     paths = predict_paths(
-        before, after, shift, cell, setting.model, setting.temperature, owner
+        before, after, shift, cell, setting.model, setting.temperature, owner, arcs
     )
     guessed, other = guessed_limits(cell.arm), disagreements(cell.arm, after)
     told = setting.model.in_motion

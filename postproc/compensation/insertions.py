@@ -8,22 +8,27 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import fields, replace
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 
 from postproc.arrays import Bools, Floats, Ints
+from postproc.compensation.arc_splitting import Chords, CutArc, is_arc
+from postproc.compensation.command import base_in_uframe
 from postproc.compensation.equivalence import equivalent
 from postproc.compensation.path_points import Points
 from postproc.compensation.program import Reading, read_program
 from postproc.compensation.rewrite import VerificationError
 from postproc.compensation.taking_up import TakeUp
 from postproc.compensation.windows import SHARED
-from postproc.language.interface import Splitter
+from postproc.language.interface import ArcPiece, Splitter
+from postproc.language.languages import language_of
 from postproc.language.source import Edit, Source, apply, compose
 from postproc.language.visits import Literals, Visits
 from postproc.robot.cell import Cell
-from postproc.robot.pose import rotation_from_vector, rotation_vector
+from postproc.robot.pose import MM, rotation_from_vector, rotation_vector
+from postproc.robot.trajectory import Motion
 
 
 def insert(
@@ -32,6 +37,8 @@ def insert(
     stops: Mapping[int, TakeUp],
     splitter: Splitter,
     cell: Cell,
+    chords: Chords = (),
+    approaches: Mapping[int, Floats] = MappingProxyType({}),
 ) -> tuple[Reading, Ints]:
     """Put points on the ways of a program.
 
@@ -41,6 +48,8 @@ def insert(
         stops: Moves whose first point is a stop, where play is taken up.
         splitter: Its files.
         cell: What holds at program start.
+        chords: Pieces of arcs that are chords.
+        approaches: Stops from which targets are approached anew, by visit, (w,) each.
 
     Returns:
         The program with points, proven to make the same moves otherwise, and those of
@@ -50,14 +59,22 @@ def insert(
         VerificationError: It would make other moves.
         CloneError: A point cannot be written.
     """
-    edits = _edits(reading, points, stops, splitter, cell)
+    edits = _edits(reading, points, stops, splitter, cell, chords)
+    lines, visits = lines_in_files(reading, cell), reading.visits
+    for visit, numbers in approaches.items():
+        config = visits.configs[visits.config[visit]]
+        file, line = int(visits.file[visit]), int(lines[visit])
+        edits[file].append(splitter.approach(file, line, numbers, config))
+    edits = [sorted(own, key=lambda edit: edit.span) for own in edits]
     sources = [
         Source(source.name, apply(source.data, own))
         for source, own in zip(reading.sources, edits, strict=True)
     ]
     again = read_program({s.name: s.data for s in sources}, cell)
-    new = _inserted(again.visits, sources, edits)
-    _prove(reading.visits, again.visits, new, points)
+    found = _inserted(again.visits, sources, edits)
+    new = points_on_ways(again.visits, sources, found)
+    count = sum(map(len, points.values())) + len(approaches)
+    _prove(reading.visits, again.visits, found, new, count)
     cloned = tuple(
         tuple(compose(one, own))
         for one, own in zip(reading.cloned or [()] * len(edits), edits, strict=True)
@@ -65,7 +82,7 @@ def insert(
     given = reading.given or reading.sources
     with_points = replace(again, cloned=cloned, given=given, missed=reading.missed)
     own = np.flatnonzero(~new)
-    aims = _aims(len(new), own, points, stops)
+    aims = _aims(visits, len(new), own, points, stops)
     told = replace(with_points, diagnostics=reading.diagnostics, aims=aims)
     return told, own
 
@@ -76,18 +93,27 @@ def _edits(
     stops: Mapping[int, TakeUp],
     splitter: Splitter,
     cell: Cell,
+    chords: Chords,
 ) -> list[list[Edit]]:
     """Write the points, file by file."""
     visits, found = reading.visits, defaultdict[int, list[Edit]](list)
     lines = lines_in_files(reading, cell)
     for visit in sorted(points):
-        numbers = between(visits, visit, np.array(points[visit]))
-        if visit in stops:
-            numbers[:1] = _turned(visits, numbers[:1], stops[visit].turn)
         config = visits.configs[visits.config[visit]]
         file, line = int(visits.file[visit]), int(lines[visit])
-        found[file].append(splitter.points(file, line, numbers, config, visit in stops))
-    return [sorted(found[k], key=lambda e: e.span) for k in range(len(reading.sources))]
+        if visits.via[visit]:
+            pieces, via = CutArc.of(visits, points, visit, chords).pieces()
+            if visit in stops:
+                pieces[0] = _turned_piece(visits, pieces[0], stops[visit].turn)
+            found[file] += splitter.arc(file, line, pieces, via, config, visit in stops)
+        elif not is_arc(visits, visit):
+            numbers = between(visits, visit, np.array(points[visit]))
+            if visit in stops:
+                numbers[:1] = _turned(visits, numbers[:1], stops[visit].turn)
+            found[file].append(
+                splitter.points(file, line, numbers, config, visit in stops)
+            )
+    return [found[k] for k in range(len(reading.sources))]
 
 
 def lines_in_files(reading: Reading, cell: Cell) -> Ints:
@@ -125,12 +151,32 @@ def _turned(visits: Visits, numbers: Floats, turn: Floats) -> Floats:
     return visits.dialect.turned(numbers, rotation_from_vector(axis))
 
 
-def _aims(m: int, own: Ints, points: Points, stops: Mapping[int, TakeUp]) -> Floats:
+def _turned_piece(visits: Visits, piece: ArcPiece, turn: Floats) -> ArcPiece:
+    """Turn the tool at the end of a piece of an arc, unless that is as written."""
+    if piece.end is None:
+        return piece
+    return replace(piece, end=_turned(visits, piece.end[None], turn)[0])
+
+
+def _aims(
+    visits: Visits, m: int, own: Ints, points: Points, stops: Mapping[int, TakeUp]
+) -> Floats:
     """Tell from which sides m visits are meant to be reached, (m, 6), NaN: any."""
     out = np.full((m, 6), np.nan)
     for visit, taken in stops.items():
-        out[own[visit] - len(points[visit])] = taken.side
+        arc = bool(visits.via[visit])
+        first = own[visit - 1] + 1 if arc else own[visit] - len(points[visit])
+        out[first] = taken.side
     return out
+
+
+def numbers_at(visits: Visits, visit: int, pose: Floats) -> Floats:
+    """Write a TCP pose (4, 4) [m] in the arm's base as numbers of a visit, (w,)."""
+    numbers = np.array(visits.values[[visit]])
+    pose = base_in_uframe(visits, np.array([visit]))[0] @ pose
+    turn = pose[:3, :3] @ visits.dialect.poses(numbers)[0, :3, :3].T
+    numbers[0, :3] = pose[:3, 3] / MM
+    return np.asarray(visits.dialect.turned(numbers, turn[None])[0])
 
 
 # The proof that a program with points makes the same moves otherwise.
@@ -143,8 +189,9 @@ def _inserted(
     found = np.zeros(len(visits), dtype=bool)
     for file, (source, own) in enumerate(zip(sources, edits, strict=True)):
         size = np.array([len(edit.new) for edit in own], dtype=np.int64)
+        old = np.array([e.span.end - e.span.start for e in own], dtype=np.int64)
         begin = np.array([e.span.start for e in own], dtype=np.int64)
-        begin += np.cumsum(size) - size
+        begin += np.cumsum(size - old) - (size - old)
         lines = source.line_starts[visits.line - 1]
         at = np.searchsorted(begin, lines, side="right") - 1
         inside = (at >= 0) & (visits.file == file)
@@ -154,17 +201,53 @@ def _inserted(
     return found
 
 
-def _prove(before: Visits, after: Visits, new: Bools, points: Points) -> None:
+def points_on_ways(visits: Visits, sources: Sequence[Source], inserted: Bools) -> Bools:
+    """Tell which visits the source does not make, (m,).
+
+    Where an arc is cut, the point on its way has become the end of a piece, and what
+    stands in its place in the move is new.
+
+    Args:
+        visits: The program with points.
+        sources: Its files.
+        inserted: Visits on lines that are points, (m,).
+    """
+    new = np.array(inserted)
+    language = language_of(sources[0].name)
+    for row in np.flatnonzero(inserted & ~visits.via).tolist():
+        source = sources[visits.file[row]]
+        text = source.line_text(int(visits.line[row])).encode("latin-1")
+        if language.ends_at_via(text):
+            later = np.flatnonzero(visits.via[row:] & ~inserted[row:])
+            if len(later):
+                new[row], new[row + later[0]] = False, True
+    return new
+
+
+def _prove(
+    before: Visits, after: Visits, inserted: Bools, new: Bools, count: int
+) -> None:
     """Hold a program with points to be the same but for them.
+
+    Args:
+        before: The program.
+        after: .. with points.
+        inserted: Visits on lines that are points, (m,).
+        new: Visits that the source does not make, (m,).
+        count: How many points were put in.
 
     Raises:
         VerificationError: It is not.
     """
-    count = sum(map(len, points.values()))
-    problem = f"{int(new.sum())} of {count} points are found again"
-    if int(new.sum()) == count:
+    found = inserted & ~after.via
+    problem = f"{int(found.sum())} of {count} points are found again"
+    if int(found.sum()) == count and len(after) - int(new.sum()) == len(before):
         nothing = np.zeros(0, dtype=np.int64)
-        problem = equivalent(before, without(after, new), nothing, before.values)
+        ends = inserted & ~new  # of pieces, which were points on ways
+        motion = np.where(ends, Motion.CIRCULAR, after.motion)
+        old = replace(after, via=after.via | ends, motion=motion)
+        same = renumbered(before, without(old, new))
+        problem = equivalent(before, same, nothing, before.values)
     if problem:
         raise VerificationError(
             f"{before.files[0]}: points on the ways would change what the program "
@@ -200,6 +283,26 @@ def without(visits: Visits, rows: Bools) -> Visits:
         pred_start=np.append(0, np.cumsum(count[own])),
         pred=np.where(pred >= 0, number[pred], pred),
         literals=_kept(visits.literals, np.flatnonzero(~gone[:-1])),
+    )
+
+
+def renumbered(before: Visits, after: Visits) -> Visits:
+    """Number the literals of a program as those of another one, where that is possible.
+
+    They are numbered as they stand in the files, and the point on the way of an arc
+    that is cut stands in front of the arc's end, not behind it.
+    """
+    has = (before.literal >= 0) & (after.literal >= 0)
+    number = np.arange(len(after.literals))
+    number[after.literal[has]] = before.literal[has]
+    if not np.array_equal(np.sort(number), np.arange(len(number))):
+        return after
+    number = np.append(number, -1)  # that is no literal
+    return replace(
+        after,
+        literal=number[after.literal],
+        follows=number[after.follows],
+        literals=_kept(after.literals, np.argsort(number[:-1])),
     )
 
 

@@ -38,6 +38,8 @@ class Options:
             which runs the program in time; None: on none.
         max_inserted: The most points.
         take_up: Let the arm stop once more where a move begins, to take up play.
+        approach: Approach targets anew that a joint reaches from a side that is not
+            sure, which runs the program in time as well.
     """
 
     clone: bool = False
@@ -50,6 +52,7 @@ class Options:
     path_mm: float | None = None
     max_inserted: int = MAX_INSERTED
     take_up: bool = False
+    approach: bool = False
 
     def check(self) -> None:
         """Refuse options that do not go together.
@@ -63,6 +66,13 @@ class Options:
             raise PostprocError("--path-mm: give a distance of more than 0 mm")
         if self.path_mm is not None and self.timing is False:
             raise PostprocError("--path-mm runs the program in time: no --no-timing")
+        if self.approach and self.timing is False:
+            raise PostprocError("--approach runs the program in time: no --no-timing")
+
+    @property
+    def inserts(self) -> bool:
+        """Tell whether points may be put into a program."""
+        return self.path_mm is not None or self.approach
 
     def told(self) -> dict[str, object]:
         """Return them for a record: a strict reading of calls only if asked for."""
@@ -72,11 +82,13 @@ class Options:
             del said["strict_calls"]
         if self.path_mm is None:
             del said["path_mm"], said["max_inserted"], said["take_up"]
+        if not self.approach:
+            del said["approach"]
         return said
 
     def times(self, visits: int) -> bool:
         """Tell whether a program of so many visits is run in time."""
-        if self.path_mm is not None:
+        if self.inserts:
             return True
         return visits <= IN_TIME if self.timing is None else self.timing
 

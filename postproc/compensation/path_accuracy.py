@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from postproc.arrays import Bools, Floats, Ints, any_in_rows, spans
+from postproc.compensation.arc_splitting import NO_ARCS, WantedArcs
 from postproc.model.model import Model
 from postproc.motion.cycle import ProgramCycle
 from postproc.robot.cell import Cell
@@ -34,13 +35,15 @@ class Deviations:
     """How a program leaves m paths (structure of arrays), s samples in all.
 
     Attributes:
-        across: Distance from the path at the samples, (s,) [m].
+        off: From the path to the TCP at the samples, (s, 3) [m].
+        across: Distance from the path there, (s,) [m].
         along: How far the TCP is ahead along it, (s,) [m].
         unsure: How much farther it may be where a joint's flank is not known, (s,) [m].
         largest: Sample of the largest distance of each path, (m,).
         joint: Joint (1 to 6) whose flank makes most of it there, (m,), 0: none.
     """
 
+    off: Floats
     across: Floats
     along: Floats
     unsure: Floats
@@ -290,6 +293,7 @@ def predict_paths(
     model: Model,
     temperature: float,
     owner: Ints | None = None,
+    arcs: WantedArcs = NO_ARCS,
 ) -> PathAccuracy:
     """Predict how far a program leaves its paths, as written and as compensated.
 
@@ -303,6 +307,7 @@ def predict_paths(
         temperature: Of the arm [deg C], NaN where not known.
         owner: The move of the source that every visit belongs to, (n,), where points
             were inserted on its way; each move is then one path.
+        arcs: The arcs of the source that were cut.
     """
     cartesian = (before.targets.move != Motion.JOINT) & ~before.targets.curved
     known = cartesian & (before.ways[1] >= 0) & (after.ways[1] == before.ways[1])
@@ -319,6 +324,8 @@ def predict_paths(
     way, tangent = _along(wanted, pair[0])
     off = _shift(shift, pair[0], way)
     moved = commanded - wanted - off
+    if owner is not None and len(rows):
+        moved += _off_the_arcs(arcs, owner, before, pair[0], wanted, way)
     found = PathAccuracy(
         rows, pair[0].first, way,
         _deviations(runs[0], error, -off, tangent, way),
@@ -330,6 +337,32 @@ def predict_paths(
     lead, _ = _groups(owner[rows])
     otherwise = _otherwise(runs[1], error, moved, tangent, pair[0].first[lead])
     return replace(found, otherwise=otherwise).joined(owner)
+
+
+def _off_the_arcs(
+    arcs: WantedArcs,
+    owner: Ints,
+    cycle: ProgramCycle,
+    ways: _PathSamples,
+    wanted: Floats,
+    way: Floats,
+) -> Floats:
+    """Return how far pieces of arcs, not corrected, are from the arcs, (s, 3) [m].
+
+    That is what chords cut off, and what points are rounded by.
+
+    Args:
+        arcs: The arcs.
+        owner: As in `predict_paths`.
+        cycle: The program with points, not corrected.
+        ways: Its ways.
+        wanted: Where it leads, (s, 3) [m].
+        way: Path length up to every sample, (s,) [m].
+    """
+    whole = way[ways.first[1:] - 1][ways.way]
+    nearest = np.where(2 * way < whole, ways.source[ways.way], ways.visit[ways.way])
+    on_arc = arcs.pieces(owner, cycle.targets.fly)[nearest]
+    return arcs.off(wanted, owner[ways.visit][ways.way], on_arc)
 
 
 def _groups(owner: Ints) -> tuple[Ints, Ints]:
@@ -431,9 +464,10 @@ def _deviations(
     across = lengths(off - along[:, None] * tangent)
     unsure, starts = _unsure(run, error), run.ways.first[:-1]
     if not len(starts):
-        return Deviations(across, along, unsure, starts, starts)
+        return Deviations(off, across, along, unsure, starts, starts)
     largest = _largest_in(across, run.ways.way, starts)
-    return Deviations(across, along, unsure, largest, _joints(run, error, largest, way))
+    joints = _joints(run, error, largest, way)
+    return Deviations(off, across, along, unsure, largest, joints)
 
 
 def _unsure(run: _Run, error: _Error) -> Floats:

@@ -15,10 +15,22 @@ from itertools import pairwise
 
 import numpy as np
 
-from postproc.arrays import Bools, Ints, any_in_rows
+from postproc.arrays import Bools, Floats, Ints, any_in_rows
+from postproc.compensation.approach import place_to_approach
+from postproc.compensation.arc_splitting import (
+    STRAIGHT,
+    Cut,
+    WantedArcs,
+    flat_pieces,
+    is_arc,
+    largest_zones,
+    passed,
+    point_on_way,
+)
 from postproc.compensation.correction import BY_VISIT, EXPLAINING, Correction, correct
 from postproc.compensation.in_time import InTime, run_in_time
-from postproc.compensation.insertions import insert, lines_in_files
+from postproc.compensation.insertions import insert, lines_in_files, numbers_at
+from postproc.compensation.notes import SURE
 from postproc.compensation.options import Setting
 from postproc.compensation.outcome import Status
 from postproc.compensation.path_accuracy import PathAccuracy
@@ -27,9 +39,11 @@ from postproc.compensation.program import Reading
 from postproc.compensation.rewrite import Output
 from postproc.compensation.splitting import hindrances, shortest_pieces, unwritable
 from postproc.compensation.taking_up import TakeUp, take_up
+from postproc.exceptions import PostprocError
 from postproc.language.interface import Splitter
 from postproc.language.languages import language_of
 from postproc.robot.pose import MM, lengths
+from postproc.robot.trajectory import Motion
 
 ROUNDS = 16  # of points put on the ways
 TAKEN = 2e-5, 1e-4, 3e-4  # [m] from where a move begins: where play is taken up
@@ -71,15 +85,27 @@ def correct_paths(draft: Draft, setting: Setting, write: Write) -> Draft:
 
     Returns:
         The program, `kept` speaking of the visits of the source.
+
+    Raises:
+        PostprocError: Targets cannot be approached anew in its language.
     """
     reading, first = draft.reading, draft.in_time
-    if first is None or setting.options.path_mm is None:
+    if first is None or not setting.options.inserts:
         return draft
-    splitter = language_of(reading.sources[0].name).splitter(reading.sources)
+    language = language_of(reading.sources[0].name)
+    splitter = language.splitter(reading.sources)
+    if splitter is None and setting.options.approach:
+        raise PostprocError(
+            f"--approach: targets are not approached anew in {language.name} programs. "
+            "Leave it out: side-not-sure says how to approach them"
+        )
     work = _PathWork(draft, first, setting, write)
+    if splitter is not None and setting.options.approach:
+        work.approach(splitter)
     work.find_split(splitter)
-    if splitter is not None and work.open:
+    if splitter is not None and (work.open or work.approaches):
         work.improve(splitter)
+        work.bend(splitter)
         work.judge(splitter)
     return work.result()
 
@@ -99,6 +125,8 @@ class _PathWork:
         stops: Moves whose first point is a stop, where play is taken up.
         idle: Moves that may have one, and how.
         tried: How far such a move began off, and where it stopped, try by try.
+        chords: Pieces of arcs that are chords whatever they bend.
+        approaches: Stops from which targets are approached anew, by visit, (w,) each.
         left: Why moves that leave their path too far are not split.
         latest: The program with these points; at first the source.
         own: The visits of it that the source makes, (n,).
@@ -113,6 +141,8 @@ class _PathWork:
     stops: set[int] = field(default_factory=set)
     idle: dict[int, TakeUp] = field(default_factory=dict)
     tried: dict[int, list[tuple[float, float]]] = field(default_factory=dict)
+    chords: set[Cut] = field(default_factory=set)
+    approaches: dict[int, Floats] = field(default_factory=dict)
     left: dict[int, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -123,7 +153,14 @@ class _PathWork:
     @property
     def tolerance(self) -> float:
         """The largest deviation that is asked for [m]."""
-        return (self.setting.options.path_mm or 0.0) * MM
+        asked = self.setting.options.path_mm
+        return np.inf if asked is None else asked * MM
+
+    @property
+    def room(self) -> int:
+        """How many more points may be put in."""
+        count = sum(map(len, self.points.values())) + len(self.approaches)
+        return self.setting.options.max_inserted - count
 
     @property
     def aim(self) -> float:
@@ -157,6 +194,8 @@ class _PathWork:
             if splitter is None:
                 name = language_of(reading.sources[0].name).name
                 self.left[v] = f"no points are put on ways in {name}"
+            elif v in self.approaches:
+                self.left[v] = "its target is approached anew"
             elif why.get(v):
                 self.left[v] = why[v]
             elif told := unwritable(splitter, reading.visits, v, file, int(lines[v])):
@@ -168,7 +207,8 @@ class _PathWork:
             else:
                 self.open[v] = pieces[v]
                 before = int(reading.visits.before[v])
-                still = self.setting.options.take_up and not reading.visits.fly[before]
+                moving = reading.visits.fly[before] or reading.visits.via[before]
+                still = self.setting.options.take_up and not moving
                 if still and splitter.stops(file, int(lines[v])):
                     self.idle[v] = taking_up(v)
 
@@ -187,36 +227,194 @@ class _PathWork:
                 return f"joint {joint} changes its flank, which in motion is {said}"
         return ""
 
+    # Stops from which targets are approached anew.
+
+    def approach(self, splitter: Splitter) -> None:
+        """Approach targets anew that a joint reaches from a side that is not sure."""
+        reading, decided = self.source.reading, self.source.kept.decisions
+        visits, why = (
+            reading.visits,
+            hindrances(reading.visits, decided, self.first.before),
+        )
+        lines = lines_in_files(reading, self.setting.cell)
+        ends = (visits.motion == Motion.LINEAR) & ~visits.fly
+        ends &= ~visits.fly[visits.before]
+        for v in np.flatnonzero(ends & self._unsure(self.source.kept)).tolist():
+            file, line = int(visits.file[v]), int(lines[v])
+            hindered = why.get(v) or unwritable(splitter, visits, v, file, line)
+            if not hindered and splitter.stops(file, line) and self.room > 0:
+                place = self._place_to_approach(v)
+                if place is not None:
+                    self.approaches[v] = place
+        if self.approaches:
+            self._make(splitter)
+
+    def _place_to_approach(self, v: int) -> Floats | None:
+        """Find the numbers of a stop from which to approach a target."""
+        cell, cycle = self.setting.cell, self.first.before
+        visits, side = self.source.reading.visits, self.source.kept.decisions.side
+        q = place_to_approach(
+            cell.arm, cycle, v, int(visits.before[v]), np.abs(side[v]) < SURE,
+            cell.limits.approach_mm * MM,
+        )  # fmt: skip
+        if q is None:
+            return None
+        pose = cell.arm.flange(q[None]) @ cycle.targets.tool[[v]]
+        return numbers_at(visits, v, pose[0])
+
+    def _unsure(self, kept: Correction) -> Bools:
+        """Tell which targets move that a joint reaches from a side that is not sure."""
+        return kept.corrected & any_in_rows(np.abs(kept.decisions.side) < SURE)
+
+    def _bad_approaches(self) -> set[int]:
+        """Find the targets that are approached anew and are no better for it."""
+        kept = of_source(self.latest.kept, self.own)
+        unsure, status = self._unsure(kept), kept.decisions.status
+        stops = self.latest.kept.decisions.status[self.own - 1]
+        others = np.flatnonzero(unsure & ~self._unsure(self.source.kept))
+        asked = np.array(sorted(self.approaches), dtype=np.int64)
+        bad = (
+            unsure[asked]
+            | (status[asked] != Status.SAFE)
+            | (stops[asked] != Status.SAFE)
+        )
+        cause = np.searchsorted(asked, others, side="right") - 1
+        return {*asked[bad].tolist(), *asked[cause[cause >= 0]].tolist()}
+
     # Points where the paths are left the most, round by round.
 
     def improve(self, splitter: Splitter) -> None:
         """Put points on the ways until none is left too far, or none helps."""
         for _ in range(ROUNDS):
-            new = dict(self._new_points())
-            if not new:
+            new, flat = dict(self._new_points()), self._new_chords()
+            new = new or dict(self._halved())
+            if not new and not flat:
                 return
             self.points |= {v: tuple(sorted(shares)) for v, shares in new.items()}
+            self.chords |= flat
+            self._cut_at_vias()
             self._make(splitter)
+
+    def bend(self, splitter: Splitter) -> None:
+        """Let pieces of arcs that are too flat go on to the next cut."""
+        for _ in range(ROUNDS):
+            joined = False
+            for v, points in self._joined().items():
+                joined |= points != self.points[v]
+                self.points[v] = points
+            self.points = {v: points for v, points in self.points.items() if points}
+            if not joined:
+                return
+            self._make(splitter)
+
+    def _joined(self) -> dict[int, tuple[float, ...]]:
+        """Return the points of arcs with such pieces, one less where one can go."""
+        found = {}
+        for (v, end), bent in self._flat_pieces().items():
+            if v in found or v not in self.points or self._chord((v, end), bent):
+                continue
+            known = self.points[v]
+            begin = max((s for s in known if s < end), default=0.0)
+            gone = end if end < 1.0 else begin
+            found[v] = tuple(s for s in known if s != gone)
+        return found
+
+    def _cut_at_vias(self) -> None:
+        """Cut arcs that are cut anywhere at the points on their ways as well."""
+        visits = self.source.reading.visits
+        for v in [v for v in self.points if is_arc(visits, v)]:
+            via = point_on_way(visits, v)
+            self.points[via] = tuple(sorted({*self.points.get(via, ()), 1.0}))
+
+    def _new_chords(self) -> set[Cut]:
+        """Find pieces of arcs that are too flat for arcs, and may be chords."""
+        may = {
+            cut for cut, bent in self._flat_pieces().items() if self._chord(cut, bent)
+        }
+        return may - self.chords
+
+    def _halved(self) -> Iterator[tuple[int, list[float]]]:
+        """Yield the points of arcs with pieces that are too flat, and no chords yet."""
+        room = self.room
+        flat, found = self._flat_pieces(), dict[int, list[float]]()
+        for (v, end), bent in flat.items():
+            known = found.get(v, [*self.points.get(v, ())])
+            begin = max((s for s in known if s < end), default=0.0)
+            k = int(np.flatnonzero(self.paths.visit == v)[0])
+            size = (end - begin) * float(self.paths.way[self.paths.samples(k)][-1])
+            least = self.open[v][0] if v in self.open else np.inf
+            if room > 0 and size >= 2 * least and not self._chord((v, end), bent):
+                found[v] = [*known, (begin + end) / 2]
+                room -= 1
+        yield from found.items()
+
+    def _chord(self, cut: Cut, bent: float) -> bool:
+        """Tell whether a piece that bends so little may be a chord, but the last."""
+        last = cut[1] == 1.0 and not self.source.reading.visits.via[cut[0]]
+        return bent <= STRAIGHT * self.tolerance and not last
+
+    def _flat_pieces(self) -> dict[Cut, float]:
+        """What the pieces of arcs bend that are too flat for arcs [m]."""
+        visits = self.latest.reading.visits
+        values = self.latest.kept.decisions.corrected
+        moved = (values - visits.values)[:, :3] * MM
+        ends = {
+            row: (half, share)
+            for via in self._cut_arcs()
+            for half in (via, via + 1)
+            for row, share in zip(
+                self._ends(half), (*self.points.get(half, ()), 1.0), strict=False
+            )
+        }
+        arcs = [row - 1 for row in sorted(ends) if visits.via[row - 1]]
+        found = flat_pieces(visits, moved, np.array(arcs, dtype=np.int64))
+        return {ends[row]: bent for row, bent in found}
+
+    def _cut_arcs(self) -> list[int]:
+        """Return the points on the ways of the arcs that are cut."""
+        return sorted(v for v in self.points if self.source.reading.visits.via[v])
+
+    def _ends(self, v: int) -> list[int]:
+        """Return the visits with points at which the pieces of a move end, itself too.
+
+        Those of the program with points.
+        """
+        first = int(self.own[v - 1]) + 1 if v else 0
+        rows = np.arange(first, int(self.own[v]) + 1)
+        ends: list[int] = rows[~self.latest.reading.visits.via[rows]].tolist()
+        return ends
 
     def _new_points(self) -> Iterator[tuple[int, list[float]]]:
         """Yield the points of moves that get more of them, by their visit."""
-        room = self.setting.options.max_inserted - sum(map(len, self.points.values()))
-        sizes = self.paths.after.sizes
+        room = self.room
+        sizes, whole = self.paths.after.sizes, self._whole_arcs()
         for k in np.argsort(-sizes, kind="stable").tolist():
             v = int(self.paths.visit[k])
             if v not in self.open or sizes[k] <= self.aim:
                 continue
-            known = self.points.get(v, ())
-            stop = self._stop(k, v) if v in self.idle and room > 0 else None
+            known, via = self.points.get(v, ()), v in whole
+            left = room - via  # the point on the way of an arc becomes one, too
+            stop = self._stop(k, v) if v in self.idle and left > 0 else None
             if stop is not None:
-                room -= v not in self.stops
-                yield v, [stop, *known[v in self.stops :]]
+                left -= v not in self.stops
+                more = [stop, *known[v in self.stops :]]
                 self.stops.add(v)
-                continue
-            more = self._on_path(k, v)[: max(room, 0)]
-            room -= len(more)
+            else:
+                new = self._on_path(k, v)[: max(left, 0)]
+                left -= len(new)
+                more = [*known, *new] if new else []
             if more:
-                yield v, [*known, *more]
+                room = left
+                if via:
+                    first = point_on_way(self.source.reading.visits, v)
+                    whole -= {first, first + 1}
+                yield v, more
+
+    def _whole_arcs(self) -> set[int]:
+        """Return both visits of arcs that are not cut."""
+        via = self.source.reading.visits.via
+        arcs = np.flatnonzero(via & ~np.isin(np.arange(len(via)), self._cut_arcs()))
+        return {*arcs.tolist(), *(arcs + 1).tolist()}
 
     def _stop(self, k: int, v: int) -> float | None:
         """Find where the arm stops to take up play before a path, as a share of it.
@@ -268,39 +466,63 @@ class _PathWork:
 
     def _make(self, splitter: Splitter) -> None:
         """Correct the program with its points, and predict it."""
-        if not self.points:
+        if not self.points and not self.approaches:
             self.__post_init__()
             return
         cell, clock = self.setting.cell, self.setting.clock
         with clock("insert"):
             stops = {v: self.idle[v] for v in self.stops & self.points.keys()}
             reading, own = insert(
-                self.source.reading, self.points, stops, splitter, cell
-            )
+                self.source.reading, self.points, stops, splitter, cell,
+                self.chords, self.approaches,
+            )  # fmt: skip
         options = replace(self.setting.options, clone=False)
         reading, kept = correct(reading, replace(self.setting, options=options))
         output, again = self.write(reading, kept, self.setting)
         n = len(reading.visits)
         owner = np.searchsorted(own, np.arange(n))
         with clock("time"):
-            told = run_in_time(reading, again, kept.position, self.setting, owner)
+            arcs = self._wanted_arcs()
+            told = run_in_time(reading, again, kept.position, self.setting, owner, arcs)
         self.latest, self.own = Draft(reading, kept, output, told), own
+
+    def _wanted_arcs(self) -> WantedArcs:
+        """Return the arcs that are cut."""
+        before = self.source.reading.visits.before
+        return WantedArcs.of(self.first.before, before, self._cut_arcs())
 
     # Points that do not help, or not for certain, are taken back.
 
     def judge(self, splitter: Splitter) -> None:
         """Take back the points of moves that are no better for certain."""
         for _ in range(JUDGED):
-            bad = dict(self._bad())
-            if not bad:
+            bad, anew = dict(self._bad()), self._bad_approaches()
+            if not bad and not anew:
                 return
             self.left |= bad
-            for v in bad:
-                self.points.pop(v, None)
+            for v in (*bad, *anew):
+                self._take_back(v)
             self._make(splitter)
         self.left |= dict.fromkeys(self.points, "its points do not stay put")
         self.points.clear()
+        self.approaches.clear()
         self._make(splitter)
+
+    def _take_back(self, v: int) -> None:
+        """Take back the points of a move; an arc that is cut no more stays whole."""
+        own = self.points.pop(v, ())
+        self.approaches.pop(v, None)
+        visits = self.source.reading.visits
+        if not is_arc(visits, v):
+            return
+        via = point_on_way(visits, v)
+        if own in ((), (1.0,)):  # what it has is the cut at the point on the way alone
+            self.points.pop(via, None)
+            self.points.pop(via + 1, None)
+        elif v == via and via + 1 in self.points:
+            self.points[via] = (1.0,)
+        elif self.points.get(via) == (1.0,):
+            del self.points[via]
 
     def _bad(self) -> Iterator[tuple[int, str]]:
         """Yield the moves whose points must go, and why."""
@@ -312,10 +534,16 @@ class _PathWork:
         with_points = self._worst(told)
         other, usual = map(self._otherwise, (told.paths, self.first.paths))
         corner = self._corners_moved(told)
-        for v in sorted(self.points):
+        flat = self._flat_pieces()
+        bent = {cut[0] for cut, far in flat.items() if not self._chord(cut, far)}
+        for v in sorted({*self.points, *(via + 1 for via in self._cut_arcs())}):
             before = without[v]
+            if self.points.get(v, ()) in ((), (1.0,)):  # its other half is cut
+                before = max(before, self.aim)
             if v not in with_points:
                 yield v, "nothing is predicted for it with points"
+            elif v in bent:
+                yield v, "pieces of it would bend too little for arcs"
             elif refused := self._refusal(v):
                 yield v, f"points on its way cannot be corrected: {refused}"
             elif with_points[v] > before:
@@ -327,8 +555,8 @@ class _PathWork:
 
     def _refusal(self, v: int) -> str:
         """Say why points of a move cannot be corrected, "" where they can."""
-        decided, end = self.latest.kept.decisions, int(self.own[v])
-        rows = np.arange(end - len(self.points[v]), end)
+        decided = self.latest.kept.decisions
+        rows = np.arange(int(self.own[v - 1]) + 1, int(self.own[v]))
         left = rows[decided.status[rows] != Status.SAFE]
         return decided.reasons[decided.why[left[0]]] if len(left) else ""
 
@@ -348,38 +576,47 @@ class _PathWork:
         for k, v in enumerate(told.paths.visit.tolist()):
             samples = told.paths.samples(k)
             way, far = told.paths.way[samples], told.paths.after.across[samples]
-            for share, (half, passed) in zip(
+            for share, (half, beside) in zip(
                 self.points.get(v, ()), rounded.get(v, ()), strict=True
             ):
                 near = far[np.abs(way - share * way[-1]) <= half]
-                found[v] = max(found[v], passed + float(near.max(initial=0.0)))
+                found[v] = max(found[v], beside + float(near.max(initial=0.0)))
         return found
 
     def _rounded(self, told: InTime) -> dict[int, list[tuple[float, float]]]:
         """Size of the largest zones at points, and how far they pass them [m].
 
         No corner is larger than half of a neighbouring piece; what cuts it off straight
-        passes the point farthest.
+        passes the point farthest. On an arc it is no larger than zones are, by any law.
         """
-        cycle, found = told.after, dict[int, list[tuple[float, float]]]()
-        p = self.setting.cell.arm.tcp(cycle.path.q, cycle.targets.tool[:, :3, 3])
+        p, c = (
+            self.setting.cell.arm.tcp(cycle.path.q, cycle.targets.tool[:, :3, 3])
+            for cycle in (told.after, told.before)
+        )
+        found = dict[int, list[tuple[float, float]]]()
+        visits, arcs = self.source.reading.visits, self._wanted_arcs()
+        zone = largest_zones(self.setting.cell.arm, told.after) if len(arcs) else None
         for v, shares in self.points.items():
-            end = int(self.own[v])
-            rows = np.arange(end - len(shares), end + 1)
-            before = self.latest.reading.visits.before[rows[0]]
-            steps = np.diff(p[np.append(before, rows)], axis=0)
-            size = np.maximum(lengths(steps), 1e-9)
-            unit = steps / size[:, None]
-            bend = lengths(np.diff(unit, axis=0)) / 2  # sine of half of the angle
+            rows = [int(self.own[visits.before[v]]), *self._ends(v)]
+            if shares[-1] == 1.0:
+                rows.append(self._ends(v + 1)[0])
+            rows = rows[: len(shares) + 2]
+            size = np.maximum(lengths(np.diff(p[rows], axis=0)), 1e-9)
+            slope = np.diff((p - c)[rows], axis=0) / size[:, None]
+            bend = lengths(np.diff(slope, axis=0)) / 2  # sine of half of the angle
             half = np.minimum(size[1:], size[:-1]) / 2
-            columns = half.tolist(), (half * bend).tolist()
-            found[v] = list(zip(*columns, strict=True))
+            far = half * bend
+            if zone is not None and is_arc(visits, v):
+                half = np.minimum(half, zone[rows[1:-1]])
+                far = half * bend + passed(half, arcs.radius_of(v))
+            found[v] = list(zip(half.tolist(), far.tolist(), strict=True))
         return found
 
     def _corners_moved(self, told: InTime) -> Bools:
         """Tell at which moves a rounded corner at an end is passed otherwise, (n,)."""
         moved = told.before.path.aside[self.own] - self.first.before.path.aside
         there = any_in_rows(np.abs(np.nan_to_num(moved)) > MOVED)
+        there[self._cut_arcs()] = False  # judged as the points that they are
         before = self.source.reading.visits.before
         return np.asarray(there | (there[before] & (before >= 0)))
 
@@ -389,7 +626,7 @@ class _PathWork:
         """Tell of the program as of the source's visits."""
         told = self.latest.in_time or self.first
         budget = "no more points may be put on ways (--max-inserted)"
-        if sum(map(len, self.points.values())) >= self.setting.options.max_inserted:
+        if self.room <= 0:
             for k in self.too_far.tolist():
                 self.left.setdefault(int(self.paths.visit[k]), budget)
         for k in self.too_far.tolist():
@@ -402,7 +639,8 @@ class _PathWork:
             self.stops & self.points.keys(),
             {v: why for v, why in self.left.items() if v not in self.points},
             self._sizes(self.first.paths),
-            self._otherwise(told.paths) if self.points else {},
+            self._otherwise(told.paths) if self.latest is not self.source else {},
+            self._approached(told),
         )
         in_time = replace(
             told,
@@ -412,6 +650,19 @@ class _PathWork:
         )
         kept = of_source(self.latest.kept, self.own)
         return replace(self.latest, kept=kept, in_time=in_time)
+
+    def _approached(self, told: InTime) -> dict[int, float]:
+        """Return the shares of the ways at which targets are approached anew."""
+        p = self.setting.cell.arm.tcp(
+            told.before.path.q, told.before.targets.tool[:, :3, 3]
+        )
+        found = {}
+        for v in self.approaches:
+            row = int(self.own[v])
+            there, back = (float(np.linalg.norm(p[row - 1] - p[k])) for k in
+                           (row - 2, row))  # fmt: skip
+            found[v] = there / (there + back)
+        return found
 
 
 def of_source(kept: Correction, own: Ints) -> Correction:

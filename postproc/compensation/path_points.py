@@ -22,7 +22,9 @@ class Insertions:
         left: Why moves that leave their path too far got none, by visit.
         without: How far each move leaves its path without points, by visit [m].
         otherwise: .. with them, if a joint's flank does not change as predicted [m].
-        tolerance: Asked for [m].
+        tolerance: Asked for [m]; infinite where nobody did.
+        approaches: Share of the way at which targets are approached anew, by visit: to
+            a stop, and on to the target.
     """
 
     own: Ints
@@ -32,6 +34,7 @@ class Insertions:
     left: Mapping[int, str] = field(default_factory=dict)
     without: Mapping[int, float] = field(default_factory=dict)
     otherwise: Mapping[int, float] = field(default_factory=dict)
+    approaches: Mapping[int, float] = field(default_factory=dict)
 
     @property
     def count(self) -> int:

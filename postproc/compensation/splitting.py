@@ -9,8 +9,9 @@ from __future__ import annotations
 import numpy as np
 
 from postproc.arrays import Bools, Floats, Ints
+from postproc.compensation.arc_splitting import hindrances_of_arcs, is_arc
 from postproc.compensation.outcome import Decisions, Status
-from postproc.language.interface import Splitter
+from postproc.language.interface import ArcPiece, Splitter
 from postproc.language.source import CloneError
 from postproc.language.visits import Meaning, OrientationLaw, Visits
 from postproc.motion.cycle import ProgramCycle
@@ -33,30 +34,38 @@ def hindrances(v: Visits, decisions: Decisions, cycle: ProgramCycle) -> dict[int
     alike = np.all([column == column[before] for column in frames], axis=0)
     found: dict[int, str] = {}
     for rows, why in (
-        (v.motion != Motion.LINEAR, "arcs are not split"),
+        (v.motion == Motion.JOINT, "it is no line and no arc"),
         (v.before < 0, "where it comes from is not one known place"),
         (_several(v), "it is reached several times"),
         (~(ends & ends[before]), "its ends are not both corrected poses"),
         (~alike, "it begins with other frames or configuration flags"),
         (~np.isnan(v.aux).all(axis=1), "auxiliary axes move along"),
         (v.tool_remote, "the arm holds the part"),
+        *hindrances_of_arcs(v, alike),
         (_turns_otherwise(v, before), "how the tool turns on its way is not sure"),
         (has_unknown(cycle.targets.linear_speed[:, None]), "its speed is not known"),
         (v.reason > 0, "it is left"),
     ):
         for row in np.flatnonzero(rows).tolist():
             found.setdefault(row, why)
+    for via in np.flatnonzero(v.via).tolist():  # an arc is cut as a whole
+        for one, other in ((via, via + 1), (via + 1, via)):
+            if one in found:
+                found.setdefault(other, found[one])
     return found
 
 
 def unwritable(splitter: Splitter, visits: Visits, v: int, file: int, line: int) -> str:
     """Say what in the text of a move hinders points on its way, "" for nothing."""
     widest = np.full((1, visits.dialect.width), WIDEST)
+    config = visits.configs[visits.config[v]]
     try:
         said = splitter.hinders(file, line)
-        said or splitter.points(
-            file, line, widest, visits.configs[visits.config[v]], False
-        )
+        if not said and is_arc(visits, v):
+            pieces = [ArcPiece(None, widest[0]), ArcPiece(widest[0], widest[0])]
+            splitter.arc(file, line, pieces, widest[0], config, False)
+        elif not said:
+            splitter.points(file, line, widest, config, False)
     except CloneError as problem:
         return str(problem)
     return said
@@ -89,7 +98,10 @@ def shortest_pieces(
     speed = np.nan_to_num(cycle.targets.linear_speed)
     least: Floats = np.maximum(SHORTEST * speed, CLOSEST)
     size = np.maximum(2 * np.nan_to_num(np.abs(visits.zone_mm) * MM), CLEAR)
-    round_ = np.where(visits.fly, np.maximum(size, least), least)
+    flown = visits.fly & ~visits.via  # the point on the way of an arc is no corner
+    round_ = np.where(flown, np.maximum(size, least), least)
     clear = np.where(visits.before >= 0, round_[np.maximum(visits.before, 0)], least)
+    ends = (visits.motion == Motion.CIRCULAR) & ~visits.via
+    round_ = np.where(ends, np.maximum(round_, CLEAR), round_)  # it must bend enough
     columns = least, np.maximum(clear, least), np.maximum(round_, least)
     return list(zip(*(column.tolist() for column in columns), strict=True))

@@ -169,6 +169,20 @@ class NoClones(Cloner):
         raise CloneError(self.why)
 
 
+@dataclass(frozen=True)
+class ArcPiece:
+    """A piece of an arc that is cut, from where the piece before it ends.
+
+    Attributes:
+        end: Numbers of its end, (w,); None: the point on the way of the arc, as the
+            move has it.
+        via: Numbers of the point on its own way, (w,); None: it is a chord.
+    """
+
+    end: Floats | None
+    via: Floats | None
+
+
 class Splitter(ABC):
     """The files of a job, to put points on the ways of its moves."""
 
@@ -204,6 +218,44 @@ class Splitter(ABC):
             numbers: Of the points, one behind the other, (k, w).
             config: Their configuration flags.
             stop: The arm stops at the first of them.
+
+        Raises:
+            CloneError: They cannot be written there.
+        """
+
+    @abstractmethod
+    def approach(self, file: int, line: int, numbers: Floats, config: str) -> Edit:
+        """Write a stop in front of a LINEAR move, from where it leads to its target.
+
+        Args:
+            file: Where the move stands.
+            line: Its line there.
+            numbers: Of the stop, (w,).
+            config: Its configuration flags.
+
+        Raises:
+            CloneError: It cannot be written there.
+        """
+
+    @abstractmethod
+    def arc(
+        self,
+        file: int,
+        line: int,
+        pieces: Sequence[ArcPiece],
+        via: Floats,
+        config: str,
+        stop: bool,
+    ) -> list[Edit]:
+        """Write pieces in front of a CIRCULAR move, which becomes the last of them.
+
+        Args:
+            file: Where the move stands.
+            line: Its line there.
+            pieces: The pieces; one ends at the point on the way of the arc.
+            via: Numbers of the point on the way that the move has from then on, (w,).
+            config: Configuration flags of all points.
+            stop: The arm stops where the first piece ends.
 
         Raises:
             CloneError: They cannot be written there.
@@ -261,7 +313,15 @@ class Language(ABC):
         return None
 
     def is_inserted(self, line: bytes) -> bool:
-        """Tell whether a line is a point that `Splitter.points` wrote."""
+        """Tell whether a line is a point that a `Splitter` wrote."""
+        return False
+
+    def is_approach(self, line: bytes) -> bool:
+        """Tell whether such a line is a stop from which a target is approached."""
+        return False
+
+    def ends_at_via(self, line: bytes) -> bool:
+        """Tell whether such a line leads to the point on the way of an arc."""
         return False
 
     def holds_joints(self, line: str) -> bool:

@@ -8,6 +8,7 @@ from dataclasses import asdict
 import numpy as np
 
 from postproc.arrays import Floats, Ints
+from postproc.compensation.corners import RoundOff
 from postproc.compensation.in_time import InTime
 from postproc.compensation.path_accuracy import Deviations, PathAccuracy
 from postproc.compensation.path_points import Insertions
@@ -29,8 +30,9 @@ def told_in_time(told: InTime, visits: Visits) -> dict[str, object]:
             "before": asdict(ErrorStatistics.of_sizes(told.paths.before.sizes)),
             "after": asdict(ErrorStatistics.of_sizes(told.paths.after.sizes)),
             "unknown": told.paths.unknown,
+            **_round_off(told.corners(visits)),
         },
-        "path": paths_of(told.paths, visits, told.inserted),
+        "path": paths_of(told.paths, visits, told.inserted, told.corners(visits)),
     }
 
 
@@ -69,13 +71,17 @@ def _uses(shares: Floats, rows: Ints, visits: Visits) -> list[dict[str, object]]
 
 
 def paths_of(
-    paths: PathAccuracy, visits: Visits, inserted: Insertions | None = None
+    paths: PathAccuracy,
+    visits: Visits,
+    inserted: Insertions | None = None,
+    corners: RoundOff | None = None,
 ) -> list[dict[str, object]]:
     """Describe how every move keeps to its path; of some the curve as well."""
     worst = set(np.argsort(-paths.after.sizes, kind="stable")[:CURVES].tolist())
     return [
         _path(paths, k, visits)
         | _points(paths, k, inserted)
+        | _corner(k, corners)
         | ({"curve": _curve(paths, k)} if k in worst else {})
         for k in range(len(paths))
     ]
@@ -102,6 +108,24 @@ def _path(paths: PathAccuracy, k: int, visits: Visits) -> dict[str, object]:
     }
 
 
+def _round_off(corners: RoundOff) -> dict[str, object]:
+    """Describe how far rounded corners are passed, where there are any."""
+    if not len(corners):
+        return {}
+    pair = {"before": corners.before, "after": corners.after}
+    sizes = {key: asdict(ErrorStatistics.of_sizes(x)) for key, x in pair.items()}
+    return {"cornering_round_off": sizes}
+
+
+def _corner(k: int, corners: RoundOff | None) -> dict[str, object]:
+    """Describe how far the corner at the end of a path is passed."""
+    pair = None if corners is None else corners.of(k)
+    if pair is None:
+        return {}
+    sizes = (round(size / MM, 5) for size in pair)
+    return {"corner_mm": dict(zip(("before", "after"), sizes, strict=True))}
+
+
 def _points(
     paths: PathAccuracy, k: int, inserted: Insertions | None
 ) -> dict[str, object]:
@@ -109,10 +133,16 @@ def _points(
     visit, length = int(paths.visit[k]), float(paths.way[paths.samples(k).stop - 1])
     if inserted is None:
         return {"inserted": 0, "points": []}
-    shares = inserted.points.get(visit, ())
+    shares: list[tuple[float, dict[str, bool]]] = [
+        (share, {}) for share in inserted.points.get(visit, ())
+    ]
+    if visit in inserted.approaches:
+        shares = [(inserted.approaches[visit], {"approach": True})]
     told: dict[str, object] = {
         "inserted": len(shares),
-        "points": [{"at_mm": round(share * length / MM, 3)} for share in shares],
+        "points": [
+            {"at_mm": round(share * length / MM, 3)} | more for share, more in shares
+        ],
         "not_split": inserted.left.get(visit),
     }
     for key, far in (

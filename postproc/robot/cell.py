@@ -142,6 +142,7 @@ class LimitSection(Strict):
         joint_deg: Most that every joint turns by a correction, at a target and on the
             way to it.
         elbow_mm, wrist_centre_mm: Most that elbow and wrist centre move likewise.
+        approach_mm: Most that a stop from which a target is approached anew is away.
     """
 
     correction_mm: PositiveFloat = 5.0
@@ -152,6 +153,7 @@ class LimitSection(Strict):
     joint_deg: Limits = JOINT_DEG
     elbow_mm: PositiveFloat = 10.0
     wrist_centre_mm: PositiveFloat = 10.0
+    approach_mm: PositiveFloat = 10.0
 
 
 class FrameTableEntry(Strict):

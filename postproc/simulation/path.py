@@ -60,6 +60,7 @@ def score_paths(
     original: Visits,
     executed: Visits | None = None,
     own: Ints | None = None,
+    skipped: Ints | None = None,
 ) -> PathScores:
     """Run a program and compare its paths with those that the original asks for.
 
@@ -70,13 +71,15 @@ def score_paths(
         executed: The compensated program; default the original itself.
         own: Its visits that the original makes, (n,), where points were put on ways:
             the pieces of a move are compared with its whole path.
+        skipped: Visits of the original whose ways are others now, and not compared.
     """
     wanted = dict(_tracks(arm, setup, original))
     done = wanted if executed is None else dict(_tracks(arm, setup, executed))
     if own is not None and executed is not None:
         done = _whole(done, own)
     visit, parts = [], []
-    for i in sorted(wanted.keys() & done.keys()):
+    others = set() if skipped is None else set(skipped.tolist())
+    for i in sorted((wanted.keys() & done.keys()) - others):
         visit.append(i)
         parts.append(_apart(done[i], wanted[i].nominal))
     count = [len(way) for way, _, _ in parts]

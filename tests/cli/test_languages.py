@@ -96,6 +96,8 @@ def run(command, place, name):
             return place.compensate(shared, "-o", to, "--clone")
         case "compensate --path-mm":
             return place.compensate(given, "-o", to, "--path-mm", "0.1")
+        case "compensate --approach":
+            return place.compensate(given, "-o", to, "--approach")
         case "compensate --lsv":
             values = place.put("v.lsv", "--$$\r\n")
             return place.compensate(given, "-o", to, "--lsv", values)

@@ -7,8 +7,14 @@ import re
 import numpy as np
 import pytest
 
+from postproc.compensation.approach import ASIDE, SHORT, place_to_approach
 from postproc.compensation.compensate import compensate
 from postproc.compensation.options import Options
+from postproc.compensation.program import read_program
+from postproc.compensation.targets import targets_from_visits
+from postproc.motion.cycle import run
+from postproc.robot.direction import half_width
+from postproc.robot.trajectory import Motion
 
 TIMED = Options(timing=True)
 START = "MOVE JOINT TO {4.0, -6.0, -84.0, 9.0, 53.0, -12.0}"
@@ -66,3 +72,43 @@ def test_a_first_move_is_told_what_to_do_before_it(bench_cell, bench_model) -> N
     plain = compensate(source, bench_cell, bench_model)
     texts = [d.message for d in plain.diagnostics if d.code == "side-not-sure"]
     assert all("start the approach farther away" in text for text in texts)
+
+
+def test_a_place_to_come_from_is_on_the_way_and_behind(bench_cell) -> None:
+    arm = bench_cell.arm
+    visits = read_program({"job.pdl": job({})}, bench_cell).visits
+    cycle = run(arm, targets_from_visits(visits, bench_cell)[0])
+    tool, unsure, found = cycle.targets.tool[0, :3, 3], np.zeros(6, dtype=bool), 0
+    unsure[:3] = True
+
+    def place(q: np.ndarray) -> np.ndarray:
+        return arm.tcp(q[None], tool[None])[0]
+
+    for row in np.flatnonzero(visits.motion == Motion.LINEAR)[1:].tolist():
+        before = int(visits.before[row])
+        most = 8e-3
+        q = place_to_approach(arm, cycle, row, before, unsure, most)
+        if q is None:
+            continue
+        found += 1
+        begin, above, end = cycle.path.q[[visits.before[before], before, row]]
+        share = (q - begin) @ (above - begin) / ((above - begin) @ (above - begin))
+        assert 0.0 <= share <= 1.0  # that move is a JOINT move: straight in its joints
+        np.testing.assert_allclose(q, begin + share * (above - begin), atol=1e-6)
+        off = place(q) - place(end)
+        assert SHORT <= np.linalg.norm(off) <= most
+        assert off @ (place(end) - place(above)) <= 1e-12
+        turned = np.abs(arm.coupling @ (end - q))
+        assert (turned >= 2 * half_width(arm))[unsure].all()
+        line = off / np.linalg.norm(off)
+        for k in np.linspace(share, 1.0, 20):
+            rel = place(begin + k * (above - begin)) - place(end)
+            assert np.linalg.norm(rel - (rel @ line) * line) <= ASIDE + 1e-6
+    assert found >= 10
+
+
+def test_there_is_no_place_to_come_from_where_the_way_is_not_known(bench_cell) -> None:
+    visits = read_program({"job.pdl": job({})}, bench_cell).visits
+    cycle = run(bench_cell.arm, targets_from_visits(visits, bench_cell)[0])
+    unsure = np.ones(6, dtype=bool)
+    assert place_to_approach(bench_cell.arm, cycle, 1, 0, unsure, 8e-3) is None

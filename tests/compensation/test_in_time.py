@@ -65,7 +65,9 @@ def test_the_report_tells_times_and_paths(outcome):
     )
     assert told["path_accuracy"]["after"]["n"] == 1
     assert [t["speed_mm_s"] for t in told["targets"]] == [0, 0, 0, 0]
-    assert outcome.exit_code == 0 and "from guessed limits" in outcome.in_time.summary()
+    assert outcome.exit_code == 0 and "from guessed limits" in outcome.in_time.summary(
+        outcome.visits
+    )
 
 
 def joint_cycle(arm, q, **more):

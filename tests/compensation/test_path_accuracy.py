@@ -3,19 +3,25 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from postproc.cli.simulate import setup_of, visits_of
 from postproc.compensation.in_time import InTime, run_in_time
 from postproc.compensation.options import AS_USUAL, Clock, Setting, silent
 from postproc.compensation.program import plan_visits, prepared, read_program
+from postproc.language.visits import Visits
 from postproc.model.model import load_model
 from postproc.robot.cell import load_cell
+from postproc.robot.pose import MM
 from postproc.robot.state import make_states
 from postproc.robot.trajectory import Motion
+from postproc.simulation import DEFAULT, virtual_arm
+from postproc.simulation.path import _tracks
 from tests.written import cli
 
 ROOT = Path(__file__).parents[2]
@@ -117,6 +123,66 @@ def test_it_is_what_the_virtual_arm_does(shop: Path) -> None:
     before, after = (report["path_accuracy"][key] for key in ("before", "after"))
     assert after["mean_mm"] < 0.5 * before["mean_mm"]
     assert 0.05 < after["max_mm"]  # right at its ends, and not between them
+
+
+# Rounded corners.
+
+ZONE = 8.0  # [mm]
+CORNERS = ((0, -200, 150), (0, 100, 150), (150, 100, 250), (150, -150, 250))
+
+
+def rounded() -> str:
+    """Write lines between stops at both ends, flown through with zones."""
+    turn, places = np.array([100.0, 160.0, 0.0]), np.array(CORNERS, dtype=float)
+    moves = [f"  MOVE LINEAR TO {pos(places[0], turn)}"]
+    moves += [f"  MOVEFLY LINEAR TO {pos(p, turn)} ADVANCE" for p in places[1:-1]]
+    head = ("$LIN_SPD := 0.1", "$FLY_TYPE := FLY_CART", "$FLY_TRAJ := FLY_FROM",
+            f"$FLY_DIST := {ZONE:g}")  # fmt: skip
+    moves.append(f"  MOVE LINEAR TO {pos(places[-1], turn)}")
+    return "\r\n".join(["PROGRAM job", "BEGIN", *head, *START, *moves, "END job", ""])
+
+
+def real_corners(folder: Path, name: str) -> dict[int, float]:
+    """How near the virtual arm comes to every target on its ways, by visit [mm]."""
+    cell = load_cell(CELL)
+    setup, wanted = setup_of(cell), visits_of(folder / "round.pdl", cell)
+    arm = virtual_arm(SEED, DEFAULT, coupling=setup.coupling, rows=1, tool=setup.tool)
+    corner = dict(_tracks(arm, setup, with_stops(wanted)))
+    real = dict(_tracks(arm, setup, visits_of(folder / name, cell)))
+    found = {}
+    for v in real.keys() & corner.keys():
+        way = np.vstack([real[k].real for k in (v, v + 1) if k in real])
+        place = corner[v].nominal[-1]
+        found[v] = float(np.linalg.norm(way - place, axis=1).min() / MM)
+    return found
+
+
+def with_stops(visits: Visits) -> Visits:
+    """Let the arm stop at all targets, so that it goes to them."""
+    return replace(visits, fly=np.zeros(len(visits), dtype=bool))
+
+
+def test_rounded_corners_are_passed_as_the_virtual_arm_does(shop: Path) -> None:
+    (shop / "round.pdl").write_text(rounded())
+    done("compensate", shop / "round.pdl", "--cell", CELL, "--model",
+         shop / "model.json", "-o", shop / "round.out.pdl",
+         "--report", shop / "round.json", "--html", shop / "round.html")  # fmt: skip
+    assert "Cornering round-off" in (shop / "round.html").read_text()
+    report = json.loads((shop / "round.json").read_bytes())
+    told = {p["visit"]: p["corner_mm"] for p in report["path"] if "corner_mm" in p}
+    places = np.array(CORNERS, dtype=float)
+    steps = np.diff(places, axis=0)
+    units = steps / np.linalg.norm(steps, axis=1)[:, None]
+    programmed = ZONE / 4 * np.linalg.norm(np.diff(units, axis=0), axis=1)
+    assert len(told) == len(programmed) == 2  # not where the arm stops
+    for key, name in (("before", "round.pdl"), ("after", "round.out.pdl")):
+        real = real_corners(shop, name)
+        off = [abs(sizes[key] - real[v]) for v, sizes in told.items()]
+        assert max(off) < 0.03
+    after = np.array([sizes["after"] for sizes in told.values()])
+    assert np.abs(after - programmed).max() < 0.1  # corrected, the zones are left
+    most = report["path_accuracy"]["cornering_round_off"]["after"]["max_mm"]
+    assert most == pytest.approx(after.max(), abs=1e-5)
 
 
 def test_it_is_what_a_slow_loop_says(ran: tuple[InTime, Setting]) -> None:

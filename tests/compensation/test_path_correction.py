@@ -11,9 +11,16 @@ from typing import Any
 import numpy as np
 import pytest
 
+from postproc.arrays import Floats
+from postproc.cli.simulate import _read, setup_of
 from postproc.compensation.path_correction import AIM, TAKEN
 from postproc.compensation.splitting import SHORTEST
 from postproc.model.model import load_model
+from postproc.robot.cell import load_cell
+from postproc.robot.pose import MM
+from postproc.simulation import DEFAULT, virtual_arm
+from postproc.simulation.program import land
+from tests.compensation.test_approach import job as approaches
 from tests.compensation.test_path_accuracy import CELL, LINES, SEED, done, job
 from tests.written import cli
 
@@ -59,8 +66,8 @@ def told(folder: Path, name: str) -> dict[str, Any]:
     return found
 
 
-def lines_of(report: dict[str, Any]) -> list[dict[str, Any]]:
-    return [path for path in report["path"] if path["move"] == "LINEAR"]
+def lines_of(report: dict[str, Any], move: str = "LINEAR") -> list[dict[str, Any]]:
+    return [path for path in report["path"] if path["move"] == move]
 
 
 def real(folder: Path, name: str) -> dict[int, dict[str, Any]]:
@@ -102,6 +109,33 @@ def test_flanks_that_a_measured_path_refuted_get_no_points(shop: Path) -> None:
     assert sum(p["inserted"] for p in paths) < 5
 
 
+def test_the_virtual_arm_keeps_closer_to_its_arcs(shop: Path) -> None:
+    sizes, most = {}, {}
+    for name in ("plain", "points", "stops"):
+        true, own = real(shop, name), lines_of(told(shop, name), "CIRCULAR")
+        assert len(own) == 4  # an arc is two paths
+        sizes[name] = np.array([true[path["visit"]]["p95_mm"] for path in own])
+        most[name] = np.array([true[path["visit"]]["max_mm"] for path in own])
+        predicted = np.array([path["max_mm"]["after"] for path in own])
+        assert np.abs(most[name] - predicted).max() < 0.1
+    assert (sizes["points"] < 0.5 * sizes["plain"]).all()
+    assert (most["points"] < most["plain"]).all()
+    assert (most["stops"] < 0.4 * most["plain"]).all()
+
+
+def test_arcs_are_cut_at_the_points_on_their_ways_too(shop: Path) -> None:
+    arcs = lines_of(told(shop, "points"), "CIRCULAR")
+    for first, second in zip(arcs[::2], arcs[1::2], strict=True):
+        assert first["line"] == second["line"]
+        assert first["points"][-1]["at_mm"] == pytest.approx(first["length_mm"])
+        for half in (first, second):
+            at = [0.0, *(point["at_mm"] for point in half["points"])]
+            assert (np.diff(at) >= SHORTEST * SPEED - 1e-3).all()
+            assert half["inserted"] == len(half["points"]) and not half["not_split"]
+    text = (shop / "points.pdl").read_text()
+    assert text.count("inserted (via)") == 2 and text.count("CIRCULAR") > 6
+
+
 def test_points_are_few_far_apart_and_told(shop: Path) -> None:
     report = told(shop, "points")
     for path in lines_of(report):
@@ -114,8 +148,6 @@ def test_points_are_few_far_apart_and_told(shop: Path) -> None:
         if path["max_mm"]["after"] > TOLERANCE:
             assert path["not_split"] or path["points"]
     assert sum(path["inserted"] for path in lines_of(report)) > 5
-    assert all(p["not_split"] == "arcs are not split" for p in report["path"]
-               if p["move"] == "CIRCULAR" and p["without_mm"] > TOLERANCE)  # fmt: skip
     findings = [d["code"] for d in report["diagnostics"]]
     assert "path-points" in findings and "path-left" in findings
     assert AIM < 1
@@ -150,7 +182,8 @@ def test_diff_tells_points_apart(shop: Path) -> None:
 
 def test_a_budget_holds(shop: Path) -> None:
     report = compensated(shop, "job.pdl", "few", "--path-mm", TOLERANCE,
-                         "--max-inserted", 2)  # fmt: skip
+                         "--max-inserted", 2, "--html", shop / "few.html")  # fmt: skip
+    assert (shop / "few.html").stat().st_size > 10_000
     assert sum(path["inserted"] for path in report["path"]) <= 2
     assert any("max-inserted" in d["message"] for d in report["diagnostics"])
     none = compensated(shop, "job.pdl", "none", "--path-mm", TOLERANCE,
@@ -171,9 +204,91 @@ def test_where_events_may_count_segments_nothing_is_split(shop: Path) -> None:
     assert any("events along a move" in d["message"] for d in report["diagnostics"])
 
 
+# Targets that are approached anew.
+
+
+def holes(speed: str = "  $LIN_SPD := 0.05\n") -> bytes:
+    """Places that are reached from 0.4 mm above: within the plays of some joints."""
+    return approaches({}).replace(b"BEGIN\n", f"BEGIN\n{speed}".encode())
+
+
+@pytest.fixture(scope="module")
+def drilled(shop: Path) -> Path:
+    (shop / "holes.pdl").write_bytes(holes())
+    for name, more in (("once", ()), ("anew", ("--approach",))):
+        compensated(shop, "holes.pdl", name, *more)
+        done("simulate", shop / f"{name}.pdl", "--cell", CELL, "--seed", SEED,
+             "--wanted", shop / "holes.pdl", "--path",
+             "--json", shop / f"{name}.true.json")  # fmt: skip
+    return shop
+
+
+def landing(folder: Path, name: str) -> Floats:
+    """How far the virtual arm lands from every target, (n,) [mm]."""
+    cell = load_cell(CELL)
+    setup, own = setup_of(cell), (_read(folder / f"{n}.pdl", cell) for n in
+                                  ("holes", name))  # fmt: skip
+    (wanted, _, _), (ran, rows, _) = own
+    arm = virtual_arm(SEED, DEFAULT, coupling=setup.coupling, rows=1, tool=setup.tool)
+    found = land(arm, setup, wanted, ran, rows)
+    assert len(found.visit) == len(wanted)
+    return np.linalg.norm(found.error, axis=1) / MM
+
+
+def test_the_virtual_arm_lands_nearer_where_it_comes_anew(drilled: Path) -> None:
+    report = told(drilled, "anew")
+    moves = [p for p in report["path"] if p["inserted"]]
+    rows = [p["visit"] for p in moves]
+    assert len(rows) >= 10
+    once, anew = landing(drilled, "once"), landing(drilled, "anew")
+    assert anew[rows].mean() < 0.75 * once[rows].mean()
+    assert anew[rows].max() < 0.6 * once[rows].max()
+    others = np.setdiff1d(np.arange(len(once)), rows)
+    assert (anew[others] < once[others] + 0.01).all()
+    codes = [[d["code"] for d in told(drilled, name)["diagnostics"]]
+             for name in ("once", "anew")]  # fmt: skip
+    assert "approached-anew" in codes[1] and "approached-anew" not in codes[0]
+    assert told(drilled, "anew.true")["path_accuracy"]["max_mm"] < 1.0
+
+
+def test_a_stop_to_come_from_is_near_and_behind(drilled: Path) -> None:
+    report, most = told(drilled, "anew"), load_cell(CELL).limits.approach_mm
+    lines = (drilled / "anew.pdl").read_text().splitlines()
+    rows = [k for k, line in enumerate(lines) if line.endswith("(approach)")]
+    assert len(rows) == sum(p["inserted"] for p in report["path"])
+    assert all(p["points"][0]["approach"] for p in report["path"] if p["inserted"])
+    for k in rows:
+        above, stop, target = (
+            np.array([float(x) for x in lines[k + i].split("POS(")[1].split(",")[:3]])
+            for i in (-1, 0, 1)
+        )
+        assert 1.0 < np.linalg.norm(stop - target) < most + 1.0
+        away = (stop - target) @ (target - above) / np.linalg.norm(target - above)
+        assert away < 1.0  # beyond by no more than corrections differ
+        assert lines[k].split()[:3] == ["MOVE", "LINEAR", "TO"]
+
+
+def test_what_was_approached_anew_comes_back(drilled: Path) -> None:
+    done("restore", drilled / "anew.pdl", "-o", drilled / "back.pdl")
+    assert (drilled / "back.pdl").read_bytes() == holes()
+    plain, anew = told(drilled, "once"), told(drilled, "anew")
+    assert [t["line"] for t in plain["targets"]] == [t["line"] for t in anew["targets"]]
+
+
+@pytest.mark.parametrize("between", ["$DOUT[2] := TRUE", "weld_on"])
+def test_nothing_is_approached_anew_where_a_process_may_run(
+    shop: Path, between: str
+) -> None:
+    text = holes().replace(b"  MOVE LINEAR", f"  {between}\n  MOVE LINEAR".encode())
+    (shop / "process.pdl").write_bytes(text)
+    report = compensated(shop, "process.pdl", "processed", "--approach")
+    assert sum(path["inserted"] for path in report["path"]) == 0
+
+
 @pytest.mark.parametrize(
     ("options", "said"),
     [
+        (("--approach", "--no-timing"), "--no-timing"),
         (("--path-mm", 0.0), "more than 0"),
         (("--path-mm", 0.1, "--no-timing"), "--no-timing"),
         (("--take-up",), "--path-mm"),

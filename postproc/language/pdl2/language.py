@@ -25,7 +25,7 @@ from postproc.language.pdl2.dialect import PDL2_DIALECT
 from postproc.language.pdl2.effects import dead_lines
 from postproc.language.pdl2.interpreter import resolve
 from postproc.language.pdl2.names import entry_names
-from postproc.language.pdl2.path_points import MARK, Pdl2Splitter
+from postproc.language.pdl2.path_points import AT_APPROACH, AT_VIA, MARK, Pdl2Splitter
 from postproc.language.pdl2.program import Program, parse
 from postproc.language.pdl2.variable_file import VariableFile, read_variables
 from postproc.language.rewrite import Skeleton
@@ -95,6 +95,16 @@ class Pdl2(Language):
     def is_inserted(self, line: bytes) -> bool:
         """Tell by the comment that such lines end with."""
         return MARK.search(line) is not None
+
+    def is_approach(self, line: bytes) -> bool:
+        """Tell by that comment as well."""
+        found = MARK.search(line)
+        return found is not None and found[1] == AT_APPROACH.encode()
+
+    def ends_at_via(self, line: bytes) -> bool:
+        """Tell by that comment as well."""
+        found = MARK.search(line)
+        return found is not None and found[1] == AT_VIA.encode()
 
     def target_names(
         self, file: str, lines: Sequence[bytes], wanted: Sequence[int]

@@ -10,21 +10,24 @@ from functools import cached_property
 import numpy as np
 
 from postproc.arrays import Floats
-from postproc.language.interface import Splitter
+from postproc.language.interface import ArcPiece, Splitter
 from postproc.language.pdl2 import syntax as ast
 from postproc.language.pdl2.clones import code_of
 from postproc.language.pdl2.dialect import DEGREE_DECIMALS, MM_DECIMALS
 from postproc.language.pdl2.program import Program
-from postproc.language.source import CloneError, Edit, Span, check_length
+from postproc.language.source import CloneError, Edit, Source, Span, check_length
 
 INSERTED = "-- postproc: inserted"  # ends such a line
-MARK = re.compile(rb"-- postproc: inserted[ \t]*\r?$")
+AT_VIA = " (via)"  # .. where it leads to the point on the way of an arc
+AT_APPROACH = " (approach)"  # .. where it is a stop from which a target is reached
+MARK = re.compile(rb"-- postproc: inserted( \((?:via|approach)\))?[ \t]*\r?$")
 
 _EVENT = re.compile(r"\b(AT|TIME|DISTANCE|PERCENT|SEGMENT|EVENT)\b", re.I)
 _ENABLE = re.compile(r"\bENABLE\b(?!\s+CONDITION\s*\[\s*\d+\s*\])", re.I)
 _ENABLED = re.compile(r"\bENABLE\s+CONDITION\b", re.I)
 _ADVANCE = re.compile(r"\bADVANCE\b", re.I)
 _WITH = re.compile(r"\bWITH\b.*", re.I)
+_VIA = re.compile(r"\bVIA\s+(POS\s*\([^()]*\))", re.I)
 _HEAD = re.compile(r"(\s*)MOVE(?:FLY)?\s+(ARM\s*\[\s*\d+\s*\]\s+)?", re.I)
 
 _MOTION = frozenset(
@@ -85,26 +88,101 @@ class Pdl2Splitter(Splitter):
         self, file: int, line: int, numbers: Floats, config: str, stop: bool
     ) -> Edit:
         """Write moves to points before another one, see `Splitter.points`."""
-        program = self.programs[file]
+        form = _Form.of(self.programs[file], line)
+        text = ""
+        for number, own in enumerate(numbers):
+            way = f"LINEAR TO {_place(own, config)}"
+            text += form.line(way, stop and number == 0)
+        return form.before(text)
+
+    def approach(self, file: int, line: int, numbers: Floats, config: str) -> Edit:
+        """Write a stop to approach a target from, see `Splitter.approach`."""
+        form = _Form.of(self.programs[file], line)
+        way = f"LINEAR TO {_place(numbers, config)}"
+        return form.before(form.line(way, True, AT_APPROACH))
+
+    def arc(
+        self,
+        file: int,
+        line: int,
+        pieces: Sequence[ArcPiece],
+        via: Floats,
+        config: str,
+        stop: bool,
+    ) -> list[Edit]:
+        """Write pieces of an arc before its move, see `Splitter.arc`."""
+        form = _Form.of(self.programs[file], line)
+        old = _VIA.search(form.code)
+        if old is None:
+            raise CloneError("the point on its way does not stand in the move")
+        text = ""
+        for number, piece in enumerate(pieces):
+            end = old[1] if piece.end is None else _place(piece.end, config)
+            way = f"LINEAR TO {end}"
+            if piece.via is not None:
+                way = f"CIRCULAR TO {end} VIA {_place(piece.via, config)}"
+            at_via = piece.end is None
+            text += form.line(way, stop and number == 0, AT_VIA if at_via else "")
+        start = form.start + old.start(1)
+        new = _place(via, config)
+        check_length(form.source, len(form.code) + len(new) - len(old[1]))
+        span = Span(start, start + len(old[1]))
+        return [form.before(text), Edit(span, new.encode("latin-1"))]
+
+
+@dataclass(frozen=True)
+class _Form:
+    """How a move is laid out: what the points in front of it look like.
+
+    Attributes:
+        source: Its file.
+        start: Offset of its line there.
+        code: Its line, without the comment.
+        indent, arm, settings: What begins the line, names the arm, and is set.
+    """
+
+    source: Source
+    start: int
+    code: str
+    indent: str
+    arm: str
+    settings: str
+
+    @classmethod
+    def of(cls, program: Program, line: int) -> _Form:
+        """Look at a move.
+
+        Raises:
+            CloneError: It is not understood.
+        """
         source, code = program.lines.source, code_of(program, line).rstrip()
         head, settings = _HEAD.match(code), _WITH.search(code)
         if head is None:
             raise CloneError("the move is not understood")
-        arm, rest = head[2] or "", f" {settings[0]}" if settings else ""
-        text = ""
-        for number, own in enumerate(numbers):
-            told = ", ".join(
-                f"{x:.{MM_DECIMALS if k < 3 else DEGREE_DECIMALS}f}"
-                for k, x in enumerate(own.tolist())
-            )
-            stops = stop and number == 0
-            word, advance = ("MOVE", "") if stops else ("MOVEFLY", " ADVANCE")
-            one = f"{word} {arm}LINEAR TO POS({told}, '{config}'){advance}{rest}"
-            new = f"{head[1]}{one} {INSERTED}"
-            check_length(source, len(new))
-            text += new + source.newline.decode("ascii")
-        at = int(source.line_starts[line - 1])
-        return Edit(Span(at, at), text.encode("latin-1"))
+        rest = f" {settings[0]}" if settings else ""
+        start = int(source.line_starts[line - 1])
+        return cls(source, start, code, head[1], head[2] or "", rest)
+
+    def line(self, way: str, stops: bool, mark: str = "") -> str:
+        """Write a move; a way is told by its trajectory and its points."""
+        word, advance = ("MOVE", "") if stops else ("MOVEFLY", " ADVANCE")
+        one = f"{word} {self.arm}{way}{advance}{self.settings}"
+        new = f"{self.indent}{one} {INSERTED}{mark}"
+        check_length(self.source, len(new))
+        return new + self.source.newline.decode("ascii")
+
+    def before(self, text: str) -> Edit:
+        """Put lines in front of the move."""
+        return Edit(Span(self.start, self.start), text.encode("latin-1"))
+
+
+def _place(numbers: Floats, config: str) -> str:
+    """Write a position, its numbers (6,)."""
+    told = ", ".join(
+        f"{x:.{MM_DECIMALS if k < 3 else DEGREE_DECIMALS}f}"
+        for k, x in enumerate(numbers.tolist())
+    )
+    return f"POS({told}, '{config}')"
 
 
 def _is_setting(statement: ast.Statement) -> bool:

@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from postproc.language.interface import ArcPiece
 from postproc.language.languages import language_of
 from postproc.language.pdl2.language import Pdl2
-from postproc.language.source import Source, apply
+from postproc.language.source import CloneError, Source, apply
 from tests.written import program
 
 PLACE = "POS(100.0, 200.0, 150.0, 0.0, 175.0, 0.0, '')"
@@ -105,6 +106,41 @@ def test_points_stand_before_the_move_as_it_is_written() -> None:
     ]
     told = [language_of("a.pdl").is_inserted(line.encode("latin-1")) for line in lines]
     assert np.flatnonzero(told).tolist() == [LINE - 1, LINE]
+
+
+def test_pieces_of_an_arc_stand_before_it_and_it_is_the_last() -> None:
+    via = "POS(10.5, 0, 150.25, 0, 175, 0, 'S')"
+    given = source(f"MOVE ARM[1] CIRCULAR TO p VIA {via} WITH $LIN_SPD = 0.1 -- seam")
+    splitter = Pdl2().splitter([given])
+    one, two = np.full(6, 1.0), np.full(6, 2.0)
+    pieces = [ArcPiece(one, None), ArcPiece(None, two), ArcPiece(two, one)]
+    edits = splitter.arc(0, LINE, pieces, np.full(6, 3.0), "S W", False)
+    lines = apply(given.data, edits).decode("latin-1").split("\r\n")
+    first, second, third = (
+        f"POS({k}.000, {k}.000, {k}.000, {k}.0000, {k}.0000, {k}.0000, 'S W')"
+        for k in (1, 2, 3)
+    )
+    end, mark = "ADVANCE WITH $LIN_SPD = 0.1", "-- postproc: inserted"
+    assert lines[LINE - 1 : LINE + 3] == [
+        f"  MOVEFLY ARM[1] LINEAR TO {first} {end} {mark}",
+        f"  MOVEFLY ARM[1] CIRCULAR TO {via} VIA {second} {end} {mark} (via)",
+        f"  MOVEFLY ARM[1] CIRCULAR TO {second} VIA {first} {end} {mark}",
+        f"  MOVE ARM[1] CIRCULAR TO p VIA {third} WITH $LIN_SPD = 0.1 -- seam",
+    ]
+    language = language_of("a.pdl")
+    rows = [line.encode("latin-1") for line in lines]
+    found = [[told(row) for row in rows] for told in
+             (language.is_inserted, language.ends_at_via)]  # fmt: skip
+    assert [np.flatnonzero(one).tolist() for one in found] == [
+        [LINE - 1, LINE, LINE + 1],
+        [LINE],
+    ]
+
+
+def test_an_arc_through_a_variable_is_not_cut() -> None:
+    splitter = Pdl2().splitter([source("MOVE CIRCULAR TO p VIA r")])
+    with pytest.raises(CloneError, match="on its way"):
+        splitter.arc(0, LINE, [ArcPiece(None, None)], np.zeros(6), "", False)
 
 
 def test_rapid_has_no_points_yet() -> None:

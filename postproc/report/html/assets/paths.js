@@ -39,16 +39,28 @@ class Paths {
     line.setAttribute("stroke", Page.COLOURS.blue);
     line.setAttribute("stroke-width", "1.5");
     svg.append(line);
+    for (const point of path.points || []) svg.append(this.mark(space, point.at_mm / length));
     return svg;
+  }
+
+  // A point that was put on the way: a small triangle at the foot of the strip.
+  mark(space, share) {
+    const shape = document.createElementNS(space, "path"), x = share * (Paths.WIDTH - 2) + 1;
+    shape.setAttribute("d", `M${x.toFixed(1)},${Paths.HEIGHT - 5} l3,5 h-6 z`);
+    shape.setAttribute("fill", Page.COLOURS.vermillion);
+    return shape;
   }
 
   select(k) {
     this.rows.forEach((row, i) => row.classList.toggle("selected", i === k));
-    const path = this.paths[k], { way_mm: x } = path.curve;
+    const path = this.paths[k], { way_mm: x } = path.curve, points = path.points || [];
+    const marks = { type: "scatter", mode: "markers", name: "points", x: points.map((point) => point.at_mm), y: points.map(() => 0),
+      marker: { symbol: "triangle-up", size: 9, color: Page.COLOURS.vermillion }, hovertemplate: "%{x:.1f} mm<extra>point</extra>" };
     const curve = (name, y, colour, dash) => ({ type: "scatter", mode: "lines", name, x, y, line: { color: colour, dash },
       hovertemplate: "%{x:.1f} mm: %{y:.3f} mm<extra></extra>" });
     Page.draw(document.getElementById("path-curve"), [
-      curve("before", path.curve.before_mm, Page.COLOURS.vermillion, "dot"), curve("after", path.curve.after_mm, Page.COLOURS.blue, "solid")], {
+      curve("before", path.curve.before_mm, Page.COLOURS.vermillion, "dot"), curve("after", path.curve.after_mm, Page.COLOURS.blue, "solid"),
+      ...(points.length ? [marks] : [])], {
       legend: { orientation: "h", x: 0, y: 1.02, yanchor: "bottom", traceorder: "normal" }, margin: { l: 56, r: 16, t: 30, b: 44 },
       xaxis: { title: { text: `way on the move to line ${path.line} [mm]` } }, yaxis: { title: { text: "from the path [mm]" }, rangemode: "tozero" },
     });

@@ -1,0 +1,285 @@
+"""Arcs cut into arcs: where pieces lie, what they bend, and how they are rounded.
+
+An arc is cut at the point on its way, which becomes the end of a piece, and anywhere
+before and behind it. Each piece has a point on its own way, in its middle; one that
+hardly bends is a chord. What the program says of the arc, from then on says its last
+piece.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+
+from postproc.arrays import Bools, Floats, Ints
+from postproc.compensation.path_points import Points
+from postproc.language.interface import ArcPiece
+from postproc.language.visits import Visits
+from postproc.motion.blending import zones
+from postproc.motion.cycle import ProgramCycle
+from postproc.motion.path import Segments, arcs, circles
+from postproc.motion.targets import Fly
+from postproc.robot.arm import Arm
+from postproc.robot.pose import MM, lengths, rotation_vector
+from postproc.robot.trajectory import Motion
+
+FLAT = 1e-5  # [m] sagitta of a piece that is a chord: ten of the digits written
+BENT = 5.0  # of what its corrections differ by: the least sagitta of an arc
+STRAIGHT = 0.3  # of the tolerance: the largest sagitta of a chord
+UNEVEN = 2e-5  # [rad] that the tool may turn otherwise than evenly along an arc
+
+Cut = tuple[int, float]  # the visit of an arc's half, and the share of its way
+Chords = Collection[Cut]  # where pieces end that are chords
+
+
+def hindrances_of_arcs(v: Visits, alike: Bools) -> list[tuple[Bools, str]]:
+    """Say what forbids to cut arcs, at the point on the way and at the end of each.
+
+    Args:
+        v: The program.
+        alike: Visits that have frames and flags of the ones before them, (n,).
+    """
+    via = np.flatnonzero(v.via)
+    own = v.name[via] == 0
+    told = np.array([bool(v.measure_id[k]) for k in via.tolist()], dtype=bool)
+    rows = (
+        (~np.isnan(v.arc_angle[via + 1]), "it ends at an angle"),
+        (~own, "the point on its way is a variable's: write its numbers in the move"),
+        (told, "the point on its way is measured"),
+        (~(alike[via] & alike[via + 1]), "its frames or configuration flags change"),
+        (_uneven(v, via), "how the tool turns on its way is not sure"),
+    )
+    found = []
+    for bad, why in rows:
+        marked = np.zeros(len(v), dtype=bool)
+        marked[via[bad]] = marked[via[bad] + 1] = True
+        found.append((marked, why))
+    return found
+
+
+def _uneven(v: Visits, via: Ints) -> Bools:
+    """Tell on which arcs (k,) the tool does not turn evenly about one axis."""
+    start = np.maximum(v.before[via], 0)
+    poses = [v.dialect.poses(v.values[rows]) for rows in (start, via, via + 1)]
+    first, second = arcs(*poses)
+    whole = np.maximum(first.angle + second.angle, 1e-12)
+    base = np.swapaxes(poses[0][:, :3, :3], 1, 2)
+    turns = [rotation_vector(base @ pose[:, :3, :3]) for pose in poses[1:]]
+    off = turns[0] - turns[1] * (first.angle / whole)[:, None]
+    return np.asarray(~(lengths(off) < UNEVEN) | ~first.valid)
+
+
+@dataclass(frozen=True)
+class CutArc:
+    """An arc and where it is cut.
+
+    Attributes:
+        numbers: Those of its start, (w,).
+        visits: The program.
+        halves: The arc up to the point on its way, and behind it.
+        cuts: Shares of either half, ascending; those of the first end with 1.
+        via: The visit of the point on its way.
+        chords: Which pieces are chords whatever they bend.
+    """
+
+    numbers: Floats
+    visits: Visits
+    halves: tuple[Segments, Segments]
+    cuts: tuple[Sequence[float], Sequence[float]]
+    via: int
+    chords: Chords
+
+    @classmethod
+    def of(cls, visits: Visits, points: Points, via: int, chords: Chords) -> CutArc:
+        """Look at the arc with the point `via` on its way."""
+        rows = [int(visits.before[via]), via, via + 1]
+        poses = visits.dialect.poses(visits.values[rows])
+        halves = arcs(*(poses[k : k + 1] for k in range(3)))
+        cuts = points.get(via, ()), points.get(via + 1, ())
+        return cls(visits.values[rows[0]], visits, halves, cuts, via, chords)
+
+    def pieces(self) -> tuple[list[ArcPiece], Floats]:
+        """Return the pieces but the last, and the point on that one's way, (w,)."""
+        found = []
+        for half, cuts in enumerate(self.cuts):
+            for begin, end in pairwise([0.0, *cuts]):
+                whole = half == 0 and end == 1.0
+                place = None if whole else self._at(half, end)
+                chord = self._is_chord(half, begin, end)
+                via = None if chord else self._at(half, (begin + end) / 2)
+                found.append(ArcPiece(place, via))
+        return found, self._at(1, (1.0 + max(self.cuts[1], default=0.0)) / 2)
+
+    def _is_chord(self, half: int, begin: float, end: float) -> bool:
+        return (self.via + half, end) in self.chords or bool(
+            self.sagitta(half, begin, end) < FLAT
+        )
+
+    def sagitta(self, half: int, begin: float, end: float) -> float:
+        """Return how far a piece bends away from its chord [m]."""
+        part = self.halves[half]
+        angle = float(part.angle[0]) * (end - begin)
+        radius = float(np.linalg.norm(part.radius[0]))
+        return float(radius * (1.0 - np.cos(min(angle, np.pi) / 2)))
+
+    def _at(self, half: int, share: float) -> Floats:
+        """Write the point at a share of a half, (w,)."""
+        part = self.halves[half]
+        pose = part.poses(np.zeros(1, dtype=int), np.array([share]))[0]
+        out = self.numbers[None].copy()
+        out[0, :3] = pose[:3, 3] / MM
+        turned = pose[:3, :3] @ self.halves[0].rotation[0].T
+        return np.asarray(self.visits.dialect.turned(out, turned[None])[0])
+
+
+# What pieces of arcs bend, against what their corrections differ by.
+
+
+def flat_pieces(visits: Visits, moved: Floats, rows: Ints) -> list[tuple[int, float]]:
+    """Find arcs that bend too little for what their corrections differ by.
+
+    Args:
+        visits: The program with points, not corrected.
+        moved: What its numbers are corrected by, (n, 3) [m].
+        rows: Points on the ways of arcs, (k,).
+
+    Returns:
+        The ends of those, and what they bend [m].
+    """
+    found = []
+    for via in rows.tolist():
+        points = np.array([visits.before[via], via, via + 1])
+        own, place = moved[points], visits.values[points, :3] * MM
+        differ = float(lengths(own - np.roll(own, 1, axis=0)).max())
+        chord = place[2] - place[0]
+        aside = np.cross(place[1] - place[0], chord / np.linalg.norm(chord))
+        sagitta = float(np.linalg.norm(aside))
+        if sagitta < max(FLAT, BENT * differ):
+            found.append((via + 1, sagitta))
+    return found
+
+
+# How points on arcs are rounded, by whatever law.
+
+
+def largest_zones(arm: Arm, cycle: ProgramCycle) -> Floats:
+    """Return how much of the way fly points may be rounded on, (n,) [m].
+
+    The larger of a zone of the distance that is set, or assumed, and of one that is
+    overlapped at 100 %.
+
+    Args:
+        arm: The arm; its limits are used.
+        cycle: The program, in time.
+    """
+    n, targets = len(cycle), cycle.targets
+    most = np.zeros(n)
+    for law in (Fly.FROM, Fly.OVERLAP):
+        told = replace(targets, rounding=np.full(n, law), overlap=np.ones(n))
+        found = zones(arm, told, cycle.path)
+        length = cycle.path.length
+        size = np.maximum(
+            found.before * length[found.into], found.behind * length[found.out]
+        )
+        np.maximum.at(most, found.visit, size)
+    return most
+
+
+def passed(zone: Floats, radius: float) -> Floats:
+    """Say how far a rounded point of an arc is passed because the arc bends [m].
+
+    Two moves that are superposed are at a quarter of the zone from the point each.
+    """
+    return np.asarray(zone**2 / (16.0 * radius))
+
+
+@dataclass(frozen=True)
+class WantedArcs:
+    """The arcs of the source that are cut, to compare the pieces with.
+
+    Attributes:
+        owner: Visits of the source at the ends of their halves, ascending, (k,).
+        centre, normal, radius: Their circles in the base of the arm, (k, 3), (k, 3) and
+            (k,) [m].
+    """
+
+    owner: Ints
+    centre: Floats
+    normal: Floats
+    radius: Floats
+
+    @classmethod
+    def of(cls, cycle: ProgramCycle, before: Ints, via: Sequence[int]) -> WantedArcs:
+        """Take the arcs with some points on their ways.
+
+        Args:
+            cycle: The source, in time.
+            before: The visit that leads to each, (n,).
+            via: Those points.
+        """
+        rows, p = np.array(via, dtype=np.int64), cycle.targets.tcp[:, :3, 3]
+        start = p[before[rows]]
+        centre, normal, _ = circles(start, p[rows], p[rows + 1])
+        owner = np.stack([rows, rows + 1], axis=1).ravel()
+        both = np.repeat(np.arange(len(rows)), 2)
+        radius = lengths(start - centre)
+        return cls(owner, centre[both], normal[both], radius[both])
+
+    def __len__(self) -> int:
+        """Return the number of their halves."""
+        return len(self.owner)
+
+    def radius_of(self, visit: int) -> float:
+        """Return the radius of the arc that a visit of the source is of [m]."""
+        return float(self.radius[np.searchsorted(self.owner, visit)])
+
+    def off(self, place: Floats, owner: Ints, rows: Bools) -> Floats:
+        """Return how far places are from their arcs, (s, 3) [m].
+
+        Args:
+            place: (s, 3) [m].
+            owner: Visit of the source that each belongs to, (s,).
+            rows: Which of them to look at, (s,).
+        """
+        out = np.zeros_like(place)
+        if not len(self.owner):
+            return out
+        at = np.minimum(np.searchsorted(self.owner, owner), len(self.owner) - 1)
+        on = np.flatnonzero(rows & (self.owner[at] == owner))
+        arc = at[on]
+        rel = place[on] - self.centre[arc]
+        height = np.einsum("ki,ki->k", rel, self.normal[arc])[:, None]
+        flat = rel - height * self.normal[arc]
+        size = np.maximum(lengths(flat), 1e-12)[:, None]
+        out[on] = rel - flat * (self.radius[arc][:, None] / size)
+        return out
+
+    def pieces(self, owner: Ints, fly: Bools) -> Bools:
+        """Tell at which visits (m,) of a program with points its path is the arc.
+
+        A rounded corner between two moves of the source is to stay.
+
+        Args:
+            owner: Visit of the source that each visit belongs to, (m,).
+            fly: Visits that are passed without stopping, (m,).
+        """
+        own = owner != np.append(owner[1:], -1)
+        return np.asarray(~(own & fly) | np.isin(owner, self.owner[::2]))
+
+
+NO_ARCS = WantedArcs(
+    np.empty(0, dtype=np.int64), np.empty((0, 3)), np.empty((0, 3)), np.empty(0)
+)
+
+
+def is_arc(visits: Visits, visit: int) -> bool:
+    """Tell whether a visit is the point on the way of an arc, or its end."""
+    return bool(visits.motion[visit] == Motion.CIRCULAR)
+
+
+def point_on_way(visits: Visits, visit: int) -> int:
+    """Return the visit of the point on the way of the arc that a visit is of."""
+    return visit if visits.via[visit] else visit - 1
