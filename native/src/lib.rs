@@ -21,6 +21,7 @@ mod play;
 mod pose;
 mod profile;
 mod pull;
+mod rescan;
 mod rounding;
 mod rows;
 mod spline;
@@ -77,6 +78,7 @@ fn native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(text::form_of, module)?)?;
     module.add_function(wrap_pyfunction!(text::line_starts, module)?)?;
     module.add_function(wrap_pyfunction!(text::scan_lines, module)?)?;
+    module.add_function(wrap_pyfunction!(rescan::rescan_lines, module)?)?;
     module.add_function(wrap_pyfunction!(statements::scan_statements, module)?)?;
     module.add_function(wrap_pyfunction!(statements::scan_krl, module)?)?;
     module.add_function(wrap_pyfunction!(spline::splines, module)?)?;
