@@ -13,6 +13,7 @@ mod design;
 mod direction;
 mod edges;
 mod evidence;
+mod interned;
 mod inverse;
 mod lines;
 mod number;

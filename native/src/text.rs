@@ -3,13 +3,12 @@
 //! `tests/reference/text.py` defines with regular expressions what is a number, a string,
 //! a comment and a name, one line at a time.
 
-use std::collections::HashMap;
-
 use numpy::{IntoPyArray, PyArray1, PyReadonlyArray1};
 use pyo3::exceptions::PyIndexError;
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyList};
 
+use crate::interned::Interned;
 use crate::number::value_of;
 use crate::rows::{detached, each, flat};
 
@@ -274,25 +273,6 @@ fn is_label(mask: &[u8], end: usize) -> bool {
     mask[behind..].starts_with(b"::")
 }
 
-/// Texts by number, in the order in which they are met first.
-#[derive(Default)]
-pub struct Interned {
-    number: HashMap<Vec<u8>, i32>,
-    pub texts: Vec<Vec<u8>>,
-}
-
-impl Interned {
-    pub fn of(&mut self, text: &[u8]) -> i32 {
-        if let Some(found) = self.number.get(text) {
-            return *found;
-        }
-        let new = self.texts.len() as i32;
-        self.number.insert(text.to_vec(), new);
-        self.texts.push(text.to_vec());
-        new
-    }
-}
-
 pub fn latin_1(text: &[u8]) -> String {
     text.iter().map(|b| *b as char).collect()
 }
@@ -400,7 +380,7 @@ pub fn scan_lines<'py>(
         first.push(start.len() as i32);
         name_first.push(name.len() as i32);
     })?;
-    let texts = masks.texts.iter().map(|text| PyBytes::new(py, text));
+    let texts = masks.texts().map(|text| PyBytes::new(py, text));
     Ok((
         PyList::new(py, texts)?,
         (
@@ -410,7 +390,7 @@ pub fn scan_lines<'py>(
             name_first.into_pyarray(py),
         ),
         (start.into_pyarray(py), end.into_pyarray(py), value.into_pyarray(py)),
-        (names.texts.iter().map(|text| latin_1(text)).collect(), name.into_pyarray(py)),
+        (names.texts().map(latin_1).collect(), name.into_pyarray(py)),
         open,
     ))
 }

@@ -276,7 +276,6 @@ def read_lines(source: Source) -> Lines:
     code = np.array([*map(bool, map(stripped, found.masks))], dtype=bool)
     rows = np.flatnonzero(code[found.shape])
     at = found.name_first[rows]
-    names = Interned[str](found.names)
     joined = join(
         found.masks, found.shape[rows], Names(at, found.name, tuple(found.names))
     )
@@ -285,7 +284,9 @@ def read_lines(source: Source) -> Lines:
     lines = with_block_rows(
         LogicalRows(joined.masks, joined.shape, kept + 1, first, at[joined.rows])
     )
-    shapes, shape = find_shapes(lines.masks, lines.shape, lines.name, found.name, names)
+    shapes, shape = find_shapes(
+        lines.masks, lines.shape, lines.name, found.name, found.names
+    )
     return Lines(
         source,
         shapes,
