@@ -1,51 +1,19 @@
 //! A text that differs from one read before in numbers: `postproc.language.scan`.
 
 use std::ops::Range;
-use std::thread::{available_parallelism, scope, ScopedJoinHandle};
 
 use numpy::{IntoPyArray, PyArray1, PyReadonlyArray1};
-use pyo3::exceptions::PyIndexError;
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 
 use crate::number::value_of;
-use crate::rows::{detached, flat};
-use crate::text::{Masked, MARK};
+use crate::rows::{detached, flat, on_cores};
+use crate::text::{Masked, Text, MARK};
 
 /// Lines that are read between two looks at signals.
 const AT_ONCE: usize = 1 << 16;
 /// Lines that are worth a thread.
 const LEAST: usize = 2000;
-
-/// A text and where its lines begin, and at last end.
-struct Text<'a> {
-    data: &'a [u8],
-    bounds: Vec<usize>,
-}
-
-impl<'a> Text<'a> {
-    fn new(data: &'a [u8], starts: &[i64]) -> PyResult<Self> {
-        let place = |at: i64| usize::try_from(at).unwrap_or(usize::MAX);
-        let bounds: Vec<usize> = starts.iter().map(|at| place(*at)).chain([data.len()]).collect();
-        if bounds.windows(2).any(|two| two[0] > two[1]) || data.len() > i32::MAX as usize {
-            return Err(PyIndexError::new_err("lines that are not there"));
-        }
-        Ok(Text { data, bounds })
-    }
-
-    fn len(&self) -> usize {
-        self.bounds.len() - 1
-    }
-
-    /// Return a line without its end.
-    fn line(&self, i: usize) -> &'a [u8] {
-        let mut line = &self.data[self.bounds[i]..self.bounds[i + 1]];
-        while let [rest @ .., b'\r' | b'\n'] = line {
-            line = rest;
-        }
-        line
-    }
-}
 
 /// Lines of both texts, as they are read.
 #[derive(Default)]
@@ -109,17 +77,25 @@ struct Texts<'a> {
 }
 
 impl Texts<'_> {
-    /// Find the line that was added; tell whether the texts may be the same but for that.
-    fn find_added(&mut self) -> bool {
-        let (before, after) = (&self.before, &self.after);
-        if after.len() != before.len() + 1 || before.data.starts_with(MARK) {
-            return after.len() == before.len() && !before.data.starts_with(MARK);
-        }
+    /// Find the first of some lines of both that are not the same.
+    fn first_other(&self, rows: Range<usize>) -> Option<usize> {
         let mut pair = Pair::default();
-        let n = before.len();
-        let added = (0..n).find(|i| !pair.same(before.line(*i), after.line(*i))).unwrap_or(n);
+        rows.into_iter().find(|i| !pair.same(self.before.line(*i), self.after.line(*i)))
+    }
+
+    /// Find the line that was added; tell whether it is one of comment alone.
+    fn find_added(&mut self, py: Python<'_>) -> PyResult<bool> {
+        let mut added = self.before.len();
+        for rows in blocks(self.before.len()) {
+            py.check_signals()?;
+            if let Some(other) = detached(py, || self.first_other(rows))? {
+                added = other;
+                break;
+            }
+        }
         self.added = Some(added);
-        pair.new.read(after.line(added)) && pair.new.mask.is_empty()
+        let mut line = Masked::default();
+        Ok(line.read(self.after.line(added)) && line.mask.is_empty())
     }
 
     /// Read some lines of the earlier text again, None where one says something else.
@@ -135,22 +111,11 @@ impl Texts<'_> {
         }
         Some(found)
     }
+}
 
-    /// Read some lines, a part of them on every core.
-    fn read_parts(&self, rows: Range<usize>) -> Vec<Option<Found>> {
-        let cores = available_parallelism().map_or(1, usize::from);
-        let parts = cores.min(rows.len() / LEAST).max(1);
-        let end = |part: usize| rows.start + rows.len() * part / parts;
-        if parts == 1 {
-            return vec![self.read(rows)];
-        }
-        scope(|crowd| {
-            let read = |part| crowd.spawn(move || self.read(end(part)..end(part + 1)));
-            let working: Vec<_> = (0..parts).map(read).collect();
-            let join = |part: ScopedJoinHandle<'_, Option<Found>>| part.join().expect("lines");
-            working.into_iter().map(join).collect()
-        })
-    }
+/// Cut lines into blocks between which signals are heard.
+fn blocks(n: usize) -> impl Iterator<Item = Range<usize>> {
+    (0..n).step_by(AT_ONCE).map(move |first| first..n.min(first + AT_ONCE))
 }
 
 type Column<'py, T> = Bound<'py, PyArray1<T>>;
@@ -184,20 +149,20 @@ pub fn rescan_lines<'py>(
 > {
     let before = Text::new(before.as_bytes(), flat(&before_starts)?)?;
     let after = Text::new(after.as_bytes(), flat(&after_starts)?)?;
+    let (n, more) = (before.len(), after.len().wrapping_sub(before.len()));
     let mut texts = Texts { before, after, added: None };
-    if !detached(py, || texts.find_added())? {
+    if texts.before.data.starts_with(MARK) || more > 1 || (more == 1 && !texts.find_added(py)?) {
         return Ok(None);
     }
-    let n = texts.before.len();
     let mut all = Found::default();
     all.comment.reserve_exact(n + 1);
     all.start.reserve_exact(count);
     all.end.reserve_exact(count);
     all.value.reserve_exact(count);
     all.changed.reserve_exact(count);
-    for first in (0..n).step_by(AT_ONCE) {
+    for rows in blocks(n) {
         py.check_signals()?;
-        for part in detached(py, || texts.read_parts(first..n.min(first + AT_ONCE)))? {
+        for part in detached(py, || on_cores(rows, LEAST, |rows| texts.read(rows)))? {
             match part {
                 Some(found) => all.append(found),
                 None => return Ok(None),

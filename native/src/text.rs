@@ -321,6 +321,42 @@ pub fn line_starts<'py>(
 
 type Column<'py, T> = Bound<'py, PyArray1<T>>;
 
+/// A text and where its lines begin, and at last end.
+pub struct Text<'a> {
+    pub data: &'a [u8],
+    pub bounds: Vec<usize>,
+}
+
+impl<'a> Text<'a> {
+    /// Take where lines start, or refuse it; offsets are told in 31 bits.
+    pub fn new(data: &'a [u8], starts: &[i64]) -> PyResult<Self> {
+        let place = |at: i64| usize::try_from(at).unwrap_or(usize::MAX);
+        let bounds = starts.iter().copied().chain([data.len() as i64]);
+        let bounds: Vec<usize> = bounds.map(place).collect();
+        if bounds.windows(2).any(|two| two[0] > two[1]) || data.len() > i32::MAX as usize {
+            return Err(PyIndexError::new_err("lines that are not there"));
+        }
+        Ok(Text { data, bounds })
+    }
+
+    pub fn len(&self) -> usize {
+        self.bounds.len() - 1
+    }
+
+    /// Return a line without its end.
+    pub fn line(&self, i: usize) -> &'a [u8] {
+        without_end(&self.data[self.bounds[i]..self.bounds[i + 1]])
+    }
+}
+
+/// Return a line without its end.
+fn without_end(mut line: &[u8]) -> &[u8] {
+    while let [rest @ .., b'\r' | b'\n'] = line {
+        line = rest;
+    }
+    line
+}
+
 /// Scan the physical lines of a text, given where they start, (n,).
 ///
 /// Returns: the distinct masks; of every line its mask, where its comment starts (-1:
@@ -340,13 +376,8 @@ pub fn scan_lines<'py>(
     (Vec<String>, Column<'py, i32>),
     Vec<usize>,
 )> {
-    let (data, starts) = (data.as_bytes(), flat(&starts)?);
-    let place = |at: i64| usize::try_from(at).unwrap_or(usize::MAX);
-    let bounds = starts.iter().copied().chain([data.len() as i64]);
-    let bounds: Vec<usize> = bounds.map(place).collect();
-    if bounds.windows(2).any(|two| two[0] > two[1]) || data.len() > i32::MAX as usize {
-        return Err(PyIndexError::new_err("lines that are not there"));
-    }
+    let lines = Text::new(data.as_bytes(), flat(&starts)?)?;
+    let (data, bounds) = (lines.data, &lines.bounds);
     let (mut masks, mut names) = (Interned::default(), Interned::default());
     let (mut mask, mut comment) = (Vec::new(), Vec::new());
     let (mut first, mut name_first) = (vec![0_i32], vec![0_i32]);
@@ -360,12 +391,9 @@ pub fn scan_lines<'py>(
         unmarked = [b"   ", &data[MARK.len()..head]].concat();
         first_line = &unmarked;
     }
-    each(py, starts.len(), |i| {
+    each(py, lines.len(), |i| {
         let at = bounds[i];
-        let mut text = if i == 0 { first_line } else { &data[at..bounds[i + 1]] };
-        while let [rest @ .., b'\r' | b'\n'] = text {
-            text = rest;
-        }
+        let text = if i == 0 { without_end(first_line) } else { lines.line(i) };
         if !line.read(text) {
             open.push(i);
         }
