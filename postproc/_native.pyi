@@ -196,6 +196,15 @@ def scan_lines(
     list[int],
 ]: ...
 
+# rescan.rs: a text that differs from one read before in numbers
+def rescan_lines(
+    before: bytes,
+    before_starts: Ints,
+    after: bytes,
+    after_starts: Ints,
+    count: int,
+) -> tuple[int, Indices, tuple[Indices, Indices, Floats, Bools]] | None: ...
+
 # statements.rs: statements as texts and numbers (`postproc.language.statements`)
 def scan_statements(
     data: bytes,

@@ -2,14 +2,13 @@
 
 use std::collections::HashMap;
 use std::ops::Range;
-use std::thread::{available_parallelism, scope};
 
 use pyo3::exceptions::{PyIndexError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::pybacked::PyBackedBytes;
 use pyo3::types::PyBytes;
 
-use crate::rows::detached;
+use crate::rows::{detached, in_threads, parts_of};
 use crate::table::{concatenated, Cells, Column};
 
 /// Rows that are written between two looks at signals.
@@ -98,29 +97,15 @@ impl Table<'_> {
 
     /// Write some rows, a part of them on every core; widen the columns.
     fn put(&self, rows: Range<usize>, widths: &mut [usize]) -> Vec<Vec<u8>> {
-        let cores = available_parallelism().map_or(1, usize::from);
-        let parts = cores.min(rows.len() / LEAST).max(1);
-        let end = |part: usize| rows.start + rows.len() * part / parts;
-        let written = side_by_side(parts, |part| self.written(end(part)..end(part + 1)));
+        let parts = parts_of(rows, LEAST);
+        let written = in_threads(parts.len(), |part| self.written(parts[part].clone()));
         let mut before = Vec::new();
         for part in &written {
             before.push(widths.to_vec());
             widths.iter_mut().zip(&part.widest).for_each(|(w, widest)| *w = (*w).max(*widest));
         }
-        side_by_side(parts, |part| self.laid_out(&written[part], before[part].clone()))
+        in_threads(parts.len(), |part| self.laid_out(&written[part], before[part].clone()))
     }
-}
-
-/// Do some parts of a work, each on a thread of its own.
-fn side_by_side<T: Send>(parts: usize, work: impl Fn(usize) -> T + Sync) -> Vec<T> {
-    if parts == 1 {
-        return vec![work(0)];
-    }
-    let work = &work;
-    scope(|crowd| {
-        let working: Vec<_> = (0..parts).map(|part| crowd.spawn(move || work(part))).collect();
-        working.into_iter().map(|part| part.join().expect("a part of the rows")).collect()
-    })
 }
 
 /// Write rows below each other.

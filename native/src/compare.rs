@@ -1,7 +1,6 @@
 //! Two texts line by line: which numbers differ, or what more (`postproc.report.diff`).
 
 use std::ops::Range;
-use std::thread::{available_parallelism, scope};
 
 use numpy::{IntoPyArray, PyArray1, PyReadonlyArray1};
 use pyo3::exceptions::PyIndexError;
@@ -9,7 +8,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 
 use crate::number::value_of;
-use crate::rows::{detached, flat, same_length};
+use crate::rows::{detached, flat, on_cores, same_length};
 use crate::statements::mask_krl_line;
 use crate::text::Masked;
 
@@ -132,21 +131,6 @@ fn compared(before: &Lines<'_>, after: &Lines<'_>, rows: Range<usize>, named: bo
     work.found
 }
 
-/// Compare some lines, a part of them on every core.
-fn in_parts(before: &Lines<'_>, after: &Lines<'_>, rows: Range<usize>, named: bool) -> Vec<Found> {
-    let cores = available_parallelism().map_or(1, usize::from);
-    let parts = cores.min(rows.len() / LEAST).max(1);
-    let end = |part: usize| rows.start + rows.len() * part / parts;
-    scope(|crowd| {
-        let working: Vec<_> = (0..parts)
-            .map(|part| {
-                crowd.spawn(move || compared(before, after, end(part)..end(part + 1), named))
-            })
-            .collect();
-        working.into_iter().map(|part| part.join().expect("a part of the lines")).collect()
-    })
-}
-
 /// Tell which of some lines begin with the same bytes as the one before them.
 fn begin_alike(before: &Lines<'_>, found: &Found) -> Vec<bool> {
     let begin = |k: usize| -> Option<&[u8]> {
@@ -193,7 +177,8 @@ pub fn compare_lines<'py>(
         py.check_signals()?;
         let rows = first..n.min(first + AT_ONCE);
         detached(py, || {
-            in_parts(&before, &after, rows, named).into_iter().for_each(|part| found.append(part));
+            let parts = on_cores(rows, LEAST, |rows| compared(&before, &after, rows, named));
+            parts.into_iter().for_each(|part| found.append(part));
         })?;
     }
     let alike = detached(py, || begin_alike(&before, &found))?;

@@ -1,6 +1,8 @@
 //! Rows of arrays, in and out.
 
+use std::ops::Range;
 use std::panic::{catch_unwind, AssertUnwindSafe};
+use std::thread::{available_parallelism, scope};
 
 use numpy::ndarray::{Array2, Array3, Dimension};
 use numpy::{
@@ -70,6 +72,36 @@ pub fn each<T: Send>(
 pub fn detached<T: Send>(py: Python<'_>, work: impl FnOnce() -> T + Send) -> PyResult<T> {
     py.detach(|| catch_unwind(AssertUnwindSafe(work)))
         .map_err(|_| PyRuntimeError::new_err("the native core has failed"))
+}
+
+/// Cut rows into a part for every core, as far as so many rows are worth a thread.
+pub fn parts_of(rows: Range<usize>, least: usize) -> Vec<Range<usize>> {
+    let cores = available_parallelism().map_or(1, usize::from);
+    let parts = cores.min(rows.len() / least).max(1);
+    let end = |part: usize| rows.start + rows.len() * part / parts;
+    (0..parts).map(|part| end(part)..end(part + 1)).collect()
+}
+
+/// Do some parts of a work, each on a thread of its own.
+pub fn in_threads<T: Send>(parts: usize, work: impl Fn(usize) -> T + Sync) -> Vec<T> {
+    if parts == 1 {
+        return vec![work(0)];
+    }
+    let work = &work;
+    scope(|crowd| {
+        let working: Vec<_> = (0..parts).map(|part| crowd.spawn(move || work(part))).collect();
+        working.into_iter().map(|part| part.join().expect("a part of the rows")).collect()
+    })
+}
+
+/// Do a work on some rows, a part of them on every core.
+pub fn on_cores<T: Send>(
+    rows: Range<usize>,
+    least: usize,
+    work: impl Fn(Range<usize>) -> T + Sync,
+) -> Vec<T> {
+    let parts = parts_of(rows, least);
+    in_threads(parts.len(), |part| work(parts[part].clone()))
 }
 
 /// Give rows to Python as an array (n, K).

@@ -8,11 +8,12 @@ use pyo3::exceptions::PyIndexError;
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyList};
 
+use crate::interned::Interned;
 use crate::number::value_of;
 use crate::rows::detached;
 use crate::text::{
-    is, latin_1, number_end, while_is, Interned, Masked, DIGIT, FIRST, IN_NAME, MARK, NAME, NUMBER,
-    UNARY, WHOLE,
+    is, latin_1, number_end, while_is, Masked, DIGIT, FIRST, IN_NAME, MARK, NAME, NUMBER, UNARY,
+    WHOLE,
 };
 
 /// Words that begin a statement, wherever they stand: what came before has no end.
@@ -569,7 +570,7 @@ fn scanned<'py, R: Cutting + Send>(
             true
         })?;
     }
-    let texts = forms.texts.iter().map(|text| PyBytes::new(py, text));
+    let texts = forms.texts().map(|text| PyBytes::new(py, text));
     Ok((
         PyList::new(py, texts)?,
         (
@@ -580,7 +581,7 @@ fn scanned<'py, R: Cutting + Send>(
             name_first.into_pyarray(py),
         ),
         (start.into_pyarray(py), end.into_pyarray(py), value.into_pyarray(py)),
-        (names.texts.iter().map(|text| latin_1(text)).collect(), name.into_pyarray(py)),
+        (names.texts().map(latin_1).collect(), name.into_pyarray(py)),
         open,
     ))
 }

@@ -3,7 +3,6 @@
 use std::collections::HashMap;
 use std::io::Write;
 use std::ops::Range;
-use std::thread::{available_parallelism, scope, ScopedJoinHandle};
 
 use numpy::{PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::exceptions::{PyIndexError, PyValueError};
@@ -12,7 +11,7 @@ use pyo3::pybacked::PyBackedBytes;
 use pyo3::types::PyBytes;
 
 use crate::number::{put_fixed, put_shortest, put_whole};
-use crate::rows::{detached, flat};
+use crate::rows::{detached, flat, on_cores};
 
 /// Rows that are written between two looks at signals.
 const AT_ONCE: usize = 1 << 16;
@@ -183,22 +182,6 @@ fn put_rows(columns: &[Column<'_>], given: &Given, rows: Range<usize>) -> Vec<u8
     out
 }
 
-/// Write some rows, a part of them on every core.
-fn put_parts(columns: &[Column<'_>], given: &Given, rows: Range<usize>) -> Vec<Vec<u8>> {
-    let cores = available_parallelism().map_or(1, usize::from);
-    let parts = cores.min(rows.len() / LEAST).max(1);
-    let end = |part: usize| rows.start + rows.len() * part / parts;
-    if parts == 1 {
-        return vec![put_rows(columns, given, rows)];
-    }
-    scope(|crowd| {
-        let write = |part| crowd.spawn(move || put_rows(columns, given, end(part)..end(part + 1)));
-        let working: Vec<_> = (0..parts).map(write).collect();
-        let join = |part: ScopedJoinHandle<'_, Vec<u8>>| part.join().expect("a part of the rows");
-        working.into_iter().map(join).collect()
-    })
-}
-
 /// Write n rows, one behind the other, column by column.
 ///
 /// Arguments:
@@ -217,7 +200,8 @@ pub fn table<'py>(
     for first in (0..n).step_by(AT_ONCE) {
         py.check_signals()?;
         let rows = first..n.min(first + AT_ONCE);
-        parts.append(&mut detached(py, || put_parts(&columns, &given, rows))?);
+        let put = |rows| put_rows(&columns, &given, rows);
+        parts.append(&mut detached(py, || on_cores(rows, LEAST, put))?);
     }
     concatenated(py, &parts)
 }

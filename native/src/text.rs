@@ -3,13 +3,12 @@
 //! `tests/reference/text.py` defines with regular expressions what is a number, a string,
 //! a comment and a name, one line at a time.
 
-use std::collections::HashMap;
-
 use numpy::{IntoPyArray, PyArray1, PyReadonlyArray1};
 use pyo3::exceptions::PyIndexError;
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyList};
 
+use crate::interned::Interned;
 use crate::number::value_of;
 use crate::rows::{detached, each, flat};
 
@@ -274,25 +273,6 @@ fn is_label(mask: &[u8], end: usize) -> bool {
     mask[behind..].starts_with(b"::")
 }
 
-/// Texts by number, in the order in which they are met first.
-#[derive(Default)]
-pub struct Interned {
-    number: HashMap<Vec<u8>, i32>,
-    pub texts: Vec<Vec<u8>>,
-}
-
-impl Interned {
-    pub fn of(&mut self, text: &[u8]) -> i32 {
-        if let Some(found) = self.number.get(text) {
-            return *found;
-        }
-        let new = self.texts.len() as i32;
-        self.number.insert(text.to_vec(), new);
-        self.texts.push(text.to_vec());
-        new
-    }
-}
-
 pub fn latin_1(text: &[u8]) -> String {
     text.iter().map(|b| *b as char).collect()
 }
@@ -341,6 +321,42 @@ pub fn line_starts<'py>(
 
 type Column<'py, T> = Bound<'py, PyArray1<T>>;
 
+/// A text and where its lines begin, and at last end.
+pub struct Text<'a> {
+    pub data: &'a [u8],
+    pub bounds: Vec<usize>,
+}
+
+impl<'a> Text<'a> {
+    /// Take where lines start, or refuse it; offsets are told in 31 bits.
+    pub fn new(data: &'a [u8], starts: &[i64]) -> PyResult<Self> {
+        let place = |at: i64| usize::try_from(at).unwrap_or(usize::MAX);
+        let bounds = starts.iter().copied().chain([data.len() as i64]);
+        let bounds: Vec<usize> = bounds.map(place).collect();
+        if bounds.windows(2).any(|two| two[0] > two[1]) || data.len() > i32::MAX as usize {
+            return Err(PyIndexError::new_err("lines that are not there"));
+        }
+        Ok(Text { data, bounds })
+    }
+
+    pub fn len(&self) -> usize {
+        self.bounds.len() - 1
+    }
+
+    /// Return a line without its end.
+    pub fn line(&self, i: usize) -> &'a [u8] {
+        without_end(&self.data[self.bounds[i]..self.bounds[i + 1]])
+    }
+}
+
+/// Return a line without its end.
+fn without_end(mut line: &[u8]) -> &[u8] {
+    while let [rest @ .., b'\r' | b'\n'] = line {
+        line = rest;
+    }
+    line
+}
+
 /// Scan the physical lines of a text, given where they start, (n,).
 ///
 /// Returns: the distinct masks; of every line its mask, where its comment starts (-1:
@@ -360,13 +376,8 @@ pub fn scan_lines<'py>(
     (Vec<String>, Column<'py, i32>),
     Vec<usize>,
 )> {
-    let (data, starts) = (data.as_bytes(), flat(&starts)?);
-    let place = |at: i64| usize::try_from(at).unwrap_or(usize::MAX);
-    let bounds = starts.iter().copied().chain([data.len() as i64]);
-    let bounds: Vec<usize> = bounds.map(place).collect();
-    if bounds.windows(2).any(|two| two[0] > two[1]) || data.len() > i32::MAX as usize {
-        return Err(PyIndexError::new_err("lines that are not there"));
-    }
+    let lines = Text::new(data.as_bytes(), flat(&starts)?)?;
+    let (data, bounds) = (lines.data, &lines.bounds);
     let (mut masks, mut names) = (Interned::default(), Interned::default());
     let (mut mask, mut comment) = (Vec::new(), Vec::new());
     let (mut first, mut name_first) = (vec![0_i32], vec![0_i32]);
@@ -380,12 +391,9 @@ pub fn scan_lines<'py>(
         unmarked = [b"   ", &data[MARK.len()..head]].concat();
         first_line = &unmarked;
     }
-    each(py, starts.len(), |i| {
+    each(py, lines.len(), |i| {
         let at = bounds[i];
-        let mut text = if i == 0 { first_line } else { &data[at..bounds[i + 1]] };
-        while let [rest @ .., b'\r' | b'\n'] = text {
-            text = rest;
-        }
+        let text = if i == 0 { without_end(first_line) } else { lines.line(i) };
         if !line.read(text) {
             open.push(i);
         }
@@ -400,7 +408,7 @@ pub fn scan_lines<'py>(
         first.push(start.len() as i32);
         name_first.push(name.len() as i32);
     })?;
-    let texts = masks.texts.iter().map(|text| PyBytes::new(py, text));
+    let texts = masks.texts().map(|text| PyBytes::new(py, text));
     Ok((
         PyList::new(py, texts)?,
         (
@@ -410,7 +418,7 @@ pub fn scan_lines<'py>(
             name_first.into_pyarray(py),
         ),
         (start.into_pyarray(py), end.into_pyarray(py), value.into_pyarray(py)),
-        (names.texts.iter().map(|text| latin_1(text)).collect(), name.into_pyarray(py)),
+        (names.texts().map(latin_1).collect(), name.into_pyarray(py)),
         open,
     ))
 }

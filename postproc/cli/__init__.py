@@ -7,6 +7,7 @@ interrupted on its way.
 from __future__ import annotations
 
 import ctypes
+import gc
 import os
 import signal
 import sys
@@ -18,6 +19,7 @@ __all__ = ["app", "main"]
 
 M_MMAP_THRESHOLD = -3  # of mallopt(3)
 LARGE = 4 << 20  # bytes
+YOUNG = 500_000  # objects that may hold others, before cycles among them are looked for
 
 
 def __getattr__(name: str) -> Any:
@@ -34,6 +36,7 @@ def main() -> None:
     _leave_signals_to_the_system()
     _leave_cores_to_processes()
     _give_large_arrays_back()
+    _look_for_cycles_seldom()
     from postproc.cli.commands import app
     from postproc.cli.common import broken, say
 
@@ -69,6 +72,14 @@ def _give_large_arrays_back() -> None:
     """
     if sys.platform == "linux" and hasattr(library := ctypes.CDLL(None), "mallopt"):
         library.mallopt(M_MMAP_THRESHOLD, LARGE)
+
+
+def _look_for_cycles_seldom() -> None:
+    """Let Python look for cycles of dead objects when many more have been made.
+
+    A command makes hardly any, and loading it takes a tenth less without looking.
+    """
+    gc.set_threshold(YOUNG, *gc.get_threshold()[1:])
 
 
 def _leave_signals_to_the_system() -> None:

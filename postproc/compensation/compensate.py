@@ -170,6 +170,7 @@ def finish(name: str, reading: Reading, kept: Correction, setting: Setting) -> O
                 reading, again, kept.position, setting,
                 own if setting.options.inserts else None,
             )  # fmt: skip
+    del again  # holds as much as the program
     draft = Draft(reading, kept, output, in_time)
     draft = correct_paths(draft, setting, write_and_verify)
     with setting.clock("report"):

@@ -46,8 +46,8 @@ class Reading:
         given: The files as they were before that; empty where nothing was cloned.
         missed: Lines of moves that are never reached, by file.
         begins: The first visit of every program.
-        programs: What was parsed of the files that hold no number of a target: they
-            come out as they went in, and need not be parsed again.
+        programs: What was parsed of the files, for who reads them again with other
+            numbers.
         aims: Sides of the joints that visits are meant to be reached from, (n, 6),
             where the search for them is to begin; NaN: as planned, as all where empty.
     """
@@ -162,7 +162,7 @@ def read_program(
         files: Bytes by name: first the program itself, then the programs that it
             imports, last, where there is one, its variable file.
         cell: What holds at program start.
-        known: Programs that were parsed before; those of the same bytes are not again.
+        known: What was parsed of the files before, see `Language.read`.
 
     Raises:
         ProgramError: A file is no program text, or the program is another arm's.

@@ -81,7 +81,7 @@ class JobReading:
         texts: Every file as it was read, in the order of `Visits.files`.
         visits: Every arrival at a target.
         diagnostics: What else was found.
-        programs: What was parsed of the files that hold no number of a target.
+        programs: What was parsed of the files, as `read` takes it for `known`.
         missed: Lines of moves that are never reached, by file.
     """
 
@@ -295,7 +295,8 @@ class Language(ABC):
         Args:
             sources: First the program itself, then those that belong to it.
             start: What the cell says.
-            known: What was parsed before; files of the same bytes are not parsed again.
+            known: What was parsed before: what files say that are the same, or the
+                same but for numbers of targets, need not be worked out again.
 
         Raises:
             ProgramError: A file is no program text, or the program is another arm's.

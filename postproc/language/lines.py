@@ -4,13 +4,20 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from postproc.arrays import Bools, Floats, Indices, Interned
+from postproc.arrays import Bools, Floats, Indices, Interned, Ints, spans
 from postproc.exceptions import ProgramError
-from postproc.language.scan import NAME_MARK, NUMBER_MARK, WHOLE, mask_of, scan_lines
+from postproc.language.scan import (
+    NAME_MARK,
+    NUMBER_MARK,
+    WHOLE,
+    mask_of,
+    rescan_lines,
+    scan_lines,
+)
 from postproc.language.shapes import (
     Shapes,
     alike,
@@ -18,6 +25,7 @@ from postproc.language.shapes import (
     numbered_in_order,
 )
 from postproc.language.source import Source
+from postproc.language.visits import Diagnostic
 
 # Statements over several lines: one that ends with a comma goes on with clauses.
 
@@ -245,6 +253,10 @@ class Lines:
         """Return the mask of a logical line."""
         return self.shapes[int(self.shape[row])]
 
+    def without_values(self) -> Lines:
+        """Let go of what the numbers are worth: it can be read again."""
+        return replace(self, value=np.empty(0))
+
 
 def read_lines(source: Source) -> Lines:
     """Split a source into logical lines with masked numbers.
@@ -264,7 +276,6 @@ def read_lines(source: Source) -> Lines:
     code = np.array([*map(bool, map(stripped, found.masks))], dtype=bool)
     rows = np.flatnonzero(code[found.shape])
     at = found.name_first[rows]
-    names = Interned[str](found.names)
     joined = join(
         found.masks, found.shape[rows], Names(at, found.name, tuple(found.names))
     )
@@ -273,7 +284,9 @@ def read_lines(source: Source) -> Lines:
     lines = with_block_rows(
         LogicalRows(joined.masks, joined.shape, kept + 1, first, at[joined.rows])
     )
-    shapes, shape = find_shapes(lines.masks, lines.shape, lines.name, found.name, names)
+    shapes, shape = find_shapes(
+        lines.masks, lines.shape, lines.name, found.name, found.names
+    )
     return Lines(
         source,
         shapes,
@@ -285,3 +298,59 @@ def read_lines(source: Source) -> Lines:
         found.value,
         found.comment,
     )
+
+
+# The lines of a text that was read before, with other numbers.
+
+
+@dataclass(frozen=True)
+class RereadLines:
+    """Lines that say what they said before, but for what their numbers are worth.
+
+    Attributes:
+        lines: The lines as they are now.
+        changed: Which numbers are written otherwise, (m,).
+        added: Physical line (from 0) that was not there, -1 where there is none.
+    """
+
+    lines: Lines
+    changed: Bools
+    added: int
+
+    def change(self, rows: Ints) -> bool:
+        """Tell whether any number in some logical lines is written otherwise."""
+        first = self.lines.first.astype(np.int64)
+        own = spans(first[rows], first[rows + 1] - first[rows])
+        return bool(self.changed[own].any())
+
+    def moved(self, found: Sequence[Diagnostic]) -> tuple[Diagnostic, ...]:
+        """Move what was found in the lines before to where these stand now."""
+        if self.added < 0:
+            return tuple(found)
+        return tuple(replace(d, line=d.line + (d.line > self.added)) for d in found)
+
+
+def reread_lines(source: Source, before: Lines) -> RereadLines | None:
+    """Read a text that should differ from one read before in numbers alone.
+
+    Every line of both is read, but what lines have in common with those before is not
+    worked out again. One line of comment may have come in, as a stamp does.
+
+    Returns:
+        Its lines; None where they say anything else, or a string does not end.
+    """
+    old = before.source
+    found = rescan_lines(
+        (old.data, old.line_starts), (source.data, source.line_starts),
+        len(before.start),
+    )  # fmt: skip
+    if found is None:
+        return None
+    line = before.line
+    if found.added >= 0:
+        line = line + (line > found.added)
+    lines = replace(
+        before, source=source, line=line.astype(np.int32, copy=False),
+        start=found.start, end=found.end, value=found.value, comment=found.comment,
+    )  # fmt: skip
+    return RereadLines(lines, found.changed, found.added)

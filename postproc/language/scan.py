@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from postproc import _native
-from postproc.arrays import Floats, Indices, Ints
+from postproc.arrays import Bools, Floats, Indices, Ints
 
 # A *mask* is the code of a line in which every number is one NUL (no program holds
 # any), the comment is gone and idle blanks are dropped. In its *form* every numbered
@@ -60,6 +60,44 @@ def scan_lines(data: bytes, line_starts: Ints) -> ScannedLines:
     """
     masks, by_line, numbers, names, unterminated = _native.scan_lines(data, line_starts)
     return ScannedLines(tuple(masks), *by_line, *numbers, *names, tuple(unterminated))
+
+
+@dataclass(frozen=True)
+class RescannedLines:
+    """A text whose n lines are those of another, but for what m numbers are worth.
+
+    Attributes:
+        added: Line (from 0) of comment alone that the other one has not, -1: none.
+        comment, start, end, value: As in `ScannedLines`.
+        changed: Which numbers are written otherwise, (m,).
+    """
+
+    added: int
+    comment: Indices
+    start: Indices
+    end: Indices
+    value: Floats
+    changed: Bools
+
+
+def rescan_lines(
+    before: tuple[bytes, Ints], after: tuple[bytes, Ints], count: int
+) -> RescannedLines | None:
+    """Scan a text that should differ from another in numbers alone.
+
+    Args:
+        before: The other text, and the offset of every line.
+        after: The text, likewise.
+        count: How many numbers the other one holds.
+
+    Returns:
+        What is in it, None where a mask or a comment differs, or a string has no end.
+    """
+    found = _native.rescan_lines(*before, *after, count)
+    if found is None:
+        return None
+    added, comment, numbers = found
+    return RescannedLines(added, comment, *numbers)
 
 
 def form_of(mask: str) -> tuple[str, tuple[str, ...]]:

@@ -160,7 +160,7 @@ def find_shapes(
     text: AnyInts,
     at: AnyInts,
     name: Ints,
-    names: Interned[str],
+    names: Sequence[str],
 ) -> tuple[Shapes, Ints]:
     """Find the distinct shapes of lines, in the order of appearance.
 
@@ -168,13 +168,14 @@ def find_shapes(
         texts: Masks with their names marked, or `WHOLE` and the mask.
         text: Index into `texts` of every line, (n,).
         at: Index into `name` of the first name of every line, (n,).
-        name: Numbers of all names in order, as in `names`.
-        names: Their numbers; names that only whole masks hold are entered, too.
+        name: Index into `names` of all names in order.
+        names: The distinct ones; those that only whole masks hold are not among them.
 
     Returns:
         The shapes, and that of every line, (n,).
     """
-    forms = Interned[str]()
+    forms, whole = Interned[str](), any(one[:1] == WHOLE for one in texts)
+    entered = Interned[str](names if whole else ())
     form = np.zeros(len(texts), dtype=np.int64)
     count = np.zeros(len(texts), dtype=np.int64)
     own = np.full(len(texts), -1, dtype=np.int64)
@@ -185,18 +186,19 @@ def find_shapes(
         if texts[k][:1] == WHOLE:
             one, found = form_of(one[1:])
             own[k], count[k] = len(name) + len(more), len(found)
-            more += names.of(found).tolist()
+            more += entered.of(found).tolist()
         else:
             count[k] = one.count(NAME_MARK)
         form[k] = forms[one]
     name = np.append(name, np.array(more, dtype=np.int64))
+    names = tuple(entered if whole else names)
     begin = np.where(own[text] >= 0, own[text], at).astype(np.int64)
     shape, example = _numbered(form[text], begin, count[text], name, len(names))
     kept = text[example]
     first = np.append(0, np.cumsum(count[kept]))
     steps = np.arange(first[-1]) - np.repeat(first[:-1], count[kept])
     own_names = name[np.repeat(begin[example], count[kept]) + steps]
-    return Shapes(tuple(forms), form[kept], first, own_names, tuple(names)), shape
+    return Shapes(tuple(forms), form[kept], first, own_names, names), shape
 
 
 def _numbered(

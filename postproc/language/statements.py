@@ -8,7 +8,7 @@ from typing import Any, Generic, TypeVar
 
 import numpy as np
 
-from postproc.arrays import Floats, Indices, Interned
+from postproc.arrays import Floats, Indices
 from postproc.exceptions import ProgramError
 from postproc.language.rewrite import Skeleton
 from postproc.language.shapes import ParsedShapes, find_shapes, parse_shapes
@@ -111,9 +111,8 @@ def read_text(
     form, begin, end, first, name_first = by_statement
     if unterminated:
         raise _unterminated(source, unterminated[0])
-    known = Interned[str](names[0])
     at_names = np.asarray(name_first[:-1])
-    shapes, shape = find_shapes(forms, form, at_names, names[1], known)
+    shapes, shape = find_shapes(forms, form, at_names, names[1], names[0])
     said = parse_shapes(shapes, parse)
     return StatementText(
         source, said, shape.astype(np.int32), begin, end, first, *numbers

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator
 from dataclasses import asdict
+from json.encoder import encode_basestring_ascii
 
 import numpy as np
 
@@ -89,7 +90,7 @@ def _columns(outcome: Outcome, rows: Ints) -> dict[str, list[Cells]]:
         "line": [whole(v.line[rows])],
         "file": [named(v.files, v.file[rows], json.dumps)],
         "literal": _literals(outcome, rows),
-        "name": [named(v.names, v.name[rows], lambda name: json.dumps(name or None))],
+        "name": [named(v.names, v.name[rows], _quoted)],
         "move": [named([*(m.name for m in Motion), "VIA"], move, json.dumps)],
         "q_deg": [_rounded(np.rad2deg(d.q[rows]), 5)],
         "lambda": [named(SIGNS, d.direction[rows].astype(np.int64) + 1, str).listed()],
@@ -106,6 +107,11 @@ def _columns(outcome: Outcome, rows: Ints) -> dict[str, list[Cells]]:
         **({} if told is None else {"share_mm": _shares(told, rows)}),
         **_speed(outcome, rows),
     }
+
+
+def _quoted(name: str) -> str:
+    """Write a name as JSON, null where there is none."""
+    return encode_basestring_ascii(name) if name else "null"
 
 
 def _speed(outcome: Outcome, rows: Ints) -> dict[str, list[Cells]]:

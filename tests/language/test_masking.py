@@ -147,3 +147,13 @@ def test_statements_are_joined_up_to_endmove() -> None:
 def test_an_open_string_is_refused_with_its_line() -> None:
     with pytest.raises(ProgramError, match=r"x:2: a string is not terminated"):
         read_lines(source_from_bytes("x", b"BEGIN\n  WRITE ('hello, NL)\nEND"))
+
+
+def test_many_names_are_told_apart() -> None:
+    names = [f"p{k}" for k in range(3000)] + [f"weld_{k}_x" for k in range(3000)]
+    order = [k * 7919 % len(names) for k in range(2 * len(names))]
+    data = "".join(f"MOVE TO {names[k]}\n" for k in order).encode()
+    found = scan_lines(data, Source("x", data).line_starts)
+    assert [found.names[k] for k in found.name] == [names[k] for k in order]
+    assert len(found.names) == len(set(found.names)) == len(names)
+    assert len(found.masks) == 1

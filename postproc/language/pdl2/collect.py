@@ -9,7 +9,7 @@ from typing import Protocol
 
 import numpy as np
 
-from postproc.arrays import Bools, Indices, Ints, spans
+from postproc.arrays import Bools, Indices, Ints, any_in_rows, spans
 from postproc.language.pdl2.columns import Collector, SettingColumns, VisitColumns
 from postproc.language.pdl2.context import Point
 from postproc.language.pdl2.dialect import PDL2_DIALECT
@@ -93,18 +93,38 @@ def find_literals(
     literal = np.full(len(columns.slots), -1, dtype=np.int64)
     rows = np.flatnonzero(columns.slots[:, 0] >= 0)
     slots = columns.slots[rows]
-    _, example, inverse = np.unique(slots[:, 0], return_index=True, return_inverse=True)
+    example, inverse = _distinct(slots[:, 0])
     distinct = slots[example]
     mixed = np.zeros(len(distinct), dtype=bool)
     mixed[inverse[(slots != distinct[inverse]).any(axis=1)]] = True
-    used = np.bincount(distinct.ravel(), minlength=len(numbering.start))
-    mixed |= (used[distinct] > 1).any(axis=1) | numbering.apart(distinct)
+    mixed |= _used_twice(distinct)
+    mixed |= numbering.apart(distinct)
     kept = np.flatnonzero(~mixed)
     index = np.full(len(distinct), -1, dtype=np.int64)
     index[kept] = np.arange(len(kept))
     literal[rows] = index[inverse]
     first = rows[example[kept]]
     return _literals(columns, numbering, names, distinct[kept], first, literal), literal
+
+
+def _distinct(values: Indices) -> tuple[Indices, Indices]:
+    """Return the first row of every distinct value, ascending, and the one of each.
+
+    Targets mostly stand in the order in which they are gone to, once each.
+    """
+    if (values[1:] > values[:-1]).all():
+        return np.arange(len(values)), np.arange(len(values))
+    _, example, inverse = np.unique(values, return_index=True, return_inverse=True)
+    return example, inverse.ravel()
+
+
+def _used_twice(slots: Indices) -> Bools:
+    """Tell in which rows (m, 6) a number stands that another place has too, (m,)."""
+    numbers = slots.ravel()
+    if (numbers[1:] > numbers[:-1]).all():
+        return np.zeros(len(slots), dtype=bool)
+    used = np.bincount(numbers)
+    return any_in_rows(used[slots] > 1)
 
 
 def _literals(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -110,6 +110,24 @@ class Entries(Mapping[str, Entry]):
         if not any(mark in "\n".join(self.name) for mark in "[."):
             return []
         return [name for name in self.row if "[" in name or "." in name]
+
+    def with_numbers(self, value: Floats, changed: Bools) -> Entries | None:
+        """Take over numbers that are written otherwise now.
+
+        Args:
+            value: What the numbers of the file are worth, (m,).
+            changed: Which of them are written otherwise, (m,).
+
+        Returns:
+            The entries; None where one was not known, is not, or belongs to none.
+        """
+        hit = (self.slots >= 0) & changed[self.slots]
+        new, numbers = value[self.slots[hit]], np.array(self.numbers)
+        known = np.isfinite(new).all() and np.isfinite(numbers[hit]).all()
+        if not known or len(new) != np.count_nonzero(changed):
+            return None
+        numbers[hit] = new
+        return replace(self, numbers=numbers)
 
     def __len__(self) -> int:
         """Return how many names have one entry."""

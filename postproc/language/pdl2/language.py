@@ -26,13 +26,18 @@ from postproc.language.pdl2.effects import dead_lines
 from postproc.language.pdl2.interpreter import resolve
 from postproc.language.pdl2.names import entry_names
 from postproc.language.pdl2.path_points import AT_APPROACH, AT_VIA, MARK, Pdl2Splitter
-from postproc.language.pdl2.program import Program, parse
-from postproc.language.pdl2.variable_file import VariableFile, read_variables
+from postproc.language.pdl2.program import Program, parse, parse_again
+from postproc.language.pdl2.variable_file import (
+    VariableFile,
+    read_variables,
+    read_variables_again,
+)
 from postproc.language.rewrite import Skeleton
 from postproc.language.source import Edit, Source
 from postproc.language.visits import Literals, never_reached
 
 _WORD = re.compile(rb"[A-Za-z_]\w*")
+Parsed = Program | VariableFile
 
 
 class Pdl2(Language):
@@ -48,7 +53,7 @@ class Pdl2(Language):
         return True
 
     def read(
-        self, sources: Sequence[Source], start: Start, known: Sequence[Program] = ()
+        self, sources: Sequence[Source], start: Start, known: Sequence[Parsed] = ()
     ) -> JobReading:
         """Parse a program, its pages and its variable file; see `Language.read`."""
         program = _parsed(sources[0], known)
@@ -61,7 +66,7 @@ class Pdl2(Language):
         texts = [Skeleton.of(program.lines)]
         for source in sources[1:]:
             if is_variables(source.name):
-                variables = read_variables(source)
+                variables = _variables(source, known)
                 texts.append(Skeleton.of(variables.lines))
             else:
                 pages.append(_named(_parsed(source, known)))
@@ -72,8 +77,14 @@ class Pdl2(Language):
         missed = dead_lines(parsed, visits)
         told = never_reached(missed, "the start", "program")
         found = (*resolved.diagnostics, *told)
+        files: tuple[Parsed, ...] = parsed
+        if variables is not None:
+            files = (*parsed, variables)
         corrected = {visits.files[k] for k in np.unique(visits.literals.file).tolist()}
-        kept = tuple(p for p in parsed if p.lines.source.name not in corrected)
+        kept = tuple(
+            _without_values(one) if one.lines.source.name in corrected else one
+            for one in files
+        )
         return JobReading(tuple(texts), visits, found, kept, missed)
 
     def cloner(self, sources: Sequence[Source]) -> Cloner:
@@ -169,12 +180,31 @@ def _refuse_other_arm(program: Program, start: Start) -> None:
         raise ProgramError(name, problem, cure, line=program.head)
 
 
-def _parsed(source: Source, known: Sequence[Program]) -> Program:
+def _parsed(source: Source, known: Sequence[Parsed]) -> Program:
     """Parse a file, unless it was parsed before."""
-    for program in known:
-        if program.lines.source == source:
-            return program
+    for one in known:
+        if isinstance(one, Program) and one.lines.source.name == source.name:
+            return one if _is_whole(one, source) else parse_again(source, one)
     return parse(source)
+
+
+def _variables(source: Source, known: Sequence[Parsed]) -> VariableFile:
+    """Read a variable file, unless it was read before."""
+    for one in known:
+        if isinstance(one, VariableFile) and one.source.name == source.name:
+            return one if _is_whole(one, source) else read_variables_again(source, one)
+    return read_variables(source)
+
+
+def _is_whole(one: Parsed, source: Source) -> bool:
+    """Tell whether a file was read before as it is, and its numbers are still known."""
+    whole = len(one.lines.value) == len(one.lines.start)
+    return whole and one.lines.source == source
+
+
+def _without_values(one: Parsed) -> Parsed:
+    """Let go of the numbers of a file, which are about to change."""
+    return replace(one, lines=one.lines.without_values())
 
 
 def _named(page: Program) -> Program:

@@ -12,7 +12,7 @@ from itertools import repeat
 import numpy as np
 
 from postproc.arrays import Bools, Ints
-from postproc.language.lines import Lines, read_lines
+from postproc.language.lines import Lines, read_lines, reread_lines
 from postproc.language.pdl2 import syntax as ast
 from postproc.language.pdl2.dialect import COMMENTS
 from postproc.language.pdl2.parser import parse_form
@@ -345,9 +345,10 @@ class Variables(Mapping[str, Variable]):
         """Tell which lower-case names are declared, and so that it passes a test."""
         index = np.fromiter(map(self._at.get, names, repeat(-1)), np.int64, len(names))
         found = index >= 0
-        own = [bisect_right(self._begins, at) - 1 for at in index[found].tolist()]
-        passed = {k: test(self._said[k]) for k in set(own)}
-        found[found] = [passed[k] for k in own]
+        own, passed = self._declaration(index[found]), np.zeros(len(self._said), bool)
+        for k in np.flatnonzero(np.bincount(own)).tolist():
+            passed[k] = test(self._said[k])
+        found[found] = passed[own]
         return found
 
     def _passed(self, test: Callable[[Variable], bool]) -> Bools:
@@ -590,8 +591,7 @@ def parse(source: Source) -> Program:
     lines = read_lines(source)
     statements = parse_shapes(lines.shapes, parse_form)
     taught = COMMENTS.taught(source)
-    structural = statements.which(lambda said: not isinstance(said, _PLAIN))
-    rows = np.flatnonzero(structural[lines.shape])
+    rows = _structural(statements, lines)
     reader = _Reader(lines, statements, taught, rows)
     for row in rows.tolist():
         statement = statements[int(lines.shape[row])]
@@ -612,6 +612,32 @@ def parse(source: Source) -> Program:
         tuple(reader.diagnostics),
         reader.nodes,
     )
+
+
+def parse_again(source: Source, before: Program) -> Program:
+    """Parse a program that should differ from one parsed before in numbers of moves.
+
+    Where its lines say what they said, and its declarations and blocks hold the same
+    numbers, it is built as it was.
+
+    Args:
+        source: The program.
+        before: What it was.
+
+    Raises:
+        ProgramError: A string does not end on its line.
+    """
+    found = reread_lines(source, before.lines)
+    if found is None or found.change(_structural(before.statements, before.lines)):
+        return parse(source)
+    told = found.moved(before.diagnostics)
+    return replace(before, lines=found.lines, diagnostics=told)
+
+
+def _structural(statements: ParsedShapes[ast.Statement], lines: Lines) -> Ints:
+    """List the rows of other statements than plain ones, ascending."""
+    structural = statements.which(lambda said: not isinstance(said, _PLAIN))
+    return np.flatnonzero(structural[lines.shape])
 
 
 def _report_unknown(reader: _Reader, row: int) -> None:

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from postproc.arrays import Ints
-from postproc.language.lines import Lines, read_lines
+from postproc.language.lines import Lines, read_lines, reread_lines
 from postproc.language.pdl2.entries import (
     NESTED,
     POSITIONS,
@@ -89,6 +89,26 @@ def read_variables(source: Source) -> VariableFile:
     found.sort(key=lambda finding: finding[0])
     told = tuple(diagnostic for _, diagnostic in found)
     return VariableFile(lines, entries, told, fields.unread)
+
+
+def read_variables_again(source: Source, before: VariableFile) -> VariableFile:
+    """Read a variable file that should differ from one read before in numbers alone.
+
+    Args:
+        source: The file.
+        before: What it was.
+
+    Raises:
+        ProgramError: A string does not end on its line.
+    """
+    found = reread_lines(source, before.lines)
+    if found is None or not len(before.entries.slots):
+        return read_variables(source)
+    entries = before.entries.with_numbers(found.lines.value, found.changed)
+    if entries is None:
+        return read_variables(source)
+    told = found.moved(before.diagnostics)
+    return VariableFile(found.lines, entries, told, before.unread)
 
 
 def _told_apart(

@@ -1,0 +1,189 @@
+//! A text that differs from one read before in numbers: `postproc.language.scan`.
+
+use std::ops::Range;
+
+use numpy::{IntoPyArray, PyArray1, PyReadonlyArray1};
+use pyo3::prelude::*;
+use pyo3::types::PyBytes;
+
+use crate::number::value_of;
+use crate::rows::{detached, flat, on_cores};
+use crate::text::{Masked, Text, MARK};
+
+/// Lines that are read between two looks at signals.
+const AT_ONCE: usize = 1 << 16;
+/// Lines that are worth a thread.
+const LEAST: usize = 2000;
+
+/// Lines of both texts, as they are read.
+#[derive(Default)]
+struct Pair {
+    old: Masked,
+    new: Masked,
+}
+
+impl Pair {
+    /// Read two lines; tell whether they say the same but for what numbers are worth.
+    fn same(&mut self, old: &[u8], new: &[u8]) -> bool {
+        self.old.read(old)
+            && self.new.read(new)
+            && self.old.mask == self.new.mask
+            && comment(&self.old, old) == comment(&self.new, new)
+    }
+}
+
+/// Return the comment that a line ends with.
+fn comment<'a>(line: &Masked, text: &'a [u8]) -> Option<&'a [u8]> {
+    line.comment.map(|at| &text[at..])
+}
+
+/// What is read of some lines of the later text.
+#[derive(Default)]
+struct Found {
+    comment: Vec<i32>,
+    start: Vec<i32>,
+    end: Vec<i32>,
+    value: Vec<f64>,
+    changed: Vec<bool>,
+}
+
+impl Found {
+    /// Take a line in that begins at an offset.
+    fn take(&mut self, pair: &Pair, (old, new): (&[u8], &[u8]), at: usize) {
+        self.comment.push(pair.new.comment.map_or(-1, |c| (at + c) as i32));
+        for (was, now) in pair.old.numbers.iter().zip(&pair.new.numbers) {
+            let text = &new[now.0..now.1];
+            self.start.push((at + now.0) as i32);
+            self.end.push((at + now.1) as i32);
+            self.value.push(value_of(text));
+            self.changed.push(&old[was.0..was.1] != text);
+        }
+    }
+
+    fn append(&mut self, mut more: Found) {
+        self.comment.append(&mut more.comment);
+        self.start.append(&mut more.start);
+        self.end.append(&mut more.end);
+        self.value.append(&mut more.value);
+        self.changed.append(&mut more.changed);
+    }
+}
+
+/// Two texts, the later of which may have one line of comment more.
+struct Texts<'a> {
+    before: Text<'a>,
+    after: Text<'a>,
+    added: Option<usize>,
+}
+
+impl Texts<'_> {
+    /// Find the first of some lines of both that are not the same.
+    fn first_other(&self, rows: Range<usize>) -> Option<usize> {
+        let mut pair = Pair::default();
+        rows.into_iter().find(|i| !pair.same(self.before.line(*i), self.after.line(*i)))
+    }
+
+    /// Find the line that was added; tell whether it is one of comment alone.
+    fn find_added(&mut self, py: Python<'_>) -> PyResult<bool> {
+        let mut added = self.before.len();
+        for rows in blocks(self.before.len()) {
+            py.check_signals()?;
+            if let Some(other) = detached(py, || self.first_other(rows))? {
+                added = other;
+                break;
+            }
+        }
+        self.added = Some(added);
+        let mut line = Masked::default();
+        Ok(line.read(self.after.line(added)) && line.mask.is_empty())
+    }
+
+    /// Read some lines of the earlier text again, None where one says something else.
+    fn read(&self, rows: Range<usize>) -> Option<Found> {
+        let (mut found, mut pair) = (Found::default(), Pair::default());
+        for i in rows {
+            let k = i + usize::from(self.added.is_some_and(|added| added <= i));
+            let (old, new) = (self.before.line(i), self.after.line(k));
+            if !pair.same(old, new) {
+                return None;
+            }
+            found.take(&pair, (old, new), self.after.bounds[k]);
+        }
+        Some(found)
+    }
+}
+
+/// Cut lines into blocks between which signals are heard.
+fn blocks(n: usize) -> impl Iterator<Item = Range<usize>> {
+    (0..n).step_by(AT_ONCE).map(move |first| first..n.min(first + AT_ONCE))
+}
+
+type Column<'py, T> = Bound<'py, PyArray1<T>>;
+
+/// Scan a text that should differ from another in its numbers, and in one line of
+/// comment that it may have more.
+///
+/// Arguments:
+///     before, before_starts: The other text, and where its lines start.
+///     after, after_starts: The text.
+///     count: How many numbers the other one holds, (m).
+///
+/// Returns: which line is new (-1: none); of every line where its comment starts; where
+/// numbers start and end, what they are worth, and whether they are written otherwise,
+/// (m,). None where a line says something else, or holds a string that does not end.
+#[pyfunction]
+#[allow(clippy::type_complexity)]
+pub fn rescan_lines<'py>(
+    py: Python<'py>,
+    before: &Bound<'py, PyBytes>,
+    before_starts: PyReadonlyArray1<'py, i64>,
+    after: &Bound<'py, PyBytes>,
+    after_starts: PyReadonlyArray1<'py, i64>,
+    count: usize,
+) -> PyResult<
+    Option<(
+        i64,
+        Column<'py, i32>,
+        (Column<'py, i32>, Column<'py, i32>, Column<'py, f64>, Column<'py, bool>),
+    )>,
+> {
+    let before = Text::new(before.as_bytes(), flat(&before_starts)?)?;
+    let after = Text::new(after.as_bytes(), flat(&after_starts)?)?;
+    let (n, more) = (before.len(), after.len().wrapping_sub(before.len()));
+    let mut texts = Texts { before, after, added: None };
+    if texts.before.data.starts_with(MARK) || more > 1 || (more == 1 && !texts.find_added(py)?) {
+        return Ok(None);
+    }
+    let mut all = Found::default();
+    all.comment.reserve_exact(n + 1);
+    all.start.reserve_exact(count);
+    all.end.reserve_exact(count);
+    all.value.reserve_exact(count);
+    all.changed.reserve_exact(count);
+    for rows in blocks(n) {
+        py.check_signals()?;
+        for part in detached(py, || on_cores(rows, LEAST, |rows| texts.read(rows)))? {
+            match part {
+                Some(found) => all.append(found),
+                None => return Ok(None),
+            }
+        }
+    }
+    if let Some(added) = texts.added {
+        let at = texts.after.bounds[added];
+        let mut line = Masked::default();
+        line.read(texts.after.line(added));
+        all.comment.insert(added, line.comment.map_or(-1, |c| (at + c) as i32));
+    }
+    let added = texts.added.map_or(-1, |added| added as i64);
+    Ok(Some((
+        added,
+        all.comment.into_pyarray(py),
+        (
+            all.start.into_pyarray(py),
+            all.end.into_pyarray(py),
+            all.value.into_pyarray(py),
+            all.changed.into_pyarray(py),
+        ),
+    )))
+}
