@@ -204,15 +204,9 @@ def without_target(visits: Visits) -> Bools:
     none = np.array([text.startswith(NO_TARGET) for text in visits.reasons])
     named = np.isin(
         visits.target,
-        (
-            Meaning.POSE,
-            Meaning.JOINTS,
-            Meaning.NEAR,
-            Meaning.PARTIAL_POSE,
-            Meaning.PARTIAL_JOINTS,
-            Meaning.UNKNOWN,
-        ),
-    )
+        (Meaning.POSE, Meaning.JOINTS, Meaning.NEAR, Meaning.PARTIAL_POSE,
+         Meaning.PARTIAL_JOINTS, Meaning.UNKNOWN),
+    )  # fmt: skip
     return np.asarray(~named | none[visits.reason])
 
 

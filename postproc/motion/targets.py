@@ -29,10 +29,8 @@ class TargetKind(IntEnum):
     JOINT_STEP = 4  # `joints` are added to where the arm is
     UNKNOWN = 5  # the arm goes where nobody knows
     TOWARDS = 6  # `tcp` is a pose that the arm goes `distance` towards on a line
-    PARTIAL_POSE = (
-        7  # `tcp` is three axes, and places along them; NaN: where the arm is
-    )
-    PARTIAL_JOINTS = 8  # `joints` that are NaN stay as they are
+    PARTIAL_POSE = 7  # `tcp` is axes and places along them; what is NaN there stays
+    PARTIAL_JOINTS = 8  # `joints`; what is NaN there stays
 
 
 @dataclass(frozen=True)

@@ -37,6 +37,10 @@ SINGULAR = np.radians(0.1)  # of axis 5: both wrist branches are tried from here
 TURNING = (3, 5)  # joints 4 and 6 may turn more than once
 SIGN_ROUNDING = 1e-6  # [rad] around 0 where an axis has any sign
 TURN_NAMES = {"T1": 3, "T2": 5, "T3": 2}
+IN_JOINTS = (
+    Meaning.JOINTS, Meaning.HOME, Meaning.CALIBRATION, Meaning.BY,
+    Meaning.PARTIAL_JOINTS,
+)  # fmt: skip
 
 
 def joints_of_pose(
@@ -158,10 +162,6 @@ def _on_turns(q: Floats, config: str) -> Floats:
 # Cartesian paths, densely sampled.
 
 # A joint that turns between two samples is missed by about step^2 / (8 m): 1 urad.
-IN_JOINTS = (
-    Meaning.JOINTS, Meaning.HOME, Meaning.CALIBRATION, Meaning.BY,
-    Meaning.PARTIAL_JOINTS,
-)  # fmt: skip
 STEP = 3e-3  # [m]
 TURN_STEP = np.radians(1.0)
 FEWEST = 4

@@ -8,7 +8,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from postproc.calibration.selection import fit_survey, model_of
 from postproc.compensation.decide import with_dependants
 from postproc.compensation.options import AS_USUAL
 from postproc.compensation.outcome import Status
@@ -17,8 +16,17 @@ from postproc.compensation.windows import cut_points
 from postproc.language.krl.moves import PARTIAL
 from postproc.motion.targets import AMBIGUOUS, CODE, NO_TARGET
 from postproc.robot.cell import load_cell
-from tests.calibration.simulator import random_arm, random_states, survey_of
-from tests.compensation.curved import CELL, CENTRE, KR, frame, job, plans, tool_pose
+from tests.compensation.curved import (
+    CELL,
+    CENTRE,
+    KR,
+    drawn_arm,
+    frame,
+    job,
+    plans,
+    surveyed,
+    tool_pose,
+)
 
 SPREAD = np.deg2rad([25.0, 8.0, 8.0, 30.0, 15.0, 30.0])
 
@@ -32,20 +40,12 @@ def cell(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def truth():
-    drawn = random_arm(np.random.default_rng(16), tool=False)
-    drawn.arm = KR
-    return drawn
+    return drawn_arm(16)
 
 
 @pytest.fixture(scope="module")
 def model(truth):
-    rng = np.random.default_rng(17)
-    states = random_states(400, rng)
-    spread = np.deg2rad([40.0, 25.0, 25.0, 60.0, 35.0, 60.0])
-    states = states.with_(q=CENTRE + rng.uniform(-1.0, 1.0, (400, 6)) * spread)
-    position, _ = truth.measure(states, rng)
-    survey = survey_of(states, position)
-    return model_of(fit_survey(survey, KR, None, None), survey)
+    return surveyed(truth, 17)
 
 
 def places(k: int, seed: int) -> np.ndarray:
