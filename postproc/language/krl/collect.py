@@ -34,7 +34,7 @@ def visits_of(machine: KrlMachine) -> Visits:
     """Put the arrivals into the order of the program, as columns."""
     found: Sequence[KrlVisit] = machine.visits
     _keep_orientation(machine, found)
-    _keep_frames(machine, found)
+    _follow_partial(machine, found)
     ends, odd = _ends(found), _odd_status(found)
     base = cell_pose(machine.start.base)
     number = {id(v): k for k, v in enumerate(found)}
@@ -170,16 +170,21 @@ def _keep_orientation(machine: KrlMachine, found: Sequence[KrlVisit]) -> None:
             )  # fmt: skip
 
 
-def _keep_frames(machine: KrlMachine, found: Sequence[KrlVisit]) -> None:
-    """Forget where missing numbers lead that were commanded in other frames."""
-    for v in found:
+def _follow_partial(machine: KrlMachine, found: Sequence[KrlVisit]) -> None:
+    """Forget where missing numbers lead that are not sure to be those before.
+
+    They are not where X, Y, Z were commanded in other frames, or behind an arc that
+    ends elsewhere than at the point that is written.
+    """
+    partial = (Meaning.PARTIAL_POSE, Meaning.PARTIAL_JOINTS)
+    for v in (v for v in found if v.goal.target in partial):
+        before = [found[k] for k in v.origins if k >= 0]
+        lost = any(one.move.angle is not None for one in before)
         if v.goal.target == Meaning.PARTIAL_POSE:
-            before = [found[k] for k in v.origins if k >= 0]
             own = _frames(machine, v)
-            if own is None or any(_frames(machine, one) != own for one in before):
-                v.goal = FoundGoal(
-                    Meaning.UNKNOWN, NOTHING, slots=NO_SLOTS, why=PARTIAL
-                )
+            lost |= own is None or any(_frames(machine, one) != own for one in before)
+        if lost:
+            v.goal = FoundGoal(Meaning.UNKNOWN, NOTHING, slots=NO_SLOTS, why=PARTIAL)
 
 
 def _frames(machine: KrlMachine, v: KrlVisit) -> tuple[Pose, Pose, str] | None:

@@ -334,6 +334,8 @@ def test_missing_numbers_stay_what_they_were():
         ["LIN {A 10}"], ["LIN {X 5,A 10}"], ["LIN {X 5,Y 1,Z 2,A 10}"], ["PTP {X 5}"],
         ["LIN {X 5,S 2}"], ["PTP {A1 5,X 2}"], ["LIN {E1 0}"], ["LIN XPART"],
         ["PTP XAPART"], ["CIRC {X 5},XP1"], ["CIRC XP1,{X 5}"],
+        ["CIRC XP2,XP1,CA 90", "LIN {Z 5}"],
+        ["CIRC XP2,XP1,CA 90", "PTP {A1 5}"],
         ["SPLINE", "SLIN {X 5}", "ENDSPLINE"],
         ["PTP_SPLINE", "SPTP {A1 5}", "ENDSPLINE"],
         ["BAS(#TOOL,N)", "N=N+1", "LIN {Z 5}"], ["BAS(#BASE,3)", "LIN {Z 5}"],
