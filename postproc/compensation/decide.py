@@ -203,8 +203,10 @@ def without_target(visits: Visits) -> Bools:
     """Tell which moves go where no target of theirs says, (n,): $HOME, RELATIVE, .."""
     none = np.array([text.startswith(NO_TARGET) for text in visits.reasons])
     named = np.isin(
-        visits.target, (Meaning.POSE, Meaning.JOINTS, Meaning.NEAR, Meaning.UNKNOWN)
-    )
+        visits.target,
+        (Meaning.POSE, Meaning.JOINTS, Meaning.NEAR, Meaning.PARTIAL_POSE,
+         Meaning.PARTIAL_JOINTS, Meaning.UNKNOWN),
+    )  # fmt: skip
     return np.asarray(~named | none[visits.reason])
 
 
@@ -290,18 +292,26 @@ def with_dependants(
         values: Numbers of every visit after the correction, (n, w).
         shift: What those with numbers of their own move by, (n, 3) [m]; else 0.
     """
-    t, moves = planned.targets, np.array(shift)
+    moves = np.array(shift)
     rows = np.flatnonzero((visits.follows >= 0) & any_in_rows(values != visits.values))
     if len(rows):
         moves[rows] = _dependant_shift(visits, planned, cell, values, rows)
     for v, sources in _steps(planned):
         source = sources[np.argmax(np.linalg.norm(moves[sources], axis=1))]
-        towards = np.zeros(3)
-        if t.kind[v] == TargetKind.TOWARDS:
-            way = t.tcp[v, :3, 3] - planned.plan.tcp[source, :3, 3]
-            towards = _turned(way, t.distance[v], moves[v] - moves[source])
-        moves[v] = moves[source] + towards
+        moves[v] = _carried(planned, v, int(source), moves)
     return moves
+
+
+def _carried(planned: Planned, v: int, source: int, moves: Floats) -> Floats:
+    """Tell what a step moves by as the place that it begins at does, (3,) [m]."""
+    t, moved = planned.targets, np.asarray(moves[source])
+    if t.kind[v] == TargetKind.TOWARDS:
+        way = t.tcp[v, :3, 3] - planned.plan.tcp[source, :3, 3]
+        return moved + _turned(way, t.distance[v], moves[v] - moved)
+    if t.kind[v] == TargetKind.PARTIAL_POSE:  # along the axes of what is not written
+        axes = t.tcp[v, :3, :3][:, np.isnan(t.tcp[v, :3, 3])]
+        return np.asarray(axes @ (axes.T @ moved))
+    return moved
 
 
 def with_origins(visits: Visits, planned: Planned, found: Bools) -> Bools:

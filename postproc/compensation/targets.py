@@ -97,6 +97,13 @@ PLACED = (
     TargetKind.BASE_STEP,
     TargetKind.TOWARDS,
 )
+IN_JOINTS = {
+    Meaning.JOINTS: TargetKind.JOINTS,
+    Meaning.HOME: TargetKind.JOINTS,
+    Meaning.CALIBRATION: TargetKind.JOINTS,
+    Meaning.BY: TargetKind.JOINT_STEP,
+    Meaning.PARTIAL_JOINTS: TargetKind.PARTIAL_JOINTS,
+}
 STEPS_IN = {
     Meaning.RELATIVE_TOOL: "tool",
     Meaning.RELATIVE_BASE: "base",
@@ -195,6 +202,8 @@ def _unplaced(kind: Ints, tcp: Floats, joints: Floats, frames: Frames) -> Bools:
     placed = np.isin(kind, PLACED)
     in_joints = np.isin(kind, (TargetKind.JOINTS, TargetKind.JOINT_STEP))
     unknown: Bools = placed & (is_unknown(tcp) | is_unknown(frames.tool))
+    partial = kind == TargetKind.PARTIAL_POSE  # of which places may be missing
+    unknown |= partial & (np.isnan(tcp[:, 0, 0]) | is_unknown(frames.tool))
     return unknown | (in_joints & np.isnan(joints).any(axis=1))
 
 
@@ -259,12 +268,9 @@ def _places(
         return np.full(n, int(TargetKind.POSE)), tcp, np.full((n, 6), np.nan)
     kind = np.full(n, int(TargetKind.UNKNOWN))
     tcp, joints = np.full((n, 4, 4), np.nan), np.full((n, 6), np.nan)
-    in_joints = np.isin(target, JOINTS)
-    kind[in_joints], kind[target == Meaning.BY] = (
-        TargetKind.JOINTS,
-        TargetKind.JOINT_STEP,
-    )
-    in_joints |= target == Meaning.BY
+    for meaning, its_kind in IN_JOINTS.items():
+        kind[target == meaning] = its_kind
+    in_joints = np.isin(target, (*IN_JOINTS,))
     joints[in_joints] = np.deg2rad(values[in_joints, :6])
     poses = np.isin(target, (Meaning.POSE, Meaning.NEAR, Meaning.FOR))
     kind[poses] = np.where(
@@ -275,6 +281,9 @@ def _places(
     tcp[near] = tcp[near] @ _along_approach(-visits.distance_mm[rows][near])
     away = target == Meaning.AWAY
     kind[away], tcp[away] = TargetKind.TOOL_STEP, _along_approach(-values[away, 0])
+    partial = target == Meaning.PARTIAL_POSE
+    kind[partial] = TargetKind.PARTIAL_POSE
+    tcp[partial] = _along_axes(user[partial], values[partial])
     steps = np.isin(target, (*STEPS_IN, Meaning.ABOUT))
     for v in np.flatnonzero(steps).tolist():
         kind[v], tcp[v] = _step(target[v], values[v], user[v])
@@ -285,6 +294,14 @@ def _along_approach(distance_mm: Floats) -> Floats:
     """Shifts (m, 4, 4) [m] along the tool's z axis."""
     T = np.tile(np.eye(4), (len(distance_mm), 1, 1))
     T[:, 2, 3] = distance_mm * MM
+    return T
+
+
+def _along_axes(user: Floats, values: Floats) -> Floats:
+    """Axes of user frames, and places along them [m], (m, 4, 4), NaN: not written."""
+    T = np.array(user)
+    origin = np.einsum("nji,nj->ni", user[:, :3, :3], user[:, :3, 3])
+    T[:, :3, 3] = origin + values[:, :3] * MM
     return T
 
 

@@ -134,7 +134,8 @@ BAND = 32  # visits on either side of a cut that both must agree on
 RUN_UP = 2_000  # visits that tell how the arm comes to a window
 STEPS = (
     Meaning.RELATIVE_TOOL, Meaning.RELATIVE_BASE, Meaning.RELATIVE_UFRAME, Meaning.AWAY,
-    Meaning.ABOUT, Meaning.BY, Meaning.FOR,
+    Meaning.ABOUT, Meaning.BY, Meaning.FOR, Meaning.PARTIAL_POSE,
+    Meaning.PARTIAL_JOINTS,
 )  # fmt: skip
 SHARED = {
     "files", "configs", "names", "frames", "frame_taught", "reasons", "pred_start",

@@ -39,6 +39,8 @@ class Meaning(IntEnum):
     ABOUT = 9  # x, y, z: axis, a: angle [deg], e: frame (4, 5 or 6 as above)
     BY = 10  # joint increments [deg]
     FOR = 11  # numbers of the pose as POSE, gone towards for `distance_mm`
+    PARTIAL_POSE = 12  # x, y, z [mm] in the user frame; NaN, and the orientation: stay
+    PARTIAL_JOINTS = 13  # joint angles [deg]; those that are NaN stay
     UNKNOWN = 99  # the arm moves, the program text does not tell where to
 
 
@@ -154,7 +156,7 @@ class Visits:
         target: `Meaning`, (n,).
         via: True at the VIA point of an arc, (n,).
         values: The numbers of the target as `dialect` spells them, (n, w), NaN where
-            not known.
+            not known, or not written (see `Meaning`).
         distance_mm: For NEAR and FOR, (n,).
         aux: Auxiliary axis values, (n, k), NaN where there is none.
         config: Index into `configs`, (n,).

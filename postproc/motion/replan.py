@@ -148,6 +148,8 @@ STEPS = (
     TargetKind.BASE_STEP,
     TargetKind.JOINT_STEP,
     TargetKind.TOWARDS,
+    TargetKind.PARTIAL_POSE,
+    TargetKind.PARTIAL_JOINTS,
 )
 IS_STEP = np.isin(np.arange(max(TargetKind) + 1), STEPS)
 

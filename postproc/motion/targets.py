@@ -29,6 +29,8 @@ class TargetKind(IntEnum):
     JOINT_STEP = 4  # `joints` are added to where the arm is
     UNKNOWN = 5  # the arm goes where nobody knows
     TOWARDS = 6  # `tcp` is a pose that the arm goes `distance` towards on a line
+    PARTIAL_POSE = 7  # `tcp` is axes and places along them; what is NaN there stays
+    PARTIAL_JOINTS = 8  # `joints`; what is NaN there stays
 
 
 @dataclass(frozen=True)
@@ -41,7 +43,8 @@ class Targets:
         move: `Motion`, (n,).
         kind: `TargetKind`, (n,).
         via: True at the point on the way of an arc, (n,).
-        tcp: Wanted TCP pose in the base frame, or a step, (n, 4, 4); else NaN.
+        tcp: Wanted TCP pose in the base frame, a step, or axes of it and places along
+            them, (n, 4, 4); else NaN.
         distance: Of TOWARDS, (n,) [m]; else NaN.
         joints: Controller joint angles, or a step, (n, 6) [rad]; else NaN.
         tool: TCP in the flange frame, (n, 4, 4); NaN where not known.

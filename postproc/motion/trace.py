@@ -82,6 +82,8 @@ NO_PATH = np.empty((0, 6))
 # The arrays that a trace fills in program order.
 
 STRAIGHT = 1e-3  # [rad] at axis 5, below this the two wrist branches are one
+PARTIAL = (TargetKind.PARTIAL_POSE, TargetKind.PARTIAL_JOINTS)
+PLACING = (TargetKind.TOOL_STEP, TargetKind.BASE_STEP, TargetKind.PARTIAL_POSE)
 CHUNK = 50_000  # poses solved at a time; solving needs room for copies
 SAME_POSE = 1e-7  # [m] and sines; poses that several predecessors agree on
 LONG = 256  # targets on one path from which on one branch is cheaper than all of them
@@ -159,8 +161,7 @@ class Workspace:
     def _settle_steps(self) -> None:
         """Place the flange after steps from places that are known already."""
         kind = self.targets.kind
-        steps = (kind == TargetKind.TOOL_STEP) | (kind == TargetKind.BASE_STEP)
-        for v in np.flatnonzero(steps).tolist():
+        for v in np.flatnonzero(np.isin(kind, PLACING)).tolist():
             sources = self.targets.pred[
                 self.targets.pred_start[v] : self.targets.pred_start[v + 1]
             ]
@@ -172,10 +173,14 @@ class Workspace:
     def after_step(self, v: int, flange: Floats) -> Floats:
         """Place the flange after step `v` from a flange pose, (4, 4) [m]."""
         step, tcp = self.targets.tcp[v], flange @ self.targets.tool[v]
-        if self.targets.kind[v] == TargetKind.TOOL_STEP:
+        kind = self.targets.kind[v]
+        if kind == TargetKind.TOOL_STEP:
             tcp = tcp @ step
+        elif kind == TargetKind.PARTIAL_POSE:
+            axes, place = step[:3, :3], step[:3, 3]
+            stays = axes.T @ tcp[:3, 3]
+            tcp[:3, 3] = axes @ np.where(np.isnan(place), stays, place)
         else:
-            tcp = tcp.copy()
             tcp[:3, :3] = step[:3, :3] @ tcp[:3, :3]
             tcp[:3, 3] += step[:3, 3]
         moved: Floats = tcp @ self.tool_inverse[v]
@@ -370,6 +375,9 @@ def arrive(work: Workspace, v: int, edge: int) -> EdgeEnd:
     kind, near = targets.kind[v], work.q[source]
     if kind == TargetKind.JOINT_STEP:
         q = near + targets.joints[v]
+        return EdgeEnd(q, work.arm.flange(q[None])[0], -1, q[None], 0)
+    if kind == TargetKind.PARTIAL_JOINTS:
+        q = np.where(np.isnan(targets.joints[v]), near, targets.joints[v])
         return EdgeEnd(q, work.arm.flange(q[None])[0], -1, q[None], 0)
     flange = work.flange[v]
     if kind == TargetKind.TOWARDS:
@@ -737,6 +745,8 @@ def _one(work: Workspace, v: int) -> list[int]:
     edges = range(int(t.pred_start[v]), int(t.pred_start[v + 1]))
     known = [e for e in edges if work.is_known_before(v, int(work.source[e]))]
     later = [e for e in edges if e not in known and work.source[e] >= v]
+    if t.kind[v] in PARTIAL and len(known) < len(edges):
+        known = later = []  # it leads elsewhere from wherever else it may begin
     arrivals = [arrive(work, v, e) for e in known]
     for edge, arrival in zip(known, arrivals, strict=True):
         _record(work, edge, arrival)

@@ -37,6 +37,10 @@ SINGULAR = np.radians(0.1)  # of axis 5: both wrist branches are tried from here
 TURNING = (3, 5)  # joints 4 and 6 may turn more than once
 SIGN_ROUNDING = 1e-6  # [rad] around 0 where an axis has any sign
 TURN_NAMES = {"T1": 3, "T2": 5, "T3": 2}
+IN_JOINTS = (
+    Meaning.JOINTS, Meaning.HOME, Meaning.CALIBRATION, Meaning.BY,
+    Meaning.PARTIAL_JOINTS,
+)  # fmt: skip
 
 
 def joints_of_pose(
@@ -486,6 +490,8 @@ def _goal_joints(
         return _known(np.radians(values[:6]))
     if kind is Meaning.BY:
         return here + _known(np.radians(values[:6]))
+    if kind is Meaning.PARTIAL_JOINTS:
+        return _filled(np.radians(values[:6]), here)
     if kind in (Meaning.HOME, Meaning.CALIBRATION):
         return _place_of(setup, kind)
     config = None
@@ -502,7 +508,7 @@ def _goal_pose(
     """Return the TCP pose in the arm base, (4, 4), that visit i asks for."""
     kind, values = Meaning(visits.target[i]), visits.values[i]
     tool = frames.tool
-    if kind in (Meaning.JOINTS, Meaning.HOME, Meaning.CALIBRATION, Meaning.BY):
+    if kind in IN_JOINTS:
         joints = _goal_joints(setup, visits, i, frames, here)
         return np.asarray(setup.chain.flange(joints[None])[0] @ tool)
     present = setup.chain.flange(here[None])[0] @ tool
@@ -517,6 +523,11 @@ def _goal_pose(
         return np.asarray(present @ _shift(0.0, 0.0, -_known(values[:1])[0]))
     if kind is Meaning.RELATIVE_TOOL:
         return np.asarray(present @ _shift(*_known(values[:3])))
+    if kind is Meaning.PARTIAL_POSE:
+        user = undo(frames.base) @ frames.uframe
+        goal = undo(user) @ present
+        xyz = _filled(values[:3] * 1e-3, goal[:3, 3])
+        return np.asarray(user @ pose(goal[:3, :3], xyz))
     if kind in (Meaning.RELATIVE_BASE, Meaning.RELATIVE_UFRAME):
         axes = _axes(kind, frames)
         return _moved(present, axes @ _known(values[:3]) * 1e-3, np.zeros(3))
@@ -526,6 +537,11 @@ def _goal_pose(
         turn = axis / np.linalg.norm(axis) * np.radians(_known(values[3:4])[0])
         return _moved(present, np.zeros(3), turn)
     raise PlanError("the program does not tell where this move goes")
+
+
+def _filled(values: Floats, before: Floats) -> Floats:
+    """Return the values, and what was before where one is not written."""
+    return np.asarray(np.where(np.isnan(values), before, values))
 
 
 def _axes(kind: Meaning, frames: MoveFrames, present: Floats | None = None) -> Floats:

@@ -1,16 +1,20 @@
-"""KRL jobs with curves for a simulated KR 210, and where they really go."""
+"""KRL jobs for a simulated KR 210, its model, and where they really go."""
 
 from __future__ import annotations
 
 import re
+from typing import Any
 
 import numpy as np
 
+from postproc.calibration.selection import fit_survey, model_of
 from postproc.compensation.compensate import compensate
 from postproc.compensation.options import AS_USUAL
 from postproc.compensation.program import plan_visits, prepared, read_program
 from postproc.language.krl.dialect import abc_from_rotation
+from postproc.model.model import Model
 from postproc.robot.arm import load_arm
+from tests.calibration.simulator import random_arm, random_states, survey_of
 
 KR = load_arm("kr210-r2700-extra")
 TOOL = (80.0, -40.0, 150.0)
@@ -23,6 +27,7 @@ xyz_mm = {list(TOOL)}
 source = "cad"
 """
 CENTRE = np.deg2rad([10.0, -80.0, 100.0, 20.0, 50.0, -30.0])
+SPREAD = np.deg2rad([40.0, 25.0, 25.0, 60.0, 35.0, 60.0])
 HEAD = f"""DEF job ( )
 $TOOL={{X {TOOL[0]},Y {TOOL[1]},Z {TOOL[2]},A 0,B 0,C 0}}
 $BASE=$NULLFRAME
@@ -30,6 +35,23 @@ BAS(#VEL_CP,0.2)
 PTP {{A1 0,A2 -90,A3 90,A4 0,A5 30,A6 0}}
 PTP {{A1 12,A2 -75,A3 104,A4 24,A5 54,A6 -26}}
 """
+
+
+def drawn_arm(seed: int) -> Any:
+    """Draw the errors of a KR 210."""
+    drawn = random_arm(np.random.default_rng(seed), tool=False)
+    drawn.arm = KR
+    return drawn
+
+
+def surveyed(truth: Any, seed: int) -> Model:
+    """Survey an arm around where jobs move it, and fit a model."""
+    rng = np.random.default_rng(seed)
+    states = random_states(400, rng)
+    states = states.with_(q=CENTRE + rng.uniform(-1.0, 1.0, (400, 6)) * SPREAD)
+    position, _ = truth.measure(states, rng)
+    survey = survey_of(states, position)
+    return model_of(fit_survey(survey, KR, None, None), survey)
 
 
 def tool_pose() -> np.ndarray:

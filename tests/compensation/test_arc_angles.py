@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from postproc.calibration.selection import fit_survey, model_of
 from postproc.compensation.arc_angles import (
     ASTRAY,
     NO_END,
@@ -19,15 +18,16 @@ from postproc.compensation.arc_angles import (
 from postproc.compensation.continuity import ANGLED
 from postproc.compensation.outcome import Status
 from postproc.robot.cell import load_cell
-from tests.calibration.simulator import random_arm, random_states, survey_of
 from tests.compensation.curved import (
     CELL,
     CENTRE,
     KR,
+    drawn_arm,
     frame,
     job,
     plans,
     points,
+    surveyed,
     tool_pose,
 )
 
@@ -41,20 +41,12 @@ def cell(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def truth():
-    drawn = random_arm(np.random.default_rng(16), tool=False)
-    drawn.arm = KR
-    return drawn
+    return drawn_arm(16)
 
 
 @pytest.fixture(scope="module")
 def model(truth):
-    rng = np.random.default_rng(17)
-    states = random_states(400, rng)
-    spread = np.deg2rad([40.0, 25.0, 25.0, 60.0, 35.0, 60.0])
-    states = states.with_(q=CENTRE + rng.uniform(-1.0, 1.0, (400, 6)) * spread)
-    position, _ = truth.measure(states, rng)
-    survey = survey_of(states, position)
-    return model_of(fit_survey(survey, KR, None, None), survey)
+    return surveyed(truth, 17)
 
 
 def circle(a: np.ndarray, b: np.ndarray, c: np.ndarray, deg: float) -> np.ndarray:

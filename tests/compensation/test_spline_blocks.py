@@ -6,23 +6,22 @@ import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline
 
-from postproc.calibration.selection import fit_survey, model_of
 from postproc.compensation.continuity import CURVE
 from postproc.compensation.outcome import Status
 from postproc.robot.cell import load_cell
-from tests.calibration.simulator import random_arm, random_states, survey_of
 from tests.compensation.curved import (
     CELL,
     CENTRE,
     KR,
+    drawn_arm,
     frame,
     job,
     plans,
+    surveyed,
     tool_pose,
 )
 
 GAP = np.full(6, 3e-4)  # [rad] half the gap of every gear
-SPREAD = np.deg2rad([40.0, 25.0, 25.0, 60.0, 35.0, 60.0])
 
 
 @pytest.fixture(scope="module")
@@ -34,19 +33,12 @@ def cell(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def truth():
-    drawn = random_arm(np.random.default_rng(26), tool=False)
-    drawn.arm = KR
-    return drawn
+    return drawn_arm(26)
 
 
 @pytest.fixture(scope="module")
 def model(truth):
-    rng = np.random.default_rng(27)
-    states = random_states(400, rng)
-    states = states.with_(q=CENTRE + rng.uniform(-1.0, 1.0, (400, 6)) * SPREAD)
-    position, _ = truth.measure(states, rng)
-    survey = survey_of(states, position)
-    return model_of(fit_survey(survey, KR, None, None), survey)
+    return surveyed(truth, 27)
 
 
 def block(rng: np.random.Generator) -> list[str]:

@@ -116,8 +116,32 @@ def with_parts(cell: Cell, rng: np.random.Generator) -> Visits:
     return visits(target, values, motion=motion, distance_mm=np.array(distance))
 
 
+def with_gaps(cell: Cell, rng: np.random.Generator) -> Visits:
+    """After every joint target moves to places of which numbers are missing."""
+    tool, base, uframe = pose_from_record(FRAMES)
+    to_user = np.linalg.inv(uframe) @ base
+    target, values, motion = [], [], []
+    for _ in range(HOLES):
+        q = rng.uniform([-40, -20, -110, -80, 25, -80], [40, 20, -80, 80, 70, 80])
+        place = to_user @ (cell.arm.flange(np.deg2rad(q)[None]) @ tool)[0]
+        xyz = place[:3, 3] * 1e3 + rng.uniform(-80, 80, 3)
+        angles = q + rng.uniform(-10, 10, 6)
+        xyz[rng.permutation(3)[: rng.integers(0, 3)]] = np.nan
+        angles[rng.permutation(6)[: rng.integers(1, 6)]] = np.nan
+        moves = [
+            (Meaning.PARTIAL_POSE, [*xyz, np.nan, np.nan, np.nan], Motion.LINEAR),
+            (Meaning.PARTIAL_JOINTS, angles.tolist(), Motion.JOINT),
+        ]
+        chosen = [moves[k] for k in rng.permutation(2)]
+        for kind, numbers, how in [(Meaning.JOINTS, q.tolist(), Motion.JOINT), *chosen]:
+            target.append(int(kind))
+            values.append(numbers)
+            motion.append(int(how))
+    return visits(target, values, motion=np.array(motion))
+
+
 @pytest.mark.parametrize("seed", [0, 1])
-@pytest.mark.parametrize("write", [program, with_steps, with_parts])
+@pytest.mark.parametrize("write", [program, with_steps, with_parts, with_gaps])
 def test_joint_angles_and_directions_agree(
     cell: Cell, seed: int, write: Callable[[Cell, np.random.Generator], Visits]
 ) -> None:

@@ -12,7 +12,7 @@ from postproc.language.collect import Conditions, FoundGoal, Pose, cell_pose
 from postproc.language.krl.dialect import COMMENTS, KRL_DIALECT
 from postproc.language.krl.interpreter import KrlMachine
 from postproc.language.krl.modes import UNKNOWN, KrlModes, ModeReader
-from postproc.language.krl.moves import NO_SLOTS, NOTHING, KrlVisit
+from postproc.language.krl.moves import NO_SLOTS, NOTHING, PARTIAL, KrlVisit
 from postproc.language.krl.syntax import SplineBlock
 from postproc.language.visits import Meaning, OrientationLaw, Switch, Visits
 from postproc.robot.trajectory import Motion
@@ -34,6 +34,7 @@ def visits_of(machine: KrlMachine) -> Visits:
     """Put the arrivals into the order of the program, as columns."""
     found: Sequence[KrlVisit] = machine.visits
     _keep_orientation(machine, found)
+    _follow_partial(machine, found)
     ends, odd = _ends(found), _odd_status(found)
     base = cell_pose(machine.start.base)
     number = {id(v): k for k, v in enumerate(found)}
@@ -167,6 +168,31 @@ def _keep_orientation(machine: KrlMachine, found: Sequence[KrlVisit]) -> None:
                 Meaning.UNKNOWN, NOTHING, slots=NO_SLOTS, name=v.goal.name,
                 why=v.goal.why or _STILL_TOOL,
             )  # fmt: skip
+
+
+def _follow_partial(machine: KrlMachine, found: Sequence[KrlVisit]) -> None:
+    """Forget where missing numbers lead that are not sure to be those before.
+
+    They are not where X, Y, Z were commanded in other frames, or behind an arc that
+    ends elsewhere than at the point that is written.
+    """
+    partial = (Meaning.PARTIAL_POSE, Meaning.PARTIAL_JOINTS)
+    for v in (v for v in found if v.goal.target in partial):
+        before = [found[k] for k in v.origins if k >= 0]
+        lost = any(one.move.angle is not None for one in before)
+        if v.goal.target == Meaning.PARTIAL_POSE:
+            own = _frames(machine, v)
+            lost |= own is None or any(_frames(machine, one) != own for one in before)
+        if lost:
+            v.goal = FoundGoal(Meaning.UNKNOWN, NOTHING, slots=NO_SLOTS, why=PARTIAL)
+
+
+def _frames(machine: KrlMachine, v: KrlVisit) -> tuple[Pose, Pose, str] | None:
+    """Return tool, base and kind of interpolation of a move, None where not known."""
+    modes, unset = _effective(machine, v)
+    tool, base, kind = modes.tool, modes.base, modes.interpolation
+    known = tool.pose and base.pose and kind
+    return (tool.pose, base.pose, kind) if known and not (unset or base.why) else None
 
 
 def _odd_status(found: Sequence[KrlVisit]) -> set[int]:

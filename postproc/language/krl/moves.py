@@ -216,6 +216,8 @@ class _Goal:
             goal = self._pose(found)
         if not name:
             return goal
+        if goal.why == PARTIAL:  # what data lack may be told elsewhere
+            return _left(PARTIAL, name=name)
         return self._named(goal, operand)
 
     def _named(self, goal: FoundGoal, operand: said.Operand) -> FoundGoal:
@@ -252,7 +254,7 @@ class _Goal:
         if not self._by_joints:
             return _left("it is joint angles, and no PTP goes to them")
         if numbers is None:
-            return _left(PARTIAL)
+            return self._partial(found, AXES, Meaning.PARTIAL_JOINTS)
         file, slots = _places(numbers)
         values = [number.value for number in numbers]
         why = "" if file >= 0 else "it is computed from other data"
@@ -265,7 +267,7 @@ class _Goal:
         """Read X, Y, Z, A, B, C with S and T."""
         numbers = _numbers(found, PLACE)
         if numbers is None:
-            return _left(PARTIAL)
+            return self._partial(found, PLACE[:3], Meaning.PARTIAL_POSE)
         flags = [found.get(name) for name in COMPONENTS[6:]]
         written = [f if isinstance(f, KrlNumber) else KrlNumber(-1.0) for f in flags]
         values = [one.value for one in (*numbers, *written)]
@@ -281,6 +283,24 @@ class _Goal:
             Meaning.POSE, tuple(values), file, (*slots, *own), NO_SLOTS, aux=aux,
             why=why,
         )  # fmt: skip
+
+    def _partial(
+        self, found: KrlRecord, names: Sequence[str], meaning: Meaning
+    ) -> FoundGoal:
+        """Read numbers of which some are missing: they stay what they were before.
+
+        It is followed by axes, or by X, Y, Z on a line. Of A, B, C the others cannot be
+        told by where the arm is, and a joint move needs S and T.
+        """
+        given = {key for key, _ in found.fields}
+        in_block = self.goals.block(self.row, self.here) is not None
+        moves_so = (meaning == Meaning.PARTIAL_JOINTS) == self._by_joints
+        alone = not in_block and self.move.via is None and bool(given & {*names})
+        if not (moves_so and alone and given <= {*names, *OUTSIDE}):
+            return _left(PARTIAL)
+        values = [found.number(name) for name in names]
+        values += [math.nan] * (WIDTH - len(values))
+        return FoundGoal(meaning, tuple(values), aux=self._outside(found), why=PARTIAL)
 
     def _status(self, s: float, t: float) -> str:
         """Say what speaks against a position's S and T, "" for nothing."""

@@ -314,6 +314,45 @@ def test_steps_hold_no_target():
     assert found.visits.values[2, :6].tolist() == [10, 0, 0, 0, 0, 0]
 
 
+def test_missing_numbers_stay_what_they_were():
+    found = job(
+        "PTP {A1 5}", "LIN {Z 500}", "SLIN {X 1,Y 2,Z 3,E1 0}", "SPTP {A6 1,A2 -90}",
+    )  # fmt: skip
+    v, nan = found.visits, np.nan
+    pose, joints = Meaning.PARTIAL_POSE, Meaning.PARTIAL_JOINTS
+    assert v.literal.tolist() == [-1] * 4
+    assert all("numbers are missing" in why for why in reasons(found))
+    assert v.target.tolist() == [joints, pose, pose, joints]
+    numbers = [[5, *[nan] * 5], [nan, nan, 500, *[nan] * 3], [1, 2, 3, *[nan] * 3],
+               [nan, -90, *[nan] * 3, 1]]  # fmt: skip
+    assert np.array_equal(v.values[:, :6], numbers, equal_nan=True)
+
+
+@pytest.mark.parametrize(
+    "lines",
+    [
+        ["LIN {A 10}"], ["LIN {X 5,A 10}"], ["LIN {X 5,Y 1,Z 2,A 10}"], ["PTP {X 5}"],
+        ["LIN {X 5,S 2}"], ["PTP {A1 5,X 2}"], ["LIN {E1 0}"], ["LIN XPART"],
+        ["PTP XAPART"], ["CIRC {X 5},XP1"], ["CIRC XP1,{X 5}"],
+        ["CIRC XP2,XP1,CA 90", "LIN {Z 5}"],
+        ["CIRC XP2,XP1,CA 90", "PTP {A1 5}"],
+        ["SPLINE", "SLIN {X 5}", "ENDSPLINE"],
+        ["PTP_SPLINE", "SPTP {A1 5}", "ENDSPLINE"],
+        ["BAS(#TOOL,N)", "N=N+1", "LIN {Z 5}"], ["BAS(#BASE,3)", "LIN {Z 5}"],
+        ["$TOOL=$NULLFRAME", "LIN {Z 5}"], ["$IPO_MODE=#TCP", "LIN {Z 5}"],
+        ["$ORI_TYPE=#CONSTANT", "LIN {Z 5}"], ["FDAT_ACT=FOUT", "BAS(#FRAMES)",
+        "LIN {Z 5}"], ["IF $IN[1] THEN", "BAS(#BASE,3)", "LIN XP1", "ENDIF",
+        "LIN {Z 5}"], ["SLIN {Z 5} WITH $BASE=BASE_DATA[3]"],
+    ],
+)  # fmt: skip
+def test_where_missing_numbers_lead_is_not_always_known(lines):
+    data = DATA + "DECL POS XPART={X 1,Y 2}\nDECL E6AXIS XAPART={A1 1}\n"
+    found = job("FDAT_ACT=FP1", "BAS(#FRAMES)", "LIN XP1", *lines, data=data)
+    goals = found.visits.target.tolist()
+    assert {Meaning.PARTIAL_POSE, Meaning.PARTIAL_JOINTS}.isdisjoint(goals)
+    assert Meaning.UNKNOWN in goals
+
+
 def test_where_the_arm_is_holds_no_target():
     """It stays there, and reading that stops what is planned ahead."""
     found = job("$APO.CDIS=5", "LIN XP1 C_DIS", "LIN $POS_ACT", "PTP $AXIS_ACT")
