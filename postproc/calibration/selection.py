@@ -11,6 +11,7 @@ from postproc.calibration.directions import mend_directions
 from postproc.calibration.evidence import Normal, highest
 from postproc.calibration.measurements import Measurements
 from postproc.calibration.orientations import Turns
+from postproc.calibration.references import TrackerMotion
 from postproc.calibration.regression import NEARLY, Fit, fit_effects
 from postproc.calibration.tool_groups import find_groups
 from postproc.model.covariate import DRIVERS
@@ -211,13 +212,31 @@ def fit_survey(
         return fit_effects(Batch(arm, states), position, chosen, origin, turns=turns)
 
     fitted = fit(states)
-    if survey.inferred.all():
+    if not survey.inferred.all():
+        progress("look for wrong directions")
+        mended = mend_directions(fitted, position)
+        again = effects is None and mended is not fitted
+        fitted = fit(mended.batch.states) if again else mended
+    return told_apart(fitted, survey.motion)
+
+
+def told_apart(fitted: Fit, motion: TrackerMotion | None) -> Fit:
+    """Settle whose it is what passes with time: the arm's, or perhaps the tracker's.
+
+    Args:
+        fitted: The fit.
+        motion: What readings of fixed points say of the tracker, if there are any.
+    """
+    c, effects = fitted.combination, []
+    for effect, part in zip(c.effects, c.slices, strict=True):
+        peak = float(np.linalg.norm(fitted.moved(part), axis=1).max(initial=0.0))
+        told = motion is not None and motion.leaves(peak)
+        effects.append(effect.told_apart(told, fitted.batch))
+    if all(new is old for new, old in zip(effects, c.effects, strict=True)):
         return fitted
-    progress("look for wrong directions")
-    mended = mend_directions(fitted, position)
-    if effects is not None or mended is fitted:
-        return mended
-    return fit(mended.batch.states)
+    position = fitted.error + fitted.batch.walk.tcp
+    origin = fitted.noise.origin
+    return fit_effects(fitted.batch, position, tuple(effects), origin, start=fitted)
 
 
 def model_of(fitted: Fit, survey: Measurements) -> Model:
@@ -240,6 +259,8 @@ def model_of(fitted: Fit, survey: Measurements) -> Model:
     }
     if fitted.turns is not None:
         statistics["orientation_std_mrad"] = fitted.turns.std * 1e3
+    if survey.motion is not None:
+        statistics |= survey.motion.statistics
     return Model(
         method="full",
         arm_name=arm.name,

@@ -36,7 +36,7 @@ from postproc.calibration.directions import mend_directions
 from postproc.calibration.measurements import Measurements
 from postproc.calibration.regression import Fit, fit_effects
 from postproc.calibration.report import report_directions, weighed_down
-from postproc.calibration.selection import model_of
+from postproc.calibration.selection import model_of, told_apart
 from postproc.model.combination import Combination
 from postproc.model.kinematics import Batch
 from postproc.model.model import Model
@@ -190,13 +190,16 @@ def diagnose(
         ModelError: A model of another arm.
     """
     base = refit(survey, arm, model, tracker, setup)
-    traced, told = trace(base, seed, progress), survey.states.direction
+    traced, sides = trace(base, seed, progress), survey.states.direction
     if not survey.inferred.all():
         traced = _with_mended_directions(traced, seed, progress)
+    search = traced.search
+    settled = told_apart(search.fit, survey.motion)
+    traced = replace(traced, search=replace(search, fit=settled))
     given = None
     if model.data_sha256 != survey.sha256:
         given = survey.position - base.batch.walk.tcp - model.error(arm, survey.states)
-    held_out = hold_out(traced.search, told, seed, progress, given)
+    held_out = hold_out(traced.search, sides, seed, progress, given)
     diagnosis = _conclude(survey, traced, held_out, tracker, seed)
     extended = _extended(model, survey, traced.search, diagnosis)
     return Extension(diagnosis, extended, traced.search, held_out)

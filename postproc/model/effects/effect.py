@@ -134,6 +134,15 @@ class Effect(ABC):
         """Return it as it is fitted beside others, which may hold a part of it."""
         return self
 
+    def told_apart(self, told: bool, batch: Batch) -> Effect:
+        """Return it as it counts by what is known of the tracker's own drift.
+
+        Args:
+            told: Whether readings of fixed points say that it is not the tracker's.
+            batch: The surveyed states.
+        """
+        return self
+
     def belongs_to(self) -> Origin:
         """Say whose error it is.
 
