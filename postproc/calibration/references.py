@@ -209,6 +209,11 @@ class TrackerMotion:
         """Whether the tracker moved."""
         return self.nats >= NATS
 
+    @property
+    def stands(self) -> bool:
+        """Whether the tracker was watched over the survey and did not move."""
+        return self.covered >= COVERED and not self.drifts
+
     def moved(self, passed: Floats, position: Floats) -> Floats:
         """Return what the drift adds to readings at positions (n, 3), (n, 3) [m]."""
         motions = rigid_motions(position - self.center)
@@ -219,8 +224,8 @@ class TrackerMotion:
 
         A tracker that moves, and whose turns nobody sees, may have turned.
         """
-        seen = self.covered >= COVERED and (self.rank == 2 or not self.drifts)
-        return bool(seen and peak > SURE * self.unsure)
+        turns_seen = self.covered >= COVERED and self.rank == 2
+        return bool((self.stands or turns_seen) and peak > SURE * self.unsure)
 
     @property
     def peak_mm(self) -> float:

@@ -18,7 +18,9 @@ from postproc.model.covariate import DRIVERS
 from postproc.model.effects import BASE_EFFECTS, EFFECTS, propose
 from postproc.model.effects.effect import Effect
 from postproc.model.effects.probe_turn import ProbeTurn
+from postproc.model.effects.thermal import Thermal
 from postproc.model.effects.tool_shift import ToolShift
+from postproc.model.effects.tracker_drift import TrackerDrift
 from postproc.model.kinematics import Batch
 from postproc.model.model import COMPENSATED, READING, Model, Ranges
 from postproc.robot.arm import Arm
@@ -41,15 +43,32 @@ def silent(stage: str) -> None:
     """Tell nobody."""
 
 
-def candidates(arm: Arm, states: States) -> tuple[str, ...]:
-    """Name the effects that a survey may give evidence for, by what drives them."""
+def candidates(
+    arm: Arm, states: States, motion: TrackerMotion | None = None
+) -> tuple[str, ...]:
+    """Name the effects that a survey may give evidence for, by what drives them.
+
+    Args:
+        arm: The arm.
+        states: States of the rows.
+        motion: What readings of fixed points say of the tracker, if there are any.
+    """
+    without = not_there(motion)
+    # What passes with time while the tracker stands is the arm's, however soon.
+    soon = len(without) > 0 and bool(np.isnan(states.temperature).all())
     tried = [
         k for k in EFFECTS
-        if k.unasked == "weighed" and k.may_show(states)
+        if k.unasked == "weighed" and k.name not in without
+        and (k.may_show(states) or (soon and k is Thermal))
         and k.propose(arm, states).parameters()
     ]  # fmt: skip
     tried.sort(key=lambda kind: DRIVERS.index(kind.driven_by))
     return tuple(kind.name for kind in tried)
+
+
+def not_there(motion: TrackerMotion | None) -> tuple[str, ...]:
+    """Name the effects that readings of fixed points, if there are any, rule out."""
+    return (TrackerDrift.name,) if motion is not None and motion.stands else ()
 
 
 def free_forms(states: States) -> tuple[str, ...]:
@@ -66,6 +85,7 @@ def fit_best(
     setup: tuple[str, ...] = (),
     turns: Turns | None = None,
     progress: Progress = silent,
+    motion: TrackerMotion | None = None,
 ) -> Fit:
     """Fit the base effects and all others that a survey gives evidence for.
 
@@ -77,13 +97,15 @@ def fit_best(
         setup: Effects of the set-up that are always fitted.
         turns: Measured orientations, where the survey has them.
         progress: Told what is being done.
+        motion: What readings of fixed points say of the tracker, if there are any.
     """
     batch = Batch(arm, states)
     base = propose((*BASE_EFFECTS, *setup), arm, states)
     kept = base
     progress("fit " + ", ".join(e.name for e in base))
     fitted = fit_effects(batch, position, base, origin, turns=turns, until=NEARLY)
-    for names in (candidates(arm, states), *((name,) for name in free_forms(states))):
+    named = candidates(arm, states, motion)
+    for names in (named, *((name,) for name in free_forms(states))):
         progress("fit and weigh " + ", ".join(names))
         tried = (*kept, *propose(names, arm, states), *slipped(fitted))
         fitted = fit_effects(batch, position, tried, origin, fitted, until=NEARLY)
@@ -206,7 +228,9 @@ def fit_survey(
 
     def fit(states: States) -> Fit:
         if effects is None:
-            return fit_best(arm, states, position, origin, setup, turns, progress)
+            return fit_best(
+                arm, states, position, origin, setup, turns, progress, survey.motion
+            )
         asked = propose((*effects, *setup), arm, states)
         chosen = tuple(effect.seen_from(origin) for effect in asked)
         return fit_effects(Batch(arm, states), position, chosen, origin, turns=turns)

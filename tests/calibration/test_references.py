@@ -84,7 +84,8 @@ def test_a_warm_up_beside_a_tracker_that_stands_is_the_arms(
     assert "did not move" in told[0]
     assert ("turns cannot be told" in told[1]) == (len(places) == 1)
     assert told[-1].endswith("Predictions are for the warm arm")
-    assert "thermal" in in_time(model.compensable()[0].effects)
+    assert in_time(model.compensable()[0].effects) == {"thermal"}
+    assert in_time(model.effects.effects) == {"thermal"}
     model.save(tmp_path / "m.json")
     again = load_model(tmp_path / "m.json")
     assert "thermal" in in_time(again.compensable()[0].effects)

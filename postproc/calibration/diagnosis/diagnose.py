@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -36,7 +36,7 @@ from postproc.calibration.directions import mend_directions
 from postproc.calibration.measurements import Measurements
 from postproc.calibration.regression import Fit, fit_effects
 from postproc.calibration.report import report_directions, weighed_down
-from postproc.calibration.selection import model_of, told_apart
+from postproc.calibration.selection import model_of, not_there, told_apart
 from postproc.model.combination import Combination
 from postproc.model.kinematics import Batch
 from postproc.model.model import Model
@@ -190,9 +190,10 @@ def diagnose(
         ModelError: A model of another arm.
     """
     base = refit(survey, arm, model, tracker, setup)
-    traced, sides = trace(base, seed, progress), survey.states.direction
+    without, sides = not_there(survey.motion), survey.states.direction
+    traced = trace(base, seed, progress, without)
     if not survey.inferred.all():
-        traced = _with_mended_directions(traced, seed, progress)
+        traced = _with_mended_directions(traced, seed, progress, without)
     search = traced.search
     settled = told_apart(search.fit, survey.motion)
     traced = replace(traced, search=replace(search, fit=settled))
@@ -206,7 +207,7 @@ def diagnose(
 
 
 def _with_mended_directions(
-    traced: Investigation, seed: int, progress: Progress
+    traced: Investigation, seed: int, progress: Progress, without: Collection[str]
 ) -> Investigation:
     """Search again with wrong directions the other way, where there are any.
 
@@ -221,7 +222,7 @@ def _with_mended_directions(
     batch, effects = Batch(base.batch.arm, states), base.combination.effects
     progress("directions mended: again", 0.0)
     again = fit_effects(batch, position, effects, base.noise.origin, start=base)
-    return trace(again, seed, progress)
+    return trace(again, seed, progress, without)
 
 
 def _conclude(
