@@ -29,12 +29,9 @@ from postproc.calibration.selection import Progress, fit_survey, model_of, silen
 from postproc.calibration.tables import DETECT, TableFormat
 from postproc.calibration.tool_groups import find_groups, find_wrong_nest
 from postproc.model.combination import Combination
-from postproc.model.effects.effect import Effect
 from postproc.model.effects.placement import Placement
 from postproc.model.effects.probe import Probe
-from postproc.model.effects.thermal import Thermal
 from postproc.model.effects.tool_shift import ToolShift
-from postproc.model.effects.tracker_drift import TrackerDrift
 from postproc.model.model import Method, Model
 from postproc.model.registration import Registration
 from postproc.robot.arm import Arm
@@ -172,19 +169,9 @@ def drifts(fitted: Fit) -> tuple[str, ...]:
             kept = _mean_mm((fitted.residual + fitted.moved(part))[used])
             told.append(
                 f"{effect.name} in time: rows are left {left:.4f} mm off, {kept:.4f} "
-                f"mm with it left in. Predictions are for {state}{_doubt(effect)}"
+                f"mm with it left in. Predictions are for {state}"
             )
     return tuple(told)
-
-
-def _doubt(effect: Effect) -> str:
-    """Say of what passes with time that nothing tells it from the tracker's drift."""
-    if not isinstance(effect, Thermal) or effect.told or effect.form != "time":
-        return ""
-    return (
-        f": it may be {TrackerDrift.name}, so nothing of it is compensated. Rows on "
-        "fixed points (column reference) would tell"
-    )
 
 
 def _mean_mm(vectors: Floats) -> float:

@@ -269,6 +269,11 @@ class TrackerMotion:
         return self.moved(passed, np.tile(self.center, (21, 1)))
 
 
+def ruled_out(motion: TrackerMotion | None) -> tuple[str, ...]:
+    """Name the effects that readings of fixed points, if there are any, rule out."""
+    return (TrackerDrift.name,) if motion is not None and motion.stands else ()
+
+
 def tracker_motion(rows: ReferenceRows, time: Floats, order: Floats) -> TrackerMotion:
     """Fit the tracker's drift to readings of fixed points.
 

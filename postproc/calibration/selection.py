@@ -11,16 +11,14 @@ from postproc.calibration.directions import mend_directions
 from postproc.calibration.evidence import Normal, highest
 from postproc.calibration.measurements import Measurements
 from postproc.calibration.orientations import Turns
-from postproc.calibration.references import TrackerMotion
+from postproc.calibration.references import TrackerMotion, ruled_out
 from postproc.calibration.regression import NEARLY, Fit, fit_effects
 from postproc.calibration.tool_groups import find_groups
 from postproc.model.covariate import DRIVERS
 from postproc.model.effects import BASE_EFFECTS, EFFECTS, propose
 from postproc.model.effects.effect import Effect
 from postproc.model.effects.probe_turn import ProbeTurn
-from postproc.model.effects.thermal import Thermal
 from postproc.model.effects.tool_shift import ToolShift
-from postproc.model.effects.tracker_drift import TrackerDrift
 from postproc.model.kinematics import Batch
 from postproc.model.model import COMPENSATED, READING, Model, Ranges
 from postproc.robot.arm import Arm
@@ -53,22 +51,15 @@ def candidates(
         states: States of the rows.
         motion: What readings of fixed points say of the tracker, if there are any.
     """
-    without = not_there(motion)
-    # What passes with time while the tracker stands is the arm's, however soon.
-    soon = len(without) > 0 and bool(np.isnan(states.temperature).all())
+    without = ruled_out(motion)
     tried = [
         k for k in EFFECTS
         if k.unasked == "weighed" and k.name not in without
-        and (k.may_show(states) or (soon and k is Thermal))
+        and (k.may_show_alone(states) if without else k.may_show(states))
         and k.propose(arm, states).parameters()
     ]  # fmt: skip
     tried.sort(key=lambda kind: DRIVERS.index(kind.driven_by))
     return tuple(kind.name for kind in tried)
-
-
-def not_there(motion: TrackerMotion | None) -> tuple[str, ...]:
-    """Name the effects that readings of fixed points, if there are any, rule out."""
-    return (TrackerDrift.name,) if motion is not None and motion.stands else ()
 
 
 def free_forms(states: States) -> tuple[str, ...]:
@@ -251,16 +242,33 @@ def told_apart(fitted: Fit, motion: TrackerMotion | None) -> Fit:
         fitted: The fit.
         motion: What readings of fixed points say of the tracker, if there are any.
     """
-    c, effects = fitted.combination, []
-    for effect, part in zip(c.effects, c.slices, strict=True):
-        peak = float(np.linalg.norm(fitted.moved(part), axis=1).max(initial=0.0))
-        told = motion is not None and motion.leaves(peak)
-        effects.append(effect.told_apart(told, fitted.batch))
-    if all(new is old for new, old in zip(effects, c.effects, strict=True)):
+    if motion is not None:
+        warm = _as_told(fitted, told=True)
+        if motion.leaves(_peak_of_others(warm, fitted)):
+            return warm
+    return _as_told(fitted, told=False)
+
+
+def _as_told(fitted: Fit, told: bool) -> Fit:
+    """Fit again with effects as they count, where any counts otherwise."""
+    old = fitted.combination.effects
+    effects = tuple(effect.told_apart(told, fitted.batch) for effect in old)
+    if all(a is b for a, b in zip(effects, old, strict=True)):
         return fitted
     position = fitted.error + fitted.batch.walk.tcp
     origin = fitted.noise.origin
-    return fit_effects(fitted.batch, position, tuple(effects), origin, start=fitted)
+    return fit_effects(fitted.batch, position, effects, origin, start=fitted)
+
+
+def _peak_of_others(fitted: Fit, before: Fit) -> float:
+    """Return the most that effects move that a fit has not had before [m]."""
+    old, c = before.combination.effects, fitted.combination
+    moved = [
+        float(np.linalg.norm(fitted.moved(part), axis=1).max(initial=0.0))
+        for was, effect, part in zip(old, c.effects, c.slices, strict=True)
+        if effect is not was
+    ]
+    return min(moved, default=0.0)
 
 
 def model_of(fitted: Fit, survey: Measurements) -> Model:

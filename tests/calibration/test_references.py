@@ -80,22 +80,23 @@ def in_time(effects: tuple[Effect, ...]) -> set[str]:
 def test_a_warm_up_beside_a_tracker_that_stands_is_the_arms(
     places: np.ndarray, seed: int, tmp_path: Path
 ) -> None:
-    model, told = fitted(campaign(seed, ("warmup",), 1.0), places)
+    c = campaign(seed, ("warmup",), 1.0)
+    model, told = fitted(c, places)
     assert "did not move" in told[0]
     assert ("turns cannot be told" in told[1]) == (len(places) == 1)
-    assert told[-1].endswith("Predictions are for the warm arm")
+    assert told[-1].endswith("Predictions are for the arm as warm as at the end")
     assert in_time(model.compensable()[0].effects) == {"thermal"}
     assert in_time(model.effects.effects) == {"thermal"}
     model.save(tmp_path / "m.json")
     again = load_model(tmp_path / "m.json")
     assert "thermal" in in_time(again.compensable()[0].effects)
     assert again.statistics["reference_drift_mm"] == 0.0
-    # A program does not say how warm the arm is: it is warm.
+    # A program does not say how warm the arm is: it is as warm as it was measured last.
     at = make_states(np.full((1, 6), 0.3))
-    (thermal,) = (e for e in again.effects.effects if isinstance(e, Thermal))
-    later = at.with_(time=np.full(1, 1e9))
-    np.testing.assert_allclose(again.error(ARM, at), again.error(ARM, later))
-    assert thermal.level == 0.0
+    end = at.with_(time=np.full(1, c.states.time.max()))
+    np.testing.assert_allclose(again.error(ARM, at), again.error(ARM, end))
+    cold = again.error(ARM, at.with_(time=np.zeros(1)))
+    assert np.linalg.norm(cold - again.error(ARM, at)) > 3e-5
 
 
 @pytest.mark.parametrize("seed", [308, 333])

@@ -34,9 +34,10 @@ from postproc.calibration.diagnosis.trace import (
 )
 from postproc.calibration.directions import mend_directions
 from postproc.calibration.measurements import Measurements
+from postproc.calibration.references import ruled_out
 from postproc.calibration.regression import Fit, fit_effects
 from postproc.calibration.report import report_directions, weighed_down
-from postproc.calibration.selection import model_of, not_there, told_apart
+from postproc.calibration.selection import model_of, told_apart
 from postproc.model.combination import Combination
 from postproc.model.kinematics import Batch
 from postproc.model.model import Model
@@ -190,7 +191,7 @@ def diagnose(
         ModelError: A model of another arm.
     """
     base = refit(survey, arm, model, tracker, setup)
-    without, sides = not_there(survey.motion), survey.states.direction
+    without, sides = ruled_out(survey.motion), survey.states.direction
     traced = trace(base, seed, progress, without)
     if not survey.inferred.all():
         traced = _with_mended_directions(traced, seed, progress, without)

@@ -88,6 +88,11 @@ class Effect(ABC):
         return varies_enough(states, cls.driven_by)
 
     @classmethod
+    def may_show_alone(cls, states: States) -> bool:
+        """Tell the same where the tracker is known to stand still."""
+        return cls.may_show(states)
+
+    @classmethod
     def candidates(cls, batch: Batch) -> list[Candidate]:
         """List what a search may try of it, a grid over what is not linear.
 

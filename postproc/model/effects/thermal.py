@@ -28,6 +28,10 @@ UNSURE = 0.7  # share by which a length differs from the common growth
 SHORT = 1e-3  # [m] what has no length does not grow
 SOON = 1200.0  # [s] in which no arm warms up enough to show
 WARM_UPS = (0.1, 0.2, 0.4, 0.8)  # of the campaign's length: time constants tried
+DOUBT = (
+    ": it may be tracker_drift, so nothing of it is compensated. Rows on fixed points "
+    "(column reference) would tell"
+)
 
 
 @dataclass(frozen=True)
@@ -66,6 +70,11 @@ class Thermal(Effect):
         if not np.isnan(states.temperature).all():
             return varies_enough(states, cls.driven_by)
         return varies(states.time) and float(np.ptp(states.time)) > SOON
+
+    @classmethod
+    def may_show_alone(cls, states: States) -> bool:
+        """Tell it of shorter times, too: what passes with them is the arm's."""
+        return bool(cls.may_show(states) or np.isnan(states.temperature).all())
 
     @classmethod
     def propose(cls, arm: Arm, states: States) -> Self:
@@ -114,15 +123,17 @@ class Thermal(Effect):
         return {"time_constant": (float(self.time_constant), unit)}
 
     def told_apart(self, told: bool, batch: Batch) -> Effect:
-        """Refer to the warm arm where it is the arm's, else to the survey's mean.
+        """Refer to the end of the survey where it is the arm's, else to its mean.
 
-        What may as well be the tracker's then moves no prediction away from the mean
-        of the rows, which is where they are without it.
+        Nothing was measured of a warmer arm than at the end. What may as well be the
+        tracker's moves no prediction away from the mean of the rows, which is where
+        they are without it.
         """
         if self.form == "temperature":
             return self
-        warm = replace(self, told=told, level=0.0)
-        return warm if told else replace(warm, level=-float(warm.warmth(batch).mean()))
+        warmth = replace(self, level=0.0).warmth(batch)
+        level = -float(warmth.max() if told else warmth.mean())
+        return replace(self, told=told, level=level)
 
     def belongs_to(self) -> Origin:
         """Say that it is of the state: the cell declares the temperature.
@@ -138,7 +149,9 @@ class Thermal(Effect):
         """Name the state between cold and warm of a warm-up in time."""
         if self.form == "temperature":
             return ""
-        return "the warm arm" if self.level == 0.0 else "the mean of the survey"
+        if self.told:
+            return "the arm as warm as at the end"
+        return ("the warm arm" if self.level == 0.0 else "the survey's mean") + DOUBT
 
     def requires(self) -> tuple[str, ...]:
         """Need the temperature; a warm-up of unknown time is over."""
