@@ -47,6 +47,8 @@ KNOWING = {
     "calibration.fit": {"placement", "probe", "tool_shift"},
     # A registration is what that effect fits.
     "calibration.registration": {"placement"},
+    # A tracker that drifts moves fixed points rigidly.
+    "calibration.references": {"base_shift", "tracker_drift"},
     "calibration.selection": {"probe_turn", "tool_shift"},
     "cli.diagnose": {"placement"},
 }

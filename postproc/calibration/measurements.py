@@ -11,6 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from postproc.arrays import Bools, Floats
+from postproc.calibration.references import (
+    ReferenceRows,
+    TrackerMotion,
+    join_references,
+    split_references,
+    tracker_motion,
+)
 from postproc.calibration.tables import (
     DETECT,
     JOINTS,
@@ -70,6 +77,9 @@ class Measurements:
             the frame of the positions.
         mounting: Orientation of the tool or probe in the flange frame, (3, 3), or None
             where it is not known.
+        references: Readings of fixed points between the rows, or None.
+        motion: What they say of the tracker, whose drift is taken out of `position`;
+            None without them.
     """
 
     path: Path
@@ -83,6 +93,8 @@ class Measurements:
     warnings: tuple[str, ...] = ()
     rotation: Floats | None = field(default=None, repr=False)
     mounting: Floats | None = field(default=None, repr=False)
+    references: ReferenceRows | None = field(default=None, repr=False)
+    motion: TrackerMotion | None = field(default=None, repr=False)
 
     def __len__(self) -> int:
         """Return the number of rows."""
@@ -140,6 +152,7 @@ def from_table(
 ) -> Measurements:
     """Interpret a table with the columns of the documentation."""
     table.require("id", *JOINTS, *(POSITION if positions else ()))
+    table, references = split_references(table)
     ids = unique_ids(table)
     q = np.deg2rad(table.block(JOINTS))
     side, travel, inferred, warnings = read_directions(table, arm, q)
@@ -154,29 +167,63 @@ def from_table(
     position = table.block(POSITION) * MM if read else np.full((len(q), 3), np.nan)
     found = Measurements(
         table.path, states, position, ids, table.line, inferred, table.sha256,
-        warnings=warnings, rotation=read_rotation(table),
+        warnings=warnings, rotation=read_rotation(table), references=references,
     )  # fmt: skip
     return drop_lost_beams(found)
 
 
 def drop_lost_beams(measured: Measurements) -> Measurements:
     """Leave out rows whose position is zero: the tracker had lost the beam."""
-    lost: Bools = np.asarray((np.abs(measured.position) < NOWHERE).all(axis=1))
+    lost = _nowhere(measured.position)
     gone = tuple(
         DroppedRow(
             measured.ids[i], int(measured.line[i]), "position 0, 0, 0: beam lost"
         )
         for i in np.flatnonzero(lost)
     )
-    return replace(measured[~lost], dropped=measured.dropped + gone)
+    fixed = measured.references
+    if fixed is not None and (blind := _nowhere(fixed.position)).any():
+        gone += tuple(
+            DroppedRow(fixed.name[i], int(fixed.line[i]), "position 0, 0, 0: beam lost")
+            for i in np.flatnonzero(blind)
+        )
+        fixed = fixed[~blind]
+    kept = replace(measured[~lost], references=fixed)
+    return replace(kept, dropped=measured.dropped + gone)
+
+
+def _nowhere(position: Floats) -> Bools:
+    """Tell which positions (n, 3) are those of a lost beam, (n,)."""
+    return np.asarray((np.abs(position) < NOWHERE).all(axis=1))
 
 
 def concatenate(parts: Sequence[Measurements]) -> Measurements:
-    """Put several files one after the other.
+    """Put several files one after the other, and take the tracker's own drift out.
 
     Raises:
-        MeasurementError: An id appears in two files.
+        MeasurementError: An id appears in two files, or readings of fixed points tell
+            nothing.
     """
+    return _steadied(_joined(parts))
+
+
+def _steadied(survey: Measurements) -> Measurements:
+    """Take out of the positions what readings of fixed points say of the tracker."""
+    if survey.references is None:
+        return survey
+    states = survey.states
+    motion = tracker_motion(survey.references, states.time, states.order)
+    passed = getattr(states, motion.drift.clock)
+    return replace(
+        survey,
+        position=survey.position - motion.moved(passed, survey.position),
+        motion=motion,
+        warnings=(*survey.warnings, *motion.tell()),
+    )
+
+
+def _joined(parts: Sequence[Measurements]) -> Measurements:
+    """Put several files one after the other."""
     first = parts[0]
     if len(parts) == 1:
         return first
@@ -206,6 +253,7 @@ def concatenate(parts: Sequence[Measurements]) -> Measurements:
         dropped=tuple(d for p in parts for d in p.dropped),
         warnings=tuple(w for p in parts for w in p.warnings),
         rotation=np.concatenate(rotations) if len(rotations) == len(parts) else None,
+        references=join_references([(p.references, len(p)) for p in parts]),
     )
 
 

@@ -11,6 +11,7 @@ from postproc.calibration.directions import mend_directions
 from postproc.calibration.evidence import Normal, highest
 from postproc.calibration.measurements import Measurements
 from postproc.calibration.orientations import Turns
+from postproc.calibration.references import TrackerMotion, ruled_out
 from postproc.calibration.regression import NEARLY, Fit, fit_effects
 from postproc.calibration.tool_groups import find_groups
 from postproc.model.covariate import DRIVERS
@@ -40,11 +41,21 @@ def silent(stage: str) -> None:
     """Tell nobody."""
 
 
-def candidates(arm: Arm, states: States) -> tuple[str, ...]:
-    """Name the effects that a survey may give evidence for, by what drives them."""
+def candidates(
+    arm: Arm, states: States, motion: TrackerMotion | None = None
+) -> tuple[str, ...]:
+    """Name the effects that a survey may give evidence for, by what drives them.
+
+    Args:
+        arm: The arm.
+        states: States of the rows.
+        motion: What readings of fixed points say of the tracker, if there are any.
+    """
+    without = ruled_out(motion)
     tried = [
         k for k in EFFECTS
-        if k.unasked == "weighed" and k.may_show(states)
+        if k.unasked == "weighed" and k.name not in without
+        and (k.may_show_alone(states) if without else k.may_show(states))
         and k.propose(arm, states).parameters()
     ]  # fmt: skip
     tried.sort(key=lambda kind: DRIVERS.index(kind.driven_by))
@@ -65,6 +76,7 @@ def fit_best(
     setup: tuple[str, ...] = (),
     turns: Turns | None = None,
     progress: Progress = silent,
+    motion: TrackerMotion | None = None,
 ) -> Fit:
     """Fit the base effects and all others that a survey gives evidence for.
 
@@ -76,13 +88,15 @@ def fit_best(
         setup: Effects of the set-up that are always fitted.
         turns: Measured orientations, where the survey has them.
         progress: Told what is being done.
+        motion: What readings of fixed points say of the tracker, if there are any.
     """
     batch = Batch(arm, states)
     base = propose((*BASE_EFFECTS, *setup), arm, states)
     kept = base
     progress("fit " + ", ".join(e.name for e in base))
     fitted = fit_effects(batch, position, base, origin, turns=turns, until=NEARLY)
-    for names in (candidates(arm, states), *((name,) for name in free_forms(states))):
+    named = candidates(arm, states, motion)
+    for names in (named, *((name,) for name in free_forms(states))):
         progress("fit and weigh " + ", ".join(names))
         tried = (*kept, *propose(names, arm, states), *slipped(fitted))
         fitted = fit_effects(batch, position, tried, origin, fitted, until=NEARLY)
@@ -205,19 +219,56 @@ def fit_survey(
 
     def fit(states: States) -> Fit:
         if effects is None:
-            return fit_best(arm, states, position, origin, setup, turns, progress)
+            return fit_best(
+                arm, states, position, origin, setup, turns, progress, survey.motion
+            )
         asked = propose((*effects, *setup), arm, states)
         chosen = tuple(effect.seen_from(origin) for effect in asked)
         return fit_effects(Batch(arm, states), position, chosen, origin, turns=turns)
 
     fitted = fit(states)
-    if survey.inferred.all():
+    if not survey.inferred.all():
+        progress("look for wrong directions")
+        mended = mend_directions(fitted, position)
+        again = effects is None and mended is not fitted
+        fitted = fit(mended.batch.states) if again else mended
+    return told_apart(fitted, survey.motion)
+
+
+def told_apart(fitted: Fit, motion: TrackerMotion | None) -> Fit:
+    """Settle whose it is what passes with time: the arm's, or perhaps the tracker's.
+
+    Args:
+        fitted: The fit.
+        motion: What readings of fixed points say of the tracker, if there are any.
+    """
+    if motion is not None:
+        warm = _as_told(fitted, told=True)
+        if motion.leaves(_peak_of_others(warm, fitted)):
+            return warm
+    return _as_told(fitted, told=False)
+
+
+def _as_told(fitted: Fit, told: bool) -> Fit:
+    """Fit again with effects as they count, where any counts otherwise."""
+    old = fitted.combination.effects
+    effects = tuple(effect.told_apart(told, fitted.batch) for effect in old)
+    if all(a is b for a, b in zip(effects, old, strict=True)):
         return fitted
-    progress("look for wrong directions")
-    mended = mend_directions(fitted, position)
-    if effects is not None or mended is fitted:
-        return mended
-    return fit(mended.batch.states)
+    position = fitted.error + fitted.batch.walk.tcp
+    origin = fitted.noise.origin
+    return fit_effects(fitted.batch, position, effects, origin, start=fitted)
+
+
+def _peak_of_others(fitted: Fit, before: Fit) -> float:
+    """Return the most that effects move that a fit has not had before [m]."""
+    old, c = before.combination.effects, fitted.combination
+    moved = [
+        float(np.linalg.norm(fitted.moved(part), axis=1).max(initial=0.0))
+        for was, effect, part in zip(old, c.effects, c.slices, strict=True)
+        if effect is not was
+    ]
+    return min(moved, default=0.0)
 
 
 def model_of(fitted: Fit, survey: Measurements) -> Model:
@@ -240,6 +291,8 @@ def model_of(fitted: Fit, survey: Measurements) -> Model:
     }
     if fitted.turns is not None:
         statistics["orientation_std_mrad"] = fitted.turns.std * 1e3
+    if survey.motion is not None:
+        statistics |= survey.motion.statistics
     return Model(
         method="full",
         arm_name=arm.name,

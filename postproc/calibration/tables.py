@@ -477,6 +477,7 @@ DETECT = TableFormat()
 #     comment = "//"
 
 DEGREES = float(np.rad2deg(1.0))  # per radian
+TEXTS = ("id", "reference")  # columns of ours that hold no numbers
 MAP_KEYS = ("columns", "file")
 FILE_KEYS = ("delimiter", "decimal", "encoding", "comment")
 
@@ -550,18 +551,24 @@ def translate(table: TextTable, form: Format) -> TextTable:
     """Rename and scale columns; a file without ids gets its line numbers."""
     cells = []
     for column, terms in form.columns.items():
-        if column == "id":
+        if column in TEXTS:
             cells.append([text.strip("'\" ") for text in table.text(terms[0][0])])
         else:
-            added = [table.numbers(source) * factor for source, factor in terms]
-            values = np.sum(added, axis=0)
-            cells.append([repr(float(v)) for v in values])
+            added = [
+                table.numbers(source, empty=True) * factor for source, factor in terms
+            ]
+            cells.append([_plain(float(v)) for v in np.sum(added, axis=0)])
     names = tuple(form.columns)
     if "id" not in names:
         names = ("id", *names)
         cells.insert(0, [str(line) for line in table.line])
     block = np.array(cells, dtype=object).T
     return replace(table, columns=names, cells=block, decimal=".")
+
+
+def _plain(value: float) -> str:
+    """Write a number, nothing for none."""
+    return "" if np.isnan(value) else repr(value)
 
 
 def read_column_map(path: str | Path) -> Format:
@@ -606,7 +613,7 @@ def column_map(path: str | Path, data: Mapping[str, Any]) -> Format:
 
 def _terms(path: str | Path, ours: str, given: Any) -> tuple[tuple[str, float], ...]:
     """Read one entry of a map: a column, or several that are added."""
-    several = isinstance(given, list) and len(given) > 0 and ours != "id"
+    several = isinstance(given, list) and len(given) > 0 and ours not in TEXTS
     terms = [_term(one) for one in (given if several else [given])]
     found = tuple(term for term in terms if term is not None)
     if len(found) == len(terms):

@@ -23,6 +23,7 @@ from postproc.calibration.measurements import (
     concatenate,
     read_points,
 )
+from postproc.calibration.references import split_references
 from postproc.calibration.registration import register
 from postproc.calibration.report import DirectionReport
 from postproc.calibration.tables import DETECT, TableFormat
@@ -58,7 +59,7 @@ def join_program(
         MeasurementError: An id that the program does not have, or has several times.
         ProgramError: The program cannot be read.
     """
-    table = read_points(data, reading)
+    table, references = split_references(read_points(data, reading))
     visits = read_program(read_files(program), cell).visits
     planned = plan_visits(visits, cell)
     places = _places(visits.measure_id, [visits.names[k] for k in visits.name])
@@ -84,6 +85,7 @@ def join_program(
         line=table.line[order],
         inferred=np.zeros(len(rows), dtype=bool),
         sha256=table.sha256,
+        references=references,
     )
 
 
@@ -249,6 +251,12 @@ def tell(found: Diagnosis) -> str:
     ]
     if found.vap_mm is not None:
         lines.append(f"vAP {found.vap_mm[0]:.4f} -> {found.vap_mm[1]:.4f} mm")
+    lines += [
+        f"{f.effect} may be tracker_drift: nothing of it is compensated. Rows on fixed "
+        "points (column reference) would tell"
+        for f in found.findings
+        if f.settings.get("form") == "time" and not f.settings.get("told")
+    ]
     if found.verdict == "unexplained":
         lines += _unexplained(found)
     if found.verdict == "noise":

@@ -587,13 +587,15 @@ def written(
     """Write a table with further columns, (n, 3) [m] each three of the header."""
     numbers = np.concatenate(parts, axis=1) / MM
     row_of = {int(line): i for i, line in enumerate(rows.line)}
+    fixed = set() if rows.references is None else set(rows.references.line.tolist())
     out = io.StringIO()
     writer = csv.writer(out, delimiter=";" if table.decimal == "," else ",")
     writer.writerow([*table.columns, *header, "outside"])
     for line, cells in zip(table.line, table.cells, strict=True):
         i = row_of.get(int(line))
         if i is None:
-            writer.writerow([*cells, *[""] * len(header), "beam lost"])
+            why = "fixed point" if int(line) in fixed else "beam lost"
+            writer.writerow([*cells, *[""] * len(header), why])
             continue
         told = [f"{v:.5f}".replace(".", table.decimal) for v in numbers[i]]
         writer.writerow([*cells, *told, "; ".join(predicted.why(i))])

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -34,9 +34,10 @@ from postproc.calibration.diagnosis.trace import (
 )
 from postproc.calibration.directions import mend_directions
 from postproc.calibration.measurements import Measurements
+from postproc.calibration.references import ruled_out
 from postproc.calibration.regression import Fit, fit_effects
 from postproc.calibration.report import report_directions, weighed_down
-from postproc.calibration.selection import model_of
+from postproc.calibration.selection import model_of, told_apart
 from postproc.model.combination import Combination
 from postproc.model.kinematics import Batch
 from postproc.model.model import Model
@@ -190,20 +191,24 @@ def diagnose(
         ModelError: A model of another arm.
     """
     base = refit(survey, arm, model, tracker, setup)
-    traced, told = trace(base, seed, progress), survey.states.direction
+    without, sides = ruled_out(survey.motion), survey.states.direction
+    traced = trace(base, seed, progress, without)
     if not survey.inferred.all():
-        traced = _with_mended_directions(traced, seed, progress)
+        traced = _with_mended_directions(traced, seed, progress, without)
+    search = traced.search
+    settled = told_apart(search.fit, survey.motion)
+    traced = replace(traced, search=replace(search, fit=settled))
     given = None
     if model.data_sha256 != survey.sha256:
         given = survey.position - base.batch.walk.tcp - model.error(arm, survey.states)
-    held_out = hold_out(traced.search, told, seed, progress, given)
+    held_out = hold_out(traced.search, sides, seed, progress, given)
     diagnosis = _conclude(survey, traced, held_out, tracker, seed)
     extended = _extended(model, survey, traced.search, diagnosis)
     return Extension(diagnosis, extended, traced.search, held_out)
 
 
 def _with_mended_directions(
-    traced: Investigation, seed: int, progress: Progress
+    traced: Investigation, seed: int, progress: Progress, without: Collection[str]
 ) -> Investigation:
     """Search again with wrong directions the other way, where there are any.
 
@@ -218,7 +223,7 @@ def _with_mended_directions(
     batch, effects = Batch(base.batch.arm, states), base.combination.effects
     progress("directions mended: again", 0.0)
     again = fit_effects(batch, position, effects, base.noise.origin, start=base)
-    return trace(again, seed, progress)
+    return trace(again, seed, progress, without)
 
 
 def _conclude(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import groupby
@@ -242,12 +242,19 @@ class Library:
     shelves: tuple[Shelf, ...]
 
     @classmethod
-    def of(cls, fit: Fit) -> Library:
-        """List all candidates that a fit's rows can show."""
+    def of(cls, fit: Fit, without: Collection[str] = ()) -> Library:
+        """List all candidates that a fit's rows can show.
+
+        Args:
+            fit: The fit.
+            without: Names of effects that are known not to be there.
+        """
         at = fit.combination.at(fit.batch, fit.values)
+        every = candidates(at, fit.noise.origin)
+        tried = [c for c in every if c.family.effect not in without]
         shelves = [
             Shelf(joint, alike[first : first + step], None)
-            for joint, alike in by_joint_and_width(candidates(at, fit.noise.origin))
+            for joint, alike in by_joint_and_width(tried)
             for step in [max(1, CHUNK // numbers(joint, alike[:1], len(at)))]
             for first in range(0, len(alike), step)
         ]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
 
 import numpy as np
@@ -118,10 +119,19 @@ class Investigation:
         return "unexplained" if nameless else "effect"
 
 
-def trace(base: Fit, seed: int, progress: Progress = silent) -> Investigation:
-    """Search a fit's rows for what it lacks, and judge what was found."""
+def trace(
+    base: Fit, seed: int, progress: Progress = silent, without: Collection[str] = ()
+) -> Investigation:
+    """Search a fit's rows for what it lacks, and judge what was found.
+
+    Args:
+        base: The fit.
+        seed: Of the bootstrap.
+        progress: Told what is being done.
+        without: Names of effects that are known not to be there.
+    """
     progress("candidates", 0.0)
-    library = Library.of(base)
+    library = Library.of(base, without)
     progress("threshold of the whole library", 0.05)
     null = bootstrap(Projection.of(base), library, seed)
     found = investigate(base, library, null, progress)

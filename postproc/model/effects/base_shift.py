@@ -18,9 +18,13 @@ AXES = "xyz"
 
 def rigid_columns(batch: Batch) -> Floats:
     """Differentiate the TCP by a shift and a turn of the base frame, (n, 3, 6)."""
-    n, tcp = len(batch), batch.walk.tcp
-    moved = [np.tile(np.eye(3)[k], (n, 1)) for k in range(3)]
-    moved += [np.cross(np.eye(3)[k], tcp) for k in range(3)]
+    return rigid_motions(batch.walk.tcp)
+
+
+def rigid_motions(points: Floats) -> Floats:
+    """Differentiate points (n, 3) by a shift, and a turn about zero, (n, 3, 6)."""
+    moved = [np.tile(np.eye(3)[k], (len(points), 1)) for k in range(3)]
+    moved += [np.cross(np.eye(3)[k], points) for k in range(3)]
     return np.stack(moved, axis=2)
 
 

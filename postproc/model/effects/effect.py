@@ -88,6 +88,11 @@ class Effect(ABC):
         return varies_enough(states, cls.driven_by)
 
     @classmethod
+    def may_show_alone(cls, states: States) -> bool:
+        """Tell the same where the tracker is known to stand still."""
+        return cls.may_show(states)
+
+    @classmethod
     def candidates(cls, batch: Batch) -> list[Candidate]:
         """List what a search may try of it, a grid over what is not linear.
 
@@ -132,6 +137,15 @@ class Effect(ABC):
 
     def beside(self, others: Sequence[Effect]) -> Effect:
         """Return it as it is fitted beside others, which may hold a part of it."""
+        return self
+
+    def told_apart(self, told: bool, batch: Batch) -> Effect:
+        """Return it as it counts by what is known of the tracker's own drift.
+
+        Args:
+            told: Whether readings of fixed points say that it is not the tracker's.
+            batch: The surveyed states.
+        """
         return self
 
     def belongs_to(self) -> Origin:

@@ -28,6 +28,10 @@ UNSURE = 0.7  # share by which a length differs from the common growth
 SHORT = 1e-3  # [m] what has no length does not grow
 SOON = 1200.0  # [s] in which no arm warms up enough to show
 WARM_UPS = (0.1, 0.2, 0.4, 0.8)  # of the campaign's length: time constants tried
+DOUBT = (
+    ": it may be tracker_drift, so nothing of it is compensated. Rows on fixed points "
+    "(column reference) would tell"
+)
 
 
 @dataclass(frozen=True)
@@ -37,11 +41,14 @@ class Thermal(Effect):
     Attributes:
         lengths: Names a1 .. d6 of the D-H lengths that grow.
         form: "temperature": growth alpha * (T - reference). "time": growth
-            g * (1 - exp(-(t - start) / time_constant)) - g, 0 when the arm is warm.
+            g * (level - exp(-(t - start) / time_constant)).
         reference: [deg C].
         time_constant: [s], or rows.
         start: When the arm was cold [s], or the row.
         clock: What t is: "order" where no time was recorded.
+        told: Whether readings of fixed points say that it is not the tracker's drift.
+        level: Share of the warm-up that is still to come in the state that predictions
+            are for: 0 is the warm arm.
     """
 
     name: ClassVar[str] = "thermal"
@@ -54,6 +61,8 @@ class Thermal(Effect):
     time_constant: float = 3600.0
     start: float = 0.0
     clock: Literal["time", "order"] = "time"
+    told: bool = False
+    level: float = 0.0
 
     @classmethod
     def may_show(cls, states: States) -> bool:
@@ -61,6 +70,11 @@ class Thermal(Effect):
         if not np.isnan(states.temperature).all():
             return varies_enough(states, cls.driven_by)
         return varies(states.time) and float(np.ptp(states.time)) > SOON
+
+    @classmethod
+    def may_show_alone(cls, states: States) -> bool:
+        """Tell it of shorter times, too: what passes with them is the arm's."""
+        return bool(cls.may_show(states) or np.isnan(states.temperature).all())
 
     @classmethod
     def propose(cls, arm: Arm, states: States) -> Self:
@@ -108,16 +122,36 @@ class Thermal(Effect):
         unit = "s" if self.clock == "time" else "rows"
         return {"time_constant": (float(self.time_constant), unit)}
 
+    def told_apart(self, told: bool, batch: Batch) -> Effect:
+        """Refer to the end of the survey where it is the arm's, else to its mean.
+
+        Nothing was measured of a warmer arm than at the end. What may as well be the
+        tracker's moves no prediction away from the mean of the rows, which is where
+        they are without it.
+        """
+        if self.form == "temperature":
+            return self
+        warmth = replace(self, level=0.0).warmth(batch)
+        level = -float(warmth.max() if told else warmth.mean())
+        return replace(self, told=told, level=level)
+
     def belongs_to(self) -> Origin:
         """Say that it is of the state: the cell declares the temperature.
 
         A warm-up that only the order of rows tells is the survey's: programs run warm.
+        One in time may be the tracker's drift where no fixed point tells.
         """
-        return "setup" if self.form == "time" and self.clock == "order" else "state"
+        if self.form == "temperature" or (self.told and self.clock == "time"):
+            return "state"
+        return "setup"
 
     def refers_to(self) -> str:
-        """Name the end of a warm-up in time."""
-        return "the warm arm" if self.form == "time" else ""
+        """Name the state between cold and warm of a warm-up in time."""
+        if self.form == "temperature":
+            return ""
+        if self.told:
+            return "the arm as warm as at the end"
+        return ("the warm arm" if self.level == 0.0 else "the survey's mean") + DOUBT
 
     def requires(self) -> tuple[str, ...]:
         """Need the temperature; a warm-up of unknown time is over."""
@@ -142,7 +176,7 @@ class Thermal(Effect):
             return np.nan_to_num(batch.states.temperature - self.reference)
         passed: Floats = getattr(batch.states, self.clock)
         since = np.maximum(passed - self.start, 0.0)
-        warm = -np.exp(-since / self.time_constant)
+        warm = self.level - np.exp(-since / self.time_constant)
         return np.nan_to_num(warm)
 
     def columns(self, batch: Batch) -> Floats:

@@ -85,15 +85,20 @@ class TrackerDrift(Effect):
 
     def columns(self, batch: Batch) -> Floats:
         """Differentiate the TCP position, (n, 3, p)."""
-        return self._in_time(batch, rigid_columns(batch))
+        return self.in_time(getattr(batch.states, self.clock), rigid_columns(batch))
 
     def rotation_columns(self, batch: Batch) -> Floats:
         """Differentiate the tool's rotation, (n, 3, p)."""
-        return self._in_time(batch, rigid_rotations(batch))
+        return self.in_time(getattr(batch.states, self.clock), rigid_rotations(batch))
 
-    def _in_time(self, batch: Batch, moved: Floats) -> Floats:
-        """Multiply six motions (n, 3, 6) by every term, (n, 3, p)."""
-        u = (getattr(batch.states, self.clock) - self.start) / self.duration
+    def in_time(self, passed: Floats, moved: Floats) -> Floats:
+        """Multiply six motions (n, 3, 6) by every term, (n, 3, p).
+
+        Args:
+            passed: What the clock shows, (n,) [s] or rows.
+            moved: The motions.
+        """
+        u = (passed - self.start) / self.duration
         u = np.clip(np.nan_to_num(u), 0.0, 1.0)
         bow = 4.0 * u * (1.0 - u)
         terms = (u, bow, bow * (1.0 - 2.0 * u) * 1.5)

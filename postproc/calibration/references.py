@@ -1,0 +1,357 @@
+"""Fixed points that the tracker read in between: what moves there is the tracker's."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from postproc.arrays import Bools, Floats
+from postproc.calibration.evidence import Normal, maximise
+from postproc.calibration.tables import TextTable
+from postproc.exceptions import MeasurementError
+from postproc.model.effects.base_shift import rigid_motions
+from postproc.model.effects.tracker_drift import TrackerDrift
+from postproc.model.noise import TRACKER_FIXED
+from postproc.robot.pose import MM
+
+# Readings of fixed points, as files hold them.
+
+REFERENCE = "reference"
+NOT, UNNAMED = ("", "0", "0.0", "false"), ("1", "1.0", "true")
+POSITION = ("x_mm", "y_mm", "z_mm")
+ONE_POINT = 5e-3  # [m] readings that lie further apart are of several points
+
+
+@dataclass(frozen=True, eq=False)
+class ReferenceRows:
+    """Readings of fixed points (monuments), in the frame of the survey's positions.
+
+    Attributes:
+        path: The file (the first of several).
+        name: Monument of every reading, (m,).
+        position: (m, 3) [m].
+        time: [s], NaN where it was not recorded, (m,).
+        order: Place among the survey's rows, (m,).
+        line: 1-based line, (m,).
+    """
+
+    path: Path
+    name: tuple[str, ...]
+    position: Floats
+    time: Floats
+    order: Floats
+    line: NDArray[np.int64]
+
+    def __getitem__(self, rows: Bools) -> ReferenceRows:
+        """Return some of the readings."""
+        return ReferenceRows(
+            self.path,
+            tuple(n for n, kept in zip(self.name, rows, strict=True) if kept),
+            self.position[rows], self.time[rows], self.order[rows], self.line[rows],
+        )  # fmt: skip
+
+    @property
+    def which(self) -> NDArray[np.int64]:
+        """Number of every reading's monument, (m,)."""
+        return np.unique(np.array(self.name), return_inverse=True)[1]
+
+
+def is_reference(table: TextTable) -> Bools:
+    """Tell which rows of a table are readings of a fixed point, (n,)."""
+    if not table.has(REFERENCE):
+        return np.zeros(len(table), dtype=bool)
+    return np.array([t.lower() not in NOT for t in table.text(REFERENCE)], dtype=bool)
+
+
+def split_references(table: TextTable) -> tuple[TextTable, ReferenceRows | None]:
+    """Part the rows of the arm from the readings of fixed points.
+
+    Raises:
+        MeasurementError: A reading without coordinates, or nothing but such readings.
+    """
+    fixed = is_reference(table)
+    if not fixed.any():
+        return table, None
+    if fixed.all():
+        cure = "Put the rows of the arm into the same file"
+        raise MeasurementError(table.path, "has rows on fixed points only", cure)
+    some, arm = _rows(table, fixed), _rows(table, ~fixed)
+    some.require(*POSITION)
+    _require_positions(some)
+    names = [t.lower() for t in some.text(REFERENCE)]
+    unknown = np.full(len(some), np.nan)
+    time = some.numbers("time_s", empty=True) if some.has("time_s") else unknown
+    position = some.block(POSITION) * MM
+    rows = ReferenceRows(
+        table.path,
+        tuple("1" if n in UNNAMED else n for n in names),
+        position, time, np.cumsum(~fixed, dtype=float)[fixed] - 0.5, some.line,
+    )  # fmt: skip
+    return arm, rows
+
+
+def _rows(table: TextTable, which: Bools) -> TextTable:
+    """Take some rows of a table."""
+    return replace(table, cells=table.cells[which], line=table.line[which])
+
+
+def _require_positions(table: TextTable) -> None:
+    """Refuse a reading of a fixed point that holds no place, or a lost beam.
+
+    Raises:
+        MeasurementError: Naming its line.
+    """
+    for column in POSITION:
+        empty = np.isnan(table.numbers(column, empty=True))
+        if empty.any():
+            raise MeasurementError(
+                table.path,
+                f"a row on a fixed point has no {column}",
+                "Fill it in or remove the row",
+                line=int(table.line[np.argmax(empty)]),
+            )
+
+
+def join_references(
+    parts: Sequence[tuple[ReferenceRows | None, int]],
+) -> ReferenceRows | None:
+    """Put the readings of several files one after the other.
+
+    Args:
+        parts: Readings and number of the arm's rows of every file.
+    """
+    found, before = [], 0
+    for rows, count in parts:
+        if rows is not None:
+            found.append(replace(rows, order=rows.order + before))
+        before += count
+    if not found:
+        return None
+    return ReferenceRows(
+        found[0].path,
+        tuple(n for rows in found for n in rows.name),
+        np.concatenate([rows.position for rows in found]),
+        np.concatenate([rows.time for rows in found]),
+        np.concatenate([rows.order for rows in found]),
+        np.concatenate([rows.line for rows in found]),
+    )
+
+
+def check_references(rows: ReferenceRows) -> None:
+    """Refuse readings that tell nothing of a drift.
+
+    Raises:
+        MeasurementError: A point that was read once, or whose readings lie apart.
+    """
+    for k in np.unique(rows.which):
+        own = np.flatnonzero(rows.which == k)
+        name, line = rows.name[own[0]], int(rows.line[own[0]])
+        if len(own) == 1:
+            raise MeasurementError(
+                rows.path,
+                f"fixed point {name!r} was read once, which tells of no drift",
+                "Read it all along the survey, or remove the row",
+                line=line,
+            )
+        away = rows.position[own] - rows.position[own[0]]
+        far = np.linalg.norm(away, axis=1)
+        if far.max() > ONE_POINT:
+            raise MeasurementError(
+                rows.path,
+                f"fixed point {name!r} is {far.max() / MM:.1f} mm from where it was "
+                f"in line {line}",
+                "Give every fixed point a name of its own in column reference",
+                line=int(rows.line[own[np.argmax(far)]]),
+            )
+
+
+# What they say of the tracker.
+
+NATS = 3.0  # that a drift must be worth: 20 to 1
+COVERED = 0.8  # of the survey that the readings must span
+SURE = 3.0  # standard errors that what counts as the arm's must stand above
+APART = 0.1  # [m] that fixed points lie apart which show a turn
+PASSES = 20
+
+
+@dataclass(frozen=True, eq=False)
+class TrackerMotion:
+    """What readings of fixed points say of the tracker's drift.
+
+    Attributes:
+        drift: The form of the drift.
+        center: Middle of the fixed points, (3,) [m]; turns are about it.
+        values: Parameters of the drift, all 0 where none shows, (p,).
+        nats: Log evidence of a drift over that of none.
+        unsure: Standard error of a steady drift over the whole survey [m].
+        covered: Share of the survey that the readings span.
+        points: Number of fixed points.
+        rank: Directions that they span: 0, 1, or 2, which tell all turns.
+        readings: Number of readings.
+    """
+
+    drift: TrackerDrift
+    center: Floats
+    values: Floats
+    nats: float
+    unsure: float
+    covered: float
+    points: int
+    rank: int
+    readings: int
+
+    @property
+    def drifts(self) -> bool:
+        """Whether the tracker moved."""
+        return self.nats >= NATS
+
+    @property
+    def stands(self) -> bool:
+        """Whether the tracker was watched over the survey and did not move."""
+        return self.covered >= COVERED and not self.drifts
+
+    def moved(self, passed: Floats, position: Floats) -> Floats:
+        """Return what the drift adds to readings at positions (n, 3), (n, 3) [m]."""
+        motions = rigid_motions(position - self.center)
+        return np.asarray(self.drift.in_time(passed, motions) @ self.values)
+
+    def leaves(self, peak: float) -> bool:
+        """Tell whether what passes with time by a peak [m] is not the tracker's.
+
+        A tracker that moves, and whose turns nobody sees, may have turned.
+        """
+        turns_seen = self.covered >= COVERED and self.rank == 2
+        return bool((self.stands or turns_seen) and peak > SURE * self.unsure)
+
+    @property
+    def peak_mm(self) -> float:
+        """How far the middle of the points seemed to move [mm]."""
+        return float(np.linalg.norm(self._at_points, axis=1).max()) / MM
+
+    @property
+    def statistics(self) -> dict[str, float]:
+        """Figures for a model file."""
+        return {
+            "reference_readings": float(self.readings),
+            "reference_points": float(self.points),
+            "reference_drift_mm": self.peak_mm if self.drifts else 0.0,
+            "reference_unsure_mm": self.unsure / MM,
+        }
+
+    def tell(self) -> tuple[str, ...]:
+        """Say in words what was found."""
+        found = f"moved by up to {self.peak_mm:.4f} mm, taken out of the rows"
+        if not self.drifts:
+            found = f"did not move ({self.unsure / MM:.4f} mm could be told per axis)"
+        told = [
+            f"{self.readings} readings of {self.points} fixed points: the tracker "
+            + found
+        ]
+        if self.rank < 2:
+            which = "turns" if self.rank == 0 else "turn about their line"
+            cure = "three points that lie apart tell all motions"
+            told.append(f"the tracker's {which} cannot be told from them: {cure}")
+        if self.covered < COVERED:
+            told.append(
+                f"the readings of fixed points span {self.covered:.0%} of the survey: "
+                "what the tracker did besides is not known"
+            )
+        return tuple(told)
+
+    @property
+    def _at_points(self) -> Floats:
+        """Return the drift at the middle of the points all along, (k, 3) [m]."""
+        passed = self.drift.start + self.drift.duration * np.linspace(0, 1, 21)
+        return self.moved(passed, np.tile(self.center, (21, 1)))
+
+
+def ruled_out(motion: TrackerMotion | None) -> tuple[str, ...]:
+    """Name the effects that readings of fixed points, if there are any, rule out."""
+    return (TrackerDrift.name,) if motion is not None and motion.stands else ()
+
+
+def tracker_motion(rows: ReferenceRows, time: Floats, order: Floats) -> TrackerMotion:
+    """Fit the tracker's drift to readings of fixed points.
+
+    Every point stands where the mean of its readings is; what its readings do in time
+    is a rigid motion of the tracker's frame, with prior scale and noise by marginal
+    likelihood, and none where the evidence does not call for it.
+
+    Args:
+        rows: The readings.
+        time: Of the arm's rows, (n,) [s], NaN where not recorded.
+        order: Of the arm's rows, (n,).
+    """
+    check_references(rows)
+    timed = not (np.isnan(time).any() or np.isnan(rows.time).any())
+    own, other = (rows.time, time) if timed else (rows.order, order)
+    start = float(min(own.min(), other.min()))
+    span = max(float(max(own.max(), other.max())) - start, 1e-9)
+    drift = TrackerDrift(start, span, "time" if timed else "order")
+    places = np.stack([_of_one(rows, k).mean(axis=0) for k in np.unique(rows.which)])
+    center = places.mean(axis=0)
+    columns = drift.in_time(own, rigid_motions(places[rows.which] - center))
+    X = _about_mean(columns, rows.which)
+    y = _about_mean(rows.position, rows.which).reshape(-1)
+    free = 3.0 * (len(own) - len(places))
+    scales = np.array([p.scale for p in drift.parameters()])
+    values, nats, sigma = _fit(X.reshape(len(y), -1) * scales, y, free)
+    spread = _about_mean((own - start)[:, None] / span, rows.which)
+    steady = float(np.sqrt((spread**2).sum()))
+    covers = float(np.ptp(own)) / max(float(np.ptp(other)), 1e-9)
+    size = np.linalg.svd(places - center, compute_uv=False)
+    return TrackerMotion(
+        drift, center, values * scales if nats >= NATS else 0.0 * values, nats,
+        sigma / max(steady, 1e-9), covers, len(places), int((size > APART).sum()),
+        len(own),
+    )  # fmt: skip
+
+
+def _of_one(rows: ReferenceRows, number: int) -> Floats:
+    """Take the readings of one fixed point, (m, 3) [m]."""
+    return np.asarray(rows.position[rows.which == number])
+
+
+def _about_mean(values: Floats, which: NDArray[np.int64]) -> Floats:
+    """Take from values (m, ..) the mean of each fixed point's."""
+    out = np.array(values, dtype=float)
+    for k in np.unique(which):
+        out[which == k] -= out[which == k].mean(axis=0)
+    return out
+
+
+def _fit(X: Floats, y: Floats, free: float) -> tuple[Floats, float, float]:
+    """Fit scaled columns (m, p) to readings (m,), noise and prior scale unknown.
+
+    Returns:
+        Values (p,), nats over those of no column, noise [m].
+    """
+    group, scale = np.zeros(X.shape[1], dtype=np.int64), np.zeros(1)
+    sigma = still = _noise(float(y @ y), free)
+    for _ in range(PASSES):
+        found = maximise(_normal(X, y, free, sigma), group, scale)
+        left = y - X @ found.mean
+        before, scale = sigma, found.log_scale
+        sigma = _noise(float(left @ left), free - found.effective)
+        if abs(np.log(sigma / before)) < 1e-3:
+            break
+    found = maximise(_normal(X, y, free, sigma), group, scale)
+    alone = _normal(X, y, free, still)
+    none = alone.log_noise + alone.square + free * np.log(2 * np.pi)
+    return found.mean, found.log_evidence + 0.5 * none, sigma
+
+
+def _normal(X: Floats, y: Floats, free: float, sigma: float) -> Normal:
+    """Write the regression as its normal sums."""
+    v = sigma**2
+    noise = free * float(np.log(v))
+    return Normal(X.T @ X / v, X.T @ y / v, float(y @ y) / v, noise, free)
+
+
+def _noise(square: float, free: float) -> float:
+    """Estimate the noise, no less than a tracker's data sheet says, per axis [m]."""
+    return max(float(np.sqrt(square / max(free, 1.0))), TRACKER_FIXED)
