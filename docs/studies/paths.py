@@ -51,15 +51,13 @@ PROGRAMS: dict[str, tuple[str, ...]] = {
     "job": (),
     "plain": (),
     "points": ("--path-mm", "0.1"),
-    "stops": ("--path-mm", "0.1", "--take-up"),
     "measured": ("--path-mm", "0.1", "--take-up"),
 }
 STATES = {
     "job": "as written",
     "plain": "compensated",
     "points": "with points",
-    "stops": "with points and stops",
-    "measured": "a path being known",
+    "measured": "with points and stops",
 }
 RUN = "from postproc.cli import main; main()"
 START = (

@@ -82,7 +82,8 @@ TakeUpOption = Annotated[
     bool,
     typer.Option(
         "--take-up",
-        help="With --path-mm: stop once more where a move begins, to take up play.",
+        help="With --path-mm: stop once more where a move begins, to take up play, "
+        "where a measured path confirms the flanks (diagnose --path).",
     ),
 ]
 ApproachOption = Annotated[

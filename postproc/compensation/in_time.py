@@ -29,6 +29,7 @@ BEYOND_LIMIT = "beyond-limit"
 SLOWED = "slowed-down"  # codes of findings
 OTHER_SIDE = "side-in-time"
 PATH_POINTS = "path-points"
+NOT_TAKEN_UP = "not-taken-up"
 PATH_LEFT = "path-left"
 APPROACHED = "approached-anew"
 MOST_SLOWER = 0.03  # of the cycle time
@@ -144,22 +145,20 @@ class InTime:
 
     def _points(self, visits: Visits, told: Insertions) -> Iterator[Diagnostic]:
         """Say what was put on the ways, and which moves still leave their paths."""
-        if told.points:
-            first = min(told.points)
-            text = (
-                f"{told.count} points are put on the ways of {len(told.points)} moves; "
-                f"{verified(self.in_motion)}"
-            )
-            place = visits.files[visits.file[first]], int(visits.line[first])
-            yield Diagnostic(*place, PATH_POINTS, text)
-        if told.approaches:
-            first = min(told.approaches)
-            text = (
-                f"{len(told.approaches)} targets are approached anew, from a stop on "
-                "the way already travelled"
-            )
-            place = visits.files[visits.file[first]], int(visits.line[first])
-            yield Diagnostic(*place, APPROACHED, text)
+        said = (
+            (PATH_POINTS, told.points, f"{told.count} points are put on the ways of "
+             f"{len(told.points)} moves; {verified(self.in_motion)}"),
+            (NOT_TAKEN_UP, told.unconfirmed, "play is not taken up before "
+             f"{len(told.unconfirmed)} moves: no measured path confirms how joints "
+             "change their flanks there (diagnose --path)"),
+            (APPROACHED, told.approaches, f"{len(told.approaches)} targets are "
+             "approached anew, from a stop on the way already travelled"),
+        )  # fmt: skip
+        for code, moves, text in said:
+            if moves:
+                first = min(moves)
+                place = visits.files[visits.file[first]], int(visits.line[first])
+                yield Diagnostic(*place, code, text)
         for k in self._too_far.tolist():
             v = int(self.paths.visit[k])
             far = self.paths.after.sizes[k] / MM

@@ -124,6 +124,7 @@ class _PathWork:
         points: What is on their ways.
         stops: Moves whose first point is a stop, where play is taken up.
         idle: Moves that may have one, and how.
+        unconfirmed: Moves that may not, as no measured path confirms their flanks.
         tried: How far such a move began off, and where it stopped, try by try.
         chords: Pieces of arcs that are chords whatever they bend.
         approaches: Stops from which targets are approached anew, by visit, (w,) each.
@@ -140,6 +141,7 @@ class _PathWork:
     points: dict[int, tuple[float, ...]] = field(default_factory=dict)
     stops: set[int] = field(default_factory=set)
     idle: dict[int, TakeUp] = field(default_factory=dict)
+    unconfirmed: set[int] = field(default_factory=set)
     tried: dict[int, list[tuple[float, float]]] = field(default_factory=dict)
     chords: set[Cut] = field(default_factory=set)
     approaches: dict[int, Floats] = field(default_factory=dict)
@@ -210,7 +212,19 @@ class _PathWork:
                 moving = reading.visits.fly[before] or reading.visits.via[before]
                 still = self.setting.options.take_up and not moving
                 if still and splitter.stops(file, int(lines[v])):
-                    self.idle[v] = taking_up(v)
+                    self._may_stop(v, taking_up(v))
+
+    def _may_stop(self, v: int, taken: TakeUp) -> None:
+        """Let the arm stop where a move begins, if flanks change there for certain.
+
+        What gives way before it carries, or lies where weight pushes it, would be led
+        off by what a sharp gap asks for, and nothing behind the stop mends that.
+        """
+        found = self.setting.model.in_motion
+        if all(found.get(str(joint)) == CONFIRMED for joint in taken.crossing):
+            self.idle[v] = taken
+        else:
+            self.unconfirmed.add(v)
 
     def _otherwise_in_motion(self, k: int) -> str:
         """Name a joint that changes its flank on a path, and in motion not as at stops.
@@ -641,6 +655,7 @@ class _PathWork:
             self._sizes(self.first.paths),
             self._otherwise(told.paths) if self.latest is not self.source else {},
             self._approached(told),
+            frozenset(self.unconfirmed),
         )
         in_time = replace(
             told,

@@ -25,6 +25,8 @@ class Insertions:
         tolerance: Asked for [m]; infinite where nobody did.
         approaches: Share of the way at which targets are approached anew, by visit: to
             a stop, and on to the target.
+        unconfirmed: Moves before which play is not taken up, as no measured path
+            confirms how their flanks change.
     """
 
     own: Ints
@@ -35,6 +37,7 @@ class Insertions:
     without: Mapping[int, float] = field(default_factory=dict)
     otherwise: Mapping[int, float] = field(default_factory=dict)
     approaches: Mapping[int, float] = field(default_factory=dict)
+    unconfirmed: Collection[int] = ()
 
     @property
     def count(self) -> int:

@@ -30,10 +30,12 @@ class TakeUp:
     Attributes:
         side: Where each joint is to lie in its play behind it, (6,) from -1 to 1.
         turn: What the tool turns by in its own frame, (3,) [rad].
+        crossing: Joints whose drives cross their gaps there, from 1.
     """
 
     side: Floats
     turn: Floats
+    crossing: tuple[int, ...]
 
 
 def take_up(cycle: ProgramCycle, setting: Setting, visits: Visits, v: int) -> TakeUp:
@@ -48,11 +50,13 @@ def take_up(cycle: ProgramCycle, setting: Setting, visits: Visits, v: int) -> Ta
     cell = setting.cell
     came, leaves = sides_on_leaving(cycle, cell, v)
     turned = leaves - came
-    side = np.where(np.abs(turned) > CROSSES, np.sign(turned), came)
+    crosses = np.abs(turned) > CROSSES
+    crossing = tuple((np.flatnonzero(crosses) + 1).tolist())
+    side = np.where(crosses, np.sign(turned), came)
     law = visits.orientation_law[v]
     known = law in (OrientationLaw.UNSET, OrientationLaw.ONE_AXIS)
     if setting.options.orientation or visits.wrist_joint[v] or not known:
-        return TakeUp(side, np.zeros(3))
+        return TakeUp(side, np.zeros(3), crossing)
     width = np.where(setting.gap > 0.0, WIDTH_IN_PLAYS * cell.arm.play, 0.0)
     q = cycle.path.q[int(cycle.ways[1][v])]
     crossed = np.linalg.solve(cell.arm.coupling, (side - came) / 2 * width)
@@ -60,4 +64,5 @@ def take_up(cycle: ProgramCycle, setting: Setting, visits: Visits, v: int) -> Ta
         cell.arm.flange(angles[None])[0, :3, :3] @ cycle.targets.tool[v, :3, :3]
         for angles in (q, q + crossed)
     )
-    return TakeUp(side, rotation_vector((before.T @ behind)[None])[0])
+    turn = rotation_vector((before.T @ behind)[None])[0]
+    return TakeUp(side, turn, crossing)

@@ -45,8 +45,10 @@ def shop(tmp_path_factory: pytest.TempPathFactory) -> Path:
     done("survey", "--cell", CELL, "--poses", 250, "--seed", 9, "-o", survey)
     done("simulate", survey, "--cell", CELL, "--seed", SEED, "-o", measured)
     done("fit", measured, "--cell", CELL, "-o", folder / "model.json")
+    known(folder, "confirmed")
+    stops = ("--path-mm", TOLERANCE, "--take-up", "--model", folder / "confirmed.json")
     for name, more in (("plain", ()), ("points", ("--path-mm", TOLERANCE)),
-                       ("stops", ("--path-mm", TOLERANCE, "--take-up"))):  # fmt: skip
+                       ("stops", stops)):  # fmt: skip
         compensated(folder, "job.pdl", name, *more)
         done("simulate", folder / f"{name}.pdl", "--cell", CELL, "--seed", SEED,
              "--wanted", folder / "job.pdl", "--path",
@@ -59,6 +61,13 @@ def compensated(folder: Path, source: str, name: str, *more: object) -> dict[str
          folder / "model.json", "-o", folder / f"{name}.pdl",
          "--report", folder / f"{name}.json", *more)  # fmt: skip
     return told(folder, name)
+
+
+def known(folder: Path, verdict: str) -> None:
+    """Write the model as after a measured path that says so of every joint."""
+    model = load_model(folder / "model.json")
+    said = {str(joint): verdict for joint in range(1, 7)}
+    replace(model, history=({"in_motion": said},)).save(folder / f"{verdict}.json")
 
 
 def told(folder: Path, name: str) -> dict[str, Any]:
@@ -96,17 +105,24 @@ def test_a_stop_takes_up_all_play_at_once(shop: Path) -> None:
 
 
 def test_flanks_that_a_measured_path_refuted_get_no_points(shop: Path) -> None:
-    model = load_model(shop / "model.json")
-    refuted = {str(joint): "refuted" for joint in range(1, 7)}
-    known = replace(model, history=({"in_motion": refuted},))
-    known.save(shop / "known.json")
-    done("compensate", shop / "job.pdl", "--cell", CELL, "--model",
-         shop / "known.json", "-o", shop / "known.pdl", "--report",
-         shop / "known.report.json", "--path-mm", TOLERANCE)  # fmt: skip
-    paths = lines_of(told(shop, "known.report"))
+    known(shop, "refuted")
+    more = ("--path-mm", TOLERANCE, "--model", shop / "refuted.json")
+    paths = lines_of(compensated(shop, "job.pdl", "known", *more))
     why = [p["not_split"] for p in paths if p["max_mm"]["after"] > TOLERANCE]
     assert sum("which in motion is refuted" in (text or "") for text in why) > 5
     assert sum(p["inserted"] for p in paths) < 5
+
+
+def test_play_is_taken_up_only_where_a_measured_path_confirms_flanks(
+    shop: Path,
+) -> None:
+    asked = ("--path-mm", TOLERANCE, "--take-up")
+    report = compensated(shop, "job.pdl", "unconfirmed", *asked)
+    assert (shop / "unconfirmed.pdl").read_bytes() == (shop / "points.pdl").read_bytes()
+    (found,) = [d for d in report["diagnostics"] if d["code"] == "not-taken-up"]
+    assert "diagnose --path" in found["message"]
+    codes = {d["code"] for d in told(shop, "stops")["diagnostics"]}
+    assert "not-taken-up" not in codes
 
 
 def test_the_virtual_arm_keeps_closer_to_its_arcs(shop: Path) -> None:
