@@ -315,6 +315,8 @@ class _PathWork:
             joined = False
             for v, points in self._joined().items():
                 joined |= points != self.points[v]
+                if points[:1] != self.points[v][:1]:
+                    self.stops.discard(v)  # what comes first now is passed
                 self.points[v] = points
             self.points = {v: points for v, points in self.points.items() if points}
             if not joined:
@@ -525,6 +527,7 @@ class _PathWork:
     def _take_back(self, v: int) -> None:
         """Take back the points of a move; an arc that is cut no more stays whole."""
         own = self.points.pop(v, ())
+        self.stops.discard(v)
         self.approaches.pop(v, None)
         visits = self.source.reading.visits
         if not is_arc(visits, v):

@@ -26,7 +26,7 @@ from tests.written import program
 CELL = load_cell(Path(__file__).parents[2] / "programs/cell.toml")
 NOTHING = np.zeros(0, dtype=np.int64)
 TURNED = TakeUp(
-    np.array([1.0, -1.0, 0.5, 0.0, 1.0, -1.0]), np.array([2e-4, 0.0, -1e-4])
+    np.array([1.0, -1.0, 0.5, 0.0, 1.0, -1.0]), np.array([2e-4, 0.0, -1e-4]), (1, 2)
 )
 ENDS = (
     (100.0, 200.0, 150.0, 80.0, 160.0, 10.0),
