@@ -11,7 +11,7 @@ from tests.compensation.test_path_accuracy import job
 from tests.conftest import SEED
 from tests.written import cli
 
-EFFECT, PLANTED = "compliance", "compliance@2=0.5"
+EFFECT, PLANTED = "compliance", "compliance@2=0.8"
 
 
 @pytest.fixture(scope="module")

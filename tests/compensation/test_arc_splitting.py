@@ -111,7 +111,7 @@ def test_a_program_with_cut_arcs_is_the_same_without_points(
     points = {VIA: first, **({END: second} if second else {})}
     splitter = language_of("job.pdl").splitter(reading.sources)
     assert splitter is not None
-    found, own = insert(reading, points, (), splitter, CELL)
+    found, own = insert(reading, points, {}, splitter, CELL)
     v, w = reading.visits, found.visits
     assert len(own) == len(v)
     np.testing.assert_array_equal(w.values[own], v.values)  # its numbers stay
@@ -126,7 +126,7 @@ def test_arcs_that_are_cut_lead_where_they_led() -> None:
     splitter = language_of("job.pdl").splitter(reading.sources)
     assert splitter is not None
     points = {VIA: (0.4, 1.0), END: (0.5,)}
-    found, own = insert(reading, points, (), splitter, CELL)
+    found, own = insert(reading, points, {}, splitter, CELL)
     cycles = [run(CELL.arm, plan_visits(r.visits, CELL).targets)
               for r in (reading, found)]  # fmt: skip
     before, after = cycles
