@@ -596,8 +596,9 @@ class _PathWork:
             for share, (half, beside) in zip(
                 self.points.get(v, ()), rounded.get(v, ()), strict=True
             ):
-                near = far[np.abs(way - share * way[-1]) <= half]
-                found[v] = max(found[v], beside + float(near.max(initial=0.0)))
+                there = np.abs(way - share * way[-1]) / half
+                near = far + beside * (1 - there**2)  # bounds chords and parabolas
+                found[v] = max(found[v], float(near[there <= 1].max(initial=0.0)))
         return found
 
     def _rounded(self, told: InTime) -> dict[int, list[tuple[float, float]]]:
