@@ -153,12 +153,11 @@ def study(seed: int, folder: Path, gears: str, programs: list[str]) -> None:
         told = json.loads(report.read_bytes())["path"]
         true = json.loads(run.to_json())["path"]
         for move in ("LINEAR", "CIRCULAR"):
-            if move == "LINEAR" or name in ("job", "plain"):  # arcs get no points
-                own = [path for path in told if path["move"] == move]
-                tell(f"{seed:4d}  {STATES[name]:21}  {move:8}", own, true,
-                     "before" if name == "job" else "after",
-                     compared(paths[name], paths.get("plain", paths[name]), own),
-                )  # fmt: skip
+            own = [path for path in told if path["move"] == move]
+            tell(f"{seed:4d}  {STATES[name]:21}  {move:8}", own, true,
+                 "before" if name == "job" else "after",
+                 compared(paths[name], paths.get("plain", paths[name]), own),
+            )  # fmt: skip
 
 
 def compared(

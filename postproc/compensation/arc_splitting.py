@@ -8,9 +8,10 @@ piece.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from types import MappingProxyType
 
 import numpy as np
 
@@ -23,7 +24,7 @@ from postproc.motion.cycle import ProgramCycle
 from postproc.motion.path import Segments, arcs, circles
 from postproc.motion.targets import Fly
 from postproc.robot.arm import Arm
-from postproc.robot.pose import MM, lengths, rotation_vector
+from postproc.robot.pose import MM, lengths, rotation_from_vector, rotation_vector
 from postproc.robot.trajectory import Motion
 
 FLAT = 1e-5  # [m] sagitta of a piece that is a chord: ten of the digits written
@@ -83,6 +84,8 @@ class CutArc:
         cuts: Shares of either half, ascending; those of the first end with 1.
         via: The visit of the point on its way.
         chords: Which pieces are chords whatever they bend.
+        turns: What the tool turns by at the cuts in its own frame, (k, 3) [rad]; what
+            the source wrote stays.
     """
 
     numbers: Floats
@@ -91,15 +94,25 @@ class CutArc:
     cuts: tuple[Sequence[float], Sequence[float]]
     via: int
     chords: Chords
+    turns: tuple[Floats, Floats]
 
     @classmethod
-    def of(cls, visits: Visits, points: Points, via: int, chords: Chords) -> CutArc:
+    def of(
+        cls,
+        visits: Visits,
+        points: Points,
+        via: int,
+        chords: Chords,
+        turns: Mapping[int, Floats] = MappingProxyType({}),
+    ) -> CutArc:
         """Look at the arc with the point `via` on its way."""
         rows = [int(visits.before[via]), via, via + 1]
         poses = visits.dialect.poses(visits.values[rows])
         halves = arcs(*(poses[k : k + 1] for k in range(3)))
         cuts = points.get(via, ()), points.get(via + 1, ())
-        return cls(visits.values[rows[0]], visits, halves, cuts, via, chords)
+        none = np.zeros((0, 3))
+        turned = turns.get(via, none), turns.get(via + 1, none)
+        return cls(visits.values[rows[0]], visits, halves, cuts, via, chords, turned)
 
     def pieces(self) -> tuple[list[ArcPiece], Floats]:
         """Return the pieces but the last, and the point on that one's way, (w,)."""
@@ -131,8 +144,18 @@ class CutArc:
         pose = part.poses(np.zeros(1, dtype=int), np.array([share]))[0]
         out = self.numbers[None].copy()
         out[0, :3] = pose[:3, 3] / MM
-        turned = pose[:3, :3] @ self.halves[0].rotation[0].T
+        own = rotation_from_vector(self._turn(half, share)[None])[0]
+        turned = pose[:3, :3] @ own @ self.halves[0].rotation[0].T
         return np.asarray(self.visits.dialect.turned(out, turned[None])[0])
+
+    def _turn(self, half: int, share: float) -> Floats:
+        """Return what the tool turns by at a share of a half, (3,) [rad]."""
+        at = [0.0, *self.cuts[half], 1.0]
+        found = np.zeros((len(at), 3))
+        for k, turn in enumerate(self.turns[half]):
+            if at[k + 1] < 1.0:
+                found[k + 1] = turn
+        return np.array([np.interp(share, at, found[:, k]) for k in range(3)])
 
 
 # What pieces of arcs bend, against what their corrections differ by.

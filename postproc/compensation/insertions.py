@@ -20,9 +20,9 @@ from postproc.compensation.equivalence import equivalent
 from postproc.compensation.path_points import Points
 from postproc.compensation.program import Reading, read_program
 from postproc.compensation.rewrite import VerificationError
-from postproc.compensation.taking_up import TakeUp
+from postproc.compensation.taking_up import MeantSides, TakeUp
 from postproc.compensation.windows import SHARED
-from postproc.language.interface import ArcPiece, Splitter
+from postproc.language.interface import Splitter
 from postproc.language.languages import language_of
 from postproc.language.source import Edit, Source, apply, compose
 from postproc.language.visits import Literals, Visits
@@ -39,6 +39,7 @@ def insert(
     cell: Cell,
     chords: Chords = (),
     approaches: Mapping[int, Floats] = MappingProxyType({}),
+    meant: Mapping[int, MeantSides] = MappingProxyType({}),
 ) -> tuple[Reading, Ints]:
     """Put points on the ways of a program.
 
@@ -50,6 +51,7 @@ def insert(
         cell: What holds at program start.
         chords: Pieces of arcs that are chords.
         approaches: Stops from which targets are approached anew, by visit, (w,) each.
+        meant: From which sides points of lines are meant to be passed, by visit.
 
     Returns:
         The program with points, proven to make the same moves otherwise, and those of
@@ -59,7 +61,7 @@ def insert(
         VerificationError: It would make other moves.
         CloneError: A point cannot be written.
     """
-    edits = _edits(reading, points, stops, splitter, cell, chords)
+    edits = _edits(reading, points, stops, splitter, cell, chords, meant)
     lines, visits = lines_in_files(reading, cell), reading.visits
     for visit, numbers in approaches.items():
         config = visits.configs[visits.config[visit]]
@@ -82,7 +84,7 @@ def insert(
     given = reading.given or reading.sources
     with_points = replace(again, cloned=cloned, given=given, missed=reading.missed)
     own = np.flatnonzero(~new)
-    aims = _aims(visits, len(new), own, points, stops)
+    aims = _aims(visits, again.visits.via, own, points, stops, meant)
     told = replace(with_points, diagnostics=reading.diagnostics, aims=aims)
     return told, own
 
@@ -94,6 +96,7 @@ def _edits(
     splitter: Splitter,
     cell: Cell,
     chords: Chords,
+    meant: Mapping[int, MeantSides],
 ) -> list[list[Edit]]:
     """Write the points, file by file."""
     visits, found = reading.visits, defaultdict[int, list[Edit]](list)
@@ -102,18 +105,32 @@ def _edits(
         config = visits.configs[visits.config[visit]]
         file, line = int(visits.file[visit]), int(lines[visit])
         if visits.via[visit]:
-            pieces, via = CutArc.of(visits, points, visit, chords).pieces()
-            if visit in stops:
-                pieces[0] = _turned_piece(visits, pieces[0], stops[visit].turn)
+            turns = {v: _turns(v, points, stops, meant) for v in (visit, visit + 1)}
+            arc = CutArc.of(visits, points, visit, chords, turns)
+            pieces, via = arc.pieces()
             found[file] += splitter.arc(file, line, pieces, via, config, visit in stops)
         elif not is_arc(visits, visit):
             numbers = between(visits, visit, np.array(points[visit]))
-            if visit in stops:
-                numbers[:1] = _turned(visits, numbers[:1], stops[visit].turn)
+            numbers = _turned(visits, numbers, _turns(visit, points, stops, meant))
             found[file].append(
                 splitter.points(file, line, numbers, config, visit in stops)
             )
     return [found[k] for k in range(len(reading.sources))]
+
+
+def _turns(
+    visit: int,
+    points: Points,
+    stops: Mapping[int, TakeUp],
+    meant: Mapping[int, MeantSides],
+) -> Floats:
+    """Return what the tool turns by at the points of a move, (k, 3) [rad]."""
+    found = np.zeros((len(points.get(visit, ())), 3))
+    if visit in meant:
+        found[:] = meant[visit].turn
+    if visit in stops:
+        found[0] = stops[visit].turn
+    return found
 
 
 def lines_in_files(reading: Reading, cell: Cell) -> Ints:
@@ -145,24 +162,26 @@ def between(visits: Visits, visit: int, share: Floats) -> Floats:
 
 
 def _turned(visits: Visits, numbers: Floats, turn: Floats) -> Floats:
-    """Turn the tool at places (k, w) by a rotation vector (3,) of its own [rad]."""
+    """Turn the tool at places (k, w) by rotation vectors (k, 3) of its own [rad]."""
     tool = visits.dialect.poses(numbers)[:, :3, :3]
-    axis = tool @ turn
+    axis = np.einsum("kij,kj->ki", tool, turn)
     return visits.dialect.turned(numbers, rotation_from_vector(axis))
 
 
-def _turned_piece(visits: Visits, piece: ArcPiece, turn: Floats) -> ArcPiece:
-    """Turn the tool at the end of a piece of an arc, unless that is as written."""
-    if piece.end is None:
-        return piece
-    return replace(piece, end=_turned(visits, piece.end[None], turn)[0])
-
-
 def _aims(
-    visits: Visits, m: int, own: Ints, points: Points, stops: Mapping[int, TakeUp]
+    visits: Visits,
+    via: Bools,
+    own: Ints,
+    points: Points,
+    stops: Mapping[int, TakeUp],
+    meant: Mapping[int, MeantSides],
 ) -> Floats:
     """Tell from which sides m visits are meant to be reached, (m, 6), NaN: any."""
-    out = np.full((m, 6), np.nan)
+    out = np.full((len(via), 6), np.nan)
+    for visit, sides in meant.items():
+        rows = np.arange(own[visit - 1] + 1 if visit else 0, own[visit] + 1)
+        ends = rows[~via[rows]][: len(points[visit])]
+        out[ends] = sides.side[: len(ends)]
     for visit, taken in stops.items():
         arc = bool(visits.via[visit])
         first = own[visit - 1] + 1 if arc else own[visit] - len(points[visit])

@@ -69,6 +69,8 @@ class PathAccuracy:
         crossing: Where joints of the compensated program change their flanks, (s, 6).
         otherwise: Distance of the compensated program's path if such a joint had stayed
             on one of its flanks, (s,) [m]; empty where nobody asked.
+        q, side: Joint angles [rad] of the program as it was written, and where each
+            joint lies in its play, (s, 6) each.
     """
 
     visit: Ints
@@ -79,6 +81,8 @@ class PathAccuracy:
     unknown: int
     crossing: Bools
     otherwise: Floats
+    q: Floats
+    side: Floats
 
     def __len__(self) -> int:
         """Return the number of paths."""
@@ -331,6 +335,7 @@ def predict_paths(
         _deviations(runs[0], error, -off, tangent, way),
         _deviations(runs[1], error, moved, tangent, way),
         int((cartesian & ~known).sum()), runs[1].changes(), np.empty(0),
+        pair[0].q, runs[0].side,
     )  # fmt: skip
     if owner is None or not len(rows):
         return found

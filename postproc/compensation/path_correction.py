@@ -38,7 +38,13 @@ from postproc.compensation.path_points import Insertions
 from postproc.compensation.program import Reading
 from postproc.compensation.rewrite import Output
 from postproc.compensation.splitting import hindrances, shortest_pieces, unwritable
-from postproc.compensation.taking_up import TakeUp, take_up
+from postproc.compensation.taking_up import (
+    MeantSides,
+    TakeUp,
+    crossed_at_once,
+    take_up,
+    turned_by_drives,
+)
 from postproc.exceptions import PostprocError
 from postproc.language.interface import Splitter
 from postproc.language.languages import language_of
@@ -48,10 +54,10 @@ from postproc.robot.trajectory import Motion
 ROUNDS = 16  # of points put on the ways
 TAKEN = 2e-5, 1e-4, 3e-4  # [m] from where a move begins: where play is taken up
 AIM = 0.6  # of the tolerance: what points are to reach
-JUDGED = 4  # rounds in which points are taken back
+JUDGED = 8  # rounds in which points are taken back
 UNSURE = 2e-5  # [m] a flank that is less sure is no reason to put points anywhere
 WORSE = 5e-5  # [m] that the path may be worse where a flank is not as predicted
-CONFIRMED = "confirmed"  # verdict of a measured path, see `flanks`
+CONFIRMED, NOT_SURE = "confirmed", "not sure"  # verdicts of a measured path
 MOVED = 5e-6  # [m] that a rounded corner may move
 
 
@@ -221,7 +227,11 @@ class _PathWork:
         off by what a sharp gap asks for, and nothing behind the stop mends that.
         """
         found = self.setting.model.in_motion
-        if all(found.get(str(joint)) == CONFIRMED for joint in taken.crossing):
+        if all(
+            found.get(str(joint)) == CONFIRMED
+            or (found.get(str(joint)) == NOT_SURE and self._step(v, joint) < WORSE)
+            for joint in taken.crossing
+        ):
             self.idle[v] = taken
         else:
             self.unconfirmed.add(v)
@@ -237,9 +247,24 @@ class _PathWork:
         )
         for joint in (changing + 1).tolist():
             said = found.get(str(joint), CONFIRMED)
-            if said != CONFIRMED:
+            if said != CONFIRMED and not self._small(k, said, joint):
                 return f"joint {joint} changes its flank, which in motion is {said}"
         return ""
+
+    def _small(self, k: int, said: str, joint: int) -> bool:
+        """Tell whether a step that nobody could measure is too small to matter."""
+        if said != NOT_SURE:
+            return False
+        v = int(self.paths.visit[k])
+        return self._step(v, joint) < WORSE
+
+    def _step(self, v: int, joint: int) -> float:
+        """Return how far a joint's change of its flank moves the TCP at a visit [m]."""
+        cycle, arm = self.first.after, self.setting.cell.arm
+        tool = cycle.targets.tool[v, :3, 3]
+        by_joint = arm.jacobian(cycle.path.q[v][None], tool)[0, :3, joint - 1]
+        gap = 2.0 * self.setting.gap[joint - 1]
+        return float(np.linalg.norm(by_joint) * gap)
 
     # Stops from which targets are approached anew.
 
@@ -301,10 +326,11 @@ class _PathWork:
         """Put points on the ways until none is left too far, or none helps."""
         for _ in range(ROUNDS):
             new, flat = dict(self._new_points()), self._new_chords()
-            new = new or dict(self._halved())
-            if not new and not flat:
+            halved = dict(self._halved({*new, *(v for v, _ in flat)}))
+            if not new and not flat and not halved:
                 return
-            self.points |= {v: tuple(sorted(shares)) for v, shares in new.items()}
+            for v, shares in (new | halved).items():
+                self.points[v] = tuple(sorted(map(float, shares)))
             self.chords |= flat
             self._cut_at_vias()
             self._make(splitter)
@@ -349,8 +375,12 @@ class _PathWork:
         }
         return may - self.chords
 
-    def _halved(self) -> Iterator[tuple[int, list[float]]]:
-        """Yield the points of arcs with pieces that are too flat, and no chords yet."""
+    def _halved(self, changed: set[int]) -> Iterator[tuple[int, list[float]]]:
+        """Yield the points of arcs with pieces that are too flat, and no chords yet.
+
+        Args:
+            changed: Moves that change anyway.
+        """
         room = self.room
         flat, found = self._flat_pieces(), dict[int, list[float]]()
         for (v, end), bent in flat.items():
@@ -359,7 +389,9 @@ class _PathWork:
             k = int(np.flatnonzero(self.paths.visit == v)[0])
             size = (end - begin) * float(self.paths.way[self.paths.samples(k)][-1])
             least = self.open[v][0] if v in self.open else np.inf
-            if room > 0 and size >= 2 * least and not self._chord((v, end), bent):
+            if v in changed or self._chord((v, end), bent):
+                continue
+            if room > 0 and size >= 2 * least:
                 found[v] = [*known, (begin + end) / 2]
                 room -= 1
         yield from found.items()
@@ -490,7 +522,7 @@ class _PathWork:
             stops = {v: self.idle[v] for v in self.stops & self.points.keys()}
             reading, own = insert(
                 self.source.reading, self.points, stops, splitter, cell,
-                self.chords, self.approaches,
+                self.chords, self.approaches, self._meant(),
             )  # fmt: skip
         options = replace(self.setting.options, clone=False)
         reading, kept = correct(reading, replace(self.setting, options=options))
@@ -502,6 +534,21 @@ class _PathWork:
             told = run_in_time(reading, again, kept.position, self.setting, owner, arcs)
         self.latest, self.own = Draft(reading, kept, output, told), own
 
+    def _meant(self) -> dict[int, MeantSides]:
+        """Say from which sides points of lines are meant to be passed."""
+        paths, found = self.first.paths, {}
+        visits = self.source.reading.visits
+        for v, shares in self.points.items():
+            rows = paths.samples(int(np.searchsorted(paths.visit, v)))
+            way, side = paths.way[rows], crossed_at_once(paths.side[rows])
+            at = np.searchsorted(way, np.array(shares) * way[-1]).clip(0, len(way) - 1)
+            tool = self.first.after.targets.tool[v, :3, :3]
+            turn = turned_by_drives(
+                self.setting, visits, v, tool, paths.q[rows][at], side[at] - side[0]
+            )
+            found[v] = MeantSides(side[at], turn)
+        return found
+
     def _wanted_arcs(self) -> WantedArcs:
         """Return the arcs that are cut."""
         before = self.source.reading.visits.before
@@ -510,19 +557,33 @@ class _PathWork:
     # Points that do not help, or not for certain, are taken back.
 
     def judge(self, splitter: Splitter) -> None:
-        """Take back the points of moves that are no better for certain."""
-        for _ in range(JUDGED):
+        """Take back points that make moves no better for certain."""
+        for k in range(JUDGED):
             bad, anew = dict(self._bad()), self._bad_approaches()
             if not bad and not anew:
                 return
-            self.left |= bad
-            for v in (*bad, *anew):
+            for v, (why, share) in bad.items():
+                if share is None or k >= JUDGED / 2 or not self._thin_out(v, share):
+                    self.left[v] = why
+                    self._take_back(v)
+            for v in anew:
                 self._take_back(v)
             self._make(splitter)
         self.left |= dict.fromkeys(self.points, "its points do not stay put")
         self.points.clear()
         self.approaches.clear()
         self._make(splitter)
+
+    def _thin_out(self, v: int, share: float) -> bool:
+        """Take back the points around a place of a move, if that leaves others."""
+        known = self.points.get(v, ())
+        free = np.array([s for s in known[v in self.stops :] if s < 1.0])
+        behind = int(np.searchsorted(free, share))
+        gone = set(free[max(behind - 1, 0) : behind + 1].tolist())
+        if not gone or len(gone) == len(free):
+            return False
+        self.points[v] = tuple(s for s in known if s not in gone)
+        return True
 
     def _take_back(self, v: int) -> None:
         """Take back the points of a move; an arc that is cut no more stays whole."""
@@ -541,15 +602,16 @@ class _PathWork:
         elif self.points.get(via) == (1.0,):
             del self.points[via]
 
-    def _bad(self) -> Iterator[tuple[int, str]]:
-        """Yield the moves whose points must go, and why."""
+    def _bad(self) -> Iterator[tuple[int, tuple[str, float | None]]]:
+        """Yield the moves with points that must go: why, and where if not all of them."""
         if not self.points:
             return
         told, without = self.latest.in_time, self._sizes(self.first.paths)
         if told is None:
             return
         with_points = self._worst(told)
-        other, usual = map(self._otherwise, (told.paths, self.first.paths))
+        other = _largest_otherwise(told.paths)
+        usual = _largest_otherwise(self.first.paths)
         corner = self._corners_moved(told)
         flat = self._flat_pieces()
         bent = {cut[0] for cut, far in flat.items() if not self._chord(cut, far)}
@@ -558,17 +620,20 @@ class _PathWork:
             if self.points.get(v, ()) in ((), (1.0,)):  # its other half is cut
                 before = max(before, self.aim)
             if v not in with_points:
-                yield v, "nothing is predicted for it with points"
+                yield v, ("nothing is predicted for it with points", None)
             elif v in bent:
-                yield v, "pieces of it would bend too little for arcs"
+                yield v, ("pieces of it would bend too little for arcs", None)
             elif refused := self._refusal(v):
-                yield v, f"points on its way cannot be corrected: {refused}"
-            elif with_points[v] > before:
-                yield v, "points on its way make it no better"
-            elif other[v] > max(before, usual[v]) + WORSE:
-                yield v, "it would be worse if a flank is not as predicted"
+                why = f"points on its way cannot be corrected: {refused}"
+                yield v, (why, None)
+            elif with_points[v][0] > before:
+                why = "points on its way make it no better"
+                yield v, (why, with_points[v][1])
+            elif other[v][0] > max(before, usual[v][0]) + WORSE:
+                why = "it would be worse if a flank is not as predicted"
+                yield v, (why, other[v][1])
             elif corner[v]:
-                yield v, "a rounded corner at one of its ends would move"
+                yield v, ("a rounded corner at one of its ends would move", None)
 
     def _refusal(self, v: int) -> str:
         """Say why points of a move cannot be corrected, "" where they can."""
@@ -581,24 +646,24 @@ class _PathWork:
     def _sizes(paths: PathAccuracy) -> dict[int, float]:
         return dict(zip(paths.visit.tolist(), paths.after.sizes.tolist(), strict=True))
 
-    @staticmethod
-    def _otherwise(paths: PathAccuracy) -> dict[int, float]:
-        """How far each move is from its path if flanks are not as predicted [m]."""
-        far = np.maximum.reduceat(paths.otherwise, paths.first[:-1])
-        return dict(zip(paths.visit.tolist(), far.tolist(), strict=True))
+    def _worst(self, told: InTime) -> dict[int, tuple[float, float]]:
+        """How far each move leaves its path, however its points are rounded.
 
-    def _worst(self, told: InTime) -> dict[int, float]:
-        """How far each move leaves its path, however its points are rounded [m]."""
-        found, rounded = self._sizes(told.paths), self._rounded(told)
+        Returns:
+            The distance [m], and where, as a share of the way.
+        """
+        rounded, found = self._rounded(told), dict[int, tuple[float, float]]()
         for k, v in enumerate(told.paths.visit.tolist()):
             samples = told.paths.samples(k)
             way, far = told.paths.way[samples], told.paths.after.across[samples]
+            worst = np.array(far)
             for share, (half, beside) in zip(
                 self.points.get(v, ()), rounded.get(v, ()), strict=True
             ):
-                there = np.abs(way - share * way[-1]) / half
+                there = np.abs(way - share * way[-1]) / max(half, 1e-12)
                 near = far + beside * (1 - there**2)  # bounds chords and parabolas
-                found[v] = max(found[v], float(near[there <= 1].max(initial=0.0)))
+                worst = np.maximum(worst, np.where(there <= 1, near, 0.0))
+            found[v] = _largest_on(way, worst)
         return found
 
     def _rounded(self, told: InTime) -> dict[int, list[tuple[float, float]]]:
@@ -657,7 +722,9 @@ class _PathWork:
             self.stops & self.points.keys(),
             {v: why for v, why in self.left.items() if v not in self.points},
             self._sizes(self.first.paths),
-            self._otherwise(told.paths) if self.latest is not self.source else {},
+            {v: far for v, (far, _) in _largest_otherwise(told.paths).items()}
+            if self.latest is not self.source
+            else {},
             self._approached(told),
             frozenset(self.unconfirmed),
         )
@@ -682,6 +749,21 @@ class _PathWork:
                            (row - 2, row))  # fmt: skip
             found[v] = there / (there + back)
         return found
+
+
+def _largest_on(way: Floats, far: Floats) -> tuple[float, float]:
+    """Return the largest distance on a way, and where, as a share of it."""
+    top = int(far.argmax())
+    return float(far[top]), float(way[top] / max(way[-1], 1e-12))
+
+
+def _largest_otherwise(paths: PathAccuracy) -> dict[int, tuple[float, float]]:
+    """How far each move is from its path if flanks are not as predicted, and where."""
+    rows = map(paths.samples, range(len(paths)))
+    return {
+        v: _largest_on(paths.way[own], paths.otherwise[own])
+        for v, own in zip(paths.visit.tolist(), rows, strict=True)
+    }
 
 
 def of_source(kept: Correction, own: Ints) -> Correction:

@@ -20,6 +20,7 @@ from postproc.motion.cycle import ProgramCycle
 from postproc.robot.direction import WIDTH_IN_PLAYS
 from postproc.robot.pose import rotation_vector
 
+WHOLE = 0.999  # of half the play: a drive that lies there has crossed
 CROSSES = 0.3  # of half the play: a joint that goes so far will rest on that flank
 
 
@@ -38,6 +39,38 @@ class TakeUp:
     crossing: tuple[int, ...]
 
 
+@dataclass(frozen=True)
+class MeantSides:
+    """From which sides k points on a way are meant to be passed.
+
+    Attributes:
+        side: Where each joint is to lie in its play, (k, 6) from -1 to 1.
+        turn: What the tool turns by in its own frame, (k, 3) [rad].
+    """
+
+    side: Floats
+    turn: Floats
+
+
+def crossed_at_once(side: Floats) -> Floats:
+    """Let drives that cross their gaps on a way do so where they begin to, (k, 6).
+
+    Args:
+        side: Where each joint lies in its play along the way, (k, 6) from -1 to 1.
+    """
+    out = np.array(side)
+    step = np.sign(np.diff(side, axis=0)) * (np.abs(np.diff(side, axis=0)) > 1e-9)
+    for joint in range(side.shape[1]):
+        sense = step[:, joint]
+        begins = np.flatnonzero(np.diff(sense, prepend=0.0) != 0)
+        ends = np.append(begins, len(sense))[1:]
+        for begin, end in zip(begins.tolist(), ends.tolist(), strict=True):
+            moves = sense[begin]
+            if moves and moves * side[end, joint] > WHOLE:
+                out[begin + 1 : end + 1, joint] = moves
+    return out
+
+
 def take_up(cycle: ProgramCycle, setting: Setting, visits: Visits, v: int) -> TakeUp:
     """Say how play is taken up where a move begins.
 
@@ -53,16 +86,36 @@ def take_up(cycle: ProgramCycle, setting: Setting, visits: Visits, v: int) -> Ta
     crosses = np.abs(turned) > CROSSES
     crossing = tuple((np.flatnonzero(crosses) + 1).tolist())
     side = np.where(crosses, np.sign(turned), came)
-    law = visits.orientation_law[v]
+    q = cycle.path.q[int(cycle.ways[1][v])]
+    tool = cycle.targets.tool[v, :3, :3]
+    turn = turned_by_drives(setting, visits, v, tool, q[None], (side - came)[None])
+    return TakeUp(side, turn[0], crossing)
+
+
+def turned_by_drives(
+    setting: Setting, visits: Visits, v: int, tool: Floats, q: Floats, crossed: Floats
+) -> Floats:
+    """Say what the tool has to turn by so that drives alone move.
+
+    Where a program does not say how the tool turns on the way it must not turn.
+
+    Args:
+        setting: What the program is compensated with.
+        visits: The program.
+        v: The visit at the end of the move.
+        tool: How the tool is mounted, (3, 3).
+        q: Joint angles at k places on its way, (k, 6) [rad].
+        crossed: What each drive has crossed there since the move began, of its play,
+            (k, 6) from -2 to 2.
+
+    Returns:
+        Rotation vectors in the tool's own frame, (k, 3) [rad].
+    """
+    cell, law = setting.cell, visits.orientation_law[v]
     known = law in (OrientationLaw.UNSET, OrientationLaw.ONE_AXIS)
     if setting.options.orientation or visits.wrist_joint[v] or not known:
-        return TakeUp(side, np.zeros(3), crossing)
+        return np.zeros((len(q), 3))
     width = np.where(setting.gap > 0.0, WIDTH_IN_PLAYS * cell.arm.play, 0.0)
-    q = cycle.path.q[int(cycle.ways[1][v])]
-    crossed = np.linalg.solve(cell.arm.coupling, (side - came) / 2 * width)
-    before, behind = (
-        cell.arm.flange(angles[None])[0, :3, :3] @ cycle.targets.tool[v, :3, :3]
-        for angles in (q, q + crossed)
-    )
-    turn = rotation_vector((before.T @ behind)[None])[0]
-    return TakeUp(side, turn, crossing)
+    behind = q + np.linalg.solve(cell.arm.coupling, (crossed / 2 * width).T).T
+    before, after = (cell.arm.flange(a)[:, :3, :3] @ tool for a in (q, behind))
+    return rotation_vector(np.swapaxes(before, 1, 2) @ after)
