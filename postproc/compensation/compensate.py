@@ -38,7 +38,8 @@ from postproc.compensation.outcome import (
     left_elsewhere,
     tell_arrivals,
 )
-from postproc.compensation.path_correction import Draft, correct_paths
+from postproc.compensation.path_correction import correct_paths
+from postproc.compensation.path_work import Draft
 from postproc.compensation.program import (
     Reading,
     prepared,

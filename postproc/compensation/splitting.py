@@ -18,8 +18,7 @@ from postproc.motion.cycle import ProgramCycle
 from postproc.robot.pose import MM, has_unknown
 from postproc.robot.trajectory import Motion
 
-SHORTEST = 0.05  # [s] that a piece of a split move lasts at the programmed speed
-CLOSEST = 1e-3  # [m] .. and its length
+CLOSEST = 1e-3  # [m] length of the shortest piece, however slow the move is
 CLEAR = 0.02  # [m] from a rounded end: how large its corner is depends on the moves
 WIDEST = -99999.9  # no number of a point is longer as it is written
 ALIKE = 1e-6  # a tool whose axes turn by less keeps its orientation
@@ -88,15 +87,19 @@ def _turns_otherwise(visits: Visits, before: Ints) -> Bools:
 
 
 def shortest_pieces(
-    visits: Visits, cycle: ProgramCycle
+    visits: Visits, cycle: ProgramCycle, shortest: float
 ) -> list[tuple[float, float, float]]:
     """Return the shortest piece of every move, and what stays clear at its ends [m].
 
-    A piece lasts `SHORTEST` at the programmed speed. Beside a rounded end it is longer
-    than the corner, which must stay as it is.
+    Beside a rounded end a piece is longer than the corner, which must stay as it is.
+
+    Args:
+        visits: The program.
+        cycle: .. in time.
+        shortest: What a piece lasts at the programmed speed, at least [s].
     """
     speed = np.nan_to_num(cycle.targets.linear_speed)
-    least: Floats = np.maximum(SHORTEST * speed, CLOSEST)
+    least: Floats = np.maximum(shortest * speed, CLOSEST)
     size = np.maximum(2 * np.nan_to_num(np.abs(visits.zone_mm) * MM), CLEAR)
     flown = visits.fly & ~visits.via  # the point on the way of an arc is no corner
     round_ = np.where(flown, np.maximum(size, least), least)

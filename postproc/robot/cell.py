@@ -142,6 +142,8 @@ class LimitSection(Strict):
         joint_deg: Most that every joint turns by a correction, at a target and on the
             way to it.
         elbow_mm, wrist_centre_mm: Most that elbow and wrist centre move likewise.
+        segment_ms: What a piece of a move with points on its way lasts at the
+            programmed speed, at least.
         approach_mm: Most that a stop from which a target is approached anew is away.
     """
 
@@ -153,6 +155,7 @@ class LimitSection(Strict):
     joint_deg: Limits = JOINT_DEG
     elbow_mm: PositiveFloat = 10.0
     wrist_centre_mm: PositiveFloat = 10.0
+    segment_ms: PositiveFloat = 50.0
     approach_mm: PositiveFloat = 10.0
 
 

@@ -13,8 +13,9 @@ import pytest
 
 from postproc.arrays import Floats
 from postproc.cli.simulate import _read, setup_of
-from postproc.compensation.path_correction import AIM, TAKEN
-from postproc.compensation.splitting import SHORTEST
+from postproc.compensation import split_moves
+from postproc.compensation.path_correction import TAKEN
+from postproc.compensation.path_work import AIM
 from postproc.model.model import load_model
 from postproc.robot.cell import load_cell
 from postproc.robot.pose import MM
@@ -26,6 +27,7 @@ from tests.written import cli
 
 TOLERANCE = 0.1  # [mm]
 SPEED = 50.0  # [mm/s] in the job
+SHORTEST_MS = 50.0  # [limits] segment_ms, as it is unless set
 INSERTED = b"postproc: inserted"
 
 
@@ -113,6 +115,44 @@ def test_flanks_that_a_measured_path_refuted_get_no_points(shop: Path) -> None:
     assert sum(p["inserted"] for p in paths) < 5
 
 
+@pytest.mark.parametrize("small_mm", [0.0, 10.0])
+def test_a_joint_that_is_not_sure_in_motion_matters_where_its_step_does(
+    shop: Path, small_mm: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    known(shop, "not sure")
+    monkeypatch.setattr(split_moves, "SMALL", small_mm * MM)
+    more = ("--path-mm", TOLERANCE, "--model", shop / "not sure.json")
+    paths = lines_of(compensated(shop, "job.pdl", f"small{small_mm}", *more))
+    hindered = ["which in motion is not sure" in (p["not_split"] or "") for p in paths]
+    assert sum(hindered) == 0 if small_mm else sum(hindered) > 5
+    assert (sum(path["inserted"] for path in paths) > 10) == (small_mm > 0)
+
+
+def test_points_are_kept_beside_a_start_that_nothing_mends(shop: Path) -> None:
+    report, without = lines_of(told(shop, "points")), lines_of(told(shop, "plain"))
+    starts = [
+        (path, plain)
+        for path, plain in zip(report, without, strict=True)
+        if plain["max_mm"]["after"] > 2 * TOLERANCE and path["at_mm"]["after"] < 2.0
+    ]
+    assert len(starts) > 5
+    assert np.mean([bool(path["inserted"]) for path, _ in starts]) > 0.8
+
+
+def test_pieces_are_as_short_as_the_cell_says(shop: Path) -> None:
+    text = CELL.read_text().replace("[limits]", "[limits]\nsegment_ms = 25.0")
+    (shop / "short.toml").write_text(text)
+    done("compensate", shop / "job.pdl", "--cell", shop / "short.toml", "--model",
+         shop / "model.json", "-o", shop / "short.pdl", "--report",
+         shop / "short.json", "--path-mm", TOLERANCE)  # fmt: skip
+    pieces = [
+        step
+        for path in lines_of(told(shop, "short"))
+        for step in np.diff([0.0, *(p["at_mm"] for p in path["points"])])
+    ]
+    assert SHORTEST_MS / 2e3 * SPEED - 1e-3 <= min(pieces) < SHORTEST_MS / 1e3 * SPEED
+
+
 def test_play_is_taken_up_only_where_a_measured_path_confirms_flanks(
     shop: Path,
 ) -> None:
@@ -146,7 +186,7 @@ def test_arcs_are_cut_at_the_points_on_their_ways_too(shop: Path) -> None:
         assert first["points"][-1]["at_mm"] == pytest.approx(first["length_mm"])
         for half in (first, second):
             at = [0.0, *(point["at_mm"] for point in half["points"])]
-            assert (np.diff(at) >= SHORTEST * SPEED - 1e-3).all()
+            assert (np.diff(at) >= SHORTEST_MS / 1e3 * SPEED - 1e-3).all()
             assert half["inserted"] == len(half["points"]) and not half["not_split"]
     text = (shop / "points.pdl").read_text()
     assert text.count("inserted (via)") == 2 and text.count("CIRCULAR") > 6
@@ -156,7 +196,7 @@ def test_points_are_few_far_apart_and_told(shop: Path) -> None:
     report = told(shop, "points")
     for path in lines_of(report):
         at = [0.0, *(point["at_mm"] for point in path["points"]), path["length_mm"]]
-        assert (np.diff(at) >= SHORTEST * SPEED - 1e-3).all()
+        assert (np.diff(at) >= SHORTEST_MS / 1e3 * SPEED - 1e-3).all()
         assert path["inserted"] == len(path["points"]) <= 10
         assert path["max_mm"]["after"] <= path["without_mm"]
         if path["without_mm"] <= TOLERANCE:

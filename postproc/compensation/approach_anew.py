@@ -1,0 +1,78 @@
+"""Stops from which targets are approached anew, and whether they are better for it."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from postproc.arrays import Bools, Floats, any_in_rows
+from postproc.compensation.approach import place_to_approach
+from postproc.compensation.correction import Correction
+from postproc.compensation.in_time import InTime
+from postproc.compensation.insertions import numbers_at
+from postproc.compensation.notes import SURE
+from postproc.compensation.outcome import Status
+from postproc.compensation.path_work import PathWork, of_source
+from postproc.language.interface import Splitter
+from postproc.robot.pose import MM
+from postproc.robot.trajectory import Motion
+
+
+def approach_anew(work: PathWork, splitter: Splitter) -> None:
+    """Approach targets anew that a joint reaches from a side that is not sure."""
+    visits = work.source.reading.visits
+    ends = (visits.motion == Motion.LINEAR) & ~visits.fly
+    ends &= ~visits.fly[visits.before]
+    for v in np.flatnonzero(ends & _unsure(work.source.kept)).tolist():
+        file, line = int(visits.file[v]), int(work.lines[v])
+        may = not work.hindered(splitter, v) and splitter.stops(file, line)
+        if may and work.room > 0:
+            place = _place_to_approach(work, v)
+            if place is not None:
+                work.approaches[v] = place
+    if work.approaches:
+        work.make()
+
+
+def _place_to_approach(work: PathWork, v: int) -> Floats | None:
+    """Find the numbers of a stop from which to approach a target."""
+    cell, cycle = work.setting.cell, work.first.before
+    visits, side = work.source.reading.visits, work.source.kept.decisions.side
+    q = place_to_approach(
+        cell.arm, cycle, v, int(visits.before[v]), np.abs(side[v]) < SURE,
+        cell.limits.approach_mm * MM,
+    )  # fmt: skip
+    if q is None:
+        return None
+    pose = cell.arm.flange(q[None]) @ cycle.targets.tool[[v]]
+    return numbers_at(visits, v, pose[0])
+
+
+def _unsure(kept: Correction) -> Bools:
+    """Tell which targets move that a joint reaches from a side that is not sure."""
+    return kept.corrected & any_in_rows(np.abs(kept.decisions.side) < SURE)
+
+
+def bad_approaches(work: PathWork) -> set[int]:
+    """Find the targets that are approached anew and are no better for it."""
+    kept = of_source(work.latest.kept, work.own)
+    unsure, status = _unsure(kept), kept.decisions.status
+    stops = work.latest.kept.decisions.status[work.own - 1]
+    others = np.flatnonzero(unsure & ~_unsure(work.source.kept))
+    asked = np.array(sorted(work.approaches), dtype=np.int64)
+    bad = unsure[asked] | (status[asked] != Status.SAFE) | (stops[asked] != Status.SAFE)
+    cause = np.searchsorted(asked, others, side="right") - 1
+    return {*asked[bad].tolist(), *asked[cause[cause >= 0]].tolist()}
+
+
+def approached(work: PathWork, told: InTime) -> dict[int, float]:
+    """Return the shares of the ways at which targets are approached anew."""
+    p = work.setting.cell.arm.tcp(
+        told.before.path.q, told.before.targets.tool[:, :3, 3]
+    )
+    found = {}
+    for v in work.approaches:
+        row = int(work.own[v])
+        there, back = (float(np.linalg.norm(p[row - 1] - p[k])) for k in
+                       (row - 2, row))  # fmt: skip
+        found[v] = there / (there + back)
+    return found

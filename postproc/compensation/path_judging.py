@@ -1,0 +1,200 @@
+"""Points on ways that make a move no better for certain are taken back."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from postproc.arrays import Bools, Floats, any_in_rows
+from postproc.compensation.approach_anew import bad_approaches
+from postproc.compensation.arc_cuts import bending, may_be_chord
+from postproc.compensation.arc_splitting import (
+    is_arc,
+    largest_zones,
+    passed,
+    point_on_way,
+)
+from postproc.compensation.in_time import InTime
+from postproc.compensation.outcome import Status
+from postproc.compensation.path_accuracy import PathAccuracy
+from postproc.compensation.path_work import PathWork
+from postproc.robot.pose import lengths
+
+JUDGED = 8  # rounds in which points are taken back
+WORSE = 5e-5  # [m] that the path may be worse where a flank is not as predicted
+MOVED = 5e-6  # [m] that a rounded corner may move
+
+
+def judge(work: PathWork) -> None:
+    """Take back points that make moves no better for certain."""
+    for k in range(JUDGED):
+        bad, anew = dict(_bad(work)), bad_approaches(work)
+        if not bad and not anew:
+            return
+        for v, (why, share) in bad.items():
+            if share is None or k >= JUDGED / 2 or not _thin_out(work, v, share):
+                work.left[v] = why
+                _take_back(work, v)
+        for v in anew:
+            _take_back(work, v)
+        work.make()
+    work.left |= dict.fromkeys(work.points, "its points do not stay put")
+    work.points.clear()
+    work.approaches.clear()
+    work.make()
+
+
+def _thin_out(work: PathWork, v: int, share: float) -> bool:
+    """Take back the points around a place of a move, if that leaves others."""
+    known = work.points.get(v, ())
+    free = np.array([s for s in known[v in work.stops :] if s < 1.0])
+    behind = int(np.searchsorted(free, share))
+    gone = set(free[max(behind - 1, 0) : behind + 1].tolist())
+    if not gone or len(gone) == len(free):
+        return False
+    work.points[v] = tuple(s for s in known if s not in gone)
+    return True
+
+
+def _take_back(work: PathWork, v: int) -> None:
+    """Take back the points of a move; an arc that is cut no more stays whole."""
+    own = work.points.pop(v, ())
+    work.stops.discard(v)
+    work.approaches.pop(v, None)
+    visits = work.source.reading.visits
+    if not is_arc(visits, v):
+        return
+    via = point_on_way(visits, v)
+    if own in ((), (1.0,)):  # what it has is the cut at the point on the way alone
+        work.points.pop(via, None)
+        work.points.pop(via + 1, None)
+    elif v == via and via + 1 in work.points:
+        work.points[via] = (1.0,)
+    elif work.points.get(via) == (1.0,):
+        del work.points[via]
+
+
+def _bad(work: PathWork) -> Iterator[tuple[int, tuple[str, float | None]]]:
+    """Yield the moves with points that must go: why, and where if not all of them."""
+    if not work.points:
+        return
+    told, without = work.latest.in_time, sizes_of(work.first.paths)
+    if told is None:
+        return
+    with_points = _worst(work, told)
+    other = largest_otherwise(told.paths)
+    usual = largest_otherwise(work.first.paths)
+    corner = _corners_moved(work, told)
+    flat = bending(work)
+    bent = {cut[0] for cut, far in flat.items() if not may_be_chord(work, cut, far)}
+    for v in sorted({*work.points, *(via + 1 for via in work.cut_arcs())}):
+        before = without[v]
+        if work.points.get(v, ()) in ((), (1.0,)):  # its other half is cut
+            before = max(before, work.aim)
+        if v not in with_points:
+            yield v, ("nothing is predicted for it with points", None)
+        elif v in bent:
+            yield v, ("pieces of it would bend too little for arcs", None)
+        elif refused := _refusal(work, v):
+            why = f"points on its way cannot be corrected: {refused}"
+            yield v, (why, None)
+        elif with_points[v][0] > before:
+            why = "points on its way make it no better"
+            yield v, (why, with_points[v][1])
+        elif other[v][0] > max(before, usual[v][0]) + WORSE:
+            why = "it would be worse if a flank is not as predicted"
+            yield v, (why, other[v][1])
+        elif corner[v]:
+            yield v, ("a rounded corner at one of its ends would move", None)
+
+
+def _refusal(work: PathWork, v: int) -> str:
+    """Say why points of a move cannot be corrected, "" where they can."""
+    decided = work.latest.kept.decisions
+    rows = np.arange(int(work.own[v - 1]) + 1, int(work.own[v]))
+    left = rows[decided.status[rows] != Status.SAFE]
+    return decided.reasons[decided.why[left[0]]] if len(left) else ""
+
+
+def _worst(work: PathWork, told: InTime) -> dict[int, tuple[float, float]]:
+    """How far each move leaves its path, however its points are rounded.
+
+    Returns:
+        The distance [m], and where, as a share of the way.
+    """
+    rounded, found = _rounded(work, told), dict[int, tuple[float, float]]()
+    for k, v in enumerate(told.paths.visit.tolist()):
+        samples = told.paths.samples(k)
+        way, far = told.paths.way[samples], told.paths.after.across[samples]
+        worst = np.array(far)
+        for share, (half, beside) in zip(
+            work.points.get(v, ()), rounded.get(v, ()), strict=True
+        ):
+            there = np.abs(way - share * way[-1]) / max(half, 1e-12)
+            near = far + beside * (1 - there**2)  # bounds chords and parabolas
+            worst = np.maximum(worst, np.where(there <= 1, near, 0.0))
+        found[v] = _largest_on(way, worst)
+    return found
+
+
+def _rounded(work: PathWork, told: InTime) -> dict[int, list[tuple[float, float]]]:
+    """Size of the largest zones at points, and how far they pass them [m].
+
+    No corner is larger than half of a neighbouring piece; what cuts it off straight
+    passes the point farthest. On an arc it is no larger than zones are, by any law.
+    """
+    p, c = (
+        work.setting.cell.arm.tcp(cycle.path.q, cycle.targets.tool[:, :3, 3])
+        for cycle in (told.after, told.before)
+    )
+    found = dict[int, list[tuple[float, float]]]()
+    visits, arcs = work.source.reading.visits, work.wanted_arcs()
+    zone = largest_zones(work.setting.cell.arm, told.after) if len(arcs) else None
+    for v, shares in work.points.items():
+        rows = [int(work.own[visits.before[v]]), *work.ends(v)]
+        if shares[-1] == 1.0:
+            rows.append(work.ends(v + 1)[0])
+        rows = rows[: len(shares) + 2]
+        size = np.maximum(lengths(np.diff(p[rows], axis=0)), 1e-9)
+        slope = np.diff((p - c)[rows], axis=0) / size[:, None]
+        bend = lengths(np.diff(slope, axis=0)) / 2  # sine of half of the angle
+        half = np.minimum(size[1:], size[:-1]) / 2
+        far = half * bend
+        if zone is not None and is_arc(visits, v):
+            half = np.minimum(half, zone[rows[1:-1]])
+            far = half * bend + passed(half, arcs.radius_of(v))
+        found[v] = list(zip(half.tolist(), far.tolist(), strict=True))
+    return found
+
+
+def _corners_moved(work: PathWork, told: InTime) -> Bools:
+    """Tell at which moves a rounded corner at an end is passed otherwise, (n,)."""
+    moved = told.before.path.aside[work.own] - work.first.before.path.aside
+    there = any_in_rows(np.abs(np.nan_to_num(moved)) > MOVED)
+    there[work.cut_arcs()] = False  # judged as the points that they are
+    before = work.source.reading.visits.before
+    return np.asarray(there | (there[before] & (before >= 0)))
+
+
+# How far moves are from their paths, by the visit at their end.
+
+
+def sizes_of(paths: PathAccuracy) -> dict[int, float]:
+    """How far each move of the compensated program leaves its path at the most [m]."""
+    return dict(zip(paths.visit.tolist(), paths.after.sizes.tolist(), strict=True))
+
+
+def _largest_on(way: Floats, far: Floats) -> tuple[float, float]:
+    """Return the largest distance on a way, and where, as a share of it."""
+    top = int(far.argmax())
+    return float(far[top]), float(way[top] / max(way[-1], 1e-12))
+
+
+def largest_otherwise(paths: PathAccuracy) -> dict[int, tuple[float, float]]:
+    """How far each move is from its path if flanks are not as predicted, and where."""
+    rows = map(paths.samples, range(len(paths)))
+    return {
+        v: _largest_on(paths.way[own], paths.otherwise[own])
+        for v, own in zip(paths.visit.tolist(), rows, strict=True)
+    }

@@ -1,0 +1,216 @@
+"""A program with points on its ways, as it is worked on round by round."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import numpy as np
+
+from postproc.arrays import Floats, Ints
+from postproc.compensation.arc_splitting import Cut, WantedArcs
+from postproc.compensation.correction import BY_VISIT, EXPLAINING, Correction, correct
+from postproc.compensation.in_time import InTime, run_in_time
+from postproc.compensation.insertions import insert, lines_in_files
+from postproc.compensation.options import Setting
+from postproc.compensation.path_accuracy import PathAccuracy
+from postproc.compensation.program import Reading
+from postproc.compensation.rewrite import Output
+from postproc.compensation.splitting import hindrances, unwritable
+from postproc.compensation.taking_up import (
+    MeantSides,
+    TakeUp,
+    crossed_at_once,
+    turned_by_drives,
+)
+from postproc.language.interface import Splitter
+from postproc.robot.pose import MM
+
+AIM = 0.6  # of the tolerance: what points are to reach
+
+
+@dataclass(frozen=True)
+class Draft:
+    """A corrected program, before it is told of.
+
+    Attributes:
+        reading: The program.
+        kept: What came of its visits.
+        output: What is to be written.
+        in_time: The program in time; None where nobody asked.
+    """
+
+    reading: Reading
+    kept: Correction
+    output: Output
+    in_time: InTime | None
+
+
+Write = Callable[[Reading, Correction, Setting], tuple[Output, Reading]]
+
+
+@dataclass
+class PathWork:
+    """The points of a program, round by round.
+
+    Attributes:
+        source: The program without points.
+        first: .. in time.
+        setting: What it is compensated with.
+        write: Writes a corrected program, and reads it again.
+        splitter: Writes points into its files; None where its language gets none.
+        open: Moves that may be split, by their visit: the shortest piece, and how far
+            from both ends [m].
+        points: What is on their ways.
+        stops: Moves whose first point is a stop, where play is taken up.
+        idle: Moves that may have one, and how.
+        unconfirmed: Moves that may not, as no measured path confirms their flanks.
+        tried: How far such a move began off, and where it stopped, try by try.
+        chords: Pieces of arcs that are chords whatever they bend.
+        approaches: Stops from which targets are approached anew, by visit, (w,) each.
+        left: Why moves that leave their path too far are not split.
+        latest: The program with these points; at first the source.
+        own: The visits of it that the source makes, (n,).
+    """
+
+    source: Draft
+    first: InTime
+    setting: Setting
+    write: Write
+    splitter: Splitter | None
+    open: dict[int, tuple[float, float, float]] = field(default_factory=dict)
+    points: dict[int, tuple[float, ...]] = field(default_factory=dict)
+    stops: set[int] = field(default_factory=set)
+    idle: dict[int, TakeUp] = field(default_factory=dict)
+    unconfirmed: set[int] = field(default_factory=set)
+    tried: dict[int, list[tuple[float, float]]] = field(default_factory=dict)
+    chords: set[Cut] = field(default_factory=set)
+    approaches: dict[int, Floats] = field(default_factory=dict)
+    left: dict[int, str] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        """Begin without points."""
+        self.latest = self.source
+        self.own: Ints = np.arange(len(self.source.reading.visits))
+
+    @cached_property
+    def lines(self) -> Ints:
+        """Return the lines of the source's visits in its files, (n,)."""
+        return lines_in_files(self.source.reading, self.setting.cell)
+
+    @cached_property
+    def _hindrances(self) -> dict[int, str]:
+        visits, decided = self.source.reading.visits, self.source.kept.decisions
+        return hindrances(visits, decided, self.first.before)
+
+    def hindered(self, splitter: Splitter, v: int) -> str:
+        """Say why nothing can be put on the way to a visit, "" for nothing."""
+        visits = self.source.reading.visits
+        file, line = int(visits.file[v]), int(self.lines[v])
+        return self._hindrances.get(v) or unwritable(splitter, visits, v, file, line)
+
+    @property
+    def tolerance(self) -> float:
+        """The largest deviation that is asked for [m]."""
+        asked = self.setting.options.path_mm
+        return np.inf if asked is None else asked * MM
+
+    @property
+    def room(self) -> int:
+        """How many more points may be put in."""
+        count = sum(map(len, self.points.values())) + len(self.approaches)
+        return self.setting.options.max_inserted - count
+
+    @property
+    def aim(self) -> float:
+        """What the points of a move are to reach [m]."""
+        return AIM * self.tolerance
+
+    @property
+    def paths(self) -> PathAccuracy:
+        """How the program keeps to its paths now."""
+        told = self.latest.in_time
+        return self.first.paths if told is None else told.paths
+
+    @property
+    def too_far(self) -> Ints:
+        """The paths that are left too far, the worst first."""
+        sizes = self.paths.after.sizes
+        order = np.argsort(-sizes, kind="stable")
+        return order[sizes[order] > self.tolerance]
+
+    def make(self) -> None:
+        """Correct the program with its points, and predict it."""
+        if not self.points and not self.approaches:
+            self.__post_init__()
+            return
+        if self.splitter is None:
+            return
+        cell, clock = self.setting.cell, self.setting.clock
+        with clock("insert"):
+            stops = {v: self.idle[v] for v in self.stops & self.points.keys()}
+            reading, own = insert(
+                self.source.reading, self.points, stops, self.splitter, cell,
+                self.chords, self.approaches, self._meant(),
+            )  # fmt: skip
+        options = replace(self.setting.options, clone=False)
+        reading, kept = correct(reading, replace(self.setting, options=options))
+        output, again = self.write(reading, kept, self.setting)
+        n = len(reading.visits)
+        owner = np.searchsorted(own, np.arange(n))
+        with clock("time"):
+            arcs = self.wanted_arcs()
+            told = run_in_time(reading, again, kept.position, self.setting, owner, arcs)
+        self.latest, self.own = Draft(reading, kept, output, told), own
+
+    def _meant(self) -> dict[int, MeantSides]:
+        """Say from which sides points of lines are meant to be passed."""
+        paths, found = self.first.paths, {}
+        visits = self.source.reading.visits
+        for v, shares in self.points.items():
+            rows = paths.samples(int(np.searchsorted(paths.visit, v)))
+            way, side = paths.way[rows], crossed_at_once(paths.side[rows])
+            at = np.searchsorted(way, np.array(shares) * way[-1]).clip(0, len(way) - 1)
+            tool = self.first.after.targets.tool[v, :3, :3]
+            turn = turned_by_drives(
+                self.setting, visits, v, tool, paths.q[rows][at], side[at] - side[0]
+            )
+            found[v] = MeantSides(side[at], turn)
+        return found
+
+    def wanted_arcs(self) -> WantedArcs:
+        """Return the arcs that are cut."""
+        before = self.source.reading.visits.before
+        return WantedArcs.of(self.first.before, before, self.cut_arcs())
+
+    def cut_arcs(self) -> list[int]:
+        """Return the points on the ways of the arcs that are cut."""
+        return sorted(v for v in self.points if self.source.reading.visits.via[v])
+
+    def ends(self, v: int) -> list[int]:
+        """Return the visits with points at which the pieces of a move end, itself too.
+
+        Those of the program with points.
+        """
+        first = int(self.own[v - 1]) + 1 if v else 0
+        rows = np.arange(first, int(self.own[v]) + 1)
+        ends: list[int] = rows[~self.latest.reading.visits.via[rows]].tolist()
+        return ends
+
+
+def of_source(kept: Correction, own: Ints) -> Correction:
+    """Keep what is told of some visits (n,) of a corrected program."""
+    moved = np.isin(np.flatnonzero(kept.corrected), own)
+    explained = len(kept.travel) > 0
+    return replace(
+        kept,
+        decisions=kept.decisions.part(own),
+        before=kept.before[moved],
+        after=kept.after[moved],
+        departure=kept.departure[own]
+        if len(kept.departure) == len(kept.corrected)
+        else kept.departure,
+        **{name: getattr(kept, name)[own] for name in BY_VISIT},
+        **{name: getattr(kept, name)[own] for name in EXPLAINING if explained},
+    )

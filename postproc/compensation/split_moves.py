@@ -1,0 +1,96 @@
+"""Which moves that leave their paths get points, and which a stop where they begin."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from postproc.compensation.path_work import PathWork
+from postproc.compensation.splitting import shortest_pieces
+from postproc.compensation.taking_up import TakeUp, take_up
+from postproc.language.languages import language_of
+
+UNSURE = 2e-5  # [m] a flank that is less sure is no reason to put points anywhere
+SMALL = 5e-5  # [m] a step of a joint that matters little if it is not as predicted
+CONFIRMED, NOT_SURE = "confirmed", "not sure"  # verdicts of a measured path
+
+
+def find_split(work: PathWork) -> None:
+    """Say which of the moves that leave their paths may be split."""
+    visits, paths = work.source.reading.visits, work.paths
+    shortest = work.setting.cell.limits.segment_ms / 1e3
+    pieces = shortest_pieces(visits, work.first.before, shortest)
+    for k in work.too_far.tolist():
+        v = int(paths.visit[k])
+        if told := _left(work, k, v):
+            work.left[v] = told
+            continue
+        work.open[v] = pieces[v]
+        if work.setting.options.take_up and _can_stop(work, v):
+            _may_stop(work, v, take_up(work.first.after, work.setting, visits, v))
+
+
+def _left(work: PathWork, k: int, v: int) -> str:
+    """Say why a path that is left too far gets no points, "" where it may."""
+    after = work.paths.after
+    if work.splitter is None:
+        name = language_of(work.source.reading.sources[0].name).name
+        return f"no points are put on ways in {name}"
+    if v in work.approaches:
+        return "its target is approached anew"
+    if told := work.hindered(work.splitter, v):
+        return told
+    if after.unsure[work.paths.samples(k)].max() > UNSURE:
+        return "the side of a joint is not sure on its way"
+    return _otherwise_in_motion(work, k, v)
+
+
+def _can_stop(work: PathWork, v: int) -> bool:
+    """Tell whether the arm stands where a move begins, and may stop once more."""
+    visits = work.source.reading.visits
+    before = int(visits.before[v])
+    if work.splitter is None or visits.fly[before] or visits.via[before]:
+        return False
+    return work.splitter.stops(int(visits.file[v]), int(work.lines[v]))
+
+
+def _may_stop(work: PathWork, v: int, taken: TakeUp) -> None:
+    """Let the arm stop where a move begins, if flanks change there for certain.
+
+    What gives way before it carries, or lies where weight pushes it, would be led
+    off by what a sharp gap asks for, and nothing behind the stop mends that.
+    """
+    found = work.setting.model.in_motion
+    said = [(joint, found.get(str(joint), "")) for joint in taken.crossing]
+    if all(_as_at_stops(work, verdict, v, joint) for joint, verdict in said):
+        work.idle[v] = taken
+    else:
+        work.unconfirmed.add(v)
+
+
+def _otherwise_in_motion(work: PathWork, k: int, v: int) -> str:
+    """Name a joint that changes its flank on a path, and in motion not as at stops."""
+    found = work.setting.model.in_motion
+    changing = work.paths.crossing[work.paths.samples(k)].any(axis=0)
+    for joint in (np.flatnonzero(changing) + 1).tolist():
+        said = found.get(str(joint), CONFIRMED)  # none was measured: as at stops
+        if not _as_at_stops(work, said, v, joint):
+            return f"joint {joint} changes its flank, which in motion is {said}"
+    return ""
+
+
+def _as_at_stops(work: PathWork, said: str, v: int, joint: int) -> bool:
+    """Tell whether a joint may be taken to change its flank in motion as at stops.
+
+    What nobody could measure for certain may be, where the step that the joint makes is
+    too small to matter much.
+    """
+    return said == CONFIRMED or (said == NOT_SURE and _step(work, v, joint) < SMALL)
+
+
+def _step(work: PathWork, v: int, joint: int) -> float:
+    """Return how far a joint's change of its flank moves the TCP at a visit [m]."""
+    cycle, arm = work.first.after, work.setting.cell.arm
+    tool = cycle.targets.tool[v, :3, 3]
+    by_joint = arm.jacobian(cycle.path.q[v][None], tool)[0, :3, joint - 1]
+    gap = 2.0 * work.setting.gap[joint - 1]
+    return float(np.linalg.norm(by_joint) * gap)

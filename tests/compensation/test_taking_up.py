@@ -1,0 +1,86 @@
+"""Drives that cross their gaps alone: from where to where, and how the tool turns."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from postproc.arrays import Floats
+from postproc.compensation.options import AS_USUAL, Clock, Setting, silent
+from postproc.compensation.program import prepared, read_program
+from postproc.compensation.taking_up import crossed_at_once, turned_by_drives
+from postproc.language.visits import OrientationLaw, Visits
+from postproc.model.model import Model
+from postproc.robot.cell import Cell
+from postproc.robot.direction import WIDTH_IN_PLAYS
+from postproc.robot.pose import rotation_from_vector
+
+
+def crossing(*sides: float) -> Floats:
+    out = np.zeros((len(sides), 6))
+    out[:, 2] = sides
+    return out
+
+
+@pytest.mark.parametrize(
+    ("side", "meant"),
+    [
+        ((-1, -1, -0.5, 0.5, 1, 1), (-1, -1, 1, 1, 1, 1)),  # across, and stays
+        ((-1, -0.5, 0.2, 0.2, 0.2), (-1, -0.5, 0.2, 0.2, 0.2)),  # never arrives
+        ((1, 0.4, -1, -0.2, 1), (1, -1, -1, 1, 1)),  # there and back
+        ((-1, 0.0, -1, -1), (-1, 0.0, -1, -1)),  # turns back before it arrives
+        ((1, 1, 1), (1, 1, 1)),
+    ],
+)
+def test_a_drive_that_crosses_has_crossed_where_it_begins_to(
+    side: tuple[float, ...], meant: tuple[float, ...]
+) -> None:
+    found = crossed_at_once(crossing(*side))
+    assert found[:, 2].tolist() == list(meant)
+    assert not found[:, [0, 1, 3, 4, 5]].any()
+
+
+JOB = b"""PROGRAM job
+BEGIN
+  MOVE JOINT TO {0, 0, -90, 0, 60, 0}
+  MOVE LINEAR TO POS(1500.0, 100.0, 900.0, 0.0, 120.0, 0.0, '')
+END job
+"""
+
+
+@pytest.fixture(scope="module")
+def setting(bench_cell: Cell, bench_model: Model) -> Setting:
+    cell = prepared(bench_cell, bench_model, AS_USUAL)
+    return Setting(cell, bench_model, AS_USUAL, Clock(silent))
+
+
+def visits(cell: Cell, law: OrientationLaw) -> Visits:
+    found = read_program({"job.pdl": JOB}, cell).visits
+    return replace(found, orientation_law=np.full(len(found), law))
+
+
+def test_the_tool_turns_as_far_as_the_drives_turn_it(setting: Setting) -> None:
+    rng = np.random.default_rng(5)
+    q = rng.uniform(-1.0, 1.0, (20, 6))
+    tool = rotation_from_vector(rng.normal(size=(1, 3)))[0]
+    crossed = rng.uniform(-2.0, 2.0, (20, 6))
+    known = visits(setting.cell, OrientationLaw.ONE_AXIS)
+    turn = turned_by_drives(setting, known, 1, tool, q, crossed)
+    arm = setting.cell.arm  # its play is as wide as the gaps that were fitted
+    gap = np.where(setting.gap > 0.0, WIDTH_IN_PLAYS * arm.play, 0.0)
+    assert (gap > 0).sum() > 2
+    behind = q + np.linalg.solve(arm.coupling, (crossed / 2.0 * gap).T).T
+    wanted = arm.flange(behind)[:, :3, :3] @ tool
+    found = arm.flange(q)[:, :3, :3] @ tool @ rotation_from_vector(turn)
+    assert found == pytest.approx(wanted, abs=1e-9)
+    assert 1e-5 < np.abs(turn).max() < 1e-2
+
+
+def test_it_does_not_where_nothing_says_how_it_turns_on_the_way(
+    setting: Setting,
+) -> None:
+    q, crossed = np.zeros((1, 6)), np.full((1, 6), 2.0)
+    unknown = visits(setting.cell, OrientationLaw.UNKNOWN)
+    assert not turned_by_drives(setting, unknown, 1, np.eye(3), q, crossed).any()
