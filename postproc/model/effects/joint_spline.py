@@ -22,9 +22,9 @@ from postproc.robot.state import States
 SCALE = 1e-4  # [rad]
 LONG = np.deg2rad(60.0)
 SHORTEST = np.deg2rad(5.0)
-ROWS_A_LENGTH = 20.0  # rows that the shortest length must see
+ROWS_A_LENGTH = 10.0  # rows that the shortest length must see
 LEAST_RANGE = np.deg2rad(10.0)
-LONG_SURVEY = 600  # rows from which it resolves more than a joint map
+LONG_SURVEY = 100  # rows from which it resolves more than a joint map
 
 
 @dataclass(frozen=True)
