@@ -104,3 +104,13 @@ class JointSpline(JointEffect):
             out[:, j] += found.mixed(mix @ p[part])
             start = part.stop
         return out
+
+    def beyond(self, batch: Batch, prior_std: Floats) -> Floats:
+        """Give back the prior's variance as far as the functions have faded, (n, 6)."""
+        q, out = batch.states.q, np.zeros((len(batch), 6))
+        ended = 1.0 - fade(q, np.array(self.lower), np.array(self.upper)) ** 2
+        start = 0
+        for j, length in self._parts():
+            out[:, j] += ended[:, j] * prior_std[start] ** 2
+            start += smooth_count(self.lower[j], self.upper[j], length)
+        return out
