@@ -1,4 +1,4 @@
-"""Joint spline: the whole error of a joint along its angle, for long surveys.
+"""Joint spline: the whole error of a joint along its angle.
 
 Where `joint_map` finds a place, this resolves every gear and encoder wave that the rows
 can show, without naming them.
@@ -24,7 +24,7 @@ LONG = np.deg2rad(60.0)
 SHORTEST = np.deg2rad(5.0)
 ROWS_A_LENGTH = 10.0  # rows that the shortest length must see
 LEAST_RANGE = np.deg2rad(10.0)
-LONG_SURVEY = 100  # rows from which it resolves more than a joint map
+LONG_SURVEY = 100  # rows from which it resolves more than a joint map does
 
 
 @dataclass(frozen=True)
