@@ -24,7 +24,8 @@ LONG = np.deg2rad(60.0)
 SHORTEST = np.deg2rad(5.0)
 ROWS_A_LENGTH = 10.0  # rows that the shortest length must see
 LEAST_RANGE = np.deg2rad(10.0)
-LONG_SURVEY = 100  # rows from which it resolves more than a joint map does
+LEAST_ROWS = 100
+LONG_SURVEY = 600  # rows from which no other free form resolves more
 
 
 @dataclass(frozen=True)
@@ -62,7 +63,7 @@ class JointSpline(JointEffect):
     @classmethod
     def may_show(cls, states: States) -> bool:
         """Wait for a survey that is long enough."""
-        return len(states) >= LONG_SURVEY
+        return len(states) >= LEAST_ROWS
 
     def _parts(self) -> list[tuple[int, float]]:
         """List joints (from 0) with lengths."""
