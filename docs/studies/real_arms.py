@@ -32,6 +32,7 @@ from postproc.model.model import Method, Model
 from postproc.model.statistics import ErrorStatistics
 
 OUT = Path(__file__).parents[1] / "real-arms.md"
+ACCOUNT = SHIPPED / "account.md"  # what was tried, and what came of it
 WITHIN = 1.96
 QUICK = 150  # rows that are fitted in a quick run
 NOMINAL, GEOMETRY, DEFAULT = "registered only", "geometry alone", "fit"
@@ -189,15 +190,20 @@ def traced(data: DataSet, found: Calibration) -> Extension:
 
 
 def judged(model: Model, data: DataSet, split: Split, draw: int) -> Outcome:
+    """Compare tested readings with what a model says of them."""
+    rows = data.series[split.test][split.draws[draw][1]]
+    return judge(model, data, rows, split.same)
+
+
+def judge(model: Model, data: DataSet, rows: Measurements, same: bool) -> Outcome:
     """Compare readings with what a model says of them.
 
     In the set-up of the fitted rows the registration is theirs; in another one it is
     found from the tested rows themselves, with the arm as the model knows it.
     """
-    rows = data.series[split.test][split.draws[draw][1]]
     arm, placed = data.cell.arm, model.registration
     states, position = rows.states, rows.position
-    if not split.same:
+    if not same:
         placed, read = predict_registered(model, arm, states, position)
         states = placed.on_probes(states)
     else:
@@ -249,6 +255,7 @@ another series may have another.
 
 {short}
 
+{account}
 ## Another arm
 
 A set is one TOML file, and its data. Put both in a folder as
@@ -316,6 +323,7 @@ def page(sets: list[tuple[DataSet, list[Tried]]], given: argparse.Namespace) -> 
         after=DIAGNOSED if traced else "; nothing was diagnosed",
         centres=MOST_CENTRES,
         short="\n".join(short(sets)),
+        account=ACCOUNT.read_text(encoding="utf-8"),
     )
     return "\n".join([text, *(line for s in sets for line in section(*s)), ""])
 

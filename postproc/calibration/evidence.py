@@ -14,7 +14,7 @@ from scipy.linalg.blas import dsymv
 from scipy.linalg.lapack import dpotrf, dpotri
 
 from postproc import _native
-from postproc.arrays import Floats, Ints
+from postproc.arrays import Bools, Floats, Ints
 
 LOG_BOUNDS = (-8.0, 7.0)  # of log s_g
 STEPS = 60
@@ -55,6 +55,28 @@ class Normal:
         values, vectors = np.linalg.eigh(self.gram)
         rows: Floats = np.sqrt(np.maximum(values, 0.0))[:, None] * vectors.T
         return rows
+
+    def left_to_prior(self, aside: Bools, s: Floats) -> Normal:
+        """Integrate over some parameters, which have known prior scales.
+
+        With Z their columns, rows that had unit variance have 1 + Z s^2 Z^T: exactly
+        the same evidence, in the columns of the others alone.
+
+        Args:
+            aside: Which parameters, (p,).
+            s: Their prior scales, (k,).
+        """
+        rest, own = ~aside, self.gram[np.ix_(aside, aside)]
+        log_det, inverse, told = inverted(np.eye(len(s)) + own * np.outer(s, s))
+        across = self.gram[np.ix_(rest, aside)] * s
+        inside = inverse if told is None else told
+        mixed, moment = across @ inside, s * self.moment[aside]
+        gram = self.gram[np.ix_(rest, rest)] - mixed @ across.T
+        return Normal(
+            (gram + gram.T) / 2.0, self.moment[rest] - mixed @ moment,
+            self.square - float(moment @ inside @ moment),
+            self.log_noise + log_det, self.rows,
+        )  # fmt: skip
 
     def __add__(self, other: Normal) -> Normal:
         """Put the rows of another set of measurements beside these."""

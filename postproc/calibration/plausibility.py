@@ -239,8 +239,9 @@ def lost_without(arm: Arm, survey: Measurements) -> tuple[str, ...]:
     told = []
     if arm.file.links is None:
         told.append(
-            "the arm file has no [links]: how joints yield to the arm's own weight, "
-            "and gaps that depend on it, cannot be fitted and stay in what is left"
+            "the arm file has no [links]: how joints yield to the arm's own weight is "
+            "fitted by the shapes of gravity alone, which tell less where no row was; "
+            "gaps that depend on it cannot be fitted and stay in what is left"
         )
     if arm.file.joints.drive_coupling is None and survey.inferred.any():
         told.append(

@@ -14,7 +14,7 @@ from postproc.arrays import Floats
 from postproc.model.combination import Combination
 from postproc.model.effects.placement import Placement
 from postproc.model.kinematics import Batch
-from postproc.model.model import Model, PredictedReading, side_variance
+from postproc.model.model import Model, PredictedReading
 from postproc.model.registration import Registration
 from postproc.robot.arm import Arm
 from postproc.robot.state import States
@@ -134,13 +134,13 @@ def predict_registered(
     own = Placement(tuple(map(int, placed.tool_ids))).columns(at)
     A = own.reshape(3 * len(batch), -1)
     inverse = np.linalg.pinv(A)
-    left = np.repeat(np.square([model.spread]), len(batch), axis=0)
+    left = model.untold_variance(effects, at, values)
     if len(covariance):
         X = effects.columns(at).reshape(len(A), -1)
         X = X - A @ (inverse @ X)
         left = left + np.einsum("rp,rp->r", X @ covariance, X).reshape(-1, 3)
     scatter = float((model.reading_std(at, np.zeros((len(batch), 3))) ** 2).mean())
     told = scatter * np.einsum("rp,pr->r", A, inverse).reshape(-1, 3)
-    known = left + side_variance(effects, at, values) + told
+    known = left + told
     error = effects.error_at(at, batch, values)
     return placed, PredictedReading(error, model.reading_std(at, known))

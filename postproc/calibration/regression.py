@@ -224,6 +224,16 @@ def fit_effects(
     return state
 
 
+def beside(fitted: Fit, effects: tuple[Effect, ...]) -> Fit:
+    """Lay effects beside those of a fit, those that are new at 0, nothing fitted.
+
+    Noise and rows are those of the fit. What it has and `effects` lack is left out.
+    """
+    position, origin = fitted.error + fitted.batch.walk.tcp, fitted.noise.origin
+    state = _begin(fitted.batch, position, Combination(effects), origin, fitted)
+    return _linearised(replace(state, whitener=fitted.whitener))
+
+
 def _begin(
     batch: Batch,
     position: Floats,

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
-from postproc.arrays import Bools, Floats
+from postproc.arrays import Bools, Floats, Ints
 from postproc.calibration.directions import mend_directions
 from postproc.calibration.evidence import Normal, highest
 from postproc.calibration.measurements import Measurements
 from postproc.calibration.orientations import Turns
 from postproc.calibration.references import TrackerMotion, ruled_out
-from postproc.calibration.regression import NEARLY, Fit, fit_effects
+from postproc.calibration.regression import NEARLY, Fit, beside, fit_effects
 from postproc.calibration.tool_groups import find_groups
 from postproc.model.covariate import DRIVERS
 from postproc.model.effects import BASE_EFFECTS, EFFECTS, propose
@@ -29,7 +30,9 @@ from postproc.robot.state import States
 #
 # An effect stays only if the marginal likelihood falls without it, all prior scales
 # being chosen anew. Named effects are weighed first; free forms must then explain what
-# is left.
+# is left. Where one of them does, it has taken away what the named ones were weighed
+# against: gravity of 0.1 mm does not show beside waves of 0.3 mm. So what was laid
+# aside is weighed once more, beside the free forms.
 
 Progress = Callable[[str], None]
 
@@ -95,14 +98,38 @@ def fit_best(
     kept = base
     progress("fit " + ", ".join(e.name for e in base))
     fitted = fit_effects(batch, position, base, origin, turns=turns, until=NEARLY)
-    named = candidates(arm, states, motion)
-    for names in (named, *((name,) for name in free_forms(states))):
+    named, free = candidates(arm, states, motion), free_forms(states)
+    for names in (named, *((name,) for name in free)):
         progress("fit and weigh " + ", ".join(names))
         tried = (*kept, *propose(names, arm, states), *slipped(fitted))
         fitted = fit_effects(batch, position, tried, origin, fitted, until=NEARLY)
         kept = keep_needed(fitted, always=base)
+    if any(e.name in free for e in kept):
+        progress("weigh once more what was laid aside")
+        kept = weighed_again(fitted, kept, named, always=base)
     progress("fit " + ", ".join(e.name for e in kept))
     return fit_effects(batch, position, kept, origin, fitted)
+
+
+def weighed_again(
+    fitted: Fit,
+    kept: tuple[Effect, ...],
+    named: tuple[str, ...],
+    always: tuple[Effect, ...],
+) -> tuple[Effect, ...]:
+    """Weigh named effects beside the free forms of a fit, without fitting anew.
+
+    Args:
+        fitted: A fit of what is kept, whose noise and free forms are taken as they are.
+        kept: The effects that are kept so far; named ones of them may go now.
+        named: Names of all that are weighed.
+        always: Effects that are not in question.
+    """
+    have = {e.name for e in kept}
+    batch = fitted.batch
+    more = propose([k for k in named if k not in have], batch.arm, batch.states)
+    free = tuple(e for e in kept if e.name not in named and e not in always)
+    return keep_needed(beside(fitted, (*kept, *more)), always, free)
 
 
 def slipped(fitted: Fit) -> tuple[Effect, ...]:
@@ -113,73 +140,87 @@ def slipped(fitted: Fit) -> tuple[Effect, ...]:
     return (ToolShift(row=float(fitted.batch.states.order[found.step])),)
 
 
-def keep_needed(fitted: Fit, always: tuple[Effect, ...]) -> tuple[Effect, ...]:
+def keep_needed(
+    fitted: Fit, always: tuple[Effect, ...], aside: tuple[Effect, ...] = ()
+) -> tuple[Effect, ...]:
     """Drop effects one after the other until each that is left is needed.
 
     Args:
         fitted: A fit of all effects in question.
         always: Effects that are not in question.
+        aside: Others that are not, and whose prior scales are not chosen anew.
     """
-    kept = list(fitted.combination.effects)
-    normal = fitted.normal()
-    present = np.ones(len(fitted.values), dtype=bool)
-    now = _evidence(fitted, normal, present)
-    while found := _least_needed(fitted, normal, kept, always, present, now):
-        effect, columns, now = found
+    weighing = _Weighing.of(fitted, aside)
+    kept = [e for e in fitted.combination.effects if e not in aside]
+    asked = [e for e in kept if e not in always]
+    present = np.ones(len(weighing.owner), dtype=bool)
+    now = weighing.evidence(present)
+    while found := weighing.least_needed(asked, present, now):
+        effect, present, now = found
         kept.remove(effect)
-        present &= ~columns
-    return tuple(kept)
+        asked.remove(effect)
+    return tuple(e for e in fitted.combination.effects if e in kept or e in aside)
 
 
-def _least_needed(
-    fitted: Fit,
-    normal: Normal,
-    kept: list[Effect],
-    always: tuple[Effect, ...],
-    present: Bools,
-    now: float,
-) -> tuple[Effect, Bools, float] | None:
-    """Find the effect that is missed least, its columns, and the evidence without it.
+@dataclass(frozen=True, eq=False)
+class _Weighing:
+    """A regression of which columns may go.
 
-    Returns:
-        None where each is worth enough.
+    Attributes:
+        normal: Its sums, linearised at a fit.
+        group: Prior group of every column, (p,).
+        log_scale: Log factors on the prior scales of all groups, to begin with.
+        owner: Effect of every column, (p,).
     """
-    best, least = None, now - ENOUGH
-    for effect, columns in _in_question(fitted, kept, always):
-        found = _evidence(fitted, normal, present & ~columns, least)
-        if found > least:
-            best, least = (effect, columns, found), found
-    return best
 
+    normal: Normal
+    group: Ints
+    log_scale: Floats
+    owner: tuple[Effect, ...]
 
-def _in_question(
-    fitted: Fit, kept: list[Effect], always: tuple[Effect, ...]
-) -> Iterator[tuple[Effect, Bools]]:
-    """List effects that may go, with their columns."""
-    c = fitted.combination
-    for effect, part in zip(c.effects, c.slices, strict=True):
-        if effect in kept and effect not in always:
-            columns = np.zeros(len(fitted.values), dtype=bool)
-            columns[part] = True
-            yield effect, columns
+    @classmethod
+    def of(cls, fitted: Fit, aside: tuple[Effect, ...]) -> _Weighing:
+        """Take a fit; the columns of effects `aside` keep their prior scales."""
+        c, normal, group = fitted.combination, fitted.normal(), fitted.group
+        owner = tuple(e for e in c.effects for _ in e.parameters())
+        out = np.array([e in aside for e in owner], dtype=bool)
+        if not out.any():
+            return cls(normal, group, fitted.log_scale, owner)
+        s = np.exp(fitted.log_scale)[group[out]]
+        rest = normal.left_to_prior(out, s)
+        owner = tuple(e for e in owner if e not in aside)
+        return cls(rest, group[~out], fitted.log_scale, owner)
 
+    def least_needed(
+        self, asked: list[Effect], present: Bools, now: float
+    ) -> tuple[Effect, Bools, float] | None:
+        """Find the effect that is missed least, what is left, and the evidence then.
 
-def _evidence(
-    fitted: Fit, normal: Normal, present: Bools, least: float = -np.inf
-) -> float:
-    """Log evidence of some of the columns, prior scales chosen anew.
+        Returns:
+            None where each is worth enough.
+        """
+        best, least = None, now - ENOUGH
+        for effect in asked:
+            without = present & np.array([e is not effect for e in self.owner])
+            found = self.evidence(without, least)
+            if found > least:
+                best, least = (effect, without, found), found
+        return best
 
-    It is found only roughly where it is far below `least`.
-    """
-    part = Normal(
-        normal.gram[np.ix_(present, present)],
-        normal.moment[present],
-        normal.square,
-        normal.log_noise,
-        normal.rows,
-    )
-    used, group = np.unique(fitted.group[present], return_inverse=True)
-    return highest(part, group, fitted.log_scale[used], STEPS, least)
+    def evidence(self, present: Bools, least: float = -np.inf) -> float:
+        """Log evidence of some of the columns, prior scales chosen anew.
+
+        It is found only roughly where it is far below `least`.
+        """
+        part = Normal(
+            self.normal.gram[np.ix_(present, present)],
+            self.normal.moment[present],
+            self.normal.square,
+            self.normal.log_noise,
+            self.normal.rows,
+        )
+        used, group = np.unique(self.group[present], return_inverse=True)
+        return highest(part, group, self.log_scale[used], STEPS, least)
 
 
 # The product's own method: a survey becomes a fit of named effects, and a model.

@@ -133,6 +133,22 @@ def side_variance(effects: Combination, at: Batch, values: Floats) -> Floats:
     return out
 
 
+def beyond_variance(effects: Combination, at: Batch, prior_std: Floats) -> Floats:
+    """Variance that free forms may have beyond the surveyed ranges, (n, 3) [m^2].
+
+    Args:
+        effects: The effects.
+        at: n states, with the kinematics taken at the parameters.
+        prior_std: Prior standard deviations of the parameters, (p,).
+    """
+    out = np.zeros((len(at), 3))
+    for effect, part in zip(effects.effects, effects.slices, strict=True):
+        turned = effect.beyond(at, prior_std[part])
+        if turned is not None and turned.any():
+            out += np.einsum("nij,nj->ni", at.jacobian**2, turned)
+    return out
+
+
 # Where a survey has been, and which states lie outside.
 
 Interval = tuple[float, float]
@@ -590,10 +606,26 @@ class Model:
         """Variance of the error, (n, 3) [m^2], and the kinematics that it is of."""
         effects, values, covariance = self.compensable()
         at = effects.at(Batch(arm, states), values)
-        variance = side_variance(effects, at, values) + np.square(self.spread)
+        variance = self.untold_variance(effects, at, values)
         if len(covariance):
             variance += parameter_variance(effects, at, covariance)
         return variance, at
+
+    def untold_variance(
+        self, effects: Combination, at: Batch, values: Floats
+    ) -> Floats:
+        """Variance that the parameters' covariance does not hold, (n, 3) [m^2].
+
+        Args:
+            effects: All effects, or those that may be compensated.
+            at: n states, with the kinematics taken at the parameters.
+            values: Of these effects' parameters.
+        """
+        prior_std = self.prior_std
+        if effects is not self.effects and len(prior_std):
+            prior_std = prior_std[self.effects.where(*COMPENSATED)]
+        beyond = beyond_variance(effects, at, prior_std)
+        return side_variance(effects, at, values) + np.square(self.spread) + beyond
 
     def reading(self, arm: Arm, states: States) -> PredictedReading:
         """Predict what the survey's own set-up reads, and how sure one reading is.
@@ -612,7 +644,7 @@ class Model:
         """Predict some readings."""
         batch = Batch(arm, states)
         at = self.effects.at(batch, self.values)
-        known = side_variance(self.effects, at, self.values) + np.square(self.spread)
+        known = self.untold_variance(self.effects, at, self.values)
         if len(self.covariance):
             known = known + parameter_variance(self.effects, at, self.covariance)
         error = self.effects.error_at(at, batch, self.values)

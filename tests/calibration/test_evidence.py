@@ -119,3 +119,15 @@ def test_a_search_gives_up_only_below_what_is_asked_for() -> None:
         assert highest(normal, group, np.zeros(2), 60, least) == best
     for least in best + np.array([1e-3, 1.0, 50.0]):
         assert highest(normal, group, np.zeros(2), 60, least) <= best
+
+
+def test_parameters_left_to_their_prior_are_integrated_over() -> None:
+    X, _, group, normal = problem()
+    aside = np.arange(X.shape[1]) % 3 == 0
+    u = np.array([0.3, -0.4])[: group.max() + 1]
+    whole = posterior(normal, group, u)
+    rest = normal.left_to_prior(aside, np.exp(u)[group[aside]])
+    part = posterior(rest, group[~aside], u)
+    assert np.isclose(part.log_evidence, whole.log_evidence, rtol=1e-10)
+    assert np.allclose(part.mean, whole.mean[~aside])
+    assert np.allclose(part.covariance, whole.covariance[np.ix_(~aside, ~aside)])

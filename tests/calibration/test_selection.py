@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
+from postproc.arrays import Floats
 from postproc.calibration.fit import drifts
 from postproc.calibration.regression import fit_effects
-from postproc.calibration.selection import candidates, fit_best
+from postproc.calibration.selection import candidates, fit_best, keep_needed
 from postproc.model.effects import BASE_EFFECTS, propose
 from postproc.model.kinematics import Batch
+from postproc.robot.state import States
 from tests.calibration.simulator import NJ, covariates, random_arm, random_states
 
 
@@ -35,7 +39,43 @@ def test_nothing_is_added_without_evidence() -> None:
 
 def test_what_is_there_is_kept() -> None:
     assert planted(2, "coupling") == (*BASE_EFFECTS, "coupling")
-    assert "joint_map" in planted(3, "joint_map")
+    assert {"joint_map", "joint_spline"} & set(planted(3, "joint_map"))
+
+
+def test_gravity_shows_beside_waves_that_are_larger() -> None:
+    rng = np.random.default_rng(4)
+    states = random_states(400, rng)
+    measured, _ = random_arm(rng).measure(states, rng)
+    batch, q = Batch(NJ, states), states.q
+    J, torque = batch.jacobian, batch.loads.gravity[:, [2]]
+    for j, order in ((0, 11.0), (1, 17.0), (2, 13.0)):
+        measured = measured + J[:, :, j] * (3e-4 * np.sin(order * q[:, [j]]))
+    measured = measured + J[:, :, 2] * (4e-5 * torque / np.abs(torque).max())
+    base = propose(BASE_EFFECTS, NJ, states)
+    alone = fit_effects(batch, measured, (*base, *propose(["compliance"], NJ, states)))
+    assert "compliance" not in {e.name for e in keep_needed(alone, base)}
+    found = fit_best(NJ, states, measured, None).combination.effects
+    assert {"compliance", "joint_spline"} <= {e.name for e in found}
+
+
+def test_an_arm_of_unknown_links_yields_by_the_shapes_of_gravity() -> None:
+    bare = replace(NJ, file=NJ.file.model_copy(update={"links": None}))
+    rng = np.random.default_rng(6)
+    states, held = random_states(300, rng), random_states(200, rng)
+    measured, _ = random_arm(rng).measure(states, rng)
+
+    def sag(states: States) -> Floats:
+        batch = Batch(NJ, states)  # which knows the links
+        turned = 3e-7 * batch.loads.gravity[:, 1:3]
+        return np.einsum("nij,nj->ni", batch.jacobian[:, :, 1:3], turned)
+
+    fit = fit_best(bare, states, measured + sag(states), None)
+    assert "compliance" in {e.name for e in fit.combination.effects}
+    plain = fit_best(NJ, states, measured, None)
+    truth = sag(held)
+    left = [f.combination.error(Batch(NJ, held), f.values) for f in (fit, plain)]
+    gap = np.linalg.norm(left[0] - left[1] - truth, axis=1)
+    assert gap.mean() < 0.05 * np.linalg.norm(truth, axis=1).mean()
 
 
 def test_only_covariates_that_vary_are_candidates() -> None:

@@ -20,6 +20,7 @@ from postproc.model.effects.effect import (
     fade_turns,
 )
 from postproc.model.kinematics import Batch
+from postproc.model.model import beyond_variance
 from tests.calibration.simulator import COUPLED, NJ, PLATE, covariates, random_states
 
 RNG = np.random.default_rng(5)
@@ -236,3 +237,22 @@ def test_what_is_known_once_serves_the_same_poses_alone() -> None:
     ):
         fresh = effect.angles(Batch(NJ, other.states), p)
         np.testing.assert_array_equal(effect.angles(other, p), fresh)
+
+
+def test_a_spline_is_as_unsure_as_its_prior_where_it_has_ended() -> None:
+    (effect,) = propose(["joint_spline"], NJ, STATES)
+    prior = np.array([1e-4 if " 60.0 deg" in p.name else 5e-5
+                      for p in effect.parameters()])  # fmt: skip
+    inside = effect.beyond(Batch(NJ, STATES), prior)
+    assert inside is not None and not inside.any()
+    q = STATES.q.copy()
+    q[:, 1] = effect.upper[1] + 2.0
+    far = Batch(NJ, STATES.with_(q=q))
+    found = effect.beyond(far, prior)
+    assert found is not None
+    np.testing.assert_allclose(found[:, 1], 1e-4**2 + 5e-5**2)
+    assert not np.delete(found, 1, axis=1).any()
+    both = Combination((*propose(["backlash"], NJ, STATES), effect))
+    spread = np.concatenate([np.ones(len(both.scales) - len(prior)), prior])
+    moved = beyond_variance(both, far, spread)
+    np.testing.assert_allclose(moved, far.jacobian[:, :, 1] ** 2 * found[:, [1]])

@@ -22,25 +22,29 @@ from postproc.robot.arm import Arm
 SCALE = 1e-7  # [rad/(N m)] softness of a usual gear
 UNSURE = 0.1  # share of the nominal moments by which real links differ
 UNSURE_PAYLOAD = 0.1  # [m] how well a payload's centre of mass is known
-MASS_TYPICAL = 50.0  # [kg]
+MASS_UNKNOWN = 10.0  # [kg] at a link's end, of an arm whose links are not known
+YIELDING = (2, 3, 5)  # joints that carry weight on most arms
 AXES = "xyz"
 
 
 def moments(arm: Arm, joint: int) -> tuple[tuple[int, float], ...]:
     """List the links whose first moments load a joint, with what is unsure of them.
 
+    Of an arm whose links are not known all of the moments is unsure: what the joint
+    yields by has the shapes of gravity, and the data alone say how much of each.
+
     Returns:
         (link, standard deviation of its moment [kg m]) of the joint's own link, which
         stands for all that is fixed to it, and of the next one.
     """
-    links = arm.file.links
-    if links is None:
-        return ()
-    mass, com = np.array(links.mass_kg), np.array(links.com_mm) * 1e-3
-    out = []
+    links, out = arm.file.links, []
     for link in range(joint, min(joint + 2, 7)):
+        length = float(np.hypot(arm.dh.a[link - 1], arm.dh.d[link - 1]))
+        if links is None:
+            out.append((link, MASS_UNKNOWN * length + 0.1))
+            continue
+        mass, com = np.array(links.mass_kg), np.array(links.com_mm) * 1e-3
         own = mass[link - 1] * np.linalg.norm(com[link - 1])
-        length = np.hypot(arm.dh.a[link - 1], arm.dh.d[link - 1])
         out.append((link, float(UNSURE * (own + mass[link:].sum() * length) + 0.1)))
     return tuple(out)
 
@@ -62,7 +66,7 @@ class Compliance(JointEffect):
     driven_by: ClassVar[str] = "torque"
     unasked: ClassVar[Unasked | None] = "weighed"
 
-    joints: tuple[int, ...] = (2, 3, 5)
+    joints: tuple[int, ...] = YIELDING
     moments: tuple[tuple[tuple[int, float], ...], ...] = ((), (), ())
     payload: bool = False
 
@@ -75,15 +79,15 @@ class Compliance(JointEffect):
     def propose(cls, arm: Arm, states: object) -> Compliance:
         """Let the joints yield that carry weight."""
         carried = getattr(states, "payload", np.zeros(0))
-        return cls.on(arm, (2, 3, 5), bool(np.nan_to_num(carried).any()))
+        return cls.on(arm, YIELDING, bool(np.nan_to_num(carried).any()))
 
     @classmethod
     def candidates(cls, batch: Batch) -> list[Candidate]:
-        """Try every joint that carries weight."""
+        """Try every joint that carries weight, or may if no weight is known."""
         loaded = bool(np.nan_to_num(batch.states.payload).any())
         return [
             c
-            for j in carrying(batch)
+            for j in carrying(batch) or YIELDING
             for c in alternatives([(cls.on(batch.arm, (j,), loaded), f"torque {j}")], j)
         ]
 

@@ -192,6 +192,18 @@ class Effect(ABC):
         """
         return None
 
+    def beyond(self, batch: Batch, prior_std: Floats) -> Floats | None:
+        """Give the variance of what it may be where it has ended, (n, 6) [rad^2].
+
+        A free form that fades to zero outside the surveyed range knows nothing there:
+        not that the error is zero. None where it does not end.
+
+        Args:
+            batch: The states.
+            prior_std: Of its parameters, as the data chose it, (p,).
+        """
+        return None
+
     def only_joint(self) -> int | None:
         """Return the joint, from 0, that all its columns turn, None without one."""
         return None

@@ -16,7 +16,7 @@ from postproc.model.effects.effect import (
     Unasked,
     fade,
 )
-from postproc.model.effects.joint_spline import LONG_SURVEY
+from postproc.model.effects.joint_spline import LEAST_ROWS
 from postproc.model.kinematics import Batch
 from postproc.robot.arm import Arm
 from postproc.robot.state import States
@@ -130,8 +130,8 @@ class Elm(JointEffect):
 
     @classmethod
     def may_show(cls, states: States) -> bool:
-        """Leave long surveys to the joint spline."""
-        return len(states) < LONG_SURVEY
+        """Leave longer surveys to the joint spline, which carries over better."""
+        return len(states) < LEAST_ROWS
 
     def parameters(self) -> tuple[Parameter, ...]:
         """Name the output weights, joint by joint."""

@@ -1,4 +1,4 @@
-"""Joint spline: the whole error of a joint along its angle, for long surveys.
+"""Joint spline: the whole error of a joint along its angle.
 
 Where `joint_map` finds a place, this resolves every gear and encoder wave that the rows
 can show, without naming them.
@@ -22,9 +22,10 @@ from postproc.robot.state import States
 SCALE = 1e-4  # [rad]
 LONG = np.deg2rad(60.0)
 SHORTEST = np.deg2rad(5.0)
-ROWS_A_LENGTH = 20.0  # rows that the shortest length must see
+ROWS_A_LENGTH = 10.0  # rows that the shortest length must see
 LEAST_RANGE = np.deg2rad(10.0)
-LONG_SURVEY = 600  # rows from which it resolves more than a joint map
+LEAST_ROWS = 100
+LONG_SURVEY = 600  # rows from which no other free form resolves more
 
 
 @dataclass(frozen=True)
@@ -62,7 +63,7 @@ class JointSpline(JointEffect):
     @classmethod
     def may_show(cls, states: States) -> bool:
         """Wait for a survey that is long enough."""
-        return len(states) >= LONG_SURVEY
+        return len(states) >= LEAST_ROWS
 
     def _parts(self) -> list[tuple[int, float]]:
         """List joints (from 0) with lengths."""
@@ -103,4 +104,14 @@ class JointSpline(JointEffect):
             part = slice(start, start + mix.shape[1])
             out[:, j] += found.mixed(mix @ p[part])
             start = part.stop
+        return out
+
+    def beyond(self, batch: Batch, prior_std: Floats) -> Floats:
+        """Give back the prior's variance as far as the functions have faded, (n, 6)."""
+        q, out = batch.states.q, np.zeros((len(batch), 6))
+        ended = 1.0 - fade(q, np.array(self.lower), np.array(self.upper)) ** 2
+        start = 0
+        for j, length in self._parts():
+            out[:, j] += ended[:, j] * prior_std[start] ** 2
+            start += smooth_count(self.lower[j], self.upper[j], length)
         return out
