@@ -60,7 +60,8 @@ def read_log(log: Path) -> list[Trial]:
 
 def _trial(data: dict[str, object]) -> Trial:
     truth = [tuple(law) for law in data["truth"]]  # type: ignore[attr-defined]
-    return Trial(**{**data, "truth": truth, "true_mm": tuple(data["true_mm"])})  # type: ignore[arg-type]
+    errors = {k: tuple(data[k]) for k in ("true_mm", "registered_mm")}  # type: ignore[arg-type]
+    return Trial(**{**data, "truth": truth, **errors})  # type: ignore[arg-type]
 
 
 def main() -> None:

@@ -284,8 +284,7 @@ def candidates(
         tracker: Where the tracker stands, base frame [m], where it is known.
     """
     every = [c for kind in EFFECTS for c in kind.candidates(batch)]
-    if tracker is not None:
-        every += [c for kind in EFFECTS for c in kind.sighted(batch, tracker)]
+    every += [c for kind in EFFECTS for c in kind.sighted(batch, tracker)]
     return sorted(every, key=lambda c: c.family.tier)
 
 

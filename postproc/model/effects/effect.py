@@ -103,13 +103,13 @@ class Effect(ABC):
 
     @classmethod
     def sighted(
-        cls, batch: Batch, tracker: tuple[float, float, float]
+        cls, batch: Batch, tracker: tuple[float, float, float] | None
     ) -> list[Candidate]:
-        """List what else may be tried of it where the tracker's place is known.
+        """List what else may be tried of it by where the tracker stands.
 
         Args:
             batch: The surveyed states.
-            tracker: Where the tracker stands, base frame [m].
+            tracker: Where that is, base frame [m], or None where nobody knows.
         """
         return []
 
