@@ -196,6 +196,10 @@ class Effect(ABC):
         """Return the joint, from 0, that all its columns turn, None without one."""
         return None
 
+    def fine(self, joint: int) -> NDArray[np.int64]:
+        """Number its parameters that map a joint, from 1, finely enough for waves."""
+        return np.zeros(0, dtype=np.int64)
+
     def turning(self, batch: Batch) -> Floats:
         """Evaluate by what each column turns `only_joint`, (n, p) [rad per unit]."""
         raise TypeError(f"{self.name} turns no joint alone")
