@@ -30,7 +30,7 @@ PART_SIZES = (0.1, 0.25, 0.5, 1.0)  # between which joints of a law are counted
 
 INTRODUCTION = """# Tracing effects that nobody declared
 
-Written by `make undeclared`. Each trial draws a virtual arm with geometry, tool and
+Written by `{command}`. Each trial draws a virtual arm with geometry, tool and
 backlash errors and one undeclared effect (or two, or none) by seed, surveys it with 400
 rows, fits geometry and backlash, and diagnoses what is left. The virtual arm shares no
 code with the model, and its link masses, load laws and shapes are not the model's
@@ -57,7 +57,9 @@ figure above; "as it stands" takes out nothing.
 """
 
 
-def write_table(trials: Sequence[Trial], output: Path, wanted: int) -> None:
+def write_table(
+    trials: Sequence[Trial], output: Path, wanted: int, command: str
+) -> None:
     """Write the page, and the plot beside it, of so many of the trials wanted."""
     by_kind: dict[str, list[Trial]] = defaultdict(list)
     for t in trials:
@@ -65,7 +67,7 @@ def write_table(trials: Sequence[Trial], output: Path, wanted: int) -> None:
     kinds = [k for k in (*NAMED, *WAVES, *NAMELESS, "two") if k in by_kind]
     planted = [t for t in trials if t.kind != "none"]
     lines = [
-        *INTRODUCTION.splitlines(),
+        *INTRODUCTION.format(command=command).splitlines(),
         *_summary(trials, wanted),
         "",
         *_by_size(planted),

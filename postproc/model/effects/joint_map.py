@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from typing import ClassVar, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from postproc.arrays import Floats
 from postproc.model.covariate import JOINTS
@@ -124,11 +123,6 @@ class JointMap(JointEffect):
         places = centre + reach * np.arange(-half, half + 1) / half
         bumps = tuple((joint, float(c)) for c in places)
         return JointMap(bumps, float(reach / half / SPACING))
-
-    def fine(self, joint: int) -> NDArray[np.int64]:
-        """Take a joint's bumps where they are more than a spot's."""
-        own = np.array([k for k, (j, _) in enumerate(self.bumps) if j == joint])
-        return own[: len(own) if len(own) > MOST_OF_A_SPOT else 0].astype(np.int64)
 
     def nonlinear(self) -> dict[str, tuple[float, str]]:
         """Tell where a spot is and how wide; a whole map has no one place."""
