@@ -51,7 +51,7 @@ from postproc.model.effects.transmission import FIRST_FREE, Orders, Transmission
 FINER = 0.25  # step of the orders, in what the range of the joint resolves
 NARROWED = tuple(0.5**k for k in range(6))  # steps round the best order that are tried
 MOST = 8  # waves of a joint
-HIGHEST = 240.0  # order that is asked for, where the poses can tell
+FASTEST = 120.0  # turns of a motor a turn: twice that and more is asked for
 STRETCHES = 6  # of a joint's range, with as many rows each
 HELD = 0.5  # share of what a wave explains that it must explain from other stretches
 
@@ -173,7 +173,7 @@ class Pursuit:
     @property
     def orders(self) -> Floats:
         """List the orders that are tried, finer than what the range resolves."""
-        told = Orders.of(self.whole.at.states.q[:, self.joint - 1], HIGHEST / 2.0)
+        told = Orders.of(self.whole.at.states.q[:, self.joint - 1], FASTEST)
         step = FINER * 2.0 * np.pi / told.covered
         return np.arange(FIRST_FREE, told.told, step)
 
