@@ -35,6 +35,8 @@ ONLY = {
 
 # Which modules know one effect in particular: all others take effects as they come.
 KNOWING = {
+    # Waves inside a map are what it names.
+    "calibration.diagnosis.waves": {"transmission"},
     # The others move along the chain that it deviates.
     "model.combination": {"geometry"},
     # The native kernel makes its columns and those of the joints itself.

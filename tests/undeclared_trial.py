@@ -12,7 +12,8 @@ from postproc.calibration.diagnosis.trace import trace
 from postproc.calibration.regression import Fit, fit_effects
 from postproc.model.combination import Combination
 from postproc.model.effects import BASE_EFFECTS, propose
-from postproc.model.effects.effect import Effect, Parameter
+from postproc.model.effects.base_shift import rigid_columns
+from postproc.model.effects.effect import Effect, Origin, Parameter
 from postproc.model.kinematics import Batch
 from postproc.simulation import VirtualArm, VirtualArrivals
 from tests.calibration.planted import (
@@ -46,6 +47,7 @@ class Trial:
         alone: Whether it is without its group, too.
         parts: Joint, own size and whether it was named, of a law of several joints.
         true_mm: True mean error at fresh poses before, after, and of an informed fit.
+        registered_mm: The same with one rigid displacement taken out of each.
         seconds: Processor time of the search.
     """
 
@@ -59,6 +61,7 @@ class Trial:
     alone: bool
     parts: list[tuple[int, float, bool]]
     true_mm: tuple[float, float, float]
+    registered_mm: tuple[float, float, float]
     seconds: float
 
 
@@ -111,12 +114,11 @@ def run(kind: str, seed: int, size: float) -> Trial:
     laws = [law for law in c.arm.laws if law.effect != "backlash"]
     truth = [(law.effect, list(law.joints), law.source) for law in laws]
     hits = [_hit(law, found) for law in truth]
-    before, after = base, traced.search.fit
+    plain, registered = _true_errors(c, seed, base, traced.search.fit)
     return Trial(
         kind, seed, size, truth, traced.verdict, found,
         all(h >= 1 for h in hits), all(h >= 2 for h in hits),
-        _parts(c, found),
-        _true_errors(c, seed, before, after), seconds,
+        _parts(c, found), plain, registered, seconds,
     )  # fmt: skip
 
 
@@ -155,25 +157,47 @@ def _hit(law: tuple[str, list[int], int], found: Sequence[dict[str, object]]) ->
     return best
 
 
+Errors = tuple[float, float, float]
+
+
 def _true_errors(
     c: Campaign, seed: int, before: Fit, after: Fit
-) -> tuple[float, float, float]:
-    """True mean errors [mm] that three fits leave at fresh poses."""
+) -> tuple[Errors, Errors]:
+    """True mean errors [mm] that three fits leave at fresh poses.
+
+    Returns:
+        As they are, and with the rigid displacement that fits each best taken out.
+    """
     fresh = _fresh(c.arm, seed, len(c.states))
-    truth = c.arm.error(fresh)
+    truth, batch = c.arm.error(fresh), Batch(ARM, states_of(fresh))
     informed = _informed(c, seed, fresh, truth)
-    out = []
-    for fit, origins in (
-        (before, ("arm", "state")),
-        (after, ("arm", "state")),
-        (informed, ("arm", "state", "setup")),
-    ):
-        keep = tuple(e for e in fit.combination.effects if e.belongs_to() in origins)
-        values = fit.values[fit.combination.where(*origins)]
-        batch = Batch(ARM, states_of(fresh))
-        left = truth - Combination(keep).error(batch, values)
-        out.append(float(np.linalg.norm(left, axis=1).mean() * 1e3))
-    return out[0], out[1], out[2]
+    told = ("arm", "state")
+    left = [
+        truth - moved(before, batch, told),
+        truth - moved(after, batch, told),
+        truth - moved(informed, batch, (*told, "setup")),
+    ]
+    plain = [_mean_mm(e) for e in left]
+    registered = [_mean_mm(without_rigid(batch, e)) for e in left]
+    return (plain[0], plain[1], plain[2]), (registered[0], registered[1], registered[2])
+
+
+def moved(fit: Fit, batch: Batch, origins: tuple[Origin, ...]) -> np.ndarray:
+    """What effects of some origins do to other states, (n, 3) [m]."""
+    keep = tuple(e for e in fit.combination.effects if e.belongs_to() in origins)
+    values = fit.values[fit.combination.where(*origins)]
+    return Combination(keep).error(batch, values)
+
+
+def _mean_mm(left: np.ndarray) -> float:
+    return float(np.linalg.norm(left, axis=1).mean() * 1e3)
+
+
+def without_rigid(batch: Batch, left: np.ndarray) -> np.ndarray:
+    """Take the rigid displacement out of errors that fits them best, (n, 3) [m]."""
+    rigid = rigid_columns(batch).reshape(-1, 6)
+    motion = np.linalg.lstsq(rigid, left.reshape(-1))[0]
+    return left - (rigid @ motion).reshape(-1, 3)
 
 
 def _fresh(arm: VirtualArm, seed: int, rows: int) -> VirtualArrivals:

@@ -37,6 +37,7 @@ NAMED = (
     "base_tilt", "elastic_flank", "azimuth", "refraction",
 )  # fmt: skip
 NAMELESS = ("joint_product", "hysteresis")
+READINGS = ("tracker_drift", "azimuth", "refraction")  # nothing moves, it only seems to
 UNTOLD = ("elastic_flank",)  # measured row by row: no travels, no directions told
 WAVES = ("motor_wave", "drive_wave", "drive_backlash")  # of an arm whose gears are told
 SIZES = (0.3, 0.5, 1.0, 2.0)  # rms after projection on the base model over the noise

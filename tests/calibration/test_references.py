@@ -18,6 +18,7 @@ from postproc.calibration.measurements import (
 from postproc.calibration.references import ReferenceRows, tracker_motion
 from postproc.calibration.selection import fit_survey, model_of
 from postproc.calibration.tables import TableFormat
+from postproc.cli.diagnose import tell
 from postproc.exceptions import MeasurementError
 from postproc.model.effects import BASE_EFFECTS
 from postproc.model.effects.effect import Effect
@@ -153,6 +154,9 @@ def test_a_diagnosis_says_whose_the_warm_up_is(places: np.ndarray | None) -> Non
     assert finding.settings["told"] == (places is not None)
     named = in_time(found.model.compensable()[0].effects)
     assert named == (set() if places is None else {"thermal"})
+    stood = " fixed points: the tracker did not move"
+    assert (stood in tell(found.diagnosis)) == (places is not None)
+    assert bool(found.diagnosis.to_dict()["fixed_points"]) == (places is not None)
 
 
 def test_readings_that_cover_a_part_of_the_survey_leave_it_in_doubt() -> None:

@@ -45,6 +45,7 @@ def variants() -> list[Effect]:
             ("azimuth", {}),
             ("refraction", {}),
             ("refraction", {"form": "stretch"}),
+            ("refraction", {"told": False}),
         )
     ]
     out.append(BY_NAME["backlash_profile"](constant=True))
@@ -110,6 +111,16 @@ def test_a_sum_of_effects_turns_the_tool_as_its_columns_say() -> None:
         slope = all_.turn(batch, at + step) - all_.turn(batch, at - step)
         gap = slope / (2e-2 * scale) - columns[:, :, k]
         assert np.abs(gap).max() * scale < 2e-5, all_.names[k]  # [rad], products
+
+
+@pytest.mark.parametrize("form", ["bend", "stretch"])
+def test_refraction_seen_from_anywhere_differs_by_a_shift(form: str) -> None:
+    """Size, and size times place, make the beam's error but for a constant."""
+    batch, place = Batch(NJ, STATES), (3.0, -2.0, 1.5)
+    told = BY_NAME["refraction"](place, form=form).columns(batch)[:, :, 0]
+    anywhere = BY_NAME["refraction"](told=False, form=form).columns(batch)
+    apart = anywhere @ np.array([1.0, *place]) - told
+    assert np.abs(apart - apart.mean(axis=0)).max() < 1e-12
 
 
 @pytest.mark.parametrize("effect", variants(), ids=lambda e: e.name)

@@ -257,6 +257,7 @@ def _conclude(
         dropped=weighed_down(found.fit, survey),
         directions=report_directions(found.fit, survey),
         not_excluded=not_excluded(found.fit.batch),
+        fixed_points=() if survey.motion is None else survey.motion.tell(),
     )
 
 

@@ -10,7 +10,7 @@ from itertools import groupby
 import numpy as np
 from numpy.typing import NDArray
 
-from postproc.arrays import Floats
+from postproc.arrays import Floats, Ints
 from postproc.calibration.regression import Fit
 from postproc.model.effects import EFFECTS
 from postproc.model.effects.effect import Candidate
@@ -64,10 +64,14 @@ class Projection:
             without: Number of an effect that is left out of the model: the rest then
                 holds what that effect explains.
         """
+        part = slice(0) if without is None else fit.combination.slices[without]
+        return cls.leaving(fit, np.arange(len(fit.values))[part])
+
+    @classmethod
+    def leaving(cls, fit: Fit, out: Ints) -> Projection:
+        """Make the filter of a fit without some of its parameters, (k,)."""
         at = fit.combination.at(fit.batch, fit.values)
-        known = np.arange(len(fit.values))
-        if without is not None:
-            known = np.delete(known, fit.combination.slices[without])
+        known = np.delete(np.arange(len(fit.values)), out)
         names = tuple(fit.combination.names[k] for k in known)
         taken, root = _taken(fit, known)
         made = cls(fit, names, at, taken, root, fit.target)
@@ -284,8 +288,7 @@ def candidates(
         tracker: Where the tracker stands, base frame [m], where it is known.
     """
     every = [c for kind in EFFECTS for c in kind.candidates(batch)]
-    if tracker is not None:
-        every += [c for kind in EFFECTS for c in kind.sighted(batch, tracker)]
+    every += [c for kind in EFFECTS for c in kind.sighted(batch, tracker)]
     return sorted(every, key=lambda c: c.family.tier)
 
 

@@ -115,6 +115,7 @@ class Diagnosis:
         dropped: Rows that count less than fully, and why.
         directions: Wrong directions, or None where the file has none.
         not_excluded: What the rows could not have shown, in words.
+        fixed_points: What readings of fixed points say of the tracker, in words.
     """
 
     verdict: Verdict
@@ -133,6 +134,7 @@ class Diagnosis:
     dropped: tuple[DroppedRow, ...]
     directions: DirectionReport | None
     not_excluded: tuple[str, ...] = ()
+    fixed_points: tuple[str, ...] = ()
 
     def to_dict(self) -> dict[str, Any]:
         """Return the content of the JSON report."""
@@ -169,6 +171,7 @@ class Diagnosis:
             ],
             "directions": None if self.directions is None else asdict(self.directions),
             "not_excluded": list(self.not_excluded),
+            "fixed_points": list(self.fixed_points),
         }
 
 

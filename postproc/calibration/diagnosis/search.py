@@ -219,6 +219,8 @@ class Search:
         null: Distribution of the largest evidence when there is nothing.
         refused: The candidate that the search stopped at, if there was one.
         ranked: The last fit that the library was ranked under, and its ranking.
+        waves: How many of the last additions came out of maps; the library need not
+            hold their orders.
     """
 
     base: Fit
@@ -228,6 +230,7 @@ class Search:
     null: Null
     refused: Addition | None
     ranked: tuple[Fit, list[Score]] | None = None
+    waves: int = 0
 
     def ranking_under(self, fit: Fit) -> list[Score]:
         """Rank the library by what a fit lacks, if that is not known already."""
@@ -257,8 +260,8 @@ def search(base: Fit, library: Library, null: Null, progress: Progress) -> Searc
         if grown.fit is found.fit:
             found = grown
             break
-        found = _settle(grown, len(grown.additions) - RECENT)
-    return _settle(found, 0) if len(found.additions) > RECENT else found
+        found = settle(grown, len(grown.additions) - RECENT)
+    return settle(found, 0) if len(found.additions) > RECENT else found
 
 
 def _grow(found: Search) -> Search:
@@ -287,10 +290,10 @@ def _best(found: Search, scores: list[Score]) -> Score:
     return name or best
 
 
-def _settle(found: Search, first: int) -> Search:
+def settle(found: Search, first: int) -> Search:
     """Look again at additions from some number on, now that the others are in."""
     number = max(first, 0)
-    while number < len(found.additions):
+    while number < len(found.additions) - found.waves:
         again = _again(found, number)
         number += len(again.additions) == len(found.additions)
         found = again
@@ -380,6 +383,9 @@ def stand(found: Search, number: int) -> JudgedAddition:
     projection = Projection.of(found.fit, without=found.place(number))
     scores = ranking(projection, found.library)
     here = next((s for s in scores if s.family == own.family), None)
+    if number >= len(found.additions) - found.waves:
+        square = float(projection.rest @ projection.rest)
+        here = rank(reduce_some(projection, [own]), square, projection.rows)[0]
     if here is None:
         here = found.additions[number].score
     rivals = []

@@ -21,6 +21,7 @@ from postproc.calibration.diagnosis.search import (
     search,
     stand,
 )
+from postproc.calibration.diagnosis.waves import name_waves
 from postproc.calibration.regression import Fit
 from postproc.model.effects.effect import FREE, JointEffect
 
@@ -31,8 +32,8 @@ STANDS_IN = 0.9  # share of the name's evidence that a free form must have
 
 
 def investigate(base: Fit, library: Library, null: Null, progress: Progress) -> Search:
-    """Search for what a fit lacks, and take back names that do not hold."""
-    return withdraw(search(base, library, null, progress))
+    """Search for what a fit lacks, take back names that do not hold, name waves."""
+    return name_waves(withdraw(search(base, library, null, progress)))
 
 
 def withdraw(found: Search) -> Search:

@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import product
 from typing import ClassVar
 
 import numpy as np
 
 from postproc.arrays import Floats
-from postproc.model.effects.effect import Candidate, Parameter, alternatives
+from postproc.model.effects.effect import Candidate, Effect, Parameter, alternatives
 from postproc.model.effects.sighting import Sighting
 from postproc.model.kinematics import Batch
 
 TURN = 2e-5  # [rad]
+NEAREST, FARTHER, RINGS = 1.5, 2.0**0.5, 7  # [m], ratio: rings of places to try
+BEARINGS = 24  # places of a ring
+CLEAR = 0.3  # [m] that the TCP keeps of the tracker's vertical axis
 
 
 @dataclass(frozen=True)
@@ -23,10 +27,47 @@ class Azimuth(Sighting):
 
     @classmethod
     def sighted(
-        cls, batch: Batch, tracker: tuple[float, float, float]
+        cls, batch: Batch, tracker: tuple[float, float, float] | None
     ) -> list[Candidate]:
-        """Try it."""
-        return alternatives([(cls(tracker), "joint 1")])
+        """Try it at the tracker's place, or where the tracker may stand."""
+        places = [cls(tracker)] if tracker else cls._anywhere(batch)
+        return alternatives([(place, "joint 1") for place in places])
+
+    @classmethod
+    def _anywhere(cls, batch: Batch) -> list[Effect]:
+        """List places round the base; their height changes nothing."""
+        rings = NEAREST * FARTHER ** np.arange(RINGS)
+        turns = 2 * np.pi * np.arange(BEARINGS) / BEARINGS
+        return cls._clear(batch, [cls._at(r, t) for r, t in product(rings, turns)])
+
+    @classmethod
+    def _at(cls, reach: float, turn: float) -> Azimuth:
+        """Put the tracker on a ring [m], at a bearing from the base [rad]."""
+        x, y = reach * np.cos(turn), reach * np.sin(turn)
+        return cls((float(x), float(y), 0.0), told=False)
+
+    @staticmethod
+    def _clear(batch: Batch, places: list[Azimuth]) -> list[Effect]:
+        """Leave out what stands where the arm works."""
+        level = [np.hypot(*p.beam(batch)[:, :2].T).min() for p in places]
+        return [p for p, near in zip(places, level, strict=True) if near > CLEAR]
+
+    def refined(self, offsets: Floats, batch: Batch) -> list[Effect]:
+        """Move a tracker whose place nobody told."""
+        if self.told:
+            return []
+        x, y, _ = self.tracker
+        reach, turn, step = np.hypot(x, y), np.arctan2(y, x), 2 * np.pi / BEARINGS
+        moved = [
+            self._at(reach * FARTHER**far, turn + step * aside)
+            for far, aside in product(offsets, offsets)
+        ]
+        return self._clear(batch, moved)
+
+    def nonlinear(self) -> dict[str, tuple[float, str]]:
+        """Tell where the tracker seems to stand, where nobody told."""
+        places = zip("xy", self.tracker[:2], strict=True)
+        return {} if self.told else {f"tracker_{a}": (w, "m") for a, w in places}
 
     def parameters(self) -> tuple[Parameter, ...]:
         """Name the two parts of the wave."""

@@ -103,13 +103,13 @@ class Effect(ABC):
 
     @classmethod
     def sighted(
-        cls, batch: Batch, tracker: tuple[float, float, float]
+        cls, batch: Batch, tracker: tuple[float, float, float] | None
     ) -> list[Candidate]:
-        """List what else may be tried of it where the tracker's place is known.
+        """List what else may be tried of it by where the tracker stands.
 
         Args:
             batch: The surveyed states.
-            tracker: Where the tracker stands, base frame [m].
+            tracker: Where that is, base frame [m], or None where nobody knows.
         """
         return []
 
@@ -207,6 +207,10 @@ class Effect(ABC):
     def only_joint(self) -> int | None:
         """Return the joint, from 0, that all its columns turn, None without one."""
         return None
+
+    def fine(self, joint: int) -> NDArray[np.int64]:
+        """Number its parameters that map a joint, from 1, finely enough for waves."""
+        return np.zeros(0, dtype=np.int64)
 
     def turning(self, batch: Batch) -> Floats:
         """Evaluate by what each column turns `only_joint`, (n, p) [rad per unit]."""

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from typing import ClassVar, Self
 
 import numpy as np
+from numpy.typing import NDArray
 
 from postproc.arrays import Floats
 from postproc.model.effects.effect import JointEffect, Parameter, Unasked, fade
@@ -81,6 +82,17 @@ class JointSpline(JointEffect):
                     Parameter(name, "rad", SCALE, f"joint {j + 1} {wide}", j + 1)
                 )
         return tuple(out)
+
+    def fine(self, joint: int) -> NDArray[np.int64]:
+        """Take a joint's functions at the short length."""
+        count = [
+            smooth_count(self.lower[j], self.upper[j], length)
+            for j, length in self._parts()
+        ]
+        short = [
+            (j + 1, length) == (joint, min(self.lengths)) for j, length in self._parts()
+        ]
+        return np.flatnonzero(np.repeat(short, count))
 
     def splines(self, batch: Batch) -> list[tuple[int, Splines, Floats]]:
         """Write the functions of every joint and length as splines, see `smooth`."""

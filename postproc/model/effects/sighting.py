@@ -21,9 +21,12 @@ class Sighting(Effect):
 
     Attributes:
         tracker: Where the tracker stands, base frame [m].
+        told: Whether somebody said so; else its place is found by a search, from what
+            it reads wrongly.
     """
 
     tracker: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    told: bool = True
 
     def seen_from(self, tracker: tuple[float, float, float] | None) -> Self:
         """Put the tracker where it stands.

@@ -10,14 +10,11 @@ import pytest
 
 from postproc.calibration.diagnosis.trace import trace
 from postproc.calibration.regression import fit_effects
-from postproc.model.combination import Combination
 from postproc.model.effects import BASE_EFFECTS, propose
-from postproc.model.effects.base_shift import rigid_columns
 from postproc.model.kinematics import Batch
-from postproc.model.model import COMPENSATED
-from tests.calibration.planted import ARM, campaign, states_of, survey
+from tests.calibration.planted import ARM, TRACKER, campaign, states_of, survey
 from tests.undeclared_score import close, ok
-from tests.undeclared_trial import run
+from tests.undeclared_trial import moved, run, without_rigid
 
 PLANTED = [
     ("compliance", 300, 0.5),
@@ -57,35 +54,31 @@ def test_a_tracker_leaves_only_where_the_base_stands_unsure(
     kind: str, seed: int, size: float
 ) -> None:
     """A drift begins, and a circle points, anywhere: one rigid motion is not told."""
+    trial = run(kind, seed, size)
+    assert trial.registered_mm[1] < 1.2 * trial.registered_mm[2]
+    assert trial.true_mm[1] < 0.05
+
+
+@pytest.mark.parametrize(
+    ("kind", "seed", "size"), [("azimuth", 410, 1.0), ("refraction", 411, 0.5)]
+)
+def test_a_tracker_that_stands_anywhere_is_named_and_not_compensated(
+    kind: str, seed: int, size: float
+) -> None:
     c = campaign(seed, (kind,), size)
-    after = trace(c.base_fit(), seed=0).search.fit
-    fresh = survey(c.arm, seed + 10**6, 200)
-    batch = Batch(ARM, states_of(fresh))
-    keep = tuple(e for e in after.combination.effects if e.belongs_to() == "arm")
-    values = after.values[after.combination.where("arm")]
-    left = c.arm.error(fresh) - Combination(keep).error(batch, values)
-    rigid = rigid_columns(batch).reshape(-1, 6)
-    motion = np.linalg.lstsq(rigid, left.reshape(-1))[0]
-    rest = left - (rigid @ motion).reshape(-1, 3)
-    mean = [np.linalg.norm(e, axis=1).mean() * 1e3 for e in (left, rest)]
-    informed = run("none", seed, 0.0).true_mm[2]
-    assert mean[1] < 1.2 * informed
-    assert mean[0] < 0.05
-
-
-def test_what_may_be_the_trackers_is_told_and_not_compensated() -> None:
-    """Nobody says where the tracker stands, so its error cannot be named."""
-    c = campaign(410, ("azimuth",), 1.0)
     batch = Batch(ARM, c.states)
     fit = fit_effects(batch, c.position, propose(BASE_EFFECTS, ARM, c.states), None)
     found = trace(fit, seed=0)
-    assert found.verdict == "unexplained"
-    assert not {"azimuth", "refraction"} & {f.effect for f in found.findings}
-    of_frame = [f for f in found.findings if f.settings.get("direction") == "base x"]
-    assert of_frame and all(f.of_setup for f in of_frame)
-    after = found.search.fit.combination
-    told = [e for e in after.effects if e.belongs_to() in COMPENSATED]
-    assert not any(e.settings().get("direction") == "base x" for e in told)
+    assert [f.effect for f in found.findings] == [kind]
+    assert all(f.of_setup for f in found.findings)
+    if kind == "azimuth":
+        (place,) = (f.settings["tracker"] for f in found.findings)
+        assert np.hypot(*(np.array(place) - TRACKER)[:2]) < 1.0  # [m]
+    fresh = survey(c.arm, seed + 10**6, 200)
+    at = Batch(ARM, states_of(fresh))
+    left = c.arm.error(fresh) - moved(found.search.fit, at, ("arm", "state"))
+    mean = np.linalg.norm(without_rigid(at, left), axis=1).mean() * 1e3
+    assert mean < 1.2 * run("none", seed, 0.0).registered_mm[2]
 
 
 @pytest.mark.parametrize("seed", [320, 321, 322, 323, 324])
