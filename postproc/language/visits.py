@@ -10,10 +10,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import IntEnum
 from functools import cached_property
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from postproc.arrays import Bools, Floats, Ints, read_only
 from postproc.language.dialect import Dialect
@@ -81,23 +79,6 @@ class ZoneRule(IntEnum):
     PASS = 2  # the point is passed exactly
     WITHIN = 3  # the path passes the point at this distance
     FROM = 4  # the path is left at this distance from the point
-
-
-def slim(column: NDArray[Any]) -> NDArray[Any]:
-    """Keep a column that holds one value throughout as that value alone.
-
-    >>> slim(np.zeros(1000)).strides
-    (0,)
-    >>> slim(np.zeros((1000, 3))).base.nbytes  # of what is kept
-    24
-    """
-    if not len(column):
-        return column
-    first = column[0]
-    same = column == first
-    if column.dtype.kind == "f":
-        same |= np.isnan(column) & np.isnan(first)
-    return np.broadcast_to(np.array(first), column.shape) if same.all() else column
 
 
 @dataclass(frozen=True)

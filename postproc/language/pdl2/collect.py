@@ -9,7 +9,7 @@ from typing import Protocol
 
 import numpy as np
 
-from postproc.arrays import Bools, Indices, Ints, any_in_rows, spans
+from postproc.arrays import Bools, Indices, Ints, any_in_rows, slim, spans
 from postproc.language.pdl2.columns import Collector, SettingColumns, VisitColumns
 from postproc.language.pdl2.context import Point
 from postproc.language.pdl2.dialect import PDL2_DIALECT
@@ -17,7 +17,7 @@ from postproc.language.pdl2.job import World
 from postproc.language.pdl2.machine import Key, Machine, MoveRun
 from postproc.language.pdl2.store import MANY
 from postproc.language.source import Source
-from postproc.language.visits import ELSEWHERE, Literals, Meaning, Visits, slim
+from postproc.language.visits import ELSEWHERE, Literals, Meaning, Visits
 
 # Which numbers of which file belong to which target.
 

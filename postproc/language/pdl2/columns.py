@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from postproc.arrays import Interned, Ints, spans
+from postproc.arrays import Interned, Ints, slim, spans
 from postproc.language.marks import MEASURE
 from postproc.language.pdl2 import syntax as ast
 from postproc.language.pdl2.dialect import COMMENTS
@@ -25,7 +25,6 @@ from postproc.language.visits import (
     OrientationLaw,
     Switch,
     ZoneRule,
-    slim,
 )
 from postproc.robot.pose import pose_from_record
 
