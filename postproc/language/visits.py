@@ -9,11 +9,11 @@ from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import IntEnum
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 
-from postproc.arrays import Bools, Floats, Ints, read_only
+from postproc.arrays import Bools, Floats, Indices, Ints, read_only
 from postproc.language.dialect import Dialect
 
 START = -1  # predecessor: wherever the arm stands when the program starts
@@ -81,6 +81,26 @@ class ZoneRule(IntEnum):
     FROM = 4  # the path is left at this distance from the point
 
 
+def texts_of(n: int, told: Mapping[int, str]) -> tuple[str, ...]:
+    """Return n texts of which few are told, and the others "".
+
+    >>> texts_of(3, {1: "a"})
+    ('', 'a', '')
+    """
+    if not told:
+        return _nothing(n)
+    texts = [""] * n
+    for row, text in told.items():
+        texts[row] = text
+    return tuple(texts)
+
+
+@lru_cache(maxsize=1)
+def _nothing(n: int) -> tuple[str, ...]:
+    """Return n times "", once for all that say nothing of a long program."""
+    return ("",) * n
+
+
 @dataclass(frozen=True)
 class Literals:
     """m places in the text that hold the numbers of a target.
@@ -98,8 +118,8 @@ class Literals:
             ""; m strings.
     """
 
-    file: Ints
-    line: Ints
+    file: Indices
+    line: Indices
     start: Ints
     end: Ints
     joints: Bools
@@ -179,10 +199,10 @@ class Visits:
     """
 
     files: tuple[str, ...]
-    file: Ints
-    line: Ints
-    motion: Ints
-    target: Ints
+    file: Indices
+    line: Indices
+    motion: Indices
+    target: Indices
     via: Bools
     values: Floats
     distance_mm: Floats
