@@ -258,6 +258,18 @@ def spans(begin: Ints, count: Ints) -> Ints:
     return np.repeat(begin - offset, count) + np.arange(int(count.sum()))
 
 
+def among(values: Indices, some: Indices) -> Bools:
+    """Tell which values, (n,), are among some in ascending order, (m,).
+
+    >>> among(np.array([7, 2, 9]), np.array([2, 5, 9])).tolist()
+    [False, True, True]
+    """
+    if not len(some):
+        return np.zeros(len(values), dtype=bool)
+    at = np.minimum(np.searchsorted(some, values), len(some) - 1)
+    return np.asarray(some[at] == values)
+
+
 # Texts that stand in many rows, once each; rows hold their numbers.
 
 
