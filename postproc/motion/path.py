@@ -314,9 +314,8 @@ class _Ends:
 def _lines(targets: Targets, flange: Floats, begin: Ints, end: Ints) -> Segments:
     """Build the straight paths from targets (m,) to others."""
     m, nothing = len(end), np.zeros((len(end), 3))
-    rotation, turn, centre, chord = _native.lines(
-        flange, few_rows(targets.tool), begin, end
-    )
+    tool = few_rows(targets.tool)
+    rotation, turn, centre, chord = _native.lines(flange, tool, begin, end)
     return Segments(
         rotation, turn, centre, nothing, nothing, chord,
         angle=np.zeros(m), valid=np.ones(m, dtype=bool),

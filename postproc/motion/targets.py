@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from postproc.arrays import Bools, Floats, Ints, is_one_value, read_only, slim, taken
+from postproc.arrays import Bools, Floats, Ints, read_only, slim, taken
 
 
 class Fly(IntEnum):
@@ -144,7 +144,7 @@ class Targets:
         """
         poses, angles = np.array(self.tcp), self.joints
         poses[rows] = tcp
-        if not (is_one_value(angles) and np.isnan(joints).all()):
+        if not np.array_equal(joints, taken(angles, rows), equal_nan=True):
             angles = np.array(angles)
             angles[rows] = joints
         moved = replace(self, tcp=poses, joints=angles)
