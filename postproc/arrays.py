@@ -34,6 +34,50 @@ def read_only(columns: object) -> None:
             column.setflags(write=False)
 
 
+# Columns that hold one value throughout, kept as that value alone.
+
+
+def slim(column: NDArray[Any]) -> NDArray[Any]:
+    """Keep a column that holds one value throughout as that value alone.
+
+    >>> slim(np.zeros(1000)).strides
+    (0,)
+    >>> slim(np.zeros((1000, 3))).base.nbytes  # of what is kept
+    24
+    """
+    if not len(column) or is_one_value(column):
+        return column
+    first = column[0]
+    same = column == first
+    if column.dtype.kind == "f":
+        same |= np.isnan(column) & np.isnan(first)
+    return np.broadcast_to(np.array(first), column.shape) if same.all() else column
+
+
+def is_one_value(column: NDArray[Any]) -> bool:
+    """Tell whether a column is kept as one value."""
+    return column.strides[0] == 0
+
+
+def few_rows(column: NDArray[Any]) -> NDArray[Any]:
+    """Return the one row of a column that is kept as one value, or all rows."""
+    return column[:1] if is_one_value(column) else column
+
+
+def taken(
+    column: NDArray[Any], rows: NDArray[np.int64] | NDArray[np.bool_] | slice
+) -> NDArray[Any]:
+    """Take rows of a column; one value stays one value.
+
+    >>> taken(slim(np.zeros(9)), np.array([2, 5])).strides
+    (0,)
+    """
+    if isinstance(rows, slice) or not len(column) or not is_one_value(column):
+        return column[rows]
+    count = int(rows.sum()) if rows.dtype == bool else len(rows)
+    return np.broadcast_to(column[0], (count, *column.shape[1:]))
+
+
 # Rows of few columns: numpy goes along rows, we go down columns, several times as fast.
 
 
@@ -212,6 +256,18 @@ def spans(begin: Ints, count: Ints) -> Ints:
     """
     offset = np.cumsum(count) - count
     return np.repeat(begin - offset, count) + np.arange(int(count.sum()))
+
+
+def among(values: Indices, some: Indices) -> Bools:
+    """Tell which values, (n,), are among some in ascending order, (m,).
+
+    >>> among(np.array([7, 2, 9]), np.array([2, 5, 9])).tolist()
+    [False, True, True]
+    """
+    if not len(some):
+        return np.zeros(len(values), dtype=bool)
+    at = np.minimum(np.searchsorted(some, values), len(some) - 1)
+    return np.asarray(some[at] == values)
 
 
 # Texts that stand in many rows, once each; rows hold their numbers.

@@ -26,6 +26,7 @@ from postproc.model.kinematics import Batch
 from postproc.model.model import parameter_variance
 from postproc.motion import blending
 from postproc.motion import path as cartesian
+from postproc.motion.branches import OTHER_TURN, on_other_turns, on_written_turns
 from postproc.motion.path import ROUNDS, BlendCoupling
 from postproc.robot import direction, play, pose
 from postproc.robot.arm import DH
@@ -124,6 +125,21 @@ def test_what_is_seen_along_the_chain(chain, random, laid_out):
             _native.jacobian(packed, given[0], wrong)
     with pytest.raises(ValueError, match="columns of"):
         _native.torque(packed, given[0], links, np.ones((7, 4)))
+
+
+def test_whole_turns(random, laid_out):
+    q, turns = random.uniform(-20, 20, (90, 6)), random.integers(-2, 3, (90, 3)) / 2.0
+    q[:4] = [[0.0], [-0.0], [np.pi], [-np.pi]]
+    q[5:8], turns[::5], q[11, 3], turns[::3, 2] = 2 * np.pi, np.nan, np.nan, np.nan
+    q, turns = laid_out(q), laid_out(turns)
+    meant = kinematics.on_turns(q, turns)
+    assert np.array_equal(on_written_turns(q, turns), meant, equal_nan=True)
+    others = (np.abs(meant - q) > OTHER_TURN).any(axis=1)
+    assert np.array_equal(on_other_turns(q, turns), others)
+    lower, upper = random.uniform(-7, 0, 6), random.uniform(0, 7, 6)
+    found = _native.into_range(floats(q), lower, upper)
+    meant = [list(map(kinematics.into_range, row, lower, upper)) for row in q]
+    assert np.array_equal(found, np.reshape(meant, (-1, 6)), equal_nan=True)
 
 
 def test_one_branch(bench_cell, random, laid_out):

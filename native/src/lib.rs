@@ -31,6 +31,7 @@ mod table;
 mod text;
 mod time_law;
 mod trig;
+mod turns;
 mod variance;
 mod walk;
 mod walks;
@@ -53,6 +54,9 @@ fn native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(rounding::resampled, module)?)?;
     module.add_function(wrap_pyfunction!(lines::lines, module)?)?;
     module.add_function(wrap_pyfunction!(lines::chords, module)?)?;
+    module.add_function(wrap_pyfunction!(turns::into_range, module)?)?;
+    module.add_function(wrap_pyfunction!(turns::on_turns, module)?)?;
+    module.add_function(wrap_pyfunction!(turns::on_other_turns, module)?)?;
     module.add_function(wrap_pyfunction!(inverse::branch, module)?)?;
     module.add_function(wrap_pyfunction!(inverse::branches, module)?)?;
     module.add_function(wrap_pyfunction!(numeric::numeric_branches, module)?)?;

@@ -93,7 +93,7 @@ struct Ends<'a> {
     tool: &'a Pose,
 }
 
-/// Look up the ends of paths from targets `begin` to targets `end`.
+/// Look up the ends of paths from targets `begin` to targets `end`; one tool is all's.
 fn paths<'a>(
     flange: &'a PyReadonlyArray3<'_, f64>,
     tool: &'a PyReadonlyArray3<'_, f64>,
@@ -105,7 +105,8 @@ fn paths<'a>(
     same_length(&[begin.len(), end.len()])?;
     let found = |(from, to): (&i64, &i64)| {
         let (from, to) = (usize::try_from(*from).ok()?, usize::try_from(*to).ok()?);
-        Some(Ends { begin: flange.get(from)?, end: flange.get(to)?, tool: tool.get(to)? })
+        let tool = if tool.len() == 1 { &tool[0] } else { tool.get(to)? };
+        Some(Ends { begin: flange.get(from)?, end: flange.get(to)?, tool })
     };
     let all: Option<Vec<Ends<'a>>> = begin.iter().zip(end).map(found).collect();
     all.ok_or_else(|| PyIndexError::new_err("a path between targets that are not there"))

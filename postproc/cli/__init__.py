@@ -17,8 +17,9 @@ from postproc import POOLS
 
 __all__ = ["app", "main"]
 
-M_MMAP_THRESHOLD = -3  # of mallopt(3)
+M_TRIM_THRESHOLD, M_MMAP_THRESHOLD = -1, -3  # of mallopt(3)
 LARGE = 4 << 20  # bytes
+SPARE = 16 << 20  # bytes that are kept for the next arrays
 YOUNG = 500_000  # objects that may hold others, before cycles among them are looked for
 
 
@@ -68,10 +69,13 @@ def _give_large_arrays_back() -> None:
     """Let the C library give memory back to the system where an array ends.
 
     It learns from the first long array to keep what is freed: a quarter of what a
-    program of a million targets needs. Only glibc has the option.
+    program of a million targets needs. A little is kept: to hand every small array's
+    pages back and ask for them again is half of what the system does for a long
+    program. Only glibc has the options.
     """
     if sys.platform == "linux" and hasattr(library := ctypes.CDLL(None), "mallopt"):
         library.mallopt(M_MMAP_THRESHOLD, LARGE)
+        library.mallopt(M_TRIM_THRESHOLD, SPARE)
 
 
 def _look_for_cycles_seldom() -> None:

@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from postproc.arrays import Bools, Floats, Ints
+from postproc.arrays import Bools, Floats, Ints, taken
 from postproc.compensation.arc_angles import ArcAngles, written_points
 from postproc.compensation.program import Planned
 from postproc.compensation.targets import few_frames
@@ -131,8 +131,8 @@ def solve(
     """
     n = len(wanted)
     tool = np.broadcast_to(tool, (n, 4, 4))
-    states = states.with_(tool=np.ascontiguousarray(tool[:, :3, 3]))
-    from_tcp = inverse(np.ascontiguousarray(tool))
+    states = states.with_(tool=tool[:, :3, 3])
+    from_tcp = inverse(tool)
     command, q = np.array(wanted), np.array(states.q)
     place = wanted[:, :3, 3]
     branch = arm.branch(np.nan_to_num(q))
@@ -284,7 +284,8 @@ def solve_again(
     """
     plan, known = planned.plan, np.flatnonzero(rows & solved.known)
     here, wanted = states[known], planned.wanted(known)
-    part = solve(model, cell.arm, wanted, plan.tool[known], here, orientation)
+    tool = taken(plan.tool, known)
+    part = solve(model, cell.arm, wanted, tool, here, orientation)
     out = replace(
         solved,
         direction=np.where(rows[:, None], states.direction, solved.direction),

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from postproc.arrays import Bools, Floats, Interned, Ints
+from postproc.arrays import Bools, Floats, Interned, Ints, among
 from postproc.compensation import windows as cuts
 from postproc.compensation.clones import give_own_points
 from postproc.compensation.decide import Proposal
@@ -111,12 +111,13 @@ class Correction:
         """
         moved = np.flatnonzero(self.corrected)
         rows = slice(*np.searchsorted(moved, [own.start, own.stop]).tolist())
-        mine = np.isin(self.edited, visits.literal[own])
-        starts = visits.literals.start[self.edited[mine]]
+        literals = np.sort(visits.literal[own])
+        mine = among(self.edited, literals)
+        starts = np.sort(visits.literals.start[self.edited[mine]], axis=None)
         edits = tuple(
             Replacements(e.start[at], e.end[at], e.new[at])
             for e in self.edits
-            for at in [np.isin(e.start, starts)]
+            for at in [among(e.start, starts)]
         )
         return replace(
             self, edited=self.edited[mine], edits=edits, before=self.before[rows],

@@ -52,8 +52,7 @@ class Reasons:
             rows: Which visits, (n,).
             text: The reason.
         """
-        rows = rows & self.none
-        if rows.any():
+        if rows.any() and (rows := rows & self.none).any():
             self.index[rows] = self._codes[text]
 
     def adopt(self, index: Ints, texts: tuple[str, ...]) -> None:

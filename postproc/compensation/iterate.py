@@ -7,7 +7,15 @@ from itertools import count, pairwise
 
 import numpy as np
 
-from postproc.arrays import Bools, Floats, Ints, any_in_rows, largest_in_rows, spans
+from postproc.arrays import (
+    Bools,
+    Floats,
+    Ints,
+    any_in_rows,
+    largest_in_rows,
+    spans,
+    taken,
+)
 from postproc.compensation.arc_angles import ArcAngles
 from postproc.compensation.command import (
     Commands,
@@ -171,7 +179,7 @@ class Iteration:
     def departed(self, solved: Commands, rows: Ints) -> Departure:
         """Say how far commands lead the arm from where it was, k visits."""
         plan, setting = self.planned.plan, self.setting
-        tool = plan.tool[rows, :3, 3]
+        tool = taken(plan.tool, rows)[:, :3, 3]
         arm, old, new = setting.cell.arm, plan.q[rows], solved.q[rows]
         return departure(arm, old, new, tool, setting.offset)
 

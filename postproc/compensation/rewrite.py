@@ -113,8 +113,9 @@ def write_edits(
         if own or (number == 0 and nothing):
             stamp = stamp_line(__version__, model, source, comment)
             at = stamp_place(source.data)
-            text = apply(source.data, own)  # its header is as it was
-            files[source.name] = text[:at] + stamp + text[at:]
+            text = memoryview(apply(source.data, own))  # its header is as it was
+            files[source.name] = b"".join((text[:at], stamp, text[at:]))
+            del text
             added = Span(at, at + len(stamp))
             records[source.name] = record(source, added, own, files[source.name])
     return Output(files, records, edits)

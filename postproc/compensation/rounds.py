@@ -36,8 +36,8 @@ class Taken:
     Attributes:
         step: What it did.
         vote: What its own targets would have.
-        moved, missed: It had, halos included, targets with other sides, and rounded
-            points that are missed by anything.
+        moved, missed: It had targets with other sides, and rounded points that are
+            missed by anything, among its own and those that are watched beyond.
     """
 
     step: Step
@@ -114,15 +114,20 @@ class Glimpses:
     looks: Mapping[Look, Glimpse]
 
     def at(self, look: Look) -> Glimpse:
-        """Return a look, or what was the same by then.
+        """Return a look, or what stands for it.
 
-        A window that has come to rest does not take the rounds of the others.
+        A window that has come to rest does not take the rounds of the others: what was
+        the same by then stands for them. Written numbers are looked at by all windows
+        together, so that they stand for those of another round.
         """
         if look in self.looks:
             return self.looks[look]
         number, written = look
-        kinds = (written, False)
-        for kind in kinds:
+        if written:
+            later = [k for k in self.looks if k[1] and k[0] > number]
+            if later:
+                return self.looks[min(later)]
+        for kind in (written, False):
             before = [k for k in self.looks if k[1] == kind and k[0] <= number]
             if before:
                 return self.looks[max(before)]
@@ -172,8 +177,19 @@ class Trail:
             vote = Step.BEND
         number = len(self.taken)
         step = self.pace[number] if number < len(self.pace) else vote
-        self.taken.append(Taken(step, vote, bool(moved.any()), bool(missed.any())))
+        near = self.near
+        taken = Taken(step, vote, bool(moved[near].any()), bool(missed[near].any()))
+        self.taken.append(taken)
         return step
+
+    @property
+    def near(self) -> slice:
+        """Return its own visits and those that are watched.
+
+        What lies farther out is decided by the windows there: where that reaches the
+        watched ones, both windows at the cut find different things at them.
+        """
+        return slice(self.left.start, self.right.stop or None)
 
 
 def common(trails: Sequence[Trail]) -> tuple[Step, ...]:

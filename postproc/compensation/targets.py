@@ -180,7 +180,7 @@ def targets_from_visits(visits: Visits, cell: Cell) -> tuple[Targets, Reasons]:
         pred_start=pred_start,
         pred=pred,
     )
-    return targets, reasons
+    return targets.slim(), reasons
 
 
 UNNAMED = (

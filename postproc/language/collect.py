@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from postproc.arrays import Floats, Interned, Ints
+from postproc.arrays import Floats, Interned, Ints, slim
 from postproc.language.dialect import Dialect
 from postproc.language.machine import Scope, TaskMachine
 from postproc.language.marks import MEASURE, Comments
@@ -23,7 +23,6 @@ from postproc.language.visits import (
     Switch,
     Visits,
     ZoneRule,
-    slim,
 )
 from postproc.robot.pose import pose_from_record
 from postproc.robot.trajectory import Motion

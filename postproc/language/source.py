@@ -61,10 +61,11 @@ class Replacements(Sequence[Edit]):
     @classmethod
     def joined(cls, parts: Sequence[Replacements]) -> Replacements:
         """Put edits one after the other."""
-        none = np.empty(0, dtype=np.int64)
+        last = max((int(p.end[-1]) for p in parts if len(p)), default=0)
+        none = np.empty(0, dtype=np.int32 if last < 2**31 else np.int64)
         return cls(
-            np.concatenate([none, *(p.start for p in parts)]),
-            np.concatenate([none, *(p.end for p in parts)]),
+            np.concatenate([none, *(p.start for p in parts)], dtype=none.dtype),
+            np.concatenate([none, *(p.end for p in parts)], dtype=none.dtype),
             np.concatenate([np.empty(0, dtype="S1"), *(p.new for p in parts)]),
         )
 

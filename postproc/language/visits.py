@@ -9,13 +9,11 @@ from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import IntEnum
-from functools import cached_property
-from typing import Any
+from functools import cached_property, lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
-from postproc.arrays import Bools, Floats, Ints, read_only
+from postproc.arrays import Bools, Floats, Indices, Ints, read_only
 from postproc.language.dialect import Dialect
 
 START = -1  # predecessor: wherever the arm stands when the program starts
@@ -83,21 +81,24 @@ class ZoneRule(IntEnum):
     FROM = 4  # the path is left at this distance from the point
 
 
-def slim(column: NDArray[Any]) -> NDArray[Any]:
-    """Keep a column that holds one value throughout as that value alone.
+def texts_of(n: int, told: Mapping[int, str]) -> tuple[str, ...]:
+    """Return n texts of which few are told, and the others "".
 
-    >>> slim(np.zeros(1000)).strides
-    (0,)
-    >>> slim(np.zeros((1000, 3))).base.nbytes  # of what is kept
-    24
+    >>> texts_of(3, {1: "a"})
+    ('', 'a', '')
     """
-    if not len(column):
-        return column
-    first = column[0]
-    same = column == first
-    if column.dtype.kind == "f":
-        same |= np.isnan(column) & np.isnan(first)
-    return np.broadcast_to(np.array(first), column.shape) if same.all() else column
+    if not told:
+        return _nothing(n)
+    texts = [""] * n
+    for row, text in told.items():
+        texts[row] = text
+    return tuple(texts)
+
+
+@lru_cache(maxsize=1)
+def _nothing(n: int) -> tuple[str, ...]:
+    """Return n times "", once for all that say nothing of a long program."""
+    return ("",) * n
 
 
 @dataclass(frozen=True)
@@ -117,8 +118,8 @@ class Literals:
             ""; m strings.
     """
 
-    file: Ints
-    line: Ints
+    file: Indices
+    line: Indices
     start: Ints
     end: Ints
     joints: Bools
@@ -198,10 +199,10 @@ class Visits:
     """
 
     files: tuple[str, ...]
-    file: Ints
-    line: Ints
-    motion: Ints
-    target: Ints
+    file: Indices
+    line: Indices
+    motion: Indices
+    target: Indices
     via: Bools
     values: Floats
     distance_mm: Floats

@@ -7,7 +7,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from postproc import _native
-from postproc.arrays import Bools, Floats, Ints, all_in_rows, any_in_rows, floats
+from postproc.arrays import (
+    Bools,
+    Floats,
+    Ints,
+    all_in_rows,
+    any_in_rows,
+    few_rows,
+    floats,
+)
 from postproc.motion.path import BlendCoupling
 from postproc.motion.targets import Fly, Targets
 from postproc.motion.trace import Trace
@@ -108,7 +116,7 @@ def _lengths(targets: Targets, traced: Trace, to: Ints, edge: Ints) -> Floats:
 
 def _chords(targets: Targets, flange: Floats, begin: Ints, end: Ints) -> Floats:
     """Measure the straight ways of the TCP from targets to others, (m,) [m]."""
-    return _native.chords(flange, targets.tool, begin, end)
+    return _native.chords(flange, few_rows(targets.tool), begin, end)
 
 
 def _by_distance(targets: Targets, visit: Ints, length: Floats) -> Floats:

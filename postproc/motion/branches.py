@@ -7,7 +7,8 @@ from typing import Protocol
 
 import numpy as np
 
-from postproc.arrays import Bools, Floats, Ints, any_in_rows, largest_in_rows
+from postproc import _native
+from postproc.arrays import Bools, Floats, Ints, floats, largest_in_rows
 from postproc.robot.arm import Arm
 
 # The solutions at the samples of a path: all branches, or only those asked for.
@@ -92,7 +93,6 @@ SUSPICIOUS = 0.3  # [rad] a step between samples that another branch might short
 OTHER_TURN = 1.0  # [rad] more than rounding of a turn
 LOST = 1.2  # [rad] a step between samples that no arm makes
 FEW, MORE = 256, 4  # samples looked ahead, and their growth while nothing happens
-TURN_AXES = [3, 5, 2]  # of T1, T2, T3
 
 
 def on_written_turns(q: Floats, turns: Floats) -> Floats:
@@ -106,21 +106,12 @@ def on_written_turns(q: Floats, turns: Floats) -> Floats:
         q: Joint angles, (n, 6) [rad].
         turns: T1, T2, T3, (n, 3), NaN where not written.
     """
-    out = np.array(q)
-    written = ~np.isnan(turns)
-    whole = np.floor(np.where(written, turns, 0.0) + 0.5)
-    middle = FULL * (np.where(written, turns, 0.0) - whole)
-    rest = np.mod(q[:, TURN_AXES] - middle + np.pi, FULL) - np.pi + middle
-    moved = rest + FULL * whole
-    moved[:, 2] = np.where(written[:, 2], moved[:, 2], q[:, 2])
-    out[:, TURN_AXES] = moved
-    return out
+    return _native.on_turns(floats(q), floats(turns))
 
 
 def on_other_turns(q: Floats, turns: Floats) -> Bools:
     """Tell which angles (n, 6) [rad] are on other turns than those written, (n,)."""
-    gap = np.abs(on_written_turns(q, turns) - q)
-    return any_in_rows(gap > OTHER_TURN)
+    return _native.on_other_turns(floats(q), floats(turns))
 
 
 def nearest_turns(q: Floats, near: Floats) -> Floats:

@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from postproc import _native
-from postproc.arrays import Bools, Floats, Ints, floats
+from postproc.arrays import Bools, Floats, Ints, few_rows, floats
 from postproc.motion.targets import Targets
 from postproc.robot.pose import inverse, rotation_from_vector, rotation_vector
 from postproc.robot.trajectory import Motion
@@ -314,7 +314,8 @@ class _Ends:
 def _lines(targets: Targets, flange: Floats, begin: Ints, end: Ints) -> Segments:
     """Build the straight paths from targets (m,) to others."""
     m, nothing = len(end), np.zeros((len(end), 3))
-    rotation, turn, centre, chord = _native.lines(flange, targets.tool, begin, end)
+    tool = few_rows(targets.tool)
+    rotation, turn, centre, chord = _native.lines(flange, tool, begin, end)
     return Segments(
         rotation, turn, centre, nothing, nothing, chord,
         angle=np.zeros(m), valid=np.ones(m, dtype=bool),

@@ -229,14 +229,14 @@ def replan(
 def _part(targets: Targets, moved: Bools, begun: bool) -> _Part | None:
     """Cut out what moved targets touch; None where that has no simple answer."""
     n, first = len(targets), targets.pred_start
-    begins = _from_nowhere(targets)
+    begins = np.array(targets.from_nowhere)
     begins[:1] &= not begun
     touched = _touched(targets, moved)
     inside, kept = _with_arcs(targets, _near(touched, TRACED)), _near(touched, CHANGED)
     if not inside.any() or np.count_nonzero(inside) > MOST * n:
         return None
     starts = inside & (begins | ~np.append(False, inside[:-1]))
-    simple = starts | _one_after_another(targets)
+    simple = starts | targets.one_after_another
     clipped = inside[0] and not begins[0] and not begun
     if clipped or not simple[inside].all() or (touched & starts & ~begins).any():
         return None
@@ -252,24 +252,6 @@ def _part(targets: Targets, moved: Bools, begun: bool) -> _Part | None:
         rows, seeds[rows], goes_on[rows], kept[rows],
         targets.part(rows, pred_start, pred),
     )  # fmt: skip
-
-
-def _from_nowhere(targets: Targets) -> Bools:
-    """Tell which targets are reached from unknown places alone, (n,)."""
-    known = np.append(0, np.cumsum(targets.pred >= 0))
-    return np.asarray(known[targets.pred_start[1:]] == known[targets.pred_start[:-1]])
-
-
-def _one_after_another(targets: Targets) -> Bools:
-    """Tell which targets have the one before as the only predecessor, alone, (n,)."""
-    n = len(targets)
-    single = np.flatnonzero(np.diff(targets.pred_start) == 1)
-    out = np.zeros(n, dtype=bool)
-    out[single] = targets.pred[targets.pred_start[single]] == single - 1
-    out[:1] = False
-    ways = np.bincount(targets.pred[targets.pred >= 0], minlength=n)
-    out[1:] &= ways[:-1] == 1
-    return out
 
 
 def _touched(targets: Targets, moved: Bools) -> Bools:
@@ -316,7 +298,7 @@ def _patched(before: Floats, part: _Part, now: Floats) -> Floats:
 def _spliced(before: Passages, part: _Part, now: Passages) -> Passages:
     """Put new edges in: those between targets whose passing may change."""
     last_kept = np.append(False, part.kept[:-1]) & ~part.seeds
-    alone = _from_nowhere(part.targets)
+    alone = part.targets.from_nowhere
     rows = np.flatnonzero(part.kept & ~part.seeds & (last_kept | alone))
     edge = _edges_of(before.first, part.rows[rows])
     new = _edges_of(now.first, rows)

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass, fields, replace
 from enum import IntEnum
+from functools import cached_property
 
 import numpy as np
 
-from postproc.arrays import Bools, Floats, Ints, read_only
+from postproc.arrays import Bools, Floats, Ints, read_only, slim, taken
 
 
 class Fly(IntEnum):
@@ -31,6 +32,9 @@ class TargetKind(IntEnum):
     TOWARDS = 6  # `tcp` is a pose that the arm goes `distance` towards on a line
     PARTIAL_POSE = 7  # `tcp` is axes and places along them; what is NaN there stays
     PARTIAL_JOINTS = 8  # `joints`; what is NaN there stays
+
+
+OF_THE_FLOW = ("from_nowhere", "one_after_another")  # what moving targets leaves as is
 
 
 @dataclass(frozen=True)
@@ -96,6 +100,11 @@ class Targets:
         """Return the number of moves."""
         return len(self.move)
 
+    def slim(self) -> Targets:
+        """Return the same, columns with one value throughout as that value alone."""
+        own = [f.name for f in fields(self)[:-2] if f.name != "tcp"]
+        return replace(self, **{name: slim(getattr(self, name)) for name in own})
+
     def part(self, rows: Ints, pred_start: Ints, pred: Ints) -> Targets:
         """Return some of the moves, with predecessors among themselves.
 
@@ -104,8 +113,26 @@ class Targets:
             pred_start: As in the class, (m + 1,).
             pred: Their predecessors, counted among the rows.
         """
-        own = {f.name: getattr(self, f.name)[rows] for f in fields(self)[:-2]}
+        own = {f.name: taken(getattr(self, f.name), rows) for f in fields(self)[:-2]}
         return Targets(**own, pred_start=pred_start, pred=pred)
+
+    @cached_property
+    def from_nowhere(self) -> Bools:
+        """Which are reached from unknown places alone, (n,)."""
+        known = np.append(0, np.cumsum(self.pred >= 0))
+        return np.asarray(known[self.pred_start[1:]] == known[self.pred_start[:-1]])
+
+    @cached_property
+    def one_after_another(self) -> Bools:
+        """Which have the one before as the only predecessor, alone, (n,)."""
+        n = len(self)
+        single = np.flatnonzero(np.diff(self.pred_start) == 1)
+        out = np.zeros(n, dtype=bool)
+        out[single] = self.pred[self.pred_start[single]] == single - 1
+        out[:1] = False
+        ways = np.bincount(self.pred[self.pred >= 0], minlength=n)
+        out[1:] &= ways[:-1] == 1
+        return out
 
     def moved_to(self, rows: Ints, tcp: Floats, joints: Floats) -> Targets:
         """Return a copy of which some targets lie elsewhere.
@@ -115,9 +142,14 @@ class Targets:
             tcp: As in the class, (m, 4, 4).
             joints: As in the class, (m, 6).
         """
-        poses, angles = np.array(self.tcp), np.array(self.joints)
-        poses[rows], angles[rows] = tcp, joints
-        return replace(self, tcp=poses, joints=angles)
+        poses, angles = np.array(self.tcp), self.joints
+        poses[rows] = tcp
+        if not np.array_equal(joints, taken(angles, rows), equal_nan=True):
+            angles = np.array(angles)
+            angles[rows] = joints
+        moved = replace(self, tcp=poses, joints=angles)
+        vars(moved).update({k: v for k, v in vars(self).items() if k in OF_THE_FLOW})
+        return moved
 
 
 def make_targets(

@@ -165,17 +165,5 @@ class Inverse:
 
     def into_range(self, q: Floats) -> Floats:
         """Shift angles by whole turns into the joint range where that is possible."""
-        turn = 2 * np.pi
-        below = np.pi - q
-        around = np.flatnonzero((below < 0) | (below >= turn))
-        if len(around):
-            below.flat[around] = np.mod(below.flat[around], turn)
-        q = np.pi - below
-        low, high = np.nonzero(q < self._lower), np.nonzero(q > self._upper)
-        if len(low[0]):
-            up = q[low] + turn
-            q[low] = np.where(up <= self._upper[low[-1]], up, q[low])
-        if len(high[0]):
-            down = q[high] - turn
-            q[high] = np.where(down >= self._lower[high[-1]], down, q[high])
-        return q
+        rows = floats(q.reshape(-1, 6))
+        return _native.into_range(rows, self._lower, self._upper).reshape(q.shape)

@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from postproc import _native
-from postproc.arrays import Bools, Floats, Ints, floats
+from postproc.arrays import Bools, Floats, Ints, few_rows, floats
 
 MM = 1e-3  # [m]
 SAME_ROTATION = 1e-10  # elements of a matrix that differ less are the same
@@ -84,8 +84,10 @@ def record_from_pose(T: Floats) -> Floats:
 
 
 def inverse(T: Floats) -> Floats:
-    """Invert poses (..., 4, 4)."""
-    return _native.inverse(floats(T.reshape(-1, 4, 4))).reshape(T.shape)
+    """Invert poses (..., 4, 4); one for all rows stays one."""
+    rows = few_rows(T) if T.ndim == 3 and len(T) else T
+    found = _native.inverse(floats(rows.reshape(-1, 4, 4))).reshape(rows.shape)
+    return found if rows is T else np.broadcast_to(found, T.shape)
 
 
 def times(left: Floats, right: Floats) -> Floats:
@@ -103,13 +105,13 @@ def products(left: Floats, right: Floats, i: Ints, j: Ints) -> Floats:
         j: Which of `right`, (n,), likewise.
 
     Returns:
-        left[i] @ right[j], (n, 4, 4).
+        left[i] @ right[j], (n, 4, 4), not to be written to.
     """
     count = len(right)
     pair = i % len(left) * count + j % count
     if len(pair) and (pair == pair[0]).all():  # one frame in a whole program, mostly
         one = left[i[0]] @ right[j[0]]
-        return np.array(np.broadcast_to(one, (len(pair), 4, 4)))
+        return np.broadcast_to(one, (len(pair), 4, 4))
     used, which = np.unique(pair, return_inverse=True)
     return np.asarray((left[used // count] @ right[used % count])[which])
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from postproc.arrays import Floats, read_only
+from postproc.arrays import Floats, read_only, taken
 
 
 @dataclass(frozen=True)
@@ -58,7 +58,7 @@ class States:
     ) -> States:
         """Return the states of the given rows."""
         return replace(
-            self, **{f.name: getattr(self, f.name)[rows] for f in fields(self)}
+            self, **{f.name: taken(getattr(self, f.name), rows) for f in fields(self)}
         )
 
     def across(self, vectors: Floats) -> Floats:
@@ -96,8 +96,8 @@ def make_states(
         "payload": (n,), "payload_com": (n, 3), "heading": (n, 3),
     }  # fmt: skip
     values: dict[str, NDArray[np.generic]] = {
-        name: np.array(
-            np.broadcast_to(covariates.pop(name, np.nan), shape), dtype=float
+        name: np.broadcast_to(
+            np.array(covariates.pop(name, np.nan), dtype=float), shape
         )
         for name, shape in shapes.items()
     }
@@ -108,8 +108,8 @@ def make_states(
     return States(
         q=q,
         direction=np.zeros((n, 6)) if direction is None else np.array(direction, float),
-        tool=np.array(np.broadcast_to(np.zeros(3) if tool is None else tool, (n, 3))),
-        tool_id=np.array(np.broadcast_to(tool_id, (n,)), dtype=np.int64),
-        order=np.array(np.broadcast_to(order, (n,)), dtype=float),
+        tool=np.broadcast_to(np.zeros(3) if tool is None else tool, (n, 3)),
+        tool_id=np.broadcast_to(np.array(tool_id, dtype=np.int64), (n,)),
+        order=np.broadcast_to(np.array(order, dtype=float), (n,)),
         **values,  # type: ignore[arg-type]
     )

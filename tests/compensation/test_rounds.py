@@ -51,16 +51,22 @@ def test_a_window_fits_where_other_rounds_would_change_nothing(own, steps, same)
     assert fits(own, steps) == same
 
 
-def test_only_own_targets_vote_but_all_are_told() -> None:
-    watched = Trail(own=slice(2, 4), pace=(AIM,))
+def test_only_own_targets_vote_but_those_at_the_cuts_are_told_too() -> None:
+    ends = slice(1, 4), slice(3, 5)
+    watched = Trail(slice(2, 4), *ends, pace=(AIM,))
     missed, far = np.zeros((6, 3)), np.zeros(6, dtype=bool)
-    moved = np.array([True, False, False, False, False, True])
+    moved = np.array([True, False, False, False, True, False])
     assert watched.take(moved, missed, far) == AIM  # the pace
     assert watched.taken[-1] == Taken(AIM, READ_BACK, True, False)
     assert watched.take(moved, missed, far) == READ_BACK
     missed[1] = far[3] = 1.0
     assert watched.take(moved, missed, far) == BEND
     assert watched.taken[-1] == Taken(BEND, BEND, True, True)
+    out_of_sight = Trail(slice(2, 4), *ends)
+    out_of_sight.take(np.arange(6) == 5, np.eye(6, 3), far & False)
+    assert out_of_sight.taken == [Taken(READ_BACK, READ_BACK, False, True)]
+    out_of_sight.take(np.arange(6) == 0, np.eye(6, 3)[::-1] * 0.0, far & False)
+    assert out_of_sight.taken[1:] == [Taken(READ_BACK, READ_BACK, False, False)]
 
 
 def glimpse(n: int, off: float = 0.0) -> Glimpse:
@@ -89,5 +95,14 @@ def test_who_has_come_to_rest_is_seen_as_then() -> None:
     seen = Glimpses({**looks, (1, True): glimpse(2, 2.0)})
     assert seen.at((5, False)) is looks[1, False]
     assert seen.at((5, True)).values[0, 0] == 2.0
-    assert seen.at((0, True)) is looks[0, False]
     assert not same_looks(seen, Glimpses(looks))
+
+
+def test_written_numbers_stand_for_those_of_another_round() -> None:
+    looks = {(0, False): glimpse(2), (1, False): glimpse(2, 1.0)}
+    early = Glimpses({(0, False): glimpse(2), (0, True): glimpse(2, 2.0)})
+    late = Glimpses({**looks, (1, True): glimpse(2, 2.0)})
+    assert late.at((0, True)).values[0, 0] == 2.0
+    assert not same_looks(early, late)  # what was aimed for differs
+    rested = Glimpses({**looks, (1, False): glimpse(2), (1, True): glimpse(2, 2.0)})
+    assert same_looks(early, rested) and same_looks(rested, early)

@@ -40,6 +40,24 @@ def shifted(targets: Targets, moved: np.ndarray, seed: int) -> Targets:
     return targets.moved_to(rows, tcp, joints)
 
 
+def test_columns_of_one_value_move_like_others(cell: Cell) -> None:
+    slim = read(cell, milling(60).source).part(*window(20, 30))
+    full = replace(slim, **{k: np.array(v) for k, v in vars(slim).items()})
+    slim = slim.slim()
+    rows = np.array([2, 5])
+    for joints in (np.full((2, 6), np.nan), np.ones((2, 6))):
+        moved, meant = (t.moved_to(rows, t.tcp[:2], joints) for t in (slim, full))
+        for name, column in vars(meant).items():
+            np.testing.assert_array_equal(getattr(moved, name), column, name)
+    assert slim.joints.strides[0] == slim.tool.strides[0] == 0
+
+
+def window(begin: int, end: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Cut out moves one after the other, from an unknown place on."""
+    rows = np.arange(begin, end)
+    return rows, np.arange(end - begin + 1), rows - begin - 1
+
+
 def picked(targets: Targets, share: float, seed: int) -> np.ndarray:
     """Pick some of the targets that a correction may move."""
     fixed = ~np.isin(targets.kind, (TargetKind.POSE, TargetKind.JOINTS))

@@ -141,3 +141,27 @@ def rotation_vector(R):
     axis = outer[:, np.argmax(np.diag(outer))]
     axis = axis / np.linalg.norm(axis)
     return angle * (axis if axis @ skew >= 0 else -axis)
+
+
+def into_range(q, lower, upper):
+    """Shift one angle by whole turns into a range where that is possible."""
+    q = math.pi - np.mod(math.pi - q, math.tau)
+    if q < lower and q + math.tau <= upper:
+        return q + math.tau
+    if q > upper and q - math.tau >= lower:
+        return q - math.tau
+    return q
+
+
+def on_turns(q, turns):
+    """Put joint angles (n, 6) on written turns (n, 3), see `motion.branches`."""
+    out, axes = np.array(q), [3, 5, 2]
+    written = ~np.isnan(turns)
+    given = np.where(written, turns, 0.0)
+    whole = np.floor(given + 0.5)
+    middle = math.tau * (given - whole)
+    rest = np.mod(q[:, axes] - middle + math.pi, math.tau) - math.pi + middle
+    moved = rest + math.tau * whole
+    moved[:, 2] = np.where(written[:, 2], moved[:, 2], q[:, 2])
+    out[:, axes] = moved
+    return out

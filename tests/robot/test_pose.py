@@ -42,6 +42,14 @@ def test_inverse_of_a_product(r, s):
     np.testing.assert_allclose(A @ inverse(A), np.eye(4), atol=1e-9)
 
 
+@given(record)
+def test_one_pose_for_all_rows_is_inverted_once(r):
+    T = pose_from_record(r)
+    found = inverse(np.broadcast_to(T, (5, 4, 4)))
+    np.testing.assert_array_equal(found, inverse(np.tile(T, (5, 1, 1))))
+    assert found.strides[0] == 0
+
+
 @pytest.mark.parametrize("e", [0.0, 180.0])
 def test_degenerate_split_puts_a_to_zero(e):
     T = pose_from_record(np.array([1, 2, 3, 25, e, 40]))

@@ -9,7 +9,7 @@ from typing import Protocol
 
 import numpy as np
 
-from postproc.arrays import Bools, Indices, Ints, any_in_rows, spans
+from postproc.arrays import Bools, Indices, Ints, any_in_rows, slim, spans
 from postproc.language.pdl2.columns import Collector, SettingColumns, VisitColumns
 from postproc.language.pdl2.context import Point
 from postproc.language.pdl2.dialect import PDL2_DIALECT
@@ -17,7 +17,7 @@ from postproc.language.pdl2.job import World
 from postproc.language.pdl2.machine import Key, Machine, MoveRun
 from postproc.language.pdl2.store import MANY
 from postproc.language.source import Source
-from postproc.language.visits import ELSEWHERE, Literals, Meaning, Visits, slim
+from postproc.language.visits import ELSEWHERE, Literals, Meaning, Visits, texts_of
 
 # Which numbers of which file belong to which target.
 
@@ -137,22 +137,23 @@ def _literals(
 ) -> Literals:
     file = np.searchsorted(numbering.first, slots[:, 0], side="right") - 1
     start, end = numbering.start[slots], numbering.end[slots]
-    line = np.zeros(len(slots), dtype=np.int64)
+    line = np.zeros(len(slots), dtype=np.int32)
     for i, source in enumerate(numbering.sources):
         mine = file == i
         places = start[mine].min(axis=1) if mine.any() else start[mine][:, 0]
         line[mine] = np.searchsorted(source.line_starts, places, side="right")
-    texts = tuple(names)
+    texts, own = tuple(names), columns.name[visit]
+    named = tuple(map(texts.__getitem__, own.tolist())) if own.any() else ()
     return Literals(
-        file=file.astype(np.int64),
+        file=slim(file.astype(np.int32)),
         line=line,
         start=start,
         end=end,
         joints=columns.target[visit] == Meaning.JOINTS,
-        name=tuple(map(texts.__getitem__, columns.name[visit].tolist())),
-        shared=_any(columns.shared, literal, len(slots)),
-        taught=_any(columns.taught, literal, len(slots)),
-        pinned=("",) * len(slots),
+        name=named or texts_of(len(slots), {}),
+        shared=slim(_any(columns.shared, literal, len(slots))),
+        taught=slim(_any(columns.taught, literal, len(slots))),
+        pinned=texts_of(len(slots), {}),
     )
 
 
@@ -205,8 +206,7 @@ def find_uses(
             stay |= {row: _IN_PART for row in rows.tolist() if 0 <= row not in stay}
     if not stay:
         return literals, follows
-    why = tuple(stay.get(row, "") for row in range(len(literals)))
-    return replace(literals, pinned=why), follows
+    return replace(literals, pinned=texts_of(len(literals), stay)), follows
 
 
 # All of it: visits in program order.
@@ -268,7 +268,7 @@ def collect(machine: Machine) -> Visits:
         reasons=tuple(collector.reasons),
         pred_start=pred_start,
         pred=pred,
-        measure_id=tuple(c.measure_id),
+        measure_id=texts_of(len(c.line), c.measured),
         literals=literals,
         dialect=PDL2_DIALECT,
         **collector.settings.columns(c.setting),

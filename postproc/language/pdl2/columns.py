@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from postproc.arrays import Interned, Ints, spans
+from postproc.arrays import Indices, Interned, Ints, slim, spans
 from postproc.language.marks import MEASURE
 from postproc.language.pdl2 import syntax as ast
 from postproc.language.pdl2.dialect import COMMENTS
@@ -25,7 +25,6 @@ from postproc.language.visits import (
     OrientationLaw,
     Switch,
     ZoneRule,
-    slim,
 )
 from postproc.robot.pose import pose_from_record
 
@@ -90,7 +89,7 @@ class SettingColumns:
         numbers = tuple(float(n) for n in value.numbers if n is not None)
         return self._frames[numbers, value.taught]
 
-    def columns(self, rows: Ints) -> dict[str, Any]:
+    def columns(self, rows: Indices) -> dict[str, Any]:
         """Return the columns of `Visits` that come from settings."""
         frames = list(self._frames)
         columns: dict[str, Any] = {
@@ -106,7 +105,7 @@ class SettingColumns:
         return columns
 
 
-def _spread(values: NDArray[Any], rows: Ints) -> NDArray[Any]:
+def _spread(values: NDArray[Any], rows: Indices) -> NDArray[Any]:
     """Return a column of settings; most programs have one row of them."""
     if len(values) == 1:
         return np.broadcast_to(values[0], (len(rows), *values.shape[1:]))
@@ -209,25 +208,25 @@ class VisitColumns:
             slots: Numbers in all files: theirs are the longest columns.
         """
         short = np.int32 if slots < 2**31 else np.int64
-        self.file = np.zeros(n, dtype=np.int64)
-        self.line = np.zeros(n, dtype=np.int64)
-        self.motion = np.zeros(n, dtype=np.int64)
-        self.target = np.zeros(n, dtype=np.int64)
+        self.file = np.zeros(n, dtype=np.int32)
+        self.line = np.zeros(n, dtype=np.int32)
+        self.motion = np.zeros(n, dtype=np.int32)
+        self.target = np.zeros(n, dtype=np.int32)
         self.via = np.zeros(n, dtype=bool)
         self.fly = np.zeros(n, dtype=bool)
         self.values = np.full((n, 6), np.nan)
         self.distance_mm = np.full(n, np.nan)
         self.aux = np.full((n, axes), np.nan)
-        self.config = np.zeros(n, dtype=np.int64)
+        self.config = np.zeros(n, dtype=np.int32)
         self.config_given = np.zeros(n, dtype=bool)
-        self.name = np.zeros(n, dtype=np.int64)
-        self.reason = np.zeros(n, dtype=np.int64)
-        self.setting = np.zeros(n, dtype=np.int64)
+        self.name = np.zeros(n, dtype=np.int32)
+        self.reason = np.zeros(n, dtype=np.int32)
+        self.setting = np.zeros(n, dtype=np.int32)
         self.slots = np.full((n, 6), -1, dtype=short)
         self.bases: dict[int, tuple[int, ...]] = {}
         self.taught = np.zeros(n, dtype=bool)
         self.shared = np.zeros(n, dtype=bool)
-        self.measure_id = [""] * n
+        self.measured: dict[int, str] = {}
 
 
 @dataclass
@@ -458,6 +457,7 @@ class Collector:
         """Say why moves must not be compensated: many moves, few combinations."""
         c, runs = self.columns, [run for _, run in moves.runs]
         whole = Interned[str]()
+        kinds: list[Indices]
         kinds = [moves.first, whole.of([self._reason(run) for run in runs])[moves.run]]
         kinds += [moves.form, c.setting[moves.visit], c.target[moves.visit], moves.last]
         which, example = _alike(kinds)
@@ -507,10 +507,10 @@ class Collector:
         ends = np.flatnonzero(np.isin(moves.row, rows) & ~self.columns.via[moves.visit])
         at = np.searchsorted(rows, moves.row[ends])
         for visit, k in zip(moves.visit[ends].tolist(), at.tolist(), strict=True):
-            self.columns.measure_id[visit] = ids[k]
+            self.columns.measured[visit] = ids[k]
 
 
-def _alike(kinds: list[Ints]) -> tuple[Ints, Ints]:
+def _alike(kinds: list[Indices]) -> tuple[Ints, Ints]:
     """Number the combinations of some columns in the order in which they first stand.
 
     Returns:

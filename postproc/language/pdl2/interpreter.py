@@ -385,6 +385,8 @@ def _report_drift(world: World, place: Place, file: ValueFile) -> None:
         world.diagnostics[found] = None
     words, declared = place.program.statements.words(), place.program.variables.names
     names = _bases(file.entries)
+    if names.keys() <= words and names.keys() <= declared:  # as nearly always
+        return
     unused = [written for name, written in names.items() if name not in words]
     undeclared = [
         written
