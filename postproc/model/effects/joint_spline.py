@@ -63,8 +63,9 @@ class JointSpline(JointEffect):
 
     @classmethod
     def may_show(cls, states: States) -> bool:
-        """Wait for a survey that is long enough."""
-        return len(states) >= LEAST_ROWS
+        """Wait for a survey that is long enough, and moved a joint far enough."""
+        moved = np.ptp(states.q, axis=0) > LEAST_RANGE
+        return len(states) >= LEAST_ROWS and bool(moved.any())
 
     def _parts(self) -> list[tuple[int, float]]:
         """List joints (from 0) with lengths."""
