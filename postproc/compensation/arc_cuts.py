@@ -6,7 +6,7 @@ leaves the arc by little enough; else it is halved, or goes on to the next cut.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Mapping
 
 import numpy as np
 
@@ -42,33 +42,34 @@ def cut_at_vias(work: PathWork) -> None:
         work.points[via] = tuple(sorted({*work.points.get(via, ()), 1.0}))
 
 
-def new_chords(work: PathWork) -> set[Cut]:
+def new_chords(work: PathWork, flat: Mapping[Cut, float]) -> set[Cut]:
     """Find pieces of arcs that are too flat for arcs, and may be chords."""
-    may = {cut for cut, bent in bending(work).items() if may_be_chord(work, cut, bent)}
+    may = {cut for cut, bent in flat.items() if may_be_chord(work, cut, bent)}
     return may - work.chords
 
 
-def halved(work: PathWork, changed: set[int]) -> Iterator[tuple[int, list[float]]]:
-    """Yield the points of arcs with pieces that are too flat, and no chords yet.
+def halved(
+    work: PathWork, flat: Mapping[Cut, float], changed: set[int]
+) -> dict[int, list[float]]:
+    """Return the points of arcs with pieces that are too flat, and no chords yet.
 
     Args:
         work: The points.
+        flat: Those pieces, see `bending`.
         changed: Moves that change anyway.
     """
-    room = work.room
-    flat, found = bending(work), dict[int, list[float]]()
+    room, found = work.room, dict[int, list[float]]()
     for (v, end), bent in flat.items():
+        if room <= 0 or v in changed or may_be_chord(work, (v, end), bent):
+            continue
         known = found.get(v, [*work.points.get(v, ())])
         begin = max((s for s in known if s < end), default=0.0)
         k = int(np.flatnonzero(work.paths.visit == v)[0])
         size = (end - begin) * float(work.paths.way[work.paths.samples(k)][-1])
-        least = work.open[v][0] if v in work.open else np.inf
-        if v in changed or may_be_chord(work, (v, end), bent):
-            continue
-        if room > 0 and size >= 2 * least:
+        if v in work.open and size >= 2 * work.open[v][0]:
             found[v] = [*known, (begin + end) / 2]
             room -= 1
-    yield from found.items()
+    return found
 
 
 def may_be_chord(work: PathWork, cut: Cut, bent: float) -> bool:

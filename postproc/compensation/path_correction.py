@@ -16,6 +16,7 @@ import numpy as np
 
 from postproc.compensation.approach_anew import approach_anew, approached
 from postproc.compensation.arc_cuts import (
+    bending,
     cut_at_vias,
     halved,
     joined,
@@ -73,13 +74,14 @@ def correct_paths(draft: Draft, setting: Setting, write: Write) -> Draft:
 def _improve(work: PathWork) -> None:
     """Put points on the ways until none is left too far, or none helps."""
     for _ in range(ROUNDS):
-        new, flat = dict(_new_points(work)), new_chords(work)
-        more = dict(halved(work, {*new, *(v for v, _ in flat)}))
-        if not new and not flat and not more:
+        new, flat = dict(_new_points(work)), bending(work)
+        chords = new_chords(work, flat)
+        more = halved(work, flat, {*new, *(v for v, _ in chords)})
+        if not new and not chords and not more:
             return
         for v, shares in (new | more).items():
             work.points[v] = tuple(sorted(map(float, shares)))
-        work.chords |= flat
+        work.chords |= chords
         cut_at_vias(work)
         work.make()
 
