@@ -16,6 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from scipy.linalg import solve_triangular
@@ -254,10 +255,7 @@ class Pursuit:
     def gains(self, orders: Floats) -> Floats:
         """Return what each order gains over the map alone [nats], (m,)."""
         waves = self._waves(orders)
-        own = self._gram(self.columns, self.columns)
-        size, turn = np.linalg.eigh(own)
-        size = np.maximum(size, 0.0)
-        along = turn.T @ (self.columns.T @ self.view.rows)[:, 0]
+        size, turn, along = self._map
         shared = (turn.T @ self._gram(self.columns, waves)).reshape(len(turn), -1, 2)
         blocks = self._blocks(waves)
         rest = (waves.T @ self.view.rows)[:, 0].reshape(-1, 2)
@@ -275,6 +273,13 @@ class Pursuit:
             moment = rest - np.einsum("kmi,k->mi", weighed, along)
             np.maximum(best, here + self._evidence(gram, moment, left), out=best)
         return np.asarray(best - alone)
+
+    @cached_property
+    def _map(self) -> tuple[Floats, Floats, Floats]:
+        """Turn the map's columns so that their sums are apart: sizes, turn, moments."""
+        size, turn = np.linalg.eigh(self._gram(self.columns, self.columns))
+        along = turn.T @ (self.columns.T @ self.view.rows)[:, 0]
+        return np.maximum(size, 0.0), turn, along
 
     def _evidence(self, gram: Floats, moment: Floats, square: float) -> Floats:
         """Compute the evidence of waves from their sums, (m, 2, 2) and (m, 2)."""
