@@ -16,6 +16,7 @@ import numpy as np
 
 from postproc.arrays import Bools, Floats, Ints, any_in_rows, spans
 from postproc.compensation.arc_splitting import NO_ARCS, WantedArcs
+from postproc.compensation.path_samples import PathSamples, measured_along, ways_of
 from postproc.model.model import Model
 from postproc.motion.cycle import ProgramCycle
 from postproc.robot.cell import Cell
@@ -118,92 +119,6 @@ class PathAccuracy:
 
 
 @dataclass(frozen=True)
-class _PathSamples:
-    """The ways of m moves, one after the other, each from where it begins on.
-
-    Attributes:
-        visit, source: Of each way, (m,).
-        q: Joint angles at the samples, (s, 6) [rad].
-        first: As in `PathAccuracy`, (m + 1,).
-    """
-
-    visit: Ints
-    source: Ints
-    q: Floats
-    first: Ints
-
-    @property
-    def begins(self) -> Bools:
-        """The first sample of each way, (s,)."""
-        out = np.zeros(len(self.q), dtype=bool)
-        out[self.first[:-1]] = True
-        return out
-
-    @property
-    def way(self) -> Ints:
-        """The way that every sample belongs to, (s,)."""
-        return np.repeat(np.arange(len(self.visit)), np.diff(self.first))
-
-    def as_many(self, other: _PathSamples) -> _PathSamples:
-        """Take as many samples of every way as there are of another one's."""
-        if np.array_equal(self.first, other.first):
-            return self
-        way = other.way
-        has, wants = (np.diff(samples.first)[way] - 1 for samples in (self, other))
-        share = (np.arange(len(way)) - other.first[way]) / np.maximum(wants, 1)
-        at = share * has
-        step = np.minimum(at.astype(int), np.maximum(has - 1, 0))
-        q = _between(self.q, self.begins, self.first[way] + step, at - step)
-        return replace(self, q=q, first=other.first)
-
-    def refined(self, after: Ints, share: Floats) -> _PathSamples:
-        """Insert samples at a share of the way from some samples to the next ones."""
-        new = _between(self.q, self.begins, after, share)
-        at = np.append(np.arange(len(self.q)), after + share)
-        order = np.argsort(at, kind="stable")
-        more = np.bincount(self.way[after], minlength=len(self.visit))
-        first = self.first + np.append(0, np.cumsum(more))
-        return replace(self, q=np.concatenate([self.q, new])[order], first=first)
-
-
-def _ways(cycle: ProgramCycle, rows: Ints) -> _PathSamples:
-    """Take the ways by which some visits are reached."""
-    edge, source = (found[rows] for found in cycle.ways)
-    edges = cycle.path.edges
-    count = edges.start[edge + 1] - edges.start[edge]
-    first = np.append(0, np.cumsum(count + 1))
-    q = np.empty((first[-1], 6))
-    inner = np.ones(len(q), dtype=bool)
-    inner[first[:-1]] = False
-    q[first[:-1]] = cycle.path.q[source]
-    q[inner] = edges.path[spans(edges.start[edge], count)]
-    return _PathSamples(rows, source, q, first)
-
-
-def _between(q: Floats, begins: Bools, after: Ints, share: Floats) -> Floats:
-    """Interpolate ways at a share of the way from samples to the next ones, (k, 6).
-
-    Cubic Hermite pieces in the distance of the joints, their slopes by the parabola
-    through three neighbours; at both ends of a way by the chord.
-    """
-    ends = np.append(begins[1:], True)
-    chord = np.diff(q, axis=0, append=q[-1:])
-    step = np.linalg.norm(chord, axis=1)
-    step[ends] = 0.0
-    slope = chord / np.maximum(step, 1e-12)[:, None]
-    before, h = np.roll(slope, 1, axis=0), np.roll(step, 1)
-    both = (h * ~begins + step)[:, None]
-    mixed = (before * step[:, None] + slope * h[:, None]) / np.maximum(both, 1e-12)
-    tangent = np.where(begins[:, None], slope, np.where(ends[:, None], before, mixed))
-    t, width = share[:, None], step[after][:, None]
-    a, b = q[after], q[np.minimum(after + 1, len(q) - 1)]
-    out = (2 * t**3 - 3 * t**2 + 1) * a + (3 * t**2 - 2 * t**3) * b
-    out += width * (t**3 - 2 * t**2 + t) * tangent[after]
-    out += width * (t**3 - t**2) * tangent[np.minimum(after + 1, len(q) - 1)]
-    return np.asarray(out)
-
-
-@dataclass(frozen=True)
 class _Run:
     """One of the two programs along its ways.
 
@@ -214,12 +129,12 @@ class _Run:
     """
 
     cycle: ProgramCycle
-    ways: _PathSamples
+    ways: PathSamples
     least: Floats
     most: Floats
 
     @classmethod
-    def of(cls, cell: Cell, cycle: ProgramCycle, ways: _PathSamples) -> _Run:
+    def of(cls, cell: Cell, cycle: ProgramCycle, ways: PathSamples) -> _Run:
         """Follow the joints' plays along the ways."""
         play = cycle.arrived.past.play[ways.source]
         return cls(cycle, ways, *sides_along(cell.arm, ways.q, ways.begins, play))
@@ -316,8 +231,8 @@ def predict_paths(
     cartesian = (before.targets.move != Motion.JOINT) & ~before.targets.curved
     known = cartesian & (before.ways[1] >= 0) & (after.ways[1] == before.ways[1])
     rows = np.flatnonzero(known)
-    ours = _ways(before, rows)
-    pair = [ours, _ways(after, rows).as_many(ours)]
+    ours = ways_of(before, rows)
+    pair = [ours, ways_of(after, rows).as_many(ours)]
     cycles = before, after
     if len(rows):
         pair = _refined(cell, cycles, pair)
@@ -325,7 +240,7 @@ def predict_paths(
     error = _Error(cell, model, temperature)
     tools = before.targets.tool[rows, :3, 3][pair[0].way]
     wanted, commanded = (cell.arm.tcp(w.q, tools) for w in pair)
-    way, tangent = _along(wanted, pair[0])
+    way, tangent = measured_along(wanted, pair[0])
     off = _shift(shift, pair[0], way)
     moved = commanded - wanted - off
     if owner is not None and len(rows):
@@ -340,7 +255,8 @@ def predict_paths(
     if owner is None or not len(rows):
         return found
     lead, _ = _groups(owner[rows])
-    otherwise = _otherwise(runs[1], error, moved, tangent, pair[0].first[lead])
+    starts = pair[0].first[lead]
+    otherwise = _otherwise(runs[1], error, moved, tangent, starts)
     return replace(found, otherwise=otherwise).joined(owner)
 
 
@@ -348,7 +264,7 @@ def _off_the_arcs(
     arcs: WantedArcs,
     owner: Ints,
     cycle: ProgramCycle,
-    ways: _PathSamples,
+    ways: PathSamples,
     wanted: Floats,
     way: Floats,
 ) -> Floats:
@@ -418,8 +334,8 @@ def _otherwise(
 
 
 def _refined(
-    cell: Cell, cycles: tuple[ProgramCycle, ...], pair: list[_PathSamples]
-) -> list[_PathSamples]:
+    cell: Cell, cycles: tuple[ProgramCycle, ...], pair: list[PathSamples]
+) -> list[PathSamples]:
     """Look closer where a joint changes its flank, before or after."""
     changes = np.zeros(len(pair[0].q), dtype=bool)
     for cycle, ways in zip(cycles, pair, strict=True):
@@ -431,19 +347,7 @@ def _refined(
     return [ways.refined(after, share) for ways in pair]
 
 
-def _along(p: Floats, ways: _PathSamples) -> tuple[Floats, Floats]:
-    """Measure the path up to every place (s, 3), (s,) [m], and its directions."""
-    step = np.diff(p, axis=0, prepend=p[:1])
-    step[ways.first[:-1]] = 0.0
-    total = np.cumsum(lengths(step))
-    tangent = step + np.append(step[1:], np.zeros((1, 3)), axis=0)
-    size = lengths(tangent)[:, None]
-    return total - total[ways.first[:-1]][ways.way], np.where(
-        size > 0, tangent / np.maximum(size, 1e-12), 0.0
-    )
-
-
-def _shift(shift: Floats, ways: _PathSamples, way: Floats) -> Floats:
+def _shift(shift: Floats, ways: PathSamples, way: Floats) -> Floats:
     """Interpolate what taught frames are off along ways, (s, 3) [m]."""
     whole = way[ways.first[1:] - 1][ways.way]
     u = np.where(whole > 0, way / np.maximum(whole, 1e-12), 1.0)[:, None]
@@ -523,10 +427,10 @@ def sides_on_leaving(cycle: ProgramCycle, cell: Cell, v: int) -> tuple[Floats, F
     Returns:
         Sides, (6,) each.
     """
-    ways = _ways(cycle, np.array([v]))
+    ways = ways_of(cycle, np.array([v]))
     run = _Run.of(cell, cycle, ways)
     tool = np.broadcast_to(cycle.targets.tool[v, :3, 3], (len(ways.q), 3))
-    way, _ = _along(cell.arm.tcp(ways.q, tool), ways)
+    way, _ = measured_along(cell.arm.tcp(ways.q, tool), ways)
     at = min(int(np.searchsorted(way, LEAVING)), len(way) - 1)
     return run.side[0], run.side[at]
 
@@ -573,7 +477,7 @@ def predicted_ways(
         temperature: Of the arm [deg C], NaN where not known.
     """
     rows = np.flatnonzero(cycle.ways[1] >= 0)
-    ways = _spaced(cell, cycle, _ways(cycle, rows))
+    ways = _spaced(cell, cycle, ways_of(cycle, rows))
     (ways,) = _refined(cell, (cycle,), [ways])
     run, error = _Run.of(cell, cycle, ways), _Error(cell, model, temperature)
     tools = cycle.targets.tool[rows, :3, 3][ways.way]
@@ -591,7 +495,7 @@ def predicted_ways(
     )
 
 
-def _spaced(cell: Cell, cycle: ProgramCycle, ways: _PathSamples) -> _PathSamples:
+def _spaced(cell: Cell, cycle: ProgramCycle, ways: PathSamples) -> PathSamples:
     """Put samples on ways so that the TCP moves by little between them."""
     tools = cycle.targets.tool[ways.visit, :3, 3][ways.way]
     step = lengths(np.diff(cell.arm.tcp(ways.q, tools), axis=0, prepend=0.0))

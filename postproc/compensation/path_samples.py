@@ -1,0 +1,109 @@
+"""The ways of moves in dense samples of the joint angles, one after the other."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from postproc.arrays import Bools, Floats, Ints, spans
+from postproc.motion.cycle import ProgramCycle
+from postproc.robot.pose import lengths
+
+
+@dataclass(frozen=True)
+class PathSamples:
+    """The ways of m moves, one after the other, each from where it begins on.
+
+    Attributes:
+        visit, source: Of each way, (m,).
+        q: Joint angles at the samples, (s, 6) [rad].
+        first: As in `PathAccuracy`, (m + 1,).
+    """
+
+    visit: Ints
+    source: Ints
+    q: Floats
+    first: Ints
+
+    @property
+    def begins(self) -> Bools:
+        """The first sample of each way, (s,)."""
+        out = np.zeros(len(self.q), dtype=bool)
+        out[self.first[:-1]] = True
+        return out
+
+    @property
+    def way(self) -> Ints:
+        """The way that every sample belongs to, (s,)."""
+        return np.repeat(np.arange(len(self.visit)), np.diff(self.first))
+
+    def as_many(self, other: PathSamples) -> PathSamples:
+        """Take as many samples of every way as there are of another one's."""
+        if np.array_equal(self.first, other.first):
+            return self
+        way = other.way
+        has, wants = (np.diff(samples.first)[way] - 1 for samples in (self, other))
+        share = (np.arange(len(way)) - other.first[way]) / np.maximum(wants, 1)
+        at = share * has
+        step = np.minimum(at.astype(int), np.maximum(has - 1, 0))
+        q = _between(self.q, self.begins, self.first[way] + step, at - step)
+        return replace(self, q=q, first=other.first)
+
+    def refined(self, after: Ints, share: Floats) -> PathSamples:
+        """Insert samples at a share of the way from some samples to the next ones."""
+        new = _between(self.q, self.begins, after, share)
+        at = np.append(np.arange(len(self.q)), after + share)
+        order = np.argsort(at, kind="stable")
+        more = np.bincount(self.way[after], minlength=len(self.visit))
+        first = self.first + np.append(0, np.cumsum(more))
+        return replace(self, q=np.concatenate([self.q, new])[order], first=first)
+
+
+def ways_of(cycle: ProgramCycle, rows: Ints) -> PathSamples:
+    """Take the ways by which some visits are reached."""
+    edge, source = (found[rows] for found in cycle.ways)
+    edges = cycle.path.edges
+    count = edges.start[edge + 1] - edges.start[edge]
+    first = np.append(0, np.cumsum(count + 1))
+    q = np.empty((first[-1], 6))
+    inner = np.ones(len(q), dtype=bool)
+    inner[first[:-1]] = False
+    q[first[:-1]] = cycle.path.q[source]
+    q[inner] = edges.path[spans(edges.start[edge], count)]
+    return PathSamples(rows, source, q, first)
+
+
+def _between(q: Floats, begins: Bools, after: Ints, share: Floats) -> Floats:
+    """Interpolate ways at a share of the way from samples to the next ones, (k, 6).
+
+    Cubic Hermite pieces in the distance of the joints, their slopes by the parabola
+    through three neighbours; at both ends of a way by the chord.
+    """
+    ends = np.append(begins[1:], True)
+    chord = np.diff(q, axis=0, append=q[-1:])
+    step = np.linalg.norm(chord, axis=1)
+    step[ends] = 0.0
+    slope = chord / np.maximum(step, 1e-12)[:, None]
+    before, h = np.roll(slope, 1, axis=0), np.roll(step, 1)
+    both = (h * ~begins + step)[:, None]
+    mixed = (before * step[:, None] + slope * h[:, None]) / np.maximum(both, 1e-12)
+    tangent = np.where(begins[:, None], slope, np.where(ends[:, None], before, mixed))
+    t, width = share[:, None], step[after][:, None]
+    a, b = q[after], q[np.minimum(after + 1, len(q) - 1)]
+    out = (2 * t**3 - 3 * t**2 + 1) * a + (3 * t**2 - 2 * t**3) * b
+    out += width * (t**3 - 2 * t**2 + t) * tangent[after]
+    out += width * (t**3 - t**2) * tangent[np.minimum(after + 1, len(q) - 1)]
+    return np.asarray(out)
+
+
+def measured_along(p: Floats, ways: PathSamples) -> tuple[Floats, Floats]:
+    """Measure the path up to every place (s, 3), (s,) [m], and its directions."""
+    step = np.diff(p, axis=0, prepend=p[:1])
+    step[ways.first[:-1]] = 0.0
+    total = np.cumsum(lengths(step))
+    tangent = step + np.append(step[1:], np.zeros((1, 3)), axis=0)
+    size = lengths(tangent)[:, None]
+    return total - total[ways.first[:-1]][ways.way], np.where(
+        size > 0, tangent / np.maximum(size, 1e-12), 0.0
+    )
