@@ -24,6 +24,7 @@ from postproc.compensation.arc_cuts import (
     whole_arcs,
 )
 from postproc.compensation.arc_splitting import point_on_way
+from postproc.compensation.best_points import BestPoints
 from postproc.compensation.options import Setting
 from postproc.compensation.path_judging import judge, largest_otherwise, sizes_of
 from postproc.compensation.path_points import Insertions
@@ -65,13 +66,15 @@ def correct_paths(draft: Draft, setting: Setting, write: Write) -> Draft:
         approach_anew(work, splitter)
     find_split(work)
     if work.open or work.approaches:
-        _improve(work)
-        _bend(work)
+        best = BestPoints(work)
+        _improve(work, best)
+        _bend(work, best)
+        best.restore()
         judge(work)
     return _result(work)
 
 
-def _improve(work: PathWork) -> None:
+def _improve(work: PathWork, best: BestPoints) -> None:
     """Put points on the ways until none is left too far, or none helps."""
     for _ in range(ROUNDS):
         new, flat = dict(_new_points(work)), bending(work)
@@ -84,9 +87,10 @@ def _improve(work: PathWork) -> None:
         work.chords |= chords
         cut_at_vias(work)
         work.make()
+        best.note()
 
 
-def _bend(work: PathWork) -> None:
+def _bend(work: PathWork, best: BestPoints) -> None:
     """Let pieces of arcs that are too flat go on to the next cut."""
     for _ in range(ROUNDS):
         changed = False
@@ -99,6 +103,7 @@ def _bend(work: PathWork) -> None:
         if not changed:
             return
         work.make()
+        best.note()
 
 
 def _new_points(work: PathWork) -> Iterator[tuple[int, list[float]]]:
@@ -187,6 +192,7 @@ def _result(work: PathWork) -> Draft:
     if work.room <= 0:
         for k in work.too_far.tolist():
             work.left.setdefault(int(work.paths.visit[k]), budget)
+    far = set(work.paths.visit[work.too_far].tolist())
     for k in work.too_far.tolist():
         closer = "its pieces would be too short, or the path no better"
         work.left.setdefault(int(work.paths.visit[k]), closer)
@@ -195,7 +201,7 @@ def _result(work: PathWork) -> Draft:
         work.tolerance,
         work.points,
         work.stops & work.points.keys(),
-        {v: why for v, why in work.left.items() if v not in work.points},
+        {v: why for v, why in work.left.items() if v in far and v not in work.points},
         sizes_of(work.first.paths),
         {v: far for v, (far, _) in largest_otherwise(told.paths).items()}
         if work.latest is not work.source

@@ -54,6 +54,8 @@ def _thin_out(work: PathWork, v: int, share: float) -> bool:
     if not gone or len(gone) == len(free):
         return False
     work.points[v] = tuple(s for s in known if s not in gone)
+    longer = min((s for s in known if s > max(gone)), default=1.0)
+    work.chords -= {(v, s) for s in (*gone, longer)}  # of what is a longer piece now
     return True
 
 
@@ -79,19 +81,18 @@ def _bad(work: PathWork) -> Iterator[tuple[int, tuple[str, float | None]]]:
     """Yield the moves with points that must go: why, and where if not all of them."""
     if not work.points:
         return
-    told, without = work.latest.in_time, sizes_of(work.first.paths)
+    told, first = work.latest.in_time, work.first.paths
     if told is None:
         return
     with_points = _worst(work, told)
     other = largest_otherwise(told.paths)
-    usual = largest_otherwise(work.first.paths)
+    without = _of_moves(work, sizes_of(first))
+    far = {v: max(far, without[v]) for v, (far, _) in largest_otherwise(first).items()}
+    usual = _of_moves(work, far)
     corner = _corners_moved(work, told)
     flat = bending(work)
     bent = {cut[0] for cut, far in flat.items() if not may_be_chord(work, cut, far)}
     for v in sorted({*work.points, *(via + 1 for via in work.cut_arcs())}):
-        before = without[v]
-        if work.points.get(v, ()) in ((), (1.0,)):  # its other half is cut
-            before = max(before, work.aim)
         if v not in with_points:
             yield v, ("nothing is predicted for it with points", None)
         elif v in bent:
@@ -99,14 +100,24 @@ def _bad(work: PathWork) -> Iterator[tuple[int, tuple[str, float | None]]]:
         elif refused := _refusal(work, v):
             why = f"points on its way cannot be corrected: {refused}"
             yield v, (why, None)
-        elif with_points[v][0] > before:
+        elif with_points[v][0] > without[v]:
             why = "points on its way make it no better"
             yield v, (why, with_points[v][1])
-        elif other[v][0] > max(before, usual[v][0]) + WORSE:
+        elif other[v][0] > usual[v] + WORSE:
             why = "it would be worse if a flank is not as predicted"
             yield v, (why, other[v][1])
         elif corner[v]:
             yield v, ("a rounded corner at one of its ends would move", None)
+
+
+def _of_moves(work: PathWork, far: dict[int, float]) -> dict[int, float]:
+    """Say of both halves of an arc, which is one move, what the farther one is off."""
+    visits, found = work.source.reading.visits, dict(far)
+    for v in far:
+        if is_arc(visits, v):
+            via = point_on_way(visits, v)
+            found[v] = max(far.get(via, 0.0), far.get(via + 1, 0.0))
+    return found
 
 
 def _refusal(work: PathWork, v: int) -> str:
@@ -164,6 +175,7 @@ def _rounded(work: PathWork, told: InTime) -> dict[int, list[tuple[float, float]
         if zone is not None and is_arc(visits, v):
             half = np.minimum(half, zone[rows[1:-1]])
             far = half * bend + passed(half, arcs.radius_of(v))
+        far[: int(v in work.stops)] = 0.0  # a stop is not rounded
         found[v] = list(zip(half.tolist(), far.tolist(), strict=True))
     return found
 

@@ -27,7 +27,8 @@ from postproc.compensation.taking_up import (
 from postproc.language.interface import Splitter
 from postproc.robot.pose import MM
 
-AIM = 0.6  # of the tolerance: what points are to reach
+AIM = 0.4  # of the tolerance: what points are to reach
+MOST = 0.95  # of a way: that much is to be within half of the tolerance
 
 
 @dataclass(frozen=True)
@@ -139,6 +140,17 @@ class PathWork:
         sizes = self.paths.after.sizes
         order = np.argsort(-sizes, kind="stable")
         return order[sizes[order] > self.tolerance]
+
+    @property
+    def to_split(self) -> Ints:
+        """The paths that are left too far, or most of whose way is not near enough."""
+        paths = self.paths
+        step = np.diff(paths.way, prepend=0.0)
+        step[paths.first[:-1]] = 0.0
+        far = np.where(paths.after.across > self.tolerance / 2, step, 0.0)
+        off, whole = (np.add.reduceat(each, paths.first[:-1]) for each in (far, step))
+        far_off = off > (1.0 - MOST) * whole
+        return np.flatnonzero(far_off | (paths.after.sizes > self.tolerance))
 
     def make(self) -> None:
         """Correct the program with its points, and predict it."""

@@ -19,7 +19,7 @@ def find_split(work: PathWork) -> None:
     visits, paths = work.source.reading.visits, work.paths
     shortest = work.setting.cell.limits.segment_ms / 1e3
     pieces = shortest_pieces(visits, work.first.before, shortest)
-    for k in work.too_far.tolist():
+    for k in work.to_split.tolist():
         v = int(paths.visit[k])
         if told := _left(work, k, v):
             work.left[v] = told

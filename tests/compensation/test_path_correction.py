@@ -13,9 +13,11 @@ import pytest
 
 from postproc.arrays import Floats
 from postproc.cli.simulate import _read, setup_of
-from postproc.compensation import split_moves
+from postproc.compensation import path_correction, split_moves
+from postproc.compensation.arc_splitting import is_arc
+from postproc.compensation.best_points import BestPoints
 from postproc.compensation.path_correction import TAKEN
-from postproc.compensation.path_work import AIM
+from postproc.compensation.path_work import AIM, PathWork
 from postproc.model.model import load_model
 from postproc.robot.cell import load_cell
 from postproc.robot.pose import MM
@@ -104,6 +106,43 @@ def test_a_stop_takes_up_all_play_at_once(shop: Path) -> None:
     assert len(early) > LINES / 2
     assert all(p["points"][0]["at_mm"] <= 1e3 * max(TAKEN) + 1e-3 for p in early)
     assert all(true[p["visit"]]["max_mm"] < 1.2 * TOLERANCE for p in early)
+
+
+def test_most_of_a_way_keeps_to_half_of_what_was_asked_for(shop: Path) -> None:
+    true = real(shop, "stops")
+    within = [
+        true[path["visit"]]["p95_mm"] < TOLERANCE / 2
+        for path in lines_of(told(shop, "stops"))
+    ]
+    assert np.mean(within) > 0.9
+
+
+def test_a_stop_is_not_judged_as_a_rounded_point(shop: Path) -> None:
+    without = {p["visit"]: p for p in lines_of(told(shop, "plain"))}
+    begins = [
+        path
+        for path in lines_of(told(shop, "stops"))
+        if without[path["visit"]]["max_mm"]["after"] > TOLERANCE
+        and without[path["visit"]]["at_mm"]["after"] < 2.0
+    ]
+    assert len(begins) > 5
+    assert all(path["inserted"] for path in begins)
+
+
+def test_points_that_did_better_are_put_back(
+    shop: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def worse(work: PathWork, best: BestPoints) -> None:
+        visits = work.source.reading.visits
+        for v in [v for v in work.points if not is_arc(visits, v)]:
+            work.points[v] = (0.5,)
+        work.make()
+        best.note()
+
+    monkeypatch.setattr(path_correction, "_bend", worse)
+    found = compensated(shop, "job.pdl", "put_back", "--path-mm", TOLERANCE)
+    for old, new in zip(lines_of(told(shop, "points")), lines_of(found), strict=True):
+        assert new["points"] == old["points"]
 
 
 def test_flanks_that_a_measured_path_refuted_get_no_points(shop: Path) -> None:
