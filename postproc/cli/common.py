@@ -72,7 +72,8 @@ PathOption = Annotated[
     float | None,
     typer.Option(
         "--path-mm",
-        help="Insert points where a path is predicted to be left farther [mm].",
+        help="Insert points where a path is predicted to be left farther [mm], or "
+        "farther than half of it on more than 5 % of the way.",
     ),
 ]
 MaxInsertedOption = Annotated[
