@@ -34,6 +34,17 @@ def read_only(columns: object) -> None:
             column.setflags(write=False)
 
 
+# What long columns took is given back, not kept for later: other processes need it.
+
+MANY = 40_000  # rows
+
+
+def give_back(rows: int = MANY) -> None:
+    """Give memory that is free by now back to the system, after work on many rows."""
+    if rows >= MANY:
+        _native.give_back()
+
+
 # Columns that hold one value throughout, kept as that value alone.
 
 

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from postproc.arrays import Bools, Floats, Interned, Ints, among
+from postproc.arrays import Bools, Floats, Interned, Ints, among, give_back
 from postproc.compensation import windows as cuts
 from postproc.compensation.clones import give_own_points
 from postproc.compensation.decide import Proposal
@@ -212,7 +212,9 @@ def _one_after_another(parts: Sequence[dict[str, Any]]) -> Decisions:
 
 def _column(name: str, parts: Sequence[dict[str, Any]]) -> NDArray[Any]:
     """Take a column from all parts, and join it."""
-    return np.concatenate([part.pop(name) for part in parts])
+    column = np.concatenate([part.pop(name) for part in parts])
+    give_back(len(column))
+    return column
 
 
 # A program corrected window by window, so that only one is in memory at a time.
