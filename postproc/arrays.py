@@ -65,6 +65,15 @@ def slim(column: NDArray[Any]) -> NDArray[Any]:
     return np.broadcast_to(np.array(first), column.shape) if same.all() else column
 
 
+def narrow(values: Indices) -> NDArray[np.unsignedinteger[Any]]:
+    """Keep whole numbers, none below 0, in as few bytes as the largest needs.
+
+    >>> narrow(np.array([3, 255])).dtype, narrow(np.array([3, 256])).dtype
+    (dtype('uint8'), dtype('uint16'))
+    """
+    return values.astype(np.min_scalar_type(int(values.max(initial=0))))
+
+
 def is_one_value(column: NDArray[Any]) -> bool:
     """Tell whether a column is kept as one value."""
     return column.strides[0] == 0

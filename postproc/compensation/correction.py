@@ -113,7 +113,7 @@ class Correction:
         rows = slice(*np.searchsorted(moved, [own.start, own.stop]).tolist())
         literals = np.sort(visits.literal[own])
         mine = among(self.edited, literals)
-        starts = np.sort(visits.literals.start[self.edited[mine]], axis=None)
+        starts = np.sort(visits.literals.places[self.edited[mine]].start, axis=None)
         edits = tuple(
             Replacements(e.start[at], e.end[at], e.new[at])
             for e in self.edits

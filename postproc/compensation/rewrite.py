@@ -180,13 +180,13 @@ def edited_numbers(
         edited: Those to look at, (m,).
         edits: The edits of numbers, file by file.
     """
-    shape = len(edited), literals.start.shape[1]
+    shape = len(edited), literals.places.offset.shape[1]
     new, changed = np.zeros(shape), np.zeros(shape, dtype=bool)
     for file, own in enumerate(edits):
         mine = np.flatnonzero(literals.file[edited] == file)
         if len(own) == 0:
             continue
-        start = literals.start[edited[mine]]
+        start = literals.places[edited[mine]].start
         at = np.minimum(np.searchsorted(own.start, start), len(own) - 1)
         hit = own.start[at] == start
         numbers = np.zeros(at.shape)

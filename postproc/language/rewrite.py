@@ -174,7 +174,8 @@ def edits(
     found = []
     for file, source in enumerate(sources):
         mine = np.flatnonzero(literals.file[rows] == file)
-        start, end = literals.start[rows[mine]], literals.end[rows[mine]]
+        places = literals.places[rows[mine]]
+        start, end = places.start, places.end
         joints = literals.joints[rows[mine], None]
         least = np.where(joints, dialect.joint_decimals, dialect.pose_decimals)
         written = start >= 0

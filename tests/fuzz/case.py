@@ -142,7 +142,9 @@ def check_bytes(
             assert after.get(name, before[name]) == before[name], name
             continue
         mine = literals.file == number
-        places = np.stack([literals.start[mine], literals.end[mine]], axis=-1)
+        places = np.stack(
+            [literals.places.start[mine], literals.places.end[mine]], axis=-1
+        )
         spans = sorted({(a, b) for a, b in places.reshape(-1, 2).tolist() if a >= 0})
         rest = _without_stamp(name, after[name])
         at = end = 0

@@ -265,7 +265,7 @@ def clone(
     found = [(first.file, _declared(program, at, variable.name, name))]
     for row in rows:
         file, line = int(literals.file[row]), int(literals.line[row])
-        starts = literals.start[row].tolist()
+        starts = literals.places[row : row + 1].start[0].tolist()
         if file == len(programs) and values is not None and first.file == 0:
             entry = copied_entry(values, line, variable.name, name, starts)
             found.append((file, entry))

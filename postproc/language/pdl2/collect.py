@@ -9,7 +9,7 @@ from typing import Protocol
 
 import numpy as np
 
-from postproc.arrays import Bools, Indices, Ints, any_in_rows, slim, spans
+from postproc.arrays import Bools, Indices, Ints, any_in_rows, in_chunks, slim, spans
 from postproc.language.pdl2.columns import Collector, SettingColumns, VisitColumns
 from postproc.language.pdl2.context import Point
 from postproc.language.pdl2.dialect import PDL2_DIALECT
@@ -17,7 +17,14 @@ from postproc.language.pdl2.job import World
 from postproc.language.pdl2.machine import Key, Machine, MoveRun
 from postproc.language.pdl2.store import MANY
 from postproc.language.source import Source
-from postproc.language.visits import ELSEWHERE, Literals, Meaning, Visits, texts_of
+from postproc.language.visits import (
+    ELSEWHERE,
+    Literals,
+    Meaning,
+    NumberPlaces,
+    Visits,
+    texts_of,
+)
 
 # Which numbers of which file belong to which target.
 
@@ -63,6 +70,14 @@ class Numbering:
             _together([start for _, start, _ in numbered]),
             _together([end for _, _, end in numbered]),
         )
+
+    def places(self, slots: Indices) -> NumberPlaces:
+        """Tell where the numbers of targets stand, by their slots, (m, 6)."""
+        some = in_chunks(
+            lambda k: NumberPlaces.of(self.start[slots[k]], self.end[slots[k]]),
+            max(len(slots), 1),
+        )
+        return NumberPlaces.joined(some)
 
     def apart(self, slots: Indices) -> Bools:
         """Tell which targets have their numbers in more than one file, (k,).
@@ -136,19 +151,18 @@ def _literals(
     literal: Indices,
 ) -> Literals:
     file = np.searchsorted(numbering.first, slots[:, 0], side="right") - 1
-    start, end = numbering.start[slots], numbering.end[slots]
+    places = numbering.places(slots)
     line = np.zeros(len(slots), dtype=np.int32)
     for i, source in enumerate(numbering.sources):
         mine = file == i
-        places = start[mine].min(axis=1) if mine.any() else start[mine][:, 0]
-        line[mine] = np.searchsorted(source.line_starts, places, side="right")
+        first = places.first[mine]
+        line[mine] = np.searchsorted(source.line_starts, first, side="right")
     texts, own = tuple(names), columns.name[visit]
     named = tuple(map(texts.__getitem__, own.tolist())) if own.any() else ()
     return Literals(
         file=slim(file.astype(np.int32)),
         line=line,
-        start=start,
-        end=end,
+        places=places,
         joints=columns.target[visit] == Meaning.JOINTS,
         name=named or texts_of(len(slots), {}),
         shared=slim(_any(columns.shared, literal, len(slots))),
