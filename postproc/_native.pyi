@@ -190,9 +190,9 @@ def by_groups(lower: Floats, z: Floats, group: Ints, count: int) -> Floats: ...
 
 # text.rs: lines of a file, but for numbers and names (`postproc.language.scan`)
 def form_of(mask: bytes) -> tuple[bytes, list[str]]: ...
-def line_starts(data: bytes) -> Ints: ...
+def line_starts(data: bytes) -> Indices: ...
 def scan_lines(
-    data: bytes, starts: Ints
+    data: bytes, starts: Indices
 ) -> tuple[
     list[bytes],
     tuple[Indices, Indices, Indices, Indices],
@@ -204,9 +204,9 @@ def scan_lines(
 # rescan.rs: a text that differs from one read before in numbers
 def rescan_lines(
     before: bytes,
-    before_starts: Ints,
+    before_starts: Indices,
     after: bytes,
-    after_starts: Ints,
+    after_starts: Indices,
     count: int,
 ) -> tuple[int, Indices, tuple[Indices, Indices, Floats, Bools]] | None: ...
 

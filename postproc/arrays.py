@@ -268,7 +268,7 @@ def chunks(n: int, size: int = CHUNK) -> Iterator[slice]:
 # Many short stretches of a long array, as one list of places.
 
 
-def spans(begin: Ints, count: Ints) -> Ints:
+def spans(begin: Indices, count: Indices) -> Ints:
     """List begin, begin + 1, .., begin + count - 1 of every span.
 
     >>> spans(np.array([3, 10]), np.array([2, 3])).tolist()

@@ -107,7 +107,7 @@ impl Texts<'_> {
             if !pair.same(old, new) {
                 return None;
             }
-            found.take(&pair, (old, new), self.after.bounds[k]);
+            found.take(&pair, (old, new), self.after.begin(k));
         }
         Some(found)
     }
@@ -136,9 +136,9 @@ type Column<'py, T> = Bound<'py, PyArray1<T>>;
 pub fn rescan_lines<'py>(
     py: Python<'py>,
     before: &Bound<'py, PyBytes>,
-    before_starts: PyReadonlyArray1<'py, i64>,
+    before_starts: PyReadonlyArray1<'py, i32>,
     after: &Bound<'py, PyBytes>,
-    after_starts: PyReadonlyArray1<'py, i64>,
+    after_starts: PyReadonlyArray1<'py, i32>,
     count: usize,
 ) -> PyResult<
     Option<(
@@ -170,7 +170,7 @@ pub fn rescan_lines<'py>(
         }
     }
     if let Some(added) = texts.added {
-        let at = texts.after.bounds[added];
+        let at = texts.after.begin(added);
         let mut line = Masked::default();
         line.read(texts.after.line(added));
         all.comment.insert(added, line.comment.map_or(-1, |c| (at + c) as i32));

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from postproc import _native
-from postproc.arrays import Bools, Floats, Indices, Ints
+from postproc.arrays import Bools, Floats, Indices
 
 # A *mask* is the code of a line in which every number is one NUL (no program holds
 # any), the comment is gone and idle blanks are dropped. In its *form* every numbered
@@ -51,7 +51,7 @@ class ScannedLines:
     unterminated: tuple[int, ...]
 
 
-def scan_lines(data: bytes, line_starts: Ints) -> ScannedLines:
+def scan_lines(data: bytes, line_starts: Indices) -> ScannedLines:
     """Mask every physical line of a text and take its numbered names out.
 
     Args:
@@ -81,7 +81,7 @@ class RescannedLines:
 
 
 def rescan_lines(
-    before: tuple[bytes, Ints], after: tuple[bytes, Ints], count: int
+    before: tuple[bytes, Indices], after: tuple[bytes, Indices], count: int
 ) -> RescannedLines | None:
     """Scan a text that should differ from another in numbers alone.
 

@@ -201,7 +201,7 @@ class Source:
         return self.data.decode("latin-1")
 
     @cached_property
-    def line_starts(self) -> NDArray[np.int64]:
+    def line_starts(self) -> Indices:
         """Return the offsets at which lines start, (n,); CR, LF and CRLF end a line."""
         return _native.line_starts(self.data)
 

@@ -264,8 +264,8 @@ class Visits:
     config: Ints
     configs: tuple[str, ...]
     config_given: Bools
-    literal: Ints
-    follows: Ints
+    literal: Indices
+    follows: Indices
     name: Ints
     names: tuple[str, ...]
     tool: Ints
@@ -291,8 +291,8 @@ class Visits:
     curved: Bools
     reason: Ints
     reasons: tuple[str, ...]
-    pred_start: Ints
-    pred: Ints
+    pred_start: Indices
+    pred: Indices
     measure_id: tuple[str, ...]
     literals: Literals
     dialect: Dialect

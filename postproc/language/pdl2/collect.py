@@ -105,7 +105,7 @@ def find_literals(
     Visits whose numbers partly belong to another target, or to another file, get none
     (-1).
     """
-    literal = np.full(len(columns.slots), -1, dtype=np.int64)
+    literal = np.full(len(columns.slots), -1, dtype=np.int32)
     rows = np.flatnonzero(columns.slots[:, 0] >= 0)
     slots = columns.slots[rows]
     example, inverse = _distinct(slots[:, 0])
@@ -189,7 +189,7 @@ def find_uses(
     bases: Mapping[int, tuple[int, ...]],
     literal: Ints,
     pinned: Mapping[int, str],
-) -> tuple[Literals, Ints]:
+) -> tuple[Literals, Indices]:
     """Find which literals computed targets move along with, and which must stay.
 
     Args:
@@ -211,7 +211,7 @@ def find_uses(
     owner[numbers] = np.arange(len(literals))[:, None]
     owner[-1] = -1
     stay = {int(owner[slot]): why for slot, why in pinned.items() if owner[slot] >= 0}
-    follows = np.full(len(literal), -1, dtype=np.int64)
+    follows = np.full(len(literal), -1, dtype=np.int32)
     for visit, base in bases.items():
         rows = owner[[*base]]
         if rows[0] >= 0 and (numbers[rows[0]] == base).all():
@@ -308,17 +308,17 @@ def _most_axes(runs: list[MoveRun], world: World) -> int:
 
 def _predecessors(
     machine: Machine, ordered: list[tuple[Key, MoveRun]], offsets: Ints
-) -> tuple[Ints, Ints]:
+) -> tuple[Indices, Indices]:
     """Translate predecessor ids to visits, in CSR form."""
     n, first = int(offsets[-1]), offsets[:-1]
     ids = np.array([machine.ids[key] for key, _ in ordered], dtype=np.int64)
     visit = np.zeros(machine.next_id, dtype=np.int64)
     visit[spans(ids, np.diff(offsets))] = np.arange(n)
     origins = [_origins(machine, run, visit) for _, run in ordered]
-    counts = np.ones(n, dtype=np.int64)
+    counts = np.ones(n, dtype=np.int32)
     counts[first] = [len(found) for found in origins]
-    start = np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
-    pred = np.repeat(np.arange(n) - 1, counts)
+    start = np.append(np.int32(0), np.cumsum(counts, dtype=np.int32))
+    pred = np.repeat(np.arange(-1, n - 1, dtype=np.int32), counts)
     pred[spans(start[first], counts[first])] = [*chain.from_iterable(origins)]
     return start, pred
 

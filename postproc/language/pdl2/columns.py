@@ -210,8 +210,8 @@ class VisitColumns:
         short = np.int32 if slots < 2**31 else np.int64
         self.file = np.zeros(n, dtype=np.int32)
         self.line = np.zeros(n, dtype=np.int32)
-        self.motion = np.zeros(n, dtype=np.int32)
-        self.target = np.zeros(n, dtype=np.int32)
+        self.motion = np.zeros(n, dtype=np.int8)
+        self.target = np.zeros(n, dtype=np.int8)
         self.via = np.zeros(n, dtype=bool)
         self.fly = np.zeros(n, dtype=bool)
         self.values = np.full((n, 6), np.nan)
