@@ -107,19 +107,21 @@ def find_literals(
     """
     literal = np.full(len(columns.slots), -1, dtype=np.int32)
     rows = np.flatnonzero(columns.slots[:, 0] >= 0)
-    slots = columns.slots[rows]
+    slots = columns.slots if len(rows) == len(literal) else columns.slots[rows]
     example, inverse = _distinct(slots[:, 0])
-    distinct = slots[example]
-    mixed = np.zeros(len(distinct), dtype=bool)
-    mixed[inverse[(slots != distinct[inverse]).any(axis=1)]] = True
+    distinct, mixed = slots, np.zeros(len(example), dtype=bool)
+    if len(example) < len(slots) or (example[1:] < example[:-1]).any():
+        distinct = slots[example]
+        mixed[inverse[(slots != distinct[inverse]).any(axis=1)]] = True
     mixed |= _used_twice(distinct)
     mixed |= numbering.apart(distinct)
     kept = np.flatnonzero(~mixed)
-    index = np.full(len(distinct), -1, dtype=np.int64)
+    index = np.full(len(distinct), -1, dtype=np.int32)
     index[kept] = np.arange(len(kept))
     literal[rows] = index[inverse]
     first = rows[example[kept]]
-    return _literals(columns, numbering, names, distinct[kept], first, literal), literal
+    distinct = distinct[kept] if mixed.any() else distinct
+    return _literals(columns, numbering, names, distinct, first, literal), literal
 
 
 def _distinct(values: Indices) -> tuple[Indices, Indices]:
@@ -128,7 +130,8 @@ def _distinct(values: Indices) -> tuple[Indices, Indices]:
     Targets mostly stand in the order in which they are gone to, once each.
     """
     if (values[1:] > values[:-1]).all():
-        return np.arange(len(values)), np.arange(len(values))
+        every = np.arange(len(values), dtype=np.int32)
+        return every, every
     _, example, inverse = np.unique(values, return_index=True, return_inverse=True)
     return example, inverse.ravel()
 
@@ -203,6 +206,9 @@ def find_uses(
         The literals with what pins them, and for every visit the literal that it moves
         along with, (n,), -1 where there is none.
     """
+    follows = np.full(len(literal), -1, dtype=np.int32)
+    if not bases and not pinned:
+        return literals, follows
     direct = np.flatnonzero(literal >= 0)
     numbers = np.full((len(literals), 6), -1, dtype=slots.dtype)
     numbers[literal[direct]] = slots[direct]
@@ -211,7 +217,6 @@ def find_uses(
     owner[numbers] = np.arange(len(literals))[:, None]
     owner[-1] = -1
     stay = {int(owner[slot]): why for slot, why in pinned.items() if owner[slot] >= 0}
-    follows = np.full(len(literal), -1, dtype=np.int32)
     for visit, base in bases.items():
         rows = owner[[*base]]
         if rows[0] >= 0 and (numbers[rows[0]] == base).all():
