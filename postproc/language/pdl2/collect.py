@@ -9,7 +9,17 @@ from typing import Protocol
 
 import numpy as np
 
-from postproc.arrays import Bools, Indices, Ints, any_in_rows, in_chunks, slim, spans
+from postproc.arrays import (
+    Bools,
+    Indices,
+    Ints,
+    among,
+    any_in_rows,
+    chunks,
+    in_chunks,
+    slim,
+    spans,
+)
 from postproc.language.pdl2.columns import Collector, SettingColumns, VisitColumns
 from postproc.language.pdl2.context import Point
 from postproc.language.pdl2.dialect import PDL2_DIALECT
@@ -207,25 +217,36 @@ def find_uses(
         along with, (n,), -1 where there is none.
     """
     follows = np.full(len(literal), -1, dtype=np.int32)
-    if not bases and not pinned:
-        return literals, follows
-    direct = np.flatnonzero(literal >= 0)
-    numbers = np.full((len(literals), 6), -1, dtype=slots.dtype)
-    numbers[literal[direct]] = slots[direct]
-    most = max([-1, *pinned, *map(max, bases.values()), numbers.max(initial=-1)])
-    owner = np.full(int(most) + 2, -1, dtype=slots.dtype)  # the last is that of slot -1
-    owner[numbers] = np.arange(len(literals))[:, None]
-    owner[-1] = -1
-    stay = {int(owner[slot]): why for slot, why in pinned.items() if owner[slot] >= 0}
+    wanted = {-1, *pinned, *chain.from_iterable(bases.values())}
+    owner = _visits_of(np.array(sorted(wanted)[1:]), slots, literal)
+    stay = {int(literal[owner[k]]): why for k, why in pinned.items() if k in owner}
     for visit, base in bases.items():
-        rows = owner[[*base]]
-        if rows[0] >= 0 and (numbers[rows[0]] == base).all():
-            follows[visit] = rows[0]
+        at = owner.get(base[0], -1)
+        if at >= 0 and (slots[at] == base).all():
+            follows[visit] = literal[at]
         else:
-            stay |= {row: _IN_PART for row in rows.tolist() if 0 <= row not in stay}
+            rows = [int(literal[owner[slot]]) for slot in base if slot in owner]
+            stay |= {row: _IN_PART for row in rows if row not in stay}
     if not stay:
         return literals, follows
     return replace(literals, pinned=texts_of(len(literals), stay)), follows
+
+
+def _visits_of(wanted: Ints, slots: Indices, literal: Indices) -> dict[int, int]:
+    """Return a visit by each of some numbers that belong to its literal.
+
+    Args:
+        wanted: The numbers, ascending, none below 0.
+        slots: As in `find_uses`, and
+        literal: .. likewise.
+    """
+    found: dict[int, int] = {}
+    for rows in chunks(len(slots) if len(wanted) else 0):
+        at, column = np.nonzero(among(slots[rows], wanted))
+        for k, slot in zip(at.tolist(), slots[rows][at, column].tolist(), strict=True):
+            if literal[rows.start + k] >= 0:
+                found[slot] = rows.start + k
+    return found
 
 
 # All of it: visits in program order.

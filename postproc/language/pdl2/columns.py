@@ -509,6 +509,8 @@ class Collector:
     def _marks(self, moves: ProgramMoves) -> None:
         """Enter the ids of moves that are measured."""
         rows, ids = _measured(moves.program)
+        if not ids:
+            return
         ends = np.flatnonzero(np.isin(moves.row, rows) & ~self.columns.via[moves.visit])
         at = np.searchsorted(rows, moves.row[ends])
         for visit, k in zip(moves.visit[ends].tolist(), at.tolist(), strict=True):
@@ -556,10 +558,13 @@ def _aux_axes(position: Position) -> tuple[int, ...] | None:
 def _measured(program: Program) -> tuple[Ints, list[str]]:
     """Return the rows of moves with a ``-- MEASURE`` comment, and its ids."""
     lines = program.lines
+    marks = [*COMMENTS.marks(lines.source, MEASURE)]
+    if not marks:
+        return np.empty(0, dtype=np.int64), []
     moves = program.statements.which(lambda said: isinstance(said, ast.Move))
     rows = np.flatnonzero(moves[lines.shape])
     found: dict[int, str] = {}
-    for line, mark in COMMENTS.marks(lines.source, MEASURE):
+    for line, mark in marks:
         at = int(np.searchsorted(lines.line[rows], line))
         if at < len(rows):
             found.setdefault(int(rows[at]), mark)
