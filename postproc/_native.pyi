@@ -208,7 +208,7 @@ def rescan_lines(
     after: bytes,
     after_starts: Indices,
     count: int,
-) -> tuple[int, Indices, tuple[Indices, Indices, Floats, Bools]] | None: ...
+) -> tuple[int, tuple[Indices, Indices, Floats, Bools]] | None: ...
 
 # statements.rs: statements as texts and numbers (`postproc.language.statements`)
 def scan_statements(

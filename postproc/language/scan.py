@@ -68,12 +68,11 @@ class RescannedLines:
 
     Attributes:
         added: Line (from 0) of comment alone that the other one has not, -1: none.
-        comment, start, end, value: As in `ScannedLines`.
+        start, end, value: As in `ScannedLines`.
         changed: Which numbers are written otherwise, (m,).
     """
 
     added: int
-    comment: Indices
     start: Indices
     end: Indices
     value: Floats
@@ -94,10 +93,7 @@ def rescan_lines(
         What is in it, None where a mask or a comment differs, or a string has no end.
     """
     found = _native.rescan_lines(*before, *after, count)
-    if found is None:
-        return None
-    added, comment, numbers = found
-    return RescannedLines(added, comment, *numbers)
+    return None if found is None else RescannedLines(found[0], *found[1])
 
 
 def form_of(mask: str) -> tuple[str, tuple[str, ...]]:
