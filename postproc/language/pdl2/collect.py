@@ -118,41 +118,27 @@ def find_literals(
     literal = np.full(len(columns.slots), -1, dtype=np.int32)
     rows = np.flatnonzero(columns.slots[:, 0] >= 0)
     slots = columns.slots if len(rows) == len(literal) else columns.slots[rows]
-    example, inverse = _distinct(slots[:, 0])
-    distinct, mixed = slots, np.zeros(len(example), dtype=bool)
-    if len(example) < len(slots) or (example[1:] < example[:-1]).any():
-        distinct = slots[example]
-        mixed[inverse[(slots != distinct[inverse]).any(axis=1)]] = True
-    mixed |= _used_twice(distinct)
+    if _ascend(slots) and not numbering.apart(slots).any():
+        literal[rows] = np.arange(len(rows), dtype=np.int32)
+        return _literals(columns, numbering, names, slots, rows, literal), literal
+    _, example, inverse = np.unique(slots[:, 0], return_index=True, return_inverse=True)
+    distinct = slots[example]
+    mixed = np.zeros(len(distinct), dtype=bool)
+    mixed[inverse[(slots != distinct[inverse]).any(axis=1)]] = True
+    mixed |= any_in_rows(np.bincount(distinct.ravel())[distinct] > 1)
     mixed |= numbering.apart(distinct)
     kept = np.flatnonzero(~mixed)
     index = np.full(len(distinct), -1, dtype=np.int32)
     index[kept] = np.arange(len(kept))
     literal[rows] = index[inverse]
     first = rows[example[kept]]
-    distinct = distinct[kept] if mixed.any() else distinct
-    return _literals(columns, numbering, names, distinct, first, literal), literal
+    return _literals(columns, numbering, names, distinct[kept], first, literal), literal
 
 
-def _distinct(values: Indices) -> tuple[Indices, Indices]:
-    """Return the first row of every distinct value, ascending, and the one of each.
-
-    Targets mostly stand in the order in which they are gone to, once each.
-    """
-    if (values[1:] > values[:-1]).all():
-        every = np.arange(len(values), dtype=np.int32)
-        return every, every
-    _, example, inverse = np.unique(values, return_index=True, return_inverse=True)
-    return example, inverse.ravel()
-
-
-def _used_twice(slots: Indices) -> Bools:
-    """Tell in which rows (m, 6) a number stands that another place has too, (m,)."""
+def _ascend(slots: Indices) -> bool:
+    """Tell whether all numbers stand in the order in which they are gone to, once."""
     numbers = slots.ravel()
-    if (numbers[1:] > numbers[:-1]).all():
-        return np.zeros(len(slots), dtype=bool)
-    used = np.bincount(numbers)
-    return any_in_rows(used[slots] > 1)
+    return bool((numbers[1:] > numbers[:-1]).all())
 
 
 def _literals(
@@ -163,7 +149,8 @@ def _literals(
     visit: Indices,
     literal: Indices,
 ) -> Literals:
-    file = np.searchsorted(numbering.first, slots[:, 0], side="right") - 1
+    file = np.searchsorted(numbering.first, slots[:, 0], side="right").astype(np.int32)
+    file -= 1
     places = numbering.places(slots)
     line = np.zeros(len(slots), dtype=np.int32)
     for i, source in enumerate(numbering.sources):
@@ -173,7 +160,7 @@ def _literals(
     texts, own = tuple(names), columns.name[visit]
     named = tuple(map(texts.__getitem__, own.tolist())) if own.any() else ()
     return Literals(
-        file=slim(file.astype(np.int32)),
+        file=slim(file),
         line=line,
         places=places,
         joints=columns.target[visit] == Meaning.JOINTS,

@@ -19,6 +19,7 @@ from postproc.language.pdl2.machine import WRITTEN, Goal, Machine, MoveForm, Mov
 from postproc.language.pdl2.program import Program
 from postproc.language.pdl2.store import Settings
 from postproc.language.pdl2.values import Nothing, Position, Value
+from postproc.language.shapes import numbered_in_order
 from postproc.language.visits import (
     Blend,
     Meaning,
@@ -530,11 +531,7 @@ def _alike(kinds: list[Indices]) -> tuple[Ints, Ints]:
             code = np.unique(code, return_inverse=True)[1]
             codes = len(code)
         code, codes = code * size + kind, codes * size
-    _, example, which = np.unique(code, return_index=True, return_inverse=True)
-    order = np.argsort(example)
-    place = np.empty(len(order), dtype=np.int64)
-    place[order] = np.arange(len(order))
-    return place[which], example[order]
+    return numbered_in_order(code)
 
 
 def _in_order(numbers: Ints) -> list[int]:
