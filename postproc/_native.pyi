@@ -190,9 +190,9 @@ def by_groups(lower: Floats, z: Floats, group: Ints, count: int) -> Floats: ...
 
 # text.rs: lines of a file, but for numbers and names (`postproc.language.scan`)
 def form_of(mask: bytes) -> tuple[bytes, list[str]]: ...
-def line_starts(data: bytes) -> Ints: ...
+def line_starts(data: bytes) -> Indices: ...
 def scan_lines(
-    data: bytes, starts: Ints
+    data: bytes, starts: Indices
 ) -> tuple[
     list[bytes],
     tuple[Indices, Indices, Indices, Indices],
@@ -204,11 +204,11 @@ def scan_lines(
 # rescan.rs: a text that differs from one read before in numbers
 def rescan_lines(
     before: bytes,
-    before_starts: Ints,
+    before_starts: Indices,
     after: bytes,
-    after_starts: Ints,
+    after_starts: Indices,
     count: int,
-) -> tuple[int, Indices, tuple[Indices, Indices, Floats, Bools]] | None: ...
+) -> tuple[int, tuple[Indices, Indices, Floats, Bools]] | None: ...
 
 # statements.rs: statements as texts and numbers (`postproc.language.statements`)
 def scan_statements(
@@ -238,6 +238,9 @@ def rewrite_numbers(
 # table.rs: rows of reports and records as text (`postproc.arrays`)
 def table(n: int, columns: Sequence[Cells], given: Mapping[int, bytes]) -> bytes: ...
 
+# heap.rs: memory that is not used any more (`postproc.arrays`)
+def give_back() -> None: ...
+
 # aligned.rs: tables whose columns stand below each other (`postproc.report.terminal`)
 def aligned(
     n: int,
@@ -259,11 +262,11 @@ def compare_lines(
 ) -> tuple[tuple[Ints, Ints, Ints, Bools, Bools], tuple[Floats, Floats]]: ...
 
 # weave.rs: edits of texts (`postproc.language.source`)
-def weave(data: bytes, start: Ints, end: Ints, new: Bytes) -> bytes: ...
+def weave(data: bytes, start: Indices, end: Indices, new: Bytes) -> bytes: ...
 def is_woven(
-    data: bytes, start: Ints, end: Ints, new: Bytes, found: bytes, skipped: int
+    data: bytes, start: Indices, end: Indices, new: Bytes, found: bytes, skipped: int
 ) -> bool: ...
-def cut(data: bytes, start: Ints, end: Ints) -> Bytes: ...
+def cut(data: bytes, start: Indices, end: Indices) -> Bytes: ...
 
 # words.rs: lines that begin with some word (`postproc.batch.tree`)
 def lines_beginning(data: bytes, words: Sequence[bytes]) -> list[tuple[int, bytes]]: ...

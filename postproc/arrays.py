@@ -34,6 +34,17 @@ def read_only(columns: object) -> None:
             column.setflags(write=False)
 
 
+# What long columns took is given back, not kept for later: other processes need it.
+
+MANY = 40_000  # rows
+
+
+def give_back(rows: int = MANY) -> None:
+    """Give memory that is free by now back to the system, after work on many rows."""
+    if rows >= MANY:
+        _native.give_back()
+
+
 # Columns that hold one value throughout, kept as that value alone.
 
 
@@ -52,6 +63,15 @@ def slim(column: NDArray[Any]) -> NDArray[Any]:
     if column.dtype.kind == "f":
         same |= np.isnan(column) & np.isnan(first)
     return np.broadcast_to(np.array(first), column.shape) if same.all() else column
+
+
+def narrow(values: Indices) -> NDArray[np.unsignedinteger[Any]]:
+    """Keep whole numbers, none below 0, in as few bytes as the largest needs.
+
+    >>> narrow(np.array([3, 255])).dtype, narrow(np.array([3, 256])).dtype
+    (dtype('uint8'), dtype('uint16'))
+    """
+    return values.astype(np.min_scalar_type(int(values.max(initial=0))))
 
 
 def is_one_value(column: NDArray[Any]) -> bool:
@@ -248,7 +268,7 @@ def chunks(n: int, size: int = CHUNK) -> Iterator[slice]:
 # Many short stretches of a long array, as one list of places.
 
 
-def spans(begin: Ints, count: Ints) -> Ints:
+def spans(begin: Indices, count: Indices) -> Ints:
     """List begin, begin + 1, .., begin + count - 1 of every span.
 
     >>> spans(np.array([3, 10]), np.array([2, 3])).tolist()

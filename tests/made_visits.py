@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from postproc.language.pdl2.dialect import PDL2_DIALECT
-from postproc.language.visits import Literals, Visits
+from postproc.language.visits import Literals, NumberPlaces, Visits
 from postproc.robot.pose import pose_from_record
 
 FRAMES = np.array(
@@ -17,7 +17,7 @@ FRAMES = np.array(
 )
 NO_INTS, NO_BOOLS = np.empty(0, dtype=np.int64), np.empty(0, dtype=bool)
 NO_LITERALS = Literals(
-    NO_INTS, NO_INTS, np.empty((0, 6), np.int64), np.empty((0, 6), np.int64), NO_BOOLS,
+    NO_INTS, NO_INTS, NumberPlaces.of(*np.empty((2, 0, 6), np.int64)), NO_BOOLS,
     (), NO_BOOLS, NO_BOOLS, (),
 )  # fmt: skip
 

@@ -13,6 +13,7 @@ mod design;
 mod direction;
 mod edges;
 mod evidence;
+mod heap;
 mod interned;
 mod inverse;
 mod lines;
@@ -76,6 +77,7 @@ fn native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(design::uncertainty, module)?)?;
     module.add_function(wrap_pyfunction!(evidence::by_groups, module)?)?;
     module.add_function(wrap_pyfunction!(evidence::scaled, module)?)?;
+    module.add_function(wrap_pyfunction!(heap::give_back, module)?)?;
     module.add_function(wrap_pyfunction!(variance::variance, module)?)?;
     module.add_function(wrap_pyfunction!(aligned::aligned, module)?)?;
     module.add_function(wrap_pyfunction!(compare::compare_lines, module)?)?;

@@ -40,7 +40,6 @@ fn comment<'a>(line: &Masked, text: &'a [u8]) -> Option<&'a [u8]> {
 /// What is read of some lines of the later text.
 #[derive(Default)]
 struct Found {
-    comment: Vec<i32>,
     start: Vec<i32>,
     end: Vec<i32>,
     value: Vec<f64>,
@@ -50,7 +49,6 @@ struct Found {
 impl Found {
     /// Take a line in that begins at an offset.
     fn take(&mut self, pair: &Pair, (old, new): (&[u8], &[u8]), at: usize) {
-        self.comment.push(pair.new.comment.map_or(-1, |c| (at + c) as i32));
         for (was, now) in pair.old.numbers.iter().zip(&pair.new.numbers) {
             let text = &new[now.0..now.1];
             self.start.push((at + now.0) as i32);
@@ -61,7 +59,6 @@ impl Found {
     }
 
     fn append(&mut self, mut more: Found) {
-        self.comment.append(&mut more.comment);
         self.start.append(&mut more.start);
         self.end.append(&mut more.end);
         self.value.append(&mut more.value);
@@ -107,7 +104,7 @@ impl Texts<'_> {
             if !pair.same(old, new) {
                 return None;
             }
-            found.take(&pair, (old, new), self.after.bounds[k]);
+            found.take(&pair, (old, new), self.after.begin(k));
         }
         Some(found)
     }
@@ -128,24 +125,19 @@ type Column<'py, T> = Bound<'py, PyArray1<T>>;
 ///     after, after_starts: The text.
 ///     count: How many numbers the other one holds, (m).
 ///
-/// Returns: which line is new (-1: none); of every line where its comment starts; where
-/// numbers start and end, what they are worth, and whether they are written otherwise,
-/// (m,). None where a line says something else, or holds a string that does not end.
+/// Returns: which line is new (-1: none); where numbers start and end, what they are
+/// worth, and whether they are written otherwise, (m,). None where a line says something else, or holds a string that does not end.
 #[pyfunction]
 #[allow(clippy::type_complexity)]
 pub fn rescan_lines<'py>(
     py: Python<'py>,
     before: &Bound<'py, PyBytes>,
-    before_starts: PyReadonlyArray1<'py, i64>,
+    before_starts: PyReadonlyArray1<'py, i32>,
     after: &Bound<'py, PyBytes>,
-    after_starts: PyReadonlyArray1<'py, i64>,
+    after_starts: PyReadonlyArray1<'py, i32>,
     count: usize,
 ) -> PyResult<
-    Option<(
-        i64,
-        Column<'py, i32>,
-        (Column<'py, i32>, Column<'py, i32>, Column<'py, f64>, Column<'py, bool>),
-    )>,
+    Option<(i64, (Column<'py, i32>, Column<'py, i32>, Column<'py, f64>, Column<'py, bool>))>,
 > {
     let before = Text::new(before.as_bytes(), flat(&before_starts)?)?;
     let after = Text::new(after.as_bytes(), flat(&after_starts)?)?;
@@ -155,7 +147,6 @@ pub fn rescan_lines<'py>(
         return Ok(None);
     }
     let mut all = Found::default();
-    all.comment.reserve_exact(n + 1);
     all.start.reserve_exact(count);
     all.end.reserve_exact(count);
     all.value.reserve_exact(count);
@@ -169,16 +160,9 @@ pub fn rescan_lines<'py>(
             }
         }
     }
-    if let Some(added) = texts.added {
-        let at = texts.after.bounds[added];
-        let mut line = Masked::default();
-        line.read(texts.after.line(added));
-        all.comment.insert(added, line.comment.map_or(-1, |c| (at + c) as i32));
-    }
     let added = texts.added.map_or(-1, |added| added as i64);
     Ok(Some((
         added,
-        all.comment.into_pyarray(py),
         (
             all.start.into_pyarray(py),
             all.end.into_pyarray(py),

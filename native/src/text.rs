@@ -302,16 +302,16 @@ fn ends_line(data: &[u8], i: usize) -> bool {
 pub fn line_starts<'py>(
     py: Python<'py>,
     data: &Bound<'py, PyBytes>,
-) -> PyResult<Bound<'py, PyArray1<i64>>> {
+) -> PyResult<Bound<'py, PyArray1<i32>>> {
     let data = data.as_bytes();
     let starts = detached(py, || {
-        let mut starts = vec![0_i64];
+        let mut starts = vec![0_i32];
         for (nth, block) in data.chunks(ENDLESS).enumerate() {
             // Without a branch for every byte: most blocks hold no end of a line.
             if block.iter().fold(false, |found, b| found | (*b == b'\n') | (*b == b'\r')) {
                 let first = nth * ENDLESS;
                 let ends = (first..first + block.len()).filter(|i| ends_line(data, *i));
-                starts.extend(ends.map(|i| i as i64 + 1));
+                starts.extend(ends.map(|i| i as i32 + 1));
             }
         }
         starts
@@ -321,31 +321,36 @@ pub fn line_starts<'py>(
 
 type Column<'py, T> = Bound<'py, PyArray1<T>>;
 
-/// A text and where its lines begin, and at last end.
+/// A text and where its lines begin.
 pub struct Text<'a> {
     pub data: &'a [u8],
-    pub bounds: Vec<usize>,
+    starts: &'a [i32],
 }
 
 impl<'a> Text<'a> {
     /// Take where lines start, or refuse it; offsets are told in 31 bits.
-    pub fn new(data: &'a [u8], starts: &[i64]) -> PyResult<Self> {
-        let place = |at: i64| usize::try_from(at).unwrap_or(usize::MAX);
-        let bounds = starts.iter().copied().chain([data.len() as i64]);
-        let bounds: Vec<usize> = bounds.map(place).collect();
-        if bounds.windows(2).any(|two| two[0] > two[1]) || data.len() > i32::MAX as usize {
+    pub fn new(data: &'a [u8], starts: &'a [i32]) -> PyResult<Self> {
+        let last = starts.last().map_or(0, |at| *at as usize);
+        let falls = starts.windows(2).any(|two| two[0] > two[1]);
+        let negative = starts.first().is_some_and(|at| *at < 0);
+        if falls || negative || last > data.len() || data.len() > i32::MAX as usize {
             return Err(PyIndexError::new_err("lines that are not there"));
         }
-        Ok(Text { data, bounds })
+        Ok(Text { data, starts })
     }
 
     pub fn len(&self) -> usize {
-        self.bounds.len() - 1
+        self.starts.len()
+    }
+
+    /// Return where a line begins; behind the last one, where the text ends.
+    pub fn begin(&self, i: usize) -> usize {
+        self.starts.get(i).map_or(self.data.len(), |at| *at as usize)
     }
 
     /// Return a line without its end.
     pub fn line(&self, i: usize) -> &'a [u8] {
-        without_end(&self.data[self.bounds[i]..self.bounds[i + 1]])
+        without_end(&self.data[self.begin(i)..self.begin(i + 1)])
     }
 }
 
@@ -368,7 +373,7 @@ fn without_end(mut line: &[u8]) -> &[u8] {
 pub fn scan_lines<'py>(
     py: Python<'py>,
     data: &Bound<'py, PyBytes>,
-    starts: PyReadonlyArray1<'py, i64>,
+    starts: PyReadonlyArray1<'py, i32>,
 ) -> PyResult<(
     Bound<'py, PyList>,
     (Column<'py, i32>, Column<'py, i32>, Column<'py, i32>, Column<'py, i32>),
@@ -377,7 +382,7 @@ pub fn scan_lines<'py>(
     Vec<usize>,
 )> {
     let lines = Text::new(data.as_bytes(), flat(&starts)?)?;
-    let (data, bounds) = (lines.data, &lines.bounds);
+    let data = lines.data;
     let (mut masks, mut names) = (Interned::default(), Interned::default());
     let (mut mask, mut comment) = (Vec::new(), Vec::new());
     let (mut first, mut name_first) = (vec![0_i32], vec![0_i32]);
@@ -385,14 +390,14 @@ pub fn scan_lines<'py>(
     let (mut name, mut open) = (Vec::new(), Vec::new());
     let (mut line, mut form) = (Masked::default(), Vec::new());
     let unmarked: Vec<u8>;
-    let head = bounds[1.min(bounds.len() - 1)];
+    let head = if lines.len() == 0 { 0 } else { lines.begin(1) };
     let mut first_line = &data[..head];
     if data.starts_with(MARK) {
         unmarked = [b"   ", &data[MARK.len()..head]].concat();
         first_line = &unmarked;
     }
     each(py, lines.len(), |i| {
-        let at = bounds[i];
+        let at = lines.begin(i);
         let text = if i == 0 { without_end(first_line) } else { lines.line(i) };
         if !line.read(text) {
             open.push(i);

@@ -10,28 +10,42 @@ use pyo3::types::PyBytes;
 
 use crate::rows::{detached, each, flat, same_length};
 
-type Ints<'py> = PyReadonlyArray1<'py, i64>;
+type Ints<'py> = PyReadonlyArray1<'py, i32>;
 
-/// Return spans of a text in ascending order, or refuse them.
-fn spans(data: &[u8], start: &Ints<'_>, end: &Ints<'_>) -> PyResult<Vec<Range<usize>>> {
-    let (start, end) = (flat(start)?, flat(end)?);
-    same_length(&[start.len(), end.len()])?;
-    let mut done = 0_i64;
-    let mut out = Vec::with_capacity(start.len());
-    for (a, b) in start.iter().zip(end) {
-        if *a < done || b < a || *b > data.len() as i64 {
-            return Err(PyValueError::new_err("an edit lies outside"));
+/// Spans of a text in ascending order.
+struct Spans<'a> {
+    start: &'a [i32],
+    end: &'a [i32],
+}
+
+impl<'a> Spans<'a> {
+    /// See two columns as spans, or refuse them.
+    fn new(data: &[u8], start: &'a Ints<'_>, end: &'a Ints<'_>) -> PyResult<Self> {
+        let (start, end) = (flat(start)?, flat(end)?);
+        same_length(&[start.len(), end.len()])?;
+        let mut done = 0_i32;
+        for (a, b) in start.iter().zip(end) {
+            if *a < done || b < a || *b as usize > data.len() {
+                return Err(PyValueError::new_err("an edit lies outside"));
+            }
+            done = *b;
         }
-        out.push(*a as usize..*b as usize);
-        done = *b;
+        Ok(Spans { start, end })
     }
-    Ok(out)
+
+    fn len(&self) -> usize {
+        self.start.len()
+    }
+
+    fn at(&self, i: usize) -> Range<usize> {
+        self.start[i] as usize..self.end[i] as usize
+    }
 }
 
 /// Spans of a text, and the rows, filled up with NUL, of what replaces them.
 struct Edits<'a> {
     data: &'a [u8],
-    spans: Vec<Range<usize>>,
+    spans: Spans<'a>,
     rows: &'a [u8],
     width: usize,
 }
@@ -39,10 +53,10 @@ struct Edits<'a> {
 impl<'a> Edits<'a> {
     fn new(
         data: &'a Bound<'_, PyBytes>,
-        (start, end): (&Ints<'_>, &Ints<'_>),
+        (start, end): (&'a Ints<'_>, &'a Ints<'_>),
         new: &'a PyReadonlyArray2<'_, u8>,
     ) -> PyResult<Self> {
-        let spans = spans(data.as_bytes(), start, end)?;
+        let spans = Spans::new(data.as_bytes(), start, end)?;
         same_length(&[new.shape()[0], spans.len()])?;
         Ok(Edits { data: data.as_bytes(), spans, rows: flat(new)?, width: new.shape()[1] })
     }
@@ -56,9 +70,10 @@ impl<'a> Edits<'a> {
     fn pass(&self, py: Python<'_>, mut piece: impl FnMut(&[u8]) + Send) -> PyResult<()> {
         let mut done = 0;
         each(py, self.spans.len(), |i| {
-            piece(&self.data[done..self.spans[i].start]);
+            let span = self.spans.at(i);
+            piece(&self.data[done..span.start]);
             piece(self.text(i));
-            done = self.spans[i].end;
+            done = span.end;
         })?;
         detached(py, || piece(&self.data[done..]))
     }
@@ -111,11 +126,11 @@ pub fn cut<'py>(
     end: Ints<'py>,
 ) -> PyResult<Bound<'py, PyArray2<u8>>> {
     let data = data.as_bytes();
-    let spans = spans(data, &start, &end)?;
-    let width = spans.iter().map(Range::len).max().unwrap_or(0).max(1);
+    let spans = Spans::new(data, &start, &end)?;
+    let width = (0..spans.len()).map(|i| spans.at(i).len()).max().unwrap_or(0).max(1);
     let mut out = vec![0_u8; width * spans.len()];
     each(py, spans.len(), |i| {
-        let text = &data[spans[i].clone()];
+        let text = &data[spans.at(i)];
         out[i * width..i * width + text.len()].copy_from_slice(text);
     })?;
     let out = Array2::from_shape_vec((spans.len(), width), out);

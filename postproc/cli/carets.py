@@ -64,8 +64,8 @@ def _at_visit(source: Source, v: Visits, i: int) -> str:
     text = source.data[first : first + LONGEST].decode("latin-1")
     text = re.split(r"[\r\n]", text)[0]
     if literal >= 0 and v.literals.file[literal] == v.file[i]:
-        start = int(v.literals.start[literal].min()) - first
-        end = int(v.literals.end[literal].max()) - first
+        places = v.literals.places[literal : literal + 1]
+        start, end = int(places.start.min()) - first, int(places.end.max()) - first
         if v.literals.line[literal] == line and 0 <= start < len(text):
             return excerpt(text, line, start + 1, end - start)
     return excerpt(text, line, 1, len(text))

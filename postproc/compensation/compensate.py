@@ -8,6 +8,7 @@ from types import MappingProxyType
 
 import numpy as np
 
+from postproc.arrays import give_back
 from postproc.compensation.arrivals import ArrivalStates
 from postproc.compensation.base import contradicted_base
 from postproc.compensation.correction import Correction, correct
@@ -103,6 +104,7 @@ def compensate(
     setting = Setting(cell, model, options, Clock(progress), processes)
     with setting.clock("parse"):
         reading = read_program(files, cell)
+        give_back(len(reading.visits))
     reading, kept = correct(reading, setting)
     return finish(name, reading, kept, setting)
 
@@ -172,10 +174,13 @@ def finish(name: str, reading: Reading, kept: Correction, setting: Setting) -> O
                 own if setting.options.inserts else None,
             )  # fmt: skip
     del again  # holds as much as the program
+    give_back(len(reading.visits))
     draft = Draft(reading, kept, output, in_time)
     draft = correct_paths(draft, setting, write_and_verify)
     with setting.clock("report"):
-        return report(name, reading, draft, setting)
+        outcome = report(name, reading, draft, setting)
+    give_back(len(reading.visits))
+    return outcome
 
 
 def write_and_verify(
@@ -189,8 +194,10 @@ def write_and_verify(
     clock = setting.clock
     with clock("rewrite"):
         output = write_edits(reading, kept.edits, setting.model.id)
+        give_back(len(reading.visits))
     with clock("verify"):
         again = read_program(output.files, setting.cell, reading.programs)
+        give_back(len(reading.visits))
         values = kept.decisions.corrected
         check_output(reading, again, output, kept.edited, values)
     return output, again
@@ -214,13 +221,15 @@ def report(
     cell, model, options = setting.cell, setting.model, setting.options
     d, rows, visits = kept.decisions, kept.corrected, reading.visits
     advice = no_advice if in_time is None else in_time.advice
-    files = tuple(output.records)
+    files = tuple(output.stamps)
     return Outcome(
         program=name,
         model=model.id,
         outputs=output.changed,
         record=replace(
-            output.sidecar(model.id, options.told(), tell_arrivals(visits, d, files)),
+            output.sidecar(
+                draft.reading, model.id, options.told(), tell_arrivals(visits, d, files)
+            ),
             assumed=tuple(
                 (x.file, x.line, x.message)
                 for x in reading.diagnostics

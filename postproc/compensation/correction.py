@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from postproc.arrays import Bools, Floats, Interned, Ints, among
+from postproc.arrays import Bools, Floats, Indices, Interned, among, give_back
 from postproc.compensation import windows as cuts
 from postproc.compensation.clones import give_own_points
 from postproc.compensation.decide import Proposal
@@ -87,7 +87,7 @@ class Correction:
             largest, one row.
     """
 
-    edited: Ints
+    edited: Indices
     edits: tuple[Replacements, ...]
     decisions: Decisions
     corrected: Bools
@@ -113,15 +113,16 @@ class Correction:
         rows = slice(*np.searchsorted(moved, [own.start, own.stop]).tolist())
         literals = np.sort(visits.literal[own])
         mine = among(self.edited, literals)
-        starts = np.sort(visits.literals.start[self.edited[mine]], axis=None)
+        starts = np.sort(visits.literals.places[self.edited[mine]].start, axis=None)
         edits = tuple(
             Replacements(e.start[at], e.end[at], e.new[at])
             for e in self.edits
             for at in [among(e.start, starts)]
         )
         return replace(
-            self, edited=self.edited[mine], edits=edits, before=self.before[rows],
-            after=self.after[rows], decisions=self.decisions.part(own),
+            self, edited=self.edited[mine].astype(np.int32), edits=edits,
+            before=self.before[rows], after=self.after[rows],
+            decisions=self.decisions.part(own),
             departure=np.fmax.reduce(self.departure[own], axis=0, keepdims=True),
             **{name: np.array(getattr(self, name)[own]) for name in BY_VISIT},
             **{
@@ -202,7 +203,7 @@ def _one_after_another(parts: Sequence[dict[str, Any]]) -> Decisions:
     codes = Interned([""])
     for part in parts:
         why, reasons = part["why"], part.pop("reasons")
-        new = np.zeros(len(reasons), dtype=np.int64)
+        new = np.zeros(len(reasons), dtype=np.int32)
         for k in np.unique(why).tolist():
             new[k] = codes[reasons[k]]
         part["why"] = new[why]
@@ -212,7 +213,9 @@ def _one_after_another(parts: Sequence[dict[str, Any]]) -> Decisions:
 
 def _column(name: str, parts: Sequence[dict[str, Any]]) -> NDArray[Any]:
     """Take a column from all parts, and join it."""
-    return np.concatenate([part.pop(name) for part in parts])
+    column = np.concatenate([part.pop(name) for part in parts])
+    give_back(len(column))
+    return column
 
 
 # A program corrected window by window, so that only one is in memory at a time.

@@ -657,7 +657,7 @@ class Round:
             else NONE
         )
         return Decisions(
-            status=status.astype(np.int64),
+            status=status.astype(np.int8),
             why=reasons.index,
             reasons=reasons.texts,
             q=self.planned.plan.q,

@@ -117,15 +117,18 @@ def flank_steps(
     last = before[rows]
     way = np.linalg.norm(place[rows] - place[last], axis=1)
     time = way / (visits.lin_spd[rows] * visits.override[rows])
-    with np.errstate(divide="ignore", invalid="ignore"):
-        asked = 4.0 * np.abs(side[rows] - side[last]) * gap / time[:, None] ** 2
-        over = np.where(time[:, None] > 0.0, asked / arm.acceleration, 0.0)
     found = []
-    for j in np.flatnonzero((over > 1.0).any(axis=0)).tolist():
-        count, i = int((over[:, j] > 1.0).sum()), int(over[:, j].argmax())
+    for j in range(len(gap)):
+        with np.errstate(divide="ignore", invalid="ignore"):
+            asked = 4.0 * np.abs(side[rows, j] - side[last, j]) * gap[j] / time**2
+            over = np.where(time > 0.0, asked / arm.acceleration[j], 0.0)
+        count = int((over > 1.0).sum())
+        if count == 0:
+            continue
+        i = int(over.argmax())
         text = (
             f"axis {j + 1} changes its flank on the way to {count} fly points faster "
-            f"than its acceleration allows (here {over[i, j]:.1f} times, as far as the "
+            f"than its acceleration allows (here {over[i]:.1f} times, as far as the "
             "arm file knows it): the controller may slow down or round the step off"
         )
         line = int(visits.line[rows[i]])
@@ -249,7 +252,8 @@ def unsure_sides(
         std_error: Standard error of the correction, (n, 3) [m].
         advice: Says how to approach some visits.
     """
-    rows = np.flatnonzero(corrected & (np.abs(side) < SURE).any(axis=1))
+    unsure = np.logical_or.reduce([np.abs(joint) < SURE for joint in side.T])
+    rows = np.flatnonzero(corrected & unsure)
     size = np.linalg.norm(std_error, axis=1) / MM
     cure = "start the approach farther away, or from the side it moves to"
     if len(rows) > SINGLY:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from postproc.arrays import Floats, Ints, Signs
+from postproc.arrays import Floats, Indices, Ints, Signs
 from postproc.compensation.record import (
     LeftLine,
     Sidecar,
@@ -68,8 +68,8 @@ class Decisions:
             nobody asked.
     """
 
-    status: Ints
-    why: Ints
+    status: Signs
+    why: Indices
     reasons: tuple[str, ...]
     q: Floats
     direction: Signs

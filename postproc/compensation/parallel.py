@@ -19,6 +19,7 @@ from threading import Thread
 from traceback import format_exc
 from typing import IO, Any, NoReturn, Protocol, TypeVar
 
+from postproc.arrays import give_back
 from postproc.compensation.options import Clock, silent
 from postproc.compensation.rounds import Step
 from postproc.exceptions import PostprocError
@@ -140,6 +141,7 @@ def _send(there: int, messages: Queue[bytes]) -> None:
                 pipe.write(len(message).to_bytes(SIZE, "little"))
                 pipe.write(message)
                 pipe.flush()
+                give_back(len(message))
     finally:
         os._exit(1)
 
@@ -163,6 +165,7 @@ def _taken(pipe: IO[bytes]) -> Iterator[Any]:
     while True:
         size = int.from_bytes(pipe.read(SIZE), "little")
         message = pipe.read(size)
+        give_back(size)
         if not size or len(message) < size:
             raise PostprocError(
                 "a process that did a part of the work was ended from outside, most "

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -41,12 +41,12 @@ class Output:
 
     Attributes:
         files: All files of the program by name, the program first.
-        records: How those that changed differ from their source.
+        stamps: Where those that changed are stamped.
         edits: Numbers that were changed in every file, in the order of the files.
     """
 
     files: Mapping[str, bytes]
-    records: Mapping[str, FileRecord]
+    stamps: Mapping[str, Span]
     edits: tuple[Replacements, ...]
 
     @property
@@ -56,11 +56,12 @@ class Output:
         return {
             name: data
             for name, data in self.files.items()
-            if name == program or name in self.records
+            if name == program or name in self.stamps
         }
 
     def sidecar(
         self,
+        reading: Reading,
         model: str,
         options: Mapping[str, object],
         arrivals: Mapping[str, Mapping[str, object]],
@@ -68,14 +69,19 @@ class Output:
         """Return the record beside the program.
 
         Args:
+            reading: The program.
             model: Id of the model.
             options: What the user asked for.
             arrivals: What came of the targets in every file.
         """
         records = {
-            name: replace(record, targets=arrivals[name])
-            for name, record in self.records.items()
-        }
+            source.name: record(
+                source, self.stamps[source.name], own, self.files[source.name],
+                arrivals[source.name],
+            )
+            for source, own in all_edits(reading, self.edits)
+            if source.name in self.stamps
+        }  # fmt: skip
         return Sidecar(__version__, model, records, options)
 
 
@@ -103,33 +109,40 @@ def write_edits(
 ) -> Output:
     """Make edits of numbers, file by file; as `write_numbers`."""
     nothing = not any(edits) and not any(reading.cloned)
-    files, records = {}, {}
+    files, stamps = {}, {}
     comment = language_of(reading.sources[0].name).comment
-    for number, (source, cloned) in enumerate(reading.originals):
-        own = edits[number]
-        if cloned:
-            own = Replacements.of(compose(cloned, own))
+    for number, (source, own) in enumerate(all_edits(reading, edits)):
         files[source.name] = source.data
         if own or (number == 0 and nothing):
             stamp = stamp_line(__version__, model, source, comment)
             at = stamp_place(source.data)
             text = memoryview(apply(source.data, own))  # its header is as it was
             files[source.name] = b"".join((text[:at], stamp, text[at:]))
-            del text
-            added = Span(at, at + len(stamp))
-            records[source.name] = record(source, added, own, files[source.name])
-    return Output(files, records, edits)
+            stamps[source.name] = Span(at, at + len(stamp))
+    return Output(files, stamps, edits)
+
+
+def all_edits(
+    reading: Reading, edits: Sequence[Replacements]
+) -> Iterator[tuple[Source, Replacements]]:
+    """Go through the files as they were given, with all that is changed in them."""
+    for (source, cloned), own in zip(reading.originals, edits, strict=True):
+        yield source, Replacements.of(compose(cloned, own)) if cloned else own
 
 
 def record(
-    source: Source, stamp: Span, edits: Replacements, output: bytes
+    source: Source,
+    stamp: Span,
+    edits: Replacements,
+    output: bytes,
+    targets: Mapping[str, object],
 ) -> FileRecord:
     """Record how an output differs from its source, in the output's offsets."""
     stamped = Replacements.of([Edit(stamp, b"")])
     length = stamp.end - stamp.start
     undone = Replacements.joined([stamped, edits.undone(source.data, length)])
     checksums = block_checksums(output)
-    return FileRecord(sha256(source.data), sha256(output), checksums, undone)
+    return FileRecord(sha256(source.data), sha256(output), checksums, undone, targets)
 
 
 # The numbers of a corrected program as they will be read from its text.
@@ -167,13 +180,13 @@ def edited_numbers(
         edited: Those to look at, (m,).
         edits: The edits of numbers, file by file.
     """
-    shape = len(edited), literals.start.shape[1]
+    shape = len(edited), literals.places.offset.shape[1]
     new, changed = np.zeros(shape), np.zeros(shape, dtype=bool)
     for file, own in enumerate(edits):
         mine = np.flatnonzero(literals.file[edited] == file)
         if len(own) == 0:
             continue
-        start = literals.start[edited[mine]]
+        start = literals.places[edited[mine]].start
         at = np.minimum(np.searchsorted(own.start, start), len(own) - 1)
         hit = own.start[at] == start
         numbers = np.zeros(at.shape)
@@ -229,7 +242,7 @@ def _in_texts(before: Reading, after: Reading, output: Output) -> str:
     """Say where the texts differ otherwise than by the edits, nothing if nowhere."""
     for old, new, edits in zip(before.texts, after.texts, output.edits, strict=True):
         name = old.source.name
-        if problem := _in_text(old, new, edits, name in output.records):
+        if problem := _in_text(old, new, edits, name in output.stamps):
             return f"{name}: {problem}; nothing is written"
     return ""
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from postproc.arrays import Bools, Floats, Ints
+from postproc.arrays import Bools, Floats, Indices, Ints
 from postproc.robot.direction import NO_SIDES, Sides
 from postproc.robot.play import Clamps
 
@@ -65,7 +65,7 @@ class Glimpse:
     """
 
     values: Floats
-    status: Ints
+    status: Indices
     why: Ints
     reasons: tuple[str, ...]
     correction: Floats

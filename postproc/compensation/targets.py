@@ -152,7 +152,10 @@ def targets_from_visits(visits: Visits, cell: Cell) -> tuple[Targets, Reasons]:
     slot, turns = visits.dialect.flags(visits.config, visits.configs, values)
     rounding, distance, overlap = rounding_of(visits)
     pred_start, pred = arc_per_start(
-        visits.motion, visits.via, visits.pred_start, visits.pred
+        visits.motion,
+        visits.via,
+        visits.pred_start.astype(np.int64),
+        visits.pred.astype(np.int64),
     )
     targets = Targets(
         move=visits.motion,

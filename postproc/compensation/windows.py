@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from postproc.arrays import Bools, Ints
-from postproc.language.visits import Literals, Meaning, Visits
+from postproc.language.visits import Literals, Meaning, NumberPlaces, Visits
 
 # The visits of several programs side by side, as if they were one program's.
 #
@@ -113,6 +113,9 @@ def _literals(programs: Sequence[Visits]) -> Literals:
         parts = [getattr(literals, name) for literals in own]
         if isinstance(parts[0], tuple):
             columns[name] = tuple(chain.from_iterable(parts))
+            continue
+        if name == "places":
+            columns[name] = NumberPlaces.joined(parts)
             continue
         moved = _moved_on(name, parts, programs) if name == "file" else parts
         columns[name] = np.concatenate(moved)

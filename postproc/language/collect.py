@@ -19,6 +19,7 @@ from postproc.language.visits import (
     Blend,
     Literals,
     Meaning,
+    NumberPlaces,
     OrientationLaw,
     Switch,
     Visits,
@@ -365,8 +366,7 @@ def _places(
     return Literals(
         file=file,
         line=line,
-        start=start,
-        end=end,
+        places=NumberPlaces.of(start, end),
         joints=np.array([v.goal.target == Meaning.JOINTS for v in rows], bool),
         name=tuple(v.goal.name for v in rows),
         shared=np.array([v.goal.shared for v in rows], bool),

@@ -232,7 +232,6 @@ class Lines:
         first: CSR offsets into the numbers, (n + 1,).
         start, end: Byte offsets of each number, its sign included, (m,).
         value: Its value, NaN where it cannot be read, (m,).
-        comment: Byte offset of the comment of every *physical* line, -1: none.
     """
 
     source: Source
@@ -243,7 +242,6 @@ class Lines:
     start: Indices
     end: Indices
     value: Floats
-    comment: Indices
 
     def __len__(self) -> int:
         """Return the number of logical lines."""
@@ -296,7 +294,6 @@ def read_lines(source: Source) -> Lines:
         found.start,
         found.end,
         found.value,
-        found.comment,
     )
 
 
@@ -351,6 +348,6 @@ def reread_lines(source: Source, before: Lines) -> RereadLines | None:
         line = line + (line > found.added)
     lines = replace(
         before, source=source, line=line.astype(np.int32, copy=False),
-        start=found.start, end=found.end, value=found.value, comment=found.comment,
+        start=found.start, end=found.end, value=found.value,
     )  # fmt: skip
     return RereadLines(lines, found.changed, found.added)

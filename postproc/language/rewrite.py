@@ -119,8 +119,7 @@ def _number_elsewhere(
     before: Skeleton, after: Skeleton, allowed: Replacements, stamp: int
 ) -> str:
     """Say which number does not stand where the edits move it to."""
-    growth = np.char.str_len(allowed.new) - (allowed.end - allowed.start)
-    shift = stamp + np.cumsum(np.append(0, growth))
+    shift = stamp + np.cumsum(np.append(np.int32(0), allowed.growth), dtype=np.int32)
     for rows in chunks(len(before.start), AT_ONCE):
         start, end = before.start[rows], before.end[rows]
         edits = np.searchsorted(allowed.start, start)  # before the number
@@ -175,7 +174,8 @@ def edits(
     found = []
     for file, source in enumerate(sources):
         mine = np.flatnonzero(literals.file[rows] == file)
-        start, end = literals.start[rows[mine]], literals.end[rows[mine]]
+        places = literals.places[rows[mine]]
+        start, end = places.start, places.end
         joints = literals.joints[rows[mine], None]
         least = np.where(joints, dialect.joint_decimals, dialect.pose_decimals)
         written = start >= 0

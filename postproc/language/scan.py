@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from postproc import _native
-from postproc.arrays import Bools, Floats, Indices, Ints
+from postproc.arrays import Bools, Floats, Indices
 
 # A *mask* is the code of a line in which every number is one NUL (no program holds
 # any), the comment is gone and idle blanks are dropped. In its *form* every numbered
@@ -51,7 +51,7 @@ class ScannedLines:
     unterminated: tuple[int, ...]
 
 
-def scan_lines(data: bytes, line_starts: Ints) -> ScannedLines:
+def scan_lines(data: bytes, line_starts: Indices) -> ScannedLines:
     """Mask every physical line of a text and take its numbered names out.
 
     Args:
@@ -68,12 +68,11 @@ class RescannedLines:
 
     Attributes:
         added: Line (from 0) of comment alone that the other one has not, -1: none.
-        comment, start, end, value: As in `ScannedLines`.
+        start, end, value: As in `ScannedLines`.
         changed: Which numbers are written otherwise, (m,).
     """
 
     added: int
-    comment: Indices
     start: Indices
     end: Indices
     value: Floats
@@ -81,7 +80,7 @@ class RescannedLines:
 
 
 def rescan_lines(
-    before: tuple[bytes, Ints], after: tuple[bytes, Ints], count: int
+    before: tuple[bytes, Indices], after: tuple[bytes, Indices], count: int
 ) -> RescannedLines | None:
     """Scan a text that should differ from another in numbers alone.
 
@@ -94,10 +93,7 @@ def rescan_lines(
         What is in it, None where a mask or a comment differs, or a string has no end.
     """
     found = _native.rescan_lines(*before, *after, count)
-    if found is None:
-        return None
-    added, comment, numbers = found
-    return RescannedLines(added, comment, *numbers)
+    return None if found is None else RescannedLines(found[0], *found[1])
 
 
 def form_of(mask: str) -> tuple[str, tuple[str, ...]]:

@@ -14,12 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from postproc import _native
-from postproc.arrays import Bytes, Ints, chunks
+from postproc.arrays import Bytes, Indices, chunks
 from postproc.exceptions import FileError, PostprocError, ProgramError
 
 # What is to be changed in a text: single edits, or a million of them as arrays.
 
 AT_ONCE = 50_000  # edits that are Python objects at the same time
+LAST = 2**31 - 1  # offset in a file; none that is read is as long
 
 
 class Span(NamedTuple):
@@ -45,8 +46,8 @@ class Replacements(Sequence[Edit]):
         new: What replaces them, (m,) strings of bytes.
     """
 
-    start: Ints
-    end: Ints
+    start: Indices
+    end: Indices
     new: NDArray[np.bytes_]
 
     def __post_init__(self) -> None:
@@ -62,7 +63,7 @@ class Replacements(Sequence[Edit]):
     def joined(cls, parts: Sequence[Replacements]) -> Replacements:
         """Put edits one after the other."""
         last = max((int(p.end[-1]) for p in parts if len(p)), default=0)
-        none = np.empty(0, dtype=np.int32 if last < 2**31 else np.int64)
+        none = np.empty(0, dtype=np.int32 if last <= LAST else np.int64)
         return cls(
             np.concatenate([none, *(p.start for p in parts)], dtype=none.dtype),
             np.concatenate([none, *(p.end for p in parts)], dtype=none.dtype),
@@ -137,9 +138,11 @@ class Replacements(Sequence[Edit]):
         """
         return _native.is_woven(data, *self._columns(), found, behind)
 
-    def _columns(self) -> tuple[Ints, Ints, Bytes]:
+    def _columns(self) -> tuple[Indices, Indices, Bytes]:
         """Return the edits as the core takes them."""
-        start, end = (np.ascontiguousarray(c, np.int64) for c in (self.start, self.end))
+        if len(self) and (self.start[0] < 0 or self.end[-1] > LAST):
+            raise ValueError("an edit lies outside")
+        start, end = (np.ascontiguousarray(c, np.int32) for c in (self.start, self.end))
         return start, end, as_bytes(self.new)
 
     def undone(self, data: bytes, after: int = 0) -> Replacements:
@@ -149,13 +152,17 @@ class Replacements(Sequence[Edit]):
             data: The text.
             after: Bytes that stand before the result.
         """
-        length = np.char.str_len(self.new).astype(np.int64)
-        growth = length - (self.end - self.start)
-        start = self.start + after + np.cumsum(growth) - growth
-        old, end, _ = self._columns()
-        return Replacements(
-            start, start + length, as_texts(_native.cut(data, old, end))
-        )
+        start, end, _ = self._columns()
+        old = as_texts(_native.cut(data, start, end))
+        growth = self.growth
+        moved = start + after + np.cumsum(growth, dtype=np.int32) - growth
+        return Replacements(moved, moved + (end - start) + growth, old)
+
+    @property
+    def growth(self) -> Indices:
+        """Return how much longer the text becomes by each edit, (m,)."""
+        grown = [np.char.str_len(p.new) - (p.end - p.start) for p in self.pieces()]
+        return np.concatenate([np.empty(0, np.int32), *grown], dtype=np.int32)
 
 
 def as_bytes(texts: NDArray[np.bytes_]) -> Bytes:
@@ -194,7 +201,7 @@ class Source:
         return self.data.decode("latin-1")
 
     @cached_property
-    def line_starts(self) -> NDArray[np.int64]:
+    def line_starts(self) -> Indices:
         """Return the offsets at which lines start, (n,); CR, LF and CRLF end a line."""
         return _native.line_starts(self.data)
 

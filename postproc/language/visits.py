@@ -7,13 +7,15 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from enum import IntEnum
 from functools import cached_property, lru_cache
+from typing import Any, Self
 
 import numpy as np
+from numpy.typing import NDArray
 
-from postproc.arrays import Bools, Floats, Indices, Ints, read_only
+from postproc.arrays import Bools, Floats, Indices, Ints, chunks, narrow, read_only
 from postproc.language.dialect import Dialect
 
 START = -1  # predecessor: wherever the arm stands when the program starts
@@ -102,14 +104,67 @@ def _nothing(n: int) -> tuple[str, ...]:
 
 
 @dataclass(frozen=True)
+class NumberPlaces:
+    """Where the w numbers of m targets stand, in 4 + 2 w bytes a target as a rule.
+
+    Attributes:
+        first: Byte offset of the first of them in its file, (m,).
+        offset: How far behind that each begins, (m, w).
+        length: Its bytes, (m, w); 0 where a component is not written as a number.
+    """
+
+    first: Indices
+    offset: NDArray[np.unsignedinteger[Any]]
+    length: NDArray[np.unsignedinteger[Any]]
+
+    @classmethod
+    def of(cls, start: Indices, end: Indices) -> Self:
+        """Take byte offsets, (m, w) each, -1 where a component is no number."""
+        rows = chunks(max(len(start), 1))
+        return cls.joined([cls._of(start[k], end[k]) for k in rows])
+
+    @classmethod
+    def _of(cls, start: Indices, end: Indices) -> Self:
+        written, none = start >= 0, np.iinfo(np.int32).max
+        first = np.where(written, start, none).min(axis=1, initial=none)
+        offset = np.where(written, start - first[:, None], 0)
+        return cls(
+            first.astype(np.int32), narrow(offset), narrow((end - start) * written)
+        )
+
+    @classmethod
+    def joined(cls, parts: Sequence[Self]) -> Self:
+        """Put places one after the other."""
+        columns = ([vars(part)[f.name] for part in parts] for f in fields(cls))
+        return cls(*map(np.concatenate, columns))
+
+    def __len__(self) -> int:
+        """Return the number of targets."""
+        return len(self.first)
+
+    def __getitem__(self, rows: Ints | Bools | slice) -> NumberPlaces:
+        """Take the places of some targets."""
+        return NumberPlaces(self.first[rows], self.offset[rows], self.length[rows])
+
+    @property
+    def start(self) -> Ints:
+        """Return where numbers begin, (m, w), -1 where there is none."""
+        return np.where(self.length > 0, self.first[:, None] + self.offset, -1)
+
+    @property
+    def end(self) -> Ints:
+        """Return where they end, (m, w), -1 where there is none."""
+        return np.where(self.length > 0, self.start + self.length, -1)
+
+
+@dataclass(frozen=True)
 class Literals:
     """m places in the text that hold the numbers of a target.
 
     Attributes:
         file: Index into `Visits.files`, (m,).
         line: 1-based line of the first number, (m,).
-        start, end: Byte offsets of each number in its file, (m, w); -1 where the
-            component is not written as a number. w as in `Visits.values`.
+        places: Where each number stands, w a literal as in `Visits.values`.
         joints: True where the numbers are joint angles, (m,).
         name: Variable or array element, or "" for an inline literal; m strings.
         shared: True where another program may read it too (exported), (m,).
@@ -120,8 +175,7 @@ class Literals:
 
     file: Indices
     line: Indices
-    start: Ints
-    end: Ints
+    places: NumberPlaces
     joints: Bools
     name: tuple[str, ...]
     shared: Bools
@@ -210,8 +264,8 @@ class Visits:
     config: Ints
     configs: tuple[str, ...]
     config_given: Bools
-    literal: Ints
-    follows: Ints
+    literal: Indices
+    follows: Indices
     name: Ints
     names: tuple[str, ...]
     tool: Ints
@@ -237,8 +291,8 @@ class Visits:
     curved: Bools
     reason: Ints
     reasons: tuple[str, ...]
-    pred_start: Ints
-    pred: Ints
+    pred_start: Indices
+    pred: Indices
     measure_id: tuple[str, ...]
     literals: Literals
     dialect: Dialect

@@ -62,7 +62,7 @@ def test_what_was_meant_is_accepted(job, cell) -> None:
 @pytest.mark.parametrize("old, new", [(b"5", b"6"), (b"MOVE", b"MOVE "), (b"\n", b" ")])
 def test_another_byte_is_refused(job, cell, old, new) -> None:
     reading, output, rows, values = job
-    for name in output.records:
+    for name in output.stamps:
         head, _, rest = output.files[name].rpartition(old)
         if not head:
             continue

@@ -76,7 +76,8 @@ def rewrite(files: Mapping[str, bytes], cell: Cell) -> str:
     output = write_numbers(reading, rows, new, "0" * 12)
     values = read_back(visits, rows, output.edits)
     check_output(reading, read_program(output.files, cell), output, rows, values)
-    check_bytes(files, output.files, output.records, visits)
+    record = output.sidecar(reading, "0" * 12, {}, {name: {} for name in output.stamps})
+    check_bytes(files, output.files, record.files, visits)
     return "rewritten"
 
 
@@ -141,7 +142,9 @@ def check_bytes(
             assert after.get(name, before[name]) == before[name], name
             continue
         mine = literals.file == number
-        places = np.stack([literals.start[mine], literals.end[mine]], axis=-1)
+        places = np.stack(
+            [literals.places.start[mine], literals.places.end[mine]], axis=-1
+        )
         spans = sorted({(a, b) for a, b in places.reshape(-1, 2).tolist() if a >= 0})
         rest = _without_stamp(name, after[name])
         at = end = 0

@@ -84,7 +84,7 @@ def test_files_are_scanned_as_lines_are_masked(parts: list[str]) -> None:
 def test_values_are_read_as_python_reads_them(value: float, decimals: int) -> None:
     text = f"{value:.{decimals}f}"
     data = f"p := {text}\n".encode()
-    assert scan_lines(data, np.array([0])).value.tolist() == [float(text)]
+    assert scan_lines(data, np.zeros(1, np.int32)).value.tolist() == [float(text)]
 
 
 @pytest.mark.parametrize(
@@ -112,14 +112,14 @@ def test_what_a_number_is(line: str, numbers: list[str]) -> None:
      "0.1000000000000000055511151231257827", "123456789012345678", "00012.50", "1.e5"],
 )  # fmt: skip
 def test_long_numbers_are_read_as_python_reads_them(text: str) -> None:
-    (value,) = scan_lines(f"x({text})".encode(), np.array([0])).value.tolist()
+    (value,) = scan_lines(f"x({text})".encode(), np.zeros(1, np.int32)).value.tolist()
     assert value == number_value(text)
 
 
 def test_lines_that_are_not_there_are_refused() -> None:
     for starts in ([0, 9], [3, 1], [-1]):
         with pytest.raises(IndexError):
-            scan_lines(b"abc", np.array(starts))
+            scan_lines(b"abc", np.array(starts, np.int32))
 
 
 def test_a_long_file_is_one_file() -> None:

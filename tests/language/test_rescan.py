@@ -45,7 +45,7 @@ def test_other_numbers_are_read_as_by_themselves(
         assert own != [old_masks.masks[k] for k in old_masks.shape]
         return
     assert found.added == (0 if stamped else -1)
-    for name in ("shape", "line", "first", "start", "end", "comment"):
+    for name in ("shape", "line", "first", "start", "end"):
         assert np.array_equal(getattr(found.lines, name), getattr(alone, name)), name
     assert np.array_equal(found.lines.value, alone.value, equal_nan=True)
     assert found.lines.shapes == alone.shapes

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from postproc.language.pdl2.dialect import PDL2_DIALECT
-from postproc.language.visits import Literals, Meaning, Visits
+from postproc.language.visits import Literals, Meaning, NumberPlaces, Visits
 from postproc.robot.trajectory import Motion
 from postproc.simulation.kinematics import pose_of_record
 
@@ -92,5 +92,5 @@ class Program:
 
 def _no_literals() -> Literals:
     ints, bools = np.zeros(0, dtype=np.int64), np.zeros(0, dtype=bool)
-    spans = np.zeros((0, 6), dtype=np.int64)
-    return Literals(ints, ints, spans, spans, bools, (), bools, bools, ())
+    places = NumberPlaces.of(*np.zeros((2, 0, 6), dtype=np.int64))
+    return Literals(ints, ints, places, bools, (), bools, bools, ())

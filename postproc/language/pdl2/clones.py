@@ -13,6 +13,7 @@ from postproc.language.pdl2 import syntax as ast
 from postproc.language.pdl2.entries import is_nested, last_head
 from postproc.language.pdl2.parser import parse_value_form
 from postproc.language.pdl2.program import Body, Program, Variable
+from postproc.language.scan import scan_lines
 from postproc.language.shapes import parse_shapes
 from postproc.language.source import (
     CloneError,
@@ -138,12 +139,10 @@ def _destination(program: Program, row: int, word: str, name: str) -> Span:
 
 def code_of(program: Program, line: int) -> str:
     """Return a physical line without its comment and line ending."""
-    lines = program.lines
-    text = lines.source.line_text(line)
-    comment = int(lines.comment[line - 1])
-    if comment < 0:
-        return text
-    return text[: comment - int(lines.source.line_starts[line - 1])]
+    text = program.lines.source.line_text(line)
+    scanned = scan_lines(text.encode("latin-1"), np.zeros(1, dtype=np.int32))
+    comment = int(scanned.comment[0])
+    return text if comment < 0 else text[:comment]
 
 
 # Copy an entry of a variable file under another name.
@@ -265,7 +264,7 @@ def clone(
     found = [(first.file, _declared(program, at, variable.name, name))]
     for row in rows:
         file, line = int(literals.file[row]), int(literals.line[row])
-        starts = literals.start[row].tolist()
+        starts = literals.places[row : row + 1].start[0].tolist()
         if file == len(programs) and values is not None and first.file == 0:
             entry = copied_entry(values, line, variable.name, name, starts)
             found.append((file, entry))

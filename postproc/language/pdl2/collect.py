@@ -9,7 +9,17 @@ from typing import Protocol
 
 import numpy as np
 
-from postproc.arrays import Bools, Indices, Ints, any_in_rows, slim, spans
+from postproc.arrays import (
+    Bools,
+    Indices,
+    Ints,
+    among,
+    any_in_rows,
+    chunks,
+    in_chunks,
+    slim,
+    spans,
+)
 from postproc.language.pdl2.columns import Collector, SettingColumns, VisitColumns
 from postproc.language.pdl2.context import Point
 from postproc.language.pdl2.dialect import PDL2_DIALECT
@@ -17,7 +27,14 @@ from postproc.language.pdl2.job import World
 from postproc.language.pdl2.machine import Key, Machine, MoveRun
 from postproc.language.pdl2.store import MANY
 from postproc.language.source import Source
-from postproc.language.visits import ELSEWHERE, Literals, Meaning, Visits, texts_of
+from postproc.language.visits import (
+    ELSEWHERE,
+    Literals,
+    Meaning,
+    NumberPlaces,
+    Visits,
+    texts_of,
+)
 
 # Which numbers of which file belong to which target.
 
@@ -64,6 +81,14 @@ class Numbering:
             _together([end for _, _, end in numbered]),
         )
 
+    def places(self, slots: Indices) -> NumberPlaces:
+        """Tell where the numbers of targets stand, by their slots, (m, 6)."""
+        some = in_chunks(
+            lambda k: NumberPlaces.of(self.start[slots[k]], self.end[slots[k]]),
+            max(len(slots), 1),
+        )
+        return NumberPlaces.joined(some)
+
     def apart(self, slots: Indices) -> Bools:
         """Tell which targets have their numbers in more than one file, (k,).
 
@@ -90,41 +115,30 @@ def find_literals(
     Visits whose numbers partly belong to another target, or to another file, get none
     (-1).
     """
-    literal = np.full(len(columns.slots), -1, dtype=np.int64)
+    literal = np.full(len(columns.slots), -1, dtype=np.int32)
     rows = np.flatnonzero(columns.slots[:, 0] >= 0)
-    slots = columns.slots[rows]
-    example, inverse = _distinct(slots[:, 0])
+    slots = columns.slots if len(rows) == len(literal) else columns.slots[rows]
+    if _ascend(slots) and not numbering.apart(slots).any():
+        literal[rows] = np.arange(len(rows), dtype=np.int32)
+        return _literals(columns, numbering, names, slots, rows, literal), literal
+    _, example, inverse = np.unique(slots[:, 0], return_index=True, return_inverse=True)
     distinct = slots[example]
     mixed = np.zeros(len(distinct), dtype=bool)
     mixed[inverse[(slots != distinct[inverse]).any(axis=1)]] = True
-    mixed |= _used_twice(distinct)
+    mixed |= any_in_rows(np.bincount(distinct.ravel())[distinct] > 1)
     mixed |= numbering.apart(distinct)
     kept = np.flatnonzero(~mixed)
-    index = np.full(len(distinct), -1, dtype=np.int64)
+    index = np.full(len(distinct), -1, dtype=np.int32)
     index[kept] = np.arange(len(kept))
     literal[rows] = index[inverse]
     first = rows[example[kept]]
     return _literals(columns, numbering, names, distinct[kept], first, literal), literal
 
 
-def _distinct(values: Indices) -> tuple[Indices, Indices]:
-    """Return the first row of every distinct value, ascending, and the one of each.
-
-    Targets mostly stand in the order in which they are gone to, once each.
-    """
-    if (values[1:] > values[:-1]).all():
-        return np.arange(len(values)), np.arange(len(values))
-    _, example, inverse = np.unique(values, return_index=True, return_inverse=True)
-    return example, inverse.ravel()
-
-
-def _used_twice(slots: Indices) -> Bools:
-    """Tell in which rows (m, 6) a number stands that another place has too, (m,)."""
+def _ascend(slots: Indices) -> bool:
+    """Tell whether all numbers stand in the order in which they are gone to, once."""
     numbers = slots.ravel()
-    if (numbers[1:] > numbers[:-1]).all():
-        return np.zeros(len(slots), dtype=bool)
-    used = np.bincount(numbers)
-    return any_in_rows(used[slots] > 1)
+    return bool((numbers[1:] > numbers[:-1]).all())
 
 
 def _literals(
@@ -135,20 +149,20 @@ def _literals(
     visit: Indices,
     literal: Indices,
 ) -> Literals:
-    file = np.searchsorted(numbering.first, slots[:, 0], side="right") - 1
-    start, end = numbering.start[slots], numbering.end[slots]
+    file = np.searchsorted(numbering.first, slots[:, 0], side="right").astype(np.int32)
+    file -= 1
+    places = numbering.places(slots)
     line = np.zeros(len(slots), dtype=np.int32)
     for i, source in enumerate(numbering.sources):
         mine = file == i
-        places = start[mine].min(axis=1) if mine.any() else start[mine][:, 0]
-        line[mine] = np.searchsorted(source.line_starts, places, side="right")
+        first = places.first[mine]
+        line[mine] = np.searchsorted(source.line_starts, first, side="right")
     texts, own = tuple(names), columns.name[visit]
     named = tuple(map(texts.__getitem__, own.tolist())) if own.any() else ()
     return Literals(
-        file=slim(file.astype(np.int32)),
+        file=slim(file),
         line=line,
-        start=start,
-        end=end,
+        places=places,
         joints=columns.target[visit] == Meaning.JOINTS,
         name=named or texts_of(len(slots), {}),
         shared=slim(_any(columns.shared, literal, len(slots))),
@@ -175,7 +189,7 @@ def find_uses(
     bases: Mapping[int, tuple[int, ...]],
     literal: Ints,
     pinned: Mapping[int, str],
-) -> tuple[Literals, Ints]:
+) -> tuple[Literals, Indices]:
     """Find which literals computed targets move along with, and which must stay.
 
     Args:
@@ -189,24 +203,37 @@ def find_uses(
         The literals with what pins them, and for every visit the literal that it moves
         along with, (n,), -1 where there is none.
     """
-    direct = np.flatnonzero(literal >= 0)
-    numbers = np.full((len(literals), 6), -1, dtype=slots.dtype)
-    numbers[literal[direct]] = slots[direct]
-    most = max([-1, *pinned, *map(max, bases.values()), numbers.max(initial=-1)])
-    owner = np.full(int(most) + 2, -1, dtype=slots.dtype)  # the last is that of slot -1
-    owner[numbers] = np.arange(len(literals))[:, None]
-    owner[-1] = -1
-    stay = {int(owner[slot]): why for slot, why in pinned.items() if owner[slot] >= 0}
-    follows = np.full(len(literal), -1, dtype=np.int64)
+    follows = np.full(len(literal), -1, dtype=np.int32)
+    wanted = {-1, *pinned, *chain.from_iterable(bases.values())}
+    owner = _visits_of(np.array(sorted(wanted)[1:]), slots, literal)
+    stay = {int(literal[owner[k]]): why for k, why in pinned.items() if k in owner}
     for visit, base in bases.items():
-        rows = owner[[*base]]
-        if rows[0] >= 0 and (numbers[rows[0]] == base).all():
-            follows[visit] = rows[0]
+        at = owner.get(base[0], -1)
+        if at >= 0 and (slots[at] == base).all():
+            follows[visit] = literal[at]
         else:
-            stay |= {row: _IN_PART for row in rows.tolist() if 0 <= row not in stay}
+            rows = [int(literal[owner[slot]]) for slot in base if slot in owner]
+            stay |= {row: _IN_PART for row in rows if row not in stay}
     if not stay:
         return literals, follows
     return replace(literals, pinned=texts_of(len(literals), stay)), follows
+
+
+def _visits_of(wanted: Ints, slots: Indices, literal: Indices) -> dict[int, int]:
+    """Return a visit by each of some numbers that belong to its literal.
+
+    Args:
+        wanted: The numbers, ascending, none below 0.
+        slots: As in `find_uses`, and
+        literal: .. likewise.
+    """
+    found: dict[int, int] = {}
+    for rows in chunks(len(slots) if len(wanted) else 0):
+        at, column = np.nonzero(among(slots[rows], wanted))
+        for k, slot in zip(at.tolist(), slots[rows][at, column].tolist(), strict=True):
+            if literal[rows.start + k] >= 0:
+                found[slot] = rows.start + k
+    return found
 
 
 # All of it: visits in program order.
@@ -294,17 +321,17 @@ def _most_axes(runs: list[MoveRun], world: World) -> int:
 
 def _predecessors(
     machine: Machine, ordered: list[tuple[Key, MoveRun]], offsets: Ints
-) -> tuple[Ints, Ints]:
+) -> tuple[Indices, Indices]:
     """Translate predecessor ids to visits, in CSR form."""
     n, first = int(offsets[-1]), offsets[:-1]
     ids = np.array([machine.ids[key] for key, _ in ordered], dtype=np.int64)
     visit = np.zeros(machine.next_id, dtype=np.int64)
     visit[spans(ids, np.diff(offsets))] = np.arange(n)
     origins = [_origins(machine, run, visit) for _, run in ordered]
-    counts = np.ones(n, dtype=np.int64)
+    counts = np.ones(n, dtype=np.int32)
     counts[first] = [len(found) for found in origins]
-    start = np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
-    pred = np.repeat(np.arange(n) - 1, counts)
+    start = np.append(np.int32(0), np.cumsum(counts, dtype=np.int32))
+    pred = np.repeat(np.arange(-1, n - 1, dtype=np.int32), counts)
     pred[spans(start[first], counts[first])] = [*chain.from_iterable(origins)]
     return start, pred
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from postproc.arrays import Indices, Interned, Ints, slim, spans
+from postproc.arrays import Indices, Interned, Ints, chunks, slim, spans
 from postproc.language.marks import MEASURE
 from postproc.language.pdl2 import syntax as ast
 from postproc.language.pdl2.dialect import COMMENTS
@@ -19,6 +19,7 @@ from postproc.language.pdl2.machine import WRITTEN, Goal, Machine, MoveForm, Mov
 from postproc.language.pdl2.program import Program
 from postproc.language.pdl2.store import Settings
 from postproc.language.pdl2.values import Nothing, Position, Value
+from postproc.language.shapes import numbered_in_order
 from postproc.language.visits import (
     Blend,
     Meaning,
@@ -210,8 +211,8 @@ class VisitColumns:
         short = np.int32 if slots < 2**31 else np.int64
         self.file = np.zeros(n, dtype=np.int32)
         self.line = np.zeros(n, dtype=np.int32)
-        self.motion = np.zeros(n, dtype=np.int32)
-        self.target = np.zeros(n, dtype=np.int32)
+        self.motion = np.zeros(n, dtype=np.int8)
+        self.target = np.zeros(n, dtype=np.int8)
         self.via = np.zeros(n, dtype=bool)
         self.fly = np.zeros(n, dtype=bool)
         self.values = np.full((n, 6), np.nan)
@@ -253,13 +254,13 @@ class ProgramMoves:
         sizes = np.array([len(run) for run in runs])
         self.visit: Ints = spans(np.array(at), sizes)
         self.row: Ints = np.concatenate([run.rows for run in runs])
-        self.run: Ints = np.repeat(np.arange(len(runs)), sizes)
+        self.run: Indices = np.repeat(np.arange(len(runs), dtype=np.int32), sizes)
         self.point: Ints = np.concatenate([run.point for run in runs])
         numbers = Interned[MoveForm]()
-        self.form: Ints = np.concatenate([_numbered(run, numbers) for run in runs])
+        self.form: Indices = np.concatenate([_numbered(run, numbers) for run in runs])
         self.forms = [*numbers]
-        self.first: Ints = np.zeros(len(self.row), dtype=np.int64)
-        self.last: Ints = np.zeros(len(self.row), dtype=np.int64)
+        self.first = np.zeros(len(self.row), dtype=np.int32)
+        self.last = np.zeros(len(self.row), dtype=np.int32)
 
     def of_forms(self, said: Callable[[MoveForm], int]) -> Ints:
         """Return what is said of every move's form, (n,)."""
@@ -274,12 +275,12 @@ class ProgramMoves:
             begin += len(run)
 
 
-def _numbered(run: MoveRun, numbers: Interned[MoveForm]) -> Ints:
+def _numbered(run: MoveRun, numbers: Interned[MoveForm]) -> Indices:
     """Return the numbers of the forms of a run's moves."""
     if len(run.forms) == 1:
         (form,) = run.forms.values()
-        return np.full(len(run.rows), numbers[form])
-    table = np.zeros(max(run.forms) + 1, dtype=np.int64)
+        return np.full(len(run.rows), numbers[form], dtype=np.int32)
+    table = np.zeros(max(run.forms) + 1, dtype=np.int32)
     for number, form in run.forms.items():
         table[number] = numbers[form]
     return table[run.form]
@@ -358,14 +359,19 @@ class Collector:
                 continue
             some = np.flatnonzero(here & (moves.form == number))
             mine = moves.visit[some]
-            numbers = lines.first[moves.row[some]][:, None] + np.array(form.slots)
-            c.values[mine], c.slots[mine] = lines.value[numbers], numbers + base
+            for k in chunks(len(some)):
+                first = lines.first[moves.row[some[k]]]
+                numbers = first[:, None] + np.array(form.slots, dtype=np.int32)
+                c.values[mine[k]] = lines.value[numbers]
+                c.slots[mine[k]] = numbers + base
             c.target[mine] = Meaning.JOINTS if form.joints else Meaning.POSE
             if form.config is not None:
                 c.config[mine] = self.configs[form.config]
                 c.config_given[mine] = True
         mine = moves.visit[here]
-        wrong = ~np.isfinite(c.values[mine]).all(axis=1)
+        wrong = np.zeros(len(mine), dtype=bool)
+        for k in chunks(len(mine)):
+            wrong[k] = ~np.isfinite(c.values[mine[k]]).all(axis=1)
         bad = mine[wrong]
         c.target[bad], c.slots[bad], c.values[bad] = Meaning.UNKNOWN, -1, np.nan
         if len(bad):
@@ -504,6 +510,8 @@ class Collector:
     def _marks(self, moves: ProgramMoves) -> None:
         """Enter the ids of moves that are measured."""
         rows, ids = _measured(moves.program)
+        if not ids:
+            return
         ends = np.flatnonzero(np.isin(moves.row, rows) & ~self.columns.via[moves.visit])
         at = np.searchsorted(rows, moves.row[ends])
         for visit, k in zip(moves.visit[ends].tolist(), at.tolist(), strict=True):
@@ -523,11 +531,7 @@ def _alike(kinds: list[Indices]) -> tuple[Ints, Ints]:
             code = np.unique(code, return_inverse=True)[1]
             codes = len(code)
         code, codes = code * size + kind, codes * size
-    _, example, which = np.unique(code, return_index=True, return_inverse=True)
-    order = np.argsort(example)
-    place = np.empty(len(order), dtype=np.int64)
-    place[order] = np.arange(len(order))
-    return place[which], example[order]
+    return numbered_in_order(code)
 
 
 def _in_order(numbers: Ints) -> list[int]:
@@ -551,10 +555,13 @@ def _aux_axes(position: Position) -> tuple[int, ...] | None:
 def _measured(program: Program) -> tuple[Ints, list[str]]:
     """Return the rows of moves with a ``-- MEASURE`` comment, and its ids."""
     lines = program.lines
+    marks = [*COMMENTS.marks(lines.source, MEASURE)]
+    if not marks:
+        return np.empty(0, dtype=np.int64), []
     moves = program.statements.which(lambda said: isinstance(said, ast.Move))
     rows = np.flatnonzero(moves[lines.shape])
     found: dict[int, str] = {}
-    for line, mark in COMMENTS.marks(lines.source, MEASURE):
+    for line, mark in marks:
         at = int(np.searchsorted(lines.line[rows], line))
         if at < len(rows):
             found.setdefault(int(rows[at]), mark)

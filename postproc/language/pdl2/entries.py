@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from postproc.arrays import Bools, Floats, Ints
+from postproc.arrays import Bools, Floats, Indices, Ints, slim
 from postproc.language.lines import Lines
 from postproc.language.pdl2.parser import EntryPart
 from postproc.language.shapes import ParsedShapes, alike, name_index, numbered_in_order
@@ -92,17 +92,19 @@ class Entries(Mapping[str, Entry]):
         slots: Index of each number in the file, (k, 6), -1 for none.
         aux: Values of the auxiliary axes of their layout, (k, a), NaN likewise.
         arm: Arm number, (k,), 0 where it is not said.
+        known: Which numbers are known, (k, 6), where they are let go of.
     """
 
     row: Mapping[str, int]
     name: Sequence[str]
     line: Ints
-    layout: Ints
+    layout: Indices
     layouts: tuple[Layout, ...]
     numbers: Floats
-    slots: Ints
+    slots: Indices
     aux: Floats
-    arm: Ints
+    arm: Indices
+    known: Bools | None = None
 
     @cached_property
     def parts(self) -> list[str]:
@@ -121,13 +123,20 @@ class Entries(Mapping[str, Entry]):
         Returns:
             The entries; None where one was not known, is not, or belongs to none.
         """
+        known = np.isfinite(self.numbers) if self.known is None else self.known
         hit = (self.slots >= 0) & changed[self.slots]
-        new, numbers = value[self.slots[hit]], np.array(self.numbers)
-        known = np.isfinite(new).all() and np.isfinite(numbers[hit]).all()
-        if not known or len(new) != np.count_nonzero(changed):
+        count = np.count_nonzero(changed)
+        if np.count_nonzero(hit) != count or np.count_nonzero(hit & known) != count:
             return None
-        numbers[hit] = new
-        return replace(self, numbers=numbers)
+        numbers = np.where(known, value[self.slots], np.nan)
+        if not np.isfinite(numbers[hit]).all():
+            return None
+        return replace(self, numbers=numbers, known=None)
+
+    def without_numbers(self) -> Entries:
+        """Let go of the numbers of positions: they can be read again."""
+        known = slim(np.isfinite(self.numbers))
+        return replace(self, numbers=np.empty((0, 6)), known=known)
 
     def __len__(self) -> int:
         """Return how many names have one entry."""
@@ -306,7 +315,7 @@ def read_records(
     k = len(records.first)
     form = said.form[lines.shape]
     numbers = np.full((k, 6), np.nan)
-    slots = np.full((k, 6), -1, dtype=np.int64)
+    slots = np.full((k, 6), -1, dtype=np.int32)
     layout = np.zeros(k, dtype=np.int64)
     layouts: list[Layout] = []
     aux: list[tuple[Ints, Floats]] = []
@@ -345,12 +354,12 @@ def read_records(
         {},
         _names(lines, said, records),
         lines.line[records.first],
-        layout,
+        slim(layout),
         tuple(layouts),
         numbers,
         slots,
         _stacked(aux, k),
-        arm,
+        slim(arm),
     )
 
 

@@ -204,7 +204,10 @@ def _is_whole(one: Parsed, source: Source) -> bool:
 
 def _without_values(one: Parsed) -> Parsed:
     """Let go of the numbers of a file, which are about to change."""
-    return replace(one, lines=one.lines.without_values())
+    lines = one.lines.without_values()
+    if isinstance(one, VariableFile):
+        return replace(one, lines=lines, entries=one.entries.without_numbers())
+    return replace(one, lines=lines)
 
 
 def _named(page: Program) -> Program:

@@ -9,7 +9,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from postproc.arrays import Floats, Ints
+from postproc.arrays import Floats, Indices, Ints
 from postproc.compensation.outcome import Outcome, Status
 from postproc.language.languages import language_of
 from postproc.language.source import Source
@@ -58,7 +58,7 @@ class PageColumns:
     literal_line: Ints
     name: Ints
     move: Ints
-    status: Ints
+    status: Indices
     why: Ints
     direction: Ints
     q_deg: Floats

@@ -112,10 +112,10 @@ def test_points_by_name():
         False,
     ]
     data = f"DEFDAT m PUBLIC\n{DATA}\nENDDAT\n"
-    start, end = v.literals.start[0], v.literals.end[0]
+    start, end = v.literals.places.start[0], v.literals.places.end[0]
     cut = [data[a:b] for a, b in zip(start, end, strict=True)]
     assert cut == ["1", "2", "3", "0", "0", "180", "2", "35"]
-    start, end = v.literals.start[1], v.literals.end[1]
+    start, end = v.literals.places.start[1], v.literals.places.end[1]
     cut = [data[a:b] for a, b in zip(start, end, strict=True)]
     assert cut[-2:] == ["'B010'", "'H23'"] and cut[1] == "-5"
 

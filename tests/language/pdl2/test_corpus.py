@@ -49,7 +49,9 @@ def described(resolved: Resolved, *texts: str) -> str:
         literal = "-"
         if v.literal[i] >= 0:
             row = v.literal[i]
-            places = zip(v.literals.start[row], v.literals.end[row], strict=True)
+            places = zip(
+                v.literals.places.start[row], v.literals.places.end[row], strict=True
+            )
             text = texts[v.literals.file[row]]
             literal = ",".join(text[a:b] for a, b in places)
             literal += " taught" * bool(v.literals.taught[row])

@@ -125,7 +125,7 @@ def told(visits: Visits) -> list[object]:
             "literal follows fly zone_mm lin_spd pred_start pred".split()
         ),
         v.measure_id,
-        *(repr(getattr(v.literals, n)) for n in ("line", "start", "name", "pinned")),
+        *(repr(getattr(v.literals, n)) for n in ("line", "places", "name", "pinned")),
         *(v.literals.taught.tolist(), v.literals.shared.tolist()),
     ]
 

@@ -31,7 +31,10 @@ def same_reading(program: bytes, values: bytes) -> bool:
     for name in set(a) - {"literals", "dialect"}:
         np.testing.assert_equal(a[name], b[name], err_msg=name)
     for name, column in vars(again.visits.literals).items():
-        np.testing.assert_equal(column, getattr(alone.visits.literals, name))
+        other = getattr(alone.visits.literals, name)
+        if name == "places":
+            column, other = vars(column), vars(other)
+        np.testing.assert_equal(column, other)
     return again.texts[0].shapes is first.texts[0].shapes
 
 

@@ -67,7 +67,7 @@ def test_values_and_their_places() -> None:
     assert v.configs[v.config[1]] == "W T1:1"
     assert v.literals.file.tolist() == [1] * 4
     assert v.literals.shared.tolist() == [False, True, False, False]
-    start, end = v.literals.start, v.literals.end
+    start, end = v.literals.places.start, v.literals.places.end
     text = variables.source.text
     spans = zip(start[0], end[0], strict=True)
     assert [float(text[a:b]) for a, b in spans] == v.values[0].tolist()

@@ -9,7 +9,7 @@ import numpy as np
 from postproc.compensation.outcome import Decisions, Outcome, Status
 from postproc.compensation.record import Sidecar
 from postproc.language.pdl2.dialect import PDL2_DIALECT
-from postproc.language.visits import Diagnostic, Literals, Visits
+from postproc.language.visits import Diagnostic, Literals, NumberPlaces, Visits
 from postproc.model.statistics import ErrorStatistics
 
 REASONS = (
@@ -53,8 +53,7 @@ def visits_of(n: int, name: str, names: tuple[str, ...]) -> Visits:
     literals = Literals(
         index * 0,
         line,
-        start,
-        start + 5,
+        NumberPlaces.of(start, start + 5),
         no,
         tuple(names[k] for k in name_of),
         no,
