@@ -54,11 +54,27 @@ def _plainer(projection: Projection, score: Score) -> Score:
     plain = score.best.effect.plainer()
     if plain == score.best.effect:
         return score
+    return _instead(projection, score, replace(score.best, effect=plain), HARDLY)
+
+
+def readable(projection: Projection, score: Score, library: Library) -> Score:
+    """Take what follows what a job can read, unless the other is clearly ahead."""
+    form = score.best.effect.readable(projection.at, library.without)
+    if form is None:
+        return score
+    effect, source = form
+    tried = replace(score.best, effect=effect, source=source)
+    return _instead(projection, score, tried, ahead(score.best_evidence))
+
+
+def _instead(
+    projection: Projection, score: Score, tried: Candidate, by: float
+) -> Score:
+    """Take another candidate of a family, unless its best is ahead by so many nats."""
     square = float(projection.rest @ projection.rest)
-    tried = [replace(score.best, effect=plain)]
-    blocks = reduce_some(projection, tried)
+    blocks = reduce_some(projection, [tried])
     found = rank(blocks, square, projection.rows)[0]
-    if found.best_evidence < score.best_evidence - HARDLY:
+    if found.best_evidence < score.best_evidence - by:
         return score
     return replace(found, evidence=score.evidence)
 
@@ -80,6 +96,7 @@ def ranking(projection: Projection, library: Library) -> list[Score]:
     for tier in (NAMED, FREE):
         leading += [s for s in scores if s.family.tier == tier][:LOOKED_AT]
     refined = [refine(projection, s) for s in leading]
+    refined = [readable(projection, s, library) for s in refined]
     rest = [s for s in scores if s not in leading]
     return sorted([*refined, *rest], key=lambda s: -s.evidence)
 
