@@ -409,8 +409,18 @@ def stand(found: Search, number: int) -> JudgedAddition:
     names = {(own.family.effect, own.family.joint)}
     for s in scores:
         name = (s.family.effect, s.family.joint)
-        if s.evidence >= here.evidence - NEAR and name not in names:
+        if s.evidence >= here.evidence - _within(own, s.best) and name not in names:
             rivals.append(s)
             names.add(name)
     p_value = found.null.p_value(here.evidence)
     return JudgedAddition(here.evidence, p_value, tuple(rivals[:MOST_OTHERS]))
+
+
+def _within(own: Candidate, other: Candidate) -> float:
+    """Return by how many nats another may be behind that is told with a candidate.
+
+    A law of two covariates is one of many that are alike: the free form of the same two
+    is told with it unless the law is clearly ahead.
+    """
+    alike = own.source == other.source and " x " in own.source
+    return CLEARLY[0] if alike and other.family.tier == FREE else NEAR
