@@ -10,6 +10,7 @@ import numpy as np
 
 from postproc.calibration.diagnosis.trace import trace
 from postproc.calibration.regression import Fit, fit_effects
+from postproc.calibration.selection import told_apart
 from postproc.model.combination import Combination
 from postproc.model.effects import BASE_EFFECTS, propose
 from postproc.model.effects.base_shift import rigid_columns
@@ -114,7 +115,8 @@ def run(kind: str, seed: int, size: float) -> Trial:
     laws = [law for law in c.arm.laws if law.effect != "backlash"]
     truth = [(law.effect, list(law.joints), law.source) for law in laws]
     hits = [_hit(law, found) for law in truth]
-    plain, registered = _true_errors(c, seed, base, traced.search.fit)
+    kept = told_apart(traced.search.fit, None)  # as `diagnose` writes it
+    plain, registered = _true_errors(c, seed, base, kept)
     return Trial(
         kind, seed, size, truth, traced.verdict, found,
         all(h >= 1 for h in hits), all(h >= 2 for h in hits),

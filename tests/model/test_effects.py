@@ -39,6 +39,7 @@ def variants() -> list[Effect]:
     out.append(BY_NAME["joint_step"](row=20.0))
     out.append(BY_NAME["base_tilt"](skew=True))
     out.append(BY_NAME["windup"](form="elastic"))
+    out.append(BY_NAME["windup"](form="dahl"))
     out += [
         BY_NAME[name](tracker=(3.0, -2.0, 1.5), **form)
         for name, form in (

@@ -241,9 +241,14 @@ class Library:
 
     Columns that are kept are those at the kinematics of the first fit: later fits
     differ by what moves a column by a thousandth.
+
+    Attributes:
+        shelves: The candidates.
+        without: Names of effects that are known not to be there.
     """
 
     shelves: tuple[Shelf, ...]
+    without: frozenset[str] = frozenset()
 
     @classmethod
     def of(cls, fit: Fit, without: Collection[str] = ()) -> Library:
@@ -265,11 +270,12 @@ class Library:
         total = sum(numbers(s.joint, s.candidates, len(at)) for s in shelves)
         if total <= KEPT:
             shelves = [shelf.made(at, fit.whitener) for shelf in shelves]
-        return cls(tuple(shelves))
+        return cls(tuple(shelves), frozenset(without))
 
     def at_rows(self, rows: NDArray[np.int64]) -> Library:
         """Return the library for some of the rows."""
-        return Library(tuple(shelf.at_rows(rows) for shelf in self.shelves))
+        some = tuple(shelf.at_rows(rows) for shelf in self.shelves)
+        return replace(self, shelves=some)
 
     def reduce(
         self, projection: Projection, rows: Floats

@@ -54,11 +54,27 @@ def _plainer(projection: Projection, score: Score) -> Score:
     plain = score.best.effect.plainer()
     if plain == score.best.effect:
         return score
+    return _instead(projection, score, replace(score.best, effect=plain), HARDLY)
+
+
+def readable(projection: Projection, score: Score, library: Library) -> Score:
+    """Take what follows what a job can read, unless the other is clearly ahead."""
+    form = score.best.effect.readable(projection.at, library.without)
+    if form is None:
+        return score
+    effect, source = form
+    tried = replace(score.best, effect=effect, source=source)
+    return _instead(projection, score, tried, ahead(score.best_evidence))
+
+
+def _instead(
+    projection: Projection, score: Score, tried: Candidate, by: float
+) -> Score:
+    """Take another candidate of a family, unless its best is ahead by so many nats."""
     square = float(projection.rest @ projection.rest)
-    tried = [replace(score.best, effect=plain)]
-    blocks = reduce_some(projection, tried)
+    blocks = reduce_some(projection, [tried])
     found = rank(blocks, square, projection.rows)[0]
-    if found.best_evidence < score.best_evidence - HARDLY:
+    if found.best_evidence < score.best_evidence - by:
         return score
     return replace(found, evidence=score.evidence)
 
@@ -80,6 +96,7 @@ def ranking(projection: Projection, library: Library) -> list[Score]:
     for tier in (NAMED, FREE):
         leading += [s for s in scores if s.family.tier == tier][:LOOKED_AT]
     refined = [refine(projection, s) for s in leading]
+    refined = [readable(projection, s, library) for s in refined]
     rest = [s for s in scores if s not in leading]
     return sorted([*refined, *rest], key=lambda s: -s.evidence)
 
@@ -392,8 +409,18 @@ def stand(found: Search, number: int) -> JudgedAddition:
     names = {(own.family.effect, own.family.joint)}
     for s in scores:
         name = (s.family.effect, s.family.joint)
-        if s.evidence >= here.evidence - NEAR and name not in names:
+        if s.evidence >= here.evidence - _within(own, s.best) and name not in names:
             rivals.append(s)
             names.add(name)
     p_value = found.null.p_value(here.evidence)
     return JudgedAddition(here.evidence, p_value, tuple(rivals[:MOST_OTHERS]))
+
+
+def _within(own: Candidate, other: Candidate) -> float:
+    """Return by how many nats another may be behind that is told with a candidate.
+
+    A law of two covariates is one of many that are alike: the free form of the same two
+    is told with it unless the law is clearly ahead.
+    """
+    alike = own.source == other.source and " x " in own.source
+    return CLEARLY[0] if alike and other.family.tier == FREE else NEAR

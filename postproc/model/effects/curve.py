@@ -101,8 +101,9 @@ class Curve(Effect):
                 out.append(cls._candidate(batch, where, both, signed=True, whole=True))
         names += [name for name in ANGLES if name != where]
         out += [cls._candidate(batch, where, (name,), signed=True) for name in names]
-        if np.ptp(batch.states.direction[:, joint - 1]) > 0:
-            before = (f"before {joint}",)
+        before = (f"before {joint}",)
+        known = covariate(batch, before[0])
+        if len(np.unique(known[~np.isnan(known)])) > 1:
             out += [
                 cls._candidate(batch, where, before, side) for side in (False, True)
             ]

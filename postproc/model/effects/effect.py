@@ -7,7 +7,7 @@ as actual minus nominal TCP position for the commanded joints, in the base frame
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, fields
 from functools import cached_property
 from typing import Any, ClassVar, Literal, Self
@@ -134,6 +134,20 @@ class Effect(ABC):
     def plainer(self) -> Effect:
         """Return what is taken instead where it explains hardly less."""
         return self
+
+    def readable(
+        self, batch: Batch, without: Collection[str]
+    ) -> tuple[Effect, str] | None:
+        """Return it as driven by what a job can read, and the covariate's name.
+
+        It is taken where what drives it now does not explain clearly more, and would
+        not be compensated. None where there is no such form.
+
+        Args:
+            batch: The surveyed states, for what was recorded.
+            without: Names of effects that are known not to be there.
+        """
+        return None
 
     def beside(self, others: Sequence[Effect]) -> Effect:
         """Return it as it is fitted beside others, which may hold a part of it."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass, replace
 from typing import ClassVar, Literal, Self
 
@@ -18,6 +19,7 @@ from postproc.model.effects.effect import (
     alternatives,
 )
 from postproc.model.effects.step import moments
+from postproc.model.effects.tracker_drift import TrackerDrift
 from postproc.model.kinematics import Batch
 from postproc.robot.arm import Arm
 from postproc.robot.state import States
@@ -81,8 +83,13 @@ class Thermal(Effect):
         """Grow with the recorded temperature, or else in time."""
         lengths = growing(arm)
         if not np.isnan(states.temperature).all():
-            return cls(lengths, reference=float(np.nanmean(states.temperature)))
+            return cls._by_temperature(lengths, states)
         return cls._warming(lengths, states, WARM_UPS[1])
+
+    @classmethod
+    def _by_temperature(cls, lengths: tuple[str, ...], states: States) -> Self:
+        """Grow with the temperature, from the survey's mean."""
+        return cls(lengths, reference=float(np.nanmean(states.temperature)))
 
     @classmethod
     def _warming(cls, lengths: tuple[str, ...], states: States, part: float) -> Self:
@@ -101,8 +108,7 @@ class Thermal(Effect):
         lengths, states = growing(batch.arm), batch.states
         members: list[tuple[Effect, str]] = []
         if varies(states.temperature):
-            middle = float(np.mean(states.temperature))
-            members.append((cls(lengths, reference=middle), "temperature"))
+            members.append((cls._by_temperature(lengths, states), "temperature"))
         if len(moments(batch)):
             warm = [cls._warming(lengths, states, part) for part in WARM_UPS]
             members += [(effect, effect.clock) for effect in warm]
@@ -114,6 +120,16 @@ class Thermal(Effect):
             return []
         each = [float(self.time_constant * 2.0**x) for x in offsets]
         return [replace(self, time_constant=c) for c in each]
+
+    def readable(
+        self, batch: Batch, without: Collection[str]
+    ) -> tuple[Effect, str] | None:
+        """Follow the temperature where that was recorded and the tracker may drift."""
+        if self.form == "temperature" or not varies(batch.states.temperature):
+            return None
+        if TrackerDrift.name in without:
+            return None
+        return self._by_temperature(self.lengths, batch.states), "temperature"
 
     def nonlinear(self) -> dict[str, tuple[float, str]]:
         """Tell how fast the arm warms up."""

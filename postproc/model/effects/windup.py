@@ -8,7 +8,7 @@ from typing import ClassVar, Literal
 import numpy as np
 
 from postproc.arrays import Floats
-from postproc.model.covariate import JOINTS, varies
+from postproc.model.covariate import JOINTS, loops, varies
 from postproc.model.effects.effect import (
     Candidate,
     Effect,
@@ -35,8 +35,11 @@ class Windup(JointEffect):
     Attributes:
         joints: Joints that wind up.
         d0: Way over which they do [rad].
-        form: "friction": s = 1 - 2 exp(-travel / d0). "elastic": a flank that gives way
-            before it carries, s = -cos(pi travel / d0) up to d0.
+        form: "friction": s = 1 - 2 exp(-travel / d0). "dahl": the same from where the
+            reversal left it, s = 1 - 2 (1 - exp(-loop / d0)) exp(-travel / d0), loop
+            the way between the last two reversals, long where it is not known.
+            "elastic": a flank that gives way before it carries,
+            s = -cos(pi travel / d0) up to d0.
     """
 
     name: ClassVar[str] = "windup"
@@ -47,7 +50,7 @@ class Windup(JointEffect):
 
     joints: tuple[int, ...] = JOINTS
     d0: float = 0.05
-    form: Literal["friction", "elastic"] = "friction"
+    form: Literal["friction", "dahl", "elastic"] = "friction"
 
     @classmethod
     def candidates(cls, batch: Batch) -> list[Candidate]:
@@ -57,12 +60,16 @@ class Windup(JointEffect):
             if varies(batch.states.travel[:, j - 1]):
                 each = [cls((j,), float(d0)) for d0 in WAYS]
                 each += [cls((j,), float(d0), "elastic") for d0 in FLANKS]
-                out += alternatives([(e, f"travel {j}") for e in each], j)
+                members: list[tuple[Effect, str]] = [(e, f"travel {j}") for e in each]
+                if not np.isnan(loops(batch, j - 1)).all():
+                    both = f"travel {j} x loop {j}"
+                    members += [(cls((j,), float(d0), "dahl"), both) for d0 in WAYS]
+                out += alternatives(members, j)
         return out
 
     def refined(self, offsets: Floats, batch: Batch) -> list[Effect]:
         """Change the way."""
-        longest = LONGEST if self.form == "friction" else LONGEST_FLANK
+        longest = LONGEST_FLANK if self.form == "elastic" else LONGEST
         ways = np.unique(np.minimum(self.d0 * 2.0**offsets, longest))
         return [replace(self, d0=float(way)) for way in ways]
 
@@ -72,7 +79,8 @@ class Windup(JointEffect):
 
     def parameters(self) -> tuple[Parameter, ...]:
         """Name one size per joint."""
-        over = f"over {self.d0:.4g}" + ("" if self.form == "friction" else " elastic")
+        form = "" if self.form == "friction" else f" {self.form}"
+        over = f"over {self.d0:.4g}{form}"
         return tuple(
             Parameter(f"w{j}", "rad", SCALE, f"{j} {over}", j) for j in self.joints
         )
@@ -81,8 +89,15 @@ class Windup(JointEffect):
         """Evaluate lambda s(travel), (n, p)."""
         joint = self.acts_on()
         travel = np.nan_to_num(batch.states.travel[:, joint], nan=np.inf)
-        if self.form == "friction":
-            wound = 1.0 - 2.0 * np.exp(-travel / self.d0)
-        else:
+        if self.form == "elastic":
             wound = -np.cos(np.pi * np.minimum(travel / self.d0, 1.0))
+        else:
+            wound = 1.0 - 2.0 * self._left(batch) * np.exp(-travel / self.d0)
         return np.asarray(batch.states.direction[:, joint] * wound)
+
+    def _left(self, batch: Batch) -> Floats:
+        """Return the share of the friction that a reversal had to turn, (n, p)."""
+        if self.form != "dahl":
+            return np.ones((1, len(self.joints)))
+        way = np.column_stack([loops(batch, int(j)) for j in self.acts_on()])
+        return np.asarray(1.0 - np.exp(-np.nan_to_num(way, nan=np.inf) / self.d0))

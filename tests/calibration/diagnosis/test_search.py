@@ -47,6 +47,32 @@ def test_an_undeclared_effect_is_named(kind: str, seed: int, size: float) -> Non
     assert close(trial) or trial.true_mm[1] < 0.02, trial.true_mm
 
 
+@pytest.mark.parametrize("drift", [True, False])
+@pytest.mark.parametrize(("kind", "seed"), [("thermal", 6001), ("warmup", 6009)])
+def test_a_warm_arm_follows_its_temperature(kind: str, seed: int, drift: bool) -> None:
+    """Time explains both a little better: it counts where the tracker stands still."""
+    fit = campaign(seed, (kind,), 0.5).base_fit()
+    without = () if drift else ("tracker_drift",)
+    traced = trace(fit, seed=0, without=without)
+    (found,) = traced.findings
+    assert (found.effect, found.of_setup) == ("thermal", not drift)
+    assert found.source == ("temperature" if drift else "time")
+    left = traced.search.ranking_under(fit)
+    assert left[0].best.source == found.source
+
+
+def test_nothing_is_asked_of_visits_before_where_all_are_missing() -> None:
+    """Where every other row was lost nobody knows where joints came from."""
+    c = campaign(313, ("joint_step",), 1.0)
+    lost = c.states.with_(order=2.0 * c.states.order)
+    base = propose(BASE_EFFECTS, ARM, lost)
+    fit = fit_effects(Batch(ARM, lost), c.position, base, tuple(TRACKER))
+    traced = trace(fit, seed=0)
+    assert [f.effect for f in traced.findings] == ["joint_step"]
+    tried = [x for s in traced.search.library.shelves for x in s.candidates]
+    assert not any("before" in x.source for x in tried)
+
+
 @pytest.mark.parametrize(
     ("kind", "seed", "size"), [("tracker_drift", 308, 2.0), ("azimuth", 405, 1.0)]
 )
