@@ -197,6 +197,8 @@ def _invert_lower(lower: Floats) -> float | None:
         Log determinant, None where C holds more rounding than the 1: nothing of the
         array is left then.
     """
+    if len(lower) == 0:
+        return 0.0
     rounding = _rounding(np.diag(lower))
     upper = lower.T  # the same, as Fortran lays it out
     _, failed = dpotrf(upper, lower=False, overwrite_a=True, clean=False)

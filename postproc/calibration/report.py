@@ -145,12 +145,12 @@ def report_fit(fit: Fit, survey: Measurements) -> FitReport:
     """Put a fit into words and numbers."""
     used = fit.rows.weight > 0
     shares = _shares(fit)
-    effects = {
-        effect.name: float(shares[part].sum())
-        for effect, part in zip(
-            fit.combination.effects, fit.combination.slices, strict=True
-        )
-    }
+    effects: dict[str, float] = {}
+    for effect, part in zip(
+        fit.combination.effects, fit.combination.slices, strict=True
+    ):
+        own = float(shares[part].sum())
+        effects[effect.name] = effects.get(effect.name, 0.0) + own
     arrival = np.sqrt(fit.noise.arrival_variance(fit.batch.jacobian).mean())
     tracker = fit.noise.tracker_std(survey.position).mean()
     return FitReport(

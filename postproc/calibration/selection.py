@@ -8,6 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from postproc.arrays import Bools, Floats, Ints
+from postproc.calibration.diagnosis.library import Projection
+from postproc.calibration.diagnosis.waves import waves_of
 from postproc.calibration.directions import mend_directions
 from postproc.calibration.evidence import Normal, highest
 from postproc.calibration.measurements import Measurements
@@ -15,7 +17,7 @@ from postproc.calibration.orientations import Turns
 from postproc.calibration.references import TrackerMotion, ruled_out
 from postproc.calibration.regression import NEARLY, Fit, beside, fit_effects
 from postproc.calibration.tool_groups import find_groups
-from postproc.model.covariate import DRIVERS
+from postproc.model.covariate import DRIVERS, JOINTS
 from postproc.model.effects import BASE_EFFECTS, EFFECTS, propose
 from postproc.model.effects.effect import Effect
 from postproc.model.effects.probe_turn import ProbeTurn
@@ -32,11 +34,13 @@ from postproc.robot.state import States
 # being chosen anew. Named effects are weighed first; free forms must then explain what
 # is left. Where one of them does, it has taken away what the named ones were weighed
 # against: gravity of 0.1 mm does not show beside waves of 0.3 mm. So what was laid
-# aside is weighed once more, beside the free forms.
+# aside is weighed once more, beside the free forms. What of these is a wave of a gear
+# is found as `diagnose` finds it, and weighed beside all else.
 
 Progress = Callable[[str], None]
 
 ENOUGH = 3.0  # nats that an effect must be worth: 20 to 1
+ROWS_FOR_WAVES = 450  # fewer leave too many orders alike
 STEPS = 12  # of the search for prior scales, which start near their best
 
 
@@ -107,8 +111,30 @@ def fit_best(
     if any(e.name in free for e in kept):
         progress("weigh once more what was laid aside")
         kept = weighed_again(fitted, kept, named, always=base)
+    progress("look for waves in free forms")
+    waves = waves_in(fitted, kept)
     progress("fit " + ", ".join(e.name for e in kept))
-    return fit_effects(batch, position, kept, origin, fitted)
+    fitted = fit_effects(batch, position, (*kept, *waves), origin, fitted)
+    needed = keep_needed(fitted, always=(), aside=kept) if waves else kept
+    if len(needed) == len(fitted.combination.effects):
+        return fitted
+    return fit_effects(batch, position, needed, origin, fitted)
+
+
+def waves_in(fitted: Fit, kept: tuple[Effect, ...]) -> tuple[Effect, ...]:
+    """Name the waves of gears that free forms hold, without fitting anew.
+
+    Args:
+        fitted: A fit of what is kept, whose noise and prior scales are taken.
+        kept: The effects that are kept so far.
+    """
+    if len(fitted.batch) < ROWS_FOR_WAVES:
+        return ()
+    if not any(len(e.fine(j)) for e in kept for j in JOINTS):
+        return ()
+    whole = Projection.of(beside(fitted, kept))
+    found = [waves_of(whole, joint, ENOUGH) for joint in JOINTS]
+    return tuple(score.best.effect for scores in found for score in scores)
 
 
 def weighed_again(

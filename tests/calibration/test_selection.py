@@ -9,6 +9,7 @@ import numpy as np
 from postproc.arrays import Floats
 from postproc.calibration.fit import drifts
 from postproc.calibration.regression import fit_effects
+from postproc.calibration.report import find
 from postproc.calibration.selection import candidates, fit_best, keep_needed
 from postproc.model.effects import BASE_EFFECTS, propose
 from postproc.model.kinematics import Batch
@@ -101,3 +102,23 @@ def test_a_warm_up_in_time_is_told_with_the_state_that_predictions_are_for() -> 
     assert kept > 1.5 * left
     assert "Predictions are for the warm arm: it may be tracker_drift" in told
     assert not drifts(fit_effects(Batch(NJ, states), measured, effects[:-1]))
+
+
+def test_waves_in_what_splines_follow_are_named_with_order_and_size() -> None:
+    rng = np.random.default_rng(5)
+    states = random_states(700, rng)
+    measured, _ = random_arm(rng).measure(states, rng)
+    J, q = Batch(NJ, states).jacobian, states.q
+    for order, size in ((17.0, 3e-4), (31.0, 1.5e-4)):
+        measured = measured + J[:, :, 1] * (size * np.sin(order * q[:, [1]] + 1.0))
+    spot = np.exp(-0.5 * ((q[:, [2]] + 1.9) / 0.1) ** 2)
+    fit = fit_best(NJ, states, measured + J[:, :, 2] * (2e-4 * spot), None)
+    waves = {f.wave[0]: f for f in find(fit) if f.wave is not None}
+    assert all(f.joint == 2 for f in waves.values())
+    for order, mrad in ((17.0, 0.3), (31.0, 0.15)):
+        found, size, error = min(
+            (f.wave for f in waves.values() if f.wave is not None),
+            key=lambda wave: abs(wave[0] - order),
+        )
+        assert abs(found - order) < 0.1
+        assert abs(size - mrad) < 4 * error

@@ -42,6 +42,7 @@ class Projection:
         at: Its states, kinematics taken at its parameters.
         taken: U, (3 n, k).
         root: r, (k,).
+        axes: V, (p, k).
         rest: Filtered residual, (3 n,): N(0, I) if the model is complete.
         seen: The joint last asked for: its axis (n, 3) whitened and of unit length, the
             length (n,), and U along the axis (n, k).
@@ -52,6 +53,7 @@ class Projection:
     at: Batch
     taken: Floats
     root: Floats
+    axes: Floats
     rest: Floats
     seen: dict[int, tuple[Floats, Floats, Floats]] = field(default_factory=dict)
 
@@ -73,8 +75,7 @@ class Projection:
         at = fit.combination.at(fit.batch, fit.values)
         known = np.delete(np.arange(len(fit.values)), out)
         names = tuple(fit.combination.names[k] for k in known)
-        taken, root = _taken(fit, known)
-        made = cls(fit, names, at, taken, root, fit.target)
+        made = cls(fit, names, at, *_taken(fit, known), fit.target)
         return replace(made, rest=made.filter(made.rest), seen={})
 
     @property
@@ -119,8 +120,8 @@ def _along(axis: Floats, columns: Floats) -> Floats:
     return along
 
 
-def _taken(fit: Fit, known: NDArray[np.int64]) -> tuple[Floats, Floats]:
-    """Compute U (3 n, k) and r (k,) of some of the parameters."""
+def _taken(fit: Fit, known: NDArray[np.int64]) -> tuple[Floats, Floats, Floats]:
+    """Compute U (3 n, k), r (k,) and V (p, k) of p of the parameters."""
     whitened, std = fit.whitened, fit.prior_std[known]
     gram = whitened.gram()[np.ix_(known, known)] * np.outer(std, std)
     size, axes = np.linalg.eigh(gram)
@@ -128,7 +129,7 @@ def _taken(fit: Fit, known: NDArray[np.int64]) -> tuple[Floats, Floats]:
     root = np.sqrt(1.0 + size[told])
     mix = np.zeros((len(fit.values), len(root)))
     mix[known] = std[:, None] * axes[:, told] / root
-    return whitened.mixed(mix), root
+    return whitened.mixed(mix), root, axes[:, told]
 
 
 @dataclass(frozen=True, eq=False)

@@ -16,21 +16,20 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 
 import numpy as np
 from scipy.linalg import solve_triangular
+from scipy.sparse import csr_array
 
-from postproc.arrays import Floats, Ints
+from postproc.arrays import Bools, Floats, Ints
 from postproc.calibration.diagnosis.held_out import held_out_gain
 from postproc.calibration.diagnosis.library import (
+    ROUNDED,
     Projection,
     ReducedCandidates,
-    View,
 )
 from postproc.calibration.diagnosis.score import (
     SIGNALS,
-    Null,
     Score,
     log_evidence,
     score_p_value,
@@ -46,11 +45,12 @@ from postproc.calibration.diagnosis.search import (
 )
 from postproc.calibration.regression import Fit
 from postproc.model.covariate import JOINTS
-from postproc.model.effects.effect import NAMED, Candidate, Effect, Family, JointEffect
+from postproc.model.effects.effect import NAMED, Candidate, Family
 from postproc.model.effects.transmission import FIRST_FREE, Orders, Transmission
 
 FINER = 0.25  # step of the orders, in what the range of the joint resolves
-NARROWED = tuple(0.5**k for k in range(6))  # steps round the best order that are tried
+NARROWED = (1.0, 0.25, 0.0625)  # steps round the best order that are tried
+GATHERED = 0.5  # of a wave's phase, between angles that many rows are gathered at
 MOST = 8  # waves of a joint
 FASTEST = 120.0  # turns of a motor a turn: twice that and more is asked for
 STRETCHES = 6  # of a joint's range, with as many rows each
@@ -63,7 +63,8 @@ def name_waves(found: Search) -> Search:
     What was added before is looked at again: a map may have nothing left to explain.
     """
     whole = Projection.of(found.fit)
-    scores = [s for j in JOINTS for s in waves_of(whole, j, found.null)]
+    least = found.null.threshold(LEVEL)
+    scores = [s for j in JOINTS for s in waves_of(whole, j, least)]
     grown = _with(found, scores) if scores else found
     return settle(grown, 0) if grown is not found and found.additions else grown
 
@@ -87,28 +88,40 @@ def _with(found: Search, scores: Sequence[Score]) -> Search:
     return replace(found, fit=fit, additions=additions, waves=len(kept))
 
 
-def waves_of(whole: Projection, joint: int, null: Null) -> list[Score]:
+def waves_of(whole: Projection, joint: int, least: float) -> list[Score]:
     """Find the waves in the map of a joint, from 1, the clearest first.
 
     Args:
         whole: A fit; without a map of the joint there are none.
         joint: The joint.
-        null: Distribution of the largest evidence when there is nothing.
+        least: Evidence that each must have [nats].
     """
-    fit = whole.fit
-    known = fine_parameters(fit, joint)
-    if len(known) == 0:
+    known = fine_parameters(whole.fit, joint)
+    orders = orders_of_waves(whole.at.states.q[:, joint - 1])
+    if len(known) == 0 or len(orders) < 2:
         return []
-    pursuit = Pursuit.of(whole, joint, known)
-    orders, out = pursuit.orders, list[Score]()
-    for _ in range(MOST if len(orders) > 1 else 0):
-        best = pursuit.best(orders)
-        if best is None or null.p_value(best.evidence) > LEVEL:
+    pursuit, out = Pursuit.of(whole, joint, known, orders), list[Score]()
+    for _ in range(MOST):
+        best = pursuit.best()
+        if best is None or best.evidence <= least:
             break
-        if pursuit.everywhere(best.best.effect):
+        order = best.best.effect.nonlinear()["order"][0]
+        seen = pursuit.seen(order)
+        if pursuit.everywhere(seen):
             out.append(best)
-        pursuit = pursuit.without(best.best.effect)
+        pursuit = pursuit.without(order, seen)
     return out
+
+
+def orders_of_waves(angle: Floats) -> Floats:
+    """List the orders that are tried, finer than what the range resolves.
+
+    Args:
+        angle: Of the joint, (n,) [rad].
+    """
+    told = Orders.of(angle, FASTEST)
+    step = FINER * 2.0 * np.pi / told.covered
+    return np.arange(FIRST_FREE, told.told, step)
 
 
 def fine_parameters(fit: Fit, joint: int) -> Ints:
@@ -119,73 +132,197 @@ def fine_parameters(fit: Fit, joint: int) -> Ints:
 
 
 @dataclass(frozen=True, eq=False)
+class Along:
+    """Filtered rows along the axis of a joint, as numbers at its angles.
+
+    The columns of a wave are f(theta) times the whitened axis: their product with
+    anything is a sum of f times numbers, one at the angle of every row.
+
+    Attributes:
+        angle: Of the joint, (m,) [rad].
+        square: Of the whitened axis: for products of two waves, (m,).
+        model: U of `Projection` without the map, and of waves that are taken, (m, k).
+        curves: Columns of the map, filtered twice, (m, c).
+        rows: The rows, filtered twice, (m,).
+    """
+
+    angle: Floats
+    square: Floats
+    model: Floats
+    curves: Floats
+    rows: Floats
+
+    def gathered(self, step: float) -> Along:
+        """Gather rows at angles of an even grid, where these are far fewer.
+
+        f(theta) is interpolated between four angles, and each takes its share of the
+        numbers of a row (error: 0.02 (order step)^4).
+        """
+        low = float(self.angle.min())
+        count = int(np.ptp(self.angle) / step) + 4
+        if 2 * count > len(self.angle):
+            return self
+        place, t = np.divmod((self.angle - low) / step, 1.0)
+        share = [
+            -t * (t - 1) * (t - 2) / 6, (t * t - 1) * (t - 2) / 2,
+            -t * (t + 1) * (t - 2) / 2, t * (t * t - 1) / 6,
+        ]  # fmt: skip
+        at = place.astype(np.int64)[:, None] + np.arange(4)
+        starts = 4 * np.arange(len(t) + 1)
+        shares = np.stack(share, axis=1).reshape(-1)
+        rows = csr_array((shares, at.reshape(-1), starts), (len(t), count)).T
+        return Along(
+            low + step * np.arange(-1.0, count - 1.0),
+            *(rows @ x for x in (self.square, self.model, self.curves, self.rows)),
+        )
+
+    def waves(self, orders: Floats) -> Floats:
+        """Evaluate sines and cosines, (m, 2 k)."""
+        angle = np.outer(self.angle, orders)
+        out = np.empty((*angle.shape, 2))
+        np.sin(angle, out=out[:, :, 0])
+        np.cos(angle, out=out[:, :, 1])
+        return out.reshape(len(angle), -1)
+
+    def sums(self, orders: Floats) -> WaveSums:
+        """Multiply waves of some orders with the map, each other and the rows."""
+        waves = self.waves(orders)
+        known = (self.model.T @ waves).reshape(-1, len(orders), 2)
+        pairs = waves.reshape(-1, len(orders), 2)
+        own = [self.square @ (pairs[:, :, a] * pairs[:, :, b]) for a, b in PAIRS]
+        own = [x - (known[:, :, a] * known[:, :, b]).sum(axis=0)
+               for x, (a, b) in zip(own, PAIRS, strict=True)]  # fmt: skip
+        curves = (self.curves.T @ waves).reshape(-1, len(orders), 2)
+        return WaveSums(
+            orders, curves, np.stack(own), (self.rows @ waves).reshape(-1, 2)
+        )
+
+    def filtered(self, waves: Floats) -> Floats:
+        """Filter columns of waves (m, k) twice."""
+        return self.square[:, None] * waves - self.model @ (self.model.T @ waves)
+
+
+PAIRS = ((0, 0), (0, 1), (1, 1))  # of sine and cosine
+
+
+@dataclass(frozen=True, eq=False)
+class WaveSums:
+    """Products of filtered waves.
+
+    Attributes:
+        orders: Of k waves, (k,).
+        curves: With the map, (c, k, 2).
+        own: Of sine and cosine with themselves, `PAIRS`, (3, k).
+        rest: With the rows, (k, 2).
+    """
+
+    orders: Floats
+    curves: Floats
+    own: Floats
+    rest: Floats
+
+    def __getitem__(self, some: Bools | slice) -> WaveSums:
+        """Return some of the waves."""
+        return WaveSums(
+            self.orders[some], self.curves[:, some], self.own[:, some], self.rest[some]
+        )
+
+    def without(self, curves: Floats, waves: Floats, rest: Floats) -> WaveSums:
+        """Take filtered columns of unit length out.
+
+        Args:
+            curves: Their products with the map, (c, 2).
+            waves: With the waves, (2, k, 2).
+            rest: With the rows, (2,).
+        """
+        own = np.stack(
+            [(waves[:, :, a] * waves[:, :, b]).sum(axis=0) for a, b in PAIRS]
+        )
+        return WaveSums(
+            self.orders, self.curves - np.einsum("cu,uki->cki", curves, waves),
+            self.own - own, self.rest - np.einsum("u,uki->ki", rest, waves),
+        )  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
 class Pursuit:
-    """Rows of a joint without its map, and the map's columns.
+    """Rows along a joint without its map, and the map's columns.
 
     Attributes:
         whole: The fit with the map.
-        projection: The fit without the map.
         joint: The joint, from 1.
-        view: Rows along the joint, what the model and waves before take with them.
+        axis: Whitened, (n, 3) [1/rad].
+        along: Rows along it, filtered by the fit without the map and by waves before.
         square: |z|^2 of the filtered rows that are left.
-        columns: Of the map, times their prior scales and whitened, (n, k).
+        gram: Products of the map's filtered columns, (c, c).
+        moment: Of these and the rows, (c,).
+        tried: Waves of all orders that are tried.
+        basis: Waves before, filtered by the whole fit and made orthonormal, (3 n, k).
         taken: Orders of waves that were taken before.
     """
 
     whole: Projection
-    projection: Projection
     joint: int
-    view: View
+    axis: Floats
+    along: Along
     square: float
-    columns: Floats
+    gram: Floats
+    moment: Floats
+    tried: WaveSums
+    basis: Floats
     taken: tuple[float, ...] = ()
 
     @classmethod
-    def of(cls, whole: Projection, joint: int, known: Ints) -> Pursuit:
+    def of(cls, whole: Projection, joint: int, known: Ints, orders: Floats) -> Pursuit:
         """Take a map out of a fit.
+
+        With U r V^T the columns X of all parameters (see `Projection`), the filter
+        without the map is I - U M (U M)^T, and the map is U B.
 
         Args:
             whole: The fit.
             joint: The joint, from 1.
-            known: Parameters of its map, (k,).
+            known: Parameters of its map, (c,).
+            orders: Of the waves that are tried, two at least.
         """
-        fit = whole.fit
-        projection = Projection.leaving(fit, known)
-        view = projection.view(joint - 1, projection.twice)
-        angles = np.concatenate(
-            [
-                effect.basis(projection.at)[:, effect.fine(joint)]
-                for effect in fit.combination.effects
-                if isinstance(effect, JointEffect) and len(effect.fine(joint))
-            ],
-            axis=1,
-        )
-        columns = angles * fit.prior_std[known] * view.size[:, None]
-        square = float(projection.rest @ projection.rest)
-        held = {
-            k
-            for effect in fit.combination.effects
-            if isinstance(effect, Transmission)
-            for j, k in effect.waves
-            if j == joint
-        }
-        return cls(whole, projection, joint, view, square, columns, tuple(held))
+        fit, target = whole.fit, whole.fit.target
+        M, B = _apart(whole, known)
+        size = 1.0 - 1.0 / whole.root**2  # U^T U
+        seen, told = M.T @ (size[:, None] * B), whole.taken.T @ target
+        left, moment = B - M @ seen, M.T @ told
+        axis = fit.whiten(whole.at.jacobian[:, :, joint - 1]).reshape(-1, 3)
+        finest = GATHERED / float(orders[-1])
+        along = _along(whole, axis, joint, target).gathered(finest)
+        rows, model = along.rows - along.model @ (M @ moment), along.model @ M
+        along = replace(along, model=model, curves=along.model @ left, rows=rows)
+        square = float(target @ target - moment @ moment)
+        gram, none = B.T @ (size[:, None] * left), np.zeros((len(target), 0))
+        rest = B.T @ told - seen.T @ moment
+        tried = along.sums(orders)
+        held = _orders_in(fit, joint)
+        return cls(
+            whole, joint, axis, along, square, gram, rest, tried, none, held
+        )  # fmt: skip
 
-    @property
-    def orders(self) -> Floats:
-        """List the orders that are tried, finer than what the range resolves."""
-        told = Orders.of(self.whole.at.states.q[:, self.joint - 1], FASTEST)
-        step = FINER * 2.0 * np.pi / told.covered
-        return np.arange(FIRST_FREE, told.told, step)
+    def seen(self, order: float) -> Floats:
+        """Filter a wave's columns by the whole fit and by waves before it, (3 n, 2)."""
+        angle = order * self.whole.at.states.q[:, self.joint - 1]
+        both = np.stack([np.sin(angle), np.cos(angle)], axis=1)
+        columns = self.axis[:, :, None] * both[:, None]
+        own = self.whole.filter(columns.reshape(-1, 2))
+        return own - self.basis @ (self.basis.T @ own)
 
-    def everywhere(self, effect: Effect) -> bool:
+    def everywhere(self, own: Floats) -> bool:
         """Tell whether a wave runs all along the joint, in one phase.
 
         Its size found in all parts of the joint's range but one must explain what it
         explains in that one: a step or a spot that no map resolves is a sum of waves
         too, but in its own place only.
+
+        Args:
+            own: Its columns, see `seen`.
         """
-        own, rest = self._beside(effect)
+        rest = self.whole.rest - self.basis @ (self.basis.T @ self.whole.rest)
         angle = self.whole.at.states.q[:, self.joint - 1]
         place = np.argsort(np.argsort(angle)) * STRETCHES // len(angle)
         which = np.repeat(place, 3) == np.arange(STRETCHES)[:, None]
@@ -198,29 +335,16 @@ class Pursuit:
         every = whole @ np.linalg.solve(gram.sum(axis=0), whole)
         return bool(gain > HELD * every)
 
-    def _beside(self, effect: Effect) -> tuple[Floats, Floats]:
-        """Filter a wave's columns and the rows by the fit and by waves before it.
-
-        Returns:
-            (3 n, 2) and (3 n,).
-        """
-        assert isinstance(effect, Transmission)
-        before = tuple((self.joint, k) for k in self.taken)
-        waves = Transmission((*before, *effect.waves)).columns(self.whole.at)
-        seen = self.whole.filter(self.whole.fit.whiten(waves))
-        basis, _ = np.linalg.qr(seen[:, :-2])
-        own, rest = seen[:, -2:], self.whole.rest
-        return own - basis @ (basis.T @ own), rest - basis @ (basis.T @ rest)
-
-    def best(self, orders: Floats) -> Score | None:
-        """Find the best wave of some orders, refined, and the evidence of a wave.
+    def best(self) -> Score | None:
+        """Find the best wave of the orders tried, refined, and the evidence of a wave.
 
         None where the evidence has no peak: it grows towards orders that nobody tried.
         """
-        free = orders[self._far(orders)]
-        gain = self.gains(free)
+        orders = self.tried.orders
+        far = self._far(orders)
+        gain = self._gains(self.tried[far])
         inner = _inner(gain)
-        free, gain = free[inner], gain[inner]
+        free, gain = orders[far][inner], gain[inner]
         if len(free) == 0:
             return None
         share = -float(np.log(len(orders)))
@@ -246,94 +370,112 @@ class Pursuit:
         plain = float(self.gains(np.array([whole]))[0])
         return (whole, plain) if plain > top - HARDLY else (order, top)
 
-    def _far(self, orders: Floats) -> Floats:
+    def _far(self, orders: Floats) -> Bools:
         """Mark orders that are told from those taken before."""
         apart = np.abs(orders[:, None] - np.array(self.taken)[None, :])
         step = float(orders[1] - orders[0]) / FINER
         return np.asarray((apart > 0.5 * step).all(axis=1))
 
     def gains(self, orders: Floats) -> Floats:
-        """Return what each order gains over the map alone [nats], (m,)."""
-        waves = self._waves(orders)
-        size, turn, along = self._map
-        shared = (turn.T @ self._gram(self.columns, waves)).reshape(len(turn), -1, 2)
-        blocks = self._blocks(waves)
-        rest = (waves.T @ self.view.rows)[:, 0].reshape(-1, 2)
-        best, alone = np.full(len(orders), -np.inf), -np.inf
-        for signal in (0.0, *SIGNALS):
-            s2 = signal / max(float(size.max(initial=0.0)), 1e-300)
-            shrunk = s2 / (1.0 + s2 * size)
-            left = self.square - float(shrunk @ along**2)
-            cost = 0.5 * float(np.log1p(s2 * size).sum())
-            here = -0.5 * self.projection.rows * np.log(left / self.square) - cost
-            if here < alone:  # a larger map beside a wave is a finer map, no wave
-                break
-            alone, weighed = here, shared * shrunk[:, None, None]
-            gram = blocks - np.einsum("kmi,kmj->mij", shared, weighed)
-            moment = rest - np.einsum("kmi,k->mi", weighed, along)
-            np.maximum(best, here + self._evidence(gram, moment, left), out=best)
-        return np.asarray(best - alone)
+        """Return what each order gains over the map alone [nats], (k,)."""
+        return self._gains(self.along.sums(orders))
 
-    @cached_property
-    def _map(self) -> tuple[Floats, Floats, Floats]:
-        """Turn the map's columns so that their sums are apart: sizes, turn, moments."""
-        size, turn = np.linalg.eigh(self._gram(self.columns, self.columns))
-        along = turn.T @ (self.columns.T @ self.view.rows)[:, 0]
-        return np.maximum(size, 0.0), turn, along
-
-    def _evidence(self, gram: Floats, moment: Floats, square: float) -> Floats:
-        """Compute the evidence of waves from their sums, (m, 2, 2) and (m, 2)."""
-        reduced = _reduced(gram, moment)
-        rows = self.projection.rows
-        return log_evidence(reduced, np.array([square]), rows)[:, 0]
+    def _gains(self, waves: WaveSums) -> Floats:
+        """Return the same, their products known: all scales of the map at once."""
+        size, turn = np.linalg.eigh(self.gram)
+        size, moment = np.maximum(size, 0.0), turn.T @ self.moment
+        s2 = np.array([0.0, *SIGNALS]) / max(float(size.max(initial=0.0)), 1e-300)
+        shrunk = s2[:, None] / (1.0 + np.outer(s2, size))
+        left = self.square - shrunk @ moment**2
+        cost = 0.5 * np.log1p(np.outer(s2, size)).sum(axis=1)
+        alone = -0.5 * self.whole.rows * np.log(left / self.square) - cost
+        # A larger map beside a wave is a finer map, no wave.
+        falls = np.flatnonzero(np.diff(alone) < 0)
+        some = slice(int(falls[0]) + 1 if len(falls) else len(s2))
+        shrunk, left, alone = shrunk[some], left[some], alone[some]
+        curves = np.tensordot(turn.T, waves.curves, 1)
+        squares = [curves[:, :, a] * curves[:, :, b] for a, b in PAIRS]
+        both = zip(waves.own, squares, strict=True)
+        own: Floats = np.stack([x - shrunk @ y for x, y in both])
+        rest = waves.rest - np.tensordot(shrunk * moment, curves, 1)
+        blocks = _reduced(own.reshape(3, -1), rest.reshape(-1, 2))
+        square = np.repeat(left, len(waves.orders))[:, None]
+        beside = log_evidence(blocks, square, self.whole.rows)
+        gain = alone[:, None] + beside.reshape(len(alone), -1) - alone[-1]
+        return np.asarray(gain.max(axis=0))
 
     def _p_value(self, order: float) -> float:
         """Test a wave alone against the rows without the map."""
-        waves = self._waves(np.array([order]))
-        rest = (waves.T @ self.view.rows)[:, 0].reshape(-1, 2)
-        reduced = _reduced(self._blocks(waves), rest)
-        return float(score_p_value(reduced, self.square, self.projection.rows)[0])
+        wave = self.along.sums(np.array([order]))
+        blocks = _reduced(wave.own, wave.rest)
+        return float(score_p_value(blocks, self.square, self.whole.rows)[0])
 
-    def without(self, effect: Effect) -> Pursuit:
+    def without(self, order: float, own: Floats) -> Pursuit:
         """Take a wave out of the rows and of all columns, whatever its size.
 
         With u the wave's columns made orthonormal under the filter and v = F F u, what
         is left of the product of columns x and y is x . F F y - (v . x) (v . y).
+
+        Args:
+            order: Its order.
+            own: Its columns, see `seen`.
         """
-        assert isinstance(effect, Transmission)
-        orders = np.array([k for _, k in effect.waves])
-        waves = self._waves(orders)
-        root = np.linalg.cholesky(self._gram(waves, waves))
-        u = solve_triangular(root, waves.T, lower=True).T
-        v = u - self.view.taken @ (self.view.taken.T @ u)
-        along = u.T @ self.view.rows
-        view = replace(
-            self.view,
-            taken=np.concatenate([self.view.taken, v], axis=1),
-            rows=self.view.rows - v @ along,
+        waves = self.along.waves(np.array([order]))
+        once = self.along.filtered(waves)
+        root = np.linalg.cholesky(waves.T @ once)
+        u, v = (solve_triangular(root, x.T, lower=True).T for x in (waves, once))
+        curves, rest = self.along.curves.T @ u, self.along.rows @ u
+        along = replace(
+            self.along,
+            model=np.concatenate([self.along.model, v], axis=1),
+            curves=self.along.curves - v @ curves.T,
+            rows=self.along.rows - v @ rest,
         )
-        square = self.square - float((along**2).sum())
-        taken = (*self.taken, *map(float, orders))
-        return replace(self, view=view, square=square, taken=taken)
+        others = (v.T @ along.waves(self.tried.orders)).reshape(2, -1, 2)
+        basis = np.concatenate([self.basis, np.linalg.qr(own)[0]], axis=1)
+        return replace(
+            self, along=along, square=self.square - float(rest @ rest),
+            gram=self.gram - curves @ curves.T, moment=self.moment - curves @ rest,
+            tried=self.tried.without(curves, others, rest), basis=basis,
+            taken=(*self.taken, order),
+        )  # fmt: skip
 
-    def _waves(self, orders: Floats) -> Floats:
-        """Make whitened columns of sines and cosines, (n, 2 m)."""
-        angle = np.outer(self.projection.at.states.q[:, self.joint - 1], orders)
-        both = np.stack([np.sin(angle), np.cos(angle)], axis=2)
-        columns: Floats = both.reshape(len(angle), -1) * self.view.size[:, None]
-        return columns
 
-    def _gram(self, one: Floats, other: Floats) -> Floats:
-        """Sum products of filtered columns, (k, k')."""
-        taken = self.view.taken
-        return np.asarray(one.T @ other - (one.T @ taken) @ (taken.T @ other))
+def _orders_in(fit: Fit, joint: int) -> tuple[float, ...]:
+    """List the orders of the waves of a joint that a fit has."""
+    waves = [
+        wave
+        for effect in fit.combination.effects
+        if isinstance(effect, Transmission)
+        for wave in effect.waves
+    ]
+    return tuple({order for j, order in waves if j == joint})
 
-    def _blocks(self, waves: Floats) -> Floats:
-        """Sum products of the two columns of every wave, (m, 2, 2)."""
-        pairs = waves.reshape(len(waves), -1, 2)
-        taken = (self.view.taken.T @ waves).reshape(-1, pairs.shape[1], 2)
-        own = np.einsum("nmi,nmj->mij", pairs, pairs)
-        return np.asarray(own - np.einsum("nmi,nmj->mij", taken, taken))
+
+def _apart(whole: Projection, known: Ints) -> tuple[Floats, Floats]:
+    """Write the model without some parameters, and these, as mixtures of its U.
+
+    Returns:
+        M (k, l), so that U M is the U of the model without them, and B (k, c).
+    """
+    mixed = whole.root[:, None] * whole.axes.T
+    out = np.zeros(mixed.shape[1], dtype=bool)
+    out[known] = True
+    others = whole.axes[~out]
+    size, turn = np.linalg.eigh((others * (whole.root**2 - 1.0)) @ others.T)
+    told = size > ROUNDED * len(size) * float(size.max(initial=0.0))
+    M: Floats = mixed[:, ~out] @ (turn[:, told] / np.sqrt(1.0 + size[told]))
+    return M, mixed[:, out]
+
+
+def _along(whole: Projection, axis: Floats, joint: int, target: Floats) -> Along:
+    """See the rows and U of a whole fit along an axis, neither filtered."""
+    by_row = whole.taken.reshape(len(axis), 3, -1)
+    model = (axis[:, None] @ by_row)[:, 0]
+    rows = np.einsum("nk,nk->n", axis, target.reshape(-1, 3))
+    angle = whole.at.states.q[:, joint - 1]
+    square = np.einsum("nk,nk->n", axis, axis)
+    return Along(angle, square, model, model[:, :0], rows)
 
 
 def _inner(gain: Floats) -> slice:
@@ -348,8 +490,13 @@ def _inner(gain: Floats) -> slice:
     return slice(int(rises[0]), int(falls[-1]) + 2)
 
 
-def _reduced(gram: Floats, moment: Floats) -> ReducedCandidates:
-    """Reduce waves to what their evidence needs."""
-    size, turn = np.linalg.eigh(gram)
-    along = np.einsum("mij,mi->mj", turn, moment)
+def _reduced(own: Floats, rest: Floats) -> ReducedCandidates:
+    """Reduce waves, own (3, k) and rest (k, 2), to what their evidence needs."""
+    middle, half = (own[0] + own[2]) / 2.0, (own[0] - own[2]) / 2.0
+    apart, turn = np.hypot(half, own[1]), np.arctan2(own[1], half) / 2.0
+    size = np.stack([middle + apart, middle - apart], axis=1)
+    cos, sin = np.cos(turn), np.sin(turn)
+    along = np.stack(
+        [cos * rest[:, 0] + sin * rest[:, 1], cos * rest[:, 1] - sin * rest[:, 0]], 1
+    )
     return ReducedCandidates((), np.maximum(size, 0.0), along[:, :, None])

@@ -11,7 +11,13 @@ from postproc.calibration.diagnosis import score, waves
 from postproc.calibration.diagnosis.library import Library, Projection
 from postproc.calibration.diagnosis.score import Null
 from postproc.calibration.diagnosis.search import Search
-from postproc.calibration.diagnosis.waves import Pursuit, fine_parameters, name_waves
+from postproc.calibration.diagnosis.waves import (
+    GATHERED,
+    Along,
+    Pursuit,
+    fine_parameters,
+    name_waves,
+)
 from postproc.calibration.regression import Fit, fit_effects
 from postproc.model.effects import BASE_EFFECTS, propose
 from postproc.model.effects.transmission import Transmission
@@ -91,20 +97,21 @@ def test_gain_is_the_ratio_of_marginal_likelihoods(
         monkeypatch.setattr(module, "SIGNALS", SIGNALS)
     fit = mapped(74, ORDERS, 60)
     known = fine_parameters(fit, JOINT)
-    pursuit, order = Pursuit.of(Projection.of(fit), JOINT, known), 23.0
-    flat = np.zeros((len(pursuit.projection.rest), 0))
+    projection, order = Projection.leaving(fit, known), 23.0
+    pursuit = Pursuit.of(Projection.of(fit), JOINT, known, np.arange(3.0, 30.0))
+    flat = np.zeros((len(projection.rest), 0))
     if before:
-        pursuit = pursuit.without(Transmission(((JOINT, before[0]),)))
-        flat = filtered(fit, pursuit.projection, before[0])
+        pursuit = pursuit.without(before[0], pursuit.seen(before[0]))
+        flat = filtered(fit, projection, before[0])
     at = fit.combination.at(fit.batch, fit.values)
     columns = fit.combination.columns(at)[:, :, known] * fit.prior_std[known]
-    M = pursuit.projection.filter(fit.whiten(columns))
-    W = filtered(fit, pursuit.projection, order)
-    z = pursuit.projection.rest
+    M = projection.filter(fit.whiten(columns))
+    W = filtered(fit, projection, order)
+    z = projection.rest
     if before:
         basis, _ = np.linalg.qr(flat)
         M, W, z = (x - basis @ (basis.T @ x) for x in (M, W, z))
-    n = pursuit.projection.rows
+    n = projection.rows
     scales = [s / np.linalg.eigvalsh(M.T @ M).max() for s in (0.0, *SIGNALS)]
     alone = [log_likelihood([(M, s)], z, n) for s in scales]
     both = []
@@ -130,3 +137,18 @@ def log_likelihood(
     inside = np.eye(len(z)) + sum(s * x @ x.T for x, s in parts)
     _, size = np.linalg.slogdet(inside)
     return -0.5 * n * float(np.log(z @ np.linalg.solve(inside, z))) - 0.5 * size
+
+
+def test_rows_gathered_at_few_angles_have_the_same_sums() -> None:
+    rng = np.random.default_rng(0)
+    n, orders = 4000, np.array([3.0, 29.5, 60.0])
+    along = Along(
+        rng.uniform(-1.0, 1.0, n), rng.uniform(0.5, 1.5, n),
+        rng.normal(size=(n, 5)), rng.normal(size=(n, 2)), rng.normal(size=n),
+    )  # fmt: skip
+    few = along.gathered(GATHERED / orders[-1])
+    assert len(few.angle) < n / 10
+    here, there = along.sums(orders), few.sums(orders)
+    for name in ("curves", "own", "rest"):
+        exact, found = getattr(here, name), getattr(there, name)
+        assert np.abs(found - exact).max() < 0.02 * np.abs(exact).max()
