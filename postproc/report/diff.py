@@ -14,7 +14,7 @@ from typing import NamedTuple, Self
 import numpy as np
 
 from postproc import _native
-from postproc.arrays import Bools, Floats, Interned, Ints
+from postproc.arrays import Bools, Floats, Indices, Interned, Ints
 from postproc.compensation.outcome import (
     LEFT_ALONE,
     LineOutcomes,
@@ -297,7 +297,7 @@ class TextLines(Sequence[bytes]):
     """
 
     data: bytes
-    first: Ints
+    first: Indices
 
     @classmethod
     def of(cls, data: bytes, skipped: int = 0) -> Self:
@@ -308,7 +308,8 @@ class TextLines(Sequence[bytes]):
         """
         starts = _native.line_starts(data)
         last = [len(data), len(data) + 1] if data[-1:] == b"\n" else [len(data) + 1]
-        return cls(data, np.append(starts, last)[skipped:])
+        ends = np.array(last, dtype=starts.dtype)
+        return cls(data, np.append(starts, ends)[skipped:])
 
     def part(self, begin: int, end: int) -> TextLines:
         """Return lines begin .. end - 1."""

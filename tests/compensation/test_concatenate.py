@@ -40,9 +40,10 @@ def told(visits: Visits, v: int, first: int) -> list[object]:
         told.append(found.tolist() if isinstance(found, np.ndarray) else found)
     for column in ("literal", "follows"):
         row, all_ = getattr(visits, column)[v], visits.literals
+        places = all_.places[row : row + 1]
         told.append(row >= 0 and [
-            visits.files[all_.file[row]], int(all_.line[row]), all_.start[row].tolist(),
-            all_.end[row].tolist(), bool(all_.joints[row]), all_.name[row],
+            visits.files[all_.file[row]], int(all_.line[row]), places.start.tolist(),
+            places.end.tolist(), bool(all_.joints[row]), all_.name[row],
             bool(all_.shared[row]), bool(all_.taught[row]), all_.pinned[row],
         ])  # fmt: skip
     pred = visits.predecessors(v)
