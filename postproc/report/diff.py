@@ -14,7 +14,7 @@ from typing import NamedTuple, Self
 import numpy as np
 
 from postproc import _native
-from postproc.arrays import Bools, Floats, Indices, Interned, Ints
+from postproc.arrays import Bools, Floats, Interned, Ints
 from postproc.compensation.outcome import (
     LEFT_ALONE,
     LineOutcomes,
@@ -297,7 +297,7 @@ class TextLines(Sequence[bytes]):
     """
 
     data: bytes
-    first: Indices
+    first: Ints
 
     @classmethod
     def of(cls, data: bytes, skipped: int = 0) -> Self:
@@ -306,10 +306,9 @@ class TextLines(Sequence[bytes]):
         >>> list(TextLines.of(b"a\n\nb\n", 1))
         [b'', b'b', b'']
         """
-        starts = _native.line_starts(data)
+        starts = _native.line_starts(data).astype(np.int64)
         last = [len(data), len(data) + 1] if data[-1:] == b"\n" else [len(data) + 1]
-        ends = np.array(last, dtype=starts.dtype)
-        return cls(data, np.append(starts, ends)[skipped:])
+        return cls(data, np.append(starts, last)[skipped:])
 
     def part(self, begin: int, end: int) -> TextLines:
         """Return lines begin .. end - 1."""
@@ -317,7 +316,8 @@ class TextLines(Sequence[bytes]):
 
     def shapes(self) -> list[str]:
         """Return the masks of all lines, with their names."""
-        found = scan_lines(b"\n".join([*self, b""]), self.first[:-1] - self.first[0])
+        starts = (self.first[:-1] - self.first[0]).astype(np.int32)
+        found = scan_lines(b"\n".join([*self, b""]), starts)
         masks = [mask.decode("latin-1") for mask in found.masks]
         ends = found.name_first.tolist()
         names = [found.names[k] for k in found.name.tolist()]
