@@ -21,10 +21,15 @@ from postproc.compensation.path_work import PathWork
 from postproc.robot.pose import MM
 
 
-def joined(work: PathWork) -> dict[int, tuple[float, ...]]:
-    """Return the points of arcs with flat pieces, one less where one can go."""
+def joined(work: PathWork, flat: Mapping[Cut, float]) -> dict[int, tuple[float, ...]]:
+    """Return the points of arcs with flat pieces, one less where one can go.
+
+    Args:
+        work: The points.
+        flat: Those pieces, see `bending`.
+    """
     found = {}
-    for (v, end), bent in bending(work).items():
+    for (v, end), bent in flat.items():
         if v in found or v not in work.points or may_be_chord(work, (v, end), bent):
             continue
         known = work.points[v]

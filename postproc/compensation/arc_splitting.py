@@ -303,6 +303,14 @@ def is_arc(visits: Visits, visit: int) -> bool:
     return bool(visits.motion[visit] == Motion.CIRCULAR)
 
 
+def halves(visits: Visits, visit: int) -> tuple[int, ...]:
+    """Return the visits that a move leads to: of an arc, which is one move, both."""
+    if not is_arc(visits, visit):
+        return (visit,)
+    via = point_on_way(visits, visit)
+    return via, via + 1
+
+
 def point_on_way(visits: Visits, visit: int) -> int:
     """Return the visit of the point on the way of the arc that a visit is of."""
     return visit if visits.via[visit] else visit - 1

@@ -6,13 +6,12 @@ where two joints turn back a next one can make the move worse.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
-
-import numpy as np
+from math import hypot
 
 from postproc.compensation.arc_cuts import bending
-from postproc.compensation.arc_splitting import Cut, is_arc, point_on_way
+from postproc.compensation.arc_splitting import Cut, halves
 from postproc.compensation.path_judging import sizes_of
 from postproc.compensation.path_work import PathWork
 
@@ -40,54 +39,51 @@ class BestPoints:
     """What did best for every move that may be split, so far."""
 
     def __init__(self, work: PathWork) -> None:
-        """Begin with the program as it is."""
+        """Begin with nothing."""
         self._best: dict[int, _Tried] = {}
         self._work = work
-        self.note()
 
-    def note(self) -> None:
-        """Look at how the moves do with the points that they have now."""
-        flat = {self._move(v) for v, _ in bending(self._work)}
+    def note(self, flat: Collection[Cut]) -> None:
+        """Look at how the moves do with the points that they have now.
+
+        Args:
+            flat: Pieces of arcs that are too flat, see `bending`.
+        """
+        moves = self._moves(flat)
         for v, tried in self._now().items():
             known = self._best.setdefault(v, tried)
-            if v not in flat and tried.size <= known.size + BETTER:  # the later one
+            if v not in moves and tried.size <= known.size + BETTER:  # the later one
                 self._best[v] = replace(tried, size=min(tried.size, known.size))
 
     def restore(self) -> None:
         """Give moves back the points that did better than those they have."""
-        work = self._work
-        flat = {self._move(v) for v, _ in bending(work)}
-        worse = {
-            v
-            for v, tried in self._now().items()
-            if v in flat or tried.size > self._best[v].size + BETTER
-        }
-        if not worse:
-            return
-        for v in [v for v in work.points if self._move(v) in worse]:
-            del work.points[v]
-        work.stops -= {v for v in work.stops if self._move(v) in worse}
-        work.chords -= {cut for cut in work.chords if self._move(cut[0]) in worse}
+        work, now = self._work, self._now()
+        flat = self._moves(bending(work))
+        worse = [v for v in now if v in flat or self._was_better(v, now[v])]
         for v in worse:
-            work.points |= self._best[v].points
-            work.stops |= self._best[v].stops
-            work.chords |= self._best[v].chords
-        work.make()
+            has, best = now[v], self._best[v]
+            others = {k: s for k, s in work.points.items() if k not in has.points}
+            work.points = {**others, **best.points}
+            work.stops = work.stops - has.stops | best.stops
+            work.chords = work.chords - has.chords | best.chords
+        if worse:
+            work.make()
 
-    def _move(self, v: int) -> int:
-        """Return the visit that stands for a move: of an arc the point on its way."""
+    def _was_better(self, v: int, tried: _Tried) -> bool:
+        return tried.size > self._best[v].size + BETTER
+
+    def _moves(self, flat: Collection[Cut]) -> set[int]:
+        """Return the moves that have flat pieces, by their first visits."""
         visits = self._work.source.reading.visits
-        return point_on_way(visits, v) if is_arc(visits, v) else v
+        return {halves(visits, v)[0] for v, _ in flat}
 
     def _now(self) -> dict[int, _Tried]:
-        """Say what the moves have now, and how they do with it."""
+        """Say what the moves have now, by their first visits, and how they do."""
         work, sizes = self._work, sizes_of(self._work.paths)
         found = {}
-        for v in {self._move(v) for v in work.open}:
-            visits = work.source.reading.visits
-            own = (v, v + 1) if is_arc(visits, v) else (v,)
-            found[v] = _Tried(
-                float(np.hypot.reduce([sizes.get(row, 0.0) for row in own])),
+        for own in {halves(work.source.reading.visits, v) for v in work.open}:
+            found[own[0]] = _Tried(
+                hypot(*(sizes.get(row, 0.0) for row in own)),
                 {row: work.points[row] for row in own if row in work.points},
                 frozenset(work.stops.intersection(own)),
                 frozenset(cut for cut in work.chords if cut[0] in own),

@@ -77,7 +77,9 @@ def correct_paths(draft: Draft, setting: Setting, write: Write) -> Draft:
 def _improve(work: PathWork, best: BestPoints) -> None:
     """Put points on the ways until none is left too far, or none helps."""
     for _ in range(ROUNDS):
-        new, flat = dict(_new_points(work)), bending(work)
+        flat = bending(work)
+        best.note(flat)
+        new = dict(_new_points(work))
         chords = new_chords(work, flat)
         more = halved(work, flat, {*new, *(v for v, _ in chords)})
         if not new and not chords and not more:
@@ -87,14 +89,14 @@ def _improve(work: PathWork, best: BestPoints) -> None:
         work.chords |= chords
         cut_at_vias(work)
         work.make()
-        best.note()
 
 
 def _bend(work: PathWork, best: BestPoints) -> None:
     """Let pieces of arcs that are too flat go on to the next cut."""
     for _ in range(ROUNDS):
-        changed = False
-        for v, points in joined(work).items():
+        flat, changed = bending(work), False
+        best.note(flat)
+        for v, points in joined(work, flat).items():
             changed |= points != work.points[v]
             if points[:1] != work.points[v][:1]:
                 work.stops.discard(v)  # what comes first now is passed
@@ -103,7 +105,6 @@ def _bend(work: PathWork, best: BestPoints) -> None:
         if not changed:
             return
         work.make()
-        best.note()
 
 
 def _new_points(work: PathWork) -> Iterator[tuple[int, list[float]]]:
@@ -188,20 +189,16 @@ def _on_path(work: PathWork, k: int, v: int) -> list[float]:
 def _result(work: PathWork) -> Draft:
     """Tell of the program as of the source's visits."""
     told = work.latest.in_time or work.first
-    budget = "no more points may be put on ways (--max-inserted)"
+    why = "its pieces would be too short, or the path no better"
     if work.room <= 0:
-        for k in work.too_far.tolist():
-            work.left.setdefault(int(work.paths.visit[k]), budget)
-    far = set(work.paths.visit[work.too_far].tolist())
-    for k in work.too_far.tolist():
-        closer = "its pieces would be too short, or the path no better"
-        work.left.setdefault(int(work.paths.visit[k]), closer)
+        why = "no more points may be put on ways (--max-inserted)"
+    too_far = set(work.paths.visit[work.too_far].tolist()) - work.points.keys()
     inserted = Insertions(
         work.own,
         work.tolerance,
         work.points,
         work.stops & work.points.keys(),
-        {v: why for v, why in work.left.items() if v in far and v not in work.points},
+        {v: work.left.get(v, why) for v in sorted(too_far)},
         sizes_of(work.first.paths),
         {v: far for v, (far, _) in largest_otherwise(told.paths).items()}
         if work.latest is not work.source

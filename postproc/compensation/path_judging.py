@@ -10,6 +10,7 @@ from postproc.arrays import Bools, Floats, any_in_rows
 from postproc.compensation.approach_anew import bad_approaches
 from postproc.compensation.arc_cuts import bending, may_be_chord
 from postproc.compensation.arc_splitting import (
+    halves,
     is_arc,
     largest_zones,
     passed,
@@ -87,8 +88,8 @@ def _bad(work: PathWork) -> Iterator[tuple[int, tuple[str, float | None]]]:
     with_points = _worst(work, told)
     other = largest_otherwise(told.paths)
     without = _of_moves(work, sizes_of(first))
-    far = {v: max(far, without[v]) for v, (far, _) in largest_otherwise(first).items()}
-    usual = _of_moves(work, far)
+    otherwise = largest_otherwise(first).items()
+    usual = _of_moves(work, {v: max(far, without[v]) for v, (far, _) in otherwise})
     corner = _corners_moved(work, told)
     flat = bending(work)
     bent = {cut[0] for cut, far in flat.items() if not may_be_chord(work, cut, far)}
@@ -112,12 +113,8 @@ def _bad(work: PathWork) -> Iterator[tuple[int, tuple[str, float | None]]]:
 
 def _of_moves(work: PathWork, far: dict[int, float]) -> dict[int, float]:
     """Say of both halves of an arc, which is one move, what the farther one is off."""
-    visits, found = work.source.reading.visits, dict(far)
-    for v in far:
-        if is_arc(visits, v):
-            via = point_on_way(visits, v)
-            found[v] = max(far.get(via, 0.0), far.get(via + 1, 0.0))
-    return found
+    visits = work.source.reading.visits
+    return {v: max(far.get(row, 0.0) for row in halves(visits, v)) for v in far}
 
 
 def _refusal(work: PathWork, v: int) -> str:

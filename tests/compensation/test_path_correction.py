@@ -14,6 +14,7 @@ import pytest
 from postproc.arrays import Floats
 from postproc.cli.simulate import _read, setup_of
 from postproc.compensation import path_correction, split_moves
+from postproc.compensation.arc_cuts import bending
 from postproc.compensation.arc_splitting import is_arc
 from postproc.compensation.best_points import BestPoints
 from postproc.compensation.path_correction import TAKEN
@@ -137,7 +138,7 @@ def test_points_that_did_better_are_put_back(
         for v in [v for v in work.points if not is_arc(visits, v)]:
             work.points[v] = (0.5,)
         work.make()
-        best.note()
+        best.note(bending(work))
 
     monkeypatch.setattr(path_correction, "_bend", worse)
     found = compensated(shop, "job.pdl", "put_back", "--path-mm", TOLERANCE)
