@@ -255,9 +255,9 @@ def aligned(
 # compare.rs: two texts line by line (`postproc.report.diff`)
 def compare_lines(
     before: bytes,
-    before_first: Ints,
+    before_first: Indices,
     after: bytes,
-    after_first: Ints,
+    after_first: Indices,
     named: bool = False,
 ) -> tuple[tuple[Ints, Ints, Ints, Bools, Bools], tuple[Floats, Floats]]: ...
 

@@ -458,7 +458,7 @@ def test_lines_of_two_texts():
         (b"b 1 -- 2", b"b 3 -- 4"), (b"a := 7", b"b := 7"), (b"a := 5", b"a := 6"),
     ]  # fmt: skip
     pairs = [b"\n".join(text) for text in zip(*texts, strict=True)]
-    first = [np.append(0, np.cumsum([len(t) + 1 for t in text]))
+    first = [np.append(0, np.cumsum([len(t) + 1 for t in text])).astype(np.int32)
              for text in zip(*texts, strict=True)]  # fmt: skip
     rows, numbers = _native.compare_lines(pairs[0], first[0], pairs[1], first[1])
     row, begins, place, alike, braced = map(np.ndarray.tolist, rows)
@@ -471,14 +471,18 @@ def test_lines_of_two_texts():
     assert old == [1, 1, 2, 0, 2, 5] and new == [2, 1, 3, 9, 3, 6]
 
 
+def _starts(*first):
+    return np.array(first, dtype=np.int32)
+
+
 def test_lines_that_are_not_there():
     for first in ([0, 9], [2, 1], [-1, 2], [0, 0]):
         with pytest.raises(IndexError, match="lines that are not there"):
-            _native.compare_lines(b"abc", np.array(first), b"abc", np.array([0, 4]))
+            _native.compare_lines(b"abc", _starts(*first), b"abc", _starts(0, 4))
     with pytest.raises(ValueError, match="columns of"):
-        _native.compare_lines(b"abc", np.array([0, 4]), b"abc", np.array([0]))
-    none = np.array([3])
-    assert len(_native.compare_lines(b"abc", none, b"", np.array([0]))[0][0]) == 0
+        _native.compare_lines(b"abc", _starts(0, 4), b"abc", _starts(0))
+    none = _starts(3)
+    assert len(_native.compare_lines(b"abc", none, b"", _starts(0))[0][0]) == 0
 
 
 def test_statements_of_rapid(random):

@@ -21,13 +21,13 @@ const LEAST: usize = 2000;
 /// first[k + 1].
 struct Lines<'a> {
     data: &'a [u8],
-    first: &'a [i64],
+    first: &'a [i32],
 }
 
 impl<'a> Lines<'a> {
-    fn new(data: &'a [u8], first: &'a [i64]) -> PyResult<Self> {
+    fn new(data: &'a [u8], first: &'a [i32]) -> PyResult<Self> {
         let fits = first.windows(2).all(|two| 0 <= two[0] && two[0] < two[1])
-            && first.last().is_none_or(|end| *end <= data.len() as i64 + 1);
+            && first.last().is_none_or(|end| i64::from(*end) <= data.len() as i64 + 1);
         match fits {
             true => Ok(Lines { data, first }),
             false => Err(PyIndexError::new_err("lines that are not there")),
@@ -159,9 +159,9 @@ type Column<'py, T> = Bound<'py, PyArray1<T>>;
 pub fn compare_lines<'py>(
     py: Python<'py>,
     before: &Bound<'py, PyBytes>,
-    before_first: PyReadonlyArray1<'py, i64>,
+    before_first: PyReadonlyArray1<'py, i32>,
     after: &Bound<'py, PyBytes>,
-    after_first: PyReadonlyArray1<'py, i64>,
+    after_first: PyReadonlyArray1<'py, i32>,
     named: bool,
 ) -> PyResult<(
     (Column<'py, i64>, Column<'py, i64>, Column<'py, i64>, Column<'py, bool>, Column<'py, bool>),

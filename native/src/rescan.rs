@@ -126,7 +126,8 @@ type Column<'py, T> = Bound<'py, PyArray1<T>>;
 ///     count: How many numbers the other one holds, (m).
 ///
 /// Returns: which line is new (-1: none); where numbers start and end, what they are
-/// worth, and whether they are written otherwise, (m,). None where a line says something else, or holds a string that does not end.
+/// worth, and whether they are written otherwise, (m,). None where a line says
+/// something else, or holds a string that does not end.
 #[pyfunction]
 #[allow(clippy::type_complexity)]
 pub fn rescan_lines<'py>(

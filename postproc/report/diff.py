@@ -14,7 +14,7 @@ from typing import NamedTuple, Self
 import numpy as np
 
 from postproc import _native
-from postproc.arrays import Bools, Floats, Interned, Ints
+from postproc.arrays import Bools, Floats, Indices, Interned, Ints
 from postproc.compensation.outcome import (
     LEFT_ALONE,
     LineOutcomes,
@@ -297,7 +297,7 @@ class TextLines(Sequence[bytes]):
     """
 
     data: bytes
-    first: Ints
+    first: Indices
 
     @classmethod
     def of(cls, data: bytes, skipped: int = 0) -> Self:
@@ -306,9 +306,9 @@ class TextLines(Sequence[bytes]):
         >>> list(TextLines.of(b"a\n\nb\n", 1))
         [b'', b'b', b'']
         """
-        starts = _native.line_starts(data).astype(np.int64)
+        starts = _native.line_starts(data)
         last = [len(data), len(data) + 1] if data[-1:] == b"\n" else [len(data) + 1]
-        return cls(data, np.append(starts, last)[skipped:])
+        return cls(data, np.append(starts, np.array(last, np.int32))[skipped:])
 
     def part(self, begin: int, end: int) -> TextLines:
         """Return lines begin .. end - 1."""
@@ -316,8 +316,7 @@ class TextLines(Sequence[bytes]):
 
     def shapes(self) -> list[str]:
         """Return the masks of all lines, with their names."""
-        starts = (self.first[:-1] - self.first[0]).astype(np.int32)
-        found = scan_lines(b"\n".join([*self, b""]), starts)
+        found = scan_lines(b"\n".join([*self, b""]), self.first[:-1] - self.first[0])
         masks = [mask.decode("latin-1") for mask in found.masks]
         ends = found.name_first.tolist()
         names = [found.names[k] for k in found.name.tolist()]
