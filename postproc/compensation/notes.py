@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
-from postproc.arrays import Bools, Floats, Ints, in_chunks
+from postproc.arrays import Bools, Floats, Ints, any_in_rows, in_chunks
 from postproc.compensation.continuity import on_path
 from postproc.compensation.frames import taught_records
 from postproc.files import is_shared_list, is_variables, variables_of
@@ -252,8 +252,7 @@ def unsure_sides(
         std_error: Standard error of the correction, (n, 3) [m].
         advice: Says how to approach some visits.
     """
-    unsure = np.logical_or.reduce([np.abs(joint) < SURE for joint in side.T])
-    rows = np.flatnonzero(corrected & unsure)
+    rows = np.flatnonzero(corrected & any_in_rows((-SURE < side) & (side < SURE)))
     size = np.linalg.norm(std_error, axis=1) / MM
     cure = "start the approach farther away, or from the side it moves to"
     if len(rows) > SINGLY:

@@ -154,7 +154,8 @@ class NumberPlaces:
     @property
     def end(self) -> Ints:
         """Return where they end, (m, w), -1 where there is none."""
-        return np.where(self.length > 0, self.start + self.length, -1)
+        behind = self.first[:, None] + self.offset + self.length
+        return np.where(self.length > 0, behind, -1)
 
 
 @dataclass(frozen=True)
