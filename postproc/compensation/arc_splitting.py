@@ -84,8 +84,8 @@ class CutArc:
         cuts: Shares of either half, ascending; those of the first end with 1.
         via: The visit of the point on its way.
         chords: Which pieces are chords whatever they bend.
-        turns: What the tool turns by at the cuts in its own frame, (k, 3) [rad]; what
-            the source wrote stays.
+        turns: What the tool turns by at the cuts in its own frame, (k, 3) [rad]; at
+            the end of the arc it stays what the source wrote.
     """
 
     numbers: Floats
@@ -110,8 +110,8 @@ class CutArc:
         poses = visits.dialect.poses(visits.values[rows])
         halves = arcs(*(poses[k : k + 1] for k in range(3)))
         cuts = points.get(via, ()), points.get(via + 1, ())
-        none = np.zeros((0, 3))
-        turned = turns.get(via, none), turns.get(via + 1, none)
+        still = [np.zeros((len(own), 3)) for own in cuts]
+        turned = turns.get(via, still[0]), turns.get(via + 1, still[1])
         return cls(visits.values[rows[0]], visits, halves, cuts, via, chords, turned)
 
     def pieces(self) -> tuple[list[ArcPiece], Floats]:
@@ -119,11 +119,12 @@ class CutArc:
         found = []
         for half, cuts in enumerate(self.cuts):
             for begin, end in pairwise([0.0, *cuts]):
-                whole = half == 0 and end == 1.0
-                place = None if whole else self._at(half, end)
+                at_via = half == 0 and end == 1.0
+                kept = at_via and not self._turn(half, end).any()
+                place = None if kept else self._at(half, end)
                 chord = self._is_chord(half, begin, end)
                 via = None if chord else self._at(half, (begin + end) / 2)
-                found.append(ArcPiece(place, via))
+                found.append(ArcPiece(place, via, at_via))
         return found, self._at(1, (1.0 + max(self.cuts[1], default=0.0)) / 2)
 
     def _is_chord(self, half: int, begin: float, end: float) -> bool:
@@ -150,12 +151,12 @@ class CutArc:
 
     def _turn(self, half: int, share: float) -> Floats:
         """Return what the tool turns by at a share of a half, (3,) [rad]."""
-        at = [0.0, *self.cuts[half], 1.0]
-        found = np.zeros((len(at), 3))
-        for k, turn in enumerate(self.turns[half]):
-            if at[k + 1] < 1.0:
-                found[k + 1] = turn
-        return np.array([np.interp(share, at, found[:, k]) for k in range(3)])
+        none, first = np.zeros((1, 3)), self.turns[0]
+        begin = first[-1:] if half and len(first) else none
+        at = np.append(np.append(0.0, self.cuts[half]), 1.0)
+        found = np.concatenate([begin, self.turns[half], none])
+        known = slice(len(at) - (half == 0))  # the first half ends with a cut
+        return np.array([np.interp(share, at[known], x[known]) for x in found.T])
 
 
 # What pieces of arcs bend, against what their corrections differ by.

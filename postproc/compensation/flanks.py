@@ -19,6 +19,7 @@ import numpy as np
 from postproc.arrays import Floats, Ints
 from postproc.compensation.measured_path import OnTheWay
 from postproc.compensation.path_accuracy import PredictedWays
+from postproc.model.model import CONFIRMED, NOT_SURE
 from postproc.robot.pose import lengths
 
 LEAST = 0.03  # [m] of the way on both sides that a step is looked for in
@@ -80,12 +81,12 @@ class JointInMotion:
     def verdict(self) -> str:
         """Say "confirmed", "refuted", "elsewhere" or "not sure"."""
         if self.steps < FEW or 2.0 * self.error > 1.0 - LIKE:
-            return "not sure"
+            return NOT_SURE
         if self.share + 2.0 * self.error < 1.0 - LIKE:
             return "refuted"
         if abs(self.share - 1.0) - 2.0 * self.error > LIKE:
             return "refuted"
-        return "confirmed" if abs(self.later) <= THERE else "elsewhere"
+        return CONFIRMED if abs(self.later) <= THERE else "elsewhere"
 
 
 def measured_steps(ways: PredictedWays, read: OnTheWay, scatter: float) -> FlankSteps:

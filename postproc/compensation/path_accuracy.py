@@ -17,7 +17,7 @@ import numpy as np
 from postproc.arrays import Bools, Floats, Ints, any_in_rows, spans
 from postproc.compensation.arc_splitting import NO_ARCS, WantedArcs
 from postproc.compensation.path_samples import PathSamples, measured_along, ways_of
-from postproc.model.model import Model
+from postproc.model.model import CONFIRMED, Model
 from postproc.motion.cycle import ProgramCycle
 from postproc.robot.cell import Cell
 from postproc.robot.direction import sides_along
@@ -70,6 +70,7 @@ class PathAccuracy:
         crossing: Where joints of the compensated program change their flanks, (s, 6).
         otherwise: Distance of the compensated program's path if such a joint had stayed
             on one of its flanks, (s,) [m]; empty where nobody asked.
+        doubtful: The same of those joints alone that no measured path confirms, (s,).
         q, side: Joint angles [rad] of the program as it was written, and where each
             joint lies in its play, (s, 6) each.
     """
@@ -82,6 +83,7 @@ class PathAccuracy:
     unknown: int
     crossing: Bools
     otherwise: Floats
+    doubtful: Floats
     q: Floats
     side: Floats
 
@@ -250,14 +252,17 @@ def predict_paths(
         _deviations(runs[0], error, -off, tangent, way),
         _deviations(runs[1], error, moved, tangent, way),
         int((cartesian & ~known).sum()), runs[1].changes(), np.empty(0),
-        pair[0].q, runs[0].side,
+        np.empty(0), pair[0].q, runs[0].side,
     )  # fmt: skip
     if owner is None or not len(rows):
         return found
     lead, _ = _groups(owner[rows])
     starts = pair[0].first[lead]
-    otherwise = _otherwise(runs[1], error, moved, tangent, starts)
-    return replace(found, otherwise=otherwise).joined(owner)
+    by_joint = _otherwise(runs[1], error, moved, tangent, starts)
+    told = model.in_motion
+    open_ = np.array([told.get(str(joint)) != CONFIRMED for joint in range(1, 7)])
+    far, doubtful = by_joint.max(axis=1), (by_joint * open_).max(axis=1)
+    return replace(found, otherwise=far, doubtful=doubtful).joined(owner)
 
 
 def _off_the_arcs(
@@ -304,7 +309,7 @@ def _largest_in(sizes: Floats, group: Ints, starts: Ints) -> Ints:
 def _otherwise(
     run: _Run, error: _Error, moved: Floats, tangent: Floats, starts: Ints
 ) -> Floats:
-    """Tell how far the path is if a joint that changes its flank did not, (s,) [m].
+    """Tell how far the path is if a joint that changes its flank did not, (s, 6) [m].
 
     Whatever moment it changes at, it stands on one of its two flanks before and behind.
 
@@ -320,7 +325,7 @@ def _otherwise(
         np.repeat(f.reduceat(sides, starts, axis=0), count, axis=0)
         for f, sides in ((np.minimum, run.least), (np.maximum, run.most))
     )
-    side, out = run.side, np.zeros(len(moved))
+    side, out = run.side, np.zeros((len(moved), 6))
     for joint in range(6):
         rows = np.flatnonzero(high[:, joint] - low[:, joint] > CHANGED)
         for flank in (low, high):
@@ -329,7 +334,7 @@ def _otherwise(
             off = moved[rows] + error(run, rows, other)
             along = np.einsum("si,si->s", off, tangent[rows])
             far = lengths(off - along[:, None] * tangent[rows])
-            out[rows] = np.maximum(out[rows], far)
+            out[rows, joint] = np.maximum(out[rows, joint], far)
     return out
 
 

@@ -86,9 +86,9 @@ def _bad(work: PathWork) -> Iterator[tuple[int, tuple[str, float | None]]]:
     if told is None:
         return
     with_points = _worst(work, told)
-    other = largest_otherwise(told.paths)
+    other = largest_in_doubt(told.paths)
     without = _of_moves(work, sizes_of(first))
-    otherwise = largest_otherwise(first).items()
+    otherwise = largest_in_doubt(first).items()
     usual = _of_moves(work, {v: max(far, without[v]) for v, (far, _) in otherwise})
     corner = _corners_moved(work, told)
     flat = bending(work)
@@ -202,8 +202,17 @@ def _largest_on(way: Floats, far: Floats) -> tuple[float, float]:
 
 def largest_otherwise(paths: PathAccuracy) -> dict[int, tuple[float, float]]:
     """How far each move is from its path if flanks are not as predicted, and where."""
+    return _largest(paths, paths.otherwise)
+
+
+def largest_in_doubt(paths: PathAccuracy) -> dict[int, tuple[float, float]]:
+    """The same, but for flanks that a measured path confirms."""
+    return _largest(paths, paths.doubtful)
+
+
+def _largest(paths: PathAccuracy, far: Floats) -> dict[int, tuple[float, float]]:
     rows = map(paths.samples, range(len(paths)))
     return {
-        v: _largest_on(paths.way[own], paths.otherwise[own])
+        v: _largest_on(paths.way[own], far[own])
         for v, own in zip(paths.visit.tolist(), rows, strict=True)
     }

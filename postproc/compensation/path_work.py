@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from postproc.arrays import Floats, Ints
-from postproc.compensation.arc_splitting import Cut, WantedArcs
+from postproc.compensation.arc_splitting import Cut, WantedArcs, halves
 from postproc.compensation.correction import BY_VISIT, EXPLAINING, Correction, correct
 from postproc.compensation.in_time import InTime, run_in_time
 from postproc.compensation.insertions import insert, lines_in_files
@@ -177,18 +177,27 @@ class PathWork:
         self.latest, self.own = Draft(reading, kept, output, told), own
 
     def _meant(self) -> dict[int, MeantSides]:
-        """Say from which sides points of lines are meant to be passed."""
+        """Say from which sides points on ways are meant to be passed.
+
+        An arc is one way, from where it begins to where it ends.
+        """
         paths, found = self.first.paths, {}
         visits = self.source.reading.visits
-        for v, shares in self.points.items():
-            rows = paths.samples(int(np.searchsorted(paths.visit, v)))
-            way, side = paths.way[rows], crossed_at_once(paths.side[rows])
-            at = np.searchsorted(way, np.array(shares) * way[-1]).clip(0, len(way) - 1)
-            tool = self.first.after.targets.tool[v, :3, :3]
-            turn = turned_by_drives(
-                self.setting, visits, v, tool, paths.q[rows][at], side[at] - side[0]
-            )
-            found[v] = MeantSides(side[at], turn)
+        for move in {halves(visits, v) for v in self.points}:
+            own = [paths.samples(int(np.searchsorted(paths.visit, v))) for v in move]
+            side = crossed_at_once(paths.side[own[0].start : own[-1].stop])
+            for v, rows in zip(move, own, strict=True):
+                if v not in self.points:
+                    continue
+                way = paths.way[rows]
+                at = np.searchsorted(way, np.array(self.points[v]) * way[-1])
+                at = at.clip(0, len(way) - 1) + rows.start
+                there = side[at - own[0].start]
+                tool = self.first.after.targets.tool[v, :3, :3]
+                turn = turned_by_drives(
+                    self.setting, visits, v, tool, paths.q[at], there - side[0]
+                )
+                found[v] = MeantSides(there, turn)
         return found
 
     def wanted_arcs(self) -> WantedArcs:

@@ -8,10 +8,10 @@ from postproc.compensation.path_work import PathWork
 from postproc.compensation.splitting import shortest_pieces
 from postproc.compensation.taking_up import TakeUp, take_up
 from postproc.language.languages import language_of
+from postproc.model.model import CONFIRMED, NOT_SURE
 
 UNSURE = 2e-5  # [m] a flank that is less sure is no reason to put points anywhere
 SMALL = 5e-5  # [m] a step of a joint that matters little if it is not as predicted
-CONFIRMED, NOT_SURE = "confirmed", "not sure"  # verdicts of a measured path
 
 
 def find_split(work: PathWork) -> None:

@@ -61,7 +61,7 @@ def unwritable(splitter: Splitter, visits: Visits, v: int, file: int, line: int)
     try:
         said = splitter.hinders(file, line)
         if not said and is_arc(visits, v):
-            pieces = [ArcPiece(None, widest[0]), ArcPiece(widest[0], widest[0])]
+            pieces = [ArcPiece(widest[0], widest[0], last) for last in (True, False)]
             splitter.arc(file, line, pieces, widest[0], config, False)
         elif not said:
             splitter.points(file, line, widest, config, False)

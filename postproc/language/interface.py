@@ -174,13 +174,14 @@ class ArcPiece:
     """A piece of an arc that is cut, from where the piece before it ends.
 
     Attributes:
-        end: Numbers of its end, (w,); None: the point on the way of the arc, as the
-            move has it.
+        end: Numbers of its end, (w,); None: as the move has them.
         via: Numbers of the point on its own way, (w,); None: it is a chord.
+        at_via: Whether it ends at the point on the way of the arc.
     """
 
     end: Floats | None
     via: Floats | None
+    at_via: bool = False
 
 
 class Splitter(ABC):

@@ -435,6 +435,7 @@ CHUNK = 5000  # states evaluated together: the columns stay in the cache
 COMPENSATED = ("arm", "state")
 READING = "reading_spread"  # statistic: see `Fit.reading_spread`
 UNSURE = "standard error above three times the survey's worst"
+CONFIRMED, NOT_SURE = "confirmed", "not sure"  # what a measured path says of a joint
 
 
 @dataclass(frozen=True, eq=False)

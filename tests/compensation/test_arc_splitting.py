@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -17,12 +18,13 @@ from postproc.compensation.arc_splitting import (
     hindrances_of_arcs,
     passed,
 )
-from postproc.compensation.insertions import insert
+from postproc.compensation.insertions import are_near, insert
 from postproc.compensation.program import Reading, plan_visits, read_program
+from postproc.compensation.taking_up import MeantSides
 from postproc.language.languages import language_of
 from postproc.motion.cycle import run
 from postproc.robot.cell import load_cell
-from postproc.robot.pose import MM
+from postproc.robot.pose import MM, rotation_vector
 from tests.written import program
 
 CELL = load_cell(Path(__file__).parents[2] / "programs/cell.toml")
@@ -119,6 +121,45 @@ def test_a_program_with_cut_arcs_is_the_same_without_points(
     ends = np.setdiff1d(np.flatnonzero(~w.via), own)
     assert len(ends) == len(first) + len(second) - 1
     assert off_the_circle(w.values[own[0] + 1 : own[END], :3]).max() < 2e-3
+
+
+def test_the_tool_is_turned_at_the_point_on_the_way_as_well() -> None:
+    reading = read()
+    splitter = language_of("job.pdl").splitter(reading.sources)
+    assert splitter is not None
+    points = {VIA: (0.4, 1.0), END: (0.5,)}
+    turned = np.array([[0.0, 0.0, 1e-4], [0.0, 0.0, 3e-4], [0.0, 0.0, 2e-4]])
+    meant = {
+        VIA: MeantSides(np.zeros((2, 6)), turned[:2]),
+        END: MeantSides(np.zeros((1, 6)), turned[2:]),
+    }
+    found, own = insert(reading, points, {}, splitter, CELL, meant=meant)
+    v, w = reading.visits, found.visits
+    poses = w.dialect.poses(w.values[own[0] + 1 : own[END] + 1])
+    turn = rotation_vector(poses[0, :3, :3].T @ poses[:, :3, :3])
+    base = rotation_vector(
+        v.dialect.poses(v.values[[0]])[0, :3, :3].T @ poses[:1, :3, :3]
+    )
+    np.testing.assert_allclose(
+        (base + turn)[:, 2],
+        [0.5e-4, 1e-4, 2e-4, 3e-4, 2.5e-4, 2e-4, 1e-4, 0.0],
+        atol=4e-6,
+    )
+    np.testing.assert_allclose(w.values[own][:, :3], v.values[:, :3], atol=6e-4)
+    np.testing.assert_array_equal(w.values[own[END]], v.values[END])
+
+
+def test_what_is_turned_too_far_or_moved_is_another_program() -> None:
+    visits = read().visits
+    for column, off, near in (
+        (0, 1e-3, True),
+        (0, 5e-3, False),
+        (5, 0.1, True),
+        (5, 0.2, False),
+    ):
+        values = np.array(visits.values)
+        values[VIA, column] += off
+        assert are_near(visits, replace(visits, values=values), np.array([VIA])) is near
 
 
 def test_arcs_that_are_cut_lead_where_they_led() -> None:

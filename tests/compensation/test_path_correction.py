@@ -13,7 +13,7 @@ import pytest
 
 from postproc.arrays import Floats
 from postproc.cli.simulate import _read, setup_of
-from postproc.compensation import path_correction, split_moves
+from postproc.compensation import path_correction, path_judging, split_moves
 from postproc.compensation.arc_cuts import bending
 from postproc.compensation.arc_splitting import is_arc
 from postproc.compensation.best_points import BestPoints
@@ -153,6 +153,21 @@ def test_flanks_that_a_measured_path_refuted_get_no_points(shop: Path) -> None:
     why = [p["not_split"] for p in paths if p["max_mm"]["after"] > TOLERANCE]
     assert sum("which in motion is refuted" in (text or "") for text in why) > 5
     assert sum(p["inserted"] for p in paths) < 5
+
+
+def test_flanks_that_a_measured_path_confirms_are_no_reason_for_doubt(
+    shop: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    known(shop, "confirmed")
+    monkeypatch.setattr(path_judging, "WORSE", -0.04 * MM)
+    doubted = []
+    for name in ("model", "confirmed"):
+        more = ("--path-mm", TOLERANCE, "--model", shop / f"{name}.json")
+        found = compensated(shop, "job.pdl", "doubted", *more)["path"]
+        why = ["if a flank is not" in (path["not_split"] or "") for path in found]
+        doubted.append(sum(why))
+        assert all(p["otherwise_mm"] > 0.0 for p in found if p["inserted"])
+    assert doubted[0] > 5 and doubted[1] == 0
 
 
 @pytest.mark.parametrize("small_mm", [0.0, 10.0])

@@ -121,8 +121,8 @@ class Pdl2Splitter(Splitter):
             way = f"LINEAR TO {end}"
             if piece.via is not None:
                 way = f"CIRCULAR TO {end} VIA {_place(piece.via, config)}"
-            at_via = piece.end is None
-            text += form.line(way, stop and number == 0, AT_VIA if at_via else "")
+            mark = AT_VIA if piece.at_via else ""
+            text += form.line(way, stop and number == 0, mark)
         start = form.start + old.start(1)
         new = _place(via, config)
         check_length(form.source, len(form.code) + len(new) - len(old[1]))

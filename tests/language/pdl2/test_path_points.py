@@ -113,7 +113,7 @@ def test_pieces_of_an_arc_stand_before_it_and_it_is_the_last() -> None:
     given = source(f"MOVE ARM[1] CIRCULAR TO p VIA {via} WITH $LIN_SPD = 0.1 -- seam")
     splitter = Pdl2().splitter([given])
     one, two = np.full(6, 1.0), np.full(6, 2.0)
-    pieces = [ArcPiece(one, None), ArcPiece(None, two), ArcPiece(two, one)]
+    pieces = [ArcPiece(one, None), ArcPiece(None, two, True), ArcPiece(two, one)]
     edits = splitter.arc(0, LINE, pieces, np.full(6, 3.0), "S W", False)
     lines = apply(given.data, edits).decode("latin-1").split("\r\n")
     first, second, third = (
@@ -140,7 +140,7 @@ def test_pieces_of_an_arc_stand_before_it_and_it_is_the_last() -> None:
 def test_an_arc_through_a_variable_is_not_cut() -> None:
     splitter = Pdl2().splitter([source("MOVE CIRCULAR TO p VIA r")])
     with pytest.raises(CloneError, match="on its way"):
-        splitter.arc(0, LINE, [ArcPiece(None, None)], np.zeros(6), "", False)
+        splitter.arc(0, LINE, [ArcPiece(None, None, True)], np.zeros(6), "", False)
 
 
 def test_rapid_has_no_points_yet() -> None:
