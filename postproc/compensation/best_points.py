@@ -41,6 +41,7 @@ class BestPoints:
     def __init__(self, work: PathWork) -> None:
         """Begin with nothing."""
         self._best: dict[int, _Tried] = {}
+        self._refused: dict[int, str] = {}
         self._work = work
 
     def note(self, flat: Collection[Cut]) -> None:
@@ -49,7 +50,9 @@ class BestPoints:
         Args:
             flat: Pieces of arcs that are too flat, see `bending`.
         """
-        moves = self._moves(flat)
+        moves, work = self._moves(flat), self._work
+        refused = {v: told for v in work.points if (told := work.refusal(v))}
+        self._refused = refused | self._refused  # what was said first
         for v, tried in self._now().items():
             known = self._best.setdefault(v, tried)
             if v not in moves and tried.size <= known.size + BETTER:  # the later one
@@ -66,6 +69,8 @@ class BestPoints:
             work.points = {**others, **best.points}
             work.stops = work.stops - has.stops | best.stops
             work.chords = work.chords - has.chords | best.chords
+        for v in self._refused.keys() - work.points.keys():
+            work.left[v] = self._refused[v]
         if worse:
             work.make()
 

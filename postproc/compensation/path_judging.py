@@ -17,7 +17,6 @@ from postproc.compensation.arc_splitting import (
     point_on_way,
 )
 from postproc.compensation.in_time import InTime
-from postproc.compensation.outcome import Status
 from postproc.compensation.path_accuracy import PathAccuracy
 from postproc.compensation.path_work import PathWork
 from postproc.robot.pose import lengths
@@ -98,9 +97,8 @@ def _bad(work: PathWork) -> Iterator[tuple[int, tuple[str, float | None]]]:
             yield v, ("nothing is predicted for it with points", None)
         elif v in bent:
             yield v, ("pieces of it would bend too little for arcs", None)
-        elif refused := _refusal(work, v):
-            why = f"points on its way cannot be corrected: {refused}"
-            yield v, (why, None)
+        elif refused := work.refusal(v):
+            yield v, (refused, None)
         elif with_points[v][0] > without[v]:
             why = "points on its way make it no better"
             yield v, (why, with_points[v][1])
@@ -115,14 +113,6 @@ def _of_moves(work: PathWork, far: dict[int, float]) -> dict[int, float]:
     """Say of both halves of an arc, which is one move, what the farther one is off."""
     visits = work.source.reading.visits
     return {v: max(far.get(row, 0.0) for row in halves(visits, v)) for v in far}
-
-
-def _refusal(work: PathWork, v: int) -> str:
-    """Say why points of a move cannot be corrected, "" where they can."""
-    decided = work.latest.kept.decisions
-    rows = np.arange(int(work.own[v - 1]) + 1, int(work.own[v]))
-    left = rows[decided.status[rows] != Status.SAFE]
-    return decided.reasons[decided.why[left[0]]] if len(left) else ""
 
 
 def _worst(work: PathWork, told: InTime) -> dict[int, tuple[float, float]]:

@@ -14,6 +14,7 @@ from postproc.compensation.correction import BY_VISIT, EXPLAINING, Correction, c
 from postproc.compensation.in_time import InTime, run_in_time
 from postproc.compensation.insertions import insert, lines_in_files
 from postproc.compensation.options import Setting
+from postproc.compensation.outcome import Status
 from postproc.compensation.path_accuracy import PathAccuracy
 from postproc.compensation.program import Reading
 from postproc.compensation.rewrite import Output
@@ -208,6 +209,16 @@ class PathWork:
     def cut_arcs(self) -> list[int]:
         """Return the points on the ways of the arcs that are cut."""
         return sorted(v for v in self.points if self.source.reading.visits.via[v])
+
+    def refusal(self, v: int) -> str:
+        """Say why points of a move cannot be corrected, "" where they can."""
+        decided = self.latest.kept.decisions
+        rows = np.arange(int(self.own[v - 1]) + 1 if v else 0, int(self.own[v]))
+        left = rows[decided.status[rows] != Status.SAFE]
+        if not len(left):
+            return ""
+        why = decided.reasons[decided.why[left[0]]]
+        return f"points on its way cannot be corrected: {why}"
 
     def ends(self, v: int) -> list[int]:
         """Return the visits with points at which the pieces of a move end, itself too.
