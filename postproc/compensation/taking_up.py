@@ -66,7 +66,12 @@ def crossed_at_once(side: Floats) -> Floats:
         ends = np.append(begins, len(sense))[1:]
         for begin, end in zip(begins.tolist(), ends.tolist(), strict=True):
             moves = sense[begin]
-            if moves and moves * side[end, joint] > WHOLE:
+            whole = moves * side[end, joint] > WHOLE
+            under_way = (
+                end == len(sense)
+                and moves * (side[end, joint] - side[begin, joint]) > CROSSES
+            )
+            if moves and (whole or under_way):
                 out[begin + 1 : end + 1, joint] = moves
     return out
 

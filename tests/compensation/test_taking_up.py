@@ -29,6 +29,8 @@ def crossing(*sides: float) -> Floats:
     [
         ((-1, -1, -0.5, 0.5, 1, 1), (-1, -1, 1, 1, 1, 1)),  # across, and stays
         ((-1, -0.5, 0.2, 0.2, 0.2), (-1, -0.5, 0.2, 0.2, 0.2)),  # never arrives
+        ((-1, -1, -0.5, 0.2), (-1, -1, 1, 1)),  # under way where the move ends
+        ((-1, -1, -0.9, -0.8), (-1, -1, -0.9, -0.8)),  # .. by little
         ((1, 0.4, -1, -0.2, 1), (1, -1, -1, 1, 1)),  # there and back
         ((-1, 0.0, -1, -1), (-1, 0.0, -1, -1)),  # turns back before it arrives
         ((1, 1, 1), (1, 1, 1)),
