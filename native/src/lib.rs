@@ -94,6 +94,7 @@ fn native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(weave::weave, module)?)?;
     module.add_function(wrap_pyfunction!(weave::is_woven, module)?)?;
     module.add_function(wrap_pyfunction!(weave::cut, module)?)?;
+    module.add_function(wrap_pyfunction!(words::holds, module)?)?;
     module.add_function(wrap_pyfunction!(words::lines_beginning, module)?)?;
     Ok(())
 }
