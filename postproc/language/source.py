@@ -228,7 +228,8 @@ def source_from_bytes(name: str, data: bytes) -> Source:
     Raises:
         ProgramError: The file is empty or binary.
     """
-    if not data.removeprefix(UTF8_MARK).strip():
+    said = data.removeprefix(UTF8_MARK)  # itself where there is no mark: no copy
+    if not said or said.isspace():
         raise ProgramError(name, "the file is empty", "Give a PDL2 program text.")
     nul = data.find(b"\0")
     if nul >= 0:

@@ -55,14 +55,14 @@ class Numbering:
 
     Attributes:
         sources: The files.
-        first: Index of each file's first number, (f,).
-        start, end: Byte offsets in its file, (m,).
+        first: Index of each file's first number, and how many there are, (f + 1,).
+        start, end: Byte offsets of every file's numbers.
     """
 
     sources: tuple[Source, ...]
     first: Indices
-    start: Indices
-    end: Indices
+    start: tuple[Indices, ...]
+    end: tuple[Indices, ...]
 
     @staticmethod
     def of(world: World) -> Numbering:
@@ -73,21 +73,39 @@ class Numbering:
         if world.variables is not None:
             v = world.variables
             numbered.append((v.source, v.start, v.end))
-        first = [world.slot_base[source.name] for source, _, _ in numbered]
-        return Numbering(
-            tuple(source for source, _, _ in numbered),
-            np.array(first, dtype=np.int64),
-            _together([start for _, start, _ in numbered]),
-            _together([end for _, _, end in numbered]),
+        sources, start, end = map(tuple, zip(*numbered, strict=True))
+        first = [world.slot_base[source.name] for source in sources]
+        first.append(sum(map(len, start)))
+        return Numbering(sources, np.array(first, dtype=np.int64), start, end)
+
+    def __len__(self) -> int:
+        """Return how many numbers there are."""
+        return int(self.first[-1])
+
+    def file(self, slots: Indices) -> Indices:
+        """Return the file of every number."""
+        found: Ints = np.searchsorted(self.first[1:], slots, side="right")
+        return found.astype(np.int32)
+
+    def places(self, slots: Indices, file: Indices) -> NumberPlaces:
+        """Tell where the numbers of targets stand.
+
+        Args:
+            slots: Six numbers of each target, (m, 6).
+            file: The file of each, (m,).
+        """
+        rows = max(len(slots), 1)
+        return NumberPlaces.joined(
+            in_chunks(lambda k: self._of(slots[k], file[k]), rows)
         )
 
-    def places(self, slots: Indices) -> NumberPlaces:
-        """Tell where the numbers of targets stand, by their slots, (m, 6)."""
-        some = in_chunks(
-            lambda k: NumberPlaces.of(self.start[slots[k]], self.end[slots[k]]),
-            max(len(slots), 1),
-        )
-        return NumberPlaces.joined(some)
+    def _of(self, slots: Indices, file: Indices) -> NumberPlaces:
+        start, end = np.zeros((2, *slots.shape), dtype=np.int32)
+        for number in np.unique(file).tolist():
+            mine = file == number
+            own = slots[mine] - self.first[number]
+            start[mine], end[mine] = self.start[number][own], self.end[number][own]
+        return NumberPlaces.of(start, end)
 
     def apart(self, slots: Indices) -> Bools:
         """Tell which targets have their numbers in more than one file, (k,).
@@ -95,16 +113,11 @@ class Numbering:
         Args:
             slots: Six numbers of each target, (k, 6).
         """
-        if len(self.first) == 1:
-            return np.zeros(len(slots), dtype=bool)
-        file = np.searchsorted(self.first, slots, side="right")
-        different: Bools = (file != file[:, :1]).any(axis=1)
-        return different
-
-
-def _together(columns: list[Indices]) -> Indices:
-    """Put the columns of files one after the other; one by itself is not copied."""
-    return columns[0] if len(columns) == 1 else np.concatenate(columns)
+        found = np.zeros(len(slots), dtype=bool)
+        for k in chunks(len(slots) if len(self.sources) > 1 else 0):
+            file = self.file(slots[k])
+            found[k] = any_in_rows(file != file[:, :1])
+        return found
 
 
 def find_literals(
@@ -149,9 +162,8 @@ def _literals(
     visit: Indices,
     literal: Indices,
 ) -> Literals:
-    file = np.searchsorted(numbering.first, slots[:, 0], side="right").astype(np.int32)
-    file -= 1
-    places = numbering.places(slots)
+    file = numbering.file(slots[:, 0])
+    places = numbering.places(slots, file)
     line = np.zeros(len(slots), dtype=np.int32)
     for i, source in enumerate(numbering.sources):
         mine = file == i
@@ -249,7 +261,7 @@ def collect(machine: Machine) -> Visits:
     offsets = offsets.astype(np.int64)
     numbering = Numbering.of(machine.world)
     axes = _most_axes(runs, machine.world)
-    columns = VisitColumns(int(offsets[-1]), axes, len(numbering.start))
+    columns = VisitColumns(int(offsets[-1]), axes, len(numbering))
     settings = SettingColumns(machine.world.start.payload_kg)
     collector = Collector(machine, columns, settings)
     collector.fill(zip(offsets.tolist(), runs, strict=False))

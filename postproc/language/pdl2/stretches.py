@@ -509,10 +509,10 @@ def _assigned(here: Execution, quiet: PlainMoves, names: Ints) -> Bools:
     """Tell which of the program's own variables it has given a value itself, (m,)."""
     values, found = here.store.values, np.zeros(len(names), dtype=bool)
     own = np.flatnonzero(names >= 0)
-    keys = [quiet.prefix + quiet.names[name] for name in names[own].tolist()]
-    given = {*islice(values, len(keys))}
-    if len(given) < len(keys):  # all that there are
-        found[own] = [key in given for key in keys]
+    keys = (quiet.prefix + quiet.names[name] for name in names[own].tolist())
+    given = {*islice(values, len(own))}
+    if len(given) < len(own):  # all that there are
+        found[own] = [key in given for key in keys] if given else False
     else:
         found[own] = [values.get(key) is not None for key in keys]
     return found

@@ -37,7 +37,7 @@ class VariableFile:
     """A variable file.
 
     Attributes:
-        lines: The text.
+        lines: The text, without what its numbers are worth.
         entries: Entries by lower-case name; a name with two entries has none.
         diagnostics: What was found while reading.
         unread: As in `Fields`.
@@ -88,7 +88,7 @@ def read_variables(source: Source) -> VariableFile:
     ]
     found.sort(key=lambda finding: finding[0])
     told = tuple(diagnostic for _, diagnostic in found)
-    return VariableFile(lines, entries, told, fields.unread)
+    return VariableFile(lines.without_values(), entries, told, fields.unread)
 
 
 def read_variables_again(source: Source, before: VariableFile) -> VariableFile:
@@ -108,7 +108,8 @@ def read_variables_again(source: Source, before: VariableFile) -> VariableFile:
     if entries is None:
         return read_variables(source)
     told = found.moved(before.diagnostics)
-    return VariableFile(found.lines, entries, told, before.unread)
+    lines = found.lines.without_values()
+    return VariableFile(lines, entries, told, before.unread)
 
 
 def _told_apart(
