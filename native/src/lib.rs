@@ -17,6 +17,7 @@ mod heap;
 mod interned;
 mod inverse;
 mod lines;
+mod names;
 mod number;
 mod numeric;
 mod play;
@@ -45,6 +46,7 @@ const SOURCES: &str = env!("SOURCES");
 #[pymodule(name = "_native")]
 fn native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("SOURCES", SOURCES)?;
+    module.add_class::<names::NameColumn>()?;
     module.add_function(wrap_pyfunction!(chain::placed, module)?)?;
     module.add_function(wrap_pyfunction!(chain::flange, module)?)?;
     module.add_function(wrap_pyfunction!(chain::frames, module)?)?;

@@ -274,9 +274,7 @@ def read_lines(source: Source) -> Lines:
     code = np.array([*map(bool, map(stripped, found.masks))], dtype=bool)
     rows = np.flatnonzero(code[found.shape])
     at = found.name_first[rows]
-    joined = join(
-        found.masks, found.shape[rows], Names(at, found.name, tuple(found.names))
-    )
+    joined = join(found.masks, found.shape[rows], Names(at, found.name, found.names))
     kept = rows[joined.rows]
     first = np.append(found.first[kept], np.int32(len(found.start)))
     lines = with_block_rows(

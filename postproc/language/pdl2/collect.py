@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from itertools import chain
 from typing import Protocol
@@ -20,6 +20,7 @@ from postproc.arrays import (
     slim,
     spans,
 )
+from postproc.language.names import NameColumn
 from postproc.language.pdl2.columns import Collector, SettingColumns, VisitColumns
 from postproc.language.pdl2.context import Point
 from postproc.language.pdl2.dialect import PDL2_DIALECT
@@ -121,7 +122,7 @@ class Numbering:
 
 
 def find_literals(
-    columns: SlotColumns, numbering: Numbering, names: Iterable[str]
+    columns: SlotColumns, numbering: Numbering, names: NameColumn
 ) -> tuple[Literals, Indices]:
     """Find the distinct literals; also return the literal of every visit.
 
@@ -157,7 +158,7 @@ def _ascend(slots: Indices) -> bool:
 def _literals(
     columns: SlotColumns,
     numbering: Numbering,
-    names: Iterable[str],
+    names: NameColumn,
     slots: Indices,
     visit: Indices,
     literal: Indices,
@@ -169,14 +170,13 @@ def _literals(
         mine = file == i
         first = places.first[mine]
         line[mine] = np.searchsorted(source.line_starts, first, side="right")
-    texts, own = tuple(names), columns.name[visit]
-    named = tuple(map(texts.__getitem__, own.tolist())) if own.any() else ()
+    own, unnamed = columns.name[visit].astype(np.int64), texts_of(len(slots), {})
     return Literals(
         file=slim(file),
         line=line,
         places=places,
         joints=columns.target[visit] == Meaning.JOINTS,
-        name=named or texts_of(len(slots), {}),
+        name=names.take(own) if own.any() else unnamed,
         shared=slim(_any(columns.shared, literal, len(slots))),
         taught=slim(_any(columns.taught, literal, len(slots))),
         pinned=texts_of(len(slots), {}),
@@ -282,6 +282,7 @@ def collect(machine: Machine) -> Visits:
             )
             c.reason[apart] = collector.reasons[why]
     pred_start, pred = _predecessors(machine, ordered, offsets)
+    collector.names.settle()
     return Visits(
         files=tuple(world.files),
         file=slim(c.file),
@@ -298,7 +299,7 @@ def collect(machine: Machine) -> Visits:
         literal=literal,
         follows=slim(follows),
         name=slim(c.name),
-        names=tuple(collector.names),
+        names=collector.names,
         fly=slim(c.fly),
         arc_angle=slim(np.full(len(c.line), np.nan)),
         block=slim(np.full(len(c.line), -1)),

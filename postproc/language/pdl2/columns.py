@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from postproc.arrays import Indices, Interned, Ints, chunks, slim, spans
 from postproc.language.marks import MEASURE
+from postproc.language.names import NameColumn
 from postproc.language.pdl2 import syntax as ast
 from postproc.language.pdl2.dialect import COMMENTS
 from postproc.language.pdl2.disturbances import disturbance
@@ -294,7 +295,7 @@ class Collector:
     columns: VisitColumns
     settings: SettingColumns
     configs: Interned[str] = field(default_factory=lambda: Interned([""]))
-    names: Interned[str] = field(default_factory=lambda: Interned([""]))
+    names: NameColumn = field(default_factory=lambda: NameColumn([""]))
     reasons: Interned[str] = field(default_factory=lambda: Interned([""]))
 
     def fill(self, runs: Iterable[tuple[int, MoveRun]]) -> None:
@@ -383,15 +384,15 @@ class Collector:
     def _names(self, moves: ProgramMoves) -> None:
         """Enter the names of the points that moves go to."""
         points, some = self.machine.world.initial.points, moves.point >= 0
-        names = {
+        told = {
             k: goal.position.name for k, _, goal in moves.evaluated() if goal.position
         }
+        names, at = NameColumn(told.values()), np.array([*told], dtype=np.int64)
         if points is not None and some.any():
-            told = [points.entries.name[row] for row in moves.point[some].tolist()]
-            names |= zip(np.flatnonzero(some).tolist(), told, strict=True)
-            names = dict(sorted(names.items()))
-        visit = moves.visit[np.array([*names], dtype=np.int64)]
-        self.columns.name[visit] = self.names.of([*names.values()])
+            names.extend(points.entries.name.take(moves.point[some]))
+            at = np.append(at, np.flatnonzero(some))
+        order = np.argsort(at)
+        self.columns.name[moves.visit[at[order]]] = self.names.of(names.take(order))
 
     def _points(self, moves: ProgramMoves) -> None:
         """Fill moves to points that the variable file tells, layout by layout."""
@@ -405,7 +406,7 @@ class Collector:
         c.slots[visit] = entries.slots[rows] + points.base
         c.taught[visit], c.shared[visit] = points.taught[rows], points.shared[rows]
         if self.machine.world.start.taught:
-            names = [entries.name[row] for row in rows.tolist()]
+            names = entries.name.take(rows)
             c.taught[visit] |= [self.is_listed(name) for name in names]
         for number in _in_order(entries.layout[rows]):
             layout, mine = entries.layouts[number], entries.layout[rows] == number

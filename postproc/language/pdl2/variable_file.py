@@ -10,11 +10,13 @@ import numpy as np
 
 from postproc.arrays import Ints
 from postproc.language.lines import Lines, read_lines, reread_lines
+from postproc.language.names import NameColumn
 from postproc.language.pdl2.entries import (
     NESTED,
     POSITIONS,
     Entries,
     Records,
+    Rows,
     find_records,
     is_nested,
     is_no_value,
@@ -24,7 +26,7 @@ from postproc.language.pdl2.entries import (
 from postproc.language.pdl2.nested import completed, find_fields, with_fields
 from postproc.language.pdl2.parser import EntryPart, parse_value_form
 from postproc.language.pdl2.store import root_of
-from postproc.language.shapes import ParsedShapes, lower, parse_shapes
+from postproc.language.shapes import ParsedShapes, parse_shapes
 from postproc.language.source import Source
 from postproc.language.visits import Diagnostic
 
@@ -122,11 +124,11 @@ def _told_apart(
         ambiguous: Names that records or paths have too.
     """
     nested = [layout.kind in NESTED for layout in entries.layouts]
-    written = lower(entries.name)
+    written, own = entries.name.lower(), NameColumn()
     if not any(nested) and not ambiguous:
-        single = dict(zip(written, range(len(written)), strict=True))
-        if len(single) == len(written):
-            return replace(entries, row=single), []
+        rows = own.of(written)
+        if len(own) == len(written):
+            return replace(entries, row=Rows(own, rows)), []
     names = [
         (row, name)
         for row, name in enumerate(written)
@@ -138,7 +140,8 @@ def _told_apart(
     single = {name: row for row, name in names if count[name] == 1}
     first = {name: row for row, name in reversed(names)}
     twice = [row for row, name in names if first[name] != row]
-    return replace(entries, row=single), twice
+    rows = np.array([*single.values()], dtype=np.int32)
+    return replace(entries, row=Rows(NameColumn(single), rows)), twice
 
 
 def _not_understood(
