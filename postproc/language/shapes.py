@@ -11,7 +11,7 @@ from typing import Any, Generic, TypeVar, overload
 import numpy as np
 from numpy.typing import NDArray
 
-from postproc.arrays import Bools, Interned, Ints
+from postproc.arrays import Bools, Indices, Interned, Ints
 from postproc.language.names import NameColumn
 from postproc.language.scan import NAME_MARK, WHOLE, form_of, mask_of
 
@@ -99,9 +99,9 @@ class Shapes(Sequence[str]):
     """
 
     texts: tuple[str, ...]
-    form: Ints
-    first: Ints
-    name: Ints
+    form: Indices
+    first: Indices
+    name: Indices
     names: NameColumn
 
     def __len__(self) -> int:
@@ -148,11 +148,11 @@ class Shapes(Sequence[str]):
         own = self.name[self.first[shape] : self.first[shape + 1]].tolist()
         return tuple([self.names[k] for k in own])
 
-    def names_at(self, shapes: Ints) -> Ints:
+    def names_at(self, shapes: Indices) -> Indices:
         """Return the names of shapes of one form, (m, c), as indices into `names`."""
         count = self.first[shapes[:1] + 1] - self.first[shapes[:1]]
         width = int(count[0]) if len(count) else 0
-        found: Ints = self.name[self.first[shapes][:, None] + np.arange(width)]
+        found: Indices = self.name[self.first[shapes][:, None] + np.arange(width)]
         return found
 
 
@@ -196,10 +196,11 @@ def find_shapes(
     begin = np.where(own[text] >= 0, own[text], at).astype(np.int64)
     shape, example = _numbered(form[text], begin, count[text], name, len(entered))
     kept = text[example]
-    first = np.append(0, np.cumsum(count[kept]))
+    first = np.append(np.int32(0), np.cumsum(count[kept], dtype=np.int32))
     steps = np.arange(first[-1]) - np.repeat(first[:-1], count[kept])
     own_names = name[np.repeat(begin[example], count[kept]) + steps]
-    return Shapes(tuple(forms), form[kept], first, own_names, entered), shape
+    short = form[kept].astype(np.int32), first, own_names.astype(np.int32)
+    return Shapes(tuple(forms), *short, entered), shape
 
 
 def _numbered(
@@ -347,7 +348,7 @@ class ParsedShapes(Sequence[T], Generic[T]):
         return (self[k] for k in range(len(self)))
 
     @property
-    def form(self) -> Ints:
+    def form(self) -> Indices:
         """Return the form of every shape, as an index into `said`, (k,)."""
         return self.shapes.form
 

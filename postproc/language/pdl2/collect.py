@@ -27,7 +27,7 @@ from postproc.language.pdl2.dialect import PDL2_DIALECT
 from postproc.language.pdl2.job import World
 from postproc.language.pdl2.machine import Key, Machine, MoveRun
 from postproc.language.pdl2.store import MANY
-from postproc.language.source import Source
+from postproc.language.source import NumberSpans, Source
 from postproc.language.visits import (
     ELSEWHERE,
     Literals,
@@ -57,27 +57,23 @@ class Numbering:
     Attributes:
         sources: The files.
         first: Index of each file's first number, and how many there are, (f + 1,).
-        start, end: Byte offsets of every file's numbers.
+        numbers: Where every file's numbers stand.
     """
 
     sources: tuple[Source, ...]
     first: Indices
-    start: tuple[Indices, ...]
-    end: tuple[Indices, ...]
+    numbers: tuple[NumberSpans, ...]
 
     @staticmethod
     def of(world: World) -> Numbering:
         """Number the files of a job as its slots are."""
-        numbered = [
-            (p.lines.source, p.lines.start, p.lines.end) for p in world.programs()
-        ]
+        texts = [program.lines for program in world.programs()]
         if world.variables is not None:
-            v = world.variables
-            numbered.append((v.source, v.start, v.end))
-        sources, start, end = map(tuple, zip(*numbered, strict=True))
+            texts.append(world.variables.lines)
+        sources, numbers = zip(*((t.source, t.numbers) for t in texts), strict=True)
         first = [world.slot_base[source.name] for source in sources]
-        first.append(sum(map(len, start)))
-        return Numbering(sources, np.array(first, dtype=np.int64), start, end)
+        first.append(sum(map(len, numbers)))
+        return Numbering(sources, np.array(first, dtype=np.int64), numbers)
 
     def __len__(self) -> int:
         """Return how many numbers there are."""
@@ -105,7 +101,8 @@ class Numbering:
         for number in np.unique(file).tolist():
             mine = file == number
             own = slots[mine] - self.first[number]
-            start[mine], end[mine] = self.start[number][own], self.end[number][own]
+            numbers = self.numbers[number]
+            start[mine], end[mine] = numbers.starts(own), numbers.ends(own)
         return NumberPlaces.of(start, end)
 
     def apart(self, slots: Indices) -> Bools:
@@ -131,7 +128,7 @@ def find_literals(
     """
     literal = np.full(len(columns.slots), -1, dtype=np.int32)
     rows = np.flatnonzero(columns.slots[:, 0] >= 0)
-    slots = columns.slots if len(rows) == len(literal) else columns.slots[rows]
+    slots = columns.slots[_as_slice(rows)]
     if _ascend(slots) and not numbering.apart(slots).any():
         literal[rows] = np.arange(len(rows), dtype=np.int32)
         return _literals(columns, numbering, names, slots, rows, literal), literal
@@ -147,6 +144,13 @@ def find_literals(
     literal[rows] = index[inverse]
     first = rows[example[kept]]
     return _literals(columns, numbering, names, distinct[kept], first, literal), literal
+
+
+def _as_slice(rows: Ints) -> Ints | slice:
+    """Return rows that follow each other as a slice: what is taken is no copy."""
+    if len(rows) and rows[-1] - rows[0] == len(rows) - 1:
+        return slice(int(rows[0]), int(rows[-1]) + 1)
+    return rows
 
 
 def _ascend(slots: Indices) -> bool:
@@ -268,6 +272,7 @@ def collect(machine: Machine) -> Visits:
     c, world = collector.columns, machine.world
     if machine.exhausted:
         c.reason[:] = collector.reasons["the program is too complex to be followed"]
+    collector.names.settle()
     literals, literal = find_literals(c, numbering, collector.names)
     literals, follows = find_uses(literals, c.slots, c.bases, literal, world.pinned)
     overlapping = (literal < 0) & (c.slots[:, 0] >= 0) & (c.reason == 0)
@@ -282,7 +287,6 @@ def collect(machine: Machine) -> Visits:
             )
             c.reason[apart] = collector.reasons[why]
     pred_start, pred = _predecessors(machine, ordered, offsets)
-    collector.names.settle()
     return Visits(
         files=tuple(world.files),
         file=slim(c.file),

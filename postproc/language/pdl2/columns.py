@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -217,7 +217,7 @@ class VisitColumns:
         self.via = np.zeros(n, dtype=bool)
         self.fly = np.zeros(n, dtype=bool)
         self.values = np.full((n, 6), np.nan)
-        self.distance_mm = np.full(n, np.nan)
+        self.distance_mm = np.broadcast_to(np.nan, n)
         self.aux = np.full((n, axes), np.nan)
         self.config = np.zeros(n, dtype=np.int32)
         self.config_given = np.zeros(n, dtype=bool)
@@ -254,9 +254,9 @@ class ProgramMoves:
         at, runs = zip(*self.runs, strict=True)
         sizes = np.array([len(run) for run in runs])
         self.visit: Ints = spans(np.array(at), sizes)
-        self.row: Ints = np.concatenate([run.rows for run in runs])
+        self.row: Ints = _together([run.rows for run in runs])
         self.run: Indices = np.repeat(np.arange(len(runs), dtype=np.int32), sizes)
-        self.point: Ints = np.concatenate([run.point for run in runs])
+        self.point: Ints = _together([run.point for run in runs])
         numbers = Interned[MoveForm]()
         self.form: Indices = np.concatenate([_numbered(run, numbers) for run in runs])
         self.forms = [*numbers]
@@ -274,6 +274,11 @@ class ProgramMoves:
             for k, goal in run.goals.items():
                 yield begin + k, run, goal
             begin += len(run)
+
+
+def _together(columns: Sequence[Ints]) -> Ints:
+    """Put columns one after the other; one by itself is not copied."""
+    return columns[0] if len(columns) == 1 else np.concatenate(columns)
 
 
 def _numbered(run: MoveRun, numbers: Interned[MoveForm]) -> Indices:
@@ -402,8 +407,9 @@ class Collector:
             return
         c, entries = self.columns, points.entries
         rows, visit = moves.point[some], moves.visit[some]
-        c.values[visit] = entries.numbers[rows]
-        c.slots[visit] = entries.slots[rows] + points.base
+        for k in chunks(len(some)):
+            c.values[visit[k]] = entries.numbers[rows[k]]
+            c.slots[visit[k]] = entries.slots[rows[k]] + points.base
         c.taught[visit], c.shared[visit] = points.taught[rows], points.shared[rows]
         if self.machine.world.start.taught:
             names = entries.name.take(rows)
@@ -429,8 +435,10 @@ class Collector:
         goals = [goal for _, _, goal in found]
         c.target[visit] = [goal.target for goal in goals]
         c.values[visit] = np.array([goal.numbers for goal in goals], dtype=float)
-        distances = [goal.distance for goal in goals]
-        c.distance_mm[visit] = np.array(distances, dtype=float)
+        distances = np.array([goal.distance for goal in goals], dtype=float)
+        if np.isfinite(distances).any():
+            c.distance_mm = np.array(c.distance_mm)
+            c.distance_mm[visit] = distances
         moves.first[index] = self.reasons.of([goal.reason for goal in goals])
         for at, k, goal in zip(visit.tolist(), index.tolist(), goals, strict=True):
             if goal.position is not None:

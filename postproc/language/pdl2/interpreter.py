@@ -558,11 +558,7 @@ def resolve(
     """
     world = World(program, dict(others or {}), start or Start(), variables)
     fill_initial(world)
-    machine = Machine(world)
-    stretches = MoveBlocks(machine)
-    _start(machine)
-    while (here := machine.next()) is not None:
-        _run(machine, here, stretches)
+    machine = _followed(world)
     if machine.exhausted:
         world.report_once(
             program, 0, "too-complex", "", "the program has too many ways, or calls, "
@@ -572,6 +568,16 @@ def resolve(
         machine = _listed(world)
     world.pin_loose()
     return Resolved(collect(machine), tuple(sorted(world.diagnostics)))
+
+
+def _followed(world: World) -> Machine:
+    """Follow every way from the start."""
+    machine = Machine(world)
+    stretches = MoveBlocks(machine)
+    _start(machine)
+    while (here := machine.next()) is not None:
+        _run(machine, here, stretches)
+    return machine
 
 
 def _listed(world: World) -> Machine:

@@ -199,7 +199,7 @@ class World:
         for program in self.programs():
             self.slot_base[program.lines.source.name] = base
             self.files.append(program.lines.source.name)
-            base += len(program.lines.start)
+            base += len(program.lines.numbers)
             source = program.lines.source
             self.taught_lines[source.name] = COMMENTS.taught(source)
             self.diagnostics |= dict.fromkeys(program.diagnostics)

@@ -201,7 +201,7 @@ def _is_whole(one: Parsed, source: Source) -> bool:
     if isinstance(one, VariableFile):
         whole = one.entries.known is None
     else:
-        whole = len(one.lines.value) == len(one.lines.start)
+        whole = len(one.lines.value) == len(one.lines.numbers)
     return whole and one.lines.source == source
 
 

@@ -226,7 +226,7 @@ def _unmatched(
 # Declared variables: a list of names is one declaration, whatever its length.
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Variable:
     """A declared variable or constant.
 

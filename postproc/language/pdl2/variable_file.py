@@ -55,16 +55,6 @@ class VariableFile:
         """Return the text."""
         return self.lines.source
 
-    @property
-    def start(self) -> Ints:
-        """Return the byte offsets of every number, its sign included, (m,)."""
-        return self.lines.start
-
-    @property
-    def end(self) -> Ints:
-        """Return the byte offsets at which they end, (m,)."""
-        return self.lines.end
-
 
 def read_variables(source: Source) -> VariableFile:
     """Read a variable file; what is wrong in it is reported, not fatal.
