@@ -342,9 +342,10 @@ def _predecessors(
     """Translate predecessor ids to visits, in CSR form."""
     n, first = int(offsets[-1]), offsets[:-1]
     ids = np.array([machine.ids[key] for key, _ in ordered], dtype=np.int64)
-    visit = np.zeros(machine.next_id, dtype=np.int64)
-    visit[spans(ids, np.diff(offsets))] = np.arange(n)
+    visit = np.zeros(machine.next_id, dtype=np.int32)
+    visit[spans(ids, np.diff(offsets))] = np.arange(n, dtype=np.int32)
     origins = [_origins(machine, run, visit) for _, run in ordered]
+    del visit
     counts = np.ones(n, dtype=np.int32)
     counts[first] = [len(found) for found in origins]
     start = np.append(np.int32(0), np.cumsum(counts, dtype=np.int32))
@@ -353,7 +354,7 @@ def _predecessors(
     return start, pred
 
 
-def _origins(machine: Machine, run: MoveRun, visit: Ints) -> list[int]:
+def _origins(machine: Machine, run: MoveRun, visit: Indices) -> list[int]:
     """Return the visits that the first move of a run may come from, ascending."""
     found = {int(visit[p]) if p >= 0 else p for p in run.predecessors - {MANY}}
     if MANY in run.predecessors or id(run.place.body) in machine.recursive:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from postproc.arrays import Indices, Interned, Ints, chunks, slim, spans
+from postproc.arrays import Indices, Interned, Ints, chunks, is_one_value, slim, spans
 from postproc.language.marks import MEASURE
 from postproc.language.names import NameColumn
 from postproc.language.pdl2 import syntax as ast
@@ -94,8 +94,9 @@ class SettingColumns:
     def columns(self, rows: Indices) -> dict[str, Any]:
         """Return the columns of `Visits` that come from settings."""
         frames = list(self._frames)
+        used = np.flatnonzero(np.bincount(rows, minlength=len(self._kept)))
         columns: dict[str, Any] = {
-            name: _spread(np.array(values), rows)
+            name: _spread(np.array(values), rows, used)
             for name, values in self._table.items()
         }
         if not columns:
@@ -107,11 +108,12 @@ class SettingColumns:
         return columns
 
 
-def _spread(values: NDArray[Any], rows: Indices) -> NDArray[Any]:
-    """Return a column of settings; most programs have one row of them."""
-    if len(values) == 1:
-        return np.broadcast_to(values[0], (len(rows), *values.shape[1:]))
-    return slim(values[rows])
+def _spread(values: NDArray[Any], rows: Indices, used: Ints) -> NDArray[Any]:
+    """Return a column of settings; those that are used often say one value."""
+    own = slim(values[used])
+    if len(used) == 1 or (len(used) and is_one_value(own)):
+        return np.broadcast_to(own[0], (len(rows), *values.shape[1:]))
+    return values[rows]
 
 
 def _row(settings: Settings, frame: Any) -> dict[str, Any]:

@@ -509,12 +509,13 @@ def _points(
 def _assigned(here: Execution, quiet: PlainMoves, names: Ints) -> Bools:
     """Tell which of the program's own variables it has given a value itself, (m,)."""
     values, found = here.store.values, np.zeros(len(names), dtype=bool)
-    own = np.flatnonzero(names >= 0)
-    keys = (quiet.prefix + quiet.names[name] for name in names[own].tolist())
-    given = {*islice(values, len(own))}
+    own, prefix = np.flatnonzero(names >= 0), quiet.prefix
+    given = [*islice(values, len(own))]
     if len(given) < len(own):  # all that there are
-        found[own] = [key in given for key in keys] if given else False
+        known = NameColumn(k[len(prefix) :] for k in given if k.startswith(prefix))
+        found[own] = (known.find(quiet.names) >= 0)[names[own]]
     else:
+        keys = (prefix + quiet.names[name] for name in names[own].tolist())
         found[own] = [values.get(key) is not None for key in keys]
     return found
 
