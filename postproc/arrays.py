@@ -274,6 +274,8 @@ def spans(begin: Indices, count: Indices) -> Ints:
     >>> spans(np.array([3, 10]), np.array([2, 3])).tolist()
     [3, 4, 10, 11, 12]
     """
+    if len(begin) == 1:
+        return np.arange(begin[0], begin[0] + count[0], dtype=np.int64)
     offset = np.cumsum(count) - count
     return np.repeat(begin - offset, count) + np.arange(int(count.sum()))
 

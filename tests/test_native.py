@@ -451,6 +451,23 @@ def test_lines_that_begin_with_a_word(random):
         assert _native.lines_beginning(text, words) == meant
 
 
+def test_words_are_found_in_letters_of_any_size():
+    text = b"MOVE TO p -- meaSUre\n\xffTAUGHT\nmeas"
+    for word in (
+        b"measure",
+        b"taught",
+        b"move",
+        b"meas",
+        b"\xff",
+        b"absent",
+        b"x" * 99,
+    ):
+        assert _native.holds(text, word) == (word.upper() in text.upper())
+    assert not _native.holds(b"", b"measure")
+    with pytest.raises(ValueError, match="empty"):
+        _native.holds(text, b"")
+
+
 def test_lines_of_two_texts():
     texts = [
         (b"a := 1", b"a := 2"), (b"p(1.0)", b"p(1.00)"), (b"x", b"x"),

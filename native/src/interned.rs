@@ -5,39 +5,87 @@ const FREE: u32 = u32::MAX;
 /// Of the hash: an odd number without a pattern, 2^64 through the golden ratio.
 const FACTOR: u64 = 0x9e37_79b9_7f4a_7c15;
 
-/// Distinct texts, one behind the other, and a table, half of it free, to find them.
+/// Texts, one behind the other, and a table, half of it free, to find them.
 #[derive(Default)]
 pub struct Interned {
     bytes: Vec<u8>,
-    ends: Vec<usize>,
-    /// Hash and number of a text at the first free place from its hash on.
+    ends: Vec<u32>,
+    /// Hash and number of a text at the first free place from its hash on; empty where
+    /// there is no table (yet).
     table: Vec<(u32, u32)>,
 }
 
 impl Interned {
-    /// Return the number of a text.
+    /// Return the number of a text, which becomes one of these where it is not yet.
+    ///
+    /// The table must hold all texts: it does where none was pushed.
     pub fn of(&mut self, text: &[u8]) -> i32 {
         if self.table.len() < 2 * (self.ends.len() + 1) {
             self.grow();
         }
         let own = hash(text);
-        let mut at = own as usize;
-        loop {
-            at &= self.table.len() - 1;
-            let (hash, number) = self.table[at];
-            if number == FREE {
-                break;
-            }
-            if hash == own && self.text(number as usize) == text {
-                return number as i32;
-            }
-            at += 1;
+        let at = self.place(own, text);
+        if self.table[at].1 == FREE {
+            self.table[at] = (own, self.ends.len() as u32);
+            self.push(text);
         }
-        let new = self.ends.len();
-        self.table[at] = (own, new as u32);
+        self.table[at].1 as i32
+    }
+
+    /// Return the number of a text, -1 where it is none of these; as for `of`.
+    pub fn find(&self, text: &[u8]) -> i32 {
+        if self.table.is_empty() {
+            return -1;
+        }
+        self.table[self.place(hash(text), text)].1 as i32
+    }
+
+    /// Put a text behind the others; no table finds it.
+    pub fn push(&mut self, text: &[u8]) {
         self.bytes.extend_from_slice(text);
-        self.ends.push(self.bytes.len());
-        new as i32
+        self.ends.push(u32::try_from(self.bytes.len()).expect("texts of less than 4 GiB"));
+    }
+
+    /// Make a table of all texts where there is none; of equal ones it finds the first.
+    pub fn make_table(&mut self) {
+        if !self.table.is_empty() {
+            return;
+        }
+        let places = (2 * (self.ends.len() + 1)).next_power_of_two().max(64);
+        self.table = vec![(0, FREE); places];
+        for number in 0..self.ends.len() {
+            let own = hash(self.text(number));
+            let at = self.place(own, self.text(number));
+            if self.table[at].1 == FREE {
+                self.table[at] = (own, number as u32);
+            }
+        }
+    }
+
+    /// Let go of the table.
+    pub fn forget_table(&mut self) {
+        self.table = Vec::new();
+    }
+
+    /// Let go of the table and of room for more texts.
+    pub fn settle(&mut self) {
+        self.forget_table();
+        self.bytes.shrink_to_fit();
+        self.ends.shrink_to_fit();
+    }
+
+    /// Tell whether others are the same texts in the same order.
+    pub fn same(&self, other: &Interned) -> bool {
+        self.ends == other.ends && self.bytes == other.bytes
+    }
+
+    pub fn len(&self) -> usize {
+        self.ends.len()
+    }
+
+    /// Return all texts, one behind the other.
+    pub fn bytes(&self) -> &[u8] {
+        &self.bytes
     }
 
     /// Go through the texts by their numbers.
@@ -45,9 +93,22 @@ impl Interned {
         (0..self.ends.len()).map(|number| self.text(number))
     }
 
-    fn text(&self, number: usize) -> &[u8] {
+    pub fn text(&self, number: usize) -> &[u8] {
         let begin = number.checked_sub(1).map_or(0, |before| self.ends[before]);
-        &self.bytes[begin..self.ends[number]]
+        &self.bytes[begin as usize..self.ends[number] as usize]
+    }
+
+    /// Return the place of a text in the table, a free one where it is not in it.
+    fn place(&self, own: u32, text: &[u8]) -> usize {
+        let mut at = own as usize;
+        loop {
+            at &= self.table.len() - 1;
+            let (hash, number) = self.table[at];
+            if number == FREE || (hash == own && self.text(number as usize) == text) {
+                return at;
+            }
+            at += 1;
+        }
     }
 
     fn grow(&mut self) {

@@ -17,6 +17,7 @@ mod heap;
 mod interned;
 mod inverse;
 mod lines;
+mod names;
 mod number;
 mod numeric;
 mod play;
@@ -44,7 +45,9 @@ const SOURCES: &str = env!("SOURCES");
 
 #[pymodule(name = "_native")]
 fn native(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    heap::map_long_columns();
     module.add("SOURCES", SOURCES)?;
+    module.add_class::<names::NameColumn>()?;
     module.add_function(wrap_pyfunction!(chain::placed, module)?)?;
     module.add_function(wrap_pyfunction!(chain::flange, module)?)?;
     module.add_function(wrap_pyfunction!(chain::frames, module)?)?;
@@ -94,6 +97,7 @@ fn native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(weave::weave, module)?)?;
     module.add_function(wrap_pyfunction!(weave::is_woven, module)?)?;
     module.add_function(wrap_pyfunction!(weave::cut, module)?)?;
+    module.add_function(wrap_pyfunction!(words::holds, module)?)?;
     module.add_function(wrap_pyfunction!(words::lines_beginning, module)?)?;
     Ok(())
 }

@@ -9,11 +9,11 @@ use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyList};
 
 use crate::interned::Interned;
+use crate::names::NameColumn;
 use crate::number::value_of;
 use crate::rows::detached;
 use crate::text::{
-    is, latin_1, number_end, while_is, Masked, DIGIT, FIRST, IN_NAME, MARK, NAME, NUMBER, UNARY,
-    WHOLE,
+    is, number_end, while_is, Masked, DIGIT, FIRST, IN_NAME, MARK, NAME, NUMBER, UNARY, WHOLE,
 };
 
 /// Words that begin a statement, wherever they stand: what came before has no end.
@@ -501,7 +501,7 @@ type Scanned<'py> = (
     Bound<'py, PyList>,
     (Column<'py, i32>, Column<'py, i32>, Column<'py, i32>, Column<'py, i32>, Column<'py, i32>),
     (Column<'py, i32>, Column<'py, i32>, Column<'py, f64>),
-    (Vec<String>, Column<'py, i32>),
+    (NameColumn, Column<'py, i32>),
     Vec<usize>,
 );
 
@@ -581,7 +581,7 @@ fn scanned<'py, R: Cutting + Send>(
             name_first.into_pyarray(py),
         ),
         (start.into_pyarray(py), end.into_pyarray(py), value.into_pyarray(py)),
-        (names.texts().map(latin_1).collect(), name.into_pyarray(py)),
+        (NameColumn::of_latin_1(names), name.into_pyarray(py)),
         open,
     ))
 }

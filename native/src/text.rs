@@ -9,6 +9,7 @@ use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyList};
 
 use crate::interned::Interned;
+use crate::names::NameColumn;
 use crate::number::value_of;
 use crate::rows::{detached, each, flat};
 
@@ -378,7 +379,7 @@ pub fn scan_lines<'py>(
     Bound<'py, PyList>,
     (Column<'py, i32>, Column<'py, i32>, Column<'py, i32>, Column<'py, i32>),
     (Column<'py, i32>, Column<'py, i32>, Column<'py, f64>),
-    (Vec<String>, Column<'py, i32>),
+    (NameColumn, Column<'py, i32>),
     Vec<usize>,
 )> {
     let lines = Text::new(data.as_bytes(), flat(&starts)?)?;
@@ -423,7 +424,7 @@ pub fn scan_lines<'py>(
             name_first.into_pyarray(py),
         ),
         (start.into_pyarray(py), end.into_pyarray(py), value.into_pyarray(py)),
-        (names.texts().map(latin_1).collect(), name.into_pyarray(py)),
+        (NameColumn::of_latin_1(names), name.into_pyarray(py)),
         open,
     ))
 }

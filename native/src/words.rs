@@ -1,5 +1,6 @@
-//! Lines that begin with some word: `postproc.batch.tree`.
+//! Words of a text, in letters of any size: `postproc.batch.tree`, `.language.marks`.
 
+use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 
@@ -43,4 +44,32 @@ fn begins(line: &[u8], words: &[Vec<u8>]) -> bool {
     let at = line.iter().position(|b| !matches!(b, b' ' | b'\t')).unwrap_or(line.len());
     let begin = |word: &[u8]| line.get(at..at + word.len());
     words.iter().any(|word| begin(word).is_some_and(|b| b.eq_ignore_ascii_case(word)))
+}
+
+/// Bytes that are looked at between two looks at signals.
+const BYTES: usize = 1 << 26;
+
+/// Tell whether a text holds a word.
+///
+/// Arguments:
+///     word: In small letters, not empty; that of the text may be of any size.
+#[pyfunction]
+pub fn holds(py: Python<'_>, data: &Bound<'_, PyBytes>, word: &[u8]) -> PyResult<bool> {
+    let text = data.as_bytes();
+    let &[small, ..] = word else {
+        return Err(PyValueError::new_err("an empty word"));
+    };
+    let (large, rest) = (small.to_ascii_uppercase(), word.len() - 1);
+    for first in (0..text.len()).step_by(BYTES) {
+        py.check_signals()?;
+        let some = &text[first..text.len().min(first + BYTES + rest)];
+        let found = detached(py, || {
+            some.windows(word.len())
+                .any(|own| (own[0] == small || own[0] == large) && own.eq_ignore_ascii_case(word))
+        })?;
+        if found {
+            return Ok(true);
+        }
+    }
+    Ok(false)
 }

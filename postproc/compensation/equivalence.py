@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import fields
 from types import MappingProxyType
 from typing import Any
@@ -93,16 +93,19 @@ def _other_text(v: Visits, w: Visits, clones: Mapping[int, str]) -> str:
     """Say which column of texts differs; reasons may speak of lines."""
     if not _same_texts(v.configs, v.config, w.configs, w.config):
         return "the output has another config"
-    texts, name = Interned(v.names), np.array(v.name)
-    name[[*clones]] = texts.of([*clones.values()])
-    if not _same_texts(tuple(texts), name, w.names, w.name):
+    texts, name = v.names, v.name
+    if clones:
+        own, name = Interned(texts), np.array(name)
+        name[[*clones]] = own.of([*clones.values()])
+        texts = tuple(own)
+    if not _same_texts(texts, name, w.names, w.name):
         return "the output has another name"
     if not np.array_equal(v.reason > 0, w.reason > 0):
         return "the output has another reason"
     return ""
 
 
-def _same_texts(a: tuple[str, ...], i: Ints, b: tuple[str, ...], j: Ints) -> bool:
+def _same_texts(a: Sequence[str], i: Ints, b: Sequence[str], j: Ints) -> bool:
     """Tell whether rows have the same texts, by their indices."""
     if a == b:
         return np.array_equal(i, j)

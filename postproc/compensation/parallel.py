@@ -36,6 +36,7 @@ AHEAD = 16  # items that a child makes before anybody takes them
 SET_PDEATHSIG = 1  # of prctl(2): the signal that the death of the parent sends
 ASKED = frozenset({signal.SIGINT, signal.SIGTERM})  # a child leaves them to its parent
 SIZE = 8  # bytes of the length before every message
+ROW = 256  # bytes of a message that hold what came of a visit, about
 _ITEM, _RAISED, _END = range(3)
 
 
@@ -141,7 +142,7 @@ def _send(there: int, messages: Queue[bytes]) -> None:
                 pipe.write(len(message).to_bytes(SIZE, "little"))
                 pipe.write(message)
                 pipe.flush()
-                give_back(len(message))
+                give_back(len(message) // ROW)
     finally:
         os._exit(1)
 
@@ -165,7 +166,7 @@ def _taken(pipe: IO[bytes]) -> Iterator[Any]:
     while True:
         size = int.from_bytes(pipe.read(SIZE), "little")
         message = pipe.read(size)
-        give_back(size)
+        give_back(size // ROW)
         if not size or len(message) < size:
             raise PostprocError(
                 "a process that did a part of the work was ended from outside, most "

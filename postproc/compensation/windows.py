@@ -69,7 +69,7 @@ def offsets(sizes: Iterable[int]) -> list[int]:
 def _joined(name: str, programs: Sequence[Visits]) -> Any:
     """Join a column, or a table."""
     parts = [getattr(program, name) for program in programs]
-    if isinstance(parts[0], tuple):
+    if not isinstance(parts[0], np.ndarray):
         return tuple(chain.from_iterable(parts))
     if name in TABLES:
         parts = _moved_on(name, parts, programs)
@@ -111,7 +111,7 @@ def _literals(programs: Sequence[Visits]) -> Literals:
     columns: dict[str, Any] = {}
     for name in (f.name for f in fields(Literals)):
         parts = [getattr(literals, name) for literals in own]
-        if isinstance(parts[0], tuple):
+        if isinstance(parts[0], Sequence):
             columns[name] = tuple(chain.from_iterable(parts))
             continue
         if name == "places":

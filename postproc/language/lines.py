@@ -24,7 +24,7 @@ from postproc.language.shapes import (
     find_shapes,
     numbered_in_order,
 )
-from postproc.language.source import Source
+from postproc.language.source import NumberSpans, Source
 from postproc.language.visits import Diagnostic
 
 # Statements over several lines: one that ends with a comma goes on with clauses.
@@ -230,7 +230,7 @@ class Lines:
         shape: Index into `shapes`, (n,).
         line: 1-based physical line on which each logical line starts, (n,).
         first: CSR offsets into the numbers, (n + 1,).
-        start, end: Byte offsets of each number, its sign included, (m,).
+        numbers: Where each number stands, its sign included, (m,).
         value: Its value, NaN where it cannot be read, (m,).
     """
 
@@ -239,8 +239,7 @@ class Lines:
     shape: Indices
     line: Indices
     first: Indices
-    start: Indices
-    end: Indices
+    numbers: NumberSpans
     value: Floats
 
     def __len__(self) -> int:
@@ -274,9 +273,7 @@ def read_lines(source: Source) -> Lines:
     code = np.array([*map(bool, map(stripped, found.masks))], dtype=bool)
     rows = np.flatnonzero(code[found.shape])
     at = found.name_first[rows]
-    joined = join(
-        found.masks, found.shape[rows], Names(at, found.name, tuple(found.names))
-    )
+    joined = join(found.masks, found.shape[rows], Names(at, found.name, found.names))
     kept = rows[joined.rows]
     first = np.append(found.first[kept], np.int32(len(found.start)))
     lines = with_block_rows(
@@ -291,8 +288,7 @@ def read_lines(source: Source) -> Lines:
         shape.astype(np.int32),
         lines.line.astype(np.int32),
         lines.first,
-        found.start,
-        found.end,
+        NumberSpans.of(found.start, found.end),
         found.value,
     )
 
@@ -339,7 +335,7 @@ def reread_lines(source: Source, before: Lines) -> RereadLines | None:
     old = before.source
     found = rescan_lines(
         (old.data, old.line_starts), (source.data, source.line_starts),
-        len(before.start),
+        len(before.numbers),
     )  # fmt: skip
     if found is None:
         return None
@@ -348,6 +344,6 @@ def reread_lines(source: Source, before: Lines) -> RereadLines | None:
         line = line + (line > found.added)
     lines = replace(
         before, source=source, line=line.astype(np.int32, copy=False),
-        start=found.start, end=found.end, value=found.value,
+        numbers=NumberSpans.of(found.start, found.end), value=found.value,
     )  # fmt: skip
     return RereadLines(lines, found.changed, found.added)

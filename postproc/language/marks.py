@@ -10,6 +10,7 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+from postproc import _native
 from postproc.language.source import Source
 
 MEASURE, TAUGHT = "MEASURE", "TAUGHT"
@@ -35,7 +36,7 @@ class Comments:
             word: `MEASURE` or `TAUGHT`.
         """
         sign, quote, said = (x.encode() for x in (self.sign, self.quote, word))
-        if said not in source.data.upper():
+        if not _native.holds(source.data, said.lower()):
             return
         pattern = rb"%b+[ \t]*%b\b[ \t]*([^\s]*)" % (re.escape(sign), said)
         strings = re.compile(rb"%b[^%b]*%b" % (quote, quote, quote))

@@ -14,7 +14,7 @@ from postproc.exceptions import ProgramError
 from postproc.language.dialect import Dialect
 from postproc.language.lines import Lines, read_lines
 from postproc.language.shapes import Shapes
-from postproc.language.source import Replacements, Source, apply, as_texts
+from postproc.language.source import NumberSpans, Replacements, Source, apply, as_texts
 from postproc.language.visits import Literals
 
 # What new numbers must leave alone: the shapes of lines and where numbers stand.
@@ -33,7 +33,7 @@ class Skeleton:
         shapes: The distinct masks of its lines.
         shape: Index into `shapes`, (n,).
         line: 1-based physical lines, (n,).
-        start, end: Byte offsets of the numbers, (m,).
+        numbers: Where the numbers stand, (m,).
         reread: Reads another text of the same language.
     """
 
@@ -41,16 +41,13 @@ class Skeleton:
     shapes: Shapes
     shape: Indices
     line: Indices
-    start: Indices
-    end: Indices
+    numbers: NumberSpans
     reread: Callable[[Source], Skeleton] | None = None
 
     @classmethod
     def of(cls, lines: Lines) -> Skeleton:
         """Take over what the lines of a text tell."""
-        return cls(
-            lines.source, lines.shapes, lines.shape, lines.line, lines.start, lines.end
-        )
+        return cls(lines.source, lines.shapes, lines.shape, lines.line, lines.numbers)
 
     @classmethod
     def read(cls, source: Source) -> Skeleton:
@@ -91,7 +88,7 @@ def difference(
         b = after if isinstance(after, Skeleton) else (a.reread or Skeleton.read)(after)
     except ProgramError as problem:
         return str(problem)
-    if len(a.shape) != len(b.shape) or len(a.start) != len(b.start):
+    if len(a.shape) != len(b.shape) or len(a.numbers) != len(b.numbers):
         return "the rewritten text has other lines or numbers than the original"
     if a.shapes != b.shapes or (a.shape != b.shape).any():
         row = int(np.flatnonzero(a.shape != b.shape)[:1].sum())
@@ -101,18 +98,18 @@ def difference(
 
 def _part_of_a_number(before: Skeleton, allowed: Replacements) -> str:
     """Say which edit does not replace one whole number."""
-    for rows in chunks(len(allowed), AT_ONCE):
-        some = allowed[rows]
-        at = np.searchsorted(before.start, some.start)
-        whole = at < len(before.start)
-        at[~whole] = 0
-        if len(before.start):
-            whole &= before.start[at] == some.start
-            whole &= before.end[at] == some.end
-        if not whole.all():
-            line = before.source.line_of(int(some.start[~whole][0]))
-            return f"line {line}: an edit does not replace one whole number"
-    return ""
+    done, wrong = 0, np.empty(0, dtype=np.int32)
+    for rows in chunks(len(before.numbers), AT_ONCE):
+        start, end = before.numbers.starts(rows), before.numbers.ends(rows)
+        some = allowed[done : np.searchsorted(allowed.start, start[-1], side="right")]
+        at = np.searchsorted(start, some.start)
+        whole = (start[at] == some.start) & (end[at] == some.end)
+        wrong, done = np.append(wrong, some.start[~whole]), done + len(some)
+    wrong = np.append(wrong, allowed.start[done:])
+    if not len(wrong):
+        return ""
+    line = before.source.line_of(int(wrong[0]))
+    return f"line {line}: an edit does not replace one whole number"
 
 
 def _number_elsewhere(
@@ -120,12 +117,12 @@ def _number_elsewhere(
 ) -> str:
     """Say which number does not stand where the edits move it to."""
     shift = stamp + np.cumsum(np.append(np.int32(0), allowed.growth), dtype=np.int32)
-    for rows in chunks(len(before.start), AT_ONCE):
-        start, end = before.start[rows], before.end[rows]
+    for rows in chunks(len(before.numbers), AT_ONCE):
+        start, end = before.numbers.starts(rows), before.numbers.ends(rows)
         edits = np.searchsorted(allowed.start, start)  # before the number
-        wrong = after.start[rows] != start + shift[edits]
+        wrong = after.numbers.starts(rows) != start + shift[edits]
         edits = np.searchsorted(allowed.start, start, side="right")  # and its own
-        wrong |= after.end[rows] != end + shift[edits]
+        wrong |= after.numbers.ends(rows) != end + shift[edits]
         if wrong.any():
             line = before.source.line_of(int(start[wrong][0]))
             return f"line {line}: a number stands elsewhere than it should"

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 from postproc import _native
 from postproc.arrays import Bools, Floats, Indices
+from postproc.language.names import NameColumn
 
 # A *mask* is the code of a line in which every number is one NUL (no program holds
 # any), the comment is gone and idle blanks are dropped. In its *form* every numbered
@@ -46,7 +46,7 @@ class ScannedLines:
     start: Indices
     end: Indices
     value: Floats
-    names: Sequence[str]
+    names: NameColumn
     name: Indices
     unterminated: tuple[int, ...]
 

@@ -11,7 +11,8 @@ from typing import Any, Generic, TypeVar, overload
 import numpy as np
 from numpy.typing import NDArray
 
-from postproc.arrays import Bools, Interned, Ints
+from postproc.arrays import Bools, Indices, Interned, Ints
+from postproc.language.names import NameColumn
 from postproc.language.scan import NAME_MARK, WHOLE, form_of, mask_of
 
 # Rows that are alike, numbered in the order in which they appear.
@@ -98,10 +99,10 @@ class Shapes(Sequence[str]):
     """
 
     texts: tuple[str, ...]
-    form: Ints
-    first: Ints
-    name: Ints
-    names: tuple[str, ...]
+    form: Indices
+    first: Indices
+    name: Indices
+    names: NameColumn
 
     def __len__(self) -> int:
         """Return the number of shapes."""
@@ -147,11 +148,11 @@ class Shapes(Sequence[str]):
         own = self.name[self.first[shape] : self.first[shape + 1]].tolist()
         return tuple([self.names[k] for k in own])
 
-    def names_at(self, shapes: Ints) -> Ints:
+    def names_at(self, shapes: Indices) -> Indices:
         """Return the names of shapes of one form, (m, c), as indices into `names`."""
         count = self.first[shapes[:1] + 1] - self.first[shapes[:1]]
         width = int(count[0]) if len(count) else 0
-        found: Ints = self.name[self.first[shapes][:, None] + np.arange(width)]
+        found: Indices = self.name[self.first[shapes][:, None] + np.arange(width)]
         return found
 
 
@@ -160,7 +161,7 @@ def find_shapes(
     text: AnyInts,
     at: AnyInts,
     name: Ints,
-    names: Sequence[str],
+    names: NameColumn,
 ) -> tuple[Shapes, Ints]:
     """Find the distinct shapes of lines, in the order of appearance.
 
@@ -175,7 +176,7 @@ def find_shapes(
         The shapes, and that of every line, (n,).
     """
     forms, whole = Interned[str](), any(one[:1] == WHOLE for one in texts)
-    entered = Interned[str](names if whole else ())
+    entered = NameColumn(names) if whole else names
     form = np.zeros(len(texts), dtype=np.int64)
     count = np.zeros(len(texts), dtype=np.int64)
     own = np.full(len(texts), -1, dtype=np.int64)
@@ -191,14 +192,15 @@ def find_shapes(
             count[k] = one.count(NAME_MARK)
         form[k] = forms[one]
     name = np.append(name, np.array(more, dtype=np.int64))
-    names = tuple(entered if whole else names)
+    entered.settle()
     begin = np.where(own[text] >= 0, own[text], at).astype(np.int64)
-    shape, example = _numbered(form[text], begin, count[text], name, len(names))
+    shape, example = _numbered(form[text], begin, count[text], name, len(entered))
     kept = text[example]
-    first = np.append(0, np.cumsum(count[kept]))
+    first = np.append(np.int32(0), np.cumsum(count[kept], dtype=np.int32))
     steps = np.arange(first[-1]) - np.repeat(first[:-1], count[kept])
     own_names = name[np.repeat(begin[example], count[kept]) + steps]
-    return Shapes(tuple(forms), form[kept], first, own_names, names), shape
+    short = form[kept].astype(np.int32), first, own_names.astype(np.int32)
+    return Shapes(tuple(forms), *short, entered), shape
 
 
 def _numbered(
@@ -327,29 +329,36 @@ class ParsedShapes(Sequence[T], Generic[T]):
             return [self[k] for k in range(*shape.indices(len(self)))]
         made = self._made.get(shape)
         if made is None:
-            form, names = int(self.form[shape]), self.shapes.names_of(shape)
-            made = self.said[form]
-            if names:
-                if form not in self._fillers:
-                    self._fillers[form] = filler(made)
-                fill = self._fillers[form]
-                made = made if fill is None else fill(names)  # type: ignore[assignment]
-            self._made[shape] = made
+            made = self._made[shape] = self.once(shape)
         return made
+
+    def once(self, shape: int) -> T:
+        """Make what a shape says for who asks for it once alone."""
+        form, names = int(self.form[shape]), self.shapes.names_of(shape)
+        made = self.said[form]
+        if not names:
+            return made
+        if form not in self._fillers:
+            self._fillers[form] = filler(made)
+        fill = self._fillers[form]
+        return made if fill is None else fill(names)  # type: ignore[return-value]
 
     def __iter__(self) -> Iterator[T]:
         """Go through the shapes."""
         return (self[k] for k in range(len(self)))
 
     @property
-    def form(self) -> Ints:
+    def form(self) -> Indices:
         """Return the form of every shape, as an index into `said`, (k,)."""
         return self.shapes.form
 
-    def words(self) -> frozenset[str]:
-        """Return all words in the shapes, in lower case; a name is one word."""
-        words = _WORD.findall("\n".join(self.shapes.texts).lower())
-        return frozenset((*words, *lower(self.shapes.names)))
+    def tell(self, names: NameColumn) -> Bools:
+        """Tell which names, in lower case, are words in the shapes, (m,)."""
+        found: Bools = self.shapes.names.lower().find(names) >= 0
+        words = {*_WORD.findall("\n".join(self.shapes.texts).lower())}
+        rest = np.flatnonzero(~found)
+        found[rest] = [names[k] in words for k in rest.tolist()]
+        return found
 
     def which(self, test: Callable[[T], bool]) -> Bools:
         """Tell which shapes pass a test that no name in them decides, (k,)."""
@@ -366,12 +375,3 @@ def parse_shapes(shapes: Shapes, parse: Callable[[str], T]) -> ParsedShapes[T]:
         parse: Says what a form says.
     """
     return ParsedShapes(tuple(map(parse, shapes.texts)), shapes)
-
-
-def lower(names: Sequence[str]) -> list[str]:
-    """Return names in lower case, all at once.
-
-    >>> lower(["WP_1", "p2"])
-    ['wp_1', 'p2']
-    """
-    return "\n".join(names).lower().split("\n") if names else []

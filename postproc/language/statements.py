@@ -12,7 +12,7 @@ from postproc.arrays import Floats, Indices
 from postproc.exceptions import ProgramError
 from postproc.language.rewrite import Skeleton
 from postproc.language.shapes import ParsedShapes, find_shapes, parse_shapes
-from postproc.language.source import Source, Span
+from postproc.language.source import NumberSpans, Source, Span
 from postproc.language.visits import Diagnostic
 
 SHOWN = 60  # characters of a statement in a message
@@ -86,8 +86,7 @@ class StatementText(Generic[T]):
             self.said.shapes,
             self.shape,
             line,
-            self.start,
-            self.stop,
+            NumberSpans.of(self.start, self.stop),
             reread=reread,
         )
 

@@ -97,7 +97,7 @@ def texts_of(n: int, told: Mapping[int, str]) -> tuple[str, ...]:
     return tuple(texts)
 
 
-@lru_cache(maxsize=1)
+@lru_cache(maxsize=2)  # of visits, and of literals
 def _nothing(n: int) -> tuple[str, ...]:
     """Return n times "", once for all that say nothing of a long program."""
     return ("",) * n
@@ -178,7 +178,7 @@ class Literals:
     line: Indices
     places: NumberPlaces
     joints: Bools
-    name: tuple[str, ...]
+    name: Sequence[str]
     shared: Bools
     taught: Bools
     pinned: tuple[str, ...]
@@ -268,7 +268,7 @@ class Visits:
     literal: Indices
     follows: Indices
     name: Ints
-    names: tuple[str, ...]
+    names: Sequence[str]
     tool: Ints
     base: Ints
     uframe: Ints

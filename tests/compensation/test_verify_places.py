@@ -13,7 +13,7 @@ from postproc.compensation.rewrite import (
     write_numbers,
 )
 from postproc.language.rewrite import Skeleton, difference
-from postproc.language.source import Replacements, Source, apply
+from postproc.language.source import NumberSpans, Replacements, Source, apply
 from postproc.robot.cell import load_cell
 from tests.bench.__main__ import CELL
 from tests.bench.made import spot
@@ -83,22 +83,22 @@ def test_a_number_that_reads_otherwise_is_refused(job, cell) -> None:
 
 def test_a_number_elsewhere_is_refused() -> None:
     before = Skeleton.read(Source("a.pdl", POSES))
-    start = before.start[2:3].astype(np.int64)
+    start = before.numbers.start[2:3].astype(np.int64)
     edits = Replacements(start, start + 1, np.array([b"9.500"]))
     data = POSES[: start[0]] + b"9.500" + POSES[start[0] + 1 :]
     after = Skeleton.read(Source("a.pdl", data))
     assert difference(before, after, edits) == ""
     assert difference(before, after, edits, 1)
     for places in ("start", "end"):
-        moved = getattr(after, places).copy()
-        moved[5] += 1
-        wrong = replace(after, **{places: moved})
+        moved = {name: getattr(after.numbers, name) for name in ("start", "end")}
+        moved[places][5] += 1
+        wrong = replace(after, numbers=NumberSpans.of(**moved))
         assert "elsewhere" in difference(before, wrong, edits)
     half = Replacements(start, start, np.array([b"9.5"]))
     after = Skeleton.read(Source("a.pdl", apply(POSES, half)))
     assert "one whole number" in difference(before, after, half)
     none = Replacements(start[:0], start[:0], np.array([], dtype="S1"))
-    fewer = replace(before, start=before.start[:0], end=before.end[:0])
+    fewer = replace(before, numbers=NumberSpans.of(start[:0], start[:0]))
     assert "other lines or numbers" in difference(before, fewer, none)
     assert difference(before, before, none) == ""
 

@@ -27,7 +27,7 @@ def variables(data: bytes) -> None:
         source = source_from_bytes("fuzz.lsv", data)
         read = read_variables(source)
         slots = [s for e in read.entries.values() for s in e.slots if s >= 0]
-        assert all(slot < len(read.start) for slot in slots)
+        assert all(slot < len(read.lines.numbers) for slot in slots)
         check_numbers(read_lines(source))
 
 
@@ -39,7 +39,7 @@ def check_numbers(lines: Lines) -> None:
     Raises:
         AssertionError: Numbers overlap, or bytes between them would change.
     """
-    source, start, end = lines.source, lines.start, lines.end
+    source, start, end = lines.source, lines.numbers.start, lines.numbers.end
     same = [source.data[a:b] for a, b in zip(start, end, strict=True)]
     assert apply(source.data, replaced(lines, same)) == source.data
     signed = [source.data[max(a - 1, 0) : a] in (b"+", b"-") for a in start.tolist()]
@@ -51,4 +51,6 @@ def check_numbers(lines: Lines) -> None:
 
 def replaced(lines: Lines, texts: list[bytes]) -> Replacements:
     """Return the edits that give every number a text."""
-    return Replacements(lines.start, lines.end, np.array(texts, dtype=np.bytes_))
+    return Replacements(
+        lines.numbers.start, lines.numbers.end, np.array(texts, dtype=np.bytes_)
+    )

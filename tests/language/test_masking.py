@@ -130,7 +130,8 @@ def test_a_long_file_is_one_file() -> None:
     assert len(lines.shapes) == 1
     assert np.array_equal(np.diff(lines.first), np.full(count, 6))
     assert lines.value[-5] == -2.25
-    assert lines.source.data[lines.start[-5] : lines.end[-5]] == b"-2.25"
+    start, end = lines.numbers.start, lines.numbers.end
+    assert lines.source.data[start[-5] : end[-5]] == b"-2.25"
 
 
 def test_statements_are_joined_up_to_endmove() -> None:

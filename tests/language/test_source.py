@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 from postproc.exceptions import FileError, ProgramError
 from postproc.language.source import (
     Edit,
+    NumberSpans,
     Replacements,
     Source,
     Span,
@@ -140,3 +141,19 @@ def test_many_edits_do_what_single_edits_do(data, wanted) -> None:
     assert many.made(data, result) and many.made(data, b"stamp" + result, 5)
     for other in (result + b"x", b"x" + result, result[:-1], b""):
         assert other == result or not many.made(data, other)
+
+
+@given(st.lists(st.tuples(st.integers(0, 70_000), st.integers(1, 300)), max_size=60))
+def test_places_of_numbers_are_those_that_were_taken(gaps):
+    ends = np.cumsum(np.array(gaps, dtype=np.int64).reshape(-1, 2).ravel())
+    start, end = ends[::2], ends[1::2]
+    numbers = NumberSpans.of(start, end)
+    assert len(numbers) == len(gaps)
+    assert numbers.start.tolist() == start.tolist()
+    assert numbers.end.tolist() == end.tolist()
+    some = np.arange(len(gaps))[::-2]
+    assert numbers.starts(some).tolist() == start[some].tolist()
+    assert numbers.ends(some).tolist() == end[some].tolist()
+    rows = slice(len(gaps) // 3, len(gaps) // 2)
+    assert numbers.starts(rows).tolist() == start[rows].tolist()
+    assert numbers.ends(rows).tolist() == end[rows].tolist()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from itertools import chain
 from typing import Protocol
@@ -20,13 +20,14 @@ from postproc.arrays import (
     slim,
     spans,
 )
+from postproc.language.names import NameColumn
 from postproc.language.pdl2.columns import Collector, SettingColumns, VisitColumns
 from postproc.language.pdl2.context import Point
 from postproc.language.pdl2.dialect import PDL2_DIALECT
 from postproc.language.pdl2.job import World
 from postproc.language.pdl2.machine import Key, Machine, MoveRun
 from postproc.language.pdl2.store import MANY
-from postproc.language.source import Source
+from postproc.language.source import NumberSpans, Source
 from postproc.language.visits import (
     ELSEWHERE,
     Literals,
@@ -55,39 +56,54 @@ class Numbering:
 
     Attributes:
         sources: The files.
-        first: Index of each file's first number, (f,).
-        start, end: Byte offsets in its file, (m,).
+        first: Index of each file's first number, and how many there are, (f + 1,).
+        numbers: Where every file's numbers stand.
     """
 
     sources: tuple[Source, ...]
     first: Indices
-    start: Indices
-    end: Indices
+    numbers: tuple[NumberSpans, ...]
 
     @staticmethod
     def of(world: World) -> Numbering:
         """Number the files of a job as its slots are."""
-        numbered = [
-            (p.lines.source, p.lines.start, p.lines.end) for p in world.programs()
-        ]
+        texts = [program.lines for program in world.programs()]
         if world.variables is not None:
-            v = world.variables
-            numbered.append((v.source, v.start, v.end))
-        first = [world.slot_base[source.name] for source, _, _ in numbered]
-        return Numbering(
-            tuple(source for source, _, _ in numbered),
-            np.array(first, dtype=np.int64),
-            _together([start for _, start, _ in numbered]),
-            _together([end for _, _, end in numbered]),
+            texts.append(world.variables.lines)
+        sources, numbers = zip(*((t.source, t.numbers) for t in texts), strict=True)
+        first = [world.slot_base[source.name] for source in sources]
+        first.append(sum(map(len, numbers)))
+        return Numbering(sources, np.array(first, dtype=np.int64), numbers)
+
+    def __len__(self) -> int:
+        """Return how many numbers there are."""
+        return int(self.first[-1])
+
+    def file(self, slots: Indices) -> Indices:
+        """Return the file of every number."""
+        found: Ints = np.searchsorted(self.first[1:], slots, side="right")
+        return found.astype(np.int32)
+
+    def places(self, slots: Indices, file: Indices) -> NumberPlaces:
+        """Tell where the numbers of targets stand.
+
+        Args:
+            slots: Six numbers of each target, (m, 6).
+            file: The file of each, (m,).
+        """
+        rows = max(len(slots), 1)
+        return NumberPlaces.joined(
+            in_chunks(lambda k: self._of(slots[k], file[k]), rows)
         )
 
-    def places(self, slots: Indices) -> NumberPlaces:
-        """Tell where the numbers of targets stand, by their slots, (m, 6)."""
-        some = in_chunks(
-            lambda k: NumberPlaces.of(self.start[slots[k]], self.end[slots[k]]),
-            max(len(slots), 1),
-        )
-        return NumberPlaces.joined(some)
+    def _of(self, slots: Indices, file: Indices) -> NumberPlaces:
+        start, end = np.zeros((2, *slots.shape), dtype=np.int32)
+        for number in np.unique(file).tolist():
+            mine = file == number
+            own = slots[mine] - self.first[number]
+            numbers = self.numbers[number]
+            start[mine], end[mine] = numbers.starts(own), numbers.ends(own)
+        return NumberPlaces.of(start, end)
 
     def apart(self, slots: Indices) -> Bools:
         """Tell which targets have their numbers in more than one file, (k,).
@@ -95,20 +111,15 @@ class Numbering:
         Args:
             slots: Six numbers of each target, (k, 6).
         """
-        if len(self.first) == 1:
-            return np.zeros(len(slots), dtype=bool)
-        file = np.searchsorted(self.first, slots, side="right")
-        different: Bools = (file != file[:, :1]).any(axis=1)
-        return different
-
-
-def _together(columns: list[Indices]) -> Indices:
-    """Put the columns of files one after the other; one by itself is not copied."""
-    return columns[0] if len(columns) == 1 else np.concatenate(columns)
+        found = np.zeros(len(slots), dtype=bool)
+        for k in chunks(len(slots) if len(self.sources) > 1 else 0):
+            file = self.file(slots[k])
+            found[k] = any_in_rows(file != file[:, :1])
+        return found
 
 
 def find_literals(
-    columns: SlotColumns, numbering: Numbering, names: Iterable[str]
+    columns: SlotColumns, numbering: Numbering, names: NameColumn
 ) -> tuple[Literals, Indices]:
     """Find the distinct literals; also return the literal of every visit.
 
@@ -117,7 +128,7 @@ def find_literals(
     """
     literal = np.full(len(columns.slots), -1, dtype=np.int32)
     rows = np.flatnonzero(columns.slots[:, 0] >= 0)
-    slots = columns.slots if len(rows) == len(literal) else columns.slots[rows]
+    slots = columns.slots[_as_slice(rows)]
     if _ascend(slots) and not numbering.apart(slots).any():
         literal[rows] = np.arange(len(rows), dtype=np.int32)
         return _literals(columns, numbering, names, slots, rows, literal), literal
@@ -135,6 +146,13 @@ def find_literals(
     return _literals(columns, numbering, names, distinct[kept], first, literal), literal
 
 
+def _as_slice(rows: Ints) -> Ints | slice:
+    """Return rows that follow each other as a slice: what is taken is no copy."""
+    if len(rows) and rows[-1] - rows[0] == len(rows) - 1:
+        return slice(int(rows[0]), int(rows[-1]) + 1)
+    return rows
+
+
 def _ascend(slots: Indices) -> bool:
     """Tell whether all numbers stand in the order in which they are gone to, once."""
     numbers = slots.ravel()
@@ -144,27 +162,25 @@ def _ascend(slots: Indices) -> bool:
 def _literals(
     columns: SlotColumns,
     numbering: Numbering,
-    names: Iterable[str],
+    names: NameColumn,
     slots: Indices,
     visit: Indices,
     literal: Indices,
 ) -> Literals:
-    file = np.searchsorted(numbering.first, slots[:, 0], side="right").astype(np.int32)
-    file -= 1
-    places = numbering.places(slots)
+    file = numbering.file(slots[:, 0])
+    places = numbering.places(slots, file)
     line = np.zeros(len(slots), dtype=np.int32)
     for i, source in enumerate(numbering.sources):
         mine = file == i
         first = places.first[mine]
         line[mine] = np.searchsorted(source.line_starts, first, side="right")
-    texts, own = tuple(names), columns.name[visit]
-    named = tuple(map(texts.__getitem__, own.tolist())) if own.any() else ()
+    own, unnamed = columns.name[visit].astype(np.int64), texts_of(len(slots), {})
     return Literals(
         file=slim(file),
         line=line,
         places=places,
         joints=columns.target[visit] == Meaning.JOINTS,
-        name=named or texts_of(len(slots), {}),
+        name=names.take(own) if own.any() else unnamed,
         shared=slim(_any(columns.shared, literal, len(slots))),
         taught=slim(_any(columns.taught, literal, len(slots))),
         pinned=texts_of(len(slots), {}),
@@ -249,13 +265,14 @@ def collect(machine: Machine) -> Visits:
     offsets = offsets.astype(np.int64)
     numbering = Numbering.of(machine.world)
     axes = _most_axes(runs, machine.world)
-    columns = VisitColumns(int(offsets[-1]), axes, len(numbering.start))
+    columns = VisitColumns(int(offsets[-1]), axes, len(numbering))
     settings = SettingColumns(machine.world.start.payload_kg)
     collector = Collector(machine, columns, settings)
     collector.fill(zip(offsets.tolist(), runs, strict=False))
     c, world = collector.columns, machine.world
     if machine.exhausted:
         c.reason[:] = collector.reasons["the program is too complex to be followed"]
+    collector.names.settle()
     literals, literal = find_literals(c, numbering, collector.names)
     literals, follows = find_uses(literals, c.slots, c.bases, literal, world.pinned)
     overlapping = (literal < 0) & (c.slots[:, 0] >= 0) & (c.reason == 0)
@@ -286,7 +303,7 @@ def collect(machine: Machine) -> Visits:
         literal=literal,
         follows=slim(follows),
         name=slim(c.name),
-        names=tuple(collector.names),
+        names=collector.names,
         fly=slim(c.fly),
         arc_angle=slim(np.full(len(c.line), np.nan)),
         block=slim(np.full(len(c.line), -1)),
@@ -325,9 +342,10 @@ def _predecessors(
     """Translate predecessor ids to visits, in CSR form."""
     n, first = int(offsets[-1]), offsets[:-1]
     ids = np.array([machine.ids[key] for key, _ in ordered], dtype=np.int64)
-    visit = np.zeros(machine.next_id, dtype=np.int64)
-    visit[spans(ids, np.diff(offsets))] = np.arange(n)
+    visit = np.zeros(machine.next_id, dtype=np.int32)
+    visit[spans(ids, np.diff(offsets))] = np.arange(n, dtype=np.int32)
     origins = [_origins(machine, run, visit) for _, run in ordered]
+    del visit
     counts = np.ones(n, dtype=np.int32)
     counts[first] = [len(found) for found in origins]
     start = np.append(np.int32(0), np.cumsum(counts, dtype=np.int32))
@@ -336,7 +354,7 @@ def _predecessors(
     return start, pred
 
 
-def _origins(machine: Machine, run: MoveRun, visit: Ints) -> list[int]:
+def _origins(machine: Machine, run: MoveRun, visit: Indices) -> list[int]:
     """Return the visits that the first move of a run may come from, ascending."""
     found = {int(visit[p]) if p >= 0 else p for p in run.predecessors - {MANY}}
     if MANY in run.predecessors or id(run.place.body) in machine.recursive:

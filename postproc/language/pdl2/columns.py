@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from postproc.arrays import Indices, Interned, Ints, chunks, slim, spans
+from postproc.arrays import Indices, Interned, Ints, chunks, is_one_value, slim, spans
 from postproc.language.marks import MEASURE
+from postproc.language.names import NameColumn
 from postproc.language.pdl2 import syntax as ast
 from postproc.language.pdl2.dialect import COMMENTS
 from postproc.language.pdl2.disturbances import disturbance
@@ -93,8 +94,9 @@ class SettingColumns:
     def columns(self, rows: Indices) -> dict[str, Any]:
         """Return the columns of `Visits` that come from settings."""
         frames = list(self._frames)
+        used = np.flatnonzero(np.bincount(rows, minlength=len(self._kept)))
         columns: dict[str, Any] = {
-            name: _spread(np.array(values), rows)
+            name: _spread(np.array(values), rows, used)
             for name, values in self._table.items()
         }
         if not columns:
@@ -106,11 +108,12 @@ class SettingColumns:
         return columns
 
 
-def _spread(values: NDArray[Any], rows: Indices) -> NDArray[Any]:
-    """Return a column of settings; most programs have one row of them."""
-    if len(values) == 1:
-        return np.broadcast_to(values[0], (len(rows), *values.shape[1:]))
-    return slim(values[rows])
+def _spread(values: NDArray[Any], rows: Indices, used: Ints) -> NDArray[Any]:
+    """Return a column of settings; those that are used often say one value."""
+    own = slim(values[used])
+    if len(used) == 1 or (len(used) and is_one_value(own)):
+        return np.broadcast_to(own[0], (len(rows), *values.shape[1:]))
+    return values[rows]
 
 
 def _row(settings: Settings, frame: Any) -> dict[str, Any]:
@@ -216,7 +219,7 @@ class VisitColumns:
         self.via = np.zeros(n, dtype=bool)
         self.fly = np.zeros(n, dtype=bool)
         self.values = np.full((n, 6), np.nan)
-        self.distance_mm = np.full(n, np.nan)
+        self.distance_mm = np.broadcast_to(np.nan, n)
         self.aux = np.full((n, axes), np.nan)
         self.config = np.zeros(n, dtype=np.int32)
         self.config_given = np.zeros(n, dtype=bool)
@@ -253,9 +256,9 @@ class ProgramMoves:
         at, runs = zip(*self.runs, strict=True)
         sizes = np.array([len(run) for run in runs])
         self.visit: Ints = spans(np.array(at), sizes)
-        self.row: Ints = np.concatenate([run.rows for run in runs])
+        self.row: Ints = _together([run.rows for run in runs])
         self.run: Indices = np.repeat(np.arange(len(runs), dtype=np.int32), sizes)
-        self.point: Ints = np.concatenate([run.point for run in runs])
+        self.point: Ints = _together([run.point for run in runs])
         numbers = Interned[MoveForm]()
         self.form: Indices = np.concatenate([_numbered(run, numbers) for run in runs])
         self.forms = [*numbers]
@@ -273,6 +276,11 @@ class ProgramMoves:
             for k, goal in run.goals.items():
                 yield begin + k, run, goal
             begin += len(run)
+
+
+def _together(columns: Sequence[Ints]) -> Ints:
+    """Put columns one after the other; one by itself is not copied."""
+    return columns[0] if len(columns) == 1 else np.concatenate(columns)
 
 
 def _numbered(run: MoveRun, numbers: Interned[MoveForm]) -> Indices:
@@ -294,7 +302,7 @@ class Collector:
     columns: VisitColumns
     settings: SettingColumns
     configs: Interned[str] = field(default_factory=lambda: Interned([""]))
-    names: Interned[str] = field(default_factory=lambda: Interned([""]))
+    names: NameColumn = field(default_factory=lambda: NameColumn([""]))
     reasons: Interned[str] = field(default_factory=lambda: Interned([""]))
 
     def fill(self, runs: Iterable[tuple[int, MoveRun]]) -> None:
@@ -383,15 +391,15 @@ class Collector:
     def _names(self, moves: ProgramMoves) -> None:
         """Enter the names of the points that moves go to."""
         points, some = self.machine.world.initial.points, moves.point >= 0
-        names = {
+        told = {
             k: goal.position.name for k, _, goal in moves.evaluated() if goal.position
         }
+        names, at = NameColumn(told.values()), np.array([*told], dtype=np.int64)
         if points is not None and some.any():
-            told = [points.entries.name[row] for row in moves.point[some].tolist()]
-            names |= zip(np.flatnonzero(some).tolist(), told, strict=True)
-            names = dict(sorted(names.items()))
-        visit = moves.visit[np.array([*names], dtype=np.int64)]
-        self.columns.name[visit] = self.names.of([*names.values()])
+            names.extend(points.entries.name.take(moves.point[some]))
+            at = np.append(at, np.flatnonzero(some))
+        order = np.argsort(at)
+        self.columns.name[moves.visit[at[order]]] = self.names.of(names.take(order))
 
     def _points(self, moves: ProgramMoves) -> None:
         """Fill moves to points that the variable file tells, layout by layout."""
@@ -401,11 +409,12 @@ class Collector:
             return
         c, entries = self.columns, points.entries
         rows, visit = moves.point[some], moves.visit[some]
-        c.values[visit] = entries.numbers[rows]
-        c.slots[visit] = entries.slots[rows] + points.base
+        for k in chunks(len(some)):
+            c.values[visit[k]] = entries.numbers[rows[k]]
+            c.slots[visit[k]] = entries.slots[rows[k]] + points.base
         c.taught[visit], c.shared[visit] = points.taught[rows], points.shared[rows]
         if self.machine.world.start.taught:
-            names = [entries.name[row] for row in rows.tolist()]
+            names = entries.name.take(rows)
             c.taught[visit] |= [self.is_listed(name) for name in names]
         for number in _in_order(entries.layout[rows]):
             layout, mine = entries.layouts[number], entries.layout[rows] == number
@@ -428,8 +437,10 @@ class Collector:
         goals = [goal for _, _, goal in found]
         c.target[visit] = [goal.target for goal in goals]
         c.values[visit] = np.array([goal.numbers for goal in goals], dtype=float)
-        distances = [goal.distance for goal in goals]
-        c.distance_mm[visit] = np.array(distances, dtype=float)
+        distances = np.array([goal.distance for goal in goals], dtype=float)
+        if np.isfinite(distances).any():
+            c.distance_mm = np.array(c.distance_mm)
+            c.distance_mm[visit] = distances
         moves.first[index] = self.reasons.of([goal.reason for goal in goals])
         for at, k, goal in zip(visit.tolist(), index.tolist(), goals, strict=True):
             if goal.position is not None:

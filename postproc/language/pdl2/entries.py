@@ -7,10 +7,10 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from postproc.arrays import Bools, Floats, Indices, Ints, slim
 from postproc.language.lines import Lines
+from postproc.language.names import NameColumn
 from postproc.language.pdl2.parser import EntryPart
 from postproc.language.shapes import ParsedShapes, alike, name_index, numbered_in_order
 
@@ -79,12 +79,45 @@ class Layout:
 
 
 @dataclass(frozen=True, eq=False)
+class Rows(Mapping[str, int]):
+    """Rows by name.
+
+    Attributes:
+        names: The names, each once.
+        rows: The row of each, (m,).
+    """
+
+    names: NameColumn
+    rows: Indices
+
+    def __len__(self) -> int:
+        """Return how many names there are."""
+        return len(self.names)
+
+    def __iter__(self) -> Iterator[str]:
+        """Go through the names."""
+        return iter(self.names)
+
+    def __getitem__(self, name: str) -> int:
+        """Return the row of a name."""
+        number = self.names.number(name)
+        if number < 0:
+            raise KeyError(name)
+        return int(self.rows[number])
+
+    def find(self, names: NameColumn) -> Ints:
+        """Return the rows of names, (m,), -1 where there is none."""
+        number = self.names.find(names)
+        return np.append(self.rows, -1)[number]
+
+
+@dataclass(frozen=True, eq=False)
 class Entries(Mapping[str, Entry]):
     """k entries, and those of them that have a name of their own by that.
 
     Attributes:
         row: Row of each lower-case name; names with two entries are missing.
-        name: Names as they are written, k strings.
+        name: Names as they are written, k of them.
         line: 1-based line of each head, (k,).
         layout: Index into `layouts`, (k,).
         layouts: How they are written.
@@ -95,8 +128,8 @@ class Entries(Mapping[str, Entry]):
         known: Which numbers are known, (k, 6), where they are let go of.
     """
 
-    row: Mapping[str, int]
-    name: Sequence[str]
+    row: Rows
+    name: NameColumn
     line: Ints
     layout: Indices
     layouts: tuple[Layout, ...]
@@ -109,7 +142,7 @@ class Entries(Mapping[str, Entry]):
     @cached_property
     def parts(self) -> list[str]:
         """List the lower-case names of elements and fields."""
-        if not any(mark in "\n".join(self.name) for mark in "[."):
+        if not self.name.hold("[."):
             return []
         return [name for name in self.row if "[" in name or "." in name]
 
@@ -351,7 +384,7 @@ def read_records(
                 )
             )
     return Entries(
-        {},
+        Rows(NameColumn(), np.empty(0, dtype=np.int32)),
         _names(lines, said, records),
         lines.line[records.first],
         slim(layout),
@@ -424,14 +457,14 @@ def _stacked(parts: Sequence[tuple[Ints, Floats]], k: int) -> Floats:
 
 def _names(
     lines: Lines, said: ParsedShapes[EntryPart | None], records: Records
-) -> list[str]:
+) -> NameColumn:
     """Name every entry: as its head does, elements with their index."""
     heads, at = np.unique(records.head, return_inverse=True)
-    names = _head_names(said, lines.shape[heads])[at]
+    names = _head_names(said, lines.shape[heads]).take(at.astype(np.int64))
     index = _indices(lines, said, records)
     if not index:
-        return [*names.tolist()]
-    return [name + index.get(row, "") for row, name in enumerate(names.tolist())]
+        return names
+    return NameColumn(name + index.get(row, "") for row, name in enumerate(names))
 
 
 def _indices(
@@ -452,18 +485,20 @@ def _indices(
     return found
 
 
-def _head_names(
-    said: ParsedShapes[EntryPart | None], shapes: Ints
-) -> NDArray[np.object_]:
+def _head_names(said: ParsedShapes[EntryPart | None], shapes: Ints) -> NameColumn:
     """Return the names in some heads, (m,)."""
-    found = np.empty(len(shapes), dtype=object)
-    texts = np.array(said.shapes.names, dtype=object)
-    form = said.form[shapes]
+    names, written = said.shapes.names, list[str]()
+    found, form = np.zeros(len(shapes), dtype=np.int64), said.form[shapes]
     for one in np.unique(form).tolist():
         mine, head = np.flatnonzero(form == one), said.said[one]
         assert head is not None
         at = name_index(head.name)
-        found[mine] = head.name
         if at >= 0:
-            found[mine] = texts[said.shapes.names_at(shapes[mine])[:, at]]
-    return found
+            found[mine] = said.shapes.names_at(shapes[mine])[:, at]
+        else:
+            found[mine] = len(names) + len(written)
+            written.append(head.name)
+    if written:
+        names = NameColumn(names)
+        names.extend(written)
+    return names.take(found)

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from postproc.language.interface import Start
+from postproc.language.names import NameColumn
 from postproc.language.pdl2 import syntax as ast
 from postproc.language.pdl2.calls import (
     assign,
@@ -63,7 +64,6 @@ from postproc.language.pdl2.values import (
 )
 from postproc.language.pdl2.variable_file import VariableFile
 from postproc.language.pdl2.variable_file import VariableFile as ValueFile
-from postproc.language.shapes import lower
 from postproc.language.visits import (
     ELSEWHERE,
     MOTION_UNKNOWN,
@@ -383,16 +383,13 @@ def _report_drift(world: World, place: Place, file: ValueFile) -> None:
     """Say where a program and its variable file have drifted apart."""
     for found in file.diagnostics:
         world.diagnostics[found] = None
-    words, declared = place.program.statements.words(), place.program.variables.names
-    names = _bases(file.entries)
-    if names.keys() <= words and names.keys() <= declared:  # as nearly always
+    names, written = _bases(file.entries)
+    used = place.program.statements.tell(names)
+    declared = place.program.variables.names.find(names) >= 0
+    if used.all() and declared.all():  # as nearly always
         return
-    unused = [written for name, written in names.items() if name not in words]
-    undeclared = [
-        written
-        for name, written in names.items()
-        if name in words and name not in declared
-    ]
+    unused = [written[k] for k in np.flatnonzero(~used).tolist()]
+    undeclared = [written[k] for k in np.flatnonzero(used & ~declared).tolist()]
     if names and len(unused) == len(names):
         _say(world, file, "lsv-other-program", "none of its variables is used by "
              f"{place.program.name}: is it the file of another program?")  # fmt: skip
@@ -403,13 +400,13 @@ def _report_drift(world: World, place: Place, file: ValueFile) -> None:
         _say(world, file, "lsv-undeclared", text)
 
 
-def _bases(entries: Entries) -> dict[str, str]:
-    """Return how variables of a file are written, by name, without their parts."""
-    written = [entries.name[row] for row in entries.row.values()]
-    names = dict(zip(lower(written), written, strict=True))
-    if entries.parts:
-        return {base_variable(name): name.partition(".")[0] for name in written}
-    return names
+def _bases(entries: Entries) -> tuple[NameColumn, Sequence[str]]:
+    """Return the variables of a file, without their parts, and how they are written."""
+    written = entries.name.take(entries.row.rows.astype(np.int64))
+    if not entries.parts:
+        return entries.row.names, written
+    names = {base_variable(name): name.partition(".")[0] for name in written}
+    return NameColumn(names), [*names.values()]
 
 
 def _say(world: World, file: ValueFile, code: str, text: str) -> None:
@@ -458,7 +455,7 @@ def _enter_all(world: World, place: Place, file: ValueFile) -> None:
     known[_declared_for_other(world, place.program, entries)] = False
     shared = np.array([layout.shared for layout in entries.layouts], dtype=bool)
     shared, taught = shared[entries.layout], np.zeros(len(known), dtype=bool)
-    named = np.fromiter(entries.row.values(), np.int64, len(entries.row))
+    named = entries.row.rows
     own, other = known.copy(), {}
     for row in _told_by_declaration(place.program, entries):
         name = entries.name[row].lower()
@@ -561,11 +558,7 @@ def resolve(
     """
     world = World(program, dict(others or {}), start or Start(), variables)
     fill_initial(world)
-    machine = Machine(world)
-    stretches = MoveBlocks(machine)
-    _start(machine)
-    while (here := machine.next()) is not None:
-        _run(machine, here, stretches)
+    machine = _followed(world)
     if machine.exhausted:
         world.report_once(
             program, 0, "too-complex", "", "the program has too many ways, or calls, "
@@ -575,6 +568,16 @@ def resolve(
         machine = _listed(world)
     world.pin_loose()
     return Resolved(collect(machine), tuple(sorted(world.diagnostics)))
+
+
+def _followed(world: World) -> Machine:
+    """Follow every way from the start."""
+    machine = Machine(world)
+    stretches = MoveBlocks(machine)
+    _start(machine)
+    while (here := machine.next()) is not None:
+        _run(machine, here, stretches)
+    return machine
 
 
 def _listed(world: World) -> Machine:

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from itertools import chain, repeat
+from itertools import chain
 
 import numpy as np
 
 from postproc.arrays import Bools, Ints
 from postproc.files import base_name
 from postproc.language.interface import Start
+from postproc.language.names import NameColumn
 from postproc.language.pdl2 import syntax as ast
 from postproc.language.pdl2.dialect import COMMENTS
 from postproc.language.pdl2.entries import Entries
@@ -54,14 +55,13 @@ class FilePoints:
                 return row
         return self.other.get(key, -1)
 
-    def rows(self, names: Sequence[str]) -> Ints:
+    def rows(self, names: NameColumn) -> Ints:
         """Return the rows of the program's own variables, (m,), -1 for no points.
 
         Args:
             names: Their names, in lower case.
         """
-        found = map(self.entries.row.get, names, repeat(-1))
-        rows = np.fromiter(found, np.int64, len(names))
+        rows = self.entries.row.find(names)
         rows[rows >= 0] = np.where(self.own[rows[rows >= 0]], rows[rows >= 0], -1)
         return rows
 
@@ -105,7 +105,7 @@ class InitialValues:
         """Return the row of a point that the variable file tells, -1 for all else."""
         return -1 if self.points is None else self.points.row(key)
 
-    def rows(self, prefix: str, names: Sequence[str]) -> Ints:
+    def rows(self, prefix: str, names: NameColumn) -> Ints:
         """Return the rows of points of a program's own variables, (m,), -1 for others.
 
         Args:
@@ -199,7 +199,7 @@ class World:
         for program in self.programs():
             self.slot_base[program.lines.source.name] = base
             self.files.append(program.lines.source.name)
-            base += len(program.lines.start)
+            base += len(program.lines.numbers)
             source = program.lines.source
             self.taught_lines[source.name] = COMMENTS.taught(source)
             self.diagnostics |= dict.fromkeys(program.diagnostics)

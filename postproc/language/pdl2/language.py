@@ -198,16 +198,18 @@ def _variables(source: Source, known: Sequence[Parsed]) -> VariableFile:
 
 def _is_whole(one: Parsed, source: Source) -> bool:
     """Tell whether a file was read before as it is, and its numbers are still known."""
-    whole = len(one.lines.value) == len(one.lines.start)
+    if isinstance(one, VariableFile):
+        whole = one.entries.known is None
+    else:
+        whole = len(one.lines.value) == len(one.lines.numbers)
     return whole and one.lines.source == source
 
 
 def _without_values(one: Parsed) -> Parsed:
     """Let go of the numbers of a file, which are about to change."""
-    lines = one.lines.without_values()
     if isinstance(one, VariableFile):
-        return replace(one, lines=lines, entries=one.entries.without_numbers())
-    return replace(one, lines=lines)
+        return replace(one, entries=one.entries.without_numbers())
+    return replace(one, lines=one.lines.without_values())
 
 
 def _named(page: Program) -> Program:

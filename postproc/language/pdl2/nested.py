@@ -10,6 +10,7 @@ import numpy as np
 
 from postproc.arrays import Ints
 from postproc.language.lines import Lines
+from postproc.language.names import NameColumn
 from postproc.language.pdl2.entries import (
     NESTED,
     POSITIONS,
@@ -361,7 +362,7 @@ def completed(entries: Entries, fields: Fields) -> Entries:
     given = np.array([one.arm for one in fields.each], dtype=np.int64)
     return replace(
         entries,
-        name=[*entries.name[:-k], *(one.name for one in fields.each)],
+        name=NameColumn((*[*entries.name][:-k], *(one.name for one in fields.each))),
         layout=layout,
         layouts=(*entries.layouts, *(replace(e, shared=True) for e in entries.layouts)),
         numbers=numbers,

@@ -3,20 +3,21 @@
 from __future__ import annotations
 
 import re
+from array import array
 from bisect import bisect_right
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence, Set
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from itertools import repeat
 
 import numpy as np
 
-from postproc.arrays import Bools, Ints
+from postproc.arrays import Bools, Indices, Ints
 from postproc.language.lines import Lines, read_lines, reread_lines
+from postproc.language.names import NameColumn
 from postproc.language.pdl2 import syntax as ast
 from postproc.language.pdl2.dialect import COMMENTS
 from postproc.language.pdl2.parser import parse_form
-from postproc.language.shapes import ParsedShapes, lower, parse_shapes
+from postproc.language.shapes import ParsedShapes, parse_shapes
 from postproc.language.source import Source
 from postproc.language.visits import Diagnostic
 
@@ -225,7 +226,7 @@ def _unmatched(
 # Declared variables: a list of names is one declaration, whatever its length.
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Variable:
     """A declared variable or constant.
 
@@ -258,8 +259,9 @@ class Variables(Mapping[str, Variable]):
 
     def __init__(self) -> None:
         """Begin without any."""
-        self._at: dict[str, int] = {}  # index into the names, by lower-case name
-        self._names: list[str] = []
+        self._names = NameColumn()  # in lower case, each once
+        self._at = array("i")  # where each is written last
+        self._written = NameColumn()
         self._begins: list[int] = []  # the first name of every declaration
         self._said: list[Variable] = []  # what holds for all names of a declaration
         self._made: dict[str, Variable] = {}
@@ -271,13 +273,16 @@ class Variables(Mapping[str, Variable]):
             names: As they are written.
             said: What holds for all of them, under any name.
         """
-        begin = len(self._names)
-        own = lower(names)
+        begin = len(self._written)
+        own = NameColumn(names).lower()
         if self._made:
             for name in own:
                 self._made.pop(name, None)
-        self._at.update(zip(own, range(begin, begin + len(own)), strict=True))
-        self._names += names
+        for at, number in enumerate(self._names.of(own).tolist(), begin):
+            if number == len(self._at):
+                self._at.append(at)
+            self._at[number] = at
+        self._written.extend(names)
         self._begins.append(begin)
         self._said.append(said)
 
@@ -290,43 +295,46 @@ class Variables(Mapping[str, Variable]):
         """Return those of some lower-case names that there are."""
         found = Variables()
         for name in names:
-            if name in self._at:
+            if name in self:
                 found.declare([self[name].name], self[name])
         return found
 
     def __len__(self) -> int:
         """Return the number of names."""
-        return len(self._at)
+        return len(self._names)
 
     def __iter__(self) -> Iterator[str]:
         """Go through the lower-case names."""
-        return iter(self._at)
+        return iter(self._names)
 
     def __contains__(self, name: object) -> bool:
         """Tell whether a lower-case name is declared."""
-        return name in self._at
+        return name in self._names
 
     def __getitem__(self, name: str) -> Variable:
         """Return the variable of a lower-case name."""
         made = self._made.get(name)
         if made is None:
-            at = self._at[name]
+            number = self._names.number(name)
+            if number < 0:
+                raise KeyError(name)
+            at = self._at[number]
             said = self._said[bisect_right(self._begins, at) - 1]
-            made = self._made[name] = replace(said, name=self._names[at])
+            made = self._made[name] = replace(said, name=self._written[at])
         return made
 
     def get(self, name: str, default: object = None) -> Variable | None:  # type: ignore[override]
         """Return the variable of a lower-case name, None where there is none."""
-        return self[name] if name in self._at else None
+        return self[name] if name in self else None
 
     @property
-    def names(self) -> Set[str]:
+    def names(self) -> NameColumn:
         """Return the lower-case names."""
-        return self._at.keys()
+        return self._names
 
     def written(self) -> list[str]:
         """Return the names as they are written, in order."""
-        return [self._names[at] for at in self._at.values()]
+        return [self._written[at] for at in self._at]
 
     def which(self, test: Callable[[Variable], bool]) -> list[str]:
         """List the lower-case names whose declaration passes a test, in order.
@@ -337,15 +345,15 @@ class Variables(Mapping[str, Variable]):
         passed = self._passed(test)
         if not passed.any():
             return []
-        index = np.fromiter(self._at.values(), np.int64, len(self._at))
-        names = [*self._at]
-        return [names[k] for k in np.flatnonzero(passed[self._declaration(index)])]
+        found = passed[self._declaration(np.array(self._at, dtype=np.int32))]
+        return [self._names[k] for k in np.flatnonzero(found).tolist()]
 
-    def passing(self, names: Sequence[str], test: Callable[[Variable], bool]) -> Bools:
+    def passing(self, names: NameColumn, test: Callable[[Variable], bool]) -> Bools:
         """Tell which lower-case names are declared, and so that it passes a test."""
-        index = np.fromiter(map(self._at.get, names, repeat(-1)), np.int64, len(names))
-        found = index >= 0
-        own, passed = self._declaration(index[found]), np.zeros(len(self._said), bool)
+        number = self._names.find(names)
+        found = number >= 0
+        own = self._declaration(np.array(self._at, dtype=np.int32)[number[found]])
+        passed = np.zeros(len(self._said), bool)
         for k in np.flatnonzero(np.bincount(own)).tolist():
             passed[k] = test(self._said[k])
         found[found] = passed[own]
@@ -354,8 +362,8 @@ class Variables(Mapping[str, Variable]):
     def _passed(self, test: Callable[[Variable], bool]) -> Bools:
         return np.array([test(said) for said in self._said], dtype=bool)
 
-    def _declaration(self, index: Ints) -> Ints:
-        begins = np.array(self._begins, dtype=np.int64)
+    def _declaration(self, index: Indices) -> Ints:
+        begins = np.array(self._begins, dtype=np.int32)
         found: Ints = np.searchsorted(begins, index, side="right") - 1
         return found
 
@@ -594,7 +602,7 @@ def parse(source: Source) -> Program:
     rows = _structural(statements, lines)
     reader = _Reader(lines, statements, taught, rows)
     for row in rows.tolist():
-        statement = statements[int(lines.shape[row])]
+        statement = statements.once(int(lines.shape[row]))
         if isinstance(statement, ast.Unknown):
             _report_unknown(reader, row)
         reader.take(row, statement)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from itertools import islice
 
@@ -10,6 +10,7 @@ import numpy as np
 
 from postproc.arrays import Bools, Ints
 from postproc.language.lines import Lines
+from postproc.language.names import NameColumn
 from postproc.language.pdl2 import syntax as ast
 from postproc.language.pdl2.calls import call_statement, calls_in_expressions
 from postproc.language.pdl2.effects import (
@@ -31,7 +32,7 @@ from postproc.language.pdl2.machine import (
 from postproc.language.pdl2.moves import UNSURE, from_value, motion_of
 from postproc.language.pdl2.routines import stays_still
 from postproc.language.pdl2.values import Nothing
-from postproc.language.shapes import alike, lower, name_index, numbered_in_order
+from postproc.language.shapes import alike, name_index, numbered_in_order
 from postproc.robot.trajectory import Motion
 
 # Lines that are run a thousand at a time: moves to known places, idle calls.
@@ -86,7 +87,7 @@ class PlainMoves:
     named: tuple[bool, ...]
     points: Mapping[int, PointVariable]
     prefix: str
-    names: Sequence[str]
+    names: NameColumn
     rows: Ints
     name: Ints
     ends: Ints
@@ -219,7 +220,7 @@ class _Variants:
         self._known: dict[tuple[int, tuple[str, ...]], int] = {}
         self._parameters = {p.name for p in self.place.body.parameters}
         self.prefix = f"{self.place.program.name}/"
-        self.names: list[str] = []
+        self.names = NameColumn()
         self.name = np.full(len(self.shapes), -1, dtype=np.int64)
 
     def add(self, form: int, shapes: Ints) -> Ints:
@@ -236,10 +237,10 @@ class _Variants:
         variants = np.full(len(shapes), -1)
         if index is None:
             return variants
-        goal, which = [where.name], np.zeros(len(shapes), dtype=np.int64)
+        goal, which = NameColumn([where.name]), np.zeros(len(shapes), dtype=np.int64)
         if at >= 0:
             used, which = np.unique(names[:, at], return_inverse=True)
-            goal = lower([said.shapes.names[k] for k in used.tolist()])
+            goal = said.shapes.names.take(used.astype(np.int64)).lower()
             names = np.delete(names, at, axis=1)
         quiet = self._points(shapes, goal, which, index, array=bool(where.steps))
         variants[quiet] = self._variants(shapes[quiet], names[quiet])
@@ -260,7 +261,7 @@ class _Variants:
     def _points(
         self,
         shapes: Ints,
-        goal: list[str],
+        goal: NameColumn,
         which: Ints,
         index: tuple[int, ...],
         array: bool,
@@ -279,13 +280,13 @@ class _Variants:
         points = declared.passing(goal, lambda said: _is_point(said.type, array))
         alone = ~declared.passing(goal, lambda said: bool(said.exported))
         alone &= not array and not any(mark in self.prefix for mark in "[.")
-        hidden = place.body.own_names | self.volatile
-        for k in np.flatnonzero([name in hidden for name in goal]).tolist():
+        hidden = NameColumn(sorted(place.body.own_names | self.volatile)).find(goal)
+        for k in np.flatnonzero(hidden >= 0).tolist():
             points[k], alone[k] = self._is_point(goal[k], array), False
         own = np.flatnonzero((points & alone)[which])
         at = np.searchsorted(self.shapes, shapes[own])
         self.name[at] = len(self.names) + which[own]
-        self.names += goal
+        self.names.extend(goal)
         for k in np.flatnonzero((points & ~alone)[which]).tolist():
             key = self.world.root(place, goal[which[k]])
             self.points[int(shapes[k])] = PointVariable(key, index)
@@ -508,12 +509,13 @@ def _points(
 def _assigned(here: Execution, quiet: PlainMoves, names: Ints) -> Bools:
     """Tell which of the program's own variables it has given a value itself, (m,)."""
     values, found = here.store.values, np.zeros(len(names), dtype=bool)
-    own = np.flatnonzero(names >= 0)
-    keys = [quiet.prefix + quiet.names[name] for name in names[own].tolist()]
-    given = {*islice(values, len(keys))}
-    if len(given) < len(keys):  # all that there are
-        found[own] = [key in given for key in keys]
+    own, prefix = np.flatnonzero(names >= 0), quiet.prefix
+    given = [*islice(values, len(own))]
+    if len(given) < len(own):  # all that there are
+        known = NameColumn(k[len(prefix) :] for k in given if k.startswith(prefix))
+        found[own] = (known.find(quiet.names) >= 0)[names[own]]
     else:
+        keys = (prefix + quiet.names[name] for name in names[own].tolist())
         found[own] = [values.get(key) is not None for key in keys]
     return found
 

@@ -10,11 +10,13 @@ import numpy as np
 
 from postproc.arrays import Ints
 from postproc.language.lines import Lines, read_lines, reread_lines
+from postproc.language.names import NameColumn
 from postproc.language.pdl2.entries import (
     NESTED,
     POSITIONS,
     Entries,
     Records,
+    Rows,
     find_records,
     is_nested,
     is_no_value,
@@ -24,7 +26,7 @@ from postproc.language.pdl2.entries import (
 from postproc.language.pdl2.nested import completed, find_fields, with_fields
 from postproc.language.pdl2.parser import EntryPart, parse_value_form
 from postproc.language.pdl2.store import root_of
-from postproc.language.shapes import ParsedShapes, lower, parse_shapes
+from postproc.language.shapes import ParsedShapes, parse_shapes
 from postproc.language.source import Source
 from postproc.language.visits import Diagnostic
 
@@ -37,7 +39,7 @@ class VariableFile:
     """A variable file.
 
     Attributes:
-        lines: The text.
+        lines: The text, without what its numbers are worth.
         entries: Entries by lower-case name; a name with two entries has none.
         diagnostics: What was found while reading.
         unread: As in `Fields`.
@@ -52,16 +54,6 @@ class VariableFile:
     def source(self) -> Source:
         """Return the text."""
         return self.lines.source
-
-    @property
-    def start(self) -> Ints:
-        """Return the byte offsets of every number, its sign included, (m,)."""
-        return self.lines.start
-
-    @property
-    def end(self) -> Ints:
-        """Return the byte offsets at which they end, (m,)."""
-        return self.lines.end
 
 
 def read_variables(source: Source) -> VariableFile:
@@ -88,7 +80,7 @@ def read_variables(source: Source) -> VariableFile:
     ]
     found.sort(key=lambda finding: finding[0])
     told = tuple(diagnostic for _, diagnostic in found)
-    return VariableFile(lines, entries, told, fields.unread)
+    return VariableFile(lines.without_values(), entries, told, fields.unread)
 
 
 def read_variables_again(source: Source, before: VariableFile) -> VariableFile:
@@ -108,7 +100,8 @@ def read_variables_again(source: Source, before: VariableFile) -> VariableFile:
     if entries is None:
         return read_variables(source)
     told = found.moved(before.diagnostics)
-    return VariableFile(found.lines, entries, told, before.unread)
+    lines = found.lines.without_values()
+    return VariableFile(lines, entries, told, before.unread)
 
 
 def _told_apart(
@@ -121,11 +114,11 @@ def _told_apart(
         ambiguous: Names that records or paths have too.
     """
     nested = [layout.kind in NESTED for layout in entries.layouts]
-    written = lower(entries.name)
+    written, own = entries.name.lower(), NameColumn()
     if not any(nested) and not ambiguous:
-        single = dict(zip(written, range(len(written)), strict=True))
-        if len(single) == len(written):
-            return replace(entries, row=single), []
+        rows = own.of(written)
+        if len(own) == len(written):
+            return replace(entries, row=Rows(own, rows)), []
     names = [
         (row, name)
         for row, name in enumerate(written)
@@ -137,7 +130,8 @@ def _told_apart(
     single = {name: row for row, name in names if count[name] == 1}
     first = {name: row for row, name in reversed(names)}
     twice = [row for row, name in names if first[name] != row]
-    return replace(entries, row=single), twice
+    rows = np.array([*single.values()], dtype=np.int32)
+    return replace(entries, row=Rows(NameColumn(single), rows)), twice
 
 
 def _not_understood(

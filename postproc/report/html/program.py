@@ -48,7 +48,7 @@ class PageColumns:
     """
 
     files: tuple[str, ...]
-    names: tuple[str, ...]
+    names: Sequence[str]
     reasons: tuple[str, ...]
     heads: tuple[str, ...]
     visit: Ints
