@@ -155,10 +155,11 @@ TAIL = 0.2  # share of the draws that the tail is taken from
 
 @dataclass(frozen=True, eq=False)
 class Null:
-    """Distribution of the largest evidence of the whole library under the model.
+    """Distribution of the largest of many statistics when there is nothing to find.
 
     Attributes:
-        maxima: Sorted maxima of the draws, (draws,) [nats].
+        maxima: Sorted maxima of the draws, (draws,): evidence of a family of the whole
+            library [nats], or what is asked of rows without a family in mind.
     """
 
     maxima: Floats
@@ -171,7 +172,7 @@ class Null:
         return start, max(float(excess.mean()) if len(excess) else 1.0, 1e-3)
 
     def p_value(self, evidence: float) -> float:
-        """Give the probability that noise alone reaches an evidence anywhere.
+        """Give the probability that noise alone reaches as much anywhere.
 
         Beyond the start of the tail the draws are continued by an exponential.
         """
@@ -249,13 +250,11 @@ def leftovers(projection: Projection, seed: int) -> tuple[Leftover, ...]:
         *_scatter(projection, rest, dealt),
     ]
     spread = np.array([_standardised(values) for _, values in found])
-    worst = spread[:, 1:].max(axis=0)
-    out = []
-    for (what, _), values in zip(found, spread, strict=True):
-        reached = float((worst >= values[0]).sum() + 1) / (OMNIBUS_DRAWS + 1)
-        out.append(
-            Leftover(what, float(values[0]), min(reached, _tail(worst, values[0])))
-        )
+    null = Null(np.sort(spread[:, 1:].max(axis=0)))
+    out = [
+        Leftover(what, float(values[0]), null.p_value(float(values[0])))
+        for (what, _), values in zip(found, spread, strict=True)
+    ]
     return tuple(sorted(out, key=lambda x: x.p_value))
 
 
@@ -285,13 +284,6 @@ def _standardised(values: Floats) -> Floats:
     """Give values the scale of their draws (all but the first)."""
     draws = values[1:]
     return np.asarray((values - draws.mean()) / max(float(draws.std()), 1e-300))
-
-
-def _tail(worst: Floats, value: float) -> float:
-    """Continue the draws by an exponential beyond their top fifth."""
-    start = float(np.quantile(worst, 0.8))
-    scale = float((worst[worst > start] - start).mean())
-    return float(0.2 * np.exp(-(value - start) / scale)) if value > start else 1.0
 
 
 def _maps(
