@@ -217,6 +217,8 @@ Dealt = NDArray[np.int32]
 MAPS = 36
 FEATURES = 10
 LENGTHS = (0.5, 0.2)  # of the ranges of both joints
+UNTAKEN = 0.5  # part of a direction that the model leaves of it: of others its priors,
+#                not the rows, say how large they may be
 LAGS = 3
 OMNIBUS_DRAWS = 400
 AT_ONCE = 50  # draws
@@ -303,9 +305,10 @@ def _maps(
         phase = rng.uniform(0, 2 * np.pi, FEATURES)
         feature = np.cos(place[:, [a, b]] @ waves + phase) * keep[:, None]
         columns = whitened[:, :, j, None] * feature[:, None, :]
-        columns = projection.filter(columns.reshape(-1, FEATURES))
-        basis, size, _ = np.linalg.svd(columns, full_matrices=False)
-        kept = basis[:, size > 1e-6 * max(float(size.max(initial=0.0)), 1e-9)]
+        own, size, _ = np.linalg.svd(columns.reshape(-1, FEATURES), full_matrices=False)
+        own = own[:, size > 1e-6 * max(float(size.max(initial=0.0)), 1e-9)]
+        basis, left, _ = np.linalg.svd(projection.filter(own), full_matrices=False)
+        kept = basis[:, left > UNTAKEN]
         share = ((kept.T @ rows) ** 2).sum(axis=0) / square
         what = f"joint {j + 1} errs alike where joints {min(a, b) + 1} and "
         out.append((what + f"{max(a, b) + 1} are alike", share))
