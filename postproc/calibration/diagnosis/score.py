@@ -155,10 +155,11 @@ TAIL = 0.2  # share of the draws that the tail is taken from
 
 @dataclass(frozen=True, eq=False)
 class Null:
-    """Distribution of the largest evidence of the whole library under the model.
+    """Distribution of the largest of many statistics when there is nothing to find.
 
     Attributes:
-        maxima: Sorted maxima of the draws, (draws,) [nats].
+        maxima: Sorted maxima of the draws, (draws,): evidence of a family of the whole
+            library [nats], or what is asked of rows without a family in mind.
     """
 
     maxima: Floats
@@ -171,7 +172,7 @@ class Null:
         return start, max(float(excess.mean()) if len(excess) else 1.0, 1e-3)
 
     def p_value(self, evidence: float) -> float:
-        """Give the probability that noise alone reaches an evidence anywhere.
+        """Give the probability that noise alone reaches as much anywhere.
 
         Beyond the start of the tail the draws are continued by an exponential.
         """
@@ -216,6 +217,8 @@ Dealt = NDArray[np.int32]
 MAPS = 36
 FEATURES = 10
 LENGTHS = (0.5, 0.2)  # of the ranges of both joints
+UNTAKEN = 0.5  # part of a direction that the model leaves of it: of others its priors,
+#                not the rows, say how large they may be
 LAGS = 3
 OMNIBUS_DRAWS = 400
 AT_ONCE = 50  # draws
@@ -249,13 +252,11 @@ def leftovers(projection: Projection, seed: int) -> tuple[Leftover, ...]:
         *_scatter(projection, rest, dealt),
     ]
     spread = np.array([_standardised(values) for _, values in found])
-    worst = spread[:, 1:].max(axis=0)
-    out = []
-    for (what, _), values in zip(found, spread, strict=True):
-        reached = float((worst >= values[0]).sum() + 1) / (OMNIBUS_DRAWS + 1)
-        out.append(
-            Leftover(what, float(values[0]), min(reached, _tail(worst, values[0])))
-        )
+    null = Null(np.sort(spread[:, 1:].max(axis=0)))
+    out = [
+        Leftover(what, float(values[0]), null.p_value(float(values[0])))
+        for (what, _), values in zip(found, spread, strict=True)
+    ]
     return tuple(sorted(out, key=lambda x: x.p_value))
 
 
@@ -287,13 +288,6 @@ def _standardised(values: Floats) -> Floats:
     return np.asarray((values - draws.mean()) / max(float(draws.std()), 1e-300))
 
 
-def _tail(worst: Floats, value: float) -> float:
-    """Continue the draws by an exponential beyond their top fifth."""
-    start = float(np.quantile(worst, 0.8))
-    scale = float((worst[worst > start] - start).mean())
-    return float(0.2 * np.exp(-(value - start) / scale)) if value > start else 1.0
-
-
 def _maps(
     projection: Projection, rows: Floats, rng: np.random.Generator
 ) -> list[tuple[str, Floats]]:
@@ -311,9 +305,10 @@ def _maps(
         phase = rng.uniform(0, 2 * np.pi, FEATURES)
         feature = np.cos(place[:, [a, b]] @ waves + phase) * keep[:, None]
         columns = whitened[:, :, j, None] * feature[:, None, :]
-        columns = projection.filter(columns.reshape(-1, FEATURES))
-        basis, size, _ = np.linalg.svd(columns, full_matrices=False)
-        kept = basis[:, size > 1e-6 * max(float(size.max(initial=0.0)), 1e-9)]
+        own, size, _ = np.linalg.svd(columns.reshape(-1, FEATURES), full_matrices=False)
+        own = own[:, size > 1e-6 * max(float(size.max(initial=0.0)), 1e-9)]
+        basis, left, _ = np.linalg.svd(projection.filter(own), full_matrices=False)
+        kept = basis[:, left > UNTAKEN]
         share = ((kept.T @ rows) ** 2).sum(axis=0) / square
         what = f"joint {j + 1} errs alike where joints {min(a, b) + 1} and "
         out.append((what + f"{max(a, b) + 1} are alike", share))

@@ -196,7 +196,7 @@ def _best_name(scores: list[Score], joint: int | None) -> Score | None:
 # The search: add the effect that is called for most, refit everything, look again.
 
 MOST = 12  # additions
-LEVEL = 0.01  # probability of a false addition, whole library
+LEVEL = 0.005  # probability of a false addition, whole library
 ALONE = 0.01  # level of the score test of the candidate itself
 BETTER = 1.0  # nats that replace one family by another
 RECENT = 2  # additions looked at again after each further one

@@ -13,6 +13,7 @@ from postproc.calibration.diagnosis.library import Library, Projection
 from postproc.calibration.diagnosis.result import Finding, Verdict
 from postproc.calibration.diagnosis.score import Leftover, Null, bootstrap, leftovers
 from postproc.calibration.diagnosis.search import (
+    LEVEL,
     JudgedAddition,
     Progress,
     Search,
@@ -81,8 +82,11 @@ def incomplete(projection: Projection, effect: JointEffect, place: int) -> float
 
 
 # What all the rows say about what a fit lacks.
+#
+# Rows that lack nothing are asked twice whether they do: by the library, at its LEVEL,
+# and without any effect in mind. Both together may be wrong in 1 of 100.
 
-REMAINS = 0.01  # level at which structure is called structure: nothing was added
+REMAINS = 0.01 - LEVEL  # level at which structure is called so: nothing was added
 STILL_REMAINS = 0.001  # ... after something was
 
 

@@ -10,9 +10,9 @@ import pytest
 from postproc.calibration.diagnosis import search
 from postproc.calibration.diagnosis.held_out import RUN, Gain, deal, held_out_gain
 from postproc.calibration.diagnosis.library import Library, Projection
-from postproc.calibration.diagnosis.score import Null, Score, bootstrap
+from postproc.calibration.diagnosis.score import Leftover, Null, Score, bootstrap
 from postproc.calibration.diagnosis.search import NEAR, Search, choose, ranking, stand
-from postproc.calibration.diagnosis.trace import silent
+from postproc.calibration.diagnosis.trace import Investigation, silent
 from postproc.calibration.regression import Fit, fit_effects
 from postproc.model.effects.effect import FREE, NAMED, Candidate, Family
 from postproc.model.effects.scale import Scale
@@ -169,3 +169,13 @@ def test_two_names_stand_for_the_free_form_that_one_cannot_reach(
 
     assert after(28.0, 3.0) is first
     assert after(60.0, 55.0, 50.0) is None
+
+
+def test_both_questions_together_are_wrong_in_1_of_100(found: Search) -> None:
+    nothing = replace(found, additions=())
+    for p_value, verdict in ((0.0075, "noise"), (0.0025, "unexplained")):
+        left = (Leftover("rows err alike", 3.0, p_value),)
+        assert Investigation(nothing, (), left).verdict == verdict
+    null = Null(np.sort(np.random.default_rng(0).exponential(1.0, 10**5)))
+    wrong = np.exp(-null.threshold(search.LEVEL)) + 0.005
+    assert wrong == pytest.approx(0.01, abs=1e-3)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
@@ -18,6 +20,7 @@ from postproc.calibration.diagnosis.score import (
     Score,
     bootstrap,
     explained,
+    leftovers,
     log_evidence,
     rank,
     score_p_value,
@@ -195,3 +198,11 @@ def test_library_asks_joints_and_axes_about_every_covariate(base: Projection) ->
     rows = sorted({c.effect.settings()["row"] for c in steps})
     assert len(rows) >= 40
     assert max(np.diff(rows)) <= len(base.fit.batch) / 40
+
+
+def test_what_the_model_takes_is_not_left_over() -> None:
+    projection = Projection.of(campaign(24, (), 0.0, rows=200).base_fit())
+    taken = projection.taken / np.linalg.norm(projection.taken, axis=0)
+    rest = np.random.default_rng(0).standard_normal(len(projection.rest))
+    rest += 9.0 * taken @ (taken.T @ rest)  # priors of the model are off by ten
+    assert leftovers(replace(projection, rest=rest), seed=0)[0].p_value > 0.05
