@@ -282,8 +282,14 @@ def source_from_bytes(name: str, data: bytes) -> Source:
     """Take bytes as a program, or refuse what can be none.
 
     Raises:
-        ProgramError: The file is empty or binary.
+        ProgramError: The file is empty, binary or too long.
     """
+    if len(data) > LAST:
+        raise ProgramError(
+            name,
+            f"has {len(data):,} bytes, and places in it are told up to {LAST:,}",
+            "Cut the program in parts",
+        )
     said = data.removeprefix(UTF8_MARK)  # itself where there is no mark: no copy
     if not said or said.isspace():
         raise ProgramError(name, "the file is empty", "Give a PDL2 program text.")

@@ -22,12 +22,12 @@ from postproc.compensation.outcome import (
     read_arrivals,
 )
 from postproc.compensation.parallel import in_background
-from postproc.exceptions import ProgramError
 from postproc.files import (
     find_data_list,
     find_variables,
     holds_values,
     is_variables,
+    read_input,
 )
 from postproc.language.languages import language_of
 from postproc.language.scan import BLANKS, mask_of, scan_lines
@@ -383,11 +383,7 @@ def is_named_by_file(place: str) -> bool:
 
 def _read_lines(path: Path) -> tuple[TextLines, bool]:
     """Read a file's lines without their endings; the stamp line is dropped."""
-    try:
-        data = path.read_bytes()
-    except OSError as exc:
-        problem = f"cannot be read ({exc.strerror})"
-        raise ProgramError(path, problem, "Check the path") from None
+    data = read_input(path)
     stamped = read_stamp(data) is not None
     span = stamp_span(data)
     if span.start:  # it stands behind a header

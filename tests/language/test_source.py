@@ -67,6 +67,13 @@ def test_empty_files_are_refused(data: bytes) -> None:
         source_from_bytes("x.pdl", data)
 
 
+def test_a_text_whose_places_cannot_be_told_is_refused(monkeypatch) -> None:
+    monkeypatch.setattr("postproc.language.source.LAST", 99)
+    assert source_from_bytes("x.pdl", b"a" * 99).data
+    with pytest.raises(ProgramError, match=r"x\.pdl: has 100 bytes, .* up to 99\. Cut"):
+        source_from_bytes("x.pdl", b"a" * 100)
+
+
 def test_binary_files_are_refused_with_the_line() -> None:
     with pytest.raises(ProgramError, match=r"x\.cod:2: .*binary.*\.pdl"):
         source_from_bytes("x.cod", b"PROGRAM x\r\n\x00\x01")

@@ -152,6 +152,13 @@ def test_a_changed_comment_is_no_change_of_numbers(pair):
     assert len(found.rows) == 1 and found.rows[0].text
 
 
+def test_a_file_longer_than_any_program_is_exit_2(pair, monkeypatch):
+    monkeypatch.setattr("postproc.files.LARGEST", 20)
+    done = cli("diff", *pair(program(FIRST, POSE), program(FIRST, POSE)))
+    assert done.exit_code == 2
+    assert "is longer than 20 bytes" in done.stderr
+
+
 def test_trouble_is_exit_2(desk):
     source = desk.put("job.pdl", program(FIRST))
     found = cli("diff", source, desk.folder / "none.pdl")
