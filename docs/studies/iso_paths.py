@@ -6,7 +6,8 @@ In the diagonal plane of a cube of 600 mm in front of the arm, its centre in the
 middle of that plane: a rectangle of 0.8 times the plane, circles of 0.8 and 0.1 times
 the cube's edge, at 10, 50 and 100 % of 1 m/s. The rectangle's corners are flown through
 with zones of 5 mm, a circle is two half arcs, flown through too. Each virtual arm is
-surveyed at 300 poses, the programs are compensated, and the arm runs all of them.
+surveyed at 300 poses, the programs are compensated, and the arm runs all of them. The
+last programs know what a tracker read that followed the job of `paths.py`.
 """
 
 from __future__ import annotations
@@ -86,6 +87,7 @@ def study(seed: int, folder: Path) -> None:
     paths.done("survey", *at, "--poses", 300, "-o", folder / "survey.pdl")
     paths.done("simulate", folder / "survey.pdl", *at, *arm, "-o", folder / "s.csv")
     paths.done("fit", folder / "s.csv", *at, "-o", model)
+    measure(seed, cell, at, arm, folder)
     for shape in SHAPES:
         rows = {}
         for share in SPEEDS:
@@ -93,6 +95,23 @@ def study(seed: int, folder: Path) -> None:
         for row in dict.fromkeys(rows.values()):
             speeds = [f"{100 * share:.0f}" for share in SPEEDS if rows[share] == row]
             print(f"| {seed} | {shape} | {', '.join(speeds)} % | {row}", flush=True)
+
+
+def measure(
+    seed: int,
+    cell: Cell,
+    at: tuple[object, ...],
+    arm: tuple[object, ...],
+    folder: Path,
+) -> None:
+    """Follow a compensated job with a tracker, and diagnose what it read."""
+    job, made, model = (folder / name for name in ("j.pdl", "c.pdl", "model.json"))
+    job.write_text(paths.job(seed, cell))
+    paths.done("compensate", job, *at, "--model", model, "-o", made)
+    track = folder / "track.csv"
+    paths.done("simulate", made, *at, *arm, "--track", track)
+    paths.done("diagnose", "--path", track, "--program", made, *at, "--model", model,
+               "-o", folder / "better.json")  # fmt: skip
 
 
 def figures(
@@ -103,13 +122,17 @@ def figures(
     arm: tuple[object, ...],
     folder: Path,
 ) -> str:
-    """Compensate a shape with and without points on its ways, and run all three."""
-    source, model = folder / "job.pdl", ("--model", folder / "model.json")
+    """Compensate a shape with and without points on its ways, and run all four."""
+    source, made = folder / "job.pdl", folder / "made.pdl"
     source.write_text(program(shape, share, cell))
     found = [scored(source, source, at, arm, folder)]
-    for more in ((), ("--path-mm", "0.1")):
-        made = folder / "made.pdl"
-        paths.done("compensate", source, *at, *model, "-o", made, *more)
+    for model, more in (
+        ("model.json", ()),
+        ("model.json", ("--path-mm", "0.1")),
+        ("better.json", ("--path-mm", "0.1", "--take-up")),
+    ):
+        known = ("--model", folder / model)
+        paths.done("compensate", source, *at, *known, "-o", made, *more)
         found.append(scored(made, source, at, arm, folder))
     cells = [f"{mean:.3f} | {most:.3f}" for mean, most in found]
     return " | ".join(cells) + " |"
@@ -136,8 +159,8 @@ def main() -> None:
     first, last = parser.parse_args().seeds
     print(
         "| arm | path | speed | as written: 95 % along, mm | AT_p | compensated: "
-        "95 % along, mm | AT_p | with points: 95 % along, mm | AT_p |"
-        "\n|---|---|---|---|---|---|---|---|---|"
+        "95 % along, mm | AT_p | with points: 95 % along, mm | AT_p | .. and a track: "
+        "95 % along, mm | AT_p |\n|---|---|---|---|---|---|---|---|---|---|---|"
     )
     for seed in range(first, last + 1):
         with tempfile.TemporaryDirectory() as folder:
