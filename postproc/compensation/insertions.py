@@ -24,6 +24,7 @@ from postproc.compensation.taking_up import MeantSides, TakeUp
 from postproc.compensation.windows import SHARED
 from postproc.language.interface import Splitter
 from postproc.language.languages import language_of
+from postproc.language.names import NameColumn
 from postproc.language.source import Edit, Source, apply, compose
 from postproc.language.visits import Literals, Visits
 from postproc.robot.cell import Cell
@@ -349,7 +350,9 @@ def _kept(literals: Literals, rows: Ints) -> Literals:
 
 
 def _some(column: Any, rows: Ints) -> Any:
-    """Take some rows of a column, which is an array or a tuple."""
-    if isinstance(column, tuple):
+    """Take some rows of a column, which is an array, or a sequence of names."""
+    if isinstance(column, NameColumn):
+        return column.take(rows)
+    if isinstance(column, Sequence):
         return tuple(column[k] for k in rows.tolist())
     return column[rows]
