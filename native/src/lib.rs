@@ -45,7 +45,6 @@ const SOURCES: &str = env!("SOURCES");
 
 #[pymodule(name = "_native")]
 fn native(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    heap::map_long_columns();
     module.add("SOURCES", SOURCES)?;
     module.add_class::<names::NameColumn>()?;
     module.add_function(wrap_pyfunction!(chain::placed, module)?)?;
