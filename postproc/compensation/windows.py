@@ -69,7 +69,7 @@ def offsets(sizes: Iterable[int]) -> list[int]:
 def _joined(name: str, programs: Sequence[Visits]) -> Any:
     """Join a column, or a table."""
     parts = [getattr(program, name) for program in programs]
-    if not isinstance(parts[0], np.ndarray):
+    if isinstance(parts[0], Sequence):
         return tuple(chain.from_iterable(parts))
     if name in TABLES:
         parts = _moved_on(name, parts, programs)

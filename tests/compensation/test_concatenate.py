@@ -8,6 +8,7 @@ import pytest
 from postproc.compensation.program import read_program
 from postproc.compensation.windows import concatenate, first_visits
 from postproc.language.visits import Visits
+from tests.bench.made import spot
 from tests.generated.landing import program
 
 SEEDS = range(40)
@@ -64,6 +65,16 @@ def test_literals_follow_each_other(programs):
     assert len(together.literals) == sum(len(own.literals) for own in programs)
     used = together.literal[together.literal >= 0]
     assert used.max() < len(together.literals)
+
+
+def test_names_stay_texts(job_cell):
+    job = spot(4)
+    files = {job.name: job.source, "spot.lsv": job.variables}
+    own = read_program(files, job_cell).visits
+    together = concatenate([own, own])
+    for names in (together.names, together.literals.name):
+        assert isinstance(names, tuple) and {type(name) for name in names} == {str}
+    assert together.literals.name == (*own.literals.name, *own.literals.name)
 
 
 def test_one_program_stays_as_it_is(programs):

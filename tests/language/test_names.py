@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import pickle
+from collections.abc import Sequence
 
 import numpy as np
 import pytest
@@ -38,6 +39,7 @@ def test_names_are_numbered_as_they_come(first: list[str], then: list[str]) -> N
 @given(TEXTS)
 def test_a_column_is_a_sequence(own: list[str]) -> None:
     names = NameColumn(own)
+    assert isinstance(names, Sequence)
     names.extend(own)
     assert [*names] == own + own and names == NameColumn(own + own)
     assert [*names.lower()] == [one.lower() for one in names]
