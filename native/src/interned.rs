@@ -17,11 +17,10 @@ pub struct Interned {
 
 impl Interned {
     /// Return the number of a text, which becomes one of these where it is not yet.
-    ///
-    /// The table must hold all texts: it does where none was pushed.
     pub fn of(&mut self, text: &[u8]) -> i32 {
         if self.table.len() < 2 * (self.ends.len() + 1) {
-            self.grow();
+            self.forget_table();
+            self.make_table();
         }
         let own = hash(text);
         let at = self.place(own, text);
@@ -32,7 +31,7 @@ impl Interned {
         self.table[at].1 as i32
     }
 
-    /// Return the number of a text, -1 where it is none of these; as for `of`.
+    /// Return the number of a text, -1 where it is none of these or there is no table.
     pub fn find(&self, text: &[u8]) -> i32 {
         if self.table.is_empty() {
             return -1;
@@ -108,18 +107,6 @@ impl Interned {
                 return at;
             }
             at += 1;
-        }
-    }
-
-    fn grow(&mut self) {
-        let places = (2 * self.table.len()).max(64);
-        let old = std::mem::replace(&mut self.table, vec![(0, FREE); places]);
-        for (own, number) in old.into_iter().filter(|(_, number)| *number != FREE) {
-            let mut at = own as usize & (places - 1);
-            while self.table[at].1 != FREE {
-                at = (at + 1) & (places - 1);
-            }
-            self.table[at] = (own, number);
         }
     }
 }

@@ -83,9 +83,7 @@ impl NameColumn {
 
     /// Put names behind the own ones that are not among them; return their numbers, (m,).
     fn of<'py>(&mut self, names: &Bound<'py, PyAny>) -> PyResult<Column<'py>> {
-        let py = names.py();
-        detached(py, || self.0.make_table())?;
-        Ok(NameColumn::for_all(names, |name| self.0.of(name))?.into_pyarray(py))
+        Ok(NameColumn::for_all(names, |name| self.0.of(name))?.into_pyarray(names.py()))
     }
 
     /// Find names among the own ones: the first number of each, (m,), -1 where it is not.
