@@ -69,8 +69,7 @@ def halved(
             continue
         known = found.get(v, [*work.points.get(v, ())])
         begin = max((s for s in known if s < end), default=0.0)
-        k = int(np.flatnonzero(work.paths.visit == v)[0])
-        size = (end - begin) * float(work.paths.way[work.paths.samples(k)][-1])
+        size = (end - begin) * float(work.paths.way[work.paths.samples_to(v)][-1])
         if v in work.open and size >= 2 * work.open[v][0]:
             found[v] = [*known, (begin + end) / 2]
             room -= 1

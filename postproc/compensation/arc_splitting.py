@@ -151,12 +151,12 @@ class CutArc:
 
     def _turn(self, half: int, share: float) -> Floats:
         """Return what the tool turns by at a share of a half, (3,) [rad]."""
-        none, first = np.zeros((1, 3)), self.turns[0]
-        begin = first[-1:] if half and len(first) else none
-        at = np.append(np.append(0.0, self.cuts[half]), 1.0)
-        found = np.concatenate([begin, self.turns[half], none])
-        known = slice(len(at) - (half == 0))  # the first half ends with a cut
-        return np.array([np.interp(share, at[known], x[known]) for x in found.T])
+        (first, second), none = self.turns, np.zeros((1, 3))
+        at, found = np.append(0.0, self.cuts[half]), np.concatenate([none, first])
+        if half:
+            at = np.append(at, 1.0)
+            found = np.concatenate([first[-1:], second, none])
+        return np.array([np.interp(share, at, x) for x in found.T])
 
 
 # What pieces of arcs bend, against what their corrections differ by.

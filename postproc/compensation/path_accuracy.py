@@ -95,6 +95,10 @@ class PathAccuracy:
         """Return the samples of a path."""
         return slice(int(self.first[k]), int(self.first[k + 1]))
 
+    def samples_to(self, visit: int) -> slice:
+        """Return the samples of the path to a visit."""
+        return self.samples(int(np.searchsorted(self.visit, visit)))
+
     def joined(self, owner: Ints) -> PathAccuracy:
         """Take the ways to points that were inserted as parts of the source's moves.
 

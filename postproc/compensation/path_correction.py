@@ -26,7 +26,7 @@ from postproc.compensation.arc_cuts import (
 from postproc.compensation.arc_splitting import point_on_way
 from postproc.compensation.best_points import BestPoints
 from postproc.compensation.options import Setting
-from postproc.compensation.path_judging import judge, largest_otherwise, sizes_of
+from postproc.compensation.path_judging import judge, largest_on_moves, sizes_of
 from postproc.compensation.path_points import Insertions
 from postproc.compensation.path_work import Draft, PathWork, Write, of_source
 from postproc.compensation.split_moves import find_split
@@ -193,6 +193,7 @@ def _result(work: PathWork) -> Draft:
     if work.room <= 0:
         why = "no more points may be put on ways (--max-inserted)"
     too_far = set(work.paths.visit[work.too_far].tolist()) - work.points.keys()
+    otherwise = largest_on_moves(told.paths, told.paths.otherwise)
     inserted = Insertions(
         work.own,
         work.tolerance,
@@ -200,7 +201,7 @@ def _result(work: PathWork) -> Draft:
         work.stops & work.points.keys(),
         {v: work.left.get(v, why) for v in sorted(too_far)},
         sizes_of(work.first.paths),
-        {v: far for v, (far, _) in largest_otherwise(told.paths).items()}
+        {v: far for v, (far, _) in otherwise.items()}
         if work.latest is not work.source
         else {},
         approached(work, told),

@@ -85,9 +85,9 @@ def _bad(work: PathWork) -> Iterator[tuple[int, tuple[str, float | None]]]:
     if told is None:
         return
     with_points = _worst(work, told)
-    other = largest_in_doubt(told.paths)
+    other = largest_on_moves(told.paths, told.paths.doubtful)
     without = _of_moves(work, sizes_of(first))
-    otherwise = largest_in_doubt(first).items()
+    otherwise = largest_on_moves(first, first.doubtful).items()
     usual = _of_moves(work, {v: max(far, without[v]) for v, (far, _) in otherwise})
     corner = _corners_moved(work, told)
     flat = bending(work)
@@ -190,17 +190,10 @@ def _largest_on(way: Floats, far: Floats) -> tuple[float, float]:
     return float(far[top]), float(way[top] / max(way[-1], 1e-12))
 
 
-def largest_otherwise(paths: PathAccuracy) -> dict[int, tuple[float, float]]:
-    """How far each move is from its path if flanks are not as predicted, and where."""
-    return _largest(paths, paths.otherwise)
-
-
-def largest_in_doubt(paths: PathAccuracy) -> dict[int, tuple[float, float]]:
-    """The same, but for flanks that a measured path confirms."""
-    return _largest(paths, paths.doubtful)
-
-
-def _largest(paths: PathAccuracy, far: Floats) -> dict[int, tuple[float, float]]:
+def largest_on_moves(
+    paths: PathAccuracy, far: Floats
+) -> dict[int, tuple[float, float]]:
+    """Say how far off each move is at the most, of samples (s,) [m], and where."""
     rows = map(paths.samples, range(len(paths)))
     return {
         v: _largest_on(paths.way[own], far[own])

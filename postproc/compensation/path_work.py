@@ -185,7 +185,7 @@ class PathWork:
         paths, found = self.first.paths, {}
         visits = self.source.reading.visits
         for move in {halves(visits, v) for v in self.points}:
-            own = [paths.samples(int(np.searchsorted(paths.visit, v))) for v in move]
+            own = [paths.samples_to(v) for v in move]
             side = crossed_at_once(paths.side[own[0].start : own[-1].stop])
             for v, rows in zip(move, own, strict=True):
                 if v not in self.points:
@@ -213,20 +213,23 @@ class PathWork:
     def refusal(self, v: int) -> str:
         """Say why points of a move cannot be corrected, "" where they can."""
         decided = self.latest.kept.decisions
-        rows = np.arange(int(self.own[v - 1]) + 1 if v else 0, int(self.own[v]))
+        rows = self._on_way(v)
         left = rows[decided.status[rows] != Status.SAFE]
         if not len(left):
             return ""
         why = decided.reasons[decided.why[left[0]]]
         return f"points on its way cannot be corrected: {why}"
 
+    def _on_way(self, v: int) -> Ints:
+        """Return the visits with points on the way to one, without it."""
+        return np.arange(int(self.own[v - 1]) + 1 if v else 0, int(self.own[v]))
+
     def ends(self, v: int) -> list[int]:
         """Return the visits with points at which the pieces of a move end, itself too.
 
         Those of the program with points.
         """
-        first = int(self.own[v - 1]) + 1 if v else 0
-        rows = np.arange(first, int(self.own[v]) + 1)
+        rows = np.append(self._on_way(v), self.own[v])
         ends: list[int] = rows[~self.latest.reading.visits.via[rows]].tolist()
         return ends
 
