@@ -81,13 +81,13 @@ def program(shape: str, share: float, cell: Cell) -> str:
 
 def study(seed: int, folder: Path) -> None:
     """Print the figures of one arm."""
-    place, model = folder / "cell.toml", folder / "model.json"
-    place.write_text(paths.CELL)
-    cell, at, arm = load_cell(place), ("--cell", place), ("--seed", seed)
-    paths.done("survey", *at, "--poses", 300, "-o", folder / "survey.pdl")
-    paths.done("simulate", folder / "survey.pdl", *at, *arm, "-o", folder / "s.csv")
-    paths.done("fit", folder / "s.csv", *at, "-o", model)
-    measure(seed, cell, at, arm, folder)
+    arm = ("--seed", seed)
+    place = paths.fit_a_survey(folder, *arm)
+    cell, at = load_cell(place), ("--cell", place)
+    job, ran = folder / "job.pdl", folder / "ran.pdl"
+    job.write_text(paths.job(seed, cell))
+    paths.done("compensate", job, *at, "--model", folder / "model.json", "-o", ran)
+    paths.follow(ran, *arm)
     for shape in SHAPES:
         rows = {}
         for share in SPEEDS:
@@ -95,23 +95,6 @@ def study(seed: int, folder: Path) -> None:
         for row in dict.fromkeys(rows.values()):
             speeds = [f"{100 * share:.0f}" for share in SPEEDS if rows[share] == row]
             print(f"| {seed} | {shape} | {', '.join(speeds)} % | {row}", flush=True)
-
-
-def measure(
-    seed: int,
-    cell: Cell,
-    at: tuple[object, ...],
-    arm: tuple[object, ...],
-    folder: Path,
-) -> None:
-    """Follow a compensated job with a tracker, and diagnose what it read."""
-    job, made, model = (folder / name for name in ("j.pdl", "c.pdl", "model.json"))
-    job.write_text(paths.job(seed, cell))
-    paths.done("compensate", job, *at, "--model", model, "-o", made)
-    track = folder / "track.csv"
-    paths.done("simulate", made, *at, *arm, "--track", track)
-    paths.done("diagnose", "--path", track, "--program", made, *at, "--model", model,
-               "-o", folder / "better.json")  # fmt: skip
 
 
 def figures(

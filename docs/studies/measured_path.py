@@ -10,7 +10,6 @@ docs/studies/paths.py compensated at its targets, run once with a tracker readin
 from __future__ import annotations
 
 import argparse
-import json
 import tempfile
 from pathlib import Path
 
@@ -23,24 +22,15 @@ EFFECTS = ("", "compliance", "transmission", "coupling", "load_backlash", "scale
 
 def study(seed: int, folder: Path) -> None:
     """Print the rows of one arm."""
-    place = folder / "cell.toml"
-    place.write_text(paths.CELL)
-    (folder / "job.pdl").write_text(paths.job(seed, load_cell(place)))
-    at, arm = ("--cell", place), ("--seed", seed)
-    model = ("--model", folder / "model.json")
-    paths.done("survey", *at, "--poses", 300, "-o", folder / "survey.pdl")
-    paths.done("simulate", folder / "survey.pdl", *at, *arm, "-o", folder / "s.csv")
-    paths.done("fit", folder / "s.csv", *at, "-o", folder / "model.json")
-    ran = folder / "ran.pdl"
-    paths.done("compensate", folder / "job.pdl", *at, *model, "-o", ran)
+    arm = ("--seed", seed)
+    place = paths.fit_a_survey(folder, *arm)
+    job, ran = folder / "job.pdl", folder / "ran.pdl"
+    job.write_text(paths.job(seed, load_cell(place)))
+    paths.done("compensate", job, "--cell", place, "--model",
+               folder / "model.json", "-o", ran)  # fmt: skip
     for effect in EFFECTS:
         more = ("--effects", effect) if effect else ()
-        track = ("--track", folder / "track.csv")
-        paths.done("simulate", ran, *at, *arm, *track, *more)
-        told = folder / "told.json"
-        paths.done("diagnose", "--path", folder / "track.csv", "--program", ran, *at,
-                   *model, "-o", folder / "better.json", "--json", told)  # fmt: skip
-        tell(seed, effect, json.loads(told.read_bytes()))
+        tell(seed, effect, paths.follow(ran, *arm, *more))
 
 
 def tell(seed: int, effect: str, told: dict) -> None:

@@ -120,15 +120,35 @@ def done(*arguments: object) -> None:
         raise RuntimeError(run.stderr)
 
 
-def study(seed: int, folder: Path, gears: str, programs: list[str]) -> None:
-    """Print the figures of one arm."""
+def fit_a_survey(folder: Path, *arm: object) -> Path:
+    """Write the cell, survey an arm and fit `model.json`; return the cell."""
     place = folder / "cell.toml"
     place.write_text(CELL)
-    (folder / "job.pdl").write_text(job(seed, load_cell(place)))
-    at, arm = ("--cell", place), ("--seed", seed, "--gears", gears)
-    done("survey", *at, "--poses", 300, "-o", folder / "survey.pdl")
-    done("simulate", folder / "survey.pdl", *at, *arm, "-o", folder / "survey.csv")
+    at, survey = ("--cell", place), folder / "survey.pdl"
+    done("survey", *at, "--poses", 300, "-o", survey)
+    done("simulate", survey, *at, *arm, "-o", folder / "survey.csv")
     done("fit", folder / "survey.csv", *at, "-o", folder / "model.json")
+    return place
+
+
+def follow(ran: Path, *arm: object) -> dict[str, Any]:
+    """Follow a program with a tracker; diagnose `better.json`, return the report."""
+    folder = ran.parent
+    at, track = ("--cell", folder / "cell.toml"), folder / "track.csv"
+    done("simulate", ran, *at, *arm, "--track", track)
+    done("diagnose", "--path", track, "--program", ran, *at, "--model",
+         folder / "model.json", "-o", folder / "better.json", "--json",
+         folder / "told.json")  # fmt: skip
+    told: dict[str, Any] = json.loads((folder / "told.json").read_bytes())
+    return told
+
+
+def study(seed: int, folder: Path, gears: str, programs: list[str]) -> None:
+    """Print the figures of one arm."""
+    arm = ("--seed", seed, "--gears", gears)
+    place = fit_a_survey(folder, *arm)
+    (folder / "job.pdl").write_text(job(seed, load_cell(place)))
+    at = ("--cell", place)
     for name in programs:
         more = PROGRAMS[name]
         model = folder / ("better.json" if name in DIAGNOSED else "model.json")
@@ -137,12 +157,7 @@ def study(seed: int, folder: Path, gears: str, programs: list[str]) -> None:
                  folder / f"{name}.pdl", "--report", folder / f"{name}.json",
                  *more)  # fmt: skip
         if name == "plain" and "measured" in programs:
-            done("simulate", folder / "plain.pdl", *at, *arm, "--track",
-                 folder / "track.csv")  # fmt: skip
-            done("diagnose", "--path", folder / "track.csv", "--program",
-                 folder / "plain.pdl", *at, "--model", model, "-o",
-                 folder / "better.json", "--json", folder / "told.json")  # fmt: skip
-            told = json.loads((folder / "told.json").read_bytes())
+            told = follow(folder / "plain.pdl", *arm)
             said = [f"{j['joint']} {j['verdict']}" for j in told["path"]["flanks"]]
             print(f"{seed:4d}  flanks in motion: joint {', '.join(said)}", flush=True)
     paths: dict[str, PathScores] = {}
