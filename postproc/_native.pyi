@@ -6,12 +6,18 @@ which says what the arguments are; the callers say it with shapes and units too.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Protocol, overload
+from typing import Any, Protocol, overload
+
+import numpy as np
+from numpy.typing import NDArray
 
 from postproc.arrays import Bools, Bytes, Cells, Floats, Indices, Ints
 
 SOURCES: str
 """Hash of the sources that it was built from."""
+
+Narrow = NDArray[np.unsignedinteger[Any]]
+SpanColumns = tuple[Indices, Narrow, Narrow]
 
 class _Clamps(Protocol):
     @property
@@ -213,10 +219,13 @@ def scan_lines(
 ) -> tuple[
     list[bytes],
     tuple[Indices, Indices, Indices, Indices],
-    tuple[Indices, Indices, Floats],
+    tuple[SpanColumns, Floats],
     tuple[NameColumn, Indices],
     list[int],
 ]: ...
+
+# spans.rs: where numbers stand in a text, in few bytes each
+def number_spans(start: Indices, end: Indices) -> SpanColumns: ...
 
 # rescan.rs: a text that differs from one read before in numbers
 def rescan_lines(
@@ -225,7 +234,7 @@ def rescan_lines(
     after: bytes,
     after_starts: Indices,
     count: int,
-) -> tuple[int, tuple[Indices, Indices, Floats, Bools]] | None: ...
+) -> tuple[int, SpanColumns, Floats, Bools] | None: ...
 
 # statements.rs: statements as texts and numbers (`postproc.language.statements`)
 def scan_statements(

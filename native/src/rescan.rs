@@ -8,6 +8,7 @@ use pyo3::types::PyBytes;
 
 use crate::number::value_of;
 use crate::rows::{detached, flat, on_cores};
+use crate::spans::{Columns, Spans};
 use crate::text::{Masked, Text, MARK};
 
 /// Lines that are read between two looks at signals.
@@ -40,8 +41,7 @@ fn comment<'a>(line: &Masked, text: &'a [u8]) -> Option<&'a [u8]> {
 /// What is read of some lines of the later text.
 #[derive(Default)]
 struct Found {
-    start: Vec<i32>,
-    end: Vec<i32>,
+    places: Vec<Range<usize>>,
     value: Vec<f64>,
     changed: Vec<bool>,
 }
@@ -51,18 +51,10 @@ impl Found {
     fn take(&mut self, pair: &Pair, (old, new): (&[u8], &[u8]), at: usize) {
         for (was, now) in pair.old.numbers.iter().zip(&pair.new.numbers) {
             let text = &new[now.0..now.1];
-            self.start.push((at + now.0) as i32);
-            self.end.push((at + now.1) as i32);
+            self.places.push(at + now.0..at + now.1);
             self.value.push(value_of(text));
             self.changed.push(&old[was.0..was.1] != text);
         }
-    }
-
-    fn append(&mut self, mut more: Found) {
-        self.start.append(&mut more.start);
-        self.end.append(&mut more.end);
-        self.value.append(&mut more.value);
-        self.changed.append(&mut more.changed);
     }
 }
 
@@ -125,9 +117,9 @@ type Column<'py, T> = Bound<'py, PyArray1<T>>;
 ///     after, after_starts: The text.
 ///     count: How many numbers the other one holds, (m).
 ///
-/// Returns: which line is new (-1: none); where numbers start and end, what they are
-/// worth, and whether they are written otherwise, (m,). None where a line says
-/// something else, or holds a string that does not end.
+/// Returns: which line is new (-1: none); where numbers stand, what they are worth, and
+/// whether they are written otherwise, (m,). None where a line says something else, or
+/// holds a string that does not end.
 #[pyfunction]
 #[allow(clippy::type_complexity)]
 pub fn rescan_lines<'py>(
@@ -137,9 +129,7 @@ pub fn rescan_lines<'py>(
     after: &Bound<'py, PyBytes>,
     after_starts: PyReadonlyArray1<'py, i32>,
     count: usize,
-) -> PyResult<
-    Option<(i64, (Column<'py, i32>, Column<'py, i32>, Column<'py, f64>, Column<'py, bool>))>,
-> {
+) -> PyResult<Option<(i64, Columns<'py>, Column<'py, f64>, Column<'py, bool>)>> {
     let before = Text::new(before.as_bytes(), flat(&before_starts)?)?;
     let after = Text::new(after.as_bytes(), flat(&after_starts)?)?;
     let (n, more) = (before.len(), after.len().wrapping_sub(before.len()));
@@ -147,28 +137,17 @@ pub fn rescan_lines<'py>(
     if texts.before.data.starts_with(MARK) || more > 1 || (more == 1 && !texts.find_added(py)?) {
         return Ok(None);
     }
-    let mut all = Found::default();
-    all.start.reserve_exact(count);
-    all.end.reserve_exact(count);
-    all.value.reserve_exact(count);
-    all.changed.reserve_exact(count);
+    let mut places = Spans::for_numbers(count);
+    let (mut value, mut changed) = (Vec::with_capacity(count), Vec::with_capacity(count));
     for rows in blocks(n) {
         py.check_signals()?;
         for part in detached(py, || on_cores(rows, LEAST, |rows| texts.read(rows)))? {
-            match part {
-                Some(found) => all.append(found),
-                None => return Ok(None),
-            }
+            let Some(mut found) = part else { return Ok(None) };
+            found.places.iter().for_each(|place| places.push(place.start, place.end));
+            value.append(&mut found.value);
+            changed.append(&mut found.changed);
         }
     }
     let added = texts.added.map_or(-1, |added| added as i64);
-    Ok(Some((
-        added,
-        (
-            all.start.into_pyarray(py),
-            all.end.into_pyarray(py),
-            all.value.into_pyarray(py),
-            all.changed.into_pyarray(py),
-        ),
-    )))
+    Ok(Some((added, places.into_arrays(py), value.into_pyarray(py), changed.into_pyarray(py))))
 }

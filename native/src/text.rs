@@ -12,6 +12,7 @@ use crate::interned::Interned;
 use crate::names::NameColumn;
 use crate::number::value_of;
 use crate::rows::{detached, each, flat};
+use crate::spans::{Columns, Spans};
 
 pub const NUMBER: u8 = 0; // stands for a number, in a mask
 pub const NAME: u8 = 1; // for a numbered name, in a form
@@ -367,7 +368,7 @@ fn without_end(mut line: &[u8]) -> &[u8] {
 ///
 /// Returns: the distinct masks; of every line its mask, where its comment starts (-1:
 /// nowhere), and from which number and name on those are its own, (n + 1,); where numbers
-/// start and end and what they are worth, (m,); the distinct names and those of the lines,
+/// stand and what they are worth, (m,); the distinct names and those of the lines,
 /// (p,); the lines (from 0) with a string that does not end.
 #[pyfunction]
 #[allow(clippy::type_complexity)]
@@ -378,7 +379,7 @@ pub fn scan_lines<'py>(
 ) -> PyResult<(
     Bound<'py, PyList>,
     (Column<'py, i32>, Column<'py, i32>, Column<'py, i32>, Column<'py, i32>),
-    (Column<'py, i32>, Column<'py, i32>, Column<'py, f64>),
+    (Columns<'py>, Column<'py, f64>),
     (NameColumn, Column<'py, i32>),
     Vec<usize>,
 )> {
@@ -387,7 +388,7 @@ pub fn scan_lines<'py>(
     let (mut masks, mut names) = (Interned::default(), Interned::default());
     let (mut mask, mut comment) = (Vec::new(), Vec::new());
     let (mut first, mut name_first) = (vec![0_i32], vec![0_i32]);
-    let (mut start, mut end, mut value) = (Vec::new(), Vec::new(), Vec::new());
+    let (mut places, mut value) = (Spans::default(), Vec::new());
     let (mut name, mut open) = (Vec::new(), Vec::new());
     let (mut line, mut form) = (Masked::default(), Vec::new());
     let unmarked: Vec<u8>;
@@ -407,11 +408,10 @@ pub fn scan_lines<'py>(
         mask.push(masks.of(&form));
         comment.push(line.comment.map_or(-1, |c| (at + c) as i32));
         for (from, to) in &line.numbers {
-            start.push((at + from) as i32);
-            end.push((at + to) as i32);
+            places.push(at + from, at + to);
             value.push(value_of(&text[*from..*to]));
         }
-        first.push(start.len() as i32);
+        first.push(places.len() as i32);
         name_first.push(name.len() as i32);
     })?;
     let texts = masks.texts().map(|text| PyBytes::new(py, text));
@@ -423,7 +423,7 @@ pub fn scan_lines<'py>(
             first.into_pyarray(py),
             name_first.into_pyarray(py),
         ),
-        (start.into_pyarray(py), end.into_pyarray(py), value.into_pyarray(py)),
+        (places.into_arrays(py), value.into_pyarray(py)),
         (NameColumn::of_latin_1(names), name.into_pyarray(py)),
         open,
     ))

@@ -275,7 +275,7 @@ def read_lines(source: Source) -> Lines:
     at = found.name_first[rows]
     joined = join(found.masks, found.shape[rows], Names(at, found.name, found.names))
     kept = rows[joined.rows]
-    first = np.append(found.first[kept], np.int32(len(found.start)))
+    first = np.append(found.first[kept], np.int32(len(found.numbers)))
     lines = with_block_rows(
         LogicalRows(joined.masks, joined.shape, kept + 1, first, at[joined.rows])
     )
@@ -288,7 +288,7 @@ def read_lines(source: Source) -> Lines:
         shape.astype(np.int32),
         lines.line.astype(np.int32),
         lines.first,
-        NumberSpans.of(found.start, found.end),
+        found.numbers,
         found.value,
     )
 
@@ -344,6 +344,6 @@ def reread_lines(source: Source, before: Lines) -> RereadLines | None:
         line = line + (line > found.added)
     lines = replace(
         before, source=source, line=line.astype(np.int32, copy=False),
-        numbers=NumberSpans.of(found.start, found.end), value=found.value,
+        numbers=found.numbers, value=found.value,
     )  # fmt: skip
     return RereadLines(lines, found.changed, found.added)

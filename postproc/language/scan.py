@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from postproc import _native
 from postproc.arrays import Bools, Floats, Indices
 from postproc.language.names import NameColumn
+from postproc.language.source import NumberSpans
 
 # A *mask* is the code of a line in which every number is one NUL (no program holds
 # any), the comment is gone and idle blanks are dropped. In its *form* every numbered
@@ -31,7 +32,7 @@ class ScannedLines:
         comment: Byte offset of each line's comment, (n,), -1 where there is none.
         first: CSR offsets into the numbers, (n + 1,).
         name_first: CSR offsets into the names, (n + 1,).
-        start, end: Byte offsets of each number, its sign included, (m,).
+        numbers: Where each number stands, its sign included, (m,).
         value: What it is worth, NaN where it cannot be read, (m,).
         names: The distinct names, in the order of appearance.
         name: Index into `names`, (p,).
@@ -43,8 +44,7 @@ class ScannedLines:
     comment: Indices
     first: Indices
     name_first: Indices
-    start: Indices
-    end: Indices
+    numbers: NumberSpans
     value: Floats
     names: NameColumn
     name: Indices
@@ -59,7 +59,10 @@ def scan_lines(data: bytes, line_starts: Indices) -> ScannedLines:
         line_starts: Offset of every line, ascending from 0, (n,).
     """
     masks, by_line, numbers, names, unterminated = _native.scan_lines(data, line_starts)
-    return ScannedLines(tuple(masks), *by_line, *numbers, *names, tuple(unterminated))
+    places, value = numbers
+    return ScannedLines(
+        tuple(masks), *by_line, NumberSpans(*places), value, *names, tuple(unterminated)
+    )
 
 
 @dataclass(frozen=True)
@@ -68,13 +71,12 @@ class RescannedLines:
 
     Attributes:
         added: Line (from 0) of comment alone that the other one has not, -1: none.
-        start, end, value: As in `ScannedLines`.
+        numbers, value: As in `ScannedLines`.
         changed: Which numbers are written otherwise, (m,).
     """
 
     added: int
-    start: Indices
-    end: Indices
+    numbers: NumberSpans
     value: Floats
     changed: Bools
 
@@ -93,7 +95,10 @@ def rescan_lines(
         What is in it, None where a mask or a comment differs, or a string has no end.
     """
     found = _native.rescan_lines(*before, *after, count)
-    return None if found is None else RescannedLines(found[0], *found[1])
+    if found is None:
+        return None
+    added, places, value, changed = found
+    return RescannedLines(added, NumberSpans(*places), value, changed)
 
 
 def form_of(mask: str) -> tuple[str, tuple[str, ...]]:

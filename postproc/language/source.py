@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from postproc import _native
-from postproc.arrays import Bytes, Indices, chunks, narrow
+from postproc.arrays import Bytes, Indices, chunks
 from postproc.exceptions import FileError, PostprocError, ProgramError
 
 # What is to be changed in a text: single edits, or a million of them as arrays.
@@ -203,9 +203,8 @@ class NumberSpans:
         >>> NumberSpans.of(np.array([3, 70]), np.array([5, 71])).start.tolist()
         [3, 70]
         """
-        base = start[::TOGETHER].astype(np.int32)
-        offset = narrow(start - np.repeat(base, TOGETHER)[: len(start)])
-        return cls(base, offset, narrow(end - start))
+        ends = start.astype(np.int32, copy=False), end.astype(np.int32, copy=False)
+        return cls(*_native.number_spans(*ends))
 
     def __len__(self) -> int:
         """Return how many numbers there are."""

@@ -68,13 +68,14 @@ def test_files_are_scanned_as_lines_are_masked(parts: list[str]) -> None:
         assert masked.masks[masked.shape[row]].decode("latin-1") == form
         own = masked.name[masked.name_first[row] : masked.name_first[row + 1]]
         assert tuple(masked.names[k] for k in own) == names
-        assert (masked.start[mine] - at).tolist() == list(wanted.start)
-        assert (masked.end[mine] - at).tolist() == list(wanted.end)
+        assert (masked.numbers.start[mine] - at).tolist() == list(wanted.start)
+        assert (masked.numbers.end[mine] - at).tolist() == list(wanted.end)
         assert masked.comment[row] == (
             at + wanted.comment if wanted.comment >= 0 else -1
         )
         assert (row in masked.unterminated) == wanted.unterminated
-    texts = [data[a:b].decode("latin-1") for a, b in zip(masked.start, masked.end)]  # noqa: B905
+    places = zip(masked.numbers.start, masked.numbers.end, strict=True)
+    texts = [data[a:b].decode("latin-1") for a, b in places]
     assert np.array_equal(
         masked.value, [number_value(t) for t in texts], equal_nan=True
     )

@@ -18,7 +18,8 @@ def edited(data: bytes, new: list[str]) -> bytes:
     """Write other numbers into a text, as far as it reads as numbers alone then."""
     found = scan_lines(data, Source("x", data).line_starts)
     out, done = b"", 0
-    for k, (a, b) in enumerate(zip(found.start, found.end, strict=True)):
+    places = zip(found.numbers.start, found.numbers.end, strict=True)
+    for k, (a, b) in enumerate(places):
         out, done = out + data[done:a] + new[k % len(new)].encode(), int(b)
     return out + data[done:]
 
@@ -66,7 +67,7 @@ def test_other_numbers_are_read_as_by_themselves(
 def rescanned(before: bytes, after: bytes) -> bool:
     """Tell whether a text is taken for another with other numbers."""
     starts = [Source("x", data).line_starts for data in (before, after)]
-    count = len(scan_lines(before, starts[0]).start)
+    count = len(scan_lines(before, starts[0]).numbers)
     return rescan_lines((before, starts[0]), (after, starts[1]), count) is not None
 
 

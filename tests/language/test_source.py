@@ -164,3 +164,11 @@ def test_places_of_numbers_are_those_that_were_taken(gaps):
     rows = slice(len(gaps) // 3, len(gaps) // 2)
     assert numbers.starts(rows).tolist() == start[rows].tolist()
     assert numbers.ends(rows).tolist() == end[rows].tolist()
+    for column in (numbers.offset, numbers.length):
+        assert column.dtype == np.min_scalar_type(int(column.max(initial=0)))
+
+
+@pytest.mark.parametrize(("start", "end"), [([5, 3], [6, 4]), ([-1], [2]), ([4], [3])])
+def test_places_that_do_not_ascend_are_refused(start, end) -> None:
+    with pytest.raises(ValueError, match="ascending"):
+        NumberSpans.of(np.array(start), np.array(end))
