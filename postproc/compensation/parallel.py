@@ -36,7 +36,7 @@ AHEAD = 16  # items that a child makes before anybody takes them
 SET_PDEATHSIG = 1  # of prctl(2): the signal that the death of the parent sends
 ASKED = frozenset({signal.SIGINT, signal.SIGTERM})  # a child leaves them to its parent
 SIZE = 8  # bytes of the length before every message
-ROW = 256  # bytes of a message that hold what came of a visit, about
+LARGE = 1 << 20  # bytes of a message whose memory is given back at once
 _ITEM, _RAISED, _END = range(3)
 
 
@@ -142,7 +142,10 @@ def _send(there: int, messages: Queue[bytes]) -> None:
                 pipe.write(len(message).to_bytes(SIZE, "little"))
                 pipe.write(message)
                 pipe.flush()
-                give_back(len(message) // ROW)
+                size = len(message)
+                del message
+                if size > LARGE:
+                    give_back()
     finally:
         os._exit(1)
 
@@ -166,13 +169,15 @@ def _taken(pipe: IO[bytes]) -> Iterator[Any]:
     while True:
         size = int.from_bytes(pipe.read(SIZE), "little")
         message = pipe.read(size)
-        give_back(size // ROW)
         if not size or len(message) < size:
             raise PostprocError(
                 "a process that did a part of the work was ended from outside, most "
                 "likely for want of memory. Free some, then run the command again"
             )
         kind, content = pickle.loads(message)
+        del message
+        if size > LARGE:
+            give_back()
         if kind == _RAISED:
             raise content
         if kind == _END:
