@@ -11,7 +11,6 @@ from tempfile import TemporaryDirectory
 from postproc.cli.jobs import Job
 from postproc.compensation import parallel
 from postproc.compensation.options import AS_USUAL
-from tests.bench.kernels import planned, ruckig_alone, toppra_alone
 from tests.bench.made import KINDS
 
 KIBI = 1024
@@ -68,7 +67,9 @@ def main() -> None:
     """
     kind, n, cell, model = sys.argv[1:5]
     found = measure(kind, int(n), Path(cell), Path(model))
-    if "--kernels" in sys.argv:
+    if "--kernels" in sys.argv:  # they load libraries that the pipeline does not need
+        from tests.bench.kernels import planned, ruckig_alone, toppra_alone
+
         arm, q = planned(KINDS[kind](min(int(n), ENOUGH)), Path(cell))
         found["toppra"], found["ruckig"] = toppra_alone(arm, q), ruckig_alone(arm, q)
     print(json.dumps(found))
