@@ -16,6 +16,7 @@ from postproc.arrays import (
     among,
     any_in_rows,
     chunks,
+    give_back,
     in_chunks,
     slim,
     spans,
@@ -273,6 +274,7 @@ def collect(machine: Machine) -> Visits:
     if machine.exhausted:
         c.reason[:] = collector.reasons["the program is too complex to be followed"]
     collector.names.settle()
+    give_back(len(c.line))
     literals, literal = find_literals(c, numbering, collector.names)
     literals, follows = find_uses(literals, c.slots, c.bases, literal, world.pinned)
     overlapping = (literal < 0) & (c.slots[:, 0] >= 0) & (c.reason == 0)

@@ -396,7 +396,11 @@ class Collector:
         }
         names, at = NameColumn(told.values()), np.array([*told], dtype=np.int64)
         if points is not None and some.any():
-            names.extend(points.entries.name.take(moves.point[some]))
+            written = points.entries.name.take(moves.point[some])
+            if not told:  # no name between them
+                self.columns.name[moves.visit[some]] = self.names.of(written)
+                return
+            names.extend(written)
             at = np.append(at, np.flatnonzero(some))
         order = np.argsort(at)
         self.columns.name[moves.visit[at[order]]] = self.names.of(names.take(order))

@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from postproc.arrays import Bools, Floats, Indices, Ints, slim
+from postproc.arrays import Bools, Floats, Indices, Ints, chunks, slim
 from postproc.language.lines import Lines
 from postproc.language.names import NameColumn
 from postproc.language.pdl2.parser import EntryPart
@@ -157,12 +157,15 @@ class Entries(Mapping[str, Entry]):
             The entries; None where one was not known, is not, or belongs to none.
         """
         known = np.isfinite(self.numbers) if self.known is None else self.known
-        hit = (self.slots >= 0) & changed[self.slots]
-        count = np.count_nonzero(changed)
-        if np.count_nonzero(hit) != count or np.count_nonzero(hit & known) != count:
-            return None
-        numbers = np.where(known, value[self.slots], np.nan)
-        if not np.isfinite(numbers[hit]).all():
+        numbers, met = np.empty(self.slots.shape), 0
+        for k in chunks(len(self.slots)):
+            slots = self.slots[k]
+            hit = (slots >= 0) & changed[slots]
+            numbers[k] = np.where(known[k], value[slots], np.nan)
+            if not np.isfinite(numbers[k][hit]).all():
+                return None
+            met += int(hit.sum())
+        if met != np.count_nonzero(changed):
             return None
         return replace(self, numbers=numbers, known=None)
 

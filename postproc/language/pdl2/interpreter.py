@@ -567,6 +567,7 @@ def resolve(
         )  # fmt: skip
         machine = _listed(world)
     world.pin_loose()
+    world.settle()
     return Resolved(collect(machine), tuple(sorted(world.diagnostics)))
 
 

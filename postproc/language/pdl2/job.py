@@ -9,7 +9,7 @@ from itertools import chain
 
 import numpy as np
 
-from postproc.arrays import Bools, Ints
+from postproc.arrays import Bools, Ints, give_back
 from postproc.files import base_name
 from postproc.language.interface import Start
 from postproc.language.names import NameColumn
@@ -211,6 +211,14 @@ class World:
     def arm(self) -> int:
         """Return the number of our arm."""
         return self.start.arm
+
+    def settle(self) -> None:
+        """Let go of what finds names by the million, and of what is free by now."""
+        for program in self.programs():
+            program.variables.settle()
+        if self.variables is not None:
+            self.variables.entries.row.names.settle()
+        give_back(sum(len(program.lines) for program in self.programs()))
 
     def programs(self) -> list[Program]:
         """Return the programs, the main one first, each once."""

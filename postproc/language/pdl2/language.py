@@ -9,6 +9,7 @@ from typing import cast
 
 import numpy as np
 
+from postproc.arrays import give_back
 from postproc.exceptions import ProgramError
 from postproc.files import base_name, is_variables
 from postproc.language.grammars import line_parser
@@ -72,6 +73,7 @@ class Pdl2(Language):
                 pages.append(_named(_parsed(source, known)))
                 texts.append(Skeleton.of(pages[-1].lines))
         others = _by_name(program, pages)
+        give_back(sum(len(text.numbers) for text in texts))
         resolved = resolve(program, start, variables, others)
         visits, parsed = resolved.visits, (program, *pages)
         missed = dead_lines(parsed, visits)

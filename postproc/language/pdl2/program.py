@@ -299,6 +299,11 @@ class Variables(Mapping[str, Variable]):
                 found.declare([self[name].name], self[name])
         return found
 
+    def settle(self) -> None:
+        """Let go of what finds names, until one is looked for again."""
+        self._names.settle()
+        self._written.settle()
+
     def __len__(self) -> int:
         """Return the number of names."""
         return len(self._names)
