@@ -19,8 +19,7 @@ impl Interned {
     /// Return the number of a text, which becomes one of these where it is not yet.
     pub fn of(&mut self, text: &[u8]) -> i32 {
         if self.table.len() < 2 * (self.ends.len() + 1) {
-            self.forget_table();
-            self.make_table();
+            self.grow();
         }
         let own = hash(text);
         let at = self.place(own, text);
@@ -45,19 +44,39 @@ impl Interned {
         self.ends.push(u32::try_from(self.bytes.len()).expect("texts of less than 4 GiB"));
     }
 
-    /// Make a table of all texts where there is none; of equal ones it finds the first.
-    pub fn make_table(&mut self) {
+    /// Begin a table where there is none; return how many texts are to enter it.
+    pub fn begin_table(&mut self) -> usize {
         if !self.table.is_empty() {
-            return;
+            return 0;
         }
         let places = (2 * (self.ends.len() + 1)).next_power_of_two().max(64);
         self.table = vec![(0, FREE); places];
-        for number in 0..self.ends.len() {
-            let own = hash(self.text(number));
-            let at = self.place(own, self.text(number));
-            if self.table[at].1 == FREE {
-                self.table[at] = (own, number as u32);
+        self.ends.len()
+    }
+
+    /// Enter a text into the table; of equal ones it finds the first.
+    pub fn enter(&mut self, number: usize) {
+        let own = hash(self.text(number));
+        let at = self.place(own, self.text(number));
+        if self.table[at].1 == FREE {
+            self.table[at] = (own, number as u32);
+        }
+    }
+
+    /// Make a larger table, from the hashes that the old one holds.
+    fn grow(&mut self) {
+        let old = std::mem::take(&mut self.table);
+        let texts = self.begin_table();
+        if old.is_empty() {
+            (0..texts).for_each(|number| self.enter(number));
+        }
+        let last = self.table.len() - 1;
+        for (own, number) in old.into_iter().filter(|(_, number)| *number != FREE) {
+            let mut at = own as usize & last;
+            while self.table[at].1 != FREE {
+                at = (at + 1) & last;
             }
+            self.table[at] = (own, number);
         }
     }
 

@@ -37,6 +37,16 @@ impl NameColumn {
         std::str::from_utf8(self.0.text(number)).expect("names are UTF-8")
     }
 
+    /// Make the table where there is none.
+    fn make_table(&mut self, py: Python<'_>) -> PyResult<()> {
+        let texts = self.0.begin_table();
+        let made = each(py, texts, |number| self.0.enter(number)).map(|_| ());
+        if made.is_err() {
+            self.0.forget_table(); // not all are in it
+        }
+        made
+    }
+
     fn listed<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
         PyList::new(py, (0..self.0.len()).map(|k| self.text(k)))
     }
@@ -88,15 +98,14 @@ impl NameColumn {
 
     /// Find names among the own ones: the first number of each, (m,), -1 where it is not.
     fn find<'py>(&mut self, names: &Bound<'py, PyAny>) -> PyResult<Column<'py>> {
-        let py = names.py();
-        detached(py, || self.0.make_table())?;
-        Ok(NameColumn::for_all(names, |name| self.0.find(name))?.into_pyarray(py))
+        self.make_table(names.py())?;
+        Ok(NameColumn::for_all(names, |name| self.0.find(name))?.into_pyarray(names.py()))
     }
 
     /// Return the first number of a name, -1 where it is not among the own ones.
-    fn number(&mut self, name: &str) -> i32 {
-        self.0.make_table();
-        self.0.find(name.as_bytes())
+    fn number(&mut self, py: Python<'_>, name: &str) -> PyResult<i32> {
+        self.make_table(py)?;
+        Ok(self.0.find(name.as_bytes()))
     }
 
     /// Return the names of some numbers, (m,).
@@ -144,7 +153,7 @@ impl NameColumn {
 
     fn __contains__(&mut self, name: &Bound<'_, PyAny>) -> PyResult<bool> {
         match name.cast::<PyString>() {
-            Ok(name) => Ok(self.number(name.to_str()?) >= 0),
+            Ok(text) => Ok(self.number(name.py(), text.to_str()?)? >= 0),
             Err(_) => Ok(false),
         }
     }

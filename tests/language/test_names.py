@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import pickle
+import signal
 from collections.abc import Sequence
 
 import numpy as np
@@ -63,3 +64,20 @@ def test_what_is_no_name_is_refused() -> None:
             names.take(np.array([wrong]))
     with pytest.raises(TypeError):
         names.extend([1])
+
+
+def test_an_interruption_leaves_no_table_of_some_names() -> None:
+    names = NameColumn([f"p{k}" for k in range(300_000)])
+
+    def interrupt(number: int, frame: object) -> None:
+        raise KeyboardInterrupt
+
+    before = signal.signal(signal.SIGALRM, interrupt)
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            signal.setitimer(signal.ITIMER_REAL, 2e-3)
+            names.find(["p299999"])
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0)
+        signal.signal(signal.SIGALRM, before)
+    assert names.find(["p299999", "p0", "q"]).tolist() == [299_999, 0, -1]
