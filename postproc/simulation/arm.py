@@ -149,8 +149,8 @@ class Gears:
 
     def half_gaps(self, angles: Floats) -> Floats:
         """Return half the gaps at angles of the motors (n, 6), (n, 6) [rad]."""
-        q = np.linalg.solve(self.coupling, angles.T).T
-        return self.gap * self.wave(q)
+        q: Floats = np.linalg.solve(self.coupling, angles.T).T.astype(float)
+        return np.asarray(self.gap * self.wave(q))
 
     def shown(self, arrivals: VirtualArrivals) -> Floats:
         """Return the sides that the links show, (n, 6) from -1 to 1."""
