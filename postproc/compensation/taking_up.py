@@ -16,8 +16,8 @@ from postproc.arrays import Floats
 from postproc.compensation.options import Setting
 from postproc.compensation.path_accuracy import sides_on_leaving
 from postproc.language.visits import OrientationLaw, Visits
+from postproc.model.play import half_widths
 from postproc.motion.cycle import ProgramCycle
-from postproc.robot.direction import WIDTH_IN_PLAYS
 from postproc.robot.pose import rotation_vector
 
 WHOLE = 0.999  # of half the play: a drive that lies there has crossed
@@ -86,7 +86,7 @@ def take_up(cycle: ProgramCycle, setting: Setting, visits: Visits, v: int) -> Ta
         v: The visit at the end of the move.
     """
     cell = setting.cell
-    came, leaves = sides_on_leaving(cycle, cell, v)
+    came, leaves = sides_on_leaving(cycle, cell, setting.model, v)
     turned = leaves - came
     crosses = np.abs(turned) > CROSSES
     crossing = tuple((np.flatnonzero(crosses) + 1).tolist())
@@ -120,7 +120,7 @@ def turned_by_drives(
     known = law in (OrientationLaw.UNSET, OrientationLaw.ONE_AXIS)
     if setting.options.orientation or visits.wrist_joint[v] or not known:
         return np.zeros((len(q), 3))
-    width = np.where(setting.gap > 0.0, WIDTH_IN_PLAYS * cell.arm.play, 0.0)
-    behind = q + np.linalg.solve(cell.arm.coupling, (crossed / 2 * width).T).T
+    half = np.where(setting.gap > 0.0, half_widths(setting.model, cell.arm, q), 0.0)
+    behind = q + np.linalg.solve(cell.arm.coupling, (crossed * half).T).T
     before, after = (cell.arm.flange(a)[:, :3, :3] @ tool for a in (q, behind))
     return rotation_vector(np.swapaxes(before, 1, 2) @ after)
