@@ -225,6 +225,15 @@ def test_flat_is_less_than_five_times_what_corrections_differ_by() -> None:
             assert found[0][1] == pytest.approx(bent, rel=1e-3)
 
 
+def test_what_corrections_change_evenly_bends_nothing() -> None:
+    visits = read((0.0, 5.0, 10.0)).visits
+    moved = np.zeros((len(visits), 3))
+    moved[[VIA - 1, VIA, END], 2] = 1e-3, 2e-3, 3e-3
+    assert not flat_pieces(visits, moved, np.array([VIA]))
+    moved[VIA, 2] += 1e-3
+    assert flat_pieces(visits, moved, np.array([VIA]))
+
+
 def test_two_arcs_that_are_superposed_pass_their_point() -> None:
     radius, zone = 0.12, 5e-3
     rest = np.array([zone / 4, -zone / 4]) / radius  # of either, in the middle
