@@ -436,13 +436,10 @@ def _joints(run: _Run, error: _Error, rows: Ints, way: Floats) -> Ints:
     return np.where(size.max(axis=1) > NO_FLANK, told + 1, 0)
 
 
-LEAVING = 5e-3  # [m] behind which a move is under way
-
-
-def sides_on_leaving(
+def sides_on_move(
     cycle: ProgramCycle, cell: Cell, model: Model, v: int
 ) -> tuple[Floats, Floats]:
-    """Tell where each joint lies in its play as a move begins, and soon behind.
+    """Tell where each joint lies in its play along a move.
 
     Args:
         cycle: The program.
@@ -451,14 +448,13 @@ def sides_on_leaving(
         v: The visit at the end of the move.
 
     Returns:
-        Sides, (6,) each.
+        The way up to k samples, (k,) [m], and the sides there, (k, 6).
     """
     ways = ways_of(cycle, np.array([v]))
     run = _Run.of(cell, model, cycle, ways)
     tool = np.broadcast_to(cycle.targets.tool[v, :3, 3], (len(ways.q), 3))
     way, _ = measured_along(cell.arm.tcp(ways.q, tool), ways)
-    at = min(int(np.searchsorted(way, LEAVING)), len(way) - 1)
-    return run.side[0], run.side[at]
+    return way, run.side
 
 
 # The ways of a program as the arm should go them: to compare with what was measured.

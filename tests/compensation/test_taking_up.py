@@ -32,7 +32,9 @@ def crossing(*sides: float) -> Floats:
         ((-1, -1, -0.5, 0.2), (-1, -1, 1, 1)),  # under way where the move ends
         ((-1, -1, -0.9, -0.8), (-1, -1, -0.9, -0.8)),  # .. by little
         ((1, 0.4, -1, -0.2, 1), (1, -1, -1, 1, 1)),  # there and back
-        ((-1, 0.0, -1, -1), (-1, 0.0, -1, -1)),  # turns back before it arrives
+        ((-1, 0.0, -1, -1), (-1, 1, -1, -1)),  # turns back before it arrives
+        ((-1, -0.8, -1, -1), (-1, -0.8, -1, -1)),  # .. at once
+        ((-1, -0.5, -0.5, 0.2, 1), (-1, 1, 1, 1, 1)),  # rests on its way
         ((1, 1, 1), (1, 1, 1)),
     ],
 )
