@@ -20,6 +20,7 @@ from postproc.compensation.arc_splitting import (
 )
 from postproc.compensation.insertions import are_near, insert
 from postproc.compensation.program import Reading, plan_visits, read_program
+from postproc.compensation.splitting import CLOSEST, shortest_pieces
 from postproc.compensation.taking_up import MeantSides
 from postproc.language.languages import language_of
 from postproc.motion.cycle import run
@@ -147,6 +148,20 @@ def test_the_tool_is_turned_at_the_point_on_the_way_as_well() -> None:
     )
     np.testing.assert_allclose(w.values[own][:, :3], v.values[:, :3], atol=6e-4)
     np.testing.assert_array_equal(w.values[own[END]], v.values[END])
+
+
+def test_the_last_piece_of_an_arc_is_long_enough_to_bend() -> None:
+    visits = read().visits
+    cycle = run(CELL.arm, plan_visits(visits, CELL).targets)
+    pieces = shortest_pieces(visits, cycle, 0.0)
+    assert [behind for _, _, behind in pieces[VIA : END + 2]] == [
+        CLOSEST,
+        pytest.approx(np.sqrt(16.0 * RADIUS * MM * FLAT), rel=1e-6),
+        CLOSEST,
+    ]
+    share = 1.0 - pieces[END][2] / (RADIUS * MM * np.deg2rad(120.0))
+    arc = CutArc.of(visits, {VIA: (1.0,), END: (share,)}, VIA, ())
+    assert arc.sagitta(1, share, 1.0) == pytest.approx(2 * FLAT, rel=1e-3)
 
 
 def test_half_way_between_points_of_an_arc_joints_are_meant_to_lie_between() -> None:
