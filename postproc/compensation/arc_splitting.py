@@ -28,7 +28,7 @@ from postproc.robot.pose import MM, lengths, rotation_from_vector, rotation_vect
 from postproc.robot.trajectory import Motion
 
 FLAT = 1e-5  # [m] sagitta of a piece that is a chord: ten of the digits written
-BENT = 5.0  # of what its corrections differ by: the least sagitta of an arc
+BENT = 5.0  # of what its corrections bend it by: the least sagitta of an arc
 STRAIGHT = 0.3  # of the tolerance: the largest sagitta of a chord
 UNEVEN = 2e-5  # [rad] that the tool may turn otherwise than evenly along an arc
 
@@ -165,6 +165,9 @@ class CutArc:
 def flat_pieces(visits: Visits, moved: Floats, rows: Ints) -> list[tuple[int, float]]:
     """Find arcs that bend too little for what their corrections differ by.
 
+    What differs is that at the point on the way from the mean of both ends: what
+    changes evenly from one end to the other moves an arc and bends none.
+
     Args:
         visits: The program with points, not corrected.
         moved: What its numbers are corrected by, (n, 3) [m].
@@ -177,7 +180,7 @@ def flat_pieces(visits: Visits, moved: Floats, rows: Ints) -> list[tuple[int, fl
     for via in rows.tolist():
         points = np.array([visits.before[via], via, via + 1])
         own, place = moved[points], visits.values[points, :3] * MM
-        differ = float(lengths(own - np.roll(own, 1, axis=0)).max())
+        differ = float(np.linalg.norm(own[1] - (own[0] + own[2]) / 2))
         chord = place[2] - place[0]
         aside = np.cross(place[1] - place[0], chord / np.linalg.norm(chord))
         sagitta = float(np.linalg.norm(aside))

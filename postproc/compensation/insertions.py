@@ -186,6 +186,8 @@ def _aims(
         rows = np.arange(own[visit - 1] + 1 if visit else 0, own[visit] + 1)
         ends = rows[~via[rows]][: len(points[visit])]
         out[ends] = sides.side[: len(ends)]
+        piece = np.cumsum(~via[rows])[via[rows]]
+        out[rows[via[rows]]] = sides.between[piece]
     for visit, taken in stops.items():
         arc = bool(visits.via[visit])
         first = own[visit - 1] + 1 if arc else own[visit] - len(points[visit])

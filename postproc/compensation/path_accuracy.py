@@ -18,6 +18,7 @@ from postproc.arrays import Bools, Floats, Ints, any_in_rows, spans
 from postproc.compensation.arc_splitting import NO_ARCS, WantedArcs
 from postproc.compensation.path_samples import PathSamples, measured_along, ways_of
 from postproc.model.model import CONFIRMED, Model
+from postproc.model.play import half_widths
 from postproc.motion.cycle import ProgramCycle
 from postproc.robot.cell import Cell
 from postproc.robot.direction import sides_along
@@ -140,10 +141,20 @@ class _Run:
     most: Floats
 
     @classmethod
-    def of(cls, cell: Cell, cycle: ProgramCycle, ways: PathSamples) -> _Run:
-        """Follow the joints' plays along the ways."""
-        play = cycle.arrived.past.play[ways.source]
-        return cls(cycle, ways, *sides_along(cell.arm, ways.q, ways.begins, play))
+    def of(
+        cls, cell: Cell, model: Model, cycle: ProgramCycle, ways: PathSamples
+    ) -> _Run:
+        """Follow the joints' plays along the ways, each as wide as its gap there.
+
+        What is known of them where a way begins is what the way before it leaves, where
+        one leads there.
+        """
+        begins, alone = ways.begins, np.ones(len(ways.visit), dtype=bool)
+        alone[1:] = ways.source[1:] != ways.visit[:-1]
+        begins[ways.first[:-1]] = alone
+        play = cycle.arrived.past.play[ways.source[alone]]
+        half = half_widths(model, cell.arm, ways.q)
+        return cls(cycle, ways, *sides_along(cell.arm, ways.q, begins, play, half))
 
     @property
     def side(self) -> Floats:
@@ -241,8 +252,8 @@ def predict_paths(
     pair = [ours, ways_of(after, rows).as_many(ours)]
     cycles = before, after
     if len(rows):
-        pair = _refined(cell, cycles, pair)
-    runs = [_Run.of(cell, c, w) for c, w in zip(cycles, pair, strict=True)]
+        pair = _refined(cell, model, cycles, pair)
+    runs = [_Run.of(cell, model, c, w) for c, w in zip(cycles, pair, strict=True)]
     error = _Error(cell, model, temperature)
     tools = before.targets.tool[rows, :3, 3][pair[0].way]
     wanted, commanded = (cell.arm.tcp(w.q, tools) for w in pair)
@@ -343,12 +354,15 @@ def _otherwise(
 
 
 def _refined(
-    cell: Cell, cycles: tuple[ProgramCycle, ...], pair: list[PathSamples]
+    cell: Cell,
+    model: Model,
+    cycles: tuple[ProgramCycle, ...],
+    pair: list[PathSamples],
 ) -> list[PathSamples]:
     """Look closer where a joint changes its flank, before or after."""
     changes = np.zeros(len(pair[0].q), dtype=bool)
     for cycle, ways in zip(cycles, pair, strict=True):
-        own = any_in_rows(_Run.of(cell, cycle, ways).changes())
+        own = any_in_rows(_Run.of(cell, model, cycle, ways).changes())
         changes |= own | np.append(own[1:], False) | np.append(False, own[:-1])
     changes &= ~np.append(pair[0].begins[1:], True)
     after = np.repeat(np.flatnonzero(changes), FINE - 1)
@@ -422,26 +436,25 @@ def _joints(run: _Run, error: _Error, rows: Ints, way: Floats) -> Ints:
     return np.where(size.max(axis=1) > NO_FLANK, told + 1, 0)
 
 
-LEAVING = 5e-3  # [m] behind which a move is under way
-
-
-def sides_on_leaving(cycle: ProgramCycle, cell: Cell, v: int) -> tuple[Floats, Floats]:
-    """Tell where each joint lies in its play as a move begins, and soon behind.
+def sides_on_move(
+    cycle: ProgramCycle, cell: Cell, model: Model, v: int
+) -> tuple[Floats, Floats]:
+    """Tell where each joint lies in its play along a move.
 
     Args:
         cycle: The program.
         cell: The arm, its play as wide as its gaps.
+        model: The arm's error.
         v: The visit at the end of the move.
 
     Returns:
-        Sides, (6,) each.
+        The way up to k samples, (k,) [m], and the sides there, (k, 6).
     """
     ways = ways_of(cycle, np.array([v]))
-    run = _Run.of(cell, cycle, ways)
+    run = _Run.of(cell, model, cycle, ways)
     tool = np.broadcast_to(cycle.targets.tool[v, :3, 3], (len(ways.q), 3))
     way, _ = measured_along(cell.arm.tcp(ways.q, tool), ways)
-    at = min(int(np.searchsorted(way, LEAVING)), len(way) - 1)
-    return run.side[0], run.side[at]
+    return way, run.side
 
 
 # The ways of a program as the arm should go them: to compare with what was measured.
@@ -487,8 +500,9 @@ def predicted_ways(
     """
     rows = np.flatnonzero(cycle.ways[1] >= 0)
     ways = _spaced(cell, cycle, ways_of(cycle, rows))
-    (ways,) = _refined(cell, (cycle,), [ways])
-    run, error = _Run.of(cell, cycle, ways), _Error(cell, model, temperature)
+    (ways,) = _refined(cell, model, (cycle,), [ways])
+    run = _Run.of(cell, model, cycle, ways)
+    error = _Error(cell, model, temperature)
     tools = cycle.targets.tool[rows, :3, 3][ways.way]
     place = cell.arm.tcp(ways.q, tools) + error(run, slice(None), run.side)
     flank = np.empty((len(ways.q), 6, 3))

@@ -191,14 +191,15 @@ class PathWork:
                 if v not in self.points:
                     continue
                 way = paths.way[rows]
-                at = np.searchsorted(way, np.array(self.points[v]) * way[-1])
-                at = at.clip(0, len(way) - 1) + rows.start
+                ends = np.array([0.0, *self.points[v], 1.0]) * way[-1]
+                at = np.searchsorted(way, ends).clip(0, len(way) - 1) + rows.start
                 there = side[at - own[0].start]
                 tool = self.first.after.targets.tool[v, :3, :3]
                 turn = turned_by_drives(
                     self.setting, visits, v, tool, paths.q[at], there - side[0]
                 )
-                found[v] = MeantSides(there, turn)
+                between = (there[:-1] + there[1:]) / 2
+                found[v] = MeantSides(there[1:-1], turn[1:-1], between)
         return found
 
     def wanted_arcs(self) -> WantedArcs:

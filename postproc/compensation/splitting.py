@@ -9,7 +9,12 @@ from __future__ import annotations
 import numpy as np
 
 from postproc.arrays import Bools, Floats, Ints
-from postproc.compensation.arc_splitting import hindrances_of_arcs, is_arc
+from postproc.compensation.arc_splitting import (
+    FLAT,
+    WantedArcs,
+    hindrances_of_arcs,
+    is_arc,
+)
 from postproc.compensation.outcome import Decisions, Status
 from postproc.language.interface import ArcPiece, Splitter
 from postproc.language.source import CloneError
@@ -20,6 +25,7 @@ from postproc.robot.trajectory import Motion
 
 CLOSEST = 1e-3  # [m] length of the shortest piece, however slow the move is
 CLEAR = 0.02  # [m] from a rounded end: how large its corner is depends on the moves
+LAST_FLATS = 2.0  # of `FLAT`: the sagitta of the last piece of an arc, no chord
 WIDEST = -99999.9  # no number of a point is longer as it is written
 ALIKE = 1e-6  # a tool whose axes turn by less keeps its orientation
 
@@ -104,7 +110,19 @@ def shortest_pieces(
     flown = visits.fly & ~visits.via  # the point on the way of an arc is no corner
     round_ = np.where(flown, np.maximum(size, least), least)
     clear = np.where(visits.before >= 0, round_[np.maximum(visits.before, 0)], least)
-    ends = (visits.motion == Motion.CIRCULAR) & ~visits.via
-    round_ = np.where(ends, np.maximum(round_, CLEAR), round_)  # it must bend enough
+    round_ = np.maximum(round_, _last_pieces(visits, cycle))
     columns = least, np.maximum(clear, least), np.maximum(round_, least)
     return list(zip(*(column.tolist() for column in columns), strict=True))
+
+
+def _last_pieces(visits: Visits, cycle: ProgramCycle) -> Floats:
+    """Return how long the last piece of an arc has to be to bend enough, (n,) [m].
+
+    No more than `CLEAR`; 0 where a move is no arc.
+    """
+    via, out = np.flatnonzero(visits.via), np.zeros(len(visits))
+    if len(via):
+        radius = WantedArcs.of(cycle, visits.before, via.tolist()).radius[::2]
+        bends = np.sqrt(8.0 * radius * LAST_FLATS * FLAT)
+        out[via + 1] = np.minimum(bends, CLEAR)
+    return out

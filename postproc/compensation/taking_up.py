@@ -9,18 +9,20 @@ all joints, and leaves some of them within their play.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
 from postproc.arrays import Floats
 from postproc.compensation.options import Setting
-from postproc.compensation.path_accuracy import sides_on_leaving
+from postproc.compensation.path_accuracy import sides_on_move
 from postproc.language.visits import OrientationLaw, Visits
+from postproc.model.play import half_widths
 from postproc.motion.cycle import ProgramCycle
-from postproc.robot.direction import WIDTH_IN_PLAYS
 from postproc.robot.pose import rotation_vector
 
 WHOLE = 0.999  # of half the play: a drive that lies there has crossed
+LEAVING = 5e-3  # [m] behind which a move is under way
 CROSSES = 0.3  # of half the play: a joint that goes so far will rest on that flank
 
 
@@ -46,14 +48,21 @@ class MeantSides:
     Attributes:
         side: Where each joint is to lie in its play, (k, 6) from -1 to 1.
         turn: What the tool turns by in its own frame, (k, 3) [rad].
+        between: Where it is to lie half way between a point and the one before, and
+            behind the last one, (k + 1, 6).
     """
 
     side: Floats
     turn: Floats
+    between: Floats
 
 
 def crossed_at_once(side: Floats) -> Floats:
     """Let drives that cross their gaps on a way do so where they begin to, (k, 6).
+
+    Those too that turn back before they are across, and were under way: a link that is
+    to turn, and turn again, has to be pushed by one flank, and by the other. One that
+    rests on its way across, and goes on, is under way.
 
     Args:
         side: Where each joint lies in its play along the way, (k, 6) from -1 to 1.
@@ -62,16 +71,17 @@ def crossed_at_once(side: Floats) -> Floats:
     step = np.sign(np.diff(side, axis=0)) * (np.abs(np.diff(side, axis=0)) > 1e-9)
     for joint in range(side.shape[1]):
         sense = step[:, joint]
+        for a, b in pairwise(np.flatnonzero(sense).tolist()):
+            if sense[a] == sense[b]:
+                sense[a:b] = sense[a]
         begins = np.flatnonzero(np.diff(sense, prepend=0.0) != 0)
         ends = np.append(begins, len(sense))[1:]
         for begin, end in zip(begins.tolist(), ends.tolist(), strict=True):
             moves = sense[begin]
             whole = moves * side[end, joint] > WHOLE
-            under_way = (
-                end == len(sense)
-                and moves * (side[end, joint] - side[begin, joint]) > CROSSES
-            )
-            if moves and (whole or under_way):
+            far = moves * (side[end, joint] - side[begin, joint]) > CROSSES
+            goes_on = end == len(sense) or sense[end] == -moves
+            if moves and (whole or (far and goes_on)):
                 out[begin + 1 : end + 1, joint] = moves
     return out
 
@@ -86,11 +96,12 @@ def take_up(cycle: ProgramCycle, setting: Setting, visits: Visits, v: int) -> Ta
         v: The visit at the end of the move.
     """
     cell = setting.cell
-    came, leaves = sides_on_leaving(cycle, cell, v)
-    turned = leaves - came
-    crosses = np.abs(turned) > CROSSES
+    way, sides = sides_on_move(cycle, cell, setting.model, v)
+    at = min(int(np.searchsorted(way, LEAVING)), len(way) - 1)
+    came, leaves = sides[0], crossed_at_once(sides)[at]
+    crosses = (np.abs(leaves - came) > CROSSES) & (np.abs(leaves) > WHOLE)
     crossing = tuple((np.flatnonzero(crosses) + 1).tolist())
-    side = np.where(crosses, np.sign(turned), came)
+    side = np.where(crosses, np.sign(leaves), came)
     q = cycle.path.q[int(cycle.ways[1][v])]
     tool = cycle.targets.tool[v, :3, :3]
     turn = turned_by_drives(setting, visits, v, tool, q[None], (side - came)[None])
@@ -120,7 +131,7 @@ def turned_by_drives(
     known = law in (OrientationLaw.UNSET, OrientationLaw.ONE_AXIS)
     if setting.options.orientation or visits.wrist_joint[v] or not known:
         return np.zeros((len(q), 3))
-    width = np.where(setting.gap > 0.0, WIDTH_IN_PLAYS * cell.arm.play, 0.0)
-    behind = q + np.linalg.solve(cell.arm.coupling, (crossed / 2 * width).T).T
+    half = np.where(setting.gap > 0.0, half_widths(setting.model, cell.arm, q), 0.0)
+    behind = q + np.linalg.solve(cell.arm.coupling, (crossed * half).T).T
     before, after = (cell.arm.flange(a)[:, :3, :3] @ tool for a in (q, behind))
     return rotation_vector(np.swapaxes(before, 1, 2) @ after)

@@ -2,8 +2,9 @@
 
 An error of +b and -b from the two sides is a gap of 2 b between the flanks. The fitted
 model knows b for every joint, much better than the guess in an arm file. Where b
-changes with the joint angle, the way across is its mean over the surveyed range: with
-its largest value every joint would be said to reach its other flank too late.
+changes with the joint angle so does the way across. One play for all angles is its mean
+over the surveyed range: with its largest value every joint would be said to reach its
+other flank too late.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from postproc.arrays import Floats
 from postproc.model.kinematics import Batch
 from postproc.model.model import Model
 from postproc.robot.arm import Arm
-from postproc.robot.direction import WIDTH_IN_PLAYS
+from postproc.robot.direction import WIDTH_IN_PLAYS, half_width
 from postproc.robot.state import make_states
 
 SAMPLES = 60  # angles over the surveyed range of every joint
@@ -31,16 +32,37 @@ def half_gap(model: Model, arm: Arm) -> Floats:
     Returns:
         (6,) [rad]; 0 where the model has no backlash.
     """
-    return np.asarray(np.abs(_backlash(model, arm)).max(axis=0))
+    return np.asarray(np.abs(_over_range(model, arm)).max(axis=0))
 
 
-def _backlash(model: Model, arm: Arm) -> Floats:
+def half_widths(model: Model, arm: Arm, q: Floats) -> Floats:
+    """Give half of the way on which every drive crosses its gap at joint angles.
+
+    Args:
+        model: A fitted model.
+        arm: Its arm, with the measured play.
+        q: Joint angles, (n, 6) [rad].
+
+    Returns:
+        (n, 6) [rad]; by the arm's play for a joint whose backlash is not in the model.
+    """
+    gap = np.abs(_backlash(model, arm, q))
+    known = gap.any(axis=0)
+    return np.where(known, np.maximum(gap, 2.0 * LEAST), half_width(arm))
+
+
+def _over_range(model: Model, arm: Arm) -> Floats:
     """Give the fitted b at angles over the surveyed range, (m, 6) [rad]."""
     lower, upper = np.array(model.ranges.lower), np.array(model.ranges.upper)
     q = lower + (upper - lower) * np.linspace(0.0, 1.0, SAMPLES)[:, None]
+    return _backlash(model, arm, q)
+
+
+def _backlash(model: Model, arm: Arm, q: Floats) -> Floats:
+    """Give the fitted b at joint angles (n, 6), (n, 6) [rad]."""
     effects, values, _ = model.compensable()
-    batch = Batch(arm, make_states(q, np.ones((SAMPLES, 6))))
-    angles = np.zeros((SAMPLES, 6))
+    batch = Batch(arm, make_states(q, np.ones(q.shape)))
+    angles = np.zeros(q.shape)
     for effect, part in zip(effects.effects, effects.slices, strict=True):
         if effect.direct and not effect.requires():
             angles += effect.angles(batch, values[part])
@@ -55,5 +77,5 @@ def measured_play(model: Model, arm: Arm) -> Floats:
     Returns:
         (6,) [rad]; the arm file's guess for a joint whose backlash is not in the model.
     """
-    gap = 2.0 * np.abs(_backlash(model, arm).mean(axis=0))
+    gap = 2.0 * np.abs(_over_range(model, arm).mean(axis=0))
     return np.where(gap > 0.0, np.maximum(gap / WIDTH_IN_PLAYS, LEAST), arm.play)

@@ -239,9 +239,12 @@ def _sides(arm: Arm, q: Floats, passed: Passages, before: Clamps) -> Sides:
 
 
 def sides_along(
-    arm: Arm, q: Floats, begins: Bools, play: Clamps
+    arm: Arm, q: Floats, begins: Bools, play: Clamps, half: Floats
 ) -> tuple[Floats, Floats]:
-    """Place every joint in its play along some ways.
+    """Place every joint in its play along some ways, however wide it is there.
+
+    A play of another width at every place is one of the width 2 for u, the integral
+    of dq / h, with h half of the width.
 
     Args:
         arm: The arm; its play and coupling are used.
@@ -249,16 +252,22 @@ def sides_along(
             is where it begins.
         begins: The first samples, (s,).
         play: What is known of the play's state there, one row each, (k, 6) [rad].
+        half: Half of the width of the play on the drive side at the samples, (s, 6).
 
     Returns:
         The least and the largest side that it may be, (s, 6) each from -1 to 1; equal
         where the side is known.
     """
-    angles, half = q @ arm.coupling.T, half_width(arm)
-    passed = prefix(passing(angles, half), begins)
-    way = np.cumsum(begins) - 1
-    lo, hi = passed(play.lo[way]), passed(play.hi[way])
-    return (angles - hi) / half, (angles - lo) / half
+    angles, way = q @ arm.coupling.T, np.cumsum(begins) - 1
+    step = np.diff(angles, axis=0, prepend=angles[:1])
+    u = np.cumsum(2.0 * step / (half + np.roll(half, 1, axis=0)), axis=0)
+    u -= u[begins][way]
+    passed = prefix(passing(u, np.ones(6)), begins)
+    lo, hi = (
+        passed(((z - angles[begins]) / half_width(arm))[way])
+        for z in (play.lo, play.hi)
+    )
+    return u - hi, u - lo
 
 
 def half_width(arm: Arm) -> Floats:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from enum import Enum
 
@@ -93,7 +94,8 @@ def _twist(
 #
 # A gear with a gap of 2 g [rad] moves its link only when a flank touches: its place in
 # the gap is s = clip(s + dq / g, -1, 1). A joint that stands keeps its flank. The side
-# s is thus a physical state, not a sign computed from two targets.
+# s is thus a physical state, not a sign computed from two targets. A gap that changes
+# with the joint angle is as wide for the motor that crosses it as for the link.
 #
 # Three other kinds of gear are drawn from the same numbers. An elastic one gives way
 # before its flank carries all of the load: it goes from flank to flank over ELASTIC
@@ -116,6 +118,11 @@ class GearKind(Enum):
     INERTIA = "inertia"
 
 
+def even(q: Floats) -> Floats:
+    """Leave gaps as wide at all joint angles, (n, 6)."""
+    return np.ones_like(q)
+
+
 @dataclass(frozen=True)
 class Gears:
     """The gears of an arm.
@@ -129,6 +136,7 @@ class Gears:
             [N m].
         runs_on: Speed of every motor from which inertia changes the flank as the arm
             brakes, (6,) [rad/s] on the joint side.
+        wave: How wide the gaps are at joint angles (n, 6) [rad] beside `gap`, (n, 6).
     """
 
     gap: Floats
@@ -137,6 +145,12 @@ class Gears:
     body: LinkMasses | None = None
     friction: Floats = field(default_factory=lambda: np.full(6, np.inf))
     runs_on: Floats = field(default_factory=lambda: np.full(6, np.inf))
+    wave: Callable[[Floats], Floats] = even
+
+    def half_gaps(self, angles: Floats) -> Floats:
+        """Return half the gaps at angles of the motors (n, 6), (n, 6) [rad]."""
+        q: Floats = np.linalg.solve(self.coupling, angles.T).T.astype(float)
+        return np.asarray(self.gap * self.wave(q))
 
     def shown(self, arrivals: VirtualArrivals) -> Floats:
         """Return the sides that the links show, (n, 6) from -1 to 1."""
@@ -207,18 +221,14 @@ def move(gears: Gears, state: GearState, path: Floats) -> GearState:
         state: The state before.
         path: Joint angles, (m, 6) [rad]; between two of them every joint moves one way.
     """
-    for angle in turning_points(np.vstack([state.angle, path @ gears.coupling.T])):
-        state = _step(gears, state, angle)
-    return state
+    return _steps(
+        gears, state, turning_points(np.vstack([state.angle, path @ gears.coupling.T]))
+    )[-1]
 
 
 def follow(gears: Gears, state: GearState, path: Floats) -> list[GearState]:
     """Follow a joint path (m, 6) as `move` does; return the state at every place."""
-    states = []
-    for angle in path @ gears.coupling.T:
-        state = _step(gears, state, angle)
-        states.append(state)
-    return states
+    return _steps(gears, state, path @ gears.coupling.T)[1:]
 
 
 def turning_points(path: Floats) -> Floats:
@@ -231,9 +241,16 @@ def turning_points(path: Floats) -> Floats:
     return np.asarray(path[1:][keep])
 
 
-def _step(gears: Gears, state: GearState, angle: Floats) -> GearState:
-    """Move every motor one way to the given angles (6,)."""
-    gap = gears.gap
+def _steps(gears: Gears, state: GearState, angles: Floats) -> list[GearState]:
+    """Move every motor one way to angles (m, 6); return the states before and there."""
+    states = [state]
+    for angle, gap in zip(angles, gears.half_gaps(angles), strict=True):
+        states.append(_step(gears, states[-1], angle, gap))
+    return states
+
+
+def _step(gears: Gears, state: GearState, angle: Floats, gap: Floats) -> GearState:
+    """Move every motor one way to the given angles (6,), over half gaps (6,)."""
     reach = gap * (ELASTIC if gears.kind is GearKind.ELASTIC else 1.0)
     side, flank = (
         np.clip(place + (angle - state.angle) / most, -1.0, 1.0)

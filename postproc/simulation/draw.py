@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import zlib
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -30,7 +30,7 @@ from postproc.simulation.laws import (
     parse_effects,
 )
 from postproc.simulation.reference import USUAL_TRACKER, reference_arrivals
-from postproc.simulation.state import VirtualArrivals
+from postproc.simulation.state import VirtualArrivals, make_arrivals
 
 TRACKER_NOISE = (0.01e-3, 5e-6)  # [m], [m/m] per axis
 SMALL = 1e-6  # a size at which every law is linear
@@ -82,7 +82,7 @@ def virtual_arm(
     planter = _Planter(seed, body, rows, stand, reference_arrivals(rows, tool), perfect)
     laws = {item: planter.law(item) for item in planted if item.name not in AS_BUILT}
     gaps = [law for law in laws.values() if law.effect == "backlash"]
-    half_gap = _half_gap(gaps[0] if gaps else planter.law(Planted("backlash")))
+    gap = gaps[0] if gaps else planter.law(Planted("backlash"))
     rng = stream(seed, "arm")
     return replace(
         perfect,
@@ -93,7 +93,8 @@ def virtual_arm(
         laws=tuple(laws.values()),
         gears=replace(
             perfect.gears,
-            gap=half_gap,
+            gap=_half_gap(gap),
+            wave=_wave(gap),
             kind=GearKind(gears),
             body=body,
             friction=_friction(body, planter.reference),
@@ -128,6 +129,12 @@ def _friction(body: LinkMasses, reference: VirtualArrivals) -> Floats:
 def _half_gap(law: Law) -> Floats:
     """Return the half gaps (6,) [rad] of the gears of a backlash law."""
     return law.scale * np.array([-law.parameters[f"b_{j}"] for j in range(1, 7)])
+
+
+def _wave(law: Law) -> Callable[[Floats], Floats]:
+    """Return how wide the gaps of a backlash law are at joint angles, beside those."""
+    half_gap = _half_gap(law)
+    return lambda q: -law(make_arrivals(q, 1.0)) / half_gap
 
 
 @dataclass(frozen=True)

@@ -20,6 +20,7 @@ from postproc.compensation.arc_splitting import (
 )
 from postproc.compensation.insertions import are_near, insert
 from postproc.compensation.program import Reading, plan_visits, read_program
+from postproc.compensation.splitting import CLOSEST, shortest_pieces
 from postproc.compensation.taking_up import MeantSides
 from postproc.language.languages import language_of
 from postproc.motion.cycle import run
@@ -130,8 +131,8 @@ def test_the_tool_is_turned_at_the_point_on_the_way_as_well() -> None:
     points = {VIA: (0.4, 1.0), END: (0.5,)}
     turned = np.array([[0.0, 0.0, 1e-4], [0.0, 0.0, 3e-4], [0.0, 0.0, 2e-4]])
     meant = {
-        VIA: MeantSides(np.zeros((2, 6)), turned[:2]),
-        END: MeantSides(np.zeros((1, 6)), turned[2:]),
+        VIA: MeantSides(np.zeros((2, 6)), turned[:2], np.zeros((3, 6))),
+        END: MeantSides(np.zeros((1, 6)), turned[2:], np.zeros((2, 6))),
     }
     found, own = insert(reading, points, {}, splitter, CELL, meant=meant)
     v, w = reading.visits, found.visits
@@ -147,6 +148,40 @@ def test_the_tool_is_turned_at_the_point_on_the_way_as_well() -> None:
     )
     np.testing.assert_allclose(w.values[own][:, :3], v.values[:, :3], atol=6e-4)
     np.testing.assert_array_equal(w.values[own[END]], v.values[END])
+
+
+def test_the_last_piece_of_an_arc_is_long_enough_to_bend() -> None:
+    visits = read().visits
+    cycle = run(CELL.arm, plan_visits(visits, CELL).targets)
+    pieces = shortest_pieces(visits, cycle, 0.0)
+    assert [behind for _, _, behind in pieces[VIA : END + 2]] == [
+        CLOSEST,
+        pytest.approx(np.sqrt(16.0 * RADIUS * MM * FLAT), rel=1e-6),
+        CLOSEST,
+    ]
+    share = 1.0 - pieces[END][2] / (RADIUS * MM * np.deg2rad(120.0))
+    arc = CutArc.of(visits, {VIA: (1.0,), END: (share,)}, VIA, ())
+    assert arc.sagitta(1, share, 1.0) == pytest.approx(2 * FLAT, rel=1e-3)
+
+
+def test_half_way_between_points_of_an_arc_joints_are_meant_to_lie_between() -> None:
+    reading = read()
+    splitter = language_of("job.pdl").splitter(reading.sources)
+    assert splitter is not None
+    points, side = {VIA: (0.4, 1.0), END: (0.5,)}, np.ones((4, 6)) * [1, 1, 1, 0, 0, 1]
+    none = np.zeros((2, 3))
+    meant = {
+        VIA: MeantSides(side[:2], none, np.array([[-0.9], [-0.8], [-0.7]]) * side[:3]),
+        END: MeantSides(-side[:1], none[:1], np.array([[0.6], [0.5]]) * side[:2]),
+    }
+    chords = {(VIA, 1.0)}
+    found, own = insert(reading, points, {}, splitter, CELL, chords, meant=meant)
+    assert found.aims is not None
+    rows = slice(int(own[0]) + 1, int(own[END]) + 1)
+    assert found.visits.via[rows].tolist() == [1, 0, 0, 1, 0, 1, 0]
+    np.testing.assert_array_equal(
+        found.aims[rows, 0], [-0.9, 1.0, 1.0, 0.6, -1.0, 0.5, np.nan]
+    )
 
 
 def test_what_is_turned_too_far_or_moved_is_another_program() -> None:
@@ -223,6 +258,15 @@ def test_flat_is_less_than_five_times_what_corrections_differ_by() -> None:
         assert [end for end, _ in found] == [END] * flat
         if flat:
             assert found[0][1] == pytest.approx(bent, rel=1e-3)
+
+
+def test_what_corrections_change_evenly_bends_nothing() -> None:
+    visits = read((0.0, 5.0, 10.0)).visits
+    moved = np.zeros((len(visits), 3))
+    moved[[VIA - 1, VIA, END], 2] = 1e-3, 2e-3, 3e-3
+    assert not flat_pieces(visits, moved, np.array([VIA]))
+    moved[VIA, 2] += 1e-3
+    assert flat_pieces(visits, moved, np.array([VIA]))
 
 
 def test_two_arcs_that_are_superposed_pass_their_point() -> None:

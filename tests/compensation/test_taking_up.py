@@ -13,8 +13,8 @@ from postproc.compensation.program import prepared, read_program
 from postproc.compensation.taking_up import crossed_at_once, turned_by_drives
 from postproc.language.visits import OrientationLaw, Visits
 from postproc.model.model import Model
+from postproc.model.play import half_widths
 from postproc.robot.cell import Cell
-from postproc.robot.direction import WIDTH_IN_PLAYS
 from postproc.robot.pose import rotation_from_vector
 
 
@@ -32,7 +32,9 @@ def crossing(*sides: float) -> Floats:
         ((-1, -1, -0.5, 0.2), (-1, -1, 1, 1)),  # under way where the move ends
         ((-1, -1, -0.9, -0.8), (-1, -1, -0.9, -0.8)),  # .. by little
         ((1, 0.4, -1, -0.2, 1), (1, -1, -1, 1, 1)),  # there and back
-        ((-1, 0.0, -1, -1), (-1, 0.0, -1, -1)),  # turns back before it arrives
+        ((-1, 0.0, -1, -1), (-1, 1, -1, -1)),  # turns back before it arrives
+        ((-1, -0.8, -1, -1), (-1, -0.8, -1, -1)),  # .. at once
+        ((-1, -0.5, -0.5, 0.2, 1), (-1, 1, 1, 1, 1)),  # rests on its way
         ((1, 1, 1), (1, 1, 1)),
     ],
 )
@@ -70,10 +72,10 @@ def test_the_tool_turns_as_far_as_the_drives_turn_it(setting: Setting) -> None:
     crossed = rng.uniform(-2.0, 2.0, (20, 6))
     known = visits(setting.cell, OrientationLaw.ONE_AXIS)
     turn = turned_by_drives(setting, known, 1, tool, q, crossed)
-    arm = setting.cell.arm  # its play is as wide as the gaps that were fitted
-    gap = np.where(setting.gap > 0.0, WIDTH_IN_PLAYS * arm.play, 0.0)
-    assert (gap > 0).sum() > 2
-    behind = q + np.linalg.solve(arm.coupling, (crossed / 2.0 * gap).T).T
+    arm = setting.cell.arm
+    half = half_widths(setting.model, arm, q) * (setting.gap > 0.0)
+    assert (half > 0).any(axis=0).sum() > 2
+    behind = q + np.linalg.solve(arm.coupling, (crossed * half).T).T
     wanted = arm.flange(behind)[:, :3, :3] @ tool
     found = arm.flange(q)[:, :3, :3] @ tool @ rotation_from_vector(turn)
     assert found == pytest.approx(wanted, abs=1e-9)

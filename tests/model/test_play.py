@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from postproc.model.model import Model
-from postproc.model.play import half_gap, measured_play
+from postproc.model.play import half_gap, half_widths, measured_play
 from postproc.robot.arm import Arm
 from postproc.robot.cell import Cell
 from postproc.robot.direction import WIDTH_IN_PLAYS
@@ -21,3 +23,25 @@ def test_play_is_as_wide_as_the_gaps(bench_cell: Cell, bench_model: Model) -> No
     off, widest = (np.abs(np.log(g / true)).mean() for g in (fitted, largest))
     assert off < 0.1 and off < widest
     assert (largest >= fitted - 1e-12).all()
+
+
+def test_widths_follow_the_gaps_with_the_joint_angle(
+    bench_cell: Cell, bench_model: Model
+) -> None:
+    gears, ranges = virtual_arm(SEED).gears, bench_model.ranges
+    share = np.random.default_rng(2).uniform(size=(200, 6))
+    q = np.array(ranges.lower) + share * np.subtract(ranges.upper, ranges.lower)
+    found = half_widths(bench_model, bench_cell.arm, q)
+    true = gears.half_gaps(q @ bench_cell.arm.coupling.T)
+    even = measured_play(bench_model, bench_cell.arm) * WIDTH_IN_PLAYS / 2
+    off, usual = (np.abs(np.log(w / true)).mean() for w in (found, even))
+    assert off < 0.7 * usual
+
+
+def test_without_backlash_widths_are_the_arms(
+    bench_cell: Cell, bench_model: Model
+) -> None:
+    arm, size = bench_cell.arm, len(bench_model.values)
+    model = replace(bench_model, values=np.zeros(size))
+    found = half_widths(model, arm, np.zeros((3, 6)))
+    np.testing.assert_allclose(found, np.tile(WIDTH_IN_PLAYS / 2 * arm.play, (3, 1)))

@@ -17,9 +17,11 @@ from postproc.robot.direction import (
     arrivals,
     arrivals_of_rows,
     directions_of_rows,
+    half_width,
     in_row_order,
     passages,
     sides,
+    sides_along,
 )
 from postproc.robot.play import (
     Clamps,
@@ -303,3 +305,37 @@ def test_a_walk_goes_on_where_it_was_cut(arm: Arm, seed: int) -> None:
             whole.side[begin:end], whole.past.play[begin:end]))  # fmt: skip
         np.testing.assert_array_equal(again.side, whole.side[begin:])
         np.testing.assert_array_equal(again.play.lo, whole.past.play.lo[begin:])
+
+
+def test_a_play_along_ways_is_as_wide_as_it_is_there(arm: Arm) -> None:
+    rng = np.random.default_rng(11)
+    half = half_width(arm)
+    steps = rng.normal(size=(200, 6)) * half * rng.choice([0.1, 0.5, 3.0], (200, 1))
+    q = np.linalg.solve(arm.coupling, np.cumsum(steps, axis=0).T).T
+    begins = np.isin(np.arange(200), [0, 70, 71])
+    side = rng.uniform(-1.0, 1.0, (3, 6))
+    angles = q @ arm.coupling.T
+    wide = half * (1.3 + np.cos(angles / half / 20.0))
+    z = angles[begins] - side * half
+    least, most = sides_along(arm, q, begins, Clamps(z, z), wide)
+    np.testing.assert_allclose(least, most, rtol=0, atol=1e-9)
+    wanted, way = np.empty((200, 6)), -1
+    for k in range(200):
+        if begins[k]:
+            way += 1
+            wanted[k] = side[way]
+            continue
+        over = (angles[k] - angles[k - 1]) * 2.0 / (wide[k] + wide[k - 1])
+        wanted[k] = np.clip(wanted[k - 1] + over, -1.0, 1.0)
+    np.testing.assert_allclose(least, wanted, rtol=0, atol=1e-9)
+
+
+def test_a_play_that_is_not_known_stays_open_until_a_flank_is_reached(arm: Arm) -> None:
+    half = half_width(arm)
+    q = np.zeros((4, 6))
+    q[:, 0] = np.array([0.0, 1.0, 2.5, 5.0]) * half[0]
+    z = Clamps(q[:1] - half, q[:1] + half)
+    wide = np.tile(2.0 * half, (4, 1))
+    least, most = sides_along(arm, q, np.arange(4) == 0, z, wide)
+    np.testing.assert_allclose(least[:, 0], [-1.0, -0.5, 0.25, 1.0], atol=1e-9)
+    np.testing.assert_allclose(most[:, 0], 1.0, atol=1e-9)

@@ -10,12 +10,14 @@ from postproc.simulation.arm import (
     ELASTIC,
     GearKind,
     Gears,
+    VirtualArm,
     at_start,
     follow,
     move,
     turning_points,
 )
 from postproc.simulation.kinematics import link_torque
+from postproc.simulation.laws import Where, total
 
 GAP = 1e-4
 GEARS = Gears(np.full(6, GAP), np.eye(6))
@@ -88,6 +90,26 @@ def test_the_motor_of_a_coupled_wrist_turns_when_its_joint_does_not() -> None:
     state = at_start(gears, np.zeros(6), np.ones(6))
     state = move(gears, state, np.array([[0, 0, 0, 0, 0.2, 0.0]]))
     assert state.side[5] == -1.0
+
+
+@pytest.mark.parametrize("seed", [4, 7])
+def test_a_link_rests_while_its_motor_crosses_the_gap(seed: int) -> None:
+    arm = virtual_arm(seed, "backlash")
+    for q in (np.radians([20.0, 30.0, -100.0, 10.0, 40.0, 0.0]), np.full(6, -0.7)):
+        gap = arm.gears.half_gaps(q[None])[0]
+        assert (np.abs(gap / arm.gears.gap - 1) > 1e-3).all()
+        way = q - np.linspace(0.0, 2.4, 25)[:, None] * gap
+        before = at_start(arm.gears, q, np.ones(6))
+        side = np.array([s.side for s in [before, *follow(arm.gears, before, way[1:])]])
+        np.testing.assert_allclose(side, np.clip(1 - (q - way) / gap, -1, 1), atol=2e-3)
+        joints = arm_joints(arm, way, side)
+        np.testing.assert_allclose(joints[:21], np.tile(joints[0], (21, 1)), atol=1e-7)
+        assert (joints[-1] < joints[20] - 0.3 * gap).all()
+
+
+def arm_joints(arm: VirtualArm, q: np.ndarray, side: np.ndarray) -> np.ndarray:
+    """Return where the links stand."""
+    return q + total(arm.laws, Where.JOINTS, make_arrivals(q, side))
 
 
 # Gears of other kinds.
