@@ -33,6 +33,7 @@ from postproc.robot.play import (
 )
 
 WIDTH_IN_PLAYS = 4.0
+SIDE_DIGITS = 9  # of a side: what is less is rounding of the way up to there
 ON_FLANK = 0.999  # of half the width: as good as resting on the flank
 
 
@@ -267,7 +268,7 @@ def sides_along(
         passed(((z - angles[begins]) / half_width(arm))[way])
         for z in (play.lo, play.hi)
     )
-    return u - hi, u - lo
+    return np.round(u - hi, SIDE_DIGITS), np.round(u - lo, SIDE_DIGITS)
 
 
 def half_width(arm: Arm) -> Floats:

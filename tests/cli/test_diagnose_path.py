@@ -11,6 +11,7 @@ from tests.compensation.test_path_accuracy import job
 from tests.conftest import SEED
 from tests.written import cli
 
+LINES = 25  # enough for some on which a joint changes its flank alone
 EFFECT, PLANTED = "compliance", "compliance@2=0.8"
 
 
@@ -20,7 +21,7 @@ def tracked(bench_cell, bench_model, tmp_path_factory):
     folder = tmp_path_factory.mktemp("tracked")
     shutil.copy(bench_cell.path, folder / "cell.toml")
     bench_model.save(folder / "model.json")
-    (folder / "job.pdl").write_bytes(job().encode())
+    (folder / "job.pdl").write_bytes(job(LINES).encode())
     at = ("--cell", folder / "cell.toml", "--seed", SEED)
     for name, more in (("plain", ()), ("planted", ("--effects", PLANTED))):
         track = ("--track", folder / f"{name}.csv", "--rate", 100)

@@ -55,7 +55,7 @@ def drawn() -> list[tuple[str, ...]]:
 
 
 @cache
-def job() -> str:
+def job(lines: int = LINES) -> str:
     """Write lines and arcs with stops that the arm can reach."""
     kept: dict[str, list[str]] = {"LINEAR": [], "CIRCULAR": []}
     for moves in drawn():
@@ -63,7 +63,7 @@ def job() -> str:
         visits = read_program({"job.pdl": text.encode()}, load_cell(CELL)).visits
         if not plan_visits(visits, load_cell(CELL)).plan.reason.any():
             kept[moves[1].split()[1]] += moves
-    moves = [*kept["LINEAR"][: 2 * LINES], *kept["CIRCULAR"][:4]]
+    moves = [*kept["LINEAR"][: 2 * lines], *kept["CIRCULAR"][:4]]
     return "\r\n".join(["PROGRAM job", "BEGIN", *START, *moves, "END job", ""])
 
 
