@@ -5,8 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from postproc.model.effects.joint_spline import LEAST_ROWS, JointSpline
-from postproc.robot.state import make_states
+from postproc.calibration.regression import fit_effects
+from postproc.model.effects import BASE_EFFECTS, propose
+from postproc.model.effects.joint_spline import LEAST_ROWS, LONG, JointSpline
+from postproc.model.kinematics import Batch
+from postproc.robot.state import States, make_states
+from tests.calibration.simulator import NJ, random_arm, random_states
+
+TURN = 2.0 * np.pi
 
 
 @pytest.mark.parametrize(
@@ -24,3 +30,65 @@ def test_it_takes_rows_and_a_joint_that_moved(
     q = np.radians(span_deg) * rng.uniform(-0.5, 0.5, (rows, 6))
     states = make_states(q, np.ones((rows, 6)), np.zeros((rows, 3)))
     assert JointSpline.may_show(states) is offered
+
+
+def ranged(span: float) -> tuple[JointSpline, States]:
+    """Make a spline over ranges of all joints, and states at their lower ends."""
+    q = np.linspace(-0.3, span - 0.3, 400)[:, None] * np.ones(6)
+    states = make_states(q, np.ones((400, 6)), np.zeros((400, 3)))
+    (effect,) = propose(["joint_spline"], NJ, states)
+    assert isinstance(effect, JointSpline)
+    return effect, states
+
+
+@pytest.mark.parametrize("span", [1.0, 3.0, 5.2, 5.3, 6.2, 7.5])
+def test_it_repeats_with_every_turn_without_a_jump(span: float) -> None:
+    effect, states = ranged(span)
+    p = np.random.default_rng(1).standard_normal(len(effect.parameters()))
+    wide = np.linspace(-1.0, TURN - 1.0, 20001)
+    there = states[np.zeros(len(wide), dtype=int)].with_(q=wide[:, None] * np.ones(6))
+    found = effect.angles(Batch(NJ, there), p)
+    for k in (-2, 1):
+        far = Batch(NJ, there.with_(q=there.q + k * TURN))
+        np.testing.assert_allclose(effect.angles(far, p), found, atol=1e-9)
+    steps = np.abs(np.diff(found, axis=0))
+    assert steps.max() < 0.02 * np.ptp(found)
+    assert np.abs(found[-1] - found[0]).max() < 0.02 * np.ptp(found)
+
+
+def test_beyond_the_surveyed_range_the_long_length_alone_goes_on() -> None:
+    effect, states = ranged(2.0)
+    far = Batch(NJ, states.with_(q=states.q + 2.4))
+    columns = effect.basis(far).any(axis=0)
+    wide = [f" {np.rad2deg(LONG):.1f} deg " in p.name for p in effect.parameters()]
+    assert np.array_equal(columns, wide)
+
+
+def test_an_older_model_ends_where_its_survey_did() -> None:
+    effect, states = ranged(2.0)
+    old = JointSpline(effect.joints, effect.lower, effect.upper, effect.lengths)
+    p = np.ones(len(old.parameters()))
+    assert old.angles(Batch(NJ, states), p).any()
+    assert not old.angles(Batch(NJ, states.with_(q=states.q + TURN)), p).any()
+
+
+def test_what_is_fitted_on_one_turn_holds_on_the_next() -> None:
+    rng = np.random.default_rng(3)
+    states = random_states(400, rng)
+    measured, _ = random_arm(rng).measure(states, rng)
+
+    def wave(at: States) -> np.ndarray:
+        size = 3e-4 * np.sin(5.0 * at.q[:, [0]]) + 2e-4 * np.cos(7.0 * at.q[:, [0]])
+        moved: np.ndarray = Batch(NJ, at).jacobian[:, :, 0] * size
+        return moved
+
+    effects = propose((*BASE_EFFECTS, "joint_spline"), NJ, states)
+    fit = fit_effects(Batch(NJ, states), measured + wave(states), effects)
+    q = states.q + np.array([TURN, 0.0, 0.0, 0.0, 0.0, 0.0])
+    here, next_turn = (
+        fit.combination.error(Batch(NJ, at), fit.values)
+        for at in (states, states.with_(q=q))
+    )
+    np.testing.assert_allclose(next_turn, here, atol=1e-9)
+    left = np.linalg.norm(fit.residual, axis=1).mean()
+    assert left < 0.5 * np.linalg.norm(wave(states), axis=1).mean()

@@ -21,12 +21,14 @@ from postproc.robot.arm import Arm
 from postproc.robot.state import States
 
 SCALE = 1e-4  # [rad]
+TURN = 2.0 * np.pi
 LONG = np.deg2rad(60.0)
 SHORTEST = np.deg2rad(5.0)
 ROWS_A_LENGTH = 10.0  # rows that the shortest length must see
 LEAST_RANGE = np.deg2rad(10.0)
 LEAST_ROWS = 100
 LONG_SURVEY = 600  # rows from which no other free form resolves more
+WHOLE = 1.0 / 1.2  # of a turn: what fades at the ends of a longer range meets
 
 
 @dataclass(frozen=True)
@@ -35,8 +37,12 @@ class JointSpline(JointEffect):
 
     Attributes:
         joints: Joints that have one.
-        lower, upper: Surveyed range of every joint [rad]; outside, f fades to zero.
+        lower, upper: Surveyed range of every joint [rad]; outside, what is finer than
+            the long length fades to zero.
         lengths: Correlation lengths [rad]; the data share f among them.
+        turns: Whether f repeats with every turn of the joint, as the errors of its gear
+            and of its encoder do: an angle counts as that of its nearest turn, and at
+            the long length f goes on all round, as unsure as that leaves it.
     """
 
     name: ClassVar[str] = "joint_spline"
@@ -46,12 +52,13 @@ class JointSpline(JointEffect):
     lower: tuple[float, ...] = (-np.pi,) * 6
     upper: tuple[float, ...] = (np.pi,) * 6
     lengths: tuple[float, ...] = (LONG, 3 * SHORTEST)
+    turns: bool = False
 
     @classmethod
     def propose(cls, arm: Arm, states: States) -> Self:
         """Resolve as much as the number of rows allows, on every joint that moved."""
         low, high = states.q.min(axis=0), states.q.max(axis=0)
-        span = high - low
+        span = np.minimum(high - low, TURN)
         short = ROWS_A_LENGTH * float(span.max()) / max(len(states), 1)
         short = float(np.clip(short, SHORTEST, LONG / 2))
         return cls(
@@ -59,6 +66,7 @@ class JointSpline(JointEffect):
             lower=tuple(map(float, low)),
             upper=tuple(map(float, high)),
             lengths=(LONG, short),
+            turns=True,
         )
 
     @classmethod
@@ -67,42 +75,55 @@ class JointSpline(JointEffect):
         moved = np.ptp(states.q, axis=0) > LEAST_RANGE
         return len(states) >= LEAST_ROWS and bool(moved.any())
 
-    def _parts(self) -> list[tuple[int, float]]:
-        """List joints (from 0) with lengths."""
-        return [(j - 1, length) for j in self.joints for length in self.lengths]
+    def _parts(self) -> list[_Part]:
+        """List the functions of every joint and length."""
+        return [
+            _Part(j - 1, length, *self._range(j - 1, length))
+            for j in self.joints
+            for length in self.lengths
+        ]
+
+    def _range(self, j: int, length: float) -> tuple[float, float, bool]:
+        """Say from where to where a joint's functions go, and whether all round."""
+        low, high = self.lower[j], self.upper[j]
+        half, middle = (high - low) / 2.0, (low + high) / 2.0
+        if not self.turns or (length < max(self.lengths) and half < WHOLE * np.pi):
+            return low, high, False
+        return middle - np.pi, middle + np.pi, True
+
+    def _counted(self, q: Floats) -> Floats:
+        """Take angles (n, 6) as they count."""
+        if not self.turns:
+            return q
+        middle = (np.array(self.lower) + np.array(self.upper)) / 2.0
+        counted: Floats = middle + np.mod(q - middle + np.pi, TURN) - np.pi
+        return counted
 
     def parameters(self) -> tuple[Parameter, ...]:
         """Name the columns of every joint and length."""
         out = []
-        for j, length in self._parts():
-            count = smooth_count(self.lower[j], self.upper[j], length)
-            wide = f"{np.rad2deg(length):.1f} deg"
-            for k in range(count):
-                name = f"f{j + 1} {wide} {k + 1}"
+        for part in self._parts():
+            joint, wide = part.j + 1, f"{np.rad2deg(part.length):.1f} deg"
+            for k in range(part.count):
+                name = f"f{joint} {wide} {k + 1}"
                 out.append(
-                    Parameter(name, "rad", SCALE, f"joint {j + 1} {wide}", j + 1)
+                    Parameter(name, "rad", SCALE, f"joint {joint} {wide}", joint)
                 )
         return tuple(out)
 
     def fine(self, joint: int) -> NDArray[np.int64]:
         """Take a joint's functions at the short length."""
-        count = [
-            smooth_count(self.lower[j], self.upper[j], length)
-            for j, length in self._parts()
-        ]
-        short = [
-            (j + 1, length) == (joint, min(self.lengths)) for j, length in self._parts()
-        ]
-        return np.flatnonzero(np.repeat(short, count))
+        parts, shortest = self._parts(), min(self.lengths)
+        short = [(part.j + 1, part.length) == (joint, shortest) for part in parts]
+        return np.flatnonzero(np.repeat(short, [part.count for part in parts]))
 
     def splines(self, batch: Batch) -> list[tuple[int, Splines, Floats]]:
         """Write the functions of every joint and length as splines, see `smooth`."""
-        q = batch.states.q
-        inside = fade(q, np.array(self.lower), np.array(self.upper))
-        out = []
-        for j, length in self._parts():
-            found, mix = smooth(q[:, j], self.lower[j], self.upper[j], length)
-            out.append((j, found.faded(inside[:, j]), mix))
+        q, out = self._counted(batch.states.q), []
+        for part in self._parts():
+            x = q[:, part.j]
+            found, mix = smooth(x, part.lower, part.upper, part.length, part.closed)
+            out.append((part.j, found.faded(part.inside(x)), mix))
         return out
 
     def basis(self, batch: Batch) -> Floats:
@@ -121,10 +142,38 @@ class JointSpline(JointEffect):
 
     def beyond(self, batch: Batch, prior_std: Floats) -> Floats:
         """Give back the prior's variance as far as the functions have faded, (n, 6)."""
-        q, out = batch.states.q, np.zeros((len(batch), 6))
-        ended = 1.0 - fade(q, np.array(self.lower), np.array(self.upper)) ** 2
-        start = 0
-        for j, length in self._parts():
-            out[:, j] += ended[:, j] * prior_std[start] ** 2
-            start += smooth_count(self.lower[j], self.upper[j], length)
+        q, start, out = self._counted(batch.states.q), 0, np.zeros((len(batch), 6))
+        for part in self._parts():
+            ended = 1.0 - part.inside(q[:, part.j]) ** 2
+            out[:, part.j] += ended * prior_std[start] ** 2
+            start += part.count
         return out
+
+
+@dataclass(frozen=True)
+class _Part:
+    """The functions of a joint at one length.
+
+    Attributes:
+        j: The joint, from 0.
+        length: Correlation length [rad].
+        lower, upper: Where they begin and end [rad].
+        closed: Whether they go all round, and have no end.
+    """
+
+    j: int
+    length: float
+    lower: float
+    upper: float
+    closed: bool
+
+    @property
+    def count(self) -> int:
+        """How many there are."""
+        return smooth_count(self.lower, self.upper, self.length, self.closed)
+
+    def inside(self, x: Floats) -> Floats:
+        """Tell how far they hold at angles (n,): 1, and 0 where they have faded."""
+        if self.closed:
+            return np.ones(len(x))
+        return fade(x, np.array(self.lower), np.array(self.upper))

@@ -20,10 +20,16 @@ LEFT_OUT = 1e-3  # share of the variance that the columns do not reach
 
 
 @cache
-def _modes(points: int, relative: float) -> Floats:
-    """Scaled eigenvectors of a Matern 3/2 process on a grid, (points, k)."""
+def _modes(points: int, relative: float, closed: bool) -> Floats:
+    """Scaled eigenvectors of a Matern 3/2 process on a grid, (points, k).
+
+    On a circle places are as far apart as its chord is long.
+    """
     grid = np.linspace(0.0, 1.0, points)
-    gap = np.sqrt(3.0) * np.abs(grid[:, None] - grid) / relative
+    apart = np.abs(grid[:, None] - grid)
+    if closed:
+        apart = np.sin(np.pi * apart) / np.pi
+    gap = np.sqrt(3.0) * apart / relative
     values, vectors = np.linalg.eigh((1 + gap) * np.exp(-gap))
     values, vectors = values[::-1], vectors[:, ::-1]
     total = np.cumsum(values) / values.sum()
@@ -39,24 +45,26 @@ def _grid(span: float, length: float) -> tuple[int, float]:
     return points, relative
 
 
-def smooth_count(lower: float, upper: float, length: float) -> int:
-    """Return the number of columns of a smooth function on [lower, upper]."""
-    return int(_modes(*_grid(upper - lower, length)).shape[1])
+def smooth_count(
+    lower: float, upper: float, length: float, closed: bool = False
+) -> int:
+    """Return the number of columns of a smooth function, see `smooth`."""
+    return int(_modes(*_grid(upper - lower, length), closed).shape[1])
 
 
 @cache
-def _mix(points: int, relative: float) -> Floats:
+def _mix(points: int, relative: float, closed: bool) -> Floats:
     """What of every spline makes each column, (points, k)."""
     from scipy.interpolate import make_interp_spline  # slow to load, and seldom wanted
 
-    modes = _modes(points, relative)
+    modes = _modes(points, relative, closed)
     grid = np.linspace(0.0, 1.0, points)
     mix: Floats = np.ascontiguousarray(make_interp_spline(grid, modes, k=ORDER).c)
     return mix
 
 
 def smooth(
-    x: Floats, lower: float, upper: float, length: float
+    x: Floats, lower: float, upper: float, length: float, closed: bool = False
 ) -> tuple[Splines, Floats]:
     """Write the columns as splines, which together have unit prior variance.
 
@@ -65,9 +73,10 @@ def smooth(
         lower: Lower end of the variable's range.
         upper: Upper end.
         length: Correlation length, in units of x.
+        closed: Whether the range is a circle, whose ends are one place.
 
     Returns:
         The splines at x, and what of each makes every column, (points, k).
     """
     points, relative = _grid(upper - lower, length)
-    return Splines.at(x, lower, upper, points), _mix(points, relative)
+    return Splines.at(x, lower, upper, points), _mix(points, relative, closed)
