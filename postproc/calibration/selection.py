@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from postproc.arrays import Bools, Floats, Ints
+from postproc.calibration.diagnosis.held_out import Folds, gain_in, regions
 from postproc.calibration.diagnosis.library import Projection
 from postproc.calibration.diagnosis.waves import waves_of
 from postproc.calibration.directions import mend_directions
@@ -35,12 +36,13 @@ from postproc.robot.state import States
 # is left. Where one of them does, it has taken away what the named ones were weighed
 # against: gravity of 0.1 mm does not show beside waves of 0.3 mm. So what was laid
 # aside is weighed once more, beside the free forms. What of these is a wave of a gear
-# is found as `diagnose` finds it, and weighed beside all else.
+# is found as `diagnose` finds it, and weighed beside all else; in a short survey it
+# must also predict regions of joint space that it was not found in.
 
 Progress = Callable[[str], None]
 
 ENOUGH = 3.0  # nats that an effect must be worth: 20 to 1
-ROWS_FOR_WAVES = 450  # fewer leave too many orders alike
+FEW_ROWS = 450  # fewer leave many orders of waves alike
 STEPS = 12  # of the search for prior scales, which start near their best
 
 
@@ -115,7 +117,7 @@ def fit_best(
     waves = waves_in(fitted, kept)
     progress("fit " + ", ".join(e.name for e in kept))
     fitted = fit_effects(batch, position, (*kept, *waves), origin, fitted)
-    needed = keep_needed(fitted, always=(), aside=kept) if waves else kept
+    needed = waves_needed(fitted, kept) if waves else kept
     if len(needed) == len(fitted.combination.effects):
         return fitted
     return fit_effects(batch, position, needed, origin, fitted)
@@ -128,13 +130,33 @@ def waves_in(fitted: Fit, kept: tuple[Effect, ...]) -> tuple[Effect, ...]:
         fitted: A fit of what is kept, whose noise and prior scales are taken.
         kept: The effects that are kept so far.
     """
-    if len(fitted.batch) < ROWS_FOR_WAVES:
-        return ()
     if not any(len(e.fine(j)) for e in kept for j in JOINTS):
         return ()
     whole = Projection.of(beside(fitted, kept))
     found = [waves_of(whole, joint, ENOUGH) for joint in JOINTS]
     return tuple(score.best.effect for scores in found for score in scores)
+
+
+def waves_needed(fitted: Fit, kept: tuple[Effect, ...]) -> tuple[Effect, ...]:
+    """Drop waves that are not needed, and of few rows those that carry nothing over.
+
+    A wave that rows at random ask for may be one of a few periods: in a region of joint
+    space that it was not found in it must predict, too.
+
+    Args:
+        fitted: A fit of what is kept and of the waves.
+        kept: All else, which is not in question.
+    """
+    if len(fitted.batch) < FEW_ROWS:
+        folds = Folds.of_fit(fitted, regions(fitted.batch.states.q))
+        held = tuple(
+            e for k, e in enumerate(fitted.combination.effects)
+            if e not in kept and gain_in(fitted, k, folds).sure
+        )  # fmt: skip
+        if not held:
+            return kept
+        fitted = beside(fitted, (*kept, *held))
+    return keep_needed(fitted, always=(), aside=kept)
 
 
 def weighed_again(

@@ -7,11 +7,18 @@ from dataclasses import replace
 import numpy as np
 
 from postproc.arrays import Floats
+from postproc.calibration.diagnosis.held_out import regions
 from postproc.calibration.fit import drifts
 from postproc.calibration.regression import fit_effects
 from postproc.calibration.report import find
-from postproc.calibration.selection import candidates, fit_best, keep_needed
+from postproc.calibration.selection import (
+    candidates,
+    fit_best,
+    keep_needed,
+    waves_needed,
+)
 from postproc.model.effects import BASE_EFFECTS, propose
+from postproc.model.effects.transmission import Transmission
 from postproc.model.kinematics import Batch
 from postproc.robot.state import States
 from tests.calibration.simulator import NJ, covariates, random_arm, random_states
@@ -122,3 +129,35 @@ def test_waves_in_what_splines_follow_are_named_with_order_and_size() -> None:
         )
         assert abs(found - order) < 0.1
         assert abs(size - mrad) < 4 * error
+
+
+def waved(seed: int, rows: int) -> tuple[States, Floats]:
+    """Survey an arm whose joint 2 has a wave of order 17, 0.3 mrad."""
+    rng = np.random.default_rng(seed)
+    states = random_states(rows, rng)
+    measured, _ = random_arm(rng).measure(states, rng)
+    q = states.q[:, [1]]
+    return states, measured + Batch(NJ, states).jacobian[:, :, 1] * (
+        3e-4 * np.sin(17.0 * q + 1.0)
+    )
+
+
+def test_a_wave_is_named_in_a_short_survey() -> None:
+    states, measured = waved(9, 300)
+    waves = [f.wave for f in find(fit_best(NJ, states, measured, None)) if f.wave]
+    assert len(waves) == 1
+    order, size, error = waves[0]
+    assert abs(order - 17.0) < 0.2
+    assert abs(size - 0.3) < 4 * error
+
+
+def test_a_wave_of_few_rows_predicts_regions_that_it_was_not_found_in() -> None:
+    states, measured = waved(10, 200)
+    few = regions(states.q) == 0
+    turned = 3e-4 * few[:, None] * np.cos(23.0 * states.q[:, [2]])
+    measured = measured + Batch(NJ, states).jacobian[:, :, 2] * turned
+    kept = propose(BASE_EFFECTS, NJ, states)
+    true, local = Transmission(((2, 17.0),)), Transmission(((3, 23.0),))
+    fitted = fit_effects(Batch(NJ, states), measured, (*kept, true, local))
+    assert local in keep_needed(fitted, always=(), aside=kept)  # by evidence alone
+    assert waves_needed(fitted, kept) == (*fitted.combination.effects[:-2], true)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass
 
 import numpy as np
@@ -24,6 +25,8 @@ from postproc.model.noise import Noise
 
 FOLDS = 10
 RUN = 4  # rows of a run
+REGIONS = 6  # of joint space
+LEAST_SPREAD = 1e-3  # [rad] of a joint that has moved
 
 
 def deal(values: Floats, folds: int, seed: int, run: int = RUN) -> NDArray[np.int64]:
@@ -46,6 +49,24 @@ def deal(values: Floats, folds: int, seed: int, run: int = RUN) -> NDArray[np.in
         [rng.permutation(folds) for _ in range(-(-count // folds))]
     )  # every fold once a round
     return np.asarray(hands[runs], dtype=np.int64)
+
+
+def regions(q: Floats) -> NDArray[np.int64]:
+    """Cut rows into regions of joint space: a fold then has no neighbours elsewhere.
+
+    Args:
+        q: Joint angles, (n, 6) [rad].
+
+    Returns:
+        Region of every row, (n,).
+    """
+    from scipy.cluster.vq import kmeans2  # slow to load, and for fits alone
+
+    spread = np.maximum(q.std(axis=0), LEAST_SPREAD)
+    with warnings.catch_warnings():  # poses that repeat may leave a region empty
+        warnings.simplefilter("ignore", UserWarning)
+        _, region = kmeans2(q / spread, REGIONS, seed=1, minit="++")
+    return np.asarray(region, dtype=np.int64)
 
 
 @dataclass(frozen=True)
@@ -75,7 +96,17 @@ def held_out_gain(fit: Fit, number: int, candidate: Candidate) -> Gain:
         candidate: The candidate that the effect was.
     """
     fold = deal(candidate.driver(fit.batch), FOLDS, seed=0)
-    folds = Folds.of(fit.whitened, fit.prior_std, fit.target, fold)
+    return gain_in(fit, number, Folds.of_fit(fit, fold))
+
+
+def gain_in(fit: Fit, number: int, folds: Folds) -> Gain:
+    """Compare what folds leave with and without one effect of their fit.
+
+    Args:
+        fit: The fit.
+        number: Place of the effect in it.
+        folds: Its rows in folds.
+    """
     after, before = folds.errors(fit.combination.slices[number])
     used = fit.rows.weight > 0
     fall = (before**2 - after**2).sum(axis=1)[used]
@@ -120,6 +151,11 @@ class Folds:
         grams = np.stack([design[r].gram() * square for r in rows])
         moments = np.stack([design[r].moment(target[r]) * prior for r in rows])
         return cls(rows, design, prior, target, grams, moments)
+
+    @classmethod
+    def of_fit(cls, fit: Fit, fold: NDArray[np.int64]) -> Folds:
+        """Cut the rows of a fit into folds; its noise and prior scales are kept."""
+        return cls.of(fit.whitened, fit.prior_std, fit.target, fold)
 
     def errors(self, without: slice = slice(0)) -> tuple[Floats, Floats]:
         """Predict every fold from the others; return what is left, (n, 3).
