@@ -75,10 +75,10 @@ class JointSpline(JointEffect):
         moved = np.ptp(states.q, axis=0) > LEAST_RANGE
         return len(states) >= LEAST_ROWS and bool(moved.any())
 
-    def _parts(self) -> list[_Part]:
+    def _parts(self) -> list[_LengthPart]:
         """List the functions of every joint and length."""
         return [
-            _Part(j - 1, length, *self._range(j - 1, length))
+            _LengthPart(j - 1, length, *self._range(j - 1, length))
             for j in self.joints
             for length in self.lengths
         ]
@@ -151,7 +151,7 @@ class JointSpline(JointEffect):
 
 
 @dataclass(frozen=True)
-class _Part:
+class _LengthPart:
     """The functions of a joint at one length.
 
     Attributes:
