@@ -22,6 +22,7 @@ from postproc.compensation.flanks import JointInMotion, in_motion, measured_step
 from postproc.compensation.measured_path import Aligned, OnTheWay, Track, align
 from postproc.compensation.path_accuracy import PredictedWays, predicted_ways
 from postproc.compensation.program import read_program, with_measured_play
+from postproc.compensation.servo_lag import ServoLag, servo_lag
 from postproc.compensation.targets import targets_from_visits
 from postproc.exceptions import MeasurementError, PostprocError
 from postproc.language.visits import Visits
@@ -65,6 +66,7 @@ class PathDiagnosis:
         joints: What the joints do where they change their flanks.
         extension: What the model lacks, from stops and from what lies across the ways.
         on_the_way: Rows of that which were read in motion.
+        lag: What bends of the ways tell of the servos' lag.
     """
 
     name: str
@@ -77,6 +79,7 @@ class PathDiagnosis:
     joints: tuple[JointInMotion, ...]
     extension: Extension
     on_the_way: int
+    lag: ServoLag
 
     def to_dict(self) -> dict[str, Any]:
         """Return it as plain data, lengths in mm."""
@@ -99,6 +102,8 @@ class PathDiagnosis:
             "flanks": joints,
             "rows_on_the_way": self.on_the_way,
             "along": None,  # the tracker's clock is its own
+            "lag_ms": _number(1e3 * self.lag.seconds),
+            "lag_below_ms": _number(1e3 * self.lag.most),
         }
 
     def tell(self) -> str:
@@ -111,6 +116,7 @@ class PathDiagnosis:
             f"across the way, from where the model has it: mean {a.mean_mm:.4f} mm, "
             f"95 % {a.p95_mm:.4f}, max {a.max_mm:.4f} over {a.n} places",
             "along the way nothing is told: the tracker's clock is its own",
+            _of_lag(self.lag),
         ]
         if not self.joints:
             return "\n".join([*lines, "no joint changes its flank alone on a way"])
@@ -120,6 +126,33 @@ class PathDiagnosis:
             for j in self.joints
         )  # fmt: skip
         return "\n".join([*lines, table_text(HEADS, rows)])
+
+
+def _number(value: float) -> float | None:
+    """Round a number; None where it is none."""
+    return round(value, 2) if np.isfinite(value) else None
+
+
+def _of_lag(lag: ServoLag) -> str:
+    """Say what bends tell of the servos' lag.
+
+    >>> _of_lag(ServoLag(4e-4, 1e-5, 12))
+    'servos lag by 20.0 ms (+- 0.2), by how 12 moves cut their bends; not fitted'
+    >>> _of_lag(ServoLag(1e-5, 1e-4, 12))
+    'servos lag by less than 14.5 ms, as far as the bends of 12 moves tell'
+    """
+    if lag.is_told:
+        error = lag.error / (2.0 * lag.seconds)
+        return (
+            f"servos lag by {1e3 * lag.seconds:.1f} ms (+- {1e3 * error:.1f}), by how "
+            f"{lag.moves} moves cut their bends; not fitted"
+        )
+    if not np.isfinite(lag.error):
+        return "of the servos' lag nothing is told: too few moves bend"
+    return (
+        f"servos lag by less than {1e3 * lag.most:.1f} ms, as far as the bends of "
+        f"{lag.moves} moves tell"
+    )
 
 
 def diagnose_path(
@@ -154,6 +187,7 @@ def diagnose_path(
     found = align(read, ways, visits.fly)
     _check(found, track, asked.measured_frame)
     joints = in_motion(measured_steps(ways, found.on_the_way, read.scatter))
+    lag = _lag(found, ways, visits, cycle, own)
     rows = _rows(found, ways, visits, cycle, cell)
     survey = Measurements(
         track, rows.states, rows.position, rows.ids, np.zeros(len(rows.ids), np.int64),
@@ -170,8 +204,18 @@ def diagnose_path(
     stops = len(found.ended), found.missed
     return PathDiagnosis(
         track.name, len(read.time), 1.0 / read.period, read.scatter, stops,
-        len(moves), size, joints, extension, rows.moving,
+        len(moves), size, joints, extension, rows.moving, lag,
     )  # fmt: skip
+
+
+def _lag(
+    found: Aligned, ways: PredictedWays, visits: Visits, cycle: ProgramCycle, cell: Cell
+) -> ServoLag:
+    """Fit the servos' lag to a track."""
+    way = np.repeat(np.arange(len(ways.visit)), np.diff(ways.first))
+    tool = cycle.targets.tool[ways.visit, :3, 3][way]
+    nominal = cell.arm.tcp(ways.q, tool)
+    return servo_lag(ways, nominal, found.on_the_way, visits.fly & ~visits.via)
 
 
 def read_track(path: Path) -> tuple[Track, str]:
