@@ -212,9 +212,8 @@ def _lag(
     found: Aligned, ways: PredictedWays, visits: Visits, cycle: ProgramCycle, cell: Cell
 ) -> ServoLag:
     """Fit the servos' lag to a track."""
-    way = np.repeat(np.arange(len(ways.visit)), np.diff(ways.first))
-    tool = cycle.targets.tool[ways.visit, :3, 3][way]
-    nominal = cell.arm.tcp(ways.q, tool)
+    visit = ways.visit[_move(np.arange(len(ways.q)), ways)]
+    nominal = cell.arm.tcp(ways.q, cycle.targets.tool[visit, :3, 3])
     return servo_lag(ways, nominal, found.on_the_way, visits.fly & ~visits.via)
 
 
