@@ -15,6 +15,8 @@ from postproc.arrays import Bools, Bytes, Cells, Floats, Indices, Ints
 
 SOURCES: str
 """Hash of the sources that it was built from."""
+TOGETHER: int
+"""Numbers whose places are told from that of the first of them."""
 
 Narrow = NDArray[np.unsignedinteger[Any]]
 SpanColumns = tuple[Indices, Narrow, Narrow]

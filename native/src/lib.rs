@@ -47,6 +47,7 @@ const SOURCES: &str = env!("SOURCES");
 #[pymodule(name = "_native")]
 fn native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("SOURCES", SOURCES)?;
+    module.add("TOGETHER", spans::TOGETHER)?;
     module.add_class::<names::NameColumn>()?;
     module.add_function(wrap_pyfunction!(chain::placed, module)?)?;
     module.add_function(wrap_pyfunction!(chain::flange, module)?)?;

@@ -7,7 +7,7 @@ use pyo3::prelude::*;
 use crate::rows::{each, flat, same_length};
 
 /// Numbers whose places are told from that of the first of them.
-const TOGETHER: usize = 16;
+pub const TOGETHER: usize = 16;
 
 /// Whole numbers in as few bytes as the largest of them needs.
 enum Narrow {

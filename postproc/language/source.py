@@ -179,8 +179,6 @@ def as_texts(rows: Bytes) -> NDArray[np.bytes_]:
 
 # Where the numbers of a text stand, by the million.
 
-TOGETHER = 16  # numbers whose places are told from that of the first of them
-
 
 @dataclass(frozen=True)
 class NumberSpans:
@@ -223,7 +221,7 @@ class NumberSpans:
     def starts(self, rows: Indices | slice) -> Indices:
         """Return where some of them begin."""
         own = np.arange(rows.start, rows.stop) if isinstance(rows, slice) else rows
-        first: Indices = self.base[own // TOGETHER]
+        first: Indices = self.base[own // _native.TOGETHER]
         first += self.offset[rows]
         return first
 
