@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from postproc.batch.tree import (
+from postproc.batch.pages import (
     group_pages,
     names_in,
     of_one_arm,

@@ -172,8 +172,8 @@ def check(
 def _current_model(folder: Path, model: Path | None, plan: Path | None) -> Current:
     """Tell which model a program of a tree should have been made with."""
     if plan is not None:
+        from postproc.batch.pages import program_arm, read_head
         from postproc.batch.plan import make_plan
-        from postproc.batch.tree import program_arm, read_head
 
         made = make_plan(plan, None, None, AS_USUAL)
         ids = [setup.model.id for setup in made.setups]

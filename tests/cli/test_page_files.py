@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from postproc.batch.tree import named_programs
+from postproc.batch.pages import named_programs
 from postproc.cli.jobs import find_pages
 from postproc.compensation.program import read_program
 from postproc.exceptions import ProgramError
