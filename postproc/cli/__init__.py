@@ -38,11 +38,12 @@ def main() -> None:
     _leave_cores_to_processes()
     _give_large_arrays_back()
     _look_for_cycles_seldom()
-    from postproc.cli.commands import app
+    _look_for_no_plugins()
+    from postproc.cli.commands import application
     from postproc.cli.common import broken, say
 
     try:
-        app()
+        application("".join(sys.argv[1:2]))()
     except OSError as exc:
         sys.exit(broken(exc))
     except Exception as exc:
@@ -84,6 +85,11 @@ def _look_for_cycles_seldom() -> None:
     A command makes hardly any, and loading it takes a tenth less without looking.
     """
     gc.set_threshold(YOUNG, *gc.get_threshold()[1:])
+
+
+def _look_for_no_plugins() -> None:
+    """Let pydantic not read what every installed package says of itself."""
+    os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "1")
 
 
 def _leave_signals_to_the_system() -> None:

@@ -10,7 +10,7 @@ import sys
 import pytest
 import typer
 
-from postproc.cli.commands import app
+from postproc.cli.commands import app, application
 from postproc.cli.common import EXAMPLES
 from tests.cli.test_cli import COMMANDS
 from tests.written import cli
@@ -103,9 +103,23 @@ def test_help_loads_nothing_heavy():
 def test_compensating_loads_nothing_that_it_may_not_need():
     code = (
         "import sys, postproc.cli.jobs, postproc.cli.common\n"
-        "print(sorted({'matplotlib', 'pinocchio', 'rich', 'scipy'} & set(sys.modules)))"
+        "import postproc.language.pdl2.language\n"
+        "ours = ('batch.plan', 'compensation.in_time', 'compensation.path_correction',\n"
+        "    'language.pdl2.clones', 'model.effects.elm', 'motion.timing')\n"
+        "never = {'matplotlib', 'pinocchio', 'rich', 'ruckig', 'scipy'}\n"
+        "never |= {f'postproc.{name}' for name in ours}\n"
+        "print(sorted(never & set(sys.modules)))"
     )
     done = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, check=True
     )
     assert done.stdout == "[]\n"
+
+
+def test_a_command_is_prepared_alone_and_all_where_none_is_named():
+    alone = application("compensate")
+    assert [c.callback.__name__ for c in alone.registered_commands] == ["compensate"]
+    assert not alone.registered_groups
+    for first in ("", "arm", "--help", "compensat"):
+        assert application(first) is app
+    assert len(app.registered_commands) > 10 and app.registered_groups
