@@ -3,91 +3,86 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from importlib import import_module
 from typing import Any
 
 import numpy as np
 
 from postproc.exceptions import PostprocError
-from postproc.model.effects.azimuth import Azimuth
-from postproc.model.effects.backlash import Backlash
-from postproc.model.effects.backlash_profile import BacklashProfile
-from postproc.model.effects.base_shift import BaseShift
-from postproc.model.effects.base_tilt import BaseTilt
-from postproc.model.effects.compliance import Compliance
-from postproc.model.effects.counterbalance import Counterbalance
-from postproc.model.effects.coupling import Coupling
-from postproc.model.effects.curve import Curve
-from postproc.model.effects.drive import (
-    DriveBacklash,
-    DriveEffect,
-    DriveLoad,
-    DriveTransmission,
-)
 from postproc.model.effects.effect import Effect
-from postproc.model.effects.elm import Elm, ElmMap
-from postproc.model.effects.geometry import Geometry
-from postproc.model.effects.joint_map import JointMap
-from postproc.model.effects.joint_spline import JointSpline
-from postproc.model.effects.joint_step import JointStep
-from postproc.model.effects.lag import Lag
-from postproc.model.effects.load_backlash import LoadBacklash
-from postproc.model.effects.maps import Interpolation, Kriging
-from postproc.model.effects.payload import Payload
-from postproc.model.effects.placement import Placement
-from postproc.model.effects.probe import Probe
-from postproc.model.effects.probe_turn import ProbeTurn
-from postproc.model.effects.refraction import Refraction
-from postproc.model.effects.scale import Scale
-from postproc.model.effects.thermal import Thermal
-from postproc.model.effects.tool_shift import ToolShift
-from postproc.model.effects.tracker_drift import TrackerDrift
-from postproc.model.effects.transmission import Transmission
-from postproc.model.effects.windup import Windup
 from postproc.robot.arm import Arm
 from postproc.robot.state import States
 
-# Every effect, one line each. Where order matters (messages, the order in which a fit
-# and a search try them), it is this one.
+# Every effect by its name, one line each. Where order matters (messages, the order in
+# which a fit and a search try them), it is this one. A class is loaded where it is
+# asked for: a model holds few of them.
 
-EFFECTS: tuple[type[Effect], ...] = (
-    Geometry,
-    Backlash,
-    BacklashProfile,
-    Compliance,
-    Payload,
-    Counterbalance,
-    BaseTilt,
-    Transmission,
-    Scale,
-    Coupling,
-    LoadBacklash,
-    DriveBacklash,
-    DriveTransmission,
-    DriveLoad,
-    Thermal,
-    Windup,
-    Lag,
-    BaseShift,
-    ToolShift,
-    JointStep,
-    TrackerDrift,
-    Azimuth,
-    Refraction,
-    JointMap,
-    Curve,
-    Probe,
-    ProbeTurn,
-    Placement,
-    JointSpline,
-    Elm,
-    ElmMap,
-    Interpolation,
-    Kriging,
-)
+PLACES = {
+    "geometry": "geometry.Geometry",
+    "backlash": "backlash.Backlash",
+    "backlash_profile": "backlash_profile.BacklashProfile",
+    "compliance": "compliance.Compliance",
+    "payload": "payload.Payload",
+    "counterbalance": "counterbalance.Counterbalance",
+    "base_tilt": "base_tilt.BaseTilt",
+    "transmission": "transmission.Transmission",
+    "scale": "scale.Scale",
+    "coupling": "coupling.Coupling",
+    "load_backlash": "load_backlash.LoadBacklash",
+    "drive_backlash": "drive.DriveBacklash",
+    "drive_transmission": "drive.DriveTransmission",
+    "drive_load": "drive.DriveLoad",
+    "thermal": "thermal.Thermal",
+    "windup": "windup.Windup",
+    "lag": "lag.Lag",
+    "base_shift": "base_shift.BaseShift",
+    "tool_shift": "tool_shift.ToolShift",
+    "joint_step": "joint_step.JointStep",
+    "tracker_drift": "tracker_drift.TrackerDrift",
+    "azimuth": "azimuth.Azimuth",
+    "refraction": "refraction.Refraction",
+    "joint_map": "joint_map.JointMap",
+    "curve": "curve.Curve",
+    "probe": "probe.Probe",
+    "probe_turn": "probe_turn.ProbeTurn",
+    "registration": "placement.Placement",
+    "joint_spline": "joint_spline.JointSpline",
+    "elm": "elm.Elm",
+    "elm_map": "elm.ElmMap",
+    "interpolation": "maps.Interpolation",
+    "kriging": "maps.Kriging",
+}
 
-BY_NAME: dict[str, type[Effect]] = {kind.name: kind for kind in EFFECTS}
-KNOWN = tuple(kind.name for kind in EFFECTS if not kind.published)
-BASE_EFFECTS = tuple(kind.name for kind in EFFECTS if kind.unasked == "always")
+
+def kind_of(name: str) -> type[Effect]:
+    """Load the class of an effect.
+
+    Raises:
+        KeyError: There is no effect of that name.
+    """
+    module, _, kind = PLACES[name].partition(".")
+    found: type[Effect] = getattr(import_module(f"{__name__}.{module}"), kind)
+    return found
+
+
+EFFECTS: tuple[type[Effect], ...]  # all of them
+BY_NAME: dict[str, type[Effect]]
+KNOWN: tuple[str, ...]  # those that a user may ask for
+BASE_EFFECTS: tuple[str, ...]  # those that every model holds
+
+
+def __getattr__(name: str) -> Any:
+    """Load all effects, where one of the lists above is asked for."""
+    if name not in ("EFFECTS", "BY_NAME", "KNOWN", "BASE_EFFECTS"):
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    every = tuple(map(kind_of, PLACES))
+    globals().update(
+        EFFECTS=every,
+        BY_NAME={kind.name: kind for kind in every},
+        KNOWN=tuple(kind.name for kind in every if not kind.published),
+        BASE_EFFECTS=tuple(kind.name for kind in every if kind.unasked == "always"),
+    )
+    return globals()[name]
 
 
 def propose(names: Iterable[str], arm: Arm, states: States) -> tuple[Effect, ...]:
@@ -99,10 +94,10 @@ def propose(names: Iterable[str], arm: Arm, states: States) -> tuple[Effect, ...
     """
     chosen = tuple(dict.fromkeys(name.strip() for name in names))
     for name in chosen:
-        if name not in KNOWN:
-            known = ", ".join(KNOWN)
+        if name not in PLACES or kind_of(name).published:
+            known = ", ".join(n for n in PLACES if not kind_of(n).published)
             raise PostprocError(f"there is no effect {name!r}. Known effects: {known}")
-    effects = tuple(BY_NAME[name].propose(arm, states) for name in chosen)
+    effects = tuple(kind_of(name).propose(arm, states) for name in chosen)
     for effect in effects:
         _check_needs(effect, states)
     return tuple(effect.beside(effects) for effect in effects)
@@ -120,6 +115,8 @@ def _check_needs(kind: Effect, states: States) -> None:
                 f"effect {kind.name} needs the {need} of every row, which the file "
                 f"does not have. Add the column or leave the effect out"
             )
+    from postproc.model.effects.drive import DriveEffect
+
     if isinstance(kind, DriveEffect) and not kind.parameters():
         raise PostprocError(
             f"effect {kind.name} is of coupled drives. Declare drive_coupling in the "
@@ -133,11 +130,10 @@ def restore(name: str, settings: Mapping[str, Any]) -> Effect:
     Raises:
         ValueError: Unknown effect or settings that do not fit it.
     """
-    kind = BY_NAME.get(name)
-    if kind is None:
+    if name not in PLACES:
         raise ValueError(f"unknown effect {name!r}")
     try:
-        return kind(**{k: _frozen(v) for k, v in settings.items()})
+        return kind_of(name)(**{k: _frozen(v) for k, v in settings.items()})
     except TypeError:
         raise ValueError(f"settings do not fit effect {name!r}") from None
 
