@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from copy import deepcopy
 from dataclasses import dataclass, fields, replace
 from itertools import pairwise
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -60,6 +60,10 @@ from postproc.robot.cell import Cell
 from postproc.robot.direction import UNLED, Arrivals
 from postproc.robot.pose import MM
 from postproc.robot.state import States
+
+if TYPE_CHECKING:
+    from postproc.compensation.in_time import InTime
+    from postproc.compensation.rewrite import Output
 
 # What is kept of a program, or of a window of it, once its targets are corrected.
 
@@ -145,6 +149,23 @@ class Correction:
 
 BY_VISIT = ("corrected", "position", "away", "overruled", "untimed")
 EXPLAINING = ("travel", "speed")
+
+
+@dataclass(frozen=True)
+class Draft:
+    """A corrected program, before it is told of.
+
+    Attributes:
+        reading: The program.
+        kept: What came of its visits.
+        output: What is to be written.
+        in_time: The program in time; None where nobody asked.
+    """
+
+    reading: Reading
+    kept: Correction
+    output: Output
+    in_time: InTime | None
 
 
 def correction_of(

@@ -215,11 +215,6 @@ def _all(column: Bools) -> Ints:
     return np.arange(len(column))
 
 
-def no_advice(rows: Ints) -> dict[int, str]:
-    """Say nothing on how to approach visits: nobody knows their ways."""
-    return {}
-
-
 def run_in_time(
     reading: Reading,
     again: Reading,

@@ -233,6 +233,11 @@ def unsure_frames(
     return found
 
 
+def no_advice(rows: Ints) -> dict[int, str]:
+    """Say nothing on how to approach visits: nobody knows their ways."""
+    return {}
+
+
 def unsure_sides(
     visits: Visits,
     corrected: Bools,

@@ -25,10 +25,11 @@ from postproc.compensation.arc_cuts import (
 )
 from postproc.compensation.arc_splitting import point_on_way
 from postproc.compensation.best_points import BestPoints
+from postproc.compensation.correction import Draft
 from postproc.compensation.options import Setting
 from postproc.compensation.path_judging import judge, largest_on_moves, sizes_of
 from postproc.compensation.path_points import Insertions
-from postproc.compensation.path_work import Draft, PathWork, Write, of_source
+from postproc.compensation.path_work import PathWork, Write, of_source
 from postproc.compensation.split_moves import find_split
 from postproc.exceptions import PostprocError
 from postproc.language.languages import language_of

@@ -10,7 +10,13 @@ import numpy as np
 
 from postproc.arrays import Floats, Ints
 from postproc.compensation.arc_splitting import Cut, WantedArcs, halves
-from postproc.compensation.correction import BY_VISIT, EXPLAINING, Correction, correct
+from postproc.compensation.correction import (
+    BY_VISIT,
+    EXPLAINING,
+    Correction,
+    Draft,
+    correct,
+)
 from postproc.compensation.in_time import InTime, run_in_time
 from postproc.compensation.insertions import insert, lines_in_files
 from postproc.compensation.options import Setting
@@ -30,23 +36,6 @@ from postproc.robot.pose import MM
 
 AIM = 0.4  # of the tolerance: what points are to reach
 MOST = 0.95  # of a way: that much is to be within half of the tolerance
-
-
-@dataclass(frozen=True)
-class Draft:
-    """A corrected program, before it is told of.
-
-    Attributes:
-        reading: The program.
-        kept: What came of its visits.
-        output: What is to be written.
-        in_time: The program in time; None where nobody asked.
-    """
-
-    reading: Reading
-    kept: Correction
-    output: Output
-    in_time: InTime | None
 
 
 Write = Callable[[Reading, Correction, Setting], tuple[Output, Reading]]

@@ -23,7 +23,6 @@ from postproc.arrays import (
 from postproc.compensation.arrivals import ArrivalStates
 from postproc.compensation.outcome import Outcome, Status
 from postproc.language.visits import Meaning, Visits
-from postproc.report.in_time import told_in_time
 from postproc.robot.pose import MM
 from postproc.robot.trajectory import Motion
 
@@ -59,6 +58,8 @@ def in_time_of(outcome: Outcome) -> dict[str, object]:
     """Describe the program in time, and its paths; nothing where nobody asked."""
     if outcome.in_time is None:
         return {}
+    from postproc.report.in_time import told_in_time  # many files, where it is timed
+
     return told_in_time(outcome.in_time, outcome.visits)
 
 
