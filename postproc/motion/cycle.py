@@ -8,9 +8,10 @@ from functools import cached_property
 import numpy as np
 
 from postproc.arrays import Floats, Ints
+from postproc.motion.arrival_times import ArrivalTimes
 from postproc.motion.blending import blend
 from postproc.motion.targets import Targets
-from postproc.motion.timing import ArrivalTimes, main_edges, tell_time
+from postproc.motion.timing import main_edges, tell_time
 from postproc.motion.trace import Trace, trace
 from postproc.robot.arm import Arm
 from postproc.robot.direction import Arrivals, arrivals

@@ -7,12 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from postproc.arrays import Bools, Floats, Ints, read_only
+from postproc.motion.arrival_times import ArrivalTimes, no_time
 from postproc.motion.blending import blend
 from postproc.motion.curves import arrivals_on_curves
 from postproc.motion.path import BlendCoupling
 from postproc.motion.replan import planned_points, where_passed
 from postproc.motion.targets import CODE, REASONS, WRIST, Targets
-from postproc.motion.timing import no_time, tell_time
 from postproc.motion.trace import NOWHERE, StartState, Trace, trace
 from postproc.robot.arm import Arm
 from postproc.robot.direction import UNLED, Arrivals, arrivals
@@ -107,7 +107,7 @@ def plan(
     traced = blend(arm, targets, exact, timed)
     arrived = arrivals(arm, traced.q, traced.driven, lead)
     arrived = arrivals_on_curves(arm, targets, traced.q, arrived)
-    clock = tell_time(arm, targets, traced) if timed else no_time(len(targets))
+    clock = _timed(arm, targets, traced) if timed else no_time(len(targets))
     tool = targets.tool
     tcp = where_passed(arm, planned_points(exact), traced.q) @ tool
     return Plan(
@@ -116,6 +116,13 @@ def plan(
         _guard(traced, wrist), REASONS, traced.overruled, clock.untimed,
         traced.pull, arrived.past, exact,
     )  # fmt: skip
+
+
+def _timed(arm: Arm, targets: Targets, traced: Trace) -> ArrivalTimes:
+    """Time all moves, with what only timed runs load."""
+    from postproc.motion.timing import tell_time
+
+    return tell_time(arm, targets, traced)
 
 
 def _guard(traced: Trace, wrist: float) -> Ints:

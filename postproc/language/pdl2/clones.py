@@ -5,9 +5,11 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import cast
 
 import numpy as np
 
+from postproc.language.interface import Cloner, NamedPoint
 from postproc.language.lines import read_lines
 from postproc.language.pdl2 import syntax as ast
 from postproc.language.pdl2.entries import is_nested, last_head
@@ -326,3 +328,38 @@ def _assigned(
     return inserted_after(
         program.lines.source, line, head[1] + name + code[head.end() :]
     )
+
+
+# All of it behind the interface of languages.
+
+
+@dataclass
+class Pdl2Cloner(Cloner):
+    """The files of a job, to clone variables in them.
+
+    Attributes:
+        programs: Its program files, parsed.
+        values: Its variable file, or None.
+        taken: All words of its files, in lower case.
+    """
+
+    programs: list[Program]
+    values: Source | None
+    taken: set[str]
+
+    def target(self, file: int, line: int, via: bool, name: str) -> CloneTarget:
+        """Find the variable that a move goes to, as far as it can be cloned."""
+        return named_at(self.programs, file, line, via, name)
+
+    def declared(self, named: NamedPoint) -> int:
+        """Return the 1-based line that declares a variable."""
+        target = cast(CloneTarget, named)
+        return int(self.programs[target.file].lines.line[target.variable.row])
+
+    def clone(
+        self, literals: Literals, named: Sequence[NamedPoint], rows: Sequence[int]
+    ) -> tuple[str, list[tuple[int, Edit]]]:
+        """Give some moves a variable of their own, see `Cloner.clone`."""
+        own = [cast(CloneTarget, one) for one in named]
+        name = free_name(own[0].variable.name, self.taken)
+        return name, clone(self.programs, self.values, literals, own, rows, name)

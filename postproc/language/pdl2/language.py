@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
-from typing import cast
+from dataclasses import replace
 
 import numpy as np
 
@@ -17,16 +16,12 @@ from postproc.language.interface import (
     Cloner,
     JobReading,
     Language,
-    NamedPoint,
     Splitter,
     Start,
 )
-from postproc.language.pdl2.clones import CloneTarget, clone, free_name, named_at
-from postproc.language.pdl2.dialect import PDL2_DIALECT
+from postproc.language.pdl2.dialect import AT_APPROACH, AT_VIA, MARK, PDL2_DIALECT
 from postproc.language.pdl2.effects import dead_lines
 from postproc.language.pdl2.interpreter import resolve
-from postproc.language.pdl2.names import entry_names
-from postproc.language.pdl2.path_points import AT_APPROACH, AT_VIA, MARK, Pdl2Splitter
 from postproc.language.pdl2.program import Program, parse, parse_again
 from postproc.language.pdl2.variable_file import (
     VariableFile,
@@ -34,15 +29,18 @@ from postproc.language.pdl2.variable_file import (
     read_variables_again,
 )
 from postproc.language.rewrite import Skeleton
-from postproc.language.source import Edit, Source
-from postproc.language.visits import Literals, never_reached
+from postproc.language.source import Source
+from postproc.language.visits import never_reached
 
 _WORD = re.compile(rb"[A-Za-z_]\w*")
 Parsed = Program | VariableFile
 
 
 class Pdl2(Language):
-    """The language of Comau controllers."""
+    """The language of Comau controllers.
+
+    What few programs need is loaded where it is used.
+    """
 
     name = "PDL2"
     suffixes = (".pdl",)
@@ -91,6 +89,8 @@ class Pdl2(Language):
 
     def cloner(self, sources: Sequence[Source]) -> Cloner:
         """Parse the files of a job to clone variables in them."""
+        from postproc.language.pdl2.clones import Pdl2Cloner
+
         own = [source for source in sources if not is_variables(source.name)]
         values = next((source for source in sources if source not in own), None)
         taken = {
@@ -102,6 +102,8 @@ class Pdl2(Language):
 
     def splitter(self, sources: Sequence[Source]) -> Splitter:
         """Parse the files of a job to put points on the ways of its moves."""
+        from postproc.language.pdl2.path_points import Pdl2Splitter
+
         own = [source for source in sources if not is_variables(source.name)]
         return Pdl2Splitter([parse(source) for source in own])
 
@@ -123,44 +125,14 @@ class Pdl2(Language):
         self, file: str, lines: Sequence[bytes], wanted: Sequence[int]
     ) -> Iterator[str]:
         """Name the variables that lines of a variable file belong to."""
+        from postproc.language.pdl2.names import entry_names
+
         return entry_names(lines, wanted)
 
     def prepare(self) -> None:
         """Load the parsers of programs and variable files."""
         for grammar in ("pdl2", "lsv"):
             line_parser(grammar, "line")
-
-
-@dataclass
-class Pdl2Cloner(Cloner):
-    """The files of a job, to clone variables in them.
-
-    Attributes:
-        programs: Its program files, parsed.
-        values: Its variable file, or None.
-        taken: All words of its files, in lower case.
-    """
-
-    programs: list[Program]
-    values: Source | None
-    taken: set[str]
-
-    def target(self, file: int, line: int, via: bool, name: str) -> CloneTarget:
-        """Find the variable that a move goes to, as far as it can be cloned."""
-        return named_at(self.programs, file, line, via, name)
-
-    def declared(self, named: NamedPoint) -> int:
-        """Return the 1-based line that declares a variable."""
-        target = cast(CloneTarget, named)
-        return int(self.programs[target.file].lines.line[target.variable.row])
-
-    def clone(
-        self, literals: Literals, named: Sequence[NamedPoint], rows: Sequence[int]
-    ) -> tuple[str, list[tuple[int, Edit]]]:
-        """Give some moves a variable of their own, see `Cloner.clone`."""
-        own = [cast(CloneTarget, one) for one in named]
-        name = free_name(own[0].variable.name, self.taken)
-        return name, clone(self.programs, self.values, literals, own, rows, name)
 
 
 def _refuse_other_arm(program: Program, start: Start) -> None:

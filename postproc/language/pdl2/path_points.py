@@ -13,14 +13,15 @@ from postproc.arrays import Floats
 from postproc.language.interface import ArcPiece, Splitter
 from postproc.language.pdl2 import syntax as ast
 from postproc.language.pdl2.clones import code_of
-from postproc.language.pdl2.dialect import DEGREE_DECIMALS, MM_DECIMALS
+from postproc.language.pdl2.dialect import (
+    AT_APPROACH,
+    AT_VIA,
+    DEGREE_DECIMALS,
+    INSERTED,
+    MM_DECIMALS,
+)
 from postproc.language.pdl2.program import Program
 from postproc.language.source import CloneError, Edit, Source, Span, check_length
-
-INSERTED = "-- postproc: inserted"  # ends such a line
-AT_VIA = " (via)"  # .. where it leads to the point on the way of an arc
-AT_APPROACH = " (approach)"  # .. where it is a stop from which a target is reached
-MARK = re.compile(rb"-- postproc: inserted( \((?:via|approach)\))?[ \t]*\r?$")
 
 _EVENT = re.compile(r"\b(AT|TIME|DISTANCE|PERCENT|SEGMENT|EVENT)\b", re.I)
 _ENABLE = re.compile(r"\bENABLE\b(?!\s+CONDITION\s*\[\s*\d+\s*\])", re.I)
