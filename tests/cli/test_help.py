@@ -104,8 +104,9 @@ def test_compensating_loads_nothing_that_it_may_not_need():
     code = (
         "import sys, postproc.cli.jobs, postproc.cli.common\n"
         "import postproc.language.pdl2.language\n"
-        "ours = ('batch.plan', 'compensation.in_time', 'compensation.path_correction',\n"
-        "    'language.pdl2.clones', 'model.effects.elm', 'motion.timing')\n"
+        "ours = ('batch.plan', 'compensation.in_time', 'motion.timing',\n"
+        "    'compensation.path_correction', 'language.pdl2.clones',\n"
+        "    'model.effects.elm')\n"
         "never = {'matplotlib', 'pinocchio', 'rich', 'ruckig', 'scipy'}\n"
         "never |= {f'postproc.{name}' for name in ours}\n"
         "print(sorted(never & set(sys.modules)))"
