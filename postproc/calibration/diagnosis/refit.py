@@ -27,6 +27,7 @@ from postproc.robot.arm import Arm
 
 ROWS_PER_PARAMETER = 2  # rows from which a model is refitted rather than revised
 NOTHING = 1e-6  # share of the largest variance below which a direction is known
+UNSEEN = 1e-7  # [m rms] a direction that moves the rows by less is not revised
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,20 +36,32 @@ class Revision(Effect):
 
     Attributes:
         model: The given model, effects of the set-up left out.
-        factor: L with L L^T its covariance, (p, r).
+        factor: L with L L^T its covariance as far as it moves the rows, (p, r).
+        unseen: What is left of its covariance: nothing that the rows tell of, (p, p).
     """
 
     name: ClassVar[str] = "revision"
 
     model: Model
     factor: Floats
+    unseen: Floats
 
     @classmethod
-    def of(cls, model: Model) -> Revision:
-        """Take a model's covariance apart."""
+    def of(cls, model: Model, batch: Batch) -> Revision:
+        """Take a model's covariance apart into what rows tell of and what not.
+
+        A long survey leaves hundreds of uncertain directions, splines at angles where
+        the rows never are for instance, which would be fitted in vain again and again.
+        """
         value, vector = np.linalg.eigh(model.covariance)
         kept = value > NOTHING * float(value.max(initial=0.0))
-        return cls(model, vector[:, kept] * np.sqrt(value[kept]))
+        factor = vector[:, kept] * np.sqrt(value[kept])
+        columns = model.effects.columns(model.effects.at(batch, model.values))
+        moved = columns.reshape(-1, len(factor)) @ factor
+        square, way = np.linalg.eigh(moved.T @ moved / len(batch))
+        seen = square > UNSEEN**2
+        aside = factor @ way[:, ~seen]
+        return cls(model, factor @ way[:, seen], aside @ aside.T)
 
     def parameters(self) -> tuple[Parameter, ...]:
         """Number the directions of the uncertainty."""
@@ -57,10 +70,13 @@ class Revision(Effect):
         )
 
     def columns(self, batch: Batch) -> Floats:
-        """Differentiate the TCP position, (n, 3, r)."""
-        effects = self.model.effects
-        at = effects.at(batch, self.model.values)
-        columns: Floats = effects.columns(at) @ self.factor
+        """Differentiate the TCP position, (n, 3, r), wherever others move it."""
+        held = batch.known.get(self)
+        if held is None or held[0] is not batch.states:
+            effects = self.model.effects
+            at = effects.at(batch, self.model.values)
+            held = batch.known[self] = batch.states, effects.columns(at) @ self.factor
+        columns: Floats = held[1]
         return columns
 
     def settings(self) -> dict[str, Any]:
@@ -96,7 +112,7 @@ def revise(
     """Fit what a model leaves of a few rows, with its own uncertainty as an effect."""
     known = only_arm(model)
     left = survey.position - known.effects.error(batch, known.values)
-    return fit_effects(batch, left, (Revision.of(known), *setup), origin)
+    return fit_effects(batch, left, (Revision.of(known, batch), *setup), origin)
 
 
 def fold_back(fit: Fit) -> Fit:
@@ -110,6 +126,8 @@ def fold_back(fit: Fit) -> Fit:
     spread[count:, rank:] = np.eye(len(fit.values) - rank)
     values = spread @ fit.values
     values[:count] += first.model.values
+    covariance = spread @ fit.covariance @ spread.T
+    covariance[:count, :count] += first.unseen
     combination = Combination(effects)
     known = first.model.effects.error(fit.batch, first.model.values)
     groups = tuple(dict.fromkeys(combination.groups))
@@ -119,7 +137,7 @@ def fold_back(fit: Fit) -> Fit:
         combination=combination,
         error=fit.error + known,
         values=values,
-        covariance=spread @ fit.covariance @ spread.T,
+        covariance=covariance,
         groups=groups,
         log_scale=np.array([scale.get(g, 0.0) for g in groups]),
         design=DesignMatrix.of(combination, combination.at(fit.batch, values)),
