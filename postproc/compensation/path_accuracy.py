@@ -30,6 +30,7 @@ FINE = 8  # parts of an interval in which a joint changes its flank
 CHANGED = 0.02  # of half the play: less between two samples is looked at no closer
 UNSURE = 1e-3  # likewise: a side that is known
 NO_FLANK = 1e-6  # [m] no joint's flank makes so little a difference
+GIVES = 4.0  # gaps over which a flank goes that gives way before it carries
 
 
 @dataclass(frozen=True)
@@ -72,6 +73,8 @@ class PathAccuracy:
         otherwise: Distance of the compensated program's path if such a joint had stayed
             on one of its flanks, (s,) [m]; empty where nobody asked.
         doubtful: The same of those joints alone that no measured path confirms, (s,).
+        giving: Distance of that path if these joints' flanks gave way, (s,) [m]; empty
+            where all are confirmed.
         q, side: Joint angles [rad] of the program as it was written, and where each
             joint lies in its play, (s, 6) each.
     """
@@ -85,6 +88,7 @@ class PathAccuracy:
     crossing: Bools
     otherwise: Floats
     doubtful: Floats
+    giving: Floats
     q: Floats
     side: Floats
 
@@ -142,18 +146,26 @@ class _Run:
 
     @classmethod
     def of(
-        cls, cell: Cell, model: Model, cycle: ProgramCycle, ways: PathSamples
-    ) -> _Run:
+        cls, cell: Cell, model: Model, cycle: ProgramCycle, ways: PathSamples,
+        width: Floats | float = 1.0,
+    ) -> _Run:  # fmt: skip
         """Follow the joints' plays along the ways, each as wide as its gap there.
 
         What is known of them where a way begins is what the way before it leaves, where
         one leads there.
+
+        Args:
+            cell: The arm, its play as wide as its gaps.
+            model: The arm's error.
+            cycle: The program.
+            ways: Its ways.
+            width: Gaps over which each joint goes from flank to flank, (6,).
         """
         begins, alone = ways.begins, np.ones(len(ways.visit), dtype=bool)
         alone[1:] = ways.source[1:] != ways.visit[:-1]
         begins[ways.first[:-1]] = alone
         play = cycle.arrived.past.play[ways.source[alone]]
-        half = half_widths(model, cell.arm, ways.q)
+        half = width * half_widths(model, cell.arm, ways.q)
         return cls(cycle, ways, *sides_along(cell.arm, ways.q, begins, play, half))
 
     @property
@@ -267,7 +279,7 @@ def predict_paths(
         _deviations(runs[0], error, -off, tangent, way),
         _deviations(runs[1], error, moved, tangent, way),
         int((cartesian & ~known).sum()), runs[1].changes(), np.empty(0),
-        np.empty(0), pair[0].q, runs[0].side,
+        np.empty(0), np.empty(0), pair[0].q, runs[0].side,
     )  # fmt: skip
     if owner is None or not len(rows):
         return found
@@ -277,6 +289,11 @@ def predict_paths(
     told = model.in_motion
     open_ = np.array([told.get(str(joint)) != CONFIRMED for joint in range(1, 7)])
     far, doubtful = by_joint.max(axis=1), (by_joint * open_).max(axis=1)
+    if open_.any():
+        soft = _Run.of(cell, model, after, pair[1], np.where(open_, GIVES, 1.0))
+        lying = np.where(open_, np.sin(np.pi / 2 * soft.side), soft.side)
+        giving, _ = _apart(moved + error(soft, slice(None), lying), tangent)
+        found = replace(found, giving=giving)
     return replace(found, otherwise=far, doubtful=doubtful).joined(owner)
 
 
@@ -346,9 +363,7 @@ def _otherwise(
         for flank in (low, high):
             other = np.array(side[rows])
             other[:, joint] = flank[rows, joint]
-            off = moved[rows] + error(run, rows, other)
-            along = np.einsum("si,si->s", off, tangent[rows])
-            far = lengths(off - along[:, None] * tangent[rows])
+            far, _ = _apart(moved[rows] + error(run, rows, other), tangent[rows])
             out[rows, joint] = np.maximum(out[rows, joint], far)
     return out
 
@@ -392,14 +407,19 @@ def _deviations(
     """
     side = run.side
     off = moved + error(run, slice(None), side)
-    along = np.einsum("si,si->s", off, tangent)
-    across = lengths(off - along[:, None] * tangent)
+    across, along = _apart(off, tangent)
     unsure, starts = _unsure(run, error), run.ways.first[:-1]
     if not len(starts):
         return Deviations(off, across, along, unsure, starts, starts)
     largest = _largest_in(across, run.ways.way, starts)
     joints = _joints(run, error, largest, way)
     return Deviations(off, across, along, unsure, largest, joints)
+
+
+def _apart(off: Floats, tangent: Floats) -> tuple[Floats, Floats]:
+    """Tell what is across a path (s,) and along it (s,) [m] of what is off (s, 3)."""
+    along = np.einsum("si,si->s", off, tangent)
+    return lengths(off - along[:, None] * tangent), along
 
 
 def _unsure(run: _Run, error: _Error) -> Floats:

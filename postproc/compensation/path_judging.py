@@ -22,7 +22,8 @@ from postproc.compensation.path_work import PathWork
 from postproc.robot.pose import lengths
 
 JUDGED = 8  # rounds in which points are taken back
-WORSE = 5e-5  # [m] that the path may be worse where a flank is not as predicted
+WORSE = 5e-5  # [m] that a move may be worse where a flank is not as predicted
+HARM = 3e-5  # [m] that any place of it may be worse where flanks give way
 MOVED = 5e-6  # [m] that a rounded corner may move
 
 
@@ -85,10 +86,8 @@ def _bad(work: PathWork) -> Iterator[tuple[int, tuple[str, float | None]]]:
     if told is None:
         return
     with_points = _worst(work, told)
-    other = largest_on_moves(told.paths, told.paths.doubtful)
     without = _of_moves(work, sizes_of(first))
-    otherwise = largest_on_moves(first, first.doubtful).items()
-    usual = _of_moves(work, {v: max(far, without[v]) for v, (far, _) in otherwise})
+    otherwise = _if_otherwise(work, told, without)
     corner = _corners_moved(work, told)
     flat = bending(work)
     bent = {cut[0] for cut, far in flat.items() if not may_be_chord(work, cut, far)}
@@ -102,11 +101,35 @@ def _bad(work: PathWork) -> Iterator[tuple[int, tuple[str, float | None]]]:
         elif with_points[v][0] > without[v]:
             why = "points on its way make it no better"
             yield v, (why, with_points[v][1])
-        elif other[v][0] > usual[v] + WORSE:
+        elif v in otherwise:
             why = "it would be worse if a flank is not as predicted"
-            yield v, (why, other[v][1])
+            yield v, (why, otherwise[v])
         elif corner[v]:
             yield v, ("a rounded corner at one of its ends would move", None)
+
+
+def _if_otherwise(
+    work: PathWork, told: InTime, without: dict[int, float]
+) -> dict[int, float]:
+    """Say which moves are worse where flanks are not as predicted, and at what share.
+
+    A flank that no measured path confirms may change later or never: what the move is
+    off at the most counts. Or it gives way before it carries: any place counts, as the
+    points around it are right for a sharp gap alone.
+    """
+    first, paths, found = work.first.paths, told.paths, dict[int, float]()
+    far_off = largest_on_moves(first, first.doubtful).items()
+    usual = _of_moves(work, {v: max(far, without[v]) for v, (far, _) in far_off})
+    for v, (far, share) in largest_on_moves(paths, paths.doubtful).items():
+        if far > usual[v] + WORSE:
+            found[v] = share
+    for k, v in enumerate(paths.visit.tolist() if len(paths.giving) else ()):
+        new, old = paths.samples(k), first.samples_to(v)
+        usual_there = np.interp(paths.way[new], first.way[old], first.giving[old])
+        excess, share = _largest_on(paths.way[new], paths.giving[new] - usual_there)
+        if excess > HARM:
+            found.setdefault(v, share)
+    return found
 
 
 def _of_moves(work: PathWork, far: dict[int, float]) -> dict[int, float]:

@@ -9,6 +9,7 @@ from postproc.compensation.splitting import shortest_pieces
 from postproc.compensation.taking_up import TakeUp, take_up
 from postproc.language.languages import language_of
 from postproc.model.model import CONFIRMED, NOT_SURE
+from postproc.model.play import ahead
 
 UNSURE = 2e-5  # [m] a flank that is less sure is no reason to put points anywhere
 SMALL = 5e-5  # [m] a step of a joint that matters little if it is not as predicted
@@ -69,10 +70,13 @@ def _may_stop(work: PathWork, v: int, taken: TakeUp) -> None:
 
 def _otherwise_in_motion(work: PathWork, k: int, v: int) -> str:
     """Name a joint that changes its flank on a path, and in motion not as at stops."""
-    found = work.setting.model.in_motion
+    setting = work.setting
+    found, leads = setting.model.in_motion, ahead(setting.model, setting.cell.arm)
     changing = work.paths.crossing[work.paths.samples(k)].any(axis=0)
     for joint in (np.flatnonzero(changing) + 1).tolist():
-        said = found.get(str(joint), CONFIRMED)  # none was measured: as at stops
+        # Where none was measured it is as at stops, if a drive can put it there.
+        as_at_stops = NOT_SURE if leads[joint - 1] else CONFIRMED
+        said = found.get(str(joint), as_at_stops)
         if not _as_at_stops(work, said, v, joint):
             return f"joint {joint} changes its flank, which in motion is {said}"
     return ""

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from postproc.arrays import Floats
+from postproc.arrays import Bools, Floats
 from postproc.model.kinematics import Batch
 from postproc.model.model import Model
 from postproc.robot.arm import Arm
@@ -33,6 +33,23 @@ def half_gap(model: Model, arm: Arm) -> Floats:
         (6,) [rad]; 0 where the model has no backlash.
     """
     return np.asarray(np.abs(_over_range(model, arm)).max(axis=0))
+
+
+def ahead(model: Model, arm: Arm) -> Bools:
+    """Tell which links rest ahead of their drives, as they arrive, by the fitted b.
+
+    A drive that pushes its link is ahead of it: b is negative. Where the link is ahead
+    of its drive, it ran on as the arm braked, or its weight put it there, and what
+    flank it is on in motion no measurement at stops tells.
+
+    Args:
+        model: A fitted model.
+        arm: Its arm.
+
+    Returns:
+        (6,); False where the model has no backlash.
+    """
+    return np.asarray(_over_range(model, arm).mean(axis=0) > 0.0)
 
 
 def half_widths(model: Model, arm: Arm, q: Floats) -> Floats:

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from postproc.arrays import Floats
-from postproc.cli.simulate import _read, setup_of
+from postproc.cli.simulate import _read, setup_of, simulate_file
 from postproc.compensation import path_correction, path_judging, split_moves
 from postproc.compensation.arc_cuts import bending
 from postproc.compensation.arc_splitting import is_arc
@@ -20,6 +20,7 @@ from postproc.compensation.best_points import BestPoints
 from postproc.compensation.path_correction import TAKEN
 from postproc.compensation.path_work import AIM, PathWork
 from postproc.model.model import load_model
+from postproc.model.play import ahead
 from postproc.robot.cell import load_cell
 from postproc.robot.pose import MM
 from postproc.simulation import DEFAULT, virtual_arm
@@ -51,9 +52,9 @@ def shop(tmp_path_factory: pytest.TempPathFactory) -> Path:
     done("simulate", survey, "--cell", CELL, "--seed", SEED, "-o", measured)
     done("fit", measured, "--cell", CELL, "-o", folder / "model.json")
     known(folder, "confirmed")
-    stops = ("--path-mm", TOLERANCE, "--take-up", "--model", folder / "confirmed.json")
-    for name, more in (("plain", ()), ("points", ("--path-mm", TOLERANCE)),
-                       ("stops", stops)):  # fmt: skip
+    asked = ("--path-mm", TOLERANCE)
+    for name, more in (("plain", ()), ("points", asked),
+                       ("stops", (*asked, "--take-up"))):  # fmt: skip
         compensated(folder, "job.pdl", name, *more)
         done("simulate", folder / f"{name}.pdl", "--cell", CELL, "--seed", SEED,
              "--wanted", folder / "job.pdl", "--path",
@@ -61,9 +62,11 @@ def shop(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def compensated(folder: Path, source: str, name: str, *more: object) -> dict[str, Any]:
+def compensated(
+    folder: Path, source: str, name: str, *more: object, model: str = "confirmed"
+) -> dict[str, Any]:
     done("compensate", folder / source, "--cell", CELL, "--model",
-         folder / "model.json", "-o", folder / f"{name}.pdl",
+         folder / f"{model}.json", "-o", folder / f"{name}.pdl",
          "--report", folder / f"{name}.json", *more)  # fmt: skip
     return told(folder, name)
 
@@ -148,8 +151,8 @@ def test_points_that_did_better_are_put_back(
 
 def test_flanks_that_a_measured_path_refuted_get_no_points(shop: Path) -> None:
     known(shop, "refuted")
-    more = ("--path-mm", TOLERANCE, "--model", shop / "refuted.json")
-    paths = lines_of(compensated(shop, "job.pdl", "known", *more))
+    asked = ("--path-mm", TOLERANCE)
+    paths = lines_of(compensated(shop, "job.pdl", "known", *asked, model="refuted"))
     why = [p["not_split"] for p in paths if p["max_mm"]["after"] > TOLERANCE]
     assert sum("which in motion is refuted" in (text or "") for text in why) > 5
     assert sum(p["inserted"] for p in paths) < 5
@@ -162,8 +165,8 @@ def test_flanks_that_a_measured_path_confirms_are_no_reason_for_doubt(
     monkeypatch.setattr(path_judging, "WORSE", -0.04 * MM)
     doubted = []
     for name in ("model", "confirmed"):
-        more = ("--path-mm", TOLERANCE, "--model", shop / f"{name}.json")
-        found = compensated(shop, "job.pdl", "doubted", *more)["path"]
+        asked = ("--path-mm", TOLERANCE)
+        found = compensated(shop, "job.pdl", "doubted", *asked, model=name)["path"]
         why = ["if a flank is not" in (path["not_split"] or "") for path in found]
         doubted.append(sum(why))
         assert all(p["otherwise_mm"] > 0.0 for p in found if p["inserted"])
@@ -176,8 +179,9 @@ def test_a_joint_that_is_not_sure_in_motion_matters_where_its_step_does(
 ) -> None:
     known(shop, "not sure")
     monkeypatch.setattr(split_moves, "SMALL", small_mm * MM)
-    more = ("--path-mm", TOLERANCE, "--model", shop / "not sure.json")
-    paths = lines_of(compensated(shop, "job.pdl", f"small{small_mm}", *more))
+    monkeypatch.setattr(path_judging, "HARM", small_mm * MM)
+    asked, name = ("--path-mm", TOLERANCE), f"small{small_mm}"
+    paths = lines_of(compensated(shop, "job.pdl", name, *asked, model="not sure"))
     hindered = ["which in motion is not sure" in (p["not_split"] or "") for p in paths]
     assert sum(hindered) == 0 if small_mm else sum(hindered) > 5
     assert (sum(path["inserted"] for path in paths) > 10) == (small_mm > 0)
@@ -194,11 +198,54 @@ def test_points_are_kept_beside_a_start_that_nothing_mends(shop: Path) -> None:
     assert np.mean([bool(path["inserted"]) for path, _ in starts]) > 0.8
 
 
+@pytest.mark.parametrize("gears", ["sharp", "elastic"])
+def test_points_do_no_harm_where_no_measured_path_says_how_flanks_change(
+    shop: Path, gears: str
+) -> None:
+    asked = ("--path-mm", TOLERANCE)
+    cautious = compensated(shop, "job.pdl", "cautious", *asked, model="model")
+    assert any(path["inserted"] for path in cautious["path"])
+    scores = []
+    for name in ("cautious", "plain"):
+        run = simulate_file(shop / f"{name}.pdl", CELL, SEED, path=True, gears=gears,
+                            wanted=shop / "job.pdl")  # fmt: skip
+        assert run.paths is not None
+        scores.append(run.paths)
+    new, old = scores
+    for k, visit in enumerate(new.visit.tolist()):
+        before = int(np.searchsorted(old.visit, visit))
+        here, there = (
+            slice(one.first[i], one.first[i + 1])
+            for one, i in ((new, k), (old, before))
+        )
+        usual = np.interp(new.way[here], old.way[there], old.across[there])
+        worse = (new.across[here] - usual).max() / MM
+        assert worse < (0.1 if gears == "elastic" else 0.3)
+        assert new.across[here].max() < old.across[there].max() + 0.05 * MM
+
+
+def test_a_link_ahead_of_its_drive_at_stops_is_not_sure_in_motion(shop: Path) -> None:
+    model = load_model(shop / "model.json")
+    arm = load_cell(CELL).arm
+    assert not ahead(model, arm).any()
+    braked = replace(model, values=np.where(
+        [name.startswith("backlash.") for name in model.effects.names],
+        -model.values, model.values,
+    ))  # fmt: skip
+    assert ahead(braked, arm).sum() > 3
+    braked.save(shop / "braked.json")
+    paths = lines_of(
+        compensated(shop, "job.pdl", "slowed", "--path-mm", TOLERANCE, model="braked")
+    )
+    why = [p["not_split"] for p in paths if p["max_mm"]["after"] > TOLERANCE]
+    assert sum("which in motion is not sure" in (text or "") for text in why) > 5
+
+
 def test_pieces_are_as_short_as_the_cell_says(shop: Path) -> None:
     text = CELL.read_text().replace("[limits]", "[limits]\nsegment_ms = 25.0")
     (shop / "short.toml").write_text(text)
     done("compensate", shop / "job.pdl", "--cell", shop / "short.toml", "--model",
-         shop / "model.json", "-o", shop / "short.pdl", "--report",
+         shop / "confirmed.json", "-o", shop / "short.pdl", "--report",
          shop / "short.json", "--path-mm", TOLERANCE)  # fmt: skip
     pieces = [
         step
@@ -211,9 +258,10 @@ def test_pieces_are_as_short_as_the_cell_says(shop: Path) -> None:
 def test_play_is_taken_up_only_where_a_measured_path_confirms_flanks(
     shop: Path,
 ) -> None:
-    asked = ("--path-mm", TOLERANCE, "--take-up")
-    report = compensated(shop, "job.pdl", "unconfirmed", *asked)
-    assert (shop / "unconfirmed.pdl").read_bytes() == (shop / "points.pdl").read_bytes()
+    asked = ("--path-mm", TOLERANCE)
+    compensated(shop, "job.pdl", "cautious", *asked, model="model")
+    report = compensated(shop, "job.pdl", "asked", *asked, "--take-up", model="model")
+    assert (shop / "asked.pdl").read_bytes() == (shop / "cautious.pdl").read_bytes()
     (found,) = [d for d in report["diagnostics"] if d["code"] == "not-taken-up"]
     assert "diagnose --path" in found["message"]
     codes = {d["code"] for d in told(shop, "stops")["diagnostics"]}
@@ -420,7 +468,7 @@ def test_check_tells_a_point_that_was_touched(
 ) -> None:
     for name in ("points.pdl", "points.pdl.postproc.json"):
         (tmp_path / name).write_bytes((shop / name).read_bytes())
-    given = ("check", tmp_path, "--model", shop / "model.json", "--accept-left")
+    given = ("check", tmp_path, "--model", shop / "confirmed.json", "--accept-left")
     assert cli(*given).exit_code == 0
     place = tmp_path / "points.pdl"
     lines = place.read_bytes().split(b"\r\n")
