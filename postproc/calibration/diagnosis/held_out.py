@@ -177,6 +177,16 @@ class Folds:
                 out[rows] = self.target[rows] - self.design[rows].times(self.prior * p)
         return left
 
+    def variance(self) -> Floats:
+        """Say how unsure every fold is of what the others tell of it, (n, 3)."""
+        gram = self.grams.sum(axis=0) + np.eye(len(self.prior))
+        out = np.empty_like(self.target)
+        for k, rows in enumerate(self.rows):
+            _, inverse, _ = inverted(gram - self.grams[k])
+            covariance = inverse * np.outer(self.prior, self.prior)
+            out[rows] = self.design[rows].variance(covariance)
+        return out
+
 
 def _with_and_without(
     gram: Floats, moment: Floats, part: slice
