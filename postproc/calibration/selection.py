@@ -12,6 +12,7 @@ from postproc.calibration.diagnosis.held_out import Folds, gain_in, regions
 from postproc.calibration.diagnosis.library import Projection
 from postproc.calibration.diagnosis.waves import waves_of
 from postproc.calibration.directions import mend_directions
+from postproc.calibration.elsewhere import widening
 from postproc.calibration.evidence import Normal, highest
 from postproc.calibration.measurements import Measurements
 from postproc.calibration.orientations import Turns
@@ -364,7 +365,7 @@ def model_of(fitted: Fit, survey: Measurements) -> Model:
     """Keep what a fit found as a model."""
     used = fitted.rows.weight > 0
     left = np.linalg.norm(fitted.residual[used], axis=1) / MM
-    covariance = fitted.stated
+    covariance = fitted.stated * widening(fitted)
     told = fitted.combination.where(*COMPENSATED)
     own = np.where(np.outer(told, told), covariance, 0.0)  # no set-up in predictions
     known = np.sqrt(fitted.design.variance(own))

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import warnings
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 
-from postproc.arrays import Floats
+from postproc.arrays import Bools, Floats
 from postproc.calibration.design import DesignMatrix
 from postproc.calibration.evidence import inverted
 from postproc.calibration.regression import Fit
@@ -81,6 +82,13 @@ class Gain:
     mean: float
     std_error: float
 
+    @classmethod
+    def between(cls, before: Floats, after: Floats, used: Bools) -> Self:
+        """Compare two sets of held-out errors (n, 3), over rows that count, (n,)."""
+        fall = (before**2 - after**2).sum(axis=1)[used]
+        error = float(fall.std() / np.sqrt(max(len(fall), 1)))
+        return cls(float(fall.mean()), error)
+
     @property
     def sure(self) -> bool:
         """Whether it is larger than its standard error."""
@@ -108,10 +116,7 @@ def gain_in(fit: Fit, number: int, folds: Folds) -> Gain:
         folds: Its rows in folds.
     """
     after, before = folds.errors(fit.combination.slices[number])
-    used = fit.rows.weight > 0
-    fall = (before**2 - after**2).sum(axis=1)[used]
-    error = float(fall.std() / np.sqrt(max(len(fall), 1)))
-    return Gain(float(fall.mean()), error)
+    return Gain.between(before, after, fit.rows.weight > 0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -176,6 +181,16 @@ class Folds:
             for out, p in zip(left, both, strict=True):
                 out[rows] = self.target[rows] - self.design[rows].times(self.prior * p)
         return left
+
+    def variance(self) -> Floats:
+        """Say how unsure every fold is of what the others tell of it, (n, 3)."""
+        gram = self.grams.sum(axis=0) + np.eye(len(self.prior))
+        out = np.empty_like(self.target)
+        for k, rows in enumerate(self.rows):
+            _, inverse, _ = inverted(gram - self.grams[k])
+            covariance = inverse * np.outer(self.prior, self.prior)
+            out[rows] = self.design[rows].variance(covariance)
+        return out
 
 
 def _with_and_without(

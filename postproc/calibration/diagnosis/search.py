@@ -7,11 +7,16 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from postproc.calibration.diagnosis.held_out import Gain, held_out_gain
+from postproc.calibration.diagnosis.held_out import (
+    Folds,
+    Gain,
+    held_out_gain,
+    regions,
+)
 from postproc.calibration.diagnosis.library import Library, Projection, reduce_some
 from postproc.calibration.diagnosis.score import Null, Score, rank
 from postproc.calibration.regression import Fit, fit_effects
-from postproc.model.effects.effect import FREE, NAMED, Candidate, Effect
+from postproc.model.effects.effect import FREE, NAMED, Candidate, Effect, Family
 
 # Finer settings around a candidate that a grid found.
 
@@ -199,6 +204,9 @@ MOST = 12  # additions
 LEVEL = 0.005  # probability of a false addition, whole library
 ALONE = 0.01  # level of the score test of the candidate itself
 BETTER = 1.0  # nats that replace one family by another
+NEAR = 3.0  # nats within which two causes are told together: odds of 20 to 1
+CERTAIN = 3.0  # standard errors by which one must predict other regions better
+MOST_OTHERS = 2  # that are told, and asked
 RECENT = 2  # additions looked at again after each further one
 
 Progress = Callable[[str, float], None]  # what is done, and how far everything is
@@ -278,7 +286,9 @@ def search(base: Fit, library: Library, null: Null, progress: Progress) -> Searc
             found = grown
             break
         found = settle(grown, len(grown.additions) - RECENT)
-    return settle(found, 0) if len(found.additions) > RECENT else found
+    if len(found.additions) <= RECENT:
+        return found
+    return settle(found, 0, elsewhere=True)
 
 
 def _grow(found: Search) -> Search:
@@ -307,17 +317,23 @@ def _best(found: Search, scores: list[Score]) -> Score:
     return name or best
 
 
-def settle(found: Search, first: int) -> Search:
-    """Look again at additions from some number on, now that the others are in."""
+def settle(found: Search, first: int, elsewhere: bool = False) -> Search:
+    """Look again at additions from some number on, now that the others are in.
+
+    Args:
+        found: The search.
+        first: The number.
+        elsewhere: Whether names that are alike are asked of regions of joint space.
+    """
     number = max(first, 0)
     while number < len(found.additions) - found.waves:
-        again = _again(found, number)
+        again = _again(found, number, elsewhere)
         number += len(again.additions) == len(found.additions)
         found = again
     return found
 
 
-def _again(found: Search, number: int) -> Search:
+def _again(found: Search, number: int, elsewhere: bool) -> Search:
     """Keep an addition, replace it by what now fits better, or drop it."""
     place = found.place(number)
     old = found.additions[number].candidate
@@ -330,10 +346,48 @@ def _again(found: Search, number: int) -> Search:
     present = next((s for s in scores if s.family == old.family), best)
     if best.evidence < present.evidence + BETTER:
         best = present
+    if elsewhere and best is present:
+        best = predicts_elsewhere(found, place, present, scores)
     other = found
     if best.best.effect != old.effect:
         other = put_instead(found, number, best)
     return _confirmed(found, number) if other is found else other
+
+
+def predicts_elsewhere(
+    found: Search, place: int, present: Score, scores: list[Score]
+) -> Score:
+    """Take the name, of those alike, that predicts regions of joint space best.
+
+    What was chosen early was chosen while much else was missing. Where the rows hardly
+    tell it from another name, poses that had no part in fitting either do.
+
+    Args:
+        found: The search.
+        place: Place of the effect in question among those of its fit.
+        present: Its score.
+        scores: Those of all that could take its place.
+    """
+    if present.family.tier != NAMED:
+        return present
+    fit = found.fit
+    region = regions(fit.batch.states.q)
+    best, left = present, Folds.of_fit(fit, region).errors()[0]
+    for rival in alike(present.family, present.evidence - NEAR, scores):
+        other = extend(fit, rival.best, instead_of=place)
+        other = replace(other, noise=fit.noise, rows=fit.rows, whitener=fit.whitener)
+        less = Folds.of_fit(other, region).errors()[0]
+        gain = Gain.between(left, less, fit.rows.weight > 0)
+        if gain.mean > CERTAIN * gain.std_error:
+            best, left = rival, less
+    return best
+
+
+def alike(own: Family, least: float, scores: list[Score]) -> list[Score]:
+    """List the best names, but for a family's own, that have some evidence [nats]."""
+    name = (own.effect, own.joint)
+    names = [s for s in scores if s.family.tier == NAMED and s.evidence >= least]
+    return [s for s in names if (s.family.effect, s.family.joint) != name][:MOST_OTHERS]
 
 
 def put_instead(found: Search, number: int, best: Score) -> Search:
@@ -374,9 +428,6 @@ def _drop(found: Search, number: int) -> Search:
 #
 # A name is preferred to a free form that is not clearly ahead of it, but that does not
 # make the rows speak for the name: such a free form is told with it.
-
-NEAR = 3.0  # nats: odds of 20 to 1
-MOST_OTHERS = 2
 
 
 @dataclass(frozen=True)

@@ -5,9 +5,13 @@ A small seeded selection of what `make undeclared` does at full size.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from postproc.calibration.diagnosis.library import Projection
+from postproc.calibration.diagnosis.search import extend, predicts_elsewhere, ranking
 from postproc.calibration.diagnosis.trace import trace
 from postproc.calibration.regression import fit_effects
 from postproc.model.effects import BASE_EFFECTS, propose
@@ -59,6 +63,30 @@ def test_a_warm_arm_follows_its_temperature(kind: str, seed: int, drift: bool) -
     assert found.source == ("temperature" if drift else "time")
     left = traced.search.ranking_under(fit)
     assert left[0].best.source == found.source
+
+
+@pytest.mark.parametrize("first", ["compliance", "load_backlash"])
+def test_of_names_alike_the_one_that_predicts_other_regions_is_taken(
+    first: str,
+) -> None:
+    """Whichever the rows were given first, as if they hardly told them apart."""
+    traced = trace(campaign(300, ("compliance",), 2.0).base_fit(), seed=0).search
+    effects = [a.candidate.family.effect for a in traced.additions]
+    number = effects.index("compliance")
+    added, place = traced.additions[number], traced.place(number)
+    scores = ranking(Projection.of(traced.fit, without=place), traced.library)
+    joint = added.candidate.family.joint
+    told = [
+        replace(s, evidence=added.score.evidence)
+        for name in ("compliance", "load_backlash")
+        for s in scores
+        if (s.family.effect, s.family.joint) == (name, joint)
+    ]
+    present = next(s for s in told if s.family.effect == first)
+    fit = extend(traced.fit, present.best, instead_of=place)
+    found = replace(traced, fit=fit)
+    best = predicts_elsewhere(found, place, present, told)
+    assert best.family.effect == "compliance"
 
 
 def test_nothing_is_asked_of_visits_before_where_all_are_missing() -> None:
