@@ -102,7 +102,10 @@ def _bad(work: PathWork) -> Iterator[tuple[int, tuple[str, float | None]]]:
             why = "points on its way make it no better"
             yield v, (why, with_points[v][1])
         elif v in otherwise:
-            why = "it would be worse if a flank is not as predicted"
+            why = (
+                "it would be worse if a flank is not as predicted: a measured path "
+                "(diagnose --path) tells"
+            )
             yield v, (why, otherwise[v])
         elif corner[v]:
             yield v, ("a rounded corner at one of its ends would move", None)
