@@ -11,7 +11,15 @@ import pytest
 from postproc.exceptions import PostprocError
 from postproc.model.combination import Combination
 from postproc.model.covariate import DRIVERS
-from postproc.model.effects import BY_NAME, EFFECTS, KNOWN, propose, restore
+from postproc.model.effects import (
+    BY_NAME,
+    EFFECTS,
+    KNOWN,
+    PLACES,
+    kind_of,
+    propose,
+    restore,
+)
 from postproc.model.effects.effect import (
     Effect,
     Family,
@@ -268,3 +276,11 @@ def test_a_spline_is_as_unsure_as_its_prior_where_it_has_ended() -> None:
     spread = np.concatenate([np.ones(len(both.scales) - len(prior)), prior])
     moved = beyond_variance(both, far, spread)
     np.testing.assert_allclose(moved, far.jacobian[:, :, 1] ** 2 * found[:, [1]])
+
+
+def test_every_effect_is_listed_by_its_own_name() -> None:
+    assert [kind_of(name).name for name in PLACES] == list(PLACES)
+    assert tuple(map(kind_of, PLACES)) == EFFECTS
+    assert list(BY_NAME) == list(PLACES)
+    with pytest.raises(KeyError):
+        kind_of("nonsense")
