@@ -15,19 +15,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from postproc.arrays import Bools, Floats, Ints, any_in_rows, spans
+from postproc.compensation.along_ways import CHANGED, AlongWays, ErrorAlong, refined
 from postproc.compensation.arc_splitting import NO_ARCS, WantedArcs
 from postproc.compensation.path_samples import PathSamples, measured_along, ways_of
 from postproc.model.model import CONFIRMED, Model
-from postproc.model.play import half_widths
 from postproc.motion.cycle import ProgramCycle
 from postproc.robot.cell import Cell
-from postproc.robot.direction import sides_along
 from postproc.robot.pose import lengths
-from postproc.robot.state import make_states
 from postproc.robot.trajectory import Motion
 
-FINE = 8  # parts of an interval in which a joint changes its flank
-CHANGED = 0.02  # of half the play: less between two samples is looked at no closer
 UNSURE = 1e-3  # likewise: a side that is known
 NO_FLANK = 1e-6  # [m] no joint's flank makes so little a difference
 GIVES = 4.0  # gaps over which a flank goes that gives way before it carries
@@ -129,110 +125,6 @@ class PathAccuracy:
         )
 
 
-@dataclass(frozen=True)
-class _Run:
-    """One of the two programs along its ways.
-
-    Attributes:
-        cycle: The program.
-        ways: Its ways.
-        least, most: Sides of the joints' plays, see `sides_along`, (s, 6) each.
-    """
-
-    cycle: ProgramCycle
-    ways: PathSamples
-    least: Floats
-    most: Floats
-
-    @classmethod
-    def of(
-        cls, cell: Cell, model: Model, cycle: ProgramCycle, ways: PathSamples,
-        width: Floats | float = 1.0,
-    ) -> _Run:  # fmt: skip
-        """Follow the joints' plays along the ways, each as wide as its gap there.
-
-        What is known of them where a way begins is what the way before it leaves, where
-        one leads there.
-
-        Args:
-            cell: The arm, its play as wide as its gaps.
-            model: The arm's error.
-            cycle: The program.
-            ways: Its ways.
-            width: Gaps over which each joint goes from flank to flank, (6,).
-        """
-        begins, alone = ways.begins, np.ones(len(ways.visit), dtype=bool)
-        alone[1:] = ways.source[1:] != ways.visit[:-1]
-        begins[ways.first[:-1]] = alone
-        play = cycle.arrived.past.play[ways.source[alone]]
-        half = width * half_widths(model, cell.arm, ways.q)
-        return cls(cycle, ways, *sides_along(cell.arm, ways.q, begins, play, half))
-
-    @property
-    def side(self) -> Floats:
-        """Where each joint lies in its play, the middle of what is known, (s, 6)."""
-        return (self.least + self.most) / 2
-
-    def changes(self) -> Bools:
-        """Tell behind which samples joints change their flanks, (s, 6)."""
-        moved = np.maximum(
-            np.abs(np.diff(self.least, axis=0, append=self.least[-1:])),
-            np.abs(np.diff(self.most, axis=0, append=self.most[-1:])),
-        )
-        return np.asarray(moved > CHANGED)
-
-
-@dataclass(frozen=True)
-class _Error:
-    """The error of the arm along ways.
-
-    Attributes:
-        cell: The arm and its payload.
-        model: The arm's error.
-        temperature: [deg C], NaN where not known.
-    """
-
-    cell: Cell
-    model: Model
-    temperature: float
-
-    def __call__(self, run: _Run, rows: Ints | slice, side: Floats) -> Floats:
-        """Predict it at samples (k,) with joints on some sides (k, 6): (k, 3) [m]."""
-        ways, targets = run.ways, run.cycle.targets
-        visit = ways.visit[ways.way[rows]]
-        states = make_states(
-            ways.q[rows],
-            side,
-            targets.tool[visit, :3, 3],
-            travel=_travel(run)[rows] if "travel" in self.model.needs else np.nan,
-            speed=targets.linear_speed[visit] * targets.override[visit],
-            temperature=self.temperature,
-            payload=self.cell.payload_mass,
-            payload_com=self.cell.payload_com,
-        )
-        return self.model.error(self.cell.arm, states)
-
-
-def _travel(run: _Run) -> Floats:
-    """Travel of every joint since its last reversal, along the ways, (s, 6) [rad]."""
-    ways, arrived = run.ways, run.cycle.arrived
-    moved = np.diff(ways.q, axis=0, prepend=ways.q[:1])
-    sense = np.sign(moved)
-    sense[ways.first[:-1]] = arrived.direction[ways.source]
-    rows = np.arange(len(sense))[:, None]
-    begin = ways.first[ways.way][:, None]
-    last = np.maximum.accumulate(np.where(sense != 0, rows, 0), axis=0)
-    sense = np.take_along_axis(sense, np.maximum(last, begin), axis=0)
-    turned = np.zeros(sense.shape, dtype=bool)
-    turned[1:] = sense[1:] != sense[:-1]
-    turned[ways.first[:-1]] = False
-    since = np.maximum.accumulate(np.where(turned, rows - 1, 0), axis=0)
-    here = since >= begin
-    place = np.take_along_axis(ways.q, np.maximum(since, begin), axis=0)
-    known = np.nan_to_num(arrived.travel[ways.source])[ways.way]
-    return np.asarray(np.abs(ways.q - place) + np.where(here, 0.0, known))
-
-
 def predict_paths(
     before: ProgramCycle,
     after: ProgramCycle,
@@ -264,9 +156,9 @@ def predict_paths(
     pair = [ours, ways_of(after, rows).as_many(ours)]
     cycles = before, after
     if len(rows):
-        pair = _refined(cell, model, cycles, pair)
-    runs = [_Run.of(cell, model, c, w) for c, w in zip(cycles, pair, strict=True)]
-    error = _Error(cell, model, temperature)
+        pair = refined(cell, model, cycles, pair)
+    runs = [AlongWays.of(cell, model, c, w) for c, w in zip(cycles, pair, strict=True)]
+    error = ErrorAlong(cell, model, temperature)
     tools = before.targets.tool[rows, :3, 3][pair[0].way]
     wanted, commanded = (cell.arm.tcp(w.q, tools) for w in pair)
     way, tangent = measured_along(wanted, pair[0])
@@ -285,16 +177,38 @@ def predict_paths(
         return found
     lead, _ = _groups(owner[rows])
     starts = pair[0].first[lead]
-    by_joint = _otherwise(runs[1], error, moved, tangent, starts)
-    told = model.in_motion
+    return _in_doubt(found, runs[1], error, moved, tangent, starts).joined(owner)
+
+
+def _in_doubt(
+    found: PathAccuracy,
+    run: AlongWays,
+    error: ErrorAlong,
+    moved: Floats,
+    tangent: Floats,
+    starts: Ints,
+) -> PathAccuracy:
+    """Add what the path would be if flanks were not as predicted.
+
+    Args:
+        found: What is predicted.
+        run: The compensated program.
+        error: The arm's error.
+        moved: From the wanted to the commanded places, (s, 3) [m].
+        tangent: Directions of the wanted path, (s, 3).
+        starts: The first sample of every move, (g,).
+    """
+    by_joint = _otherwise(run, error, moved, tangent, starts)
+    told = error.model.in_motion
     open_ = np.array([told.get(str(joint)) != CONFIRMED for joint in range(1, 7)])
-    far, doubtful = by_joint.max(axis=1), (by_joint * open_).max(axis=1)
+    giving = np.empty(0)
     if open_.any():
-        soft = _Run.of(cell, model, after, pair[1], np.where(open_, GIVES, 1.0))
+        width = np.where(open_, GIVES, 1.0)
+        soft = AlongWays.of(error.cell, error.model, run.cycle, run.ways, width)
         lying = np.where(open_, np.sin(np.pi / 2 * soft.side), soft.side)
         giving, _ = _apart(moved + error(soft, slice(None), lying), tangent)
-        found = replace(found, giving=giving)
-    return replace(found, otherwise=far, doubtful=doubtful).joined(owner)
+    far, doubtful = by_joint.max(axis=1), (by_joint * open_).max(axis=1)
+    return replace(found, otherwise=far, doubtful=doubtful, giving=giving)
 
 
 def _off_the_arcs(
@@ -339,7 +253,7 @@ def _largest_in(sizes: Floats, group: Ints, starts: Ints) -> Ints:
 
 
 def _otherwise(
-    run: _Run, error: _Error, moved: Floats, tangent: Floats, starts: Ints
+    run: AlongWays, error: ErrorAlong, moved: Floats, tangent: Floats, starts: Ints
 ) -> Floats:
     """Tell how far the path is if a joint that changes its flank did not, (s, 6) [m].
 
@@ -368,23 +282,6 @@ def _otherwise(
     return out
 
 
-def _refined(
-    cell: Cell,
-    model: Model,
-    cycles: tuple[ProgramCycle, ...],
-    pair: list[PathSamples],
-) -> list[PathSamples]:
-    """Look closer where a joint changes its flank, before or after."""
-    changes = np.zeros(len(pair[0].q), dtype=bool)
-    for cycle, ways in zip(cycles, pair, strict=True):
-        own = any_in_rows(_Run.of(cell, model, cycle, ways).changes())
-        changes |= own | np.append(own[1:], False) | np.append(False, own[:-1])
-    changes &= ~np.append(pair[0].begins[1:], True)
-    after = np.repeat(np.flatnonzero(changes), FINE - 1)
-    share = np.tile(np.arange(1, FINE) / FINE, int(changes.sum()))
-    return [ways.refined(after, share) for ways in pair]
-
-
 def _shift(shift: Floats, ways: PathSamples, way: Floats) -> Floats:
     """Interpolate what taught frames are off along ways, (s, 3) [m]."""
     whole = way[ways.first[1:] - 1][ways.way]
@@ -394,7 +291,7 @@ def _shift(shift: Floats, ways: PathSamples, way: Floats) -> Floats:
 
 
 def _deviations(
-    run: _Run, error: _Error, moved: Floats, tangent: Floats, way: Floats
+    run: AlongWays, error: ErrorAlong, moved: Floats, tangent: Floats, way: Floats
 ) -> Deviations:
     """Tell how far the TCP is from where it should be, as the model says.
 
@@ -422,7 +319,7 @@ def _apart(off: Floats, tangent: Floats) -> tuple[Floats, Floats]:
     return lengths(off - along[:, None] * tangent), along
 
 
-def _unsure(run: _Run, error: _Error) -> Floats:
+def _unsure(run: AlongWays, error: ErrorAlong) -> Floats:
     """Half of what flanks that are not known make, all joints added up, (s,) [m]."""
     out = np.zeros(len(run.least))
     for joint in range(6):
@@ -436,7 +333,7 @@ def _unsure(run: _Run, error: _Error) -> Floats:
     return out
 
 
-def _joints(run: _Run, error: _Error, rows: Ints, way: Floats) -> Ints:
+def _joints(run: AlongWays, error: ErrorAlong, rows: Ints, way: Floats) -> Ints:
     """Name the joint whose flank makes the most of what stands at samples (m,).
 
     That is how much the error changes if the joint went from the side on which it
@@ -471,7 +368,7 @@ def sides_on_move(
         The way up to k samples, (k,) [m], and the sides there, (k, 6).
     """
     ways = ways_of(cycle, np.array([v]))
-    run = _Run.of(cell, model, cycle, ways)
+    run = AlongWays.of(cell, model, cycle, ways)
     tool = np.broadcast_to(cycle.targets.tool[v, :3, 3], (len(ways.q), 3))
     way, _ = measured_along(cell.arm.tcp(ways.q, tool), ways)
     return way, run.side
@@ -520,9 +417,9 @@ def predicted_ways(
     """
     rows = np.flatnonzero(cycle.ways[1] >= 0)
     ways = _spaced(cell, cycle, ways_of(cycle, rows))
-    (ways,) = _refined(cell, model, (cycle,), [ways])
-    run = _Run.of(cell, model, cycle, ways)
-    error = _Error(cell, model, temperature)
+    (ways,) = refined(cell, model, (cycle,), [ways])
+    run = AlongWays.of(cell, model, cycle, ways)
+    error = ErrorAlong(cell, model, temperature)
     tools = cycle.targets.tool[rows, :3, 3][ways.way]
     place = cell.arm.tcp(ways.q, tools) + error(run, slice(None), run.side)
     flank = np.empty((len(ways.q), 6, 3))
