@@ -130,6 +130,13 @@ def job_model(job_folder):
     return load_model(job_folder / "model.json")
 
 
+@pytest.fixture(scope="session")
+def free_model(job_folder, job_cell) -> Model:
+    """A model of the same survey that has free forms, too."""
+    effects = (*BASE_EFFECTS, "joint_map", "elm")
+    return fit([job_folder / "survey.csv"], job_cell, effects=effects).model
+
+
 @pytest.fixture
 def desk(job_folder, tmp_path):
     """An empty folder to work in, with the cell and the model of the job folder."""

@@ -133,7 +133,7 @@ def fit_measurements(
     )
     survey = replace(survey, warnings=told)
     model = replace(model_of(fitted, survey), registration=placed)
-    report = report_fit(fitted, survey)
+    report = report_fit(fitted, survey, model)
     return Calibration(model, report, survey.with_states(fitted.batch.states))
 
 

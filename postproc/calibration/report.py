@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 
@@ -13,7 +14,7 @@ from postproc.calibration.measurements import DroppedRow, Measurements
 from postproc.calibration.regression import Fit, Unseen, observe
 from postproc.model.effects.effect import Effect
 from postproc.model.kinematics import Batch
-from postproc.model.model import Model
+from postproc.model.model import FreePart, Model
 from postproc.model.statistics import ErrorStatistics
 from postproc.robot.arm import Arm
 from postproc.robot.pose import MM
@@ -104,6 +105,30 @@ class DirectionReport:
 
 
 @dataclass(frozen=True)
+class FreeForms:
+    """What functions without a law have in the predicted errors of the rows.
+
+    Attributes:
+        names: The effects; none where named ones leave nothing to them.
+        rms_mm: Root mean square over the rows of what they predict together.
+        std_mm: Of its standard error.
+    """
+
+    names: tuple[str, ...] = ()
+    rms_mm: float = 0.0
+    std_mm: float = 0.0
+
+    @classmethod
+    def of(cls, part: FreePart) -> Self:
+        """Sum up what free forms predict."""
+        if not part.names:
+            return cls()
+        sizes = ((v**2).sum(axis=1).mean() for v in (part.error, part.std))
+        rms, std = (float(np.sqrt(v) / MM) for v in sizes)
+        return cls(part.names, rms, std)
+
+
+@dataclass(frozen=True)
 class FitReport:
     """Everything worth telling about a fit.
 
@@ -122,6 +147,7 @@ class FitReport:
         orientation_mrad: Estimated scatter of orientations about each axis, or None.
         found: What every effect does at every joint, largest first.
         directions: Wrong directions, or None where the file has none.
+        free: What functions without a law predict; None for published methods.
     """
 
     parameters: tuple[ParameterRow, ...]
@@ -139,10 +165,17 @@ class FitReport:
     orientation_mrad: float | None = None
     found: tuple[Found, ...] = ()
     directions: DirectionReport | None = None
+    free: FreeForms | None = None
 
 
-def report_fit(fit: Fit, survey: Measurements) -> FitReport:
-    """Put a fit into words and numbers."""
+def report_fit(fit: Fit, survey: Measurements, model: Model) -> FitReport:
+    """Put a fit into words and numbers.
+
+    Args:
+        fit: The fit.
+        survey: Its rows.
+        model: What it became.
+    """
     used = fit.rows.weight > 0
     shares = _shares(fit)
     effects: dict[str, float] = {}
@@ -169,6 +202,7 @@ def report_fit(fit: Fit, survey: Measurements) -> FitReport:
         orientation_mrad=None if fit.turns is None else fit.turns.std * 1e3,
         found=find(fit),
         directions=report_directions(fit, survey),
+        free=FreeForms.of(model.free_part(fit.batch.arm, fit.batch.states[used])),
     )
 
 

@@ -12,6 +12,7 @@ import numpy as np
 
 from postproc.arrays import Floats, Ints, Signs
 from postproc.cli.jobs import read_files
+from postproc.compensation.arrivals import ArrivalStates
 from postproc.compensation.compensate import compensate
 from postproc.compensation.in_time import InTime
 from postproc.compensation.options import AS_USUAL, Options
@@ -53,6 +54,7 @@ IN_TIME = (Column("v [mm/s]"), Column("AT_p [mm]"))  # where it was run in time
 PLANNED = (*COLUMNS[:5], Column(STATUS, "left"))  # without a model
 SHARES = (Column("effect", "left"), *map(Column, ("share mm", "x", "y", "z")))
 WHOLE = "predicted error"  # the sum of the shares
+PART = ("of it free forms", "+- free forms")  # what no law predicts, and how surely
 
 
 @dataclass(frozen=True)
@@ -150,19 +152,32 @@ class Explanation:
             print(self.summary())
         elif self.outcome is not None and self.outcome.arrivals is not None:
             shares = self.outcome.arrivals.shares(rows) / MM
-            for i, own in zip(rows.tolist(), shares, strict=True):
-                self._print_shares(i, own, self.outcome.arrivals.effects)
+            free = self.outcome.arrivals.free(rows) / MM
+            for i, own, part in zip(rows.tolist(), shares, free, strict=True):
+                self._print_shares(i, own, part, self.outcome.arrivals)
 
-    def _print_shares(self, i: int, shares: Floats, effects: Sequence[str]) -> None:
-        """Print which of k effects has which share (k, 3) [mm] in the error there."""
+    def _print_shares(
+        self, i: int, shares: Floats, free: Floats, told: ArrivalStates
+    ) -> None:
+        """Print which of k effects has which share in the error there.
+
+        Args:
+            i: The visit.
+            shares: Of the effects, (k, 3) [mm].
+            free: What free forms have of it, and how surely, (2, 3) [mm].
+            told: Names the effects.
+        """
         if not np.isfinite(shares).any():
             return
         sizes = np.linalg.norm(shares, axis=1)
         order = np.argsort(-sizes, kind="stable").tolist()
-        rows = [_share_cells(effects[k], shares[k]) for k in order]
+        rows = [_share_cells(told.effects[k], shares[k]) for k in order]
+        rows.append(_share_cells(WHOLE, shares.sum(axis=0)))
+        if told.free_forms:
+            rows += map(_share_cells, PART, free)
         place = f"{self._line(i, 'line ')} from {_few(self._from(i))}:"
         print(f"\n{printable(place)}")
-        print_table(SHARES, [*rows, _share_cells(WHOLE, shares.sum(axis=0))])
+        print_table(SHARES, rows)
 
     def summary(self) -> str:
         """Say in one line what came of the program."""

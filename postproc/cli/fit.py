@@ -34,13 +34,19 @@ from postproc.calibration.published import (
     span_of,
 )
 from postproc.calibration.registration import predict_registered
-from postproc.calibration.report import FitReport, Found
+from postproc.calibration.report import FitReport, Found, FreeForms
 from postproc.calibration.tables import DETECT, TableFormat, read_foreign
 from postproc.calibration.tables import TextTable as Cells
 from postproc.cli.diagnose import join_program, tell_directions
 from postproc.exceptions import MeasurementError, PostprocError
 from postproc.files import write_all
-from postproc.model.model import Model, PredictedReading, Prediction, load_model
+from postproc.model.model import (
+    FreePart,
+    Model,
+    PredictedReading,
+    Prediction,
+    load_model,
+)
 from postproc.model.registration import Registration
 from postproc.model.statistics import ErrorStatistics
 from postproc.report.terminal import Column, table_text
@@ -77,6 +83,10 @@ PREDICTED = (
     *("dx_mm", "dy_mm", "dz_mm"),  # predicted error
     *("sx_mm", "sy_mm", "sz_mm"),  # its standard error
     *("arrival_sx_mm", "arrival_sy_mm", "arrival_sz_mm"),  # of one arrival
+)
+FREE = (
+    *("free_dx_mm", "free_dy_mm", "free_dz_mm"),  # of it what no law predicts
+    *("free_sx_mm", "free_sy_mm", "free_sz_mm"),  # its standard error
 )
 READINGS = (
     *("reading_dx_mm", "reading_dy_mm", "reading_dz_mm"),  # less the nominal TCP
@@ -183,6 +193,7 @@ def tell_fit(report: FitReport, everything: bool = False) -> str:
     lines += _tell_rows(report, len(report.dropped) if everything else FEW)
     lines += tell_directions(report.directions, ROWS if everything else FEW)
     lines += [f"warning: {warning}" for warning in report.warnings]
+    lines += _tell_free(report.free)
     lines += _tell_scatter(report)
     return "\n".join(line for line in lines if line)
 
@@ -277,6 +288,16 @@ def _tell_rows(report: FitReport, most: int) -> list[str]:
         ids += f" and {more} more" if more > 0 else ""
         lines.append(f"suspect, but kept, for rows beside them agree: row {ids}")
     return lines
+
+
+def _tell_free(free: FreeForms | None) -> list[str]:
+    """Tell what functions without a law have in the predicted errors."""
+    if free is None:
+        return []
+    if not free.names:
+        return ["free forms: none, the named effects predict every correction"]
+    names = ", ".join(free.names)
+    return [f"free forms ({names}): {free.rms_mm:.3f} +- {free.std_mm:.3f} mm rms"]
 
 
 def _tell_scatter(report: FitReport) -> list[str]:
@@ -479,8 +500,8 @@ def predict_table(table: Cells, cell: Cell, model: Model) -> tuple[str, str]:
     """Add predicted errors to the rows of a table; lost beams get empty cells."""
     measured = from_table(table, cell.arm, cell.probes, positions=False)
     predicted = model.predict(cell.arm, measured.states)
-    header, parts = list(PREDICTED), _told(predicted)
-    summary = _inside(predicted)
+    header, parts, told = _told(predicted, model.free_part(cell.arm, measured.states))
+    summary = _inside(predicted) + told
     if table.has(*POSITION):
         left = measured.position - nominal_tcp(cell, measured.states) - predicted.error
         parts.append(left)
@@ -497,10 +518,11 @@ def predict_readings(
     Raises:
         PostprocError: The set-up is not known, and not to be found from the rows.
     """
-    rows, read, told = read_setup(table, cell, model, readings)
+    rows, read, placed = read_setup(table, cell, model, readings)
     predicted = model.predict(cell.arm, rows.states)
-    parts = [*_told(predicted), read.error, read.std]
-    header, summary = [*PREDICTED, *READINGS], _inside(predicted) + told
+    header, parts, told = _told(predicted, model.free_part(cell.arm, rows.states))
+    header, parts = [*header, *READINGS], [*parts, read.error, read.std]
+    summary = _inside(predicted) + told + placed
     if table.has(*POSITION):
         left = rows.position - nominal_tcp(cell, rows.states) - read.error
         parts.append(left)
@@ -563,9 +585,13 @@ def _apart(left: Floats, std: Floats) -> str:
     return f"; a term of {np.sqrt(more) / MM:.4f} mm per axis would explain the rest"
 
 
-def _told(predicted: Prediction) -> list[Floats]:
-    """List the columns of `PREDICTED`."""
-    return [predicted.error, predicted.std_model, predicted.std_arrival]
+def _told(predicted: Prediction, free: FreePart) -> tuple[list[str], list[Floats], str]:
+    """List the columns of a prediction, and tell of free forms if there are any."""
+    columns = [predicted.error, predicted.std_model, predicted.std_arrival]
+    if not free.names:
+        return [*PREDICTED], columns, ""
+    (told,) = _tell_free(FreeForms.of(free))
+    return [*PREDICTED, *FREE], [*columns, free.error, free.std], f"\nof it {told}"
 
 
 def _inside(predicted: Prediction) -> str:

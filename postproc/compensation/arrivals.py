@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -11,6 +12,7 @@ from postproc.arrays import Floats, Ints
 from postproc.compensation.targets import few_frames
 from postproc.language.visits import Visits
 from postproc.model.model import CHUNK, Model
+from postproc.robot.arm import Arm
 from postproc.robot.cell import Cell
 from postproc.robot.state import States, make_states
 
@@ -79,21 +81,50 @@ class ArrivalStates:
         Returns:
             See `Combination.shares`; NaN where joint angles or the tool are not known.
         """
-        out = np.full((len(rows), len(self.effects), 3), np.nan)
+        return self._by_block(rows, self.model.shares, len(self.effects))
+
+    @property
+    def free_forms(self) -> tuple[str, ...]:
+        """Name the effects without a law among those that have a share."""
+        return self.model.free_forms
+
+    def free(self, rows: Ints) -> Floats:
+        """Return what free forms predict at some visits, and how surely, (r, 2, 3) [m].
+
+        Args:
+            rows: Visits, ascending, as for `shares`.
+
+        Returns:
+            Their part of the error and its standard error per axis, base frame; NaN
+            where joint angles or the tool are not known.
+        """
+
+        def both(arm: Arm, states: States) -> Floats:
+            part = self.model.free_part(arm, states)
+            return np.stack([part.error, part.std], axis=1)
+
+        return self._by_block(rows, both, 2)
+
+    def _by_block(
+        self, rows: Ints, evaluate: Callable[[Arm, States], Floats], k: int
+    ) -> Floats:
+        """Evaluate k vectors at some visits, together with those beside them.
+
+        Args:
+            rows: Visits, ascending.
+            evaluate: Arm and n states -> (n, k, 3) [m].
+            k: How many they are.
+        """
+        out = np.full((len(rows), k, 3), np.nan)
         for block in np.unique(rows // CHUNK).tolist():
             first, end = np.searchsorted(rows, [block * CHUNK, (block + 1) * CHUNK])
             end_of_block = min((block + 1) * CHUNK, len(self.visits))
-            whole = np.arange(block * CHUNK, end_of_block)
-            out[first:end] = self._of_block(whole)[rows[first:end] - whole[0]]
-        return out
-
-    def _of_block(self, rows: Ints) -> Floats:
-        """Split the error at all visits of a block, (r, k, 3) [m]."""
-        states = self.states(rows)
-        told = np.concatenate([states.q, states.tool], axis=1)
-        known = np.flatnonzero(np.isfinite(told).all(axis=1))
-        out = np.full((len(rows), len(self.effects), 3), np.nan)
-        out[known] = self.model.shares(self.cell.arm, states[known])
+            states = self.states(np.arange(block * CHUNK, end_of_block))
+            told = np.concatenate([states.q, states.tool], axis=1)
+            known = np.flatnonzero(np.isfinite(told).all(axis=1))
+            whole = np.full((len(states), k, 3), np.nan)
+            whole[known] = evaluate(self.cell.arm, states[known])
+            out[first:end] = whole[rows[first:end] - block * CHUNK]
         return out
 
     def sizes(self, rows: Ints) -> Floats:

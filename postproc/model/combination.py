@@ -111,6 +111,14 @@ class Combination:
             kinds[name] = (alone, np.concatenate([c for _, c in own]))
         return kinds
 
+    @cached_property
+    def free(self) -> tuple[Combination, NDArray[np.int64]]:
+        """Take the free forms, with the columns of their parameters."""
+        kinds = [kind for kind in self._kinds.values() if kind[0].effects[0].free]
+        effects = tuple(e for alone, _ in kinds for e in alone.effects)
+        none = np.zeros(0, dtype=np.int64)
+        return Combination(effects), np.concatenate([none, *(c for _, c in kinds)])
+
     @property
     def share_names(self) -> tuple[str, ...]:
         """Names of the k shares of the error; of several, the last is the rest."""

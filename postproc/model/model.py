@@ -64,6 +64,21 @@ class Prediction:
 
 
 @dataclass(frozen=True)
+class FreePart:
+    """What free forms predict of the errors of n states: effects without a law.
+
+    Attributes:
+        names: Of the free forms that the model has; none: the other two are 0.
+        error: The error that the arm would have with them alone, (n, 3) [m].
+        std: Standard error of it per axis, (n, 3) [m].
+    """
+
+    names: tuple[str, ...]
+    error: Floats
+    std: Floats
+
+
+@dataclass(frozen=True)
 class PredictedReading:
     """What a survey's set-up reads in n states.
 
@@ -546,6 +561,35 @@ class Model:
             CHUNK,
         )
         return np.concatenate([np.zeros((0, len(effects.share_names), 3)), *parts])
+
+    @property
+    def free_forms(self) -> tuple[str, ...]:
+        """Name the free forms among what is compensated."""
+        free, _ = self.compensable()[0].free
+        return tuple(dict.fromkeys(e.name for e in free.effects))
+
+    def free_part(self, arm: Arm, states: States) -> FreePart:
+        """Tell what free forms have in the predicted errors, and how sure that is."""
+        if not self.free_forms:
+            return FreePart((), np.zeros((len(states), 3)), np.zeros((len(states), 3)))
+        parts = in_chunks(
+            lambda rows: self._free_part(arm, states[rows]), len(states), CHUNK
+        )
+        nothing = (np.zeros((0, 3)), np.zeros((0, 3)))
+        error, std = (np.concatenate(p) for p in zip(nothing, *parts, strict=True))
+        return FreePart(self.free_forms, error, std)
+
+    def _free_part(self, arm: Arm, states: States) -> tuple[Floats, Floats]:
+        """Evaluate free forms alone: errors and standard errors, (n, 3) [m] each."""
+        effects, values, covariance = self.compensable()
+        free, own = effects.free
+        batch = Batch(arm, states)
+        at = effects.at(batch, values)
+        prior_std = self.prior_std[self.effects.where(*COMPENSATED)][own]
+        variance = side_variance(free, at, values[own])
+        variance += beyond_variance(free, at, prior_std)
+        variance += parameter_variance(free, at, covariance[np.ix_(own, own)])
+        return free.error(batch, values[own]), np.sqrt(np.maximum(variance, 0.0))
 
     def measured_error(self, arm: Arm, states: States) -> Floats:
         """Predict what the survey's set-up would measure, (n, 3) [m]."""

@@ -106,6 +106,7 @@ def _columns(outcome: Outcome, rows: Ints) -> dict[str, list[Cells]]:
         "step_mm": [_steps(outcome, rows)],
         "std_error_mm": [_rounded(d.std_error[rows] / MM, 5)],
         **({} if told is None else {"share_mm": _shares(told, rows)}),
+        **({} if told is None else _free(told, rows)),
         **_speed(outcome, rows),
     }
 
@@ -138,6 +139,14 @@ def _shares(arrivals: ArrivalStates, rows: Ints) -> list[Cells]:
         lead = f"{', ' if number else '{'}{json.dumps(name)}: "
         parts.append(fixed(sizes[:, number], 5).behind(lead.encode()))
     return [*parts, Cells(b"}" if parts else b"{}")]
+
+
+def _free(arrivals: ArrivalStates, rows: Ints) -> dict[str, list[Cells]]:
+    """Write what free forms predict, and how surely; nothing without free forms."""
+    if not arrivals.free_forms:
+        return {}
+    error, std = np.moveaxis(arrivals.free(rows) / MM, 1, 0)
+    return {"free_mm": [_rounded(error, 5)], "free_std_mm": [_rounded(std, 5)]}
 
 
 def _literals(outcome: Outcome, rows: Ints) -> list[Cells]:

@@ -12,7 +12,7 @@ import pytest
 from postproc.calibration.fit import fit
 from postproc.calibration.measurements import DroppedRow
 from postproc.calibration.report import FitReport, find, report_fit
-from postproc.calibration.selection import fit_survey
+from postproc.calibration.selection import fit_survey, model_of
 from postproc.cli.fit import tell_fit
 from postproc.exceptions import MeasurementError, PostprocError
 from postproc.model.effects import BASE_EFFECTS
@@ -167,6 +167,32 @@ def test_all_of_a_fit_is_told_where_it_is_asked_for(tmp_path: Path) -> None:
     )
 
 
+def test_what_free_forms_predict_is_told(
+    job_folder, free_model, tmp_path: Path
+) -> None:
+    """By `fit` of its rows, by `predict` of every row; `none` where there are none."""
+    data, given = job_folder / "survey.csv", ("--cell", job_folder / "cell.toml")
+    model, out = tmp_path / "free.json", tmp_path / "predicted.csv"
+    free_model.save(model)
+    found = cli("predict", data, *given, "--model", model, "-o", out)
+    assert found.exit_code == 0, found.stderr
+    rows = np.genfromtxt(out, delimiter=",", names=True)
+    error, std = (
+        np.stack([rows[f"free_{k}{axis}_mm"] for axis in "xyz"], axis=1) for k in "ds"
+    )
+    rms, sure = (np.sqrt((v**2).sum(axis=1).mean()) for v in (error, std))
+    told = f"of it free forms (joint_map, elm): {rms:.3f} +- {sure:.3f} mm rms"
+    assert told in found.stderr + found.stdout
+    named = cli("predict", data, *given, "--model", job_folder / "model.json")
+    assert "free" not in named.stdout + named.stderr
+    for names, wanted in (
+        (BASE_EFFECTS, "free forms: none, the named effects predict every correction"),
+        ((*BASE_EFFECTS, "joint_map", "elm"), told.removeprefix("of it ")),
+    ):
+        fitted = cli("fit", data, *given, "-o", model, "--effects", ",".join(names))
+        assert wanted in fitted.stdout.splitlines()
+
+
 def test_what_physics_forbids_is_marked(tmp_path: Path) -> None:
     """A joint that rises under its load has no negative stiffness."""
     rng = np.random.default_rng(5)
@@ -179,7 +205,7 @@ def test_what_physics_forbids_is_marked(tmp_path: Path) -> None:
         noise = 2e-5 * rng.standard_normal((300, 3))
         survey = survey_of(states, batch.walk.tcp + lifted + noise)
         fitted = fit_survey(survey, NJ, ("geometry", "compliance"), None)
-        told[sign] = report_fit(fitted, survey)
+        told[sign] = report_fit(fitted, survey, model_of(fitted, survey))
     assert not any(f.impossible for f in told[1.0].found)
     bad = [f for f in told[-1.0].found if f.impossible]
     assert [(f.effect, f.joint) for f in bad] == [("compliance", 2)]

@@ -95,6 +95,25 @@ def test_the_shares_of_a_line(desk):
     np.testing.assert_allclose(whole[1:], -np.array(row["correction_mm"]), atol=0.05)
 
 
+def test_free_forms_are_told_below_the_error(desk, free_model):
+    """And how surely, as the report has it."""
+    model = desk.folder / "free.json"
+    free_model.save(model)
+    source = desk.put("job.pdl", program(FIRST, POSE))
+    given = ("--cell", desk.cell, "--model", model, "--line", 6)
+    lines = cli("explain", source, *given).stdout.splitlines()
+    (row,) = visits(cli("explain", source, *given, "--json", "-"))
+    for line, name, key in (
+        (lines[-2], "of it free forms", "free_mm"),
+        (lines[-1], "+- free forms", "free_std_mm"),
+    ):
+        told, size, *vector = line.rsplit(None, 4)
+        assert told == name
+        np.testing.assert_allclose(np.array(vector, float), row[key], atol=6e-5)
+        assert float(size) == pytest.approx(np.linalg.norm(row[key]), abs=1e-4)
+    assert lines[-3].startswith("predicted error")
+
+
 def test_every_visit_of_a_line_has_its_shares(desk):
     point = "p := POS(120.0, 200.0, 150.0, 0.0, 175.0, 0.0, '')"
     lines = (FIRST, point, "MOVE LINEAR TO p", POSE, "MOVE LINEAR TO p")

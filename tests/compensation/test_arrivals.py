@@ -57,6 +57,27 @@ def test_what_is_not_known_has_no_share(outcome):
     np.testing.assert_allclose(list(told[1]["share_mm"].values()), wanted, atol=2e-5)
 
 
+def test_what_free_forms_predict_is_told_beside_its_error(job_cell, free_model):
+    source = program(FIRST, POSE, LOST, NEXT)
+    outcome = compensate(source, job_cell, free_model, name="job.pdl")
+    rows = np.arange(len(outcome.visits))
+    told = list(target_rows(outcome, rows))
+    part = free_model.free_part(job_cell.arm, outcome.arrivals.states(rows[:2]))
+    for i in (0, 1):
+        wanted = np.array([part.error[i], part.std[i]]) / MM
+        given = [told[i]["free_mm"], told[i]["free_std_mm"]]
+        np.testing.assert_allclose(given, wanted, atol=1e-5)
+        shares = told[i]["share_mm"]
+        size = np.linalg.norm(told[i]["free_mm"])
+        assert abs(shares["joint_map"] - shares["elm"]) <= size + 1e-4
+        assert size <= shares["joint_map"] + shares["elm"] + 1e-4
+    assert told[2]["free_mm"] == told[2]["free_std_mm"] == [None] * 3
+
+
+def test_without_free_forms_nothing_is_told_of_them(outcome):
+    assert '"free_' not in report_text(outcome)
+
+
 def test_some_visits_are_told_as_among_all(outcome):
     whole = outcome.arrivals.shares(np.arange(len(outcome.visits)))
     rows = np.array([1, 3])

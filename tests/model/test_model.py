@@ -52,6 +52,33 @@ def test_a_model_file_gives_back_the_model(tmp_path: Path) -> None:
     np.testing.assert_allclose(a.std_arrival, b.std_arrival, rtol=1e-9)
 
 
+def test_free_forms_have_a_part_of_their_own() -> None:
+    """What they predict alone, and its scatter over parameters as unsure as theirs."""
+    saved = model(3, ("compliance", "elm", "joint_map"))
+    assert saved.free_forms == ("elm", "joint_map")
+    states = random_states(400, np.random.default_rng(3), PLATE)
+    states = states[~saved.predict(NJ, states).any_outside][:40]
+    part = saved.free_part(NJ, states)
+    effects, values, covariance = saved.compensable()
+    free = np.array([n.split(".")[0] in saved.free_forms for n in effects.names])
+    batch = Batch(NJ, states)
+    alone = effects.error(batch, np.where(free, values, 0.0))
+    np.testing.assert_allclose(part.error, alone, rtol=0, atol=1e-12)
+    at = effects.columns(effects.at(batch, values))[:, :, free]
+    rng = np.random.default_rng(4)
+    own = np.ix_(free, free)
+    drawn = rng.multivariate_normal(np.zeros(free.sum()), covariance[own], 4000)
+    np.testing.assert_allclose(part.std, (at @ drawn.T).std(axis=2), rtol=0.1)
+    assert (part.std > 0).all()
+
+
+def test_named_effects_leave_no_part_to_free_forms() -> None:
+    states = random_states(10, np.random.default_rng(3))
+    part = model().free_part(NJ, states)
+    assert part.names == ()
+    assert not part.error.any() and not part.std.any()
+
+
 def test_a_model_file_of_an_older_release_keeps_its_id(tmp_path: Path) -> None:
     data = model().to_dict()
     del data["ranges"]["oriented"]  # a key that was added later

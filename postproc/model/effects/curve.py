@@ -48,6 +48,7 @@ class Curve(Effect):
 
     name: ClassVar[str] = "curve"
     nameless: ClassVar[bool] = True
+    free: ClassVar[bool] = True
 
     direction: str = "joint 1"
     source: tuple[str, ...] = ("joint 1",)

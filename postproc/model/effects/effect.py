@@ -65,6 +65,7 @@ class Effect(ABC):
             weighs it alone, for what all others leave. None: it must be asked for.
         variation_of: Name of the plainer effect that a search takes first.
         nameless: True where finding it says no more than that something is there.
+        free: True for a function that may have any shape: what no law predicts.
         published: True for what a method of the literature trains: no fit of effects
             knows it.
     """
@@ -75,6 +76,7 @@ class Effect(ABC):
     unasked: ClassVar[Unasked | None] = None
     variation_of: ClassVar[str | None] = None
     nameless: ClassVar[bool] = False
+    free: ClassVar[bool] = False
     published: ClassVar[bool] = False
 
     @classmethod

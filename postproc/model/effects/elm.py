@@ -116,6 +116,7 @@ class Elm(JointEffect):
 
     name: ClassVar[str] = "elm"
     unasked: ClassVar[Unasked | None] = "last"
+    free: ClassVar[bool] = True
 
     layer: HiddenLayer
 

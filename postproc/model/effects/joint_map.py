@@ -46,6 +46,7 @@ class JointMap(JointEffect):
 
     name: ClassVar[str] = "joint_map"
     unasked: ClassVar[Unasked | None] = "last"
+    free: ClassVar[bool] = True
 
     bumps: tuple[tuple[int, float], ...] = ()
     width: float = 0.1

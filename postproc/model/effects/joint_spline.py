@@ -47,6 +47,7 @@ class JointSpline(JointEffect):
 
     name: ClassVar[str] = "joint_spline"
     unasked: ClassVar[Unasked | None] = "last"
+    free: ClassVar[bool] = True
 
     joints: tuple[int, ...] = (1, 2, 3, 4, 5, 6)
     lower: tuple[float, ...] = (-np.pi,) * 6

@@ -94,10 +94,14 @@ class PageShares:
     Attributes:
         effects: Names of the effects, and of their interaction.
         size_mm: Size of every share, (n, k).
+        free_mm, free_std_mm: What free forms predict, and its standard error per axis,
+            (n, 3); (n, 0) without free forms.
     """
 
     effects: tuple[str, ...]
     size_mm: Floats
+    free_mm: Floats
+    free_std_mm: Floats
 
 
 @dataclass(frozen=True)
@@ -168,10 +172,15 @@ def columns_of(outcome: Outcome) -> PageColumns:
 
 def shares_of(outcome: Outcome) -> PageShares:
     """Take the shares of effects out of an outcome, as far as reports tell them."""
-    told, n = outcome.reported.arrivals, len(outcome.visits)
+    told, rows = outcome.reported.arrivals, np.arange(len(outcome.visits))
+    none = np.empty((len(rows), 0))
     if told is None:
-        return PageShares((), np.empty((n, 0)))
-    return PageShares(told.effects, told.sizes(np.arange(n)) / MM)
+        return PageShares((), none, none, none)
+    sizes = told.sizes(rows) / MM
+    if not told.free_forms:
+        return PageShares(told.effects, sizes, none, none)
+    free, std = np.moveaxis(told.free(rows) / MM, 1, 0)
+    return PageShares(told.effects, sizes, free, std)
 
 
 # The columns of the program page out of a written report.
@@ -252,7 +261,9 @@ def shares_from(targets: Sequence[Mapping[str, Any]]) -> PageShares:
     effects = tuple(dict.fromkeys(str(name) for shares in told for name in shares))
     rows = [[shares.get(name) for name in effects] for shares in told]
     size = np.array(rows, dtype=np.float64).reshape(len(targets), len(effects))
-    return PageShares(effects, size)
+    axes = 3 if any("free_mm" in t for t in targets) else 0
+    free, std = (_numbers(targets, k, axes) for k in ("free_mm", "free_std_mm"))
+    return PageShares(effects, size, free, std)
 
 
 def _numbers(targets: Sequence[Mapping[str, Any]], key: str, width: int) -> Floats:
@@ -276,6 +287,8 @@ STEPS = {
     "correction_mm": 1e-4,
     "std_mm": 1e-4,
     "share_mm": 1e-4,
+    "free_mm": 1e-4,
+    "free_std_mm": 1e-4,
 }
 
 
@@ -317,10 +330,6 @@ def pack(columns: PageColumns, shares: PageShares) -> dict[str, Any]:
         shares: Of all visits.
     """
     effects = [visible(name) for name in shares.effects]
-    written = columns.original.shape[1]
-    width = {
-        "original": written, "change": written, "q_deg": 6, "share_mm": len(effects),
-    }  # fmt: skip
     numbers = {
         "original": columns.original,
         "change": columns.corrected - columns.original,
@@ -329,11 +338,13 @@ def pack(columns: PageColumns, shares: PageShares) -> dict[str, Any]:
         "correction_mm": columns.correction_mm,
         "std_mm": columns.std_mm,
         "share_mm": shares.size_mm[columns.visit - 1],
+        "free_mm": shares.free_mm[columns.visit - 1],
+        "free_std_mm": shares.free_std_mm[columns.visit - 1],
     }
     packed = {
         key: {
             "step": STEPS[key],
-            "width": width.get(key, 3),
+            "width": values.shape[1],
             "values": integers(values, STEPS[key]),
         }
         for key, values in numbers.items()

@@ -166,6 +166,7 @@ def test_a_target_shows_the_shares_of_the_effects(browser: Any, folder: Path) ->
     data = json.loads(report_text(outcome_of(30)))
     for target in data["targets"]:
         target["share_mm"] = {"backlash": 0.125, "<b>x</b>": 0.5, "thermal": None}
+        target |= {"free_mm": [0.3, 0.0, 0.4], "free_std_mm": [0.0, 0.03, 0.04]}
     show(browser, folder, "shares", program_report_from_json(data))
     click(browser, "#targets tbody tr[data-row='11']")
     rows = browser.find_elements("css selector", "#detail .shares tbody tr")
@@ -173,12 +174,16 @@ def test_a_target_shows_the_shares_of_the_effects(browser: Any, folder: Path) ->
     assert told == [["<b>x</b>", "0.5000"], ["backlash", "0.1250"], ["thermal", "–"]]
     bars = "return [...document.querySelectorAll('#detail meter')].map((m) => m.value)"
     assert browser.execute_script(bars) == [0.5, 0.125, 0]
+    detail = browser.find_element("css selector", "#detail").text
+    assert "error 0.3000 0.0000 0.4000 0.5000" in detail
+    assert "± std error 0.0000 0.0300 0.0400 0.0500" in detail
     assert complaints(browser) == []
     picture(browser, "shares")
     bare = program_report(outcome_of(30))
     show(browser, folder, "bare", bare)
     click(browser, "#targets tbody tr[data-row='11']")
     assert not browser.find_elements("css selector", "#detail .shares")
+    assert "free forms" not in browser.find_element("css selector", "#detail").text
 
 
 def test_a_click_into_the_view_leads_to_the_row(program: Any) -> None:

@@ -164,6 +164,18 @@ def test_an_outcome_says_which_effect_has_which_share(job_cell, job_model) -> No
     assert a["share_mm"] == b["share_mm"]
 
 
+def test_a_page_has_what_free_forms_predict(job_cell, job_model, free_model) -> None:
+    for model, width in ((job_model, 0), (free_model, 3)):
+        outcome = compensate(written(FIRST, POSE), job_cell, model, name="job.pdl")
+        direct = program.shares_of(outcome)
+        again = program.shares_from(json.loads(report_text(outcome))["targets"])
+        for key in ("free_mm", "free_std_mm"):
+            assert getattr(direct, key).shape == (2, width)
+            np.testing.assert_allclose(
+                getattr(direct, key), getattr(again, key), atol=1e-5
+            )
+
+
 def test_a_report_without_positions_has_no_view() -> None:
     data = json.loads(report_text(outcome_of(20)))
     for target in data["targets"]:
@@ -180,16 +192,20 @@ def test_an_empty_program_makes_a_page() -> None:
 def test_numbers_survive_packing() -> None:
     columns = columns_of(outcome_of(50))
     size = np.random.default_rng(2).uniform(0.0, 1.0, (50, 3))
-    packed = program.pack(columns, program.PageShares(("a", "b", NASTY), size))
+    free, std = size - 0.5, size / 3
+    shares = program.PageShares(("a", "b", NASTY), size, free, std)
+    packed = program.pack(columns, shares)
     for key in ("position_mm", "correction_mm", "std_mm", "q_deg", "original"):
         step = packed["numbers"][key]["step"]
         values = np.array(packed["numbers"][key]["values"], dtype=float) * step
         wanted = getattr(columns, key).ravel()
         np.testing.assert_allclose(values, wanted, atol=0.5001 * step)
-    told = packed["numbers"]["share_mm"]
-    assert told["width"] == len(packed["effects"]) == 3
-    values = np.array(told["values"]).reshape(50, 3) * told["step"]
-    np.testing.assert_allclose(values, size, atol=0.5001 * told["step"])
+    assert len(packed["effects"]) == 3
+    for key, given in (("share_mm", size), ("free_mm", free), ("free_std_mm", std)):
+        told = packed["numbers"][key]
+        assert told["width"] == 3
+        values = np.array(told["values"]).reshape(50, 3) * told["step"]
+        np.testing.assert_allclose(values, given, atol=0.5001 * told["step"])
     sides = np.array([{"-": -1, "0": 0, "+": 1}[s] for s in packed["direction"]])
     np.testing.assert_array_equal(sides.reshape(-1, 6), columns.direction)
 

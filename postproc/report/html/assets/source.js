@@ -49,7 +49,7 @@ class Detail {
       Page.element("h3", {}, title),
       Page.element("p", {}, `${c.moves[c.move[i]]}, ${status.told}${why ? ` – ${why}` : ""}`),
       ...this.source(i),
-      Page.element("div", { className: "pair" }, this.tool(i), this.shares(i), this.joints(i)),
+      Page.element("div", { className: "pair" }, this.tool(i), this.shares(i), this.free(i), this.joints(i)),
       this.numbers(i),
     );
     const here = this.node.querySelector(".here");
@@ -99,6 +99,15 @@ class Detail {
       Page.element("td", { className: "wide" }, Page.element("meter", { min: 0, max: most, value: known[k] }))));
     return Page.element("table", { className: "small shares" },
       Page.element("caption", {}, "Shares in the predicted error [mm]"), Page.element("tbody", {}, ...rows));
+  }
+
+  // What free forms, which no law explains, have of it, and how surely.
+  free(i) {
+    const c = this.columns, told = ["free_mm", "free_std_mm"].map((key) => [...c.of(key, i)]);
+    if (!told[0].length) return "";
+    const cells = (values) => [...values, Math.hypot(...values)].map((v) => Page.number(v, 4));
+    return Detail.table("Of it free forms, base frame [mm]", ["", "x", "y", "z", "length"],
+      [["error", ...cells(told[0])], ["± std error", ...cells(told[1])]]);
   }
 
   joints(i) {
