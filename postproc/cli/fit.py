@@ -301,11 +301,13 @@ def _tell_free(free: FreeForms | None) -> list[str]:
 
 
 def _tell_scatter(report: FitReport) -> list[str]:
-    """Tell of the noise, and of the errors before and after."""
-    lines = [
-        f"tracker {report.tracker_mm:.4f} mm, repeatability "
-        f"{report.repeatability_mm:.4f} mm per axis (estimated)"
-    ]
+    """Tell of the noise, which published methods do not know, and of the errors."""
+    lines = []
+    if report.tracker_mm or report.repeatability_mm:
+        lines.append(
+            f"tracker {report.tracker_mm:.4f} mm, repeatability "
+            f"{report.repeatability_mm:.4f} mm per axis (estimated)"
+        )
     if report.orientation_mrad is not None:
         lines.append(f"orientation {report.orientation_mrad:.4f} mrad (estimated)")
     lines.append(f"measured error  {_tell(report.before)}")

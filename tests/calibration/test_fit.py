@@ -97,6 +97,8 @@ def test_methods_of_the_source_are_fitted_from_files(tmp_path: Path) -> None:
     assert found.model.method == "elm" and not found.report.parameters
     held = random_states(10, np.random.default_rng(0), TOOL[None])
     assert found.model.predict(NJ, held).error.shape == (10, 3)
+    told = tell_fit(found.report)
+    assert "measured error" in told and "repeatability" not in told  # never estimated
 
 
 def test_all_rows_from_one_side_name_the_backlash(tmp_path: Path) -> None:

@@ -276,6 +276,7 @@ def comparison_report(comparison: Mapping[str, Any]) -> str:
         SCRIPTS,
         rows=rows,
         split=comparison["split"],
+        span=comparison.get("span_deg") or (),
     )
 
 

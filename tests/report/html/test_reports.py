@@ -141,7 +141,8 @@ def comparison() -> dict[str, Any]:
     row = {"min_mm": 0.1, "max_mm": 1.5, "mean_mm": 0.8, "std_mm": 0.3, "n": 150}
     better = {"min_mm": 0.01, "max_mm": 0.3, "mean_mm": 0.1, "std_mm": 0.05, "n": 150}
     rows = [{"method": "none", **row}, {"method": NASTY, **better}]
-    return {"rows": rows, "split": "300 rows to fit, 150 to test"}
+    split, span = "300 rows to fit, 150 to test", [347.2, 159.0, 252.4, 344, 239, 40.0]
+    return {"rows": rows, "split": split, "span_deg": span}
 
 
 def noise() -> dict[str, Any]:
@@ -221,6 +222,15 @@ def test_the_history_is_told_in_rows() -> None:
     page = calibration_report(model_file() | {"history": [told, {}]})
     assert "coupling of joint 6 by joint 5" in page and "&#39;mean_mm" not in page
     assert steps(None) == []
+
+
+def test_a_comparison_tells_how_far_the_joints_span() -> None:
+    told = "Joints 1 to 6 span 347, 159, 252, 344, 239, 40 deg"
+    assert told in comparison_report(comparison())
+    old = {k: v for k, v in comparison().items() if k != "span_deg"}
+    assert (
+        "span" not in comparison_report(old).partition("<main")[0].partition("<h1")[2]
+    )
 
 
 def test_running_means_follow_a_line() -> None:
