@@ -150,29 +150,45 @@ def targets_from_visits(visits: Visits, cell: Cell) -> tuple[Targets, Reasons]:
     lost |= place_ends(visits, tcp, reasons)
     lost |= _unnamed(visits, cell, reasons)
     slot, turns = visits.dialect.flags(visits.config, visits.configs, values)
-    rounding, distance, overlap = rounding_of(visits)
-    pred_start, pred = arc_per_start(
-        visits.motion,
-        visits.via,
-        visits.pred_start.astype(np.int64),
-        visits.pred.astype(np.int64),
-    )
-    targets = Targets(
+    branch = np.where(visits.config_given & poses, slot, -1), turns
+    places = np.where(lost, TargetKind.UNKNOWN, kind), tcp, joints
+    return _targets(visits, places, frames.tool, branch).slim(), reasons
+
+
+def _targets(
+    visits: Visits,
+    places: tuple[Ints, Floats, Floats],
+    tool: Floats,
+    branch: tuple[Ints, Floats],
+) -> Targets:
+    """Put targets together with how the program moves there.
+
+    Args:
+        visits: What the program says.
+        places: Kinds, TCP poses and joints, as `_places` returns them.
+        tool: TCP in the flange frame, (n, 4, 4) [m].
+        branch: Slots of the arm's branches, -1 where not told, and turns.
+    """
+    kind, tcp, joints = places
+    rounding, fly_distance, overlap = rounding_of(visits)
+    starts, before = (v.astype(np.int64) for v in (visits.pred_start, visits.pred))
+    pred_start, pred = arc_per_start(visits.motion, visits.via, starts, before)
+    return Targets(
         move=visits.motion,
-        kind=np.where(lost, TargetKind.UNKNOWN, kind),
+        kind=kind,
         via=visits.via,
         tcp=tcp,
         distance=np.where(
             visits.target == Meaning.FOR, visits.distance_mm * MM, np.nan
         ),
         joints=joints,
-        tool=frames.tool,
-        slot=np.where(visits.config_given & poses, slot, -1),
-        turns=turns,
+        tool=tool,
+        slot=branch[0],
+        turns=branch[1],
         nearest_turn=visits.nearest_turn,
         fly=visits.fly,
         rounding=rounding,
-        fly_distance=distance,
+        fly_distance=fly_distance,
         overlap=overlap,
         linear_speed=visits.lin_spd,
         rotary_speed=visits.rot_spd,
@@ -183,7 +199,6 @@ def targets_from_visits(visits: Visits, cell: Cell) -> tuple[Targets, Reasons]:
         pred_start=pred_start,
         pred=pred,
     )
-    return targets.slim(), reasons
 
 
 UNNAMED = (
