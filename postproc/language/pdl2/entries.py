@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import Self
 
 import numpy as np
 
@@ -343,59 +344,89 @@ class _Read:
         if entered.config is not None:
             self.config = entered.config
 
+    @classmethod
+    def of(
+        cls, kind: str, parts: Sequence[EntryPart | None], axes: Iterable[int]
+    ) -> Self:
+        """Take in all lines of an entry whose axes have these numbers."""
+        read, numbered = cls(kind), iter(axes)
+        for row, entered in enumerate(parts):
+            if entered is not None:
+                read.take(row, entered, numbered)
+        return read
+
+    def layout(self, shared: bool) -> Layout:
+        """Describe it."""
+        axes = tuple(sorted(self.aux))
+        return Layout(self.kind, shared, self.config, axes, self.seen)
+
+
+@dataclass
+class _Columns:
+    """What the entries of a file hold, as far as it has been read."""
+
+    numbers: Floats
+    slots: Indices
+    layout: Ints
+    arm: Ints
+    layouts: list[Layout] = field(default_factory=list)
+    aux: list[tuple[Ints, Floats]] = field(default_factory=list)
+
+    @classmethod
+    def blank(cls, k: int) -> Self:
+        """Make room for k entries."""
+        slots = np.full((k, 6), -1, dtype=np.int32)
+        layout, arm = np.zeros(k, dtype=np.int64), np.zeros(k, dtype=np.int64)
+        return cls(np.full((k, 6), np.nan), slots, layout, arm)
+
+    def fill(
+        self, lines: Lines, some: Ints, first: Ints, read: _Read, shared: bool
+    ) -> None:
+        """Enter those that are laid out alike.
+
+        Args:
+            lines: The file.
+            some: Which entries.
+            first: The row at which each begins.
+            read: What stands where in them.
+            shared: Whether other programs may read them.
+        """
+        for at, (row, slot) in enumerate(read.places):
+            if slot >= 0:
+                self.numbers[some, at] = _values(lines, first + row, slot)
+                self.slots[some, at] = lines.first[first + row] + slot
+        places = [read.aux[axis] for axis in sorted(read.aux)]
+        self.aux.append((some, _columns(lines, first, places)))
+        self.layout[some] = len(self.layouts)
+        self.layouts.append(read.layout(shared))
+
 
 def read_records(
     lines: Lines, said: ParsedShapes[EntryPart | None], records: Records
 ) -> Entries:
     """Read the entries of a file, layout by layout; no name is told yet to be twice."""
-    k = len(records.first)
-    form = said.form[lines.shape]
-    numbers = np.full((k, 6), np.nan)
-    slots = np.full((k, 6), -1, dtype=np.int32)
-    layout = np.zeros(k, dtype=np.int64)
-    layouts: list[Layout] = []
-    aux: list[tuple[Ints, Floats]] = []
-    arm = np.zeros(k, dtype=np.int64)
+    form, k = said.form[lines.shape], len(records.first)
+    c = _Columns.blank(k)
     for mine in _alike(form, records):
         a, b = int(records.first[mine[0]]), int(records.closed[mine[0]])
         parts = [said.said[f] for f in form[a:b].tolist()]
         head = said.said[int(form[records.head[mine[0]]])]
         assert head is not None
         if head.arm >= 0:
-            arm[mine] = _whole(_values(lines, records.head[mine], head.arm))
+            c.arm[mine] = _whole(_values(lines, records.head[mine], head.arm))
         for some, axes in _by_axes(lines, records.first, mine, parts):
-            read = _Read(kind_of(head.type)[0])
-            numbered = iter(axes)
-            for row, entered in enumerate(parts):
-                if entered is not None:
-                    read.take(row, entered, numbered)
-            first = records.first[some]
-            for at, (row, slot) in enumerate(read.places):
-                if slot >= 0:
-                    numbers[some, at] = _values(lines, first + row, slot)
-                    slots[some, at] = lines.first[first + row] + slot
-            own = sorted(read.aux.items())
-            aux.append((some, _columns(lines, first, [place for _, place in own])))
-            layout[some] = len(layouts)
-            layouts.append(
-                Layout(
-                    read.kind,
-                    head.shared,
-                    read.config,
-                    tuple(axis for axis, _ in own),
-                    read.seen,
-                )
-            )
+            read = _Read.of(kind_of(head.type)[0], parts, axes)
+            c.fill(lines, some, records.first[some], read, head.shared)
     return Entries(
         Rows(NameColumn(), np.empty(0, dtype=np.int32)),
         _names(lines, said, records),
         lines.line[records.first],
-        slim(layout),
-        tuple(layouts),
-        numbers,
-        slots,
-        _stacked(aux, k),
-        slim(arm),
+        slim(c.layout),
+        tuple(c.layouts),
+        c.numbers,
+        c.slots,
+        _stacked(c.aux, k),
+        slim(c.arm),
     )
 
 
