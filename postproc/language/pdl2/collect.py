@@ -258,36 +258,26 @@ def _visits_of(wanted: Ints, slots: Indices, literal: Indices) -> dict[int, int]
 MOST_AXES = 12  # auxiliary axes that are told
 
 
+TORN = "a number of the target belongs to another target too"
+APART = (
+    "some of its numbers stand in the program, others in another file: write them in "
+    "one"
+)
+
+
 def collect(machine: Machine) -> Visits:
     """Put the visits in program order and make arrays of them."""
     ordered = sorted(machine.arrivals.items(), key=lambda item: _order(item[0]))
-    runs = [run for _, run in ordered]
+    runs, world = [run for _, run in ordered], machine.world
     offsets = np.concatenate([[0], np.cumsum([len(run) for run in runs])])
     offsets = offsets.astype(np.int64)
-    numbering = Numbering.of(machine.world)
-    axes = _most_axes(runs, machine.world)
-    columns = VisitColumns(int(offsets[-1]), axes, len(numbering))
-    settings = SettingColumns(machine.world.start.payload_kg)
-    collector = Collector(machine, columns, settings)
-    collector.fill(zip(offsets.tolist(), runs, strict=False))
-    c, world = collector.columns, machine.world
-    if machine.exhausted:
-        c.reason[:] = collector.reasons["the program is too complex to be followed"]
-    collector.names.settle()
+    numbering = Numbering.of(world)
+    collector = _collected(machine, runs, offsets, len(numbering))
+    c = collector.columns
     give_back(len(c.line))
     literals, literal = find_literals(c, numbering, collector.names)
     literals, follows = find_uses(literals, c.slots, c.bases, literal, world.pinned)
-    overlapping = (literal < 0) & (c.slots[:, 0] >= 0) & (c.reason == 0)
-    if overlapping.any():
-        apart = overlapping & numbering.apart(c.slots)
-        why = "a number of the target belongs to another target too"
-        c.reason[overlapping] = collector.reasons[why]
-        if apart.any():
-            why = (
-                "some of its numbers stand in the program, others in another file: "
-                "write them in one"
-            )
-            c.reason[apart] = collector.reasons[why]
+    _mark_torn(collector, numbering, literal)
     pred_start, pred = _predecessors(machine, ordered, offsets)
     return Visits(
         files=tuple(world.files),
@@ -319,6 +309,41 @@ def collect(machine: Machine) -> Visits:
         dialect=PDL2_DIALECT,
         **collector.settings.columns(c.setting),
     )
+
+
+def _collected(
+    machine: Machine, runs: list[MoveRun], offsets: Ints, numbers: int
+) -> Collector:
+    """Fill the columns of all visits.
+
+    Args:
+        machine: Has followed the program.
+        runs: Of moves, in program order.
+        offsets: The first visit of every run, and how many there are, (r + 1,).
+        numbers: How many numbers the files hold.
+    """
+    world = machine.world
+    columns = VisitColumns(int(offsets[-1]), _most_axes(runs, world), numbers)
+    settings = SettingColumns(world.start.payload_kg)
+    collector = Collector(machine, columns, settings)
+    collector.fill(zip(offsets.tolist(), runs, strict=False))
+    if machine.exhausted:
+        why = "the program is too complex to be followed"
+        columns.reason[:] = collector.reasons[why]
+    collector.names.settle()
+    return collector
+
+
+def _mark_torn(collector: Collector, numbering: Numbering, literal: Indices) -> None:
+    """Give a reason to targets whose numbers are no literal of their own."""
+    c = collector.columns
+    torn = (literal < 0) & (c.slots[:, 0] >= 0) & (c.reason == 0)
+    if not torn.any():
+        return
+    apart = torn & numbering.apart(c.slots)
+    c.reason[torn] = collector.reasons[TORN]
+    if apart.any():
+        c.reason[apart] = collector.reasons[APART]
 
 
 def _order(key: Key) -> tuple[Point, int]:

@@ -390,20 +390,16 @@ class Collector:
 
     def _names(self, moves: ProgramMoves) -> None:
         """Enter the names of the points that moves go to."""
-        points, some = self.machine.world.initial.points, moves.point >= 0
+        points, names = self.machine.world.initial.points, NameColumn()
+        at = np.flatnonzero(moves.point >= 0)
+        if points is not None and len(at):
+            names = points.entries.name.take(moves.point[at])
         told = {
             k: goal.position.name for k, _, goal in moves.evaluated() if goal.position
         }
-        names, at = NameColumn(told.values()), np.array([*told], dtype=np.int64)
-        if points is not None and some.any():
-            written = points.entries.name.take(moves.point[some])
-            if not told:  # no name between them
-                self.columns.name[moves.visit[some]] = self.names.of(written)
-                return
-            names.extend(written)
-            at = np.append(at, np.flatnonzero(some))
-        order = np.argsort(at)
-        self.columns.name[moves.visit[at[order]]] = self.names.of(names.take(order))
+        if told:
+            at, names = _between(at, names, told)
+        self.columns.name[moves.visit[at]] = self.names.of(names)
 
     def _points(self, moves: ProgramMoves) -> None:
         """Fill moves to points that the variable file tells, layout by layout."""
@@ -554,6 +550,16 @@ def _in_order(numbers: Ints) -> list[int]:
     found, first = np.unique(numbers, return_index=True)
     ordered: list[int] = found[np.argsort(first)].tolist()
     return ordered
+
+
+def _between(
+    at: Ints, names: NameColumn, others: Mapping[int, str]
+) -> tuple[Ints, NameColumn]:
+    """Put names by what they stand at, others among them, ascending."""
+    places = np.append(np.array([*others], dtype=np.int64), at)
+    every, order = NameColumn(others.values()), np.argsort(places)
+    every.extend(names)
+    return places[order], every.take(order)
 
 
 def _set(names: list[str], numbers: list[float]) -> dict[str, Value]:
