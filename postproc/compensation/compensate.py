@@ -44,6 +44,7 @@ from postproc.compensation.program import (
     prepared,
     read_program,
 )
+from postproc.compensation.record import Sidecar
 from postproc.compensation.rewrite import (
     Output,
     check_output,
@@ -55,7 +56,7 @@ from postproc.files import variables_of
 from postproc.language.languages import language_of
 from postproc.language.source import Source
 from postproc.language.stamp import is_stamped
-from postproc.language.visits import ASSUMED_STILL, Visits, told_once
+from postproc.language.visits import ASSUMED_STILL, Diagnostic, Visits, told_once
 from postproc.model.model import Model
 from postproc.model.statistics import ErrorStatistics
 from postproc.robot.cell import Cell
@@ -223,56 +224,65 @@ def report(
         draft: What is to be written.
         setting: What it was compensated with.
     """
-    kept, output, in_time = draft.kept, draft.output, draft.in_time
-    cell, model, options = setting.cell, setting.model, setting.options
-    d, rows, visits = kept.decisions, kept.corrected, reading.visits
-    advice = no_advice if in_time is None else in_time.advice
-    files = tuple(output.stamps)
+    kept, output, visits = draft.kept, draft.output, reading.visits
+    off = assumed_off(name, setting.cell)
     return Outcome(
         program=name,
-        model=model.id,
+        model=setting.model.id,
         outputs=output.changed,
-        record=replace(
-            output.sidecar(
-                draft.reading, model.id, options.told(), tell_arrivals(visits, d, files)
-            ),
-            assumed=tuple(
-                (x.file, x.line, x.message)
-                for x in reading.diagnostics
-                if x.code == ASSUMED_STILL
-            ),
-            left=left_elsewhere(visits, d, files, reading.missed, reading.diagnostics),
-        ),
+        record=_record(reading, draft, setting),
         visits=visits,
-        decisions=d,
+        decisions=kept.decisions,
         before=ErrorStatistics.of_sizes(kept.before),
         after=ErrorStatistics.of_sizes(kept.after),
-        diagnostics=told_once(
-            (
-                *reading.diagnostics,
-                *followed_pages(visits),
-                *missing_file(visits),
-                *contradicted_base(visits, cell),
-                *tool_in_metres(visits),
-                *overruled_strings(visits, kept.overruled),
-                *untimed_runs(visits, kept.untimed),
-                *rounded_points(visits, kept.away),
-                *unsure_sides(visits, rows, d.side, d.std_error, advice),
-                *unsure_frames(visits, rows, d.std_error, cell),
-                *flank_steps(
-                    visits, rows, kept.position, d.side, setting.gap, cell.arm
-                ),
-                *listing_cost(visits, rows, d.q, cell.arm),
-                *(in_time.findings(visits) if in_time is not None else ()),
-                assumed_off(name, cell),
-            )
-        ),
+        diagnostics=told_once((*_findings(reading, draft, setting), off)),
         stages=setting.clock.stages,
         motion=largest_motion(kept.departure),
         position=kept.position,
         sources={source.name: source.data for source, _ in reading.originals},
         arrivals=_arrivals(visits, kept, setting),
-        in_time=in_time,
+        in_time=draft.in_time,
+    )
+
+
+def _record(reading: Reading, draft: Draft, setting: Setting) -> Sidecar:
+    """Keep what was changed, what was assumed, and what was left for other files."""
+    output, visits, d = draft.output, reading.visits, draft.kept.decisions
+    files = tuple(output.stamps)
+    arrivals = tell_arrivals(visits, d, files)
+    told = setting.options.told()
+    return replace(
+        output.sidecar(draft.reading, setting.model.id, told, arrivals),
+        assumed=tuple(
+            (x.file, x.line, x.message)
+            for x in reading.diagnostics
+            if x.code == ASSUMED_STILL
+        ),
+        left=left_elsewhere(visits, d, files, reading.missed, reading.diagnostics),
+    )
+
+
+def _findings(
+    reading: Reading, draft: Draft, setting: Setting
+) -> tuple[Diagnostic, ...]:
+    """Say what was found: in the program, in the plan, and in what came of it."""
+    kept, in_time, visits = draft.kept, draft.in_time, reading.visits
+    d, rows, cell = kept.decisions, kept.corrected, setting.cell
+    advice = no_advice if in_time is None else in_time.advice
+    return (
+        *reading.diagnostics,
+        *followed_pages(visits),
+        *missing_file(visits),
+        *contradicted_base(visits, cell),
+        *tool_in_metres(visits),
+        *overruled_strings(visits, kept.overruled),
+        *untimed_runs(visits, kept.untimed),
+        *rounded_points(visits, kept.away),
+        *unsure_sides(visits, rows, d.side, d.std_error, advice),
+        *unsure_frames(visits, rows, d.std_error, cell),
+        *flank_steps(visits, rows, kept.position, d.side, setting.gap, cell.arm),
+        *listing_cost(visits, rows, d.q, cell.arm),
+        *(in_time.findings(visits) if in_time is not None else ()),
     )
 
 
