@@ -144,10 +144,15 @@ def _send(there: int, messages: Queue[bytes]) -> None:
                 pipe.flush()
                 size = len(message)
                 del message
-                if size > LARGE:
-                    give_back()
+                _give_back(size)
     finally:
         os._exit(1)
+
+
+def _give_back(size: int) -> None:
+    """Return the room of a large message to the system, once nobody holds it."""
+    if size > LARGE:
+        give_back()
 
 
 def _told(exc: BaseException) -> bytes:
@@ -176,8 +181,7 @@ def _taken(pipe: IO[bytes]) -> Iterator[Any]:
             )
         kind, content = pickle.loads(message)
         del message
-        if size > LARGE:
-            give_back()
+        _give_back(size)
         if kind == _RAISED:
             raise content
         if kind == _END:
