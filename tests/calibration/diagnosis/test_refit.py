@@ -22,23 +22,24 @@ from tests.calibration.planted import ARM, BASE, TRACKER, states_of, survey
 SEED = 29
 
 
+Known = tuple[Measurements, Model, Batch, Revision]
+
+
 @pytest.fixture(scope="module")
-def known() -> tuple[Measurements, Model]:
-    """Twelve rows of an arm, and what a survey of 150 tells of it."""
+def known() -> Known:
+    """Twelve rows of an arm, and what a survey of 150 tells of it and may revise."""
     arm = virtual_arm(SEED, BASE)
     old = survey(arm, SEED, 150)
     rows = measurements(
         states_of(old), arm.measure(old, TRACKER, stream(SEED, "old")), "old"
     )
-    return rows[np.arange(12)], only_arm(base_model(rows))
-
-
-def test_directions_that_move_no_row_keep_their_uncertainty(
-    known: tuple[Measurements, Model],
-) -> None:
-    few, model = known
+    few, model = rows[np.arange(12)], only_arm(base_model(rows))
     batch = Batch(ARM, few.states)
-    revision = Revision.of(model, batch)
+    return few, model, batch, Revision.of(model, batch)
+
+
+def test_directions_that_move_no_row_keep_their_uncertainty(known: Known) -> None:
+    few, model, batch, revision = known
     count = len(model.values)
     assert 0 < revision.factor.shape[1] < count
     np.testing.assert_allclose(
@@ -54,12 +55,8 @@ def test_directions_that_move_no_row_keep_their_uncertainty(
     assert (left >= np.diag(revision.unseen) * (1 - 1e-9)).all()
 
 
-def test_columns_are_those_of_the_rows_that_are_asked_for(
-    known: tuple[Measurements, Model],
-) -> None:
-    few, model = known
-    batch = Batch(ARM, few.states)
-    revision = Revision.of(model, batch)
+def test_columns_are_those_of_the_rows_that_are_asked_for(known: Known) -> None:
+    few, _, batch, revision = known
     forth = revision.columns(batch)
     back = revision.columns(batch.arriving(-few.states.direction))
     alone = Batch(ARM, few.states.with_(direction=-few.states.direction))
