@@ -43,6 +43,7 @@ from postproc.robot.state import States
 Progress = Callable[[str], None]
 
 ENOUGH = 3.0  # nats that an effect must be worth: 20 to 1
+SURE = 6.0  # nats that what the tracker reads wrongly must be worth: 400 to 1
 FEW_ROWS = 450  # fewer leave many orders of waves alike
 STEPS = 12  # of the search for prior scales, which start near their best
 
@@ -100,8 +101,56 @@ def fit_best(
         progress: Told what is being done.
         motion: What readings of fixed points say of the tracker, if there are any.
     """
+    fitted = _fit_kept(arm, states, position, origin, setup, turns, progress, motion)
+    seen = sightings(fitted, origin)
+    if not seen:
+        return fitted
+    progress("fit again beside " + ", ".join(seen))
+    setup = (*setup, *seen)
+    return _fit_kept(arm, states, position, origin, setup, turns, progress, motion)
+
+
+def sightings(
+    fitted: Fit, origin: tuple[float, float, float] | None
+) -> tuple[str, ...]:
+    """Name what the tracker reads wrongly, where all else then has a law.
+
+    Where free forms are needed beside it, nobody can say who errs: the arm, in a way
+    that has no name, may look like a tracker. `diagnose` looks for more names there.
+
+    Args:
+        fitted: A fit of all else.
+        origin: Tracker position, where it is known.
+    """
+    if origin is None:
+        return ()
+    kept, batch = fitted.combination.effects, fitted.batch
+    names = [k.name for k in EFFECTS if k.unasked == "seen"]
+    more = propose(names, batch.arm, batch.states)
+    tried = beside(fitted, (*kept, *(e.seen_from(origin) for e in more)))
+    if len(keep_needed(tried, always=(), aside=kept, enough=SURE)) == len(kept):
+        return ()
+    laws = tuple(e for e in kept if not e.free)
+    needed = keep_needed(tried, always=(), aside=laws, enough=SURE)
+    if any(e.free for e in needed):
+        return ()
+    return tuple(e.name for e in needed if e not in kept)
+
+
+def _fit_kept(
+    arm: Arm,
+    states: States,
+    position: Floats,
+    origin: tuple[float, float, float] | None,
+    setup: tuple[str, ...],
+    turns: Turns | None,
+    progress: Progress,
+    motion: TrackerMotion | None,
+) -> Fit:
+    """Fit and weigh once, as `fit_best`."""
     batch = Batch(arm, states)
     base = propose((*BASE_EFFECTS, *setup), arm, states)
+    base = tuple(effect.seen_from(origin) for effect in base)
     kept = base
     progress("fit " + ", ".join(e.name for e in base))
     fitted = fit_effects(batch, position, base, origin, turns=turns, until=NEARLY)
@@ -190,7 +239,10 @@ def slipped(fitted: Fit) -> tuple[Effect, ...]:
 
 
 def keep_needed(
-    fitted: Fit, always: tuple[Effect, ...], aside: tuple[Effect, ...] = ()
+    fitted: Fit,
+    always: tuple[Effect, ...],
+    aside: tuple[Effect, ...] = (),
+    enough: float = ENOUGH,
 ) -> tuple[Effect, ...]:
     """Drop effects one after the other until each that is left is needed.
 
@@ -198,13 +250,14 @@ def keep_needed(
         fitted: A fit of all effects in question.
         always: Effects that are not in question.
         aside: Others that are not, and whose prior scales are not chosen anew.
+        enough: Evidence that each must be worth [nats].
     """
     weighing = _Weighing.of(fitted, aside)
     kept = [e for e in fitted.combination.effects if e not in aside]
     asked = [e for e in kept if e not in always]
     present = np.ones(len(weighing.owner), dtype=bool)
     now = weighing.evidence(present)
-    while found := weighing.least_needed(asked, present, now):
+    while found := weighing.least_needed(asked, present, now, enough):
         effect, present, now = found
         kept.remove(effect)
         asked.remove(effect)
@@ -241,14 +294,14 @@ class _Weighing:
         return cls(rest, group[~out], fitted.log_scale, owner)
 
     def least_needed(
-        self, asked: list[Effect], present: Bools, now: float
+        self, asked: list[Effect], present: Bools, now: float, enough: float
     ) -> tuple[Effect, Bools, float] | None:
         """Find the effect that is missed least, what is left, and the evidence then.
 
         Returns:
             None where each is worth enough.
         """
-        best, least = None, now - ENOUGH
+        best, least = None, now - enough
         for effect in asked:
             without = present & np.array([e is not effect for e in self.owner])
             found = self.evidence(without, least)

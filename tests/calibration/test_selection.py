@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from postproc.arrays import Floats
 from postproc.calibration.diagnosis.held_out import regions
@@ -20,7 +21,10 @@ from postproc.calibration.selection import (
 from postproc.model.effects import BASE_EFFECTS, propose
 from postproc.model.effects.transmission import Transmission
 from postproc.model.kinematics import Batch
+from postproc.model.model import COMPENSATED
 from postproc.robot.state import States
+from postproc.simulation import VirtualArm, VirtualArrivals, stream, virtual_arm
+from tests.calibration.planted import BASE, TRACKER, states_of, survey
 from tests.calibration.simulator import NJ, covariates, random_arm, random_states
 
 
@@ -48,6 +52,40 @@ def test_nothing_is_added_without_evidence() -> None:
 def test_what_is_there_is_kept() -> None:
     assert planted(2, "coupling") == (*BASE_EFFECTS, "coupling")
     assert {"joint_map", "joint_spline"} & set(planted(3, "joint_map"))
+
+
+def test_the_tracker_reads_nothing_wrongly_without_evidence() -> None:
+    for seed in (3, 4):
+        old = survey(virtual_arm(seed, BASE), seed, 300)
+        assert names_of(virtual_arm(seed, BASE), old) == BASE_EFFECTS
+
+
+@pytest.mark.parametrize("kind", ["azimuth", "refraction"])
+def test_what_a_tracker_reads_wrongly_is_the_set_up_s(kind: str) -> None:
+    """Where its place is known it is named, and the arm is not taken to err so."""
+    arm = virtual_arm(3, (*BASE, f"{kind}=0.5"))
+    old, fresh = survey(arm, 3, 300), survey(arm, 4, 100)
+    measured = arm.measure(old, TRACKER, stream(3, "measured"))
+    batch = Batch(NJ, states_of(fresh))
+    true = arm.nominal_tcp(fresh) + arm.error(fresh) - batch.tcp
+    left = {}
+    for told in (True, False):
+        origin = tuple(TRACKER) if told else None
+        fit = fit_best(NJ, states_of(old), measured, origin)
+        c = fit.combination
+        found = [e for e in c.effects if e.name in ("azimuth", "refraction")]
+        assert [e.name for e in found] == [kind] * told
+        assert not any(e.belongs_to() in COMPENSATED for e in found)
+        predicted = c.error(batch, np.where(c.where(*COMPENSATED), fit.values, 0.0))
+        left[told] = np.linalg.norm(true - predicted, axis=1).mean()
+    assert left[True] < 0.7 * left[False]
+
+
+def names_of(arm: VirtualArm, old: VirtualArrivals) -> tuple[str, ...]:
+    """Name what a fit keeps of a survey whose tracker's place is known."""
+    measured = arm.measure(old, TRACKER, stream(7, "measured"))
+    fit = fit_best(NJ, states_of(old), measured, tuple(TRACKER))
+    return tuple(e.name for e in fit.combination.effects)
 
 
 def test_gravity_shows_beside_waves_that_are_larger() -> None:

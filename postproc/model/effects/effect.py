@@ -23,7 +23,7 @@ from postproc.robot.arm import Arm
 from postproc.robot.state import States
 
 Origin = Literal["arm", "state", "setup"]
-Unasked = Literal["always", "weighed", "last"]
+Unasked = Literal["always", "weighed", "last", "seen"]
 
 FAR = 1e3  # [rad] a joint angle that no arm reaches: no range is known
 
@@ -62,7 +62,8 @@ class Effect(ABC):
         driven_by: Kind of covariate that drives it, one of `covariate.DRIVERS`.
         unasked: What a fit does with it that is not told which effects to fit:
             "always" fits it; "weighed" keeps it where the rows speak for it; "last"
-            weighs it alone, for what all others leave. None: it must be asked for.
+            weighs it alone, for what all others leave; "seen" weighs it for that where
+            the tracker's place is known. None: it must be asked for.
         variation_of: Name of the plainer effect that a search takes first.
         nameless: True where finding it says no more than that something is there.
         free: True for a function that may have any shape: what no law predicts.

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Self
+from typing import ClassVar, Self
 
 import numpy as np
 
 from postproc.arrays import Floats
 from postproc.exceptions import PostprocError
-from postproc.model.effects.effect import Effect, Origin
+from postproc.model.effects.effect import Effect, Origin, Unasked
 from postproc.model.kinematics import Batch
 
 
@@ -24,6 +24,8 @@ class Sighting(Effect):
         told: Whether somebody said so; else its place is found by a search, from what
             it reads wrongly.
     """
+
+    unasked: ClassVar[Unasked | None] = "seen"
 
     tracker: tuple[float, float, float] = (0.0, 0.0, 0.0)
     told: bool = True
