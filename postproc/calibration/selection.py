@@ -38,7 +38,8 @@ from postproc.robot.state import States
 # against: gravity of 0.1 mm does not show beside waves of 0.3 mm. So what was laid
 # aside is weighed once more, beside the free forms. What of these is a wave of a gear
 # is found as `diagnose` finds it, and weighed beside all else; in a short survey it
-# must also predict regions of joint space that it was not found in.
+# must also predict regions of joint space that it was not found in. Free forms that are
+# fine enough to take up the waves come last: a name holds where no row was, too.
 
 Progress = Callable[[str], None]
 
@@ -168,9 +169,10 @@ def _fit_kept(
     progress("fit " + ", ".join(e.name for e in kept))
     fitted = fit_effects(batch, position, (*kept, *waves), origin, fitted)
     needed = waves_needed(fitted, kept) if waves else kept
-    if len(needed) == len(fitted.combination.effects):
+    last = tuple(effect.beside_waves(states) for effect in needed)
+    if last == fitted.combination.effects:
         return fitted
-    return fit_effects(batch, position, needed, origin, fitted)
+    return fit_effects(batch, position, last, origin, fitted)
 
 
 def waves_in(fitted: Fit, kept: tuple[Effect, ...]) -> tuple[Effect, ...]:

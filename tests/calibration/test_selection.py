@@ -19,6 +19,7 @@ from postproc.calibration.selection import (
     waves_needed,
 )
 from postproc.model.effects import BASE_EFFECTS, propose
+from postproc.model.effects.joint_spline import SHORTEST, JointSpline
 from postproc.model.effects.transmission import Transmission
 from postproc.model.kinematics import Batch
 from postproc.model.model import COMPENSATED
@@ -167,6 +168,48 @@ def test_waves_in_what_splines_follow_are_named_with_order_and_size() -> None:
         )
         assert abs(found - order) < 0.1
         assert abs(size - mrad) < 4 * error
+
+
+def test_waves_are_named_before_splines_are_fine_enough_to_take_them_up() -> None:
+    rng = np.random.default_rng(9)
+    states, held = (narrow(random_states(n, rng)) for n in (900, 300))
+    measured, _ = random_arm(rng).measure(states, rng)
+    low, high = states.q[:, 2].min(), states.q[:, 2].max()
+    places, signs = rng.uniform(low, high, 15), rng.choice([-1.0, 1.0], (15, 1))
+
+    def planted(at: States) -> Floats:  # a wave, and spots in places of their own
+        q = at.q[:, [1]]
+        turned = (
+            3e-4 * np.sin(17.0 * q + 1.0),
+            2e-4 * np.exp(-0.5 * ((at.q[:, [2]] - places) / 0.013) ** 2) @ signs,
+        )
+        J = Batch(NJ, at).jacobian
+        moved: Floats = J[:, :, 1] * turned[0] + J[:, :, 2] * turned[1]
+        return moved
+
+    fit = fit_best(NJ, states, measured + planted(states), None)
+    plain = fit_best(NJ, states, measured, None)
+    effects = fit.combination.effects
+    waves = [e.waves[0] for e in effects if isinstance(e, Transmission)]
+    assert any(j == 2 and abs(order - 17.0) < 0.1 for j, order in waves)
+    (spline,) = [e for e in effects if isinstance(e, JointSpline)]
+    assert min(spline.lengths) < SHORTEST
+    coarse = JointSpline.propose(NJ, states)
+    others = tuple(coarse if e is spline else e for e in effects)
+    before = fit_effects(fit.batch, measured + planted(states), others)
+    at = Batch(NJ, held)
+    truth = plain.combination.error(at, plain.values) + planted(held)
+    fine, rough = (
+        np.linalg.norm(f.combination.error(at, f.values) - truth, axis=1).mean()
+        for f in (fit, before)
+    )
+    assert fine < 0.7 * rough
+
+
+def narrow(states: States) -> States:
+    """Move the joints by a third as far."""
+    middle = states.q.mean(axis=0)
+    return states.with_(q=middle + (states.q - middle) / 3.0)
 
 
 def waved(seed: int, rows: int) -> tuple[States, Floats]:

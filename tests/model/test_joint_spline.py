@@ -7,7 +7,13 @@ import pytest
 
 from postproc.calibration.regression import fit_effects
 from postproc.model.effects import BASE_EFFECTS, propose
-from postproc.model.effects.joint_spline import LEAST_ROWS, LONG, JointSpline
+from postproc.model.effects.joint_spline import (
+    FINEST,
+    LEAST_ROWS,
+    LONG,
+    SHORTEST,
+    JointSpline,
+)
 from postproc.model.kinematics import Batch
 from postproc.robot.state import States, make_states
 from tests.calibration.simulator import NJ, random_arm, random_states
@@ -39,6 +45,22 @@ def ranged(span: float) -> tuple[JointSpline, States]:
     (effect,) = propose(["joint_spline"], NJ, states)
     assert isinstance(effect, JointSpline)
     return effect, states
+
+
+@pytest.mark.parametrize(
+    ("rows", "finest"),
+    [(400, SHORTEST), (600, np.deg2rad(4.5)), (900, FINEST), (9000, FINEST)],
+)
+def test_it_is_finer_beside_named_waves_where_rows_allow(
+    rows: int, finest: float
+) -> None:
+    q = np.linspace(0.0, np.pi, rows)[:, None] * np.ones(6)
+    states = make_states(q, np.ones((rows, 6)), np.zeros((rows, 3)))
+    effect = JointSpline.propose(NJ, states)
+    assert effect.lengths == (LONG, SHORTEST)
+    long, short = effect.beside_waves(states).lengths
+    assert long == LONG
+    assert short == pytest.approx(finest)
 
 
 @pytest.mark.parametrize("span", [1.0, 3.0, 5.2, 5.3, 6.2, 7.5])

@@ -156,6 +156,14 @@ class Effect(ABC):
         """Return it as it is fitted beside others, which may hold a part of it."""
         return self
 
+    def beside_waves(self, states: States) -> Effect:
+        """Return it as it is fitted once the waves that it may hold are named.
+
+        Args:
+            states: States of the rows.
+        """
+        return self
+
     def told_apart(self, told: bool, batch: Batch) -> Effect:
         """Return it as it counts by what is known of the tracker's own drift.
 

@@ -6,7 +6,7 @@ can show, without naming them.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar, Self
 
 import numpy as np
@@ -23,8 +23,10 @@ from postproc.robot.state import States
 SCALE = 1e-4  # [rad]
 TURN = 2.0 * np.pi
 LONG = np.deg2rad(60.0)
-SHORTEST = np.deg2rad(5.0)
+SHORTEST = np.deg2rad(5.0)  # while waves are not named: a shorter one takes them up
+FINEST = np.deg2rad(3.0)  # and once they are
 ROWS_A_LENGTH = 10.0  # rows that the shortest length must see
+ROWS_BESIDE_WAVES = 15.0  # and the finer one that waves are named beside
 LEAST_RANGE = np.deg2rad(10.0)
 LEAST_ROWS = 100
 LONG_SURVEY = 600  # rows from which no other free form resolves more
@@ -60,8 +62,7 @@ class JointSpline(JointEffect):
         """Resolve as much as the number of rows allows, on every joint that moved."""
         low, high = states.q.min(axis=0), states.q.max(axis=0)
         span = np.minimum(high - low, TURN)
-        short = ROWS_A_LENGTH * float(span.max()) / max(len(states), 1)
-        short = float(np.clip(short, SHORTEST, LONG / 2))
+        short = _resolved(states, ROWS_A_LENGTH, SHORTEST)
         return cls(
             joints=tuple(int(j) + 1 for j in np.flatnonzero(span > LEAST_RANGE)),
             lower=tuple(map(float, low)),
@@ -75,6 +76,13 @@ class JointSpline(JointEffect):
         """Wait for a survey that is long enough, and moved a joint far enough."""
         moved = np.ptp(states.q, axis=0) > LEAST_RANGE
         return len(states) >= LEAST_ROWS and bool(moved.any())
+
+    def beside_waves(self, states: States) -> Self:
+        """Resolve what named waves leave: as much as more rows allow."""
+        short = _resolved(states, ROWS_BESIDE_WAVES, FINEST)
+        if short >= min(self.lengths):
+            return self
+        return replace(self, lengths=(max(self.lengths), short))
 
     def _parts(self) -> list[_LengthPart]:
         """List the functions of every joint and length."""
@@ -149,6 +157,13 @@ class JointSpline(JointEffect):
             out[:, part.j] += ended * prior_std[start] ** 2
             start += part.count
         return out
+
+
+def _resolved(states: States, rows: float, shortest: float) -> float:
+    """Say what length so many rows see, `shortest` at least [rad]."""
+    span = min(float(np.ptp(states.q, axis=0).max()), TURN)
+    seen = rows * span / max(len(states), 1)
+    return float(np.clip(seen, shortest, LONG / 2))
 
 
 @dataclass(frozen=True)
