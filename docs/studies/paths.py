@@ -47,10 +47,11 @@ xyz_mm = [3000.0, -2000.0, 1500.0]
 points_mm = [[-212.5, 96.0, 331.0], [148.0, -121.5, 268.0], [-58.0, 42.5, 514.0]]
 """
 LINES, ARCS = 40, 20
+REVERSALS = 4  # of every joint
 PROGRAMS: dict[str, tuple[str, ...]] = {
     "job": (),
     "plain": (),
-    "points": ("--path-mm", "0.1"),
+    "points": ("--path-mm", "0.1", "--take-up"),
     "diagnosed": (),
     "measured": ("--path-mm", "0.1", "--take-up"),
 }
@@ -120,12 +121,12 @@ def done(*arguments: object) -> None:
         raise RuntimeError(run.stderr)
 
 
-def fit_a_survey(folder: Path, *arm: object) -> Path:
+def fit_a_survey(folder: Path, *arm: object, reversals: int = 0) -> Path:
     """Write the cell, survey an arm and fit `model.json`; return the cell."""
     place = folder / "cell.toml"
     place.write_text(CELL)
     at, survey = ("--cell", place), folder / "survey.pdl"
-    done("survey", *at, "--poses", 300, "-o", survey)
+    done("survey", *at, "--poses", 300, "--reversals", reversals, "-o", survey)
     done("simulate", survey, *at, *arm, "-o", folder / "survey.csv")
     done("fit", folder / "survey.csv", *at, "-o", folder / "model.json")
     return place
@@ -146,7 +147,7 @@ def follow(ran: Path, *arm: object) -> dict[str, Any]:
 def study(seed: int, folder: Path, gears: str, programs: list[str]) -> None:
     """Print the figures of one arm."""
     arm = ("--seed", seed, "--gears", gears)
-    place = fit_a_survey(folder, *arm)
+    place = fit_a_survey(folder, *arm, reversals=REVERSALS)
     (folder / "job.pdl").write_text(job(seed, load_cell(place)))
     at = ("--cell", place)
     for name in programs:

@@ -12,7 +12,14 @@ from typing import Annotated, Any, Literal
 import numpy as np
 import pydantic
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field, NonNegativeFloat, PositiveInt
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    NonNegativeFloat,
+    PositiveFloat,
+    PositiveInt,
+)
 
 from postproc import _native
 from postproc.arrays import Bools, Floats, all_in_rows, any_in_rows, chunks, in_chunks
@@ -365,6 +372,9 @@ class RegistrationSection(ModelSection):
         return Registration(T, probes, ids)
 
 
+WidthSection = tuple[PositiveFloat, PositiveFloat]
+
+
 class ModelFile(ModelSection):
     """A whole model file."""
 
@@ -384,6 +394,7 @@ class ModelFile(ModelSection):
     statistics: dict[str, float]
     history: tuple[dict[str, Any], ...]
     registration: RegistrationSection | None = None
+    flank_widths: Annotated[tuple[WidthSection | None, ...], Field(max_length=6)] = ()
 
 
 def content_id(data: dict[str, Any]) -> str:
@@ -450,6 +461,8 @@ CHUNK = 5000  # states evaluated together: the columns stay in the cache
 COMPENSATED = ("arm", "state")
 READING = "reading_spread"  # statistic: see `Fit.reading_spread`
 UNSURE = "standard error above three times the survey's worst"
+Width = tuple[float, float]  # least and largest way from flank to flank [gaps]
+UNTOLD: Width = 1.0, np.inf
 CONFIRMED, NOT_SURE = "confirmed", "not sure"  # what a measured path says of a joint
 
 
@@ -473,6 +486,9 @@ class Model:
         statistics: Figures of the fit, units in their names.
         history: What was added to the ancestors, oldest first.
         registration: Of the survey, where it was in the tracker's frame.
+        flank_widths: Over how many gaps at the least and at the most each of the 6
+            joints goes from flank to flank, by reversals of the survey; UNTOLD where
+            they do not tell, empty where none were measured.
     """
 
     method: Method
@@ -491,6 +507,7 @@ class Model:
     statistics: dict[str, float] = field(default_factory=dict)
     history: tuple[dict[str, Any], ...] = ()
     registration: Registration | None = None
+    flank_widths: tuple[Width, ...] = ()
 
     @cached_property
     def id(self) -> str:
@@ -505,6 +522,11 @@ class Model:
         """
         told = (r["in_motion"] for r in reversed(self.history) if "in_motion" in r)
         return dict(next(told, {}))
+
+    @property
+    def reading_spread(self) -> float:
+        """How much wider readings scatter than their noise, see `Fit`."""
+        return self.statistics.get(READING, 1.0)
 
     @property
     def needs(self) -> frozenset[str]:
@@ -705,7 +727,7 @@ class Model:
         tracker = self.noise.tracker_std(at.tcp)[:, None]
         scatter = self.noise.arrival_variance(at.jacobian) + tracker**2
         std = np.sqrt(np.maximum(known, 0.0) + scatter)
-        return np.asarray(self.statistics.get(READING, 1.0) * std)
+        return np.asarray(self.reading_spread * std)
 
     def check_arm(self, arm: Arm, path: str | Path = "model") -> None:
         """Refuse an arm that the model was not made for.
@@ -757,6 +779,10 @@ class Model:
         if self.registration is not None:
             kept = RegistrationSection.of(self.registration)
             data["registration"] = kept.model_dump()
+        if self.flank_widths:
+            data["flank_widths"] = [
+                None if width == UNTOLD else list(width) for width in self.flank_widths
+            ]
         data = json.loads(json.dumps(data))
         return {"id": content_id(data), **data}
 
@@ -807,6 +833,7 @@ def load_model(path: str | Path) -> Model:
         statistics=file.statistics,
         history=file.history,
         registration=None if file.registration is None else file.registration.read(),
+        flank_widths=tuple(UNTOLD if w is None else w for w in file.flank_widths),
     )
     # A file of an older release lacks keys that have been added since: it keeps its id.
     vars(model)["id"] = file.id
