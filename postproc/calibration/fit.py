@@ -37,7 +37,8 @@ from postproc.model.combination import Combination
 from postproc.model.effects.placement import Placement
 from postproc.model.effects.probe import Probe
 from postproc.model.effects.tool_shift import ToolShift
-from postproc.model.model import Method, Model
+from postproc.model.model import Model
+from postproc.model.model_file import Method
 from postproc.model.registration import Registration
 from postproc.robot.arm import Arm
 from postproc.robot.cell import Cell
