@@ -111,7 +111,7 @@ def figures(
     found = [scored(source, source, at, arm, folder)]
     for model, more in (
         ("model.json", ()),
-        ("model.json", ("--path-mm", "0.1")),
+        ("model.json", ("--path-mm", "0.1", "--take-up")),
         ("better.json", ("--path-mm", "0.1", "--take-up")),
     ):
         known = ("--model", folder / model)
