@@ -82,7 +82,7 @@ def program(shape: str, share: float, cell: Cell) -> str:
 def study(seed: int, folder: Path) -> None:
     """Print the figures of one arm."""
     arm = ("--seed", seed)
-    place = paths.fit_a_survey(folder, *arm, reversals=paths.REVERSALS)
+    place = paths.fit_a_survey(folder, *arm)
     cell, at = load_cell(place), ("--cell", place)
     job, ran = folder / "job.pdl", folder / "ran.pdl"
     job.write_text(paths.job(seed, cell))
@@ -111,7 +111,7 @@ def figures(
     found = [scored(source, source, at, arm, folder)]
     for model, more in (
         ("model.json", ()),
-        ("model.json", ("--path-mm", "0.1", "--take-up")),
+        ("model.json", ("--path-mm", "0.1")),
         ("better.json", ("--path-mm", "0.1", "--take-up")),
     ):
         known = ("--model", folder / model)

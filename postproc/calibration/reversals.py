@@ -53,14 +53,17 @@ class Reversals:
 def split_reversals(
     survey: Measurements, arm: Arm
 ) -> tuple[Measurements, Reversals | None]:
-    """Part the arrivals from afar from the steps back behind them.
+    """Part reversals from the rest of a survey.
+
+    Their arrivals from afar go with them: as rows of a fit they would count what an arm
+    does at one pose many times.
 
     Args:
         survey: Rows in visit order.
         arm: Their arm.
 
     Returns:
-        The survey without the steps, and the reversals, None where there are none.
+        The survey without reversals, and these, None where there are none.
     """
     step = np.diff(survey.states.q, axis=0) @ arm.coupling.T
     moves = np.abs(step) > STILL
@@ -82,8 +85,7 @@ def split_reversals(
     rows = np.concatenate([np.arange(*own) for own in found])
     first = np.cumsum([0, *(end - begin for begin, end in found)])
     begins = np.array([begin for begin, _ in found])
-    steps = np.setdiff1d(rows, begins)
-    rest = np.setdiff1d(np.arange(len(survey)), steps)
+    rest = np.setdiff1d(np.arange(len(survey)), rows)
     return survey[rest], Reversals(survey[rows], first, drive[begins])
 
 
@@ -106,13 +108,13 @@ def flank_widths(model: Model, arm: Arm, found: Reversals) -> tuple[Width, ...]:
         the joint does not do what the model says.
     """
     return tuple(
-        _width([_tried(model, arm, found, int(i)) for i in own])
+        _width([_compared(model, arm, found, int(i)) for i in own])
         for own in (np.flatnonzero(found.drive == joint) for joint in range(6))
     )
 
 
 @dataclass(frozen=True)
-class _Tried:
+class _OneReversal:
     """One reversal: what is left of its k whitened readings, by what is said of it.
 
     Attributes:
@@ -124,7 +126,7 @@ class _Tried:
     step: Floats
 
 
-def _tried(model: Model, arm: Arm, found: Reversals, i: int) -> _Tried:
+def _compared(model: Model, arm: Arm, found: Reversals, i: int) -> _OneReversal:
     """Compare the steps of a reversal with all widths."""
     own = found.rows[np.arange(found.first[i], found.first[i + 1])]
     states, drive = own.states, int(found.drive[i])
@@ -151,10 +153,10 @@ def _tried(model: Model, arm: Arm, found: Reversals, i: int) -> _Tried:
     on_flank = predicted(np.ones(len(own)))
     by_width = [predicted(on_the_way(1.0 - back / w, w)) for w in WIDTHS]
     left = whitened(own.position) - on_flank
-    return _Tried(left, np.array(by_width) - on_flank)
+    return _OneReversal(left, np.array(by_width) - on_flank)
 
 
-def _width(tried: list[_Tried]) -> Width:
+def _width(tried: list[_OneReversal]) -> Width:
     """Say how wide the flank of a joint may be by its reversals [gaps]."""
     if not tried:
         return UNTOLD
