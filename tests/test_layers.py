@@ -40,7 +40,7 @@ KNOWING = {
     # The others move along the chain that it deviates.
     "model.combination": {"geometry"},
     # The native kernel makes its columns and those of the joints itself.
-    "model.model": {"geometry"},
+    "model.variance": {"geometry"},
     # Any survey must determine it, or be refused.
     "calibration.plausibility": {"geometry"},
     # What the methods of the literature train.

@@ -23,7 +23,7 @@ from postproc.model.effects.backlash_profile import BacklashProfile
 from postproc.model.effects.compliance import Compliance
 from postproc.model.effects.geometry import Geometry
 from postproc.model.kinematics import Batch
-from postproc.model.model import parameter_variance
+from postproc.model.variance import parameter_variance
 from postproc.motion import blending
 from postproc.motion import path as cartesian
 from postproc.motion.branches import OTHER_TURN, on_other_turns, on_written_turns

@@ -2,12 +2,13 @@
 
     python docs/studies/paths.py [--seeds 41 45] [--gears sharp] [--unmeasured]
 
-For each virtual arm: a survey of 300 poses from both sides, a model, a job of 40 lines
-of 300 to 900 mm and 20 arcs with stops and random approaches at 50 mm/s anywhere in
-front of the arm, compensated at its targets; the arm then runs both programs, and its
-paths are compared every millimetre with those that were asked for. The last two
-programs know what a tracker read that followed the compensated one, which
-`--unmeasured` leaves out: to diagnose that takes minutes where weight chooses flanks.
+For each virtual arm: a survey of 300 poses from both sides and of reversals, a model, a
+job of 40 lines of 300 to 900 mm and 20 arcs with stops and random approaches at 50 mm/s
+anywhere in front of the arm, compensated at its targets, and with points on its ways
+and stops that take up play. The arm then runs all programs, and its paths are compared
+every millimetre with those that were asked for. The last two programs know what a
+tracker read that followed the compensated one, which `--unmeasured` leaves out: to
+diagnose that takes minutes where weight chooses flanks.
 The last columns are what 95 % of all the way stays within, and the most by which a path
 is worse than without points (those with points) or as written: of the moves' largest
 deviations, and at any place of a move.
@@ -47,10 +48,11 @@ xyz_mm = [3000.0, -2000.0, 1500.0]
 points_mm = [[-212.5, 96.0, 331.0], [148.0, -121.5, 268.0], [-58.0, 42.5, 514.0]]
 """
 LINES, ARCS = 40, 20
+REVERSALS = 4  # of every joint
 PROGRAMS: dict[str, tuple[str, ...]] = {
     "job": (),
     "plain": (),
-    "points": ("--path-mm", "0.1"),
+    "points": ("--path-mm", "0.1", "--take-up"),
     "diagnosed": (),
     "measured": ("--path-mm", "0.1", "--take-up"),
 }
@@ -60,7 +62,7 @@ STATES = {
     "plain": "compensated",
     "points": "with points",
     "diagnosed": "compensated, diagnosed",
-    "measured": "with points and stops",
+    "measured": "with points, after a track",
 }
 WITHOUT = {"points": "plain", "measured": "diagnosed"}  # the same without points
 RUN = "from postproc.cli import main; main()"
@@ -120,12 +122,12 @@ def done(*arguments: object) -> None:
         raise RuntimeError(run.stderr)
 
 
-def fit_a_survey(folder: Path, *arm: object) -> Path:
+def fit_a_survey(folder: Path, *arm: object, reversals: int = 0) -> Path:
     """Write the cell, survey an arm and fit `model.json`; return the cell."""
     place = folder / "cell.toml"
     place.write_text(CELL)
     at, survey = ("--cell", place), folder / "survey.pdl"
-    done("survey", *at, "--poses", 300, "-o", survey)
+    done("survey", *at, "--poses", 300, "--reversals", reversals, "-o", survey)
     done("simulate", survey, *at, *arm, "-o", folder / "survey.csv")
     done("fit", folder / "survey.csv", *at, "-o", folder / "model.json")
     return place
@@ -146,7 +148,7 @@ def follow(ran: Path, *arm: object) -> dict[str, Any]:
 def study(seed: int, folder: Path, gears: str, programs: list[str]) -> None:
     """Print the figures of one arm."""
     arm = ("--seed", seed, "--gears", gears)
-    place = fit_a_survey(folder, *arm)
+    place = fit_a_survey(folder, *arm, reversals=REVERSALS)
     (folder / "job.pdl").write_text(job(seed, load_cell(place)))
     at = ("--cell", place)
     for name in programs:
@@ -173,7 +175,7 @@ def study(seed: int, folder: Path, gears: str, programs: list[str]) -> None:
         true = json.loads(run.to_json())["path"]
         for move in ("LINEAR", "CIRCULAR"):
             own = [path for path in told if path["move"] == move]
-            tell(f"{seed:4d}  {STATES[name]:22}  {move:8}", own, true,
+            tell(f"{seed:4d}  {STATES[name]:26}  {move:8}", own, true,
                  "before" if name == "job" else "after",
                  compared(paths[name], paths[WITHOUT.get(name, "job")], own),
             )  # fmt: skip

@@ -28,7 +28,8 @@ from postproc.model.combination import Combination
 from postproc.model.effects.maps import MOST_CENTRES
 from postproc.model.effects.placement import Placement
 from postproc.model.kinematics import Batch
-from postproc.model.model import Method, Model
+from postproc.model.model import Model
+from postproc.model.model_file import Method
 from postproc.model.statistics import ErrorStatistics
 
 OUT = Path(__file__).parents[1] / "real-arms.md"

@@ -25,6 +25,11 @@ from postproc.calibration.published import fit_method, too_wide
 from postproc.calibration.registration import register, typical_gap
 from postproc.calibration.regression import Fit
 from postproc.calibration.report import FitReport, report_fit, report_method
+from postproc.calibration.reversals import (
+    flank_widths,
+    split_reversals,
+    tell_widths,
+)
 from postproc.calibration.selection import Progress, fit_survey, model_of, silent
 from postproc.calibration.tables import DETECT, TableFormat
 from postproc.calibration.tool_groups import find_groups, find_wrong_nest
@@ -32,7 +37,8 @@ from postproc.model.combination import Combination
 from postproc.model.effects.placement import Placement
 from postproc.model.effects.probe import Probe
 from postproc.model.effects.tool_shift import ToolShift
-from postproc.model.model import Method, Model
+from postproc.model.model import Model
+from postproc.model.model_file import Method
 from postproc.model.registration import Registration
 from postproc.robot.arm import Arm
 from postproc.robot.cell import Cell
@@ -113,6 +119,7 @@ def fit_measurements(
         points = stated_points(survey)
         survey, placed = into_base_frame(survey, cell.arm)
         tracker, setup = placed.tracker, (Placement.name,)
+    survey, reversals = split_reversals(survey, cell.arm)
     check_survey(survey, cell.arm)
     survey = check_orientations(survey, cell.arm)
     told = (*survey.warnings, *lost_without(cell.arm, survey))
@@ -133,6 +140,10 @@ def fit_measurements(
     )
     survey = replace(survey, warnings=told)
     model = replace(model_of(fitted, survey), registration=placed)
+    if reversals is not None:
+        widths = flank_widths(model, cell.arm, reversals)
+        model = replace(model, flank_widths=widths)
+        survey = replace(survey, warnings=(*survey.warnings, tell_widths(widths)))
     report = report_fit(fitted, survey, model)
     return Calibration(model, report, survey.with_states(fitted.batch.states))
 

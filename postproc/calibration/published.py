@@ -19,8 +19,10 @@ from postproc.model.effects.elm import HiddenLayer
 from postproc.model.effects.geometry import Geometry
 from postproc.model.effects.maps import Interpolation
 from postproc.model.kinematics import Batch
-from postproc.model.model import Method, Model, Ranges
+from postproc.model.model import Model
+from postproc.model.model_file import Method
 from postproc.model.noise import Noise
+from postproc.model.ranges import Ranges
 from postproc.robot.arm import Arm
 from postproc.robot.pose import MM
 from postproc.robot.state import States

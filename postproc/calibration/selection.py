@@ -25,7 +25,8 @@ from postproc.model.effects.effect import Effect
 from postproc.model.effects.probe_turn import ProbeTurn
 from postproc.model.effects.tool_shift import ToolShift
 from postproc.model.kinematics import Batch
-from postproc.model.model import COMPENSATED, READING, Model, Ranges
+from postproc.model.model import COMPENSATED, READING, Model
+from postproc.model.ranges import Ranges
 from postproc.robot.arm import Arm
 from postproc.robot.pose import MM
 from postproc.robot.state import States

@@ -275,3 +275,53 @@ def _whitened(arm: Arm, states: States) -> tuple[Floats, tuple[str, ...]]:
     both = [base.columns(Batch(arm, s)) for s in (states, back)]
     X = np.concatenate(both, axis=1) * base.scales / TYPICAL_NOISE
     return X, base.names
+
+
+# Where drives turn back step by step.
+
+FAR = 0.25  # of the poses, those at which a drive moves the probe the farthest
+REPEATS = 1e-5  # [rad] a usual scatter of every joint
+MORE = 3  # times as often at the most, where a drive moves the probe less than others
+
+
+def where_to_reverse(
+    arm: Arm, design: Design, probes: Floats, count: int
+) -> list[tuple[int, int]]:
+    """Choose poses at which each drive shows well how it crosses its gap.
+
+    Args:
+        arm: The arm.
+        design: The poses of a survey.
+        probes: Probe points in the flange frame, (k, 3) [m].
+        count: How many poses for the drive that shows best; for others up to MORE times
+            as many.
+
+    Returns:
+        Poses and drives, both from 0: of the poses at which a drive moves the probe
+        far beside what readings there scatter by, those that are evenly spread over
+        its joint's angles.
+
+    Raises:
+        PostprocError: There are fewer poses than are asked for.
+    """
+    if MORE * count > len(design.q):
+        raise PostprocError(
+            f"--reversals {count} need {MORE * count} poses, and there are "
+            f"{len(design.q)}. Ask for more --poses"
+        )
+    tools = np.atleast_2d(probes)[design.probe]
+    by_joint = Batch(arm, make_states(design.q, tool=tools)).jacobian
+    by_drive = by_joint @ np.linalg.inv(arm.coupling)
+    scatter = np.hypot(TYPICAL_NOISE, REPEATS * np.linalg.norm(by_joint, axis=(1, 2)))
+    clear = np.linalg.norm(by_drive, axis=1) / scatter[:, None]
+    many = max(MORE * count, int(FAR * len(clear)))
+    far = np.argsort(-clear, axis=0, kind="stable")[:many]
+    usual = np.median(np.take_along_axis(clear, far, axis=0), axis=0)
+    times = np.clip((usual.max() / usual) ** 2, 1.0, MORE)
+    chosen = []
+    for drive, often in enumerate(np.round(count * times).astype(int).tolist()):
+        poses = far[:, drive]
+        along = poses[np.argsort(design.q[poses, drive], kind="stable")]
+        places = (np.arange(often) + 0.5) / max(often, 1) * many
+        chosen += [(int(pose), drive) for pose in along[places.astype(np.int64)]]
+    return chosen

@@ -84,7 +84,8 @@ TakeUpOption = Annotated[
     typer.Option(
         "--take-up",
         help="With --path-mm: stop once more where a move begins, to take up play, "
-        "where a measured path confirms the flanks (diagnose --path).",
+        "where reversals (survey --reversals) or a measured path (diagnose --path) "
+        "confirm the flanks.",
     ),
 ]
 ApproachOption = Annotated[

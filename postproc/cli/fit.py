@@ -35,6 +35,7 @@ from postproc.calibration.published import (
 )
 from postproc.calibration.registration import predict_registered
 from postproc.calibration.report import FitReport, Found, FreeForms
+from postproc.calibration.reversals import split_reversals
 from postproc.calibration.tables import DETECT, TableFormat, read_foreign
 from postproc.calibration.tables import TextTable as Cells
 from postproc.cli.diagnose import join_program, tell_directions
@@ -402,7 +403,7 @@ def compare_files(
         PostprocError: A file cannot be used.
     """
     cell = load_cell(cell_path)
-    survey = read_surveys(data, cell, reading)
+    survey, _ = split_reversals(read_surveys(data, cell, reading), cell.arm)
     pairs, said = held.pairs(survey, cell, reading)
     trials = [_trial(train, test, cell, frame) for train, test in pairs]
     for trial in trials:

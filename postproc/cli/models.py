@@ -82,6 +82,14 @@ def survey(
         str | None, typer.Option("--tracker", help="x,y,z [mm] in the base frame.")
     ] = None,
     seed: SeedOption = 0,
+    reversals: Annotated[
+        int,
+        typer.Option(
+            "--reversals",
+            min=0,
+            help="How often every joint turns back in small steps, too.",
+        ),
+    ] = 0,
 ) -> None:
     """Write a measurement program; every pose is approached from both sides."""
     from postproc.cli.survey import write_survey
@@ -89,7 +97,7 @@ def survey(
     with explained():
         check_places([output], [cell])
         with busy("choose poses"):
-            told = write_survey(cell, output, poses, mode, tracker, seed)
+            told = write_survey(cell, output, poses, mode, tracker, seed, reversals)
         say(told)
 
 

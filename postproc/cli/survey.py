@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 
 from postproc.arrays import Floats, Ints
-from postproc.calibration.survey import design_survey
+from postproc.calibration.survey import design_survey, where_to_reverse
 from postproc.exceptions import PostprocError
 from postproc.files import write_all
 from postproc.robot.cell import Cell, load_cell
@@ -17,7 +18,17 @@ BACK = np.deg2rad(2.0)  # how far to the side every approach starts [rad]
 SETTLE_MS = 1500  # pause before the tracker reads
 
 
-def survey_program(cell: Cell, q: Floats, side: Floats, probe: Ints, name: str) -> str:
+STEPS = np.array([0.1, 0.2, 0.4, 0.8, 1.6]) * 1e-3  # [rad] of a drive that turns back
+
+
+def survey_program(
+    cell: Cell,
+    q: Floats,
+    side: Floats,
+    probe: Ints,
+    name: str,
+    reversals: Sequence[tuple[int, int]] = (),
+) -> str:
     """Write a survey: every pose is reached twice, with all joints from the other side.
 
     Args:
@@ -26,11 +37,14 @@ def survey_program(cell: Cell, q: Floats, side: Floats, probe: Ints, name: str) 
         side: Arrival direction of every joint in the first approach, (n, 6), +1 or -1.
         probe: Index of the probe point that is measured, (n,).
         name: Program name.
+        reversals: Poses, from 0, at which drives, from 0, turn back step by step.
 
     Returns:
-        The program text. The measurement ids are the pose number with a or b.
+        The program text. The measurement ids are the pose number with a or b; of
+        reversals the numbers of pose, drive and step.
     """
-    count = f"{len(q)} poses, each from both sides: {2 * len(q)} measurements"
+    measured = 2 * len(q) + len(reversals) * (1 + len(STEPS))
+    count = f"{len(q)} poses, each from both sides: {measured} measurements"
     lines = [
         f"-- Laser-tracker survey of {cell.arm.name}: {count}",
         "-- After a MEASURE comment: read the tracker when the next move has settled.",
@@ -47,10 +61,29 @@ def survey_program(cell: Cell, q: Floats, side: Floats, probe: Ints, name: str) 
             lines.append(f"  $TOOL := POS({xyz}, 0, 0, 0, '')")
         for letter, sign in (("a", 1.0), ("b", -1.0)):
             lines.append(f"  MOVE JOINT TO {_joints(q[i] - sign * BACK * side[i])}")
-            lines.append(f"  -- MEASURE {i + 1}{letter}")
-            lines.append(f"  MOVE JOINT TO {_joints(q[i])}")
-            lines.append(f"  DELAY {SETTLE_MS}")
+            lines += _measured(f"{i + 1}{letter}", q[i])
+        for drive in (drive for pose, drive in reversals if pose == i):
+            lines += _reversal(cell, q[i], side[i], int(i), drive)
     return "\n".join([*lines, f"END {name}", ""])
+
+
+def _reversal(cell: Cell, q: Floats, side: Floats, pose: int, drive: int) -> list[str]:
+    """Write an arrival from afar, and steps of one drive back from there."""
+    coupling = cell.arm.coupling
+    back = -np.sign(coupling[drive] @ side) * np.linalg.inv(coupling)[:, drive]
+    lines = [f"  MOVE JOINT TO {_joints(q - BACK * side)}"]
+    for k, step in enumerate((0.0, *STEPS)):
+        lines += _measured(f"{pose + 1}.{drive + 1}.{k}", q + step * back)
+    return lines
+
+
+def _measured(name: str, q: Floats) -> list[str]:
+    """Write a move to a place that is measured."""
+    return [
+        f"  -- MEASURE {name}",
+        f"  MOVE JOINT TO {_joints(q)}",
+        f"  DELAY {SETTLE_MS}",
+    ]
 
 
 def _joints(q: Floats) -> str:
@@ -65,8 +98,18 @@ def write_survey(
     mode: str = "lhs",
     tracker: str | None = None,
     seed: int = 0,
+    reversals: int = 0,
 ) -> str:
     """Design a survey and write it as a program.
+
+    Args:
+        cell_path: The cell.
+        output: The program to write.
+        poses: Number of poses.
+        mode: How they are chosen, see `design_survey`.
+        tracker: Where it stands, x,y,z [mm]; the cell says so else.
+        seed: Of the random draws.
+        reversals: How many times every drive turns back step by step.
 
     Returns:
         What was written, with the observability of the design, in words.
@@ -79,7 +122,8 @@ def write_survey(
     stand = cell.tracker if tracker is None else _position(tracker)
     design = design_survey(cell.arm, cell.probes, poses, mode, stand, seed)
     name = "".join(c if c.isalnum() else "_" for c in output.stem) or "survey"
-    text = survey_program(cell, design.q, design.side, design.probe, name)
+    turned = where_to_reverse(cell.arm, design, cell.probes, reversals)
+    text = survey_program(cell, design.q, design.side, design.probe, name, turned)
     write_all({output: text.encode("ascii")})
     return f"{output}: {design.summary()}"
 

@@ -149,8 +149,9 @@ class InTime:
             (PATH_POINTS, told.points, f"{told.count} points are put on the ways of "
              f"{len(told.points)} moves; {verified(self.in_motion)}"),
             (NOT_TAKEN_UP, told.unconfirmed, "play is not taken up before "
-             f"{len(told.unconfirmed)} moves: no measured path confirms how joints "
-             "change their flanks there (diagnose --path)"),
+             f"{len(told.unconfirmed)} moves: neither reversals (survey --reversals) "
+             "nor a measured path (diagnose --path) confirm how joints change their "
+             "flanks there"),
             (APPROACHED, told.approaches, f"{len(told.approaches)} targets are "
              "approached anew, from a stop on the way already travelled"),
         )  # fmt: skip

@@ -23,7 +23,7 @@ from postproc.compensation.arc_cuts import (
     new_chords,
     whole_arcs,
 )
-from postproc.compensation.arc_splitting import point_on_way
+from postproc.compensation.arc_splitting import halves, point_on_way
 from postproc.compensation.best_points import BestPoints
 from postproc.compensation.correction import Draft
 from postproc.compensation.options import Setting
@@ -187,6 +187,12 @@ def _on_path(work: PathWork, k: int, v: int) -> list[float]:
     return [share for _, share in sorted(found, reverse=True)]
 
 
+def _why_left(work: PathWork, v: int, why: str) -> str:
+    """Say why a move is left; what is said of one half of an arc is so of both."""
+    both = halves(work.source.reading.visits, v)
+    return work.left.get(v) or next((work.left[h] for h in both if h in work.left), why)
+
+
 def _result(work: PathWork) -> Draft:
     """Tell of the program as of the source's visits."""
     told = work.latest.in_time or work.first
@@ -200,7 +206,7 @@ def _result(work: PathWork) -> Draft:
         work.tolerance,
         work.points,
         work.stops & work.points.keys(),
-        {v: work.left.get(v, why) for v in sorted(too_far)},
+        {v: _why_left(work, v, why) for v in sorted(too_far)},
         sizes_of(work.first.paths),
         {v: far for v, (far, _) in otherwise.items()}
         if work.latest is not work.source

@@ -32,6 +32,7 @@ from postproc.compensation.taking_up import (
     turned_by_drives,
 )
 from postproc.language.interface import Splitter
+from postproc.model.play import verdicts_of_flanks
 from postproc.robot.pose import MM
 
 AIM = 0.4  # of the tolerance: what points are to reach
@@ -89,6 +90,11 @@ class PathWork:
     def lines(self) -> Ints:
         """Return the lines of the source's visits in its files, (n,)."""
         return lines_in_files(self.source.reading, self.setting.cell)
+
+    @cached_property
+    def verdicts(self) -> tuple[str, ...]:
+        """Say what is known of how joints 1 to 6 change their flanks."""
+        return verdicts_of_flanks(self.setting.model, self.setting.cell.arm)
 
     @cached_property
     def _hindrances(self) -> dict[int, str]:

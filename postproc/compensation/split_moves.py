@@ -9,7 +9,7 @@ from postproc.compensation.splitting import shortest_pieces
 from postproc.compensation.taking_up import TakeUp, take_up
 from postproc.language.languages import language_of
 from postproc.model.model import CONFIRMED, NOT_SURE
-from postproc.model.play import ahead
+from postproc.model.play import left_behind
 
 UNSURE = 2e-5  # [m] a flank that is less sure is no reason to put points anywhere
 SMALL = 5e-5  # [m] a step of a joint that matters little if it is not as predicted
@@ -60,9 +60,8 @@ def _may_stop(work: PathWork, v: int, taken: TakeUp) -> None:
     What gives way before it carries, or lies where weight pushes it, would be led
     off by what a sharp gap asks for, and nothing behind the stop mends that.
     """
-    found = work.setting.model.in_motion
-    said = [(joint, found.get(str(joint), "")) for joint in taken.crossing]
-    if all(_as_at_stops(work, verdict, v, joint) for joint, verdict in said):
+    told = work.verdicts
+    if all(_as_at_stops(work, told[j - 1], v, j) for j in taken.crossing):
         work.idle[v] = taken
     else:
         work.unconfirmed.add(v)
@@ -70,25 +69,30 @@ def _may_stop(work: PathWork, v: int, taken: TakeUp) -> None:
 
 def _otherwise_in_motion(work: PathWork, k: int, v: int) -> str:
     """Name a joint that changes its flank on a path, and in motion not as at stops."""
-    setting = work.setting
-    found, leads = setting.model.in_motion, ahead(setting.model, setting.cell.arm)
+    in_motion = work.setting.model.in_motion or not work.setting.model.flank_widths
+    where = "in motion" if in_motion else "at stops"
     changing = work.paths.crossing[work.paths.samples(k)].any(axis=0)
     for joint in (np.flatnonzero(changing) + 1).tolist():
-        # Where none was measured it is as at stops, if a drive can put it there.
-        as_at_stops = NOT_SURE if leads[joint - 1] else CONFIRMED
-        said = found.get(str(joint), as_at_stops)
+        # Where none was measured it is as at stops, if nothing speaks against it.
+        said = work.verdicts[joint - 1] or CONFIRMED
         if not _as_at_stops(work, said, v, joint):
-            return f"joint {joint} changes its flank, which in motion is {said}"
+            return f"joint {joint} changes its flank, which {where} is {said}"
     return ""
 
 
 def _as_at_stops(work: PathWork, said: str, v: int, joint: int) -> bool:
     """Tell whether a joint may be taken to change its flank in motion as at stops.
 
-    What nobody could measure for certain may be, where the step that the joint makes is
-    too small to matter much.
+    What nobody could measure for certain may be, where what the joint may lack of its
+    step is too small to matter much.
     """
-    return said == CONFIRMED or (said == NOT_SURE and _step(work, v, joint) < SMALL)
+    if said != NOT_SURE:
+        return said == CONFIRMED
+    model = work.setting.model
+    lacks = left_behind(model, work.setting.cell.arm)[joint - 1]
+    if str(joint) in model.in_motion:
+        lacks = 1.0
+    return bool(lacks * _step(work, v, joint) < SMALL)
 
 
 def _step(work: PathWork, v: int, joint: int) -> float:

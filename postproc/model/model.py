@@ -1,30 +1,39 @@
-"""The accuracy model: what it predicts, how surely, and its file."""
+"""The accuracy model: what it predicts, and how surely."""
 
 from __future__ import annotations
 
-import hashlib
 import json
 from dataclasses import asdict, dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Any
 
 import numpy as np
-import pydantic
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field, NonNegativeFloat, PositiveInt
 
-from postproc import _native
 from postproc.arrays import Bools, Floats, all_in_rows, any_in_rows, chunks, in_chunks
 from postproc.exceptions import ModelError
 from postproc.files import write_all
 from postproc.model.combination import Combination
 from postproc.model.effects import restore
-from postproc.model.effects.effect import JointEffect
-from postproc.model.effects.geometry import Geometry
-from postproc.model.kinematics import Batch, base_of, deviated
+from postproc.model.kinematics import Batch
+from postproc.model.model_file import (
+    FORMAT,
+    Method,
+    RegistrationSection,
+    content_id,
+    packed,
+    read_model_file,
+    square_of,
+)
 from postproc.model.noise import Noise
+from postproc.model.ranges import Ranges
 from postproc.model.registration import Registration
+from postproc.model.variance import (
+    beyond_variance,
+    parameter_variance,
+    side_variance,
+)
 from postproc.robot.arm import Arm
 from postproc.robot.pose import MM
 from postproc.robot.state import States
@@ -91,365 +100,14 @@ class PredictedReading:
     std: Floats
 
 
-# How far off errors may be: parameters are not known exactly, nor are all sides.
-
-NONE = np.empty(0, dtype=np.int64)
-
-
-def parameter_variance(effects: Combination, at: Batch, covariance: Floats) -> Floats:
-    """Variance that uncertain parameters give, (n, 3) [m^2].
-
-    Args:
-        effects: The effects.
-        at: n states, with the kinematics taken at the parameters.
-        covariance: Of the parameters, (p, p).
-    """
-    placing = sum(isinstance(e, Geometry) for e in effects.effects)
-    turning = sum(isinstance(e, JointEffect) for e in effects.effects)
-    if placing == 1 and 1 + turning == len(effects.effects):
-        return _variance_by_joints(effects, at, covariance)
-    columns = effects.columns(at)
-    rows = columns.T.reshape(columns.shape[2], -1)  # one large product
-    summed = np.einsum("pr,pr->r", covariance @ rows, rows)
-    return np.asarray(summed.reshape(3, -1).T)
-
-
-def _variance_by_joints(effects: Combination, at: Batch, covariance: Floats) -> Floats:
-    """Do it for one geometry and joint effects, whose columns are the Jacobian's."""
-    parts = list(zip(effects.effects, effects.slices, strict=True))
-    ((geometry, first),) = [(e, s) for e, s in parts if isinstance(e, Geometry)]
-    turning = [(e, s) for e, s in parts if isinstance(e, JointEffect)]
-    acts_on = np.concatenate([NONE, *(e.acts_on() for e, _ in turning)])
-    by_joint = np.argsort(acts_on, kind="stable")
-    columns = np.arange(len(covariance))
-    turns = np.concatenate([NONE, *(columns[s] for _, s in turning)])[by_joint]
-    order = np.concatenate([columns[first], turns])
-    given = [np.empty((len(at), 0)), *(e.basis(at) for e, _ in turning)]
-    basis = np.ascontiguousarray(np.concatenate(given, axis=1)[:, by_joint])
-    tool = at.states.tool + at.deviation.tool
-    return _native.variance(
-        deviated(at.arm.dh, at.deviation).packed(at.deviation.link[:, 4]),
-        base_of(at.deviation),
-        (np.ascontiguousarray(at.angles), np.ascontiguousarray(tool)),
-        (geometry.base, geometry.links, True),
-        (basis, np.bincount(acts_on, minlength=6).tolist()),
-        np.ascontiguousarray(covariance[np.ix_(order, order)]),
-    )
-
-
-def side_variance(effects: Combination, at: Batch, values: Floats) -> Floats:
-    """Variance that unknown directions give, (n, 3) [m^2]."""
-    unknown = 1.0 - np.clip(at.states.direction, -1.0, 1.0) ** 2
-    out = np.zeros((len(at), 3))
-    rows = np.flatnonzero(any_in_rows(unknown > 0.0))
-    if len(rows):
-        slopes = effects.direction_slopes(at[rows], values)
-        out[rows] = np.einsum("nij,nj->ni", slopes**2, unknown[rows])
-    return out
-
-
-def beyond_variance(effects: Combination, at: Batch, prior_std: Floats) -> Floats:
-    """Variance that free forms may have beyond the surveyed ranges, (n, 3) [m^2].
-
-    Args:
-        effects: The effects.
-        at: n states, with the kinematics taken at the parameters.
-        prior_std: Prior standard deviations of the parameters, (p,).
-    """
-    out = np.zeros((len(at), 3))
-    for effect, part in zip(effects.effects, effects.slices, strict=True):
-        turned = effect.beyond(at, prior_std[part])
-        if turned is not None and turned.any():
-            out += np.einsum("nij,nj->ni", at.jacobian**2, turned)
-    return out
-
-
-# Where a survey has been, and which states lie outside.
-
-Interval = tuple[float, float]
-
-MARGIN = 0.05  # of a joint's surveyed range: random poses do not reach its ends
-SAME_TOOL = 1e-3  # [m] tools closer than this count as one
-REACH_OF_PLATE = 0.5  # [m] how far from three or more probe points a tool may be
-PAYLOAD_MARGIN = 0.5  # [kg]
-TEMPERATURE_MARGIN = 1.0  # [K] steel of 2.5 m grows by 0.03 mm
-
-
-@dataclass(frozen=True)
-class Ranges:
-    """What a survey covered.
-
-    Attributes:
-        lower, upper: Joint angles, (6,) [rad].
-        tools: Surveyed probe points in the flange frame, (k, 3) [m].
-        payload: [kg], or None where it was not recorded.
-        temperature: [deg C], or None.
-        speed: [m/s], or None.
-        oriented: Whether orientations were measured with a probe of known mounting.
-    """
-
-    lower: tuple[float, ...]
-    upper: tuple[float, ...]
-    tools: tuple[tuple[float, ...], ...]
-    payload: Interval | None
-    temperature: Interval | None
-    speed: Interval | None
-    oriented: bool = False
-
-    @classmethod
-    def of(cls, states: States, oriented: bool = False) -> Ranges:
-        """Take the ranges of a survey."""
-        tools = np.unique(np.round(states.tool, 9), axis=0)
-        return cls(
-            lower=tuple(map(float, states.q.min(axis=0))),
-            upper=tuple(map(float, states.q.max(axis=0))),
-            tools=tuple(tuple(map(float, t)) for t in tools),
-            payload=_interval(states.payload),
-            temperature=_interval(states.temperature),
-            speed=_interval(states.speed),
-            oriented=oriented,
-        )
-
-    def outside(self, states: States, needs: frozenset[str]) -> dict[str, Bools]:
-        """Say which states lie outside, by reason; reasons without states are left out.
-
-        Args:
-            states: n states.
-            needs: Covariates that the model cannot do without.
-        """
-        found = {**self._joints(states.q), **self._tools(states.tool)}
-        for name, unit, margin in (
-            ("payload", "kg", PAYLOAD_MARGIN),
-            ("temperature", "deg C", TEMPERATURE_MARGIN),
-        ):
-            value, span = getattr(states, name), getattr(self, name)
-            if span is not None:
-                low, high = span[0] - margin, span[1] + margin
-                text = f"{name} outside the surveyed {span[0]:g} to {span[1]:g} {unit}"
-                found[text] = (value < low) | (value > high)
-        for name in sorted(needs):
-            value = getattr(states, name)
-            unknown = np.isnan(value) if value.ndim == 1 else np.isnan(value).any(1)
-            found[f"{name} is not known, and the model needs it"] = unknown
-        return {reason: rows for reason, rows in found.items() if rows.any()}
-
-    def _joints(self, q: Floats) -> dict[str, Bools]:
-        """Compare joint angles; an axis surveyed all around has no outside."""
-        low, high = np.array(self.lower), np.array(self.upper)
-        middle, margin = (low + high) / 2, MARGIN * (high - low) + 1e-6
-        near = middle + np.mod(q - middle + np.pi, 2 * np.pi) - np.pi
-        whole = (high - low) * (1 + MARGIN) >= 2 * np.pi * 0.95
-        out = ~whole & ((near < low - margin) | (near > high + margin))
-        ends = np.rad2deg(np.stack([low, high], axis=1))
-        return {
-            f"axis {j + 1} outside the surveyed {ends[j, 0]:.1f} to "
-            f"{ends[j, 1]:.1f} deg": out[:, j]
-            for j in range(6)
-        }
-
-    def _tools(self, tool: Floats) -> dict[str, Bools]:
-        """Compare the tool with the probe points."""
-        points = np.array(self.tools).reshape(-1, 3)
-        gap = np.linalg.norm(tool[:, None] - points, axis=2).min(axis=1, initial=np.inf)
-        if self.see_all_rotations:
-            text = f"tool more than {REACH_OF_PLATE / MM:.0f} mm from the probe points"
-            return {text: gap > REACH_OF_PLATE}
-        text = "tool not surveyed: the survey's probe points fix it at one point only"
-        return {text: gap > SAME_TOOL}
-
-    @property
-    def see_all_rotations(self) -> bool:
-        """Whether flange rotations show: points that span a plane, or orientations."""
-        if self.oriented:
-            return True
-        points = np.array(self.tools).reshape(-1, 3)
-        spread = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
-        return len(spread) > 1 and bool(spread[1] > 0.02)  # [m]
-
-
-def _interval(values: Floats) -> Interval | None:
-    """Return the least and the largest of the known values."""
-    known = values[~np.isnan(values)]
-    return (float(known.min()), float(known.max())) if len(known) else None
-
-
-# The model file: JSON, checked when it is read.
-
-FORMAT = 1
-MAX_BYTES = 200_000_000
-
-Method = Literal["full", "eja-elm", "elm", "interpolation", "kinematic-elm", "kriging"]
-
-
-class ModelSection(BaseModel):
-    """A part of the file: unknown keys and non-finite numbers are errors."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
-
-
-class ArmSection(ModelSection):
-    """The arm that the model was made for."""
-
-    name: str
-    id: str
-
-
-class EffectSection(ModelSection):
-    """An effect and its settings."""
-
-    name: str
-    settings: dict[str, Any]
-
-
-class ParameterSection(ModelSection):
-    """One parameter, SI units."""
-
-    name: str
-    unit: str
-    value: float
-    std_error: NonNegativeFloat
-    prior_std: NonNegativeFloat
-
-
-class NoiseSection(ModelSection):
-    """The noise components of `postproc.model.noise.Noise`."""
-
-    tracker: NonNegativeFloat
-    joint: NonNegativeFloat
-    origin: tuple[float, float, float] | None
-
-
-class RangesSection(ModelSection):
-    """The ranges of `postproc.model.model.Ranges`."""
-
-    lower: tuple[float, ...] = Field(min_length=6, max_length=6)
-    upper: tuple[float, ...] = Field(min_length=6, max_length=6)
-    tools: tuple[tuple[float, float, float], ...]
-    payload: tuple[float, float] | None
-    temperature: tuple[float, float] | None
-    speed: tuple[float, float] | None
-    oriented: bool = False
-
-
-class ProbeSection(ModelSection):
-    """A probe point in the flange frame [m]."""
-
-    tool_id: int
-    xyz_m: Annotated[tuple[float, ...], Field(min_length=3, max_length=3)]
-
-
-class RegistrationSection(ModelSection):
-    """Where the survey's tracker stood: P_base = R P_tracker + t."""
-
-    rotation: Annotated[tuple[float, ...], Field(min_length=9, max_length=9)]
-    shift_m: Annotated[tuple[float, ...], Field(min_length=3, max_length=3)]
-    probes: tuple[ProbeSection, ...]
-
-    @classmethod
-    def of(cls, found: Registration) -> RegistrationSection:
-        """Write a registration, row by row."""
-        T = found.base_from_tracker
-        rotation, shift = T[:3, :3].reshape(-1).tolist(), T[:3, 3].tolist()
-        points = zip(found.tool_ids.tolist(), found.probes.tolist(), strict=True)
-        probes = tuple(ProbeSection(tool_id=k, xyz_m=tuple(xyz)) for k, xyz in points)
-        return cls(rotation=tuple(rotation), shift_m=tuple(shift), probes=probes)
-
-    def read(self) -> Registration:
-        """Make the registration."""
-        T = np.eye(4)
-        T[:3, :3] = np.reshape(self.rotation, (3, 3))
-        T[:3, 3] = self.shift_m
-        points = sorted(self.probes, key=lambda p: p.tool_id)
-        probes = np.array([p.xyz_m for p in points]).reshape(-1, 3)
-        ids = np.array([p.tool_id for p in points], dtype=np.int64)
-        return Registration(T, probes, ids)
-
-
-class ModelFile(ModelSection):
-    """A whole model file."""
-
-    format: Literal[1]
-    id: str
-    parent: str | None
-    method: Method
-    arm: ArmSection
-    data_sha256: str
-    rows: PositiveInt
-    effects: tuple[EffectSection, ...]
-    parameters: tuple[ParameterSection, ...]
-    covariance: tuple[float, ...]
-    spread: tuple[float, float, float]
-    noise: NoiseSection
-    ranges: RangesSection
-    statistics: dict[str, float]
-    history: tuple[dict[str, Any], ...]
-    registration: RegistrationSection | None = None
-
-
-def content_id(data: dict[str, Any]) -> str:
-    """Hash everything but the id."""
-    rest = {k: v for k, v in data.items() if k != "id"}
-    text = json.dumps(rest, sort_keys=True, separators=(",", ":"))
-    return hashlib.sha256(text.encode()).hexdigest()[:16]
-
-
-def read_model_file(path: Path) -> ModelFile:
-    """Read and check a model file.
-
-    Raises:
-        ModelError: Naming the file, the place and the cure.
-    """
-    try:
-        raw = path.read_bytes()
-    except OSError as exc:
-        cure = "Make a model with postproc fit"
-        raise ModelError(path, f"cannot be read ({exc.strerror})", cure) from None
-    if len(raw) > MAX_BYTES:
-        raise ModelError(path, "is too large for a model", "Check the path")
-    try:
-        data = json.loads(raw)
-        own = content_id(data) if isinstance(data, dict) else ""
-    except (ValueError, RecursionError):  # also a number of thousands of digits
-        cure = "Make it again with postproc fit"
-        raise ModelError(path, "is not valid JSON", cure) from None
-    try:
-        file = ModelFile.model_validate(data)
-    except pydantic.ValidationError as exc:
-        first = exc.errors()[0]
-        place = "$" + "".join(f".{key}" for key in first["loc"])
-        cure = "Make the model again with postproc fit"
-        raise ModelError(path, first["msg"], cure, place=place) from None
-    if own != file.id:
-        raise ModelError(
-            path,
-            "has been changed since it was made: its id does not match its content",
-            "Make the model again with postproc fit",
-            place="$.id",
-        )
-    return file
-
-
-def packed(square: Floats) -> list[float]:
-    """Pack a symmetric matrix as its upper triangle, row by row."""
-    upper: list[float] = square[np.triu_indices(len(square))].tolist()
-    return upper
-
-
-def square_of(values: Floats, count: int) -> Floats:
-    """Unpack an upper triangle, row by row."""
-    if len(values) == 0:
-        return np.zeros((0, 0))
-    full = np.zeros((count, count))
-    full[np.triu_indices(count)] = values
-    return np.asarray(full + np.triu(full, 1).T)
-
-
 # A fitted model: what the arm does wrong, and how well that is known.
 
 CHUNK = 5000  # states evaluated together: the columns stay in the cache
 COMPENSATED = ("arm", "state")
 READING = "reading_spread"  # statistic: see `Fit.reading_spread`
 UNSURE = "standard error above three times the survey's worst"
+Width = tuple[float, float]  # least and largest way from flank to flank [gaps]
+UNTOLD: Width = 1.0, np.inf
 CONFIRMED, NOT_SURE = "confirmed", "not sure"  # what a measured path says of a joint
 
 
@@ -473,6 +131,9 @@ class Model:
         statistics: Figures of the fit, units in their names.
         history: What was added to the ancestors, oldest first.
         registration: Of the survey, where it was in the tracker's frame.
+        flank_widths: Over how many gaps at the least and at the most each of the 6
+            joints goes from flank to flank, by reversals of the survey; UNTOLD where
+            they do not tell, empty where none were measured.
     """
 
     method: Method
@@ -491,6 +152,7 @@ class Model:
     statistics: dict[str, float] = field(default_factory=dict)
     history: tuple[dict[str, Any], ...] = ()
     registration: Registration | None = None
+    flank_widths: tuple[Width, ...] = ()
 
     @cached_property
     def id(self) -> str:
@@ -505,6 +167,11 @@ class Model:
         """
         told = (r["in_motion"] for r in reversed(self.history) if "in_motion" in r)
         return dict(next(told, {}))
+
+    @property
+    def reading_spread(self) -> float:
+        """How much wider readings scatter than their noise, see `Fit`."""
+        return self.statistics.get(READING, 1.0)
 
     @property
     def needs(self) -> frozenset[str]:
@@ -705,7 +372,7 @@ class Model:
         tracker = self.noise.tracker_std(at.tcp)[:, None]
         scatter = self.noise.arrival_variance(at.jacobian) + tracker**2
         std = np.sqrt(np.maximum(known, 0.0) + scatter)
-        return np.asarray(self.statistics.get(READING, 1.0) * std)
+        return np.asarray(self.reading_spread * std)
 
     def check_arm(self, arm: Arm, path: str | Path = "model") -> None:
         """Refuse an arm that the model was not made for.
@@ -757,6 +424,10 @@ class Model:
         if self.registration is not None:
             kept = RegistrationSection.of(self.registration)
             data["registration"] = kept.model_dump()
+        if self.flank_widths:
+            data["flank_widths"] = [
+                None if width == UNTOLD else list(width) for width in self.flank_widths
+            ]
         data = json.loads(json.dumps(data))
         return {"id": content_id(data), **data}
 
@@ -807,6 +478,7 @@ def load_model(path: str | Path) -> Model:
         statistics=file.statistics,
         history=file.history,
         registration=None if file.registration is None else file.registration.read(),
+        flank_widths=tuple(UNTOLD if w is None else w for w in file.flank_widths),
     )
     # A file of an older release lacks keys that have been added since: it keeps its id.
     vars(model)["id"] = file.id

@@ -13,13 +13,15 @@ import numpy as np
 
 from postproc.arrays import Bools, Floats
 from postproc.model.kinematics import Batch
-from postproc.model.model import Model
+from postproc.model.model import CONFIRMED, NOT_SURE, UNTOLD, Model, Width
 from postproc.robot.arm import Arm
 from postproc.robot.direction import WIDTH_IN_PLAYS, half_width
 from postproc.robot.state import make_states
 
 SAMPLES = 60  # angles over the surveyed range of every joint
 LEAST = np.deg2rad(1e-3)  # [rad] plays below this are jitter of the numbers
+SHARP = 1.5  # gaps: a flank that is no wider is that of a sharp gap
+ELASTIC = "elastic"  # what reversals say of a joint, see `verdict_at_stops`
 
 
 def half_gap(model: Model, arm: Arm) -> Floats:
@@ -50,6 +52,69 @@ def ahead(model: Model, arm: Arm) -> Bools:
         (6,); False where the model has no backlash.
     """
     return np.asarray(_over_range(model, arm).mean(axis=0) > 0.0)
+
+
+def verdict_at_stops(width: Width) -> str:
+    """Say whether a joint changes its flank as one with a sharp gap does.
+
+    Args:
+        width: Over how many gaps it does at the least and at the most, by reversals.
+
+    Returns:
+        "confirmed", "elastic", or "not sure".
+    """
+    least, most = width
+    if most <= SHARP:
+        return CONFIRMED
+    return ELASTIC if least > SHARP and np.isfinite(most) else NOT_SURE
+
+
+def verdicts_of_flanks(model: Model, arm: Arm) -> tuple[str, ...]:
+    """Say what is known of how joints 1 to 6 change their flanks.
+
+    Returns:
+        What a measured path says of them in motion, what reversals say at stops else;
+        "elastic" whatever a path says. Where none was measured "not sure" of links
+        that are ahead of their drives, and "" of all others.
+    """
+    at_stops = [verdict_at_stops(width) for width in model.flank_widths] or [""] * 6
+    told = []
+    for joint, leads in enumerate(ahead(model, arm).tolist()):
+        here = NOT_SURE if leads else at_stops[joint]
+        elastic = at_stops[joint] == ELASTIC
+        told.append(ELASTIC if elastic else model.in_motion.get(str(joint + 1), here))
+    return tuple(told)
+
+
+def on_the_way(side: Floats, width: Floats | float) -> Floats:
+    """Say where links lie that are on their way from flank to flank.
+
+    A link with a sharp gap rests until its drive has crossed it. An elastic flank gives
+    way before it carries, more the nearer the middle it is: half a sine.
+
+    Args:
+        side: Where each drive is on that way, -1 at one end of it, 1 at the other.
+        width: How long that way is [gaps], 1 for a sharp gap.
+
+    Returns:
+        -1 on one flank, 1 on the other.
+    """
+    side = np.clip(side, -1.0, 1.0)
+    return np.asarray(np.where(np.greater(width, 1.0), np.sin(np.pi / 2 * side), side))
+
+
+def left_behind(model: Model, arm: Arm) -> Floats:
+    """Say what a link at the most still lacks of the way to its other flank.
+
+    That is behind the way that crosses a sharp gap, if its flank is as wide as
+    reversals allow.
+
+    Returns:
+        Shares of that way, (6,), 0 for a sharp gap; 1 where they say nothing.
+    """
+    most = np.array(model.flank_widths or [UNTOLD] * 6)[:, 1]
+    lacks = (1.0 + on_the_way(1.0 - 2.0 / most, most)) / 2.0
+    return np.where(ahead(model, arm), 1.0, lacks)
 
 
 def half_widths(model: Model, arm: Arm, q: Floats) -> Floats:

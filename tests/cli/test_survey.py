@@ -7,7 +7,7 @@ import re
 import numpy as np
 import pytest
 
-from postproc.cli.survey import BACK, write_survey
+from postproc.cli.survey import BACK, STEPS, write_survey
 from postproc.compensation.program import plan_visits, read_program
 from tests.written import cli
 
@@ -64,12 +64,39 @@ def test_same_seed_same_survey(job_folder, survey, tmp_path):
     assert again.read_bytes() == survey.read_bytes() != other.read_bytes()
 
 
+def test_reversals_turn_one_drive_back_from_where_all_came(
+    job_folder, job_cell, tmp_path
+):
+    path = tmp_path / "s.pdl"
+    write_survey(job_folder / "cell.toml", path, POSES, reversals=2)
+    visits = read_program({path.name: path.read_bytes()}, job_cell).visits
+    steps = [
+        (i, *map(int, name.split(".")))
+        for i, name in enumerate(visits.measure_id)
+        if "." in name
+    ]
+    assert {drive for _, _, drive, _ in steps} == set(range(1, 7))
+    drives = visits.values @ job_cell.arm.coupling.T
+    for i, pose, drive, k in steps:
+        if not k:
+            begin, came = i, drives[i] - drives[i - 1]
+            assert (np.abs(came) > np.rad2deg(BACK) / 2).all()
+            known = visits.measure_id.index(f"{pose}a")
+            np.testing.assert_array_equal(visits.values[i], visits.values[known])
+            continue
+        turned = np.deg2rad(drives[i] - drives[begin])
+        assert turned[drive - 1] * came[drive - 1] < 0
+        np.testing.assert_allclose(abs(turned[drive - 1]), STEPS[k - 1], atol=1e-6)
+        assert (np.abs(np.delete(turned, drive - 1)) < 1e-6).all()
+
+
 @pytest.mark.parametrize(
     ("options", "said"),
     [
         (("--poses", "0"), "0 poses are no survey"),
         (("--mode", "both"), "no survey mode 'both'. Use lhs, optimal, d-optimal"),
         (("--tracker", "1,2"), "--tracker 1,2: not a position. Write x,y,z in mm"),
+        (("--poses", "11", "--reversals", "4"), "need 12 poses, and there are 11"),
     ],
 )
 def test_wrong_options(desk, options, said):

@@ -18,7 +18,7 @@ from postproc.compensation.continuity import (
 from postproc.compensation.notes import flank_steps
 from postproc.compensation.outcome import Status
 from postproc.compensation.program import read_program
-from postproc.model.model import MARGIN
+from postproc.model.ranges import MARGIN
 from postproc.robot.arm import load_arm
 from tests.compensation.test_arcs import START, job, point, whys
 

@@ -268,6 +268,56 @@ def test_play_is_taken_up_only_where_a_measured_path_confirms_flanks(
     assert "not-taken-up" not in codes
 
 
+def with_reversals(
+    shop: Path, *width: float, in_motion: str = ""
+) -> tuple[list[dict[str, Any]], dict[str, str]]:
+    """Compensate with stops and a model whose reversals say so of the joints.
+
+    Returns:
+        Lines of the report, and its findings by their codes.
+    """
+    model = load_model(shop / "model.json")
+    if in_motion:
+        model = load_model(shop / f"{in_motion}.json")
+    replace(model, flank_widths=(width,) * 6).save(shop / "known.json")
+    asked = ("--path-mm", TOLERANCE, "--take-up")
+    report = compensated(shop, "job.pdl", "reversed", *asked, model="known")
+    said = {d["code"]: d["message"] for d in report["diagnostics"]}
+    return lines_of(report), said
+
+
+def test_reversals_that_say_sharp_gaps_let_play_be_taken_up(shop: Path) -> None:
+    paths, said = with_reversals(shop, 1.0, 1.25)
+    assert "not-taken-up" not in said
+    assert "unverified in motion" in said["path-points"]
+    stops = [p for p in paths if p["points"] and p["points"][0]["at_mm"] < 1.0]
+    assert len(stops) > LINES / 2
+    run = simulate_file(shop / "reversed.pdl", CELL, SEED, path=True,
+                        wanted=shop / "job.pdl")  # fmt: skip
+    true = {m["visit"]: m["max_mm"] for m in json.loads(run.to_json())["path"]}
+    plain = real(shop, "plain")
+    mean = np.mean([true[path["visit"]] for path in paths])
+    assert mean < 0.5 * np.mean([plain[path["visit"]]["max_mm"] for path in paths])
+
+
+def test_elastic_flanks_are_so_whatever_a_measured_path_says(shop: Path) -> None:
+    paths, _ = with_reversals(shop, 2.0, 6.0, in_motion="confirmed")
+    assert sum("is elastic" in (path["not_split"] or "") for path in paths) > 5
+
+
+@pytest.mark.parametrize(
+    ("width", "verdict"), [((2.0, 6.0), "elastic"), ((1.0, 4.0), "not sure")]
+)
+def test_moves_with_flanks_that_reversals_do_not_call_sharp_are_left(
+    shop: Path, width: tuple[float, float], verdict: str
+) -> None:
+    paths, said = with_reversals(shop, *width)
+    why = [path["not_split"] or "" for path in paths]
+    assert sum(f"which at stops is {verdict}" in text for text in why) > 5
+    assert not [p for p in paths if p["points"] and p["points"][0]["at_mm"] < 1.0]
+    assert "path-left" in said
+
+
 def test_the_virtual_arm_keeps_closer_to_its_arcs(shop: Path) -> None:
     sizes, most = {}, {}
     for name in ("plain", "points", "stops"):

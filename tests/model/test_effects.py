@@ -28,7 +28,7 @@ from postproc.model.effects.effect import (
     fade_turns,
 )
 from postproc.model.kinematics import Batch
-from postproc.model.model import beyond_variance
+from postproc.model.variance import beyond_variance
 from tests.calibration.simulator import COUPLED, NJ, PLATE, covariates, random_states
 
 RNG = np.random.default_rng(5)

@@ -17,7 +17,8 @@ from postproc.calibration.selection import fit_survey, model_of
 from postproc.exceptions import ModelError, OutputError
 from postproc.model.effects import BASE_EFFECTS, BY_NAME, propose
 from postproc.model.kinematics import Batch
-from postproc.model.model import Model, content_id, load_model
+from postproc.model.model import Model, load_model
+from postproc.model.model_file import content_id
 from postproc.robot.state import make_states
 from tests.calibration.simulator import (
     NJ,

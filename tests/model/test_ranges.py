@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from postproc.model.model import Ranges
+from postproc.model.ranges import Ranges
 from postproc.robot.state import make_states
 from tests.calibration.simulator import PLATE, TOOL, covariates, random_states
 

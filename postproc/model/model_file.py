@@ -1,0 +1,195 @@
+"""The model file: JSON, checked when it is read."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import numpy as np
+import pydantic
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    NonNegativeFloat,
+    PositiveFloat,
+    PositiveInt,
+)
+
+from postproc.arrays import Floats
+from postproc.exceptions import ModelError
+from postproc.model.registration import Registration
+
+FORMAT = 1
+MAX_BYTES = 200_000_000
+
+Method = Literal["full", "eja-elm", "elm", "interpolation", "kinematic-elm", "kriging"]
+
+
+class ModelSection(BaseModel):
+    """A part of the file: unknown keys and non-finite numbers are errors."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+class ArmSection(ModelSection):
+    """The arm that the model was made for."""
+
+    name: str
+    id: str
+
+
+class EffectSection(ModelSection):
+    """An effect and its settings."""
+
+    name: str
+    settings: dict[str, Any]
+
+
+class ParameterSection(ModelSection):
+    """One parameter, SI units."""
+
+    name: str
+    unit: str
+    value: float
+    std_error: NonNegativeFloat
+    prior_std: NonNegativeFloat
+
+
+class NoiseSection(ModelSection):
+    """The noise components of `postproc.model.noise.Noise`."""
+
+    tracker: NonNegativeFloat
+    joint: NonNegativeFloat
+    origin: tuple[float, float, float] | None
+
+
+class RangesSection(ModelSection):
+    """The ranges of `postproc.model.ranges.Ranges`."""
+
+    lower: tuple[float, ...] = Field(min_length=6, max_length=6)
+    upper: tuple[float, ...] = Field(min_length=6, max_length=6)
+    tools: tuple[tuple[float, float, float], ...]
+    payload: tuple[float, float] | None
+    temperature: tuple[float, float] | None
+    speed: tuple[float, float] | None
+    oriented: bool = False
+
+
+class ProbeSection(ModelSection):
+    """A probe point in the flange frame [m]."""
+
+    tool_id: int
+    xyz_m: Annotated[tuple[float, ...], Field(min_length=3, max_length=3)]
+
+
+class RegistrationSection(ModelSection):
+    """Where the survey's tracker stood: P_base = R P_tracker + t."""
+
+    rotation: Annotated[tuple[float, ...], Field(min_length=9, max_length=9)]
+    shift_m: Annotated[tuple[float, ...], Field(min_length=3, max_length=3)]
+    probes: tuple[ProbeSection, ...]
+
+    @classmethod
+    def of(cls, found: Registration) -> RegistrationSection:
+        """Write a registration, row by row."""
+        T = found.base_from_tracker
+        rotation, shift = T[:3, :3].reshape(-1).tolist(), T[:3, 3].tolist()
+        points = zip(found.tool_ids.tolist(), found.probes.tolist(), strict=True)
+        probes = tuple(ProbeSection(tool_id=k, xyz_m=tuple(xyz)) for k, xyz in points)
+        return cls(rotation=tuple(rotation), shift_m=tuple(shift), probes=probes)
+
+    def read(self) -> Registration:
+        """Make the registration."""
+        T = np.eye(4)
+        T[:3, :3] = np.reshape(self.rotation, (3, 3))
+        T[:3, 3] = self.shift_m
+        points = sorted(self.probes, key=lambda p: p.tool_id)
+        probes = np.array([p.xyz_m for p in points]).reshape(-1, 3)
+        ids = np.array([p.tool_id for p in points], dtype=np.int64)
+        return Registration(T, probes, ids)
+
+
+WidthSection = tuple[PositiveFloat, PositiveFloat]
+
+
+class ModelFile(ModelSection):
+    """A whole model file."""
+
+    format: Literal[1]
+    id: str
+    parent: str | None
+    method: Method
+    arm: ArmSection
+    data_sha256: str
+    rows: PositiveInt
+    effects: tuple[EffectSection, ...]
+    parameters: tuple[ParameterSection, ...]
+    covariance: tuple[float, ...]
+    spread: tuple[float, float, float]
+    noise: NoiseSection
+    ranges: RangesSection
+    statistics: dict[str, float]
+    history: tuple[dict[str, Any], ...]
+    registration: RegistrationSection | None = None
+    flank_widths: Annotated[tuple[WidthSection | None, ...], Field(max_length=6)] = ()
+
+
+def content_id(data: dict[str, Any]) -> str:
+    """Hash everything but the id."""
+    rest = {k: v for k, v in data.items() if k != "id"}
+    text = json.dumps(rest, sort_keys=True, separators=(",", ":"))
+    return hashlib.sha256(text.encode()).hexdigest()[:16]
+
+
+def read_model_file(path: Path) -> ModelFile:
+    """Read and check a model file.
+
+    Raises:
+        ModelError: Naming the file, the place and the cure.
+    """
+    try:
+        raw = path.read_bytes()
+    except OSError as exc:
+        cure = "Make a model with postproc fit"
+        raise ModelError(path, f"cannot be read ({exc.strerror})", cure) from None
+    if len(raw) > MAX_BYTES:
+        raise ModelError(path, "is too large for a model", "Check the path")
+    try:
+        data = json.loads(raw)
+        own = content_id(data) if isinstance(data, dict) else ""
+    except (ValueError, RecursionError):  # also a number of thousands of digits
+        cure = "Make it again with postproc fit"
+        raise ModelError(path, "is not valid JSON", cure) from None
+    try:
+        file = ModelFile.model_validate(data)
+    except pydantic.ValidationError as exc:
+        first = exc.errors()[0]
+        place = "$" + "".join(f".{key}" for key in first["loc"])
+        cure = "Make the model again with postproc fit"
+        raise ModelError(path, first["msg"], cure, place=place) from None
+    if own != file.id:
+        raise ModelError(
+            path,
+            "has been changed since it was made: its id does not match its content",
+            "Make the model again with postproc fit",
+            place="$.id",
+        )
+    return file
+
+
+def packed(square: Floats) -> list[float]:
+    """Pack a symmetric matrix as its upper triangle, row by row."""
+    upper: list[float] = square[np.triu_indices(len(square))].tolist()
+    return upper
+
+
+def square_of(values: Floats, count: int) -> Floats:
+    """Unpack an upper triangle, row by row."""
+    if len(values) == 0:
+        return np.zeros((0, 0))
+    full = np.zeros((count, count))
+    full[np.triu_indices(count)] = values
+    return np.asarray(full + np.triu(full, 1).T)

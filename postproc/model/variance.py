@@ -1,0 +1,82 @@
+"""How far off errors may be: parameters are not known exactly, nor are all sides."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from postproc import _native
+from postproc.arrays import Floats, any_in_rows
+from postproc.model.combination import Combination
+from postproc.model.effects.effect import JointEffect
+from postproc.model.effects.geometry import Geometry
+from postproc.model.kinematics import Batch, base_of, deviated
+
+NONE = np.empty(0, dtype=np.int64)
+
+
+def parameter_variance(effects: Combination, at: Batch, covariance: Floats) -> Floats:
+    """Variance that uncertain parameters give, (n, 3) [m^2].
+
+    Args:
+        effects: The effects.
+        at: n states, with the kinematics taken at the parameters.
+        covariance: Of the parameters, (p, p).
+    """
+    placing = sum(isinstance(e, Geometry) for e in effects.effects)
+    turning = sum(isinstance(e, JointEffect) for e in effects.effects)
+    if placing == 1 and 1 + turning == len(effects.effects):
+        return _variance_by_joints(effects, at, covariance)
+    columns = effects.columns(at)
+    rows = columns.T.reshape(columns.shape[2], -1)  # one large product
+    summed = np.einsum("pr,pr->r", covariance @ rows, rows)
+    return np.asarray(summed.reshape(3, -1).T)
+
+
+def _variance_by_joints(effects: Combination, at: Batch, covariance: Floats) -> Floats:
+    """Do it for one geometry and joint effects, whose columns are the Jacobian's."""
+    parts = list(zip(effects.effects, effects.slices, strict=True))
+    ((geometry, first),) = [(e, s) for e, s in parts if isinstance(e, Geometry)]
+    turning = [(e, s) for e, s in parts if isinstance(e, JointEffect)]
+    acts_on = np.concatenate([NONE, *(e.acts_on() for e, _ in turning)])
+    by_joint = np.argsort(acts_on, kind="stable")
+    columns = np.arange(len(covariance))
+    turns = np.concatenate([NONE, *(columns[s] for _, s in turning)])[by_joint]
+    order = np.concatenate([columns[first], turns])
+    given = [np.empty((len(at), 0)), *(e.basis(at) for e, _ in turning)]
+    basis = np.ascontiguousarray(np.concatenate(given, axis=1)[:, by_joint])
+    tool = at.states.tool + at.deviation.tool
+    return _native.variance(
+        deviated(at.arm.dh, at.deviation).packed(at.deviation.link[:, 4]),
+        base_of(at.deviation),
+        (np.ascontiguousarray(at.angles), np.ascontiguousarray(tool)),
+        (geometry.base, geometry.links, True),
+        (basis, np.bincount(acts_on, minlength=6).tolist()),
+        np.ascontiguousarray(covariance[np.ix_(order, order)]),
+    )
+
+
+def side_variance(effects: Combination, at: Batch, values: Floats) -> Floats:
+    """Variance that unknown directions give, (n, 3) [m^2]."""
+    unknown = 1.0 - np.clip(at.states.direction, -1.0, 1.0) ** 2
+    out = np.zeros((len(at), 3))
+    rows = np.flatnonzero(any_in_rows(unknown > 0.0))
+    if len(rows):
+        slopes = effects.direction_slopes(at[rows], values)
+        out[rows] = np.einsum("nij,nj->ni", slopes**2, unknown[rows])
+    return out
+
+
+def beyond_variance(effects: Combination, at: Batch, prior_std: Floats) -> Floats:
+    """Variance that free forms may have beyond the surveyed ranges, (n, 3) [m^2].
+
+    Args:
+        effects: The effects.
+        at: n states, with the kinematics taken at the parameters.
+        prior_std: Prior standard deviations of the parameters, (p,).
+    """
+    out = np.zeros((len(at), 3))
+    for effect, part in zip(effects.effects, effects.slices, strict=True):
+        turned = effect.beyond(at, prior_std[part])
+        if turned is not None and turned.any():
+            out += np.einsum("nij,nj->ni", at.jacobian**2, turned)
+    return out
