@@ -293,8 +293,8 @@ def where_to_reverse(
         arm: The arm.
         design: The poses of a survey.
         probes: Probe points in the flange frame, (k, 3) [m].
-        count: How many poses for the drive that shows best; for others up to MORE times
-            as many.
+        count: How many poses for the drive that shows best, 1 or more; for others up to
+            MORE times as many.
 
     Returns:
         Poses and drives, both from 0: of the poses at which a drive moves the probe
@@ -322,6 +322,6 @@ def where_to_reverse(
     for drive, often in enumerate(np.round(count * times).astype(int).tolist()):
         poses = far[:, drive]
         along = poses[np.argsort(design.q[poses, drive], kind="stable")]
-        places = (np.arange(often) + 0.5) / max(often, 1) * many
+        places = (np.arange(often) + 0.5) / often * many
         chosen += [(int(pose), drive) for pose in along[places.astype(np.int64)]]
     return chosen

@@ -16,8 +16,6 @@ from postproc.robot.pose import MM
 
 BACK = np.deg2rad(2.0)  # how far to the side every approach starts [rad]
 SETTLE_MS = 1500  # pause before the tracker reads
-
-
 STEPS = np.array([0.1, 0.2, 0.4, 0.8, 1.6]) * 1e-3  # [rad] of a drive that turns back
 
 
@@ -122,7 +120,9 @@ def write_survey(
     stand = cell.tracker if tracker is None else _position(tracker)
     design = design_survey(cell.arm, cell.probes, poses, mode, stand, seed)
     name = "".join(c if c.isalnum() else "_" for c in output.stem) or "survey"
-    turned = where_to_reverse(cell.arm, design, cell.probes, reversals)
+    turned = (
+        where_to_reverse(cell.arm, design, cell.probes, reversals) if reversals else []
+    )
     text = survey_program(cell, design.q, design.side, design.probe, name, turned)
     write_all({output: text.encode("ascii")})
     return f"{output}: {design.summary()}"

@@ -18,8 +18,8 @@ from postproc.arrays import Bools, Floats, Ints, any_in_rows, spans
 from postproc.compensation.along_ways import CHANGED, AlongWays, ErrorAlong, refined
 from postproc.compensation.arc_splitting import NO_ARCS, WantedArcs
 from postproc.compensation.path_samples import PathSamples, measured_along, ways_of
-from postproc.model.model import CONFIRMED, UNTOLD, Model
-from postproc.model.play import SHARP, on_the_way
+from postproc.model.model import CONFIRMED, Model
+from postproc.model.play import SHARP, on_the_way, widest
 from postproc.motion.cycle import ProgramCycle
 from postproc.robot.cell import Cell
 from postproc.robot.pose import lengths
@@ -202,11 +202,10 @@ def _in_doubt(
     by_joint = _otherwise(run, error, moved, tangent, starts)
     told = error.model.in_motion
     open_ = np.array([told.get(str(joint)) != CONFIRMED for joint in range(1, 7)])
-    giving = np.empty(0)
-    if open_.any():
-        told_of = np.array(error.model.flank_widths or [UNTOLD] * 6)
-        widest = np.minimum(told_of[:, 1], GIVES)
-        width = np.where(open_ & (widest > SHARP), widest, 1.0)
+    giving = found.after.across if open_.any() else np.empty(0)
+    gives = open_ & (widest(error.model) > SHARP)
+    if gives.any():
+        width = np.where(gives, np.minimum(widest(error.model), GIVES), 1.0)
         soft = AlongWays.of(error.cell, error.model, run.cycle, run.ways, width)
         lying = on_the_way(soft.side, width)
         giving, _ = _apart(moved + error(soft, slice(None), lying), tangent)

@@ -32,7 +32,7 @@ from postproc.compensation.taking_up import (
     turned_by_drives,
 )
 from postproc.language.interface import Splitter
-from postproc.model.play import verdicts_of_flanks
+from postproc.model.play import left_behind, verdicts_of_flanks
 from postproc.robot.pose import MM
 
 AIM = 0.4  # of the tolerance: what points are to reach
@@ -95,6 +95,11 @@ class PathWork:
     def verdicts(self) -> tuple[str, ...]:
         """Say what is known of how joints 1 to 6 change their flanks."""
         return verdicts_of_flanks(self.setting.model, self.setting.cell.arm)
+
+    @cached_property
+    def left_behind(self) -> Floats:
+        """Say what links may lack of their ways to the other flanks, (6,)."""
+        return left_behind(self.setting.model, self.setting.cell.arm)
 
     @cached_property
     def _hindrances(self) -> dict[int, str]:

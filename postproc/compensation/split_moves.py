@@ -9,7 +9,6 @@ from postproc.compensation.splitting import shortest_pieces
 from postproc.compensation.taking_up import TakeUp, take_up
 from postproc.language.languages import language_of
 from postproc.model.model import CONFIRMED, NOT_SURE
-from postproc.model.play import left_behind
 
 UNSURE = 2e-5  # [m] a flank that is less sure is no reason to put points anywhere
 SMALL = 5e-5  # [m] a step of a joint that matters little if it is not as predicted
@@ -88,11 +87,7 @@ def _as_at_stops(work: PathWork, said: str, v: int, joint: int) -> bool:
     """
     if said != NOT_SURE:
         return said == CONFIRMED
-    model = work.setting.model
-    lacks = left_behind(model, work.setting.cell.arm)[joint - 1]
-    if str(joint) in model.in_motion:
-        lacks = 1.0
-    return bool(lacks * _step(work, v, joint) < SMALL)
+    return bool(work.left_behind[joint - 1] * _step(work, v, joint) < SMALL)
 
 
 def _step(work: PathWork, v: int, joint: int) -> float:

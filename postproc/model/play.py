@@ -103,6 +103,11 @@ def on_the_way(side: Floats, width: Floats | float) -> Floats:
     return np.asarray(np.where(np.greater(width, 1.0), np.sin(np.pi / 2 * side), side))
 
 
+def widest(model: Model) -> Floats:
+    """Give the largest ways from flank to flank that reversals allow, (6,) [gaps]."""
+    return np.array(model.flank_widths or [UNTOLD] * 6)[:, 1]
+
+
 def left_behind(model: Model, arm: Arm) -> Floats:
     """Say what a link at the most still lacks of the way to its other flank.
 
@@ -110,11 +115,13 @@ def left_behind(model: Model, arm: Arm) -> Floats:
     reversals allow.
 
     Returns:
-        Shares of that way, (6,), 0 for a sharp gap; 1 where they say nothing.
+        Shares of that way, (6,), 0 for a sharp gap; 1 where they say nothing, or a
+        measured path has had its say.
     """
-    most = np.array(model.flank_widths or [UNTOLD] * 6)[:, 1]
+    most = widest(model)
     lacks = (1.0 + on_the_way(1.0 - 2.0 / most, most)) / 2.0
-    return np.where(ahead(model, arm), 1.0, lacks)
+    measured = [str(joint) in model.in_motion for joint in range(1, 7)]
+    return np.where(ahead(model, arm) | measured, 1.0, lacks)
 
 
 def half_widths(model: Model, arm: Arm, q: Floats) -> Floats:
