@@ -42,7 +42,8 @@ def survey_program(
         reversals the numbers of pose, drive and step.
     """
     measured = 2 * len(q) + len(reversals) * (1 + len(STEPS))
-    count = f"{len(q)} poses, each from both sides: {measured} measurements"
+    more = f", and {len(reversals)} reversals" if reversals else ""
+    count = f"{len(q)} poses, each from both sides{more}: {measured} measurements"
     lines = [
         f"-- Laser-tracker survey of {cell.arm.name}: {count}",
         "-- After a MEASURE comment: read the tracker when the next move has settled.",

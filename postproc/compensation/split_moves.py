@@ -9,6 +9,7 @@ from postproc.compensation.splitting import shortest_pieces
 from postproc.compensation.taking_up import TakeUp, take_up
 from postproc.language.languages import language_of
 from postproc.model.model import CONFIRMED, NOT_SURE
+from postproc.model.play import ELASTIC
 
 UNSURE = 2e-5  # [m] a flank that is less sure is no reason to put points anywhere
 SMALL = 5e-5  # [m] a step of a joint that matters little if it is not as predicted
@@ -68,13 +69,14 @@ def _may_stop(work: PathWork, v: int, taken: TakeUp) -> None:
 
 def _otherwise_in_motion(work: PathWork, k: int, v: int) -> str:
     """Name a joint that changes its flank on a path, and in motion not as at stops."""
-    in_motion = work.setting.model.in_motion or not work.setting.model.flank_widths
-    where = "in motion" if in_motion else "at stops"
+    model = work.setting.model
+    by_reversals = model.flank_widths and not model.in_motion
     changing = work.paths.crossing[work.paths.samples(k)].any(axis=0)
     for joint in (np.flatnonzero(changing) + 1).tolist():
         # Where none was measured it is as at stops, if nothing speaks against it.
         said = work.verdicts[joint - 1] or CONFIRMED
         if not _as_at_stops(work, said, v, joint):
+            where = "at stops" if by_reversals or said == ELASTIC else "in motion"
             return f"joint {joint} changes its flank, which {where} is {said}"
     return ""
 

@@ -70,6 +70,9 @@ def test_reversals_turn_one_drive_back_from_where_all_came(
     path = tmp_path / "s.pdl"
     write_survey(job_folder / "cell.toml", path, POSES, reversals=2)
     visits = read_program({path.name: path.read_bytes()}, job_cell).visits
+    first = path.read_text().splitlines()[0]
+    many, measured = map(int, re.findall(r"and (\d+) reversals: (\d+) meas", first)[0])
+    assert measured == 2 * POSES + 6 * many == sum(map(bool, visits.measure_id))
     steps = [
         (i, *map(int, name.split(".")))
         for i, name in enumerate(visits.measure_id)
