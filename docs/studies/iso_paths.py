@@ -6,8 +6,8 @@ In the diagonal plane of a cube of 600 mm in front of the arm, its centre in the
 middle of that plane: a rectangle of 0.8 times the plane, circles of 0.8 and 0.1 times
 the cube's edge, at 10, 50 and 100 % of 1 m/s. The rectangle's corners are flown through
 with zones of 5 mm, a circle is two half arcs, flown through too. Each virtual arm is
-surveyed at 300 poses, the programs are compensated, and the arm runs all of them. The
-last programs know what a tracker read that followed the job of `paths.py`.
+surveyed at 300 poses, every joint with reversals, the programs are compensated, and the
+arm runs all of them. The last programs know what a tracker read that followed the job of `paths.py`.
 """
 
 from __future__ import annotations
@@ -82,7 +82,7 @@ def program(shape: str, share: float, cell: Cell) -> str:
 def study(seed: int, folder: Path) -> None:
     """Print the figures of one arm."""
     arm = ("--seed", seed)
-    place = paths.fit_a_survey(folder, *arm)
+    place = paths.fit_a_survey(folder, *arm, reversals=paths.REVERSALS)
     cell, at = load_cell(place), ("--cell", place)
     job, ran = folder / "job.pdl", folder / "ran.pdl"
     job.write_text(paths.job(seed, cell))
@@ -111,8 +111,8 @@ def figures(
     found = [scored(source, source, at, arm, folder)]
     for model, more in (
         ("model.json", ()),
-        ("model.json", ("--path-mm", "0.1")),
-        ("better.json", ("--path-mm", "0.1", "--take-up")),
+        ("model.json", paths.PROGRAMS["points"]),
+        ("better.json", paths.PROGRAMS["measured"]),
     ):
         known = ("--model", folder / model)
         paths.done("compensate", source, *at, *known, "-o", made, *more)
