@@ -6,8 +6,9 @@ In the diagonal plane of a cube of 600 mm in front of the arm, its centre in the
 middle of that plane: a rectangle of 0.8 times the plane, circles of 0.8 and 0.1 times
 the cube's edge, at 10, 50 and 100 % of 1 m/s. The rectangle's corners are flown through
 with zones of 5 mm, a circle is two half arcs, flown through too. Each virtual arm is
-surveyed at 300 poses, every joint with reversals, the programs are compensated, and the
-arm runs all of them. The last programs know what a tracker read that followed the job of `paths.py`.
+surveyed at 300 poses and with reversals, the programs are compensated, and the arm runs
+all of them. The last programs know what a tracker read that followed the job of
+`paths.py`.
 """
 
 from __future__ import annotations

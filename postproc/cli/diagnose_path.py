@@ -18,11 +18,11 @@ from postproc.calibration.measurements import POSITION, Measurements
 from postproc.calibration.tables import read_table
 from postproc.cli.diagnose import Asked, extended_path
 from postproc.cli.jobs import read_files
-from postproc.compensation.flanks import JointInMotion, in_motion, measured_steps
-from postproc.compensation.measured_path import Aligned, OnTheWay, Track, align
-from postproc.compensation.path_accuracy import PredictedWays, predicted_ways
+from postproc.compensation.paths.accuracy import PredictedWays, predicted_ways
+from postproc.compensation.paths.flanks import JointInMotion, in_motion, measured_steps
+from postproc.compensation.paths.measured import Aligned, OnTheWay, Track, align
+from postproc.compensation.paths.servo_lag import ServoLag, servo_lag
 from postproc.compensation.program import read_program, with_measured_play
-from postproc.compensation.servo_lag import ServoLag, servo_lag
 from postproc.compensation.targets import targets_from_visits
 from postproc.exceptions import MeasurementError, PostprocError
 from postproc.language.visits import Visits

@@ -10,7 +10,7 @@ import numpy as np
 
 from postproc.arrays import Ints
 from postproc.cli.jobs import read_files
-from postproc.compensation.insertions import points_on_ways
+from postproc.compensation.paths.insertions import points_on_ways
 from postproc.compensation.program import read_program
 from postproc.exceptions import CellError
 from postproc.language.languages import language_of

@@ -181,7 +181,7 @@ def finish(name: str, reading: Reading, kept: Correction, setting: Setting) -> O
     del again  # holds as much as the program
     give_back(len(reading.visits))
     if setting.options.inserts:
-        from postproc.compensation.path_correction import correct_paths
+        from postproc.compensation.paths.correction import correct_paths
 
         draft = correct_paths(draft, setting, write_and_verify)
     with setting.clock("report"):

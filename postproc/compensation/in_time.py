@@ -9,11 +9,11 @@ import numpy as np
 
 from postproc.arrays import Bools, Floats, Ints
 from postproc.compensation.approach import advise
-from postproc.compensation.arc_splitting import NO_ARCS, WantedArcs
-from postproc.compensation.corners import RoundOff, predict_corners
 from postproc.compensation.options import Setting
-from postproc.compensation.path_accuracy import PathAccuracy, predict_paths
-from postproc.compensation.path_points import Insertions
+from postproc.compensation.paths.accuracy import PathAccuracy, predict_paths
+from postproc.compensation.paths.arcs import NO_ARCS, WantedArcs
+from postproc.compensation.paths.corners import RoundOff, predict_corners
+from postproc.compensation.paths.points import Insertions
 from postproc.compensation.program import Reading
 from postproc.compensation.targets import targets_from_visits
 from postproc.language.visits import Diagnostic, Visits

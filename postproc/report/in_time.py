@@ -8,10 +8,10 @@ from dataclasses import asdict
 import numpy as np
 
 from postproc.arrays import Floats, Ints
-from postproc.compensation.corners import RoundOff
 from postproc.compensation.in_time import InTime
-from postproc.compensation.path_accuracy import Deviations, PathAccuracy
-from postproc.compensation.path_points import Insertions
+from postproc.compensation.paths.accuracy import Deviations, PathAccuracy
+from postproc.compensation.paths.corners import RoundOff
+from postproc.compensation.paths.points import Insertions
 from postproc.language.visits import Visits
 from postproc.model.statistics import ErrorStatistics
 from postproc.motion.cycle import ProgramCycle

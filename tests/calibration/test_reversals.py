@@ -19,7 +19,7 @@ from postproc.model.effects import BASE_EFFECTS
 from postproc.model.model import CONFIRMED, NOT_SURE, UNTOLD, Model, load_model
 from postproc.model.play import ELASTIC, SHARP, on_the_way, verdicts_of_flanks
 from postproc.robot.cell import load_cell
-from tests.compensation.test_path_accuracy import CELL, SEED, done
+from tests.compensation.paths.test_accuracy import CELL, SEED, done
 from tests.written import cli
 
 POSES, EACH = 150, 4

@@ -7,7 +7,7 @@ import shutil
 
 import pytest
 
-from tests.compensation.test_path_accuracy import job
+from tests.compensation.paths.test_accuracy import job
 from tests.conftest import SEED
 from tests.written import cli
 

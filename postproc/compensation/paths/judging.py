@@ -7,18 +7,18 @@ from collections.abc import Iterator
 import numpy as np
 
 from postproc.arrays import Bools, Floats, any_in_rows
-from postproc.compensation.approach_anew import bad_approaches
-from postproc.compensation.arc_cuts import bending, may_be_chord
-from postproc.compensation.arc_splitting import (
+from postproc.compensation.in_time import InTime
+from postproc.compensation.paths.accuracy import PathAccuracy
+from postproc.compensation.paths.approach_anew import bad_approaches
+from postproc.compensation.paths.arc_cuts import bending, may_be_chord
+from postproc.compensation.paths.arcs import (
     halves,
     is_arc,
     largest_zones,
     passed,
     point_on_way,
 )
-from postproc.compensation.in_time import InTime
-from postproc.compensation.path_accuracy import PathAccuracy
-from postproc.compensation.path_work import PathWork
+from postproc.compensation.paths.work import PathWork
 from postproc.robot.pose import lengths
 
 JUDGED = 8  # rounds in which points are taken back

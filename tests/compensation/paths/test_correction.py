@@ -13,20 +13,19 @@ import pytest
 
 from postproc.arrays import Floats
 from postproc.cli.simulate import _read, setup_of, simulate_file
-from postproc.compensation import path_correction, path_judging, split_moves
-from postproc.compensation.arc_cuts import bending
-from postproc.compensation.arc_splitting import is_arc
-from postproc.compensation.best_points import BestPoints
-from postproc.compensation.path_correction import TAKEN
-from postproc.compensation.path_work import AIM, PathWork
+from postproc.compensation.paths import correction, judging, split_moves
+from postproc.compensation.paths.arc_cuts import bending
+from postproc.compensation.paths.arcs import is_arc
+from postproc.compensation.paths.correction import TAKEN, BestPoints
+from postproc.compensation.paths.work import AIM, PathWork
 from postproc.model.model import load_model
 from postproc.model.play import ahead
 from postproc.robot.cell import load_cell
 from postproc.robot.pose import MM
 from postproc.simulation import DEFAULT, virtual_arm
 from postproc.simulation.program import land
+from tests.compensation.paths.test_accuracy import CELL, LINES, SEED, done, job
 from tests.compensation.test_approach import job as approaches
-from tests.compensation.test_path_accuracy import CELL, LINES, SEED, done, job
 from tests.written import cli
 
 TOLERANCE = 0.1  # [mm]
@@ -143,7 +142,7 @@ def test_points_that_did_better_are_put_back(
         work.make()
         best.note(bending(work))
 
-    monkeypatch.setattr(path_correction, "_bend", worse)
+    monkeypatch.setattr(correction, "_bend", worse)
     found = compensated(shop, "job.pdl", "put_back", "--path-mm", TOLERANCE)
     for old, new in zip(lines_of(told(shop, "points")), lines_of(found), strict=True):
         assert new["points"] == old["points"]
@@ -162,7 +161,7 @@ def test_flanks_that_a_measured_path_confirms_are_no_reason_for_doubt(
     shop: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     known(shop, "confirmed")
-    monkeypatch.setattr(path_judging, "WORSE", -0.04 * MM)
+    monkeypatch.setattr(judging, "WORSE", -0.04 * MM)
     doubted = []
     for name in ("model", "confirmed"):
         asked = ("--path-mm", TOLERANCE)
@@ -179,7 +178,7 @@ def test_a_joint_that_is_not_sure_in_motion_matters_where_its_step_does(
 ) -> None:
     known(shop, "not sure")
     monkeypatch.setattr(split_moves, "SMALL", small_mm * MM)
-    monkeypatch.setattr(path_judging, "HARM", small_mm * MM)
+    monkeypatch.setattr(judging, "HARM", small_mm * MM)
     asked, name = ("--path-mm", TOLERANCE), f"small{small_mm}"
     paths = lines_of(compensated(shop, "job.pdl", name, *asked, model="not sure"))
     hindered = ["which in motion is not sure" in (p["not_split"] or "") for p in paths]

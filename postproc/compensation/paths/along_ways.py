@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from postproc.arrays import Bools, Floats, Ints, any_in_rows
-from postproc.compensation.path_samples import PathSamples
+from postproc.compensation.paths.samples import PathSamples
 from postproc.model.model import Model
 from postproc.model.play import half_widths
 from postproc.motion.cycle import ProgramCycle

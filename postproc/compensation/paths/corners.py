@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from postproc.arrays import Floats, Ints
-from postproc.compensation.path_accuracy import PathAccuracy
+from postproc.compensation.paths.accuracy import PathAccuracy
 from postproc.language.visits import Visits
 from postproc.motion.cycle import ProgramCycle
 from postproc.robot.pose import lengths

@@ -8,10 +8,10 @@ from postproc.arrays import Bools, Floats, any_in_rows
 from postproc.compensation.approach import place_to_approach
 from postproc.compensation.correction import Correction
 from postproc.compensation.in_time import InTime
-from postproc.compensation.insertions import numbers_at
 from postproc.compensation.notes import SURE
 from postproc.compensation.outcome import Status
-from postproc.compensation.path_work import PathWork, of_source
+from postproc.compensation.paths.insertions import numbers_at
+from postproc.compensation.paths.work import PathWork, of_source
 from postproc.language.interface import Splitter
 from postproc.robot.pose import MM
 from postproc.robot.trajectory import Motion

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from postproc.compensation.measured_path import FAR, align, find_stops, paired
-from tests.compensation.measured_ways import COUNT, MOVES, made_ways, read
+from postproc.compensation.paths.measured import FAR, align, find_stops, paired
+from tests.compensation.paths.measured_ways import COUNT, MOVES, made_ways, read
 
 STOPS = np.zeros(2 * MOVES + 2, dtype=bool)
 

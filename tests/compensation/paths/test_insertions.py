@@ -12,10 +12,10 @@ from scipy.spatial.transform import Rotation, Slerp
 
 from postproc.arrays import Floats
 from postproc.compensation.equivalence import equivalent
-from postproc.compensation.insertions import between, insert, without
+from postproc.compensation.paths.insertions import between, insert, without
+from postproc.compensation.paths.taking_up import TakeUp
 from postproc.compensation.program import Reading, read_program
 from postproc.compensation.rewrite import VerificationError
-from postproc.compensation.taking_up import TakeUp
 from postproc.language.pdl2.language import Pdl2
 from postproc.language.pdl2.path_points import Pdl2Splitter
 from postproc.language.pdl2.program import parse
@@ -23,7 +23,7 @@ from postproc.language.source import Edit
 from postproc.robot.cell import load_cell
 from tests.written import program
 
-CELL = load_cell(Path(__file__).parents[2] / "programs/cell.toml")
+CELL = load_cell(Path(__file__).parents[3] / "programs/cell.toml")
 NOTHING = np.zeros(0, dtype=np.int64)
 TURNED = TakeUp(
     np.array([1.0, -1.0, 0.5, 0.0, 1.0, -1.0]), np.array([2e-4, 0.0, -1e-4]), (1, 2)

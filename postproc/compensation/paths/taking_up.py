@@ -15,7 +15,7 @@ import numpy as np
 
 from postproc.arrays import Floats
 from postproc.compensation.options import Setting
-from postproc.compensation.path_accuracy import sides_on_move
+from postproc.compensation.paths.accuracy import sides_on_move
 from postproc.language.visits import OrientationLaw, Visits
 from postproc.model.play import half_widths
 from postproc.motion.cycle import ProgramCycle

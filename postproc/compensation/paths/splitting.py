@@ -9,13 +9,13 @@ from __future__ import annotations
 import numpy as np
 
 from postproc.arrays import Bools, Floats, Ints
-from postproc.compensation.arc_splitting import (
+from postproc.compensation.outcome import Decisions, Status
+from postproc.compensation.paths.arcs import (
     FLAT,
     WantedArcs,
     hindrances_of_arcs,
     is_arc,
 )
-from postproc.compensation.outcome import Decisions, Status
 from postproc.language.interface import ArcPiece, Splitter
 from postproc.language.source import CloneError
 from postproc.language.visits import Meaning, OrientationLaw, Visits

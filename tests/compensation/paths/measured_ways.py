@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from postproc.compensation.measured_path import Track
-from postproc.compensation.path_accuracy import PredictedWays
+from postproc.compensation.paths.accuracy import PredictedWays
+from postproc.compensation.paths.measured import Track
 
 MOVES, COUNT, RATE = 6, 401, 100.0
 STEP = np.array([0.0, 0.0, 3e-4])  # [m] that joint 1 makes as it changes its flank

@@ -10,14 +10,14 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from postproc.compensation.arc_splitting import (
+from postproc.compensation.paths.arcs import (
     STRAIGHT,
     Cut,
     flat_pieces,
     is_arc,
     point_on_way,
 )
-from postproc.compensation.path_work import PathWork
+from postproc.compensation.paths.work import PathWork
 from postproc.robot.pose import MM
 
 

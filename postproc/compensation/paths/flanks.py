@@ -17,8 +17,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from postproc.arrays import Floats, Ints
-from postproc.compensation.measured_path import OnTheWay
-from postproc.compensation.path_accuracy import PredictedWays
+from postproc.compensation.paths.accuracy import PredictedWays
+from postproc.compensation.paths.measured import OnTheWay
 from postproc.model.model import CONFIRMED, NOT_SURE
 from postproc.robot.pose import lengths
 

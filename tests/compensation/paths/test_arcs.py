@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from postproc.arrays import Floats
-from postproc.compensation.arc_splitting import (
+from postproc.compensation.paths.arcs import (
     BENT,
     FLAT,
     CutArc,
@@ -18,17 +18,17 @@ from postproc.compensation.arc_splitting import (
     hindrances_of_arcs,
     passed,
 )
-from postproc.compensation.insertions import are_near, insert
+from postproc.compensation.paths.insertions import are_near, insert
+from postproc.compensation.paths.splitting import CLOSEST, shortest_pieces
+from postproc.compensation.paths.taking_up import MeantSides
 from postproc.compensation.program import Reading, plan_visits, read_program
-from postproc.compensation.splitting import CLOSEST, shortest_pieces
-from postproc.compensation.taking_up import MeantSides
 from postproc.language.languages import language_of
 from postproc.motion.cycle import run
 from postproc.robot.cell import load_cell
 from postproc.robot.pose import MM, rotation_vector
 from tests.written import program
 
-CELL = load_cell(Path(__file__).parents[2] / "programs/cell.toml")
+CELL = load_cell(Path(__file__).parents[3] / "programs/cell.toml")
 MIDDLE, RADIUS = np.array([150.0, -40.0, 180.0]), 120.0  # [mm]
 TURN = (80.0, 160.0, 10.0)
 VIA, END = 1, 2  # visits of the arc; 0 is its start

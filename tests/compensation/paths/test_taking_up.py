@@ -9,8 +9,8 @@ import pytest
 
 from postproc.arrays import Floats
 from postproc.compensation.options import AS_USUAL, Clock, Setting, silent
+from postproc.compensation.paths.taking_up import crossed_at_once, turned_by_drives
 from postproc.compensation.program import prepared, read_program
-from postproc.compensation.taking_up import crossed_at_once, turned_by_drives
 from postproc.language.visits import OrientationLaw, Visits
 from postproc.model.model import Model
 from postproc.model.play import half_widths

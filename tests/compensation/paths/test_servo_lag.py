@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from postproc.compensation.measured_path import OnTheWay
-from postproc.compensation.path_accuracy import PredictedWays
-from postproc.compensation.servo_lag import CORNER, REACH, ServoLag, servo_lag
+from postproc.compensation.paths.accuracy import PredictedWays
+from postproc.compensation.paths.measured import OnTheWay
+from postproc.compensation.paths.servo_lag import CORNER, REACH, ServoLag, servo_lag
 
 MOVES, COUNT, RATE, SPEED, RADIUS = 8, 301, 500.0, 0.2, 0.1
 SHARP = np.zeros(2 * MOVES + 2, dtype=bool)

@@ -16,7 +16,7 @@ from types import MappingProxyType
 import numpy as np
 
 from postproc.arrays import Bools, Floats, Ints
-from postproc.compensation.path_points import Points
+from postproc.compensation.paths.points import Points
 from postproc.language.interface import ArcPiece
 from postproc.language.visits import Visits
 from postproc.motion.blending import zones

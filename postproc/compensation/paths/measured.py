@@ -14,7 +14,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from postproc.arrays import Bools, Floats, Ints
-from postproc.compensation.path_accuracy import PredictedWays
+from postproc.compensation.paths.accuracy import PredictedWays
 from postproc.robot.pose import lengths
 
 WINDOW = 0.05  # [s] over which the tool's speed is looked at

@@ -24,7 +24,7 @@ from postproc.simulation import DEFAULT, virtual_arm
 from postproc.simulation.path import _tracks
 from tests.written import cli
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 CELL = ROOT / "programs/cell.toml"
 SEED = 41  # of the virtual arm
 LINES = 12

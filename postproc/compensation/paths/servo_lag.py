@@ -13,8 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from postproc.arrays import Bools, Floats
-from postproc.compensation.measured_path import OnTheWay
-from postproc.compensation.path_accuracy import PredictedWays
+from postproc.compensation.paths.accuracy import PredictedWays
+from postproc.compensation.paths.measured import OnTheWay
 from postproc.robot.pose import lengths
 
 REACH = 0.01  # [m] on both sides of a place over which its way bends

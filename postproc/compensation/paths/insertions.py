@@ -14,13 +14,13 @@ from typing import Any
 import numpy as np
 
 from postproc.arrays import Bools, Floats, Ints
-from postproc.compensation.arc_splitting import Chords, CutArc, is_arc
 from postproc.compensation.command import base_in_uframe
 from postproc.compensation.equivalence import equivalent
-from postproc.compensation.path_points import Points
+from postproc.compensation.paths.arcs import Chords, CutArc, is_arc
+from postproc.compensation.paths.points import Points
+from postproc.compensation.paths.taking_up import MeantSides, TakeUp
 from postproc.compensation.program import Reading, read_program
 from postproc.compensation.rewrite import VerificationError
-from postproc.compensation.taking_up import MeantSides, TakeUp
 from postproc.compensation.windows import SHARED
 from postproc.language.interface import Splitter
 from postproc.language.languages import language_of

@@ -15,9 +15,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from postproc.arrays import Bools, Floats, Ints, any_in_rows, spans
-from postproc.compensation.along_ways import CHANGED, AlongWays, ErrorAlong, refined
-from postproc.compensation.arc_splitting import NO_ARCS, WantedArcs
-from postproc.compensation.path_samples import PathSamples, measured_along, ways_of
+from postproc.compensation.paths.along_ways import (
+    CHANGED,
+    AlongWays,
+    ErrorAlong,
+    refined,
+)
+from postproc.compensation.paths.arcs import NO_ARCS, WantedArcs
+from postproc.compensation.paths.samples import PathSamples, measured_along, ways_of
 from postproc.model.model import CONFIRMED, Model
 from postproc.model.play import SHARP, on_the_way, widest
 from postproc.motion.cycle import ProgramCycle

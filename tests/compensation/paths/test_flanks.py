@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from postproc.compensation.flanks import in_motion, measured_steps
 from postproc.compensation.in_time import verified
-from postproc.compensation.measured_path import align
-from tests.compensation.measured_ways import MOVES, STEP, made_ways, read
-from tests.compensation.test_measured_path import STOPS
+from postproc.compensation.paths.flanks import in_motion, measured_steps
+from postproc.compensation.paths.measured import align
+from tests.compensation.paths.measured_ways import MOVES, STEP, made_ways, read
+from tests.compensation.paths.test_measured import STOPS
 
 
 def told(share: float, later: int, scatter: float = 2e-5):

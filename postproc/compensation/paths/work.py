@@ -9,7 +9,6 @@ from functools import cached_property
 import numpy as np
 
 from postproc.arrays import Floats, Ints
-from postproc.compensation.arc_splitting import Cut, WantedArcs, halves
 from postproc.compensation.correction import (
     BY_VISIT,
     EXPLAINING,
@@ -18,19 +17,20 @@ from postproc.compensation.correction import (
     correct,
 )
 from postproc.compensation.in_time import InTime, run_in_time
-from postproc.compensation.insertions import insert, lines_in_files
 from postproc.compensation.options import Setting
 from postproc.compensation.outcome import Status
-from postproc.compensation.path_accuracy import PathAccuracy
-from postproc.compensation.program import Reading
-from postproc.compensation.rewrite import Output
-from postproc.compensation.splitting import hindrances, unwritable
-from postproc.compensation.taking_up import (
+from postproc.compensation.paths.accuracy import PathAccuracy
+from postproc.compensation.paths.arcs import Cut, WantedArcs, halves
+from postproc.compensation.paths.insertions import insert, lines_in_files
+from postproc.compensation.paths.splitting import hindrances, unwritable
+from postproc.compensation.paths.taking_up import (
     MeantSides,
     TakeUp,
     crossed_at_once,
     turned_by_drives,
 )
+from postproc.compensation.program import Reading
+from postproc.compensation.rewrite import Output
 from postproc.language.interface import Splitter
 from postproc.model.play import left_behind, verdicts_of_flanks
 from postproc.robot.pose import MM

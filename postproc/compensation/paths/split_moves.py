@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from postproc.compensation.path_work import PathWork
-from postproc.compensation.splitting import shortest_pieces
-from postproc.compensation.taking_up import TakeUp, take_up
+from postproc.compensation.paths.splitting import shortest_pieces
+from postproc.compensation.paths.taking_up import TakeUp, take_up
+from postproc.compensation.paths.work import PathWork
 from postproc.language.languages import language_of
 from postproc.model.model import CONFIRMED, NOT_SURE
 from postproc.model.play import ELASTIC

@@ -1,0 +1,1 @@
+"""Between the targets: path accuracy predicted, measured, and corrected by points."""
