@@ -87,6 +87,7 @@ class PathDiagnosis:
             {"joint": j.joint, "steps": j.steps,
              "predicted_mm": round(j.predicted / MM, 5), "share": round(j.share, 4),
              "share_error": round(j.error, 4), "later_mm": round(j.later / MM, 3),
+             "later_error_mm": round(j.later_error / MM, 3),
              "verdict": j.verdict}
             for j in self.joints
         ]  # fmt: skip

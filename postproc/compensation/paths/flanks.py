@@ -30,6 +30,8 @@ CLEAR = 3.0  # a step this many times what readings there scatter by is told
 FEW = 3  # steps that tell of a joint, at least
 LIKE = 0.2  # of the predicted step, that the measured one may differ by
 THERE = 0.01  # [m] .. and it may lie elsewhere by
+HALF = 0.5  # of the predicted step: one that may be off by more is not known
+SURE = 0.975  # in each direction
 
 
 @dataclass(frozen=True)
@@ -68,6 +70,7 @@ class JointInMotion:
         share: Median of the measured sizes beside the predicted ones.
         error: Its standard error, by the spread of the steps.
         later: Median of how much later they were found [m].
+        later_error: Its standard error, likewise.
     """
 
     joint: int
@@ -76,17 +79,30 @@ class JointInMotion:
     share: float
     error: float
     later: float
+    later_error: float
 
     @property
     def verdict(self) -> str:
-        """Say "confirmed", "refuted", "elsewhere" or "not sure"."""
-        if self.steps < FEW or 2.0 * self.error > 1.0 - LIKE:
+        """Say "confirmed", "refuted", "elsewhere" or "not sure", at 95 %."""
+        if self.steps < FEW:
             return NOT_SURE
-        if self.share + 2.0 * self.error < 1.0 - LIKE:
+        times = _student(self.steps - 1)
+        off, wide = abs(self.share - 1.0), times * self.error
+        away = abs(self.later)
+        if off - wide > LIKE:
             return "refuted"
-        if abs(self.share - 1.0) - 2.0 * self.error > LIKE:
-            return "refuted"
-        return CONFIRMED if abs(self.later) <= THERE else "elsewhere"
+        if off + wide > HALF:
+            return NOT_SURE
+        if away <= THERE:
+            return CONFIRMED
+        return "elsewhere" if away - times * self.later_error > THERE else NOT_SURE
+
+
+def _student(freedom: int) -> float:
+    """Return how many standard errors a mean is known within, by few samples."""
+    from scipy.special import stdtrit  # slow to load, and seldom wanted
+
+    return float(stdtrit(freedom, SURE))
 
 
 def measured_steps(ways: PredictedWays, read: OnTheWay, scatter: float) -> FlankSteps:
@@ -208,14 +224,19 @@ def in_motion(steps: FlankSteps) -> tuple[JointInMotion, ...]:
     found = []
     for joint in sorted(set(steps.joint.tolist())):
         mine = steps.joint == joint
-        share, later = steps.share[mine], steps.later[mine]
-        middle = float(np.median(share))
-        spread = 1.4826 * float(np.median(np.abs(share - middle)))
-        error = max(spread, float(np.median(steps.error[mine]))) / np.sqrt(mine.sum())
+        least = float(np.median(steps.error[mine]))
+        share, error = _middle(steps.share[mine], least)
+        later, later_error = _middle(steps.later[mine], STEP / np.sqrt(12.0))
+        size = float(steps.predicted[mine].mean())
+        count = int(mine.sum())
         found.append(
-            JointInMotion(
-                joint, int(mine.sum()), float(steps.predicted[mine].mean()), middle,
-                float(1.2533 * error), float(np.median(later)),
-            )
-        )  # fmt: skip
+            JointInMotion(joint, count, size, share, error, later, later_error)
+        )
     return tuple(found)
+
+
+def _middle(told: Floats, least: float) -> tuple[float, float]:
+    """Return a median and its standard error, of a scatter that is no less."""
+    middle = float(np.median(told))
+    spread = 1.4826 * float(np.median(np.abs(told - middle)))
+    return middle, 1.2533 * max(spread, least) / float(np.sqrt(len(told)))

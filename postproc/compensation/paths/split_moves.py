@@ -84,12 +84,13 @@ def _otherwise_in_motion(work: PathWork, k: int, v: int) -> str:
 def _as_at_stops(work: PathWork, said: str, v: int, joint: int) -> bool:
     """Tell whether a joint may be taken to change its flank in motion as at stops.
 
-    What nobody could measure for certain may be, where what the joint may lack of its
-    step is too small to matter much.
+    What is not may be, where what the joint may lack of its step is too small to
+    matter much: all of it, but for what nobody could measure for certain.
     """
-    if said != NOT_SURE:
-        return said == CONFIRMED
-    return bool(work.left_behind[joint - 1] * _step(work, v, joint) < SMALL)
+    if said == CONFIRMED:
+        return True
+    lacks = work.left_behind[joint - 1] if said == NOT_SURE else 1.0
+    return bool(lacks * _step(work, v, joint) < SMALL)
 
 
 def _step(work: PathWork, v: int, joint: int) -> float:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from postproc.compensation.in_time import verified
-from postproc.compensation.paths.flanks import in_motion, measured_steps
+from postproc.compensation.paths.flanks import FlankSteps, in_motion, measured_steps
 from postproc.compensation.paths.measured import align
 from tests.compensation.paths.measured_ways import MOVES, STEP, made_ways, read
 from tests.compensation.paths.test_measured import STOPS
@@ -64,3 +64,36 @@ def test_what_a_measured_path_says_is_said_where_points_are_put():
     told = verified({"1": "confirmed", "3": "confirmed", "2": "not sure"})
     assert told.endswith("flanks of joint 1, 3, not those of 2")
     assert verified({"1": "confirmed"}).endswith("joint 1")
+
+
+def steps_of(share, later=0.0, error=0.1):
+    m = len(share)
+    each = np.full(m, 6), np.arange(m), np.full(m, 2e-5), np.array(share)
+    return FlankSteps(*each, np.full(m, error), np.broadcast_to(later, m))
+
+
+@pytest.mark.parametrize(
+    ("share", "later", "verdict"),
+    [
+        ([0.1, 0.3, 0.55, 0.8], 0.0, "not sure"),  # few, and alike by chance
+        ([0.35, 0.4, 0.45, 0.5] * 4, 0.0, "refuted"),
+        ([0.9, 1.1, 1.2], 0.0, "not sure"),
+        ([0.9, 1.1, 1.2] * 3, 0.0, "confirmed"),
+        ([0.9, 1.1, 1.2] * 3, [-0.02, 0.011, 0.03] * 3, "not sure"),
+        ([0.9, 1.1, 1.2] * 3, [0.015, 0.016, 0.018] * 3, "elsewhere"),
+    ],
+)
+def test_few_steps_that_scatter_leave_it_open(share, later, verdict):
+    (joint,) = in_motion(steps_of(share, later))
+    assert joint.verdict == verdict
+
+
+def test_no_joint_is_refuted_by_scatter_alone():
+    rng = np.random.default_rng(5)
+    told = [
+        in_motion(steps_of(rng.normal(1.0, 0.4, n), rng.normal(0.0, 0.01, n), 0.4))
+        for n in (3, 4, 6, 10)
+        for _ in range(200)
+    ]
+    wrong = sum(joint.verdict in ("refuted", "elsewhere") for (joint,) in told)
+    assert wrong <= 12  # of 800; 1.5 %
