@@ -104,7 +104,11 @@ class PathAccuracy:
 
     def samples_to(self, visit: int) -> slice:
         """Return the samples of the path to a visit."""
-        return self.samples(int(np.searchsorted(self.visit, visit)))
+        return self.samples(self.row_of(visit))
+
+    def row_of(self, visit: int) -> int:
+        """Return which path leads to a visit."""
+        return int(np.searchsorted(self.visit, visit))
 
     def joined(self, owner: Ints) -> PathAccuracy:
         """Take the ways to points that were inserted as parts of the source's moves.

@@ -79,6 +79,9 @@ def correct_paths(draft: Draft, setting: Setting, write: Write) -> Draft:
 def _improve(work: PathWork, best: BestPoints) -> None:
     """Put points on the ways until none is left too far, or none helps."""
     for _ in range(ROUNDS):
+        if _even_out(work):
+            work.make()
+            continue
         flat = bending(work)
         best.note(flat)
         new = dict(_new_points(work))
@@ -91,6 +94,27 @@ def _improve(work: PathWork, best: BestPoints) -> None:
         work.chords |= chords
         cut_at_vias(work)
         work.make()
+
+
+def _even_out(work: PathWork) -> bool:
+    """Take back points beside which corrections change faster than they may.
+
+    The error itself changes fast there, and all points of the way would be left for it:
+    over a longer piece it changes less.
+    """
+    changed = False
+    for v, known in [*work.points.items()]:
+        ends, gone = [0.0, *known, 1.0], set[float]()
+        room = {b: c - a for a, b, c in zip(ends, ends[1:], ends[2:], strict=False)}
+        free = {*known[v in work.stops :]} - {1.0}
+        for k in work.stepping(v):
+            if either := free.intersection(ends[k : k + 2]):
+                gone.add(max(either, key=room.__getitem__))
+        if gone:
+            work.drop(v, gone)
+            work.shut.setdefault(v, set()).update(gone)
+            changed = True
+    return changed
 
 
 def _bend(work: PathWork, best: BestPoints) -> None:
@@ -171,7 +195,7 @@ def _on_path(work: PathWork, k: int, v: int) -> list[float]:
     """
     paths, samples = work.paths, work.paths.samples(k)
     way, far = paths.way[samples], paths.after.across[samples]
-    known = work.points.get(v, ())
+    known, shut = work.points.get(v, ()), work.shut.get(v, ())
     least, clear, behind = work.open[v]
     ends = [0.0, *(share * way[-1] for share in known), float(way[-1])]
     found = []
@@ -180,6 +204,8 @@ def _on_path(work: PathWork, k: int, v: int) -> list[float]:
         high = b - (behind if i == len(known) else least)
         inside = np.flatnonzero((way >= a) & (way <= b))
         if high < low or not len(inside):
+            continue
+        if any(a < share * way[-1] < b for share in shut):
             continue
         top = inside[far[inside].argmax()]
         if far[top] > work.aim:

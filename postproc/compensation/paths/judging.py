@@ -54,9 +54,7 @@ def _thin_out(work: PathWork, v: int, share: float) -> bool:
     gone = set(free[max(behind - 1, 0) : behind + 1].tolist())
     if not gone or len(gone) == len(free):
         return False
-    work.points[v] = tuple(s for s in known if s not in gone)
-    longer = min((s for s in known if s > max(gone)), default=1.0)
-    work.chords -= {(v, s) for s in (*gone, longer)}  # of what is a longer piece now
+    work.drop(v, gone)
     return True
 
 

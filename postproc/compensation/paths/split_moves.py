@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from postproc.compensation.paths.arcs import halves
 from postproc.compensation.paths.splitting import shortest_pieces
 from postproc.compensation.paths.taking_up import TakeUp, take_up
 from postproc.compensation.paths.work import PathWork
@@ -20,10 +21,11 @@ def find_split(work: PathWork) -> None:
     visits, paths = work.source.reading.visits, work.paths
     shortest = work.setting.cell.limits.segment_ms / 1e3
     pieces = shortest_pieces(visits, work.first.before, shortest)
-    for k in work.to_split.tolist():
-        v = int(paths.visit[k])
-        if told := _left(work, k, v):
-            work.left[v] = told
+    far = set(paths.visit[work.to_split].tolist())
+    for v in sorted({half for row in far for half in halves(visits, row)}):
+        if told := _left(work, paths.row_of(v), v):
+            if v in far:
+                work.left[v] = told
             continue
         work.open[v] = pieces[v]
         if work.setting.options.take_up and _can_stop(work, v):

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 
 from postproc.arrays import Floats, Ints
+from postproc.compensation.continuity import STEP
 from postproc.compensation.correction import (
     BY_VISIT,
     EXPLAINING,
@@ -60,6 +62,7 @@ class PathWork:
         unconfirmed: Moves that may not, as no measured path confirms their flanks.
         tried: How far such a move began off, and where it stopped, try by try.
         chords: Pieces of arcs that are chords whatever they bend.
+        shut: Where no points may lie any more: corrections changed too fast there.
         approaches: Stops from which targets are approached anew, by visit, (w,) each.
         left: Why moves that leave their path too far are not split.
         latest: The program with these points; at first the source.
@@ -78,6 +81,7 @@ class PathWork:
     unconfirmed: set[int] = field(default_factory=set)
     tried: dict[int, list[tuple[float, float]]] = field(default_factory=dict)
     chords: set[Cut] = field(default_factory=set)
+    shut: dict[int, set[float]] = field(default_factory=dict)
     approaches: dict[int, Floats] = field(default_factory=dict)
     left: dict[int, str] = field(default_factory=dict)
 
@@ -220,6 +224,25 @@ class PathWork:
             return ""
         why = decided.reasons[decided.why[left[0]]]
         return f"points on its way cannot be corrected: {why}"
+
+    def stepping(self, v: int) -> list[int]:
+        """List the pieces of a move, from 0, on which corrections change too fast."""
+        decided, via = self.latest.kept.decisions, self.latest.reading.visits.via
+        text = STEP.format(self.setting.cell.limits.step_mm)
+        marked = np.array([why == text for why in decided.reasons])[decided.why]
+        begin = int(self.own[self.source.reading.visits.before[v]])
+        pieces = enumerate(pairwise([begin, *self.ends(v)]))
+        return [
+            k for k, (a, b) in pieces
+            if (marked[b - 1] if via[b - 1] else marked[a] and marked[b])
+        ]  # fmt: skip
+
+    def drop(self, v: int, gone: Collection[float]) -> None:
+        """Take back points of a move; pieces that grow by it are chords no more."""
+        known = self.points[v]
+        self.points[v] = left = tuple(s for s in known if s not in gone)
+        longer = {min((s for s in left if s > share), default=1.0) for share in gone}
+        self.chords -= {(v, share) for share in (*gone, *longer)}
 
     def _on_way(self, v: int) -> Ints:
         """Return the visits with points on the way to one, without it."""

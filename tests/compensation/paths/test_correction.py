@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import json
 from dataclasses import replace
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from typing import Any
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
 
-from postproc.arrays import Floats
+from postproc.arrays import Floats, Ints
 from postproc.cli.simulate import _read, setup_of, simulate_file
 from postproc.compensation.paths import correction, judging, split_moves
 from postproc.compensation.paths.arc_cuts import bending
@@ -342,6 +343,52 @@ def test_arcs_are_cut_at_the_points_on_their_ways_too(shop: Path) -> None:
             assert half["inserted"] == len(half["points"]) and not half["not_split"]
     text = (shop / "points.pdl").read_text()
     assert text.count("inserted (via)") == 2 and text.count("CIRCULAR") > 6
+
+
+def test_both_halves_of_an_arc_are_open_where_one_is(
+    shop: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    works: list[PathWork] = []
+    monkeypatch.setattr(correction, "judge", works.append)
+    monkeypatch.setattr(PathWork, "to_split", property(one_half_of_every_arc))
+    compensated(shop, "job.pdl", "halves", "--path-mm", TOLERANCE)
+    (work,) = works
+    via = np.flatnonzero(work.source.reading.visits.via)
+    assert len(via) > 1 and {*via, *(via + 1)} == set(work.open)
+
+
+def one_half_of_every_arc(work: PathWork) -> Ints:
+    behind = np.flatnonzero(work.source.reading.visits.via) + 1
+    return np.searchsorted(work.paths.visit, behind)
+
+
+def test_of_two_points_too_close_for_the_error_the_one_with_more_room_goes() -> None:
+    work = Mock(points={7: (0.2, 0.5, 0.6)}, stops=set(), chords=set(), shut={})
+    work.stepping.return_value = [2]  # from 0.5 to 0.6
+    work.drop = partial(PathWork.drop, work)
+    assert correction._even_out(work)
+    assert work.points == {7: (0.2, 0.5)} and work.shut == {7: {0.6}}
+    work.stepping.return_value = []
+    assert not correction._even_out(work)
+
+
+def test_where_the_error_changes_fast_points_beside_it_are_taken_back(
+    shop: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    works: list[PathWork] = []
+    judged = correction.judge
+    monkeypatch.setattr(correction, "judge", lambda w: (works.append(w), judged(w)))
+    strict = Path(CELL).read_text().replace("step_mm = 0.5", "step_mm = 0.1")
+    (shop / "strict.toml").write_text(strict)
+    done("compensate", shop / "job.pdl", "--cell", shop / "strict.toml", "--model",
+         shop / "confirmed.json", "-o", shop / "strict.pdl", "--report",
+         shop / "strict.json", "--path-mm", TOLERANCE)  # fmt: skip
+    (work,) = works
+    assert len(work.shut) > 2
+    assert all(not gone & {*work.points.get(v, ())} for v, gone in work.shut.items())
+    report = told(shop, "strict")
+    assert all(target["status"] == "safe" for target in report["targets"][2:])
+    assert sum(path["inserted"] > 0 for path in report["path"]) > 5
 
 
 def test_points_are_few_far_apart_and_told(shop: Path) -> None:
