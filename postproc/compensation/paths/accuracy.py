@@ -69,6 +69,7 @@ class PathAccuracy:
         visit: The visit at the end of each, (m,).
         first: Its samples are first[k] .. first[k + 1] - 1, (m + 1,).
         way: Path length up to every sample since the move began, (s,) [m].
+        tangent: Directions of the programmed path there, (s, 3).
         before, after: Deviations of the program as it was written and compensated.
         unknown: Cartesian moves that nothing is predicted for.
         crossing: Where joints of the compensated program change their flanks, (s, 6).
@@ -84,6 +85,7 @@ class PathAccuracy:
     visit: Ints
     first: Ints
     way: Floats
+    tangent: Floats
     before: Deviations
     after: Deviations
     unknown: int
@@ -177,7 +179,7 @@ def predict_paths(
     if owner is not None and len(rows):
         moved += _off_the_arcs(arcs, owner, before, pair[0], wanted, way)
     found = PathAccuracy(
-        rows, pair[0].first, way,
+        rows, pair[0].first, way, tangent,
         _deviations(runs[0], error, -off, tangent, way),
         _deviations(runs[1], error, moved, tangent, way),
         int((cartesian & ~known).sum()), runs[1].changes(), np.empty(0),
@@ -217,7 +219,7 @@ def _in_doubt(
         width = np.where(gives, np.minimum(widest(error.model), GIVES), 1.0)
         soft = AlongWays.of(error.cell, error.model, run.cycle, run.ways, width)
         lying = on_the_way(soft.side, width)
-        giving, _ = _apart(moved + error(soft, slice(None), lying), tangent)
+        giving, _ = apart(moved + error(soft, slice(None), lying), tangent)
     far, doubtful = by_joint.max(axis=1), (by_joint * open_).max(axis=1)
     return replace(found, otherwise=far, doubtful=doubtful, giving=giving)
 
@@ -288,7 +290,7 @@ def _otherwise(
         for flank in (low, high):
             other = np.array(side[rows])
             other[:, joint] = flank[rows, joint]
-            far, _ = _apart(moved[rows] + error(run, rows, other), tangent[rows])
+            far, _ = apart(moved[rows] + error(run, rows, other), tangent[rows])
             out[rows, joint] = np.maximum(out[rows, joint], far)
     return out
 
@@ -315,7 +317,7 @@ def _deviations(
     """
     side = run.side
     off = moved + error(run, slice(None), side)
-    across, along = _apart(off, tangent)
+    across, along = apart(off, tangent)
     unsure, starts = _unsure(run, error), run.ways.first[:-1]
     if not len(starts):
         return Deviations(off, across, along, unsure, starts, starts)
@@ -324,7 +326,7 @@ def _deviations(
     return Deviations(off, across, along, unsure, largest, joints)
 
 
-def _apart(off: Floats, tangent: Floats) -> tuple[Floats, Floats]:
+def apart(off: Floats, tangent: Floats) -> tuple[Floats, Floats]:
     """Tell what is across a path (s,) and along it (s,) [m] of what is off (s, 3)."""
     along = np.einsum("si,si->s", off, tangent)
     return lengths(off - along[:, None] * tangent), along

@@ -22,7 +22,7 @@ from postproc.language.visits import Visits
 from postproc.motion.blending import zones
 from postproc.motion.cycle import ProgramCycle
 from postproc.motion.path import Segments, arcs, circles
-from postproc.motion.targets import Fly
+from postproc.motion.targets import Fly, Targets
 from postproc.robot.arm import Arm
 from postproc.robot.pose import MM, lengths, rotation_from_vector, rotation_vector
 from postproc.robot.trajectory import Motion
@@ -203,16 +203,27 @@ def largest_zones(arm: Arm, cycle: ProgramCycle) -> Floats:
         cycle: The program, in time.
     """
     n, targets = len(cycle), cycle.targets
-    most = np.zeros(n)
-    for law in (Fly.FROM, Fly.OVERLAP):
-        told = replace(targets, rounding=np.full(n, law), overlap=np.ones(n))
-        found = zones(arm, told, cycle.path)
-        length = cycle.path.length
-        size = np.maximum(
-            found.before * length[found.into], found.behind * length[found.out]
-        )
-        np.maximum.at(most, found.visit, size)
-    return most
+    laws = [
+        replace(targets, rounding=np.full(n, law), overlap=np.ones(n))
+        for law in (Fly.FROM, Fly.OVERLAP)
+    ]
+    return np.maximum(*(zone_sizes(arm, cycle, told) for told in laws))
+
+
+def zone_sizes(arm: Arm, cycle: ProgramCycle, targets: Targets) -> Floats:
+    """Return how much of the way fly points are rounded on, (n,) [m], 0: not at all.
+
+    Args:
+        arm: The arm; its limits are used.
+        cycle: The program, in time.
+        targets: Its targets, with the laws by which they are rounded.
+    """
+    size, found = np.zeros(len(cycle)), zones(arm, targets, cycle.path)
+    length = cycle.path.length
+    size[found.visit] = np.maximum(
+        found.before * length[found.into], found.behind * length[found.out]
+    )
+    return size
 
 
 def passed(zone: Floats, radius: float) -> Floats:

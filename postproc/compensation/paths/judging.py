@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 
 import numpy as np
 
 from postproc.arrays import Bools, Floats, any_in_rows
 from postproc.compensation.in_time import InTime
-from postproc.compensation.paths.accuracy import PathAccuracy
+from postproc.compensation.paths.accuracy import PathAccuracy, apart
 from postproc.compensation.paths.approach_anew import bad_approaches
 from postproc.compensation.paths.arc_cuts import bending, may_be_chord
 from postproc.compensation.paths.arcs import (
@@ -17,6 +18,7 @@ from postproc.compensation.paths.arcs import (
     largest_zones,
     passed,
     point_on_way,
+    zone_sizes,
 )
 from postproc.compensation.paths.work import PathWork
 from postproc.robot.pose import lengths
@@ -139,6 +141,36 @@ def _of_moves(work: PathWork, far: dict[int, float]) -> dict[int, float]:
     return {v: max(far.get(row, 0.0) for row in halves(visits, v)) for v in far}
 
 
+@dataclass(frozen=True)
+class _Corner:
+    """How a point on a way may be rounded.
+
+    Attributes:
+        half: Half of its largest zone [m].
+        moved: What that moves the path by at the point, (3,) [m].
+        done: How much of it the plan has.
+        beside: How far an arc is passed besides [m].
+    """
+
+    half: float
+    moved: Floats
+    done: float
+    beside: float
+
+    def farthest(self, aside: Floats, off: Floats, tangent: Floats) -> Floats:
+        """Say how far the path is off at the most, however the point is rounded, (s,).
+
+        Args:
+            aside: How far samples are from the point along the way, (s,) [m].
+            off: From the path to the TCP there, (s, 3) [m].
+            tangent: Directions of the path, (s, 3).
+        """
+        bend = 1 - (aside / max(self.half, 1e-12)) ** 2  # bounds chords and parabolas
+        by = bend[:, None] * self.moved
+        far = [apart(off + u * by, tangent)[0] for u in (-self.done, 1.0 - self.done)]
+        return np.where(bend >= 0, np.maximum(*far) + self.beside * bend, 0.0)
+
+
 def _worst(work: PathWork, told: InTime) -> dict[int, tuple[float, float]]:
     """How far each move leaves its path, however its points are rounded.
 
@@ -148,31 +180,31 @@ def _worst(work: PathWork, told: InTime) -> dict[int, tuple[float, float]]:
     rounded, found = _rounded(work, told), dict[int, tuple[float, float]]()
     for k, v in enumerate(told.paths.visit.tolist()):
         samples = told.paths.samples(k)
-        way, far = told.paths.way[samples], told.paths.after.across[samples]
-        worst = np.array(far)
-        for share, (half, beside) in zip(
-            work.points.get(v, ()), rounded.get(v, ()), strict=True
-        ):
-            there = np.abs(way - share * way[-1]) / max(half, 1e-12)
-            near = far + beside * (1 - there**2)  # bounds chords and parabolas
-            worst = np.maximum(worst, np.where(there <= 1, near, 0.0))
+        way, off = told.paths.way[samples], told.paths.after.off[samples]
+        tangent = told.paths.tangent[samples]
+        worst = np.array(told.paths.after.across[samples])
+        points = zip(work.points.get(v, ()), rounded.get(v, ()), strict=True)
+        for share, corner in points:
+            aside = np.abs(way - share * way[-1])
+            worst = np.maximum(worst, corner.farthest(aside, off, tangent))
         found[v] = _largest_on(way, worst)
     return found
 
 
-def _rounded(work: PathWork, told: InTime) -> dict[int, list[tuple[float, float]]]:
-    """Size of the largest zones at points, and how far they pass them [m].
+def _rounded(work: PathWork, told: InTime) -> dict[int, list[_Corner]]:
+    """Say how points on ways may be rounded, where they are no stops.
 
     No corner is larger than half of a neighbouring piece; what cuts it off straight
     passes the point farthest. On an arc it is no larger than zones are, by any law.
     """
+    arm, found = work.setting.cell.arm, dict[int, list[_Corner]]()
     p, c = (
-        work.setting.cell.arm.tcp(cycle.path.q, cycle.targets.tool[:, :3, 3])
+        arm.tcp(cycle.path.q, cycle.targets.tool[:, :3, 3])
         for cycle in (told.after, told.before)
     )
-    found = dict[int, list[tuple[float, float]]]()
     visits, arcs = work.source.reading.visits, work.wanted_arcs()
-    zone = largest_zones(work.setting.cell.arm, told.after) if len(arcs) else None
+    zone = largest_zones(arm, told.after) if len(arcs) else None
+    planned = zone_sizes(arm, told.after, told.after.targets)
     for v, shares in work.points.items():
         rows = [int(work.own[visits.before[v]]), *work.ends(v)]
         if shares[-1] == 1.0:
@@ -180,14 +212,15 @@ def _rounded(work: PathWork, told: InTime) -> dict[int, list[tuple[float, float]
         rows = rows[: len(shares) + 2]
         size = np.maximum(lengths(np.diff(p[rows], axis=0)), 1e-9)
         slope = np.diff((p - c)[rows], axis=0) / size[:, None]
-        bend = lengths(np.diff(slope, axis=0)) / 2  # sine of half of the angle
         half = np.minimum(size[1:], size[:-1]) / 2
-        far = half * bend
+        beside = np.zeros(len(half))
         if zone is not None and is_arc(visits, v):
             half = np.minimum(half, zone[rows[1:-1]])
-            far = half * bend + passed(half, arcs.radius_of(v))
-        far[: int(v in work.stops)] = 0.0  # a stop is not rounded
-        found[v] = list(zip(half.tolist(), far.tolist(), strict=True))
+            beside = passed(half, arcs.radius_of(v))
+        moved = np.diff(slope, axis=0) * half[:, None] / 2
+        done = np.minimum(planned[rows[1:-1]] / np.maximum(half, 1e-12), 1.0)
+        moved[: int(v in work.stops)] = beside[: int(v in work.stops)] = 0.0
+        found[v] = [*map(_Corner, half, moved, done, beside)]
     return found
 
 
