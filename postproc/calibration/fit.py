@@ -26,9 +26,8 @@ from postproc.calibration.registration import register, typical_gap
 from postproc.calibration.regression import Fit
 from postproc.calibration.report import FitReport, report_fit, report_method
 from postproc.calibration.reversals import (
-    flank_widths,
+    newer_widths,
     split_reversals,
-    tell_widths,
 )
 from postproc.calibration.selection import Progress, fit_survey, model_of, silent
 from postproc.calibration.tables import DETECT, TableFormat
@@ -140,10 +139,8 @@ def fit_measurements(
     )
     survey = replace(survey, warnings=told)
     model = replace(model_of(fitted, survey), registration=placed)
-    if reversals is not None:
-        widths = flank_widths(model, cell.arm, reversals)
-        model = replace(model, flank_widths=widths)
-        survey = replace(survey, warnings=(*survey.warnings, tell_widths(widths)))
+    widths = newer_widths((), model, cell.arm, reversals)
+    model = replace(model, flank_widths=widths)
     report = report_fit(fitted, survey, model)
     return Calibration(model, report, survey.with_states(fitted.batch.states))
 

@@ -12,6 +12,7 @@ from postproc.arrays import Bools, Floats
 from postproc.calibration.directions import judge_directions
 from postproc.calibration.measurements import DroppedRow, Measurements
 from postproc.calibration.regression import Fit, Unseen, observe
+from postproc.calibration.reversals import tell_widths
 from postproc.model.effects.effect import Effect
 from postproc.model.kinematics import Batch
 from postproc.model.model import FreePart, Model
@@ -148,6 +149,7 @@ class FitReport:
         found: What every effect does at every joint, largest first.
         directions: Wrong directions, or None where the file has none.
         free: What functions without a law predict; None for published methods.
+        flanks: What reversals tell of the flanks of the joints; "" without reversals.
     """
 
     parameters: tuple[ParameterRow, ...]
@@ -166,6 +168,7 @@ class FitReport:
     found: tuple[Found, ...] = ()
     directions: DirectionReport | None = None
     free: FreeForms | None = None
+    flanks: str = ""
 
 
 def report_fit(fit: Fit, survey: Measurements, model: Model) -> FitReport:
@@ -203,6 +206,7 @@ def report_fit(fit: Fit, survey: Measurements, model: Model) -> FitReport:
         found=find(fit),
         directions=report_directions(fit, survey),
         free=FreeForms.of(model.free_part(fit.batch.arm, fit.batch.states[used])),
+        flanks=tell_widths(model.flank_widths),
     )
 
 

@@ -113,6 +113,26 @@ def flank_widths(model: Model, arm: Arm, found: Reversals) -> tuple[Width, ...]:
     )
 
 
+def newer_widths(
+    known: tuple[Width, ...], model: Model, arm: Arm, found: Reversals | None
+) -> tuple[Width, ...]:
+    """Say over how many gaps each joint goes, by what was known and by new reversals.
+
+    What these tell of a joint counts, what they leave open stays as it was known.
+
+    Args:
+        known: Of every joint, or of none.
+        model: A model of the new survey.
+        arm: The arm.
+        found: Its reversals, None where there are none.
+    """
+    if found is None:
+        return known
+    new = flank_widths(model, arm, found)
+    pairs = zip(known or new, new, strict=True)
+    return tuple(old if width == UNTOLD else width for old, width in pairs)
+
+
 @dataclass(frozen=True)
 class _OneReversal:
     """One reversal: what is left of its k whitened readings, by what is said of it.
@@ -176,11 +196,13 @@ def _width(tried: list[_OneReversal]) -> Width:
 
 
 def tell_widths(widths: tuple[Width, ...]) -> str:
-    """Say in words what reversals tell of the joints.
+    """Say in words what reversals tell of the joints; "" where there were none.
 
     >>> tell_widths((*[(1.0, 1.25)] * 4, (2.0, 6.0), UNTOLD))
     'flanks at stops: joint 1, 2, 3, 4 sharp; joint 5 2 to 6 gaps; joint 6 not sure'
     """
+    if not widths:
+        return ""
     joints = dict[str, list[str]]()
     for joint, width in enumerate(widths, start=1):
         joints.setdefault(_said(width), []).append(str(joint))

@@ -7,6 +7,7 @@ noise nor any error of the arm does.
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass
 
 import numpy as np
@@ -90,7 +91,9 @@ def _heaps(seen: Floats, count: int) -> ToolGroups | None:
     scale = max(float(np.median(np.abs(seen))), 1e-9)
     best, least = None, np.inf
     for seed in range(STARTS):
-        centre, which = kmeans2(seen / scale, count, minit="++", rng=seed)
+        with warnings.catch_warnings():  # points that are few may leave a heap empty
+            warnings.simplefilter("ignore", UserWarning)
+            centre, which = kmeans2(seen / scale, count, minit="++", rng=seed)
         spread = np.linalg.norm(seen / scale - centre[which], axis=1)
         if float(np.median(spread)) < least:
             best, least = (centre, which), float(np.median(spread))

@@ -251,7 +251,7 @@ def tell(found: Diagnosis) -> str:
     ]
     if found.vap_mm is not None:
         lines.append(f"vAP {found.vap_mm[0]:.4f} -> {found.vap_mm[1]:.4f} mm")
-    lines += found.fixed_points
+    lines += [*found.fixed_points, *filter(None, [found.flanks])]
     lines += [
         f"{f.effect} may be tracker_drift: nothing of it is compensated. Rows on fixed "
         "points (column reference) would tell"

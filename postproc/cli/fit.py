@@ -193,7 +193,7 @@ def tell_fit(report: FitReport, everything: bool = False) -> str:
         lines = [_tell_found(_large(report.found)), *_tell_rest(report)]
     lines += _tell_rows(report, len(report.dropped) if everything else FEW)
     lines += tell_directions(report.directions, ROWS if everything else FEW)
-    lines += [f"warning: {warning}" for warning in report.warnings]
+    lines += [report.flanks, *(f"warning: {warning}" for warning in report.warnings)]
     lines += _tell_free(report.free)
     lines += _tell_scatter(report)
     return "\n".join(line for line in lines if line)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,6 +13,7 @@ from postproc.calibration.fit import fit, read_surveys
 from postproc.calibration.reversals import (
     Reversals,
     flank_widths,
+    newer_widths,
     split_reversals,
     tell_widths,
 )
@@ -133,6 +135,38 @@ def test_the_model_keeps_what_they_tell(sharp: Path, tmp_path: Path) -> None:
     assert said[:3] == (ELASTIC, NOT_SURE, CONFIRMED)
     silent = replace(model, flank_widths=())
     assert not any(verdicts_of_flanks(silent, load_cell(CELL).arm))
+
+
+def test_what_new_reversals_leave_open_stays_as_it_was_known(sharp: Path) -> None:
+    cell, model = load_cell(CELL), fitted(sharp)
+    survey = read_surveys([sharp], cell)
+    _, found = split_reversals(survey, cell.arm)
+    assert found is not None
+    few = Reversals(found.rows, found.first[: EACH + 1], found.drive[:EACH])
+    drives = sorted({int(drive) for drive in few.drive})
+    known = ((2.0, 6.0),) * 6
+    widths = newer_widths(known, model, cell.arm, few)
+    told = flank_widths(model, cell.arm, few)
+    for joint in range(6):
+        new = joint in drives and told[joint] != UNTOLD
+        assert widths[joint] == (told[joint] if new else (2.0, 6.0))
+    assert widths != known
+    assert newer_widths((), model, cell.arm, few) == told
+    assert newer_widths(known, model, cell.arm, None) == known
+
+
+def test_diagnose_reads_the_reversals_of_a_new_survey(
+    sharp: Path, tmp_path: Path
+) -> None:
+    model = tmp_path / "m.json"
+    replace(fitted(sharp), flank_widths=()).save(model)
+    report = tmp_path / "told.json"
+    told = cli("diagnose", sharp, "--cell", CELL, "--model", model, "-o",
+               tmp_path / "better.json", "--json", report)  # fmt: skip
+    said = json.loads(report.read_bytes())["flanks_at_stops"]
+    assert said.startswith("flanks at stops: joint 1, 2, 3")
+    assert said in " ".join(told.stdout.split())
+    assert len(load_model(tmp_path / "better.json").flank_widths) == 6
 
 
 def test_a_link_on_its_way_goes_from_flank_to_flank() -> None:

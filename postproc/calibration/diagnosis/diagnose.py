@@ -37,7 +37,7 @@ from postproc.calibration.measurements import Measurements
 from postproc.calibration.references import ruled_out
 from postproc.calibration.regression import Fit, fit_effects
 from postproc.calibration.report import report_directions, weighed_down
-from postproc.calibration.reversals import split_reversals
+from postproc.calibration.reversals import newer_widths, split_reversals, tell_widths
 from postproc.calibration.selection import model_of, told_apart
 from postproc.model.combination import Combination
 from postproc.model.kinematics import Batch
@@ -191,7 +191,7 @@ def diagnose(
         PostprocError: A model that cannot be refitted.
         ModelError: A model of another arm.
     """
-    survey, _ = split_reversals(survey, arm)
+    survey, reversals = split_reversals(survey, arm)
     base = refit(survey, arm, model, tracker, setup)
     without, sides = ruled_out(survey.motion), survey.states.direction
     traced = trace(base, seed, progress, without)
@@ -206,6 +206,10 @@ def diagnose(
     held_out = hold_out(traced.search, sides, seed, progress, given)
     diagnosis = _conclude(survey, traced, held_out, tracker, seed)
     extended = _extended(model, survey, traced.search, diagnosis)
+    widths = newer_widths(model.flank_widths, extended, arm, reversals)
+    extended = replace(extended, flank_widths=widths)
+    if reversals is not None:
+        diagnosis = replace(diagnosis, flanks=tell_widths(widths))
     return Extension(diagnosis, extended, traced.search, held_out)
 
 
@@ -317,10 +321,7 @@ def _extended(
     fit = found.fit
     revised = any(isinstance(e, Revision) for e in fit.combination.effects)
     fitted = model_of(fold_back(fit) if revised else fit, survey)
-    return replace(
-        fitted, parent=model.id, history=(*model.history, record),
-        flank_widths=model.flank_widths,
-    )  # fmt: skip
+    return replace(fitted, parent=model.id, history=(*model.history, record))
 
 
 # What a reader needs to judge a diagnosis: residuals, rivals, rows, the chain.

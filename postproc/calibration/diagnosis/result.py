@@ -116,6 +116,7 @@ class Diagnosis:
         directions: Wrong directions, or None where the file has none.
         not_excluded: What the rows could not have shown, in words.
         fixed_points: What readings of fixed points say of the tracker, in words.
+        flanks: What reversals among the rows tell of the flanks of the joints.
     """
 
     verdict: Verdict
@@ -135,6 +136,7 @@ class Diagnosis:
     directions: DirectionReport | None
     not_excluded: tuple[str, ...] = ()
     fixed_points: tuple[str, ...] = ()
+    flanks: str = ""
 
     def to_dict(self) -> dict[str, Any]:
         """Return the content of the JSON report."""
@@ -172,6 +174,7 @@ class Diagnosis:
             "directions": None if self.directions is None else asdict(self.directions),
             "not_excluded": list(self.not_excluded),
             "fixed_points": list(self.fixed_points),
+            "flanks_at_stops": self.flanks,
         }
 
 
