@@ -73,17 +73,23 @@ def verdicts_of_flanks(model: Model, arm: Arm) -> tuple[str, ...]:
     """Say what is known of how joints 1 to 6 change their flanks.
 
     Returns:
-        What a measured path says of them in motion, what reversals say at stops else;
-        "elastic" whatever a path says. Where none was measured "not sure" of links
-        that are ahead of their drives, and "" of all others.
+        What a measured path says of them in motion; where it is not sure, or none was
+        measured, what reversals say at stops. "elastic" whatever a path says. Without
+        both "not sure" of links that are ahead of their drives, and "" of all others.
     """
     at_stops = [verdict_at_stops(width) for width in model.flank_widths] or [""] * 6
-    told = []
-    for joint, leads in enumerate(ahead(model, arm).tolist()):
-        here = NOT_SURE if leads else at_stops[joint]
-        elastic = at_stops[joint] == ELASTIC
-        told.append(ELASTIC if elastic else model.in_motion.get(str(joint + 1), here))
-    return tuple(told)
+    in_motion = (model.in_motion.get(str(joint), "") for joint in range(1, 7))
+    each = zip(at_stops, in_motion, ahead(model, arm).tolist(), strict=True)
+    return tuple(_verdict(*said) for said in each)
+
+
+def _verdict(at_stops: str, in_motion: str, leads: bool) -> str:
+    """Say what is known of one joint, "" for nothing."""
+    if at_stops == ELASTIC:
+        return ELASTIC
+    if in_motion not in ("", NOT_SURE):
+        return in_motion
+    return NOT_SURE if leads else at_stops or in_motion
 
 
 def on_the_way(side: Floats, width: Floats | float) -> Floats:
@@ -115,13 +121,11 @@ def left_behind(model: Model, arm: Arm) -> Floats:
     reversals allow.
 
     Returns:
-        Shares of that way, (6,), 0 for a sharp gap; 1 where they say nothing, or a
-        measured path has had its say.
+        Shares of that way, (6,), 0 for a sharp gap; 1 where they say nothing.
     """
     most = widest(model)
     lacks = (1.0 + on_the_way(1.0 - 2.0 / most, most)) / 2.0
-    measured = [str(joint) in model.in_motion for joint in range(1, 7)]
-    return np.where(ahead(model, arm) | measured, 1.0, lacks)
+    return np.where(ahead(model, arm), 1.0, lacks)
 
 
 def half_widths(model: Model, arm: Arm, q: Floats) -> Floats:

@@ -133,6 +133,12 @@ def test_the_model_keeps_what_they_tell(sharp: Path, tmp_path: Path) -> None:
     assert again.flank_widths == other.flank_widths and again.id == other.id
     said = verdicts_of_flanks(again, load_cell(CELL).arm)
     assert said[:3] == (ELASTIC, NOT_SURE, CONFIRMED)
+    asked = {str(joint): NOT_SURE for joint in range(1, 7)}
+    unclear = replace(again, history=({"in_motion": asked},))
+    assert verdicts_of_flanks(unclear, load_cell(CELL).arm) == said
+    refuted = replace(again, history=({"in_motion": {"1": "refuted", "3": "refuted"}},))
+    then = verdicts_of_flanks(refuted, load_cell(CELL).arm)
+    assert then[:3] == (ELASTIC, NOT_SURE, "refuted")
     silent = replace(model, flank_widths=())
     assert not any(verdicts_of_flanks(silent, load_cell(CELL).arm))
 

@@ -26,6 +26,7 @@ from postproc.robot.pose import lengths
 JUDGED = 8  # rounds in which points are taken back
 WORSE = 5e-5  # [m] that a move may be worse where a flank is not as predicted
 HARM = 3e-5  # [m] that any place of it may be worse where flanks give way
+SLIGHT = 1e-6  # [m] a difference that is none
 MOVED = 5e-6  # [m] that a rounded corner may move
 
 
@@ -117,8 +118,8 @@ def _if_otherwise(
     """Say which moves are worse where flanks are not as predicted, and at what share.
 
     A flank that no measured path confirms may change later or never: what the move is
-    off at the most counts. Or it gives way before it carries: any place counts, as the
-    points around it are right for a sharp gap alone.
+    off at the most counts. Or it gives way before it carries: any place counts where
+    that makes a difference, as the points around it are right for a sharp gap alone.
     """
     first, paths, found = work.first.paths, told.paths, dict[int, float]()
     far_off = largest_on_moves(first, first.doubtful).items()
@@ -128,8 +129,10 @@ def _if_otherwise(
             found[v] = share
     for k, v in enumerate(paths.visit.tolist() if len(paths.giving) else ()):
         new, old = paths.samples(k), first.samples_to(v)
-        usual_there = np.interp(paths.way[new], first.way[old], first.giving[old])
-        excess, share = _largest_on(paths.way[new], paths.giving[new] - usual_there)
+        way, giving = paths.way[new], paths.giving[new]
+        given_way = np.abs(giving - paths.after.across[new]) > SLIGHT
+        usual_there = np.interp(way, first.way[old], first.giving[old])
+        excess, share = _largest_on(way, given_way * (giving - usual_there))
         if excess > HARM:
             found.setdefault(v, share)
     return found
