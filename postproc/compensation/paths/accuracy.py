@@ -164,14 +164,16 @@ def predict_paths(
     cartesian = (before.targets.move != Motion.JOINT) & ~before.targets.curved
     known = cartesian & (before.ways[1] >= 0) & (after.ways[1] == before.ways[1])
     rows = np.flatnonzero(known)
-    ours = ways_of(before, rows)
-    pair = [ours, ways_of(after, rows).as_many(ours)]
-    cycles = before, after
+    cycles, tools = (before, after), before.targets.tool[rows, :3, 3]
+    pair = [ways_of(cycle, rows) for cycle in cycles]
     if len(rows):
+        p = [cell.arm.tcp(w.q, tools[w.way]) for w in pair]
+        wanted, way = (measured_along(*at)[0] for at in zip(p, pair, strict=True))
+        pair[1] = pair[1].as_many(pair[0], way, wanted)
         pair = refined(cell, model, cycles, pair)
     runs = [AlongWays.of(cell, model, c, w) for c, w in zip(cycles, pair, strict=True)]
     error = ErrorAlong(cell, model, temperature)
-    tools = before.targets.tool[rows, :3, 3][pair[0].way]
+    tools = tools[pair[0].way]
     wanted, commanded = (cell.arm.tcp(w.q, tools) for w in pair)
     way, tangent = measured_along(wanted, pair[0])
     off = _shift(shift, pair[0], way)

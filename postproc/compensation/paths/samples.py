@@ -10,6 +10,8 @@ from postproc.arrays import Bools, Floats, Ints, spans
 from postproc.motion.cycle import ProgramCycle
 from postproc.robot.pose import lengths
 
+AS_FAR = 1e-3  # of a way: samples that lie as far along it
+
 
 @dataclass(frozen=True)
 class PathSamples:
@@ -38,17 +40,38 @@ class PathSamples:
         """The way that every sample belongs to, (s,)."""
         return np.repeat(np.arange(len(self.visit)), np.diff(self.first))
 
-    def as_many(self, other: PathSamples) -> PathSamples:
-        """Take as many samples of every way as there are of another one's."""
-        if np.array_equal(self.first, other.first):
+    def as_many(self, other: PathSamples, way: Floats, wanted: Floats) -> PathSamples:
+        """Take a sample of every way for each one of another, as far along it.
+
+        Ways whose samples lie as far along them are taken as they are. Those beside
+        corners that are rounded otherwise are not.
+
+        Args:
+            other: The other ways.
+            way: Path length up to every sample of these, (s,) [m].
+            wanted: .. and of the other ones, (t,) [m].
+        """
+        along, there, to = self._shares(way), other._shares(wanted), other.way
+        alike = np.diff(self.first) == np.diff(other.first)
+        number = np.arange(len(to)) - other.first[to]
+        own = np.minimum(self.first[to] + number, self.first[to + 1] - 1)
+        off = np.abs(along[own] - there)
+        alike &= np.maximum.reduceat(off, other.first[:-1]) < AS_FAR
+        if alike.all():
             return self
-        way = other.way
-        has, wants = (np.diff(samples.first)[way] - 1 for samples in (self, other))
-        share = (np.arange(len(way)) - other.first[way]) / np.maximum(wants, 1)
-        at = share * has
-        step = np.minimum(at.astype(int), np.maximum(has - 1, 0))
-        q = _between(self.q, self.begins, self.first[way] + step, at - step)
+        step = np.searchsorted(along + 2 * self.way, there + 2 * to, side="right") - 1
+        last = np.maximum(self.first[to + 1] - 2, self.first[to])
+        step = np.where(alike[to], own, step.clip(self.first[to], last))
+        size = along[np.minimum(step + 1, len(along) - 1)] - along[step]
+        share = ((there - along[step]) / np.maximum(size, 1e-12)).clip(0.0, 1.0)
+        share[alike[to]] = 0.0
+        q = _between(self.q, self.begins, step, share)
         return replace(self, q=q, first=other.first)
+
+    def _shares(self, way: Floats) -> Floats:
+        """Give path lengths (s,) as shares of each way."""
+        whole = way[self.first[1:] - 1][self.way]
+        return way / np.maximum(whole, 1e-12)
 
     def refined(self, after: Ints, share: Floats) -> PathSamples:
         """Insert samples at a share of the way from some samples to the next ones."""

@@ -1,0 +1,58 @@
+"""Samples of ways are paired by how far along them they lie."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from postproc.arrays import Floats
+from postproc.compensation.paths.samples import PathSamples
+
+ENDS = np.array(
+    [[0.0] * 6, [0.3, -0.2, 0.1, 0.5, 0.0, 0.4], [0.6, 0.1, 0.1, 0.2, 0.3, 0.1]]
+)
+
+
+def made(*shares: Floats) -> tuple[PathSamples, Floats]:
+    """Ways from end to end, straight in the joints' space, and path lengths."""
+    counts = [len(share) for share in shares]
+    q = [
+        a + share[:, None] * (b - a)
+        for share, a, b in zip(shares, ENDS[:-1], ENDS[1:], strict=True)
+    ]
+    rows = np.arange(len(shares))
+    samples = PathSamples(rows + 1, rows, np.concatenate(q), np.cumsum([0, *counts]))
+    return samples, np.concatenate([100.0 * share for share in shares])
+
+
+EVEN, CORNER = np.linspace(0.0, 1.0, 9), np.array([0.0, 0.5, 0.9, 0.92, 0.95, 1.0])
+
+
+def test_samples_are_taken_as_far_along() -> None:
+    other, wanted = made(EVEN, EVEN)
+    same_number = np.sort(np.r_[CORNER, 0.93, 0.97, 0.99])
+    for shares in (
+        (CORNER, EVEN),
+        (EVEN, CORNER),
+        (CORNER, CORNER),
+        (same_number, EVEN),
+    ):
+        samples, way = made(*shares)
+        found = samples.as_many(other, way, wanted)
+        np.testing.assert_array_equal(found.first, other.first)
+        np.testing.assert_allclose(found.q, other.q, atol=1e-12)
+
+
+def test_ways_that_lie_alike_are_taken_as_they_are() -> None:
+    other, wanted = made(EVEN, EVEN)
+    samples, way = made(EVEN, EVEN)
+    assert samples.as_many(other, 2.0 * way, wanted) is samples
+    samples, way = made(EVEN, CORNER)
+    found = samples.as_many(other, way, wanted)
+    np.testing.assert_array_equal(found.q[:9], samples.q[:9])
+
+
+def test_a_way_of_no_length_stays_where_it_is() -> None:
+    other, wanted = made(EVEN, EVEN)
+    still, _ = made(np.zeros(2), CORNER)
+    found = still.as_many(other, np.r_[0.0, 0.0, 100.0 * CORNER], wanted)
+    np.testing.assert_array_equal(found.q[:9], np.zeros((9, 6)))
