@@ -118,7 +118,7 @@ def newer_widths(
 ) -> tuple[Width, ...]:
     """Say over how many gaps each joint goes, by what was known and by new reversals.
 
-    What these tell of a joint counts, what they leave open stays as it was known.
+    New ones of a joint count, also where they leave open what was known before.
 
     Args:
         known: Of every joint, or of none.
@@ -128,9 +128,10 @@ def newer_widths(
     """
     if found is None:
         return known
-    new = flank_widths(model, arm, found)
-    pairs = zip(known or new, new, strict=True)
-    return tuple(old if width == UNTOLD else width for old, width in pairs)
+    new, again = flank_widths(model, arm, found), set(found.drive.tolist())
+    if not known:
+        return new
+    return tuple(new[j] if j in again else known[j] for j in range(len(known)))
 
 
 @dataclass(frozen=True)

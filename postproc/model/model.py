@@ -163,7 +163,7 @@ class Model:
     def in_motion(self) -> dict[str, str]:
         """What the newest measured path says of joints ("1" to "6") in motion.
 
-        Empty where none was measured; the verdicts are those of `compensation.flanks`.
+        Empty where none was measured; see `compensation.paths.flanks` for verdicts.
         """
         told = (r["in_motion"] for r in reversed(self.history) if "in_motion" in r)
         return dict(next(told, {}))

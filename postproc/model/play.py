@@ -73,9 +73,10 @@ def verdicts_of_flanks(model: Model, arm: Arm) -> tuple[str, ...]:
     """Say what is known of how joints 1 to 6 change their flanks.
 
     Returns:
-        What a measured path says of them in motion; where it is not sure, or none was
-        measured, what reversals say at stops. "elastic" whatever a path says. Without
-        both "not sure" of links that are ahead of their drives, and "" of all others.
+        "elastic" of what reversals say so of, whatever a measured path says; else what
+        that says in motion. Where it is not sure, or none was measured, "not sure" of
+        links that are ahead of their drives, and what reversals say at stops of all
+        others, "" without any.
     """
     at_stops = [verdict_at_stops(width) for width in model.flank_widths] or [""] * 6
     in_motion = (model.in_motion.get(str(joint), "") for joint in range(1, 7))
@@ -112,6 +113,11 @@ def on_the_way(side: Floats, width: Floats | float) -> Floats:
 def widest(model: Model) -> Floats:
     """Give the largest ways from flank to flank that reversals allow, (6,) [gaps]."""
     return np.array(model.flank_widths or [UNTOLD] * 6)[:, 1]
+
+
+def narrowest(model: Model) -> Floats:
+    """Give the shortest ways from flank to flank that reversals allow, (6,) [gaps]."""
+    return np.array(model.flank_widths or [UNTOLD] * 6)[:, 0]
 
 
 def left_behind(model: Model, arm: Arm) -> Floats:

@@ -105,7 +105,7 @@ def test_compensating_loads_nothing_that_it_may_not_need():
         "import sys, postproc.cli.jobs, postproc.cli.common\n"
         "import postproc.language.pdl2.language\n"
         "ours = ('batch.plan', 'compensation.in_time', 'motion.timing',\n"
-        "    'compensation.path_correction', 'language.pdl2.clones',\n"
+        "    'compensation.paths.correction', 'language.pdl2.clones',\n"
         "    'model.effects.elm')\n"
         "never = {'matplotlib', 'pinocchio', 'rich', 'ruckig', 'scipy'}\n"
         "never |= {f'postproc.{name}' for name in ours}\n"

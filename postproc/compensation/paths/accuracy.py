@@ -24,7 +24,7 @@ from postproc.compensation.paths.along_ways import (
 from postproc.compensation.paths.arcs import NO_ARCS, WantedArcs
 from postproc.compensation.paths.samples import PathSamples, measured_along, ways_of
 from postproc.model.model import CONFIRMED, Model
-from postproc.model.play import SHARP, on_the_way, widest
+from postproc.model.play import SHARP, narrowest, on_the_way, widest
 from postproc.motion.cycle import ProgramCycle
 from postproc.robot.cell import Cell
 from postproc.robot.pose import lengths
@@ -167,9 +167,8 @@ def predict_paths(
     cycles, tools = (before, after), before.targets.tool[rows, :3, 3]
     pair = [ways_of(cycle, rows) for cycle in cycles]
     if len(rows):
-        p = [cell.arm.tcp(w.q, tools[w.way]) for w in pair]
-        wanted, way = (measured_along(*at)[0] for at in zip(p, pair, strict=True))
-        pair[1] = pair[1].as_many(pair[0], way, wanted)
+        wanted, commanded = (cell.arm.tcp(w.q, tools[w.way]) for w in pair)
+        pair[1] = pair[1].as_many(pair[0], commanded, wanted)
         pair = refined(cell, model, cycles, pair)
     runs = [AlongWays.of(cell, model, c, w) for c, w in zip(cycles, pair, strict=True)]
     error = ErrorAlong(cell, model, temperature)
@@ -215,6 +214,7 @@ def _in_doubt(
     by_joint = _otherwise(run, error, moved, tangent, starts)
     told = error.model.in_motion
     open_ = np.array([told.get(str(joint)) != CONFIRMED for joint in range(1, 7)])
+    open_ |= narrowest(error.model) > SHARP
     giving = found.after.across if open_.any() else np.empty(0)
     gives = open_ & (widest(error.model) > SHARP)
     if gives.any():

@@ -16,6 +16,9 @@ from postproc.language.interface import Splitter
 from postproc.robot.pose import MM
 from postproc.robot.trajectory import Motion
 
+TRIES = 8  # rounds in which stops are taken back
+WORSE = 5e-5  # [m] that a path may be worse for such a stop
+
 
 def approach_anew(work: PathWork, splitter: Splitter) -> None:
     """Approach targets anew that a joint reaches from a side that is not sure."""
@@ -29,8 +32,31 @@ def approach_anew(work: PathWork, splitter: Splitter) -> None:
             place = _place_to_approach(work, v)
             if place is not None:
                 work.approaches[v] = place
-    if work.approaches:
+    for _ in range(TRIES):
         work.make()
+        bad = bad_approaches(work) | _worse_paths(work)
+        if not bad:
+            return
+        for v in bad:
+            del work.approaches[v]
+    work.approaches.clear()
+    work.make()
+
+
+def _worse_paths(work: PathWork) -> set[int]:
+    """Find the targets approached anew to or from which the path is worse for it.
+
+    Only where a path was asked for, and where it is farther off than that.
+    """
+    before = work.source.reading.visits.before
+    first, now = work.first.paths, work.paths
+    was = dict(zip(first.visit.tolist(), first.after.sizes.tolist(), strict=True))
+    worse = {
+        v
+        for v, far in zip(now.visit.tolist(), now.after.sizes.tolist(), strict=True)
+        if far > max(was.get(v, np.inf) + WORSE, work.tolerance)
+    }
+    return {v for v in work.approaches if worse & {v, *np.flatnonzero(before == v)}}
 
 
 def _place_to_approach(work: PathWork, v: int) -> Floats | None:

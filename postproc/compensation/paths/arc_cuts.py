@@ -65,12 +65,14 @@ def halved(
     """
     room, found = work.room, dict[int, list[float]]()
     for (v, end), bent in flat.items():
+        work.crowded |= room <= 0
         if room <= 0 or v in changed or may_be_chord(work, (v, end), bent):
             continue
         known = found.get(v, [*work.points.get(v, ())])
         begin = max((s for s in known if s < end), default=0.0)
         size = (end - begin) * float(work.paths.way[work.paths.samples_to(v)][-1])
-        if v in work.open and size >= 2 * work.open[v][0]:
+        shut = any(begin < share < end for share in work.shut.get(v, ()))
+        if v in work.open and not shut and size >= 2 * work.open[v][0]:
             found[v] = [*known, (begin + end) / 2]
             room -= 1
     return found

@@ -8,7 +8,7 @@ the old flank and one on the new, and few others.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from math import hypot
@@ -37,6 +37,7 @@ from postproc.language.languages import language_of
 ROUNDS = 16  # of points put on the ways
 BETTER = 1e-6  # [m] less is no matter
 TAKEN = 2e-5, 1e-4, 3e-4  # [m] from where a move begins: where play is taken up
+LATEST = 0.9  # of a way: the last place of it for a stop
 
 
 def correct_paths(draft: Draft, setting: Setting, write: Write) -> Draft:
@@ -79,7 +80,7 @@ def correct_paths(draft: Draft, setting: Setting, write: Write) -> Draft:
 def _improve(work: PathWork, best: BestPoints) -> None:
     """Put points on the ways until none is left too far, or none helps."""
     for _ in range(ROUNDS):
-        if _even_out(work):
+        if _drop_where_steep(work):
             work.make()
             continue
         flat = bending(work)
@@ -96,7 +97,7 @@ def _improve(work: PathWork, best: BestPoints) -> None:
         work.make()
 
 
-def _even_out(work: PathWork) -> bool:
+def _drop_where_steep(work: PathWork) -> bool:
     """Take back points beside which corrections change faster than they may.
 
     The error itself changes fast there, and all points of the way would be left for it:
@@ -107,7 +108,7 @@ def _even_out(work: PathWork) -> bool:
         ends, gone = [0.0, *known, 1.0], set[float]()
         room = {b: c - a for a, b, c in zip(ends, ends[1:], ends[2:], strict=False)}
         free = {*known[v in work.stops :]} - {1.0}
-        for k in work.stepping(v):
+        for k in work.steep_pieces(v):
             if either := free.intersection(ends[k : k + 2]):
                 gone.add(max(either, key=room.__getitem__))
         if gone:
@@ -149,7 +150,9 @@ def _new_points(work: PathWork) -> Iterator[tuple[int, list[float]]]:
             more = [stop, *known[v in work.stops :]]
             work.stops.add(v)
         else:
-            new = _on_path(work, k, v)[: max(left, 0)]
+            wanted = _on_path(work, k, v)
+            new = wanted[: max(left, 0)]
+            work.crowded |= len(new) < len(wanted)
             left -= len(new)
             more = [*known, *new] if new else []
         if more:
@@ -166,23 +169,19 @@ def _stop(work: PathWork, k: int, v: int) -> float | None:
     How near does best is tried out. None where nothing is left to try.
     """
     paths, samples = work.paths, work.paths.samples(k)
-    begin = paths.way[samples] < work.open[v][0]
+    begin, length = paths.way[samples] < work.open[v][0], float(paths.way[samples][-1])
+    places = [there / length for there in TAKEN if there < LATEST * length]
     off = float(paths.after.across[samples][begin].max(initial=0.0))
     tried = work.tried.setdefault(v, [])
-    if v in work.stops and len(tried) < len(TAKEN):
+    if v in work.stops and len(tried) < len(places):
         tried.append((off, work.points[v][0]))
-    if off <= work.aim or (v in work.stops and _settled(work, v)):
+    if off <= work.aim or len(tried) > len(places) or not places:
         return None
-    if len(tried) == len(TAKEN):
+    if len(tried) == len(places):
         best = min(tried)[1]
-        tried.append((0.0, best))
+        tried.append((0.0, best))  # it is settled
         return best if best != work.points[v][0] else None
-    return TAKEN[len(tried)] / float(paths.way[samples][-1])
-
-
-def _settled(work: PathWork, v: int) -> bool:
-    """Tell whether a move stops where it does best."""
-    return len(work.tried.get(v, ())) > len(TAKEN)
+    return places[len(tried)]
 
 
 def _on_path(work: PathWork, k: int, v: int) -> list[float]:
@@ -224,7 +223,7 @@ def _result(work: PathWork) -> Draft:
     """Tell of the program as of the source's visits."""
     told = work.latest.in_time or work.first
     why = "its pieces would be too short, or the path no better"
-    if work.room <= 0:
+    if work.crowded:
         why = "no more points may be put on ways (--max-inserted)"
     too_far = set(work.paths.visit[work.too_far].tolist()) - work.points.keys()
     otherwise = largest_on_moves(told.paths, told.paths.otherwise)
@@ -287,19 +286,19 @@ class BestPoints:
         Args:
             flat: Pieces of arcs that are too flat, see `bending`.
         """
-        moves, work = self._moves(flat), self._work
-        refused = {v: told for v in work.points if (told := work.refusal(v))}
+        refused = self._refusals()
         self._refused = refused | self._refused  # what was said first
+        bad = self._moves((*(v for v, _ in flat), *refused))
         for v, tried in self._now().items():
             known = self._best.setdefault(v, tried)
-            if v not in moves and tried.size <= known.size + BETTER:  # the later one
+            if v not in bad and tried.size <= known.size + BETTER:  # the later one
                 self._best[v] = replace(tried, size=min(tried.size, known.size))
 
     def restore(self) -> None:
         """Give moves back the points that did better than those they have."""
         work, now = self._work, self._now()
-        flat = self._moves(bending(work))
-        worse = [v for v in now if v in flat or self._was_better(v, now[v])]
+        bad = self._moves((*(v for v, _ in bending(work)), *self._refusals()))
+        worse = [v for v in now if v in bad or self._was_better(v, now[v])]
         for v in worse:
             has, best = now[v], self._best[v]
             others = {k: s for k, s in work.points.items() if k not in has.points}
@@ -314,10 +313,15 @@ class BestPoints:
     def _was_better(self, v: int, tried: _Tried) -> bool:
         return tried.size > self._best[v].size + BETTER
 
-    def _moves(self, flat: Collection[Cut]) -> set[int]:
-        """Return the moves that have flat pieces, by their first visits."""
+    def _refusals(self) -> dict[int, str]:
+        """Say why points of moves cannot be corrected, by their visits."""
+        work = self._work
+        return {v: told for v in work.points if (told := work.refusal(v))}
+
+    def _moves(self, some: Iterable[int]) -> set[int]:
+        """Return the moves that visits belong to, by their first visits."""
         visits = self._work.source.reading.visits
-        return {halves(visits, v)[0] for v, _ in flat}
+        return {halves(visits, v)[0] for v in some}
 
     def _now(self) -> dict[int, _Tried]:
         """Say what the moves have now, by their first visits, and how they do."""
@@ -325,7 +329,7 @@ class BestPoints:
         found = {}
         for own in {halves(work.source.reading.visits, v) for v in work.open}:
             found[own[0]] = _Tried(
-                hypot(*(sizes.get(row, 0.0) for row in own)),
+                hypot(*(sizes.get(row, np.inf) for row in own)),
                 {row: work.points[row] for row in own if row in work.points},
                 frozenset(work.stops.intersection(own)),
                 frozenset(cut for cut in work.chords if cut[0] in own),

@@ -28,6 +28,7 @@ ELSEWHERE = 0.03  # [m] how far from where it is predicted a step is looked for
 STEP = 1e-3  # [m] between places that are tried
 CLEAR = 3.0  # a step this many times what readings there scatter by is told
 FEW = 3  # steps that tell of a joint, at least
+MANY = 12  # of which some may be wrong
 LIKE = 0.2  # of the predicted step, that the measured one may differ by
 THERE = 0.01  # [m] .. and it may lie elsewhere by
 HALF = 0.5  # of the predicted step: one that may be off by more is not known
@@ -93,9 +94,10 @@ class JointInMotion:
             return "refuted"
         if off + wide > HALF:
             return NOT_SURE
-        if away <= THERE:
-            return CONFIRMED
-        return "elsewhere" if away - times * self.later_error > THERE else NOT_SURE
+        if away - times * self.later_error > THERE:
+            return "elsewhere"
+        near = away <= THERE and away + times * self.later_error <= ELSEWHERE
+        return CONFIRMED if near else NOT_SURE
 
 
 def _student(freedom: int) -> float:
@@ -236,7 +238,13 @@ def in_motion(steps: FlankSteps) -> tuple[JointInMotion, ...]:
 
 
 def _middle(told: Floats, least: float) -> tuple[float, float]:
-    """Return a median and its standard error, of a scatter that is no less."""
+    """Return a median and its standard error, of a scatter that is no less.
+
+    Of few the scatter is their standard deviation: their median deviation may be small
+    by chance.
+    """
     middle = float(np.median(told))
     spread = 1.4826 * float(np.median(np.abs(told - middle)))
+    if len(told) < MANY:
+        spread = float(np.std(told, ddof=1)) if len(told) > 1 else np.inf
     return middle, 1.2533 * max(spread, least) / float(np.sqrt(len(told)))

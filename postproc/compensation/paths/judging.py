@@ -10,7 +10,7 @@ import numpy as np
 from postproc.arrays import Bools, Floats, any_in_rows
 from postproc.compensation.in_time import InTime
 from postproc.compensation.paths.accuracy import PathAccuracy, apart
-from postproc.compensation.paths.approach_anew import bad_approaches
+from postproc.compensation.paths.approach_anew import WORSE, bad_approaches
 from postproc.compensation.paths.arc_cuts import bending, may_be_chord
 from postproc.compensation.paths.arcs import (
     halves,
@@ -24,7 +24,7 @@ from postproc.compensation.paths.work import PathWork
 from postproc.robot.pose import lengths
 
 JUDGED = 8  # rounds in which points are taken back
-WORSE = 5e-5  # [m] that a move may be worse where a flank is not as predicted
+NEAR = 4  # visits behind a move that may be worse for its points
 HARM = 3e-5  # [m] that any place of it may be worse where flanks give way
 SLIGHT = 1e-6  # [m] a difference that is none
 MOVED = 5e-6  # [m] that a rounded corner may move
@@ -33,7 +33,7 @@ MOVED = 5e-6  # [m] that a rounded corner may move
 def judge(work: PathWork) -> None:
     """Take back points that make moves no better for certain."""
     for k in range(JUDGED):
-        bad, anew = dict(_bad(work)), bad_approaches(work)
+        bad, anew = dict([*_harmful(work), *_bad(work)]), bad_approaches(work)
         if not bad and not anew:
             return
         for v, (why, share) in bad.items():
@@ -41,6 +41,7 @@ def judge(work: PathWork) -> None:
                 work.left[v] = why
                 _take_back(work, v)
         for v in anew:
+            work.left[v] = "the stop to approach its target from was no help"
             _take_back(work, v)
         work.make()
     work.left |= dict.fromkeys(work.points, "its points do not stay put")
@@ -110,6 +111,23 @@ def _bad(work: PathWork) -> Iterator[tuple[int, tuple[str, float | None]]]:
             yield v, (why, otherwise[v])
         elif corner[v]:
             yield v, ("a rounded corner at one of its ends would move", None)
+
+
+def _harmful(work: PathWork) -> Iterator[tuple[int, tuple[str, float | None]]]:
+    """Yield moves with points behind which moves without any are worse for them.
+
+    From which flank a joint leaves is a matter of the moves before.
+    """
+    without, now = (
+        _of_moves(work, sizes_of(paths)) for paths in (work.first.paths, work.paths)
+    )
+    cut = np.array(sorted(work.points), dtype=np.int64)
+    own = {*work.points, *work.approaches, *(via + 1 for via in work.cut_arcs())}
+    for v in now.keys() - own:
+        last = int(np.searchsorted(cut, v)) - 1
+        near = last >= 0 and v - cut[last] <= NEAR
+        if near and now[v] > without.get(v, np.inf) + WORSE:
+            yield int(cut[last]), ("a move behind it would be worse", None)
 
 
 def _if_otherwise(

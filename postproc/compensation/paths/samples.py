@@ -10,6 +10,7 @@ from postproc.arrays import Bools, Floats, Ints, spans
 from postproc.motion.cycle import ProgramCycle
 from postproc.robot.pose import lengths
 
+LEVER = 0.1  # [m] what a turn of a joint counts beside the way of the TCP
 AS_FAR = 1e-3  # of a way: samples that lie as far along it
 
 
@@ -40,18 +41,21 @@ class PathSamples:
         """The way that every sample belongs to, (s,)."""
         return np.repeat(np.arange(len(self.visit)), np.diff(self.first))
 
-    def as_many(self, other: PathSamples, way: Floats, wanted: Floats) -> PathSamples:
+    def as_many(self, other: PathSamples, p: Floats, wanted: Floats) -> PathSamples:
         """Take a sample of every way for each one of another, as far along it.
+
+        How far that is, is told by the TCP and the joints together: a tool may turn in
+        place.
 
         Ways whose samples lie as far along them are taken as they are. Those beside
         corners that are rounded otherwise are not.
 
         Args:
             other: The other ways.
-            way: Path length up to every sample of these, (s,) [m].
-            wanted: .. and of the other ones, (t,) [m].
+            p: TCP positions at the samples of these, (s, 3) [m].
+            wanted: .. and of the other ones, (t, 3) [m].
         """
-        along, there, to = self._shares(way), other._shares(wanted), other.way
+        along, there, to = self._shares(p), other._shares(wanted), other.way
         alike = np.diff(self.first) == np.diff(other.first)
         number = np.arange(len(to)) - other.first[to]
         own = np.minimum(self.first[to] + number, self.first[to + 1] - 1)
@@ -68,10 +72,19 @@ class PathSamples:
         q = _between(self.q, self.begins, step, share)
         return replace(self, q=q, first=other.first)
 
-    def _shares(self, way: Floats) -> Floats:
-        """Give path lengths (s,) as shares of each way."""
+    def _shares(self, p: Floats) -> Floats:
+        """Say how far along each way samples lie, as shares of it, (s,).
+
+        Args:
+            p: TCP positions there, (s, 3) [m].
+        """
+        moved = np.column_stack([p, LEVER * self.q])
+        step = np.linalg.norm(np.diff(moved, axis=0, prepend=moved[:1]), axis=1)
+        step[self.first[:-1]] = 0.0
+        way = np.cumsum(step)
+        way -= way[self.first[:-1]][self.way]
         whole = way[self.first[1:] - 1][self.way]
-        return way / np.maximum(whole, 1e-12)
+        return np.asarray(way / np.maximum(whole, 1e-12))
 
     def refined(self, after: Ints, share: Floats) -> PathSamples:
         """Insert samples at a share of the way from some samples to the next ones."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from postproc.compensation.paths.arcs import halves
@@ -62,11 +64,10 @@ def _may_stop(work: PathWork, v: int, taken: TakeUp) -> None:
     What gives way before it carries, or lies where weight pushes it, would be led
     off by what a sharp gap asks for, and nothing behind the stop mends that.
     """
-    told = work.verdicts
-    if all(_as_at_stops(work, told[j - 1], v, j) for j in taken.crossing):
-        work.idle[v] = taken
-    else:
+    if _in_doubt(work, v, taken.crossing, work.verdicts):
         work.unconfirmed.add(v)
+    else:
+        work.idle[v] = taken
 
 
 def _otherwise_in_motion(work: PathWork, k: int, v: int) -> str:
@@ -74,25 +75,31 @@ def _otherwise_in_motion(work: PathWork, k: int, v: int) -> str:
     model = work.setting.model
     by_reversals = model.flank_widths and not model.in_motion
     changing = work.paths.crossing[work.paths.samples(k)].any(axis=0)
-    for joint in (np.flatnonzero(changing) + 1).tolist():
-        # Where none was measured it is as at stops, if nothing speaks against it.
-        said = work.verdicts[joint - 1] or CONFIRMED
-        if not _as_at_stops(work, said, v, joint):
-            where = "at stops" if by_reversals or said == ELASTIC else "in motion"
-            return f"joint {joint} changes its flank, which {where} is {said}"
-    return ""
+    # Where none was measured it is as at stops, if nothing speaks against it.
+    told = [said or CONFIRMED for said in work.verdicts]
+    joint = _in_doubt(work, v, (np.flatnonzero(changing) + 1).tolist(), told)
+    if not joint:
+        return ""
+    said = told[joint - 1]
+    where = "at stops" if by_reversals or said == ELASTIC else "in motion"
+    return f"joint {joint} changes its flank, which {where} is {said}"
 
 
-def _as_at_stops(work: PathWork, said: str, v: int, joint: int) -> bool:
-    """Tell whether a joint may be taken to change its flank in motion as at stops.
+def _in_doubt(
+    work: PathWork, v: int, joints: Sequence[int], told: Sequence[str]
+) -> int:
+    """Name a joint that may not change its flank in motion as at stops, 0 for none.
 
-    What is not may be, where what the joint may lack of its step is too small to
-    matter much: all of it, but for what nobody could measure for certain.
+    What is not confirmed may be, where what the joints may lack of their steps is too
+    small to matter much: all of it, but for what nobody could measure for certain.
     """
-    if said == CONFIRMED:
-        return True
-    lacks = work.left_behind[joint - 1] if said == NOT_SURE else 1.0
-    return bool(lacks * _step(work, v, joint) < SMALL)
+    lacks = {
+        joint: (work.left_behind[joint - 1] if told[joint - 1] == NOT_SURE else 1.0)
+        * _step(work, v, joint)
+        for joint in joints
+        if told[joint - 1] != CONFIRMED
+    }
+    return max(lacks, key=lacks.__getitem__) if sum(lacks.values()) >= SMALL else 0
 
 
 def _step(work: PathWork, v: int, joint: int) -> float:

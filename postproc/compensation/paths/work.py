@@ -63,6 +63,7 @@ class PathWork:
         tried: How far such a move began off, and where it stopped, try by try.
         chords: Pieces of arcs that are chords whatever they bend.
         shut: Where no points may lie any more: corrections changed too fast there.
+        crowded: More points were wanted than there was room for.
         approaches: Stops from which targets are approached anew, by visit, (w,) each.
         left: Why moves that leave their path too far are not split.
         latest: The program with these points; at first the source.
@@ -82,6 +83,7 @@ class PathWork:
     tried: dict[int, list[tuple[float, float]]] = field(default_factory=dict)
     chords: set[Cut] = field(default_factory=set)
     shut: dict[int, set[float]] = field(default_factory=dict)
+    crowded: bool = False
     approaches: dict[int, Floats] = field(default_factory=dict)
     left: dict[int, str] = field(default_factory=dict)
 
@@ -225,7 +227,7 @@ class PathWork:
         why = decided.reasons[decided.why[left[0]]]
         return f"points on its way cannot be corrected: {why}"
 
-    def stepping(self, v: int) -> list[int]:
+    def steep_pieces(self, v: int) -> list[int]:
         """List the pieces of a move, from 0, on which corrections change too fast."""
         decided, via = self.latest.kept.decisions, self.latest.reading.visits.via
         text = STEP.format(self.setting.cell.limits.step_mm)
@@ -239,10 +241,13 @@ class PathWork:
 
     def drop(self, v: int, gone: Collection[float]) -> None:
         """Take back points of a move; pieces that grow by it are chords no more."""
-        known = self.points[v]
-        self.points[v] = left = tuple(s for s in known if s not in gone)
+        left = tuple(s for s in self.points.pop(v) if s not in gone)
         longer = {min((s for s in left if s > share), default=1.0) for share in gone}
         self.chords -= {(v, share) for share in (*gone, *longer)}
+        if left:
+            self.points[v] = left
+        elif self.points.get(v - 1) == (1.0,):  # an arc that is cut at its point alone
+            del self.points[v - 1]
 
     def _on_way(self, v: int) -> Ints:
         """Return the visits with points on the way to one, without it."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from dataclasses import replace
 from functools import cache, partial
 from pathlib import Path
@@ -23,9 +24,19 @@ from postproc.model.model import load_model
 from postproc.model.play import ahead
 from postproc.robot.cell import load_cell
 from postproc.robot.pose import MM
+from postproc.robot.trajectory import Motion
 from postproc.simulation import DEFAULT, virtual_arm
 from postproc.simulation.program import land
-from tests.compensation.paths.test_accuracy import CELL, LINES, SEED, done, job
+from tests.compensation.paths.test_accuracy import (
+    CELL,
+    LINES,
+    SEED,
+    START,
+    done,
+    drawn,
+    job,
+    pos,
+)
 from tests.compensation.test_approach import job as approaches
 from tests.written import cli
 
@@ -364,12 +375,12 @@ def one_half_of_every_arc(work: PathWork) -> Ints:
 
 def test_of_two_points_too_close_for_the_error_the_one_with_more_room_goes() -> None:
     work = Mock(points={7: (0.2, 0.5, 0.6)}, stops=set(), chords=set(), shut={})
-    work.stepping.return_value = [2]  # from 0.5 to 0.6
+    work.steep_pieces.return_value = [2]  # from 0.5 to 0.6
     work.drop = partial(PathWork.drop, work)
-    assert correction._even_out(work)
+    assert correction._drop_where_steep(work)
     assert work.points == {7: (0.2, 0.5)} and work.shut == {7: {0.6}}
-    work.stepping.return_value = []
-    assert not correction._even_out(work)
+    work.steep_pieces.return_value = []
+    assert not correction._drop_where_steep(work)
 
 
 def test_where_the_error_changes_fast_points_beside_it_are_taken_back(
@@ -581,3 +592,90 @@ def test_check_tells_a_point_that_was_touched(
     found = cli(*given)
     assert found.exit_code == 1
     assert "points.pdl" in found.stdout + found.stderr
+
+
+# Short ways, and turns in place.
+
+
+@cache
+def short() -> bytes:
+    """Turn the tool in place, go on by millimetres, and away."""
+    moves, rng = [], np.random.default_rng(7)
+    for begin, _ in [m for m in drawn() if "LINEAR" in m[1]][:12]:
+        numbers = [float(x) for x in re.findall(r"-?\d+\.\d+", begin)]
+        place, turn = np.array(numbers[:3]), np.array(numbers[3:])
+        there = np.add(turn, (0.0, 0.0, 20.0))
+        moves += [begin, f"  MOVE LINEAR TO {pos(place, there)}"]
+        for _ in range(4):
+            place = place + rng.normal(size=3)
+            moves.append(f"  MOVE LINEAR TO {pos(place, there)}")
+        away = place + rng.uniform(-150, 150, 3)
+        moves.append(f"  MOVE LINEAR TO {pos(away, turn)}")
+    head = ["PROGRAM job", "BEGIN", *START, "  $LIN_SPD := 0.05"]
+    return "\r\n".join([*head, *moves, "END job", ""]).encode()
+
+
+@pytest.fixture(scope="module")
+def turned(shop: Path) -> Path:
+    (shop / "short.pdl").write_bytes(short())
+    asked = ("--path-mm", TOLERANCE, "--take-up")
+    for name, more in (("alone", ()), ("put", asked), ("both", (*asked, "--approach"))):
+        compensated(shop, "short.pdl", f"short.{name}", *more)
+    return shop
+
+
+def test_every_way_ends_where_the_target_is_corrected(turned: Path) -> None:
+    report = told(turned, "short.alone")
+    side = [np.abs(target["side"]).min() for target in report["targets"]]
+    ends = [
+        path["curve"]["after_mm"][-1]
+        for path in report["path"]
+        if path.get("curve") and side[path["visit"]] > 0.999
+    ]
+    assert len(ends) > 30 and max(ends) < 0.001
+
+
+def test_no_stop_lies_beyond_the_target(turned: Path) -> None:
+    for name in ("put", "both"):
+        paths = told(turned, f"short.{name}")["path"]
+        assert sum(p["inserted"] for p in paths) > 10
+        for path in paths:
+            places = [0.0, *(p["at_mm"] for p in path["points"]), path["length_mm"]]
+            assert (np.diff(places) > 0).all()
+        done("restore", turned / f"short.{name}.pdl", "-o", turned / f"{name}.back")
+        assert (turned / f"{name}.back").read_bytes() == short()
+
+
+def test_targets_are_approached_anew_only_where_no_path_is_worse(drilled: Path) -> None:
+    asked = ("--path-mm", TOLERANCE, "--take-up", "--approach")
+    report = compensated(drilled, "holes.pdl", "holes.both", *asked)
+    usual = {p["visit"]: p["max_mm"]["after"] for p in told(drilled, "once")["path"]}
+    assert any(d["code"] == "approached-anew" for d in report["diagnostics"])
+    for path in report["path"]:
+        most = max(usual[path["visit"]] + 0.05, TOLERANCE)
+        assert path["max_mm"]["after"] <= most + 1e-6
+        if "approached anew" in (path["not_split"] or ""):
+            assert path["inserted"]
+
+
+def test_an_arc_that_loses_all_points_is_whole_again() -> None:
+    work = Mock(points={5: (1.0,), 6: (0.4,)}, chords={(6, 1.0)})
+    PathWork.drop(work, 6, {0.4})
+    assert work.points == {} and work.chords == set()
+    work = Mock(points={5: (0.5, 1.0), 6: (0.4,)}, chords=set())
+    PathWork.drop(work, 6, {0.4})
+    assert work.points == {5: (0.5, 1.0)}
+
+
+def test_points_behind_which_a_move_would_be_worse_are_taken_back() -> None:
+    def paths(*mm: float) -> Mock:
+        return Mock(visit=np.array([3, 4, 9]), after=Mock(sizes=np.array(mm) * MM))
+
+    work = Mock(points={3: (0.5,)}, approaches={})
+    work.cut_arcs.return_value = []
+    work.source.reading.visits.motion = [Motion.LINEAR] * 10
+    work.first.paths, work.paths = paths(0.3, 0.01, 0.01), paths(0.02, 0.07, 0.09)
+    ((v, (why, _)),) = judging._harmful(work)  # 9 is too far behind
+    assert v == 3 and "behind" in why
+    work.paths = paths(0.02, 0.05, 0.09)
+    assert not [*judging._harmful(work)]

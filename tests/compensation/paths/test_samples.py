@@ -13,7 +13,7 @@ ENDS = np.array(
 
 
 def made(*shares: Floats) -> tuple[PathSamples, Floats]:
-    """Ways from end to end, straight in the joints' space, and path lengths."""
+    """Ways from end to end, straight in the joints' space, and TCP positions."""
     counts = [len(share) for share in shares]
     q = [
         a + share[:, None] * (b - a)
@@ -21,9 +21,10 @@ def made(*shares: Floats) -> tuple[PathSamples, Floats]:
     ]
     rows = np.arange(len(shares))
     samples = PathSamples(rows + 1, rows, np.concatenate(q), np.cumsum([0, *counts]))
-    return samples, np.concatenate([100.0 * share for share in shares])
+    return samples, np.concatenate([share[:, None] * AHEAD for share in shares])
 
 
+AHEAD = np.array([0.1, 0.0, 0.0])
 EVEN, CORNER = np.linspace(0.0, 1.0, 9), np.array([0.0, 0.5, 0.9, 0.92, 0.95, 1.0])
 
 
@@ -36,23 +37,33 @@ def test_samples_are_taken_as_far_along() -> None:
         (CORNER, CORNER),
         (same_number, EVEN),
     ):
-        samples, way = made(*shares)
-        found = samples.as_many(other, way, wanted)
+        samples, place = made(*shares)
+        found = samples.as_many(other, place, wanted)
         np.testing.assert_array_equal(found.first, other.first)
         np.testing.assert_allclose(found.q, other.q, atol=1e-12)
 
 
 def test_ways_that_lie_alike_are_taken_as_they_are() -> None:
     other, wanted = made(EVEN, EVEN)
-    samples, way = made(EVEN, EVEN)
-    assert samples.as_many(other, 2.0 * way, wanted) is samples
-    samples, way = made(EVEN, CORNER)
-    found = samples.as_many(other, way, wanted)
+    samples, place = made(EVEN, EVEN)
+    assert samples.as_many(other, place, wanted) is samples
+    samples, place = made(EVEN, CORNER)
+    found = samples.as_many(other, place, wanted)
     np.testing.assert_array_equal(found.q[:9], samples.q[:9])
 
 
 def test_a_way_of_no_length_stays_where_it_is() -> None:
     other, wanted = made(EVEN, EVEN)
-    still, _ = made(np.zeros(2), CORNER)
-    found = still.as_many(other, np.r_[0.0, 0.0, 100.0 * CORNER], wanted)
+    still, place = made(np.zeros(2), CORNER)
+    found = still.as_many(other, place, wanted)
     np.testing.assert_array_equal(found.q[:9], np.zeros((9, 6)))
+
+
+def test_a_tool_that_turns_in_place_is_paired_by_its_joints() -> None:
+    rng = np.random.default_rng(3)
+    other, wanted = made(EVEN, EVEN)
+    samples, place = made(CORNER, EVEN)
+    noise = 1e-6 * rng.normal(size=(len(EVEN), 3)), 1e-6 * rng.normal(size=(6, 3))
+    wanted[: len(EVEN)], place[: len(CORNER)] = noise
+    found = samples.as_many(other, place, wanted)
+    np.testing.assert_allclose(found.q, other.q, atol=1e-4)
