@@ -165,11 +165,7 @@ def predict_paths(
     known = cartesian & (before.ways[1] >= 0) & (after.ways[1] == before.ways[1])
     rows = np.flatnonzero(known)
     cycles, tools = (before, after), before.targets.tool[rows, :3, 3]
-    pair = [ways_of(cycle, rows) for cycle in cycles]
-    if len(rows):
-        wanted, commanded = (cell.arm.tcp(w.q, tools[w.way]) for w in pair)
-        pair[1] = pair[1].as_many(pair[0], commanded, wanted)
-        pair = refined(cell, model, cycles, pair)
+    pair = _ways(cell, model, cycles, rows, tools)
     runs = [AlongWays.of(cell, model, c, w) for c, w in zip(cycles, pair, strict=True)]
     error = ErrorAlong(cell, model, temperature)
     tools = tools[pair[0].way]
@@ -191,6 +187,22 @@ def predict_paths(
     lead, _ = _groups(owner[rows])
     starts = pair[0].first[lead]
     return _in_doubt(found, runs[1], error, moved, tangent, starts).joined(owner)
+
+
+def _ways(
+    cell: Cell,
+    model: Model,
+    cycles: tuple[ProgramCycle, ...],
+    rows: Ints,
+    tools: Floats,
+) -> list[PathSamples]:
+    """Sample the ways to some visits before and after, at the same places."""
+    pair = [ways_of(cycle, rows) for cycle in cycles]
+    if not len(rows):
+        return pair
+    wanted, commanded = (cell.arm.tcp(w.q, tools[w.way]) for w in pair)
+    pair[1] = pair[1].as_many(pair[0], commanded, wanted)
+    return refined(cell, model, cycles, pair)
 
 
 def _in_doubt(

@@ -16,6 +16,7 @@ from math import hypot
 import numpy as np
 
 from postproc.compensation.correction import Draft
+from postproc.compensation.in_time import InTime
 from postproc.compensation.options import Setting
 from postproc.compensation.paths.approach_anew import approach_anew, approached
 from postproc.compensation.paths.arc_cuts import (
@@ -222,32 +223,37 @@ def _why_left(work: PathWork, v: int, why: str) -> str:
 def _result(work: PathWork) -> Draft:
     """Tell of the program as of the source's visits."""
     told = work.latest.in_time or work.first
+    in_time = replace(
+        told,
+        before=work.first.before,
+        other_side=told.other_side[work.own],
+        inserted=_told(work, told),
+    )
+    kept = of_source(work.latest.kept, work.own)
+    return replace(work.latest, kept=kept, in_time=in_time)
+
+
+def _told(work: PathWork, told: InTime) -> Insertions:
+    """Say what was put on ways, and why moves that are left too far got nothing."""
     why = "its pieces would be too short, or the path no better"
     if work.crowded:
         why = "no more points may be put on ways (--max-inserted)"
     too_far = set(work.paths.visit[work.too_far].tolist()) - work.points.keys()
-    otherwise = largest_on_moves(told.paths, told.paths.otherwise)
-    inserted = Insertions(
+    otherwise = {}
+    if work.latest is not work.source:
+        far = largest_on_moves(told.paths, told.paths.otherwise)
+        otherwise = {v: size for v, (size, _) in far.items()}
+    return Insertions(
         work.own,
         work.tolerance,
         work.points,
         work.stops & work.points.keys(),
         {v: _why_left(work, v, why) for v in sorted(too_far)},
         sizes_of(work.first.paths),
-        {v: far for v, (far, _) in otherwise.items()}
-        if work.latest is not work.source
-        else {},
+        otherwise,
         approached(work, told),
         frozenset(work.unconfirmed),
     )
-    in_time = replace(
-        told,
-        before=work.first.before,
-        other_side=told.other_side[work.own],
-        inserted=inserted,
-    )
-    kept = of_source(work.latest.kept, work.own)
-    return replace(work.latest, kept=kept, in_time=in_time)
 
 
 @dataclass(frozen=True)

@@ -27,6 +27,10 @@ JUDGED = 8  # rounds in which points are taken back
 NEAR = 4  # visits behind a move that may be worse for its points
 HARM = 3e-5  # [m] that any place of it may be worse where flanks give way
 SLIGHT = 1e-6  # [m] a difference that is none
+NOT_AS_PREDICTED = (
+    "it would be worse if a flank is not as predicted: a measured path "
+    "(diagnose --path) tells"
+)
 MOVED = 5e-6  # [m] that a rounded corner may move
 
 
@@ -80,40 +84,65 @@ def _take_back(work: PathWork, v: int) -> None:
         del work.points[via]
 
 
-def _bad(work: PathWork) -> Iterator[tuple[int, tuple[str, float | None]]]:
-    """Yield the moves with points that must go: why, and where if not all of them."""
-    if not work.points:
+Reason = tuple[str, float | None]  # why points must go, and where if not all of them
+
+
+def _bad(work: PathWork) -> Iterator[tuple[int, Reason]]:
+    """Yield the moves with points that must go, and why."""
+    told = work.latest.in_time
+    if not work.points or told is None:
         return
-    told, first = work.latest.in_time, work.first.paths
-    if told is None:
-        return
-    with_points = _worst(work, told)
-    without = _of_moves(work, sizes_of(first))
-    otherwise = _if_otherwise(work, told, without)
-    corner = _corners_moved(work, told)
+    without = _of_moves(work, sizes_of(work.first.paths))
     flat = bending(work)
     bent = {cut[0] for cut, far in flat.items() if not may_be_chord(work, cut, far)}
+    judged = _Judged(
+        work, without, _worst(work, told), _if_otherwise(work, told, without),
+        _corners_moved(work, told), bent,
+    )  # fmt: skip
     for v in sorted({*work.points, *(via + 1 for via in work.cut_arcs())}):
-        if v not in with_points:
-            yield v, ("nothing is predicted for it with points", None)
-        elif v in bent:
-            yield v, ("pieces of it would bend too little for arcs", None)
-        elif refused := work.refusal(v):
-            yield v, (refused, None)
-        elif with_points[v][0] > without[v]:
-            why = "points on its way make it no better"
-            yield v, (why, with_points[v][1])
-        elif v in otherwise:
-            why = (
-                "it would be worse if a flank is not as predicted: a measured path "
-                "(diagnose --path) tells"
-            )
-            yield v, (why, otherwise[v])
-        elif corner[v]:
-            yield v, ("a rounded corner at one of its ends would move", None)
+        if reason := judged.why_not(v):
+            yield v, reason
 
 
-def _harmful(work: PathWork) -> Iterator[tuple[int, tuple[str, float | None]]]:
+@dataclass(frozen=True)
+class _Judged:
+    """What is known of moves with points.
+
+    Attributes:
+        work: The points.
+        without: How far each move leaves its path without points [m].
+        worst: .. and with them at the most, however they are rounded, and where.
+        otherwise: Where moves are worse if flanks are not as predicted.
+        corner: Moves with a rounded corner at an end that is passed otherwise, (n,).
+        bent: Arcs with pieces that bend too little.
+    """
+
+    work: PathWork
+    without: dict[int, float]
+    worst: dict[int, tuple[float, float]]
+    otherwise: dict[int, float]
+    corner: Bools
+    bent: set[int]
+
+    def why_not(self, v: int) -> Reason | None:
+        """Say why the points of a move must go, None where they may stay."""
+        if v not in self.worst:
+            return "nothing is predicted for it with points", None
+        if v in self.bent:
+            return "pieces of it would bend too little for arcs", None
+        if refused := self.work.refusal(v):
+            return refused, None
+        far, share = self.worst[v]
+        if far > self.without[v]:
+            return "points on its way make it no better", share
+        if v in self.otherwise:
+            return NOT_AS_PREDICTED, self.otherwise[v]
+        if self.corner[v]:
+            return "a rounded corner at one of its ends would move", None
+        return None
+
+
+def _harmful(work: PathWork) -> Iterator[tuple[int, Reason]]:
     """Yield moves with points behind which moves without any are worse for them.
 
     From which flank a joint leaves is a matter of the moves before.
