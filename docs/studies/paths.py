@@ -42,6 +42,8 @@ source = "tracker"
 [payload]
 mass_kg = 90.0
 com_mm = [0.0, 0.0, 200.0]
+[environment]
+temperature_c = 22.0
 [tracker]
 xyz_mm = [3000.0, -2000.0, 1500.0]
 [survey]
