@@ -141,9 +141,10 @@ def _new_points(work: PathWork) -> Iterator[tuple[int, list[float]]]:
     sizes, whole = work.paths.after.sizes, whole_arcs(work)
     for k in np.argsort(-sizes, kind="stable").tolist():
         v = int(work.paths.visit[k])
-        if v not in work.open or sizes[k] <= work.aim:
-            continue
         known, via = work.points.get(v, ()), v in whole
+        near = v in work.beside and known in ((), (1.0,))
+        if v not in work.open or sizes[k] <= (work.tolerance / 2 if near else work.aim):
+            continue
         left = room - via  # the point on the way of an arc becomes one, too
         stop = _stop(work, k, v) if v in work.idle and left > 0 else None
         if stop is not None:

@@ -56,6 +56,7 @@ class PathWork:
         splitter: Writes points into its files; None where its language gets none.
         open: Moves that may be split, by their visit: the shortest piece, and how far
             from both ends [m].
+        beside: Those among them that keep near enough, but are halves of others' arcs.
         points: What is on their ways.
         stops: Moves whose first point is a stop, where play is taken up.
         idle: Moves that may have one, and how.
@@ -76,6 +77,7 @@ class PathWork:
     write: Write
     splitter: Splitter | None
     open: dict[int, tuple[float, float, float]] = field(default_factory=dict)
+    beside: set[int] = field(default_factory=set)
     points: dict[int, tuple[float, ...]] = field(default_factory=dict)
     stops: set[int] = field(default_factory=set)
     idle: dict[int, TakeUp] = field(default_factory=dict)

@@ -366,6 +366,11 @@ def test_both_halves_of_an_arc_are_open_where_one_is(
     (work,) = works
     via = np.flatnonzero(work.source.reading.visits.via)
     assert len(via) > 1 and {*via, *(via + 1)} == set(work.open)
+    assert work.beside == set(via.tolist())
+    sizes = dict(zip(work.paths.visit.tolist(), work.paths.after.sizes, strict=True))
+    for half in work.beside:  # it gets points of its own where it leaves its path
+        alone = work.points.get(half, ()) in ((), (1.0,))
+        assert not alone or sizes[half] <= TOLERANCE * MM / 2
 
 
 def one_half_of_every_arc(work: PathWork) -> Ints:
