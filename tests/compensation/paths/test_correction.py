@@ -8,7 +8,7 @@ from dataclasses import replace
 from functools import cache, partial
 from pathlib import Path
 from typing import Any
-from unittest.mock import Mock
+from unittest.mock import MagicMock, Mock
 
 import numpy as np
 import pytest
@@ -684,3 +684,32 @@ def test_points_behind_which_a_move_would_be_worse_are_taken_back() -> None:
     assert v == 3 and "behind" in why
     work.paths = paths(0.02, 0.05, 0.09)
     assert not [*judging._harmful(work)]
+
+
+def test_a_rounded_point_is_judged_by_the_worst_of_all_its_zones() -> None:
+    rng = np.random.default_rng(4)
+    aside, half, done = np.linspace(0.0, 0.015, 7), 0.01, 0.25
+    moved, tangent = 1e-4 * rng.normal(size=3), np.tile((1.0, 0.0, 0.0), (7, 1))
+    off = 1e-4 * rng.normal(size=(7, 3))
+    found = judging._Corner(half, moved, done, 0.0).farthest(aside, off, tangent)
+    bend = np.maximum(1.0 - (aside / half) ** 2, 0.0)[:, None]
+    tried = [off + u * bend * moved for u in np.linspace(-done, 1.0 - done, 21)]
+    worst = np.max([np.hypot(one[:, 1], one[:, 2]) for one in tried], axis=0)
+    np.testing.assert_allclose(found, np.where(aside <= half, worst, 0.0), atol=1e-12)
+
+
+def test_flanks_that_make_no_difference_are_no_reason_to_take_points_back() -> None:
+    way, near = np.linspace(0.0, 0.1, 5), np.full(5, 3.5e-5)
+    paths = MagicMock(visit=np.array([3]), way=way, giving=near, doubtful=near)
+    paths.after.across, paths.samples = near, Mock(return_value=slice(0, 5))
+    paths.__len__.return_value = 1
+    first = MagicMock(visit=paths.visit, way=way, giving=np.zeros(5), doubtful=near)
+    first.samples = first.samples_to = Mock(return_value=slice(0, 5))
+    first.__len__.return_value = 1
+    work = Mock()
+    work.first.paths = first
+    work.source.reading.visits.motion = [Motion.LINEAR] * 4
+    told = Mock(paths=paths)
+    assert not judging._if_otherwise(work, told, {3: 1e-4})
+    paths.giving = near + 1e-5  # it does make one, and the place is worse by 0.045 mm
+    assert 3 in judging._if_otherwise(work, told, {3: 1e-4})
