@@ -137,6 +137,11 @@ class PathAccuracy:
         )
 
 
+def sizes_of(paths: PathAccuracy) -> dict[int, float]:
+    """How far each move of the compensated program leaves its path at the most [m]."""
+    return dict(zip(paths.visit.tolist(), paths.after.sizes.tolist(), strict=True))
+
+
 def predict_paths(
     before: ProgramCycle,
     after: ProgramCycle,

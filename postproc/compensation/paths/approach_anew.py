@@ -10,6 +10,7 @@ from postproc.compensation.correction import Correction
 from postproc.compensation.in_time import InTime
 from postproc.compensation.notes import SURE
 from postproc.compensation.outcome import Status
+from postproc.compensation.paths.accuracy import sizes_of
 from postproc.compensation.paths.insertions import numbers_at
 from postproc.compensation.paths.work import PathWork, of_source
 from postproc.language.interface import Splitter
@@ -49,11 +50,10 @@ def _worse_paths(work: PathWork) -> set[int]:
     Only where a path was asked for, and where it is farther off than that.
     """
     before = work.source.reading.visits.before
-    first, now = work.first.paths, work.paths
-    was = dict(zip(first.visit.tolist(), first.after.sizes.tolist(), strict=True))
+    was, now = sizes_of(work.first.paths), sizes_of(work.paths)
     worse = {
         v
-        for v, far in zip(now.visit.tolist(), now.after.sizes.tolist(), strict=True)
+        for v, far in now.items()
         if far > max(was.get(v, np.inf) + WORSE, work.tolerance)
     }
     return {v for v in work.approaches if worse & {v, *np.flatnonzero(before == v)}}

@@ -8,7 +8,7 @@ the old flank and one on the new, and few others.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from math import hypot
@@ -18,6 +18,7 @@ import numpy as np
 from postproc.compensation.correction import Draft
 from postproc.compensation.in_time import InTime
 from postproc.compensation.options import Setting
+from postproc.compensation.paths.accuracy import sizes_of
 from postproc.compensation.paths.approach_anew import approach_anew, approached
 from postproc.compensation.paths.arc_cuts import (
     bending,
@@ -28,7 +29,7 @@ from postproc.compensation.paths.arc_cuts import (
     whole_arcs,
 )
 from postproc.compensation.paths.arcs import Cut, halves, point_on_way
-from postproc.compensation.paths.judging import judge, largest_on_moves, sizes_of
+from postproc.compensation.paths.judging import judge, largest_on_moves
 from postproc.compensation.paths.points import Insertions
 from postproc.compensation.paths.split_moves import find_split
 from postproc.compensation.paths.work import PathWork, Write, of_source
@@ -295,7 +296,7 @@ class BestPoints:
         """
         refused = self._refusals()
         self._refused = refused | self._refused  # what was said first
-        bad = self._moves((*(v for v, _ in flat), *refused))
+        bad = self._unfit(flat, refused)
         for v, tried in self._now().items():
             known = self._best.setdefault(v, tried)
             if v not in bad and tried.size <= known.size + BETTER:  # the later one
@@ -304,7 +305,7 @@ class BestPoints:
     def restore(self) -> None:
         """Give moves back the points that did better than those they have."""
         work, now = self._work, self._now()
-        bad = self._moves((*(v for v, _ in bending(work)), *self._refusals()))
+        bad = self._unfit(bending(work), self._refusals())
         worse = [v for v in now if v in bad or self._was_better(v, now[v])]
         for v in worse:
             has, best = now[v], self._best[v]
@@ -325,10 +326,10 @@ class BestPoints:
         work = self._work
         return {v: told for v in work.points if (told := work.refusal(v))}
 
-    def _moves(self, some: Iterable[int]) -> set[int]:
-        """Return the moves that visits belong to, by their first visits."""
+    def _unfit(self, flat: Collection[Cut], refused: Collection[int]) -> set[int]:
+        """Return the moves with flat pieces, or refused points, by first visits."""
         visits = self._work.source.reading.visits
-        return {halves(visits, v)[0] for v in some}
+        return {halves(visits, v)[0] for v in (*(v for v, _ in flat), *refused)}
 
     def _now(self) -> dict[int, _Tried]:
         """Say what the moves have now, by their first visits, and how they do."""

@@ -9,7 +9,7 @@ import numpy as np
 
 from postproc.arrays import Bools, Floats, any_in_rows
 from postproc.compensation.in_time import InTime
-from postproc.compensation.paths.accuracy import PathAccuracy, apart
+from postproc.compensation.paths.accuracy import PathAccuracy, apart, sizes_of
 from postproc.compensation.paths.approach_anew import WORSE, bad_approaches
 from postproc.compensation.paths.arc_cuts import bending, may_be_chord
 from postproc.compensation.paths.arcs import (
@@ -36,8 +36,10 @@ MOVED = 5e-6  # [m] that a rounded corner may move
 
 def judge(work: PathWork) -> None:
     """Take back points that make moves no better for certain."""
+    without = _of_moves(work, sizes_of(work.first.paths))
     for k in range(JUDGED):
-        bad, anew = dict([*_harmful(work), *_bad(work)]), bad_approaches(work)
+        bad = dict([*_harmful(work, without), *_bad(work, without)])
+        anew = bad_approaches(work)
         if not bad and not anew:
             return
         for v, (why, share) in bad.items():
@@ -87,19 +89,18 @@ def _take_back(work: PathWork, v: int) -> None:
 Reason = tuple[str, float | None]  # why points must go, and where if not all of them
 
 
-def _bad(work: PathWork) -> Iterator[tuple[int, Reason]]:
+def _bad(work: PathWork, without: dict[int, float]) -> Iterator[tuple[int, Reason]]:
     """Yield the moves with points that must go, and why."""
     told = work.latest.in_time
     if not work.points or told is None:
         return
-    without = _of_moves(work, sizes_of(work.first.paths))
     flat = bending(work)
     bent = {cut[0] for cut, far in flat.items() if not may_be_chord(work, cut, far)}
     judged = _Judged(
         work, without, _worst(work, told), _if_otherwise(work, told, without),
         _corners_moved(work, told), bent,
     )  # fmt: skip
-    for v in sorted({*work.points, *(via + 1 for via in work.cut_arcs())}):
+    for v in sorted(_with_points(work)):
         if reason := judged.why_not(v):
             yield v, reason
 
@@ -142,17 +143,19 @@ class _Judged:
         return None
 
 
-def _harmful(work: PathWork) -> Iterator[tuple[int, Reason]]:
+def _with_points(work: PathWork) -> set[int]:
+    """Return the moves with points, of arcs that are cut both halves."""
+    return {*work.points, *(via + 1 for via in work.cut_arcs())}
+
+
+def _harmful(work: PathWork, without: dict[int, float]) -> Iterator[tuple[int, Reason]]:
     """Yield moves with points behind which moves without any are worse for them.
 
     From which flank a joint leaves is a matter of the moves before.
     """
-    without, now = (
-        _of_moves(work, sizes_of(paths)) for paths in (work.first.paths, work.paths)
-    )
+    now = _of_moves(work, sizes_of(work.paths))
     cut = np.array(sorted(work.points), dtype=np.int64)
-    own = {*work.points, *work.approaches, *(via + 1 for via in work.cut_arcs())}
-    for v in now.keys() - own:
+    for v in now.keys() - _with_points(work) - work.approaches.keys():
         last = int(np.searchsorted(cut, v)) - 1
         near = last >= 0 and v - cut[last] <= NEAR
         if near and now[v] > without.get(v, np.inf) + WORSE:
@@ -284,11 +287,6 @@ def _corners_moved(work: PathWork, told: InTime) -> Bools:
 
 
 # How far moves are from their paths, by the visit at their end.
-
-
-def sizes_of(paths: PathAccuracy) -> dict[int, float]:
-    """How far each move of the compensated program leaves its path at the most [m]."""
-    return dict(zip(paths.visit.tolist(), paths.after.sizes.tolist(), strict=True))
 
 
 def _largest_on(way: Floats, far: Floats) -> tuple[float, float]:

@@ -16,6 +16,7 @@ import pytest
 from postproc.arrays import Floats, Ints
 from postproc.cli.simulate import _read, setup_of, simulate_file
 from postproc.compensation.paths import correction, judging, split_moves
+from postproc.compensation.paths.accuracy import sizes_of
 from postproc.compensation.paths.arc_cuts import bending
 from postproc.compensation.paths.arcs import is_arc
 from postproc.compensation.paths.correction import TAKEN, BestPoints
@@ -679,11 +680,12 @@ def test_points_behind_which_a_move_would_be_worse_are_taken_back() -> None:
     work = Mock(points={3: (0.5,)}, approaches={})
     work.cut_arcs.return_value = []
     work.source.reading.visits.motion = [Motion.LINEAR] * 10
-    work.first.paths, work.paths = paths(0.3, 0.01, 0.01), paths(0.02, 0.07, 0.09)
-    ((v, (why, _)),) = judging._harmful(work)  # 9 is too far behind
+    without = sizes_of(paths(0.3, 0.01, 0.01))
+    work.paths = paths(0.02, 0.07, 0.09)
+    ((v, (why, _)),) = judging._harmful(work, without)  # 9 is too far behind
     assert v == 3 and "behind" in why
     work.paths = paths(0.02, 0.05, 0.09)
-    assert not [*judging._harmful(work)]
+    assert not [*judging._harmful(work, without)]
 
 
 def test_a_rounded_point_is_judged_by_the_worst_of_all_its_zones() -> None:
