@@ -10,6 +10,7 @@ from postproc.calibration.selection import model_of
 from postproc.model.combination import Combination
 from postproc.model.effects import BASE_EFFECTS, BY_NAME, propose
 from postproc.model.effects.effect import Effect
+from postproc.model.effects.step import EDGE
 from postproc.model.kinematics import Batch
 from postproc.robot.state import States
 from tests.calibration.simulator import (
@@ -76,3 +77,14 @@ def test_it_is_fitted_and_the_arm_is_compensated_without_it(name: str) -> None:
     held = covariates(random_states(150, rng, PLATE), rng)
     truth = arm.tcp(held.q, held.direction, held.tool) - Batch(NJ, held).walk.tcp
     assert np.linalg.norm(truth - model.error(NJ, held), axis=1).mean() < 4e-5
+
+
+@pytest.mark.parametrize("name", ["base_shift", "tool_shift"])
+def test_a_step_is_shown_by_rows_on_both_sides(name: str) -> None:
+    """What all rows but a few are off by was there before they were measured."""
+    rng = np.random.default_rng(4)
+    batch = Batch(NJ, random_states(N, rng, PLATE))
+    for row in (EDGE, N - EDGE):
+        tried = BY_NAME[name](row=float(row)).refined(np.linspace(-1, 1, 9), batch)
+        rows = [effect.row for effect in tried]
+        assert len(rows) > 3 and min(rows) >= EDGE and max(rows) <= N - EDGE
