@@ -25,7 +25,7 @@ from postproc.model.effects.effect import Effect
 from postproc.model.effects.probe_turn import ProbeTurn
 from postproc.model.effects.tool_shift import ToolShift
 from postproc.model.kinematics import Batch
-from postproc.model.model import COMPENSATED, READING, Model
+from postproc.model.model import COMPENSATED, READING, WORST_STD, Model
 from postproc.model.ranges import Ranges
 from postproc.robot.arm import Arm
 from postproc.robot.pose import MM
@@ -429,7 +429,7 @@ def model_of(fitted: Fit, survey: Measurements) -> Model:
     statistics = {
         "residual_mean_mm": float(left.mean()),
         "residual_max_mm": float(left.max()),
-        "worst_std_mm": float(known.max(initial=0.0) / MM),
+        WORST_STD: float(known.max(initial=0.0) / MM),
         "effective_parameters": fitted.effective,
         "log_evidence": fitted.log_evidence,
         "rows_dropped": float((~used).sum() + len(survey.dropped)),

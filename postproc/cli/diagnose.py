@@ -10,7 +10,6 @@ from typing import Any
 
 import numpy as np
 
-from postproc.arrays import Floats
 from postproc.calibration.diagnosis.diagnose import Extension, diagnose
 from postproc.calibration.diagnosis.result import Diagnosis
 from postproc.calibration.diagnosis.search import Progress
@@ -32,6 +31,7 @@ from postproc.compensation.program import Planned, plan_visits, read_program, st
 from postproc.exceptions import MeasurementError
 from postproc.model.effects.placement import Placement
 from postproc.model.model import Model, load_model
+from postproc.model.registration import Registration
 from postproc.model.statistics import ErrorStatistics
 from postproc.report.terminal import Column, folded, table_text
 from postproc.robot.cell import Cell, load_cell
@@ -146,6 +146,9 @@ FINDINGS = (
 )
 
 
+REGISTERED = (Placement.name,)  # what is fitted besides where the tracker is found
+
+
 @dataclass(frozen=True)
 class Asked:
     """How measurements are to be diagnosed.
@@ -189,16 +192,17 @@ def diagnose_files(
     else:
         program = asked.program
         survey = concatenate([join_program(path, program, cell) for path in data])
-    tracker, setup = cell.tracker, several_points(survey)
+    tracker, setup, placed = cell.tracker, several_points(survey), None
     if asked.measured_frame == "uframe":
         survey = from_user_frame(survey, cell)
     elif asked.measured_frame == "tracker":
-        survey, tracker = from_tracker_frame(survey, cell, model)
-        setup = (Placement.name,)
+        survey, placed = from_tracker_frame(survey, cell, model)
+        tracker, setup = placed.tracker, REGISTERED
     found = diagnose(
         survey, cell.arm, model, tracker=tracker, setup=setup, seed=asked.seed,
         progress=progress,
     )  # fmt: skip
+    found = replace(found, model=replace(found.model, registration=placed))
     found.model.save(asked.output or extended_path(model_path))
     return found
 
@@ -216,23 +220,24 @@ def from_user_frame(survey: Measurements, cell: Cell) -> Measurements:
 
 def from_tracker_frame(
     survey: Measurements, cell: Cell, model: Model
-) -> tuple[Measurements, Floats]:
+) -> tuple[Measurements, Registration]:
     """Convert positions from the tracker's frame, found with the model's help.
 
     A model that was fitted in the tracker's frame has probe points of its own, which
     are then found again; else those of the cell hold.
 
     Returns:
-        The measurements in the base frame, and where the tracker stands, (3,) [m].
+        The measurements in the base frame, and where tracker and probes are.
     """
     effects, values, _ = model.compensable()
     placed = register(cell.arm, survey.states, survey.position, effects, values)
     states = survey.states
+    _, first, which = np.unique(states.tool_id, return_index=True, return_inverse=True)
     if any(isinstance(e, Placement) for e in model.effects.effects):
-        _, which = np.unique(states.tool_id, return_inverse=True)
         states = states.with_(tool=placed.probes[which])
+    placed = replace(placed, probes=states.tool[first])
     position = placed.to_base(survey.position)
-    return replace(survey, states=states, position=position), placed.tracker
+    return replace(survey, states=states, position=position), placed
 
 
 def tell(found: Diagnosis) -> str:
@@ -252,6 +257,8 @@ def tell(found: Diagnosis) -> str:
     if found.vap_mm is not None:
         lines.append(f"vAP {found.vap_mm[0]:.4f} -> {found.vap_mm[1]:.4f} mm")
     lines += [*found.fixed_points, *filter(None, [found.flanks])]
+    if found.set_anew is not None:
+        lines.append(found.set_anew.tell())
     lines += [
         f"{f.effect} may be tracker_drift: nothing of it is compensated. Rows on fixed "
         "points (column reference) would tell"

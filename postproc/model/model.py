@@ -105,6 +105,7 @@ class PredictedReading:
 CHUNK = 5000  # states evaluated together: the columns stay in the cache
 COMPENSATED = ("arm", "state")
 READING = "reading_spread"  # statistic: see `Fit.reading_spread`
+WORST_STD = "worst_std_mm"  # statistic: largest standard error at a surveyed pose
 UNSURE = "standard error above three times the survey's worst"
 Width = tuple[float, float]  # least and largest way from flank to flank [gaps]
 UNTOLD: Width = 1.0, np.inf
@@ -312,7 +313,7 @@ class Model:
     @property
     def _sure_up_to(self) -> float:
         """Standard error per axis up to which the survey vouches for it [m]."""
-        return 3 * (self.statistics.get("worst_std_mm", np.inf) * MM)
+        return 3 * (self.statistics.get(WORST_STD, np.inf) * MM)
 
     def _variance(self, arm: Arm, states: States) -> tuple[Floats, Batch]:
         """Variance of the error, (n, 3) [m^2], and the kinematics that it is of."""

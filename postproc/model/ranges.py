@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
+from typing import overload
 
 import numpy as np
 
@@ -53,6 +55,37 @@ class Ranges:
             speed=_interval(states.speed),
             oriented=oriented,
         )
+
+    def joined(self, fresh: Ranges, only: Collection[str] = ()) -> Ranges:
+        """Return what both cover: what a model knew, and rows that revised it.
+
+        Where their ranges lie apart those of the rows count: nobody has been between.
+
+        Args:
+            fresh: What the rows cover.
+            only: Of which nothing but the rows counts: joints "1" to "6", "payload",
+                "temperature", "tool".
+        """
+        ends = [
+            _joined(old, new, str(j + 1) in only)
+            for j, (old, new) in enumerate(zip(self._ends, fresh._ends, strict=True))
+        ]
+        states = {
+            name: _joined(getattr(self, name), getattr(fresh, name), name in only)
+            for name in ("payload", "temperature", "speed")
+        }
+        tools = () if "tool" in only else self.tools
+        return Ranges(
+            lower=tuple(low for low, _ in ends),
+            upper=tuple(high for _, high in ends),
+            tools=tuple(sorted({*tools, *fresh.tools})),
+            oriented=fresh.oriented or (self.oriented and bool(tools)),
+            **states,
+        )
+
+    @property
+    def _ends(self) -> list[Interval]:
+        return list(zip(self.lower, self.upper, strict=True))
 
     def outside(self, states: States, needs: frozenset[str]) -> dict[str, Bools]:
         """Say which states lie outside, by reason; reasons without states are left out.
@@ -109,6 +142,27 @@ class Ranges:
         points = np.array(self.tools).reshape(-1, 3)
         spread = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
         return len(spread) > 1 and bool(spread[1] > 0.02)  # [m]
+
+
+@overload
+def _joined(old: Interval, new: Interval, only: bool) -> Interval: ...
+@overload
+def _joined(
+    old: Interval | None, new: Interval | None, only: bool
+) -> Interval | None: ...
+def _joined(old: Interval | None, new: Interval | None, only: bool) -> Interval | None:
+    """Join two ranges that touch; else the second counts, where it is known.
+
+    >>> _joined((0.0, 2.0), (1.0, 3.0), False), _joined((0.0, 1.0), (2.0, 3.0), False)
+    ((0.0, 3.0), (2.0, 3.0))
+    >>> _joined((0.0, 2.0), None, False), _joined((0.0, 2.0), (1.0, 3.0), True)
+    ((0.0, 2.0), (1.0, 3.0))
+    """
+    if old is None or new is None:
+        return old if new is None else new
+    if only or new[0] > old[1] or new[1] < old[0]:
+        return new
+    return min(old[0], new[0]), max(old[1], new[1])
 
 
 def _interval(values: Floats) -> Interval | None:

@@ -125,7 +125,7 @@ def test_positions_in_the_tracker_frame_are_registered(job: Path) -> None:
     rows = read_surveys([job / "rows.csv"], cell)
     turn = pose_from_record((-3000.0, 500.0, 200.0, 70.0, 5.0, 20.0))
     there = rows.position @ turn[:3, :3].T + turn[:3, 3]
-    back, tracker = from_tracker_frame(replace(rows, position=there), cell, model)
+    back, placed = from_tracker_frame(replace(rows, position=there), cell, model)
     assert np.abs(back.position - rows.position).max() < 1e-3
-    assert np.linalg.inv(turn)[:3, 3] == pytest.approx(tracker, abs=1e-3)
+    assert np.linalg.inv(turn)[:3, 3] == pytest.approx(placed.tracker, abs=1e-3)
     assert back.states.tool == pytest.approx(rows.states.tool)

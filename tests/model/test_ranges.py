@@ -63,3 +63,23 @@ def test_collinear_points_do_not_show_all_rotations() -> None:
     assert not Ranges.of(survey(line)).see_all_rotations
     assert Ranges.of(survey(PLATE)).see_all_rotations
     assert not Ranges.of(survey()).see_all_rotations
+
+
+def of(low: float, high: float, tool: tuple[float, ...] = (0.1, 0.0, 0.2)) -> Ranges:
+    """Make ranges that are the same for all joints."""
+    return Ranges(6 * (low,), 6 * (high,), (tool,), (low, high), None, None)
+
+
+def test_a_revised_model_covers_what_it_knew_and_the_fresh_rows() -> None:
+    both = of(-1.0, 1.0).joined(of(0.5, 1.5, (0.3, 0.0, 0.1)))
+    assert (both.lower, both.upper) == (6 * (-1.0,), 6 * (1.5,))
+    assert both.payload == (-1.0, 1.5) and both.temperature is None
+    assert both.tools == ((0.1, 0.0, 0.2), (0.3, 0.0, 0.1))
+
+
+def test_of_ranges_that_lie_apart_or_have_changed_the_fresh_ones_count() -> None:
+    apart = of(-1.0, 1.0).joined(of(1.2, 1.5))
+    assert (apart.lower, apart.upper) == (6 * (1.2,), 6 * (1.5,))
+    some = of(-1.0, 1.0).joined(of(0.0, 1.5, (0.3, 0.0, 0.1)), {"5", "payload", "tool"})
+    assert some.lower == (*(4 * (-1.0,)), 0.0, -1.0)
+    assert some.payload == (0.0, 1.5) and some.tools == ((0.3, 0.0, 0.1),)

@@ -16,7 +16,13 @@ from postproc.calibration.diagnosis.next_poses import (
     poses_that_separate,
     poses_that_sharpen,
 )
-from postproc.calibration.diagnosis.refit import Revision, fold_back, refit
+from postproc.calibration.diagnosis.refit import (
+    Revision,
+    SetAnew,
+    fold_back,
+    no_surer,
+    refit,
+)
 from postproc.calibration.diagnosis.result import (
     Diagnosis,
     Profile,
@@ -40,8 +46,9 @@ from postproc.calibration.report import report_directions, weighed_down
 from postproc.calibration.reversals import newer_widths, split_reversals, tell_widths
 from postproc.calibration.selection import model_of, told_apart
 from postproc.model.combination import Combination
+from postproc.model.covariate import JOINTS
 from postproc.model.kinematics import Batch
-from postproc.model.model import Model
+from postproc.model.model import WORST_STD, Model
 from postproc.model.statistics import ErrorStatistics
 from postproc.robot.arm import Arm
 from postproc.robot.pose import MM
@@ -143,6 +150,7 @@ def left_by(fit: Fit, every: Fit, rows: NDArray[np.int64], told: Floats) -> Floa
 # Close the loop: what a model leaves of fresh measurements, and why.
 
 PLACES = 5
+BY_ANGLE = ("joint", "lambda", "before", "travel", "loop")  # what drives at an angle
 
 
 @dataclass(frozen=True, eq=False)
@@ -192,9 +200,10 @@ def diagnose(
         ModelError: A model of another arm.
     """
     survey, reversals = split_reversals(survey, arm)
-    base = refit(survey, arm, model, tracker, setup)
+    bases = refit(survey, arm, model, tracker, setup)
     without, sides = ruled_out(survey.motion), survey.states.direction
-    traced = trace(base, seed, progress, without)
+    tried = [trace(base, seed, progress, without) for base in bases]
+    traced = max(tried, key=lambda each: each.search.fit.log_evidence)
     if not survey.inferred.all():
         traced = _with_mended_directions(traced, seed, progress, without)
     search = traced.search
@@ -202,7 +211,8 @@ def diagnose(
     traced = replace(traced, search=replace(search, fit=settled))
     given = None
     if model.data_sha256 != survey.sha256:
-        given = survey.position - base.batch.walk.tcp - model.error(arm, survey.states)
+        nominal = bases[0].batch.walk.tcp
+        given = survey.position - nominal - model.error(arm, survey.states)
     held_out = hold_out(traced.search, sides, seed, progress, given)
     diagnosis = _conclude(survey, traced, held_out, tracker, seed)
     extended = _extended(model, survey, traced.search, diagnosis)
@@ -264,6 +274,7 @@ def _conclude(
         directions=report_directions(found.fit, survey),
         not_excluded=not_excluded(found.fit.batch),
         fixed_points=() if survey.motion is None else survey.motion.tell(),
+        set_anew=SetAnew.of(found.fit),
     )
 
 
@@ -318,10 +329,43 @@ def _extended(
         "before": statistics(diagnosis.before),
         "after": statistics(diagnosis.after),
     }  # fmt: skip
-    fit = found.fit
-    revised = any(isinstance(e, Revision) for e in fit.combination.effects)
-    fitted = model_of(fold_back(fit) if revised else fit, survey)
+    fitted = fold_back(model_of(no_surer(found.fit), survey))
+    if model.data_sha256 != survey.sha256:
+        fitted = replace(
+            fitted,
+            ranges=model.ranges.joined(fitted.ranges, _unlike(found, diagnosis)),
+            statistics=fitted.statistics | _worst(model, fitted),
+        )
     return replace(fitted, parent=model.id, history=(*model.history, record))
+
+
+def _unlike(found: Search, diagnosis: Diagnosis) -> set[str]:
+    """Name what a revised model knows from its fresh rows alone, see `Ranges.joined`.
+
+    What drives an effect that was added is one: nobody has seen it elsewhere. Where
+    something is left without a name, every joint is.
+    """
+    only, every = set[str](), {*map(str, JOINTS), "payload"}
+    for addition in found.additions:
+        for source in addition.candidate.source.split(" x "):
+            kind, _, joint = source.partition(" ")
+            if kind in BY_ANGLE:
+                only.add(joint)
+            elif kind in ("payload", "temperature"):
+                only.add(kind)
+            elif kind not in ("time", "order", "speed"):
+                only |= every
+    if diagnosis.verdict == "unexplained":
+        only |= every
+    if diagnosis.set_anew is not None and diagnosis.set_anew.bent:
+        only.add("tool")
+    return only
+
+
+def _worst(model: Model, fitted: Model) -> dict[str, float]:
+    """Return the least sure that a model is where it has been, as it was revised."""
+    known = [m.statistics.get(WORST_STD) for m in (model, fitted)]
+    return {WORST_STD: max(k for k in known if k is not None)}
 
 
 # What a reader needs to judge a diagnosis: residuals, rivals, rows, the chain.

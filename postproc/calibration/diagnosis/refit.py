@@ -8,9 +8,10 @@ from typing import Any, ClassVar
 import numpy as np
 
 from postproc.arrays import Floats
-from postproc.calibration.design import DesignMatrix
+from postproc.calibration.evidence import posterior
 from postproc.calibration.measurements import Measurements
 from postproc.calibration.regression import Fit, fit_effects
+from postproc.calibration.selection import ENOUGH
 from postproc.exceptions import PostprocError
 from postproc.model.combination import Combination
 from postproc.model.effects import propose
@@ -18,25 +19,33 @@ from postproc.model.effects.effect import Effect, Parameter
 from postproc.model.kinematics import Batch
 from postproc.model.model import Model
 from postproc.robot.arm import Arm
+from postproc.robot.pose import MM
 
-# A model that few fresh points may revise but cannot replace.
+# A model that fresh rows revise and do not replace.
 #
-# A handful of points of a production part cannot determine an arm's geometry again.
-# What the given model says is then the prior: its parameters may move as far as its
-# covariance lets them, times a factor that the points choose.
+# What the given model says is the prior: its parameters may move as far as its
+# covariance lets them, times a factor that the rows choose. Rows of one job tell little
+# of the rest of an arm's range, and what a survey has told of that is not thrown away
+# for them. Base and tool may be others since: they may move besides, as far as the
+# rows ask for.
 
-ROWS_PER_PARAMETER = 2  # rows from which a model is refitted rather than revised
 NOTHING = 1e-6  # share of the largest variance below which a direction is known
 UNSEEN = 1e-7  # [m rms] a direction that moves the rows by less is not revised
+GIVEN = "model"  # group of the given model's own uncertainty
+TRACKER = "tracker"  # group of a set-up's parameters that place the base
+CLEARLY = 3.0  # standard errors
+SET_ANEW = ("base shift", "base turn", "tool")  # groups of what may be others since
 
 
 @dataclass(frozen=True, eq=False)
 class Revision(Effect):
-    """The given model's uncertainty as an effect: its own columns times L eta.
+    """The given model's uncertainty as an effect: its own columns times F eta.
 
     Attributes:
         model: The given model, effects of the set-up left out.
-        factor: L with L L^T its covariance as far as it moves the rows, (p, r).
+        factor: F, (p, r): first L with L L^T its covariance as far as it moves the
+            rows, then what may be others since, one parameter a column.
+        groups: Prior group of every column, (r,).
         unseen: What is left of its covariance: nothing that the rows tell of, (p, p).
     """
 
@@ -44,14 +53,20 @@ class Revision(Effect):
 
     model: Model
     factor: Floats
+    groups: tuple[str, ...]
     unseen: Floats
 
     @classmethod
-    def of(cls, model: Model, batch: Batch) -> Revision:
+    def of(cls, model: Model, batch: Batch, anew: tuple[str, ...] = ()) -> Revision:
         """Take a model's covariance apart into what rows tell of and what not.
 
         A long survey leaves hundreds of uncertain directions, splines at angles where
         the rows never are for instance, which would be fitted in vain again and again.
+
+        Args:
+            model: The model.
+            batch: States of the rows.
+            anew: Groups of parameters that may be others since.
         """
         value, vector = np.linalg.eigh(model.covariance)
         kept = value > NOTHING * float(value.max(initial=0.0))
@@ -61,22 +76,31 @@ class Revision(Effect):
         square, way = np.linalg.eigh(moved.T @ moved / len(batch))
         seen = square > UNSEEN**2
         aside = factor @ way[:, ~seen]
-        return cls(model, factor @ way[:, seen], aside @ aside.T)
+        free = [k for k, p in enumerate(model.effects.parameters) if p.group in anew]
+        more = np.diag(model.effects.scales)[:, free]
+        groups = [model.effects.parameters[k].group for k in free]
+        return cls(
+            model,
+            np.concatenate([factor @ way[:, seen], more], axis=1),
+            (*(int(seen.sum()) * [GIVEN]), *groups),
+            aside @ aside.T,
+        )
 
     def parameters(self) -> tuple[Parameter, ...]:
         """Number the directions of the uncertainty."""
         return tuple(
-            Parameter(f"eta{k}", "1", 1.0, "model") for k in range(self.factor.shape[1])
+            Parameter(f"eta{k}", "1", 1.0, group) for k, group in enumerate(self.groups)
         )
 
     def columns(self, batch: Batch) -> Floats:
         """Differentiate the TCP position, (n, 3, r), wherever others move it."""
-        held = batch.known.get(self)
-        if held is None or held[0] is not batch.states:
+        held = batch.known.get(self.name, (None, None, None))
+        if held[0] is not self.factor or held[1] is not batch.states:
             effects = self.model.effects
             at = effects.at(batch, self.model.values)
-            held = batch.known[self] = batch.states, effects.columns(at) @ self.factor
-        columns: Floats = held[1]
+            held = self.factor, batch.states, effects.columns(at) @ self.factor
+            batch.known[self.name] = held
+        columns: Floats = held[2]
         return columns
 
     def settings(self) -> dict[str, Any]:
@@ -97,50 +121,135 @@ def only_arm(model: Model) -> Model:
     )
 
 
-def few(survey: Measurements, model: Model) -> bool:
-    """Tell whether rows are too few to fit the model's parameters again."""
-    return len(survey) < ROWS_PER_PARAMETER * len(model.values)
-
-
 def revise(
     survey: Measurements,
     model: Model,
     batch: Batch,
     origin: tuple[float, float, float] | None,
     setup: tuple[Effect, ...] = (),
-) -> Fit:
-    """Fit what a model leaves of a few rows, with its own uncertainty as an effect."""
+) -> tuple[Fit, ...]:
+    """Fit what a model leaves of fresh rows, with its own uncertainty as an effect.
+
+    Returns:
+        The fit; where the rows speak for it, a second one in which base and tool may
+        be others than the given model's.
+    """
     known = only_arm(model)
     left = survey.position - known.effects.error(batch, known.values)
-    return fit_effects(batch, left, (Revision.of(known, batch), *setup), origin)
+
+    def fit(*anew: str) -> Fit:
+        revision = Revision.of(known, batch, anew)
+        return fit_effects(batch, left, (revision, *setup), origin)
+
+    same = fit()
+    if any(p.group == TRACKER for e in setup for p in e.parameters()):
+        return (same,)  # it places both
+    other = fit(*SET_ANEW)
+    return (same, other) if other.log_evidence > same.log_evidence + ENOUGH else (same,)
 
 
-def fold_back(fit: Fit) -> Fit:
-    """Write a revision and what was added as effects with parameters of their own."""
-    first, *added = fit.combination.effects
-    assert isinstance(first, Revision)
-    effects = (*first.model.effects.effects, *added)
-    count, rank = first.factor.shape
-    spread = np.zeros((count + len(fit.values) - rank, len(fit.values)))
-    spread[:count, :rank] = first.factor
-    spread[count:, rank:] = np.eye(len(fit.values) - rank)
-    values = spread @ fit.values
-    values[:count] += first.model.values
-    covariance = spread @ fit.covariance @ spread.T
-    covariance[:count, :count] += first.unseen
-    combination = Combination(effects)
-    known = first.model.effects.error(fit.batch, first.model.values)
-    groups = tuple(dict.fromkeys(combination.groups))
-    scale = dict(zip(fit.groups, fit.log_scale, strict=True))
+@dataclass(frozen=True)
+class SetAnew:
+    """How base and tool lie beside where the given model has them, base and flange.
+
+    Attributes:
+        base: Shift of the base, (3,) [m].
+        turn: Turn of the base about its axes, (3,) [rad].
+        tool: Shift of the TCP on the flange, (3,) [m].
+        bent: Whether that of the tool is none of noise.
+    """
+
+    base: Floats
+    turn: Floats
+    tool: Floats
+    bent: bool
+
+    @classmethod
+    def of(cls, fit: Fit) -> SetAnew | None:
+        """Read it from a revision, None where both are the same as far as rows tell."""
+        first = fit.combination.effects[0]
+        if not isinstance(first, Revision):
+            return None
+        (base, shifted), (turn, turned), (tool, bent) = (
+            cls._moved(fit, first, name) for name in SET_ANEW
+        )
+        if not (shifted or turned or bent):
+            return None
+        return cls(base, turn, tool, bent)
+
+    @staticmethod
+    def _moved(fit: Fit, first: Revision, group: str) -> tuple[Floats, bool]:
+        """Return by what one group moved, (3,), and whether that is none of noise."""
+        own = np.flatnonzero([g == group for g in first.groups])
+        if not len(own):
+            return np.zeros(3), False
+        scale = first.factor[:, own].sum(axis=0)  # a column is one parameter
+        moved = scale * fit.values[own]
+        return moved, bool((np.abs(moved) > CLEARLY * scale * fit.std[own]).any())
+
+    def tell(self) -> str:
+        """Say it in a line."""
+        base, tool = (float(np.linalg.norm(v)) / MM for v in (self.base, self.tool))
+        turn = 1e3 * float(np.linalg.norm(self.turn))
+        return (
+            f"since the given model the base has moved by {base:.3f} mm and turned by "
+            f"{turn:.3f} mrad, the tool by {tool:.3f} mm: this is compensated. If the "
+            "tracker was set up anew instead, give its readings with --frame tracker"
+        )
+
+    def to_dict(self) -> dict[str, list[float]]:
+        """Return it as plain data, in mm and mrad."""
+        parts = ("base_mm", self.base), ("turn_mrad", self.turn), ("tool_mm", self.tool)
+        return {name: [round(1e3 * float(v), 5) for v in part] for name, part in parts}
+
+
+def no_surer(fit: Fit) -> Fit:
+    """Solve a revision again whose rows make the given model surer than it says.
+
+    A few rows that it happens to predict well are no proof of that.
+    """
+    group = f"{Revision.name}.{GIVEN}"
+    if group not in fit.groups or fit.log_scale[fit.groups.index(group)] >= 0.0:
+        return fit
+    log_scale = np.where([g == group for g in fit.groups], 0.0, fit.log_scale)
+    solved, scales = (
+        posterior(fit.normal(), fit.group, log_scale),
+        fit.combination.scales,
+    )
+    values = scales * solved.mean
     return replace(
         fit,
-        combination=combination,
-        error=fit.error + known,
+        values=values,
+        covariance=solved.covariance * np.outer(scales, scales),
+        log_scale=log_scale,
+        residual=fit.residual - fit.design.times(values - fit.values),
+    )
+
+
+def fold_back(model: Model) -> Model:
+    """Write a revised model as effects with parameters of their own.
+
+    Directions that the rows tell nothing of are as unsure as before, and more so where
+    the rows found the given model less sure than it said.
+    """
+    first, *added = model.effects.effects
+    if not isinstance(first, Revision):
+        return model
+    count, rank = first.factor.shape
+    spread = np.zeros((count + len(model.values) - rank, len(model.values)))
+    spread[:count, :rank] = first.factor
+    spread[count:, rank:] = np.eye(len(model.values) - rank)
+    values = spread @ model.values
+    values[:count] += first.model.values
+    covariance = spread @ model.covariance @ spread.T
+    unsure = float(model.prior_std[0]) if GIVEN in first.groups else 1.0
+    covariance[:count, :count] += max(unsure, 1.0) ** 2 * first.unseen
+    return replace(
+        model,
+        effects=Combination((*first.model.effects.effects, *added)),
         values=values,
         covariance=covariance,
-        groups=groups,
-        log_scale=np.array([scale.get(g, 0.0) for g in groups]),
-        design=DesignMatrix.of(combination, combination.at(fit.batch, values)),
+        prior_std=np.append(first.model.prior_std, model.prior_std[rank:]),
     )
 
 
@@ -155,8 +264,11 @@ def refit(
     model: Model,
     tracker: Floats | None,
     setup: tuple[str, ...] = (),
-) -> Fit:
-    """Fit the given model's effects to the rows, or revise it where they are few.
+) -> tuple[Fit, ...]:
+    """Fit the given model's effects to its own rows, or revise it by fresh ones.
+
+    Returns:
+        The fit, or two of which the rows must tell which is right, see `revise`.
 
     Raises:
         PostprocError: The model was not made by the full method, or there are hardly
@@ -175,11 +287,10 @@ def refit(
         )
     origin = None if tracker is None else (tracker[0], tracker[1], tracker[2])
     batch = Batch(arm, survey.states)
-    effects = model.effects.effects
-    if model.data_sha256 != survey.sha256:
-        effects = only_arm(model).effects.effects
+    fresh = model.data_sha256 != survey.sha256
+    effects = (only_arm(model) if fresh else model).effects.effects
     missing = [name for name in setup if name not in {e.name for e in effects}]
     placed = propose(missing, arm, survey.states)
-    if model.data_sha256 != survey.sha256 and few(survey, model):
+    if fresh:
         return revise(survey, model, batch, origin, placed)
-    return fit_effects(batch, survey.position, (*effects, *placed), origin)
+    return (fit_effects(batch, survey.position, (*effects, *placed), origin),)

@@ -9,6 +9,7 @@ import numpy as np
 
 from postproc.arrays import Floats
 from postproc.calibration.diagnosis.library import Projection
+from postproc.calibration.diagnosis.refit import SetAnew
 from postproc.calibration.diagnosis.score import LENGTHS, Leftover
 from postproc.calibration.measurements import DroppedRow
 from postproc.calibration.regression import Fit
@@ -117,6 +118,7 @@ class Diagnosis:
         not_excluded: What the rows could not have shown, in words.
         fixed_points: What readings of fixed points say of the tracker, in words.
         flanks: What reversals among the rows tell of the flanks of the joints.
+        set_anew: Where base and tool are now, None where they are as they were.
     """
 
     verdict: Verdict
@@ -137,6 +139,7 @@ class Diagnosis:
     not_excluded: tuple[str, ...] = ()
     fixed_points: tuple[str, ...] = ()
     flanks: str = ""
+    set_anew: SetAnew | None = None
 
     def to_dict(self) -> dict[str, Any]:
         """Return the content of the JSON report."""
@@ -175,6 +178,7 @@ class Diagnosis:
             "not_excluded": list(self.not_excluded),
             "fixed_points": list(self.fixed_points),
             "flanks_at_stops": self.flanks,
+            "set_anew": None if self.set_anew is None else self.set_anew.to_dict(),
         }
 
 
