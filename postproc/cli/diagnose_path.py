@@ -16,7 +16,7 @@ from postproc.calibration.diagnosis.search import Progress
 from postproc.calibration.diagnosis.trace import silent
 from postproc.calibration.measurements import POSITION, Measurements
 from postproc.calibration.tables import read_table
-from postproc.cli.diagnose import Asked, extended_path
+from postproc.cli.diagnose import REGISTERED, Asked, extended_path
 from postproc.cli.jobs import read_files
 from postproc.compensation.paths.accuracy import PredictedWays, predicted_ways
 from postproc.compensation.paths.flanks import JointInMotion, in_motion, measured_steps
@@ -26,7 +26,7 @@ from postproc.compensation.program import read_program, with_measured_play
 from postproc.compensation.targets import targets_from_visits
 from postproc.exceptions import MeasurementError, PostprocError
 from postproc.language.visits import Visits
-from postproc.model.model import Model, load_model
+from postproc.model.model import READING, Model, load_model
 from postproc.model.statistics import ErrorStatistics
 from postproc.motion.cycle import ProgramCycle, run
 from postproc.report.terminal import Column, table_text
@@ -194,11 +194,14 @@ def diagnose_path(
         track, rows.states, rows.position, rows.ids, np.zeros(len(rows.ids), np.int64),
         np.zeros(len(rows.ids), dtype=bool), digest,
     )  # fmt: skip
-    place, seed = cell.tracker, asked.seed
+    tracker, setup = cell.tracker, tuple[str, ...]()
+    if asked.measured_frame == "tracker" and model.registration is not None:
+        tracker, setup = model.registration.tracker, REGISTERED
     extension = diagnose(
-        survey, cell.arm, model, tracker=place, seed=seed, progress=progress
-    )
-    extension = _with_verdicts(extension, joints)
+        survey, cell.arm, model, tracker=tracker, setup=setup, seed=asked.seed,
+        progress=progress,
+    )  # fmt: skip
+    extension = _with_verdicts(_as_surveyed(extension, model), joints)
     extension.model.save(asked.output or extended_path(model_path))
     size = ErrorStatistics.of_sizes(lengths(found.on_the_way.off))
     moves = np.unique(_move(found.on_the_way.sample, ways))
@@ -356,6 +359,23 @@ def _resting(ways: PredictedWays, sample: Ints) -> Bools:
 def _move(sample: Ints, ways: PredictedWays) -> Ints:
     """Return the moves that samples belong to, (n,)."""
     return np.asarray(np.searchsorted(ways.first, sample, side="right") - 1)
+
+
+def _as_surveyed(found: Extension, model: Model) -> Extension:
+    """Leave what one run tells nothing of: how poses repeat, where the tracker stood.
+
+    Args:
+        found: What a track says.
+        model: The given model.
+    """
+    told = {k: v for k, v in model.statistics.items() if k == READING}
+    kept = replace(
+        found.model,
+        noise=model.noise,
+        registration=model.registration,
+        statistics=found.model.statistics | told,
+    )
+    return replace(found, model=kept)
 
 
 def _with_verdicts(found: Extension, joints: tuple[JointInMotion, ...]) -> Extension:

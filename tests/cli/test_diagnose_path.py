@@ -5,8 +5,10 @@ from __future__ import annotations
 import json
 import shutil
 
+import numpy as np
 import pytest
 
+from postproc.model.model import load_model
 from tests.compensation.paths.test_accuracy import job
 from tests.conftest import SEED
 from tests.written import cli
@@ -56,6 +58,18 @@ def test_a_path_confirms_the_flanks_and_lacks_nothing(tracked):
     assert better["history"][-1]["in_motion"] == {
         str(j): v for j, v in verdicts.items()
     }
+
+
+def test_one_run_tells_nothing_of_how_poses_repeat_nor_of_the_rest_of_the_range(
+    tracked,
+):
+    diagnosed(tracked, "plain.csv")
+    given, better = (load_model(tracked / f"{n}.json") for n in ("model", "better"))
+    assert better.noise == given.noise and better.registration == given.registration
+    assert better.reading_spread == given.reading_spread
+    assert np.all(np.array(better.ranges.lower) <= given.ranges.lower)
+    assert np.all(np.array(better.ranges.upper) >= given.ranges.upper)
+    assert set(better.ranges.tools) >= set(given.ranges.tools)
 
 
 def test_an_effect_that_nobody_declared_is_found_on_the_way(tracked):
