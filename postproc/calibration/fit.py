@@ -283,8 +283,12 @@ def read_surveys(
         read_measurements(path, cell.arm, cell.probes, reading=reading)
         for path in files
     ]
-    survey = replace(concatenate(parts), mounting=cell.mounting)
+    return carrying_load(replace(concatenate(parts), mounting=cell.mounting), cell)
+
+
+def carrying_load(rows: Measurements, cell: Cell) -> Measurements:
+    """Tell of every row where its payload has its weight, as the cell knows it."""
     if cell.file.payload is None:
-        return survey
-    com = np.tile(cell.payload_com, (len(survey), 1))
-    return survey.with_states(survey.states.with_(payload_com=com))
+        return rows
+    com = np.tile(cell.payload_com, (len(rows), 1))
+    return rows.with_states(rows.states.with_(payload_com=com))
