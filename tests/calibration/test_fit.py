@@ -219,6 +219,27 @@ def test_predict_knows_where_the_payload_hangs(tmp_path: Path) -> None:
     assert np.abs(right - wrong).max() > 1e-5
 
 
+def test_rows_without_a_payload_carry_that_of_the_cell(tmp_path: Path) -> None:
+    """Compensation takes it to hang there; a fit without it would count it twice."""
+    bare = write(tmp_path / "bare.csv", 60)
+    header, *rows = bare.read_text().splitlines()
+    told, some = tmp_path / "told.csv", tmp_path / "some.csv"
+    for path, kept in ((told, 60), (some, 40)):
+        ends = [",120" if k < kept else "," for k in range(len(rows))]
+        loaded = [f"{header},payload_kg", *map("".join, zip(rows, ends, strict=True))]
+        path.write_text("\n".join(loaded) + "\n")
+    cell(tmp_path)
+    with (tmp_path / "cell.toml").open("a") as file:
+        file.write("[payload]\nmass_kg = 120.0\ncom_mm = [-300.0, 0.0, -100.0]\n")
+    given = load_cell(tmp_path / "cell.toml")
+    whole, *others = (read_surveys([path], given) for path in (told, bare, some))
+    assert not any("payload" in text for text in whole.warnings)
+    for other, which in zip(others, ("rows", "20 rows"), strict=True):
+        np.testing.assert_array_equal(other.states.payload, whole.states.payload)
+        said = f"no payload_kg: {which} taken as measured with the payload of the cell"
+        assert any(text.startswith(said) for text in other.warnings)
+
+
 def test_what_physics_forbids_is_marked(tmp_path: Path) -> None:
     """A joint that rises under its load has no negative stiffness."""
     rng = np.random.default_rng(5)
