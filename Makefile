@@ -16,7 +16,7 @@
 # make intervals   coverage of a reading's intervals on two real arms: docs/intervals.md
 # make detection   outliers, wrong directions and nests that a fit finds: docs/detection.md
 # make languages   where arms land that run one job in every language: docs/languages.md
-# make undeclared  undeclared effects traced on virtual arms, 1,400 of them: docs/undeclared.md
+# make undeclared  undeclared effects traced on virtual arms, 1,880 of them: docs/undeclared.md
 # make paths       predicted and true path accuracy on virtual arms: docs/paths.md
 # make real DATA=folder [FITS=1]   real arms, rows that nothing has seen; FITS leaves out diagnoses: docs/real-arms.md
 # make blind       effects traced in the blind campaigns and on a real arm: docs/blind.md

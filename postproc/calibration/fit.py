@@ -283,8 +283,24 @@ def read_surveys(
         read_measurements(path, cell.arm, cell.probes, reading=reading)
         for path in files
     ]
-    survey = replace(concatenate(parts), mounting=cell.mounting)
+    return carrying_load(replace(concatenate(parts), mounting=cell.mounting), cell)
+
+
+def carrying_load(rows: Measurements, cell: Cell) -> Measurements:
+    """Tell of every row where its payload has its weight, as the cell knows it.
+
+    Where the file does not tell the payload either, it is the cell's: compensation
+    takes that to hang there, and what joints yield by holds for one payload.
+    """
     if cell.file.payload is None:
-        return survey
-    com = np.tile(cell.payload_com, (len(survey), 1))
-    return survey.with_states(survey.states.with_(payload_com=com))
+        return rows
+    com = np.tile(cell.payload_com, (len(rows), 1))
+    untold = np.isnan(rows.states.payload)
+    mass = np.where(untold, cell.payload_mass, rows.states.payload)
+    loaded = rows.with_states(rows.states.with_(payload=mass, payload_com=com))
+    if not untold.any():
+        return loaded
+    which = "rows" if untold.all() else f"{untold.sum()} rows"
+    told = f"no payload_kg: {which} taken as measured with the payload of the cell, "
+    told += f"{cell.payload_mass:g} kg"
+    return replace(loaded, warnings=(*rows.warnings, told))

@@ -173,6 +173,7 @@ def check_references(rows: ReferenceRows) -> None:
 
 NATS = 3.0  # that a drift must be worth: 20 to 1
 COVERED = 0.8  # of the survey that the readings must span
+UNSEEN = 0.3  # of the survey that may pass between two of them
 SURE = 3.0  # standard errors that what counts as the arm's must stand above
 APART = 0.1  # [m] that fixed points lie apart which show a turn
 PASSES = 20
@@ -189,6 +190,7 @@ class TrackerMotion:
         nats: Log evidence of a drift over that of none.
         unsure: Standard error of a steady drift over the whole survey [m].
         covered: Share of the survey that the readings span.
+        unseen: Largest share of the survey that passes between two readings.
         points: Number of fixed points.
         rank: Directions that they span: 0, 1, or 2, which tell all turns.
         readings: Number of readings.
@@ -200,6 +202,7 @@ class TrackerMotion:
     nats: float
     unsure: float
     covered: float
+    unseen: float
     points: int
     rank: int
     readings: int
@@ -212,7 +215,12 @@ class TrackerMotion:
     @property
     def stands(self) -> bool:
         """Whether the tracker was watched over the survey and did not move."""
-        return self.covered >= COVERED and not self.drifts
+        return self.watched and not self.drifts
+
+    @property
+    def watched(self) -> bool:
+        """Whether the tracker was watched all along the survey."""
+        return self.covered >= COVERED and self.unseen <= UNSEEN
 
     def moved(self, passed: Floats, position: Floats) -> Floats:
         """Return what the drift adds to readings at positions (n, 3), (n, 3) [m]."""
@@ -224,7 +232,7 @@ class TrackerMotion:
 
         A tracker that moves, and whose turns nobody sees, may have turned.
         """
-        turns_seen = self.covered >= COVERED and self.rank == 2
+        turns_seen = self.watched and self.rank == 2
         return bool((self.stands or turns_seen) and peak > SURE * self.unsure)
 
     @property
@@ -246,6 +254,8 @@ class TrackerMotion:
         """Say in words what was found."""
         found = f"moved by up to {self.peak_mm:.4f} mm, taken out of the rows"
         if not self.drifts:
+            found = "did not move while they were read"
+        if self.stands:
             found = f"did not move ({self.unsure / MM:.4f} mm could be told per axis)"
         told = [
             f"{self.readings} readings of {self.points} fixed points: the tracker "
@@ -259,6 +269,12 @@ class TrackerMotion:
             told.append(
                 f"the readings of fixed points span {self.covered:.0%} of the survey: "
                 "what the tracker did besides is not known"
+            )
+        elif not self.watched:
+            told.append(
+                f"{self.unseen:.0%} of the survey pass between two readings of fixed "
+                "points: what the tracker did meanwhile is not known. Read one every "
+                "20 rows or so"
             )
         return tuple(told)
 
@@ -303,11 +319,12 @@ def tracker_motion(rows: ReferenceRows, time: Floats, order: Floats) -> TrackerM
     spread = _about_mean((own - start)[:, None] / span, rows.which)
     steady = float(np.sqrt((spread**2).sum()))
     covers = float(np.ptp(own)) / max(float(np.ptp(other)), 1e-9)
+    apart = float(np.diff(np.sort(own)).max()) / max(float(np.ptp(other)), 1e-9)
     size = np.linalg.svd(places - center, compute_uv=False)
     return TrackerMotion(
         drift, center, values * scales if nats >= NATS else 0.0 * values, nats,
-        sigma / max(steady, 1e-9), covers, len(places), int((size > APART).sum()),
-        len(own),
+        sigma / max(steady, 1e-9), covers, apart, len(places),
+        int((size > APART).sum()), len(own),
     )  # fmt: skip
 
 

@@ -381,8 +381,9 @@ FULL_TURN = 2 * np.pi + 1e-3  # angles all below it are radians
 
 
 def is_robodk(table: TextTable) -> bool:
-    """Tell whether a table has 18 columns, all of numbers."""
-    if table.cells.shape[1] != WIDTH or table.has("id"):
+    """Tell whether a table has 18 columns of numbers, none of them named as ours."""
+    ours = any(table.has(name) for name in ("id", *JOINTS, *MEASURED))
+    if table.cells.shape[1] != WIDTH or ours:
         return False
     cells = "\n".join(str(c) for c in table.cells.reshape(-1)).replace(",", ".")
     try:

@@ -16,6 +16,7 @@ import numpy as np
 from postproc.arrays import Floats
 from postproc.calibration.fit import (
     Calibration,
+    carrying_load,
     fit,
     fit_measurements,
     into_base_frame,
@@ -501,7 +502,7 @@ def predict_file(
 
 def predict_table(table: Cells, cell: Cell, model: Model) -> tuple[str, str]:
     """Add predicted errors to the rows of a table; lost beams get empty cells."""
-    measured = from_table(table, cell.arm, cell.probes, positions=False)
+    measured = _rows(table, cell, positions=False)
     predicted = model.predict(cell.arm, measured.states)
     header, parts, told = _told(predicted, model.free_part(cell.arm, measured.states))
     summary = _inside(predicted) + told
@@ -546,7 +547,7 @@ def read_setup(
         PostprocError: The set-up is not known, and not to be found from the rows.
     """
     found = readings.refit is not None
-    rows = from_table(table, cell.arm, cell.probes, positions=found)
+    rows = _rows(table, cell, positions=found)
     if found:
         placed, read = predict_registered(model, cell.arm, rows.states, rows.position)
         at = ", ".join(f"{v / MM:.1f}" for v in placed.tracker)
@@ -559,6 +560,12 @@ def read_setup(
             raise MeasurementError(table.path, problem, cure)
         rows = _placed(rows, model.registration, table.path)
     return rows, model.reading(cell.arm, rows.states), ""
+
+
+def _rows(table: Cells, cell: Cell, positions: bool) -> Measurements:
+    """Read rows as a survey's are read, with what the cell knows of the load."""
+    rows = from_table(table, cell.arm, cell.probes, positions=positions)
+    return carrying_load(rows, cell)
 
 
 def _placed(rows: Measurements, placed: Registration, path: Path) -> Measurements:

@@ -176,6 +176,11 @@ class ArmJointSection(Strict):
         ):
             if min(getattr(self, name) or [1.0]) <= 0:
                 raise ValueError(f"{name} must be positive")
+        if any(0.0 < abs(r) < 1.0 for r in self.gear_ratio or ()):
+            raise ValueError(
+                "gear_ratio is turns of the motor per turn of the joint, 1 or more; "
+                "0 where not known"
+            )
         coupling = np.array(self.drive_coupling or np.eye(6))
         if np.linalg.matrix_rank(coupling) < 6:
             raise ValueError("drive_coupling must be invertible")

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from postproc.calibration.fit import fit
+from postproc.calibration.fit import fit, read_surveys
 from postproc.calibration.measurements import DroppedRow
 from postproc.calibration.report import FitReport, find, report_fit
 from postproc.calibration.selection import fit_survey, model_of
@@ -193,6 +193,51 @@ def test_what_free_forms_predict_is_told(
     ):
         fitted = cli("fit", data, *given, "-o", model, "--effects", ",".join(names))
         assert wanted in fitted.stdout.splitlines()
+
+
+def test_predict_knows_where_the_payload_hangs(tmp_path: Path) -> None:
+    """Rows are read as a survey's are: the cell tells the payload's centre of mass."""
+    data, setup = write(tmp_path / "loaded.csv", 60), tmp_path / "cell.toml"
+    header, *rows = data.read_text().splitlines()
+    loaded = [f"{header},payload_kg", *(f"{row},120" for row in rows)]
+    data.write_text("\n".join(loaded) + "\n")
+    bare = cell(tmp_path)
+    with setup.open("a") as file:
+        file.write("[payload]\nmass_kg = 120.0\ncom_mm = [-300.0, 0.0, -100.0]\n")
+    model, out, given = tmp_path / "m.json", tmp_path / "out.csv", ("--cell", setup)
+    found = cli("fit", data, *given, "-o", model, "--effects", "geometry,compliance")
+    assert found.exit_code == 0, found.stderr
+    assert cli("predict", data, *given, "--model", model, "-o", out).exit_code == 0
+    told = np.genfromtxt(out, delimiter=",", names=True)
+    moved = np.stack([told[f"d{axis}_mm"] for axis in "xyz"], axis=1)
+    kept, setups = ~np.isnan(moved[:, 0]), (load_cell(setup), bare)
+    right, wrong = (
+        load_model(model).predict(one.arm, read_surveys([data], one).states).error
+        for one in setups
+    )
+    np.testing.assert_allclose(moved[kept], right * 1e3, atol=1e-5)
+    assert np.abs(right - wrong).max() > 1e-5
+
+
+def test_rows_without_a_payload_carry_that_of_the_cell(tmp_path: Path) -> None:
+    """Compensation takes it to hang there; a fit without it would count it twice."""
+    bare = write(tmp_path / "bare.csv", 60)
+    header, *rows = bare.read_text().splitlines()
+    told, some = tmp_path / "told.csv", tmp_path / "some.csv"
+    for path, kept in ((told, 60), (some, 40)):
+        ends = [",120" if k < kept else "," for k in range(len(rows))]
+        loaded = [f"{header},payload_kg", *map("".join, zip(rows, ends, strict=True))]
+        path.write_text("\n".join(loaded) + "\n")
+    cell(tmp_path)
+    with (tmp_path / "cell.toml").open("a") as file:
+        file.write("[payload]\nmass_kg = 120.0\ncom_mm = [-300.0, 0.0, -100.0]\n")
+    given = load_cell(tmp_path / "cell.toml")
+    whole, *others = (read_surveys([path], given) for path in (told, bare, some))
+    assert not any("payload" in text for text in whole.warnings)
+    for other, which in zip(others, ("rows", "20 rows"), strict=True):
+        np.testing.assert_array_equal(other.states.payload, whole.states.payload)
+        said = f"no payload_kg: {which} taken as measured with the payload of the cell"
+        assert any(text.startswith(said) for text in other.warnings)
 
 
 def test_what_physics_forbids_is_marked(tmp_path: Path) -> None:

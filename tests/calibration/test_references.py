@@ -169,6 +169,18 @@ def test_readings_that_cover_a_part_of_the_survey_leave_it_in_doubt() -> None:
     assert whole.leaves(1e-3) and not whole.leaves(2 * whole.unsure)
 
 
+def test_readings_at_both_ends_only_leave_it_in_doubt() -> None:
+    """A tracker that went and came back was seen where it started, twice."""
+    c = campaign(321, ("warmup",), 1.0)
+    rows = monuments(c, THREE)
+    ends = np.isin(rows.order, [rows.order.min(), rows.order.max()])
+    motion = tracker_motion(rows[ends], c.states.time, c.states.order)
+    assert motion.covered > 0.9 and motion.unseen > 0.9 and not motion.drifts
+    assert not motion.stands and not motion.leaves(1e-3)
+    assert motion.tell()[0].endswith("did not move while they were read")
+    assert "pass between two readings of fixed points" in motion.tell()[-1]
+
+
 def test_a_moving_tracker_whose_turns_nobody_sees_leaves_it_in_doubt() -> None:
     c = campaign(308, ("tracker_drift",), 1.0)
     for places in (ONE, THREE[:2], THREE):

@@ -57,6 +57,16 @@ def test_a_table_of_points_only_has_no_orientations(tmp_path: Path) -> None:
     assert read_measurements(tmp_path / "t.csv", NJ, TOOL[None]).rotation is None
 
 
+def test_our_columns_without_ids_are_no_table_of_robodk(tmp_path: Path) -> None:
+    """Of 18 columns they are, too; read by position, sides would be measured points."""
+    ours = [f"q{j}_deg" for j in range(1, 7)] + [f"lambda{j}" for j in range(1, 7)]
+    ours += ["x_mm", "y_mm", "z_mm", "time_s", "temperature_c", "payload_kg"]
+    path = tmp_path / "t.csv"
+    path.write_text("\n".join([",".join(ours), *2 * [",".join(["1"] * 18)]]) + "\n")
+    with pytest.raises(MeasurementError, match="column id is missing"):
+        read_measurements(path, NJ, TOOL[None])
+
+
 def plain(path: Path, text: str, encoding: str = "utf-8") -> Path:
     head = "id," + ",".join(f"q{j}_deg" for j in range(1, 7)) + ",x_mm,y_mm,z_mm\n"
     body = "é,1.5,2,3,4,5,6,7.25,8,9\nb,1.5,2,3,4,5,6,7.25,8,9\n"

@@ -12,6 +12,7 @@ from postproc.exceptions import PostprocError
 from postproc.model.effects import BY_NAME, propose
 from postproc.model.effects.drive import DriveTransmission
 from postproc.model.effects.transmission import Orders, Transmission
+from postproc.model.effects.windup import Windup
 from postproc.model.kinematics import Batch
 from tests.calibration.simulator import COUPLED, GEARED, NJ, covariates, random_states
 
@@ -77,6 +78,17 @@ def test_what_noise_does_not_exclude_follows_the_arm_file() -> None:
     assert "no drive_coupling" in plain and "two joints finer than 20%" in plain
     assert "no gear_ratio" not in told and "no drive_coupling" not in told
     assert "more than 262 a turn of joints 1, 2, 3" in told
+
+
+def test_what_noise_does_not_exclude_names_ways_that_rows_do_not_tell() -> None:
+    """An elastic flank is no candidate where nobody knows how far a joint came."""
+    n = len(STATES.q)
+    way = np.linspace(0.0, 1.0, n)[:, None] * np.ones(6)
+    for travel, missing in ((np.full((n, 6), np.nan), True), (way, False)):
+        batch = Batch(NJ, STATES.with_(travel=travel))
+        said = any("since they turned" in what for what in not_excluded(batch))
+        assert said == missing
+        assert bool(Windup.candidates(batch)) != missing
 
 
 def test_a_ratio_of_0_is_not_known() -> None:

@@ -175,6 +175,7 @@ def _write_arm(tmp_path, arm, old, new):
         ("a_mm =", "a_m =", "unknown key|required key"),
         ("repeatability_mm = 0.075", "repeatability_mm = nan", "repeatability_mm"),
         ("[links]", f"drive_coupling = {[[0.0] * 6] * 6}\n[links]", "invertible"),
+        ("[links]", f"gear_ratio = {[121.0, -0.01] * 3}\n[links]", "turns of the"),
     ],
 )
 def test_wrong_arm_file_names_the_place(tmp_path, arm, old, new, said):

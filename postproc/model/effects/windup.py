@@ -67,6 +67,16 @@ class Windup(JointEffect):
                 out += alternatives(members, j)
         return out
 
+    @classmethod
+    def not_tried(cls, batch: Batch) -> tuple[str, ...]:
+        """Say that joints may wind up, where nothing tells how far they came."""
+        if any(varies(batch.states.travel[:, j - 1]) for j in JOINTS):
+            return ()
+        return (
+            "what joints do over the way since they turned, such as flanks that give "
+            "way: the rows do not tell it (travel1_deg ..), nor does their order",
+        )
+
     def refined(self, offsets: Floats, batch: Batch) -> list[Effect]:
         """Change the way."""
         longest = LONGEST_FLANK if self.form == "elastic" else LONGEST
