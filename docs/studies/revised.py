@@ -52,11 +52,7 @@ CHANGES: dict[str, tuple[Planted, ...]] = {
     "wave of joint 5": (Planted("transmission", 5, peak_mm=0.2),),
     "joint 2 yields": (Planted("compliance", 2, peak_mm=0.3),),
 }
-CAMPAIGNS = (
-    ("100, all over", 100),
-    ("250, round a pose", 250),
-    ("40, round a pose", 40),
-)
+CAMPAIGNS = {"100, all over": 100, "250, round a pose": 250, "40, round a pose": 40}
 
 
 @dataclass(frozen=True)

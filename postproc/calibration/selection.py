@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from postproc.arrays import Bools, Floats, Ints
 from postproc.calibration.diagnosis.held_out import Folds, gain_in, regions
-from postproc.calibration.diagnosis.library import Projection
+from postproc.calibration.diagnosis.library import Library, Projection
+from postproc.calibration.diagnosis.score import bootstrap
+from postproc.calibration.diagnosis.search import search
 from postproc.calibration.diagnosis.waves import waves_of
 from postproc.calibration.directions import mend_directions
 from postproc.calibration.elsewhere import widening
@@ -46,6 +48,7 @@ Progress = Callable[[str], None]
 
 ENOUGH = 3.0  # nats that an effect must be worth: 20 to 1
 SURE = 6.0  # nats that what the tracker reads wrongly must be worth: 400 to 1
+SOUGHT_BESIDE_FREE = 600  # rows at the most: of more, with many columns, it takes long
 FEW_ROWS = 450  # fewer leave many orders of waves alike
 STEPS = 12  # of the search for prior scales, which start near their best
 
@@ -103,13 +106,73 @@ def fit_best(
         progress: Told what is being done.
         motion: What readings of fixed points say of the tracker, if there are any.
     """
-    fitted = _fit_kept(arm, states, position, origin, setup, turns, progress, motion)
+
+    def fit(more: tuple[str, ...] = ()) -> Fit:
+        found = _fit_kept(
+            arm, states, position, origin, (*setup, *more), turns, progress, motion
+        )
+        progress("look for steps, tilt, warming-up and waves of gears")
+        return with_sought(found, ruled_out(motion))
+
+    fitted = fit()
     seen = sightings(fitted, origin)
     if not seen:
         return fitted
     progress("fit again beside " + ", ".join(seen))
-    setup = (*setup, *seen)
-    return _fit_kept(arm, states, position, origin, setup, turns, progress, motion)
+    return fit(seen)
+
+
+def with_sought(fitted: Fit, without: Collection[str] = ()) -> Fit:
+    """Look in what a fit leaves for what cannot be fitted before it is found.
+
+    A drift in time stands in for a step, and laws and free forms for a law that is
+    missing: the search goes without such a drift, which is among what is sought, and
+    the others are weighed again beside what is found. Where free forms are needed all
+    the same, the arm does more than has a name, and steps may be pieces of that.
+
+    Args:
+        fitted: The fit.
+        without: Names of effects that are known not to be there.
+    """
+    kept, origin = fitted.combination.effects, fitted.noise.origin
+    free = any(e.free for e in kept)
+    if free and len(fitted.batch) > SOUGHT_BESIDE_FREE:
+        return fitted
+    now = ("always", "rival") if free else ("always", "rival", "alone")
+    states = fitted.batch.states
+    sought = [k for k in EFFECTS if k.sought in now and k.may_be_sought(states)]
+    other = {k.name for k in EFFECTS if k not in sought}
+    steady = tuple(e for e in kept if not (e.sought and e.driven_by == "time"))
+    base, position = fitted, fitted.error + fitted.batch.walk.tcp
+    if steady != kept:
+        base = fit_effects(fitted.batch, position, steady, origin, fitted)
+    library = Library.of(base, other.union(without))
+    if not library.shelves:
+        return fitted
+    null = bootstrap(Projection.of(base), library, seed=0)
+    found = search(base, library, null, lambda *_: None).fit
+    new = tuple(e for e in found.combination.effects if e not in kept)
+    if not new or any(e.sought == "rival" for e in new):
+        return fitted
+    if _worth(found, kept) < SURE:
+        return fitted
+    sure = tuple(e for e in kept if not e.free and e.unasked != "weighed")
+    needed = keep_needed(found, always=(*sure, *new))
+    if any(e.free for e in needed):
+        return fitted
+    return fit_effects(found.batch, position, needed, origin, found)
+
+
+def _worth(found: Fit, kept: tuple[Effect, ...]) -> float:
+    """Weigh the effects of a fit against others on the same rows [nats]."""
+    own = found.combination.effects
+    both = beside(found, (*own, *(e for e in kept if e not in own)))
+    weighing = _Weighing.of(both, ())
+    with_, instead = (
+        weighing.evidence(np.array([e in some for e in weighing.owner]))
+        for some in (own, kept)
+    )
+    return with_ - instead
 
 
 def sightings(

@@ -29,11 +29,14 @@ def cell(tmp_path_factory: pytest.TempPathFactory) -> Cell:
 
 
 def readings(frame: str, drift: float = 0.0, seed: int = 2) -> Measurements:
-    """Measure poses of one arm; the tracker drifts by so much [m] along z."""
+    """Measure poses of one arm; the tracker drifts by so much [m] along x.
+
+    Along z it would look like a first link that grows.
+    """
     rng = np.random.default_rng(seed)
     states = random_states(ROWS, rng)
     position = random_arm(np.random.default_rng(0)).measure(states, rng)[0]
-    position[:, 2] += np.linspace(0.0, drift, ROWS)
+    position[:, 0] += np.linspace(0.0, drift, ROWS)
     if frame == "tracker":
         position = (position - PLACE) @ TURN
         states = states.with_(tool=np.zeros((ROWS, 3)))

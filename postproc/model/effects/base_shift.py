@@ -8,7 +8,7 @@ from typing import ClassVar
 import numpy as np
 
 from postproc.arrays import Floats
-from postproc.model.effects.effect import Candidate, Parameter, alternatives
+from postproc.model.effects.effect import Candidate, Parameter, Sought, alternatives
 from postproc.model.effects.step import CampaignStep, moments
 from postproc.model.kinematics import Batch
 
@@ -39,6 +39,7 @@ class BaseShift(CampaignStep):
     """A step of the base frame: a shift and a turn at one row."""
 
     name: ClassVar[str] = "base_shift"
+    sought: ClassVar[Sought | None] = "rival"
 
     @classmethod
     def candidates(cls, batch: Batch) -> list[Candidate]:

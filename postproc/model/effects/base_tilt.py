@@ -10,7 +10,13 @@ import numpy as np
 from postproc.arrays import Floats
 from postproc.model.covariate import TILTING, varies
 from postproc.model.effects.base_shift import rigid_columns, rigid_rotations
-from postproc.model.effects.effect import Candidate, Effect, Parameter, alternatives
+from postproc.model.effects.effect import (
+    Candidate,
+    Effect,
+    Parameter,
+    Sought,
+    alternatives,
+)
 from postproc.model.kinematics import Batch
 from postproc.robot.arm import GRAVITY, Arm
 from postproc.robot.state import States
@@ -36,6 +42,7 @@ class BaseTilt(Effect):
     """
 
     name: ClassVar[str] = "base_tilt"
+    sought: ClassVar[Sought | None] = "always"
     driven_by: ClassVar[str] = "torque"
 
     skew: bool = False

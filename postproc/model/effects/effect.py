@@ -24,6 +24,7 @@ from postproc.robot.state import States
 
 Origin = Literal["arm", "state", "setup"]
 Unasked = Literal["always", "weighed", "last", "seen"]
+Sought = Literal["always", "alone", "rival"]
 
 FAR = 1e3  # [rad] a joint angle that no arm reaches: no range is known
 
@@ -64,6 +65,10 @@ class Effect(ABC):
             "always" fits it; "weighed" keeps it where the rows speak for it; "last"
             weighs it alone, for what all others leave; "seen" weighs it for that where
             the tracker's place is known. None: it must be asked for.
+        sought: Whether a fit looks for it in what all else leaves, as `diagnose` does,
+            since when it happened or how fast it turns is not known beforehand:
+            "always", or "alone", where no free form holds a part of it; "rival" where
+            it only must not be taken for another: whose step it is nobody knows.
         variation_of: Name of the plainer effect that a search takes first.
         nameless: True where finding it says no more than that something is there.
         free: True for a function that may have any shape: what no law predicts.
@@ -75,6 +80,7 @@ class Effect(ABC):
     direct: ClassVar[bool] = False
     driven_by: ClassVar[str] = "joint"
     unasked: ClassVar[Unasked | None] = None
+    sought: ClassVar[Sought | None] = None
     variation_of: ClassVar[str | None] = None
     nameless: ClassVar[bool] = False
     free: ClassVar[bool] = False
@@ -89,6 +95,11 @@ class Effect(ABC):
     def may_show(cls, states: States) -> bool:
         """Tell whether a survey can show it: what drives it varies enough."""
         return varies_enough(states, cls.driven_by)
+
+    @classmethod
+    def may_be_sought(cls, states: States) -> bool:
+        """Tell whether a fit may look for it, see `sought`."""
+        return cls.sought is not None
 
     @classmethod
     def may_show_alone(cls, states: States) -> bool:

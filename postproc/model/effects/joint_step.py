@@ -13,6 +13,7 @@ from postproc.model.effects.effect import (
     Candidate,
     JointEffect,
     Parameter,
+    Sought,
     alternatives,
 )
 from postproc.model.effects.step import CampaignStep, moments
@@ -33,6 +34,7 @@ class JointStep(CampaignStep, JointEffect):
     """
 
     name: ClassVar[str] = "joint_step"
+    sought: ClassVar[Sought | None] = "always"
 
     joints: tuple[int, ...] = JOINTS
 
@@ -47,6 +49,10 @@ class JointStep(CampaignStep, JointEffect):
                 [(cls(float(r), (j,)), "order") for r in rows], j
             )
         ]
+
+    def refers_to(self) -> str:
+        """Name the state after the step."""
+        return "the zero of the joint as it is after the step"
 
     def parameters(self) -> tuple[Parameter, ...]:
         """Name the change of every joint's zero, from before to after."""

@@ -15,6 +15,7 @@ from postproc.model.effects.effect import (
     Effect,
     Origin,
     Parameter,
+    Sought,
     Unasked,
     alternatives,
 )
@@ -54,6 +55,7 @@ class Thermal(Effect):
     """
 
     name: ClassVar[str] = "thermal"
+    sought: ClassVar[Sought | None] = "always"
     driven_by: ClassVar[str] = "temperature"
     unasked: ClassVar[Unasked | None] = "weighed"
 
@@ -72,6 +74,11 @@ class Thermal(Effect):
         if not np.isnan(states.temperature).all():
             return varies_enough(states, cls.driven_by)
         return varies(states.time) and float(np.ptp(states.time)) > SOON
+
+    @classmethod
+    def may_be_sought(cls, states: States) -> bool:
+        """Tell it of rows without times, too: their order tells what passes."""
+        return cls.may_show(states) or not varies(states.time)
 
     @classmethod
     def may_show_alone(cls, states: States) -> bool:

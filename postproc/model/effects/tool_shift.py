@@ -8,7 +8,7 @@ from typing import ClassVar
 import numpy as np
 
 from postproc.arrays import Floats
-from postproc.model.effects.effect import Candidate, Parameter, alternatives
+from postproc.model.effects.effect import Candidate, Parameter, Sought, alternatives
 from postproc.model.effects.step import CampaignStep, moments
 from postproc.model.kinematics import Batch
 
@@ -25,6 +25,7 @@ class ToolShift(CampaignStep):
     """
 
     name: ClassVar[str] = "tool_shift"
+    sought: ClassVar[Sought | None] = "rival"
 
     turns: bool = False
 

@@ -14,6 +14,7 @@ from postproc.model.effects.effect import (
     Effect,
     Origin,
     Parameter,
+    Sought,
     Unasked,
     alternatives,
 )
@@ -40,6 +41,7 @@ class TrackerDrift(Effect):
     """
 
     name: ClassVar[str] = "tracker_drift"
+    sought: ClassVar[Sought | None] = "always"
     driven_by: ClassVar[str] = "time"
     unasked: ClassVar[Unasked | None] = "weighed"
 

@@ -16,6 +16,7 @@ from postproc.model.effects.effect import (
     Family,
     JointEffect,
     Parameter,
+    Sought,
     Unasked,
 )
 from postproc.model.kinematics import Batch
@@ -41,6 +42,7 @@ class Transmission(JointEffect):
     """
 
     name: ClassVar[str] = "transmission"
+    sought: ClassVar[Sought | None] = "alone"
     unasked: ClassVar[Unasked | None] = "weighed"
 
     waves: tuple[tuple[int, float], ...] = tuple(
