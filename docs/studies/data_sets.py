@@ -58,7 +58,7 @@ class SplitSection(Strict):
     registered: Literal["anew", "as fitted"] = "anew"
     rows: tuple[str, ...] = ()
     draw: Literal["random", "blocks", "last"] | None = None
-    share: float = 0.3
+    share: float = Field(0.3, gt=0.0, lt=1.0)
     seeds: tuple[int, ...] = (0,)
 
 
@@ -79,7 +79,7 @@ class Description(Strict):
     arm: str
     frame: Literal["base", "tracker"]
     folder: str = "."
-    tool_mm: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    tool_mm: tuple[float, float, float] | None = None
     licence: str
     source: str
     get: str | None = None
@@ -164,7 +164,10 @@ def _cell(about: Description, path: Path) -> Cell:
     """Make the cell of a set: its arm, and the probe."""
     beside = (path.parent / about.arm).resolve()
     arm = str(beside) if beside.suffix == ".toml" else about.arm
-    tool = ", ".join(map(repr, about.tool_mm))
+    if about.frame == "base" and about.tool_mm is None:
+        problem = "does not say where the reflector sits on the flange"
+        raise MeasurementError(path, problem, "Write tool_mm = [x, y, z]")
+    tool = ", ".join(map(repr, about.tool_mm or (0.0, 0.0, 0.0)))
     with tempfile.TemporaryDirectory() as name:
         cell = Path(name) / "cell.toml"
         cell.write_text(f'[robot]\narm = "{arm}"\n[tool]\nxyz_mm = [{tool}]\n')
@@ -194,6 +197,9 @@ def _splits(
     found = []
     for k, said in enumerate(about.split):
         place, test = f"$.split[{k + 1}]", said.test or said.fit
+        if said.test == said.fit:
+            cure = "Leave test out, and say how its rows are drawn"
+            raise MeasurementError(path, f"{test!r} tests itself", cure, place=place)
         for name in (said.fit, test):
             if name not in series:
                 cure = f"Series here: {', '.join(series)}"

@@ -238,9 +238,9 @@ are not part of the project; every set below says where they come from.
   the diagnosis, not by the registration. Only where another series is *registered
   anew*, its tracker and its probe (nine numbers) are found from the tested rows, with
   the arm as the model knows it; this flatters all methods alike, small series more.
-- **Nothing is tuned**: every method runs with its defaults. The splits, with a hash of
-  the rows that they draw, stand in descriptions (`docs/studies/real/*.toml`) that were
-  committed before the first fit.
+- **Nothing is tuned**: every method runs with its defaults. The splits stand in the
+  descriptions; those of the project (`docs/studies/real/*.toml`), with a hash of the
+  rows that they draw, were committed before the first fit.
 - **Every tested row counts**, also those that are no measurements.
 
 *{nominal}* is the arm as its maker gives it; *{geometry}* has its
@@ -324,9 +324,15 @@ def page(sets: list[tuple[DataSet, list[Tried]]], given: argparse.Namespace) -> 
         after=DIAGNOSED if traced else "; nothing was diagnosed",
         centres=MOST_CENTRES,
         short="\n".join(short(sets)),
-        account=ACCOUNT.read_text(encoding="utf-8"),
+        account=ACCOUNT.read_text(encoding="utf-8") if shipped(sets) else "",
     )
     return "\n".join([text, *(line for s in sets for line in section(*s)), ""])
+
+
+def shipped(sets: list[tuple[DataSet, list[Tried]]]) -> bool:
+    """Tell whether a page is the project's own: all its sets are there."""
+    read = {tried.trial.path for _, tries in sets for tried in tries}
+    return read.issuperset(SHIPPED.glob("*.toml"))
 
 
 def short(sets: list[tuple[DataSet, list[Tried]]]) -> Iterator[str]:
@@ -420,7 +426,7 @@ def main() -> None:
     parser.add_argument("--described", type=Path, default=SHIPPED)
     parser.add_argument("--jobs", type=int, default=1)
     parser.add_argument("--quick", action="store_true", help="few rows, no diagnosis")
-    parser.add_argument("-o", "--output", type=Path, default=OUT)
+    parser.add_argument("-o", "--output", type=Path, help="default: beside the data")
     parser.add_argument("--no-diagnosis", action="store_true", help="fits only")
     given = parser.parse_args()
     traced = not (given.quick or given.no_diagnosis)
@@ -428,10 +434,10 @@ def main() -> None:
         found = list(descriptions(given.data, given.described))
         trials = {at: trials_of(*at, given.quick, traced) for at in found}
     except PostprocError as exc:
-        raise SystemExit(f"not run: {exc}") from None
+        parser.exit(2, f"not run: {exc}\n")
     work = [t for some in trials.values() for t in some]
     if not work:
-        raise SystemExit(f"not run: no described data in {given.data}")
+        parser.exit(2, f"not run: no described data in {given.data}\n")
     tried = list(tried_by(work, given.jobs))
     sets = []
     for at in found:
@@ -440,8 +446,10 @@ def main() -> None:
             [t for t in tried if (t.trial.path, t.trial.base) == at],
         )
         sets += [(data, mine)] if data is not None else []
-    given.output.write_text(page(sets, given), encoding="utf-8")
-    print(f"{given.output}")
+    beside = OUT if shipped(sets) else given.data / OUT.name
+    output = given.output or beside
+    output.write_text(page(sets, given), encoding="utf-8")
+    print(f"{output}")
 
 
 def tried_by(work: list[Trial], jobs: int) -> Iterator[Tried]:

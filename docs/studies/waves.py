@@ -1,4 +1,4 @@
-"""Tell the waves that the maps of real arms' joints hold: order, size, and how sure.
+"""Tell the waves of gears that a fit names on real arms: order, size, and how sure.
 
 PYTHONPATH=. python docs/studies/waves.py DATA [--only UR10]
 
@@ -14,46 +14,32 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
-from data_sets import DataSet, Split, descriptions
+from data_sets import descriptions
 from real_arms import DEFAULT, fitted, read_once
 
-from postproc.calibration.diagnosis.library import Library, Projection
-from postproc.calibration.diagnosis.refit import refit
-from postproc.calibration.diagnosis.score import bootstrap
-from postproc.calibration.diagnosis.search import Search
-from postproc.calibration.diagnosis.waves import name_waves
-from postproc.model.effects.placement import Placement
+from postproc.calibration.fit import Calibration
+from postproc.model.combination import Combination
+from postproc.model.kinematics import Batch
+from postproc.robot.arm import Arm
 
 
-def found_in(data: DataSet, split: Split) -> Search:
-    """Fit the rows of a split's first draw, and name the waves in what was fitted."""
-    rows = data.series[split.fit][split.draws[0][0]]
-    calibration = fitted(data, rows, DEFAULT)
-    placed = calibration.model.registration
-    tracker = data.cell.tracker if placed is None else placed.tracker
-    setup = () if placed is None else (Placement.name,)
-    survey, arm = calibration.survey, data.cell.arm
-    base = refit(survey, arm, calibration.model, tracker, setup)
-    library = Library.of(base)
-    null = bootstrap(Projection.of(base), library, 0)
-    return name_waves(Search(base, base, library, (), null, None))
-
-
-def told(found: Search) -> Iterator[str]:
+def told(found: Calibration, arm: Arm) -> Iterator[str]:
     """Write a row for every wave, by joint and order."""
-    rows = []
-    for k, addition in enumerate(found.additions):
-        fit, place = found.fit, found.place(k)
-        effect, part = addition.candidate.effect, fit.combination.slices[place]
-        size = effect.amplitude(fit.values[part], fit.covariance[part, part])
-        assert size is not None
-        peak = float(np.linalg.norm(fit.moved(part), axis=1).max())
-        joint, order = addition.candidate.family.joint, effect.nonlinear()["order"][0]
-        rows.append((joint, order, *size, peak, addition.score.evidence))
-    for joint, order, size, error, peak, evidence in sorted(rows):
+    rows, model = [], found.model
+    batch = Batch(arm, found.survey.states)
+    for effect, part in zip(model.effects.effects, model.effects.slices, strict=True):
+        values = model.values[part]
+        size = effect.amplitude(values, model.covariance[part, part])
+        if size is None:
+            continue
+        moved = Combination((effect,)).error(batch, values)
+        peak = float(np.linalg.norm(moved, axis=1).max())
+        (joint,) = {p.joint for p in effect.parameters()}
+        rows.append((joint, effect.nonlinear()["order"][0], *size, peak))
+    for joint, order, size, error, peak in sorted(rows):
         yield (
             f"| {joint} | {order:.4g} | {size * 1e3:.4f} +- {error * 1e3:.4f} "
-            f"| {peak * 1e3:.3f} | {evidence:.0f} |"
+            f"| {peak * 1e3:.3f} |"
         )
 
 
@@ -69,12 +55,13 @@ def main() -> None:
             continue
         for split in (s for s in data.splits if "random" in s.title and s.same):
             began = time.process_time()
-            found = found_in(data, split)
+            rows = data.series[split.fit][split.draws[0][0]]
+            found = fitted(data, rows, DEFAULT)
             seconds = time.process_time() - began
-            where = f"{data.about.name} {split.fit}, {len(found.base.batch)} rows"
+            where = f"{data.about.name} {split.fit}, {len(rows)} rows"
             print(f"\n{where}, {seconds:.0f} s\n")
-            print("| joint | order | mrad | peak mm | nats |\n|---|---|---|---|---|")
-            print("\n".join(told(found)), flush=True)
+            print("| joint | order | mrad | peak mm |\n|---|---|---|---|")
+            print("\n".join(told(found, data.cell.arm)), flush=True)
 
 
 if __name__ == "__main__":

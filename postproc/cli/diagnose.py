@@ -146,6 +146,7 @@ FINDINGS = (
 )
 
 
+ABOVE = 1.2  # of the noise floor: more is told
 REGISTERED = (Placement.name,)  # what is fitted besides where the tracker is found
 
 
@@ -269,6 +270,14 @@ def tell(found: Diagnosis) -> str:
         lines += _unexplained(found)
     if found.verdict == "noise":
         lines += [f"not excluded: {what}" for what in found.not_excluded]
+    if found.verdict != "unexplained" and found.after.mean_mm > (
+        ABOVE * found.noise_floor_mm
+    ):
+        lines.append(
+            f"what is left is {found.after.mean_mm / found.noise_floor_mm:.1f} times "
+            "the noise floor: the arm repeats worse than its data sheet says, or "
+            "something is missing that these rows do not show. Measure some poses twice"
+        )
     lines += [f"row {d.id} (line {d.line}): {d.why}" for d in found.dropped]
     lines += tell_directions(found.directions, LIKELIEST)
     lines.append(f"measure next, to {found.why_next} (q1..q6 deg):")
@@ -317,7 +326,11 @@ def _constants(found: Diagnosis, number: int) -> str:
         for name, (value, error, unit) in f.parameters.items()
         if abs(value) > 2 * error
     ]
-    return f"{f.effect}: " + (", ".join(clear[:8]) or "no parameter stands out")
+    told = f"{f.effect}: " + (", ".join(clear[:8]) or "no parameter stands out")
+    doubts = [f"IMPOSSIBLE: {text}" for text in f.impossible]
+    if f.of_setup and not f.nameless:
+        doubts.append("of the set-up: not compensated")
+    return "; ".join([told, *doubts])
 
 
 def _spread(spread: ErrorStatistics) -> str:

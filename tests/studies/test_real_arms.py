@@ -123,6 +123,19 @@ def test_a_page_comes_from_a_folder_and_a_description(
         assert mean["fit"] < 0.06 < mean["geometry alone"] < mean["registered only"]
     assert "| 120 |" in page and "| 60 |" in page  # both draws, and all of the other
     assert "- nothing: mean 0.5 mm (none)" in page
+    assert "UR10" not in page
+
+
+def test_a_folder_without_a_description_is_told(tmp_path: Path) -> None:
+    study = ROOT / "docs" / "studies" / "real_arms.py"
+    done = subprocess.run(
+        [sys.executable, study, tmp_path],
+        env=os.environ | {"PYTHONPATH": str(ROOT)},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 2 and "no described data" in done.stderr
 
 
 def test_what_is_fitted_is_never_tested(drawn: Path) -> None:
@@ -145,6 +158,9 @@ def test_what_is_fitted_is_never_tested(drawn: Path) -> None:
         ('test = "two"', 'test = "three"', "no series 'three'.*one, two"),
         ('licence = "none"', "", "licence"),
         ('goal_z"', 'goal"', "goal"),
+        ('test = "two"', 'test = "one"', "'one' tests itself"),
+        ("share = 0.25", "share = 1.0", "share"),
+        ('frame = "tracker"', 'frame = "base"', "tool_mm"),
     ],
 )
 def test_what_is_not_as_described_is_refused(

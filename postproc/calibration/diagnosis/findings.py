@@ -6,11 +6,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from postproc.arrays import Floats
+from postproc.arrays import Bools, Floats
 from postproc.calibration.diagnosis.result import Finding
 from postproc.calibration.diagnosis.search import Addition, JudgedAddition, Search
 from postproc.calibration.regression import Fit
-from postproc.calibration.report import SHOWN_UNITS
+from postproc.calibration.report import SHOWN_UNITS, impossible
 from postproc.model.effects.effect import Effect
 from postproc.robot.pose import MM
 
@@ -53,7 +53,15 @@ def _describe(
         confusable_with=confusable,
         settings=effect.settings(),
         held_out_gain=(addition.gain.mean, addition.gain.std_error),
+        impossible=impossible(fit, _own(fit, part)),
     )
+
+
+def _own(fit: Fit, part: slice) -> Bools:
+    """Tell which parameters of a fit are of one part, (p,)."""
+    own = np.zeros(len(fit.values), dtype=bool)
+    own[part] = True
+    return own
 
 
 def _parameters(

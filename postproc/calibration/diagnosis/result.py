@@ -45,6 +45,7 @@ class Finding:
         settings: What is not linear: order, row, time constant and the like.
         held_out_gain: Fall of the squared held-out error per row, in noise variances,
             and its standard error.
+        impossible: Values of it that physics forbids, in words.
     """
 
     effect: str
@@ -60,6 +61,7 @@ class Finding:
     confusable_with: tuple[tuple[str, int | None], ...]
     settings: dict[str, Any]
     held_out_gain: tuple[float, float]
+    impossible: tuple[str, ...] = ()
 
     def to_dict(self) -> dict[str, Any]:
         """Return the finding as plain data."""
@@ -76,6 +78,8 @@ class Finding:
                 for effect, joint in self.confusable_with
             ],
             "kept": True,
+            "of_setup": self.of_setup,
+            "impossible": list(self.impossible),
         }
 
 
