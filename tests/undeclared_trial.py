@@ -116,7 +116,7 @@ def run(kind: str, seed: int, size: float) -> Trial:
     truth = [(law.effect, list(law.joints), law.source) for law in laws]
     hits = [_hit(law, found) for law in truth]
     kept = told_apart(traced.search.fit, None)  # as `diagnose` writes it
-    plain, registered = _true_errors(c, seed, base, kept)
+    plain, registered = true_errors(c, seed, base, kept)
     return Trial(
         kind, seed, size, truth, traced.verdict, found,
         all(h >= 1 for h in hits), all(h >= 2 for h in hits),
@@ -162,7 +162,7 @@ def _hit(law: tuple[str, list[int], int], found: Sequence[dict[str, object]]) ->
 Errors = tuple[float, float, float]
 
 
-def _true_errors(
+def true_errors(
     c: Campaign, seed: int, before: Fit, after: Fit
 ) -> tuple[Errors, Errors]:
     """True mean errors [mm] that three fits leave at fresh poses.
