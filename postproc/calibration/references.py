@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from postproc.arrays import Bools, Floats
+from postproc.arrays import Bools, Floats, Ints
 from postproc.calibration.evidence import Normal, maximise
 from postproc.calibration.tables import TextTable
 from postproc.exceptions import MeasurementError
@@ -176,6 +176,7 @@ COVERED = 0.8  # of the survey that the readings must span
 UNSEEN = 0.3  # of the survey that may pass between two of them
 SURE = 3.0  # standard errors that what counts as the arm's must stand above
 APART = 0.1  # [m] that fixed points lie apart which show a turn
+JUMPS = np.repeat([1e-4, 3e-5], 3)  # [m], [rad] prior scales of a jump
 PASSES = 20
 
 
@@ -185,6 +186,8 @@ class TrackerMotion:
 
     Attributes:
         drift: The form of the drift.
+        jump: When the tracker was knocked, by the drift's clock, between the two
+            readings that show it; None where it was not.
         center: Middle of the fixed points, (3,) [m]; turns are about it.
         values: Parameters of the drift, all 0 where none shows, (p,).
         nats: Log evidence of a drift over that of none.
@@ -197,6 +200,7 @@ class TrackerMotion:
     """
 
     drift: TrackerDrift
+    jump: float | None
     center: Floats
     values: Floats
     nats: float
@@ -225,7 +229,7 @@ class TrackerMotion:
     def moved(self, passed: Floats, position: Floats) -> Floats:
         """Return what the drift adds to readings at positions (n, 3), (n, 3) [m]."""
         motions = rigid_motions(position - self.center)
-        return np.asarray(self.drift.in_time(passed, motions) @ self.values)
+        return np.asarray(_motion(self.drift, self.jump, passed, motions) @ self.values)
 
     def leaves(self, peak: float) -> bool:
         """Tell whether what passes with time by a peak [m] is not the tracker's.
@@ -261,6 +265,11 @@ class TrackerMotion:
             f"{self.readings} readings of {self.points} fixed points: the tracker "
             + found
         ]
+        if self.jump is not None:
+            told.append(
+                f"the tracker jumped at {self.drift.clock} {self.jump:g}, between two "
+                "readings of fixed points: rows near it may be weighed down"
+            )
         if self.rank < 2:
             which = "turns" if self.rank == 0 else "turn about their line"
             cure = "three points that lie apart tell all motions"
@@ -310,22 +319,49 @@ def tracker_motion(rows: ReferenceRows, time: Floats, order: Floats) -> TrackerM
     drift = TrackerDrift(start, span, "time" if timed else "order")
     places = np.stack([_of_one(rows, k).mean(axis=0) for k in np.unique(rows.which)])
     center = places.mean(axis=0)
-    columns = drift.in_time(own, rigid_motions(places[rows.which] - center))
-    X = _about_mean(columns, rows.which)
+    motions = rigid_motions(places[rows.which] - center)
     y = _about_mean(rows.position, rows.which).reshape(-1)
     free = 3.0 * (len(own) - len(places))
-    scales = np.array([p.scale for p in drift.parameters()])
-    values, nats, sigma = _fit(X.reshape(len(y), -1) * scales, y, free)
+
+    def tried(jump: float | None) -> tuple[Floats, float, float]:
+        """Fit one form of motion: values, nats and noise."""
+        columns = _about_mean(_motion(drift, jump, own, motions), rows.which)
+        smooth, sudden = (np.array([p.scale for p in drift.parameters()]), JUMPS)
+        scales = smooth if jump is None else np.concatenate([smooth, sudden])
+        group = np.repeat([0, 1], [len(smooth), len(scales) - len(smooth)])
+        values, nats, sigma = _fit(columns.reshape(len(y), -1) * scales, y, free, group)
+        return values * scales, nats, sigma
+
+    jump, (values, nats, sigma) = None, tried(None)
+    moments = np.unique(own)
+    knocked = {t: tried(t) for t in ((moments[1:] + moments[:-1]) / 2).tolist()}
+    if knocked:
+        likeliest = max(knocked, key=lambda t: knocked[t][1])
+        at_once, more, scatter = knocked[likeliest]
+        more -= float(np.log(len(knocked)))  # any moment was as likely beforehand
+        if more > nats + NATS:
+            jump, values, nats, sigma = likeliest, at_once, more, scatter
     spread = _about_mean((own - start)[:, None] / span, rows.which)
     steady = float(np.sqrt((spread**2).sum()))
     covers = float(np.ptp(own)) / max(float(np.ptp(other)), 1e-9)
     apart = float(np.diff(np.sort(own)).max()) / max(float(np.ptp(other)), 1e-9)
     size = np.linalg.svd(places - center, compute_uv=False)
     return TrackerMotion(
-        drift, center, values * scales if nats >= NATS else 0.0 * values, nats,
+        drift, jump, center, values if nats >= NATS else 0.0 * values, nats,
         sigma / max(steady, 1e-9), covers, apart, len(places),
         int((size > APART).sum()), len(own),
     )  # fmt: skip
+
+
+def _motion(
+    drift: TrackerDrift, jump: float | None, passed: Floats, motions: Floats
+) -> Floats:
+    """Multiply six motions (n, 3, 6) by what a slow drift and a jump do, (n, 3, p)."""
+    slow = drift.in_time(passed, motions)
+    if jump is None:
+        return slow
+    after = np.where((passed > jump)[:, None, None], motions, 0.0)
+    return np.concatenate([slow, after], axis=2)
 
 
 def _of_one(rows: ReferenceRows, number: int) -> Floats:
@@ -341,13 +377,19 @@ def _about_mean(values: Floats, which: NDArray[np.int64]) -> Floats:
     return out
 
 
-def _fit(X: Floats, y: Floats, free: float) -> tuple[Floats, float, float]:
-    """Fit scaled columns (m, p) to readings (m,), noise and prior scale unknown.
+def _fit(X: Floats, y: Floats, free: float, group: Ints) -> tuple[Floats, float, float]:
+    """Fit scaled columns (m, p) to readings (m,), noise and prior scales unknown.
+
+    Args:
+        X: Columns.
+        y: Readings.
+        free: Degrees of freedom of the readings.
+        group: Which columns share a prior scale, (p,).
 
     Returns:
         Values (p,), nats over those of no column, noise [m].
     """
-    group, scale = np.zeros(X.shape[1], dtype=np.int64), np.zeros(1)
+    scale = np.zeros(int(group.max()) + 1)
     sigma = still = _noise(float(y @ y), free)
     for _ in range(PASSES):
         found = maximise(_normal(X, y, free, sigma), group, scale)

@@ -123,6 +123,44 @@ def test_a_drift_of_the_tracker_is_never_compensated(
     assert model.statistics["reference_drift_mm"] > 0.05
 
 
+@pytest.mark.parametrize("seed", [308, 333])
+def test_a_tracker_that_was_knocked_is_no_step_of_the_base(seed: int) -> None:
+    """Three fixed points show the jump: neither arm nor base has moved."""
+    c = campaign(seed, (), 1.0)
+    shift, turn = np.array([2e-4, -1e-4, 1e-4]), np.array([0.0, 5e-5, -5e-5])
+    at = len(c.states) / 2
+
+    def knocked(position: np.ndarray, order: np.ndarray) -> np.ndarray:
+        moved = shift + np.cross(turn, position)
+        return position + np.where(order[:, None] > at, moved, 0.0)
+
+    survey = replace(survey_of(c, None), position=knocked(c.position, c.states.order))
+    points = monuments(c, THREE)
+    points = replace(points, position=knocked(points.position, points.order))
+    with_points = concatenate([replace(survey, references=points)])
+    motion = with_points.motion
+    assert motion is not None and motion.drifts and motion.jump is not None
+    assert any("the tracker jumped at" in text for text in motion.tell())
+    own = points.time if motion.drift.clock == "time" else points.order
+    gap = np.unique(own)
+    near = np.searchsorted(gap, motion.jump)
+    assert gap[near - 1] <= motion.jump <= gap[near]
+    fit = fit_survey(with_points, ARM, None, TRACKER)
+    steady = fit_survey(survey_of(c, None), ARM, None, TRACKER)
+    assert not {e.name for e in fit.combination.effects} & {"base_shift", "joint_step"}
+    there = c.states
+    away = model_of(fit, with_points).error(ARM, there) - model_of(
+        steady, survey_of(c, None)
+    ).error(ARM, there)
+    assert np.linalg.norm(away, axis=1).mean() < 1.5e-5
+
+
+def test_a_tracker_that_drifts_slowly_did_not_jump() -> None:
+    for seed in (308, 333):
+        motion = survey_of(campaign(seed, ("tracker_drift",), 1.0), THREE).motion
+        assert motion is not None and motion.jump is None
+
+
 @pytest.mark.parametrize("seed", [305, 321])
 def test_without_fixed_points_nothing_of_a_warm_up_is_compensated(seed: int) -> None:
     """Predictions are those of the rows' mean, as without the effect."""
