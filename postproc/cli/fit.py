@@ -505,13 +505,28 @@ def predict_table(table: Cells, cell: Cell, model: Model) -> tuple[str, str]:
     measured = _rows(table, cell, positions=False)
     predicted = model.predict(cell.arm, measured.states)
     header, parts, told = _told(predicted, model.free_part(cell.arm, measured.states))
-    summary = _inside(predicted) + told
+    summary = _inside(predicted) + told + _warming(table, model)
     if table.has(*POSITION):
         left = measured.position - nominal_tcp(cell, measured.states) - predicted.error
         parts.append(left)
         header += RESIDUAL
         summary += f"\nresidual {_tell(ErrorStatistics.of(left))}"
     return written(table, measured, header, parts, predicted), summary
+
+
+def _warming(table: Cells, model: Model) -> str:
+    """Say that predictions follow the clock of a file, where the arm warms up by it."""
+    states = [
+        effect.refers_to()
+        for effect in model.compensable()[0].effects
+        if effect.driven_by == "temperature" and effect.refers_to()
+    ]
+    if not states or not table.has("time_s"):
+        return ""
+    return (
+        "\nthe arm warms up with time_s, cold where the survey's clock began: leave "
+        f"the column out for {states[0]}"
+    )
 
 
 def predict_readings(
@@ -526,7 +541,7 @@ def predict_readings(
     predicted = model.predict(cell.arm, rows.states)
     header, parts, told = _told(predicted, model.free_part(cell.arm, rows.states))
     header, parts = [*header, *READINGS], [*parts, read.error, read.std]
-    summary = _inside(predicted) + told + placed
+    summary = _inside(predicted) + told + placed + _warming(table, model)
     if table.has(*POSITION):
         left = rows.position - nominal_tcp(cell, rows.states) - read.error
         parts.append(left)

@@ -72,7 +72,10 @@ class TrackerDrift(Effect):
 
     def refers_to(self) -> str:
         """Name the start, when the tracker was registered."""
-        return "the tracker as it stood at the first row"
+        return (
+            "the tracker as it stood at the first row. If it is the arm that passes, "
+            "rows on fixed points (column reference) tell"
+        )
 
     def parameters(self) -> tuple[Parameter, ...]:
         """Name shift and turn of every term."""
