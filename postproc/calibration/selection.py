@@ -10,7 +10,7 @@ import numpy as np
 from postproc.arrays import Bools, Floats, Ints
 from postproc.calibration.diagnosis.held_out import Folds, gain_in, regions
 from postproc.calibration.diagnosis.library import Library, Projection
-from postproc.calibration.diagnosis.score import bootstrap
+from postproc.calibration.diagnosis.score import bootstrap, leftovers
 from postproc.calibration.diagnosis.search import search
 from postproc.calibration.diagnosis.waves import waves_of
 from postproc.calibration.directions import mend_directions
@@ -48,8 +48,10 @@ Progress = Callable[[str], None]
 
 ENOUGH = 3.0  # nats that an effect must be worth: 20 to 1
 SURE = 6.0  # nats that what the tracker reads wrongly must be worth: 400 to 1
+REMAINS = 0.01  # level at which what is left is no noise: a step may be a piece of it
 SOUGHT_BESIDE_FREE = 600  # rows at the most: of more, with many columns, it takes long
 FEW_ROWS = 450  # fewer leave many orders of waves alike
+HARDLY_ANY = 100  # fewer leave alike what has a form, or happens, and what does not
 STEPS = 12  # of the search for prior scales, which start near their best
 
 
@@ -128,7 +130,8 @@ def with_sought(fitted: Fit, without: Collection[str] = ()) -> Fit:
     A drift in time stands in for a step, and laws and free forms for a law that is
     missing: the search goes without such a drift, which is among what is sought, and
     the others are weighed again beside what is found. Where free forms are needed all
-    the same, the arm does more than has a name, and steps may be pieces of that.
+    the same, or what is left is no noise, the arm does more than has a name, and steps
+    may be pieces of that.
 
     Args:
         fitted: The fit.
@@ -136,7 +139,8 @@ def with_sought(fitted: Fit, without: Collection[str] = ()) -> Fit:
     """
     kept, origin = fitted.combination.effects, fitted.noise.origin
     free = any(e.free for e in kept)
-    if free and len(fitted.batch) > SOUGHT_BESIDE_FREE:
+    rows = len(fitted.batch)
+    if rows < HARDLY_ANY or (free and rows > SOUGHT_BESIDE_FREE):
         return fitted
     now = ("always", "rival") if free else ("always", "rival", "alone")
     states = fitted.batch.states
@@ -160,7 +164,10 @@ def with_sought(fitted: Fit, without: Collection[str] = ()) -> Fit:
     needed = keep_needed(found, always=(*sure, *new))
     if any(e.free for e in needed):
         return fitted
-    return fit_effects(found.batch, position, needed, origin, found)
+    better = fit_effects(found.batch, position, needed, origin, found)
+    left = leftovers(Projection.of(better), seed=0)
+    remains = any(what.p_value < REMAINS for what in left)
+    return fitted if remains else better
 
 
 def _worth(found: Fit, kept: tuple[Effect, ...]) -> float:
@@ -224,7 +231,7 @@ def _fit_kept(
         progress("fit and weigh " + ", ".join(names))
         tried = (*kept, *propose(names, arm, states), *slipped(fitted))
         fitted = fit_effects(batch, position, tried, origin, fitted, until=NEARLY)
-        kept = keep_needed(fitted, always=base)
+        kept = carried_over(fitted, keep_needed(fitted, always=base))
     if any(e.name in free for e in kept):
         progress("weigh once more what was laid aside")
         kept = weighed_again(fitted, kept, named, always=base)
@@ -237,6 +244,25 @@ def _fit_kept(
     if last == fitted.combination.effects:
         return fitted
     return fit_effects(batch, position, last, origin, fitted)
+
+
+def carried_over(fitted: Fit, kept: tuple[Effect, ...]) -> tuple[Effect, ...]:
+    """Drop free forms of hardly any rows that predict no region they were not found in.
+
+    An error that they cannot follow looks like one that they can, at a few rows: other
+    poses are left worse than without them.
+
+    Args:
+        fitted: A fit of what is kept, and of more.
+        kept: The effects.
+    """
+    if len(fitted.batch) >= HARDLY_ANY or not any(e.free for e in kept):
+        return kept
+    tried = beside(fitted, kept)
+    folds = Folds.of_fit(tried, regions(tried.batch.states.q))
+    return tuple(
+        e for k, e in enumerate(kept) if not e.free or gain_in(tried, k, folds).sure
+    )
 
 
 def waves_in(fitted: Fit, kept: tuple[Effect, ...]) -> tuple[Effect, ...]:

@@ -27,7 +27,14 @@ from postproc.model.kinematics import Batch
 from postproc.model.model import COMPENSATED
 from postproc.robot.state import States
 from postproc.simulation import VirtualArm, VirtualArrivals, stream, virtual_arm
-from tests.calibration.planted import BASE, TRACKER, campaign, states_of, survey
+from tests.calibration.planted import (
+    ARM,
+    BASE,
+    TRACKER,
+    campaign,
+    states_of,
+    survey,
+)
 from tests.calibration.simulator import NJ, covariates, random_arm, random_states
 
 
@@ -282,6 +289,28 @@ def test_beside_free_forms_nothing_is_sought_in_many_rows() -> None:
     free = fit_effects(batch, c.position, effects, tuple(TRACKER))
     many = replace(free, batch=Many(batch))
     assert with_sought(many) is many
+
+
+@pytest.mark.parametrize("law", ["joint_product", "worn_spot"])
+def test_free_forms_of_hardly_any_rows_must_carry_over(law: str) -> None:
+    """A product of angles is none that they follow; a worn spot is one."""
+    left = []
+    for seed in range(4):
+        arm = virtual_arm(seed, (*BASE, f"{law}=0.5"))
+        old, fresh = survey(arm, seed, 80), survey(arm, seed + 500, 200)
+        read = arm.measure(old, TRACKER, stream(seed, "m"))
+        states, truth = states_of(fresh), arm.error(fresh)
+        for fit in (
+            fit_best(ARM, states_of(old), read, tuple(TRACKER)),
+            fit_effects(
+                Batch(ARM, states_of(old)), read,
+                propose(BASE_EFFECTS, ARM, states_of(old)), tuple(TRACKER),
+            ),
+        ):  # fmt: skip
+            off = truth - fit.combination.error(Batch(ARM, states), fit.values)
+            left.append(np.linalg.norm(off, axis=1).mean())
+    fitted, plain = np.mean(np.reshape(left, (-1, 2)), axis=0)
+    assert fitted < (1.1 if law == "joint_product" else 0.6) * plain
 
 
 class Many(Batch):
