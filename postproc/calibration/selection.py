@@ -2,25 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from postproc.arrays import Bools, Floats, Ints
+from postproc.arrays import Floats
 from postproc.calibration.diagnosis.held_out import Folds, gain_in, regions
-from postproc.calibration.diagnosis.library import Library, Projection
-from postproc.calibration.diagnosis.score import bootstrap, leftovers
-from postproc.calibration.diagnosis.search import search
+from postproc.calibration.diagnosis.library import Projection
 from postproc.calibration.diagnosis.waves import waves_of
 from postproc.calibration.directions import mend_directions
 from postproc.calibration.elsewhere import widening
-from postproc.calibration.evidence import Normal, highest
 from postproc.calibration.measurements import Measurements
 from postproc.calibration.orientations import Turns
 from postproc.calibration.references import TrackerMotion, ruled_out
 from postproc.calibration.regression import NEARLY, Fit, beside, fit_effects
+from postproc.calibration.sought import with_sought
 from postproc.calibration.tool_groups import find_groups
+from postproc.calibration.weighing import ENOUGH, SURE, keep_needed
 from postproc.model.covariate import DRIVERS, JOINTS
 from postproc.model.effects import BASE_EFFECTS, EFFECTS, propose
 from postproc.model.effects.effect import Effect
@@ -46,13 +44,8 @@ from postproc.robot.state import States
 
 Progress = Callable[[str], None]
 
-ENOUGH = 3.0  # nats that an effect must be worth: 20 to 1
-SURE = 6.0  # nats that what the tracker reads wrongly must be worth: 400 to 1
-REMAINS = 0.01  # level at which what is left is no noise: a step may be a piece of it
-SOUGHT_BESIDE_FREE = 600  # rows at the most: of more, with many columns, it takes long
 FEW_ROWS = 450  # fewer leave many orders of waves alike
-HARDLY_ANY = 100  # fewer leave alike what has a form, or happens, and what does not
-STEPS = 12  # of the search for prior scales, which start near their best
+HARDLY_ANY = 100  # fewer leave alike what free forms follow, and what they do not
 
 
 def silent(stage: str) -> None:
@@ -122,64 +115,6 @@ def fit_best(
         return fitted
     progress("fit again beside " + ", ".join(seen))
     return fit(seen)
-
-
-def with_sought(fitted: Fit, without: Collection[str] = ()) -> Fit:
-    """Look in what a fit leaves for what cannot be fitted before it is found.
-
-    A drift in time stands in for a step, and laws and free forms for a law that is
-    missing: the search goes without such a drift, which is among what is sought, and
-    the others are weighed again beside what is found. Where free forms are needed all
-    the same, or what is left is no noise, the arm does more than has a name, and steps
-    may be pieces of that.
-
-    Args:
-        fitted: The fit.
-        without: Names of effects that are known not to be there.
-    """
-    kept, origin = fitted.combination.effects, fitted.noise.origin
-    free = any(e.free for e in kept)
-    rows = len(fitted.batch)
-    if rows < HARDLY_ANY or (free and rows > SOUGHT_BESIDE_FREE):
-        return fitted
-    now = ("always", "rival") if free else ("always", "rival", "alone")
-    states = fitted.batch.states
-    sought = [k for k in EFFECTS if k.sought in now and k.may_be_sought(states)]
-    other = {k.name for k in EFFECTS if k not in sought}
-    steady = tuple(e for e in kept if not (e.sought and e.driven_by == "time"))
-    base, position = fitted, fitted.error + fitted.batch.walk.tcp
-    if steady != kept:
-        base = fit_effects(fitted.batch, position, steady, origin, fitted)
-    library = Library.of(base, other.union(without))
-    if not library.shelves:
-        return fitted
-    null = bootstrap(Projection.of(base), library, seed=0)
-    found = search(base, library, null, lambda *_: None).fit
-    new = tuple(e for e in found.combination.effects if e not in kept)
-    if not new or any(e.sought == "rival" for e in new):
-        return fitted
-    if _worth(found, kept) < SURE:
-        return fitted
-    sure = tuple(e for e in kept if not e.free and e.unasked != "weighed")
-    needed = keep_needed(found, always=(*sure, *new))
-    if any(e.free for e in needed):
-        return fitted
-    better = fit_effects(found.batch, position, needed, origin, found)
-    left = leftovers(Projection.of(better), seed=0)
-    remains = any(what.p_value < REMAINS for what in left)
-    return fitted if remains else better
-
-
-def _worth(found: Fit, kept: tuple[Effect, ...]) -> float:
-    """Weigh the effects of a fit against others on the same rows [nats]."""
-    own = found.combination.effects
-    both = beside(found, (*own, *(e for e in kept if e not in own)))
-    weighing = _Weighing.of(both, ())
-    with_, instead = (
-        weighing.evidence(np.array([e in some for e in weighing.owner]))
-        for some in (own, kept)
-    )
-    return with_ - instead
 
 
 def sightings(
@@ -328,93 +263,6 @@ def slipped(fitted: Fit) -> tuple[Effect, ...]:
     if found is None or found.step is None:
         return ()
     return (ToolShift(row=float(fitted.batch.states.order[found.step])),)
-
-
-def keep_needed(
-    fitted: Fit,
-    always: tuple[Effect, ...],
-    aside: tuple[Effect, ...] = (),
-    enough: float = ENOUGH,
-) -> tuple[Effect, ...]:
-    """Drop effects one after the other until each that is left is needed.
-
-    Args:
-        fitted: A fit of all effects in question.
-        always: Effects that are not in question.
-        aside: Others that are not, and whose prior scales are not chosen anew.
-        enough: Evidence that each must be worth [nats].
-    """
-    weighing = _Weighing.of(fitted, aside)
-    kept = [e for e in fitted.combination.effects if e not in aside]
-    asked = [e for e in kept if e not in always]
-    present = np.ones(len(weighing.owner), dtype=bool)
-    now = weighing.evidence(present)
-    while found := weighing.least_needed(asked, present, now, enough):
-        effect, present, now = found
-        kept.remove(effect)
-        asked.remove(effect)
-    return tuple(e for e in fitted.combination.effects if e in kept or e in aside)
-
-
-@dataclass(frozen=True, eq=False)
-class _Weighing:
-    """A regression of which columns may go.
-
-    Attributes:
-        normal: Its sums, linearised at a fit.
-        group: Prior group of every column, (p,).
-        log_scale: Log factors on the prior scales of all groups, to begin with.
-        owner: Effect of every column, (p,).
-    """
-
-    normal: Normal
-    group: Ints
-    log_scale: Floats
-    owner: tuple[Effect, ...]
-
-    @classmethod
-    def of(cls, fitted: Fit, aside: tuple[Effect, ...]) -> _Weighing:
-        """Take a fit; the columns of effects `aside` keep their prior scales."""
-        c, normal, group = fitted.combination, fitted.normal(), fitted.group
-        owner = tuple(e for e in c.effects for _ in e.parameters())
-        out = np.array([e in aside for e in owner], dtype=bool)
-        if not out.any():
-            return cls(normal, group, fitted.log_scale, owner)
-        s = np.exp(fitted.log_scale)[group[out]]
-        rest = normal.left_to_prior(out, s)
-        owner = tuple(e for e in owner if e not in aside)
-        return cls(rest, group[~out], fitted.log_scale, owner)
-
-    def least_needed(
-        self, asked: list[Effect], present: Bools, now: float, enough: float
-    ) -> tuple[Effect, Bools, float] | None:
-        """Find the effect that is missed least, what is left, and the evidence then.
-
-        Returns:
-            None where each is worth enough.
-        """
-        best, least = None, now - enough
-        for effect in asked:
-            without = present & np.array([e is not effect for e in self.owner])
-            found = self.evidence(without, least)
-            if found > least:
-                best, least = (effect, without, found), found
-        return best
-
-    def evidence(self, present: Bools, least: float = -np.inf) -> float:
-        """Log evidence of some of the columns, prior scales chosen anew.
-
-        It is found only roughly where it is far below `least`.
-        """
-        part = Normal(
-            self.normal.gram[np.ix_(present, present)],
-            self.normal.moment[present],
-            self.normal.square,
-            self.normal.log_noise,
-            self.normal.rows,
-        )
-        used, group = np.unique(self.group[present], return_inverse=True)
-        return highest(part, group, self.log_scale[used], STEPS, least)
 
 
 # The product's own method: a survey becomes a fit of named effects, and a model.

@@ -13,13 +13,11 @@ from postproc.calibration.fit import drifts
 from postproc.calibration.regression import fit_effects
 from postproc.calibration.report import find
 from postproc.calibration.selection import (
-    SOUGHT_BESIDE_FREE,
     candidates,
     fit_best,
-    keep_needed,
     waves_needed,
-    with_sought,
 )
+from postproc.calibration.weighing import keep_needed
 from postproc.model.effects import BASE_EFFECTS, propose
 from postproc.model.effects.joint_spline import SHORTEST, JointSpline
 from postproc.model.effects.transmission import Transmission
@@ -31,7 +29,6 @@ from tests.calibration.planted import (
     ARM,
     BASE,
     TRACKER,
-    campaign,
     states_of,
     survey,
 )
@@ -253,44 +250,6 @@ def test_a_wave_of_few_rows_predicts_regions_that_it_was_not_found_in() -> None:
     assert waves_needed(fitted, kept) == (*fitted.combination.effects[:-2], true)
 
 
-SOUGHT = {
-    "joint_step": "joint_step",
-    "base_tilt": "base_tilt",
-    "motor_wave": "transmission",
-    "base_shift": "tracker_drift",  # whose step it is nobody knows
-}
-
-
-@pytest.mark.parametrize("kind", SOUGHT)
-def test_what_must_be_found_first_is_named_without_being_asked_for(kind: str) -> None:
-    """No drift and no chain of other laws stands in for it."""
-    c = campaign(331, (kind,), 1.5)
-    fit = fit_best(c.declared, c.states, c.position, tuple(TRACKER))
-    names = [e.name for e in fit.combination.effects if e.name not in BASE_EFFECTS]
-    assert set(names) == {SOUGHT[kind]}
-
-
-def test_a_warm_up_is_named_by_the_order_of_rows_alone() -> None:
-    c = campaign(334, ("warmup",), 2.0)
-    untold = np.full(len(c.states), np.nan)
-    states = c.states.with_(time=untold, temperature=untold)
-    fit = fit_best(c.declared, states, c.position, tuple(TRACKER))
-    names = {e.name for e in fit.combination.effects} - set(BASE_EFFECTS)
-    assert names == {"thermal"}
-
-
-def test_beside_free_forms_nothing_is_sought_in_many_rows() -> None:
-    c = campaign(331, ("joint_step",), 1.5)
-    fit = c.base_fit()
-    assert with_sought(fit) is not fit
-    spline = JointSpline.propose(c.declared, c.states)
-    effects = (*fit.combination.effects, spline)
-    batch = Batch(c.declared, c.states)
-    free = fit_effects(batch, c.position, effects, tuple(TRACKER))
-    many = replace(free, batch=Many(batch))
-    assert with_sought(many) is many
-
-
 @pytest.mark.parametrize("law", ["joint_product", "worn_spot"])
 def test_free_forms_of_hardly_any_rows_must_carry_over(law: str) -> None:
     """A product of angles is none that they follow; a worn spot is one."""
@@ -311,13 +270,3 @@ def test_free_forms_of_hardly_any_rows_must_carry_over(law: str) -> None:
             left.append(np.linalg.norm(off, axis=1).mean())
     fitted, plain = np.mean(np.reshape(left, (-1, 2)), axis=0)
     assert fitted < (1.1 if law == "joint_product" else 0.6) * plain
-
-
-class Many(Batch):
-    """A batch that says it is longer than it is."""
-
-    def __init__(self, batch: Batch) -> None:
-        vars(self).update(vars(batch))
-
-    def __len__(self) -> int:
-        return SOUGHT_BESIDE_FREE + 1

@@ -11,7 +11,7 @@ from postproc.arrays import Floats
 from postproc.calibration.evidence import posterior
 from postproc.calibration.measurements import Measurements
 from postproc.calibration.regression import Fit, fit_effects
-from postproc.calibration.selection import ENOUGH
+from postproc.calibration.weighing import ENOUGH
 from postproc.exceptions import PostprocError
 from postproc.model.combination import Combination
 from postproc.model.effects import propose

@@ -1,0 +1,69 @@
+"""What a fit must find before it can fit it: steps, tilt, warming-up, fast waves."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+
+from postproc.calibration.diagnosis.library import Library, Projection
+from postproc.calibration.diagnosis.score import bootstrap, leftovers
+from postproc.calibration.diagnosis.search import search
+from postproc.calibration.regression import Fit, fit_effects
+from postproc.calibration.weighing import SURE, keep_needed, worth
+from postproc.model.effects import EFFECTS
+
+REMAINS = 0.01  # level at which what is left is no noise: a step may be a piece of it
+SOUGHT_BESIDE_FREE = 600  # rows at the most: of more, with many columns, it takes long
+LEAST_ROWS = 100  # fewer leave alike what happens and what has no form
+
+
+def with_sought(fitted: Fit, without: Collection[str] = ()) -> Fit:
+    """Look in what a fit leaves for what cannot be fitted before it is found.
+
+    A drift in time stands in for a step, and laws and free forms for a law that is
+    missing: the search goes without such a drift, which is among what is sought, and
+    the others are weighed again beside what is found. Where free forms are needed all
+    the same, or what is left is no noise, the arm does more than has a name, and steps
+    may be pieces of that.
+
+    Args:
+        fitted: The fit.
+        without: Names of effects that are known not to be there.
+    """
+    kept = fitted.combination.effects
+    free = any(e.free for e in kept)
+    rows = len(fitted.batch)
+    if rows < LEAST_ROWS or (free and rows > SOUGHT_BESIDE_FREE):
+        return fitted
+    found = _searched(
+        fitted, ("always", "rival", *(() if free else ("alone",))), without
+    )
+    new = tuple(e for e in found.combination.effects if e not in kept)
+    if not new or any(e.sought == "rival" for e in new):
+        return fitted
+    if worth(found, kept) < SURE:
+        return fitted
+    sure = tuple(e for e in kept if not e.free and e.unasked != "weighed")
+    needed = keep_needed(found, always=(*sure, *new))
+    if any(e.free for e in needed):
+        return fitted
+    position = fitted.error + fitted.batch.walk.tcp
+    better = fit_effects(found.batch, position, needed, fitted.noise.origin, found)
+    left = leftovers(Projection.of(better), seed=0)
+    remains = any(what.p_value < REMAINS for what in left)
+    return fitted if remains else better
+
+
+def _searched(fitted: Fit, now: tuple[str, ...], without: Collection[str]) -> Fit:
+    """Search in what a fit leaves, but for a drift in time, for what is sought now."""
+    kept, states = fitted.combination.effects, fitted.batch.states
+    named = {k.name for k in EFFECTS if k.sought in now and k.may_be_sought(states)}
+    steady = tuple(e for e in kept if not (e.sought and e.driven_by == "time"))
+    base, position = fitted, fitted.error + fitted.batch.walk.tcp
+    if steady != kept:
+        base = fit_effects(fitted.batch, position, steady, fitted.noise.origin, fitted)
+    other = {k.name for k in EFFECTS if k.name not in named}
+    library = Library.of(base, other.union(without))
+    if not library.shelves:
+        return fitted
+    null = bootstrap(Projection.of(base), library, seed=0)
+    return search(base, library, null, lambda *_: None).fit
