@@ -229,7 +229,8 @@ class TrackerMotion:
     def moved(self, passed: Floats, position: Floats) -> Floats:
         """Return what the drift adds to readings at positions (n, 3), (n, 3) [m]."""
         motions = rigid_motions(position - self.center)
-        return np.asarray(_motion(self.drift, self.jump, passed, motions) @ self.values)
+        slow = self.drift.in_time(passed, motions)
+        return np.asarray(_with_jump(slow, self.jump, passed, motions) @ self.values)
 
     def leaves(self, peak: float) -> bool:
         """Tell whether what passes with time by a peak [m] is not the tracker's.
@@ -317,15 +318,19 @@ def tracker_motion(rows: ReferenceRows, time: Floats, order: Floats) -> TrackerM
     start = float(min(own.min(), other.min()))
     span = max(float(max(own.max(), other.max())) - start, 1e-9)
     drift = TrackerDrift(start, span, "time" if timed else "order")
-    places = np.stack([_of_one(rows, k).mean(axis=0) for k in np.unique(rows.which)])
+    which = rows.which
+    places = np.stack(
+        [rows.position[which == k].mean(axis=0) for k in np.unique(which)]
+    )
     center = places.mean(axis=0)
-    motions = rigid_motions(places[rows.which] - center)
-    y = _about_mean(rows.position, rows.which).reshape(-1)
+    motions = rigid_motions(places[which] - center)
+    y = _about_mean(rows.position, which).reshape(-1)
     free = 3.0 * (len(own) - len(places))
+    slow = drift.in_time(own, motions)
 
     def tried(jump: float | None) -> tuple[Floats, float, float]:
         """Fit one form of motion: values, nats and noise."""
-        columns = _about_mean(_motion(drift, jump, own, motions), rows.which)
+        columns = _about_mean(_with_jump(slow, jump, own, motions), which)
         smooth, sudden = (np.array([p.scale for p in drift.parameters()]), JUMPS)
         scales = smooth if jump is None else np.concatenate([smooth, sudden])
         group = np.repeat([0, 1], [len(smooth), len(scales) - len(smooth)])
@@ -341,7 +346,7 @@ def tracker_motion(rows: ReferenceRows, time: Floats, order: Floats) -> TrackerM
         more -= float(np.log(len(knocked)))  # any moment was as likely beforehand
         if more > nats + NATS:
             jump, values, nats, sigma = likeliest, at_once, more, scatter
-    spread = _about_mean((own - start)[:, None] / span, rows.which)
+    spread = _about_mean((own - start)[:, None] / span, which)
     steady = float(np.sqrt((spread**2).sum()))
     covers = float(np.ptp(own)) / max(float(np.ptp(other)), 1e-9)
     apart = float(np.diff(np.sort(own)).max()) / max(float(np.ptp(other)), 1e-9)
@@ -353,20 +358,14 @@ def tracker_motion(rows: ReferenceRows, time: Floats, order: Floats) -> TrackerM
     )  # fmt: skip
 
 
-def _motion(
-    drift: TrackerDrift, jump: float | None, passed: Floats, motions: Floats
+def _with_jump(
+    slow: Floats, jump: float | None, passed: Floats, motions: Floats
 ) -> Floats:
-    """Multiply six motions (n, 3, 6) by what a slow drift and a jump do, (n, 3, p)."""
-    slow = drift.in_time(passed, motions)
+    """Put six motions (n, 3, 6) after a jump beside a slow drift's (n, 3, p)."""
     if jump is None:
         return slow
     after = np.where((passed > jump)[:, None, None], motions, 0.0)
     return np.concatenate([slow, after], axis=2)
-
-
-def _of_one(rows: ReferenceRows, number: int) -> Floats:
-    """Take the readings of one fixed point, (m, 3) [m]."""
-    return np.asarray(rows.position[rows.which == number])
 
 
 def _about_mean(values: Floats, which: NDArray[np.int64]) -> Floats:
@@ -389,26 +388,26 @@ def _fit(X: Floats, y: Floats, free: float, group: Ints) -> tuple[Floats, float,
     Returns:
         Values (p,), nats over those of no column, noise [m].
     """
+    gram, moment, square = X.T @ X, X.T @ y, float(y @ y)
+
+    def normal(sigma: float) -> Normal:
+        v = sigma**2
+        noise = free * float(np.log(v))
+        return Normal(gram / v, moment / v, square / v, noise, free)
+
     scale = np.zeros(int(group.max()) + 1)
-    sigma = still = _noise(float(y @ y), free)
+    sigma = still = _noise(square, free)
     for _ in range(PASSES):
-        found = maximise(_normal(X, y, free, sigma), group, scale)
+        found = maximise(normal(sigma), group, scale)
         left = y - X @ found.mean
         before, scale = sigma, found.log_scale
         sigma = _noise(float(left @ left), free - found.effective)
         if abs(np.log(sigma / before)) < 1e-3:
             break
-    found = maximise(_normal(X, y, free, sigma), group, scale)
-    alone = _normal(X, y, free, still)
+    found = maximise(normal(sigma), group, scale)
+    alone = normal(still)
     none = alone.log_noise + alone.square + free * np.log(2 * np.pi)
     return found.mean, found.log_evidence + 0.5 * none, sigma
-
-
-def _normal(X: Floats, y: Floats, free: float, sigma: float) -> Normal:
-    """Write the regression as its normal sums."""
-    v = sigma**2
-    noise = free * float(np.log(v))
-    return Normal(X.T @ X / v, X.T @ y / v, float(y @ y) / v, noise, free)
 
 
 def _noise(square: float, free: float) -> float:
