@@ -16,8 +16,7 @@ from __future__ import annotations
 import argparse
 from collections import Counter
 from collections.abc import Iterator
-from dataclasses import dataclass
-from pathlib import Path
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -39,6 +38,7 @@ from postproc.simulation import (
 )
 from postproc.simulation.reference import WORKING_RANGE
 from tests.calibration.planted import ARM, BASE, TRACKER, states_of
+from tests.calibration.simulator import survey_of
 
 SURVEYED, JUDGED = 300, 150  # poses
 NEAR = np.deg2rad(20.0)
@@ -91,24 +91,15 @@ class Change:
         return self.seen(nominal + self.arm.error(there), states_of(there)) - nominal
 
 
-def rows_of(states: States, position: np.ndarray, name: str) -> Measurements:
-    """Make rows of one campaign."""
-    n = len(states)
-    ids, unknown = tuple(map(str, range(n))), np.zeros(n, dtype=bool)
-    return Measurements(
-        Path(name), states, position, ids, np.arange(n) + 2, unknown, name
-    )
-
-
 def measured(
     arm: VirtualArm, there: VirtualArrivals, name: str, change: Change | None = None
 ) -> Measurements:
     """Measure an arm."""
     states = states_of(there)
     position = arm.measure(there, TRACKER, stream(arm.seed, name))
-    return rows_of(
-        states, position if change is None else change.seen(position, states), name
-    )
+    if change is not None:
+        position = change.seen(position, states)
+    return replace(survey_of(states, position), sha256=name)
 
 
 def around(seed: int) -> np.ndarray:

@@ -62,6 +62,11 @@ class Fit:
     turns: Turns | None = None
 
     @property
+    def position(self) -> Floats:
+        """Measured TCP positions in the base frame, (n, 3) [m]."""
+        return self.error + self.batch.walk.tcp
+
+    @property
     def std(self) -> Floats:
         """Standard errors of the parameters, (p,)."""
         return np.sqrt(np.diag(self.covariance))
@@ -150,8 +155,7 @@ class Fit:
         standard deviation (leave one out). At least 1: the noise is what it is.
         """
         noise = self.noise.arrival_variance(self.design.jacobian)
-        position = self.batch.walk.tcp + self.error
-        noise = noise + np.square(self.noise.tracker_std(position))[:, None]
+        noise = noise + np.square(self.noise.tracker_std(self.position))[:, None]
         noise = noise + self.whitener.extra
         told = (1.0 - 2.0 * self.rows.weight[:, None]) * self.design.variance(
             self.stated
@@ -229,7 +233,7 @@ def beside(fitted: Fit, effects: tuple[Effect, ...]) -> Fit:
 
     Noise and rows are those of the fit. What it has and `effects` lack is left out.
     """
-    position, origin = fitted.error + fitted.batch.walk.tcp, fitted.noise.origin
+    position, origin = fitted.position, fitted.noise.origin
     state = _begin(fitted.batch, position, Combination(effects), origin, fitted)
     return _linearised(replace(state, whitener=fitted.whitener))
 

@@ -9,6 +9,7 @@ import numpy as np
 from postproc.arrays import Floats
 from postproc.calibration.diagnosis.held_out import Folds, gain_in, regions
 from postproc.calibration.diagnosis.library import Projection
+from postproc.calibration.diagnosis.search import with_effects
 from postproc.calibration.diagnosis.waves import waves_of
 from postproc.calibration.directions import mend_directions
 from postproc.calibration.elsewhere import widening
@@ -191,13 +192,18 @@ def carried_over(fitted: Fit, kept: tuple[Effect, ...]) -> tuple[Effect, ...]:
         fitted: A fit of what is kept, and of more.
         kept: The effects.
     """
-    if len(fitted.batch) >= HARDLY_ANY or not any(e.free for e in kept):
+    free = [e for e in kept if e.free]
+    if len(fitted.batch) >= HARDLY_ANY or not free:
         return kept
-    tried = beside(fitted, kept)
-    folds = Folds.of_fit(tried, regions(tried.batch.states.q))
-    return tuple(
-        e for k, e in enumerate(kept) if not e.free or gain_in(tried, k, folds).sure
-    )
+    held = predicting(beside(fitted, kept), free)
+    return tuple(e for e in kept if not e.free or e in held)
+
+
+def predicting(fitted: Fit, asked: Sequence[Effect]) -> tuple[Effect, ...]:
+    """Return the effects of a fit, of some, that predict regions left out for sure."""
+    folds = Folds.of_fit(fitted, regions(fitted.batch.states.q))
+    own = enumerate(fitted.combination.effects)
+    return tuple(e for k, e in own if e in asked and gain_in(fitted, k, folds).sure)
 
 
 def waves_in(fitted: Fit, kept: tuple[Effect, ...]) -> tuple[Effect, ...]:
@@ -225,11 +231,8 @@ def waves_needed(fitted: Fit, kept: tuple[Effect, ...]) -> tuple[Effect, ...]:
         kept: All else, which is not in question.
     """
     if len(fitted.batch) < FEW_ROWS:
-        folds = Folds.of_fit(fitted, regions(fitted.batch.states.q))
-        held = tuple(
-            e for k, e in enumerate(fitted.combination.effects)
-            if e not in kept and gain_in(fitted, k, folds).sure
-        )  # fmt: skip
+        waves = [e for e in fitted.combination.effects if e not in kept]
+        held = predicting(fitted, waves)
         if not held:
             return kept
         fitted = beside(fitted, (*kept, *held))
@@ -338,9 +341,7 @@ def _as_told(fitted: Fit, told: bool) -> Fit:
     effects = tuple(effect.told_apart(told, fitted.batch) for effect in old)
     if all(a is b for a, b in zip(effects, old, strict=True)):
         return fitted
-    position = fitted.error + fitted.batch.walk.tcp
-    origin = fitted.noise.origin
-    return fit_effects(fitted.batch, position, effects, origin, start=fitted)
+    return with_effects(fitted, effects)
 
 
 def _peak_of_others(fitted: Fit, before: Fit) -> float:

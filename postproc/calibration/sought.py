@@ -6,8 +6,8 @@ from collections.abc import Collection
 
 from postproc.calibration.diagnosis.library import Library, Projection
 from postproc.calibration.diagnosis.score import bootstrap, leftovers
-from postproc.calibration.diagnosis.search import search
-from postproc.calibration.regression import Fit, fit_effects
+from postproc.calibration.diagnosis.search import search, with_effects
+from postproc.calibration.regression import Fit
 from postproc.calibration.weighing import SURE, keep_needed, worth
 from postproc.model.effects import EFFECTS
 
@@ -34,9 +34,8 @@ def with_sought(fitted: Fit, without: Collection[str] = ()) -> Fit:
     rows = len(fitted.batch)
     if rows < LEAST_ROWS or (free and rows > SOUGHT_BESIDE_FREE):
         return fitted
-    found = _searched(
-        fitted, ("always", "rival", *(() if free else ("alone",))), without
-    )
+    now = ("always", "rival") if free else ("always", "rival", "alone")
+    found = _searched(fitted, now, without)
     new = tuple(e for e in found.combination.effects if e not in kept)
     if not new or any(e.sought == "rival" for e in new):
         return fitted
@@ -46,8 +45,7 @@ def with_sought(fitted: Fit, without: Collection[str] = ()) -> Fit:
     needed = keep_needed(found, always=(*sure, *new))
     if any(e.free for e in needed):
         return fitted
-    position = fitted.error + fitted.batch.walk.tcp
-    better = fit_effects(found.batch, position, needed, fitted.noise.origin, found)
+    better = with_effects(found, needed)
     left = leftovers(Projection.of(better), seed=0)
     remains = any(what.p_value < REMAINS for what in left)
     return fitted if remains else better
@@ -56,12 +54,10 @@ def with_sought(fitted: Fit, without: Collection[str] = ()) -> Fit:
 def _searched(fitted: Fit, now: tuple[str, ...], without: Collection[str]) -> Fit:
     """Search in what a fit leaves, but for a drift in time, for what is sought now."""
     kept, states = fitted.combination.effects, fitted.batch.states
-    named = {k.name for k in EFFECTS if k.sought in now and k.may_be_sought(states)}
     steady = tuple(e for e in kept if not (e.sought and e.driven_by == "time"))
-    base, position = fitted, fitted.error + fitted.batch.walk.tcp
-    if steady != kept:
-        base = fit_effects(fitted.batch, position, steady, fitted.noise.origin, fitted)
-    other = {k.name for k in EFFECTS if k.name not in named}
+    base = fitted if steady == kept else with_effects(fitted, steady)
+    sought = [k for k in EFFECTS if k.sought in now and k.may_be_sought(states)]
+    other = {k.name for k in EFFECTS if k not in sought}
     library = Library.of(base, other.union(without))
     if not library.shelves:
         return fitted

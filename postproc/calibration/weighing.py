@@ -12,7 +12,7 @@ from postproc.calibration.regression import Fit, beside
 from postproc.model.effects.effect import Effect
 
 ENOUGH = 3.0  # nats that an effect must be worth: 20 to 1
-SURE = 6.0  # nats that what the tracker reads wrongly must be worth: 400 to 1
+SURE = 6.0  # nats that what is looked for last must be worth: 400 to 1
 STEPS = 12  # of the search for prior scales, which start near their best
 
 

@@ -20,6 +20,7 @@ from postproc.calibration.diagnosis.refit import (
     Revision,
     SetAnew,
     fold_back,
+    is_fresh,
     no_surer,
     refit,
 )
@@ -126,8 +127,10 @@ def hold_out(
 
 def _fit_of(base: Fit, rows: NDArray[np.int64]) -> Fit:
     """Fit the effects of a fit to some of its rows only."""
-    batch = Batch(base.batch.arm, base.batch.states[rows])
-    position = base.error[rows] + batch.walk.tcp
+    batch, position = (
+        Batch(base.batch.arm, base.batch.states[rows]),
+        base.position[rows],
+    )
     return fit_effects(batch, position, base.combination.effects, base.noise.origin)
 
 
@@ -210,7 +213,7 @@ def diagnose(
     settled = told_apart(search.fit, survey.motion)
     traced = replace(traced, search=replace(search, fit=settled))
     given = None
-    if model.data_sha256 != survey.sha256:
+    if is_fresh(survey, model):
         nominal = bases[0].batch.walk.tcp
         given = survey.position - nominal - model.error(arm, survey.states)
     held_out = hold_out(traced.search, sides, seed, progress, given)
@@ -231,14 +234,13 @@ def _with_mended_directions(
     They are asked for last: what an effect does is not to be taken for them.
     """
     base, fit = traced.search.base, traced.search.fit
-    position = base.error + base.batch.walk.tcp
-    mended = mend_directions(fit, position)
+    mended = mend_directions(fit, base.position)
     if mended is fit:
         return traced
     states = base.batch.states.with_(direction=mended.batch.states.direction)
     batch, effects = Batch(base.batch.arm, states), base.combination.effects
     progress("directions mended: again", 0.0)
-    again = fit_effects(batch, position, effects, base.noise.origin, start=base)
+    again = fit_effects(batch, base.position, effects, base.noise.origin, start=base)
     return trace(again, seed, progress, without)
 
 
@@ -330,7 +332,7 @@ def _extended(
         "after": statistics(diagnosis.after),
     }  # fmt: skip
     fitted = fold_back(model_of(no_surer(found.fit), survey))
-    if model.data_sha256 != survey.sha256:
+    if is_fresh(survey, model):
         fitted = replace(
             fitted,
             ranges=model.ranges.joined(fitted.ranges, _unlike(found, diagnosis)),
@@ -364,8 +366,8 @@ def _unlike(found: Search, diagnosis: Diagnosis) -> set[str]:
 
 def _worst(model: Model, fitted: Model) -> dict[str, float]:
     """Return the least sure that a model is where it has been, as it was revised."""
-    known = [m.statistics.get(WORST_STD) for m in (model, fitted)]
-    return {WORST_STD: max(k for k in known if k is not None)}
+    given = model.statistics.get(WORST_STD, 0.0)
+    return {WORST_STD: max(given, fitted.statistics[WORST_STD])}
 
 
 # What a reader needs to judge a diagnosis: residuals, rivals, rows, the chain.

@@ -245,7 +245,7 @@ def noise_floor(fit: Fit, tracker_known: bool) -> NoiseFloor:
         return NoiseFloor(size, f"repeated poses ({count} repeats)")
     if tracker_known:
         sheet = Noise(1.0, 0.0, fit.noise.origin)
-        tracker = sheet.tracker_std(fit.batch.walk.tcp + fit.error)
+        tracker = sheet.tracker_std(fit.position)
         arrival = fit.batch.arm.repeatability / ISO_RP
         size = LENGTH * float(np.sqrt(3 * (arrival**2 + (tracker**2).mean())))
         return NoiseFloor(size, "tracker and repeatability of the data sheets")

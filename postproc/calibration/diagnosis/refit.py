@@ -258,6 +258,11 @@ def fold_back(model: Model) -> Model:
 FEWEST = 12  # rows
 
 
+def is_fresh(survey: Measurements, model: Model) -> bool:
+    """Tell whether rows are others than those that a model was fitted to."""
+    return model.data_sha256 != survey.sha256
+
+
 def refit(
     survey: Measurements,
     arm: Arm,
@@ -287,7 +292,7 @@ def refit(
         )
     origin = None if tracker is None else (tracker[0], tracker[1], tracker[2])
     batch = Batch(arm, survey.states)
-    fresh = model.data_sha256 != survey.sha256
+    fresh = is_fresh(survey, model)
     effects = (only_arm(model) if fresh else model).effects.effects
     missing = [name for name in setup if name not in {e.name for e in effects}]
     placed = propose(missing, arm, survey.states)

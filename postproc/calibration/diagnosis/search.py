@@ -150,8 +150,8 @@ def without(fit: Fit, place: int) -> Fit:
 
 def with_effects(fit: Fit, effects: Sequence[Effect]) -> Fit:
     """Fit other effects to the rows of a fit, beginning where it ended."""
-    position = fit.error + fit.batch.walk.tcp
-    return fit_effects(fit.batch, position, tuple(effects), fit.noise.origin, fit)
+    origin = fit.noise.origin
+    return fit_effects(fit.batch, fit.position, tuple(effects), origin, fit)
 
 
 # A free form must not stand for causes that have names.

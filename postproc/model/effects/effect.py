@@ -98,8 +98,8 @@ class Effect(ABC):
 
     @classmethod
     def may_be_sought(cls, states: States) -> bool:
-        """Tell whether a fit may look for it, see `sought`."""
-        return cls.sought is not None
+        """Tell whether rows let a fit look for it, where it is `sought`."""
+        return True
 
     @classmethod
     def may_show_alone(cls, states: States) -> bool:
