@@ -7,7 +7,8 @@ alone; of phi that are made of splines, the four that are not 0 at a row. The co
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
 import numpy as np
@@ -17,6 +18,7 @@ from postproc.arrays import Floats, Ints
 from postproc.model.combination import Combination
 from postproc.model.effects.effect import Effect, JointEffect
 from postproc.model.kinematics import Batch
+from postproc.model.noise import RowBlocks
 from postproc.model.splines import Splines
 
 Features = tuple[
@@ -70,6 +72,7 @@ class DesignMatrix:
         splines: Those.
         direct: Columns of all other effects, (n, 3, m) [m per unit].
         moving: Their places among the parameters, (m,).
+        blocks: What the rows are multiplied with, those of a pose at once.
     """
 
     jacobian: Floats
@@ -77,6 +80,7 @@ class DesignMatrix:
     splines: tuple[SplineColumns, ...]
     direct: Floats
     moving: Ints
+    blocks: RowBlocks = field(default_factory=RowBlocks)
 
     @classmethod
     def of(cls, combination: Combination, at: Batch) -> DesignMatrix:
@@ -106,13 +110,19 @@ class DesignMatrix:
         return replace(self, jacobian=jacobian, direct=_direct(combination.effects, at))
 
     def __getitem__(self, rows: Ints) -> DesignMatrix:
-        """Return some of the rows."""
+        """Return some of the rows; those that are taken at once stay together."""
         turning = replace(self.turning, angles=self.turning.angles[rows])
         splines = tuple(replace(c, splines=c.splines[rows]) for c in self.splines)
         return replace(
             self, jacobian=self.jacobian[rows], turning=turning, splines=splines,
             direct=self.direct[rows],
+            blocks=self.blocks.at_rows(rows, len(self.jacobian)),
         )  # fmt: skip
+
+    @property
+    def by_row(self) -> DesignMatrix:
+        """Return the columns before rows are taken at once."""
+        return replace(self, blocks=RowBlocks()) if self.blocks else self
 
     @property
     def size(self) -> int:
@@ -128,7 +138,7 @@ class DesignMatrix:
         out[t.places] = axes[t.joint] * t.angles.T[:, None]
         for c in self.splines:
             out[c.places] = axes[c.joint] * c.splines.mixed(c.mix).T[:, None]
-        return out.T
+        return self.blocks.apply(out.T)
 
     def shift(self, values: Floats) -> Floats:
         """Turn the joints by parameters, (n, 6) [rad]."""
@@ -144,21 +154,21 @@ class DesignMatrix:
         """Move the positions by parameters, (n, 3) [m]."""
         turned = np.einsum("nij,nj->ni", self.jacobian, self.shift(values))
         moved: Floats = turned + self.direct @ values[self.moving]
-        return moved
+        return self.blocks.apply(moved)
 
     def mixed(self, mix: Floats) -> Floats:
         """Mix the columns, (p, k), to columns of all scalar rows, (3 n, k)."""
-        n = len(self.jacobian)
-        out = np.empty((3 * n, mix.shape[1]))
+        n, plain = len(self.jacobian), self.by_row
+        out = np.empty((n, 3, mix.shape[1]))
         for first in range(0, n, BLOCK):
-            some = self[np.arange(first, min(first + BLOCK, n))]
-            rows = slice(3 * first, 3 * (first + BLOCK))
-            out[rows] = some.dense().reshape(-1, self.size) @ mix
-        return out
+            some = plain[np.arange(first, min(first + BLOCK, n))]
+            out[first : first + BLOCK] = some.dense() @ mix
+        return self.blocks.apply(out).reshape(3 * n, -1)
 
     def moment(self, rows: Floats) -> Floats:
         """Sum columns times rows (n, 3) over all rows, (p,)."""
         out, t = np.zeros(self.size), self.turning
+        rows = self.blocks.apply(rows, transposed=True)
         along = np.einsum("nij,ni->nj", self.jacobian, rows)
         out[t.places] = np.einsum("nd,nd->d", t.angles, along[:, t.joint])
         for c in self.splines:
@@ -172,6 +182,9 @@ class DesignMatrix:
 
     def gram(self) -> Floats:
         """Sum products of columns over all rows, (p, p)."""
+        if self.blocks:
+            alone = np.delete(np.arange(len(self.jacobian)), self.blocks.rows)
+            return self[alone].gram() + self._gram_of_blocks()
         plain, splines = _native.gram(*self._features())
         plain[: plain.shape[1]] += np.tril(plain[: plain.shape[1]], -1).T
         out = np.empty((self.size, self.size))
@@ -187,12 +200,33 @@ class DesignMatrix:
                 out[np.ix_(a.places, b.places)] = block
         return out
 
+    def _gram_of_blocks(self) -> Floats:
+        """Sum products of columns over the rows that are taken at once, (p, p)."""
+        out = np.zeros((self.size, self.size))
+        for X in self._columns_of_blocks():
+            flat = X.reshape(-1, self.size)
+            out += flat.T @ flat
+        return out
+
+    def _columns_of_blocks(self) -> Iterator[Floats]:
+        """Write the rows that are taken at once out, some (groups, 3 m, p) a time."""
+        plain = self.by_row
+        for rows, matrix in self.blocks.parts:
+            count, m = rows.shape
+            at_once = max(1, BLOCK // m)
+            for first in range(0, count, at_once):
+                some = rows[first : first + at_once]
+                X = plain[some.reshape(-1)].dense().reshape(len(some), 3 * m, -1)
+                yield matrix[first : first + at_once] @ X
+
     def variance(self, covariance: Floats) -> Floats:
         """Variance of every component that uncertain parameters give, (n, 3).
 
         Args:
             covariance: Of the parameters, (p, p).
         """
+        if self.blocks:
+            return self._variance_with_blocks(covariance)
         places, sets = self._plain_places(), self._sets()
         count = sum(len(a.mix) for a, _ in sets)
         plain, splines = np.empty((len(places) + count, len(places))), []
@@ -208,6 +242,15 @@ class DesignMatrix:
         total = _native.uncertainty(*self._features(), form)
         variance: Floats = np.maximum(total, 0.0)
         return variance
+
+    def _variance_with_blocks(self, covariance: Floats) -> Floats:
+        """Do it where rows are taken at once."""
+        out = self.by_row.variance(covariance)
+        own = [np.einsum("gkp,gkp->gk", X @ covariance, X).reshape(-1, 3)
+               for X in self._columns_of_blocks()]  # fmt: skip
+        rows = np.concatenate([r.reshape(-1) for r, _ in self.blocks.parts])
+        out[rows] = np.maximum(np.concatenate(own), 0.0)
+        return out
 
     def _plain_places(self) -> Ints:
         """Give the places of columns that are not made of splines, as the core does."""

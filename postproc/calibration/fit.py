@@ -30,6 +30,7 @@ from postproc.calibration.reversals import (
     split_reversals,
 )
 from postproc.calibration.selection import Progress, fit_survey, model_of, silent
+from postproc.calibration.stops import pool_readings
 from postproc.calibration.tables import DETECT, TableFormat
 from postproc.calibration.tool_groups import find_groups, find_wrong_nest
 from postproc.model.combination import Combination
@@ -112,6 +113,7 @@ def fit_measurements(
     progress: Progress = silent,
 ) -> Calibration:
     """Fit a model to measurements, see `fit`."""
+    survey = pool_readings(survey)
     tracker, setup = cell.tracker, several_points(survey)
     placed, points = None, None
     if frame == "tracker":

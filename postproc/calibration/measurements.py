@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from postproc.arrays import Bools, Floats
+from postproc.arrays import Bools, Floats, Ints
 from postproc.calibration.references import (
     ReferenceRows,
     TrackerMotion,
@@ -30,6 +30,7 @@ from postproc.calibration.tables import (
     read_headed,
     read_rotation,
     read_tools,
+    read_visits,
     translate,
     unique_ids,
 )
@@ -80,6 +81,7 @@ class Measurements:
         references: Readings of fixed points between the rows, or None.
         motion: What they say of the tracker, whose drift is taken out of `position`;
             None without them.
+        visit: Number of the visit of every row, as the file has it, (n,), or None.
     """
 
     path: Path
@@ -95,6 +97,7 @@ class Measurements:
     mounting: Floats | None = field(default=None, repr=False)
     references: ReferenceRows | None = field(default=None, repr=False)
     motion: TrackerMotion | None = field(default=None, repr=False)
+    visit: Ints | None = field(default=None, repr=False)
 
     def __len__(self) -> int:
         """Return the number of rows."""
@@ -115,6 +118,7 @@ class Measurements:
             line=self.line[index],
             inferred=self.inferred[index],
             rotation=None if self.rotation is None else self.rotation[index],
+            visit=None if self.visit is None else self.visit[index],
         )
 
 
@@ -168,6 +172,7 @@ def from_table(
     found = Measurements(
         table.path, states, position, ids, table.line, inferred, table.sha256,
         warnings=warnings, rotation=read_rotation(table), references=references,
+        visit=read_visits(table),
     )  # fmt: skip
     return drop_lost_beams(found)
 
@@ -242,6 +247,11 @@ def _joined(parts: Sequence[Measurements]) -> Measurements:
     }
     order = np.arange(sum(map(len, parts)), dtype=float)
     rotations = [p.rotation for p in parts if p.rotation is not None]
+    visits, last = [], 0
+    for part in parts:
+        if part.visit is not None and len(part):
+            visits.append(last + part.visit)
+            last = int(visits[-1].max()) + 1
     return Measurements(
         path=first.path,
         states=States(order=order, **joined),
@@ -253,6 +263,7 @@ def _joined(parts: Sequence[Measurements]) -> Measurements:
         dropped=tuple(d for p in parts for d in p.dropped),
         warnings=tuple(w for p in parts for w in p.warnings),
         rotation=np.concatenate(rotations) if len(rotations) == len(parts) else None,
+        visit=np.concatenate(visits) if len(visits) == len(parts) else None,
         references=join_references([(p.references, len(p)) for p in parts]),
     )
 

@@ -10,7 +10,7 @@ from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 from scipy.stats import chi2
 
-from postproc.arrays import Floats
+from postproc.arrays import Bools, Floats, Ints
 from postproc.calibration.evidence import Normal
 from postproc.model.combination import Combination
 from postproc.model.kinematics import Batch
@@ -54,7 +54,7 @@ def limit_of(n: int) -> float:
 
 
 def judge(
-    distance: Floats, residual: Floats, q: Floats, jacobian: Floats
+    distance: Floats, residual: Floats, q: Floats, jacobian: Floats, pose: Ints
 ) -> RowWeights:
     """Weigh the rows of a survey.
 
@@ -63,70 +63,100 @@ def judge(
         residual: Residual positions, (n, 3) [m].
         q: Joint angles, (n, 6) [rad].
         jacobian: Position Jacobian, (n, 3, 6) [m/rad].
+        pose: Number of the pose of every row, (n,): rows of one pose are no neighbours.
     """
-    n = len(q)
-    limit = limit_of(n)
+    limit = limit_of(len(distance))
     stands_out = distance > limit
-    spared = np.zeros(n, dtype=bool)
-    if stands_out.any() and n > 2 * NEIGHBOURS:
-        rows = np.flatnonzero(stands_out)
-        spared[rows] = _together(rows, residual, q) | _same_joint(
-            rows, residual, q, jacobian
-        )
+    spared = np.zeros(len(distance), dtype=bool)
+    _, first, of_row = np.unique(pose, return_index=True, return_inverse=True)
+    if stands_out.any() and len(first) > 2 * NEIGHBOURS:
+        rows, place = np.flatnonzero(stands_out), of_row.reshape(-1)
+        mean = means(residual, place)
+        poses = Poses(q[first], mean, jacobian[first])
+        own = residual[rows], jacobian[rows], place[rows]
+        spared[rows] = poses.share(*own) | poses.share_joint_error(*own)
     weight = np.where(stands_out & ~spared, (limit / distance.clip(1e-300)) ** 4, 1.0)
     weight[weight < DROPPED] = 0.0
     return RowWeights(weight, distance, spared)
 
 
-def _together(
-    rows: NDArray[np.int64], residual: Floats, q: Floats
-) -> NDArray[np.bool_]:
-    """Tell whether the nearest rows in joint space share a row's residual."""
-    spread = np.maximum(q.std(axis=0), 1e-9)
-    found = cKDTree(q / spread).query(q[rows] / spread, k=NEIGHBOURS + 1)
-    nearest = _without(rows, np.asarray(found[1]))
-    own = residual[rows]
-    along = np.einsum("rkj,rj->rk", residual[nearest], own)
-    agrees: NDArray[np.bool_] = np.median(along, axis=1) > AGREES * (own**2).sum(axis=1)
-    return agrees
+@dataclass(frozen=True, eq=False)
+class Poses:
+    """All poses, each with the mean residual of its rows.
+
+    Attributes:
+        q: Joint angles, (k, 6) [rad].
+        residual: Mean residuals, (k, 3) [m].
+        jacobian: (k, 3, 6) [m/rad].
+    """
+
+    q: Floats
+    residual: Floats
+    jacobian: Floats
+
+    def share(self, own: Floats, jacobian: Floats, place: Ints) -> Bools:
+        """Find the rows whose residual the nearest poses in joint space share, (r,).
+
+        Args:
+            own: Residuals of the rows, (r, 3) [m].
+            jacobian: Of the rows, (r, 3, 6) [m/rad].
+            place: Their poses, (r,).
+        """
+        spread = np.maximum(self.q.std(axis=0), 1e-9)
+        tree, asked = cKDTree(self.q / spread), self.q[place] / spread
+        nearest = np.asarray(tree.query(asked, k=NEIGHBOURS + 1)[1])
+        along = np.einsum("rkj,rj->rk", self.residual[_without(place, nearest)], own)
+        return np.asarray(np.median(along, axis=1) > AGREES * (own**2).sum(axis=1))
+
+    def share_joint_error(self, own: Floats, jacobian: Floats, place: Ints) -> Bools:
+        """Find the rows whose joint error poses at the same angle share, (r,).
+
+        The residual is read as an error of that joint alone; it must explain most of
+        the row, and the poses next to it on that joint must show the same error.
+        """
+        angle, explained = _as_joint_error(own, jacobian)
+        others, _ = _as_joint_error(self.residual, self.jacobian)
+        count, agrees = len(self.q), np.zeros(len(own), dtype=bool)
+        for j in range(self.q.shape[1]):
+            order = np.argsort(self.q[:, j], kind="stable")
+            rank = np.empty(count, dtype=int)
+            rank[order] = np.arange(count)
+            near = order[_places_beside(rank[place], count)]
+            signed = others[near, j] * np.sign(angle[:, j])[:, None]
+            same = np.median(signed, axis=1) > AGREES * np.abs(angle[:, j])
+            agrees |= same & (explained[:, j] > 0.5)
+        return agrees
 
 
-def _without(rows: NDArray[np.int64], near: NDArray[np.int64]) -> NDArray[np.int64]:
+def means(values: Floats, label: Ints) -> Floats:
+    """Average values (n, k) over each label."""
+    sums = [np.bincount(label, column) for column in values.T]
+    return np.asarray(np.stack(sums, axis=1) / np.bincount(label)[:, None])
+
+
+def _as_joint_error(residual: Floats, jacobian: Floats) -> tuple[Floats, Floats]:
+    """Read residuals (k, 3) as errors of each joint alone.
+
+    Returns:
+        Angles, (k, 6) [rad], and the share of the squared residual that each explains.
+    """
+    square = np.maximum((jacobian**2).sum(axis=1), 1e-12)
+    angle = np.einsum("nij,ni->nj", jacobian, residual) / square
+    total = np.maximum((residual**2).sum(axis=1), 1e-300)[:, None]
+    return angle, angle**2 * square / total
+
+
+def _without(own: Ints, near: Ints) -> Ints:
     """Take each row out of those that are nearest to it, (r, k + 1) to (r, k).
 
     Where more rows are at one place it need not be the first, nor among them.
     """
-    own = near == rows[:, None]
-    own[~own.any(axis=1), -1] = True
-    return np.asarray(near[~own].reshape(len(rows), -1))
+    same = near == own[:, None]
+    same[~same.any(axis=1), -1] = True
+    return np.asarray(near[~same].reshape(len(own), -1))
 
 
-def _same_joint(
-    rows: NDArray[np.int64], residual: Floats, q: Floats, jacobian: Floats
-) -> NDArray[np.bool_]:
-    """Tell whether rows at the same angle of one joint share the joint's error.
-
-    The residual is read as an error of that joint alone; it must explain most of the
-    row, and the rows next to it on that joint must show the same error.
-    """
-    square = np.maximum((jacobian**2).sum(axis=1), 1e-12)
-    angle = np.einsum("nij,ni->nj", jacobian, residual) / square
-    explained = (
-        angle**2 * square / np.maximum((residual**2).sum(axis=1), 1e-300)[:, None]
-    )
-    agrees = np.zeros(len(rows), dtype=bool)
-    for j in range(q.shape[1]):
-        order = np.argsort(q[:, j], kind="stable")
-        place = np.empty(len(q), dtype=int)
-        place[order] = np.arange(len(q))
-        near = order[_places_beside(place[rows], len(q))]
-        ratio = np.median(angle[near, j] * np.sign(angle[rows, j])[:, None], axis=1)
-        same = ratio > AGREES * np.abs(angle[rows, j])
-        agrees |= same & (explained[rows, j] > 0.5)
-    return agrees
-
-
-def _places_beside(place: NDArray[np.int64], n: int) -> NDArray[np.int64]:
+def _places_beside(place: Ints, n: int) -> Ints:
     """Return the nearest other places in a row of n, (k, 6)."""
     first = np.clip(place - NEIGHBOURS // 2, 0, n - NEIGHBOURS - 1)[:, None]
     beside = first + np.arange(NEIGHBOURS)

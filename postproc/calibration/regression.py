@@ -15,7 +15,7 @@ from postproc.calibration.orientations import RowWeights, Turns, judge, student_
 from postproc.model.combination import Combination
 from postproc.model.effects.effect import Effect
 from postproc.model.kinematics import Batch
-from postproc.model.noise import Noise, Whitener
+from postproc.model.noise import Noise, Whitener, Whitening, poses_of
 
 # What a fit has found, with all that tests of further effects need.
 
@@ -83,6 +83,11 @@ class Fit:
         index = {g: i for i, g in enumerate(self.groups)}
         return np.array([index[g] for g in self.combination.groups], dtype=np.int64)
 
+    @property
+    def poses(self) -> int:
+        """Number of poses: what no effect describes of one all its rows share."""
+        return len(np.unique(self.pose))
+
     def moved(self, part: slice) -> Floats:
         """Move the positions by some of the parameters alone, (n, 3) [m]."""
         own = np.zeros(len(self.values))
@@ -90,11 +95,9 @@ class Fit:
         return self.design.times(own)
 
     @cached_property
-    def row_scale(self) -> Floats:
-        """What whitening multiplies the rotated components with, (n, 3) [1/m]."""
-        v = self.whitener.variance(self.noise)
-        scale: Floats = np.sqrt(self.rows.weight[:, None] / v)
-        return scale
+    def whitening(self) -> Whitening:
+        """What makes the noise of the rotated rows independent, of unit variance."""
+        return self.whitener.whitening(self.noise, self.rows.weight)
 
     def whiten(self, rows: Floats) -> Floats:
         """Whiten (n, 3) or (n, 3, k): the noise of the result has unit variance.
@@ -102,15 +105,20 @@ class Fit:
         Returns:
             (3 n,) or (3 n, k).
         """
-        turned = self.whitener.rotate(rows)
-        if rows.ndim == 2:
-            return (turned * self.row_scale).reshape(-1)
-        return (turned * self.row_scale[:, :, None]).reshape(-1, rows.shape[2])
+        white = self.whitening.apply(self.whitener.rotate(rows))
+        return white.reshape(-1) if rows.ndim == 2 else white.reshape(-1, rows.shape[2])
 
     @property
     def whitened(self) -> DesignMatrix:
         """Derivatives at the solution, whitened."""
-        return self.design.turned(self.row_scale[:, :, None] * self.whitener.turn)
+        by = self.whitening
+        turned = self.design.turned(by.scale[:, :, None] * self.whitener.turn)
+        return replace(turned, blocks=by.blocks)
+
+    @cached_property
+    def pose(self) -> Ints:
+        """Number of the commanded pose of every row, (n,)."""
+        return poses_of(self.batch.states)
 
     @property
     def target(self) -> Floats:
@@ -124,12 +132,11 @@ class Fit:
         """
         scales = self.combination.scales
         whitened, y = self.whitened, self.target.reshape(-1, 3)
-        v = self.whitener.variance(self.noise)
         used = self.rows.weight > 0
         normal = Normal(
             whitened.gram() * np.outer(scales, scales), whitened.moment(y) * scales,
             float((y * y).sum()),
-            float(np.log(v[used]).sum()), 3.0 * float(used.sum()),
+            self.whitening.log_det, 3.0 * float(used.sum()),
         )  # fmt: skip
         if self.turns is None:
             return normal
@@ -145,6 +152,13 @@ class Fit:
         )  # fmt: skip
         return widened(self.normal(), self.group, at) * np.outer(scales, scales)
 
+    @property
+    def _tracker_variance(self) -> Floats:
+        """Variance per axis that the tracker gives the rows, (n,) [m^2]."""
+        std = self.noise.tracker_std(self.position)
+        variance: Floats = std**2 / self.batch.states.readings
+        return variance
+
     @cached_property
     def reading_spread(self) -> float:
         """Factor on the standard deviation of a reading so that 1.96 hold 95 %.
@@ -155,7 +169,8 @@ class Fit:
         standard deviation (leave one out). At least 1: the noise is what it is.
         """
         noise = self.noise.arrival_variance(self.design.jacobian)
-        noise = noise + np.square(self.noise.tracker_std(self.position))[:, None]
+        noise = noise + self.noise.pose_variance(self.design.jacobian)
+        noise = noise + self._tracker_variance[:, None]
         noise = noise + self.whitener.extra
         told = (1.0 - 2.0 * self.rows.weight[:, None]) * self.design.variance(
             self.stated
@@ -175,6 +190,7 @@ class Fit:
 
 PASSES = 30
 HEAVY_TAILED = 4  # first passes that a gross outlier must not lead astray
+ROWS_AT_ONCE = 2048  # of which products are formed
 BENT = 0.3  # sigma beyond which a step tells nothing of the noise
 
 
@@ -296,21 +312,48 @@ def _bent(before: Fit, after: Fit) -> float:
 def _weighed(state: Fit, heavy: bool) -> Fit:
     """Estimate the noise from what is left, and weigh the rows by it."""
     c, batch, residual = state.combination, state.batch, state.residual
-    spread = state.design.turned(state.whitener.turn).variance(state.covariance)
+    design = state.design.turned(state.whitener.turn)
     turned = state.whitener.rotate(residual)
-    distance = np.sqrt((turned**2 / state.whitener.variance(state.noise)).sum(axis=1))
+    distance = state.whitener.distances(turned, state.noise, state.rows.weight)
     if heavy:
         weight = student_weights(distance)
         rows = replace(state.rows, weight=weight, distance=distance)
     else:
-        rows = judge(distance, residual, batch.states.q, batch.jacobian)
-    noise = state.whitener.estimate(turned**2 + spread, rows.weight, state.noise)
+        rows = judge(distance, residual, batch.states.q, batch.jacobian, state.pose)
+    spread = design.variance(state.covariance)
+    noise = state.whitener.estimate(
+        turned**2 + spread, rows.weight, state.noise,
+        [_products(design, turned, block.rows, state.covariance)
+         for block in state.whitener.blocks],
+    )  # fmt: skip
     turns = state.turns
     if turns is not None:
         turns = turns.left(c, batch, state.values)
         turns = turns.judged(state.covariance, rows.weight, heavy)
     whitener = _with_unknown_sides(state, state.values)
     return replace(state, noise=noise, rows=rows, turns=turns, whitener=whitener)
+
+
+def _products(
+    design: DesignMatrix, rotated: Floats, rows: Ints, covariance: Floats
+) -> Floats:
+    """Expected products of the residuals of poses, (groups, 3 m, 3 m) [m^2].
+
+    Args:
+        design: Rotated columns.
+        rotated: Rotated residuals, (n, 3) [m].
+        rows: Rows of every pose, (groups, m).
+        covariance: Of the parameters, (p, p).
+    """
+    count, m = rows.shape
+    left = rotated[rows].reshape(count, 3 * m)
+    out = left[:, :, None] * left[:, None]
+    at_once = max(1, ROWS_AT_ONCE // m)
+    for first in range(0, count, at_once):
+        some = rows[first : first + at_once]
+        X = design[some.reshape(-1)].dense().reshape(len(some), 3 * m, -1)
+        out[first : first + at_once] += (X @ covariance) @ np.swapaxes(X, 1, 2)
+    return out
 
 
 def _linearised(state: Fit) -> Fit:

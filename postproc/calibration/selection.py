@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -27,6 +28,7 @@ from postproc.model.effects.probe_turn import ProbeTurn
 from postproc.model.effects.tool_shift import ToolShift
 from postproc.model.kinematics import Batch
 from postproc.model.model import COMPENSATED, READING, WORST_STD, Model
+from postproc.model.noise import Noise
 from postproc.model.ranges import Ranges
 from postproc.robot.arm import Arm
 from postproc.robot.pose import MM
@@ -45,8 +47,8 @@ from postproc.robot.state import States
 
 Progress = Callable[[str], None]
 
-FEW_ROWS = 450  # fewer leave many orders of waves alike
-HARDLY_ANY = 100  # fewer leave alike what free forms follow, and what they do not
+FEW_POSES = 450  # fewer leave many orders of waves alike
+HARDLY_ANY = 100  # poses: fewer leave alike what free forms follow, and what they do not
 
 
 def silent(stage: str) -> None:
@@ -193,7 +195,7 @@ def carried_over(fitted: Fit, kept: tuple[Effect, ...]) -> tuple[Effect, ...]:
         kept: The effects.
     """
     free = [e for e in kept if e.free]
-    if len(fitted.batch) >= HARDLY_ANY or not free:
+    if fitted.poses >= HARDLY_ANY or not free:
         return kept
     held = predicting(beside(fitted, kept), free)
     return tuple(e for e in kept if not e.free or e in held)
@@ -230,7 +232,7 @@ def waves_needed(fitted: Fit, kept: tuple[Effect, ...]) -> tuple[Effect, ...]:
         fitted: A fit of what is kept and of the waves.
         kept: All else, which is not in question.
     """
-    if len(fitted.batch) < FEW_ROWS:
+    if fitted.poses < FEW_POSES:
         waves = [e for e in fitted.combination.effects if e not in kept]
         held = predicting(fitted, waves)
         if not held:
@@ -355,6 +357,53 @@ def _peak_of_others(fitted: Fit, before: Fit) -> float:
     return min(moved, default=0.0)
 
 
+ISO_RP = 3.615  # RP of ISO 9283 over the standard deviation per axis, round scatter
+DECIMALS = 5  # of joint angles, from which on rounding is below all else
+WRITTEN = 1e-6  # of the last decimal by which a written number is off
+
+
+def angle_step(q: Floats) -> float:
+    """Return the step of joint angles (n, 6) [rad] that were written rounded [rad].
+
+    0 where they have more decimals than matter, as degrees or as radians.
+    """
+    for decimals in range(DECIMALS):
+        for unit in (np.rad2deg(1.0), 1.0):
+            scaled = q * unit * 10.0**decimals
+            if np.abs(scaled - np.round(scaled)).max(initial=0.0) < WRITTEN:
+                return float(10.0**-decimals / unit)
+    return 0.0
+
+
+def expected_noise(fitted: Fit) -> Noise:
+    """Return the noise of other poses than those of a fit.
+
+    Rounded joint angles are an error of the file: it is taken off the scatter of
+    poses, as far as rounding can be the cause. Where no pose has several stops, the
+    scatter of stops and poses is one sum: what exceeds rounding and the repeatability
+    of the data sheet is taken to be an error of the pose, which a mean over arrivals
+    has as well.
+    """
+    noise = fitted.noise
+    rounding = angle_step(fitted.batch.states.q) ** 2 / 12.0
+    if "pose" in fitted.whitener.estimated:
+        return replace(noise, pose_joint=_less(noise.pose_joint, rounding))
+    noise = replace(noise, joint=_less(noise.joint, rounding))
+    sheet = fitted.batch.arm.repeatability / ISO_RP
+    total = float(noise.arrival_variance(fitted.design.jacobian).mean())
+    share = max(0.0, 1.0 - sheet**2 / max(total, 1e-300))
+    kept, part = float(np.sqrt(1.0 - share)), float(np.sqrt(share))
+    return replace(
+        noise, joint=kept * noise.joint, stop=kept * noise.stop,
+        pose_joint=part * noise.joint, pose=part * noise.stop,
+    )  # fmt: skip
+
+
+def _less(std: float, variance: float) -> float:
+    """Take a variance off a standard deviation."""
+    return float(np.sqrt(max(0.0, std**2 - variance)))
+
+
 def model_of(fitted: Fit, survey: Measurements) -> Model:
     """Keep what a fit found as a model."""
     used = fitted.rows.weight > 0
@@ -362,8 +411,9 @@ def model_of(fitted: Fit, survey: Measurements) -> Model:
     covariance = fitted.stated * widening(fitted)
     told = fitted.combination.where(*COMPENSATED)
     own = np.where(np.outer(told, told), covariance, 0.0)  # no set-up in predictions
-    known = np.sqrt(fitted.design.variance(own))
-    arm = fitted.batch.arm
+    arm, noise = fitted.batch.arm, expected_noise(fitted)
+    jacobian = fitted.design.jacobian
+    known = np.sqrt(fitted.design.variance(own) + noise.pose_variance(jacobian))
     statistics = {
         "residual_mean_mm": float(left.mean()),
         "residual_max_mm": float(left.max()),
@@ -385,7 +435,7 @@ def model_of(fitted: Fit, survey: Measurements) -> Model:
         values=fitted.values,
         covariance=covariance,
         prior_std=fitted.prior_std,
-        noise=fitted.noise,
+        noise=noise,
         ranges=Ranges.of(survey.states[used], fitted.turns is not None),
         rows=int(used.sum()),
         data_sha256=survey.sha256,

@@ -12,8 +12,8 @@ from postproc.calibration.weighing import SURE, keep_needed, worth
 from postproc.model.effects import EFFECTS
 
 REMAINS = 0.01  # level at which what is left is no noise: a step may be a piece of it
-SOUGHT_BESIDE_FREE = 600  # rows at the most: of more, with many columns, it takes long
-LEAST_ROWS = 100  # fewer leave alike what happens and what has no form
+SOUGHT_BESIDE_FREE = 600  # poses at the most: of more, with many columns, it takes long
+LEAST_POSES = 100  # fewer leave alike what happens and what has no form
 
 
 def with_sought(fitted: Fit, without: Collection[str] = ()) -> Fit:
@@ -31,8 +31,8 @@ def with_sought(fitted: Fit, without: Collection[str] = ()) -> Fit:
     """
     kept = fitted.combination.effects
     free = any(e.free for e in kept)
-    rows = len(fitted.batch)
-    if rows < LEAST_ROWS or (free and rows > SOUGHT_BESIDE_FREE):
+    poses = fitted.poses
+    if poses < LEAST_POSES or (free and poses > SOUGHT_BESIDE_FREE):
         return fitted
     now = ("always", "rival") if free else ("always", "rival", "alone")
     found = _searched(fitted, now, without)

@@ -354,6 +354,14 @@ def read_rotation(table: TextTable) -> Floats | None:
     return np.asarray(Rotation.from_euler("XYZ", angles, degrees=True).as_matrix())
 
 
+def read_visits(table: TextTable) -> NDArray[np.int64] | None:
+    """Number the visits by their names in the column `visit`, (n,), None without it."""
+    if not table.has("visit"):
+        return None
+    _, number = np.unique(table.text("visit"), return_inverse=True)
+    return np.asarray(number.reshape(-1), dtype=np.int64)
+
+
 def _sorted(table: TextTable) -> str:
     """Say whether the rows still are in the order in which they were measured."""
     for name in (*JOINTS, "x_mm", "y_mm", "z_mm"):

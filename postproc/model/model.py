@@ -329,6 +329,9 @@ class Model:
     ) -> Floats:
         """Variance that the parameters' covariance does not hold, (n, 3) [m^2].
 
+        Unknown directions, free forms beyond their range, and what no effect describes
+        of a pose that was not measured.
+
         Args:
             effects: All effects, or those that may be compensated.
             at: n states, with the kinematics taken at the parameters.
@@ -338,6 +341,8 @@ class Model:
         if effects is not self.effects and len(prior_std):
             prior_std = prior_std[self.effects.where(*COMPENSATED)]
         beyond = beyond_variance(effects, at, prior_std)
+        if self.noise.pose_joint or self.noise.pose:
+            beyond = beyond + self.noise.pose_variance(at.jacobian)
         return side_variance(effects, at, values) + np.square(self.spread) + beyond
 
     def reading(self, arm: Arm, states: States) -> PredictedReading:

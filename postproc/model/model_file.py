@@ -64,6 +64,9 @@ class NoiseSection(ModelSection):
     tracker: NonNegativeFloat
     joint: NonNegativeFloat
     origin: tuple[float, float, float] | None
+    stop: NonNegativeFloat = 0.0
+    pose_joint: NonNegativeFloat = 0.0
+    pose: NonNegativeFloat = 0.0
 
 
 class RangesSection(ModelSection):

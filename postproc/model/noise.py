@@ -1,40 +1,63 @@
-"""What scatters a measurement: the tracker, and the arm's own repeatability.
+"""What scatters a measurement: tracker, arrival of the arm, and the pose.
 
-The covariance of one measured position is  t^2 T + r^2 J J^T : the tracker's error,
-equal on all axes and growing with range, and joint angles that do not repeat, seen
-through the Jacobian. In the eigenbasis of J J^T both are diagonal, for any t and r, so
-one rotation of every row makes all further algebra a matter of weights.
+A row is not a measurement, a stop is: readings and nests of one stop share where the
+arm stood, and all stops of one pose share what the model cannot know of that pose. The
+covariance of the rows of one pose is
+
+    V = diag(t^2 T / k) + same stop * (r^2 J J^T + s^2 1) + (R^2 J J^T + S^2 1),
+
+with t^2 T the tracker's variance (equal on all axes, growing with range) over the k
+readings that a row is the mean of; r and s the scatter of a stop, as joint angles that
+do not repeat and as a shift; R and S the same of the pose: rounded joint angles, and
+errors that no effect describes. Rows of different poses are independent.
+
+A row that is alone at its pose has a diagonal covariance in the eigenbasis of J J^T,
+for any sizes. All rows are rotated there; those that share a pose then take a matrix
+for all of them.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 
-from postproc.arrays import Floats
+from postproc.arrays import Bools, Floats, Ints
 from postproc.model.kinematics import Batch
+from postproc.robot.state import States
 
 TRACKER_FIXED, TRACKER_RANGE = 1e-5, 5e-6  # [m], [m/m] a laser tracker's data sheet
 LIVELY = 0.3  # share of the other component that each begins with at least
 UNSEEN = 1.0  # [m] as good as not measured
-SMALLEST, LARGEST = 1e-7, 1e-2  # [m] bounds of both standard deviations at the TCP
+SMALLEST, LARGEST = 1e-7, 1e-2  # [m] bounds of all standard deviations at the TCP
+SAME_POSE = 1e-5  # [rad] joint angles that are one pose
+NO_POSE = 0.02  # share of the variance below which poses scatter no more than stops
+KINDS = ("tracker", "joint", "stop", "pose_joint", "pose")
 
 
 @dataclass(frozen=True)
 class Noise:
-    """The two estimated components.
+    """The estimated components.
 
     Attributes:
         tracker: Factor t on the tracker's data sheet, 1 = as specified.
-        joint: Standard deviation r of every joint angle [rad].
+        joint: Standard deviation r of every joint angle from stop to stop [rad]. Where
+            no pose has several stops, that of the pose is in it.
         origin: Tracker position in the base frame, (3,) [m], or None: the range is
             then not known, and the tracker's error is the same everywhere.
+        stop: Standard deviation s of a stop per axis [m].
+        pose_joint: Standard deviation R of every joint angle from pose to pose [rad].
+        pose: Standard deviation S of a pose per axis [m].
     """
 
     tracker: float
     joint: float
     origin: tuple[float, float, float] | None = None
+    stop: float = 0.0
+    pose_joint: float = 0.0
+    pose: float = 0.0
 
     def tracker_std(self, position: Floats) -> Floats:
         """Standard deviation per axis of the tracker at positions (n, 3), (n,) [m]."""
@@ -42,9 +65,18 @@ class Noise:
         return std
 
     def arrival_variance(self, jacobian: Floats) -> Floats:
-        """Variance per axis that repeatability gives, (n, 3) [m^2]."""
-        variance: Floats = self.joint**2 * np.einsum("nij,nij->ni", jacobian, jacobian)
-        return variance
+        """Variance per axis of one arrival, (n, 3) [m^2]."""
+        return _seen_through(jacobian, self.joint, self.stop)
+
+    def pose_variance(self, jacobian: Floats) -> Floats:
+        """Variance per axis of a pose that was not measured, (n, 3) [m^2]."""
+        return _seen_through(jacobian, self.pose_joint, self.pose)
+
+
+def _seen_through(jacobian: Floats, joint: float, shift: float) -> Floats:
+    """Variance per axis of joint angles and of a shift, (n, 3) [m^2]."""
+    square: Floats = np.einsum("nij,nij->ni", jacobian, jacobian)
+    return joint**2 * square + shift**2
 
 
 def tracker_shape(
@@ -57,6 +89,28 @@ def tracker_shape(
     return np.asarray(TRACKER_FIXED + TRACKER_RANGE * reach)
 
 
+def poses_of(states: States) -> Ints:
+    """Number the commanded poses, (n,): rows of one pose have equal joint angles.
+
+    A row that was read in motion is a pose of its own.
+    """
+    moving = ~np.isnan(states.heading[:, 0])
+    payload = np.nan_to_num(states.payload)[:, None]
+    own = np.where(moving, np.arange(1, len(states) + 1), 0)[:, None]
+    key = np.concatenate([np.round(states.q / SAME_POSE), payload, own], axis=1)
+    _, label = np.unique(key, axis=0, return_inverse=True)
+    return np.asarray(label.reshape(-1), dtype=np.int64)
+
+
+def groups_of(label: Ints) -> list[Ints]:
+    """List the rows that share a label with others: (groups, m) for every size m."""
+    order = np.argsort(label, kind="stable")
+    cuts = np.flatnonzero(np.diff(label[order])) + 1
+    parts = [rows for rows in np.split(order, cuts) if len(rows) > 1]
+    sizes = sorted({len(rows) for rows in parts})
+    return [np.array([rows for rows in parts if len(rows) == m]) for m in sizes]
+
+
 def _along_first(heading: Floats) -> Floats:
     """Give right-handed bases (n, 3, 3) whose first columns are unit vectors (n, 3)."""
     aside = np.eye(3)[np.abs(heading).argmin(axis=1)]
@@ -65,9 +119,166 @@ def _along_first(heading: Floats) -> Floats:
     return np.stack([heading, second, np.cross(heading, second)], axis=2)
 
 
+# Matrices that act on the rows of a group at once.
+
+
+@dataclass(frozen=True, eq=False)
+class RowBlocks:
+    """Matrices for groups of rows; all other rows stay as they are.
+
+    Attributes:
+        parts: For every size m of a group its rows, (groups, m), and matrices,
+            (groups, 3 m, 3 m).
+    """
+
+    parts: tuple[tuple[Ints, Floats], ...] = ()
+
+    def __bool__(self) -> bool:
+        """Return True if there is any group."""
+        return bool(self.parts)
+
+    @cached_property
+    def rows(self) -> Ints:
+        """All rows of groups, ascending."""
+        none = [np.zeros(0, dtype=np.int64)]
+        return np.sort(np.concatenate([*none, *(r.reshape(-1) for r, _ in self.parts)]))
+
+    def apply(self, rows: Floats, transposed: bool = False) -> Floats:
+        """Multiply rows (n, 3) or (n, 3, k) by the matrices of their groups."""
+        if not self.parts:
+            return rows
+        out = np.array(rows)
+        for index, matrix in self.parts:
+            count, m = index.shape
+            stacked = rows[index].reshape(count, 3 * m, -1)
+            by = np.swapaxes(matrix, 1, 2) if transposed else matrix
+            out[index] = (by @ stacked).reshape(count, m, *rows.shape[1:])
+        return out
+
+    def at_rows(self, rows: Ints, count: int) -> RowBlocks:
+        """Keep the groups of some rows.
+
+        Args:
+            rows: Which of the rows, in their new order.
+            count: Number of rows now.
+
+        Raises:
+            ValueError: A group is among them in part.
+        """
+        place = np.full(count, -1, dtype=np.int64)
+        place[rows] = np.arange(len(rows))
+        parts = []
+        for index, matrix in self.parts:
+            inside = (place[index] >= 0).all(axis=1)
+            if (place[index[~inside]] >= 0).any():
+                raise ValueError("rows of one pose were taken apart")
+            if inside.any():
+                parts.append((place[index[inside]], matrix[inside]))
+        return RowBlocks(tuple(parts))
+
+
+@dataclass(frozen=True, eq=False)
+class Whitening:
+    """What makes the noise of rotated rows independent and of unit variance.
+
+    Attributes:
+        scale: What rotated components are multiplied with, (n, 3) [1/m]; 1 for rows of
+            a group.
+        blocks: Matrices of the groups [1/m].
+        log_det: Sum of the logarithms of all variances of rows that are used.
+    """
+
+    scale: Floats
+    blocks: RowBlocks
+    log_det: float
+
+    def apply(self, rotated: Floats) -> Floats:
+        """Whiten rotated rows (n, 3) or (n, 3, k)."""
+        scale = self.scale if rotated.ndim == 2 else self.scale[:, :, None]
+        return self.blocks.apply(rotated * scale)
+
+
+# The rows of one pose.
+
+
+@dataclass(frozen=True, eq=False)
+class PoseBlock:
+    """Poses of m rows each.
+
+    Attributes:
+        rows: Their rows, (groups, m).
+        stop: Whether two rows are of one stop, (groups, 3 m, 3 m), 1 or 0.
+        joint: J J^T between the rows, in their eigenbases, (groups, 3 m, 3 m).
+        shift: A common shift seen in their eigenbases, (groups, 3 m, 3 m).
+    """
+
+    rows: Ints
+    stop: Floats
+    joint: Floats
+    shift: Floats
+
+    @classmethod
+    def of(cls, rows: Ints, order: Floats, turn: Floats, jacobian: Floats) -> PoseBlock:
+        """Take the rows of poses, (groups, m).
+
+        Args:
+            rows: Their numbers.
+            order: Place of every row in the visit order, (n,): equal within a stop.
+            turn: Rotations into the eigenbases, (n, 3, 3).
+            jacobian: (n, 3, 6) [m/rad].
+        """
+        count, m = rows.shape
+        same = order[rows][:, :, None] == order[rows][:, None, :]
+        stop = np.repeat(np.repeat(same.astype(float), 3, axis=1), 3, axis=2)
+        seen = (turn[rows] @ jacobian[rows]).reshape(count, 3 * m, 6)
+        axes = turn[rows].reshape(count, 3 * m, 3)
+        joint = seen @ np.swapaxes(seen, 1, 2)
+        return cls(rows, stop, joint, axes @ np.swapaxes(axes, 1, 2))
+
+    def parts(self, kind: str) -> Floats:
+        """Return the covariance per unit variance of a component off the tracker."""
+        shape = self.joint if kind in ("joint", "pose_joint") else self.shift
+        return shape * self.stop if kind in ("joint", "stop") else shape
+
+    def covariance(self, noise: Noise, own: Floats) -> Floats:
+        """Covariance of the rows of each pose, (groups, 3 m, 3 m) [m^2].
+
+        Args:
+            noise: The components.
+            own: Variances of the rows by themselves, (n, 3) [m^2].
+        """
+        out = self.stop * (noise.joint**2 * self.joint + noise.stop**2 * self.shift)
+        out += noise.pose_joint**2 * self.joint + noise.pose**2 * self.shift
+        k = np.arange(out.shape[1])
+        out[:, k, k] += own[self.rows].reshape(len(out), -1)
+        return out
+
+
 @dataclass(frozen=True)
+class Readings:
+    """Scatter of repeated readings round their means: the tracker's alone.
+
+    Attributes:
+        square: Sum of squares over the data sheet's variances.
+        freedom: Degrees of freedom.
+        log_shape: Sum of the logarithms of these variances.
+    """
+
+    square: float = 0.0
+    freedom: float = 0.0
+    log_shape: float = 0.0
+
+    def log_noise(self, tracker: float) -> float:
+        """Return minus twice their log likelihood, up to a constant."""
+        if not self.freedom:
+            return 0.0
+        spread = self.freedom * 2.0 * float(np.log(tracker))
+        return spread + self.log_shape + self.square / tracker**2
+
+
+@dataclass(frozen=True, eq=False)
 class Whitener:
-    """Rotations that make every row's covariance diagonal, and its two parts.
+    """Rotations that make the covariance of rows alone diagonal, and its parts.
 
     Attributes:
         turn: Rotates base axes into the eigenbasis of J J^T, (n, 3, 3).
@@ -75,6 +286,9 @@ class Whitener:
         extra: Variance known beforehand (an unknown direction), (n, 3) [m^2].
         unseen: Variance of what the reading does not tell at all, (n, 3) [m^2].
         origin: Tracker position, see `Noise`.
+        blocks: Rows that share a pose.
+        readings: Scatter of repeated readings.
+        estimated: Names of the components that the rows can tell apart.
     """
 
     turn: Floats
@@ -83,6 +297,9 @@ class Whitener:
     extra: Floats
     unseen: Floats
     origin: tuple[float, float, float] | None
+    blocks: tuple[PoseBlock, ...] = ()
+    readings: Readings = field(default_factory=Readings)
+    estimated: tuple[str, ...] = ("tracker", "joint")
 
     @classmethod
     def build(
@@ -100,25 +317,30 @@ class Whitener:
             origin: Tracker position in the frame of `position`, or None.
             extra: Additional variance of each row, (n,) [m^2].
         """
-        J = batch.jacobian
+        J, states = batch.jacobian, batch.states
         square = J @ np.swapaxes(J, 1, 2)
         values, vectors = np.linalg.eigh(square)
-        heading = batch.states.heading
+        heading = states.heading
         unseen, moving = np.zeros_like(values), ~np.isnan(heading[:, 0])
         if moving.any():
             vectors[moving] = _along_first(heading[moving])
             turned = np.swapaxes(vectors, 1, 2) @ square @ vectors
             values[moving] = np.einsum("nii->ni", turned)[moving]
             unseen[moving, 0] = UNSEEN**2
-        shape = np.repeat(tracker_shape(position, origin)[:, None] ** 2, 3, axis=1)
+        shape = tracker_shape(position, origin) ** 2
         more = np.zeros(len(batch)) if extra is None else extra
+        turn = np.swapaxes(vectors, 1, 2)
+        groups = groups_of(poses_of(states))
         return cls(
-            turn=np.swapaxes(vectors, 1, 2),
-            tracker=shape,
+            turn=turn,
+            tracker=np.repeat((shape / states.readings)[:, None], 3, axis=1),
             joint=np.maximum(values, 0.0),
             extra=np.repeat(more[:, None], 3, axis=1),
             unseen=unseen,
             origin=origin,
+            blocks=tuple(PoseBlock.of(g, states.order, turn, J) for g in groups),
+            readings=_scatter_of_readings(states, shape),
+            estimated=_estimable(states, groups),
         )
 
     def rotate(self, rows: Floats) -> Floats:
@@ -127,45 +349,336 @@ class Whitener:
             return np.asarray(np.einsum("nij,nj->ni", self.turn, rows))
         return np.asarray(self.turn @ rows)
 
+    def own_variance(self, noise: Noise) -> Floats:
+        """Variance of every rotated component that a row shares with no other row."""
+        own: Floats = noise.tracker**2 * self.tracker + self.extra + self.unseen
+        return own
+
     def variance(self, noise: Noise) -> Floats:
         """Variance of every rotated component, (n, 3) [m^2]."""
-        total: Floats = (
-            noise.tracker**2 * self.tracker
-            + noise.joint**2 * self.joint
-            + self.extra
-            + self.unseen
+        joint, shift = (
+            noise.joint**2 + noise.pose_joint**2,
+            noise.stop**2 + noise.pose**2,
         )
+        total: Floats = self.own_variance(noise) + joint * self.joint + shift
         return total
 
-    def estimate(self, squares: Floats, weight: Floats, start: Noise) -> Noise:
-        """Maximise the likelihood of expected squared residuals over t and r.
+    def whitening(self, noise: Noise, weight: Floats) -> Whitening:
+        """Make the noise of rows independent and of unit variance.
+
+        The variance of a row of weight w < 1 is larger by (1 / w - 1) of it; a row of
+        weight 0 says nothing.
+
+        Args:
+            noise: Sizes of the components.
+            weight: Of every row, (n,).
+        """
+        v, used = self.variance(noise), weight > 0
+        scale: Floats = np.sqrt(weight[:, None] / v)
+        logs = np.where(used[:, None], np.log(v), 0.0)
+        log_det, parts = self.readings.log_noise(noise.tracker), []
+        for block in self.correlated(noise):
+            V = block.covariance(noise, self.own_variance(noise))
+            log_det += _log_det(V, used[block.rows]) - float(logs[block.rows].sum())
+            inflated = V + _inflation(v[block.rows], weight[block.rows])
+            root = _inverse_root(_masked(inflated, used[block.rows]))
+            there = np.repeat(used[block.rows], 3, axis=1)
+            parts.append((block.rows, root * (there[:, :, None] & there[:, None])))
+            scale[block.rows] = 1.0
+        return Whitening(scale, RowBlocks(tuple(parts)), log_det + float(logs.sum()))
+
+    def correlated(self, noise: Noise) -> tuple[PoseBlock, ...]:
+        """Return the poses whose rows must be taken together."""
+        shared = noise.pose_joint**2 * self.joint + noise.pose**2
+        if float(shared.mean()) > NO_POSE * float(self.variance(noise).mean()):
+            return self.blocks
+        return tuple(
+            b for b in (_several_in_stop(b) for b in self.blocks) if len(b.rows)
+        )
+
+    def distances(self, rotated: Floats, noise: Noise, weight: Floats) -> Floats:
+        """Measure residuals in standard deviations, (n,).
+
+        A row of a pose with others is also compared with what those, as far as they
+        are used, make likely of it: a reading that disagrees with its own stop. Of
+        rows that disagree it is the one that is farther off by itself.
+
+        Args:
+            rotated: Residuals in the eigenbases, (n, 3) [m].
+            noise: Sizes of the components.
+            weight: Weight of every row so far, (n,).
+        """
+        alone: Floats = np.sqrt((rotated**2 / self.variance(noise)).sum(axis=1))
+        out = np.array(alone)
+        for block in self.correlated(noise):
+            V = block.covariance(noise, self.own_variance(noise))
+            used = weight[block.rows] > 0
+            off = _given_others(V, rotated[block.rows], used)
+            worst = (alone[block.rows] * used).max(axis=1, keepdims=True)
+            asked = ~used | (alone[block.rows] >= worst)
+            out[block.rows] = np.where(
+                asked, np.maximum(off, alone[block.rows]), alone[block.rows]
+            )
+        return out
+
+    def estimate(
+        self,
+        squares: Floats,
+        weight: Floats,
+        start: Noise,
+        products: Sequence[Floats] = (),
+    ) -> Noise:
+        """Maximise the likelihood of expected squared residuals over the components.
 
         Args:
             squares: Squared residual plus its posterior variance, rotated, (n, 3).
             weight: Weight of every row, (n,), 0 drops it.
             start: Where to begin.
+            products: The same as products between the rows of each of `blocks`,
+                (groups, 3 m, 3 m); without them rows of a pose count by themselves.
         """
-        t0 = float(np.median(np.sqrt(self.tracker)))
-        r0 = float(np.median(np.sqrt(self.joint.mean(axis=1))))
-        used = weight > 0
-        T, R = self.tracker[used], self.joint[used]
-        E, S, w = (self.extra + self.unseen)[used], squares[used], weight[used, None]
+        with_others = len(products) == len(self.blocks)
+        kinds = self.estimated if with_others else KINDS[:2]
+        alone = np.ones(len(weight), dtype=bool)
+        costs: list[Callable[[Floats], tuple[float, Floats]]] = []
+        if with_others:
+            for block, S in zip(self.blocks, products, strict=True):
+                alone[block.rows] = False
+                costs.append(_BlockCost.of(self, block, S, weight, kinds))
+        costs.append(_RowCost.of(self, squares, weight * alone, kinds))
+        costs.append(_ReadingCost(self.readings, kinds))
 
         def cost(u: Floats) -> tuple[float, Floats]:
             """Negative log likelihood and its gradient by log standard deviations."""
-            t2, r2 = np.exp(2 * u)
-            v = t2 * T + r2 * R + E
-            slope = w * (1.0 / v - S / v**2)
-            grad = np.array([(slope * t2 * T).sum(), (slope * r2 * R).sum()])
-            return float(0.5 * (w * (np.log(v) + S / v)).sum()), grad
+            parts = [each(np.exp(2.0 * u)) for each in costs]
+            return sum(p[0] for p in parts), np.sum([p[1] for p in parts], axis=0)
 
         from scipy.optimize import minimize  # slow to load, and for fits alone
 
-        bounds = [(np.log(SMALLEST / s), np.log(LARGEST / s)) for s in (t0, r0)]
-        # A component of no size has no slope by its logarithm and would stay so.
-        t1 = max(start.tracker, LIVELY * start.joint * r0 / t0)
-        r1 = max(start.joint, LIVELY * start.tracker * t0 / r0)
-        begin = np.clip(np.log([t1, r1]), *np.array(bounds).T)
+        begin, bounds = self._begin(start, kinds)
         best = minimize(cost, begin, jac=True, method="L-BFGS-B", bounds=bounds)
-        t, r = np.exp(best.x)
-        return Noise(float(t), float(r), self.origin)
+        found = dict(zip(kinds, np.exp(best.x).tolist(), strict=True))
+        return replace(Noise(0.0, 0.0, self.origin), **found)
+
+    def _begin(
+        self, start: Noise, kinds: Sequence[str]
+    ) -> tuple[Floats, list[tuple[float, float]]]:
+        """Return logarithms to begin with, and their bounds.
+
+        A component of no size has no slope by its logarithm and would stay so.
+        """
+        t0 = float(np.median(np.sqrt(self.tracker)))
+        r0 = float(np.median(np.sqrt(self.joint.mean(axis=1))))
+        unit = {"tracker": t0, "joint": r0, "pose_joint": r0, "stop": 1.0, "pose": 1.0}
+        size = np.array([getattr(start, k) * unit[k] for k in kinds])
+        least = LIVELY * float(size.max())
+        bounds = [
+            (np.log(SMALLEST / unit[k]), np.log(LARGEST / unit[k])) for k in kinds
+        ]
+        begin = np.log(np.maximum(size, least) / [unit[k] for k in kinds])
+        return np.clip(begin, *np.array(bounds).T), bounds
+
+
+def _scatter_of_readings(states: States, shape: Floats) -> Readings:
+    """Sum the scatter of readings over the tracker's variances, (n,) [m^2]."""
+    more = states.readings > 1.0
+    if not more.any():
+        return Readings()
+    freedom = 3.0 * (states.readings[more] - 1.0)
+    square = float((states.scatter[more] / shape[more]).sum())
+    log_shape = float((freedom * np.log(shape[more])).sum())
+    return Readings(square, float(freedom.sum()), log_shape)
+
+
+def _estimable(states: States, groups: Sequence[Ints]) -> tuple[str, ...]:
+    """Name the components that rows can tell apart."""
+    order = states.order
+    repeated = bool((states.readings > 1.0).any())
+    nests = rounds = False
+    for rows in groups:
+        stops = order[rows]
+        rounds |= bool((stops != stops[:, :1]).any())
+        in_stop = (np.diff(np.sort(stops, axis=1), axis=1) == 0.0).any()
+        nests |= bool(in_stop)
+    out = KINDS[:3] if repeated or nests else KINDS[:2]
+    return (*out, *KINDS[3:]) if rounds else out
+
+
+def _several_in_stop(block: PoseBlock) -> PoseBlock:
+    """Keep the poses of which a stop has several rows."""
+    m = block.rows.shape[1]
+    several = block.stop[:, ::3, ::3].sum(axis=(1, 2)) > m
+    return PoseBlock(
+        block.rows[several], block.stop[several], block.joint[several],
+        block.shift[several],
+    )  # fmt: skip
+
+
+def _inflation(v: Floats, weight: Floats) -> Floats:
+    """Give rows of a weight below 1 more variance, (groups, 3 m, 3 m)."""
+    more = 1.0 / np.where(weight > 0, np.minimum(weight, 1.0), 1.0) - 1.0
+    diagonal = (v * more[:, :, None]).reshape(len(v), -1)
+    out = np.zeros((*diagonal.shape, diagonal.shape[1]))
+    k = np.arange(diagonal.shape[1])
+    out[:, k, k] = diagonal
+    return out
+
+
+def _masked(V: Floats, used: Bools) -> Floats:
+    """Take rows out of covariances: they have unit variance, and no other row's.
+
+    Args:
+        V: (groups, 3 m, 3 m).
+        used: Which rows stay, (groups, m).
+    """
+    there = np.repeat(used, 3, axis=1).astype(float)
+    out: Floats = V * there[:, :, None] * there[:, None]
+    k = np.arange(V.shape[1])
+    out[:, k, k] += 1.0 - there
+    return out
+
+
+def _inverse_root(V: Floats) -> Floats:
+    """Return symmetric W with W V W = 1, (groups, k, k)."""
+    values, vectors = np.linalg.eigh(V)
+    scaled = vectors / np.sqrt(values)[:, None]
+    root: Floats = scaled @ np.swapaxes(vectors, 1, 2)
+    return root
+
+
+def _log_det(V: Floats, used: Bools) -> float:
+    """Sum log determinants of covariances of the rows that are used."""
+    return float(np.linalg.slogdet(_masked(V, used))[1].sum())
+
+
+def _given_others(V: Floats, rotated: Floats, used: Bools) -> Floats:
+    """Measure rows against what the other used rows of their pose make likely.
+
+    Args:
+        V: Covariances, (groups, 3 m, 3 m).
+        rotated: Residuals, (groups, m, 3).
+        used: Which rows the others may be, (groups, m).
+
+    Returns:
+        Mahalanobis distances, (groups, m).
+    """
+    count, m = used.shape
+    out = np.zeros((count, m))
+    flat = rotated.reshape(count, -1)
+    for k in range(m):
+        asked = np.array(used)
+        asked[:, k] = True
+        P = np.linalg.inv(_masked(V, asked))
+        kept = np.repeat(asked, 3, axis=1)
+        own = slice(3 * k, 3 * k + 3)
+        pulled = np.einsum("gij,gj->gi", P[:, own], flat * kept)
+        spread = np.linalg.solve(P[:, own, own], pulled[:, :, None])[:, :, 0]
+        out[:, k] = np.sqrt(np.maximum((pulled * spread).sum(axis=1), 0.0))
+    return out
+
+
+# What sizes of the components cost: minus their log likelihood, and its slope by the
+# logarithm of every standard deviation. They are asked by their squares.
+
+
+@dataclass(frozen=True, eq=False)
+class _RowCost:
+    """Of rows alone.
+
+    Attributes:
+        parts: Variance per unit of each component, (kinds, n, 3).
+        known, square, weight: As in `Whitener.estimate`.
+    """
+
+    parts: Floats
+    known: Floats
+    square: Floats
+    weight: Floats
+
+    @classmethod
+    def of(
+        cls, whitener: Whitener, square: Floats, weight: Floats, kinds: Sequence[str]
+    ) -> _RowCost:
+        """Take the rows that are used."""
+        used = weight > 0
+        ones = np.ones_like(whitener.joint)
+        shape = {
+            "tracker": whitener.tracker, "joint": whitener.joint, "stop": ones,
+            "pose_joint": whitener.joint, "pose": ones,
+        }  # fmt: skip
+        parts = np.stack([shape[k][used] for k in kinds])
+        known = (whitener.extra + whitener.unseen)[used]
+        return cls(parts, known, square[used], weight[used, None])
+
+    def __call__(self, sizes: Floats) -> tuple[float, Floats]:
+        v = np.tensordot(sizes, self.parts, axes=1) + self.known
+        slope = self.weight * (1.0 / v - self.square / v**2)
+        value = 0.5 * (self.weight * (np.log(v) + self.square / v)).sum()
+        return float(value), sizes * np.tensordot(self.parts, slope, axes=2)
+
+
+@dataclass(frozen=True, eq=False)
+class _BlockCost:
+    """Of rows that share a pose.
+
+    Attributes:
+        parts: Covariance per unit of each component, (kinds, groups, 3 m, 3 m).
+        known, square: Known covariance and expected products, (groups, 3 m, 3 m).
+        weight: Of every group, (groups,).
+    """
+
+    parts: tuple[Floats, ...]
+    known: Floats
+    square: Floats
+    weight: Floats
+
+    @classmethod
+    def of(
+        cls,
+        whitener: Whitener,
+        block: PoseBlock,
+        products: Floats,
+        weight: Floats,
+        kinds: Sequence[str],
+    ) -> _BlockCost:
+        """Take the poses of which any row is used."""
+        rows = block.rows
+        used = np.repeat(weight[rows] > 0, 3, axis=1).astype(float)
+        mask, k = used[:, :, None] * used[:, None], np.arange(used.shape[1])
+        parts = []
+        for kind in kinds:
+            if kind == "tracker":
+                part = np.zeros_like(mask)
+                part[:, k, k] = whitener.tracker[rows].reshape(len(rows), -1)
+            else:
+                part = block.parts(kind)
+            parts.append(part * mask)
+        known = np.zeros_like(mask)
+        extra = (whitener.extra + whitener.unseen)[rows].reshape(len(rows), -1)
+        known[:, k, k] = extra * used + (1.0 - used)
+        heaviness = np.where(weight[rows] > 0, weight[rows], np.inf).min(axis=1)
+        heaviness = np.where(np.isfinite(heaviness), heaviness, 0.0)
+        return cls(tuple(parts), known, products * mask, heaviness)
+
+    def __call__(self, sizes: Floats) -> tuple[float, Floats]:
+        V = self.known + sum(s * p for s, p in zip(sizes, self.parts, strict=True))
+        P = np.linalg.inv(V)
+        PS = P @ self.square
+        log_det = np.linalg.slogdet(V)[1]
+        value = 0.5 * (self.weight * (log_det + np.einsum("gii->g", PS))).sum()
+        M = (P - PS @ P) * self.weight[:, None, None]
+        slope = np.array([float((M * p).sum()) for p in self.parts])
+        return float(value), sizes * slope
+
+
+@dataclass(frozen=True, eq=False)
+class _ReadingCost:
+    """Of repeated readings."""
+
+    readings: Readings
+    kinds: Sequence[str]
+
+    def __call__(self, sizes: Floats) -> tuple[float, Floats]:
+        grad = np.zeros(len(sizes))
+        grad[0] = self.readings.freedom - self.readings.square / sizes[0]
+        return 0.5 * self.readings.log_noise(float(np.sqrt(sizes[0]))), grad

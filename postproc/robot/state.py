@@ -27,10 +27,12 @@ class States:
         temperature: Arm or ambient temperature, (n,) [deg C].
         payload: Payload mass, (n,) [kg].
         payload_com: Payload centre of mass in the flange frame, (n, 3) [m].
-        order: Position in the visit order, (n,).
+        order: Position in the visit order, (n,); equal for rows of one stop.
         heading: Direction in which the TCP moves, (n, 3), unit vectors in the base
             frame, where it was read in motion: then nothing is known of its place along
             that direction. NaN where the arm stands still.
+        readings: Number of readings that a row's position is the mean of, (n,).
+        scatter: Sum of their squared distances from it, (n,) [m^2].
     """
 
     q: Floats
@@ -45,6 +47,8 @@ class States:
     payload_com: Floats
     order: Floats
     heading: Floats
+    readings: Floats
+    scatter: Floats
 
     def __post_init__(self) -> None:
         read_only(self)
@@ -101,6 +105,9 @@ def make_states(
         )
         for name, shape in shapes.items()
     }
+    for name, value in (("readings", 1.0), ("scatter", 0.0)):
+        given = np.array(covariates.pop(name, value), dtype=float)
+        values[name] = np.broadcast_to(given, (n,))
     tool_id = covariates.pop("tool_id", 0)
     order = covariates.pop("order", np.arange(n))
     if covariates:

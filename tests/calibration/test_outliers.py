@@ -19,7 +19,7 @@ NOISE = 3e-5
 
 def judged(residual: np.ndarray):  # type: ignore[no-untyped-def]
     distance = np.linalg.norm(residual, axis=1) / NOISE
-    return judge(distance, residual, STATES.q, J)
+    return judge(distance, residual, STATES.q, J, np.arange(len(J)))
 
 
 def noise(seed: int = 1) -> np.ndarray:
@@ -58,7 +58,7 @@ def test_a_row_is_no_neighbour_of_its_own_where_poses_repeat() -> None:
     residual = noise(3)[twice]
     residual[105] = [3e-3, 0, 0]
     distance = np.linalg.norm(residual, axis=1) / NOISE
-    found = judge(distance, residual, STATES.q[twice], J[twice])
+    found = judge(distance, residual, STATES.q[twice], J[twice], twice)
     assert found.weight[105] == 0
     nearest = _without(np.array([5, 7]), np.array([[4, 5, 6], [1, 2, 3]]))
     assert nearest.tolist() == [[4, 6], [1, 2]]

@@ -11,7 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from postproc.arrays import Floats
-from postproc.calibration.diagnosis.held_out import deal, multi_directional, noise_floor
+from postproc.calibration.diagnosis.held_out import (
+    deal,
+    multi_directional,
+    noise_floor,
+    whole_poses,
+)
 from postproc.calibration.diagnosis.next_poses import (
     poses_that_separate,
     poses_that_sharpen,
@@ -46,6 +51,7 @@ from postproc.calibration.regression import Fit, fit_effects
 from postproc.calibration.report import report_directions, weighed_down
 from postproc.calibration.reversals import newer_widths, split_reversals, tell_widths
 from postproc.calibration.selection import model_of, told_apart
+from postproc.calibration.stops import pool_readings
 from postproc.model.combination import Combination
 from postproc.model.covariate import JOINTS
 from postproc.model.kinematics import Batch
@@ -100,7 +106,7 @@ def hold_out(
     """
     base = found.base
     used = base.rows.weight > 0
-    part = deal(base.batch.states.order, PARTS, seed, RUN)
+    part = whole_poses(deal(base.batch.states.order, PARTS, seed, RUN), base.pose)
     count = PARTS if len(base.batch) < MANY else 1
     rows, before, after, fitted = [], [], [], 0
     for k in range(count):
@@ -202,7 +208,7 @@ def diagnose(
         PostprocError: A model that cannot be refitted.
         ModelError: A model of another arm.
     """
-    survey, reversals = split_reversals(survey, arm)
+    survey, reversals = split_reversals(pool_readings(survey), arm)
     bases = refit(survey, arm, model, tracker, setup)
     without, sides = ruled_out(survey.motion), survey.states.direction
     tried = [trace(base, seed, progress, without) for base in bases]

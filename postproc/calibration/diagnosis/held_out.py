@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 import warnings
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 
-from postproc.arrays import Bools, Floats
+from postproc.arrays import Floats
 from postproc.calibration.design import DesignMatrix
 from postproc.calibration.evidence import inverted
 from postproc.calibration.regression import Fit
 from postproc.model.effects.effect import Candidate
 from postproc.model.kinematics import Batch
-from postproc.model.noise import Noise
+from postproc.model.noise import SAME_POSE, Noise
 
 # Whether a candidate predicts rows that did not fit it.
 #
@@ -52,6 +52,12 @@ def deal(values: Floats, folds: int, seed: int, run: int = RUN) -> NDArray[np.in
     return np.asarray(hands[runs], dtype=np.int64)
 
 
+def whole_poses(fold: NDArray[np.int64], pose: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Put all rows of a pose into the fold of its first one, (n,)."""
+    _, first, of_row = np.unique(pose, return_index=True, return_inverse=True)
+    return np.asarray(fold[first][of_row.reshape(-1)])
+
+
 def regions(q: Floats) -> NDArray[np.int64]:
     """Cut rows into regions of joint space: a fold then has no neighbours elsewhere.
 
@@ -76,18 +82,23 @@ class Gain:
 
     Attributes:
         mean: In units of the noise variance.
-        std_error: Of the mean, over the rows.
+        std_error: Of the mean, over the poses.
     """
 
     mean: float
     std_error: float
 
     @classmethod
-    def between(cls, before: Floats, after: Floats, used: Bools) -> Self:
-        """Compare two sets of held-out errors (n, 3), over rows that count, (n,)."""
+    def between(cls, before: Floats, after: Floats, fit: Fit) -> Self:
+        """Compare two sets of held-out errors (n, 3) of a fit's rows that count."""
+        used = fit.rows.weight > 0
         fall = (before**2 - after**2).sum(axis=1)[used]
-        error = float(fall.std() / np.sqrt(max(len(fall), 1)))
-        return cls(float(fall.mean()), error)
+        _, pose = np.unique(fit.pose[used], return_inverse=True)
+        by_pose = np.bincount(pose.reshape(-1), fall)
+        mean = float(fall.mean())
+        each = by_pose - mean * np.bincount(pose.reshape(-1))
+        error = float(np.sqrt((each**2).sum()) / max(len(fall), 1))
+        return cls(mean, error)
 
     @property
     def sure(self) -> bool:
@@ -103,7 +114,7 @@ def held_out_gain(fit: Fit, number: int, candidate: Candidate) -> Gain:
         number: Place of the effect in the fit.
         candidate: The candidate that the effect was.
     """
-    fold = deal(candidate.driver(fit.batch), FOLDS, seed=0)
+    fold = whole_poses(deal(candidate.driver(fit.batch), FOLDS, seed=0), fit.pose)
     return gain_in(fit, number, Folds.of_fit(fit, fold))
 
 
@@ -116,7 +127,7 @@ def gain_in(fit: Fit, number: int, folds: Folds) -> Gain:
         folds: Its rows in folds.
     """
     after, before = folds.errors(fit.combination.slices[number])
-    return Gain.between(before, after, fit.rows.weight > 0)
+    return Gain.between(before, after, fit)
 
 
 @dataclass(frozen=True, eq=False)
@@ -214,7 +225,6 @@ def _with_and_without(
 
 # The noise floor: how large the error of one measured row is at best.
 
-SAME_POSE = 1e-5  # [rad] joint angles that are one pose
 ENOUGH = 5  # repeats beyond the first that give an estimate
 LENGTH = float(np.sqrt(8 / (3 * np.pi)))  # mean length over its root mean square
 ISO_RP = 3.615  # RP of ISO 9283 over the standard deviation per axis, round scatter
@@ -249,7 +259,8 @@ def noise_floor(fit: Fit, tracker_known: bool) -> NoiseFloor:
         arrival = fit.batch.arm.repeatability / ISO_RP
         size = LENGTH * float(np.sqrt(3 * (arrival**2 + (tracker**2).mean())))
         return NoiseFloor(size, "tracker and repeatability of the data sheets")
-    variance = fit.whitener.variance(fit.noise).sum(axis=1).mean()
+    of_stops = replace(fit.noise, pose_joint=0.0, pose=0.0)
+    variance = fit.whitener.variance(of_stops).sum(axis=1).mean()
     return NoiseFloor(LENGTH * float(np.sqrt(variance)), "estimated from the rows")
 
 

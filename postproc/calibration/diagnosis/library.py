@@ -15,7 +15,7 @@ from postproc.calibration.regression import Fit
 from postproc.model.effects import EFFECTS
 from postproc.model.effects.effect import Candidate
 from postproc.model.kinematics import Batch
-from postproc.model.noise import Whitener
+from postproc.model.noise import Whitener, Whitening
 
 # The present model taken out of the residual and of every candidate, once.
 #
@@ -44,8 +44,7 @@ class Projection:
         root: r, (k,).
         axes: V, (p, k).
         rest: Filtered residual, (3 n,): N(0, I) if the model is complete.
-        seen: The joint last asked for: its axis (n, 3) whitened and of unit length, the
-            length (n,), and U along the axis (n, k).
+        seen: The joint last asked for: its axes, and U along them, (n, k).
     """
 
     fit: Fit
@@ -55,7 +54,7 @@ class Projection:
     root: Floats
     axes: Floats
     rest: Floats
-    seen: dict[int, tuple[Floats, Floats, Floats]] = field(default_factory=dict)
+    seen: dict[int, tuple[JointAxes, Floats]] = field(default_factory=dict)
 
     @classmethod
     def of(cls, fit: Fit, without: int | None = None) -> Projection:
@@ -102,22 +101,87 @@ class Projection:
             rows: The rows.
         """
         if joint is None:
-            return View(self.fit.row_scale.reshape(-1), self.taken, rows)
+            return View(ColumnWhitening.of(self.fit.whitening), self.taken, rows)
         if joint not in self.seen:
             self.seen.clear()  # a search asks again and again for one joint
-            axis = self.fit.whiten(self.at.jacobian[:, :, joint]).reshape(-1, 3)
-            size = np.linalg.norm(axis, axis=1)
-            axis = axis / np.maximum(size, 1e-300)[:, None]
-            self.seen[joint] = axis, size, _along(axis, self.taken)
-        axis, size, taken = self.seen[joint]
-        return View(size, taken, _along(axis, rows))
+            axes = JointAxes.of(self.fit, self.at.jacobian[:, :, joint])
+            self.seen[joint] = axes, axes.along(self.taken)
+        axes, taken = self.seen[joint]
+        return View(axes.size, taken, axes.along(rows))
 
 
-def _along(axis: Floats, columns: Floats) -> Floats:
-    """Take columns of scalar rows (3 n, k) along an axis a row, (n, 3): (n, k)."""
-    by_row = columns.reshape(len(axis), 3, columns.shape[1])
-    along: Floats = np.einsum("nk,nkd->nd", axis, by_row)
-    return along
+@dataclass(frozen=True, eq=False)
+class ColumnWhitening:
+    """What whitens columns given as (c, k, m) by their m numbers.
+
+    Attributes:
+        size: What each number is multiplied with, (m,); 1 in a block.
+        blocks: Numbers that are taken at once, (groups, w), and matrices of each group,
+            (groups, w, w).
+    """
+
+    size: Floats
+    blocks: tuple[tuple[Ints, Floats], ...] = ()
+
+    @classmethod
+    def of(cls, whitening: Whitening) -> ColumnWhitening:
+        """Take the whitening of rotated rows, three numbers a row."""
+        blocks = tuple(
+            ((3 * rows[:, :, None] + np.arange(3)).reshape(len(rows), -1), matrix)
+            for rows, matrix in whitening.blocks.parts
+        )
+        return cls(whitening.scale.reshape(-1), blocks)
+
+    def apply(self, columns: Floats, out: Floats | None = None) -> Floats:
+        """Whiten columns, (c, k, m)."""
+        white: Floats = np.multiply(columns, self.size, out=out)
+        for index, matrix in self.blocks:
+            white[:, :, index] = np.einsum("gab,ckgb->ckga", matrix, white[:, :, index])
+        return white
+
+
+@dataclass(frozen=True, eq=False)
+class JointAxes:
+    """Whitened axes of one joint, orthonormal, and their sizes.
+
+    Whitened columns of the joint are the axes times the sizes times its angles.
+
+    Attributes:
+        axis: Of every row alone, (n, 3), 0 in a block.
+        size: The sizes.
+        blocks: Rows of a pose, (groups, m), and their axes, (groups, 3 m, m).
+    """
+
+    axis: Floats
+    size: ColumnWhitening
+    blocks: tuple[tuple[Ints, Floats], ...]
+
+    @classmethod
+    def of(cls, fit: Fit, moved: Floats) -> JointAxes:
+        """Whiten what the joint moves the rows by, (n, 3) [m/rad]."""
+        by, turned = fit.whitening, fit.whitener.rotate(moved)
+        axis = turned * by.scale
+        size = np.linalg.norm(axis, axis=1)
+        blocks, sizes = [], []
+        for rows, matrix in by.blocks.parts:
+            count, m = rows.shape
+            apart = np.zeros((count, m, 3, m))
+            apart[:, np.arange(m), :, np.arange(m)] = np.swapaxes(turned[rows], 0, 1)
+            own, triangle = np.linalg.qr(matrix @ apart.reshape(count, 3 * m, m))
+            blocks.append((rows, own))
+            sizes.append((rows, triangle))
+            axis[rows], size[rows] = 0.0, 1.0
+        axis = axis / np.maximum(size, 1e-300)[:, None]
+        return cls(axis, ColumnWhitening(size, tuple(sizes)), tuple(blocks))
+
+    def along(self, columns: Floats) -> Floats:
+        """Take columns of scalar rows (3 n, k) along the axes: (n, k)."""
+        by_row = columns.reshape(len(self.axis), 3, columns.shape[1])
+        out: Floats = np.einsum("nk,nkd->nd", self.axis, by_row)
+        for rows, own in self.blocks:
+            stacked = by_row[rows].reshape(*own.shape[:2], -1)
+            out[rows] = np.swapaxes(own, 1, 2) @ stacked
+        return out
 
 
 def _taken(fit: Fit, known: NDArray[np.int64]) -> tuple[Floats, Floats, Floats]:
@@ -137,12 +201,12 @@ class View:
     """Filtered rows, and what the model takes, along the columns of candidates.
 
     Attributes:
-        size: What whitening multiplies the columns with, (m,).
+        size: What whitens the columns.
         taken: U of `Projection` along them, (m, k).
         rows: Filtered rows along them, (m, draws).
     """
 
-    size: Floats
+    size: ColumnWhitening
     taken: Floats
     rows: Floats
 
@@ -219,13 +283,13 @@ class Shelf:
         columns = make_columns(self.joint, self.candidates, batch, whitener)
         return replace(self, columns=columns)
 
-    def whitened(self, projection: Projection, size: Floats) -> Floats:
-        """Return the columns times a size (m,), (c, k, m)."""
+    def whitened(self, projection: Projection, size: ColumnWhitening) -> Floats:
+        """Return the whitened columns, (c, k, m)."""
         if self.columns is not None:
-            return self.columns * size
+            return size.apply(self.columns)
         made = self.made(projection.at, projection.fit.whitener)
         assert made.columns is not None
-        return np.multiply(made.columns, size, out=made.columns)
+        return size.apply(made.columns, out=made.columns)
 
     def at_rows(self, rows: NDArray[np.int64]) -> Shelf:
         """Return the columns of some of the rows."""

@@ -377,7 +377,7 @@ def predicts_elsewhere(
         other = extend(fit, rival.best, instead_of=place)
         other = replace(other, noise=fit.noise, rows=fit.rows, whitener=fit.whitener)
         less = Folds.of_fit(other, region).errors()[0]
-        gain = Gain.between(left, less, fit.rows.weight > 0)
+        gain = Gain.between(left, less, fit)
         if gain.mean > CERTAIN * gain.std_error:
             best, left = rival, less
     return best

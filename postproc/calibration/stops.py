@@ -1,0 +1,164 @@
+"""Stops of a survey: readings that were taken while the arm stood still are one row."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from scipy.stats import chi2
+
+from postproc.arrays import Bools, Floats, Ints
+from postproc.calibration.measurements import DroppedRow, Measurements
+from postproc.calibration.orientations import means
+from postproc.model.noise import SAME_POSE, poses_of
+from postproc.robot.pose import MM
+from postproc.robot.state import States
+
+AWAY = (
+    2.0  # times the usual time between two stops in which an arm can leave and return
+)
+SAME_POINT = 1e-7  # [m] probe points that are one
+FALSE_ALARMS = 0.01  # readings that are dropped per survey of good ones
+FEWEST = 3  # readings of one stop of which one may disagree with the others
+NORMAL = 1.4826  # standard deviation over the median absolute deviation
+
+
+def stops_of(states: States, visit: Ints | None = None) -> Ints:
+    """Number the stops, (n,), rows in visit order.
+
+    A stop is a run of rows with equal commanded angles, directions and payload, in
+    which, if there is a clock, no gap is as long as the arm needs to leave and return.
+
+    Args:
+        states: The rows.
+        visit: Number of the visit of every row where the file has it, (n,).
+    """
+    if len(states) == 0:
+        return np.zeros(0, dtype=np.int64)
+    if visit is not None:
+        key = np.column_stack([visit, poses_of(states), states.direction])
+        _, label = np.unique(key, axis=0, return_inverse=True)
+        return _in_order(label.reshape(-1))
+    begins = _commanded_elsewhere(states)
+    begins |= _long_gaps(states.time, begins)
+    return np.concatenate([[0], np.cumsum(begins)]).astype(np.int64)
+
+
+def _commanded_elsewhere(states: States) -> Bools:
+    """Find the rows that another pose, direction or payload precedes, (n - 1,)."""
+    moved = (np.abs(np.diff(states.q, axis=0)) > SAME_POSE).any(axis=1)
+    turned = (np.diff(states.direction, axis=0) != 0).any(axis=1)
+    loaded = np.diff(np.nan_to_num(states.payload)) != 0
+    moving = ~np.isnan(states.heading[1:, 0])
+    return np.asarray(moved | turned | loaded | moving)
+
+
+def _long_gaps(time: Floats, begins: Bools) -> Bools:
+    """Find the gaps in which the arm can have left a pose and returned, (n - 1,)."""
+    gap = np.diff(time)
+    usual = gap[begins & np.isfinite(gap)]
+    if not len(usual):
+        return np.zeros(len(gap), dtype=bool)
+    return np.asarray(np.nan_to_num(gap) > AWAY * float(np.median(usual)))
+
+
+def pool_readings(survey: Measurements) -> Measurements:
+    """Average the readings of every stop and nest into one row.
+
+    A reading that disagrees with all others of its stop is dropped and listed.
+
+    Args:
+        survey: Rows in visit order.
+
+    Returns:
+        Rows with the mean position; `readings` and `scatter` of their states say how
+        many readings there were and how they scatter. Rows of one stop have the same
+        `order`.
+    """
+    stop = stops_of(survey.states, survey.visit)
+    if len(np.unique(stop)) == len(survey):
+        return survey
+    survey, stop = _without_strays(survey, stop)
+    _, label = np.unique(_row_keys(survey.states, stop), axis=0, return_inverse=True)
+    label = _in_order(label.reshape(-1))
+    first = np.unique(label, return_index=True)[1]
+    count = np.bincount(label).astype(float)
+    mean = means(survey.position, label)
+    square = ((survey.position - mean[label]) ** 2).sum(axis=1)
+    begins = np.unique(stop, return_index=True)[1]
+    order = survey.states.order[begins[np.searchsorted(np.unique(stop), stop[first])]]
+    pooled = survey[first]
+    states = pooled.states.with_(
+        readings=count, scatter=np.bincount(label, square), order=order,
+        time=means(survey.states.time[:, None], label)[:, 0],
+        temperature=means(survey.states.temperature[:, None], label)[:, 0],
+    )  # fmt: skip
+    rotation = survey.rotation
+    if rotation is not None:
+        rotation = _mean_rotations(rotation, label)
+    note = (
+        f"{len(survey)} readings at {len(begins)} stops: readings of one probe point "
+        "at a stop are averaged"
+    )
+    return replace(
+        pooled, states=states, position=mean, rotation=rotation,
+        warnings=(*survey.warnings, note),
+    )  # fmt: skip
+
+
+def _row_keys(states: States, stop: Ints) -> Floats:
+    """Tell stops and probe points apart, (n, 5)."""
+    point = np.round(states.tool / SAME_POINT)
+    return np.column_stack([stop, states.tool_id, point])
+
+
+def _in_order(label: Ints) -> Ints:
+    """Number labels by where they first appear."""
+    _, first, of_row = np.unique(label, return_index=True, return_inverse=True)
+    rank = np.argsort(np.argsort(first))
+    return np.asarray(rank[of_row.reshape(-1)])
+
+
+def _mean_rotations(rotation: Floats, label: Ints) -> Floats:
+    """Average rotations (n, 3, 3) over each label: the nearest rotation to the mean."""
+    mean = means(rotation.reshape(-1, 9), label).reshape(-1, 3, 3)
+    u, _, vt = np.linalg.svd(mean)
+    sign = np.linalg.det(u @ vt)
+    u[:, :, 2] *= sign[:, None]
+    return np.asarray(u @ vt)
+
+
+def _without_strays(survey: Measurements, stop: Ints) -> tuple[Measurements, Ints]:
+    """Drop readings that disagree with the others of their stop, list them.
+
+    The scatter is that of all stops with enough readings: most of these are good.
+    """
+    _, label = np.unique(_row_keys(survey.states, stop), axis=0, return_inverse=True)
+    label = label.reshape(-1)
+    enough = np.bincount(label)[label] >= FEWEST
+    if not enough.any():
+        return survey, stop
+    off = survey.position - _medians(survey.position, label)
+    std = NORMAL * float(np.median(np.abs(off[enough])))
+    limit = float(np.sqrt(chi2.isf(FALSE_ALARMS / len(survey), 3)))
+    size = np.linalg.norm(off, axis=1)
+    stray = enough & (size > 2.0 * limit * std) & (size > SAME_POINT)
+    if not stray.any():
+        return survey, stop
+    gone = tuple(
+        DroppedRow(
+            survey.ids[i], int(survey.line[i]),
+            f"off by {size[i] / MM:.3f} mm from the other readings of its stop",
+        )
+        for i in np.flatnonzero(stray)
+    )  # fmt: skip
+    return replace(survey[~stray], dropped=survey.dropped + gone), stop[~stray]
+
+
+def _medians(values: Floats, label: Ints) -> Floats:
+    """Return the median of every row's label, (n, 3)."""
+    out = np.empty_like(values)
+    order = np.argsort(label, kind="stable")
+    for rows in np.split(order, np.flatnonzero(np.diff(label[order])) + 1):
+        out[rows] = np.median(values[rows], axis=0)
+    return out

@@ -1,0 +1,220 @@
+"""Campaigns as people measure: repeats, nests, rounds, rounded angles, one side or two.
+
+python -m tests.campaigns [--count 50] [--first 0] [--poses LOW HIGH]
+
+Every campaign is of an arm of its own. Printed are the true errors at poses that no
+fit has seen, of the default fit and of `geometry,backlash`, and how many of the stated
+intervals hold them.
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from postproc.calibration.fit import Calibration, fit_measurements
+from postproc.calibration.measurements import Measurements
+from postproc.exceptions import PostprocError
+from postproc.robot.cell import Cell, load_cell
+from postproc.robot.state import States, make_states
+from tests.calibration.simulator import (
+    HIGH,
+    LOW,
+    PLATE,
+    Simulated,
+    random_arm,
+    survey_of,
+)
+
+CHECKED = 400  # poses that no fit has seen
+MOST_ROWS = 1800
+PLAIN = ("geometry", "backlash")
+
+
+@dataclass(frozen=True)
+class Habit:
+    """How somebody measures.
+
+    Attributes:
+        poses: Number of commanded poses.
+        repeats: Readings while the arm stands still.
+        nests: Probe points that are read at every stop.
+        rounds: Times that all poses are visited.
+        sides: 1, or 2 where every pose is approached from both sides.
+        decimals: Of the joint angles in the file [deg].
+        joint: Scatter of joint angles from stop to stop [rad].
+        shift: Scatter of a stop per axis [m].
+        tracker: Scatter of a reading per axis [m].
+        clock: Whether the file has times.
+    """
+
+    poses: int
+    repeats: int
+    nests: int
+    rounds: int
+    sides: int
+    decimals: int
+    joint: float
+    shift: float
+    tracker: float
+    clock: bool
+
+
+def draw_habit(rng: np.random.Generator, low: int, high: int) -> Habit:
+    """Draw how a campaign is measured, of `low` to `high` poses."""
+    poses = int(np.exp(rng.uniform(np.log(low), np.log(high))))
+    habit = Habit(
+        poses=poses,
+        repeats=int(rng.choice([1, 1, 2, 3, 5, 10])),
+        nests=int(rng.choice([1, 1, 2, 3])),
+        rounds=int(rng.choice([1, 1, 1, 2, 3])),
+        sides=int(rng.choice([1, 2])),
+        decimals=int(rng.choice([1, 2, 3, 4, 5])),
+        joint=float(rng.choice([0.0, 5e-6, 2e-5])),
+        shift=float(rng.choice([0.0, 1e-5, 3e-5, 8e-5])),
+        tracker=float(rng.choice([1e-5, 2e-5, 4e-5])),
+        clock=bool(rng.integers(2)),
+    )
+    while rows_of(habit) > MOST_ROWS and (habit.repeats > 1 or habit.rounds > 1):
+        habit = replace(
+            habit, repeats=max(1, habit.repeats // 2), rounds=max(1, habit.rounds - 1)
+        )
+    return habit
+
+
+def rows_of(habit: Habit) -> int:
+    """Count the rows of a campaign."""
+    return habit.poses * habit.repeats * habit.nests * habit.rounds * habit.sides
+
+
+def measure(
+    arm: Simulated, habit: Habit, rng: np.random.Generator
+) -> Measurements:
+    """Measure an arm; the angles in the file are rounded, those of the arm are not."""
+    q = rng.uniform(LOW, HIGH, (habit.poses, 6))
+    one_side = rng.choice([-1.0, 1.0], (habit.poses, 6))
+    rows: list[tuple[np.ndarray, np.ndarray, int, float]] = []
+    position, clock = [], 0.0
+    for _ in range(habit.rounds):
+        for k in range(habit.poses):
+            for side in range(habit.sides):
+                came = one_side[k] if side == 0 else -one_side[k]
+                shaken = q[k] + habit.joint * rng.standard_normal(6)
+                shift = habit.shift * rng.standard_normal(3)
+                clock += rng.uniform(8.0, 12.0)
+                for nest in range(habit.nests):
+                    at = arm.tcp(shaken[None], came[None], PLATE[nest][None])[0] + shift
+                    for _ in range(habit.repeats):
+                        clock += 0.5
+                        rows.append((q[k], came, nest, clock))
+                        position.append(at + habit.tracker * rng.standard_normal(3))
+    angles = np.round(np.rad2deg([r[0] for r in rows]), habit.decimals)
+    nests = np.array([r[2] for r in rows])
+    states = make_states(
+        np.deg2rad(angles), np.array([r[1] for r in rows]), PLATE[nests], tool_id=nests
+    )
+    if habit.clock:
+        states = states.with_(time=np.array([r[3] for r in rows]))
+    return survey_of(states, np.array(position))
+
+
+def unseen(arm: Simulated, rng: np.random.Generator) -> tuple[States, np.ndarray]:
+    """Draw poses that no fit has seen, with the true error of the arm, (n, 3) [m]."""
+    q = rng.uniform(LOW, HIGH, (CHECKED, 6))
+    side = rng.choice([-1.0, 1.0], (CHECKED, 6))
+    states = make_states(q, side, PLATE[:1].repeat(CHECKED, axis=0))
+    true = arm.tcp(q, side, states.tool)
+    return states, true - arm.arm.tcp(q, states.tool)
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What a fit leaves of the true errors.
+
+    Attributes:
+        mean, worst: Length of what is left [mm].
+        covered: Share of coordinates within the stated 95 % intervals.
+        stated: Mean stated standard error per axis [mm].
+        names: Effects of the model that the arm has not.
+        seconds: Time that the fit took.
+    """
+
+    mean: float
+    worst: float
+    covered: float
+    stated: float
+    names: tuple[str, ...]
+    seconds: float
+
+
+def judge(
+    survey: Measurements,
+    cell: Cell,
+    effects: tuple[str, ...] | None,
+    checked: tuple[States, np.ndarray],
+) -> Outcome | str:
+    """Fit a survey and compare with the truth; words where it was refused."""
+    begun = time.perf_counter()
+    try:
+        found: Calibration = fit_measurements(survey, cell, effects=effects)
+    except PostprocError as refused:
+        return str(refused)
+    seconds = time.perf_counter() - begun
+    states, true = checked
+    predicted = found.model.predict(cell.arm, states)
+    off = predicted.error - true
+    size = 1e3 * np.linalg.norm(off, axis=1)
+    covered = float((np.abs(off) < 1.96 * predicted.std_model).mean())
+    named = [e.name for e in found.model.effects.effects]
+    planted = {"geometry", "backlash", "backlash_profile", "probe"}
+    return Outcome(
+        float(size.mean()), float(size.max()), covered,
+        1e3 * float(predicted.std_model.mean()),
+        tuple(n for n in named if n not in planted), seconds,
+    )  # fmt: skip
+
+
+def main() -> None:
+    """Run campaigns and print a line for each."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--count", type=int, default=50)
+    parser.add_argument("--first", type=int, default=0)
+    parser.add_argument("--poses", type=int, nargs=2, default=(20, 300))
+    asked = parser.parse_args()
+    cell = load_cell("programs/cell.toml")
+    ratios, shares = [], []
+    for seed in range(asked.first, asked.first + asked.count):
+        rng = np.random.default_rng([20261126, seed])
+        arm, habit = random_arm(rng), draw_habit(rng, *asked.poses)
+        survey, checked = measure(arm, habit, rng), unseen(arm, rng)
+        full = judge(survey, cell, None, checked)
+        plain = judge(survey, cell, PLAIN, checked)
+        what = (
+            f"{seed:4d} {habit.poses:3d} poses x{habit.repeats} n{habit.nests} "
+            f"r{habit.rounds} s{habit.sides} .{habit.decimals} "
+            f"j{habit.joint * 1e6:2.0f} d{habit.shift * 1e6:2.0f} "
+            f"t{habit.tracker * 1e6:2.0f}"
+        )
+        if isinstance(full, str) or isinstance(plain, str):
+            print(what, full if isinstance(full, str) else plain, flush=True)
+            continue
+        ratios.append(full.mean / plain.mean)
+        shares.append(full.covered)
+        print(
+            f"{what}: {full.mean:.4f} (max {full.worst:.3f}) plain {plain.mean:.4f} "
+            f"ratio {ratios[-1]:.2f} covered {full.covered:.3f} "
+            f"({plain.covered:.3f}) stated {full.stated:.4f} {full.seconds:.1f} s "
+            f"{' '.join(full.names)}",
+            flush=True,
+        )
+    print(
+        f"ratio to geometry,backlash: mean {np.mean(ratios):.3f}, "
+        f"max {np.max(ratios):.3f}; coverage {np.mean(shares):.3f}"
+    )
+
+
+if __name__ == "__main__":
+    main()
