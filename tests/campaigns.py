@@ -90,9 +90,7 @@ def rows_of(habit: Habit) -> int:
     return habit.poses * habit.repeats * habit.nests * habit.rounds * habit.sides
 
 
-def measure(
-    arm: Simulated, habit: Habit, rng: np.random.Generator
-) -> Measurements:
+def measure(arm: Simulated, habit: Habit, rng: np.random.Generator) -> Measurements:
     """Measure an arm; the angles in the file are rounded, those of the arm are not."""
     q = rng.uniform(LOW, HIGH, (habit.poses, 6))
     one_side = rng.choice([-1.0, 1.0], (habit.poses, 6))
@@ -159,7 +157,9 @@ def judge(
     """Fit a survey and compare with the truth; words where it was refused."""
     begun = time.perf_counter()
     try:
-        found: Calibration = fit_measurements(survey, cell, effects=effects)
+        found: Calibration = fit_measurements(
+            survey, cell, effects=effects, validate=effects is None
+        )
     except PostprocError as refused:
         return str(refused)
     seconds = time.perf_counter() - begun
@@ -170,6 +170,8 @@ def judge(
     covered = float((np.abs(off) < 1.96 * predicted.std_model).mean())
     named = [e.name for e in found.model.effects.effects]
     planted = {"geometry", "backlash", "backlash_profile", "probe"}
+    if found.rejected:
+        return "rejected: " + found.rejected
     return Outcome(
         float(size.mean()), float(size.max()), covered,
         1e3 * float(predicted.std_model.mean()),

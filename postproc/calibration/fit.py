@@ -29,10 +29,11 @@ from postproc.calibration.reversals import (
     newer_widths,
     split_reversals,
 )
-from postproc.calibration.selection import Progress, fit_survey, model_of, silent
+from postproc.calibration.selection import Progress, model_of, silent
 from postproc.calibration.stops import pool_readings
 from postproc.calibration.tables import DETECT, TableFormat
 from postproc.calibration.tool_groups import find_groups, find_wrong_nest
+from postproc.calibration.validation import Task, validate_fit
 from postproc.model.combination import Combination
 from postproc.model.effects.placement import Placement
 from postproc.model.effects.probe import Probe
@@ -58,6 +59,11 @@ class Calibration:
     model: Model
     report: FitReport
     survey: Measurements
+
+    @property
+    def rejected(self) -> str:
+        """Why the model must not be used; "" where it may be."""
+        return self.report.rejected
 
 
 def fit(
@@ -111,8 +117,14 @@ def fit_measurements(
     frame: Frame = "base",
     seed: int = 0,
     progress: Progress = silent,
+    validate: bool = True,
 ) -> Calibration:
-    """Fit a model to measurements, see `fit`."""
+    """Fit a model to measurements, see `fit`.
+
+    Args:
+        validate: Whether poses are held out, to say what new ones will be left, and to
+            take simpler effects where those leave less. It takes several fits.
+    """
     survey = pool_readings(survey)
     tracker, setup = cell.tracker, several_points(survey)
     placed, points = None, None
@@ -131,19 +143,28 @@ def fit_measurements(
         survey = replace(survey, warnings=told)
         model = replace(model, registration=placed)
         return Calibration(model, report_method(model, survey, cell.arm), survey)
-    fitted = fit_survey(survey, cell.arm, effects, tracker, setup, progress)
+    task = Task(survey, cell.arm, effects, tracker, setup)
+    fitted = task.fit(progress=progress)
+    validated = None
+    if validate:
+        progress("predict poses that are held out")
+        validated = validate_fit(task, fitted)
+        fitted = validated.fit
     progress("report")
     told = (
         *survey.warnings,
         *moved_tools(fitted, survey),
         *drifts(fitted),
         *wrong_nests(fitted, points),
+        *(() if validated is None else validated.notes),
     )
     survey = replace(survey, warnings=told)
     model = replace(model_of(fitted, survey), registration=placed)
     widths = newer_widths((), model, cell.arm, reversals)
     model = replace(model, flank_widths=widths)
     report = report_fit(fitted, survey, model)
+    if validated is not None:
+        report = replace(report, held_out=validated.error, rejected=validated.rejected)
     return Calibration(model, report, survey.with_states(fitted.batch.states))
 
 

@@ -9,6 +9,7 @@ from typing import Self
 import numpy as np
 
 from postproc.arrays import Bools, Floats
+from postproc.calibration.cross_validation import HeldOutError
 from postproc.calibration.directions import judge_directions
 from postproc.calibration.measurements import DroppedRow, Measurements
 from postproc.calibration.regression import Fit, Unseen, observe
@@ -150,6 +151,8 @@ class FitReport:
         directions: Wrong directions, or None where the file has none.
         free: What functions without a law predict; None for published methods.
         flanks: What reversals tell of the flanks of the joints; "" without reversals.
+        held_out: What new poses are expected to be left, None where none were held out.
+        rejected: Why the model must not be used; "" where it may be.
     """
 
     parameters: tuple[ParameterRow, ...]
@@ -169,6 +172,8 @@ class FitReport:
     directions: DirectionReport | None = None
     free: FreeForms | None = None
     flanks: str = ""
+    held_out: HeldOutError | None = None
+    rejected: str = ""
 
 
 def report_fit(fit: Fit, survey: Measurements, model: Model) -> FitReport:

@@ -48,7 +48,7 @@ from postproc.robot.state import States
 Progress = Callable[[str], None]
 
 FEW_POSES = 450  # fewer leave many orders of waves alike
-HARDLY_ANY = 100  # poses: fewer leave alike what free forms follow, and what they do not
+HARDLY_ANY = 100  # poses: fewer leave alike what free forms follow, and what not
 
 
 def silent(stage: str) -> None:
@@ -91,6 +91,7 @@ def fit_best(
     turns: Turns | None = None,
     progress: Progress = silent,
     motion: TrackerMotion | None = None,
+    free: bool = True,
 ) -> Fit:
     """Fit the base effects and all others that a survey gives evidence for.
 
@@ -103,12 +104,14 @@ def fit_best(
         turns: Measured orientations, where the survey has them.
         progress: Told what is being done.
         motion: What readings of fixed points say of the tracker, if there are any.
+        free: Whether functions without a law may be taken.
     """
 
     def fit(more: tuple[str, ...] = ()) -> Fit:
         found = _fit_kept(
-            arm, states, position, origin, (*setup, *more), turns, progress, motion
-        )
+            arm, states, position, origin, (*setup, *more), turns, progress, motion,
+            free,
+        )  # fmt: skip
         progress("look for steps, tilt, warming-up and waves of gears")
         return with_sought(found, ruled_out(motion))
 
@@ -156,6 +159,7 @@ def _fit_kept(
     turns: Turns | None,
     progress: Progress,
     motion: TrackerMotion | None,
+    with_free: bool,
 ) -> Fit:
     """Fit and weigh once, as `fit_best`."""
     batch = Batch(arm, states)
@@ -164,7 +168,8 @@ def _fit_kept(
     kept = base
     progress("fit " + ", ".join(e.name for e in base))
     fitted = fit_effects(batch, position, base, origin, turns=turns, until=NEARLY)
-    named, free = candidates(arm, states, motion), free_forms(states)
+    named = candidates(arm, states, motion)
+    free = free_forms(states) if with_free else ()
     for names in (named, *((name,) for name in free)):
         progress("fit and weigh " + ", ".join(names))
         tried = (*kept, *propose(names, arm, states), *slipped(fitted))
@@ -280,6 +285,7 @@ def fit_survey(
     tracker: Floats | None,
     setup: tuple[str, ...] = (),
     progress: Progress = silent,
+    free: bool = True,
 ) -> Fit:
     """Fit effects to a survey in the base frame.
 
@@ -290,6 +296,7 @@ def fit_survey(
         tracker: Tracker position in the base frame, (3,) [m], or None.
         setup: Names of effects of the set-up, fitted besides.
         progress: Told what is being done.
+        free: Whether functions without a law may be taken where none are named.
 
     Returns:
         The fit. Where directions of the file are probably wrong, its states have them
@@ -308,8 +315,9 @@ def fit_survey(
     def fit(states: States) -> Fit:
         if effects is None:
             return fit_best(
-                arm, states, position, origin, setup, turns, progress, survey.motion
-            )
+                arm, states, position, origin, setup, turns, progress, survey.motion,
+                free,
+            )  # fmt: skip
         asked = propose((*effects, *setup), arm, states)
         chosen = tuple(effect.seen_from(origin) for effect in asked)
         return fit_effects(Batch(arm, states), position, chosen, origin, turns=turns)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Self
 
@@ -193,13 +194,20 @@ class Folds:
                 out[rows] = self.target[rows] - self.design[rows].times(self.prior * p)
         return left
 
+    def solved(self) -> Iterator[tuple[NDArray[np.int64], Floats, Floats]]:
+        """Fit all others than each fold: its rows, values and covariance, (p, p)."""
+        gram = self.grams.sum(axis=0) + np.eye(len(self.prior))
+        moment = self.moments.sum(axis=0)
+        for k, rows in enumerate(self.rows):
+            _, inverse, part = inverted(gram - self.grams[k])
+            values = (inverse if part is None else part) @ (moment - self.moments[k])
+            covariance = inverse * np.outer(self.prior, self.prior)
+            yield rows, self.prior * values, covariance
+
     def variance(self) -> Floats:
         """Say how unsure every fold is of what the others tell of it, (n, 3)."""
-        gram = self.grams.sum(axis=0) + np.eye(len(self.prior))
         out = np.empty_like(self.target)
-        for k, rows in enumerate(self.rows):
-            _, inverse, _ = inverted(gram - self.grams[k])
-            covariance = inverse * np.outer(self.prior, self.prior)
+        for rows, _, covariance in self.solved():
             out[rows] = self.design[rows].variance(covariance)
         return out
 

@@ -1,0 +1,201 @@
+"""The model that a survey deserves: what new poses are left decides."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from postproc.arrays import Bools, Floats, Ints
+from postproc.calibration.cross_validation import (
+    PARTS,
+    Compared,
+    HeldOutError,
+    HeldOutRows,
+    held_out,
+    held_out_linearly,
+    mean_error_mm,
+    parts_of,
+    regions_of,
+    simplest,
+    summarise,
+)
+from postproc.calibration.measurements import Measurements
+from postproc.calibration.regression import Fit
+from postproc.calibration.selection import Progress, fit_survey, model_of, silent
+from postproc.model.effects import BASE_EFFECTS
+from postproc.model.effects.placement import Placement
+from postproc.model.model import Model
+from postproc.model.noise import poses_of
+from postproc.robot.arm import Arm
+from postproc.robot.pose import MM
+
+FEW_POSES = 300  # at the most: effects are chosen again without each part
+FEWEST_POSES = 6  # that a part of the rows can be predicted from
+SEED = 0
+FLOOR = 5e-6  # [m] differences of models that nobody can use
+
+
+@dataclass(frozen=True)
+class Rung:
+    """Effects that a survey may deserve.
+
+    Attributes:
+        name: As it is reported.
+        effects: Their names; None: those that the survey gives evidence for.
+        free: Whether functions without a law may be among those.
+    """
+
+    name: str
+    effects: tuple[str, ...] | None
+    free: bool = False
+
+
+SET_UP = Rung("registration and probe alone", (Placement.name,))
+ASKED = "the effects that were asked for"
+DEFAULT = "the effects that the survey gives evidence for"
+
+
+def ladder() -> tuple[Rung, ...]:
+    """List what the default fit may fall back to, the simplest first."""
+    return (
+        SET_UP,
+        Rung("geometry", BASE_EFFECTS[:1]),
+        Rung("geometry,backlash", ("geometry", "backlash")),
+        Rung("effects with a law", None),
+        Rung(DEFAULT, None, free=True),
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class Task:
+    """A survey that is to be fitted.
+
+    Attributes:
+        survey: One row a stop and probe point, base frame.
+        arm: The arm.
+        effects: Names of effects; None: those that it gives evidence for.
+        tracker: Tracker position in the base frame, (3,) [m], or None.
+        setup: Names of effects of the set-up, fitted besides.
+    """
+
+    survey: Measurements
+    arm: Arm
+    effects: Sequence[str] | None
+    tracker: Floats | None
+    setup: tuple[str, ...] = ()
+
+    @property
+    def rung(self) -> Rung:
+        """What was asked for."""
+        if self.effects is None:
+            return Rung(DEFAULT, None, free=True)
+        return Rung(ASKED, tuple(self.effects))
+
+    def fit(
+        self,
+        rung: Rung | None = None,
+        rows: Measurements | None = None,
+        progress: Progress = silent,
+    ) -> Fit:
+        """Fit the effects that were asked for, or others, to all rows or some."""
+        chosen = rung or self.rung
+        some = self.survey if rows is None else rows
+        return fit_survey(
+            some, self.arm, chosen.effects, self.tracker, self.setup, progress,
+            chosen.free,
+        )  # fmt: skip
+
+    def errors(self, rung: Rung, part: Ints, used: Bools) -> HeldOutRows:
+        """Predict every part of the rows by fits of all others."""
+
+        def fit(rows: Measurements) -> tuple[Fit, Model]:
+            found = self.fit(rung, rows)
+            return found, model_of(found, rows)
+
+        return held_out(self.survey, self.arm, fit, part, used)
+
+
+@dataclass(frozen=True, eq=False)
+class Validated:
+    """A fit that was compared with simpler ones at poses that none has seen.
+
+    Attributes:
+        fit: The fit to take.
+        error: What it is expected to leave; None where there are too few poses.
+        notes: What a reader of the fit should know.
+        rejected: Why no model must be used; "" where it may be.
+    """
+
+    fit: Fit
+    error: HeldOutError | None
+    notes: tuple[str, ...] = ()
+    rejected: str = ""
+
+
+def validate_fit(task: Task, fitted: Fit) -> Validated:
+    """Say what a fit leaves at new poses, and take a simpler one where that leaves less.
+
+    Args:
+        task: What was fitted.
+        fitted: The fit.
+    """
+    survey, used = task.survey, fitted.rows.weight > 0
+    poses = len(np.unique(poses_of(survey.states[used])))
+    if poses < FEWEST_POSES + PARTS:
+        note = f"{poses} poses: too few to hold some out; nobody has checked this model"
+        return Validated(fitted, None, (note,))
+    part = parts_of(poses_of(survey.states), SEED)
+    if poses > FEW_POSES:
+        rows = held_out_linearly(fitted, model_of(fitted, survey), part)
+        return _concluded(task, fitted, rows, part, chosen=False)
+    rung, rows, note = _chosen(task, part, used)
+    if rung != task.rung:
+        fitted = task.fit(rung)
+    found = _concluded(task, fitted, rows, part, chosen=True)
+    return replace(found, notes=(*note, *found.notes))
+
+
+def _chosen(
+    task: Task, part: Ints, used: Bools
+) -> tuple[Rung, HeldOutRows, tuple[str, ...]]:
+    """Choose the simplest effects that leave new poses as little as any.
+
+    Returns:
+        The effects, their held-out errors, and a note where they are others than asked.
+    """
+    if task.effects is not None:
+        return task.rung, task.errors(task.rung, part, used), ()
+    rungs = ladder()[1:]
+    tried = [task.errors(rung, part, used) for rung in rungs]
+    number = simplest(tried)
+    rung, rows = rungs[number], tried[number]
+    if rung == task.rung or number == len(rungs) - 1:
+        return rung, rows, ()
+    best = mean_error_mm(tried[-1])
+    note = (
+        f"written with {rung.name}: {DEFAULT} predict new poses no better "
+        f"({best:.4f} mm, {mean_error_mm(rows):.4f} mm with {rung.name})"
+    )
+    return rung, rows, (note,)
+
+
+def _concluded(
+    task: Task, fitted: Fit, rows: HeldOutRows, part: Ints, chosen: bool
+) -> Validated:
+    """Put figures together, and compare with a set-up without errors of the arm."""
+    survey, used = task.survey, rows.used
+    model = model_of(fitted, survey)
+    region = held_out_linearly(fitted, model, regions_of(survey))
+    error = summarise(rows, mean_error_mm(region), chosen)
+    plain = task.errors(SET_UP, part, used)
+    gain = Compared.of(plain, rows)
+    if gain.better or (gain.gain > -FLOOR and mean_error_mm(plain) < FLOOR / MM):
+        return Validated(fitted, error)
+    why = (
+        f"new poses are left {error.error.mean_mm:.4f} mm with this model and "
+        f"{mean_error_mm(plain):.4f} mm with {SET_UP.name}: the rows are those of "
+        "another arm, program or frame, or too few"
+    )
+    return Validated(fitted, error, rejected=why)
