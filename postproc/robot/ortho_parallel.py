@@ -237,7 +237,7 @@ alpha_deg = [-90.0, 0.0, -90.0, 90.0, -90.0, 0.0]
 offset_deg = {offset}
 sense = {sense}
 axis3_adds_axis2 = false      # a URDF does not tell: true where a parallelogram keeps
-                              # the forearm from following axis 2
+                              # the forearm's direction while joint 2 moves alone
 
 [joints]
 lower_deg = {lower}
