@@ -171,6 +171,20 @@ def test_what_the_inverse_finds_leads_there(tmp_path, structure):
     assert there.sum() > 50
 
 
+@pytest.mark.parametrize("structure", STRUCTURES)
+def test_a_solution_nearby_is_found(tmp_path, structure):
+    """An arm may have 16 solutions, more than there are names of branches."""
+    _, arm = made(tmp_path, structure, 1)
+    rng = np.random.default_rng(5)
+    q = rng.uniform(-2.5, 2.5, (300, 6))
+    least = np.linalg.svd(arm.jacobian(q, np.zeros(3)), compute_uv=False)[:, -1]
+    q = q[least > 0.02]
+    wanted = q + rng.uniform(-0.005, 0.005, q.shape)
+    found = arm.nearest(arm.flange(wanted), q, arm.branch(q))
+    assert len(q) > 150
+    np.testing.assert_allclose(found, wanted, atol=1e-8)
+
+
 UR10_URDF = [  # the lengths of ROS-Industrial's ur10, upright frames
     (Z, (0.0, 0.0, 0.1273)), (-Y, (0.0, 0.0, 0.0)), (-Y, (-0.612, 0.0, 0.0)),
     (-Y, (-0.5723, 0.0, 0.0)), (-Z, (0.0, -0.163941, 0.0)), (-Y, (0.0, 0.0, -0.1157)),
