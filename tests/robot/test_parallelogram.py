@@ -15,6 +15,7 @@ from scipy.spatial.transform import Rotation
 from postproc.exceptions import ArmError
 from postproc.robot.arm import load_arm
 from postproc.robot.inverse import wrap
+from postproc.robot.pose import pose_from_record, record_from_pose
 from postproc.simulation.kinematics import (
     Chain,
     LinkMasses,
@@ -89,6 +90,7 @@ axis3_adds_axis2 = true
 [joints]
 lower_deg = [-180.0, -75.0, -75.0, -180.0, -120.0, -180.0]
 upper_deg = [180.0, 95.0, 75.0, 180.0, 120.0, 180.0]
+velocity_deg_s = [150.0, 150.0, 150.0, 360.0, 360.0, 450.0]
 """
         flips = str([bool(s < 0) for s in self.sense]).lower()
         return (
@@ -207,7 +209,7 @@ def test_the_simulator_has_the_same_arm(case):
 
 
 @pytest.mark.parametrize(("seed", "senses"), list(enumerate(SENSES)))
-def test_a_fit_leaves_the_noise(tmp_path, seed, senses):
+def test_a_fit_leaves_the_noise_and_a_program_is_compensated(tmp_path, seed, senses):
     """Rows of an arm as built: its lengths are 0.4 mm off the file's."""
     rod = Rod(100 + seed, *senses)
     (tmp_path / "arm.toml").write_text(rod.text(False, seed % 2 == 0))
@@ -215,6 +217,10 @@ def test_a_fit_leaves_the_noise(tmp_path, seed, senses):
         '[robot]\narm = "arm.toml"\n[payload]\nmass_kg = 5.0\n'
     )
     q = drawn(rod, 150)
+    corners = np.array([0.2, 0.3, -0.2, 0.4, 0.9, 0.3]) + rod.rng.uniform(
+        -0.1, 0.1, (6, 6)
+    )
+    wanted = rod.flange(corners)
     for length in ("a1", "a2", "c1", "c2", "c3", "c4"):
         setattr(rod, length, getattr(rod, length) + 4e-4 * rod.rng.choice([-1, 1]))
     read = rod.flange(q)[:, :3, 3] * 1e3 + rod.rng.normal(0.0, 0.015, (150, 3))
@@ -229,6 +235,31 @@ def test_a_fit_leaves_the_noise(tmp_path, seed, senses):
     assert found.exit_code == 0
     left = re.search(r"left by the fit mean ([\d.]+)", found.stdout + found.stderr)
     assert left is not None and float(left[1]) < 0.026
+    records = record_from_pose(wanted).round(4).tolist()
+    moves = [f"  MOVE LINEAR TO POS({str(record)[1:-1]}, '')" for record in records]
+    start = ", ".join(map(str, np.rad2deg(corners[0]).round(3).tolist()))
+    job = tmp_path / "job.pdl"
+    lines = [
+        "PROGRAM job",
+        "BEGIN",
+        f"  MOVE JOINT TO {{{start}}}",
+        *moves,
+        "END job",
+        "",
+    ]
+    job.write_text("\n".join(lines))
+    found = cli("compensate", job, "--cell", tmp_path / "cell.toml", "--model",
+                tmp_path / "m.json", "-o", tmp_path / "out.pdl")  # fmt: skip
+    assert found.exit_code == 0, found.stderr
+    numbers = re.findall(r"POS\((.*), ''\)", (tmp_path / "out.pdl").read_text())
+    commands = np.array([[float(v) for v in row.split(",")] for row in numbers])
+    # The controller solves for the lengths of the file; the arm as built goes there.
+    arm = load_arm(tmp_path / "arm.toml")
+    q = arm.nearest(pose_from_record(commands), corners)
+    miss = (rod.flange(q) - wanted)[:, :3, 3]
+    before = (rod.flange(corners) - wanted)[:, :3, 3]
+    assert np.linalg.norm(miss, axis=1).max() < 3e-5
+    assert np.linalg.norm(before, axis=1).min() > 2e-4
 
 
 def test_a_parallelogram_needs_parallel_axes(tmp_path):
