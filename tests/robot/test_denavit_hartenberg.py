@@ -14,6 +14,8 @@ from postproc.exceptions import ArmError
 from postproc.robot.arm import Arm, load_arm
 from postproc.robot.ortho_parallel import arm_text, closed_form_obstacle
 from postproc.robot.urdf import read_chain
+from tests.robot import urdfs
+from tests.robot.urdfs import QUARTER, Row, turning, urdf_text
 from tests.written import cli
 
 X, Y, Z = np.eye(3)
@@ -183,6 +185,28 @@ def test_a_solution_nearby_is_found(tmp_path, structure):
     found = arm.nearest(arm.flange(wanted), q, arm.branch(q))
     assert len(q) > 150
     np.testing.assert_allclose(found, wanted, atol=1e-8)
+
+
+THREE_PARALLEL = (  # a UR's lengths, upright
+    turning(1, (0.0, 0.0, 0.1273), urdfs.Z),
+    turning(2, (0.0, 0.220941, 0.0), urdfs.Y, (0.0, QUARTER, 0.0)),
+    turning(3, (0.0, -0.1719, 0.612), urdfs.Y),
+    turning(4, (0.0, 0.0, 0.5723), urdfs.Y, (0.0, QUARTER, 0.0)),
+    turning(5, (0.0, 0.1149, 0.0), urdfs.Z),
+    turning(6, (0.0, 0.0, 0.1157), urdfs.Y),
+    Row((0.0, 0.0922, 0.0), (-QUARTER, 0.0, 0.0)),
+)
+
+
+def test_three_parallel_axes_have_their_offset_in_one_length(tmp_path):
+    path = tmp_path / "robot.urdf"
+    path.write_text(urdf_text(THREE_PARALLEL))
+    (tmp_path / "arm.toml").write_text(arm_text(read_chain(path), 0.1))
+    arm = load_arm(tmp_path / "arm.toml")
+    q = np.random.default_rng(7).uniform(-6.0, 6.0, (300, 6))
+    np.testing.assert_allclose(arm.flange(q), by_pinocchio(path, q), atol=1e-12)
+    assert arm.file.dh.a_mm == [0.0, 612.0, 572.3, 0.0, 0.0, 0.0]
+    assert arm.file.dh.d_mm == [127.3, 0.0, 0.0, 163.941, 115.7, 92.2]
 
 
 UR10_URDF = [  # the lengths of ROS-Industrial's ur10, upright frames
