@@ -67,8 +67,8 @@ def from_urdf(
         float, typer.Option("--repeatability", min=0.001, help="RP of ISO 9283 [mm].")
     ] = 0.1,
 ) -> None:
-    """Write the arm file of a URDF: six axes with a spherical wrist."""
-    from postproc.robot.ortho_parallel import arm_text
+    """Write the arm file of a URDF: six revolute joints in series."""
+    from postproc.robot.ortho_parallel import arm_text, closed_form_obstacle
     from postproc.robot.urdf import read_chain
 
     with explained(urdf):
@@ -78,6 +78,8 @@ def from_urdf(
         write_text(output, text)
         for rounded in chain.rounded:
             say(f"{urdf}: {rounded}")
+        if obstacle := closed_form_obstacle(chain):
+            say(obstacle)
         if output != "-":
             say(f"written {output}")
 

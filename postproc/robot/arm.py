@@ -22,7 +22,7 @@ from postproc.robot.inverse import (
     NumericForm,
     wrap,
 )
-from postproc.robot.pose import MM
+from postproc.robot.pose import MM, rotation_vector
 
 # The Denavit-Hartenberg chain: frames and points along it, for many poses at once.
 
@@ -82,6 +82,8 @@ class DH:
 # base frame.
 
 SPEED_UP, SPEED_UP_OF_PUSH = 0.4, 0.1  # [s] to full speed, to full acceleration
+NEARBY = 0.5  # [rad] that Newton's method goes from one solution to the next
+NEWTON_ROUNDS, NEWTON_CLOSE, NEWTON_SINGULAR = 8, 1e-11, 1e-6
 GRAVITY = 9.80665  # [m/s^2], standard gravity
 
 
@@ -338,12 +340,20 @@ class Arm:
             flange: Flange poses, (n, 4, 4) [m].
             near: Joint angles to stay close to, (n, 6) [rad].
             branch: Slot to use, (n,); default: the nearest one, in the maximum norm.
+                Without a closed form, a solution that no singularity parts from
+                `near` comes first.
 
         Returns:
             (n, 6) [rad] on the turn nearest to `near`, NaN where no solution exists.
         """
-        if branch is not None:
+        if branch is not None and self.file.opw is not None:
             one: Floats = near + wrap(self.on_branch(flange, branch) - near)
+            return one
+        if branch is not None:
+            one = self._from_nearby(flange, near)
+            far = np.flatnonzero(~self._regular_between(near, one))
+            found = self.on_branch(flange[far], branch[far])
+            one[far] = near[far] + wrap(found - near[far])
             return one
         slots = self.inverse(flange).q
         slots = near[:, None, :] + wrap(slots - near[:, None, :])
@@ -352,9 +362,55 @@ class Arm:
         q: Floats = slots[np.arange(len(slots)), best]
         return q
 
+    def _from_nearby(self, flange: Floats, near: Floats) -> Floats:
+        """Go from joint angles (n, 6) to flange poses (n, 4, 4) by Newton's method.
+
+        An arm without a closed form can have 16 solutions, more than there are
+        branches: the one that is near is found by going there.
+
+        Returns:
+            (n, 6) [rad], NaN where the way does not lead there or is longer than
+            `NEARBY`.
+        """
+        q, rows = np.array(near), np.flatnonzero(~np.isnan(near).any(axis=1))
+        out = np.full(q.shape, np.nan)
+        for _ in range(NEWTON_ROUNDS):
+            off = _twist(self.flange(q[rows]), flange[rows])
+            close = np.abs(off).max(axis=1) < NEWTON_CLOSE
+            out[rows[close]] = q[rows[close]]
+            rows, off = rows[~close], off[~close]
+            if len(rows) == 0:
+                break
+            J = self.jacobian(q[rows], np.zeros(3))
+            regular = np.linalg.svd(J, compute_uv=False)[:, -1] > NEWTON_SINGULAR
+            rows, J, off = rows[regular], J[regular], off[regular]
+            q[rows] += np.linalg.solve(J, off[..., None])[..., 0]
+            rows = rows[np.abs(q[rows] - near[rows]).max(axis=1) < NEARBY]
+        return out
+
+    def _regular_between(self, start: Floats, end: Floats) -> NDArray[np.bool_]:
+        """Return True for joint angles (n, 6) [rad] with no singularity between them.
+
+        Branches meet at singularities alone: so both are on one branch.
+        """
+        known = np.asarray(~np.isnan(start + end).any(axis=1))
+        first, step = start[known, None], (end - start)[known, None]
+        way = first + np.linspace(0.0, 1.0, 5)[:, None] * step
+        J = self.jacobian(way.reshape(-1, 6), np.zeros(3))
+        sign = np.sign(np.linalg.det(J)).reshape(-1, 5)
+        known[known] = (sign == sign[:, :1]).all(axis=1) & (sign[:, 0] != 0.0)
+        return known
+
     def within_limits(self, q: Floats) -> NDArray[np.bool_]:
         """Tell which joint angles (n, 6) [rad] respect the limits, (n,)."""
         return np.asarray(((q >= self.lower) & (q <= self.upper)).all(axis=-1))
+
+
+def _twist(start: Floats, end: Floats) -> Floats:
+    """Return shift [m] and turn [rad] from poses (n, 4, 4) to others, (n, 6)."""
+    turn = end[:, :3, :3] @ np.swapaxes(start[:, :3, :3], 1, 2)
+    shift = end[:, :3, 3] - start[:, :3, 3]
+    return np.concatenate([shift, rotation_vector(turn)], axis=1)
 
 
 def load_arm(name: str | Path, beside: Path | None = None) -> Arm:
@@ -374,12 +430,14 @@ def build_arm(file: ArmFile) -> Arm:
     """Convert an arm file to SI."""
     dh, joints = file.dh, file.joints
     mix = np.eye(6)
-    mix[2, 1] = 1.0 if dh.axis3_adds_axis2 else 0.0
+    mix[2, 1] = dh.axis2_in_axis3
     sense = np.array(dh.sense)
     offset = np.deg2rad(dh.offset_deg) + sense * np.deg2rad(dh.shift_deg)
     a, d = np.array(dh.a_mm) * MM, np.array(dh.d_mm) * MM
     alpha = np.deg2rad(dh.alpha_deg)
-    digest = hashlib.sha256(dh.model_dump_json().encode()).hexdigest()[:16]
+    # A model fitted while the flag added axis 2 to every arm is of another chain.
+    kinematics = dh.model_dump_json() + ("-axis2" if dh.axis2_in_axis3 < 0 else "")
+    digest = hashlib.sha256(kinematics.encode()).hexdigest()[:16]
     ratio = np.array(joints.gear_ratio or [0.0] * 6)
     coupling = joints.drive_coupling
     return Arm(

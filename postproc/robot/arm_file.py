@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 import tomllib
 from pathlib import Path
@@ -120,10 +121,14 @@ def _siblings(schema: type[BaseModel], place: tuple[int | str, ...]) -> list[str
 # The arm file: what is known of an arm, as plain numbers.
 
 ARMS = Path(__file__).parent / "arms"
+NEARLY_PARALLEL = 0.01  # sine of the angle between axes 2 and 3 of a parallelogram
 
 
 class DhSection(Strict):
-    """Standard Denavit-Hartenberg parameters and the controller's angle convention."""
+    """Standard Denavit-Hartenberg parameters and the controller's angle convention.
+
+    `axis3_adds_axis2`: a parallelogram keeps the forearm from following axis 2 alone.
+    """
 
     a_mm: Sextuple
     d_mm: Sextuple
@@ -138,6 +143,34 @@ class DhSection(Strict):
         if any(abs(s) != 1 for s in self.sense):
             raise ValueError("sense must be +1 or -1")
         return self
+
+    @model_validator(mode="after")
+    def _parallelogram(self) -> DhSection:
+        if self.axis3_adds_axis2 and abs(math.sin(math.radians(self.alpha_deg[1]))) > (
+            NEARLY_PARALLEL
+        ):
+            raise ValueError(
+                "axis3_adds_axis2 needs axes 2 and 3 parallel: alpha_deg[2] of 0 or 180"
+            )
+        return self
+
+    @property
+    def axis2_in_axis3(self) -> float:
+        """Share of joint angle 2 in the D-H angle of joint 3, before its sense.
+
+        The forearm turns by sense2 * q2 + cos(alpha2) * sense3 * (q3 + share * q2)
+        about axis 2. A parallelogram takes q2 out of this sum.
+
+        >>> lengths = {"a_mm": [0.0] * 6, "d_mm": [0.0] * 6, "alpha_deg": [0.0] * 6}
+        >>> DhSection(**lengths, axis3_adds_axis2=True).axis2_in_axis3
+        -1.0
+        """
+        if not self.axis3_adds_axis2:
+            return 0.0
+        same_way = (
+            self.sense[1] * self.sense[2] * math.cos(math.radians(self.alpha_deg[1]))
+        )
+        return -1.0 if same_way > 0 else 1.0
 
 
 class ArmJointSection(Strict):

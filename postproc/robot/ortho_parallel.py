@@ -1,4 +1,4 @@
-"""Lengths and zeros of a six-axis arm found in its chain, and its arm file."""
+"""The arm file of a chain of six joints, with a closed form where the arm has one."""
 
 from __future__ import annotations
 
@@ -10,8 +10,9 @@ import numpy as np
 
 from postproc.arrays import Floats
 from postproc.exceptions import ArmError
-from postproc.robot.arm import build_arm
+from postproc.robot.arm import Arm, build_arm
 from postproc.robot.arm_file import ArmFile, parse_toml
+from postproc.robot.denavit_hartenberg import PARALLEL, DhParameters, dh_parameters
 from postproc.robot.pose import MM
 from postproc.robot.urdf import MOVING, UrdfChain, turned
 
@@ -21,6 +22,12 @@ from postproc.robot.urdf import MOVING, UrdfChain, turned
 # and 6, which lie along z, turn about y then.
 
 EXACT = 1e-10  # [rad], [m] that axes may be off
+BY_NUMBERS = "Its inverse kinematics is numeric"
+ON_AXIS_6 = "Name the flange with --tip: it stands on axis 6, its z points out of it"
+
+
+class NoClosedFormError(ArmError):
+    """The arm is not six axes with an ortho-parallel basis and a spherical wrist."""
 
 
 class Shape(NamedTuple):
@@ -56,32 +63,59 @@ class _Geometry:
                 axes.append(frame[:3, :3] @ joint.axis)
                 points.append(frame[:3, 3])
         self.axes, self.points = np.array(axes), np.array(points)
-        self.flange = frame
+        self.flange: Floats = np.asarray(frame)
 
     def need(self, k: int, gap: float, problem: str, cure: str = "") -> None:
         """Refuse the arm where a gap is more than rounding.
 
         Raises:
-            ArmError: Naming joint k and the gap.
+            NoClosedFormError: Naming joint k and the gap.
+            ArmError: Likewise, where a cure is given: no arm file can say that.
         """
         if abs(gap) > EXACT:
             joint = self.joints[k]
             what = f"joint {joint.name} {problem}, off by {abs(gap):.3g}"
-            default = "Only six axes with a spherical wrist can be written"
-            raise ArmError(self._chain.path, what, cure or default, line=joint.line)
+            error, default = (
+                (ArmError, cure) if cure else (NoClosedFormError, BY_NUMBERS)
+            )
+            raise error(self._chain.path, what, default, line=joint.line)
+
+    def need_base(self) -> None:
+        """Refuse a base whose z is not axis 1.
+
+        Raises:
+            ArmError: It is beside axis 1, or askew.
+        """
+        z = np.array([0.0, 0.0, 1.0])
+        cure = "Name the controller's base frame with --base"
+        problem = f"does not turn about z of {self._chain.base}"
+        self.need(0, _sine(self.axes[0], z), problem, cure)
+        beside = float(np.hypot(*self.points[0][:2]))
+        self.need(0, beside, "is beside the base's z", cure)
+
+    def need_flange(self) -> None:
+        """Refuse a flange that does not stand on axis 6, with z along it.
+
+        Raises:
+            ArmError: It is beside axis 6, or askew.
+        """
+        last, place = self.axes[5], self.flange[:3, 3] - self.points[5]
+        askew = _sine(self.flange[:3, 2], last)
+        self.need(5, askew, "is not along the z of the flange", ON_AXIS_6)
+        beside = _length(place - (place @ last) * last)
+        self.need(5, beside, "misses the flange", ON_AXIS_6)
 
 
 def shape_of(chain: UrdfChain) -> Shape:
     """Find the closed form of a chain.
 
     Raises:
-        ArmError: It is not six axes with an ortho-parallel basis and a spherical wrist.
+        NoClosedFormError: It has no ortho-parallel basis, or no spherical wrist.
+        ArmError: Base or flange are not on its axes.
     """
     here = _Geometry(chain)
     axes, z = here.axes, np.array([0.0, 0.0, 1.0])
-    cure = "Name the controller's base frame with --base"
-    here.need(0, _sine(axes[0], z), f"does not turn about z of {chain.base}", cure)
-    here.need(0, float(np.hypot(*here.points[0][:2])), "is beside the base's z", cure)
+    here.need_base()
     here.need(1, axes[1] @ z, "is not square to axis 1")
     here.need(2, _sine(axes[2], axes[1]), "is not parallel to axis 2")
     here.need(3, axes[3] @ axes[2], "is not square to axis 3")
@@ -167,7 +201,8 @@ def _wrist(here: _Geometry, basis: Shape) -> Shape:
     u5, u6 = here.axes[4:]
     out: Floats = np.asarray(here.flange[:3, 2])
     place = here.flange[:3, 3] - _wrist_centre(here)
-    _check_flange(here, place, out)
+    here.need_flange()
+    here.need(5, min(float(place @ out), 0.0), "is behind its flange", ON_AXIS_6)
     local = forearm.T @ u5
     t4 = math.atan2(-local[0], local[1])
     if abs(t4) > math.pi / 2 + EXACT:  # the other half turn, with axis 5 the other way
@@ -183,22 +218,27 @@ def _wrist(here: _Geometry, basis: Shape) -> Shape:
     )
 
 
-def _check_flange(here: _Geometry, place: Floats, out: Floats) -> None:
-    """Refuse a flange that does not look out of joint 6.
+# What any six axes are: Denavit-Hartenberg parameters.
 
-    Args:
-        here: The chain.
-        place: The flange's origin seen from the wrist centre, (3,) [m].
-        out: Its z axis, (3,).
+NEARLY = 0.01  # [rad] between axes whose common normal is far from the arm
+SINGULAR = 1e-6  # least singular value of the Jacobian [m, rad] of an arm that moves
+
+
+def dh_of(chain: UrdfChain) -> DhParameters:
+    """Find the D-H parameters of a chain.
 
     Raises:
-        ArmError: It is beside axis 6, or askew, or looks back into the wrist.
+        ArmError: Base or flange are not on its axes, or axes are nearly parallel.
     """
-    cure = "Name the flange with --tip: it stands on axis 6, its z points out of it"
-    last = here.axes[5]
-    here.need(5, _sine(out, last), "is not along the z of the flange", cure)
-    here.need(5, _length(place - (place @ last) * last), "misses the flange", cure)
-    here.need(5, min(float(place @ out), 0.0), "is behind its flange", cure)
+    here = _Geometry(chain)
+    here.need_base()
+    here.need_flange()
+    for k in range(1, 6):
+        sine = _sine(here.axes[k - 1], here.axes[k])
+        near = sine if PARALLEL <= sine < NEARLY else 0.0
+        cure = "Make it parallel: the common normal of such axes is far from the arm"
+        here.need(k, near, f"is nearly parallel to axis {k}", cure)
+    return dh_parameters(here.axes, here.points, here.flange)
 
 
 # The arm file.
@@ -217,9 +257,30 @@ def arm_text(chain: UrdfChain, repeatability_mm: float, name: str | None = None)
     Raises:
         ArmError: The chain is no arm that an arm file can say.
     """
-    text = _written(chain, shape_of(chain), repeatability_mm, name or chain.name)
-    _verify(chain, text)
+    obstacle = None
+    try:
+        parts = _closed_form_parts(shape_of(chain))
+    except NoClosedFormError as exc:
+        obstacle, parts = exc, _numeric_parts(dh_of(chain))
+    text = _written(chain, parts, repeatability_mm, name or chain.name)
+    arm = build_arm(parse_toml(chain.path, text.encode(), ArmFile, ArmError))
+    if obstacle is not None:
+        _check_mobility(arm, obstacle)
+    _verify(chain, arm)
     return text
+
+
+def closed_form_obstacle(chain: UrdfChain) -> str:
+    """Say why the arm file of a chain has no closed form; "" where it has one.
+
+    Raises:
+        ArmError: The chain is no arm that an arm file can say.
+    """
+    try:
+        shape_of(chain)
+    except NoClosedFormError as exc:
+        return str(exc)
+    return ""
 
 
 TEMPLATE = """\
@@ -232,13 +293,11 @@ repeatability_mm = {repeatability}
 [dh]                          # standard Denavit-Hartenberg
 a_mm = {a}
 d_mm = {d}
-alpha_deg = [-90.0, 0.0, -90.0, 90.0, -90.0, 0.0]
+alpha_deg = {alpha}
 # D-H angle = offset + sense * q, q the controller's joint angle
 offset_deg = {offset}
 sense = {sense}
-axis3_adds_axis2 = false      # a URDF does not tell: true where a parallelogram keeps
-                              # the forearm from following axis 2
-
+{parallelogram}
 [joints]
 lower_deg = {lower}
 upper_deg = {upper}
@@ -249,21 +308,32 @@ guessed = ["acceleration", "jerk"]
 acceleration_deg_s2 = {acceleration}
 jerk_deg_s3 = {jerk}
 
+{closed_form}"""
+PARALLELOGRAM = """\
+axis3_adds_axis2 = false      # a URDF does not tell: true where a parallelogram keeps
+                              # the forearm's direction while joint 2 moves alone
+"""
+CLOSED_FORM = """\
 [opw]                         # ortho-parallel basis with spherical wrist
 {lengths}
 offsets_deg = {offsets}
 flip_axes = {flips}
 """
+NUMERIC = """\
+# No [opw]: no spherical wrist on an ortho-parallel basis. The inverse is numeric.
+"""
 DH_ZERO = (0.0, -90.0, -90.0, 0.0, 0.0, 180.0)  # [deg] D-H angles of the upright arm
 
 
-def _written(chain: UrdfChain, shape: Shape, repeatability_mm: float, name: str) -> str:
+def _written(
+    chain: UrdfChain, parts: dict[str, str], repeatability_mm: float, name: str
+) -> str:
     """Fill in the arm file."""
     return TEMPLATE.format(
         robot=_quoted(chain.name), file=_quoted(chain.path.name),
         base=_quoted(chain.base), tip=_quoted(chain.tip),
         name=_quoted(name), repeatability=_number(repeatability_mm),
-        **_dh_parts(shape), **_joint_parts(chain), **_opw_parts(shape),
+        **parts, **_joint_parts(chain),
     )  # fmt: skip
 
 
@@ -277,8 +347,8 @@ def _quoted(text: str) -> str:
     return json.dumps(valid, ensure_ascii=False).replace("\x7f", "\\u007f")
 
 
-def _dh_parts(shape: Shape) -> dict[str, str]:
-    """Write the standard D-H parameters of the closed form."""
+def _closed_form_parts(shape: Shape) -> dict[str, str]:
+    """Write the closed form and its standard D-H parameters."""
     a = np.array([shape.a1, shape.c2, -shape.a2, 0.0, 0.0, 0.0])
     d = np.array([shape.c1, shape.b, 0.0, shape.c3, 0.0, shape.c4])
     offset = np.rad2deg(shape.zero) + np.array(DH_ZERO)
@@ -287,9 +357,37 @@ def _dh_parts(shape: Shape) -> dict[str, str]:
     return {
         "a": _list(a / MM),
         "d": _list(d / MM),
+        "alpha": "[-90.0, 0.0, -90.0, 90.0, -90.0, 0.0]",
         "offset": _list(wrapped),
         "sense": str(sense),
+        "parallelogram": PARALLELOGRAM,
+        "closed_form": CLOSED_FORM.format(**_opw_parts(shape)),
     }
+
+
+def _numeric_parts(dh: DhParameters) -> dict[str, str]:
+    """Write standard D-H parameters alone, to more digits where these are needed."""
+    alpha, offset = (
+        180.0 - (180.0 - _rounded(np.rad2deg(angles))) % 360.0
+        for angles in (dh.alpha, dh.offset)
+    )
+    lists = {"a": dh.a / MM, "d": dh.d / MM, "alpha": alpha, "offset": offset}
+    return {
+        **{key: str((_rounded(v) + 0.0).tolist()) for key, v in lists.items()},
+        "sense": str([round(float(s)) for s in dh.sense]),
+        "parallelogram": PARALLELOGRAM if abs(np.sin(dh.alpha[1])) < NEARLY else "",
+        "closed_form": NUMERIC,
+    }
+
+
+def _rounded(values: Floats) -> Floats:
+    """Round to 1e-9 what is so round, and the rest to 1e-12.
+
+    >>> _rounded(np.array([163.94100000000003, 100.0 / 3.0])).tolist()
+    [163.941, 33.333333333333]
+    """
+    short: Floats = np.round(values, 9)
+    return np.where(np.abs(values - short) < 1e-11, short, np.round(values, 12))
 
 
 def _joint_parts(chain: UrdfChain) -> dict[str, str]:
@@ -333,17 +431,37 @@ def _list(values: Floats) -> str:
     return f"[{', '.join(map(_number, values))}]"
 
 
-def _verify(chain: UrdfChain, text: str) -> None:
-    """Refuse a text that does not say what the URDF says.
+Q = np.linspace(-3.0, 3.0, 90).reshape(15, 6) * [1.0, -0.7, 0.5, -0.9, 0.6, 0.8]
+
+
+def _check_mobility(arm: Arm, obstacle: NoClosedFormError) -> None:
+    """Refuse an arm that is singular wherever its joints stand.
+
+    Args:
+        arm: The arm.
+        obstacle: Why it has no closed form: likely what is wrong.
+
+    Raises:
+        ArmError: No joint angles move the flange in all six directions.
+    """
+    J = arm.jacobian(Q, np.zeros(3))
+    if np.linalg.svd(J, compute_uv=False)[:, -1].max() < SINGULAR:
+        problem = f"{obstacle.problem}, and no joint angles move the flange freely"
+        cure = "Check origins and axes of the joints"
+        raise ArmError(obstacle.path, problem, cure, line=obstacle.line)
+
+
+def _verify(chain: UrdfChain, arm: Arm) -> None:
+    """Refuse an arm that is not what the URDF says.
 
     Raises:
         ArmError: It places the flange elsewhere.
     """
-    arm = build_arm(parse_toml(chain.path, text.encode(), ArmFile, ArmError))
-    q = np.linspace(-3.0, 3.0, 90).reshape(15, 6) * [1.0, -0.7, 0.5, -0.9, 0.6, 0.8]
-    wanted = chain.flange(q)
-    gap = float(np.abs(arm.flange(q) - wanted).max())
-    back = arm.flange(arm.nearest(wanted, q))
+    wanted = chain.flange(Q)
+    gap = float(np.abs(arm.flange(Q) - wanted).max())
+    back = arm.flange(arm.nearest(wanted, Q))
+    if arm.file.opw is None:  # Newton's method may miss a pose
+        back = np.where(np.isnan(back), wanted, back)
     gap = max(gap, float(np.abs(back - wanted).max()))
     if not gap < 1e-9:
         problem = f"cannot be said as an arm file: flanges differ by {gap:.3g}"

@@ -287,10 +287,9 @@ def joints_with_wrist(
         miss = points - tcp
         if np.abs(miss).max() < CLOSE:
             break
-        axes = chain.sense[:3, None] * frames[:, :3, :3, 2]
-        jacobian = np.swapaxes(
-            np.cross(axes, tcp[:, None] - frames[:, :3, :3, 3]), 1, 2
-        )
+        levers = tcp[:, None] - frames[:, :3, :3, 3]
+        columns = chain.by_joints(np.cross(frames[:, :3, :3, 2], levers))
+        jacobian = np.swapaxes(columns, 1, 2)
         if np.abs(np.linalg.det(jacobian)).min() < 1e-6:
             raise PlanError("the path passes a singularity of the arm")
         q[:, :3] += np.linalg.solve(jacobian, miss[..., None])[..., 0]

@@ -30,6 +30,8 @@ class Chain:
         centre: Centres of mass in the D-H link frames, (6, 3) [m].
         speed: Highest joint speeds, (6,) [rad/s].
         lower, upper: Joint range, (6,) [rad].
+        parallelogram: A rod holds the forearm's direction while joint 2 moves alone:
+            what axis 2 turns by, joint 3 turns back.
     """
 
     a: Floats
@@ -44,14 +46,39 @@ class Chain:
     speed: Floats
     lower: Floats
     upper: Floats
+    parallelogram: bool = False
+
+    @property
+    def _turned_back(self) -> float:
+        """D-H angle of joint 3 that the rod takes back per radian of joint 2."""
+        facing = 1.0 if np.cos(self.alpha[1]) > 0 else -1.0
+        return float(facing * self.sense[1]) if self.parallelogram else 0.0
 
     def dh_angles(self, q: Floats) -> Floats:
         """Convert controller angles (n, 6) to D-H angles (n, 6) [rad]."""
-        return np.asarray(self.offset + self.sense * (q + self.shift))
+        theta = np.asarray(self.offset + self.sense * (q + self.shift))
+        if self.parallelogram:
+            theta[:, 2] -= self._turned_back * q[:, 1]
+        return theta
 
     def controller_angles(self, theta: Floats) -> Floats:
         """Convert D-H angles (n, 6) to controller angles (n, 6) [rad]."""
-        return np.asarray((theta - self.offset) / self.sense - self.shift)
+        q = np.asarray((theta - self.offset) / self.sense - self.shift)
+        if self.parallelogram:
+            q[:, 2] += self._turned_back * q[:, 1] / self.sense[2]
+        return q
+
+    def by_joints(self, by_angles: Floats) -> Floats:
+        """Convert derivatives by D-H angles to those by controller angles.
+
+        Args:
+            by_angles: Of the first k >= 3 angles, (n, k, ..).
+        """
+        senses = self.sense[: by_angles.shape[1]]
+        out = np.asarray(np.moveaxis(by_angles, 1, -1) * senses)
+        if self.parallelogram:
+            out[..., 1] -= self._turned_back * by_angles[:, 2]
+        return np.moveaxis(out, -1, 1)
 
     @cached_property
     def twists(self) -> Floats:
@@ -334,7 +361,7 @@ def link_torque(body: LinkMasses, q: Floats) -> Floats:
     """Return the torque of the links' weight about every joint.
 
     tau_j = sense_j z_j . sum_{i >= j} (c_i - o_j) x m_i g, positive along positive
-    rotation as the controller counts it.
+    rotation as the controller counts it; joint 2 of a parallelogram turns axis 3 too.
 
     Args:
         body: Chain, masses and centres of mass.
@@ -402,6 +429,5 @@ def _moments(chain: Chain, frames: Floats, centre: Floats, mass: Floats) -> Floa
     for j in range(6):
         lever = centre[:, j:] - frames[:, j, None, :3, 3]
         moment = np.cross(lever, weight[:, j:]).sum(axis=1)
-        axis = chain.sense[j] * frames[:, j, :3, 2]
-        torque[:, j] = np.sum(axis * moment, axis=-1)
-    return torque
+        torque[:, j] = np.sum(frames[:, j, :3, 2] * moment, axis=-1)
+    return chain.by_joints(torque)

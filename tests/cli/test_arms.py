@@ -1,6 +1,7 @@
 """postproc arm: the shipped arms in a table, an arm file from a URDF."""
 
 import json
+import re
 
 import numpy as np
 import pytest
@@ -63,6 +64,15 @@ def test_it_goes_to_standard_output_and_says_what_was_rounded(urdf):
     found = cli("arm", "from-urdf", urdf, "--name", "nj130", "--base", "l0")
     assert found.exit_code == 0 and 'name = "nj130"' in found.stdout
     assert found.stderr == f"{urdf}: joint j3: -1.57 rad taken as -90 deg\n"
+
+
+def test_an_offset_wrist_has_a_numeric_inverse_and_that_is_said(urdf):
+    urdf.write_text(urdf.read_text().replace('xyz="0.135 0.0', 'xyz="0.135 0.05'))
+    place = urdf.with_name("arm.toml")
+    found = cli("arm", "from-urdf", urdf, "-o", place)
+    assert found.exit_code == 0 and load_arm(place).file.opw is None
+    said = r"robot\.urdf:41: joint j6 misses the wrist centre, off by 0\.05\. .*numeric"
+    assert re.search(said, found.stderr)
 
 
 @pytest.mark.parametrize(

@@ -1,6 +1,7 @@
 """A URDF becomes an arm file that says the same, or is refused in words."""
 
 import math
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -10,7 +11,7 @@ from postproc.exceptions import ArmError
 from postproc.robot.arm import load_arm
 from postproc.robot.arm_file import read_arm_file
 from postproc.robot.inverse import wrap
-from postproc.robot.ortho_parallel import arm_text
+from postproc.robot.ortho_parallel import arm_text, closed_form_obstacle
 from postproc.robot.urdf import read_chain
 from tests.reference import urdf
 from tests.robot.urdfs import (
@@ -122,18 +123,13 @@ def changed(k, **parts):
     [
         (changed(0, axis=X), "joint j1 does not turn about z of l0.*--base"),
         (changed(0, xyz=(0.1, 0.0, 0.4)), "joint j1 is beside the base's z.*--base"),
-        (changed(1, axis=Z), "joint j2 is not square to axis 1"),
-        (changed(2, axis=X), "joint j3 is not parallel to axis 2"),
-        (changed(3, axis=Y), "joint j4 is not square to axis 3"),
-        (changed(4, axis=X), "joint j5 is not square to axis 4"),
-        (changed(5, axis=Y), "joint j6 is not square to axis 5"),
-        (changed(4, xyz=(0.96, 0.0, 0.03)), "joint j5 does not cross axis 4.*0.03"),
-        (changed(5, xyz=(0.13, 0.0, 0.02)), "joint j6 misses the wrist.*0.02"),
+        (changed(3, axis=Y), "j4 is not square to axis 3.*no joint angles move"),
+        (changed(4, axis=X), "j5 is not square to axis 4.*no joint angles move"),
         (changed(6, xyz=(0.0, 0.01, 0.0)), "joint j6 misses the flange.*--tip"),
         (changed(6, rpy=(0.0, 0.0, 0.0)), "not along the z of the flange.*--tip"),
         (changed(6, rpy=(0.0, -QUARTER, 0.0)), "behind its flange.*--tip"),
-        (changed(2, xyz=(0.0, 0.0, 0.0)), "joint j3 ends an upper arm of no length"),
-        (upright(0.5, 0.2, 0.9, 0.2, 0.0, 0.1), "joint j4 ends a forearm of no length"),
+        (changed(5, axis=Y), "joint j6 is not along the z of the flange.*--tip"),
+        (changed(2, xyz=(0.0, 0.0, 0.0)), "j3 ends an upper arm of no.*no joint angl"),
         (IRB[1:], "has 5 revolute joints between l0 and tool0, not 6"),
     ],
 )
@@ -144,6 +140,27 @@ def test_what_is_not_such_an_arm_is_refused_with_its_joint(tmp_path, rows, said)
     if "joints" not in said:
         line = refused.value.line
         assert path.read_text().splitlines()[line - 1].strip().startswith("<joint")
+
+
+@pytest.mark.parametrize(
+    ("rows", "said"),
+    [
+        (changed(1, axis=Z), "joint j2 is not square to axis 1"),
+        (changed(2, axis=X), "joint j3 is not parallel to axis 2"),
+        (changed(4, xyz=(0.96, 0.0, 0.03)), "joint j5 does not cross axis 4.*0.03"),
+        (changed(5, xyz=(0.13, 0.0, 0.02)), "joint j6 misses the wrist.*0.02"),
+        (upright(0.5, 0.2, 0.9, 0.2, 0.0, 0.1), "joint j4 ends a forearm of no length"),
+    ],
+)
+def test_an_arm_of_another_structure_has_no_closed_form(tmp_path, rows, said):
+    chain = read_chain(write(tmp_path, rows))
+    assert re.search(rf":\d+: {said}.*numeric", closed_form_obstacle(chain))
+    (tmp_path / "arm.toml").write_text(arm_text(chain, 0.1))
+    arm = load_arm(tmp_path / "arm.toml")
+    q = np.random.default_rng(5).uniform(-3.0, 3.0, (50, 6))
+    np.testing.assert_allclose(arm.flange(q), urdf.flange(rows, q), atol=1e-9)
+    assert arm.file.opw is None
+    assert closed_form_obstacle(read_chain(write(tmp_path, IRB))) == ""
 
 
 @pytest.mark.parametrize(
