@@ -1,8 +1,8 @@
 """What a fit is expected to leave at new poses, and whether a simpler one leaves less.
 
 Poses are predicted by fits that have not seen any of their stops. Where a campaign is
-short, effects are chosen again without each part, and the simplest model whose error is
-within one standard error of the best is taken (Breiman et al., 1984, section 3.4.3).
+short, effects are chosen again without each part, and more than `geometry,backlash` is
+taken only where that leaves new poses less, beyond what chance does.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.stats import t as student
 
 from postproc.arrays import Bools, Floats, Ints
 from postproc.calibration.diagnosis.held_out import Folds, regions, whole_poses
@@ -24,8 +25,10 @@ from postproc.robot.arm import Arm
 from postproc.robot.pose import MM
 
 PARTS = 5
+STRAY = 5.0  # standard deviations beyond which an error counts no more
 WITHIN = 1.96  # standard deviations that hold 95 % of normal deviates
 SURE = 1.645  # standard errors, one-sided 95 %
+LEVEL = 0.025  # of a false choice between two models
 
 FitRows = Callable[[Measurements], tuple[Fit, Model]]
 
@@ -36,17 +39,38 @@ class HeldOutRows:
 
     Attributes:
         error: What is left, (n, 3) [m].
-        within: Whether a coordinate lies in its stated 95 % interval, (n, 3).
+        std: Stated standard deviation of a reading, (n, 3) [m].
+        part: Part of every row, (n,): what predicted it has seen no other row of it.
         used: Rows that are measurements of the arm, (n,).
         pose: Number of the pose of every row, (n,).
         tracker: Variance per axis of the tracker, (n,) [m^2].
     """
 
     error: Floats
-    within: Bools
+    std: Floats
+    part: Ints
     used: Bools
     pose: Ints
     tracker: Floats
+
+    @property
+    def widening(self) -> float:
+        """Factor on the stated standard deviations by what held-out rows show."""
+        return _birge_ratio((self.error / self.std)[self.used])
+
+    @property
+    def covered(self) -> float:
+        """Share of coordinates in their 95 % intervals.
+
+        Intervals of a part are widened by what all other parts show.
+        """
+        ratio, hits = self.error / self.std, []
+        for k in np.unique(self.part):
+            others = self.used & (self.part != k)
+            wide = _birge_ratio(ratio[others])
+            own = np.abs(ratio[self.used & (self.part == k)])
+            hits.append(own < WITHIN * wide)
+        return float(np.concatenate(hits).mean())
 
     def by_pose(self) -> Floats:
         """Average the length of what is left over every pose, (poses,) [m]."""
@@ -85,6 +109,19 @@ class HeldOutError:
         )
 
 
+def _birge_ratio(ratio: Floats) -> float:
+    """Return the factor by which errors (n, 3) exceed their standard deviations.
+
+    The root of the mean squared ratio, at least 1 (R. T. Birge, Phys. Rev. 40, 1932),
+    strays counting as far; 1 where as many rows exceed it by chance.
+    """
+    if ratio.size == 0:
+        return 1.0
+    square = float(np.minimum(ratio**2, STRAY**2).mean())
+    chance = 1.0 + SURE * float(np.sqrt(2.0 / ratio.size))
+    return float(np.sqrt(square)) if square > chance else 1.0
+
+
 def parts_of(pose: Ints, seed: int, parts: int = PARTS) -> Ints:
     """Deal poses to parts at random, rows (n,)."""
     _, label = np.unique(pose, return_inverse=True)
@@ -112,7 +149,7 @@ def held_out(
         used: Rows that count as measurements, (n,).
     """
     error = np.full((len(survey), 3), np.nan)
-    within = np.zeros((len(survey), 3), dtype=bool)
+    std = np.ones((len(survey), 3))
     tracker = np.zeros(len(survey))
     for k in np.unique(part):
         out = np.flatnonzero(part == k)
@@ -121,10 +158,10 @@ def held_out(
         batch = Batch(arm, states)
         read = model.reading(arm, states)
         error[out] = survey.position[out] - batch.walk.tcp - read.error
-        within[out] = np.abs(error[out]) < WITHIN * read.std
+        std[out] = read.std
         shape = fitted.noise.tracker_std(survey.position[out]) ** 2
         tracker[out] = shape / states.readings
-    return HeldOutRows(error, within, used, poses_of(survey.states), tracker)
+    return HeldOutRows(error, std, part, used, poses_of(survey.states), tracker)
 
 
 def held_out_linearly(fit: Fit, model: Model, part: Ints) -> HeldOutRows:
@@ -140,14 +177,13 @@ def held_out_linearly(fit: Fit, model: Model, part: Ints) -> HeldOutRows:
     noise = fit.noise.arrival_variance(jacobian) + fit.noise.pose_variance(jacobian)
     tracker = fit.noise.tracker_std(fit.position) ** 2 / fit.batch.states.readings
     noise = noise + tracker[:, None] + fit.whitener.extra
-    error, within = np.empty((n, 3)), np.empty((n, 3), dtype=bool)
+    error, std = np.empty((n, 3)), np.empty((n, 3))
     for rows, values, covariance in folds.solved():
         design = fit.design[rows]
         error[rows] = fit.residual[rows] + design.times(fit.values - values)
         known = design.variance(covariance)
-        std = model.reading_spread * np.sqrt(known + noise[rows])
-        within[rows] = np.abs(error[rows]) < WITHIN * std
-    return HeldOutRows(error, within, fit.rows.weight > 0, fit.pose, tracker)
+        std[rows] = model.reading_spread * np.sqrt(known + noise[rows])
+    return HeldOutRows(error, std, part, fit.rows.weight > 0, fit.pose, tracker)
 
 
 def summarise(rows: HeldOutRows, regions_mm: float, chosen: bool) -> HeldOutError:
@@ -160,7 +196,7 @@ def summarise(rows: HeldOutRows, regions_mm: float, chosen: bool) -> HeldOutErro
         ErrorStatistics.of(rows.error[used]),
         mean * float(np.sqrt(max(0.0, share))) / MM,
         regions_mm,
-        float(rows.within[used].mean()),
+        rows.covered,
         chosen,
     )
 
@@ -177,41 +213,43 @@ class Compared:
     Attributes:
         gain: Mean fall of the error by the second one [m].
         std_error: Of it, over poses [m].
+        poses: Number of poses.
     """
 
     gain: float
     std_error: float
+    poses: int
 
     @classmethod
     def of(cls, first: HeldOutRows, second: HeldOutRows) -> Compared:
         """Pair the poses."""
         fall = first.by_pose() - second.by_pose()
-        error = (
-            float(fall.std(ddof=1) / np.sqrt(len(fall))) if len(fall) > 1 else np.inf
-        )
-        return cls(float(fall.mean()), error)
+        spread = float(fall.std(ddof=1)) if len(fall) > 1 else np.inf
+        return cls(float(fall.mean()), spread / len(fall) ** 0.5, len(fall))
 
     @property
     def better(self) -> bool:
-        """Whether the second one is better, one-sided 95 %."""
-        return self.gain > SURE * self.std_error
+        """Whether the second one is better beyond doubt."""
+        return self.gain > self.limit
 
     @property
-    def worse(self) -> bool:
-        """Whether the second one is worse, one-sided 95 %."""
-        return self.gain < -SURE * self.std_error
+    def limit(self) -> float:
+        """Gain that chance alone reaches at `LEVEL` [m]."""
+        return float(student.isf(LEVEL, max(self.poses - 1, 1))) * self.std_error
 
 
-def simplest(tried: Sequence[HeldOutRows]) -> int:
-    """Return the number of the simplest model that is within an error of the best.
+def choose(tried: Sequence[HeldOutRows], usual: int) -> int:
+    """Choose between models by what they leave of held-out poses.
+
+    A more complex model than the usual one must leave less beyond doubt, and so must a
+    simpler one.
 
     Args:
         tried: Held-out errors of models, the simplest first.
+        usual: Number of the usual one.
     """
-    means = [float(rows.by_pose().mean()) for rows in tried]
-    best = int(np.argmin(means))
-    for k in range(best):
-        compared = Compared.of(tried[k], tried[best])
-        if compared.gain <= compared.std_error:
-            return k
+    best = usual
+    for k in (*range(usual - 1, -1, -1), *range(usual + 1, len(tried))):
+        if Compared.of(tried[best], tried[k]).better:
+            best = k
     return best

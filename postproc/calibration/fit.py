@@ -122,7 +122,14 @@ def fit_measurements(
     """Fit a model to measurements, see `fit`.
 
     Args:
-        validate: Whether poses are held out, to say what new ones will be left, and to
+        survey: The rows.
+        cell: As `fit` takes it, and so are those that follow.
+        method: "full" or one of the source's methods.
+        effects: Names of effects, or None.
+        frame: Frame of the measured positions.
+        seed: Of random layers.
+        progress: Told what is being done.
+        validate: Whether poses are held out, to find what new ones will be left, and to
             take simpler effects where those leave less. It takes several fits.
     """
     survey = pool_readings(survey)
@@ -159,7 +166,8 @@ def fit_measurements(
         *(() if validated is None else validated.notes),
     )
     survey = replace(survey, warnings=told)
-    model = replace(model_of(fitted, survey), registration=placed)
+    wide = 1.0 if validated is None else validated.widening
+    model = replace(model_of(fitted, survey, wide), registration=placed)
     widths = newer_widths((), model, cell.arm, reversals)
     model = replace(model, flank_widths=widths)
     report = report_fit(fitted, survey, model)

@@ -28,7 +28,7 @@ from postproc.model.effects.probe_turn import ProbeTurn
 from postproc.model.effects.tool_shift import ToolShift
 from postproc.model.kinematics import Batch
 from postproc.model.model import COMPENSATED, READING, WORST_STD, Model
-from postproc.model.noise import Noise
+from postproc.model.noise import Noise, angle_step
 from postproc.model.ranges import Ranges
 from postproc.robot.arm import Arm
 from postproc.robot.pose import MM
@@ -366,21 +366,6 @@ def _peak_of_others(fitted: Fit, before: Fit) -> float:
 
 
 ISO_RP = 3.615  # RP of ISO 9283 over the standard deviation per axis, round scatter
-DECIMALS = 5  # of joint angles, from which on rounding is below all else
-WRITTEN = 1e-6  # of the last decimal by which a written number is off
-
-
-def angle_step(q: Floats) -> float:
-    """Return the step of joint angles (n, 6) [rad] that were written rounded [rad].
-
-    0 where they have more decimals than matter, as degrees or as radians.
-    """
-    for decimals in range(DECIMALS):
-        for unit in (np.rad2deg(1.0), 1.0):
-            scaled = q * unit * 10.0**decimals
-            if np.abs(scaled - np.round(scaled)).max(initial=0.0) < WRITTEN:
-                return float(10.0**-decimals / unit)
-    return 0.0
 
 
 def expected_noise(fitted: Fit) -> Noise:
@@ -392,11 +377,15 @@ def expected_noise(fitted: Fit) -> Noise:
     of the data sheet is taken to be an error of the pose, which a mean over arrivals
     has as well.
     """
-    noise = fitted.noise
-    rounding = angle_step(fitted.batch.states.q) ** 2 / 12.0
+    noise, limit = fitted.noise, angle_step(fitted.batch.states.q) ** 2 / 12.0
     if "pose" in fitted.whitener.estimated:
-        return replace(noise, pose_joint=_less(noise.pose_joint, rounding))
-    noise = replace(noise, joint=_less(noise.joint, rounding))
+        rounding = min(noise.pose_joint**2, limit)
+        left = _less(noise.pose_joint, rounding)
+        return replace(noise, pose_joint=left, rounding=float(np.sqrt(rounding)))
+    rounding = min(noise.joint**2, limit)
+    noise = replace(
+        noise, joint=_less(noise.joint, rounding), rounding=float(np.sqrt(rounding))
+    )
     sheet = fitted.batch.arm.repeatability / ISO_RP
     total = float(noise.arrival_variance(fitted.design.jacobian).mean())
     share = max(0.0, 1.0 - sheet**2 / max(total, 1e-300))
@@ -412,14 +401,20 @@ def _less(std: float, variance: float) -> float:
     return float(np.sqrt(max(0.0, std**2 - variance)))
 
 
-def model_of(fitted: Fit, survey: Measurements) -> Model:
-    """Keep what a fit found as a model."""
+def model_of(fitted: Fit, survey: Measurements, wide: float = 1.0) -> Model:
+    """Keep what a fit found as a model.
+
+    Args:
+        fitted: The fit.
+        survey: Its rows.
+        wide: Factor on all standard deviations off the tracker, by held-out rows.
+    """
     used = fitted.rows.weight > 0
     left = np.linalg.norm(fitted.residual[used], axis=1) / MM
-    covariance = fitted.stated * widening(fitted)
+    covariance = fitted.stated * max(widening(fitted), wide**2)
     told = fitted.combination.where(*COMPENSATED)
     own = np.where(np.outer(told, told), covariance, 0.0)  # no set-up in predictions
-    arm, noise = fitted.batch.arm, expected_noise(fitted)
+    arm, noise = fitted.batch.arm, expected_noise(fitted).scaled(wide)
     jacobian = fitted.design.jacobian
     known = np.sqrt(fitted.design.variance(own) + noise.pose_variance(jacobian))
     statistics = {

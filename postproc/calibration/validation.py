@@ -13,18 +13,18 @@ from postproc.calibration.cross_validation import (
     Compared,
     HeldOutError,
     HeldOutRows,
+    choose,
     held_out,
     held_out_linearly,
     mean_error_mm,
     parts_of,
     regions_of,
-    simplest,
     summarise,
 )
 from postproc.calibration.measurements import Measurements
 from postproc.calibration.regression import Fit
 from postproc.calibration.selection import Progress, fit_survey, model_of, silent
-from postproc.model.effects import BASE_EFFECTS
+from postproc.model.effects.effect import Effect
 from postproc.model.effects.placement import Placement
 from postproc.model.model import Model
 from postproc.model.noise import poses_of
@@ -34,7 +34,7 @@ from postproc.robot.pose import MM
 FEW_POSES = 300  # at the most: effects are chosen again without each part
 FEWEST_POSES = 6  # that a part of the rows can be predicted from
 SEED = 0
-FLOOR = 5e-6  # [m] differences of models that nobody can use
+FLOOR = 2e-5  # [m] an arm that is as good as its drawing
 
 
 @dataclass(frozen=True)
@@ -57,15 +57,9 @@ ASKED = "the effects that were asked for"
 DEFAULT = "the effects that the survey gives evidence for"
 
 
-def ladder() -> tuple[Rung, ...]:
-    """List what the default fit may fall back to, the simplest first."""
-    return (
-        SET_UP,
-        Rung("geometry", BASE_EFFECTS[:1]),
-        Rung("geometry,backlash", ("geometry", "backlash")),
-        Rung("effects with a law", None),
-        Rung(DEFAULT, None, free=True),
-    )
+SIMPLER = Rung("geometry", ("geometry",))
+USUAL = Rung("geometry,backlash", ("geometry", "backlash"))
+WITH_LAWS = Rung("effects with a law", None)
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,18 +118,20 @@ class Validated:
     Attributes:
         fit: The fit to take.
         error: What it is expected to leave; None where there are too few poses.
+        widening: Factor on its stated standard deviations that held-out rows ask for.
         notes: What a reader of the fit should know.
         rejected: Why no model must be used; "" where it may be.
     """
 
     fit: Fit
     error: HeldOutError | None
+    widening: float = 1.0
     notes: tuple[str, ...] = ()
     rejected: str = ""
 
 
 def validate_fit(task: Task, fitted: Fit) -> Validated:
-    """Say what a fit leaves at new poses, and take a simpler one where that leaves less.
+    """Find what a fit leaves at new poses; take simpler effects that leave less.
 
     Args:
         task: What was fitted.
@@ -144,58 +140,63 @@ def validate_fit(task: Task, fitted: Fit) -> Validated:
     survey, used = task.survey, fitted.rows.weight > 0
     poses = len(np.unique(poses_of(survey.states[used])))
     if poses < FEWEST_POSES + PARTS:
-        note = f"{poses} poses: too few to hold some out; nobody has checked this model"
-        return Validated(fitted, None, (note,))
+        note = f"{poses} poses are too few to hold some out: the model is not checked"
+        return Validated(fitted, None, notes=(note,))
     part = parts_of(poses_of(survey.states), SEED)
     if poses > FEW_POSES:
         rows = held_out_linearly(fitted, model_of(fitted, survey), part)
-        return _concluded(task, fitted, rows, part, chosen=False)
-    rung, rows, note = _chosen(task, part, used)
+        return _conclude(task, fitted, rows, chosen=False)
+    effects = fitted.combination.effects
+    rung, rows, notes = _choose(task, effects, part, used)
     if rung != task.rung:
         fitted = task.fit(rung)
-    found = _concluded(task, fitted, rows, part, chosen=True)
-    return replace(found, notes=(*note, *found.notes))
+    return replace(_conclude(task, fitted, rows, chosen=True), notes=notes)
 
 
-def _chosen(
-    task: Task, part: Ints, used: Bools
+def _choose(
+    task: Task, effects: tuple[Effect, ...], part: Ints, used: Bools
 ) -> tuple[Rung, HeldOutRows, tuple[str, ...]]:
-    """Choose the simplest effects that leave new poses as little as any.
+    """Choose the effects that leave new poses least.
+
+    Args:
+        task: What was fitted.
+        effects: Effects of the fit that was asked for.
+        part: Part of every row, (n,).
+        used: Rows that count, (n,).
 
     Returns:
         The effects, their held-out errors, and a note where they are others than asked.
     """
+    asked = task.rung
     if task.effects is not None:
-        return task.rung, task.errors(task.rung, part, used), ()
-    rungs = ladder()[1:]
+        return asked, task.errors(asked, part, used), ()
+    laws = (WITH_LAWS,) if any(e.free for e in effects) else ()
+    rungs = (SIMPLER, USUAL, *laws, asked)
     tried = [task.errors(rung, part, used) for rung in rungs]
-    number = simplest(tried)
+    number = choose(tried, rungs.index(USUAL))
     rung, rows = rungs[number], tried[number]
-    if rung == task.rung or number == len(rungs) - 1:
+    if rung == asked:
         return rung, rows, ()
-    best = mean_error_mm(tried[-1])
     note = (
         f"written with {rung.name}: {DEFAULT} predict new poses no better "
-        f"({best:.4f} mm, {mean_error_mm(rows):.4f} mm with {rung.name})"
+        f"({mean_error_mm(tried[-1]):.4f} mm, {mean_error_mm(rows):.4f} mm with "
+        f"{rung.name})"
     )
     return rung, rows, (note,)
 
 
-def _concluded(
-    task: Task, fitted: Fit, rows: HeldOutRows, part: Ints, chosen: bool
-) -> Validated:
+def _conclude(task: Task, fitted: Fit, rows: HeldOutRows, chosen: bool) -> Validated:
     """Put figures together, and compare with a set-up without errors of the arm."""
-    survey, used = task.survey, rows.used
+    survey = task.survey
     model = model_of(fitted, survey)
     region = held_out_linearly(fitted, model, regions_of(survey))
     error = summarise(rows, mean_error_mm(region), chosen)
-    plain = task.errors(SET_UP, part, used)
-    gain = Compared.of(plain, rows)
-    if gain.better or (gain.gain > -FLOOR and mean_error_mm(plain) < FLOOR / MM):
-        return Validated(fitted, error)
+    plain = task.errors(SET_UP, rows.part, rows.used)
+    if Compared.of(plain, rows).better or mean_error_mm(plain) < FLOOR / MM:
+        return Validated(fitted, error, rows.widening)
     why = (
         f"new poses are left {error.error.mean_mm:.4f} mm with this model and "
         f"{mean_error_mm(plain):.4f} mm with {SET_UP.name}: the rows are those of "
         "another arm, program or frame, or too few"
     )
-    return Validated(fitted, error, rejected=why)
+    return Validated(fitted, error, rows.widening, rejected=why)

@@ -377,6 +377,7 @@ class Model:
         """
         tracker = self.noise.tracker_std(at.tcp)[:, None]
         scatter = self.noise.arrival_variance(at.jacobian) + tracker**2
+        scatter = scatter + self.noise.rounding_variance(at.states.q, at.jacobian)
         std = np.sqrt(np.maximum(known, 0.0) + scatter)
         return np.asarray(self.reading_spread * std)
 

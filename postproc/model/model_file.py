@@ -67,6 +67,7 @@ class NoiseSection(ModelSection):
     stop: NonNegativeFloat = 0.0
     pose_joint: NonNegativeFloat = 0.0
     pose: NonNegativeFloat = 0.0
+    rounding: NonNegativeFloat = 0.0
 
 
 class RangesSection(ModelSection):

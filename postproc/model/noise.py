@@ -29,7 +29,8 @@ from postproc.model.kinematics import Batch
 from postproc.robot.state import States
 
 TRACKER_FIXED, TRACKER_RANGE = 1e-5, 5e-6  # [m], [m/m] a laser tracker's data sheet
-LIVELY = 0.3  # share of the other component that each begins with at least
+DEAD = 0.03  # share of the largest component below which another begins again
+LIVELY = 0.3  # with this share of the largest
 UNSEEN = 1.0  # [m] as good as not measured
 SMALLEST, LARGEST = 1e-7, 1e-2  # [m] bounds of all standard deviations at the TCP
 SAME_POSE = 1e-5  # [rad] joint angles that are one pose
@@ -50,6 +51,8 @@ class Noise:
         stop: Standard deviation s of a stop per axis [m].
         pose_joint: Standard deviation R of every joint angle from pose to pose [rad].
         pose: Standard deviation S of a pose per axis [m].
+        rounding: Part of R that rounded joint angles of the file explain [rad]: other
+            rounded rows have it, commands have not.
     """
 
     tracker: float
@@ -58,6 +61,7 @@ class Noise:
     stop: float = 0.0
     pose_joint: float = 0.0
     pose: float = 0.0
+    rounding: float = 0.0
 
     def tracker_std(self, position: Floats) -> Floats:
         """Standard deviation per axis of the tracker at positions (n, 3), (n,) [m]."""
@@ -71,6 +75,35 @@ class Noise:
     def pose_variance(self, jacobian: Floats) -> Floats:
         """Variance per axis of a pose that was not measured, (n, 3) [m^2]."""
         return _seen_through(jacobian, self.pose_joint, self.pose)
+
+    def rounding_variance(self, q: Floats, jacobian: Floats) -> Floats:
+        """Variance per axis of rows with joint angles q (n, 6) [rad], (n, 3) [m^2]."""
+        rounding = self.rounding if self.rounding and angle_step(q) else 0.0
+        return _seen_through(jacobian, rounding, 0.0)
+
+    def scaled(self, factor: float) -> Noise:
+        """Multiply the scatter of stops and poses, rounding aside, by a factor."""
+        return replace(
+            self, joint=factor * self.joint, stop=factor * self.stop,
+            pose_joint=factor * self.pose_joint, pose=factor * self.pose,
+        )  # fmt: skip
+
+
+DECIMALS = 5  # of joint angles, from which on rounding is below all else
+WRITTEN = 1e-6  # of the last decimal by which a written number is off
+
+
+def angle_step(q: Floats) -> float:
+    """Return the step of joint angles (n, 6) [rad] that were written rounded [rad].
+
+    0 where they have more decimals than matter, as degrees or as radians.
+    """
+    for decimals in range(DECIMALS):
+        for unit in (float(np.rad2deg(1.0)), 1.0):
+            scaled = q * unit * 10.0**decimals
+            if np.abs(scaled - np.round(scaled)).max(initial=0.0) < WRITTEN:
+                return float(10.0**-decimals / unit)
+    return 0.0
 
 
 def _seen_through(jacobian: Floats, joint: float, shift: float) -> Floats:
@@ -471,11 +504,12 @@ class Whitener:
         r0 = float(np.median(np.sqrt(self.joint.mean(axis=1))))
         unit = {"tracker": t0, "joint": r0, "pose_joint": r0, "stop": 1.0, "pose": 1.0}
         size = np.array([getattr(start, k) * unit[k] for k in kinds])
-        least = LIVELY * float(size.max())
+        largest = float(size.max())
+        size = np.where(size < DEAD * largest, LIVELY * largest, size)
         bounds = [
             (np.log(SMALLEST / unit[k]), np.log(LARGEST / unit[k])) for k in kinds
         ]
-        begin = np.log(np.maximum(size, least) / [unit[k] for k in kinds])
+        begin = np.log(np.maximum(size, SMALLEST) / [unit[k] for k in kinds])
         return np.clip(begin, *np.array(bounds).T), bounds
 
 
