@@ -196,7 +196,7 @@ def _conclude(task: Task, fitted: Fit, rows: HeldOutRows, chosen: bool) -> Valid
         return Validated(fitted, error, rows.widening)
     why = (
         f"new poses are left {error.error.mean_mm:.4f} mm with this model and "
-        f"{mean_error_mm(plain):.4f} mm with {SET_UP.name}: the rows are those of "
-        "another arm, program or frame, or too few"
+        f"{mean_error_mm(plain):.4f} mm with {SET_UP.name}. The rows are those of "
+        "another arm, program or frame, or there are too few"
     )
     return Validated(fitted, error, rows.widening, rejected=why)

@@ -204,7 +204,8 @@ def diagnose_files(
         progress=progress,
     )  # fmt: skip
     found = replace(found, model=replace(found.model, registration=placed))
-    found.model.save(asked.output or extended_path(model_path))
+    if found.diagnosis.verdict != "rejected":
+        found.model.save(asked.output or extended_path(model_path))
     return found
 
 
@@ -243,7 +244,7 @@ def from_tracker_frame(
 
 def tell(found: Diagnosis) -> str:
     """Write a diagnosis for a terminal."""
-    lines = [f"verdict: {found.verdict}"]
+    lines = [f"verdict: {found.verdict}", found.story()]
     if found.findings:
         lines.append(
             table_text(FINDINGS, (_finding_row(found, k) for k in _numbers(found)))

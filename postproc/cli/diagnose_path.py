@@ -202,7 +202,8 @@ def diagnose_path(
         progress=progress,
     )  # fmt: skip
     extension = _with_verdicts(_as_surveyed(extension, model), joints)
-    extension.model.save(asked.output or extended_path(model_path))
+    if extension.diagnosis.verdict != "rejected":
+        extension.model.save(asked.output or extended_path(model_path))
     size = ErrorStatistics.of_sizes(lengths(found.on_the_way.off))
     moves = np.unique(_move(found.on_the_way.sample, ways))
     stops = len(found.ended), found.missed

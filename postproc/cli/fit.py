@@ -108,7 +108,7 @@ def fit_files(
     reading: TableFormat = DETECT,
     **how: Any,
 ) -> Calibration:
-    """Fit measurement files and write the model.
+    """Fit measurement files and write the model, unless the fit rejects it.
 
     Args:
         data: Measurement files.
@@ -133,6 +133,8 @@ def fit_files(
         parts = [join_program(path, program, cell, reading) for path in data]
         survey = concatenate(parts)
         found = fit_measurements(survey, cell, **chosen)
+    if found.rejected:
+        return found
     found.model.save(output)
     if html is not None:
         write_page(html, found, cell)
@@ -147,8 +149,10 @@ def tell_fit_files(found: Calibration, output: Path, everything: bool = False) -
         output: The file its model was written to.
         everything: Whether the report lists all parameters and rows.
     """
-    told = tell_fit(found.report, everything)
-    return told + f"\nmodel {found.model.id} written to {output}"
+    report = tell_fit(found.report, everything)
+    if found.rejected:
+        return f"{report}\nno model is written: {found.rejected}"
+    return f"{report}\nmodel {found.model.id} written to {output}"
 
 
 def fit_json(found: Calibration) -> str:
@@ -158,7 +162,8 @@ def fit_json(found: Calibration) -> str:
     """
     from postproc.report.json import finite
 
-    said = {"model": found.model.id, **asdict(found.report)}
+    verdict = "rejected" if found.rejected else "accepted"
+    said = {"model": found.model.id, "verdict": verdict, **asdict(found.report)}
     return json.dumps(finite(said), indent=1, allow_nan=False) + "\n"
 
 
@@ -192,6 +197,8 @@ def tell_fit(report: FitReport, everything: bool = False) -> str:
         lines += [f"not determined by these rows: {d}" for d in report.unseen]
     else:
         lines = [_tell_found(_large(report.found)), *_tell_rest(report)]
+    if report.held_out is not None:
+        lines.insert(0, report.held_out.describe())
     lines += _tell_rows(report, len(report.dropped) if everything else FEW)
     lines += tell_directions(report.directions, ROWS if everything else FEW)
     lines += [report.flanks, *(f"warning: {warning}" for warning in report.warnings)]

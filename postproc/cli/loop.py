@@ -94,6 +94,8 @@ def diagnose(
             if on_the_way is not None:
                 typer.echo(on_the_way.tell())
             typer.echo(diagnose.tell(found.diagnosis))
+        if found.diagnosis.verdict == "rejected":
+            raise typer.Exit(2)
 
 
 def _diagnosed(

@@ -203,6 +203,8 @@ def fit(
             write_text(json, fit.fit_json(found))
         if json != "-":
             typer.echo(fit.tell_fit_files(found, output, everything))
+        if found.rejected:
+            raise typer.Exit(2)
 
 
 @app.command()

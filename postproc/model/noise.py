@@ -18,9 +18,10 @@ for all of them.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import Protocol
 
 import numpy as np
 
@@ -473,29 +474,20 @@ class Whitener:
         with_others = len(products) == len(self.blocks)
         kinds = self.estimated if with_others else KINDS[:2]
         alone = np.ones(len(weight), dtype=bool)
-        costs: list[Callable[[Floats], tuple[float, Floats]]] = []
+        costs: list[_Cost] = []
         if with_others:
             for block, S in zip(self.blocks, products, strict=True):
                 alone[block.rows] = False
                 costs.append(_BlockCost.of(self, block, S, weight, kinds))
         costs.append(_RowCost.of(self, squares, weight * alone, kinds))
         costs.append(_ReadingCost(self.readings, kinds))
-
-        def cost(u: Floats) -> tuple[float, Floats]:
-            """Negative log likelihood and its gradient by log standard deviations."""
-            parts = [each(np.exp(2.0 * u)) for each in costs]
-            return sum(p[0] for p in parts), np.sum([p[1] for p in parts], axis=0)
-
-        from scipy.optimize import minimize  # slow to load, and for fits alone
-
-        begin, bounds = self._begin(start, kinds)
-        best = minimize(cost, begin, jac=True, method="L-BFGS-B", bounds=bounds)
-        found = dict(zip(kinds, np.exp(best.x).tolist(), strict=True))
+        best = _score(costs, *self._begin(start, kinds))
+        found = dict(zip(kinds, np.exp(best).tolist(), strict=True))
         return replace(Noise(0.0, 0.0, self.origin), **found)
 
     def _begin(
         self, start: Noise, kinds: Sequence[str]
-    ) -> tuple[Floats, list[tuple[float, float]]]:
+    ) -> tuple[Floats, Floats, Floats]:
         """Return logarithms to begin with, and their bounds.
 
         A component of no size has no slope by its logarithm and would stay so.
@@ -506,11 +498,10 @@ class Whitener:
         size = np.array([getattr(start, k) * unit[k] for k in kinds])
         largest = float(size.max())
         size = np.where(size < DEAD * largest, LIVELY * largest, size)
-        bounds = [
-            (np.log(SMALLEST / unit[k]), np.log(LARGEST / unit[k])) for k in kinds
-        ]
-        begin = np.log(np.maximum(size, SMALLEST) / [unit[k] for k in kinds])
-        return np.clip(begin, *np.array(bounds).T), bounds
+        units = np.array([unit[k] for k in kinds])
+        low, high = np.log(SMALLEST / units), np.log(LARGEST / units)
+        begin = np.log(np.maximum(size, SMALLEST) / units)
+        return np.clip(begin, low, high), low, high
 
 
 def _scatter_of_readings(states: States, shape: Floats) -> Readings:
@@ -611,8 +602,23 @@ def _given_others(V: Floats, rotated: Floats, used: Bools) -> Floats:
     return out
 
 
-# What sizes of the components cost: minus their log likelihood, and its slope by the
-# logarithm of every standard deviation. They are asked by their squares.
+# What sizes of the components cost: minus their log likelihood, asked by their squares.
+
+SCORES = 20  # steps at the most
+FARTHEST = 1.5  # step of the logarithm of a standard deviation
+HALVINGS = 6  # of a step that leads uphill
+LEAST_BEND = 1e-6  # of the trace of the information, in every direction
+ENOUGH = 1e-3  # nats that a further step must bring
+
+
+class _Cost(Protocol):
+    """Minus the log likelihood of some rows, by the squared sizes of the components."""
+
+    def value(self, sizes: Floats) -> float:
+        """Evaluate it."""
+
+    def slopes(self, sizes: Floats) -> tuple[Floats, Floats]:
+        """Return its slope by the sizes, and the Fisher information."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -644,11 +650,17 @@ class _RowCost:
         known = (whitener.extra + whitener.unseen)[used]
         return cls(parts, known, square[used], weight[used, None])
 
-    def __call__(self, sizes: Floats) -> tuple[float, Floats]:
+    def value(self, sizes: Floats) -> float:
+        """Return minus the log likelihood."""
         v = np.tensordot(sizes, self.parts, axes=1) + self.known
-        slope = self.weight * (1.0 / v - self.square / v**2)
-        value = 0.5 * (self.weight * (np.log(v) + self.square / v)).sum()
-        return float(value), sizes * np.tensordot(self.parts, slope, axes=2)
+        return 0.5 * float((self.weight * (np.log(v) + self.square / v)).sum())
+
+    def slopes(self, sizes: Floats) -> tuple[Floats, Floats]:
+        """Return its slope by the sizes, and the Fisher information."""
+        v = np.tensordot(sizes, self.parts, axes=1) + self.known
+        slope = 0.5 * self.weight * (1.0 / v - self.square / v**2)
+        scaled = (self.parts * np.sqrt(self.weight) / v).reshape(len(sizes), -1)
+        return np.tensordot(self.parts, slope, axes=2), 0.5 * scaled @ scaled.T
 
 
 @dataclass(frozen=True, eq=False)
@@ -694,15 +706,30 @@ class _BlockCost:
         heaviness = np.where(np.isfinite(heaviness), heaviness, 0.0)
         return cls(tuple(parts), known, products * mask, heaviness)
 
-    def __call__(self, sizes: Floats) -> tuple[float, Floats]:
-        V = self.known + sum(s * p for s, p in zip(sizes, self.parts, strict=True))
-        P = np.linalg.inv(V)
-        PS = P @ self.square
-        log_det = np.linalg.slogdet(V)[1]
-        value = 0.5 * (self.weight * (log_det + np.einsum("gii->g", PS))).sum()
-        M = (P - PS @ P) * self.weight[:, None, None]
+    def value(self, sizes: Floats) -> float:
+        """Return minus the log likelihood."""
+        root = np.linalg.cholesky(self._covariance(sizes))
+        log_det = 2.0 * np.log(np.einsum("gii->gi", root)).sum(axis=1)
+        inverse = np.linalg.inv(root)
+        square = np.einsum("gij,gji->g", inverse @ self.square, inverse.swapaxes(1, 2))
+        return 0.5 * float((self.weight * (log_det + square)).sum())
+
+    def slopes(self, sizes: Floats) -> tuple[Floats, Floats]:
+        """Return its slope by the sizes, and the Fisher information."""
+        P = np.linalg.inv(self._covariance(sizes))
+        M = 0.5 * (P - P @ self.square @ P) * self.weight[:, None, None]
         slope = np.array([float((M * p).sum()) for p in self.parts])
-        return float(value), sizes * slope
+        turned = [P @ p for p in self.parts]
+        weighed = [t * self.weight[:, None, None] for t in turned]
+        information = [
+            [float((a * b.swapaxes(1, 2)).sum()) for b in turned] for a in weighed
+        ]
+        return slope, 0.5 * np.array(information)
+
+    def _covariance(self, sizes: Floats) -> Floats:
+        """Sum the components, (groups, 3 m, 3 m)."""
+        parts = zip(sizes, self.parts, strict=True)
+        return np.asarray(self.known + sum(s * p for s, p in parts))
 
 
 @dataclass(frozen=True, eq=False)
@@ -712,7 +739,50 @@ class _ReadingCost:
     readings: Readings
     kinds: Sequence[str]
 
-    def __call__(self, sizes: Floats) -> tuple[float, Floats]:
-        grad = np.zeros(len(sizes))
-        grad[0] = self.readings.freedom - self.readings.square / sizes[0]
-        return 0.5 * self.readings.log_noise(float(np.sqrt(sizes[0]))), grad
+    def value(self, sizes: Floats) -> float:
+        """Return minus the log likelihood."""
+        return 0.5 * self.readings.log_noise(float(np.sqrt(sizes[0])))
+
+    def slopes(self, sizes: Floats) -> tuple[Floats, Floats]:
+        """Return its slope by the sizes, and the Fisher information."""
+        slope, t2 = np.zeros(len(sizes)), float(sizes[0])
+        slope[0] = (self.readings.freedom - self.readings.square / t2) / (2.0 * t2)
+        information = np.zeros((len(sizes), len(sizes)))
+        information[0, 0] = self.readings.freedom / (2.0 * t2**2)
+        return slope, information
+
+
+def _score(costs: Sequence[_Cost], begin: Floats, low: Floats, high: Floats) -> Floats:
+    """Minimise costs by logarithms of standard deviations: Fisher's scoring.
+
+    Args:
+        costs: What sizes of the components cost.
+        begin: Where to begin, (kinds,).
+        low: Lower bounds, (kinds,).
+        high: Upper bounds, (kinds,).
+    """
+
+    def value(u: Floats) -> float:
+        return sum(cost.value(np.exp(2.0 * u)) for cost in costs)
+
+    u, here = begin, value(begin)
+    for _ in range(SCORES):
+        sizes = np.exp(2.0 * u)
+        parts = [cost.slopes(sizes) for cost in costs]
+        slope = 2.0 * sizes * np.sum([p[0] for p in parts], axis=0)
+        bend = 4.0 * np.outer(sizes, sizes) * np.sum([p[1] for p in parts], axis=0)
+        free = ~((u <= low) & (slope > 0.0) | (u >= high) & (slope < 0.0))
+        step = np.zeros(len(u))
+        bend += np.eye(len(u)) * LEAST_BEND * max(float(np.trace(bend)), 1e-300)
+        step[free] = -np.linalg.solve(bend[np.ix_(free, free)], slope[free])
+        step *= min(1.0, FARTHEST / max(float(np.abs(step).max()), 1e-300))
+        for _ in range(HALVINGS):
+            there = np.clip(u + step, low, high)
+            found = value(there)
+            if found < here:
+                break
+            step = step / 2.0
+        if not found < here - ENOUGH:
+            break
+        u, here = there, found
+    return u

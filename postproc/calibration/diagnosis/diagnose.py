@@ -9,9 +9,12 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import t as student
 
 from postproc.arrays import Floats
 from postproc.calibration.diagnosis.held_out import (
+    LENGTH,
+    NoiseFloor,
     deal,
     multi_directional,
     noise_floor,
@@ -33,6 +36,7 @@ from postproc.calibration.diagnosis.result import (
     Diagnosis,
     Profile,
     ResidualPlace,
+    Verdict,
     not_excluded,
     profile,
     statistics,
@@ -46,6 +50,7 @@ from postproc.calibration.diagnosis.trace import (
 )
 from postproc.calibration.directions import mend_directions
 from postproc.calibration.measurements import Measurements
+from postproc.calibration.orientations import means
 from postproc.calibration.references import ruled_out
 from postproc.calibration.regression import Fit, fit_effects
 from postproc.calibration.report import report_directions, weighed_down
@@ -65,6 +70,8 @@ from postproc.robot.pose import MM
 # The whole search is repeated without each part of the rows; the errors on that part
 # are then errors on rows that no fit has seen and that chose nothing.
 
+CLEARLY_ABOVE = 1.2  # times the noise floor
+WORSE = 0.025  # probability of calling a model worse that is not
 PARTS = 5
 RUN = 8  # consecutive rows that are held out together
 MANY = 2000  # rows from which one part is enough
@@ -78,12 +85,27 @@ class HeldOut:
         rows: The rows, (m,).
         fitted: Rows that each of them was predicted from, typically.
         before, after: Errors that the given and the extended model leave, (m, 3) [m].
+        pose: Number of the pose of each, (m,).
     """
 
     rows: NDArray[np.int64]
     fitted: int
     before: Floats
     after: Floats
+    pose: NDArray[np.int64]
+
+    @property
+    def worse(self) -> bool:
+        """Whether the extended model leaves more, beyond what chance does."""
+        before, after = (
+            np.linalg.norm(e, axis=1)[:, None] for e in (self.before, self.after)
+        )
+        _, label = np.unique(self.pose, return_inverse=True)
+        rise = means(after - before, label.reshape(-1))[:, 0]
+        if len(rise) < 2:
+            return False
+        limit = student.isf(WORSE, len(rise) - 1) * rise.std(ddof=1) / len(rise) ** 0.5
+        return bool(rise.mean() > limit)
 
 
 def hold_out(
@@ -127,8 +149,9 @@ def hold_out(
     which = np.concatenate(rows)
     across = base.batch.states[which].across
     return HeldOut(
-        which, fitted, across(np.concatenate(before)), across(np.concatenate(after))
-    )
+        which, fitted, across(np.concatenate(before)), across(np.concatenate(after)),
+        base.pose[which],
+    )  # fmt: skip
 
 
 def _fit_of(base: Fit, rows: NDArray[np.int64]) -> Fit:
@@ -261,11 +284,12 @@ def _conclude(
     found = traced.search
     floor = noise_floor(found.fit, tracker is not None)
     batch = Batch(found.fit.batch.arm, found.fit.batch.states[held_out.rows])
+    verdict = _judge(traced, held_out, floor)
     before = multi_directional(batch, held_out.before)
     after = multi_directional(batch, held_out.after)
     why, poses = _next(traced, seed)
     return Diagnosis(
-        verdict=traced.verdict,
+        verdict=verdict,
         noise_floor_mm=floor.size / MM,
         noise_floor_source=floor.source,
         n_fit=held_out.fitted,
@@ -283,7 +307,34 @@ def _conclude(
         not_excluded=not_excluded(found.fit.batch),
         fixed_points=() if survey.motion is None else survey.motion.tell(),
         set_anew=SetAnew.of(found.fit),
+        explained=_explained(held_out, floor) if traced.findings else None,
     )
+
+
+def _judge(traced: Investigation, held_out: HeldOut, floor: NoiseFloor) -> Verdict:
+    """Decide on the verdict by what held-out rows are left.
+
+    Structure in what is left is "unexplained" only where what is left exceeds the noise
+    floor clearly, as far as that is known otherwise than from the same rows.
+    """
+    if held_out.worse:
+        return "rejected"
+    size = float(np.linalg.norm(held_out.after, axis=1).mean())
+    names = [a.candidate.effect for a in traced.search.additions]
+    small = floor.measured and size < CLEARLY_ABOVE * floor.size
+    if traced.verdict == "unexplained" and names and small:
+        nameless = any(e.nameless for e in names)
+        return "unexplained" if nameless else "effect"
+    return traced.verdict
+
+
+def _explained(held_out: HeldOut, floor: NoiseFloor) -> float:
+    """Return the part of the squared error above the noise floor that is explained."""
+    before, after = (
+        (e**2).sum(axis=1).mean() for e in (held_out.before, held_out.after)
+    )
+    above = float(before) - (floor.size / LENGTH) ** 2
+    return float(np.clip((before - after) / max(above, 1e-300), 0.0, 1.0))
 
 
 def _places(found: Search) -> tuple[ResidualPlace, ...]:

@@ -244,6 +244,7 @@ class NoiseFloor:
 
     size: float
     source: str
+    measured: bool = True  # by other than these rows' own fit
 
 
 def noise_floor(fit: Fit, tracker_known: bool) -> NoiseFloor:
@@ -269,7 +270,9 @@ def noise_floor(fit: Fit, tracker_known: bool) -> NoiseFloor:
         return NoiseFloor(size, "tracker and repeatability of the data sheets")
     of_stops = replace(fit.noise, pose_joint=0.0, pose=0.0)
     variance = fit.whitener.variance(of_stops).sum(axis=1).mean()
-    return NoiseFloor(LENGTH * float(np.sqrt(variance)), "estimated from the rows")
+    return NoiseFloor(
+        LENGTH * float(np.sqrt(variance)), "estimated from the rows", False
+    )
 
 
 def repeats(batch: Batch) -> list[NDArray[np.int64]]:

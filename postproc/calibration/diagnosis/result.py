@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import Any, Literal
 
@@ -23,7 +24,7 @@ from postproc.robot.pose import MM
 
 # What a diagnosis says.
 
-Verdict = Literal["effect", "noise", "unexplained"]
+Verdict = Literal["effect", "noise", "unexplained", "rejected"]
 
 
 @dataclass(frozen=True)
@@ -105,7 +106,8 @@ class Diagnosis:
     """The answer to "what is left, and why".
 
     Attributes:
-        verdict: "effect", "noise", or "unexplained": structure that no name explains.
+        verdict: "effect", "noise", "unexplained": structure that no name explains, or
+            "rejected": held-out poses are worse off with the extended model.
         noise_floor_mm: Mean length of one row's error at best.
         noise_floor_source: Where that comes from.
         n_fit: Rows that each held-out row was predicted from.
@@ -123,6 +125,8 @@ class Diagnosis:
         fixed_points: What readings of fixed points say of the tracker, in words.
         flanks: What reversals among the rows tell of the flanks of the joints.
         set_anew: Where base and tool are now, None where they are as they were.
+        explained: Part of the squared held-out error above the noise floor that the
+            additions explain; None where nothing was added.
     """
 
     verdict: Verdict
@@ -144,6 +148,38 @@ class Diagnosis:
     fixed_points: tuple[str, ...] = ()
     flanks: str = ""
     set_anew: SetAnew | None = None
+    explained: float | None = None
+
+    @property
+    def named(self) -> float | None:
+        """Part of that error whose causes have names."""
+        total = sum(f.share for f in self.findings)
+        if self.explained is None or total <= 0.0:
+            return self.explained
+        share = sum(f.share for f in self.findings if not f.nameless)
+        return self.explained * share / total
+
+    @property
+    def times_floor(self) -> float:
+        """How often the noise floor held-out rows are left."""
+        return self.after.mean_mm / max(self.noise_floor_mm, 1e-12)
+
+    def story(self) -> str:
+        """Tell in a sentence what is named, and what remains."""
+        remains = (
+            f"{self.after.mean_mm:.4f} mm remain, {self.times_floor:.1f} times the "
+            "noise floor"
+        )
+        if self.verdict == "rejected":
+            return (
+                f"held-out poses are left {self.after.mean_mm:.4f} mm with the "
+                f"extended model and {self.before.mean_mm:.4f} mm with the given one: "
+                "no model is written. The rows are too few, or those of another arm"
+            )
+        if self.named is None:
+            return f"nothing was added: {remains}"
+        causes = "; ".join(_causes(self.findings)) or "none"
+        return f"{self.named:.0%} of the error is named: {causes}; {remains}"
 
     def to_dict(self) -> dict[str, Any]:
         """Return the content of the JSON report."""
@@ -153,6 +189,9 @@ class Diagnosis:
             vap = {"before": self.vap_mm[0], "after": self.vap_mm[1]}
         return {
             "verdict": self.verdict,
+            "story": self.story(),
+            "named_share": self.named,
+            "times_noise_floor": self.times_floor,
             "noise_floor_mm": self.noise_floor_mm,
             "noise_floor_source": self.noise_floor_source,
             "n_fit": self.n_fit,
@@ -184,6 +223,20 @@ class Diagnosis:
             "flanks_at_stops": self.flanks,
             "set_anew": None if self.set_anew is None else self.set_anew.to_dict(),
         }
+
+
+def _causes(findings: Sequence[Finding]) -> list[str]:
+    """List the causes that have names, each with its joints."""
+    joints: dict[str, list[int]] = {}
+    for f in findings:
+        if not f.nameless:
+            joints.setdefault(f.effect, []).extend([f.joint] if f.joint else [])
+    out = []
+    for effect, own in joints.items():
+        places = ", ".join(map(str, sorted(set(own))))
+        of = "" if not own else f" of joint{'s' * (len(set(own)) > 1)} {places}"
+        out.append(effect + of)
+    return out
 
 
 def statistics(spread: ErrorStatistics) -> dict[str, float]:

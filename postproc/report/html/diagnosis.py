@@ -25,6 +25,7 @@ SCRIPTS = ("page.js", "figures.js")
 VERDICTS = {
     "effect": "The model lacks an effect, and it has a name.",
     "noise": "What is left is noise: nothing is missing that these rows could show.",
+    "rejected": "New poses are worse off with what was found: no model is written.",
     "unexplained": "What is left is not noise, and no effect with a name explains it.",
 }
 BANDS = 24  # of the running mean along a covariate
@@ -60,7 +61,7 @@ def diagnosis_report(diagnosis: Mapping[str, Any]) -> str:
         {"figures": figures},
         SCRIPTS,
         diagnosis=diagnosis,
-        said=VERDICTS.get(diagnosis["verdict"], ""),
+        said=diagnosis.get("story") or VERDICTS.get(diagnosis["verdict"], ""),
         effects=effects,
         names=[name_of(e) for e in effects],
         alike=[[name_of(c) for c in e.get("confusable_with", ())] for e in effects],
