@@ -40,6 +40,7 @@ from postproc.model.effects.probe import Probe
 from postproc.model.effects.tool_shift import ToolShift
 from postproc.model.model import Model
 from postproc.model.model_file import Method
+from postproc.model.noise import angle_step
 from postproc.model.registration import Registration
 from postproc.robot.arm import Arm
 from postproc.robot.cell import Cell
@@ -49,6 +50,7 @@ from postproc.robot.state import States
 Frame = Literal["base", "tracker"]
 
 SAME_POINT = 1e-4  # [m] nests that are nearer are one, or the cell has not said
+NOTABLE = 0.002  # [mm] at the tool by rounded joint angles
 TURNED = 3e-3  # [rad] that a plate may be turned by, as far as a tracker can tell
 
 
@@ -158,16 +160,17 @@ def fit_measurements(
         validated = validate_fit(task, fitted)
         fitted = validated.fit
     progress("report")
+    wide = 1.0 if validated is None else validated.widening
+    model = replace(model_of(fitted, survey, wide), registration=placed)
     told = (
         *survey.warnings,
         *moved_tools(fitted, survey),
         *drifts(fitted),
         *wrong_nests(fitted, points),
+        *_rounding(model, fitted),
         *(() if validated is None else validated.notes),
     )
     survey = replace(survey, warnings=told)
-    wide = 1.0 if validated is None else validated.widening
-    model = replace(model_of(fitted, survey, wide), registration=placed)
     widths = newer_widths((), model, cell.arm, reversals)
     model = replace(model, flank_widths=widths)
     report = report_fit(fitted, survey, model)
@@ -196,6 +199,21 @@ def moved_tools(fitted: Fit, survey: Measurements) -> tuple[str, ...]:
         *told,
         f"the rows look like several tools, the others at {far} from the first: if "
         "they are, add tool_id; if not, run postproc diagnose",
+    )
+
+
+def _rounding(model: Model, fitted: Fit) -> tuple[str, ...]:
+    """Name what rounded joint angles of the file do at the tool."""
+    batch = fitted.batch
+    variance = model.noise.rounding_variance(batch.states.q, batch.jacobian)
+    size = float(np.sqrt(variance.sum(axis=1).mean())) / MM
+    if size < NOTABLE:
+        return ()
+    step = float(np.rad2deg(angle_step(batch.states.q)))
+    return (
+        f"the joint angles of the file are rounded to {step:.3g} deg: that is "
+        f"{size:.3f} mm at the tool (rms), which no effect can take out of these rows. "
+        "Write more decimals, or give the survey program (--program)",
     )
 
 
