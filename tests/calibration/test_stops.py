@@ -1,0 +1,109 @@
+"""Readings of one stop become one row."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from postproc.calibration.fit import fit_measurements
+from postproc.calibration.measurements import Measurements
+from postproc.calibration.stops import pool_readings, stops_of
+from postproc.robot.cell import load_cell
+from tests.calibration.simulator import PLATE, random_arm, random_states, survey_of
+
+CELL = load_cell("programs/cell.toml")
+
+
+def repeated(poses: int, repeats: int, seed: int = 0, shift: float = 0.0) -> tuple:  # type: ignore[type-arg]
+    """Read every pose some times while the arm stands, each stop off by a shift."""
+    rng = np.random.default_rng(seed)
+    arm, states = random_arm(rng), random_states(poses, rng)
+    true = arm.tcp(states.q, states.direction, states.tool)
+    stop = true + shift * rng.standard_normal(true.shape)
+    rows = np.repeat(np.arange(poses), repeats)
+    read = stop[rows] + 1e-5 * rng.standard_normal((len(rows), 3))
+    some = states[rows].with_(order=np.arange(len(rows), dtype=float))
+    return arm, survey_of(some, read)
+
+
+def test_readings_are_averaged_and_their_scatter_is_kept() -> None:
+    _, survey = repeated(8, 3)
+    found = pool_readings(survey)
+    assert len(found) == 8 and (found.states.readings == 3.0).all()
+    by_stop = survey.position.reshape(8, 3, 3)
+    np.testing.assert_allclose(found.position, by_stop.mean(axis=1))
+    square = ((by_stop - by_stop.mean(axis=1, keepdims=True)) ** 2).sum(axis=(1, 2))
+    np.testing.assert_allclose(found.states.scatter, square)
+    assert "24 readings at 8 stops" in found.warnings[-1]
+
+
+def test_single_readings_stay_as_they_are() -> None:
+    _, survey = repeated(8, 1)
+    assert pool_readings(survey) is survey
+
+
+def test_nests_of_a_stop_share_its_order() -> None:
+    states = random_states(4, np.random.default_rng(1))
+    rows = np.repeat(np.arange(4), 6)
+    nest = np.tile([0, 0, 1, 1, 2, 2], 4)
+    states = states[rows].with_(
+        tool=PLATE[nest], tool_id=nest, order=np.arange(24, dtype=float)
+    )
+    found = pool_readings(survey_of(states, np.zeros((24, 3)) + 1.0))
+    assert len(found) == 12
+    assert found.states.order.tolist() == np.repeat([0.0, 6, 12, 18], 3).tolist()
+    assert found.states.tool_id.tolist() == [0, 1, 2] * 4
+
+
+def test_a_pose_that_is_visited_again_is_another_stop() -> None:
+    states = random_states(3, np.random.default_rng(2))
+    there = states[np.array([0, 1, 0, 0, 2])]
+    assert stops_of(there).tolist() == [0, 1, 2, 2, 3]
+    other = there.with_(direction=there.direction * np.array([1, 1, 1, -1, 1])[:, None])
+    assert stops_of(other).tolist() == [0, 1, 2, 3, 4]
+
+
+def test_a_clock_tells_whether_the_arm_can_have_left() -> None:
+    states = random_states(3, np.random.default_rng(3))[np.array([0, 0, 1, 1, 2])]
+    at_once = states.with_(time=np.array([0.0, 1, 11, 12, 22]))
+    assert stops_of(at_once).tolist() == [0, 0, 1, 1, 2]
+    away = states.with_(time=np.array([0.0, 60, 70, 71, 81]))
+    assert stops_of(away).tolist() == [0, 1, 2, 2, 3]
+
+
+def test_a_visit_column_decides() -> None:
+    states = random_states(2, np.random.default_rng(4))[np.array([0, 0, 0, 1])]
+    assert stops_of(states, np.array([1, 2, 1, 2])).tolist() == [0, 1, 0, 2]
+
+
+def test_a_reading_that_disagrees_with_its_stop_is_listed() -> None:
+    _, survey = repeated(20, 4)
+    position = np.array(survey.position)
+    position[41] += [0.0, 3e-4, 0.0]
+    found = pool_readings(replace(survey, position=position))
+    assert [d.id for d in found.dropped] == [survey.ids[41]]
+    assert "0.295 mm from" in found.dropped[0].why and found.states.readings[10] == 3.0
+
+
+def test_repeated_readings_are_worth_no_more_than_their_mean() -> None:
+    """A stop that scatters by 0.08 mm is no surer for being read five times."""
+    arm, survey = repeated(60, 5, seed=7, shift=8e-5)
+    effects = ("geometry", "backlash")
+
+    def left(rows: Measurements) -> tuple[float, float]:
+        found = fit_measurements(rows, CELL, effects=effects, validate=False)
+        states = random_states(200, np.random.default_rng(9))
+        off = arm.tcp(states.q, states.direction, states.tool)
+        nominal = CELL.arm.tcp(states.q, states.tool)
+        predicted = found.model.predict(CELL.arm, states)
+        error = np.linalg.norm(predicted.error - (off - nominal), axis=1)
+        return float(error.mean()), float(predicted.std_model.mean())
+
+    once = replace(
+        survey[np.arange(0, 300, 5)],
+        position=survey.position.reshape(60, 5, 3).mean(axis=1),
+    )
+    (many, stated), (mean, alone) = left(survey), left(once)
+    assert many < 1.1 * mean
+    assert stated > 0.8 * alone
