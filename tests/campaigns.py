@@ -28,6 +28,7 @@ from tests.calibration.simulator import (
     random_arm,
     survey_of,
 )
+from tests.reference import generalised_least_squares as gls
 
 CHECKED = 400  # poses that no fit has seen
 MOST_ROWS = 1800
@@ -119,6 +120,27 @@ def measure(arm: Simulated, habit: Habit, rng: np.random.Generator) -> Measureme
     return survey_of(states, np.array(position))
 
 
+def best_possible(
+    arm: Simulated,
+    habit: Habit,
+    survey: Measurements,
+    checked: tuple[States, np.ndarray],
+) -> float:
+    """Return what generalised least squares with all that is true leaves [mm]."""
+    n = len(survey)
+    stop = np.arange(n) // (habit.repeats * habit.nests)
+    step = np.deg2rad(10.0**-habit.decimals)
+    scatter = gls.Scatter(
+        habit.joint, habit.shift, habit.tracker, float(step / np.sqrt(12.0))
+    )
+    p = gls.solve(arm.arm, survey.states, survey.position, stop, scatter)
+    states, true = checked
+    at = states.q, states.direction, states.tool
+    nominal = gls.place(arm.arm, *at, np.zeros(len(p)))
+    off = gls.place(arm.arm, *at, p) - nominal - true
+    return 1e3 * float(np.linalg.norm(off, axis=1).mean())
+
+
 def unseen(arm: Simulated, rng: np.random.Generator) -> tuple[States, np.ndarray]:
     """Draw poses that no fit has seen, with the true error of the arm, (n, 3) [m]."""
     q = rng.uniform(LOW, HIGH, (CHECKED, 6))
@@ -187,7 +209,7 @@ def main() -> None:
     parser.add_argument("--poses", type=int, nargs=2, default=(20, 300))
     asked = parser.parse_args()
     cell = load_cell("programs/cell.toml")
-    ratios, shares = [], []
+    ratios, shares, to_best = [], [], []
     for seed in range(asked.first, asked.first + asked.count):
         rng = np.random.default_rng([20261126, seed])
         arm, habit = random_arm(rng), draw_habit(rng, *asked.poses)
@@ -204,17 +226,22 @@ def main() -> None:
             print(what, full if isinstance(full, str) else plain, flush=True)
             continue
         ratios.append(full.mean / plain.mean)
+        best = best_possible(arm, habit, survey, checked)
+        to_best.append(full.mean / best)
         shares.append(full.covered)
         print(
             f"{what}: {full.mean:.4f} (max {full.worst:.3f}) plain {plain.mean:.4f} "
-            f"ratio {ratios[-1]:.2f} covered {full.covered:.3f} "
+            f"ratio {ratios[-1]:.2f} best {best:.4f} ({to_best[-1]:.2f}) "
+            f"covered {full.covered:.3f} "
             f"({plain.covered:.3f}) stated {full.stated:.4f} {full.seconds:.1f} s "
             f"{' '.join(full.names)}",
             flush=True,
         )
     print(
         f"ratio to geometry,backlash: mean {np.mean(ratios):.3f}, "
-        f"max {np.max(ratios):.3f}; coverage {np.mean(shares):.3f}"
+        f"max {np.max(ratios):.3f}; to the best possible: median "
+        f"{np.median(to_best):.2f}, 90 % {np.quantile(to_best, 0.9):.2f}, max "
+        f"{np.max(to_best):.2f}; coverage {np.mean(shares):.3f}"
     )
 
 
