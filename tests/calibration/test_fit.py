@@ -133,7 +133,8 @@ def test_fit_prints_what_an_engineer_reads(tmp_path: Path) -> None:
     )  # fmt: skip
     assert found.exit_code == 0, found.stderr
     lines = found.stdout.splitlines()
-    assert lines[0].split() == ["found", "joint", "rms", "mm", "max", "mm", "evidence",
+    assert lines[0].startswith("expected on new poses 0.0")
+    assert lines[1].split() == ["found", "joint", "rms", "mm", "max", "mm", "evidence",
                                 "nats"]  # fmt: skip
     rows = [line.split() for line in lines if re.match(r"(geometry|backlash) ", line)]
     sizes = [float(row[-3]) for row in rows]
@@ -153,7 +154,8 @@ def test_all_of_a_fit_is_told_where_it_is_asked_for(tmp_path: Path) -> None:
     )  # fmt: skip
     assert found.exit_code == 0, found.stderr
     lines = found.stdout.splitlines()
-    assert lines[0].split() == ["parameter", "value", "std", "error", "unit", "share",
+    assert lines[0].startswith("expected on new poses 0.0")
+    assert lines[1].split() == ["parameter", "value", "std", "error", "unit", "share",
                                 "seen"]  # fmt: skip
     row = next(line.split() for line in lines if line.startswith("geometry.a2 "))
     assert row[3] == "mm" and row[4].endswith("%") and 0 < float(row[2]) < 0.02
