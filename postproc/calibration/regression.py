@@ -351,8 +351,10 @@ def _products(
     at_once = max(1, ROWS_AT_ONCE // m)
     for first in range(0, count, at_once):
         some = rows[first : first + at_once]
-        X = design[some.reshape(-1)].dense().reshape(len(some), 3 * m, -1)
-        out[first : first + at_once] += (X @ covariance) @ np.swapaxes(X, 1, 2)
+        X = design[some.reshape(-1)].dense().reshape(-1, len(covariance))
+        shape = len(some), 3 * m, -1
+        spread = (X @ covariance).reshape(shape), X.reshape(shape)
+        out[first : first + at_once] += spread[0] @ spread[1].swapaxes(1, 2)
     return out
 
 
