@@ -35,7 +35,7 @@ LIVELY = 0.3  # with this share of the largest
 UNSEEN = 1.0  # [m] as good as not measured
 SMALLEST, LARGEST = 1e-7, 1e-2  # [m] bounds of all standard deviations at the TCP
 SAME_POSE = 1e-5  # [rad] joint angles that are one pose
-NO_POSE = 0.02  # share of the variance below which poses scatter no more than stops
+NO_POSE = 0.05  # share of the variance below which poses scatter no more than stops
 KINDS = ("tracker", "joint", "stop", "pose_joint", "pose")
 
 
