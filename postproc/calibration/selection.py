@@ -26,7 +26,7 @@ from postproc.model.effects.effect import Effect
 from postproc.model.effects.probe_turn import ProbeTurn
 from postproc.model.effects.tool_shift import ToolShift
 from postproc.model.kinematics import Batch
-from postproc.model.model import COMPENSATED, READING, WORST_STD, Model
+from postproc.model.model import COMPENSATED, READING, WORST_STD, Model, weight_of
 from postproc.model.ranges import Ranges
 from postproc.robot.arm import Arm
 from postproc.robot.pose import MM
@@ -390,4 +390,5 @@ def model_of(fitted: Fit, survey: Measurements) -> Model:
         rows=int(used.sum()),
         data_sha256=survey.sha256,
         statistics=statistics,
+        weight=weight_of(arm),
     )

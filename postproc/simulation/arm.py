@@ -10,6 +10,7 @@ import numpy as np
 
 from postproc.arrays import Floats
 from postproc.simulation.kinematics import (
+    GRAVITY,
     Chain,
     LinkMasses,
     small_motion,
@@ -69,11 +70,19 @@ def draw_as_built(
     return AsBuilt(chain, base, mount if tool else 0 * mount)
 
 
-def draw_body(rng: np.random.Generator, chain: Chain) -> LinkMasses:
-    """Draw the weights of one arm: 10 % and 20 mm off the estimates."""
+def draw_body(
+    rng: np.random.Generator, chain: Chain, gravity: Floats = GRAVITY
+) -> LinkMasses:
+    """Draw the weights of one arm: 10 % and 20 mm off the estimates.
+
+    Args:
+        rng: Random numbers of the weights alone.
+        chain: The arm of the drawing.
+        gravity: Acceleration of gravity in the arm base, (3,) [m/s^2].
+    """
     mass = chain.mass * rng.uniform(0.9, 1.1, 6)
     centre = chain.centre + rng.uniform(-0.02, 0.02, (6, 3))
-    return LinkMasses(chain, mass, centre)
+    return LinkMasses(chain, mass, centre, gravity)
 
 
 def _off(

@@ -147,7 +147,7 @@ def payload(draw: Draw) -> Law:
 
     def shape(arrivals: VirtualArrivals) -> Floats:
         torque = payload_torque(
-            draw.body.chain, arrivals.q, arrivals.payload, arrivals.payload_com
+            draw.body, arrivals.q, arrivals.payload, arrivals.payload_com
         )
         return on_joint(joint, torque[:, joint - 1] / KILO)
 
