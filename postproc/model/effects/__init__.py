@@ -22,6 +22,7 @@ PLACES = {
     "backlash": "backlash.Backlash",
     "backlash_profile": "backlash_profile.BacklashProfile",
     "compliance": "compliance.Compliance",
+    "bending": "bending.Bending",
     "payload": "payload.Payload",
     "counterbalance": "counterbalance.Counterbalance",
     "base_tilt": "base_tilt.BaseTilt",

@@ -91,6 +91,17 @@ class Effect(ABC):
         """Make the effect with the settings that fit an arm and a survey."""
         return cls()
 
+    def pieces(self) -> tuple[Self, ...]:
+        """Return what is weighed by itself of it: the effect at each of its joints."""
+        return (self,)
+
+    def least_evidence(self) -> float:
+        """Return the evidence beyond that of others that it must be worth [nats].
+
+        What few arms have, and what many columns tell, is a false name sooner.
+        """
+        return 0.0
+
     @classmethod
     def may_show(cls, states: States) -> bool:
         """Tell whether a survey can show it: what drives it varies enough."""
