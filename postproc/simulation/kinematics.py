@@ -92,9 +92,24 @@ class Chain:
             np.matmul(out[:, i], links[:, i], out=out[:, i + 1])
         return out
 
-    def flange(self, q: Floats) -> Floats:
-        """Return the flange poses (n, 4, 4) in the arm base [m]."""
-        return np.asarray(self.frames(q)[:, 6])
+    def flange(self, q: Floats, leans: Floats | None = None) -> Floats:
+        """Return the flange poses (n, 4, 4) in the arm base [m].
+
+        Args:
+            q: Controller joint angles, (n, 6) [rad].
+            leans: By what the arm is bent before every joint turns, about x and y of
+                the frame there, (n, 6, 2) [rad].
+        """
+        if leans is None:
+            return np.asarray(self.frames(q)[:, 6])
+        links = self.links(np.asarray(q, dtype=float))
+        about = np.concatenate([leans, np.zeros_like(leans[..., :1])], axis=2)
+        bent = exponential(about)
+        placed = np.broadcast_to(np.eye(4), (len(links), 4, 4)).copy()
+        for i in range(6):
+            placed[:, :3, :3] = placed[:, :3, :3] @ bent[:, i]
+            placed = placed @ links[:, i]
+        return placed
 
     def bent(self, growth: Floats) -> Chain:
         """Return a chain whose lengths grew by the relative amounts (n, 6)."""
@@ -418,6 +433,32 @@ def foundation_moment(body: LinkMasses, q: Floats, mass: Floats, com: Floats) ->
         total += np.cross(centre, body.mass[i] * body.gravity)
     held = frames[:, 6] @ np.append(com, np.ones((len(q), 1)), axis=1)[..., None]
     return np.asarray(total + np.cross(held[:, :3, 0], mass[:, None] * body.gravity))
+
+
+def bending_moment(body: LinkMasses, q: Floats, mass: Floats, com: Floats) -> Floats:
+    """Return the moment of all weight behind every joint, across its axis.
+
+    Args:
+        body: As in `link_torque`.
+        q: Controller joint angles, (n, 6) [rad].
+        mass: As in `payload_torque`.
+        com: Likewise.
+
+    Returns:
+        (n, 6, 2) [N m], about x and y of the frame before each joint.
+    """
+    frames = body.chain.frames(q)
+    held = frames[:, 6, :3, 3] + np.einsum("nab,nb->na", frames[:, 6, :3, :3], com)
+    out = np.empty((len(q), 6, 2))
+    for j in range(6):
+        at, axes = frames[:, j, :3, 3], frames[:, j, :3, :2]
+        total = np.cross(held - at, mass[:, None] * body.gravity)
+        for i in range(j, 6):
+            link = frames[:, i + 1]
+            centre = link[:, :3, :3] @ body.centre[i] + link[:, :3, 3]
+            total += np.cross(centre - at, body.mass[i] * body.gravity)
+        out[:, j] = np.einsum("nca,nc->na", axes, total)
+    return out
 
 
 def _moments(body: LinkMasses, frames: Floats, centre: Floats, mass: Floats) -> Floats:

@@ -31,10 +31,10 @@ PAYLOADS = np.array([0.0, 40.0, 120.0])  # [kg]
 BASE = ("geometry", "tool", "backlash")
 
 NAMED = (
-    "compliance", "payload", "counterbalance", "transmission", "transmission_free",
-    "scale", "coupling", "load_backlash", "gravity_side", "thermal", "warmup", "windup",
-    "lag", "base_shift", "tool_shift", "tracker_drift", "worn_spot", "joint_step",
-    "base_tilt", "elastic_flank", "azimuth", "refraction",
+    "compliance", "bending", "payload", "counterbalance", "transmission",
+    "transmission_free", "scale", "coupling", "load_backlash", "gravity_side",
+    "thermal", "warmup", "windup", "lag", "base_shift", "tool_shift", "tracker_drift",
+    "worn_spot", "joint_step", "base_tilt", "elastic_flank", "azimuth", "refraction",
 )  # fmt: skip
 NAMELESS = ("joint_product", "hysteresis")
 READINGS = ("tracker_drift", "azimuth", "refraction")  # nothing moves, it only seems to
