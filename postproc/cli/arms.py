@@ -70,6 +70,7 @@ def from_urdf(
     """Write the arm file of a URDF: six axes with a spherical wrist."""
     from postproc.robot.ortho_parallel import arm_text
     from postproc.robot.urdf import read_chain
+    from postproc.robot.urdf_links import placeholder
 
     with explained(urdf):
         check_places([as_path(output)], [urdf])
@@ -78,6 +79,8 @@ def from_urdf(
         write_text(output, text)
         for rounded in chain.rounded:
             say(f"{urdf}: {rounded}")
+        if (problem := placeholder(chain.weights)) is not None:
+            say(f"{urdf}: {problem}. [links] is not written")
         if output != "-":
             say(f"written {output}")
 

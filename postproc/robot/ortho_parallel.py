@@ -10,10 +10,11 @@ import numpy as np
 
 from postproc.arrays import Floats
 from postproc.exceptions import ArmError
-from postproc.robot.arm import build_arm
+from postproc.robot.arm import Arm, build_arm
 from postproc.robot.arm_file import ArmFile, parse_toml
 from postproc.robot.pose import MM
 from postproc.robot.urdf import MOVING, UrdfChain, turned
+from postproc.robot.urdf_links import links_text
 
 # What the chain is: lengths and zeros of an ortho-parallel basis with a wrist.
 #
@@ -218,8 +219,7 @@ def arm_text(chain: UrdfChain, repeatability_mm: float, name: str | None = None)
         ArmError: The chain is no arm that an arm file can say.
     """
     text = _written(chain, shape_of(chain), repeatability_mm, name or chain.name)
-    _verify(chain, text)
-    return text
+    return text + links_text(chain.weights, _verify(chain, text))
 
 
 TEMPLATE = """\
@@ -244,7 +244,7 @@ lower_deg = {lower}
 upper_deg = {upper}
 velocity_deg_s = {velocity}
 # Accelerations and jerks are guesses, full speed in 0.4 s, full acceleration in 0.1 s.
-# Masses, gear ratios and coupled gears are not taken over.
+# A URDF states no gear ratios and no coupled gears.
 guessed = ["acceleration", "jerk"]
 acceleration_deg_s2 = {acceleration}
 jerk_deg_s3 = {jerk}
@@ -333,8 +333,8 @@ def _list(values: Floats) -> str:
     return f"[{', '.join(map(_number, values))}]"
 
 
-def _verify(chain: UrdfChain, text: str) -> None:
-    """Refuse a text that does not say what the URDF says.
+def _verify(chain: UrdfChain, text: str) -> Arm:
+    """Check that a text places the flange where the URDF does, and return its arm.
 
     Raises:
         ArmError: It places the flange elsewhere.
@@ -348,3 +348,4 @@ def _verify(chain: UrdfChain, text: str) -> None:
     if not gap < 1e-9:
         problem = f"cannot be said as an arm file: flanges differ by {gap:.3g}"
         raise ArmError(chain.path, problem, "Write the arm file by hand")
+    return arm

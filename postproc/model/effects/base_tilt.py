@@ -22,7 +22,6 @@ from postproc.robot.arm import GRAVITY, Arm
 from postproc.robot.state import States
 
 SCALE = 1e-8  # [rad/(N m)] softness of a usual foundation
-UNSURE = 0.1  # share of the arm's mass that sits elsewhere than its file says
 LEAST = 1.0  # [kg] of an arm whose links are not known
 DEEP = 0.5  # [m] below the base's origin that a table may turn about
 PLACES = ("", "_elbow", "_wrist")  # of the moment, and of what is unsure of it
@@ -106,7 +105,8 @@ class BaseTilt(Effect):
 
 def unsure_mass(arm: Arm) -> float:
     """Say how much of an arm's mass may hang elsewhere than its file says [kg]."""
-    return max(UNSURE * arm.mass, LEAST)
+    links = arm.file.links
+    return LEAST if links is None else max(links.spread * arm.mass, LEAST)
 
 
 def _moments(batch: Batch) -> Floats:

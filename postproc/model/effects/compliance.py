@@ -24,7 +24,6 @@ SCALE = 1e-7  # [rad/(N m)] softness of the gears of a large arm
 YIELDS = 2e-4  # [rad] by which a joint may be expected to yield to its largest torque
 LOADED = 1e-3  # of the torque that varies most: less is no load of a joint
 RARE = 3.0  # nats that a joint must be worth besides which few arms let yield
-UNSURE = 0.1  # share of the nominal moments by which real links differ
 UNSURE_PAYLOAD = 0.1  # [m] how well a payload's centre of mass is known
 MASS_UNKNOWN = 10.0  # [kg] at a link's end, of an arm whose links are not known
 YIELDING = (2, 3, 5)  # joints that carry most of the weight on most arms
@@ -49,7 +48,9 @@ def moments(arm: Arm, joint: int) -> tuple[tuple[int, float], ...]:
             continue
         mass, com = np.array(links.mass_kg), np.array(links.com_mm) * 1e-3
         own = mass[link - 1] * np.linalg.norm(com[link - 1])
-        out.append((link, float(UNSURE * (own + mass[link:].sum() * length) + 0.1)))
+        out.append(
+            (link, float(links.spread * (own + mass[link:].sum() * length) + 0.1))
+        )
     return tuple(out)
 
 
