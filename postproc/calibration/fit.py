@@ -32,6 +32,7 @@ from postproc.calibration.reversals import (
 from postproc.calibration.selection import Progress, fit_survey, model_of, silent
 from postproc.calibration.tables import DETECT, TableFormat
 from postproc.calibration.tool_groups import find_groups, find_wrong_nest
+from postproc.calibration.weight_direction import direction_warning
 from postproc.model.combination import Combination
 from postproc.model.effects.placement import Placement
 from postproc.model.effects.probe import Probe
@@ -136,6 +137,7 @@ def fit_measurements(
         *moved_tools(fitted, survey),
         *drifts(fitted),
         *wrong_nests(fitted, points),
+        *direction_warning(fitted),
     )
     survey = replace(survey, warnings=told)
     model = replace(model_of(fitted, survey), registration=placed)

@@ -23,7 +23,7 @@ from postproc.robot.state import States
 SCALE = 1e-7  # [rad/(N m)] softness of the gears of a large arm
 YIELDS = 2e-4  # [rad] by which a joint may be expected to yield to its largest torque
 LOADED = 1e-3  # of the torque that varies most: less is no load of a joint
-RARE = 3.0  # nats that a joint must be worth besides which few arms let yield
+USUAL, RARE = 1.0, 3.0  # nats that one of `YIELDING`, or another, must be worth besides
 UNSURE_PAYLOAD = 0.1  # [m] how well a payload's centre of mass is known
 MASS_UNKNOWN = 10.0  # [kg] at a link's end, of an arm whose links are not known
 YIELDING = (2, 3, 5)  # joints that carry most of the weight on most arms
@@ -146,7 +146,7 @@ class Compliance(JointEffect):
 
     def least_evidence(self) -> float:
         """Ask more of joints that carry little weight on most arms."""
-        return 0.0 if set(self.joints) <= set(YIELDING) else RARE
+        return USUAL if set(self.joints) <= set(YIELDING) else RARE
 
     def parameters(self) -> tuple[Parameter, ...]:
         """Name softness, and moments over stiffness, joint by joint."""
