@@ -206,8 +206,11 @@ class Model:
         """
         effects, values, _ = self.compensable()
         pairs = zip(effects.effects, effects.slices, strict=True)
-        theta = np.sum([e.zero_errors(values[part]) for e, part in pairs], axis=0)
-        return np.asarray(np.linalg.solve(arm.dh.mix, arm.dh.sense * theta))
+        theta, q = np.zeros(6), np.zeros(6)
+        for effect, part in pairs:
+            theta += effect.zero_errors(values[part])
+            q += effect.joint_zeros(values[part])
+        return np.asarray(np.linalg.solve(arm.dh.mix, arm.dh.sense * theta) + q)
 
     def error(self, arm: Arm, states: States) -> Floats:
         """Predict the error without its uncertainty, (n, 3) [m]."""

@@ -491,6 +491,16 @@ def joint_step(draw: Draw) -> Law:
     return Law("joint_step", Where.JOINTS, (joint,), 0, {"row": float(row)}, shape)
 
 
+def joint_offset(draw: Draw) -> Law:
+    """A joint was mastered again before the campaign: its zero is another."""
+    joint, sign = draw.pick(range(1, 7)), draw.sign()
+
+    def shape(arrivals: VirtualArrivals) -> Floats:
+        return on_joint(joint, np.full(len(arrivals), sign))
+
+    return Law("joint_offset", Where.JOINTS, (joint,), 0, {}, shape)
+
+
 def base_tilt(draw: Draw) -> Law:
     """A table or foundation leans under the weight that hangs over it.
 
@@ -603,6 +613,7 @@ KINDS = {
     "tool_shift": LawKind(tool_shift, 0.05, 0.5),
     "tracker_drift": LawKind(tracker_drift, 0.03, 0.1),
     "joint_step": LawKind(joint_step, 0.05, 0.5),
+    "joint_offset": LawKind(joint_offset, 0.1, 1.0),
     "base_tilt": LawKind(base_tilt, 0.1, 1.0),
     "elastic_flank": LawKind(elastic_flank, 0.03, 0.15),
     "azimuth": LawKind(azimuth, 0.03, 0.1),

@@ -60,7 +60,7 @@ COVARIATES = {
     "thermal": {"temperature"}, "warmup": {"time"}, "base_shift": {"order"},
     "tool_shift": {"order"}, "tracker_drift": {"time"}, "joint_step": {"order"},
     "base_tilt": {"payload"}, "elastic_flank": {"flank", "travel", "loop"},
-    "azimuth": set(), "refraction": set(),
+    "azimuth": set(), "refraction": set(), "joint_offset": set(),
 }  # fmt: skip
 OTHER = {
     "flank": -REFERENCE.flank,

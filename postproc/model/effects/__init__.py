@@ -39,6 +39,7 @@ PLACES = {
     "base_shift": "base_shift.BaseShift",
     "tool_shift": "tool_shift.ToolShift",
     "joint_step": "joint_step.JointStep",
+    "joint_offset": "joint_offset.JointOffset",
     "tracker_drift": "tracker_drift.TrackerDrift",
     "azimuth": "azimuth.Azimuth",
     "refraction": "refraction.Refraction",

@@ -72,6 +72,7 @@ class Effect(ABC):
         variation_of: Name of the plainer effect that a search takes first.
         nameless: True where finding it says no more than that something is there.
         free: True for a function that may have any shape: what no law predicts.
+        everywhere: True for what is the same at all poses, unseen ones too.
         published: True for what a method of the literature trains: no fit of effects
             knows it.
     """
@@ -84,6 +85,7 @@ class Effect(ABC):
     variation_of: ClassVar[str | None] = None
     nameless: ClassVar[bool] = False
     free: ClassVar[bool] = False
+    everywhere: ClassVar[bool] = False
     published: ClassVar[bool] = False
 
     @classmethod
@@ -270,6 +272,22 @@ class Effect(ABC):
             p: Its parameters.
         """
         return np.zeros(6)
+
+    def joint_zeros(self, p: Floats) -> Floats:
+        """Return by what it turns every controller angle at all poses, (6,) [rad].
+
+        Args:
+            p: Its parameters.
+        """
+        return np.zeros(6)
+
+    def tied(self, batch: Batch) -> tuple[str, ...]:
+        """Name effects that explain the same at any poses: one is never named alone.
+
+        Args:
+            batch: The states.
+        """
+        return ()
 
     def settings(self) -> dict[str, Any]:
         """Return the settings as plain data, for a model file."""
