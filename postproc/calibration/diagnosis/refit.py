@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
@@ -15,7 +16,8 @@ from postproc.calibration.weighing import ENOUGH
 from postproc.exceptions import PostprocError
 from postproc.model.combination import Combination
 from postproc.model.effects import propose
-from postproc.model.effects.effect import Effect, Parameter
+from postproc.model.effects.effect import Effect, JointEffect, Parameter
+from postproc.model.effects.joint_offset import MASTERED
 from postproc.model.kinematics import Batch
 from postproc.model.model import Model
 from postproc.robot.arm import Arm
@@ -34,6 +36,7 @@ UNSEEN = 1e-7  # [m rms] a direction that moves the rows by less is not revised
 GIVEN = "model"  # group of the given model's own uncertainty
 TRACKER = "tracker"  # group of a set-up's parameters that place the base
 CLEARLY = 3.0  # standard errors
+ZERO = "zero"  # groups of zeros of joints that are open again
 SET_ANEW = ("base shift", "base turn", "tool")  # groups of what may be others since
 
 
@@ -86,6 +89,30 @@ class Revision(Effect):
             aside @ aside.T,
         )
 
+    def beside(self, others: Sequence[Effect]) -> Revision:
+        """Return the revision as it is fitted beside laws that the model lacks.
+
+        The model's zero of a joint holds the mean of what the model lacks there: a law
+        that is added has that mean too, and the zero is open again. It stays known
+        beside a `joint_offset`, which is the change of the zero itself.
+        """
+        names, groups = self.model.effects.names, self.groups
+        offsets = {j for e in others if e.everywhere for j in joints_of(e)}
+        opened = {
+            j for e in others
+            if isinstance(e, JointEffect) and not e.direct for j in joints_of(e)
+        }  # fmt: skip
+        zeros = [f"geometry.theta{j}" for j in sorted(opened - offsets)]
+        known = [k for k, g in enumerate(groups) if not g.startswith(ZERO)]
+        places = [names.index(name) for name in zeros if name in names]
+        more = np.zeros((len(names), len(places)))
+        more[places, range(len(places))] = MASTERED
+        return replace(
+            self,
+            factor=np.concatenate([self.factor[:, known], more], axis=1),
+            groups=(*(groups[k] for k in known), *(f"{ZERO} {k}" for k in places)),
+        )
+
     def parameters(self) -> tuple[Parameter, ...]:
         """Number the directions of the uncertainty."""
         return tuple(
@@ -106,6 +133,11 @@ class Revision(Effect):
     def settings(self) -> dict[str, Any]:
         """Refuse: it is folded back into the model before anything is written."""
         raise TypeError("a revision is no part of a model file")
+
+
+def joints_of(effect: Effect) -> set[int]:
+    """Return the joints that the parameters of an effect act on."""
+    return {p.joint for p in effect.parameters() if p.joint is not None}
 
 
 def only_arm(model: Model) -> Model:

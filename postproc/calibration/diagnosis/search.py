@@ -149,9 +149,15 @@ def without(fit: Fit, place: int) -> Fit:
 
 
 def with_effects(fit: Fit, effects: Sequence[Effect]) -> Fit:
-    """Fit other effects to the rows of a fit, beginning where it ended."""
-    origin = fit.noise.origin
-    return fit_effects(fit.batch, fit.position, tuple(effects), origin, fit)
+    """Fit other effects to the rows of a fit, beginning where it ended.
+
+    The first of them is the given model where one is revised: it counts as known beside
+    the others.
+    """
+    origin, effects = fit.noise.origin, tuple(effects)
+    if effects:
+        effects = (effects[0].beside(effects[1:]), *effects[1:])
+    return fit_effects(fit.batch, fit.position, effects, origin, fit)
 
 
 # A free form must not stand for causes that have names.
