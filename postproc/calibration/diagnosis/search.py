@@ -107,11 +107,32 @@ def ranking(projection: Projection, library: Library) -> list[Score]:
 
 
 def choose(scores: list[Score]) -> Score:
-    """Take the best name, unless a free form is clearly ahead of it."""
-    name = next(s for s in scores if s.family.tier == NAMED)
+    """Take the best name, unless a free form is clearly ahead of it.
+
+    A free form of the torque never comes before the law of the same torque, which is
+    what a joint that yields does: the law stays, and the free form gets what it leaves.
+    """
+    names = [s for s in scores if s.family.tier == NAMED]
+    name = max(names, key=lambda s: s.evidence - s.best.effect.least_evidence())
     free = next((s for s in scores if s.family.tier == FREE), name)
-    lead = free.evidence - name.evidence
-    return _forerunner(free if lead > ahead(name.evidence) else name, scores)
+    if free.evidence - name.evidence > ahead(name.evidence):
+        return _law(free, names) or free
+    return _forerunner(name, scores)
+
+
+def _law(free: Score, names: list[Score]) -> Score | None:
+    """Find the law that the torque drives as it does a free form, if rows speak for it.
+
+    Args:
+        free: The free form.
+        names: Scores of names, best first.
+    """
+    source = free.best.source
+    for s in names if source.startswith("torque") else ():
+        same = s.family.joint == free.family.joint and s.best.source == source
+        if same and s.evidence > CLEARLY[0]:
+            return s
+    return None
 
 
 def ahead(evidence: float) -> float:
