@@ -14,7 +14,8 @@ from postproc.model.effects.compliance import Compliance
 from postproc.model.effects.effect import Effect
 from postproc.model.kinematics import Batch
 
-CLEARLY = 10.0  # nats by which another direction must be better
+CLEARLY = 10.0  # nats by which another direction must be better, and than none
+REVERSED = 10.0  # nats besides for the opposite one, of which signs alone speak
 LEAST_ROWS = 60  # fewer tell directions apart by chance
 DIRECTIONS = {
     "a floor": (0, 0, -1), "a ceiling": (0, 0, 1), "a wall": (1, 0, 0),
@@ -31,7 +32,9 @@ def direction_warning(fitted: Fit) -> tuple[str, ...]:
 
     The joints yield to the weight in either: columns of `compliance` under the stated
     direction are exchanged for those under each of `DIRECTIONS`. Effects of other
-    causes stay, but for free forms, which would stand in for any direction.
+    causes stay. Another direction must be better beside the free forms of the fit,
+    which could stand in for any direction, and without them, as what has no name may
+    look like any direction.
 
     Args:
         fitted: A fit under the stated direction, with compliance kept or without.
@@ -39,19 +42,15 @@ def direction_warning(fitted: Fit) -> tuple[str, ...]:
     if len(fitted.batch) < LEAST_ROWS:
         return ()
     arm = fitted.batch.arm
-    others = tuple(e for e in fitted.combination.effects if _stays(e))
-    stated = Compliance.on(fitted.batch)
-    base = fit_effects(
-        fitted.batch, fitted.position, (*others, stated), fitted.noise.origin, fitted,
-        until=NEARLY,
-    )  # fmt: skip
-    here = direction_evidence(base, others, arm.weight)
-    found = [
-        (direction_evidence(base, others, along) - here, name, along)
-        for name, along in _unit_directions()
-        if _degrees(along, arm.weight) > SAME
-    ]
-    gain, name, along = max(found, key=lambda each: each[0])
+    effects = tuple(e for e in fitted.combination.effects if _stays(e))
+    laws = tuple(e for e in effects if not e.free)
+    gains = np.array(_gains(fitted, laws))
+    if gains.max() < CLEARLY:
+        return ()
+    if laws != effects:
+        gains = np.minimum(gains, _gains(fitted, effects))
+    best = int(np.argmax(gains))
+    gain, (name, along) = float(gains[best]), _unit_directions()[best]
     if gain < CLEARLY:
         return ()
     x, y, z = (round(float(v), 2) + 0.0 for v in along)
@@ -64,24 +63,63 @@ def direction_warning(fitted: Fit) -> tuple[str, ...]:
     )
 
 
-def direction_evidence(base: Fit, others: tuple[Effect, ...], along: Floats) -> float:
+def _gains(fitted: Fit, others: tuple[Effect, ...]) -> list[float]:
+    """Compute by how much every direction is better than the stated one [nats].
+
+    Args:
+        fitted: A fit under the stated direction.
+        others: The effects beside `compliance`.
+
+    Returns:
+        For each, less than that where it is hardly better than no weight at all.
+    """
+    stated = fitted.batch.arm.weight
+    origin, effects = fitted.noise.origin, (*others, Compliance.on(fitted.batch))
+    base = fit_effects(
+        fitted.batch, fitted.position, effects, origin, fitted, until=NEARLY
+    )
+    here = direction_evidence(base, others, stated)
+    none = direction_evidence(base, others, None)
+    gains = []
+    for _, along in _unit_directions():
+        apart = _degrees(along, stated)
+        if apart < SAME:
+            gains.append(-np.inf)
+            continue
+        there = direction_evidence(base, others, along)
+        less = REVERSED if apart > 180.0 - SAME else 0.0
+        gains.append(min(there - here - less, there - none))
+    return gains
+
+
+def direction_evidence(
+    base: Fit, others: tuple[Effect, ...], along: Floats | None
+) -> float:
     """Compute the log evidence of joints that yield to weight in a direction.
 
     Args:
         base: A fit whose noise and rows count.
         others: Effects beside `compliance`, of that fit.
-        along: The direction, (3,), base frame.
+        along: The direction, (3,), base frame; None: no joint yields.
 
     Returns:
         Log evidence [nats] with all softnesses above 0, up to a constant.
     """
-    batch = Batch(base.batch.arm.mounted(along), base.batch.states)
-    yields = Compliance.on(batch)
-    laid = beside(replace(base, batch=batch), (*others, yields))
-    found = maximise(laid.normal(), laid.group, laid.log_scale)
+    if along is None:
+        laid = beside(base, others)
+    else:
+        batch = Batch(base.batch.arm.mounted(along), base.batch.states)
+        laid = beside(replace(base, batch=batch), (*others, Compliance.on(batch)))
+    known = np.array([e.free for e in laid.combination.effects
+                      for _ in e.parameters()], dtype=bool)  # fmt: skip
+    scales = np.exp(laid.log_scale)[laid.group[known]]
+    normal = laid.normal().left_to_prior(known, scales)
+    used, group = np.unique(laid.group[~known], return_inverse=True)
+    found = maximise(normal, group, laid.log_scale[used])
     value = found.log_evidence
     value -= 0.5 * float((found.log_scale**2).sum()) / LOG_SPREAD**2
-    soft = [k for k, p in enumerate(laid.combination.parameters) if p.positive]
+    parameters = np.array(laid.combination.parameters, dtype=object)[~known]
+    soft = [k for k, p in enumerate(parameters) if p.positive]
     std = np.sqrt(np.diag(found.covariance)[soft])
     above = found.mean[soft] / np.maximum(std, 1e-300)
     return value + float((log_ndtr(above) + np.log(2.0)).sum())
@@ -89,7 +127,7 @@ def direction_evidence(base: Fit, others: tuple[Effect, ...], along: Floats) -> 
 
 def _stays(effect: Effect) -> bool:
     """Return True if an effect has nothing to do with the direction of weight."""
-    return not effect.free and effect.driven_by not in ("torque", "payload")
+    return effect.driven_by not in ("torque", "payload")
 
 
 def _unit_directions() -> list[tuple[str, Floats]]:
