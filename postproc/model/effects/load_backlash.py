@@ -24,7 +24,8 @@ from postproc.robot.state import States
 SCALE = 1e-4  # [rad] at the threshold torque
 UNSURE = 0.2  # of the power of the load, and of torque against t0
 FLANKS = (0.1, 0.3, 0.8)  # of the usual torque: t0 that are tried
-BOTH_WAYS = 0.05  # of the rows that weight must push each way beyond the bend
+SHOWN = 0.05  # of the rows that must be on either side of the bend
+BELOW, BEYOND = 0.5, 1.5  # of t0: clearly on one side of the bend
 STRAIGHT = 3.0  # of it: the law is nearly proportional
 
 
@@ -72,18 +73,20 @@ class LoadBacklash(JointEffect):
     def passes_bend(self, batch: Batch) -> bool:
         """Return True if the rows can tell its law from laws of other causes.
 
-        A flank that weight chooses shows where weight pushes both ways by more than
-        the bend of tanh. Below the bend the law is that of `compliance`; where weight
-        pushes one way alone it is a constant.
+        A flank that weight chooses shows where weight pushes both ways beyond the bend
+        of tanh, or is now clearly below the bend and now beyond. Below the bend the law
+        is that of `compliance`, beyond it on one side a constant.
         """
         if self.form != "gravity_side":
             return True
-        torque = batch.loads.total[:, np.array(self.joints) - 1]
-        ahead, behind = (
-            (torque > self.t0).mean(axis=0),
-            (torque < -self.t0).mean(axis=0),
-        )
-        return bool((np.minimum(ahead, behind) > BOTH_WAYS).all())
+        torque = batch.loads.total[:, np.array(self.joints) - 1] / self.t0
+        sides = torque > 1.0, torque < -1.0
+        sizes = np.abs(torque) < BELOW, np.abs(torque) > BEYOND
+        shown = [
+            np.minimum(a.mean(axis=0), b.mean(axis=0)) > SHOWN
+            for a, b in (sides, sizes)
+        ]
+        return bool(np.logical_or(*shown).all())
 
     def refined(self, offsets: Floats, batch: Batch) -> list[Effect]:
         """Change the torque at which the flank changes."""
