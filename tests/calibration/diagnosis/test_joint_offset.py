@@ -12,8 +12,15 @@ from postproc.model.kinematics import Batch
 from postproc.model.model import Model
 from postproc.robot.pose import lengths
 from postproc.simulation import Planted, VirtualArm, sample_survey, stream, virtual_arm
-from tests.calibration.diagnosis.test_diagnose import base_model, measurements
-from tests.calibration.planted import ARM, BASE, TRACKER, states_of, survey
+from tests.calibration.planted import (
+    ARM,
+    BASE,
+    TRACKER,
+    base_model,
+    measurements,
+    states_of,
+    survey,
+)
 
 SEED, ROWS = 61, 60
 NESTS = np.array([[0.1, 0.0, 0.2], [-0.08, 0.06, 0.2]])  # [m]
@@ -64,3 +71,22 @@ def test_two_nests_tell_joint_6_from_a_tool() -> None:
     six = JointOffset((6,))
     assert six.tied(Batch(ARM, states)) == ("tool_shift",)
     assert six.tied(Batch(ARM, two)) == ()
+
+
+def test_joints_that_always_yielded_are_no_offsets() -> None:
+    """The zeros of a model without compliance hold its mean: fresh rows know both."""
+    yields = (Planted("compliance", j, mm) for j, mm in ((2, 0.5), (3, 0.3), (5, 0.15)))
+    arm = virtual_arm(SEED, (*map(Planted, BASE), *yields), tracker=TRACKER)
+    first, second = (
+        measurements(
+            states_of(rows), arm.measure(rows, TRACKER, stream(SEED, name)), name
+        )
+        for name, rows in (("old", survey(arm, 5, 300)), ("new", survey(arm, 6, 300)))
+    )
+    found = diagnose(second, ARM, base_model(first), tracker=TRACKER)
+    named = {(f.effect, f.joint) for f in found.diagnosis.findings}
+    assert named == {("compliance", 2), ("compliance", 3), ("compliance", 5)}
+    assert found.diagnosis.verdict == "effect"
+    there = sample_survey(arm, 200, seed=SEED + 2)
+    off = lengths(arm.error(there) - found.model.error(ARM, states_of(there)))
+    assert off.mean() < 0.02e-3

@@ -30,8 +30,15 @@ from postproc.simulation import (
     virtual_arm,
 )
 from postproc.simulation.reference import WORKING_RANGE
-from tests.calibration.diagnosis.test_diagnose import base_model, measurements
-from tests.calibration.planted import ARM, BASE, TRACKER, states_of, survey
+from tests.calibration.planted import (
+    ARM,
+    BASE,
+    TRACKER,
+    base_model,
+    measurements,
+    states_of,
+    survey,
+)
 
 SEED = 29
 
