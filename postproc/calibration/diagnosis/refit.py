@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
@@ -16,7 +16,7 @@ from postproc.calibration.weighing import ENOUGH
 from postproc.exceptions import PostprocError
 from postproc.model.combination import Combination
 from postproc.model.effects import propose
-from postproc.model.effects.effect import Effect, JointEffect, Parameter
+from postproc.model.effects.effect import Effect, Parameter
 from postproc.model.effects.joint_offset import MASTERED
 from postproc.model.kinematics import Batch
 from postproc.model.model import Model
@@ -96,27 +96,39 @@ class Revision(Effect):
         that is added has that mean too, and the zero is open again. It stays known
         beside a `joint_offset`, which is the change of the zero itself.
         """
-        names, groups = self.model.effects.names, self.groups
         offsets = {j for e in others if e.everywhere for j in joints_of(e)}
-        opened = {
-            j for e in others
-            if isinstance(e, JointEffect) and not e.direct for j in joints_of(e)
+        lacking = {j for e in others if e.has_mean() for j in joints_of(e)}
+        known = [k for k, g in enumerate(self.groups) if not g.startswith(ZERO)]
+        closed = replace(
+            self,
+            factor=self.factor[:, known],
+            groups=tuple(self.groups[k] for k in known),
+        )
+        return closed.opened(lacking - offsets)
+
+    def opened(self, joints: Collection[int]) -> Revision:
+        """Return the revision with the zeros of joints to be fitted again."""
+        names = self.model.effects.names
+        zeros = {f"{ZERO}{j}": f"geometry.theta{j}" for j in sorted(joints)}
+        added = {
+            group: names.index(name) for group, name in zeros.items()
+            if name in names and group not in self.groups
         }  # fmt: skip
-        zeros = [f"geometry.theta{j}" for j in sorted(opened - offsets)]
-        known = [k for k, g in enumerate(groups) if not g.startswith(ZERO)]
-        places = [names.index(name) for name in zeros if name in names]
-        more = np.zeros((len(names), len(places)))
-        more[places, range(len(places))] = MASTERED
+        if not added:
+            return self
+        more = np.zeros((len(names), len(added)))
+        more[list(added.values()), range(len(added))] = MASTERED
         return replace(
             self,
-            factor=np.concatenate([self.factor[:, known], more], axis=1),
-            groups=(*(groups[k] for k in known), *(f"{ZERO} {k}" for k in places)),
+            factor=np.concatenate([self.factor, more], axis=1),
+            groups=(*self.groups, *added),
         )
 
     def parameters(self) -> tuple[Parameter, ...]:
-        """Number the directions of the uncertainty."""
+        """Number the directions of the uncertainty, and name open zeros."""
         return tuple(
-            Parameter(f"eta{k}", "1", 1.0, group) for k, group in enumerate(self.groups)
+            Parameter(g if g.startswith(ZERO) else f"eta{k}", "1", 1.0, g)
+            for k, g in enumerate(self.groups)
         )
 
     def columns(self, batch: Batch) -> Floats:

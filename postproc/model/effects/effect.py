@@ -188,6 +188,14 @@ class Effect(ABC):
         """
         return self
 
+    def has_mean(self) -> bool:
+        """Return True if the zero of its joint, fitted without it, holds its mean."""
+        return False
+
+    def opened(self, joints: Collection[int]) -> Effect:
+        """Return it with the zeros of joints, from 1, to be fitted again."""
+        return self
+
     def told_apart(self, told: bool, batch: Batch) -> Effect:
         """Return it as it counts by what is known of the tracker's own drift.
 
@@ -331,6 +339,10 @@ class JointEffect(Effect):
     def _acts_on(self) -> NDArray[np.int64]:
         """Find them once: a program asks some hundred times."""
         return np.array([(p.joint or 1) - 1 for p in self.parameters()], dtype=int)
+
+    def has_mean(self) -> bool:
+        """Return True but for constants, and for what the direction changes."""
+        return not self.direct and not self.everywhere
 
     def only_joint(self) -> int | None:
         """Tell from the parameters."""

@@ -70,6 +70,10 @@ class LoadBacklash(JointEffect):
             out += alternatives([(law, f"torque {j}") for law in tried], j)
         return out
 
+    def has_mean(self) -> bool:
+        """Return True: weight mostly chooses one flank of a joint."""
+        return True
+
     def passes_bend(self, batch: Batch) -> bool:
         """Return True if the rows can tell its law from laws of other causes.
 
