@@ -7,7 +7,7 @@ import pinocchio as pin
 import pytest
 
 from postproc.exceptions import ArmError
-from postproc.robot.arm import GRAVITY, load_arm
+from postproc.robot.arm import GRAVITY, build_arm, load_arm
 from postproc.robot.pose import record_from_pose
 
 TOOL = np.array([0.08, -0.04, 0.15])
@@ -137,6 +137,15 @@ def test_gravity_basis_spans_the_torque(arm, q, weight):
     ]
     torque = arm.gravity_basis(q[:50]) @ lumped
     np.testing.assert_allclose(torque, arm.gravity_torque(q[:50]), atol=1e-9)
+
+
+@WEIGHTS
+def test_a_parallelogram_takes_part_of_the_torque(arm, q, weight):
+    """Axis 3 follows axis 2: the controller's joint 2 turns both."""
+    dh = arm.file.dh.model_copy(update={"axis3_adds_axis2": True})
+    rod = build_arm(arm.file.model_copy(update={"dh": dh, "opw": None}))
+    test_gravity_basis_spans_the_torque(rod, q, weight)
+    test_gravity_torque_is_the_energy_gradient(rod, q, weight)
 
 
 @WEIGHTS
